@@ -1,0 +1,41 @@
+"""The errors that users meet. Each message names the key, the value and what is allowed."""
+
+import difflib
+
+
+class InputError(ValueError):
+    """A description, option or argument that cannot be used; raised before anything runs."""
+
+
+class SimulationStopped(RuntimeError):
+    """A run that cannot go on (capsize, non-finite state).
+
+    Attributes: reason (str), time (s), frame (the rows up to the stop, or None).
+    """
+
+    def __init__(self, message, reason, time, frame=None):
+        super().__init__(message)
+        self.reason = reason
+        self.time = time
+        self.frame = frame
+
+
+def unknown(kind, name, known):
+    """InputError for a name that is not known, with the nearest known one as a suggestion."""
+    known = sorted(str(k) for k in known)
+    close = difflib.get_close_matches(str(name), known, n=1)
+    hint = f" Did you mean {close[0]!r}?" if close else ""
+    return InputError(f"unknown {kind} {name!r}.{hint} Known: {', '.join(known)}")
+
+
+class ControllerError(RuntimeError):
+    """A controller that did not return two finite numbers.
+
+    Attributes: controller (its name), time (s), returned (what it gave back).
+    """
+
+    def __init__(self, message, controller, time, returned):
+        super().__init__(message)
+        self.controller = controller
+        self.time = time
+        self.returned = returned

@@ -1,0 +1,274 @@
+"""Base of all descriptions: strict frozen records, handy units in files, and errors that help.
+
+A problem is one line of text: key, value and allowed range. Keys are dotted paths as they stand in the file.
+"""
+
+import difflib
+import math
+import types
+import typing
+from typing import Annotated
+
+import numpy as np
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic_core import PydanticCustomError
+
+RPM = 2.0 * math.pi / 60.0
+DEGREE = math.pi / 180.0
+
+# Keys that may be given in handy units: key in the file -> (field, factor to SI).
+HANDY_UNITS = {
+    "rated_rotor_speed_rpm": ("rated_rotor_speed", RPM),
+    "overspeed_rpm": ("overspeed", RPM),
+    "rate_limit_deg_per_s": ("rate_limit", DEGREE),
+    "minimum_deg": ("minimum", DEGREE),
+    "maximum_deg": ("maximum", DEGREE),
+    "azimuth_deg": ("azimuth", DEGREE),
+    "region3_min_pitch_deg": ("region3_min_pitch", DEGREE),
+    "gain_schedule_pitch_deg": ("gain_schedule_pitch", DEGREE),
+}
+
+# Tables that files may give instead of a field: key in the file -> field.
+OTHER_FORMS = {"mooring": "lines"}
+
+
+def plain_number(value):
+    """A numpy scalar as a Python number, which the strict float type takes (and no string or bool)."""
+    return value.item() if isinstance(value, (np.floating, np.integer)) else value
+
+
+def is_number(value):
+    """Whether a value is a finite number that fits a float, and neither bool nor text."""
+    value = plain_number(value)
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= 1e300
+
+
+def bounded(**limits):
+    return Annotated[float, BeforeValidator(plain_number), Field(strict=True, allow_inf_nan=False, **limits)]
+
+
+def _float_array(value):
+    """A (n,) float64 copy of a list or array of finite numbers."""
+    try:
+        array = np.array(value)
+    except (ValueError, TypeError):  # a ragged list, or no list at all
+        array = np.array(None)
+    if array.dtype.kind not in "iuf" or array.ndim != 1 or not np.isfinite(array).all():
+        raise PydanticCustomError("no_array", "must be a list of finite numbers")
+    return array.astype(np.float64)
+
+
+def _number_or_array(value):
+    """A float, or a (n,) float64 copy of a list or array of finite numbers."""
+    if is_number(value):
+        return float(value)
+    return _float_array(value)
+
+
+Positive = bounded(gt=0)
+NonNegative = bounded(ge=0)
+Finite = bounded()
+Fraction = bounded(gt=0, le=1)
+FloatArray = Annotated[np.ndarray, BeforeValidator(_float_array)]
+NumberOrArray = Annotated[typing.Any, BeforeValidator(_number_or_array)]
+
+
+class Record(BaseModel):
+    """Base of all descriptions: frozen, no unknown keys, no silent type changes."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
+
+
+# --------------------------------------------------------------------------- units
+
+
+def to_si(data, problems, path=()):
+    """(data in SI units, {path in SI names: (path in the file, value in the file)}) of nested TOML data.
+
+    Only the keys of HANDY_UNITS are converted; what is no number is left for the validation to reject.
+    """
+    converted, origin = {}, {}
+    for key, value in data.items():
+        field, factor = HANDY_UNITS.get(key, (key, None))
+        here = (*path, field)
+        if factor is not None and field in data:
+            problems.append(f"{dotted((*path, key))}: given twice, also as {field!r}; allowed: one of them")
+            continue
+        if factor is not None:
+            origin[here] = ((*path, key), value)
+            value = _scaled(value, factor)
+        elif isinstance(value, dict):
+            value, below = to_si(value, problems, here)
+            origin.update(below)
+        converted[field] = value
+    return converted, origin
+
+
+def _scaled(value, factor):
+    if isinstance(value, list):
+        return [_scaled(item, factor) for item in value]
+    if is_number(value):
+        return value * factor
+    return value
+
+
+# --------------------------------------------------------------------------- validation
+
+
+def validate(model, data, origin=None):
+    """(record, []) of a pydantic model, or (None, problems) with one line per wrong value."""
+    try:
+        return model.model_validate(data), []
+    except ValidationError as error:
+        problems = []
+        for item in error.errors(include_url=False):
+            problems.extend(_problem(model, item, origin or {}))
+        return None, problems
+
+
+def _problem(model, item, origin):
+    """Lines of text for one entry of pydantic's ValidationError.errors()."""
+    loc = tuple(part for part in item["loc"] if part != "[key]")
+    shown, value = loc, item["input"]
+    for length in range(len(loc), 0, -1):
+        if loc[:length] in origin:
+            shown, whole = origin[loc[:length]]
+            shown = (*shown, *loc[length:])
+            value = _element(whole, loc[length:], value)
+            break
+    key = dotted(shown)
+    kind = item["type"]
+    if kind == "missing":
+        handy = [name for name, (field, _) in HANDY_UNITS.items() if field == loc[-1]]
+        alias = f" (or {handy[0]})" if handy else ""
+        return [f"{key}{alias} is missing: must be {allowed(model, loc)}"]
+    if kind == "extra_forbidden":
+        return [unknown_key(key, shown[-1], _fields_at(model, loc[:-1]))]
+    if kind == "value_error":
+        prefix = f"{key}: " if key else ""
+        return [prefix + line for line in str(item["ctx"]["error"]).splitlines()]
+    close = ""
+    if isinstance(value, str) and kind == "literal_error":
+        options = [option.strip("'") for option in allowed(model, loc).removeprefix("one of ").split(", ")]
+        nearest = difflib.get_close_matches(value, options, n=1)
+        close = f" Did you mean {nearest[0]!r}?" if nearest else ""
+    return [f"{key} = {short(value)}: must be {allowed(model, loc)}.{close}".rstrip(".")]
+
+
+def unknown_key(key, name, known):
+    """Problem line for a key that is not known, with the nearest known one."""
+    lowered = {option.lower(): option for option in known}
+    nearest = difflib.get_close_matches(str(name).lower(), lowered, n=1)
+    hint = f" Did you mean {lowered[nearest[0]]!r}?" if nearest else ""
+    return f"{key}: unknown key.{hint} Allowed: {', '.join(known)}"
+
+
+def _fields_at(model, loc):
+    """Names of the keys allowed in the table at loc, handy-unit names included."""
+    here, _ = _type_at(model, loc)
+    if not (isinstance(here, type) and issubclass(here, BaseModel)):
+        return []
+    fields = list(here.model_fields)
+    handy = [name for name, (field, _) in HANDY_UNITS.items() if field in fields]
+    return sorted(fields + handy + [key for key, field in OTHER_FORMS.items() if field in fields])
+
+
+def _unwrapped(kind, metadata):
+    """(type, constraints) without Annotated and Optional."""
+    while True:
+        origin = typing.get_origin(kind)
+        if origin is typing.Annotated:
+            kind, *more = typing.get_args(kind)
+            for entry in more:
+                metadata = [*metadata, *getattr(entry, "metadata", [entry])]
+        elif origin in (typing.Union, types.UnionType):
+            kind = next(arg for arg in typing.get_args(kind) if arg is not type(None))
+        else:
+            return kind, metadata
+
+
+def _type_at(model, loc):
+    """(type, constraints) of the field at loc; (None, []) where the model has no such field."""
+    kind, metadata = model, []
+    for part in loc:
+        if isinstance(kind, type) and issubclass(kind, BaseModel):
+            field = kind.model_fields.get(part)
+            if field is None:
+                return None, []
+            kind, metadata = _unwrapped(field.annotation, list(field.metadata))
+            continue
+        arguments = typing.get_args(kind)
+        if typing.get_origin(kind) is dict:
+            keys = typing.get_args(arguments[0])  # of a Literal; empty for str
+            if keys and part not in keys:
+                return arguments[0], []
+            kind, metadata = _unwrapped(arguments[1], [])
+        elif typing.get_origin(kind) is tuple:
+            index = 0 if arguments[-1] is Ellipsis else min(part, len(arguments) - 1)
+            kind, metadata = _unwrapped(arguments[index], [])
+        else:
+            return None, []
+    return kind, metadata
+
+
+def allowed(model, loc):
+    """What the field at loc of a pydantic model may be, in words: "a number > 0", "a table" ..."""
+    kind, metadata = _type_at(model, loc)
+    if kind in (float, int):
+        low, high, low_open, high_open = -math.inf, math.inf, True, True
+        for entry in metadata:
+            if (limit := getattr(entry, "ge", None)) is not None:
+                low, low_open = limit, False
+            if (limit := getattr(entry, "gt", None)) is not None:
+                low, low_open = limit, True
+            if (limit := getattr(entry, "le", None)) is not None:
+                high, high_open = limit, False
+            if (limit := getattr(entry, "lt", None)) is not None:
+                high, high_open = limit, True
+        return interval(low, high, low_open, high_open, "a number" if kind is float else "a whole number")
+    if typing.get_origin(kind) is typing.Literal:
+        return "one of " + ", ".join(repr(option) for option in typing.get_args(kind))
+    if typing.get_origin(kind) is tuple:
+        arguments = typing.get_args(kind)
+        count = "" if arguments[-1] is Ellipsis else f"{len(arguments)} "
+        inner, _ = _unwrapped(arguments[0], [])
+        return f"a list of {count}{'numbers' if inner is float else 'entries'}"
+    if kind is str:
+        return "text"
+    if kind is np.ndarray:
+        return "a list of finite numbers"
+    if kind is typing.Any:
+        return "a finite number or, for components, a list of finite numbers"
+    return "a table"
+
+
+def interval(low, high, low_open, high_open, noun="a number"):
+    """A range in words, such as "a number > 0" or "a finite number"."""
+    above = f"{'>' if low_open else '>='} {low:g}" if low > -math.inf else ""
+    below = f"{'<' if high_open else '<='} {high:g}" if high < math.inf else ""
+    if not (above or below):
+        return noun.replace("a ", "a finite ", 1)
+    return f"{noun} {' and '.join(part for part in (above, below) if part)}"
+
+
+def dotted(path):
+    """A key as it would be written in the file; positions in lists count from 1."""
+    return ".".join(str(part + 1) if isinstance(part, int) else str(part) for part in path)
+
+
+def short(value):
+    """repr of a value, shortened for messages."""
+    try:
+        text = repr(value)
+    except ValueError:  # an integer of more digits than Python prints
+        text = "a very large whole number"
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _element(whole, path, default):
+    for part in path:
+        try:
+            whole = whole[part]
+        except (KeyError, IndexError, TypeError):
+            return default
+    return whole

@@ -1,0 +1,253 @@
+"""Sea states: waves of one kind, by name, from a mapping or a file, and tables of them against wind speed."""
+
+import functools
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from pydantic import model_validator
+
+from fowt_env.errors import InputError
+from fowt_env.records import (
+    FloatArray,
+    NonNegative,
+    NumberOrArray,
+    Positive,
+    Record,
+    bounded,
+    is_number,
+    short,
+    unknown_key,
+    validate,
+)
+from fowt_env.textfiles import DATA, locate, raise_problems, read_toml
+
+STANDARD_GRAVITY = 9.80665  # m/s2
+
+SEA_KEYS = {  # kind -> (required keys, optional keys); the common keys may be given with every kind
+    "still": ((), ()),
+    "regular": (("H", "T"), ("phase",)),
+    "jonswap": (("Hs", "Tp"), ("gamma",)),
+    "pierson_moskowitz": (("Hs",), ("Tp",)),
+    "components": (("omega", "amplitude"), ("phase",)),
+}
+COMMON_SEA_KEYS = ("name", "kind", "heading", "ramp", "wind", "source", "confidence")
+
+
+class SeaState(Record):
+    """Waves of one kind; the fields of other kinds are None.
+
+    still: none. regular: H (m, crest to trough), T (s), phase (rad, 0).
+    jonswap: Hs (m), Tp (s), gamma (1 to 10; the IEC rule of iec_gamma if omitted).
+    pierson_moskowitz: Hs, Tp (fully developed sea of that Hs if omitted).
+    components: omega (rad/s), amplitude (m), phase (rad, 0 if omitted), equally long; given as one number,
+    phase is filled up to an array. heading may be one number or an array.
+    """
+
+    kind: Literal["still", "regular", "jonswap", "pierson_moskowitz", "components"]
+    name: str = ""
+    heading: NumberOrArray = 0.0  # degrees, as users write it: direction of travel from +x towards +y
+    ramp: NonNegative = 0.0  # s: waves grow from nothing over this time
+    wind: NonNegative | None = None  # m/s at hub height that belongs to this sea state
+    H: NonNegative | None = None
+    T: Positive | None = None
+    phase: NumberOrArray | None = None
+    Hs: NonNegative | None = None
+    Tp: Positive | None = None
+    gamma: bounded(ge=1, le=10) | None = None
+    omega: FloatArray | None = None
+    amplitude: FloatArray | None = None
+    source: str = ""
+    confidence: str = ""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _kind_keys(cls, data):
+        """Checks the keys against the kind and fills what the kind defines by rule."""
+        if not isinstance(data, dict) or str(data.get("kind")) not in SEA_KEYS:
+            return data
+        kind = data["kind"]
+        required, optional = SEA_KEYS[kind]
+        given = {key: value for key, value in data.items() if value is not None}
+        known = (*required, *optional, *COMMON_SEA_KEYS)
+        needs = f"kind {kind!r} needs {', '.join(required)}"
+        problems = [unknown_key(key, key, known) + f" (kind {kind!r})" for key in given if key not in known]
+        problems += [f"{key} is missing: {needs}" for key in required if key not in given]
+        if problems:
+            raise ValueError("\n".join(problems))
+        if "phase" in optional:
+            given.setdefault("phase", 0.0)
+        if kind == "components" and is_number(given["phase"]):
+            given["phase"] = np.full(np.size(given["omega"]), float(given["phase"]))
+        if kind == "jonswap" and "gamma" not in given and _usable(given["Hs"], given["Tp"]):
+            given["gamma"] = iec_gamma(float(given["Hs"]), float(given["Tp"]))
+        if kind == "pierson_moskowitz" and "Tp" not in given and _usable(given["Hs"]):
+            given["Tp"] = fully_developed_period(float(given["Hs"]))
+        return given
+
+    @model_validator(mode="after")
+    def _shapes(self):
+        if self.kind != "components":
+            problems = [
+                f"{name} = {short(value.tolist())}: must be one number for kind {self.kind!r}"
+                for name, value in (("heading", self.heading), ("phase", self.phase))
+                if isinstance(value, np.ndarray)
+            ]
+        else:
+            problems = self._component_problems()
+        if problems:
+            raise ValueError("\n".join(problems))
+        return self
+
+    def _component_problems(self):
+        sizes = {"omega": len(self.omega), "amplitude": len(self.amplitude)}
+        sizes |= {key: len(getattr(self, key)) for key in ("phase", "heading") if np.ndim(getattr(self, key))}
+        if len(set(sizes.values())) != 1:
+            return [f"{', '.join(sizes)}: need the same length; got {', '.join(map(str, sizes.values()))}"]
+        problems = []
+        for name, bad, rule in (
+            ("omega", self.omega <= 0.0, "a number > 0"),
+            ("amplitude", self.amplitude < 0.0, "a number >= 0"),
+        ):
+            if bad.any():
+                first = int(np.argmax(bad))
+                problems.append(f"{name}.{first + 1} = {getattr(self, name)[first]}: must be {rule}")
+        return problems
+
+
+class JointTable(Record):
+    """Sea states of a site against wind speed at hub height."""
+
+    name: str = ""
+    wind: tuple[NonNegative, ...]  # m/s, increasing
+    Hs: tuple[NonNegative, ...]
+    Tp: tuple[Positive, ...]
+    source: str = ""
+    confidence: str = ""
+
+    @model_validator(mode="after")
+    def _columns(self):
+        sizes = [len(self.wind), len(self.Hs), len(self.Tp)]
+        if len(set(sizes)) != 1 or sizes[0] < 2:
+            raise ValueError(f"wind, Hs, Tp need the same length, at least 2; got {sizes}")
+        if any(b <= a for a, b in zip(self.wind[:-1], self.wind[1:], strict=True)):
+            raise ValueError(f"wind = {list(self.wind)}: must increase")
+        return self
+
+
+def _usable(*values):
+    """Whether all values are numbers >= 0, so that a rule can be applied before they are validated."""
+    return all(is_number(value) and value >= 0 for value in values)
+
+
+def iec_gamma(Hs, Tp):
+    """JONSWAP peak enhancement gamma (-) of a sea state (Hs m, Tp s) by the rule of IEC 61400-3.
+
+    With r = Tp/sqrt(Hs): 5 up to r = 3.6, exp(5.75 - 1.15 r) to r = 5, 1 above; 1 for Hs = 0.
+    """
+    if Hs <= 0.0:
+        return 1.0
+    ratio = Tp / math.sqrt(Hs)
+    if ratio <= 3.6:
+        return 5.0
+    return max(1.0, math.exp(5.75 - 1.15 * ratio))
+
+
+def fully_developed_period(Hs):
+    """Peak period (s) of the one-parameter Pierson-Moskowitz sea with this Hs (m); 1 s without waves.
+
+    S = alpha g^2 omega^-5 exp(-1.25 (omega_p/omega)^4), alpha = 0.0081: Hs = 4 sqrt(alpha/5) g/omega_p^2.
+    """
+    if Hs <= 0.0:
+        return 1.0
+    return 2.0 * math.pi * math.sqrt(Hs / (4.0 * math.sqrt(0.0081 / 5.0) * STANDARD_GRAVITY))
+
+
+@functools.cache
+def _sea_data():
+    """({name: SeaState}, {name: JointTable}) of the built-in file; every table row is a named state too."""
+    path = DATA / "sea_states.toml"
+    data = read_toml(path, "sea state")
+    states, tables, problems = {}, {}, []
+    for name, entry in data["table"].items():
+        table, found = validate(JointTable, {"name": name, **entry})
+        problems += [f"table.{name}: {problem}" for problem in found]
+        if table is not None:
+            tables[name] = table
+            states.update({state.name: state for state in _rows(table)})
+    for name, entry in data["state"].items():
+        state, found = validate(SeaState, {"name": name, **entry})
+        problems += [f"state.{name}: {problem}" for problem in found]
+        states[name] = state
+    raise_problems(f"sea state file {str(path)!r}", problems)
+    return states, tables
+
+
+def _rows(table):
+    for wind, Hs, Tp in zip(table.wind, table.Hs, table.Tp, strict=True):
+        label = f"{wind:g}".replace(".", "_")
+        yield _joint_state(table, wind, Hs, Tp, f"{table.name}_{label}")
+
+
+def _joint_state(table, wind, Hs, Tp, name):
+    origin = {"source": table.source, "confidence": table.confidence}
+    return SeaState(kind="jonswap", name=name, wind=wind, Hs=Hs, Tp=Tp, **origin)
+
+
+def sea_states():
+    """{name: SeaState} of all built-in sea states, rows of the joint tables included."""
+    return dict(_sea_data()[0])
+
+
+def joint_tables():
+    """{name: JointTable} of the built-in tables of sea state against wind speed."""
+    return dict(_sea_data()[1])
+
+
+def read_sea_state(name_or_path):
+    """SeaState from a built-in name (sea_states()) or a user's TOML file with its keys at the top level."""
+    if isinstance(name_or_path, str) and name_or_path in _sea_data()[0]:
+        return _sea_data()[0][name_or_path]
+    path = locate("sea_state", name_or_path, _sea_data()[0])
+    state, problems = validate(SeaState, read_toml(path, "sea state"))
+    raise_problems(f"sea state file {str(path)!r}", problems)
+    return state
+
+
+def sea_state_of(spec):
+    """SeaState from None (still water), a name, a path, a mapping {"kind": ..., ...} or a SeaState."""
+    if spec is None:
+        return SeaState(kind="still")
+    if isinstance(spec, SeaState):
+        return spec
+    if isinstance(spec, Mapping):
+        state, problems = validate(SeaState, dict(spec))
+        raise_problems("sea state", problems)
+        return state
+    if isinstance(spec, (str, Path)):
+        return read_sea_state(spec)
+    raise InputError(f"sea state = {short(spec)}: must be None, a name, a path, a mapping or a SeaState")
+
+
+def joint_sea_state(table, wind_speed):
+    """JONSWAP SeaState of a joint table at a wind speed (m/s at hub height), linear between its rows.
+
+    table: a built-in name (names("joint_tables")), a user's TOML file with wind, Hs, Tp, or a JointTable.
+    """
+    if isinstance(table, str) and table in _sea_data()[1]:
+        table = _sea_data()[1][table]
+    elif not isinstance(table, JointTable):
+        path = locate("joint_table", table, _sea_data()[1])
+        table, problems = validate(JointTable, read_toml(path, "joint table"))
+        raise_problems(f"joint table file {str(path)!r}", problems)
+    low, high = table.wind[0], table.wind[-1]
+    if not (is_number(wind_speed) and low <= wind_speed <= high):
+        raise InputError(
+            f"wind_speed = {short(wind_speed)}: must be >= {low:g} and <= {high:g} m/s (table {table.name!r})"
+        )
+    speed = float(wind_speed)
+    Hs = float(np.interp(speed, table.wind, table.Hs))
+    Tp = float(np.interp(speed, table.wind, table.Tp))
+    return _joint_state(table, speed, Hs, Tp, f"{table.name} at {speed:g} m/s")

@@ -1,0 +1,140 @@
+"""Checked reading of TOML and CSV files; whatever is wrong becomes an InputError that names the file."""
+
+import csv
+import difflib
+import io
+import math
+import tomllib
+from pathlib import Path
+
+import numpy as np
+
+from fowt_env.errors import InputError
+from fowt_env.records import interval, short
+
+DATA = Path(__file__).parent / "data"
+MAX_BYTES = 5_000_000  # a description is a few kB; anything far larger is a wrong file
+MAX_LISTED = 20  # problems listed in one message
+
+
+def read_text(path, kind):
+    """Text of a file of at most MAX_BYTES; kind ("platform", "blade" ...) is for the messages."""
+    try:
+        if not path.exists():
+            raise InputError(f"{kind} file {str(path)!r} does not exist")
+        if not path.is_file():
+            raise InputError(f"{kind} file {str(path)!r} is not a regular file")
+        size = path.stat().st_size
+        if size > MAX_BYTES:
+            raise InputError(f"{kind} file {str(path)!r} has {size} bytes; allowed: at most {MAX_BYTES}")
+        return path.read_bytes().decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        where = f"{error.reason} at byte {error.start}"
+        raise InputError(f"{kind} file {str(path)!r} is not UTF-8 text: {where}") from None
+    except (OSError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"{kind} file {str(path)[:200]!r} cannot be read: {error}") from None
+
+
+def read_toml(path, kind):
+    """Contents of a TOML file as nested dicts."""
+    text = read_text(path, kind)
+    try:
+        return tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{kind} file {str(path)!r} is not valid TOML: {error}") from None
+
+
+def read_table(path, kind, columns):
+    """Rows of a CSV file with exactly these columns, in any order: a list of (line number, dict of strings).
+
+    Lines starting with # and empty lines are skipped. Wrong columns, ragged or missing rows are errors.
+    """
+    lines = [
+        (number, line)
+        for number, line in enumerate(io.StringIO(read_text(path, kind), newline=None), 1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
+    where = f"{kind} file {str(path)!r}"
+    try:
+        cells = [[cell.strip() for cell in row] for row in csv.reader(line for _, line in lines)]
+    except csv.Error as error:
+        raise InputError(f"{where} is not valid CSV: {error}") from None
+    expected = ", ".join(columns)
+    if not cells:
+        raise InputError(f"{where} is empty; expected the columns {expected} and at least one row")
+    if sorted(cells[0]) != sorted(columns):
+        raise InputError(f"{where}: columns are {', '.join(cells[0])[:200]}; expected {expected}")
+    if len(cells) == 1:
+        raise InputError(f"{where} has no rows below its header; expected the columns {expected}")
+    if len(cells) != len(lines):
+        raise InputError(f"{where}: a quoted cell runs over several lines; allowed: one row per line")
+    rows = []
+    for (number, _), row in zip(lines[1:], cells[1:], strict=True):
+        if len(row) != len(columns):
+            raise InputError(f"{where}: line {number} has {len(row)} cells; expected {expected}")
+        rows.append((number, dict(zip(cells[0], row, strict=True))))
+    return rows
+
+
+def column(rows, name, problems, minimum=-math.inf, maximum=math.inf, *, open_ends=True):
+    """(n,) float64 values of one CSV column; appends one problem per value that is no number in the range.
+
+    open_ends: the limits themselves are not allowed.
+    """
+    values = np.full(len(rows), np.nan)
+    allowed = interval(minimum, maximum, open_ends, open_ends)
+    for i, (number, row) in enumerate(rows):
+        try:
+            value = float(row[name])
+        except ValueError:
+            value = math.nan
+        inside = minimum < value < maximum if open_ends else minimum <= value <= maximum
+        if not (math.isfinite(value) and inside):
+            problems.append(f"line {number}: {name} = {row[name][:40]}: must be {allowed}")
+        values[i] = value
+    return values
+
+
+def raise_problems(where, problems):
+    """Raises one InputError listing the problems found in where (a file), if there are any."""
+    if not problems:
+        return
+    shown = problems[:MAX_LISTED]
+    more = [f"... and {len(problems) - MAX_LISTED} more"] if len(problems) > MAX_LISTED else []
+    if len(problems) == 1:
+        raise InputError(f"{where}: {problems[0]}")
+    raise InputError("\n  ".join([f"{where}: {len(problems)} problems", *shown, *more]))
+
+
+def locate(kind, name_or_path, known, builtin=None, folder=Path()):
+    """File of a known built-in name (builtin(name) -> Path), or of a user's path relative to folder."""
+    if isinstance(name_or_path, str) and name_or_path in known:
+        return builtin(name_or_path)
+    if not isinstance(name_or_path, (str, Path)):
+        raise InputError(f"{kind} = {short(name_or_path)}: must be a built-in name or a path to a .toml file")
+    path = _as_path(name_or_path)
+    if path is None:
+        raise _unknown_name(kind, name_or_path, known)
+    return folder / path
+
+
+def _unknown_name(kind, name, known):
+    nearest = difflib.get_close_matches(name.lower(), known, n=3)
+    hint = f" Did you mean {' or '.join(map(repr, nearest))}?" if nearest else ""
+    listed = ", ".join(known) if len(known) <= 12 else f'the {len(known)} of names("{kind}s")'
+    label = kind.replace("_", " ")
+    return InputError(f"unknown {label} {short(name)}.{hint} Allowed: {listed}, or a path to a .toml file")
+
+
+def _as_path(name_or_path):
+    """Path of a user's file, with ~ expanded; or None if the text is a plain name and not a path."""
+    text = str(name_or_path)
+    has_separator = "/" in text or "\\" in text
+    if isinstance(name_or_path, str) and not has_separator and not text.lower().endswith(".toml"):
+        return None
+    try:
+        return Path(text).expanduser()
+    except RuntimeError:  # ~user that does not exist
+        return Path(text)
