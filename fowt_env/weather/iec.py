@@ -1,0 +1,38 @@
+"""Numbers and wind models of IEC 61400-1 (ed. 3) that the gusts and the turbulence share.
+
+The same formulas can be read in the theory page of pyIECWind, https://pyiecwind.readthedocs.io.
+"""
+
+REFERENCE_SPEED = {"I": 50.0, "II": 42.5, "III": 37.5}  # Vref, m/s, of the wind turbine classes
+TURBULENCE_INTENSITY = {"A+": 0.18, "A": 0.16, "B": 0.14, "C": 0.12}  # Iref; A+ from ed. 4
+EXTREME_SHEAR_EXPONENT = 0.11  # of the extreme wind models, 6.3.2.1
+
+
+def length_scale(height):
+    """Longitudinal turbulence scale Lambda_1 (m) at a height (m): 0.7 z, 42 m from 60 m up."""
+    return 0.7 * min(height, 60.0)
+
+
+def ntm_sigma(speed, turbulence_class):
+    """Point standard deviation sigma_1 (m/s) of the normal turbulence model (NTM), its 90 % quantile."""
+    return TURBULENCE_INTENSITY[turbulence_class] * (0.75 * speed + 5.6)
+
+
+def etm_sigma(speed, turbulence_class, turbine_class):
+    """Point standard deviation sigma_1 (m/s) of the extreme turbulence model (ETM), c = 2 m/s."""
+    c = 2.0
+    mean_of_year = 0.2 * REFERENCE_SPEED[turbine_class]
+    return (
+        c
+        * TURBULENCE_INTENSITY[turbulence_class]
+        * (0.072 * (mean_of_year / c + 3.0) * (speed / c - 4.0) + 10.0)
+    )
+
+
+def extreme_speed(turbine_class, recurrence, *, turbulent=False):
+    """Hub wind speed (m/s) of the extreme wind model (EWM) for a recurrence of 50 or 1 years.
+
+    Steady: 1.4 Vref, a 3 s gust. Turbulent: Vref, the 10 min mean about which the wind fluctuates.
+    """
+    fifty_years = REFERENCE_SPEED[turbine_class] * (1.0 if turbulent else 1.4)
+    return fifty_years if recurrence == 50 else 0.8 * fifty_years

@@ -1,0 +1,169 @@
+"""Turbulent wind of IEC 61400-1 (Kaimal spectrum, exponential coherence) as seen by a whole rotor.
+
+A hub-point series blown uniformly over the disk overstates what a rotor feels: gusts smaller than
+the rotor cancel. So each series is averaged over the disk, exactly in the second moments: the point
+spectrum times the average of the coherence over all pairs of points of the disk. The gradients of u
+over the disk (which turn the rotor plane) follow in the same way, from pairs weighted with their
+positions.
+
+Coherence depends on distance r and frequency f only through k r, with
+    k = 12 sqrt((f/V)^2 + (0.12/Lc)^2),   coherence = exp(-k r),   Lc = 8.1 Lambda_1   (Annex B)
+so the averages are functions of k R alone: one table serves every rotor, wind speed and frequency.
+
+Assumptions, stated because the standard leaves them open:
+- Area weighting, which needs no blade data. At a given rotor speed thrust and torque respond to u
+  nearly in proportion to chord x radius per radius, i.e. to the chord per area, which favours the
+  inner disk: weighted so, the wind over the NREL 5 MW in a TurbSim box (18 m/s, class B) deviates 2 to
+  3 % more than with area weights.
+- The rotor-averaged wind is the mean over azimuth and radius: the multiples of the blade-passing
+  frequency, which a blade meets by slicing through gusts, are not in it.
+- v and w get the coherence of u (the standard gives none for them), and are independent of u.
+- The amplitudes follow the spectrum exactly and only the phases are random, so that every seed has
+  the same strength. The point series has the standard deviation sigma_1 over its period.
+"""
+
+from functools import lru_cache
+
+import numpy as np
+
+from fowt_env.weather.iec import length_scale
+
+LENGTH_RATIO = np.array([8.1, 2.7, 0.66])  # L_u, L_v, L_w over Lambda_1 (IEC Annex B)
+SIGMA_RATIO = np.array([1.0, 0.8, 0.5])  # sigma of u, v, w over sigma_1 (IEC Annex B)
+COHERENCE_DECAY = 12.0
+COHERENCE_OFFSET = 0.12
+SHORTEST_PERIOD = 600.0  # s; sigma_1 is defined over 10 min, a shorter record would squeeze it into gusts
+STEP = 0.1  # s
+TABLE_RANGE = (1e-6, 1e4)  # of k R; beyond it the averages are 1 and 0 to 1e-6 and 1e-7
+TABLE_SIZE = 2000  # log-spaced; log-log interpolation is then within 1e-5
+PAIR_NODES = 200  # quadrature over pair distances, quadratically denser towards 0
+
+
+@lru_cache(maxsize=1)
+def _pair_tables():
+    """Logarithms of k R, of the mean coherence of pairs, and of its gradient moment; (n,) each.
+
+    With two points of the disk at distance d = 2 R cos(h), their midpoint lies in the overlap of two
+    disks, i.e. two circular segments of half-angle h; area and second moments are elementary. That
+    gives the density of d (disk line picking) and the mean scalar product of the two positions.
+    """
+    s, weight = np.polynomial.legendre.leggauss(PAIR_NODES)
+    s = 0.5 * (s + 1.0)
+    distance = 2.0 * s**2  # in radii
+    weight = 0.5 * weight * 4.0 * s
+    h = np.arccos(0.5 * distance)
+    sine, cosine = np.sin(h), np.cos(h)
+    area = h - sine * cosine
+    first = 2.0 / 3.0 * sine**3  # moment about the disk's centre, along the distance
+    along = 0.25 * (area + 2.0 * sine**3 * cosine) - 2.0 * cosine * first + cosine**2 * area
+    across = (3.0 * area - 2.0 * sine**3 * cosine) / 12.0
+    density = 2.0 * area * 2.0 * np.pi * distance / np.pi**2
+    product = (along + across) / area - 0.25 * distance**2  # mean of rho . rho' over R^2
+    log_kr = np.linspace(*np.log(TABLE_RANGE), TABLE_SIZE)
+    coherence = np.exp(-np.outer(np.exp(log_kr), distance)) * (density * weight)
+    # u ~ u0 + b z/R has b = 4 <u z/R>; <z z'> is half of <rho . rho'> by symmetry
+    return log_kr, np.log(coherence.sum(axis=1)), np.log(8.0 * (coherence @ product))
+
+
+def disk_average(kr):
+    """Variance of the disk average of u over the point variance, for k R = kr (any shape)."""
+    log_kr, mean, _ = _pair_tables()
+    return np.exp(np.interp(np.log(kr), log_kr, mean))
+
+
+def disk_gradient(kr):
+    """Variance of R times the fitted gradient of u over the disk over the point variance, for k R = kr.
+
+    The gradient along one axis of the plane that fits u best over the disk (area weighting).
+    """
+    log_kr, _, gradient = _pair_tables()
+    return np.exp(np.interp(np.log(kr), log_kr, gradient))
+
+
+def coherence_wave_number(frequency, speed, height):
+    """k (1/m) of the coherence exp(-k r) at frequencies (Hz)."""
+    coherence_length = LENGTH_RATIO[0] * length_scale(height)
+    return COHERENCE_DECAY * np.hypot(frequency / speed, COHERENCE_OFFSET / coherence_length)
+
+
+def kaimal_spectrum(frequency, speed, sigma, length):
+    """One-sided spectrum (m^2/s^2/Hz) with variance sigma^2 and scale L (m), IEC Annex B."""
+    return sigma**2 * 4.0 * length / speed / (1.0 + 6.0 * frequency * length / speed) ** (5.0 / 3.0)
+
+
+def _kaimal_below(frequency, speed, length):
+    """Share of the Kaimal variance below a frequency (the integral of kaimal_spectrum)."""
+    return 1.0 - (1.0 + 6.0 * frequency * length / speed) ** (-2.0 / 3.0)
+
+
+@lru_cache(maxsize=64)
+def amplitudes(speed, sigma, height, diameter, samples, step, average):
+    """Amplitudes (m/s) of u, v, w, vertical_shear, horizontal_shear at k/(samples step); (5, m).
+
+    The shears are per rotor diameter. average: "rotor", or "point" for the hub point without shears.
+    The frequency bins carry the exact integral of the spectrum, scaled so that the point's standard
+    deviation over the period is sigma (2 % for what lies outside 1/period and the Nyquist frequency).
+    """
+    frequency = np.arange(samples // 2 + 1) / (samples * step)
+    half_bin = 0.5 * frequency[1]
+    variance = np.zeros((5, frequency.size))
+    inside = slice(1, (samples + 1) // 2)  # neither the mean nor, for even samples, the Nyquist bin
+    for row, (length_ratio, sigma_ratio) in enumerate(zip(LENGTH_RATIO, SIGMA_RATIO, strict=True)):
+        length = length_ratio * length_scale(height)
+        share = _kaimal_below(frequency[inside] + half_bin, speed, length) - _kaimal_below(
+            frequency[inside] - half_bin, speed, length
+        )
+        variance[row, inside] = (sigma_ratio * sigma) ** 2 * share / share.sum()
+    if average == "rotor":
+        kr = coherence_wave_number(frequency, speed, height) * 0.5 * diameter
+        variance[3:] = 4.0 * variance[0] * disk_gradient(kr)  # per diameter, not per radius
+        variance[:3] *= disk_average(kr)
+    result = np.sqrt(2.0 * variance)
+    result.flags.writeable = False
+    return result
+
+
+def fft_length(minimum):
+    """Smallest even length with no prime factor above 5 that is at least the minimum."""
+    length = 2 * ((minimum + 1) // 2)
+    while True:
+        rest = length
+        for prime in (2, 3, 5):
+            while rest % prime == 0:
+                rest //= prime
+        if rest == 1:
+            return length
+        length += 2
+
+
+def component_generator(seed, component):
+    """Random generator of one wind component, so that leaving one out does not change the others.
+
+    seed: non-negative int or SeedSequence (which is left as it is).
+    """
+    if not isinstance(seed, np.random.SeedSequence):
+        seed = np.random.SeedSequence(seed)
+    child = np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, component))
+    return np.random.Generator(np.random.PCG64(child))
+
+
+def turbulence(
+    speed, sigma, *, height, diameter, period, seed, average="rotor", shear_turbulence=True, step=STEP
+):
+    """(period, value): one period of turbulence about a mean of zero, (n + 1, 5), last row = first row.
+
+    Columns as in WindSeries, the shears per rotor diameter; sigma is the standard deviation (m/s) of
+    u at a point. The period returned is the one asked for (s), rounded up to a length that transforms
+    quickly. The phases belong to the frequencies k/period, so another period gives another wind.
+    """
+    samples = fft_length(int(np.ceil(period / step - 1e-9)))
+    amplitude = amplitudes(speed, sigma, height, diameter, samples, step, average)
+    used = 5 if average == "rotor" and shear_turbulence else 3
+    spectrum = np.empty((used, amplitude.shape[1]), dtype=np.complex128)
+    for row in range(used):
+        phase = component_generator(seed, row).uniform(0.0, 2.0 * np.pi, amplitude.shape[1])
+        spectrum[row] = 0.5 * samples * amplitude[row] * np.exp(1j * phase)
+    value = np.zeros((samples + 1, 5))
+    value[:-1, :used] = np.fft.irfft(spectrum, samples, axis=1).T
+    value[-1] = value[0]
+    return samples * step, value

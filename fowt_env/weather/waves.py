@@ -1,0 +1,185 @@
+"""Linear (Airy) waves as a sum of components, and the spectra that they are drawn from.
+
+Everything random happens here, before stepping. A component travels towards its heading:
+phase P = k (X cos b + Y sin b) - omega t + e, elevation a cos P (theory.md, 5.4).
+"""
+
+from math import cos, exp, pi, sin
+from typing import NamedTuple
+
+import numpy as np
+
+from fowt_env.errors import InputError
+from fowt_env.jit import kernel
+
+# Beyond this k*depth-like product an exponential is below 1e-12 of its surface value.
+NEGLIGIBLE = 27.6
+
+
+class Waves(NamedTuple):
+    """Wave components; every array (n,), C-contiguous."""
+
+    omega: np.ndarray  # rad/s
+    wave_number: np.ndarray  # 1/m
+    amplitude: np.ndarray  # m
+    phase: np.ndarray  # e, rad
+    cos_heading: np.ndarray
+    sin_heading: np.ndarray
+    velocity: np.ndarray  # a omega / (1 - exp(-2 k h)), so that cosh/sinh = (e1 + e2) * this / (a omega)
+    depth: float
+    density: float
+    ramp: float  # s over which the waves are raised from rest; 0: none
+    random: bool  # drawn from a spectrum: repeats after the duration it was drawn for
+
+
+def wave_number(omega, depth, gravity):
+    """k of omega^2 = g k tanh(k depth), (n,), to machine precision."""
+    omega = np.asarray(omega, dtype=np.float64)
+    deep = omega**2 / gravity
+    # Guo's explicit start is within 1 %; Newton on the log-free form then converges in 3-4 steps
+    x = omega * np.sqrt(depth / gravity)
+    k = x**2 / depth * (1.0 - np.exp(-(x**2.5))) ** -0.4
+    for _ in range(20):
+        t = np.tanh(k * depth)
+        step = (k * t - deep) / (t + k * depth * (1.0 - t * t))
+        k = k - step
+        if np.all(np.abs(step) <= 1e-15 * k):
+            break
+    return k
+
+
+def jonswap(omega, significant_height, peak_period, gamma):
+    """One-sided JONSWAP spectrum S(omega), m2 s/rad (gamma = 1: Pierson-Moskowitz); theory.md, 5.4."""
+    omega = np.asarray(omega, dtype=np.float64)
+    peak = 2.0 * pi / peak_period
+    sigma = np.where(omega <= peak, 0.07, 0.09)
+    shape = gamma ** np.exp(-((omega - peak) ** 2) / (2.0 * sigma**2 * peak**2))
+    norm = 1.0 - 0.287 * np.log(gamma)
+    return (
+        norm
+        * 5.0
+        / 16.0
+        * significant_height**2
+        * peak**4
+        * omega**-5.0
+        * np.exp(-1.25 * (peak / omega) ** 4)
+        * shape
+    )
+
+
+def build_waves(sea, *, depth, density, gravity, seed, duration, components=None):
+    """Waves part of a description.SeaState, or None for still water (exactly no waves).
+
+    components: number of components of a spectrum; default one per harmonic of 1/duration, so that
+    the record does not repeat within it, over the band that holds 99.9 % of the energy (at least 200).
+    """
+    if sea is None or sea.kind == "still":
+        return None
+    if sea.kind == "regular":
+        omega = np.array([2.0 * pi / sea.T])
+        amplitude = np.array([sea.H / 2.0])
+        phase = np.array([sea.phase])
+        heading = np.array([np.radians(sea.heading)])
+    elif sea.kind == "components":
+        omega = np.asarray(sea.omega, dtype=np.float64)
+        amplitude = np.asarray(sea.amplitude, dtype=np.float64)
+        phase = np.asarray(sea.phase, dtype=np.float64)
+        heading = np.radians(np.broadcast_to(np.asarray(sea.heading, dtype=np.float64), omega.shape))
+    else:
+        gamma = sea.gamma if sea.kind == "jonswap" else 1.0
+        omega, amplitude = _spectral_components(sea.Hs, sea.Tp, gamma, duration, components)
+        phase = np.random.default_rng(np.random.SeedSequence([seed, 2])).uniform(0.0, 2.0 * pi, omega.size)
+        heading = np.full(omega.size, np.radians(sea.heading))
+    if not np.any(amplitude > 0.0):
+        return None
+    k = wave_number(omega, depth, gravity)
+    random = sea.kind not in ("regular", "components")
+    return _pack(omega, k, amplitude, phase, heading, depth, density, sea.ramp, random)
+
+
+def _pack(omega, k, amplitude, phase, heading, depth, density, ramp, random):
+    """Waves from plain arrays, shortest wave last so that loops may stop early."""
+    order = np.argsort(k, kind="stable")
+    velocity = amplitude * omega / -np.expm1(-2.0 * k * depth)
+    arrays = (omega, k, amplitude, phase, np.cos(heading), np.sin(heading), velocity)
+    packed = [np.ascontiguousarray(np.asarray(a, dtype=np.float64)[order]) for a in arrays]
+    return Waves(*packed, float(depth), float(density), float(ramp), bool(random))
+
+
+def _spectral_components(significant_height, peak_period, gamma, duration, components):
+    """(omega, amplitude) of a spectrum, renormalised so that 4 sqrt(m0) = Hs.
+
+    Band 0.5 to 5 peak frequencies: outside it JONSWAP holds 0.2 % of the variance (gamma 3.3),
+    which the renormalisation returns.
+    """
+    if significant_height == 0.0:
+        return np.array([2.0 * pi / peak_period]), np.zeros(1)
+    peak = 2.0 * pi / peak_period
+    low, high = 0.5 * peak, 5.0 * peak
+    if components is None:
+        components = max(200, int(np.ceil((high - low) * duration / (2.0 * pi))))
+    if components < 1:
+        raise InputError(f"wave_components = {components}: must be at least 1")
+    step = (high - low) / components
+    omega = low + step * (np.arange(components) + 0.5)
+    amplitude = np.sqrt(2.0 * jonswap(omega, significant_height, peak_period, gamma) * step)
+    amplitude *= significant_height / (4.0 * np.sqrt(np.sum(amplitude**2) / 2.0))
+    return omega, amplitude
+
+
+@kernel
+def ramp_factor(t, ramp):
+    """Share of the wave amplitude at time t: raised linearly over ramp seconds."""
+    if t < ramp:
+        return t / ramp
+    return 1.0
+
+
+@kernel
+def elevation(t, x, y, waves):
+    """Surface elevation at an inertial point, m; 0 without waves."""
+    if waves is None:
+        return 0.0
+    total = 0.0
+    for j in range(waves.omega.shape[0]):
+        k = waves.wave_number[j]
+        total += waves.amplitude[j] * cos(
+            k * (x * waves.cos_heading[j] + y * waves.sin_heading[j]) - waves.omega[j] * t + waves.phase[j]
+        )
+    return total * ramp_factor(t, waves.ramp)
+
+
+class Kinematics(NamedTuple):
+    """Water velocity (m/s), local acceleration (m/s2) and dynamic pressure (Pa) at one point."""
+
+    u: float
+    v: float
+    w: float
+    du: float
+    dv: float
+    dw: float
+    pressure: float
+
+
+@kernel
+def wave_kinematics(t, x, y, z, waves):
+    """Kinematics at an inertial point with z used as given (stretch it before), plain component sum."""
+    u = v = w = du = dv = dw = p = 0.0
+    h = waves.depth
+    for j in range(waves.omega.shape[0]):
+        k, om = waves.wave_number[j], waves.omega[j]
+        phase = k * (x * waves.cos_heading[j] + y * waves.sin_heading[j]) - om * t + waves.phase[j]
+        c, s = cos(phase), sin(phase)
+        e1 = exp(k * z)
+        e2 = exp(-k * (z + 2.0 * h))
+        even = waves.velocity[j] * (e1 + e2)
+        odd = waves.velocity[j] * (e1 - e2)
+        u += even * c * waves.cos_heading[j]
+        v += even * c * waves.sin_heading[j]
+        w += odd * s
+        du += om * even * s * waves.cos_heading[j]
+        dv += om * even * s * waves.sin_heading[j]
+        dw -= om * odd * c
+        p += waves.density * om / k * even * c
+    f = ramp_factor(t, waves.ramp)
+    return Kinematics(f * u, f * v, f * w, f * du, f * dv, f * dw, f * p)

@@ -1,0 +1,308 @@
+"""Wind at any instant and point: a time series at the reference height, sheared over the height.
+
+The series is uniform over the rotor apart from the power law and two linear shears. Frame: inertial,
+x downwind, y left when looking downwind, z up (state.py). What users may ask for is in wind_spec.py.
+"""
+
+from math import cos, hypot, radians, sin
+from typing import NamedTuple
+
+import numpy as np
+
+from fowt_env.errors import InputError
+from fowt_env.jit import kernel
+from fowt_env.weather import gusts
+from fowt_env.weather.iec import EXTREME_SHEAR_EXPONENT, etm_sigma, extreme_speed, ntm_sigma
+from fowt_env.weather.turbulence import SHORTEST_PERIOD, turbulence
+from fowt_env.weather.wind_spec import SHARED, Number, Seed, read_wind
+
+OPENING = 60.0  # s; the platform trims to the mean of this much of a user's series
+LOWEST_HEIGHT = 1.0  # m; points below it (waves, rotor at sea level) see the wind of this height
+
+
+class WindSeries(NamedTuple):
+    """Wind varying in time, with its shear over the height."""
+
+    time: np.ndarray  # (n,) s, increasing, n >= 1; with a period it runs from 0 to the period
+    value: np.ndarray  # (n, 5) u, v, w at the reference height, vertical_shear, horizontal_shear; m/s
+    inverse_step: float  # 1/dt of a uniform time, 1/s; 0: not uniform (then bisection)
+    period: float  # s; > 0: the series repeats, its last row equals the first; 0: ends are held
+    shear_exponent: float  # of the power law on u and v
+    reference_height: float  # m
+    reference_length: float  # m; the linear shears are m/s per this length
+
+
+class WindNow(NamedTuple):
+    """One instant of a WindSeries, m/s."""
+
+    u: float
+    v: float
+    w: float
+    vertical_shear: float
+    horizontal_shear: float
+
+
+NO_WIND = WindNow(0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@kernel
+def _row(series, i, weight):
+    """WindNow at the fraction `weight` from row i to row i + 1."""
+    value = series.value
+    rest = 1.0 - weight
+    return WindNow(
+        rest * value[i, 0] + weight * value[i + 1, 0],
+        rest * value[i, 1] + weight * value[i + 1, 1],
+        rest * value[i, 2] + weight * value[i + 1, 2],
+        rest * value[i, 3] + weight * value[i + 1, 3],
+        rest * value[i, 4] + weight * value[i + 1, 4],
+    )
+
+
+@kernel
+def wind_now(t, series):
+    """WindNow at time t (s): linear between samples, repeated with the period or held at the ends."""
+    if series is None:
+        return NO_WIND
+    time = series.time
+    last = time.shape[0] - 1
+    if series.period > 0.0:
+        t = t % series.period
+    # written so that a NaN time gives the first row instead of an index out of range
+    if last == 0 or not t > time[0]:
+        first = series.value[0]
+        return WindNow(first[0], first[1], first[2], first[3], first[4])
+    if t >= time[last]:
+        final = series.value[last]
+        return WindNow(final[0], final[1], final[2], final[3], final[4])
+    if series.inverse_step > 0.0:
+        i = min(int((t - time[0]) * series.inverse_step), last - 1)
+    else:
+        i, above = 0, last
+        while above - i > 1:
+            middle = (i + above) // 2
+            if time[middle] <= t:
+                i = middle
+            else:
+                above = middle
+    return _row(series, i, (t - time[i]) / (time[i + 1] - time[i]))
+
+
+@kernel
+def wind_at(t, X, Y, Z, now, series, field):
+    """(u, v, w) m/s, inertial components, at the inertial point X, Y, Z (m) and time t (s).
+
+    The horizontal wind follows the power law (Z/reference_height)**shear_exponent; the linear shears
+    add to u, m/s per reference_length above and to the left (+y) of the reference point. Points below
+    LOWEST_HEIGHT take its wind. now: wind_now(t, series). field: None, the wind is uniform in space
+    apart from its shears.
+    """
+    if series is None:
+        return 0.0, 0.0, 0.0
+    height = max(Z, LOWEST_HEIGHT)
+    profile = 1.0
+    if series.shear_exponent != 0.0:
+        profile = (height / series.reference_height) ** series.shear_exponent
+    linear = (
+        now.vertical_shear * (height - series.reference_height) + now.horizontal_shear * Y
+    ) / series.reference_length
+    return now.u * profile + linear, now.v * profile, now.w
+
+
+def make_series(time, value, *, reference_height, reference_length, shear_exponent, period=0.0):
+    """WindSeries of samples value (n, 5) at time (n,) s; finds out whether the time is uniform."""
+    time = np.ascontiguousarray(time, dtype=np.float64)
+    value = np.ascontiguousarray(value, dtype=np.float64)
+    inverse_step = 0.0
+    if time.size > 1:
+        step = (time[-1] - time[0]) / (time.size - 1)
+        # every sample on its grid line, so that the index cannot be off by more than rounding
+        if np.abs(time - time[0] - step * np.arange(time.size)).max() <= 1e-6 * step:
+            inverse_step = 1.0 / step
+    return WindSeries(
+        time,
+        value,
+        float(inverse_step),
+        float(period),
+        float(shear_exponent),
+        float(reference_height),
+        float(reference_length),
+    )
+
+
+def build_wind(spec, *, reference_height, rotor_diameter, shear_exponent, seed, duration):
+    """WindSeries of what a user asked for, None for no aerodynamics at all.
+
+    spec               None; a speed in m/s (0: still air); a dictionary with "kind", or the WindSpec that
+                       read_wind made of one (kinds and keys: wind_spec.KINDS); a WindSeries, which is
+                       returned as it is
+    reference_height   hub height, m
+    shear_exponent     power law of the site, unless the spec gives one (ewm: 0.11 of the standard)
+    seed               of turbulence: int >= 0 or numpy SeedSequence, unless the spec gives one
+    duration           s, which turbulence has to cover before it repeats
+    Raises: InputError naming the key, its value and what is allowed.
+    """
+    if spec is None or isinstance(spec, WindSeries):
+        return spec
+    spec = read_wind(spec)
+    height = Number(1.0, 1000.0, "m").read("reference_height", reference_height)
+    diameter = Number(1.0, 1000.0, "m").read("rotor_diameter", rotor_diameter)
+    exponent = spec["shear_exponent"]
+    if exponent is None:
+        site = SHARED["shear_exponent"].read("shear_exponent", shear_exponent)
+        exponent = EXTREME_SHEAR_EXPONENT if spec.kind == "ewm" else site
+    period = 0.0
+    if spec.kind in GUSTS:
+        length, value = GUSTS[spec.kind](spec, height, diameter)
+        time = spec["start"] + np.linspace(0.0, length, len(value))
+    elif _is_turbulent(spec):
+        period, value = _turbulent(spec, height, diameter, seed, duration)
+        time = np.linspace(0.0, period, len(value))
+    elif spec.kind == "series":
+        time, value = _given(spec)
+    elif spec.kind == "steps":
+        time, value = _stepped(spec)
+    else:
+        time, value = np.zeros(1), np.zeros((1, 5))
+        _blow(value, nominal_speed(spec), radians(spec["direction"]))
+        value[:, 2] = spec.values.get("vertical", 0.0)
+    return make_series(
+        time,
+        value,
+        reference_height=height,
+        reference_length=diameter,
+        shear_exponent=exponent,
+        period=period,
+    )
+
+
+def nominal_speed(spec):
+    """Horizontal hub speed (m/s) that the episode starts from, for trim; spec as in build_wind.
+
+    The nominal speed of steady, turbulent and gusty wind, the first of steps; of a series the mean
+    over its first 60 s, since a platform does not follow the single first sample. None gives 0.
+    """
+    if spec is None:
+        return 0.0
+    if isinstance(spec, WindSeries):
+        mean = mean_wind(spec)
+        return hypot(mean.value[0, 0], mean.value[0, 1])
+    spec = read_wind(spec)
+    if spec.kind == "steps":
+        return float(spec["speeds"][0])
+    if spec.kind == "series":
+        return _opening_mean(spec["time"], spec["speed"])
+    if spec.kind == "ewm":
+        return extreme_speed(spec["turbine_class"], spec["recurrence"], turbulent=spec["turbulent"])
+    return spec["speed"]
+
+
+def mean_wind(series):
+    """Constant WindSeries that the episode starts from, for trim: the mean of a repeating series over
+    its period, of another over its first 60 s (before its first sample that one holds). None: None."""
+    if series is None:
+        return None
+    end = series.period if series.period > 0.0 else OPENING
+    value = np.array([_opening_mean(series.time, column, end) for column in series.value.T])
+    return series._replace(
+        time=np.zeros(1), value=np.ascontiguousarray(value[None, :]), inverse_step=0.0, period=0.0
+    )
+
+
+def _opening_mean(time, value, length=OPENING):
+    """Mean of the piecewise linear value over [0, length], its ends held; exact."""
+    inside = time[(time > 0.0) & (time < length)]
+    nodes = np.concatenate(([0.0], inside, [length]))
+    return float(np.trapezoid(np.interp(nodes, time, value), nodes) / length)
+
+
+def _blow(value, speed, direction):
+    """Write a horizontal wind of some direction (rad, from +x towards +y) into the rows."""
+    value[:, 0] = speed * cos(direction)
+    value[:, 1] = speed * sin(direction)
+
+
+def _given(spec):
+    """Samples of the user's own series."""
+    columns = [spec[key] for key in ("speed", "v", "w", "vertical_shear", "horizontal_shear")]
+    zero = np.zeros(spec["time"].size)
+    return spec["time"], np.stack([zero if column is None else column for column in columns], axis=1)
+
+
+def _stepped(spec):
+    """Samples of a staircase: each speed lasts `every`, then ramps to the next; the last holds."""
+    speeds = spec["speeds"]
+    edges = spec["every"] * np.arange(1, speeds.size)
+    time = np.concatenate(([0.0], np.stack([edges, edges + spec["ramp"]], axis=1).ravel()))
+    value = np.zeros((time.size, 5))
+    value[:, 0] = np.concatenate(([speeds[0]], np.stack([speeds[:-1], speeds[1:]], axis=1).ravel()))
+    return time, value
+
+
+def _is_turbulent(spec):
+    """True where the spec needs random numbers."""
+    return spec.kind in ("ntm", "etm") or (spec.kind == "ewm" and spec["turbulent"])
+
+
+def _turbulent(spec, height, diameter, seed, duration):
+    """(period, value) of one period of turbulence about its mean speed and direction."""
+    speed = nominal_speed(spec)
+    if spec.kind == "ntm":
+        sigma = ntm_sigma(speed, spec["class"])
+    elif spec.kind == "etm":
+        sigma = etm_sigma(speed, spec["class"], spec["turbine_class"])
+    else:
+        sigma = 0.11 * speed  # the turbulent extreme wind of IEC 61400-1
+    duration = Number(0.0, 1e5, "s").read("duration", duration)
+    period = spec["period"]
+    if period is None:
+        period = max(duration, SHORTEST_PERIOD)
+    elif period < duration:
+        raise InputError(f"wind.period = {period}: must be at least the duration, {duration:g} s")
+    if spec["seed"] is not None:
+        seed = spec["seed"]
+    elif not isinstance(seed, np.random.SeedSequence):
+        seed = Seed().read("seed", seed)
+    period, value = turbulence(
+        speed,
+        sigma,
+        height=height,
+        diameter=diameter,
+        period=period,
+        seed=seed,
+        average=spec["average"],
+        shear_turbulence=spec["shear_turbulence"],
+    )
+    value[:, 0] += speed
+    direction = radians(spec["direction"])
+    if direction != 0.0:
+        along, across = value[:, 0].copy(), value[:, 1].copy()
+        value[:, 0] = along * cos(direction) - across * sin(direction)
+        value[:, 1] = along * sin(direction) + across * cos(direction)
+        # of the gradients of the turned wind only the part that changes u along z and y can be carried
+        value[:, 3] *= cos(direction)
+        value[:, 4] *= cos(direction) ** 2
+    return period, value
+
+
+GUSTS = {
+    "eog": lambda spec, height, diameter: gusts.operating_gust(
+        spec["speed"],
+        turbulence_class=spec["class"],
+        turbine_class=spec["turbine_class"],
+        height=height,
+        diameter=diameter,
+    ),
+    "edc": lambda spec, height, diameter: gusts.direction_change(
+        spec["speed"], turbulence_class=spec["class"], height=height, diameter=diameter, sign=spec["sign"]
+    ),
+    "ecd": lambda spec, height, diameter: gusts.coherent_gust(spec["speed"], sign=spec["sign"]),
+    "ews": lambda spec, height, diameter: gusts.wind_shear(
+        spec["speed"],
+        turbulence_class=spec["class"],
+        height=height,
+        diameter=diameter,
+        orientation=spec["orientation"],
+        sign=spec["sign"],
+    ),
+}

@@ -1,0 +1,235 @@
+"""What a user may ask of the wind: the kinds, their keys, units, ranges and defaults, and the checks.
+
+KINDS is the whole list; `read_wind` turns a number or a dictionary into a checked WindSpec.
+"""
+
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fowt_env.errors import InputError, unknown
+from fowt_env.weather.iec import REFERENCE_SPEED, TURBULENCE_INTENSITY
+
+
+class Required:
+    """Mark of a key that has no default."""
+
+
+class Number(NamedTuple):
+    """A finite number within [low, high]."""
+
+    low: float
+    high: float
+    unit: str
+    default: Any = Required
+
+    def read(self, where, value):
+        number = as_float(where, value)
+        if not self.low <= number <= self.high:  # NaN is in no range
+            raise InputError(
+                f"{where} = {number}: must be in [{self.low:g}, {self.high:g}] {self.unit}".rstrip()
+            )
+        return number
+
+
+class Choice(NamedTuple):
+    """One of a few names or numbers; letters of either case."""
+
+    allowed: tuple
+    default: Any = Required
+
+    def read(self, where, value):
+        wanted = value.upper() if isinstance(value, str) else value
+        for choice in self.allowed:
+            same = choice.upper() if isinstance(choice, str) else choice
+            if type(wanted) is not bool and wanted == same:
+                return choice
+        if isinstance(value, str):
+            raise unknown(where, value, self.allowed)
+        raise InputError(f"{where} = {value!r}: must be one of {', '.join(map(str, self.allowed))}")
+
+
+class Flag(NamedTuple):
+    """True or False."""
+
+    default: Any = Required
+
+    def read(self, where, value):
+        if not isinstance(value, (bool, np.bool_)):
+            raise InputError(f"{where} = {value!r}: must be True or False")
+        return bool(value)
+
+
+class Samples(NamedTuple):
+    """A non-empty one-dimensional array of finite numbers within [low, high]."""
+
+    low: float
+    high: float
+    unit: str
+    default: Any = Required
+
+    def read(self, where, value):
+        try:
+            array = np.array(value, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise InputError(f"{where} = {value!r}: must be a list of numbers") from None
+        if array.ndim != 1 or array.size == 0:
+            raise InputError(
+                f"{where} has shape {array.shape}: must be a list of at least one number, shape (n,)"
+            )
+        wrong = np.flatnonzero(~((array >= self.low) & (array <= self.high)))
+        if wrong.size:
+            raise InputError(
+                f"{where}[{wrong[0]}] = {array[wrong[0]]}: must be in "
+                f"[{self.low:g}, {self.high:g}] {self.unit}"
+            )
+        return array
+
+
+class Seed(NamedTuple):
+    """A non-negative whole number."""
+
+    default: Any = Required
+
+    def read(self, where, value):
+        whole = isinstance(value, (int, np.integer)) and not isinstance(value, (bool, np.bool_))
+        if not whole or value < 0:
+            raise InputError(f"{where} = {value!r}: must be a whole number >= 0")
+        return int(value)
+
+
+def as_float(where, value):
+    """float(value) of a real number; text and booleans are refused."""
+    if isinstance(value, (bool, np.bool_, str, bytes)):
+        raise InputError(f"{where} = {value!r}: must be a number")
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise InputError(f"{where} = {value!r}: must be a number") from None
+
+
+SPEED_LIMIT = 100.0  # m/s; above every extreme of the standard (70 m/s)
+SPEED = Number(0.0, SPEED_LIMIT, "m/s")
+# the mean of turbulence and gusts divides frequencies and angles, so it cannot be zero
+MOVING = Number(1.0, SPEED_LIMIT, "m/s")
+DIRECTION = Number(-180.0, 180.0, "deg", 0.0)  # towards which the wind blows, from +x towards +y
+TURBINE_CLASS = Choice(tuple(REFERENCE_SPEED), "I")
+TURBULENCE_CLASS = Choice(tuple(TURBULENCE_INTENSITY), "B")
+START = Number(0.0, 1e6, "s", 60.0)
+SIGN = Choice((1, -1), 1)
+COMPONENT = Samples(-SPEED_LIMIT, SPEED_LIMIT, "m/s", None)
+
+RANDOM = {  # keys of every turbulent wind
+    "direction": DIRECTION,
+    "average": Choice(("rotor", "point"), "rotor"),
+    "shear_turbulence": Flag(True),
+    "period": Number(60.0, 1e5, "s", None),
+    "seed": Seed(None),
+}
+GUST = {"speed": MOVING, "start": START, "class": TURBULENCE_CLASS}
+SHARED = {"shear_exponent": Number(0.0, 1.0, "", None)}  # key of every kind; None: that of the site
+
+KINDS = {
+    "steady": {
+        "speed": SPEED,
+        "direction": DIRECTION,
+        "vertical": Number(-SPEED_LIMIT, SPEED_LIMIT, "m/s", 0.0),
+    },
+    "series": {
+        "time": Samples(-1e6, 1e9, "s"),
+        "speed": Samples(0.0, SPEED_LIMIT, "m/s"),
+        "v": COMPONENT,
+        "w": COMPONENT,
+        "vertical_shear": COMPONENT,
+        "horizontal_shear": COMPONENT,
+    },
+    "steps": {
+        "speeds": Samples(0.0, SPEED_LIMIT, "m/s"),
+        "every": Number(0.01, 1e6, "s"),
+        "ramp": Number(1e-3, 1e6, "s", 0.1),
+    },
+    "eog": GUST | {"turbine_class": TURBINE_CLASS},
+    "edc": GUST | {"sign": SIGN},
+    "ecd": {"speed": MOVING, "start": START, "sign": SIGN},
+    "ews": GUST | {"sign": SIGN, "orientation": Choice(("vertical", "horizontal"), "vertical")},
+    "ntm": {"speed": MOVING, "class": TURBULENCE_CLASS} | RANDOM,
+    "etm": {"speed": MOVING, "class": TURBULENCE_CLASS, "turbine_class": TURBINE_CLASS} | RANDOM,
+    "ewm": {"turbine_class": TURBINE_CLASS, "recurrence": Choice((50, 1), 50), "turbulent": Flag(False)}
+    | RANDOM,
+}
+
+
+@dataclass(frozen=True)
+class WindSpec:
+    """A checked wind: its kind and the value of each of its keys (see KINDS)."""
+
+    kind: str
+    values: dict = field(default_factory=dict)
+
+    def __getitem__(self, key):
+        return self.values[key]
+
+
+def read_wind(spec):
+    """WindSpec of a speed in m/s, a dictionary with "kind", or a WindSpec.
+
+    Raises: InputError naming the key, its value and what is allowed.
+    """
+    if isinstance(spec, WindSpec):
+        return spec
+    if not isinstance(spec, dict):
+        if isinstance(spec, str):
+            raise InputError(
+                f"wind = {spec!r}: must be None, a speed in m/s or a dictionary with 'kind', one of "
+                + ", ".join(KINDS)
+            )
+        spec = {"kind": "steady", "speed": SPEED.read("wind", spec)}
+    if "kind" not in spec:
+        raise InputError(f"wind.kind is missing: must be one of {', '.join(KINDS)}")
+    kind = spec["kind"]
+    if not isinstance(kind, str) or kind not in KINDS:
+        raise unknown("wind.kind", kind, KINDS)
+    keys = KINDS[kind] | SHARED
+    for key in spec:
+        if key != "kind" and key not in keys:
+            raise unknown(f"key of the {kind} wind", key, keys)
+    values = {}
+    for key, rule in keys.items():
+        value = spec.get(key, rule.default)
+        if value is Required:
+            raise InputError(f"wind.{key} is missing: the {kind} wind needs it")
+        values[key] = value if value is None and rule.default is None else rule.read(f"wind.{key}", value)
+    _check_together(kind, values)
+    return WindSpec(kind, values)
+
+
+def _check_together(kind, values):
+    """Rules that join several keys. Raises InputError."""
+    if kind == "series":
+        time = values["time"]
+        for key, array in values.items():
+            if isinstance(array, np.ndarray) and array.size != time.size:
+                raise InputError(
+                    f"wind.{key} has {array.size} values: must be {time.size}, as many as wind.time"
+                )
+        wrong = np.flatnonzero(np.diff(time) <= 0.0)
+        if wrong.size:
+            late = wrong[0] + 1
+            raise InputError(
+                f"wind.time[{late}] = {time[late]}: must be above wind.time[{late - 1}] = {time[late - 1]}"
+                " (strictly increasing)"
+            )
+    if kind == "steps" and values["ramp"] >= values["every"]:
+        raise InputError(f"wind.ramp = {values['ramp']}: must be below wind.every = {values['every']} s")
+    if kind == "eog":
+        limit = 0.8 * 1.4 * REFERENCE_SPEED[values["turbine_class"]]
+        if values["speed"] >= limit:
+            raise InputError(
+                f"wind.speed = {values['speed']}: must be below {limit:g} m/s, the one-year extreme speed of"
+                f" turbine class {values['turbine_class']}"
+            )
+    if kind == "ewm" and not values["turbulent"]:
+        for key, rule in RANDOM.items():
+            if key != "direction" and values[key] != rule.default:
+                raise InputError(f"wind.{key} = {values[key]!r}: needs wind.turbulent = True")
