@@ -1,0 +1,108 @@
+"""The house decorators for compiled code, and the disk cache keyed by the package's sources.
+
+Numba's own cache watches only the file of the function itself: after an edit of a callee in
+another file a cached caller would go on returning the old result. So the cache lives in a folder
+named by a hash of every source file of the packages that hold kernels.
+"""
+
+import hashlib
+import os
+import shutil
+import sys
+import time
+from pathlib import Path
+
+import numba
+from numba import types
+
+KEEP_CACHES = 4  # folders of older sources kept, so that switching branches does not recompile
+KERNEL_PACKAGES = ("fowt_env", "controllers")
+
+
+def _source_hash():
+    """Hash of the kernel packages' sources and of the versions that shape machine code."""
+    digest = hashlib.sha256(f"{numba.__version__} {sys.version}".encode())
+    root = Path(__file__).resolve().parent.parent
+    for package in KERNEL_PACKAGES:
+        for path in sorted((root / package).rglob("*.py")):
+            digest.update(path.relative_to(root).as_posix().encode())
+            digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def cache_root():
+    """Folder that holds the compiled kernels (FOWT_CACHE_DIR, else the user's cache folder)."""
+    given = os.environ.get("FOWT_CACHE_DIR")
+    if given:
+        return Path(given)
+    base = os.environ.get("XDG_CACHE_HOME")
+    return (Path(base) if base else Path.home() / ".cache") / "fowt_env"
+
+
+def _use_cache_folder():
+    """Point numba at this source version's folder; drop the oldest others. Returns the folder."""
+    root = cache_root()
+    folder = root / _source_hash()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        os.utime(folder)
+        others = sorted(
+            (p for p in root.iterdir() if p.is_dir() and p != folder),
+            key=lambda p: p.stat().st_mtime,
+        )
+        day_ago = time.time() - 86400.0  # a process that is still running may use a younger one
+        for old in others[: max(0, len(others) - KEEP_CACHES)]:
+            if old.stat().st_mtime < day_ago:
+                shutil.rmtree(old, ignore_errors=True)
+    except OSError:
+        return None  # read-only home: numba falls back to its own choice
+    numba.config.CACHE_DIR = str(folder)
+    return folder
+
+
+CACHE_FOLDER = _use_cache_folder()
+
+kernel = numba.njit(cache=True, error_model="numpy", nogil=True)
+
+FLOATS = types.float64[::1]
+CONTROL_SIGNATURE = types.void(FLOATS, FLOATS, FLOATS, FLOATS)
+
+
+def control_kernel(function):
+    """Compile a control law to a first-class function, so that one compiled loop serves them all.
+
+    function(parameters, memory, measurement, command): four (n,) float64 arrays; it reads the
+    first and third and writes the second and fourth. Under NUMBA_DISABLE_JIT it stays Python.
+    """
+    if numba.config.DISABLE_JIT:
+        return function
+    return numba.cfunc(CONTROL_SIGNATURE, cache=True, error_model="numpy")(function)
+
+
+if numba.config.DISABLE_JIT:
+
+    class Box:
+        """Plain twin of the compiled box, for runs with the JIT off."""
+
+        def __init__(self, scene, work):
+            self.scene = scene
+            self.work = work
+
+else:
+    from numba.experimental import structref
+
+    @structref.register
+    class _BoxType(types.StructRef):
+        def preprocess_fields(self, fields):
+            return tuple((name, types.unliteral(kind)) for name, kind in fields)
+
+    class Box(structref.StructRefProxy):
+        """What Python holds and hands to kernels: a scene and its scratch arrays.
+
+        A structref crosses from Python, and into prange, far cheaper than nested NamedTuples.
+        """
+
+        def __new__(cls, scene, work):
+            return structref.StructRefProxy.__new__(cls, scene, work)
+
+    structref.define_proxy(Box, _BoxType, ["scene", "work"])

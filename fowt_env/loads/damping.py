@@ -1,0 +1,41 @@
+"""Additional linear damping and yaw spring of the platform definition, theory.md 5.6."""
+
+from typing import NamedTuple
+
+from fowt_env.jit import kernel
+from fowt_env.state import NO_LOAD, State, Wrench
+
+
+class LinearDamping(NamedTuple):
+    """Linear damping on the platform's own (body) velocity, and the delta lines' yaw spring."""
+
+    surge: float  # N s/m
+    sway: float
+    heave: float
+    roll: float  # N m s/rad
+    platform_pitch: float
+    yaw: float
+    yaw_stiffness: float  # N m/rad
+
+
+def build_damping(hydro):
+    """LinearDamping of a description.Hydro, or None where every coefficient is zero."""
+    values = (*hydro.linear_damping, hydro.yaw_stiffness)
+    if not any(values):
+        return None
+    return LinearDamping(*(float(v) for v in values))
+
+
+@kernel
+def damping_load(pose, x, damping):
+    """-diag(B) (v, w) and the yaw spring on the yaw angle, body components."""
+    if damping is None:
+        return NO_LOAD
+    return Wrench(
+        -damping.surge * pose.vx,
+        -damping.sway * pose.vy,
+        -damping.heave * pose.vz,
+        -damping.roll * pose.wx,
+        -damping.platform_pitch * pose.wy,
+        -damping.yaw * pose.wz - damping.yaw_stiffness * x[State.YAW],
+    )

@@ -1,0 +1,185 @@
+"""Torque law, shaft balance and blade-pitch actuator of a geared turbine (theory.md, section 3)."""
+
+from math import sqrt
+from typing import NamedTuple
+
+from fowt_env.errors import InputError, unknown
+from fowt_env.jit import kernel
+
+REGION3 = ("constant_torque", "constant_power")
+
+
+class TorqueCurve(NamedTuple):
+    """Generator torque over generator speed, both on the high-speed shaft (theory.md, section 3).
+
+    In region 3 the torque is region3_torque + region3_power / speed; one of the two is zero.
+    """
+
+    cut_in_speed: float  # region 1 to 1.5, rad/s
+    region2_start_speed: float  # region 1.5 to 2
+    region25_start_speed: float  # region 2 to 2.5, where the parabola meets the slip line
+    region3_start_speed: float  # region 2.5 to 3
+    synchronous_speed: float  # where the slip line of region 2.5 meets zero torque
+    region15_slope: float  # N m/(rad/s)
+    region2_constant: float  # N m/(rad/s)^2
+    region25_slope: float  # N m/(rad/s)
+    region3_torque: float  # N m
+    region3_power: float  # W
+    region3_min_pitch: float  # region 3 whatever the speed at this blade pitch and above, rad
+    maximum_torque: float  # N m
+
+
+class Drivetrain(NamedTuple):
+    """Rigid shaft with gearbox: the figures of theory.md Eq. (7).
+
+    inertia_row is I_rx = I_rotor + N_g^2 I_g, the inertia of the rotor-speed equation; coupling is
+    H = I_rotor + N_g I_g, the angular momentum per unit rotor speed.
+    """
+
+    gear_ratio: float  # N_g
+    inertia_row: float  # kg m2
+    coupling: float  # kg m2
+    mesh_loss: float  # zeta_m
+    bearing_loss_coefficient: float  # zeta_v tau_0 / w_b0, N m/(rad/s)
+    generator_efficiency: float  # electrical over mechanical generator power
+
+
+class PitchActuator(NamedTuple):
+    """First-order collective blade-pitch actuator with rate and position limits."""
+
+    time_constant: float  # s; 0: the command is followed at once
+    rate_limit: float  # rad/s
+    minimum: float  # rad
+    maximum: float  # rad
+
+
+def build_torque_curve(torque_law, region3="constant_torque"):
+    """TorqueCurve of a description.TorqueLaw; region3 is "constant_torque" or "constant_power".
+
+    The slip line of region 2.5 rises from the synchronous speed, region3_start/(1 + slip), to the
+    region-3 torque at region3_start; it takes over from the parabola where the two meet.
+    Raises: InputError for an unknown region3, or where line and parabola do not meet in between.
+    """
+    if region3 not in REGION3:
+        raise unknown("region3 law", region3, REGION3)
+    constant = region3 == "constant_torque"
+    start3 = torque_law.transition_speed
+    torque3 = torque_law.rated_torque if constant else torque_law.rated_power / start3
+    synchronous = start3 / (1.0 + 0.01 * torque_law.slip_percent)
+    slope25 = torque3 / (start3 - synchronous)
+    k2, start2 = torque_law.region2_constant, torque_law.region2_start_speed
+    discriminant = slope25 * (slope25 - 4.0 * k2 * synchronous)
+    start25 = (slope25 - sqrt(discriminant)) / (2.0 * k2) if discriminant >= 0.0 else float("nan")
+    if not start2 <= start25 <= start3:
+        raise InputError(
+            f"torque_law.region2_constant = {k2}: region 2 does not meet the slip line of region 2.5 between"
+            f" region2_start_speed = {start2} and transition_speed = {start3} rad/s; or change slip_percent"
+        )
+    return TorqueCurve(
+        cut_in_speed=float(torque_law.cut_in_speed),
+        region2_start_speed=float(start2),
+        region25_start_speed=float(start25),
+        region3_start_speed=float(start3),
+        synchronous_speed=float(synchronous),
+        region15_slope=float(k2 * start2**2 / (start2 - torque_law.cut_in_speed)),
+        region2_constant=float(k2),
+        region25_slope=float(slope25),
+        region3_torque=float(torque_law.rated_torque) if constant else 0.0,
+        region3_power=0.0 if constant else float(torque_law.rated_power),
+        region3_min_pitch=float(torque_law.region3_min_pitch),
+        maximum_torque=float(torque_law.max_torque),
+    )
+
+
+def build_drivetrain(turbine):
+    """Drivetrain of a description.Turbine."""
+    shaft, rotor_inertia = turbine.drivetrain, turbine.rotor.inertia
+    ratio = shaft.gear_ratio
+    rated_torque = ratio * turbine.torque_law.rated_torque  # tau_0, low-speed shaft
+    return Drivetrain(
+        gear_ratio=float(ratio),
+        inertia_row=float(rotor_inertia + ratio**2 * shaft.generator_inertia),
+        coupling=float(rotor_inertia + ratio * shaft.generator_inertia),
+        mesh_loss=float(shaft.mesh_loss),
+        bearing_loss_coefficient=float(shaft.bearing_loss * rated_torque / turbine.rated_rotor_speed),
+        generator_efficiency=float(shaft.generator_efficiency),
+    )
+
+
+def build_pitch_actuator(pitch_drive):
+    """PitchActuator of a description.PitchDrive."""
+    return PitchActuator(
+        time_constant=float(pitch_drive.time_constant),
+        rate_limit=float(pitch_drive.rate_limit),
+        minimum=float(pitch_drive.minimum),
+        maximum=float(pitch_drive.maximum),
+    )
+
+
+@kernel
+def limited(value, low, high):
+    """The value, or the limit that it passes."""
+    return min(max(value, low), high)
+
+
+@kernel
+def generator_torque(generator_speed, blade_pitch, curve):
+    """Generator torque of the static curve, N m on the high-speed shaft (theory.md, section 3).
+
+    Region 3 is tested first, so a blade pitch of region3_min_pitch and above forces it at any
+    forward speed, as published. A shaft that stands or turns backwards gives no torque: it brakes
+    the rotor at most to rest, never drives it.
+    """
+    if generator_speed <= 0.0:
+        return 0.0
+    if generator_speed >= curve.region3_start_speed or blade_pitch >= curve.region3_min_pitch:
+        torque = curve.region3_torque + curve.region3_power / generator_speed
+    elif generator_speed <= curve.cut_in_speed:
+        torque = 0.0
+    elif generator_speed < curve.region2_start_speed:
+        torque = curve.region15_slope * (generator_speed - curve.cut_in_speed)
+    elif generator_speed < curve.region25_start_speed:
+        torque = curve.region2_constant * generator_speed**2
+    else:
+        torque = curve.region25_slope * (generator_speed - curve.synchronous_speed)
+    return min(torque, curve.maximum_torque)
+
+
+@kernel
+def shaft_torque(aerodynamic_torque, torque, rotor_speed, drivetrain):
+    """Torque Q_b that accelerates the rotor, N m on the low-speed shaft (theory.md Eq. (7)).
+
+    torque is the generator's, on the high-speed shaft, positive against positive rotation. The mesh
+    loss always takes power: it adds to the torque where the rotor drives the generator, and lessens
+    it where the generator drives the rotor.
+    """
+    gearbox = drivetrain.gear_ratio * torque
+    if torque * rotor_speed >= 0.0:
+        gearbox *= 1.0 + drivetrain.mesh_loss
+    else:
+        gearbox /= 1.0 + drivetrain.mesh_loss
+    return aerodynamic_torque - gearbox - drivetrain.bearing_loss_coefficient * rotor_speed
+
+
+@kernel
+def pitch_rate(blade_pitch, command, actuator):
+    """Rate of change of the blade pitch, rad/s (theory.md Eq. (8)); 0 without lag, see followed_pitch."""
+    if actuator.time_constant <= 0.0:
+        return 0.0
+    target = limited(command, actuator.minimum, actuator.maximum)
+    rate = (target - blade_pitch) / actuator.time_constant
+    return limited(rate, -actuator.rate_limit, actuator.rate_limit)
+
+
+@kernel
+def followed_pitch(blade_pitch, command, dt, actuator):
+    """Blade pitch to start a step of dt with, rad: an actuator without lag has no rate to integrate.
+
+    With lag: unchanged. Without: the command, within the position limits and the way that the rate
+    limit allows in dt.
+    """
+    if actuator.time_constant > 0.0:
+        return blade_pitch
+    target = limited(command, actuator.minimum, actuator.maximum)
+    way = actuator.rate_limit * dt
+    return blade_pitch + limited(target - blade_pitch, -way, way)

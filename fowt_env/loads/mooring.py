@@ -1,0 +1,315 @@
+"""Mooring lines as quasi-static elastic catenaries on a flat seabed with friction (theory.md, 5.5).
+
+Equations (18)(19) and (18t)(19t) are solved in lengths of the line and forces of its weight,
+with h = H/(wL), v = V/(wL), kappa = wL/EA, and X, Z the spans over L. One unknown is eliminated in
+closed form, which leaves one strictly increasing scalar equation per regime; the regime is known
+before the first iteration. So a bracketed Newton iteration finds the one solution from any start.
+"""
+
+from math import asinh, expm1, hypot, log1p, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from fowt_env.counters import Counter
+from fowt_env.jit import kernel
+from fowt_env.state import NO_LOAD, Wrench
+
+SLACK, TOUCHDOWN, SUSPENDED = 0, 1, 2  # regimes, as written to the last column of `lines`
+
+N_LINE = 6  # columns of `lines`: H, V, fairlead tension, anchor tension, length on seabed, regime
+
+# The error after a Newton step is about the square of that step, so stopping on this relative step
+# leaves rounding, and a result that does not remember where the iteration started.
+LAST_STEP = 3e-8
+# Newton needs 2 or 3 steps warm and at most a dozen from nothing; after this many, halve the bracket instead.
+NEWTON_STEPS = 30
+MAX_STEPS = 120  # enough halvings (of the logarithm) for any bracket of finite doubles
+BRACKET_WIDTH = 4e-16  # relative: no double is left in between
+DEEPEST_SAG = 300.0  # above any root for spans that NEGLIGIBLE lets through; its sinh is finite
+NEGLIGIBLE = 1e-100  # spans over L below this count as none, far below the rounding of any real one
+
+
+class Mooring(NamedTuple):
+    """All lines of a platform: anchors in inertial, fairleads in body coordinates."""
+
+    anchor: np.ndarray  # (n, 3), m
+    fairlead: np.ndarray  # (n, 3), m
+    length: np.ndarray  # (n,), unstretched, m
+    weight: np.ndarray  # (n,), in water per unstretched length, N/m
+    EA: np.ndarray  # (n,), N
+    friction: np.ndarray  # (n,), seabed friction coefficient C_B
+
+
+class Catenary(NamedTuple):
+    """State of one line: tensions in N, lengths in m (unstretched)."""
+
+    H: float  # horizontal tension at the fairlead
+    V: float  # vertical tension at the fairlead, pulling down
+    fairlead_tension: float
+    anchor_tension: float
+    seabed_length: float
+    regime: int
+    converged: bool
+
+
+def build_mooring(lines):
+    """Mooring of a platform's `description.Line` records; None where it has no lines."""
+    if not lines:
+        return None
+
+    def column(name):
+        return np.ascontiguousarray([getattr(line, name) for line in lines], dtype=np.float64)
+
+    return Mooring(
+        anchor=column("anchor"),
+        fairlead=column("fairlead"),
+        length=column("length"),
+        weight=column("wet_weight"),
+        EA=column("EA"),
+        friction=column("seabed_friction"),
+    )
+
+
+@kernel
+def suspended_residual(mu, X, Z, k):
+    """(f, df/dmu, v, dv/dmu) of a line clear of the seabed; f = 0 solves theory.md Eqs. (18)(19).
+
+    mu = (X - kappa h)/(2h) is the sag parameter (0 straight, growing with sag) and k = kappa/2.
+    With it h = X/(2(mu + k)) and v = 1/2 + Z/(2(tanh mu + k)), and the length of the catenary,
+    (Z - 2kv + k)^2 + (2h sinh mu)^2 = 1, is the equation that is left. f increases with mu.
+    No difference of nearly equal terms occurs, however taut the line.
+    """
+    e = expm1(mu)
+    s = 0.5 * (e + e / (1.0 + e))
+    c = 1.0 + e - s
+    t = s / c
+    tk = 1.0 / (t + k)
+    mk = 1.0 / (mu + k)
+    dt = 1.0 / (c * c)
+    P = Z * t * tk
+    Q = X * s * mk
+    length = sqrt(P * P + Q * Q)
+    dP = Z * k * dt * tk * tk
+    dQ = X * (c - s * mk) * mk
+    dv = -0.5 * Z * dt * tk * tk
+    return length - 1.0, (P * dP + Q * dQ) / length, 0.5 + 0.5 * Z * tk, dv
+
+
+@kernel
+def touchdown_residual(h, Z, kappa, friction, s, excess):
+    """(f, df/dh, v, dv/dh) of a line on the seabed; f = 0 solves theory.md Eqs. (18t)(19t).
+
+    s: hanging length of the slack line; excess = X - (1 - s) > 0, the span beyond the slack one.
+    (19t) is quadratic in v^2 and gives v(h) > s. What is left of (18t), less its slack limit, has
+    the factor h in each term (through v - s = h drop), so that h keeps its digits as it vanishes.
+    f increases with h.
+    """
+    q = 2.0 * Z * (Z + 2.0 * h)
+    q /= 1.0 + kappa * (Z + h) + sqrt(1.0 + kappa * (2.0 * (Z + h) + kappa * h * h))
+    v = sqrt(q)
+    a = sqrt(h * h + q)
+    ah = 1.0 / (a + h)
+    lift = q * ah  # a - h
+    angle = log1p((v + lift) / h)  # asinh(v/h)
+    drop = v * (1.0 + h / (a + v)) * ah / (1.0 + 0.5 * kappa * (s + v))
+    b = max(1.0 - v, 0.0)
+    p = b if h >= friction * b else h / friction  # length on the seabed that is under tension
+    grip = kappa * friction * p
+    f = h * (angle + kappa * (v + p) - drop) - 0.5 * grip * p - excess
+    dv = v * ah / (1.0 + kappa * a)
+    slope = angle - v / a + kappa * (v + p) + (grip - lift / a) * dv
+    return f, slope, v, dv
+
+
+@kernel
+def next_iterate(x, step, low, high, n):
+    """Newton's iterate, or one inside the bracket (low, high) where Newton leaves it or dawdles."""
+    new = x + step
+    if low < new < high and n < NEWTON_STEPS:
+        return new
+    if low > 0.0:
+        return sqrt(low) * sqrt(high)
+    return 0.1 * x
+
+
+@kernel
+def solve_suspended(X, Z, kappa, h0):
+    """(h, v, converged) of a line clear of the seabed, started from h0 if positive."""
+    k = 0.5 * kappa
+    if X <= NEGLIGIBLE:
+        return 0.0, 0.5 + (Z - 1.0) / kappa, True
+    chord = hypot(X, Z)
+    low, high = k / (1.2 * chord + k), DEEPEST_SAG  # f(low) < 0, for f + 1 < chord sinh(low)/(low + k)
+    mu = X / (2.0 * h0) - k if h0 > 0.0 else 0.0
+    if not low < mu < high:
+        mu = (6.0 * k) ** (1.0 / 3.0)  # a chord as long as the line
+        if chord > 1.0:
+            mu = min(mu, k / (chord - 1.0))
+        else:
+            mu = max(mu, sqrt(3.0 * (1.0 - chord * chord)) / X)
+        mu = min(max(mu, low), 0.5 * high)
+    for n in range(MAX_STEPS):
+        f, slope, v, dv = suspended_residual(mu, X, Z, k)
+        step = -f / slope if slope > 0.0 else 0.0
+        if slope > 0.0 and abs(step) <= LAST_STEP * mu:
+            return X / (2.0 * (mu + step + k)), v + dv * step, True
+        if f > 0.0:
+            high = mu
+        else:
+            low = mu
+        if high - low <= BRACKET_WIDTH * high:
+            return X / (2.0 * (mu + k)), v, True
+        mu = next_iterate(mu, step, low, high, n)
+    return X / (2.0 * (mu + k)), v, False
+
+
+@kernel
+def solve_touchdown(X, Z, kappa, friction, s, excess, high, h0):
+    """(h, v, converged) of a line partly on the seabed, h in (0, high), started from h0 if it fits."""
+    low = 0.0
+    h = h0
+    if not low < h < high:
+        chord = hypot(X, Z)
+        h = 0.5 * high
+        if chord < 1.0:
+            h = min(h, 0.5 * X * X / sqrt(3.0 * (1.0 - chord * chord)))
+    for n in range(MAX_STEPS):
+        f, slope, v, dv = touchdown_residual(h, Z, kappa, friction, s, excess)
+        step = -f / slope if slope > 0.0 else 0.0
+        if slope > 0.0 and abs(step) <= LAST_STEP * h:
+            return h + step, v + dv * step, True
+        if f > 0.0:
+            high = h
+        else:
+            low = h
+        if high - low <= BRACKET_WIDTH * high:
+            return h, v, True
+        h = next_iterate(h, step, low, high, n)
+    return h, v, False
+
+
+@kernel
+def catenary(x_f, z_f, length, weight, EA, friction, h0):
+    """Catenary of one line whose anchor lies on a flat seabed, for any finite spans.
+
+    x_f >= 0, z_f: horizontal and vertical distance from anchor to fairlead, m. h0: horizontal
+    tension to start from, N (0: none); it changes the effort, not the result beyond 1e-12.
+    The fairlead at or below the anchor (z_f <= 0) counts as lying on the seabed: V = 0 and the line
+    pulls horizontally. A fairlead straight above the anchor gives H = 0: hanging or stretched
+    vertically. Slack: the rest of the line lies without tension. x_f beyond the stretch of any real
+    line is answered with the tension that linear elasticity gives.
+    NaN in gives NaN out, not converged. theory.md, 5.5.
+    """
+    kappa = weight * length / EA
+    W = weight * length
+    X = x_f / length
+    Z = z_f / length
+    if Z < 0.0:
+        Z = 0.0
+    s = 2.0 * Z / (1.0 + sqrt(1.0 + 2.0 * kappa * Z))
+    excess = X - 1.0 + s
+    if excess <= NEGLIGIBLE:
+        V = W * s
+        return Catenary(0.0, V, V, 0.0, length * (1.0 - s), SLACK, True)
+
+    # The whole line is just off the seabed (v = 1) where tanh mu = Z - k; more span lifts it.
+    zeta = Z - 0.5 * kappa
+    high = (excess + Z) / kappa + friction  # s <= Z, and the seabed part alone stretches this far
+    suspended = zeta >= 1.0
+    if 0.0 < zeta < 1.0:
+        h_lift = 0.5 * (1.0 - zeta) * (1.0 + zeta) / zeta
+        x_lift = h_lift * (log1p(2.0 * zeta / (1.0 - zeta)) + kappa)
+        suspended = X >= x_lift
+        high = min(high, h_lift)
+    if suspended:
+        h, v, converged = solve_suspended(X, Z, kappa, h0 / W)
+        v = max(v, 1.0)  # rounding at lift-off
+        T_anchor = W * hypot(h, v - 1.0)
+        return Catenary(W * h, W * v, W * hypot(h, v), T_anchor, 0.0, SUSPENDED, converged)
+    h, v, converged = solve_touchdown(X, Z, kappa, friction, s, excess, high, h0 / W)
+    v = min(v, 1.0)
+    T_anchor = W * max(h - friction * (1.0 - v), 0.0)
+    return Catenary(W * h, W * v, W * hypot(h, v), T_anchor, length * (1.0 - v), TOUCHDOWN, converged)
+
+
+@kernel
+def mooring_load(pose, mooring, lines, counters):
+    """Wrench of all mooring lines on the platform, body axes, about the body origin (theory.md, 5.5).
+
+    lines: (n, 6), carried between calls: H, V, fairlead tension, anchor tension, length on the
+    seabed, regime (0 slack, 1 touchdown, 2 suspended). H is where the next call starts; zeros are
+    a cold start. counters[MOORING_UNCONVERGED] counts lines that missed the tolerance.
+    """
+    if mooring is None:
+        return NO_LOAD
+    fx = fy = fz = mx = my = mz = 0.0
+    for i in range(mooring.length.shape[0]):
+        bx = mooring.fairlead[i, 0]
+        by = mooring.fairlead[i, 1]
+        bz = mooring.fairlead[i, 2]
+        dx = mooring.anchor[i, 0] - (pose.x + pose.r11 * bx + pose.r12 * by + pose.r13 * bz)
+        dy = mooring.anchor[i, 1] - (pose.y + pose.r21 * bx + pose.r22 * by + pose.r23 * bz)
+        z_f = pose.z + pose.r31 * bx + pose.r32 * by + pose.r33 * bz - mooring.anchor[i, 2]
+        x_f = hypot(dx, dy)
+        line = catenary(
+            x_f,
+            z_f,
+            mooring.length[i],
+            mooring.weight[i],
+            mooring.EA[i],
+            mooring.friction[i],
+            lines[i, 0],
+        )
+        lines[i, 0] = line.H
+        lines[i, 1] = line.V
+        lines[i, 2] = line.fairlead_tension
+        lines[i, 3] = line.anchor_tension
+        lines[i, 4] = line.seabed_length
+        lines[i, 5] = line.regime
+        if not line.converged:
+            counters[Counter.MOORING_UNCONVERGED] += 1.0
+        pull = line.H / x_f if x_f > 0.0 else 0.0  # a vertical line pulls nowhere
+        X = pull * dx
+        Y = pull * dy
+        Z = -line.V
+        px = pose.r11 * X + pose.r21 * Y + pose.r31 * Z
+        py = pose.r12 * X + pose.r22 * Y + pose.r32 * Z
+        pz = pose.r13 * X + pose.r23 * Y + pose.r33 * Z
+        fx += px
+        fy += py
+        fz += pz
+        mx += by * pz - bz * py
+        my += bz * px - bx * pz
+        mz += bx * py - by * px
+    return Wrench(fx, fy, fz, mx, my, mz)
+
+
+def line_shape(H, V, x_f, length, weight, EA, friction=0.0, n=41):
+    """Points of a line in its vertical plane, anchor first: (n, 2) distance and height from the anchor, m.
+
+    H, V: fairlead tensions, N, as `catenary` and the columns of `lines` have them; x_f: horizontal
+    span, m, which places the slack line (drawn straight along the seabed, then up).
+    The points are evenly spaced in unstretched length.
+    """
+    along = np.linspace(0.0, length, n)
+    seabed = min(max(length - V / weight, 0.0), length)
+    lifted = np.maximum(along - seabed, 0.0)
+    V_low = max(V - weight * length, 0.0)
+    stretch = (V_low * lifted + 0.5 * weight * lifted**2) / EA
+    if H <= 0.0:
+        x = np.where(lifted > 0.0, x_f, x_f * along / max(seabed, 1e-300))
+        return np.column_stack([x if V_low == 0.0 else np.full(n, x_f), lifted + stretch])
+    grip = friction * weight
+    taut = seabed if H >= grip * seabed else H / grip
+
+    def elongation(d):
+        """Of the last d metres on the seabed; tension falls towards the anchor."""
+        return (H - 0.5 * grip * d) * d / EA
+
+    lying = np.minimum(along, seabed)
+    x = lying + elongation(taut) - elongation(np.minimum(seabed - lying, taut))
+    V_up = V_low + weight * lifted
+    x += H / weight * (np.arcsinh(V_up / H) - asinh(V_low / H)) + H * lifted / EA
+    z = lifted * (V_up + V_low) / (np.hypot(H, V_up) + hypot(H, V_low)) + stretch
+    return np.column_stack([x, z])

@@ -1,0 +1,331 @@
+"""Strip (Morison) loads of waves, current and own motion on the hull, theory.md Eqs (16)-(17).
+
+Nodes lie in equal cells of two Gauss points per hull section. Along the axis the complex amplitude
+of a component is exp(kappa z), so it is carried from node to node by multiplication instead of an
+exponential, sine and cosine each; tests compare this with the plain sum (tests/naive).
+"""
+
+from math import cos, exp, hypot, pi, sin, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from fowt_env.jit import kernel
+from fowt_env.state import Wrench
+from fowt_env.weather.waves import NEGLIGIBLE, elevation, ramp_factor
+
+CELL = 2.0  # m, longest cell below the surface section: 1e-5 of the first harmonic at T = 5 s
+SURFACE_CELLS = 4  # cells between the last joint and the moving surface
+SURFACE_ROUNDS = 8  # fixed-point rounds for the surface on the axis; slope*tilt contracts by 10 or more
+SURFACE_TOLERANCE = 1e-10  # m
+EXTINCT = 1e-24  # squared magnitude (1e-12 of the surface value) below which a component is dropped
+GAUSS_OFFSET = 0.5 * (1.0 - 1.0 / sqrt(3.0))  # first two-point Gauss node in a unit cell
+GAUSS_GAP = 1.0 / sqrt(3.0)
+
+# rows of the node scratch array
+U, V, W, DU, DV, DW, P = range(7)
+
+
+class Strips(NamedTuple):
+    """Strip description of the hull. Sections run downwards from the surface one."""
+
+    section_top: np.ndarray  # (m,) body z; [0] is replaced by the instantaneous surface
+    section_bottom: np.ndarray  # (m,)
+    cells: np.ndarray  # (m,) int64
+    first_node: np.ndarray  # (m,) int64
+    node_z: np.ndarray  # (n,) body z at rest, top to bottom in each section
+    node_weight: np.ndarray  # (n,) m
+    node_diameter: np.ndarray  # (n,)
+    node_area_slope: np.ndarray  # (n,) dA/dz, m
+    density: float
+    added_mass_coefficient: float
+    drag_coefficient: float
+    heave_added_mass: float  # A33, kg
+    axial_drag_coefficient: float
+    keel_z: float
+    keel_area: float
+    top_z: float  # of the hull: the surface integral ends there
+    depth: float
+    s0_below: float  # added-mass integrals below the surface section
+    s1_below: float
+    s2_below: float
+    instantaneous_position: bool
+    instantaneous_surface: bool
+    wheeler: bool
+
+
+class Current(NamedTuple):
+    """Steady current: velocity at the surface and power-law decay to the seabed (exponent 0: uniform)."""
+
+    u: float
+    v: float
+    exponent: float
+
+
+class StripLoad(NamedTuple):
+    """Hydrodynamic wrench without the added-mass part, and that part's integrals S_k (kg m^k), A33."""
+
+    wrench: Wrench
+    s0: float
+    s1: float
+    s2: float
+    a33: float
+
+
+def build_strips(hull, hydro, *, density, depth, position, surface, stretching, cell=CELL):
+    """Strips from description.Hull and description.Hydro with the three kinematics switches."""
+    z = list(hull.z)
+    tops, bottoms, diameters = [], [], []
+    for i in range(len(z) - 2, -1, -1):
+        tops.append(z[i + 1])
+        bottoms.append(z[i])
+        diameters.append((hull.diameter[i], hull.diameter[i + 1]))
+    tops[0] = 0.0
+    cells, first, node_z, weight, diameter, slope = [], [], [], [], [], []
+    for number, (top, bottom, (d0, d1)) in enumerate(zip(tops, bottoms, diameters, strict=True)):
+        height = top - bottom
+        n = SURFACE_CELLS if number == 0 else max(2, int(np.ceil(height / cell)))
+        cells.append(n)
+        first.append(len(node_z))
+        for c in range(n):
+            for offset in (GAUSS_OFFSET, 1.0 - GAUSS_OFFSET):
+                at = top - height * (c + offset) / n
+                share = (at - bottom) / height if number > 0 else 0.0
+                d = d0 + (d1 - d0) * share
+                node_z.append(at)
+                weight.append(0.5 * height / n)
+                diameter.append(d)
+                slope.append(0.5 * pi * d * (d1 - d0) / height)
+    array = np.array([node_z, weight, diameter, slope])
+    below = first[1] if len(first) > 1 else len(node_z)
+    mass = density * hydro.added_mass_coefficient * 0.25 * pi * array[2, below:] ** 2 * array[1, below:]
+    zb = array[0, below:]
+    return Strips(
+        np.array(tops, dtype=np.float64),
+        np.array(bottoms, dtype=np.float64),
+        np.array(cells, dtype=np.int64),
+        np.array(first, dtype=np.int64),
+        *(np.ascontiguousarray(row) for row in array),
+        float(density),
+        float(hydro.added_mass_coefficient),
+        float(hydro.drag_coefficient),
+        float(hydro.heave_added_mass),
+        float(hydro.axial_drag_coefficient),
+        float(hull.z[0]),
+        float(0.25 * pi * hull.diameter[0] ** 2),
+        float(hull.z[-1]),
+        float(depth),
+        float(mass.sum()),
+        float((mass * zb).sum()),
+        float((mass * zb * zb).sum()),
+        position == "instantaneous",
+        surface == "instantaneous",
+        stretching == "wheeler",
+    )
+
+
+@kernel
+def axis_surface(t, pose, strips, waves):
+    """(z_surf, eta): body z where the axis meets the water surface, and the elevation there."""
+    eta = 0.0
+    if not strips.instantaneous_position:
+        if waves is not None:
+            eta = elevation(t, 0.0, 0.0, waves)
+        z = eta if strips.instantaneous_surface else 0.0
+        return min(max(z, strips.section_bottom[0]), strips.top_z), eta
+    tilt = max(pose.r33, 0.1)
+    z = -pose.z / tilt
+    if waves is not None:
+        for _ in range(SURFACE_ROUNDS):
+            eta = elevation(t, pose.x + pose.r13 * z, pose.y + pose.r23 * z, waves)
+            if not strips.instantaneous_surface:
+                break
+            new = (eta - pose.z) / tilt
+            change = abs(new - z)
+            z = new
+            if change < SURFACE_TOLERANCE:
+                break
+    return min(max(z, strips.section_bottom[0]), strips.top_z), eta
+
+
+@kernel
+def strip_kinematics(t, pose, z_surf, eta, strips, waves, kin):
+    """Fill kin (7, n_nodes) with velocity, acceleration (inertial axes) and dynamic pressure at the nodes.
+
+    z_surf, eta   from axis_surface
+    Returns the keel's (p, u, v, w, du, dv, dw), in Pa, m/s and m/s2.
+    """
+    kin[:] = 0.0
+    h = waves.depth
+    if strips.instantaneous_position:
+        x0, y0, z0, r13, r23, r33 = pose.x, pose.y, pose.z, pose.r13, pose.r23, pose.r33
+    else:
+        x0 = y0 = z0 = r13 = r23 = 0.0
+        r33 = 1.0
+    stretch = 1.0
+    drop = 0.0
+    if strips.wheeler:
+        stretch = h / (h + eta)
+        drop = stretch * eta
+    base_z = stretch * z0 - drop
+    kp = ku = kv = kw = kdu = kdv = kdw = 0.0
+    for j in range(waves.omega.shape[0]):
+        k, om, a = waves.wave_number[j], waves.omega[j], waves.velocity[j]
+        cb, sb = waves.cos_heading[j], waves.sin_heading[j]
+        phase = k * (x0 * cb + y0 * sb) - om * t + waves.phase[j]
+        rate = k * (r13 * cb + r23 * sb)  # phase per metre of axis
+        up = k * stretch * r33
+        pressure = waves.density * om / k
+        bottom_wave = 2.0 * k * (h + strips.keel_z) < NEGLIGIBLE  # the seabed reflection reaches the keel
+        alive = True
+        for section in range(strips.cells.shape[0]):
+            if not alive:
+                break
+            top = z_surf if section == 0 else strips.section_top[section]
+            cells = strips.cells[section]
+            height = (top - strips.section_bottom[section]) / cells
+            node = strips.first_node[section]
+            za = top - GAUSS_OFFSET * height
+            m = exp(k * base_z + up * za)
+            ar, ai = m * cos(phase + rate * za), m * sin(phase + rate * za)
+            gap = GAUSS_GAP * height
+            m = exp(-up * gap)
+            c, s = cos(rate * gap), -sin(rate * gap)
+            br, bi = m * (ar * c - ai * s), m * (ar * s + ai * c)
+            m = exp(-up * height)
+            qc, qs = cos(rate * height), -sin(rate * height)
+            qr, qi = m * qc, m * qs
+            # reflected part: exp(-k (Z' + 2h)) with the same phase
+            ra = rb = grow = 0.0
+            car = cai = cbr = cbi = 0.0
+            if bottom_wave:
+                grow = exp(up * height)
+                ra = exp(-k * base_z - up * za - 2.0 * k * h)
+                rb = ra * exp(up * gap)
+                car, cai = cos(phase + rate * za), sin(phase + rate * za)
+                cbr, cbi = car * c - cai * s, car * s + cai * c
+            for _ in range(cells):
+                for point in range(2):
+                    er, ei = (ar, ai) if point == 0 else (br, bi)
+                    fr = fi = 0.0
+                    if bottom_wave:
+                        if point == 0:
+                            fr, fi = ra * car, ra * cai
+                        else:
+                            fr, fi = rb * cbr, rb * cbi
+                    even_c, even_s = a * (er + fr), a * (ei + fi)
+                    odd_c, odd_s = a * (er - fr), a * (ei - fi)
+                    kin[U, node] += even_c * cb
+                    kin[V, node] += even_c * sb
+                    kin[W, node] += odd_s
+                    kin[DU, node] += om * even_s * cb
+                    kin[DV, node] += om * even_s * sb
+                    kin[DW, node] -= om * odd_c
+                    kin[P, node] += pressure * even_c
+                    node += 1
+                ar, ai = ar * qr - ai * qi, ar * qi + ai * qr
+                br, bi = br * qr - bi * qi, br * qi + bi * qr
+                if bottom_wave:
+                    car, cai = car * qc - cai * qs, car * qs + cai * qc
+                    cbr, cbi = cbr * qc - cbi * qs, cbr * qs + cbi * qc
+                    ra *= grow
+                    rb *= grow
+                elif ar * ar + ai * ai < EXTINCT:
+                    alive = False
+                    break
+        if alive:
+            zk = strips.keel_z
+            m = exp(k * base_z + up * zk)
+            r = exp(-k * base_z - up * zk - 2.0 * k * h) if bottom_wave else 0.0
+            c, s = cos(phase + rate * zk), sin(phase + rate * zk)
+            even, odd = a * (m + r), a * (m - r)
+            kp += pressure * even * c
+            ku += even * c * cb
+            kv += even * c * sb
+            kw += odd * s
+            kdu += om * even * s * cb
+            kdv += om * even * s * sb
+            kdw -= om * odd * c
+    f = ramp_factor(t, waves.ramp)
+    if f != 1.0:
+        kin *= f
+    return f * kp, f * ku, f * kv, f * kw, f * kdu, f * kdv, f * kdw
+
+
+@kernel
+def current_at(z, depth, current):
+    """(u, v) of the current at inertial height z."""
+    if current is None:
+        return 0.0, 0.0
+    share = min(max((depth + z) / depth, 0.0), 1.0) ** current.exponent
+    return current.u * share, current.v * share
+
+
+@kernel
+def morison_load(t, pose, strips, waves, current, kin):
+    """Strip load from the keel to the surface, Eqs (16)-(17), with the axial terms of theory.md 5.4.
+
+    kin: (7, n_nodes) scratch. The section-acceleration term is returned as S_k for the left-hand side.
+    """
+    if strips is None:
+        return StripLoad(Wrench(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0, 0.0)
+    rho, ca = strips.density, strips.added_mass_coefficient
+    z_surf, eta = axis_surface(t, pose, strips, waves)
+    kp = ku = kv = kw = kdu = kdv = kdw = 0.0
+    if waves is not None:
+        kp, ku, kv, kw, kdu, kdv, kdw = strip_kinematics(t, pose, z_surf, eta, strips, waves, kin)
+    fx = fy = fz = mx = my = 0.0
+    surface_height = (z_surf - strips.section_bottom[0]) / strips.cells[0]
+    surface_scale = (z_surf - strips.section_bottom[0]) / (strips.section_top[0] - strips.section_bottom[0])
+    for n in range(strips.node_z.shape[0]):
+        if n < 2 * strips.cells[0]:
+            weight = 0.5 * surface_height
+            z = z_surf + surface_scale * strips.node_z[n]
+        else:
+            weight = strips.node_weight[n]
+            z = strips.node_z[n]
+        d = strips.node_diameter[n]
+        sx = pose.vx + pose.wy * z
+        sy = pose.vy - pose.wx * z
+        u = v = w = 0.0
+        if waves is not None:
+            u, v, w = kin[U, n], kin[V, n], kin[W, n]
+        if current is not None:
+            cu, cv = current_at(pose.z + pose.r33 * z, strips.depth, current)
+            u += cu
+            v += cv
+        rx = pose.r11 * u + pose.r21 * v + pose.r31 * w - sx
+        ry = pose.r12 * u + pose.r22 * v + pose.r32 * w - sy
+        area = 0.25 * pi * d * d
+        drag = 0.5 * rho * strips.drag_coefficient * d * hypot(rx, ry)
+        inertia = rho * area * ca
+        px = drag * rx - inertia * (pose.wy * pose.vz - pose.wz * sy)
+        py = drag * ry - inertia * (pose.wz * sx - pose.wx * pose.vz)
+        if waves is not None:
+            du, dv, dw = kin[DU, n], kin[DV, n], kin[DW, n]
+            froude = rho * area * (1.0 + ca)
+            px += froude * (pose.r11 * du + pose.r21 * dv + pose.r31 * dw)
+            py += froude * (pose.r12 * du + pose.r22 * dv + pose.r32 * dw)
+            fz += weight * kin[P, n] * strips.node_area_slope[n]
+        fx += weight * px
+        fy += weight * py
+        mx -= weight * z * py
+        my += weight * z * px
+    zk = strips.keel_z
+    sx = pose.vx + pose.wy * zk
+    sy = pose.vy - pose.wx * zk
+    if current is not None:
+        cu, cv = current_at(pose.z + pose.r33 * zk, strips.depth, current)
+        ku += cu
+        kv += cv
+    rz = pose.r13 * ku + pose.r23 * kv + pose.r33 * kw - pose.vz
+    az = pose.r13 * kdu + pose.r23 * kdv + pose.r33 * kdw
+    fz += kp * strips.keel_area
+    fz += strips.heave_added_mass * (az - (pose.wx * sy - pose.wy * sx))
+    fz += 0.5 * rho * strips.axial_drag_coefficient * strips.keel_area * abs(rz) * rz
+    zb = strips.section_bottom[0]
+    line = rho * ca * 0.25 * pi * strips.node_diameter[0] ** 2
+    s0 = strips.s0_below + line * (z_surf - zb)
+    s1 = strips.s1_below + line * (z_surf**2 - zb**2) / 2.0
+    s2 = strips.s2_below + line * (z_surf**3 - zb**3) / 3.0
+    return StripLoad(Wrench(fx, fy, fz, mx, my, 0.0), s0, s1, s2, strips.heave_added_mass)

@@ -1,0 +1,58 @@
+"""Wind drag of the tower (theory.md, Eq. 14)."""
+
+from math import sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from fowt_env.jit import kernel
+from fowt_env.state import NO_LOAD, Wrench
+from fowt_env.weather.wind import wind_at
+
+POINTS = 6  # Gauss points; the error against 40 points is below 1e-6 in sheared wind on a pitching tower
+
+
+class TowerDrag(NamedTuple):
+    """Gauss points over the height of the tower. n points."""
+
+    z: np.ndarray  # (n,) m, body frame
+    factor: np.ndarray  # (n,) kg/m: 1/2 air density * drag coefficient * diameter * quadrature weight
+
+
+def build_tower_drag(tower, air_density, points=POINTS):
+    """TowerDrag of a tower description, the diameter linear from base to top."""
+    node, weight = np.polynomial.legendre.leggauss(points)
+    height = tower.top_height - tower.base_height
+    up = 0.5 * (node + 1.0)
+    diameter = tower.base_diameter + up * (tower.top_diameter - tower.base_diameter)
+    factor = 0.5 * air_density * tower.drag_coefficient * diameter * 0.5 * height * weight
+    return TowerDrag(
+        np.ascontiguousarray(tower.base_height + height * up, dtype=np.float64),
+        np.ascontiguousarray(factor, dtype=np.float64),
+    )
+
+
+@kernel
+def tower_load(t, pose, now, series, field, tower):
+    """Wrench of the wind on the tower, with the relative wind normal to its axis; theory.md Eq. (14).
+
+    No tower or no wind series: zero. In still air (a series of zero wind) it always takes energy.
+    """
+    if tower is None:
+        return NO_LOAD
+    if series is None:
+        return NO_LOAD
+    fx = fy = mx = my = 0.0
+    for i in range(tower.z.shape[0]):
+        z = tower.z[i]
+        u, v, w = wind_at(
+            t, pose.x + z * pose.r13, pose.y + z * pose.r23, pose.z + z * pose.r33, now, series, field
+        )
+        wx = pose.r11 * u + pose.r21 * v + pose.r31 * w - pose.vx - pose.wy * z
+        wy = pose.r12 * u + pose.r22 * v + pose.r32 * w - pose.vy + pose.wx * z
+        pressure = tower.factor[i] * sqrt(wx * wx + wy * wy)
+        fx += pressure * wx
+        fy += pressure * wy
+        mx -= z * pressure * wy
+        my += z * pressure * wx
+    return Wrench(fx, fy, 0.0, mx, my, 0.0)

@@ -1,0 +1,108 @@
+"""Optional wake models on top of the quasi-steady induction: skewed wake and dynamic inflow.
+
+Both are off by default (None). Source: theory.md, 5.1.
+"""
+
+from math import atan2, pi, sqrt, tan
+from typing import NamedTuple
+
+from fowt_env.jit import kernel
+from fowt_env.state import State
+
+PER_ELEMENT = 4  # wake states of a blade element: first stage and induced velocity, axial and tangential
+LOWEST_WIND = 1.0  # m/s; weaker wind gets the time constants of this one, which would else grow without bound
+
+
+class SkewedWake(NamedTuple):
+    """Glauert / Pitt-Peters redistribution of the axial induction in yawed or tilted inflow.
+
+    a_skew = a (1 + strength tan(chi/2) (radius/tip radius) cos(psi - psi_0)), with the wake skew angle
+    chi = (0.6 a + 1) chi_0 of each element, chi_0 the angle between shaft and relative wind at the
+    hub, and psi_0 the blade that points downstream. chi is limited to 90 deg.
+    """
+
+    strength: float  # 15 pi/32 in the literature
+
+
+class DynamicInflow(NamedTuple):
+    """Oeye's filter on the induced velocity of every blade element, with two time constants.
+
+    W_int + tau_1 W_int' = W_qs + 0.6 tau_1 W_qs',  W + tau_2 W' = W_int. With the state
+    s = W_int - 0.6 W_qs no derivative of W_qs is needed: tau_1 s' = 0.4 W_qs - s.
+    tau_1 = scale 1.1/(1 - 1.3 min(a, 0.5)) tip_radius/U_0, tau_2 = (0.39 - 0.26 (r/tip_radius)^2) tau_1.
+    """
+
+    scale: float  # 1; other values only to study the effect
+
+
+class Skew(NamedTuple):
+    """Direction of the wind in the rotor plane (unit vector) and its angle to the shaft, rad."""
+
+    y: float
+    z: float
+    angle: float
+
+
+def build_skewed_wake(strength=15.0 * pi / 32.0):
+    """SkewedWake with the given strength."""
+    return SkewedWake(float(strength))
+
+
+def build_dynamic_inflow(scale=1.0):
+    """DynamicInflow with its time constants scaled."""
+    return DynamicInflow(float(scale))
+
+
+def n_wake_states(rotor, wake):
+    """Number of wake states that follow State.WAKE; 0 without rotor or dynamic inflow."""
+    if rotor is None or wake is None:
+        return 0
+    return PER_ELEMENT * rotor.blades * len(rotor.radius)
+
+
+@kernel
+def skew_of(hub, skew):
+    """Skew of the relative wind at the hub; none where no skew model is used."""
+    if skew is None:
+        return Skew(0.0, 0.0, 0.0)
+    across = sqrt(hub.wy * hub.wy + hub.wz * hub.wz)
+    if across == 0.0:
+        return Skew(0.0, 0.0, 0.0)
+    return Skew(hub.wy / across, hub.wz / across, atan2(across, abs(hub.wx)))
+
+
+@kernel
+def skew_factor(induced_normal, v_normal, ey, ez, span, skewed, skew):
+    """Factor on the axial induced velocity of an element at azimuth direction (0, ey, ez)."""
+    if skew is None:
+        return 1.0
+    a = -induced_normal / v_normal if v_normal != 0.0 else 0.0
+    chi = min((0.6 * min(max(a, 0.0), 1.0) + 1.0) * skewed.angle, 0.5 * pi)
+    return 1.0 + skew.strength * tan(0.5 * chi) * span * (skewed.y * ey + skewed.z * ez)
+
+
+@kernel
+def time_constants(a, wind_speed, radius, tip_radius, wake):
+    """(tau_1, tau_2) s of a blade element with axial induction a."""
+    slow = 1.1 / (1.0 - 1.3 * min(max(a, 0.0), 0.5)) * tip_radius / max(wind_speed, LOWEST_WIND)
+    span = radius / tip_radius
+    slow *= wake.scale
+    return slow, (0.39 - 0.26 * span * span) * slow
+
+
+@kernel
+def filtered_induction(section, v_normal, blade, j, wind_speed, wake, x, dx, radius, tip_radius):
+    """(normal, tangential) induced velocity of an element, m/s; quasi-steady without dynamic inflow.
+
+    With it the velocities are states, and their derivatives are written to dx.
+    """
+    if wake is None:
+        return section.induced_normal, section.induced_tangential
+    a = -section.induced_normal / v_normal if v_normal != 0.0 else 0.0
+    slow, fast = time_constants(a, wind_speed, radius[j], tip_radius, wake)
+    i = State.WAKE + PER_ELEMENT * (blade * radius.shape[0] + j)
+    dx[i] = (0.4 * section.induced_normal - x[i]) / slow
+    dx[i + 1] = (x[i] + 0.6 * section.induced_normal - x[i + 1]) / fast
+    dx[i + 2] = (0.4 * section.induced_tangential - x[i + 2]) / slow
+    dx[i + 3] = (x[i + 2] + 0.6 * section.induced_tangential - x[i + 3]) / fast
+    return x[i + 1], x[i + 3]

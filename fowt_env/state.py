@@ -1,0 +1,110 @@
+"""Names and order of the plant's states, and the small records that loads exchange (SI, radians).
+
+Frames (theory.md, section 1): inertial frame O at the still-water level, x downwind, y left when
+looking downwind, z up; body frame P fixed in the platform, coinciding with O at rest.
+"""
+
+from enum import IntEnum
+from math import cos, sin
+from typing import NamedTuple
+
+from fowt_env.jit import kernel
+
+
+class State(IntEnum):
+    """Index of each state in the flat (n_state,) float64 vector. Wake states follow from WAKE on."""
+
+    SURGE = 0  # position of the body origin in O, m
+    SWAY = 1
+    HEAVE = 2
+    ROLL = 3  # 3-2-1 Euler angles (yaw first), rad
+    PLATFORM_PITCH = 4
+    YAW = 5
+    AZIMUTH = 6  # rotor azimuth, rad
+    VX = 7  # velocity of the body origin, body components, m/s
+    VY = 8
+    VZ = 9
+    WX = 10  # platform angular velocity, body components, rad/s
+    WY = 11
+    WZ = 12
+    ROTOR_SPEED = 13  # relative to the nacelle, rad/s
+    BLADE_PITCH = 14  # collective, positive to feather, rad
+    WAKE = 15  # first wake state; none unless dynamic inflow is on
+
+
+N_RIGID = 15  # states of a plant without wake states
+
+
+class Wrench(NamedTuple):
+    """Force (N) and moment about the body origin (N m), body components."""
+
+    fx: float
+    fy: float
+    fz: float
+    mx: float
+    my: float
+    mz: float
+
+
+NO_LOAD = Wrench(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@kernel
+def add(a, b):
+    """Sum of two wrenches."""
+    return Wrench(a.fx + b.fx, a.fy + b.fy, a.fz + b.fz, a.mx + b.mx, a.my + b.my, a.mz + b.mz)
+
+
+class Pose(NamedTuple):
+    """Where the platform is and how it moves, computed once per evaluation.
+
+    x, y, z: body origin in O. r11..r33: rotation R, body to inertial components (Eq. 1).
+    vx..vz, wx..wz: velocity and angular velocity, body components.
+    """
+
+    x: float
+    y: float
+    z: float
+    r11: float
+    r12: float
+    r13: float
+    r21: float
+    r22: float
+    r23: float
+    r31: float
+    r32: float
+    r33: float
+    vx: float
+    vy: float
+    vz: float
+    wx: float
+    wy: float
+    wz: float
+
+
+@kernel
+def pose_of(x):
+    """Pose of a state vector; R = Rz(yaw) Ry(pitch) Rx(roll), theory.md Eq. (1)."""
+    s1, c1 = sin(x[State.ROLL]), cos(x[State.ROLL])
+    s2, c2 = sin(x[State.PLATFORM_PITCH]), cos(x[State.PLATFORM_PITCH])
+    s3, c3 = sin(x[State.YAW]), cos(x[State.YAW])
+    return Pose(
+        x[State.SURGE],
+        x[State.SWAY],
+        x[State.HEAVE],
+        c3 * c2,
+        c3 * s2 * s1 - s3 * c1,
+        c3 * s2 * c1 + s3 * s1,
+        s3 * c2,
+        s3 * s2 * s1 + c3 * c1,
+        s3 * s2 * c1 - c3 * s1,
+        -s2,
+        c2 * s1,
+        c2 * c1,
+        x[State.VX],
+        x[State.VY],
+        x[State.VZ],
+        x[State.WX],
+        x[State.WY],
+        x[State.WZ],
+    )
