@@ -1,0 +1,243 @@
+"""OpenFAST-named outputs and controller measurements from a state: the only place with deg, rpm and kN."""
+
+from enum import IntEnum
+from math import pi
+from typing import NamedTuple
+
+import numpy as np
+
+from fowt_env.dynamics import inertial_load
+from fowt_env.jit import kernel
+from fowt_env.measurement import Measure
+from fowt_env.state import State, pose_of
+from fowt_env.weather.waves import elevation
+from fowt_env.weather.wind import wind_at, wind_now
+
+DEG = 180.0 / pi
+RPM = 30.0 / pi
+
+
+class Channel(NamedTuple):
+    """One output channel: OpenFAST name, unit, and factor from SI."""
+
+    name: str
+    unit: str
+    scale: float
+
+    @property
+    def column(self):
+        return f"{self.name}_[{self.unit}]"
+
+
+FIXED_CHANNELS = (
+    Channel("Time", "s", 1.0),
+    Channel("PtfmSurge", "m", 1.0),
+    Channel("PtfmSway", "m", 1.0),
+    Channel("PtfmHeave", "m", 1.0),
+    Channel("PtfmRoll", "deg", DEG),
+    Channel("PtfmPitch", "deg", DEG),
+    Channel("PtfmYaw", "deg", DEG),
+    Channel("PtfmTVxi", "m/s", 1.0),
+    Channel("PtfmTVyi", "m/s", 1.0),
+    Channel("PtfmTVzi", "m/s", 1.0),
+    Channel("PtfmRVxi", "deg/s", DEG),
+    Channel("PtfmRVyi", "deg/s", DEG),
+    Channel("PtfmRVzi", "deg/s", DEG),
+    Channel("PtfmTAxi", "m/s^2", 1.0),
+    Channel("PtfmTAyi", "m/s^2", 1.0),
+    Channel("PtfmTAzi", "m/s^2", 1.0),
+    Channel("PtfmRAxi", "deg/s^2", DEG),
+    Channel("PtfmRAyi", "deg/s^2", DEG),
+    Channel("PtfmRAzi", "deg/s^2", DEG),
+    Channel("NcIMUTAxs", "m/s^2", 1.0),
+    Channel("NcIMUTAys", "m/s^2", 1.0),
+    Channel("Azimuth", "deg", DEG),
+    Channel("RotSpeed", "rpm", RPM),
+    Channel("GenSpeed", "rpm", RPM),
+    Channel("BldPitch1", "deg", DEG),
+    Channel("GenTq", "kN-m", 1e-3),
+    Channel("GenPwr", "kW", 1e-3),
+    Channel("RotThrust", "kN", 1e-3),
+    Channel("RotTorq", "kN-m", 1e-3),
+    Channel("RtFldFxh", "N", 1.0),
+    Channel("RtFldMxh", "N-m", 1.0),
+    Channel("TwrBsFxt", "kN", 1e-3),
+    Channel("TwrBsFyt", "kN", 1e-3),
+    Channel("TwrBsFzt", "kN", 1e-3),
+    Channel("TwrBsMxt", "kN-m", 1e-3),
+    Channel("TwrBsMyt", "kN-m", 1e-3),
+    Channel("TwrBsMzt", "kN-m", 1e-3),
+    Channel("HydroFxi", "N", 1.0),
+    Channel("HydroFyi", "N", 1.0),
+    Channel("HydroFzi", "N", 1.0),
+    Channel("HydroMxi", "N-m", 1.0),
+    Channel("HydroMyi", "N-m", 1.0),
+    Channel("HydroMzi", "N-m", 1.0),
+    Channel("Wave1Elev", "m", 1.0),
+    Channel("Wind1VelX", "m/s", 1.0),
+    Channel("Wind1VelY", "m/s", 1.0),
+    Channel("Wind1VelZ", "m/s", 1.0),
+)
+Out = IntEnum("Out", [c.name.upper() for c in FIXED_CHANNELS], start=0)
+N_FIXED = len(FIXED_CHANNELS)
+
+
+def channels(n_lines):
+    """Every output channel of a scene with n_lines mooring lines, in row order."""
+    lines = range(1, n_lines + 1)
+    return (
+        *FIXED_CHANNELS,
+        *(Channel(f"FAIRTEN{i}", "kN", 1e-3) for i in lines),
+        *(Channel(f"ANCHTEN{i}", "kN", 1e-3) for i in lines),
+    )
+
+
+class Layout(NamedTuple):
+    """Points and masses that outputs need beyond the dynamics."""
+
+    hub: np.ndarray  # (3,) body, m
+    tower_top: np.ndarray  # (3,)
+    base_height: float  # tower base
+    rotor_mass: float
+    rotor_inertia: float  # about the shaft, without generator
+    upper_matrix: np.ndarray  # (6, 6) mass matrix of everything above the tower base
+    gear_ratio: float
+    generator_efficiency: float
+
+
+@kernel
+def point_acceleration(pose, dx, px, py, pz):
+    """Absolute acceleration (body components) of a body-fixed point: v' + w x v + w' x p + w x (w x p)."""
+    wx, wy, wz = pose.wx, pose.wy, pose.wz
+    ux = pose.vx + wy * pz - wz * py
+    uy = pose.vy + wz * px - wx * pz
+    uz = pose.vz + wx * py - wy * px
+    ax = dx[State.VX] + dx[State.WY] * pz - dx[State.WZ] * py + wy * uz - wz * uy
+    ay = dx[State.VY] + dx[State.WZ] * px - dx[State.WX] * pz + wz * ux - wx * uz
+    az = dx[State.VZ] + dx[State.WX] * py - dx[State.WY] * px + wx * uy - wy * ux
+    return ax, ay, az
+
+
+@kernel
+def to_inertial(pose, a, b, c):
+    """R (a, b, c)."""
+    return (
+        pose.r11 * a + pose.r12 * b + pose.r13 * c,
+        pose.r21 * a + pose.r22 * b + pose.r23 * c,
+        pose.r31 * a + pose.r32 * b + pose.r33 * c,
+    )
+
+
+@kernel
+def measure(scene, x, dx, u, t, m):
+    """Fill the measurement array m (N_MEASUREMENTS,) from a state and its derivative."""
+    layout = scene.layout
+    pose = pose_of(x)
+    now = wind_now(t, scene.wind)
+    wind = wind_at(t, 0.0, 0.0, layout.hub[2], now, scene.wind, scene.wind_field)
+    top = layout.tower_top
+    ax, _, _ = point_acceleration(pose, dx, top[0], top[1], top[2])
+    m[Measure.TIME] = t
+    m[Measure.ROTOR_SPEED] = x[State.ROTOR_SPEED]
+    m[Measure.GENERATOR_SPEED] = layout.gear_ratio * x[State.ROTOR_SPEED]
+    m[Measure.BLADE_PITCH] = x[State.BLADE_PITCH]
+    m[Measure.GENERATOR_TORQUE] = u[0]
+    for i in range(6):
+        m[Measure.SURGE + i] = x[State.SURGE + i]
+        m[Measure.SURGE_RATE + i] = dx[State.SURGE + i]
+    m[Measure.NACELLE_ACCELERATION] = ax
+    m[Measure.NACELLE_VELOCITY] = pose.vx + pose.wy * top[2] - pose.wz * top[1]
+    m[Measure.PLATFORM_PITCH_ACCELERATION] = dx[State.WY]
+    m[Measure.WIND_SPEED] = wind[0]
+    m[Measure.WAVE_ELEVATION] = elevation(t, 0.0, 0.0, scene.waves)
+
+
+@kernel
+def record(scene, work, x, dx, u, t, loads, row):
+    """Fill one output row (n_channels,), SI, in the order of channels()."""
+    layout = scene.layout
+    body = scene.body
+    pose = pose_of(x)
+    row[Out.TIME] = t
+    for i in range(6):
+        row[Out.PTFMSURGE + i] = x[State.SURGE + i]
+    rates = to_inertial(pose, pose.wx, pose.wy, pose.wz)
+    spins = to_inertial(pose, dx[State.WX], dx[State.WY], dx[State.WZ])
+    a = point_acceleration(pose, dx, 0.0, 0.0, 0.0)
+    accelerations = to_inertial(pose, a[0], a[1], a[2])
+    for i in range(3):
+        row[Out.PTFMTVXI + i] = dx[State.SURGE + i]
+    row[Out.PTFMRVXI], row[Out.PTFMRVYI], row[Out.PTFMRVZI] = rates
+    row[Out.PTFMTAXI], row[Out.PTFMTAYI], row[Out.PTFMTAZI] = accelerations
+    row[Out.PTFMRAXI], row[Out.PTFMRAYI], row[Out.PTFMRAZI] = spins
+    top = layout.tower_top
+    ax, ay, _ = point_acceleration(pose, dx, top[0], top[1], top[2])
+    row[Out.NCIMUTAXS], row[Out.NCIMUTAYS] = ax, ay
+
+    speed = x[State.ROTOR_SPEED]
+    row[Out.AZIMUTH] = x[State.AZIMUTH] % (2.0 * pi)
+    row[Out.ROTSPEED] = speed
+    row[Out.GENSPEED] = layout.gear_ratio * speed
+    row[Out.BLDPITCH1] = x[State.BLADE_PITCH]
+    row[Out.GENTQ] = u[0]
+    row[Out.GENPWR] = layout.generator_efficiency * layout.gear_ratio * speed * u[0]
+    # shaft loads: aerodynamics less the rotor's own inertia and weight
+    hub = layout.hub
+    hx, _, _ = point_acceleration(pose, dx, hub[0], hub[1], hub[2])
+    row[Out.ROTTHRUST] = loads.rotor.thrust - layout.rotor_mass * (hx + body.gravity * pose.r31)
+    row[Out.ROTTORQ] = loads.rotor.torque - layout.rotor_inertia * (dx[State.ROTOR_SPEED] + dx[State.WX])
+    row[Out.RTFLDFXH] = loads.rotor.thrust
+    row[Out.RTFLDMXH] = loads.rotor.torque
+    tower_base(pose, x, dx, loads, body, layout, row)
+
+    h = loads.hydro
+    row[Out.HYDROFXI], row[Out.HYDROFYI], row[Out.HYDROFZI] = to_inertial(pose, h.fx, h.fy, h.fz)
+    row[Out.HYDROMXI], row[Out.HYDROMYI], row[Out.HYDROMZI] = to_inertial(pose, h.mx, h.my, h.mz)
+    row[Out.WAVE1ELEV] = elevation(t, 0.0, 0.0, scene.waves)
+    now = wind_now(t, scene.wind)
+    wind = wind_at(t, 0.0, 0.0, hub[2], now, scene.wind, scene.wind_field)
+    row[Out.WIND1VELX], row[Out.WIND1VELY], row[Out.WIND1VELZ] = wind
+    n = work.lines.shape[0]
+    for i in range(n):
+        row[N_FIXED + i] = work.lines[i, 2]
+        row[N_FIXED + n + i] = work.lines[i, 3]
+
+
+@kernel
+def tower_base(pose, x, dx, loads, body, layout, row):
+    """Loads carried at the tower base: aerodynamics and weight above it less the momentum rate there.
+
+    Body axes at (0, 0, base_height), quasi-static sense of OpenFAST's TwrBs (load of the upper part
+    on the lower one).
+    """
+    m = layout.upper_matrix
+    c = inertial_load(pose, x[State.ROTOR_SPEED], m, body.coupling)
+    mass, sx, sz = m[0, 0], m[1, 5], m[0, 4]
+    nx, ny, nz = pose.r31, pose.r32, pose.r33
+    g = body.gravity
+    f = loads.rotor.wrench
+    w = loads.tower
+    fx = f.fx + w.fx - mass * g * nx - c.fx
+    fy = f.fy + w.fy - mass * g * ny - c.fy
+    fz = f.fz + w.fz - mass * g * nz - c.fz
+    mx = f.mx + w.mx + g * sz * ny - c.mx - body.coupling * dx[State.ROTOR_SPEED]
+    my = f.my + w.my - g * (sz * nx - sx * nz) - c.my
+    mz = f.mz + w.mz - g * sx * ny - c.mz
+    for j in range(6):
+        a = dx[State.VX + j]
+        fx -= m[0, j] * a
+        fy -= m[1, j] * a
+        fz -= m[2, j] * a
+        mx -= m[3, j] * a
+        my -= m[4, j] * a
+        mz -= m[5, j] * a
+    z = layout.base_height
+    row[Out.TWRBSFXT], row[Out.TWRBSFYT], row[Out.TWRBSFZT] = fx, fy, fz
+    row[Out.TWRBSMXT] = mx + z * fy
+    row[Out.TWRBSMYT] = my - z * fx
+    row[Out.TWRBSMZT] = mz
+
+
+def to_units(rows, n_lines):
+    """Rows (k, n_channels) in SI -> a copy in the channels' units."""
+    return rows * np.array([c.scale for c in channels(n_lines)])

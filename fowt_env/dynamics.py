@@ -1,0 +1,251 @@
+"""The equation of motion: sum of loads to accelerations, theory.md Eq. (9).
+
+Unknowns (v', w', w_b'): one symmetric positive-definite system. The rotor row is eliminated, which
+leaves a 6x6 Cholesky solve.
+"""
+
+from math import cos, sin, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from fowt_env.jit import kernel
+from fowt_env.loads.damping import damping_load
+from fowt_env.loads.drivetrain import pitch_rate, shaft_torque
+from fowt_env.loads.hydrostatics import hydrostatic_load
+from fowt_env.loads.mooring import mooring_load
+from fowt_env.loads.morison import morison_load
+from fowt_env.loads.rotor import RotorLoad, rotor_load
+from fowt_env.loads.rotor_table import rotor_table_load
+from fowt_env.loads.tower import tower_load
+from fowt_env.state import NO_LOAD, State, Wrench, add, pose_of
+from fowt_env.weather.wind import wind_now
+
+
+class Body(NamedTuple):
+    """Mass properties of the whole turbine about the body origin, theory.md Eq. (10)."""
+
+    mass_matrix: np.ndarray  # (6, 6) M1
+    mass: float
+    s_x: float  # first moments: S = (s_x, 0, s_z), kg m
+    s_z: float
+    gravity: float
+    coupling: float  # H = I_rotor + N_g I_g
+    rotor_row: float  # I_rx = I_rotor + N_g^2 I_g
+    platform_held: bool
+    rotor_held: bool
+
+
+class Model(NamedTuple):
+    """Everything that does not change while stepping. A part that a scene lacks is None."""
+
+    body: Body
+    layout: object  # channels.Layout
+    drivetrain: object  # loads.drivetrain.Drivetrain
+    actuator: object  # loads.drivetrain.PitchActuator
+    hull: object  # loads.hydrostatics.Hull or None
+    strips: object  # loads.morison.Strips or None
+    waves: object  # weather.waves.Waves or None
+    current: object  # loads.morison.Current or None
+    mooring: object  # loads.mooring.Mooring or None
+    damping: object  # loads.damping.LinearDamping or None
+    rotor: object  # loads.rotor.BladeElements or None
+    rotor_table: object  # loads.rotor_table.RotorTable or None
+    skew: object  # loads.wake.SkewedWake or None
+    wake: object  # loads.wake.DynamicInflow or None
+    tower: object  # loads.tower.TowerDrag or None
+    wind: object  # weather.wind.WindSeries or None: no aerodynamics at all
+    wind_field: object  # None
+
+
+class Work(NamedTuple):
+    """Scratch of one plant. lines and counters carry over between calls; the rest does not."""
+
+    lines: np.ndarray  # (n_lines, 6) mooring warm start and results
+    counters: np.ndarray  # (N_COUNTERS,)
+    kinematics: np.ndarray  # (7, n_nodes) water kinematics at the strip nodes
+    matrix: np.ndarray  # (6, 6)
+    stages: np.ndarray  # (5, n_state) Runge-Kutta stages and stage state
+
+
+class Loads(NamedTuple):
+    """Loads of one evaluation, for outputs (body components about the body origin)."""
+
+    rotor: RotorLoad
+    tower: Wrench
+    hydro: Wrench  # buoyancy and strip loads, added mass times acceleration included
+    mooring: Wrench
+
+
+@kernel
+def gravity_load(pose, body):
+    """Weight of the whole turbine, Eq. (13)."""
+    nx, ny, nz = pose.r31, pose.r32, pose.r33
+    mg = -body.mass * body.gravity
+    g = body.gravity
+    return Wrench(
+        mg * nx,
+        mg * ny,
+        mg * nz,
+        g * body.s_z * ny,
+        -g * (body.s_z * nx - body.s_x * nz),
+        -g * body.s_x * ny,
+    )
+
+
+@kernel
+def inertial_load(pose, rotor_speed, mass_matrix, coupling):
+    """C1 nu + C2 w_b: velocity-dependent part of the momentum rate, Eqs (9)-(10)."""
+    m = mass_matrix
+    vx, vy, vz, wx, wy, wz = pose.vx, pose.vy, pose.vz, pose.wx, pose.wy, pose.wz
+    px = m[0, 0] * vx + m[0, 1] * vy + m[0, 2] * vz + m[0, 3] * wx + m[0, 4] * wy + m[0, 5] * wz
+    py = m[1, 0] * vx + m[1, 1] * vy + m[1, 2] * vz + m[1, 3] * wx + m[1, 4] * wy + m[1, 5] * wz
+    pz = m[2, 0] * vx + m[2, 1] * vy + m[2, 2] * vz + m[2, 3] * wx + m[2, 4] * wy + m[2, 5] * wz
+    kx = m[3, 0] * vx + m[3, 1] * vy + m[3, 2] * vz + m[3, 3] * wx + m[3, 4] * wy + m[3, 5] * wz
+    ky = m[4, 0] * vx + m[4, 1] * vy + m[4, 2] * vz + m[4, 3] * wx + m[4, 4] * wy + m[4, 5] * wz
+    kz = m[5, 0] * vx + m[5, 1] * vy + m[5, 2] * vz + m[5, 3] * wx + m[5, 4] * wy + m[5, 5] * wz
+    kx += coupling * rotor_speed
+    return Wrench(
+        wy * pz - wz * py,
+        wz * px - wx * pz,
+        wx * py - wy * px,
+        vy * pz - vz * py + wy * kz - wz * ky,
+        vz * px - vx * pz + wz * kx - wx * kz,
+        vx * py - vy * px + wx * ky - wy * kx,
+    )
+
+
+@kernel
+def attitude_rate(x, dx):
+    """Position and Euler-angle rates: r' = R v, phi' = J^-1 w (singular at 90 deg of platform pitch)."""
+    pose = pose_of(x)
+    dx[State.SURGE] = pose.r11 * pose.vx + pose.r12 * pose.vy + pose.r13 * pose.vz
+    dx[State.SWAY] = pose.r21 * pose.vx + pose.r22 * pose.vy + pose.r23 * pose.vz
+    dx[State.HEAVE] = pose.r31 * pose.vx + pose.r32 * pose.vy + pose.r33 * pose.vz
+    s1, c1 = sin(x[State.ROLL]), cos(x[State.ROLL])
+    s2, c2 = sin(x[State.PLATFORM_PITCH]), cos(x[State.PLATFORM_PITCH])
+    swing = (s1 * pose.wy + c1 * pose.wz) / c2
+    dx[State.ROLL] = pose.wx + swing * s2
+    dx[State.PLATFORM_PITCH] = c1 * pose.wy - s1 * pose.wz
+    dx[State.YAW] = swing
+
+
+@kernel
+def solve_spd(a, b):
+    """Solve a b = b in place by Cholesky; a is (6, 6) symmetric positive definite and is overwritten."""
+    n = b.shape[0]
+    for i in range(n):
+        for j in range(i + 1):
+            total = a[i, j]
+            for k in range(j):
+                total -= a[i, k] * a[j, k]
+            if i == j:
+                a[i, i] = sqrt(total)
+            else:
+                a[i, j] = total / a[j, j]
+    for i in range(n):
+        total = b[i]
+        for k in range(i):
+            total -= a[i, k] * b[k]
+        b[i] = total / a[i, i]
+    for i in range(n - 1, -1, -1):
+        total = b[i]
+        for k in range(i + 1, n):
+            total -= a[k, i] * b[k]
+        b[i] = total / a[i, i]
+
+
+@kernel
+def rotor_part(t, pose, x, now, scene_wind, wind_field, rotor, rotor_table, skew, wake, dx, counters):
+    """Load of whichever rotor model the scene has; none without wind."""
+    if scene_wind is None:
+        return RotorLoad(NO_LOAD, 0.0, 0.0)
+    if rotor is None:
+        if rotor_table is None:
+            return RotorLoad(NO_LOAD, 0.0, 0.0)
+        return rotor_table_load(t, pose, x, now, scene_wind, wind_field, rotor_table)
+    return rotor_load(t, pose, x, now, scene_wind, wind_field, rotor, skew, wake, dx, counters)
+
+
+@kernel
+def derivative(t, x, u, scene, work, dx):
+    """dx = f(t, x, u); returns the loads. u: generator torque (N m) and blade-pitch command (rad)."""
+    body = scene.body
+    pose = pose_of(x)
+    now = wind_now(t, scene.wind)
+    aero = rotor_part(
+        t, pose, x, now, scene.wind, scene.wind_field, scene.rotor, scene.rotor_table,
+        scene.skew, scene.wake, dx, work.counters,
+    )  # fmt: skip
+    tower = tower_load(t, pose, now, scene.wind, scene.wind_field, scene.tower)
+    buoyancy = hydrostatic_load(pose, scene.hull, work.counters)
+    strips = morison_load(t, pose, scene.strips, scene.waves, scene.current, work.kinematics)
+    mooring = mooring_load(pose, scene.mooring, work.lines, work.counters)
+
+    load = add(aero.wrench, tower)
+    load = add(load, gravity_load(pose, body))
+    load = add(load, buoyancy)
+    load = add(load, strips.wrench)
+    load = add(load, mooring)
+    load = add(load, damping_load(pose, x, scene.damping))
+    torque = shaft_torque(aero.torque, u[0], x[State.ROTOR_SPEED], scene.drivetrain)
+
+    attitude_rate(x, dx)
+    dx[State.AZIMUTH] = x[State.ROTOR_SPEED]
+    dx[State.BLADE_PITCH] = pitch_rate(x[State.BLADE_PITCH], u[1], scene.actuator)
+    accelerate(pose, x, load, torque, strips, body, work.matrix, dx)
+    hydro = added_mass_load(strips, dx)
+    return Loads(aero, tower, add(add(buoyancy, strips.wrench), hydro), mooring)
+
+
+@kernel
+def added_mass_load(strips, dx):
+    """-A_a nu': the part of the strip load that went to the left-hand side."""
+    ax, ay, az = dx[State.VX], dx[State.VY], dx[State.VZ]
+    bx, by = dx[State.WX], dx[State.WY]
+    return Wrench(
+        -strips.s0 * ax - strips.s1 * by,
+        -strips.s0 * ay + strips.s1 * bx,
+        -strips.a33 * az,
+        strips.s1 * ay - strips.s2 * bx,
+        -strips.s1 * ax - strips.s2 * by,
+        0.0,
+    )
+
+
+@kernel
+def accelerate(pose, x, load, torque, strips, body, matrix, dx):
+    """Solve (M1 + A_a, M2; M2^T, I_rx) (nu', w_b') = loads - C1 nu - C2 w_b into dx."""
+    b = dx[State.VX : State.WZ + 1]
+    if body.platform_held:
+        b[:] = 0.0
+        dx[State.ROTOR_SPEED] = 0.0 if body.rotor_held else torque / body.rotor_row
+        return
+    c = inertial_load(pose, x[State.ROTOR_SPEED], body.mass_matrix, body.coupling)
+    b[0] = load.fx - c.fx
+    b[1] = load.fy - c.fy
+    b[2] = load.fz - c.fz
+    b[3] = load.mx - c.mx
+    b[4] = load.my - c.my
+    b[5] = load.mz - c.mz
+    for i in range(6):
+        for j in range(6):
+            matrix[i, j] = body.mass_matrix[i, j]
+    matrix[0, 0] += strips.s0
+    matrix[1, 1] += strips.s0
+    matrix[2, 2] += strips.a33
+    matrix[0, 4] += strips.s1
+    matrix[4, 0] += strips.s1
+    matrix[1, 3] -= strips.s1
+    matrix[3, 1] -= strips.s1
+    matrix[3, 3] += strips.s2
+    matrix[4, 4] += strips.s2
+    if body.rotor_held:
+        solve_spd(matrix, b)
+        dx[State.ROTOR_SPEED] = 0.0
+        return
+    share = body.coupling / body.rotor_row
+    matrix[3, 3] -= share * body.coupling
+    b[3] -= share * torque
+    solve_spd(matrix, b)
+    dx[State.ROTOR_SPEED] = (torque - body.coupling * b[3]) / body.rotor_row

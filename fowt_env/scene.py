@@ -1,0 +1,348 @@
+"""From descriptions to a scene: everything that a run needs, checked, typed and built once."""
+
+from dataclasses import dataclass, replace
+from math import cos, isfinite, radians, sin
+from typing import Any
+
+import numpy as np
+
+from fowt_env.channels import Layout, channels
+from fowt_env.counters import N_COUNTERS
+from fowt_env.description import Platform, Turbine, read_platform, read_turbine, sea_state_of
+from fowt_env.dynamics import Body, Model, Work
+from fowt_env.errors import InputError, unknown
+from fowt_env.jit import Box
+from fowt_env.loads.damping import build_damping
+from fowt_env.loads.drivetrain import build_drivetrain, build_pitch_actuator
+from fowt_env.loads.hydrostatics import build_hull
+from fowt_env.loads.mooring import build_mooring
+from fowt_env.loads.morison import Current, build_strips
+from fowt_env.loads.rotor import build_blade_elements
+from fowt_env.loads.rotor_table import build_rotor_table
+from fowt_env.loads.tower import build_tower_drag
+from fowt_env.loads.wake import build_dynamic_inflow, build_skewed_wake, n_wake_states
+from fowt_env.state import N_RIGID
+from fowt_env.weather.waves import build_waves
+from fowt_env.weather.wind import build_wind, nominal_speed
+
+ROTORS = ("bem", "table")
+OPTIONS = {
+    # name: (default, allowed values or a description of the allowed range)
+    "kinematics_position": ("instantaneous", ("instantaneous", "fixed")),
+    "surface": ("instantaneous", ("instantaneous", "swl")),
+    "stretching": ("wheeler", ("wheeler", "none")),
+    "skewed_wake": (False, (False, True)),
+    "dynamic_inflow": (False, (False, True)),
+    "tower_drag": (True, (False, True)),
+    "hydrodynamics": (True, (False, True)),
+    "mooring": (True, (False, True)),
+    "current": (None, "None, a speed (m/s) or {'speed', 'heading' (deg), 'exponent'}"),
+    "duration": (700.0, "seconds of random wind and sea, > 0"),
+    "wave_components": (None, "None or a number of components, 1 to 10000"),
+    "shear_exponent": (None, "None (the platform file's) or 0 to 1"),
+    "turbine": (None, "None (the platform file's), a name, a path or a description.Turbine"),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A turbine on its platform in its weather, ready to be stepped.
+
+    model is what kernels read; the rest says where it came from. Scenes are never written to: the
+    state vector and the scratch of a run belong to the run.
+    """
+
+    model: Model
+    platform: Platform
+    turbine: Turbine
+    wind: Any  # as asked for
+    sea: Any
+    seed: int
+    rotor: str
+    options: dict
+    wind_speed: float | None  # mean hub wind that a trim uses; None without aerodynamics
+
+    @property
+    def n_lines(self):
+        return 0 if self.model.mooring is None else self.model.mooring.length.shape[0]
+
+    @property
+    def n_state(self):
+        return N_RIGID + n_wake_states(self.model.rotor, self.model.wake)
+
+    @property
+    def channels(self):
+        """Output channels of this scene, in row order."""
+        return channels(self.n_lines)
+
+    def work(self):
+        """Fresh scratch arrays for one plant of this scene."""
+        nodes = 0 if self.model.strips is None else self.model.strips.node_z.shape[0]
+        return Work(
+            np.zeros((self.n_lines, 6)),
+            np.zeros(N_COUNTERS),
+            np.zeros((7, nodes)),
+            np.zeros((6, 6)),
+            np.zeros((5, self.n_state)),
+        )
+
+    def box(self, work=None):
+        """The scene and scratch in the form that kernels take from Python."""
+        return Box(self.model, self.work() if work is None else work)
+
+    def with_weather(self, wind, sea, seed):
+        """A copy in other weather of the same kind: only wind and sea are drawn anew.
+
+        Raises: InputError, also where aerodynamics would appear or vanish (build a scene for that).
+        """
+        seed = _seed(seed)
+        series, waves = _weather(wind, sea, seed, self.platform, self.turbine, self.options)
+        if (series is None) != (self.model.wind is None):
+            raise InputError(
+                f"wind = {wind!r}: a scene cannot gain or lose its aerodynamics; use build_scene"
+            )
+        return replace(
+            self,
+            model=self.model._replace(wind=series, waves=waves),
+            wind=wind,
+            sea=sea,
+            seed=seed,
+            wind_speed=None if series is None else nominal_speed(wind),
+        )
+
+    def with_model(self, **parts):
+        """A copy with some parts of the model replaced (same types: no recompilation)."""
+        return replace(self, model=self.model._replace(**parts))
+
+    def __repr__(self):
+        return (
+            f"Scene({self.platform.name!r}, wind={self.wind!r}, sea={self.sea!r}, seed={self.seed},"
+            f" rotor={self.rotor!r})"
+        )
+
+
+def build_scene(platform="oc3_hywind", wind=None, sea=None, *, seed=0, rotor="bem", **options):
+    """Scene of a platform, a wind and a sea.
+
+    platform  built-in name, path to a TOML file, or a description.Platform
+    wind      None: no aerodynamics; 0.0: still air; a speed (m/s); or a dict with "kind": steady,
+              series, steps, eog, edc, ecd, ews, ewm, ntm, etm (weather/wind.py)
+    sea       None: still water; a named sea state; or a dict with "kind": regular, jonswap,
+              pierson_moskowitz, components
+    seed      of everything random: the same seed gives the same bits
+    rotor     "bem": blade-element momentum of every blade and station; "table": one table of it
+    options   see OPTIONS; a platform file may set other defaults
+
+    Raises: InputError naming the key, the value and what is allowed.
+    """
+    if not isinstance(platform, Platform):
+        platform = read_platform(platform)
+    chosen = _options(options, platform)
+    turbine = chosen["turbine"] or platform.turbine
+    if not isinstance(turbine, Turbine):
+        turbine = read_turbine(turbine)
+    if rotor not in ROTORS:
+        raise unknown("rotor model", rotor, ROTORS)
+    seed = _seed(seed)
+    site = platform.environment
+    series, waves = _weather(wind, sea, seed, platform, turbine, chosen)
+    hydrodynamics = chosen["hydrodynamics"]
+    aero = series is not None
+    if rotor == "table" and (chosen["dynamic_inflow"] or chosen["skewed_wake"]):
+        raise InputError("rotor = 'table': skewed_wake and dynamic_inflow need rotor = 'bem'")
+    elements = build_blade_elements(turbine, site.air_density) if aero else None
+    model = Model(
+        body=build_body(platform, turbine),
+        layout=build_layout(platform, turbine),
+        drivetrain=build_drivetrain(turbine),
+        actuator=build_pitch_actuator(turbine.pitch_drive),
+        hull=build_hull(platform.hull, site.water_density, site.gravity) if hydrodynamics else None,
+        strips=_strips(platform, chosen) if hydrodynamics else None,
+        waves=waves,
+        current=_current(chosen["current"]) if hydrodynamics else None,
+        mooring=build_mooring(platform.lines) if platform.lines and chosen["mooring"] else None,
+        damping=build_damping(platform.hydro) if hydrodynamics else None,
+        rotor=elements if rotor == "bem" else None,
+        rotor_table=build_rotor_table(elements) if aero and rotor == "table" else None,
+        skew=build_skewed_wake() if aero and chosen["skewed_wake"] else None,
+        wake=build_dynamic_inflow() if aero and chosen["dynamic_inflow"] else None,
+        tower=build_tower_drag(platform.tower, site.air_density) if aero and chosen["tower_drag"] else None,
+        wind=series,
+        wind_field=None,
+    )
+    speed = nominal_speed(wind) if aero else None
+    return Scene(model, platform, turbine, wind, sea, seed, rotor, chosen, speed)
+
+
+def _options(given, platform):
+    """Options with defaults, the platform file's own ones and the caller's, checked."""
+    chosen = {name: default for name, (default, _) in OPTIONS.items()}
+    for source, values in (
+        (f"platform {platform.name!r}, options", platform.options),
+        ("build_scene", given),
+    ):
+        for name, value in values.items():
+            if name not in OPTIONS:
+                raise unknown(f"option of {source}", name, OPTIONS)
+            allowed = OPTIONS[name][1]
+            if isinstance(allowed, tuple) and not any(value is a or value == a for a in allowed):
+                raise InputError(f"{name} = {value!r}: allowed {', '.join(repr(a) for a in allowed)}")
+            chosen[name] = value
+    chosen["duration"] = _number("duration", chosen["duration"], 0.0, 1e6, low_open=True)
+    if chosen["shear_exponent"] is not None:
+        chosen["shear_exponent"] = _number("shear_exponent", chosen["shear_exponent"], 0.0, 1.0)
+    if chosen["wave_components"] is not None:
+        count = chosen["wave_components"]
+        if isinstance(count, bool) or not isinstance(count, int | np.integer) or not 1 <= count <= 10000:
+            raise InputError(f"wave_components = {count!r}: must be a whole number from 1 to 10000")
+    return chosen
+
+
+def _weather(wind, sea, seed, platform, turbine, chosen):
+    """(WindSeries or None, Waves or None) of a wind and sea specification."""
+    site = platform.environment
+    shear = site.shear_exponent if chosen["shear_exponent"] is None else chosen["shear_exponent"]
+    series = build_wind(
+        wind,
+        reference_height=turbine.rotor.hub_height,
+        rotor_diameter=2.0 * turbine.rotor.tip_radius,
+        shear_exponent=shear,
+        seed=seed,
+        duration=chosen["duration"],
+    )
+    state = sea_state_of(sea)
+    _check_sea(state, site.water_depth)
+    if not chosen["hydrodynamics"]:
+        return series, None
+    waves = build_waves(
+        state,
+        depth=site.water_depth,
+        density=site.water_density,
+        gravity=site.gravity,
+        seed=seed,
+        duration=chosen["duration"],
+        components=chosen["wave_components"],
+    )
+    return series, waves
+
+
+def _number(name, value, low, high, low_open=False):
+    """The value as a float inside [low, high]. Raises: InputError."""
+    good = isinstance(value, int | float | np.number) and not isinstance(value, bool) and isfinite(value)
+    if not good or value > high or value < low or (low_open and value == low):
+        bracket = "(" if low_open else "["
+        raise InputError(f"{name} = {value!r}: must be a number in {bracket}{low:g}, {high:g}]")
+    return float(value)
+
+
+def _seed(seed):
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise InputError(f"seed = {seed!r}: must be a whole number >= 0")
+    return int(seed)
+
+
+def _check_sea(state, depth):
+    """Refuse a sea that does not fit into the water."""
+    if state is None:
+        return
+    height = {"regular": getattr(state, "H", None), "jonswap": getattr(state, "Hs", None)}.get(
+        state.kind, getattr(state, "Hs", None)
+    )
+    if state.kind == "components":
+        height = 2.0 * float(np.sum(np.abs(state.amplitude)))
+    if height is not None and height > depth:
+        raise InputError(f"sea: wave height {height:g} m: must not exceed the water depth of {depth:g} m")
+
+
+def _strips(platform, chosen):
+    site = platform.environment
+    return build_strips(
+        platform.hull,
+        platform.hydro,
+        density=site.water_density,
+        depth=site.water_depth,
+        position=chosen["kinematics_position"],
+        surface=chosen["surface"],
+        stretching=chosen["stretching"],
+    )
+
+
+def _current(spec):
+    """Current part, or None where its speed is zero."""
+    if spec is None:
+        return None
+    if not isinstance(spec, dict):
+        spec = {"speed": spec}
+    for key in spec:
+        if key not in ("speed", "heading", "exponent"):
+            raise unknown("key of current", key, ("speed", "heading", "exponent"))
+    if "speed" not in spec:
+        raise InputError("current: the key 'speed' (m/s) is missing")
+    speed = _number("current.speed", spec["speed"], 0.0, 10.0)
+    heading = radians(_number("current.heading", spec.get("heading", 0.0), -360.0, 360.0))
+    exponent = _number("current.exponent", spec.get("exponent", 0.0), 0.0, 10.0)
+    if speed == 0.0:
+        return None
+    return Current(speed * cos(heading), speed * sin(heading), exponent)
+
+
+def assemble(bodies):
+    """(6, 6) mass matrix about the body origin of rigid bodies (mass, centre (3,), inertia (3,) about it)."""
+    matrix = np.zeros((6, 6))
+    for mass, centre, inertia in bodies:
+        x, y, z = centre
+        cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+        matrix[:3, :3] += mass * np.eye(3)
+        matrix[:3, 3:] -= mass * cross
+        matrix[3:, :3] += mass * cross
+        matrix[3:, 3:] += np.diag(inertia) - mass * cross @ cross
+    return matrix
+
+
+def _upper_bodies(platform, turbine):
+    """Tower, nacelle and rotor as (mass, centre, inertia)."""
+    tower, nacelle, rotor = platform.tower, turbine.nacelle, turbine.rotor
+    return [
+        (tower.mass, (0.0, 0.0, tower.cm_height), tower.inertia),
+        (nacelle.mass, (nacelle.cm_downwind, 0.0, nacelle.cm_height), nacelle.inertia),
+        (
+            rotor.mass,
+            (-rotor.overhang, 0.0, rotor.hub_height),
+            (rotor.inertia, rotor.inertia_diameter, rotor.inertia_diameter),
+        ),
+    ]
+
+
+def build_body(platform, turbine, platform_held=False, rotor_held=False):
+    """Body part: Eq. (10) from the four rigid bodies."""
+    ballast = platform.ballast
+    matrix = assemble(
+        [(ballast.mass, (0.0, 0.0, -ballast.cm_depth), ballast.inertia), *_upper_bodies(platform, turbine)]
+    )
+    drivetrain = build_drivetrain(turbine)
+    return Body(
+        np.ascontiguousarray(matrix),
+        float(matrix[0, 0]),
+        float(matrix[1, 5]),
+        float(matrix[0, 4]),
+        float(platform.environment.gravity),
+        drivetrain.coupling,
+        drivetrain.inertia_row,
+        platform_held,
+        rotor_held,
+    )
+
+
+def build_layout(platform, turbine):
+    """Layout part: points and masses that outputs need."""
+    rotor = turbine.rotor
+    return Layout(
+        np.array([-rotor.overhang, 0.0, rotor.hub_height]),
+        np.array([0.0, 0.0, platform.tower.top_height]),
+        float(platform.tower.base_height),
+        float(rotor.mass),
+        float(rotor.inertia),
+        np.ascontiguousarray(assemble(_upper_bodies(platform, turbine))),
+        float(turbine.drivetrain.gear_ratio),
+        float(turbine.drivetrain.generator_efficiency),
+    )

@@ -1,0 +1,267 @@
+"""One run of a scene with a controller, to a table of OpenFAST channels."""
+
+from math import isfinite, pi
+
+import numpy as np
+import pandas as pd
+
+from fowt_env.channels import DEG, RPM, to_units
+from fowt_env.errors import InputError, SimulationStopped, unknown
+from fowt_env.jit import control_kernel
+from fowt_env.measurement import N_MEASUREMENTS, Measurement
+from fowt_env.state import State, pose_of
+from fowt_env.steady import trim
+from fowt_env.step import RUNNING, STOP_REASONS, advance, observe, output_row, run
+
+CHUNK = 20.0  # simulated seconds per compiled call: Ctrl-C is heard and progress shown between them
+STARTS = ("trim", "zero")
+INITIAL = {  # channel: (state, factor to SI)
+    "PtfmSurge": (State.SURGE, 1.0),
+    "PtfmSway": (State.SWAY, 1.0),
+    "PtfmHeave": (State.HEAVE, 1.0),
+    "PtfmRoll": (State.ROLL, 1.0 / DEG),
+    "PtfmPitch": (State.PLATFORM_PITCH, 1.0 / DEG),
+    "PtfmYaw": (State.YAW, 1.0 / DEG),
+    "Azimuth": (State.AZIMUTH, 1.0 / DEG),
+    "RotSpeed": (State.ROTOR_SPEED, 1.0 / RPM),
+    "BldPitch1": (State.BLADE_PITCH, 1.0 / DEG),
+    "PtfmTVxi": (State.VX, 1.0),
+    "PtfmTVyi": (State.VY, 1.0),
+    "PtfmTVzi": (State.VZ, 1.0),
+    "PtfmRVxi": (State.WX, 1.0 / DEG),
+    "PtfmRVyi": (State.WY, 1.0 / DEG),
+    "PtfmRVzi": (State.WZ, 1.0 / DEG),
+}
+
+
+@control_kernel
+def hold(parameters, memory, measurement, command):
+    """Leave the command as it is."""
+
+
+class _Hold:
+    """Stand-in controller for controller=None."""
+
+    kernel = staticmethod(hold)
+    parameters = np.zeros(1)
+    memory = np.zeros(1)
+
+    def reset(self, measurement):
+        """Nothing to start."""
+
+
+def steps_in(name, period, dt):
+    """Number of physics steps in a period. Raises: InputError if dt does not divide it."""
+    for key, value in ((name, period), ("dt", dt)):
+        good = isinstance(value, int | float | np.number) and not isinstance(value, bool)
+        if not good or not isfinite(value) or value <= 0.0:
+            raise InputError(f"{key} = {value!r}: must be a positive number of seconds")
+    count = round(period / dt)
+    if count < 1 or abs(count * dt - period) > 1e-9 * period:
+        raise InputError(f"dt = {dt:g} s does not divide {name} = {period:g} s (ratio {period / dt:.6g})")
+    return count
+
+
+def initial_state(scene, start="trim", initial=None):
+    """(state, command) that a run begins with.
+
+    start: "trim" the floating steady state in the mean wind; "zero" all platform states zero, with
+    the rotor speed and blade pitch of that wind on a fixed platform. initial: {channel: absolute value}.
+    """
+    if start not in STARTS:
+        raise unknown("start", start, STARTS)
+    point = trim(scene, platform="floating" if start == "trim" else "fixed")
+    x, u = point.state.copy(), point.command.copy()
+    rates = {}
+    for name, value in (initial or {}).items():
+        key = str(name).split("_[")[0]
+        if key not in INITIAL:
+            raise unknown("channel of initial", name, INITIAL)
+        good = isinstance(value, int | float | np.number) and not isinstance(value, bool)
+        if not good or not isfinite(value):
+            raise InputError(f"initial[{name!r}] = {value!r}: must be a finite number")
+        index, factor = INITIAL[key]
+        if State.VX <= index <= State.WZ:
+            rates[index] = value * factor
+        else:
+            x[index] = value * factor
+    if abs(x[State.PLATFORM_PITCH]) >= 0.5 * pi:
+        raise InputError(
+            f"initial['PtfmPitch'] = {x[State.PLATFORM_PITCH] * DEG:g}: must be inside (-90, 90) deg"
+        )
+    if rates:  # given in inertial axes, kept in body axes
+        inertial = np.zeros(6)
+        for index, value in rates.items():
+            inertial[index - State.VX] = value
+        p = pose_of(x)
+        rotation = np.array([[p.r11, p.r12, p.r13], [p.r21, p.r22, p.r23], [p.r31, p.r32, p.r33]])
+        x[State.VX : State.VX + 3] = rotation.T @ inertial[:3]
+        x[State.WX : State.WX + 3] = rotation.T @ inertial[3:]
+    drive = scene.turbine.pitch_drive
+    if not drive.minimum <= x[State.BLADE_PITCH] <= drive.maximum:
+        raise InputError(
+            f"initial['BldPitch1'] = {x[State.BLADE_PITCH] * DEG:g} deg: must be in"
+            f" [{drive.minimum * DEG:g}, {drive.maximum * DEG:g}] deg"
+        )
+    u[1] = x[State.BLADE_PITCH]
+    return x, u
+
+
+def check_duration(scene, duration):
+    """Refuse a run that is longer than the scene's random or recorded weather."""
+    limit = scene.options["duration"]
+    random_sea = scene.model.waves is not None and scene.model.waves.omega.shape[0] > 1
+    wind = scene.model.wind
+    if wind is not None and wind.period > 0.0 and duration > wind.period + 1e-9:
+        raise InputError(
+            f"duration = {duration:g} s: this scene's random wind was drawn for {wind.period:g} s and would"
+            f" repeat; build_scene(..., duration={duration:g})"
+        )
+    if random_sea and scene.model.waves.random and duration > limit + 1e-9:
+        raise InputError(
+            f"duration = {duration:g} s: this scene's random sea was drawn for {limit:g} s and would repeat;"
+            f" build_scene(..., duration={duration:g})"
+        )
+    if isinstance(scene.wind, dict) and scene.wind.get("kind") == "series":
+        end = float(wind.time[-1])
+        if wind.time.shape[0] > 1 and duration > end + 1e-9:
+            raise InputError(f"duration = {duration:g} s: the wind series ends at {end:g} s")
+
+
+def simulate(
+    scene,
+    controller="pi",
+    duration=600.0,
+    dt=0.05,
+    control_dt=0.1,
+    output_dt=0.1,
+    start="trim",
+    initial=None,
+    progress=False,
+):
+    """DataFrame of one run, columns named as OpenFAST writes them (`PtfmPitch_[deg]`).
+
+    controller  None: the rotor is held at the trim's speed and blade pitch (at rest without wind); a
+                name of controllers.CONTROLLERS or "module:Class"; or an object with
+                reset(measurement) and act(measurement) -> (generator torque N m, blade pitch rad)
+    duration    s; rows run from 0 to duration inclusive, every output_dt
+    dt          physics step, s; must divide control_dt and output_dt, and those the duration
+    start       "trim" or "zero"; initial then sets absolute values of named channels
+    progress    True shows a bar; a callable is called with the share done
+
+    Raises: InputError before anything runs; SimulationStopped (with the rows so far) on capsize or a
+    non-finite state; ControllerError if a controller returns anything but two finite numbers.
+    """
+    per_control = steps_in("control_dt", control_dt, dt)
+    per_output = steps_in("output_dt", output_dt, dt)
+    last = steps_in("duration", duration, dt)
+    steps_in("duration", duration, output_dt)
+    check_duration(scene, duration)
+    held = controller is None
+    if not held:
+        from controllers import make  # looked up only when used: fowt_env imports nothing from it
+
+        controller = make(controller, scene.turbine, control_dt)
+    x, u = initial_state(scene, start, initial)
+    if held:
+        scene = scene.with_model(body=scene.model.body._replace(rotor_held=True))
+        controller = _Hold()
+    loop = _Loop(scene, controller, x, u, dt, per_control, per_output, last)
+    with _bar(progress) as report:
+        loop.go(report)
+    return loop.frame()
+
+
+class _Loop:
+    """A run in chunks, compiled where the controller is."""
+
+    def __init__(self, scene, controller, x, u, dt, per_control, per_output, last):
+        self.scene = scene
+        self.controller = controller
+        self.box = scene.box()
+        self.x, self.u, self.dt = x, u, float(dt)
+        self.per_control, self.per_output, self.last = per_control, per_output, last
+        self.dx = np.zeros_like(x)
+        self.measurement = np.zeros(N_MEASUREMENTS)
+        self.rows = np.empty((last // per_output + 1, len(scene.channels)))
+        self.filled = 0
+
+    def go(self, report):
+        observe(self.box, self.x, self.u, 0.0, self.dx, self.measurement)
+        self.controller.reset(Measurement(*self.measurement.tolist()))
+        compiled = hasattr(self.controller, "kernel")
+        if compiled:
+            size = max(1, round(CHUNK / (self.dt * self.per_control * self.per_output)))
+            size *= self.per_control * self.per_output
+        step = 0
+        while step < self.last:
+            if compiled:
+                step = self._compiled(step, min(step + size, self.last))
+            else:
+                step = self._python(step)
+            report(step / self.last)
+        row = output_row(self.box, self.x, self.u, self.last * self.dt, self.rows.shape[1])
+        self.rows[self.filled] = row
+        self.filled += 1
+
+    def _compiled(self, first, last):
+        c = self.controller
+        status, step, count = run(
+            self.box, self.x, self.u, c.kernel, c.parameters, c.memory, self.measurement, self.dx,
+            self.dt, self.per_control, self.per_output, first, last, self.rows[self.filled :],
+        )  # fmt: skip
+        self.filled += count
+        self._check(status, step)
+        return step
+
+    def _python(self, step):
+        """One control period (or what is left of the run) with a controller in Python."""
+        t = step * self.dt
+        observe(self.box, self.x, self.u, t, self.dx, self.measurement)
+        self.u[:] = self.controller.act(Measurement(*self.measurement.tolist()))
+        end = min(step + self.per_control, self.last)
+        while step < end:
+            if step % self.per_output == 0:
+                self.rows[self.filled] = output_row(
+                    self.box, self.x, self.u, step * self.dt, self.rows.shape[1]
+                )
+                self.filled += 1
+            n = min(self.per_output - step % self.per_output, end - step)
+            status = advance(self.box, self.x, self.u, step, n, self.dt)
+            step += n
+            self._check(status, step)
+        return step
+
+    def _check(self, status, step):
+        if status != RUNNING:
+            reason, time = STOP_REASONS[status], step * self.dt
+            raise SimulationStopped(f"stopped at t = {time:.3f} s: {reason}", reason, time, self.frame())
+
+    def frame(self):
+        """Rows so far in channel units."""
+        values = to_units(self.rows[: self.filled], self.scene.n_lines)
+        return pd.DataFrame(values, columns=[c.column for c in self.scene.channels])
+
+
+class _bar:
+    """Context that hands out a callable taking the share done: nothing, rich's bar, or the user's own."""
+
+    def __init__(self, progress):
+        self.progress = progress
+        self.bar = None
+
+    def __enter__(self):
+        if callable(self.progress):
+            return self.progress
+        if not self.progress:
+            return lambda share: None
+        from rich.progress import Progress
+
+        self.bar = Progress(transient=True)
+        self.bar.start()
+        task = self.bar.add_task("simulating", total=1.0)
+        return lambda share: self.bar.update(task, completed=share)
+
+    def __exit__(self, *_):
+        if self.bar is not None:
+            self.bar.stop()
