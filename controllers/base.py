@@ -1,0 +1,100 @@
+"""What a controller is: the protocol, its compiled form, and the check of a Python one's answers."""
+
+from math import isfinite
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+
+from fowt_env.errors import ControllerError, InputError
+from fowt_env.jit import kernel
+from fowt_env.measurement import N_MEASUREMENTS
+
+N_COMMANDS = 2  # command[0]: generator torque, N m, high-speed shaft; command[1]: blade pitch, rad
+LONGEST_CONTROL_DT = 1.0  # s; beyond it the sampled loop no longer resembles the design
+
+
+@runtime_checkable
+class Controller(Protocol):
+    """Any object with these two methods can control a run (SI, radians)."""
+
+    def reset(self, measurement):
+        """Start afresh from a Measurement, so that the first command does not bump the plant."""
+
+    def act(self, measurement):
+        """(generator torque N m on the high-speed shaft, blade pitch rad) held until the next call."""
+
+
+@kernel
+def call_law(law, parameters, memory, measurement, command):
+    """Run a compiled law once; the way to it from Python."""
+    law(parameters, memory, measurement, command)
+
+
+class CompiledController:
+    """Base of the controllers whose law runs inside the compiled loop.
+
+    A subclass sets `kernel = staticmethod(law)`, with law made by fowt_env.jit.control_kernel, and
+    writes reset(). parameters and memory are float64 arrays; IntEnums beside the law name their
+    entries. The compiled loop calls kernel on these arrays; act() calls the same law from Python.
+    """
+
+    kernel = None
+
+    def __init__(self, name, parameters, n_memory):
+        self.name = str(name)
+        self.parameters = np.ascontiguousarray(parameters, dtype=np.float64)
+        self.memory = np.zeros(n_memory)
+
+    def reset(self, measurement):
+        """Set memory from a Measurement, forgetting everything before."""
+        raise NotImplementedError(f"{type(self).__name__} must define reset(measurement)")
+
+    def act(self, measurement):
+        """(generator torque, blade pitch) for a Measurement; advances the memory by one period."""
+        values = np.array(measurement, dtype=np.float64)
+        if values.shape != (N_MEASUREMENTS,):
+            raise InputError(f"measurement has shape {values.shape}: must be ({N_MEASUREMENTS},)")
+        command = np.zeros(N_COMMANDS)
+        call_law(self.kernel, self.parameters, self.memory, values, command)
+        return float(command[0]), float(command[1])
+
+
+class CheckedController:
+    """A Python controller whose every answer is checked to be two finite numbers."""
+
+    def __init__(self, controller, name=None):
+        self.controller = controller
+        self.name = str(name or getattr(controller, "name", type(controller).__name__))
+
+    def reset(self, measurement):
+        """Reset the controller inside."""
+        self.controller.reset(measurement)
+
+    def act(self, measurement):
+        """(generator torque, blade pitch) as floats.
+
+        Raises: ControllerError naming the controller, the time and what it returned.
+        """
+        returned = self.controller.act(measurement)
+        try:
+            values = np.asarray(returned)
+            good = values.shape == (N_COMMANDS,) and values.dtype.kind in "iuf"
+        except ValueError:  # ragged sequences
+            good = False
+        if good and isfinite(values[0]) and isfinite(values[1]):
+            return float(values[0]), float(values[1])
+        time = float(measurement.time)
+        raise ControllerError(
+            f"controller {self.name!r} returned {returned!r} at t = {time:.3f} s: act() must return two"
+            " finite numbers, (generator torque in N m on the high-speed shaft, blade pitch in rad)",
+            controller=self.name,
+            time=time,
+            returned=returned,
+        )
+
+
+def check_control_dt(control_dt):
+    """The control period as a float. Raises: InputError outside (0, 1] s."""
+    if not 0.0 < control_dt <= LONGEST_CONTROL_DT:
+        raise InputError(f"control_dt = {control_dt}: must be in (0, {LONGEST_CONTROL_DT:g}] s")
+    return float(control_dt)

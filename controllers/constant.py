@@ -1,0 +1,53 @@
+"""Constant commands: what is measured at the start, or given figures."""
+
+from enum import IntEnum
+from math import isfinite
+
+import numpy as np
+
+from controllers.base import CompiledController, check_control_dt
+from fowt_env.errors import InputError
+from fowt_env.jit import control_kernel
+
+
+class Memory(IntEnum):
+    """Entries of the law's memory array."""
+
+    TORQUE_COMMAND = 0  # N m, high-speed shaft
+    PITCH_COMMAND = 1  # rad
+
+
+@control_kernel
+def constant_law(parameters, memory, measurement, command):
+    """Command what the memory holds."""
+    command[0] = memory[Memory.TORQUE_COMMAND]
+    command[1] = memory[Memory.PITCH_COMMAND]
+
+
+class Constant(CompiledController):
+    """Constant generator torque and blade pitch; None: the one measured at reset.
+
+    Raises: InputError for a figure that is not finite.
+    """
+
+    kernel = staticmethod(constant_law)
+
+    def __init__(self, torque=None, blade_pitch=None, name="constant"):
+        for key, value in (("torque", torque), ("blade_pitch", blade_pitch)):
+            if value is not None and not isfinite(value):
+                raise InputError(f"{key} = {value}: must be finite, or None for the measured one")
+        super().__init__(name, np.zeros(0), len(Memory))
+        self.torque = torque
+        self.blade_pitch = blade_pitch
+
+    def reset(self, measurement):
+        """Take what is measured for each figure that was not given."""
+        torque, pitch = self.torque, self.blade_pitch
+        self.memory[Memory.TORQUE_COMMAND] = measurement.generator_torque if torque is None else torque
+        self.memory[Memory.PITCH_COMMAND] = measurement.blade_pitch if pitch is None else pitch
+
+
+def constant(turbine, control_dt):
+    """Generator torque and blade pitch held at what is measured at the start."""
+    check_control_dt(control_dt)
+    return Constant()

@@ -1,0 +1,79 @@
+"""DEMONSTRATION ONLY: Eq. (8) of the source paper as printed, whose gain grows with time.
+
+theory.md, section 4. The printed law has t (w_b - w_b0) where the integral of the speed error
+belongs. So it is a proportional controller with the gain G (1 + t/tau_i): it leaves a speed offset
+that fades only like 1/t, depends on the choice of t = 0, and ends unstable. Do not control with it.
+"""
+
+from enum import IntEnum
+
+from controllers.base import CompiledController, check_control_dt
+from controllers.pi import (
+    Memory,
+    Parameter,
+    PISettings,
+    schedule_gain,
+    schedule_pitch_of,
+    speed_error,
+    start_commands,
+    write_commands,
+)
+from fowt_env.jit import control_kernel, kernel
+from fowt_env.measurement import Measure
+
+
+class LiteralMemory(IntEnum):
+    """Entries of the law's memory beyond those it shares with the PI law (Memory, before INTEGRAL)."""
+
+    START_TIME = Memory.INTEGRAL  # s
+    START_PITCH = Memory.INTEGRAL + 1  # rad
+
+
+@kernel
+def literal_gain(time, parameters):
+    """Gain of the printed law, rad per rad/s of rotor speed: G (1 + t/tau_i), without the schedule."""
+    return parameters[Parameter.PROPORTIONAL] + parameters[Parameter.INTEGRAL] * time
+
+
+@kernel
+def literal_step(parameters, memory, measurement, command):
+    """One period of the printed law; filter, schedule, limits and torque are those of the PI law."""
+    error = speed_error(parameters, memory, measurement)
+    pitch = schedule_pitch_of(parameters, memory, measurement)
+    time = measurement[Measure.TIME] - memory[LiteralMemory.START_TIME]
+    gain = schedule_gain(pitch, parameters[Parameter.SCHEDULE_PITCH]) * literal_gain(time, parameters)
+    write_commands(pitch, memory[LiteralMemory.START_PITCH] + gain * error, parameters, memory, command)
+
+
+@control_kernel
+def literal_law(parameters, memory, measurement, command):
+    """Compiled form of literal_step, one type for all control laws."""
+    literal_step(parameters, memory, measurement, command)
+
+
+class Eq8Literal(CompiledController):
+    """The printed Eq. (8), as a demonstration: t = 0 and the blade pitch of zero error are those at reset.
+
+    Without that pitch the printed law would have no operating point above rated at all.
+    """
+
+    kernel = staticmethod(literal_law)
+
+    def __init__(self, settings, control_dt, name="eq8_literal"):
+        parameters = settings.parameters(check_control_dt(control_dt))
+        super().__init__(name, parameters, LiteralMemory.START_PITCH + 1)
+        self.settings = settings
+
+    def reset(self, measurement):
+        """Start the clock of the printed law here, from the measured speed, blade pitch and torque."""
+        p = self.parameters
+        low, high = p[Parameter.PITCH_MINIMUM], p[Parameter.PITCH_MAXIMUM]
+        pitch = float(min(max(measurement.blade_pitch, low), high))
+        start_commands(self.memory, p, pitch, measurement)
+        self.memory[LiteralMemory.START_TIME] = measurement.time
+        self.memory[LiteralMemory.START_PITCH] = pitch
+
+
+def eq8_literal(turbine, control_dt):
+    """DEMONSTRATION ONLY: Eq. (8) as printed, with OC3 gains; its gain grows with time."""
+    return Eq8Literal(PISettings.published(turbine), control_dt)

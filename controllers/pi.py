@@ -1,0 +1,333 @@
+"""The baseline: torque law and gain-scheduled PI on rotor speed, Eq. (8) in its consistent form.
+
+theory.md, sections 3 and 4. Above rated the torque is constant (or the power, by name) and the
+blade pitch holds the rotor speed; below rated the pitch rests on its minimum and the torque curve rules.
+"""
+
+from dataclasses import dataclass, fields
+from enum import IntEnum
+from math import exp, inf, isfinite, isinf
+from typing import NamedTuple
+
+import numpy as np
+
+from controllers.base import CompiledController, check_control_dt
+from fowt_env.errors import InputError, unknown
+from fowt_env.jit import control_kernel, kernel
+from fowt_env.loads.drivetrain import TorqueCurve, build_torque_curve, generator_torque, limited
+from fowt_env.measurement import Measure
+
+SCHEDULE_ON = ("commanded", "measured")
+BUMPLESS = 1e-9  # rad, largest step of the first command that still counts as none
+
+
+class Gains(NamedTuple):
+    """Published form of the PI gains: blade pitch over generator-speed error and its integral."""
+
+    KP: float  # s
+    KI: float  # -
+
+
+class Parameter(IntEnum):
+    """Entries of the law's parameter array; the fields of TorqueCurve follow from CURVE on."""
+
+    CONTROL_DT = 0  # s
+    FILTER_DECAY = 1  # share of the filtered speed that one period leaves
+    GEAR_RATIO = 2
+    RATED_SPEED = 3  # w_b0, the set-point of the rotor speed, rad/s
+    PROPORTIONAL = 4  # G, s
+    INTEGRAL = 5  # G/tau_i
+    SCHEDULE_PITCH = 6  # beta_K, rad; inf: no schedule
+    SCHEDULE_MEASURED = 7  # 1: gains follow the measured blade pitch, 0: the last command
+    PITCH_MINIMUM = 8  # rad
+    PITCH_MAXIMUM = 9
+    PITCH_RATE_LIMIT = 10  # rad/s
+    TORQUE_RATE_LIMIT = 11  # N m/s
+    CURVE = 12
+
+
+class Memory(IntEnum):
+    """Entries of the law's memory array."""
+
+    FILTERED_SPEED = 0  # generator speed, rad/s
+    PITCH_COMMAND = 1  # rad
+    TORQUE_COMMAND = 2  # N m
+    INTEGRAL = 3  # I_e, rad
+
+
+def gains(design_frequency, damping, inertia, rated_speed, gear_ratio, dP_dpitch):
+    """Gains that give the rotor-speed loop this frequency (rad/s) and damping ratio at zero pitch.
+
+    inertia: I_D about the low-speed shaft, kg m2; rated_speed: w_b0 of the rotor, rad/s; dP_dpitch:
+    slope of the aerodynamic power at rated speed, W/rad, negative. theory.md, section 4.
+    Raises: InputError unless all are finite, dP_dpitch < 0 and the others > 0.
+    """
+    given = {
+        "design_frequency": design_frequency,
+        "damping": damping,
+        "inertia": inertia,
+        "rated_speed": rated_speed,
+        "gear_ratio": gear_ratio,
+    }
+    for key, value in given.items():
+        _check(key, value, value > 0.0 and isfinite(value), "must be positive and finite")
+    negative = dP_dpitch < 0.0 and isfinite(dP_dpitch)
+    _check("dP_dpitch", dP_dpitch, negative, "must be negative and finite, W/rad")
+    scale = inertia * rated_speed / (gear_ratio * -dP_dpitch)
+    return Gains(KP=2.0 * damping * design_frequency * scale, KI=design_frequency**2 * scale)
+
+
+def _check(key, value, good, allowed):
+    """Raise InputError unless good; comparisons with NaN are False, so NaN is never good."""
+    if not good:
+        raise InputError(f"{key} = {value}: {allowed}")
+
+
+@dataclass(frozen=True)
+class PISettings:
+    """Everything that shapes the PI law. Raises: InputError naming the key, value and allowed range."""
+
+    KP: float  # on generator speed, s
+    KI: float  # on generator speed, -
+    rated_speed: float  # of the rotor, rad/s
+    gear_ratio: float
+    pitch_minimum: float  # rad
+    pitch_maximum: float
+    pitch_rate_limit: float  # of the command, rad/s
+    torque_rate_limit: float  # N m/s
+    curve: TorqueCurve
+    speed_filter_corner: float = inf  # rad/s; inf: no filter
+    gain_schedule_pitch: float = inf  # beta_K, rad; inf: no schedule
+    schedule_on: str = "commanded"  # which blade pitch sets the gain and forces region 3
+
+    def __post_init__(self):
+        for key in ("KI", "rated_speed", "gear_ratio", "pitch_rate_limit", "torque_rate_limit"):
+            value = getattr(self, key)
+            _check(key, value, value > 0.0 and isfinite(value), "must be positive and finite")
+        _check("KP", self.KP, self.KP >= 0.0 and isfinite(self.KP), "must be non-negative and finite")
+        for key in ("speed_filter_corner", "gain_schedule_pitch"):
+            value = getattr(self, key)
+            _check(key, value, value > 0.0, "must be positive; inf switches it off")
+        low, high = self.pitch_minimum, self.pitch_maximum
+        _check("pitch_maximum", high, isfinite(high) and high > low, f"must exceed pitch_minimum = {low}")
+        lowest = -0.5 * self.gain_schedule_pitch  # there GK has doubled; it is singular at -beta_K
+        _check("pitch_minimum", low, isfinite(low) and low >= lowest, f"must be finite and >= {lowest} rad")
+        if self.schedule_on not in SCHEDULE_ON:
+            raise unknown("schedule_on", self.schedule_on, SCHEDULE_ON)
+
+    @classmethod
+    def published(cls, turbine, gain_set="oc3", region3="constant_torque", scheduled=True, **changes):
+        """Settings of a description.Turbine with one of its published gain sets, "oc3" or "land".
+
+        changes: fields of PISettings that replace the published ones.
+        """
+        if gain_set not in turbine.gains:
+            raise unknown("gain set", gain_set, turbine.gains)
+        known = {field.name for field in fields(cls)}
+        for key in changes:
+            if key not in known:
+                raise unknown("PI setting", key, known)
+        published, law, drive = turbine.gains[gain_set], turbine.torque_law, turbine.pitch_drive
+        settings = {
+            "KP": published.KP,
+            "KI": published.KI,
+            "rated_speed": turbine.rated_rotor_speed,
+            "gear_ratio": turbine.drivetrain.gear_ratio,
+            "pitch_minimum": drive.minimum,
+            "pitch_maximum": drive.maximum,
+            "pitch_rate_limit": drive.rate_limit,
+            "torque_rate_limit": law.max_torque_rate,
+            "curve": build_torque_curve(law, region3),
+            "speed_filter_corner": law.speed_filter_corner,
+            "gain_schedule_pitch": published.gain_schedule_pitch if scheduled else inf,
+        }
+        return cls(**(settings | changes))
+
+    def parameters(self, control_dt):
+        """(n,) parameter array of the law at this control period, in the order of Parameter."""
+        filtered = not isinf(self.speed_filter_corner)
+        head = {
+            Parameter.CONTROL_DT: control_dt,
+            Parameter.FILTER_DECAY: exp(-control_dt * self.speed_filter_corner) if filtered else 0.0,
+            Parameter.GEAR_RATIO: self.gear_ratio,
+            Parameter.RATED_SPEED: self.rated_speed,
+            Parameter.PROPORTIONAL: self.KP * self.gear_ratio,
+            Parameter.INTEGRAL: self.KI * self.gear_ratio,
+            Parameter.SCHEDULE_PITCH: self.gain_schedule_pitch,
+            Parameter.SCHEDULE_MEASURED: float(self.schedule_on == "measured"),
+            Parameter.PITCH_MINIMUM: self.pitch_minimum,
+            Parameter.PITCH_MAXIMUM: self.pitch_maximum,
+            Parameter.PITCH_RATE_LIMIT: self.pitch_rate_limit,
+            Parameter.TORQUE_RATE_LIMIT: self.torque_rate_limit,
+        }
+        values = np.empty(Parameter.CURVE + len(self.curve))
+        for entry, value in head.items():
+            values[entry] = value
+        values[Parameter.CURVE :] = self.curve
+        return values
+
+
+@kernel
+def curve_of(parameters):
+    """TorqueCurve stored in a parameter array from Parameter.CURVE on."""
+    i = Parameter.CURVE
+    return TorqueCurve(
+        parameters[i],
+        parameters[i + 1],
+        parameters[i + 2],
+        parameters[i + 3],
+        parameters[i + 4],
+        parameters[i + 5],
+        parameters[i + 6],
+        parameters[i + 7],
+        parameters[i + 8],
+        parameters[i + 9],
+        parameters[i + 10],
+        parameters[i + 11],
+    )
+
+
+@kernel
+def schedule_gain(blade_pitch, schedule_pitch):
+    """GK(beta) = 1/(1 + beta/beta_K), theory.md Eq. (8); 1 for an infinite beta_K."""
+    return 1.0 / (1.0 + blade_pitch / schedule_pitch)
+
+
+@kernel
+def schedule_pitch_of(parameters, memory, measurement):
+    """Blade pitch that sets the gain and the torque region: the last command or the measured one."""
+    if parameters[Parameter.SCHEDULE_MEASURED] > 0.5:
+        low, high = parameters[Parameter.PITCH_MINIMUM], parameters[Parameter.PITCH_MAXIMUM]
+        return limited(measurement[Measure.BLADE_PITCH], low, high)
+    return memory[Memory.PITCH_COMMAND]
+
+
+@kernel
+def speed_error(parameters, memory, measurement):
+    """Error e = w_f - w_b0 of the filtered rotor speed, rad/s; advances the filter by one period.
+
+    The filter is a single pole held exactly over the period (exponential smoothing).
+    """
+    decay = parameters[Parameter.FILTER_DECAY]
+    speed = (1.0 - decay) * measurement[Measure.GENERATOR_SPEED] + decay * memory[Memory.FILTERED_SPEED]
+    memory[Memory.FILTERED_SPEED] = speed
+    return speed / parameters[Parameter.GEAR_RATIO] - parameters[Parameter.RATED_SPEED]
+
+
+@kernel
+def write_commands(blade_pitch, target, parameters, memory, command):
+    """Write the torque of the curve and the pitch target, both within their limits of value and rate.
+
+    blade_pitch: the one that may force region 3. The rates are those of the commands, per period.
+    """
+    dt = parameters[Parameter.CONTROL_DT]
+    torque, pitch = memory[Memory.TORQUE_COMMAND], memory[Memory.PITCH_COMMAND]
+    wanted = generator_torque(memory[Memory.FILTERED_SPEED], blade_pitch, curve_of(parameters))
+    step = dt * parameters[Parameter.TORQUE_RATE_LIMIT]
+    torque += limited(wanted - torque, -step, step)
+    wanted = limited(target, parameters[Parameter.PITCH_MINIMUM], parameters[Parameter.PITCH_MAXIMUM])
+    step = dt * parameters[Parameter.PITCH_RATE_LIMIT]
+    pitch += limited(wanted - pitch, -step, step)
+    memory[Memory.TORQUE_COMMAND] = torque
+    memory[Memory.PITCH_COMMAND] = pitch
+    command[0] = torque
+    command[1] = pitch
+
+
+@kernel
+def pi_step(parameters, memory, measurement, command):
+    """One period of the sampled PI law, theory.md Eq. (8), with the torque law of section 3.
+
+    Anti-windup: the integral term GK (G/tau_i) I_e stays within the pitch limits.
+    """
+    error = speed_error(parameters, memory, measurement)
+    pitch = schedule_pitch_of(parameters, memory, measurement)
+    gain = schedule_gain(pitch, parameters[Parameter.SCHEDULE_PITCH])
+    slope = gain * parameters[Parameter.INTEGRAL]
+    integral = limited(
+        memory[Memory.INTEGRAL] + error * parameters[Parameter.CONTROL_DT],
+        parameters[Parameter.PITCH_MINIMUM] / slope,
+        parameters[Parameter.PITCH_MAXIMUM] / slope,
+    )
+    memory[Memory.INTEGRAL] = integral
+    target = gain * parameters[Parameter.PROPORTIONAL] * error + slope * integral
+    write_commands(pitch, target, parameters, memory, command)
+
+
+@control_kernel
+def pi_law(parameters, memory, measurement, command):
+    """Compiled form of pi_step, one type for all control laws."""
+    pi_step(parameters, memory, measurement, command)
+
+
+class PI(CompiledController):
+    """PI law of theory.md Eq. (8) and torque law, sampled every control_dt.
+
+    bumpless, set by reset(): False where no integral within the anti-windup limits gives the
+    measured blade pitch as first command; the command then moves from it at most at the rate limit.
+    """
+
+    kernel = staticmethod(pi_law)
+
+    def __init__(self, settings, control_dt, name="pi"):
+        super().__init__(name, settings.parameters(check_control_dt(control_dt)), len(Memory))
+        self.settings = settings
+        self.bumpless = True
+
+    def reset(self, measurement):
+        """Start so that act() on this same measurement commands the measured blade pitch.
+
+        The filter starts at the measured speed and the torque at the measured torque (at the curve
+        where none is measured); the integral balances the proportional term, as far as anti-windup
+        allows. Where the blade rests on a limit several integrals do, and the limit itself is taken:
+        it is where a long stay there ends, so no wound-up integral is left behind.
+        """
+        p = self.parameters
+        low, high = p[Parameter.PITCH_MINIMUM], p[Parameter.PITCH_MAXIMUM]
+        pitch = float(min(max(measurement.blade_pitch, low), high))
+        gain = schedule_gain(pitch, p[Parameter.SCHEDULE_PITCH])
+        error = measurement.generator_speed / p[Parameter.GEAR_RATIO] - p[Parameter.RATED_SPEED]
+        proportional = gain * p[Parameter.PROPORTIONAL] * error
+        if pitch <= low:
+            term = low
+        elif pitch >= high:
+            term = high
+        else:
+            term = min(max(pitch - proportional, low), high)
+        first = min(max(proportional + term, low), high)
+        self.bumpless = bool(abs(first - measurement.blade_pitch) <= BUMPLESS)
+        # the first act() adds this instant's error before it uses the integral
+        integral = term / (gain * p[Parameter.INTEGRAL]) - error * p[Parameter.CONTROL_DT]
+        self.memory[Memory.INTEGRAL] = integral
+        start_commands(self.memory, p, pitch, measurement)
+
+
+def start_commands(memory, parameters, pitch, measurement):
+    """Set the filter and the last commands in memory from what is measured."""
+    speed, torque = measurement.generator_speed, measurement.generator_torque
+    curve = curve_of(parameters)
+    if not isfinite(torque):
+        torque = generator_torque(float(speed), pitch, curve)
+    memory[Memory.FILTERED_SPEED] = speed
+    memory[Memory.PITCH_COMMAND] = pitch
+    memory[Memory.TORQUE_COMMAND] = min(max(torque, 0.0), curve.maximum_torque)
+
+
+def pi(turbine, control_dt):
+    """OC3 gains with their schedule, constant torque above rated: the default baseline."""
+    return PI(PISettings.published(turbine), control_dt, "pi")
+
+
+def pi_unscheduled(turbine, control_dt):
+    """OC3 gains without schedule (GK = 1 at every blade pitch), constant torque above rated."""
+    return PI(PISettings.published(turbine, scheduled=False), control_dt, "pi_unscheduled")
+
+
+def pi_land(turbine, control_dt):
+    """Land-based gains with their schedule, constant torque above rated: for comparison only."""
+    return PI(PISettings.published(turbine, "land"), control_dt, "pi_land")
+
+
+def pi_land_power(turbine, control_dt):
+    """Land-based gains with their schedule, constant power above rated, as published for land."""
+    return PI(PISettings.published(turbine, "land", "constant_power"), control_dt, "pi_land_power")

@@ -1,0 +1,213 @@
+"""Names, import paths and objects that can be controllers, and what they may return."""
+
+import pickle
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from naive.turbine import turbine
+
+import controllers
+from controllers import CONTROLLERS, CheckedController, make
+from controllers.constant import Constant
+from fowt_env.errors import ControllerError, InputError
+from fowt_env.measurement import Measurement
+
+ROOT = Path(__file__).resolve().parents[2]
+QUIET = Measurement(*[0.0] * len(Measurement._fields))
+RATED = QUIET._replace(
+    rotor_speed=1.267109, generator_speed=122.9096, generator_torque=43093.55, blade_pitch=0.2
+)
+
+
+class Steady:
+    """A user's controller without constructor arguments."""
+
+    def reset(self, measurement):
+        self.pitch = measurement.blade_pitch
+
+    def act(self, measurement):
+        return 4e4, self.pitch
+
+
+class Returning:
+    """A user's controller that returns whatever it was given."""
+
+    def __init__(self, answer):
+        self.answer = answer
+
+    def reset(self, measurement):
+        pass
+
+    def act(self, measurement):
+        return self.answer
+
+
+@pytest.mark.parametrize("name", sorted(CONTROLLERS))
+def test_every_controller_commands_within_the_turbines_limits(name):
+    controller = make(name, turbine(), 0.1)
+    rng = np.random.default_rng(4)
+    controller.reset(RATED)
+    for k in range(500):
+        speed, blade_pitch = rng.uniform(0.0, 200.0), rng.uniform(0.0, 1.5)
+        m = RATED._replace(time=0.1 * k, generator_speed=speed, blade_pitch=blade_pitch)
+        torque, pitch = controller.act(m)
+        assert 0.0 <= torque <= 47402.91
+        assert 0.0 <= pitch <= 1.570796
+
+
+@pytest.mark.parametrize("name", sorted(CONTROLLERS))
+def test_reset_forgets(name):
+    controller = make(name, turbine(), 0.1)
+
+    def run():
+        controller.reset(RATED)
+        return [controller.act(RATED._replace(time=0.1 * k, generator_speed=120.0 + k)) for k in range(50)]
+
+    first = run()
+    for k in range(200):
+        controller.act(RATED._replace(time=5.0 + 0.1 * k, generator_speed=140.0))
+    assert run() == first
+
+
+@pytest.mark.parametrize("name", sorted(CONTROLLERS))
+def test_every_controller_survives_pickling(name):
+    controller = make(name, turbine(), 0.1)
+    controller.reset(RATED)
+    controller.act(RATED)
+    twin = pickle.loads(pickle.dumps(controller))
+    later = RATED._replace(time=0.1, generator_speed=130.0)
+    assert twin.act(later) == controller.act(later)
+
+
+@pytest.mark.parametrize("name", sorted(CONTROLLERS))
+def test_every_name_says_what_it_is(name):
+    assert CONTROLLERS[name].__doc__
+    assert make(name, turbine(), 0.1).name == name
+
+
+def test_constant_holds_what_was_measured_or_given():
+    held = make("constant", turbine(), 0.1)
+    held.reset(RATED)
+    assert held.act(RATED._replace(generator_torque=0.0, blade_pitch=0.0)) == (43093.55, 0.2)
+    given = Constant(torque=1e4)
+    given.reset(RATED)
+    assert given.act(QUIET) == (1e4, 0.2)
+    with pytest.raises(InputError, match="blade_pitch = nan"):
+        Constant(blade_pitch=float("nan"))
+
+
+def test_an_unknown_name_gets_a_suggestion():
+    with pytest.raises(InputError, match="unknown controller 'pi_lnad'. Did you mean 'pi_land'"):
+        make("pi_lnad", turbine(), 0.1)
+
+
+@pytest.mark.parametrize("control_dt", [0.0, -0.1, 1.5, float("nan"), float("inf")])
+def test_a_control_period_outside_its_range_is_refused(control_dt):
+    with pytest.raises(InputError, match="control_dt"):
+        make("pi", turbine(), control_dt)
+
+
+def test_objects_and_classes_of_the_protocol_are_taken():
+    for given in (Steady(), Steady):
+        controller = make(given, turbine(), 0.1)
+        controller.reset(RATED)
+        assert controller.act(RATED) == (4e4, 0.2)
+        assert controller.name == "Steady"
+    compiled = Constant()
+    assert make(compiled, turbine(), 0.1) is compiled
+
+
+def test_a_class_that_takes_the_turbine_gets_it():
+    class Tuned(Steady):
+        def __init__(self, turbine, control_dt):
+            self.given = turbine.name, control_dt
+
+    assert make(Tuned, turbine(), 0.25).controller.given == ("published", 0.25)
+
+
+def test_an_import_path_is_looked_for_in_the_working_folder(tmp_path, monkeypatch):
+    (tmp_path / "my_own_law.py").write_text(
+        "class Law:\n"
+        "    def reset(self, measurement):\n        pass\n"
+        "    def act(self, measurement):\n        return 1.0, measurement.blade_pitch\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    before = list(sys.path)
+    controller = make("my_own_law:Law", turbine(), 0.1)
+    controller.reset(RATED)
+    assert controller.act(RATED) == (1.0, 0.2)
+    assert controller.name == "my_own_law:Law"
+    assert sys.path == before
+    with pytest.raises(InputError, match="'Lau'.*Did you mean 'Law'"):
+        make("my_own_law:Lau", turbine(), 0.1)
+
+
+@pytest.mark.parametrize("path", ["no_such_module_at_all:Law", "controllers.pi:", ":PI"])
+def test_a_broken_import_path_is_named(path):
+    with pytest.raises(InputError, match=path):
+        make(path, turbine(), 0.1)
+
+
+def test_things_that_are_no_controllers_are_refused():
+    class NoAct:
+        def reset(self, measurement):
+            pass
+
+    with pytest.raises(InputError, match="no method act"):
+        make(NoAct(), turbine(), 0.1)
+    with pytest.raises(InputError, match="no method reset"):
+        make(3.0, turbine(), 0.1)
+    with pytest.raises(InputError, match=r"must take \(turbine, control_dt\) or no arguments"):
+        make(Returning, turbine(), 0.1)
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        (float("nan"), 0.1),
+        (4e4, float("inf")),
+        (4e4,),
+        (4e4, 0.1, 0.2),
+        4e4,
+        None,
+        ("40000", "0.1"),
+        (4e4, None),
+        (4e4, [0.1, 0.2]),
+        np.zeros((2, 1)),
+    ],
+)
+def test_a_wrong_answer_names_controller_time_and_answer(answer):
+    controller = make(Returning(answer), turbine(), 0.1)
+    controller.reset(RATED)
+    with pytest.raises(ControllerError) as caught:
+        controller.act(RATED._replace(time=12.5))
+    assert "'Returning'" in str(caught.value) and "12.500 s" in str(caught.value)
+    assert repr(answer) in str(caught.value)
+    assert (caught.value.controller, caught.value.time) == ("Returning", 12.5)
+    assert caught.value.returned is answer
+
+
+@pytest.mark.parametrize("answer", [(4e4, 0.1), [4e4, 0.1], np.array([4e4, 0.1]), (40000, np.float64(0.1))])
+def test_two_finite_numbers_pass_the_check(answer):
+    torque, pitch = CheckedController(Returning(answer)).act(RATED)
+    assert (torque, pitch) == (4e4, 0.1)
+    assert type(torque) is float and type(pitch) is float
+
+
+def test_a_measurement_of_another_length_is_refused():
+    controller = make("pi", turbine(), 0.1)
+    controller.reset(RATED)
+    with pytest.raises(InputError, match="measurement has shape"):
+        controller.act(RATED[:-1])
+
+
+def test_the_plant_does_not_import_controllers():
+    code = "import sys, fowt_env, fowt_env.loads.drivetrain; sys.exit('controllers' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], cwd=ROOT).returncode == 0
+
+
+def test_public_names_exist():
+    assert all(hasattr(controllers, name) for name in controllers.__all__)
