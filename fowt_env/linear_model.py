@@ -1,6 +1,7 @@
 """Linear models of a scene about an operating point, by central differences of the nonlinear plant."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,7 +15,8 @@ STATES = (
     "vx", "vy", "vz", "wx", "wy", "wz", "rotor_speed", "blade_pitch",
 )  # fmt: skip
 STATE_INDEX = tuple(State[name.upper()] for name in STATES)
-STEPS = np.array([1e-3, 1e-3, 1e-3, 1e-5, 1e-5, 1e-5, 1e-3, 1e-3, 1e-3, 1e-5, 1e-5, 1e-5, 1e-4, 1e-5])
+# velocity steps are small because quadratic drag leaves a false damping proportional to them
+STEPS = np.array([1e-3, 1e-3, 1e-3, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-7, 1e-7, 1e-7, 1e-4, 1e-5])
 INPUTS = ("generator_torque", "blade_pitch_command", "wind_speed")
 INPUT_STEPS = np.array([1.0, 1e-5, 1e-3])
 MOTIONS = ("surge", "sway", "heave", "roll", "platform_pitch", "yaw")
@@ -32,6 +34,7 @@ class LinearModel:
     states: tuple
     inputs: tuple
     point: object
+    cm_height: float  # of the whole turbine, body z, m
 
     def index(self, name):
         """Row of a state. Raises: InputError for an unknown name."""
@@ -40,14 +43,45 @@ class LinearModel:
         return self.states.index(name)
 
     def modes(self):
-        """[(period s, damping ratio, frequency rad/s, shape (n,))] of the oscillating modes, slowest first."""
-        values, vectors = np.linalg.eig(self.A)
-        found = []
-        for value, vector in zip(values, vectors.T, strict=True):
-            if value.imag > 1e-6:
-                frequency = abs(value)
-                found.append((2.0 * np.pi / value.imag, -value.real / frequency, frequency, vector))
-        return sorted(found, key=lambda mode: -mode[0])
+        """[Mode] of the plant without control, slowest first."""
+        return modes(self.A, self.states, self.cm_height)
+
+
+class Mode(NamedTuple):
+    """One oscillating mode."""
+
+    name: str  # the state with the largest share
+    period: float  # s
+    damping_ratio: float
+    frequency: float  # rad/s
+
+
+def modes(a, names, cm_height):
+    """[Mode] of a system matrix a (n, n) with these state names, slowest first.
+
+    A mode is named by its largest motion: translations of the centre of mass (at the water line a
+    platform-pitch mode moves more in surge than in pitch), angles times 60 m, rotor speed times 5 m s.
+    """
+    values, vectors = np.linalg.eig(a)
+    found = []
+    for value, vector in zip(values, vectors.T, strict=True):
+        if value.imag <= 1e-6:
+            continue
+        part = dict(zip(names, vector, strict=True))
+        share = {
+            "surge": abs(part["surge"] + cm_height * part["platform_pitch"]),
+            "sway": abs(part["sway"] - cm_height * part["roll"]),
+            "heave": abs(part["heave"]),
+            "roll": 60.0 * abs(part["roll"]),
+            "platform_pitch": 60.0 * abs(part["platform_pitch"]),
+            "yaw": 60.0 * abs(part["yaw"]),
+            "rotor_speed": 5.0 * abs(part["rotor_speed"]),
+        }
+        name = max(share, key=share.get)
+        found.append(
+            Mode(name, float(2.0 * np.pi / value.imag), float(-value.real / abs(value)), float(abs(value)))
+        )
+    return sorted(found, key=lambda mode: -mode.period)
 
 
 @kernel
@@ -100,7 +134,8 @@ def linearize(scene, operating_point=None):
             mean_derivative(other, x, u, AZIMUTHS, dx, mean)
             out[:] = mean
         b[:, 2] = (up[rows] - down[rows]) / (2.0 * step)
-    return LinearModel(a, b, STATES, INPUTS, point)
+    cm_height = body.s_z / body.mass
+    return LinearModel(a, b, STATES, INPUTS, point, cm_height)
 
 
 def natural_periods(scene):

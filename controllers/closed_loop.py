@@ -1,0 +1,83 @@
+"""Linear closed loop of a plant and the PI law: what its gains do to every mode, theory.md, section 4."""
+
+from math import isinf
+
+import numpy as np
+
+from controllers.pi import PISettings, schedule_gain
+from fowt_env.errors import InputError
+from fowt_env.linear_model import LinearModel, linearize, modes
+from fowt_env.loads.drivetrain import generator_torque
+from fowt_env.scene import build_scene
+from fowt_env.state import State
+from fowt_env.steady import trim
+
+PLATFORM_PERIOD = 30.0  # s
+TORQUE_STEP = 1e-4  # rad/s of rotor speed, for the slope of the torque curve
+
+
+def closed_loop_matrix(model: LinearModel, settings: PISettings):
+    """(A, names): the plant's states, then filtered rotor speed and speed-error integral, continuous in time.
+
+    The gain schedule counts with its slope: the integral term is GK(beta) times the integral, so a rise
+    of beta lowers GK. With the schedule on the last command that divides every gain by 2 - GK; on the
+    measured pitch it adds -(1 - GK) times that pitch to the command.
+    Raises: InputError where the pitch rests on a limit (below rated the loop is open).
+    """
+    point = model.point
+    pitch = float(point.state[State.BLADE_PITCH])
+    if not settings.pitch_minimum < pitch < settings.pitch_maximum:
+        raise InputError(
+            f"blade pitch {np.degrees(pitch):.4g} deg rests on a limit: the pitch loop is open there;"
+            " choose a wind above rated"
+        )
+    n = len(model.states)
+    speed, blade = model.index("rotor_speed"), model.index("blade_pitch")
+    gain = schedule_gain(pitch, settings.gain_schedule_pitch)
+    proportional = gain * settings.KP * settings.gear_ratio
+    integral = gain * settings.KI * settings.gear_ratio
+    feedback = 0.0
+    if settings.schedule_on == "measured":
+        feedback = -(1.0 - gain)
+    else:
+        proportional /= 2.0 - gain
+        integral /= 2.0 - gain
+    a = np.zeros((n + 2, n + 2))
+    a[:n, :n] = model.A
+    command = np.zeros(n + 2)
+    filtered = not isinf(settings.speed_filter_corner)
+    seen = n if filtered else speed
+    command[seen] += proportional
+    command[n + 1] += integral
+    command[blade] += feedback
+    a[:n] += np.outer(model.B[:, 1], command)
+    ratio = settings.gear_ratio
+    centre = float(point.state[State.ROTOR_SPEED])
+    torques = [
+        generator_torque(ratio * (centre + s * TORQUE_STEP), pitch, settings.curve) for s in (1.0, -1.0)
+    ]
+    a[:n, seen] += model.B[:, 0] * (torques[0] - torques[1]) / (2.0 * TORQUE_STEP)
+    corner = settings.speed_filter_corner if filtered else 1.0
+    a[n, speed] += corner
+    a[n, n] -= corner
+    a[n + 1, seen] += 1.0
+    return a, (*model.states, "filtered_speed", "speed_integral")
+
+
+def platform_pitch_damping(winds, gain_sets, platform="oc3_hywind", **options):
+    """{gain set: [damping ratio of the platform-pitch mode at each wind]} on the floating platform.
+
+    gain_sets: {name: changes of PISettings.published, e.g. {"gain_set": "land"}}. The mode is the one
+    named platform pitch with the period nearest to that of the platform alone. Viscous damping is not
+    in it.
+    """
+    table = {name: [] for name in gain_sets}
+    for wind in winds:
+        scene = build_scene(platform, wind=float(wind), **options)
+        model = linearize(scene, trim(scene))
+        for name, changes in gain_sets.items():
+            a, names = closed_loop_matrix(model, PISettings.published(scene.turbine, **changes))
+            pitching = [m for m in modes(a, names, model.cm_height) if m.name == "platform_pitch"]
+            # the rotor loop may come near; the platform's own period tells them apart
+            table[name].append(min(pitching, key=lambda m: abs(m.period - PLATFORM_PERIOD)).damping_ratio)
+    return table
