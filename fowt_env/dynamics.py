@@ -4,6 +4,7 @@ Unknowns (v', w', w_b'): one symmetric positive-definite system. The rotor row i
 leaves a 6x6 Cholesky solve.
 """
 
+from enum import IntEnum
 from math import cos, sin, sqrt
 from typing import NamedTuple
 
@@ -14,7 +15,7 @@ from fowt_env.loads.damping import damping_load
 from fowt_env.loads.drivetrain import pitch_rate, shaft_torque
 from fowt_env.loads.hydrostatics import hydrostatic_load
 from fowt_env.loads.mooring import mooring_load
-from fowt_env.loads.morison import morison_load
+from fowt_env.loads.morison import StripLoad, morison_load
 from fowt_env.loads.rotor import RotorLoad, rotor_load
 from fowt_env.loads.rotor_table import rotor_table_load
 from fowt_env.loads.tower import tower_load
@@ -56,16 +57,45 @@ class Model(NamedTuple):
     tower: object  # loads.tower.TowerDrag or None
     wind: object  # weather.wind.WindSeries or None: no aerodynamics at all
     wind_field: object  # None
+    multistep: object  # integrators.Multistep or None: Runge-Kutta 4
+
+
+class Kept(IntEnum):
+    """Entries of Work.kept: the last evaluation of the loads, which the state alone decides.
+
+    FRESH is 1 while they belong to the present state (at TIME), so that an observation and the step after it
+    share one evaluation. STEPS counts the steps since the start, for the multistep integrators.
+    """
+
+    FRESH = 0
+    STEPS = 1
+    TORQUE = 2  # aerodynamic, about the shaft
+    THRUST = 3
+    S0 = 4  # strip added mass
+    S1 = 5
+    S2 = 6
+    A33 = 7
+    TOTAL = 8  # six entries each: sum of all loads, ...
+    ROTOR = 14
+    TOWER = 20
+    HYDRO = 26  # buoyancy and strips
+    MOORING = 32
+    TIME = 38
+
+
+N_KEPT = 39
 
 
 class Work(NamedTuple):
-    """Scratch of one plant. lines and counters carry over between calls; the rest does not."""
+    """Scratch of one plant. lines, counters, kept and history carry over between calls."""
 
     lines: np.ndarray  # (n_lines, 6) mooring warm start and results
     counters: np.ndarray  # (N_COUNTERS,)
     kinematics: np.ndarray  # (7, n_nodes) water kinematics at the strip nodes
     matrix: np.ndarray  # (6, 6)
     stages: np.ndarray  # (5, n_state) Runge-Kutta stages and stage state
+    kept: np.ndarray  # (N_KEPT,)
+    history: np.ndarray  # (4, n_state) derivatives of past steps, latest first
 
 
 class Loads(NamedTuple):
@@ -168,9 +198,28 @@ def rotor_part(t, pose, x, now, scene_wind, wind_field, rotor, rotor_table, skew
 
 
 @kernel
-def derivative(t, x, u, scene, work, dx):
-    """dx = f(t, x, u); returns the loads. u: generator torque (N m) and blade-pitch command (rad)."""
-    body = scene.body
+def _keep(kept, start, wrench):
+    """Store a wrench in six entries of kept."""
+    kept[start] = wrench.fx
+    kept[start + 1] = wrench.fy
+    kept[start + 2] = wrench.fz
+    kept[start + 3] = wrench.mx
+    kept[start + 4] = wrench.my
+    kept[start + 5] = wrench.mz
+
+
+@kernel
+def _kept_wrench(kept, start):
+    """The wrench stored by _keep."""
+    return Wrench(
+        kept[start], kept[start + 1], kept[start + 2], kept[start + 3], kept[start + 4], kept[start + 5]
+    )
+
+
+@kernel
+def evaluate(t, x, scene, work, dx):
+    """Every load at a state, kept in work.kept; writes only the wake rates of dx. The command has no part."""
+    body, kept = scene.body, work.kept
     pose = pose_of(x)
     now = wind_now(t, scene.wind)
     aero = rotor_part(
@@ -188,14 +237,49 @@ def derivative(t, x, u, scene, work, dx):
     load = add(load, strips.wrench)
     load = add(load, mooring)
     load = add(load, damping_load(pose, x, scene.damping))
-    torque = shaft_torque(aero.torque, u[0], x[State.ROTOR_SPEED], scene.drivetrain)
 
+    _keep(kept, Kept.TOTAL, load)
+    _keep(kept, Kept.ROTOR, aero.wrench)
+    _keep(kept, Kept.TOWER, tower)
+    _keep(kept, Kept.HYDRO, add(buoyancy, strips.wrench))
+    _keep(kept, Kept.MOORING, mooring)
+    kept[Kept.TORQUE] = aero.torque
+    kept[Kept.THRUST] = aero.thrust
+    kept[Kept.S0] = strips.s0
+    kept[Kept.S1] = strips.s1
+    kept[Kept.S2] = strips.s2
+    kept[Kept.A33] = strips.a33
+
+
+@kernel
+def respond(x, u, scene, work, dx):
+    """Rates of the state under the command u with the loads of the last evaluate at this state."""
+    kept = work.kept
+    pose = pose_of(x)
+    torque = shaft_torque(kept[Kept.TORQUE], u[0], x[State.ROTOR_SPEED], scene.drivetrain)
     attitude_rate(x, dx)
     dx[State.AZIMUTH] = x[State.ROTOR_SPEED]
     dx[State.BLADE_PITCH] = pitch_rate(x[State.BLADE_PITCH], u[1], scene.actuator)
-    accelerate(pose, x, load, torque, strips, body, work.matrix, dx)
-    hydro = added_mass_load(strips, dx)
-    return Loads(aero, tower, add(add(buoyancy, strips.wrench), hydro), mooring)
+    strips = StripLoad(NO_LOAD, kept[Kept.S0], kept[Kept.S1], kept[Kept.S2], kept[Kept.A33])
+    accelerate(pose, x, _kept_wrench(kept, Kept.TOTAL), torque, strips, scene.body, work.matrix, dx)
+
+
+@kernel
+def derivative(t, x, u, scene, work, dx):
+    """dx = f(t, x, u). u: generator torque (N m) and blade-pitch command (rad)."""
+    work.kept[Kept.FRESH] = 0.0
+    evaluate(t, x, scene, work, dx)
+    respond(x, u, scene, work, dx)
+
+
+@kernel
+def loads_of(work, dx):
+    """Loads of the last evaluate and the accelerations dx that followed from them."""
+    kept = work.kept
+    strips = StripLoad(NO_LOAD, kept[Kept.S0], kept[Kept.S1], kept[Kept.S2], kept[Kept.A33])
+    hydro = add(_kept_wrench(kept, Kept.HYDRO), added_mass_load(strips, dx))
+    rotor = RotorLoad(_kept_wrench(kept, Kept.ROTOR), kept[Kept.THRUST], kept[Kept.TORQUE])
+    return Loads(rotor, _kept_wrench(kept, Kept.TOWER), hydro, _kept_wrench(kept, Kept.MOORING))
 
 
 @kernel

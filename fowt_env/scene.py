@@ -9,8 +9,9 @@ import numpy as np
 from fowt_env.channels import Layout, channels
 from fowt_env.counters import N_COUNTERS
 from fowt_env.description import Platform, Turbine, read_platform, read_turbine, sea_state_of
-from fowt_env.dynamics import Body, Model, Work
+from fowt_env.dynamics import N_KEPT, Body, Model, Work
 from fowt_env.errors import InputError, unknown
+from fowt_env.integrators import INTEGRATORS, build_integrator
 from fowt_env.jit import Box
 from fowt_env.loads.damping import build_damping
 from fowt_env.loads.drivetrain import build_drivetrain, build_pitch_actuator
@@ -36,6 +37,7 @@ OPTIONS = {
     "tower_drag": (True, (False, True)),
     "hydrodynamics": (True, (False, True)),
     "mooring": (True, (False, True)),
+    "integrator": ("rk4", INTEGRATORS),
     "current": (None, "None, a speed (m/s) or {'speed', 'heading' (deg), 'exponent'}"),
     "duration": (700.0, "seconds of random wind and sea, > 0"),
     "wave_components": (None, "None or a number of components, 1 to 10000"),
@@ -84,6 +86,8 @@ class Scene:
             np.zeros((7, nodes)),
             np.zeros((6, 6)),
             np.zeros((5, self.n_state)),
+            np.zeros(N_KEPT),
+            np.zeros((4, self.n_state)),
         )
 
     def box(self, work=None):
@@ -169,6 +173,7 @@ def build_scene(platform="oc3_hywind", wind=None, sea=None, *, seed=0, rotor="be
         tower=build_tower_drag(platform.tower, site.air_density) if aero and chosen["tower_drag"] else None,
         wind=series,
         wind_field=None,
+        multistep=build_integrator(chosen["integrator"]),
     )
     speed = nominal_speed(wind) if aero else None
     return Scene(model, platform, turbine, wind, sea, seed, rotor, chosen, speed)

@@ -11,7 +11,7 @@ from fowt_env.jit import control_kernel
 from fowt_env.measurement import N_MEASUREMENTS, Measurement
 from fowt_env.state import State, pose_of
 from fowt_env.steady import trim
-from fowt_env.step import RUNNING, STOP_REASONS, advance, observe, output_row, run
+from fowt_env.step import RUNNING, STOP_REASONS, advance, observe, output, output_row, run
 
 CHUNK = 20.0  # simulated seconds per compiled call: Ctrl-C is heard and progress shown between them
 STARTS = ("trim", "zero")
@@ -222,9 +222,7 @@ class _Loop:
         end = min(step + self.per_control, self.last)
         while step < end:
             if step % self.per_output == 0:
-                self.rows[self.filled] = output_row(
-                    self.box, self.x, self.u, step * self.dt, self.rows.shape[1]
-                )
+                output(self.box, self.x, self.u, step * self.dt, self.dx, self.rows[self.filled])
                 self.filled += 1
             n = min(self.per_output - step % self.per_output, end - step)
             status = advance(self.box, self.x, self.u, step, n, self.dt)

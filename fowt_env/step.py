@@ -5,9 +5,9 @@ from math import isfinite
 import numpy as np
 
 from fowt_env.channels import measure, record
-from fowt_env.dynamics import derivative
+from fowt_env.dynamics import Kept, loads_of
+from fowt_env.integrators import rates, take_step
 from fowt_env.jit import kernel
-from fowt_env.loads.drivetrain import followed_pitch
 from fowt_env.state import State
 
 RUNNING, NON_FINITE, CAPSIZED = 0, 1, 2
@@ -27,29 +27,10 @@ def status_of(x):
 
 
 @kernel
-def rk4(t, x, u, dt, scene, work):
-    """One classical Runge-Kutta step of x in place."""
-    k1, k2, k3, k4, y = work.stages[0], work.stages[1], work.stages[2], work.stages[3], work.stages[4]
-    derivative(t, x, u, scene, work, k1)
-    for i in range(x.shape[0]):
-        y[i] = x[i] + 0.5 * dt * k1[i]
-    derivative(t + 0.5 * dt, y, u, scene, work, k2)
-    for i in range(x.shape[0]):
-        y[i] = x[i] + 0.5 * dt * k2[i]
-    derivative(t + 0.5 * dt, y, u, scene, work, k3)
-    for i in range(x.shape[0]):
-        y[i] = x[i] + dt * k3[i]
-    derivative(t + dt, y, u, scene, work, k4)
-    for i in range(x.shape[0]):
-        x[i] += dt / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i])
-
-
-@kernel
 def advance_scene(scene, work, x, u, first, n, dt):
     """Advance x by n steps from time first*dt under constant u; returns the status."""
     for i in range(n):
-        x[State.BLADE_PITCH] = followed_pitch(x[State.BLADE_PITCH], u[1], dt, scene.actuator)
-        rk4((first + i) * dt, x, u, dt, scene, work)
+        take_step((first + i) * dt, x, u, dt, scene, scene.multistep, work)
         status = status_of(x)
         if status != RUNNING:
             return status
@@ -64,23 +45,35 @@ def advance(box, x, u, first, n, dt):
 
 @kernel
 def observe(box, x, u, t, dx, measurement):
-    """Fill dx (n_state,) and measurement (N_MEASUREMENTS,) at time t under u."""
+    """Fill dx (n_state,) and measurement (N_MEASUREMENTS,) at time t under u.
+
+    The loads kept by the work arrays are used where they are fresh: after changing x from outside,
+    call forget first.
+    """
     scene = box.scene
-    derivative(t, x, u, scene, box.work, dx)
+    rates(t, x, u, scene, box.work, dx)
     measure(scene, x, dx, u, t, measurement)
 
 
 @kernel
 def output(box, x, u, t, dx, row):
-    """Fill one output row (n_channels,) in SI at time t under u."""
+    """Fill one output row (n_channels,) in SI at time t under u; kept loads as in observe."""
     scene = box.scene
-    loads = derivative(t, x, u, scene, box.work, dx)
-    record(scene, box.work, x, dx, u, t, loads, row)
+    rates(t, x, u, scene, box.work, dx)
+    record(scene, box.work, x, dx, u, t, loads_of(box.work, dx), row)
+
+
+@kernel
+def forget(box):
+    """Drop kept loads and past derivatives: the state was changed from outside."""
+    box.work.kept[Kept.FRESH] = 0.0
+    box.work.kept[Kept.STEPS] = 0.0
 
 
 def output_row(box, x, u, t, size):
-    """One output row (size,) in SI at time t under u."""
+    """One output row (size,) in SI of any state at time t under u."""
     row = np.empty(size)
+    forget(box)
     output(box, x, u, float(t), np.zeros_like(x), row)
     return row
 
