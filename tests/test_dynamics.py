@@ -1,8 +1,8 @@
+import csv
 from math import pi
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 from naive import rigid_body
 from plant import integrate, make_pose, random_state, rates, state
@@ -11,8 +11,8 @@ from scipy.integrate import solve_ivp
 from fowt_env.dynamics import accelerate, gravity_load, inertial_load
 from fowt_env.loads.drivetrain import build_drivetrain, shaft_torque
 from fowt_env.loads.hydrostatics import submerged
-from fowt_env.loads.morison import StripLoad
 from fowt_env.loads.mooring import mooring_load
+from fowt_env.loads.morison import StripLoad
 from fowt_env.scene import assemble, build_body
 from fowt_env.state import NO_LOAD, State, Wrench, add, pose_of
 
@@ -26,7 +26,9 @@ TUMBLING = dict(
 
 
 def reference_states():
-    return pd.read_csv(REFERENCE, comment="#", float_precision="round_trip").to_dict("records")
+    with REFERENCE.open() as lines:
+        rows = csv.DictReader(line for line in lines if not line.startswith("#"))
+        return [{name: float(value) for name, value in row.items()} for row in rows]
 
 
 def columns(row, *names):

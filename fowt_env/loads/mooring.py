@@ -194,7 +194,8 @@ def catenary(x_f, z_f, length, weight, EA, friction, h0):
     """Catenary of one line whose anchor lies on a flat seabed, for any finite spans.
 
     x_f >= 0, z_f: horizontal and vertical distance from anchor to fairlead, m. h0: horizontal
-    tension to start from, N (0: none); it changes the effort, not the result beyond 1e-12.
+    tension to start from, N (0: none); it changes the effort, not the result beyond 1e-12 (or beyond
+    what the rounding of the spans does, in a line that lies on the seabed a hair from slack).
     The fairlead at or below the anchor (z_f <= 0) counts as lying on the seabed: V = 0 and the line
     pulls horizontally. A fairlead straight above the anchor gives H = 0: hanging or stretched
     vertically. Slack: the rest of the line lies without tension. x_f beyond the stretch of any real

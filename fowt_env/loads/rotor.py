@@ -3,6 +3,16 @@
 One station is `blade_section` (inflow in, loads out); its scalar residual is `bem_residual`. The rest
 of the file finds the root of that residual, and integrates the sections over blades and span.
 
+At very high tip-speed ratios (above about 20: spinning in little or no wind) the published equations have
+their root on a pole, where drag with no flow through the disk makes endless swirl, and the load vanishes.
+Here the residual is one continuous function of the inflow angle f from -pi/2 to pi/2:
+
+* the swirl is carried away by a flow of at least LEAST_FLOW; no operating state is that low;
+* f < 0 (propeller brake): the thrust is the larger of Buhl's curve continued beyond a = 1 and the
+  momentum value 4 F a (a - 1), so that the root passes through f = 0 without a jump.
+
+So loads are continuous from the wind through still air to reversed flow, and oppose its change.
+
 Degenerate inflows, by name:
 
 * no inflow at all: zero load;
@@ -10,11 +20,8 @@ Degenerate inflows, by name:
   FAST_ROTOR (as AeroDyn does), below it the blade sees the wind alone, at any angle of attack;
 * in-plane inflow from behind (v_tangential <= 0: reverse rotation, strong cross wind at the root):
   no induction; it fades in between two small ratios v_tangential/|v_normal|, so that loads are continuous;
-* reversed flow (v_normal < 0): the mirrored problem, solved by the same equations. The momentum theory
-  itself jumps where v_normal changes sign on a loaded, spinning rotor (from the turbulent wake to
-  the propeller state): the load jumps there too;
-* no bracket (seen only at v_normal = 0 exactly, on sections without lift): no induction at that
-  station, and the event is counted.
+* reversed flow (v_normal < 0): the mirrored problem, solved by the same equations;
+* no root (never met with a finite polar): no induction at that station, and the event is counted.
 
 The blade pitching moment (cm) is not included.
 """
@@ -22,6 +29,7 @@ The blade pitching moment (cm) is not included.
 from math import acos, atan2, cos, exp, floor, nan, pi, sin, sqrt
 from typing import NamedTuple
 
+import numba
 import numpy as np
 
 from fowt_env.counters import Counter
@@ -32,9 +40,11 @@ from fowt_env.state import NO_LOAD, State, Wrench
 from fowt_env.weather.wind import wind_at
 
 TOLERANCE = 1e-8  # of the residual before the last step of Newton's method; after it, about its square
-LAST_STEP = 1e-6  # largest last step, times sin f: the second-order error of loads is then 1e-12
-SMALLEST_ANGLE = 1e-6  # rad; end of the brackets, where the residual is singular
-MAX_NEWTON = 24  # safeguarded Newton steps; usually 3 or 4 are taken
+LAST_STEP = 1e-6  # largest last step, times Momentum.scale: the second-order error of loads is then 1e-12
+SMALLEST_ANGLE = 1e-6  # rad; end of a bracket, the residual may be singular at 0
+LARGEST_ANGLE = 1.8  # rad; roots above pi/2 (flow turned by the swirl) only where v_normal > 50 v_tangential
+LEAST_FLOW = 0.01  # least normal flow, as a share of the local speed, that carries the swirl away
+MAX_NEWTON = 24  # safeguarded Newton steps; usually 2 or 3 are taken
 MAX_BISECTIONS = 180  # a third of them halve the bracket: to pi/2^60, below rounding of the smallest angle
 SLOW_ROTOR, FAST_ROTOR = 1.0, 2.0  # tip-speed ratios between which the induction fades in
 SLOW_SECTION, FAST_SECTION = 0.01, 0.02  # v_tangential/|v_normal| between which it fades in
@@ -126,7 +136,9 @@ class Momentum(NamedTuple):
     ct: float
     qs: float  # sin f / (1 - a)
     swirl: float  # cos f (1 - k')
-    value: float  # sin f times the residual times v_tangential
+    weight: float  # of the residual in value: abs(sin f), or 1 in the empirical state
+    scale: float  # of f, on which the terms change
+    value: float  # weight times the residual times v_tangential
     slope: float  # its derivative with f
     dcn: float  # derivatives with f
     dct: float
@@ -172,63 +184,92 @@ def lift_drag(alpha, foil, polars):
 
 
 @kernel
-def _loss(exponent, s, c):
-    """acos(exp(-exponent/s)) and its derivative with the inflow angle; Prandtl's factor is 2/pi of it."""
-    x = exponent / s
-    if x > NO_LOSS:
+def _loss(exponent, h, dh):
+    """acos(exp(-exponent/h)) and its derivative with the inflow angle; Prandtl's factor is 2/pi of it.
+
+    h, dh: absolute value of the sine of the inflow angle, and its derivative.
+    """
+    if exponent > NO_LOSS * h:
         return HALF_PI, 0.0
+    x = exponent / h
     e = exp(-x)
     if e < 0.02:  # the series of acos, exact to rounding here, at a third of its cost
         e2 = e * e
         arc = HALF_PI - e * (1.0 + e2 * (1.0 / 6.0 + e2 * (3.0 / 40.0 + e2 * (15.0 / 336.0))))
     else:
         arc = acos(e)
-    return arc, -e * x * c / (s * sqrt(1.0 - e * e))
+    return arc, -e * x * dh / (h * sqrt(1.0 - e * e))
 
 
 @kernel
 def _momentum(f, side, v_normal, v_tangential, element, polars):
-    """Momentum terms at 0 < f < pi of one station, v_normal >= 0.
+    """Momentum terms of one station at -pi/2 <= f < pi, v_normal >= 0.
 
     side -1 is the mirrored problem of reversed flow: the foil turned upside down. Buhl's
-    a = (g1 - sqrt(g2))/g3 is, without its singularity at g3 = 0,
-    1/(1 - a) = 5/3 - F + sqrt(2 F k - F (4/3 - F)).
+    a = (g1 -+ sqrt(g2))/g3 is, without its singularity at g3 = 0,
+    1/(1 - a) = 5/3 - F +- sqrt(2 F k - F (4/3 - F)), upper sign for f > 0.
     """
     s, c = sin(f), cos(f)
+    sign = -1.0 if s < 0.0 else 1.0
+    h, dh = max(sign * s, 1e-12), sign * c  # never 0: a bisection may come to f = 0
     lift, drag, lift_slope, drag_slope = lift_drag(side * f - element.theta, element.foil, polars)
     lift, drag_slope = side * lift, side * drag_slope
     cn, ct = lift * c + drag * s, lift * s - drag * c
     dcn, dct = lift_slope * c + drag_slope * s - ct, lift_slope * s - drag_slope * c + cn
-    tip, dtip = _loss(element.tip_exponent, s, c)
-    hub, dhub = _loss(element.hub_exponent, s, c)
+    tip, dtip = _loss(element.tip_exponent, h, dh)
+    hub, dhub = _loss(element.hub_exponent, h, dh)
     loss, dloss = PRANDTL * tip * hub, PRANDTL * (tip * dhub + dtip * hub)
-    sigma = element.solidity
-    m = sigma / (4.0 * loss)
+    m = 0.25 * element.solidity / loss
     dm = -m * dloss / loss
-    if m * cn <= 2.0 / 3.0 * s * s:  # 1/(1-a) = 1 + k
-        qs = s + m * cn / s
-        axial, daxial = s * qs, 2.0 * s * c + dm * cn + m * dcn
+
+    flow, dflow = (h, dh) if h > LEAST_FLOW else (LEAST_FLOW, 0.0)
+    swirl = c - m * ct / flow
+    dswirl = -s - (dm * ct + m * dct - m * ct * dflow / flow) / flow
+
+    factor = loss * (4.0 / 3.0 - loss)
+    square = 0.5 * element.solidity * cn - factor * s * s
+    root = sqrt(max(square, 0.0))
+    empirical = s * (5.0 / 3.0 - loss) + root
+    if s > 0.0:
+        wake_is_ordered = m * cn <= 2.0 / 3.0 * s * s
     else:
-        factor = loss * (4.0 / 3.0 - loss)
-        root = sqrt(0.5 * sigma * cn - factor * s * s)
-        droot = 0.5 * sigma * dcn - 2.0 * factor * s * c - (4.0 / 3.0 - 2.0 * loss) * dloss * s * s
-        qs = s * (5.0 / 3.0 - loss) + root
-        axial = s * qs
-        daxial = c * qs + s * (c * (5.0 / 3.0 - loss) - s * dloss + 0.5 * droot / root)
-    swirl, dswirl = s * c - m * ct, c * c - s * s - dm * ct - m * dct
+        wake_is_ordered = not (square > 0.0 and empirical * h < s * h + m * cn)
+    if wake_is_ordered:  # 1/(1-a) = 1 + k, and 1 - k for f < 0; times h, which makes it smooth at 0
+        balance, dbalance = s * h + m * cn, 2.0 * c * h + dm * cn + m * dcn
+        qs = balance / h
+        return Momentum(
+            s,
+            c,
+            cn,
+            ct,
+            qs,
+            swirl,
+            h,
+            h,
+            v_tangential * balance - v_normal * h * swirl,
+            v_tangential * dbalance - v_normal * (dh * swirl + h * dswirl),
+            dcn,
+            dct,
+            (dbalance - dh * qs) / h,
+            dswirl,
+        )
+    dsquare = 0.5 * element.solidity * dcn - 2.0 * factor * s * c - (4.0 / 3.0 - 2.0 * loss) * dloss * s * s
+    dqs = c * (5.0 / 3.0 - loss) - s * dloss + 0.5 * dsquare / root
     return Momentum(
         s,
         c,
         cn,
         ct,
-        qs,
-        swirl / s,
-        v_tangential * axial - v_normal * swirl,
-        v_tangential * daxial - v_normal * dswirl,
+        empirical,
+        swirl,
+        1.0,
+        flow,
+        v_tangential * empirical - v_normal * swirl,
+        v_tangential * dqs - v_normal * dswirl,
         dcn,
         dct,
-        (daxial - c * qs) / s,
-        (dswirl - c * swirl / s) / s,
+        dqs,
+        dswirl,
     )
 
 
@@ -242,6 +283,8 @@ def _shifted(at, step):
         at.ct + step * at.dct,
         at.qs + step * at.dqs,
         at.swirl + step * at.dswirl,
+        at.weight,
+        at.scale,
         at.value,
         at.slope,
         at.dcn,
@@ -252,46 +295,23 @@ def _shifted(at, step):
 
 
 @kernel
-def _brake(f, v_normal, v_tangential, element, polars):
-    """Momentum terms of the propeller-brake state, -pi/2 < f < 0; derivatives are not given."""
-    s, c = sin(f), cos(f)
-    lift, drag, _, _ = lift_drag(f - element.theta, element.foil, polars)
-    cn, ct = lift * c + drag * s, lift * s - drag * c
-    tip, _ = _loss(element.tip_exponent, -s, c)
-    hub, _ = _loss(element.hub_exponent, -s, c)
-    m = element.solidity / (4.0 * PRANDTL * tip * hub)
-    qs, swirl = s - m * cn / s, c - m * ct / s
-    value = s * (v_tangential * qs - v_normal * swirl)
-    return Momentum(s, c, cn, ct, qs, swirl, value, nan, nan, nan, nan, nan)
-
-
-@kernel
-def _terms(f, side, v_normal, v_tangential, element, polars):
-    """Momentum terms at any f: brake state for f < 0, else the momentum and empirical one."""
-    if f < 0.0:
-        return _brake(f, v_normal, v_tangential, element, polars)
-    return _momentum(f, side, v_normal, v_tangential, element, polars)
-
-
-@kernel
 def bem_residual(phi, v_normal, v_tangential, blade_pitch, station, rotor):
-    """Residual of theory.md, 5.1 at the inflow angle phi of one station; v_tangential > 0.
+    """sin f/(1-a) - (V_x/V_y) cos f (1-k') of one station at the inflow angle phi = f; v_tangential > 0.
 
-    f > 0: sin f/(1-a) - (V_x/V_y) cos f (1-k'); f < 0: sin f (1-k) - (V_x/V_y) cos f (1-k').
-    For v_normal < 0 the mirrored problem, with f = -phi and the foil turned upside down.
+    For v_normal < 0 of the mirrored problem, with f = -phi and the foil turned upside down.
     """
     side = -1.0 if v_normal < 0.0 else 1.0
     element = element_of(station, blade_pitch, rotor)
-    at = _terms(side * phi, side, side * v_normal, v_tangential, element, rotor.polars)
+    at = _momentum(side * phi, side, side * v_normal, v_tangential, element, rotor.polars)
     return at.qs - side * v_normal / v_tangential * at.swirl
 
 
 @kernel
 def _bracketed(low, high, side, v_normal, v_tangential, element, polars):
     """(found, f): root of the residual in [low, high] by bisection with secant steps (Illinois)."""
-    at = _terms(low, side, v_normal, v_tangential, element, polars)
+    at = _momentum(low, side, v_normal, v_tangential, element, polars)
     r_low = v_tangential * at.qs - v_normal * at.swirl
-    at = _terms(high, side, v_normal, v_tangential, element, polars)
+    at = _momentum(high, side, v_normal, v_tangential, element, polars)
     r_high = v_tangential * at.qs - v_normal * at.swirl
     if r_low == 0.0:
         return True, low
@@ -302,7 +322,7 @@ def _bracketed(low, high, side, v_normal, v_tangential, element, polars):
         f = 0.5 * (low + high)
         if i % 3 != 0:  # every third step halves the bracket, whatever the secants do
             f = min(max((low * r_high - high * r_low) / (r_high - r_low), low), high)
-        at = _terms(f, side, v_normal, v_tangential, element, polars)
+        at = _momentum(f, side, v_normal, v_tangential, element, polars)
         r = v_tangential * at.qs - v_normal * at.swirl
         if abs(r) <= 1e-13 * v_tangential or high - low <= 1e-16 * abs(f):
             break
@@ -315,13 +335,11 @@ def _bracketed(low, high, side, v_normal, v_tangential, element, polars):
 
 @kernel
 def _solve_bracketed(side, v_normal, v_tangential, element, polars):
-    """(found, f) by the full sequence of brackets of theory.md, 5.1; rarely needed."""
+    """(found, f) bracket by bracket, the wind turbine states first; rarely needed."""
     low = SMALLEST_ANGLE
-    found, f = _bracketed(low, HALF_PI, side, v_normal, v_tangential, element, polars)
-    if not found and side > 0.0:
-        found, f = _bracketed(-0.25 * pi, -low, side, v_normal, v_tangential, element, polars)
+    found, f = _bracketed(low, LARGEST_ANGLE, side, v_normal, v_tangential, element, polars)
     if not found:
-        found, f = _bracketed(HALF_PI, pi - low, side, v_normal, v_tangential, element, polars)
+        found, f = _bracketed(-HALF_PI, low, side, v_normal, v_tangential, element, polars)
     return found, f
 
 
@@ -360,20 +378,20 @@ def first_guess(v_normal, v_tangential, blade_pitch, j, rotor):
 def _solve(guess, side, v_normal, v_tangential, element, polars):
     """(found, f, momentum terms there) of one station, v_normal >= 0 and v_tangential > 0.
 
-    Newton's method inside the bracket [SMALLEST_ANGLE, pi/2], where the residual goes from minus to
-    plus for nearly every inflow; if that does not converge, the brackets one by one.
+    Newton's method inside [-pi/2, LARGEST_ANGLE], where the residual goes from minus to plus; if that does
+    not converge, the brackets one by one.
     """
     scale = 1.0 / (v_normal + v_tangential)
     v_normal, v_tangential = scale * v_normal, scale * v_tangential
-    low, high = SMALLEST_ANGLE, HALF_PI
+    low, high = -HALF_PI, LARGEST_ANGLE
     f = guess
-    if not low < f < high:
+    if f == 0.0:
         f = _rough_guess(v_normal, v_tangential, side, element)
     goal = TOLERANCE * v_tangential
     for _ in range(MAX_NEWTON):
         at = _momentum(f, side, v_normal, v_tangential, element, polars)
         step = -at.value / at.slope
-        if abs(at.value) <= goal * at.s and at.slope > 0.0 and abs(step) <= LAST_STEP * at.s:
+        if abs(at.value) <= goal * at.weight and at.slope > 0.0 and abs(step) <= LAST_STEP * at.scale:
             return True, f + step, _shifted(at, step)
         if at.value > 0.0:
             high = f
@@ -383,7 +401,8 @@ def _solve(guess, side, v_normal, v_tangential, element, polars):
         if not (at.slope > 0.0 and low < f < high):
             f = 0.5 * (low + high)
     found, f = _solve_bracketed(side, v_normal, v_tangential, element, polars)
-    return found, f, _terms(f, side, v_normal, v_tangential, element, polars)
+    at = _momentum(f, side, v_normal, v_tangential, element, polars)
+    return found and abs(at.value) <= goal * at.weight, f, at  # no root where the residual jumps
 
 
 @kernel
@@ -461,7 +480,7 @@ def solve_section(v_normal, v_tangential, induction, guess, element, polars):
                 half * square * ct,
                 induced_normal,
                 induced_tangential,
-                at.value * (abs(v_normal) + v_tangential) / (at.s * v_tangential),
+                at.value * (abs(v_normal) + v_tangential) / (at.weight * v_tangential),
                 True,
             )
     cn, ct, square = _airload(v_normal, v_tangential, element, polars)
@@ -639,6 +658,26 @@ def _fill_guesses(rotor):
                 rotor.guess[j, i, k] = f if found else 0.0
 
 
+_guesses = {}  # one table per blade in this process: filling one takes a fifth of a second
+
+
+def elements_key(elements):
+    """What identifies the aerodynamics of BladeElements, hashable."""
+    parts = (*elements[: elements._fields.index("polars")], *elements.polars)
+    return tuple(part.tobytes() if isinstance(part, np.ndarray) else part for part in parts)
+
+
+def _guess_table(elements):
+    """The filled guess table of BladeElements; left at zero (the rough guess) without the compiler."""
+    if numba.config.DISABLE_JIT:
+        return elements.guess
+    key = elements_key(elements._replace(air_density=0.0))
+    if key not in _guesses:
+        _fill_guesses(elements)
+        _guesses[key] = elements.guess
+    return _guesses[key]
+
+
 def _hat_weights(radius, hub_radius, tip_radius):
     """((n,), (n,)): integrals of each station's hat function and of radius times it (m, m2).
 
@@ -689,6 +728,8 @@ def build_blade_elements(turbine, air_density, stations=None):
     segments, cells, start = [], [], 0
     for name in names:
         polar = np.asarray(blade.polars[name], dtype=float)
+        if not np.all(np.isfinite(polar)):
+            raise InputError(f"polar {name}: all values must be finite numbers")
         if abs(polar[0, 0] + pi) > 1e-6 or abs(polar[-1, 0] - pi) > 1e-6 or np.any(np.diff(polar[:, 0]) <= 0):
             raise InputError(f"polar {name}: alpha must increase from -180 to 180 deg")
         part, first = _polar_segments(polar)
@@ -723,5 +764,4 @@ def build_blade_elements(turbine, air_density, stations=None):
         ),
         np.zeros((len(radius), GUESSES, GUESSES), dtype=np.float32),
     )
-    _fill_guesses(elements)
-    return elements
+    return elements._replace(guess=_guess_table(elements))

@@ -18,14 +18,15 @@ from fowt_env.loads.rotor import (
     SLOW_ROTOR,
     RotorLoad,
     blade_section,
+    elements_key,
     fade,
 )
 from fowt_env.state import State, Wrench
 from fowt_env.weather.wind import wind_at
 
 # Angle theta = atan2(speed * tip radius, axial wind): 0 parked, 90 deg no wind, 180 deg parked in reversed
-# wind, negative turning backwards. Steps are small where the loads bend: (start, step) in deg. The load
-# jumps at 90 deg (rotor.py), between two close points; tip-speed ratios 3 to 20 are 71 to 87 deg.
+# wind, negative turning backwards. Steps are small where the loads bend: (start, step) in deg. Tip-speed
+# ratios 3 to 20 are 71 to 87 deg; around 90 deg the wake state changes within a degree.
 THETA_STEPS = ((-180.0, 3.0), (0.0, 1.0), (40.0, 0.5), (66.0, 0.1), (89.9, 0.02), (90.1, 0.5), (110.0, 2.0))
 PITCH_STEPS = ((-10.0, 1.0), (-4.0, 0.25), (26.0, 1.0), (40.0, 2.5))  # deg, blade pitch
 THETA_END, PITCH_END = 180.0, 100.0
@@ -98,8 +99,7 @@ _built = {}  # one table per set of blade elements in this process: building tak
 
 def build_rotor_table(rotor):
     """RotorTable of a BladeElements; the same elements give the table built before."""
-    key = tuple(part.tobytes() if isinstance(part, np.ndarray) else part for part in rotor[:16])
-    key += tuple(part.tobytes() for part in rotor.polars)
+    key = elements_key(rotor)
     if key not in _built:
         unit = rotor._replace(air_density=1.0) if rotor.air_density == 0.0 else rotor
         theta, blade_pitch = _points(THETA_STEPS, THETA_END), _points(PITCH_STEPS, PITCH_END)

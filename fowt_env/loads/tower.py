@@ -9,7 +9,7 @@ from fowt_env.jit import kernel
 from fowt_env.state import NO_LOAD, Wrench
 from fowt_env.weather.wind import wind_at
 
-POINTS = 6  # Gauss points; the error against 40 points is below 1e-6 in sheared wind on a pitching tower
+POINTS = 6  # Gauss points: force and moment to 4e-6 against 60 points, sheared wind on a pitching tower
 
 
 class TowerDrag(NamedTuple):

@@ -130,9 +130,9 @@ def _spectral_components(significant_height, peak_period, gamma, duration, compo
 @kernel
 def ramp_factor(t, ramp):
     """Share of the wave amplitude at time t: raised linearly over ramp seconds."""
-    if t < ramp:
-        return t / ramp
-    return 1.0
+    if ramp <= 0.0 or t >= ramp:
+        return 1.0
+    return max(t, 0.0) / ramp
 
 
 @kernel

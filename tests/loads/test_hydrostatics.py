@@ -37,7 +37,8 @@ def test_no_hull_no_load():
 def test_closed_form_is_the_integral_over_the_wet_hull(hull):
     rng = np.random.default_rng(1)
     cases = [([3.0, -1.0, 0.8], np.radians([6.0, 14.0, 40.0]))]
-    cases += [(rng.normal(size=3) * [9, 9, 0.7], rng.uniform(-1, 1, 3) * [0.25, 0.25, 3.0]) for _ in range(30)]
+    for _ in range(30):
+        cases.append((rng.normal(size=3) * [9, 9, 0.7], rng.uniform(-1, 1, 3) * [0.25, 0.25, 3.0]))
     for r, angles in cases:
         R = rotation(*angles)
         volume, Q, fallbacks = volume_and_moment(r, R, hull)

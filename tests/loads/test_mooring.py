@@ -357,6 +357,27 @@ def test_friction_regimes_join_smoothly():
     assert (np.diff(H) > 0).all() and second.max() < 0.02  # 0.1 m steps: no kink in the stiffness
 
 
+@pytest.mark.parametrize("share", [0.5, 0.995, 1.0, 1.005, 2.0])
+@pytest.mark.parametrize("friction", [0.5, 2.0])
+def test_tensions_are_recovered_from_their_spans_around_full_grip(friction, share):
+    """share: of the tension that friction can take before the anchor; 1 is where the branches of CB join."""
+    seabed = 0.4 * L
+    H, V = share * friction * W * seabed, W * (L - seabed)
+    line = catenary(*naive.spans(H, V, *LINE, friction), *LINE, friction, 0.0)
+    assert [line.H, line.V] == pytest.approx([H, V], rel=1e-11)
+    assert line.anchor_tension == pytest.approx(max(H - friction * W * seabed, 0.0), abs=1e-11 * H)
+
+
+def test_pull_of_a_nearly_vertical_line_points_at_its_anchor():
+    def load_of(x, y):
+        line = Line(anchor=(x, y, -975.0), fairlead=(0.0, 0.0, -70.0), length=L, wet_weight=W, EA=EA)
+        return wrench(np.zeros(6), build_mooring((line,)), np.zeros((1, N_LINE)))
+
+    H = catenary(0.5, 905.0, *LINE, 0.0, 0.0).H
+    assert load_of(0.3, -0.4)[:2] == pytest.approx([0.6 * H, -0.8 * H], rel=1e-12)
+    assert list(load_of(0.0, 0.0)[[0, 1, 3, 4, 5]]) == [0.0] * 5
+
+
 @pytest.mark.parametrize("friction", [0.0, 0.001, 0.5, 5.0])
 @pytest.mark.parametrize(
     "x_f, z_f", [(700.0, 250.0), (848.67, 250.0), (857.0, 250.0), (866.0, 250.0), (905.0, 300.0)]

@@ -1,0 +1,286 @@
+import json
+import os
+import re
+import subprocess
+import sys
+
+import numpy as np
+import pandas as pd
+import pytest
+from typer.testing import CliRunner
+
+import fowt_env
+from fowt_env import cli
+from fowt_env.cli_arguments import parse_numbers, parse_pairs, parse_sea, parse_wind
+from fowt_env.errors import InputError, SimulationStopped
+from fowt_env.warmup import COMPILING_MESSAGE
+
+SHORT = ("--duration", "10", "--wind", "18")
+
+
+def fowt(*arguments, code=0):
+    """(stdout, stderr) of a command that must end with the exit code, and never with a traceback."""
+    result = CliRunner().invoke(cli.app, list(arguments), env={"COLUMNS": "200", "NO_COLOR": "1"})
+    assert result.exit_code == code, (
+        f"{result.exit_code}\n{result.stdout}\n{result.stderr}\n{result.exception!r}"
+    )
+    assert "Traceback" not in result.stderr
+    return result.stdout, result.stderr
+
+
+def test_simulate_prints_statistics_and_writes_what_simulate_returns(tmp_path):
+    out, plot = tmp_path / "run.csv", tmp_path / "run.png"
+    stdout, stderr = fowt("simulate", *SHORT, "--seed", "4", "--out", str(out), "--plot", str(plot))
+    assert "PtfmPitch [deg]" in stdout and "run.csv" in stderr
+    scene = fowt_env.build_scene("oc3_hywind", wind=18.0, sea=None, seed=4)
+    expected = fowt_env.simulate(scene, controller="pi", duration=10.0)
+    np.testing.assert_allclose(pd.read_csv(out), expected, rtol=1e-9, atol=1e-12)
+    assert plot.read_bytes().startswith(b"\x89PNG")
+
+
+def test_parquet_holds_the_same_bits(tmp_path):
+    wind = json.dumps({"kind": "ntm", "speed": 16, "class": "A"})
+    for name in ("a", "b"):
+        fowt(
+            "simulate",
+            "--duration",
+            "5",
+            "--wind",
+            wind,
+            "--sea",
+            "jonswap:3:9",
+            "--out",
+            str(tmp_path / f"{name}.parquet"),
+        )
+    pd.testing.assert_frame_equal(
+        pd.read_parquet(tmp_path / "a.parquet"), pd.read_parquet(tmp_path / "b.parquet"), check_exact=True
+    )
+
+
+def test_initial_values_and_locked_rotor_reach_the_run(tmp_path):
+    out = tmp_path / "decay.csv"
+    fowt(
+        "simulate", "--wind", "none", "--controller", "none", "--start", "zero", "--duration", "5",
+        "--initial", "PtfmSurge=10", "--out", str(out),
+    )  # fmt: skip
+    frame = pd.read_csv(out)
+    assert frame["PtfmSurge_[m]"].iloc[0] == 10.0
+    assert (frame["RotSpeed_[rpm]"] == 0.0).all()
+
+
+def test_a_wind_series_file_drives_the_run(tmp_path):
+    series = tmp_path / "wind.csv"
+    series.write_text("time,speed\n0,15\n10,17\n")
+    out = tmp_path / "run.csv"
+    fowt("simulate", "--wind", str(series), "--duration", "10", "--out", str(out))
+    frame = pd.read_csv(out)
+    np.testing.assert_allclose(frame["Wind1VelX_[m/s]"], 15.0 + 0.2 * frame["Time_[s]"], rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("simulate", "--platform", "oc3_hywnd"), "oc3_hywind"),
+        (("simulate", "--platform", "no/such/file.toml"), "no/such/file.toml"),
+        (("simulate", "--wind", "breezy"), "breezy"),
+        (("simulate", "--wind", "missing.csv"), "missing.csv"),
+        (("simulate", "--wind", "{broken"), "JSON"),
+        (("simulate", "--wind", "-3"), "-3"),
+        (("simulate", "--sea", "jonswap:x:10"), "jonswap"),
+        (("simulate", "--sea", "paper_wnd_wave"), "paper_wind_wave"),
+        (("simulate", "--controller", "pie"), "'pi'"),
+        (("simulate", "--dt", "0.03"), "0.03"),
+        (("simulate", "--initial", "PtfmSurge"), "KEY=VALUE"),
+        (("simulate", "--option", "surfac=swl"), "surface"),
+        (("simulate", "--rotor", "bemm"), "bem"),
+        (("simulate", "--out", "run.xls"), "run.xls"),
+        (("evaluate", "--cases", "above_ratted"), "above_rated"),
+        (("evaluate", "--seeds", "1.5"), "whole numbers"),
+        (("evaluate", "--skip", "700"), "skip = 700"),
+        (("trim", "--winds", "24:4:1"), "START:STOP:STEP"),
+        (("trim", "--winds", ""), "winds"),
+        (("list", "platfroms"), "platforms"),
+    ],
+)
+def test_a_user_error_is_one_clear_line_and_exit_code_2(arguments, message, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    _, stderr = fowt(*arguments, code=2)
+    line = stderr.strip().splitlines()[-1]
+    assert line.startswith("Error:") and message in line
+    assert not [path for path in tmp_path.rglob("*") if path.suffix in (".csv", ".parquet", ".xls")]
+
+
+def test_unknown_options_end_with_code_2():
+    fowt("simulate", "--windd", "18", code=2)
+
+
+def test_a_stopped_run_gives_its_reason_and_its_rows(tmp_path, monkeypatch):
+    rows = pd.DataFrame({"Time_[s]": [0.0, 0.1], "PtfmPitch_[deg]": [0.5, 89.5]})
+
+    def stop(*arguments, **options):
+        raise SimulationStopped("stopped at t = 0.100 s: capsize", "capsize", 0.1, rows)
+
+    monkeypatch.setattr(fowt_env, "simulate", stop)
+    out = tmp_path / "run.csv"
+    _, stderr = fowt("simulate", *SHORT, "--out", str(out), code=1)
+    assert "capsize" in stderr
+    pd.testing.assert_frame_equal(pd.read_csv(out), rows)
+
+
+def test_compiling_is_announced_once_and_only_when_it_happens(tmp_path):
+    code = "from fowt_env.cli import main; main()"
+    arguments = ["simulate", "--duration", "1", "--wind", "none", "--controller", "none"]
+    options = {"env": os.environ | {"FOWT_CACHE_DIR": str(tmp_path), "COLUMNS": "200"}, "capture_output": True}
+    said = []
+    for _ in range(2):
+        done = subprocess.run([sys.executable, "-c", code, *arguments], text=True, check=True, **options)
+        said.append(done.stderr.count(COMPILING_MESSAGE))
+    assert said == [1, 0]
+
+
+def test_ctrl_c_ends_with_130_and_without_a_half_file(tmp_path, monkeypatch):
+    def interrupt(*arguments, **options):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(fowt_env, "simulate", interrupt)
+    _, stderr = fowt("simulate", *SHORT, "--out", str(tmp_path / "run.csv"), code=130)
+    assert "interrupted" in stderr and not list(tmp_path.iterdir())
+
+
+def test_an_interrupted_evaluation_says_where_its_rows_are(tmp_path, monkeypatch):
+    import training.evaluate
+
+    real, calls = training.evaluate.score, []
+
+    def second_is_interrupted(run):
+        calls.append(run)
+        if len(calls) == 2:
+            raise KeyboardInterrupt
+        return real(run)
+
+    monkeypatch.setattr(training.evaluate, "score", second_is_interrupted)
+    arguments = (
+        "--cases",
+        "steady_16",
+        "--seeds",
+        "1,2",
+        "--duration",
+        "10",
+        "--skip",
+        "2",
+        "--out",
+        str(tmp_path),
+    )
+    _, stderr = fowt("evaluate", *arguments, code=130)
+    assert "1 finished" in stderr
+    assert len(pd.read_csv(tmp_path / "metrics.csv")) == 1
+
+
+def test_evaluate_writes_table_runs_and_plots(tmp_path):
+    stdout, _ = fowt(
+        "evaluate", "--controllers", "pi,pi_land", "--cases", "steady_16,ntm_18",
+        "--duration", "15", "--skip", "5", "--out", str(tmp_path),
+    )  # fmt: skip
+    assert "pi_land" in stdout and "ntm_18" in stdout
+    table = pd.read_csv(tmp_path / "metrics.csv")
+    assert table[["controller", "case"]].values.tolist() == [
+        ["pi", "steady_16"], ["pi_land", "steady_16"], ["pi", "ntm_18"], ["pi_land", "ntm_18"],
+    ]  # fmt: skip
+    assert (table["status"] == "ok").all() and len(pd.read_csv(tmp_path / "summary.csv")) == 4
+    pictures = sorted(path.name for path in tmp_path.glob("*.png"))
+    assert pictures == [
+        "metrics.png", "spectra_ntm_18.png", "spectra_steady_16.png", "timeseries_ntm_18.png",
+        "timeseries_steady_16.png",
+    ]  # fmt: skip
+    assert all(path.stat().st_size > 10_000 for path in tmp_path.glob("*.png"))
+    assert len(list((tmp_path / "runs").rglob("*.parquet"))) == 4
+
+
+def test_trim_prints_the_operating_points_of_trim(tmp_path):
+    out = tmp_path / "steady.csv"
+    stdout, _ = fowt("trim", "--winds", "8,18", "--out", str(out))
+    assert "RotThrust" in stdout
+    table = pd.read_csv(out)
+    assert table["Wind_[m/s]"].tolist() == [8.0, 18.0]
+    point = fowt_env.trim(fowt_env.build_scene("oc3_hywind", wind=18.0), platform="floating")
+    assert table["RotThrust_[kN]"][1] == pytest.approx(point["RotThrust"], rel=1e-9)
+
+
+def test_list_names_everything_that_the_other_commands_take():
+    stdout, _ = fowt("list")
+    for name in ("oc3_hywind", "paper_wind_wave", "pi_land", "above_rated", "ntm_18"):
+        assert name in stdout
+    assert "oc3_hywind" not in fowt("list", "controllers")[0]
+
+
+@pytest.mark.parametrize("command", ["simulate", "evaluate", "trim"])
+def test_help_shows_examples_whose_options_exist(command):
+    stdout, _ = fowt(command, "--help")
+    assert "Examples" in stdout
+    options = set(re.findall(r"│ +\*? *(--[a-z-]+)", stdout))
+    used = set(re.findall(r"--[a-z-]+", stdout[stdout.index("Examples") :]))
+    assert used and used <= options
+
+
+def test_version_is_that_of_the_package():
+    assert fowt("--version")[0].strip() == fowt_env.__version__
+
+
+# ------------------------------------------------------------------ what users type
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("18", 18.0),
+        ("0", 0.0),
+        ("none", None),
+        ("ntm:18:B", {"kind": "ntm", "speed": 18.0, "class": "B"}),
+        ("eog:11.4", {"kind": "eog", "speed": 11.4}),
+        ('{"kind": "steady", "speed": 9}', {"kind": "steady", "speed": 9}),
+    ],
+)
+def test_wind_texts(text, expected):
+    assert parse_wind(text) == expected
+
+
+@pytest.mark.parametrize("text", ["nan", "inf", "", "ntm", "ntm:fast", "ntm:18:B:1", "18 m/s"])
+def test_wind_texts_that_mean_nothing_are_refused(text):
+    with pytest.raises(InputError, match="wind"):
+        parse_wind(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("none", None),
+        ("paper_wind_wave", "paper_wind_wave"),
+        ("jonswap:7.5:10:3.3", {"kind": "jonswap", "Hs": 7.5, "Tp": 10.0, "gamma": 3.3}),
+        ("regular:3:5", {"kind": "regular", "H": 3.0, "T": 5.0}),
+        ('{"kind": "still"}', {"kind": "still"}),
+    ],
+)
+def test_sea_texts(text, expected):
+    assert parse_sea(text) == expected
+
+
+@pytest.mark.parametrize("content", ["a,b,c\n1,2,3\n", "time,speed\n0,fast\n", "time\n1\n"])
+def test_a_wind_series_needs_two_columns_of_numbers(tmp_path, content):
+    path = tmp_path / "wind.csv"
+    path.write_text(content)
+    with pytest.raises(InputError, match="wind series"):
+        parse_wind(str(path))
+
+
+def test_numbers_and_pairs():
+    assert parse_numbers("4:24:0.1", "winds")[-1] == pytest.approx(24.0)
+    assert parse_numbers("8,11.4", "winds") == [8.0, 11.4]
+    assert parse_pairs(["a=1.5", "b=true", "c=swl", "d=x=y"], "option") == {
+        "a": 1.5,
+        "b": True,
+        "c": "swl",
+        "d": "x=y",
+    }
+    for text in ("", "a", "1:2", "1:2:0", "2:1:1", "0:1:1e-9"):
+        with pytest.raises(InputError):
+            parse_numbers(text, "winds")

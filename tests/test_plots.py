@@ -1,0 +1,130 @@
+import subprocess
+import sys
+
+import numpy as np
+import pandas as pd
+import pytest
+
+pytest.importorskip("matplotlib", reason="matplotlib is not installed: the extra `plot` is missing")
+
+from fowt_env import plots  # noqa: E402
+from fowt_env.errors import InputError  # noqa: E402
+
+PNG = b"\x89PNG\r\n\x1a\n"
+
+
+def run(shift=0.0, n=6001):
+    """A run with waves of 10 s, platform pitch of 30 s and a rotor at 12 rpm."""
+    t = 0.1 * np.arange(n)
+    return pd.DataFrame(
+        {
+            "Time_[s]": t,
+            "Wind1VelX_[m/s]": 18.0 + np.sin(0.05 * t),
+            "Wave1Elev_[m]": 2.0 * np.cos(2.0 * np.pi * t / 10.0),
+            "RotSpeed_[rpm]": 12.0 + 0.3 * np.sin(2.0 * np.pi * t / 30.0 + shift),
+            "BldPitch1_[deg]": 15.0 + np.sin(0.2 * t + shift),
+            "GenPwr_[kW]": 5000.0 + 50.0 * np.sin(0.2 * t + shift),
+            "PtfmPitch_[deg]": 2.0 + np.sin(2.0 * np.pi * t / 30.0 + shift),
+            "PtfmSurge_[m]": 12.0 + np.sin(0.05 * t + shift),
+            "FAIRTEN1_[kN]": 900.0 + 10.0 * np.sin(0.05 * t),
+        }
+    )
+
+
+def test_stacked_plot_has_a_labelled_panel_per_channel(tmp_path):
+    path = tmp_path / "new" / "run.png"
+    figure = plots.plot_run(run(), path, title="a run")
+    assert path.read_bytes().startswith(PNG) and path.stat().st_size > 20_000
+    assert len(figure.axes) == len(plots.PANELS)
+    for axes, (label, channel) in zip(figure.axes, plots.PANELS, strict=True):
+        assert axes.get_ylabel() == label and "(" in label  # the unit
+        assert axes.get_legend().get_texts()[0].get_text() == channel.split("_[")[0]
+        np.testing.assert_array_equal(axes.lines[0].get_ydata(), run()[channel])
+
+
+def test_a_run_without_a_channel_has_no_panel_for_it():
+    figure = plots.plot_run(run().drop(columns="FAIRTEN1_[kN]"))
+    assert len(figure.axes) == len(plots.PANELS) - 1
+
+
+def test_overlay_draws_each_run_and_the_common_weather_once(tmp_path):
+    figure = plots.plot_runs({"pi": run(), "pi_land": run(1.0)}, tmp_path / "both.svg")
+    texts = {axes.get_ylabel(): [t.get_text() for t in axes.get_legend().get_texts()] for axes in figure.axes}
+    assert texts["wave\n(m)"] == ["Wave1Elev · all"]
+    assert texts["rotor speed\n(rpm)"] == ["RotSpeed · pi", "RotSpeed · pi_land"]
+    assert (tmp_path / "both.svg").read_text(encoding="utf-8").startswith("<?xml")
+
+
+def test_spectrum_holds_the_variance_and_peaks_at_the_period():
+    frame = run()
+    frequency, density = plots.spectrum(frame["Time_[s]"], frame["Wave1Elev_[m]"])
+    assert frequency[np.argmax(density)] == pytest.approx(0.1, abs=0.005)
+    assert np.trapezoid(density, frequency) == pytest.approx(2.0, rel=0.01)  # 2^2 / 2
+
+
+def test_spectra_mark_platform_pitch_wave_and_1p(tmp_path):
+    path = tmp_path / "spectra.png"
+    figure = plots.plot_spectra(run(), path, platform_pitch_period=29.9)
+    assert path.read_bytes().startswith(PNG)
+    marks = sorted(line.get_xdata()[0] for line in figure.axes[1].lines[1:])
+    assert marks == pytest.approx([1.0 / 29.9, 0.1, 0.2], abs=0.005)
+    texts = " ".join(text.get_text() for text in figure.axes[0].texts)
+    assert "platform pitch" in texts and "wave peak" in texts and "1P" in texts
+
+
+def test_still_water_has_no_wave_mark():
+    frame = run().assign(**{"Wave1Elev_[m]": 0.0})
+    figure = plots.plot_spectra(frame)
+    assert [text.get_text().split()[0] for text in figure.axes[0].texts] == ["1P"]
+
+
+def test_evaluation_plot_leaves_failed_runs_out_and_says_so(tmp_path):
+    table = pd.DataFrame(
+        {
+            "controller": ["a", "a", "b", "b"],
+            "case": ["x", "y", "x", "y"],
+            "seed": 1,
+            "status": ["ok", "ok", "ok", "failed"],
+            "PtfmPitch_std_[deg]": [1.0, 2.0, 3.0, np.nan],
+        }
+    )
+    figure = plots.plot_evaluation(table, ["PtfmPitch_std_[deg]"], tmp_path / "metrics.png")
+    assert (tmp_path / "metrics.png").read_bytes().startswith(PNG)
+    assert "1 of 4 runs failed" in figure.legends[0].get_title().get_text()
+    np.testing.assert_array_equal(figure.axes[0].containers[0].lines[0].get_ydata(), [1.0, 2.0])
+
+
+def test_wrong_input_is_named_and_leaves_no_file(tmp_path):
+    with pytest.raises(InputError, match="unknown ending"):
+        plots.plot_run(run(), tmp_path / "run.docx")
+    with pytest.raises(InputError, match="no runs"):
+        plots.plot_runs({})
+    with pytest.raises(InputError, match=r"Time_\[s\]"):
+        plots.plot_run(run().drop(columns="Time_[s]"))
+    with pytest.raises(InputError, match="platform_pitch_period = 0"):
+        plots.plot_spectra(run(), platform_pitch_period=0.0)
+    with pytest.raises(InputError, match="evenly"):
+        plots.spectrum([0.0, 0.1, 0.5, 0.6], [0.0, 1.0, 0.0, 1.0])
+    assert not list(tmp_path.iterdir())
+
+
+def test_without_matplotlib_the_message_names_the_extra():
+    code = (
+        "import sys; sys.modules['matplotlib'] = None\n"
+        "import pandas as pd\n"
+        "from fowt_env import plots\n"
+        "frame = pd.DataFrame({'Time_[s]': [0.0, 1.0], 'RotSpeed_[rpm]': [12.0, 12.0]})\n"
+        "try:\n    plots.plot_run(frame)\n"
+        "except plots.InputError as error:\n    print(error)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "fowt-env[plot]" in done.stdout
+
+
+def test_plotting_leaves_pyplot_alone():
+    code = (
+        "import sys, pandas as pd\nfrom fowt_env import plots\n"
+        "plots.plot_run(pd.DataFrame({'Time_[s]': [0.0, 1.0], 'RotSpeed_[rpm]': [12.0, 12.0]}))\n"
+        "assert 'matplotlib.pyplot' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)

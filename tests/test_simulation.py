@@ -1,0 +1,406 @@
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from plant import random_state
+
+import fowt_env
+from controllers import make
+from fowt_env import simulation
+from fowt_env.errors import ControllerError, InputError, SimulationStopped
+from fowt_env.jit import control_kernel
+from fowt_env.simulation import initial_state
+from fowt_env.state import State, pose_of
+from fowt_env.step import advance
+
+ROOT = Path(__file__).resolve().parent.parent
+COLUMNS = ["PtfmSurge_[m]", "PtfmHeave_[m]", "PtfmPitch_[deg]", "PtfmYaw_[deg]"]
+
+
+def run(scene, **options):
+    return fowt_env.simulate(scene, **({"controller": None, "duration": 10.0} | options))
+
+
+def in_python(code, **environment):
+    """Standard output of a fresh interpreter that runs code on this package."""
+    paths = os.pathsep.join([str(ROOT), str(ROOT / "tests")])
+    result = subprocess.run(
+        [sys.executable, "-c", code],
+        env=os.environ | {"PYTHONPATH": paths} | environment,
+        capture_output=True,
+        text=True,
+        timeout=600,
+    )
+    assert result.returncode == 0, result.stderr
+    return result.stdout
+
+
+class Delegate:
+    """The law of a compiled controller, without its kernel: runs through the Python path."""
+
+    def __init__(self, turbine, control_dt, name="pi"):
+        self.inner = make(name, turbine, control_dt)
+
+    def reset(self, measurement):
+        self.inner.reset(measurement)
+
+    def act(self, measurement):
+        return self.inner.act(measurement)
+
+
+# Rows and time
+
+
+def test_rows_run_from_zero_to_the_duration_inclusive(wave_scene):
+    frame = run(wave_scene, duration=3.0, output_dt=0.25, control_dt=0.1)
+    assert len(frame) == 13
+    assert np.allclose(frame["Time_[s]"], 0.25 * np.arange(13), rtol=0.0, atol=1e-12)
+    assert list(frame.columns) == [channel.column for channel in wave_scene.channels]
+    assert np.isfinite(frame.to_numpy()).all()
+
+
+def test_output_step_does_not_change_the_motion(wave_scene):
+    fine, coarse = (run(wave_scene, duration=4.0, output_dt=step) for step in (0.05, 0.5))
+    thinned = fine.iloc[::10].reset_index(drop=True)
+    # the rows evaluate the moorings, and those start from their last solution
+    assert np.allclose(thinned[COLUMNS], coarse[COLUMNS], rtol=0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "options, names",
+    [
+        (dict(dt=0.03), ("dt = 0.03", "control_dt = 0.1")),
+        (dict(dt=0.05, control_dt=0.1, output_dt=0.12), ("dt = 0.05", "output_dt = 0.12")),
+        (dict(duration=1.02), ("dt = 0.05", "duration = 1.02")),
+        (dict(duration=1.05), ("dt = 0.1", "duration = 1.05")),
+        (dict(dt=0.0), ("dt = 0.0", "positive")),
+        (dict(duration=-5.0), ("duration = -5.0", "positive")),
+        (dict(control_dt=float("nan")), ("control_dt = nan", "positive")),
+        (dict(output_dt=True), ("output_dt = True", "positive")),
+    ],
+)
+def test_steps_that_do_not_fit_are_refused_with_both_values(options, names, still_scene):
+    with pytest.raises(InputError) as caught:
+        run(still_scene, **options)
+    for name in names:
+        assert name in str(caught.value)
+
+
+def test_run_longer_than_the_random_sea_is_refused(storm_scene):
+    with pytest.raises(InputError, match=r"duration = 61 s.*drawn for 60 s"):
+        run(storm_scene, duration=61.0)
+
+
+# Start
+
+
+def test_run_starts_at_the_trim(still_scene):
+    point, first = fowt_env.trim(still_scene), run(still_scene, duration=1.0).iloc[0]
+    for name in ("PtfmSurge", "PtfmHeave", "PtfmPitch"):
+        column = next(c.column for c in still_scene.channels if c.name == name)
+        assert first[column] == pytest.approx(point[name], rel=1e-12)
+
+
+def test_zero_start_has_an_undisplaced_platform_and_the_rotor_of_that_wind(storm_scene):
+    x, u = initial_state(storm_scene, start="zero")
+    assert np.all(x[:6] == 0.0) and np.all(x[State.VX : State.WZ + 1] == 0.0)
+    fixed = fowt_env.trim(storm_scene, platform="fixed")
+    assert np.array_equal(x, fixed.state) and np.array_equal(u, fixed.command)
+
+
+def test_initial_values_are_absolute_with_or_without_unit(still_scene):
+    initial = {"PtfmSurge": 5.0, "PtfmPitch_[deg]": 3.0, "RotSpeed": 6.0, "BldPitch1": 10.0, "Azimuth": 30.0}
+    first = run(still_scene, duration=1.0, initial=initial).iloc[0]
+    assert first["PtfmSurge_[m]"] == 5.0
+    for column, expected in (
+        ("PtfmPitch_[deg]", 3.0), ("RotSpeed_[rpm]", 6.0), ("BldPitch1_[deg]", 10.0), ("Azimuth_[deg]", 30.0),
+    ):  # fmt: skip
+        assert first[column] == pytest.approx(expected, rel=1e-14)
+    assert first["PtfmHeave_[m]"] == pytest.approx(fowt_env.trim(still_scene)["PtfmHeave"], rel=1e-12)
+
+
+def test_initial_velocities_are_in_inertial_axes(still_scene):
+    initial = {"PtfmYaw": 90.0, "PtfmPitch": 10.0, "PtfmTVxi": 1.0, "PtfmTVzi": -0.5, "PtfmRVyi": 2.0}
+    x, _ = initial_state(still_scene, initial=initial)
+    assert x[State.VY] == pytest.approx(-1.0, rel=1e-12)
+    pose = pose_of(x)
+    assert pose.r11 * x[State.VX] + pose.r12 * x[State.VY] + pose.r13 * x[State.VZ] == pytest.approx(1.0)
+    first = run(still_scene, duration=1.0, initial=initial).iloc[0]
+    expected = dict(PtfmTVxi=1.0, PtfmTVyi=0.0, PtfmTVzi=-0.5, PtfmRVxi=0.0, PtfmRVyi=2.0, PtfmRVzi=0.0)
+    for name, value in expected.items():
+        column = next(c.column for c in still_scene.channels if c.name == name)
+        assert first[column] == pytest.approx(value, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    "options, message",
+    [
+        (dict(start="somewhere"), "unknown start 'somewhere'.*Known: trim, zero"),
+        (dict(initial={"PtfmSurg": 1.0}), "Did you mean 'PtfmSurge'"),
+        (dict(initial={"PtfmSurge": float("inf")}), r"initial\['PtfmSurge'\] = inf.*finite"),
+        (dict(initial={"PtfmSurge": "5"}), r"initial\['PtfmSurge'\] = '5'"),
+        (dict(initial={"PtfmPitch": 95.0}), r"PtfmPitch.*= 95: must be inside \(-90, 90\)"),
+        (dict(initial={"BldPitch1": 95.0}), r"BldPitch1.*= 95 deg: must be in \[0, 90\]"),
+    ],
+)
+def test_bad_starts_are_refused(options, message, still_scene):
+    with pytest.raises(InputError, match=message):
+        run(still_scene, **options)
+
+
+# Controllers
+
+
+def test_no_controller_holds_rotor_speed_and_blade_pitch(storm_scene):
+    frame = run(storm_scene, duration=5.0)
+    for column in ("RotSpeed_[rpm]", "BldPitch1_[deg]", "GenTq_[kN-m]"):
+        assert np.ptp(frame[column]) < 1e-12
+    assert np.ptp(frame["PtfmPitch_[deg]"]) > 0.0
+    assert frame["RotSpeed_[rpm]"][0] == pytest.approx(12.1)
+
+
+def test_law_called_from_python_gives_the_bits_of_the_compiled_loop(storm_scene, turbine):
+    for output_dt in (0.1, 0.25):
+        options = dict(duration=6.0, output_dt=output_dt)
+        compiled = run(storm_scene, controller="pi", **options)
+        plain = run(storm_scene, controller=Delegate(turbine, 0.1), **options)
+        pd.testing.assert_frame_equal(plain, compiled, check_exact=True)
+    assert np.ptp(compiled["BldPitch1_[deg]"]) > 0.0
+
+
+def test_run_in_chunks_is_one_run(storm_scene, monkeypatch):
+    whole = run(storm_scene, controller="pi", duration=12.0)
+    monkeypatch.setattr(simulation, "CHUNK", 0.7)
+    shares = []
+    chunked = run(storm_scene, controller="pi", duration=12.0, progress=shares.append)
+    pd.testing.assert_frame_equal(whole, chunked, check_exact=True)
+    assert len(shares) > 10 and shares[-1] == 1.0 and shares == sorted(shares)
+
+
+def test_control_instants_are_control_dt_apart(storm_scene, turbine):
+    class Clock(Delegate):
+        times = []
+
+        def act(self, measurement):
+            self.times.append(measurement.time)
+            return super().act(measurement)
+
+    run(storm_scene, controller=Clock(turbine, 0.2), control_dt=0.2, output_dt=0.5, duration=2.0)
+    assert np.allclose(Clock.times, 0.2 * np.arange(10), rtol=0.0, atol=1e-12)
+
+
+def test_controller_that_returns_nan_is_named(storm_scene, turbine):
+    class Broken(Delegate):
+        def act(self, measurement):
+            torque, pitch = super().act(measurement)
+            return torque, float("nan") if measurement.time > 0.95 else pitch
+
+    with pytest.raises(ControllerError, match=r"'Broken' returned .*nan.* at t = 1.000 s") as caught:
+        run(storm_scene, controller=Broken(turbine, 0.1))
+    assert caught.value.time == pytest.approx(1.0)
+    assert caught.value.controller == "Broken"
+
+
+@control_kernel
+def nan_after_one_second(parameters, memory, measurement, command):
+    command[0] = 0.0
+    command[1] = 0.1
+    if measurement[0] > 0.95:
+        command[1] = np.nan
+
+
+class CompiledNan:
+    kernel = staticmethod(nan_after_one_second)
+    parameters, memory = np.zeros(1), np.zeros(1)
+
+    def reset(self, measurement):
+        pass
+
+
+# Stops
+
+
+def test_capsize_stops_the_run_and_keeps_the_rows(still_scene):
+    with pytest.raises(SimulationStopped, match="capsize") as caught:
+        run(still_scene, initial={"PtfmPitch": 78.0, "PtfmRVyi": 20.0}, duration=60.0)
+    stop = caught.value
+    assert 0.0 < stop.time < 2.0 and "capsize" in stop.reason
+    assert f"t = {stop.time:.3f} s" in str(stop)
+    assert stop.frame["Time_[s]"].iloc[-1] <= stop.time
+    assert stop.frame["Time_[s]"].iloc[-1] == pytest.approx(stop.time, abs=0.1 + 1e-9)
+    assert stop.frame["PtfmPitch_[deg]"].iloc[0] == pytest.approx(78.0)
+
+
+def test_compiled_run_stops_on_a_state_that_is_not_a_number(storm_scene):
+    x, u = initial_state(storm_scene)
+    closed = simulation._Loop(storm_scene, CompiledNan(), x, u, 0.05, 2, 2, 200)
+    with pytest.raises(SimulationStopped, match="non-finite state") as caught:
+        closed.go(lambda share: None)
+    assert 1.0 < caught.value.time <= 1.1 + 1e-9  # the end of the control period that went wrong
+    frame = caught.value.frame
+    assert len(frame) == 11
+    assert np.isfinite(frame[COLUMNS].to_numpy()).all()
+
+
+# The same again
+
+
+def test_same_seed_gives_the_same_bits(storm_scene):
+    options = dict(controller="pi", duration=8.0)
+    first, second = run(storm_scene, **options), run(storm_scene, **options)
+    pd.testing.assert_frame_equal(first, second, check_exact=True)
+    again = fowt_env.build_scene(
+        "oc3_hywind", wind=18.0, sea=storm_scene.sea, seed=3, duration=60.0, wave_components=60
+    )
+    pd.testing.assert_frame_equal(first, run(again, **options), check_exact=True)
+    other = fowt_env.build_scene(
+        "oc3_hywind", wind=18.0, sea=storm_scene.sea, seed=4, duration=60.0, wave_components=60
+    )
+    assert not np.array_equal(first["Wave1Elev_[m]"], run(other, **options)["Wave1Elev_[m]"])
+
+
+STORM_IN_A_PROCESS = """
+import hashlib, fowt_env
+scene = fowt_env.build_scene("oc3_hywind", wind={"kind": "ntm", "speed": 18.0}, seed=3, duration=60.0,
+    sea={"kind": "jonswap", "Hs": 6.0, "Tp": 10.0, "gamma": 3.3}, wave_components=60)
+frame = fowt_env.simulate(scene, "pi", duration=8.0)
+print(hashlib.sha256(frame.to_numpy().tobytes()).hexdigest(), frame["Wind1VelX_[m/s]"].std())
+"""
+
+
+def test_two_processes_give_the_same_bits():
+    first, second = in_python(STORM_IN_A_PROCESS), in_python(STORM_IN_A_PROCESS)
+    assert first == second
+    assert float(first.split()[1]) > 0.1
+
+
+PLAIN_STEPS = """
+import numpy as np, fowt_env
+from plant import random_state
+from fowt_env.step import advance
+scene = fowt_env.build_scene("oc3_hywind", wind=18.0, seed=3, duration=60.0, wave_components=20,
+    sea={"kind": "jonswap", "Hs": 6.0, "Tp": 10.0, "gamma": 3.3})
+x = random_state(np.random.default_rng(6))
+status = advance(scene.box(), x, np.array([4e4, 0.2]), 100, 3, 0.05)
+print(status, *(repr(float(value)) for value in x))
+"""
+
+
+def test_kernels_are_plain_python_with_the_jit_off():
+    compiled, plain = (
+        np.array(in_python(PLAIN_STEPS, NUMBA_DISABLE_JIT=flag).split(), dtype=float) for flag in ("0", "1")
+    )
+    assert compiled[0] == plain[0] == 0.0
+    # the compiler may contract or reorder nothing but libm calls: some last bits differ
+    assert np.allclose(plain, compiled, rtol=1e-11, atol=1e-13)
+
+
+# Steps
+
+
+def test_many_steps_are_one_step_many_times(wave_scene):
+    x0, u = random_state(np.random.default_rng(1)), np.zeros(2)
+    together, alone = x0.copy(), x0.copy()
+    assert advance(wave_scene.box(), together, u, 7, 40, 0.05) == 0
+    box = wave_scene.box()
+    for i in range(40):
+        assert advance(box, alone, u, 7 + i, 1, 0.05) == 0
+    assert np.array_equal(together, alone)
+
+
+def test_steps_are_fourth_order(wave_scene):
+    # without drag, whose |u| u is not smooth where the flow turns
+    smooth = wave_scene.with_model(strips=wave_scene.model.strips._replace(drag_coefficient=0.0))
+    x0, _ = initial_state(smooth, initial={"PtfmSurge": 1.0, "PtfmPitch": 1.0, "PtfmYaw": 1.0})
+    duration = 8.0
+
+    def end(dt):
+        x = x0.copy()
+        assert advance(smooth.box(), x, np.zeros(2), 0, round(duration / dt), dt) == 0
+        return x
+
+    exact = end(0.0125)
+    errors = np.array([np.linalg.norm((end(dt) - exact)[:13]) for dt in (0.4, 0.2, 0.1)])
+    orders = np.log2(errors[:-1] / errors[1:])
+    assert np.all(orders > 3.7) and np.all(orders < 4.5)
+
+
+def test_default_step_is_accurate_in_waves(wave_scene):
+    options = dict(duration=60.0, output_dt=0.2, control_dt=0.2)
+    coarse, fine = run(wave_scene, dt=0.1, **options), run(wave_scene, dt=0.0125, **options)
+    for column in ("PtfmSurge_[m]", "PtfmPitch_[deg]"):
+        assert np.abs(coarse[column] - fine[column]).max() < 1e-3 * np.ptp(fine[column])
+
+
+# Absent is zero strength
+
+
+def test_no_sea_is_a_sea_of_no_height(still_scene, wave_scene):
+    waves = wave_scene.model.waves
+    flat = wave_scene.with_model(
+        waves=waves._replace(amplitude=0.0 * waves.amplitude, velocity=0.0 * waves.velocity)
+    )
+    options = dict(duration=20.0, initial={"PtfmSurge": 4.0, "PtfmPitch": 3.0, "PtfmRoll": 1.0})
+    without, zero = run(still_scene, **options), run(flat, **options)
+    assert np.allclose(without[COLUMNS], zero[COLUMNS], rtol=0.0, atol=1e-11)
+
+
+def test_no_aerodynamics_is_air_without_density(storm_scene, platform):
+    thin = platform.model_copy(
+        update={"environment": platform.environment.model_copy(update={"air_density": 0.0})}
+    )
+    weather = dict(sea=storm_scene.sea, seed=3, duration=60.0, wave_components=60)
+    options = dict(duration=10.0, start="zero", initial={"RotSpeed": 0.0, "BldPitch1": 0.0})
+    empty = run(fowt_env.build_scene(thin, wind=18.0, **weather), **options)
+    without = run(fowt_env.build_scene(thin, wind=None, **weather), **options)
+    assert np.allclose(empty[COLUMNS], without[COLUMNS], rtol=0.0, atol=1e-11)
+
+
+# Response in waves
+
+
+def harmonics(frame, column, period, orders=(1, 2)):
+    """Amplitudes of the harmonics of a wave period, slow modes fitted away."""
+    t = frame["Time_[s]"].to_numpy()
+    keep = t >= 260.0
+    t = t[keep]
+    terms = [np.ones_like(t)]
+    for p in (*(period / q for q in (1, 2, 3)), 125.0, 33.0, 31.0):
+        terms += [np.cos(2 * np.pi * t / p), np.sin(2 * np.pi * t / p)]
+    fit = np.linalg.lstsq(np.array(terms).T, frame[column].to_numpy()[keep], rcond=None)[0]
+    return [np.hypot(fit[2 * q - 1], fit[2 * q]) for q in orders]
+
+
+@pytest.mark.slow
+def test_double_frequency_comes_from_position_and_from_surface():
+    # theory.md, section 8: H = 3 m, T = 5 s; second over first harmonic of surge and pitch, per cent
+    expected = {
+        ("fixed", "swl"): (0.02, 0.02),
+        ("instantaneous", "swl"): (0.34, 0.34),
+        ("fixed", "instantaneous"): (0.60, 0.52),
+        ("instantaneous", "instantaneous"): (0.92, 0.83),
+    }
+    measured = {}
+    for position, surface in expected:
+        scene = fowt_env.build_scene(
+            "oc3_hywind",
+            sea={"kind": "regular", "H": 3.0, "T": 5.0, "ramp": 50.0},
+            kinematics_position=position,
+            surface=surface,
+            stretching="wheeler" if surface == "instantaneous" else "none",
+        )
+        frame = run(scene, duration=460.0, dt=0.1, control_dt=0.1, output_dt=0.1)
+        surge, surge2 = harmonics(frame, "PtfmSurge_[m]", 5.0)
+        pitch, pitch2 = harmonics(frame, "PtfmPitch_[deg]", 5.0)
+        assert surge == pytest.approx(0.178, rel=0.01)
+        assert pitch == pytest.approx(0.1035, rel=0.01)
+        measured[position, surface] = (100.0 * surge2 / surge, 100.0 * pitch2 / pitch)
+    for key, ratios in expected.items():
+        assert measured[key] == pytest.approx(ratios, abs=0.05)
+    for i in range(2):
+        in_order = [measured[key][i] for key in expected]
+        assert in_order == sorted(in_order)

@@ -1,0 +1,156 @@
+import numpy as np
+import pytest
+from naive import rigid_body
+from plant import state
+
+import fowt_env
+from fowt_env.dynamics import gravity_load
+from fowt_env.errors import InputError
+from fowt_env.loads.hydrostatics import hydrostatic_load
+from fowt_env.loads.mooring import mooring_load
+from fowt_env.state import State, pose_of
+from fowt_env.steady import AZIMUTHS, calm, mean_derivative, trim
+
+
+@pytest.fixture(scope="module")
+def at_rest(still_scene):
+    return trim(still_scene)
+
+
+@pytest.fixture(scope="module")
+def in_wind(storm_scene):
+    return trim(storm_scene)
+
+
+def test_trim_in_still_water_has_the_known_offsets(at_rest):
+    # theory.md, section 7; the overhanging rotor leaves a small lean upwind
+    assert at_rest["PtfmSurge"] == pytest.approx(-0.0503, abs=5e-5)
+    assert at_rest["PtfmHeave"] == pytest.approx(0.125e-3, abs=1e-6)
+    assert at_rest["PtfmPitch"] == pytest.approx(-0.0422, abs=5e-5)
+    for name in ("PtfmSway", "PtfmRoll", "PtfmYaw", "RotSpeed", "RotTorq", "GenPwr"):
+        assert at_rest[name] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_vertical_loads_at_zero_offset_leave_44_newtons(still_scene):
+    model, work = still_scene.model, still_scene.work()
+    pose = pose_of(state())
+    up = gravity_load(pose, model.body).fz + hydrostatic_load(pose, model.hull, work.counters).fz
+    up += mooring_load(pose, model.mooring, work.lines, work.counters).fz
+    assert up == pytest.approx(44.0, abs=5.0)
+
+
+def test_mooring_tension_at_trim_is_the_published_preload(at_rest, platform):
+    published = platform.published["mooring"]["fairlead_tension"] / 1e3
+    assert np.mean([at_rest[f"FAIRTEN{i}"] for i in (1, 2, 3)]) == pytest.approx(published, rel=1e-4)
+
+
+def test_platform_stays_at_trim_in_still_water(still_scene):
+    frame = fowt_env.simulate(still_scene, controller=None, duration=100.0)
+    for column in ("PtfmSurge_[m]", "PtfmSway_[m]", "PtfmHeave_[m]", "PtfmPitch_[deg]", "PtfmYaw_[deg]"):
+        assert np.ptp(frame[column]) < 1e-9
+
+
+def remaining(scene, point):
+    """Azimuth-averaged derivative at an operating point."""
+    box = calm(scene).box()
+    dx, mean = np.zeros(scene.n_state), np.zeros(scene.n_state)
+    mean_derivative(box, point.state.copy(), point.command.copy(), AZIMUTHS, dx, mean)
+    return mean
+
+
+def test_trim_in_wind_is_at_rest_on_average(storm_scene, in_wind):
+    left = remaining(storm_scene, in_wind)
+    moving = [i for i in range(storm_scene.n_state) if i != State.AZIMUTH]
+    assert np.abs(left[moving]).max() < 1e-8
+    assert left[State.AZIMUTH] == pytest.approx(in_wind.state[State.ROTOR_SPEED], rel=1e-14)
+
+
+def test_trim_above_rated_holds_rated_speed_and_power(in_wind, turbine):
+    assert in_wind["RotSpeed"] == pytest.approx(12.1, rel=1e-12)
+    assert in_wind["GenPwr"] == pytest.approx(5000.0, rel=1e-4)
+    assert 14.0 < in_wind["BldPitch1"] < 16.0
+    assert in_wind.command[0] == pytest.approx(turbine.torque_law.rated_torque, rel=1e-12)
+    assert in_wind.wind_speed == 18.0
+
+
+def test_trim_in_wind_leans_and_drifts_with_the_thrust(in_wind):
+    # means of a free OpenFAST run in the same steady wind, still water
+    assert in_wind["PtfmSurge"] == pytest.approx(14.441, rel=0.05)
+    assert in_wind["PtfmPitch"] == pytest.approx(2.829, rel=0.05)
+
+
+def test_tower_base_carries_the_weight_above_it(at_rest, platform, turbine):
+    parts = rigid_body.bodies(platform, turbine)[1:]
+    R = rigid_body.rotation(*at_rest.state[3:6])
+    base = np.array([0.0, 0.0, platform.tower.base_height])
+    weight = [-body.mass * platform.environment.gravity * R[2] for body in parts]
+    moment = sum(np.cross(body.centre - base, w) for body, w in zip(parts, weight, strict=True))
+    assert at_rest["TwrBsMyt"] * 1e3 == pytest.approx(moment[1], rel=1e-8)
+    assert at_rest["TwrBsFzt"] * 1e3 == pytest.approx(sum(w[2] for w in weight), rel=1e-10)
+    assert at_rest["TwrBsFxt"] * 1e3 == pytest.approx(sum(w[0] for w in weight), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    "wind, rotor_speed, blade_pitch, thrust",
+    [
+        (5.0, 7.508, 0.0, 174.0),
+        (8.0, 9.208, 0.0, 387.8),
+        (12.0, 12.1, 3.963, 586.2),
+        (18.0, 12.1, 14.95, 348.4),
+        (24.0, 12.1, 22.141, 280.6),
+    ],
+)
+def test_fixed_platform_works_where_openfast_does(wind, rotor_speed, blade_pitch, thrust, storm_scene):
+    scene = fowt_env.build_scene(
+        "oc3_hywind", wind=wind, sea=storm_scene.sea, duration=60.0, wave_components=60, shear_exponent=0.0
+    )
+    point = trim(scene, platform="fixed")
+    assert np.all(point.state[: State.AZIMUTH] == 0.0)
+    assert point["RotSpeed"] == pytest.approx(rotor_speed, rel=5e-3)
+    assert point["BldPitch1"] == pytest.approx(blade_pitch, abs=0.1)
+    assert point["RtFldFxh"] / 1e3 == pytest.approx(thrust, rel=1e-2)
+
+
+def test_rotor_stands_in_still_air_and_is_feathered_in_a_gale(storm_scene):
+    options = dict(sea=storm_scene.sea, duration=60.0, wave_components=60)
+    calm_air = trim(fowt_env.build_scene("oc3_hywind", wind=0.0, **options), platform="fixed")
+    assert calm_air["RotSpeed"] == 0.0 and calm_air["BldPitch1"] == 0.0
+    gale = trim(fowt_env.build_scene("oc3_hywind", wind=40.0, **options), platform="fixed")
+    assert gale["RotSpeed"] == 0.0 and gale["BldPitch1"] == pytest.approx(90.0, rel=1e-12)
+
+
+def test_calm_scene_keeps_its_types(storm_scene):
+    quiet = calm(storm_scene).model
+    for part, other in zip(quiet, storm_scene.model, strict=True):
+        assert type(part) is type(other)
+    assert np.all(quiet.waves.amplitude == 0.0) and np.all(quiet.waves.velocity == 0.0)
+
+
+def test_spar_without_moorings_floats_higher_where_it_is(platform):
+    scene = fowt_env.build_scene("oc3_hywind", mooring=False)
+    point = trim(scene)
+    # the lines' 1.607 MN go: 4.8 m of cylinder and taper come out of the water
+    assert 3.5 < point["PtfmHeave"] < 5.0
+    assert abs(point["PtfmSurge"]) < 1e-6
+    left = remaining(scene, point)
+    assert np.abs(left[State.VX : State.WZ + 1]).max() < 1e-9
+
+
+def test_a_scene_that_cannot_rest_is_refused(bare_scene):
+    with pytest.raises(InputError, match="no steady state"):
+        trim(bare_scene)
+
+
+def test_operating_point_is_a_mapping_that_names_what_it_has(at_rest, still_scene):
+    assert "PtfmSurge" in at_rest and "Nonsense" not in at_rest
+    assert "Time" not in at_rest
+    assert len(at_rest) == len(list(at_rest)) == len(still_scene.channels) - 1
+    assert at_rest.get("Nonsense") is None
+    assert "PtfmSurge" in repr(at_rest)
+    with pytest.raises(InputError, match="Did you mean 'PtfmSurge'"):
+        at_rest["PtfmSurg"]
+
+
+def test_unknown_platform_mode_is_refused(still_scene):
+    with pytest.raises(InputError, match="Known: fixed, floating"):
+        trim(still_scene, platform="flying")

@@ -1,0 +1,193 @@
+from math import pi
+
+import numpy as np
+import pytest
+from naive import waves as naive
+
+from fowt_env.description import SeaState
+from fowt_env.weather.waves import (
+    build_waves,
+    elevation,
+    jonswap,
+    ramp_factor,
+    wave_kinematics,
+    wave_number,
+)
+
+G, RHO, DEPTH = 9.80665, 1025.0, 320.0
+SITE = dict(depth=DEPTH, density=RHO, gravity=G, seed=0, duration=600.0)
+# omega, amplitude, phase, heading: kh from 0.5 to 158 at the depth of the site
+SEA = [(0.09, 0.8, 0.3, 0.0), (0.5, 1.2, 1.0, 0.7), (1.1, 0.5, -2.0, -2.5), (2.2, 0.1, 0.0, 3.0)]
+
+
+def components(sea, depth=DEPTH, **changes):
+    omega, amplitude, phase, heading = np.array(sea).T
+    state = SeaState(
+        kind="components", omega=omega, amplitude=amplitude, phase=phase, heading=np.degrees(heading)
+    )
+    return build_waves(state, **(SITE | {"depth": depth} | changes))
+
+
+def jonswap_sea(**changes):
+    sea = dict(kind="jonswap", Hs=6.0, Tp=10.0, gamma=3.3) | changes
+    return SeaState(**sea)
+
+
+@pytest.mark.parametrize("sea", [None, SeaState(kind="still"), SeaState(kind="regular", H=0.0, T=8.0)])
+def test_still_water_has_no_waves(sea):
+    assert build_waves(sea, **SITE) is None
+    assert elevation(3.0, 1.0, 2.0, None) == 0.0
+
+
+@pytest.mark.parametrize("depth", [5.0, 50.0, 320.0, 5000.0])
+def test_wave_numbers_satisfy_the_dispersion_relation(depth):
+    omega = np.geomspace(0.02, 6.0, 300)
+    k = wave_number(omega, depth, G)
+    assert np.abs(G * k * np.tanh(k * depth) / omega**2 - 1.0).max() < 1e-14
+    expected = [naive.wave_number(om, depth, G) for om in omega[::30]]
+    assert np.allclose(k[::30], expected, rtol=1e-12, atol=0.0)
+
+
+def test_deep_and_shallow_water_limits_of_the_wave_number():
+    omega = np.array([1.0, 2.0])
+    assert np.allclose(wave_number(omega, 5000.0, G), omega**2 / G, rtol=1e-14, atol=0.0)
+    slow = np.array([1e-3])
+    assert np.allclose(wave_number(slow, 10.0, G), slow / np.sqrt(G * 10.0), rtol=1e-6, atol=0.0)
+
+
+@pytest.mark.parametrize("depth", [30.0, 320.0])
+def test_kinematics_are_the_hyperbolic_sums(depth):
+    waves = components(SEA, depth=depth)
+    rng = np.random.default_rng(0)
+    for _ in range(40):
+        t, x, y = rng.uniform(-100.0, 100.0, 3)
+        z = rng.uniform(-depth, 2.0)
+        got = wave_kinematics(t, x, y, z, waves)
+        velocity, acceleration, pressure = naive.kinematics(t, x, y, z, SEA, depth, RHO, G)
+        assert np.allclose(got[0:3], velocity, rtol=1e-10, atol=1e-11)
+        assert np.allclose(got[3:6], acceleration, rtol=1e-10, atol=1e-11)
+        assert got.pressure == pytest.approx(pressure, rel=1e-10, abs=1e-7)
+        assert elevation(t, x, y, waves) == pytest.approx(naive.elevation(t, x, y, SEA, depth, G), abs=1e-11)
+
+
+def test_water_does_not_cross_the_seabed():
+    waves = components(SEA, depth=30.0)
+    got = wave_kinematics(7.0, 3.0, 4.0, -30.0, waves)
+    assert abs(got.w) < 1e-14 and abs(got.dw) < 1e-14
+    assert abs(got.u) > 1e-3
+
+
+def test_acceleration_is_the_time_derivative_of_velocity_and_of_pressure_gradient():
+    waves = components(SEA)
+    t, x, y, z, step = 11.0, 5.0, -3.0, -12.0, 1e-4
+    now = wave_kinematics(t, x, y, z, waves)
+    later, before = (wave_kinematics(t + s * step, x, y, z, waves) for s in (1, -1))
+    for i in range(3):
+        rate = (later[i] - before[i]) / (2 * step)
+        assert rate == pytest.approx(now[3 + i], abs=1e-7)
+    moved = [
+        [wave_kinematics(t, x + s * dx, y + s * dy, z + s * dz, waves).pressure for s in (1e-3, -1e-3)]
+        for dx, dy, dz in np.eye(3)
+    ]
+    for (up, down), acceleration in zip(moved, now[3:6], strict=True):
+        assert -(up - down) / 2e-3 / RHO == pytest.approx(acceleration, abs=1e-6)
+
+
+def test_velocity_field_is_free_of_divergence():
+    waves = components(SEA)
+    step, centre = 1e-3, np.array([5.0, -3.0, -12.0])
+    total = 0.0
+    for i, axis in enumerate(np.eye(3)):
+        up, down = (wave_kinematics(4.0, *(centre + s * step * axis), waves)[i] for s in (1, -1))
+        total += (up - down) / (2 * step)
+    assert abs(total) < 1e-8
+
+
+def test_surface_moves_with_the_water_on_it():
+    waves = components(SEA)
+    step = 1e-4
+    rise = (elevation(9.0 + step, 2.0, 1.0, waves) - elevation(9.0 - step, 2.0, 1.0, waves)) / (2 * step)
+    assert wave_kinematics(9.0, 2.0, 1.0, 0.0, waves).w == pytest.approx(rise, abs=1e-7)
+
+
+def test_crest_travels_towards_the_heading():
+    waves = components([(0.8, 1.0, 0.0, np.radians(30.0))])
+    speed = 0.8 / waves.wave_number[0]
+    x, y = speed * 5.0 * np.cos(np.radians(30.0)), speed * 5.0 * np.sin(np.radians(30.0))
+    assert elevation(0.0, 0.0, 0.0, waves) == pytest.approx(1.0, abs=1e-15)
+    assert elevation(5.0, x, y, waves) == pytest.approx(1.0, abs=1e-12)
+
+
+def test_longest_waves_come_first_so_that_sums_may_stop_early():
+    waves = components(SEA[::-1])
+    assert np.all(np.diff(waves.wave_number) > 0.0)
+
+
+def test_ramp_raises_the_waves_from_rest():
+    still = build_waves(SeaState(kind="regular", H=2.0, T=8.0), **SITE)
+    raised = build_waves(SeaState(kind="regular", H=2.0, T=8.0, ramp=50.0), **SITE)
+    assert [ramp_factor(t, 50.0) for t in (0.0, 12.5, 50.0, 80.0)] == [0.0, 0.25, 1.0, 1.0]
+    assert [ramp_factor(t, 0.0) for t in (-3.0, 0.0, 3.0)] == [1.0, 1.0, 1.0]
+    assert ramp_factor(-3.0, 50.0) == 0.0
+    for t in (0.0, 20.0, 60.0):
+        share = min(t / 50.0, 1.0)
+        assert elevation(t, 3.0, 0.0, raised) == pytest.approx(
+            share * elevation(t, 3.0, 0.0, still), abs=1e-15
+        )
+        full, part = (wave_kinematics(t, 3.0, 0.0, -5.0, waves) for waves in (still, raised))
+        assert np.allclose(part, share * np.array(full), rtol=1e-14, atol=0.0)
+
+
+def test_spectrum_has_its_height_peak_and_area():
+    omega = np.linspace(0.05, 40.0, 400000)
+    spectrum = jonswap(omega, 6.0, 10.0, 3.3)
+    m0 = np.sum((spectrum[1:] + spectrum[:-1]) / 2.0 * np.diff(omega))
+    assert 4.0 * np.sqrt(m0) == pytest.approx(6.0, rel=5e-3)  # 1 - 0.287 ln(gamma) is a fit
+    assert omega[np.argmax(spectrum)] == pytest.approx(2.0 * pi / 10.0, abs=2e-4)
+    # Pierson-Moskowitz has this height exactly
+    m0 = np.sum(jonswap(omega, 6.0, 10.0, 1.0)) * (omega[1] - omega[0])
+    assert 4.0 * np.sqrt(m0) == pytest.approx(6.0, rel=1e-4)
+
+
+def test_unit_gamma_is_pierson_moskowitz():
+    omega = np.linspace(0.3, 3.0, 50)
+    peak = 2.0 * pi / 9.0
+    expected = 5.0 / 16.0 * 4.0**2 * peak**4 / omega**5 * np.exp(-1.25 * (peak / omega) ** 4)
+    assert np.allclose(jonswap(omega, 4.0, 9.0, 1.0), expected, rtol=1e-14, atol=0.0)
+    a = build_waves(jonswap_sea(gamma=1.0), **SITE)
+    b = build_waves(SeaState(kind="pierson_moskowitz", Hs=6.0, Tp=10.0), **SITE)
+    assert np.array_equal(a.amplitude, b.amplitude) and np.array_equal(a.phase, b.phase)
+
+
+@pytest.mark.parametrize("count", [None, 1, 7, 500])
+def test_drawn_sea_has_its_significant_height(count):
+    waves = build_waves(jonswap_sea(), **SITE, components=count)
+    assert 4.0 * np.sqrt(np.sum(waves.amplitude**2) / 2.0) == pytest.approx(6.0, rel=1e-12)
+    assert count is None or waves.omega.size == count
+
+
+def test_drawn_sea_follows_the_spectrum():
+    waves = build_waves(jonswap_sea(), **SITE)
+    step = np.diff(waves.omega).mean()
+    density = waves.amplitude**2 / (2.0 * step)
+    expected = jonswap(waves.omega, 6.0, 10.0, 3.3)
+    assert np.allclose(density, expected, rtol=0.01, atol=0.0)  # what lies outside the band is returned
+
+
+def test_elevation_has_a_quarter_of_the_significant_height_as_deviation():
+    waves = build_waves(jonswap_sea(), **(SITE | {"duration": 3600.0}))
+    eta = np.array([elevation(t, 0.0, 0.0, waves) for t in np.arange(0.0, 3600.0, 1.0)])
+    assert eta.std() == pytest.approx(1.5, rel=0.01)
+    assert abs(eta.mean()) < 0.02
+
+
+def test_default_sea_does_not_repeat_within_the_run():
+    waves = build_waves(jonswap_sea(), **(SITE | {"duration": 1200.0}))
+    assert np.diff(waves.omega).max() <= 2.0 * pi / 1200.0 * (1.0 + 1e-12)
+
+
+def test_seed_draws_the_phases_and_nothing_else():
+    first, again, other = (build_waves(jonswap_sea(), **(SITE | {"seed": s})) for s in (5, 5, 6))
+    assert np.array_equal(first.phase, again.phase)
+    assert not np.array_equal(first.phase, other.phase)
+    assert np.array_equal(first.amplitude, other.amplitude)
