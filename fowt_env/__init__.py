@@ -5,6 +5,8 @@ Public names are loaded on first use, so that importing the package costs nothin
 
 from importlib import import_module
 
+from fowt_env_registration import register_with_gymnasium
+
 __version__ = "0.1.0"
 
 _PUBLIC = {
@@ -33,3 +35,6 @@ def __getattr__(name):
 
 def __dir__():
     return sorted({*globals(), *__all__})
+
+
+register_with_gymnasium()  # for those who did not install the package; costs nothing, see there

@@ -64,6 +64,13 @@ CACHE_FOLDER = _use_cache_folder()
 
 kernel = numba.njit(cache=True, error_model="numpy", nogil=True)
 
+# For long sums of loads/fast_waves.py alone. A plain loop may not reorder a sum, so it cannot use
+# vector registers: with these flags the whole wave load takes a fifth of the time (see that file).
+# NaN and infinity keep their meaning, and the same binary gives the same bits, alone or in a batch.
+fast_kernel = numba.njit(
+    cache=True, error_model="numpy", nogil=True, fastmath={"reassoc", "contract", "nsz", "arcp"}
+)
+
 FLOATS = types.float64[::1]
 CONTROL_SIGNATURE = types.void(FLOATS, FLOATS, FLOATS, FLOATS)
 

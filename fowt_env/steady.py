@@ -44,6 +44,9 @@ class OperatingPoint(Mapping):
             raise unknown("channel", name, self._values)
         return self._values[name]
 
+    def get(self, name, default=None):
+        return self._values.get(name, default)
+
     def __contains__(self, name):
         return name in self._values
 
@@ -174,7 +177,8 @@ class _Steady:
                 down = self.rates()[State.VX : State.WZ + 1].copy()
                 self.x[j] = keep
                 jacobian[:, j] = (up - down) / (2.0 * steps[j])
-            change = np.linalg.solve(jacobian, -residual)
+            # least squares: without moorings nothing restores surge and sway, which then stay as they are
+            change = np.linalg.lstsq(jacobian, -residual, rcond=1e-9)[0]
             # far from the solution lines go taut within metres: limit one round to what they allow
             largest = np.max(np.abs(change) / np.array([5.0, 5.0, 5.0, 0.1, 0.1, 0.1]))
             if largest > 1.0:

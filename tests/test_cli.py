@@ -127,10 +127,12 @@ def test_a_stopped_run_gives_its_reason_and_its_rows(tmp_path, monkeypatch):
     pd.testing.assert_frame_equal(pd.read_csv(out), rows)
 
 
+@pytest.mark.slow
 def test_compiling_is_announced_once_and_only_when_it_happens(tmp_path):
     code = "from fowt_env.cli import main; main()"
     arguments = ["simulate", "--duration", "1", "--wind", "none", "--controller", "none"]
-    options = {"env": os.environ | {"FOWT_CACHE_DIR": str(tmp_path), "COLUMNS": "200"}, "capture_output": True}
+    environment = os.environ | {"FOWT_CACHE_DIR": str(tmp_path), "COLUMNS": "200"}
+    options = {"env": environment, "capture_output": True}
     said = []
     for _ in range(2):
         done = subprocess.run([sys.executable, "-c", code, *arguments], text=True, check=True, **options)
@@ -182,6 +184,7 @@ def test_evaluate_writes_table_runs_and_plots(tmp_path):
         "--duration", "15", "--skip", "5", "--out", str(tmp_path),
     )  # fmt: skip
     assert "pi_land" in stdout and "ntm_18" in stdout
+    assert "tension" in stdout and "…" not in stdout  # piped output keeps every column whole
     table = pd.read_csv(tmp_path / "metrics.csv")
     assert table[["controller", "case"]].values.tolist() == [
         ["pi", "steady_16"], ["pi_land", "steady_16"], ["pi", "ntm_18"], ["pi_land", "ntm_18"],

@@ -1,0 +1,45 @@
+# Targets work from a fresh clone with only Python 3.11 and make; the environment is made once.
+PYTHON ?= python3.11
+VENV ?= .venv
+BIN := $(VENV)/bin
+PROJECT := pyproject.toml setup.py constraints.txt
+INSTALL = $(BIN)/python -m pip install --quiet --constraint constraints.txt --editable
+
+.PHONY: help demo test test-quick lint format clean
+.DELETE_ON_ERROR:
+
+help:
+	@echo "make demo        score the PI controller of Eq. (8) above rated: table and plots under results/demo"
+	@echo "make test        all tests (make test-quick: without the slow ones)"
+	@echo "make lint        ruff;  make format: let ruff mend what it can"
+	@echo "make clean       remove results and build leftovers (the environment stays; rm -r $(VENV) removes it)"
+
+$(BIN)/python:
+	$(PYTHON) -m venv $(VENV)
+
+$(VENV)/.installed-plot: $(PROJECT) | $(BIN)/python
+	$(INSTALL) ".[plot]"
+	@touch $@
+
+$(VENV)/.installed-dev: $(PROJECT) | $(BIN)/python
+	$(INSTALL) ".[dev]"
+	@touch $@ $(VENV)/.installed-plot
+
+demo: $(VENV)/.installed-plot
+	$(BIN)/fowt evaluate --controllers pi --cases above_rated --seeds 1 --jobs 2 --out results/demo
+
+test: $(VENV)/.installed-dev
+	$(BIN)/python -m pytest -m "" --durations=10
+
+test-quick: $(VENV)/.installed-dev
+	$(BIN)/python -m pytest
+
+lint: $(VENV)/.installed-dev
+	$(BIN)/ruff check .
+
+format: $(VENV)/.installed-dev
+	$(BIN)/ruff check --fix .
+
+clean:
+	rm -rf results build dist *.egg-info .pytest_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -not -path "./$(VENV)/*" -prune -exec rm -rf {} +

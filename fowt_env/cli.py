@@ -1,0 +1,397 @@
+"""The `fowt` command: simulate, evaluate, trim and list. Thin: it parses, calls the library and prints."""
+
+import functools
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich import box
+from rich.columns import Columns
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import (
+    BarColumn,
+    Progress,
+    SpinnerColumn,
+    TaskProgressColumn,
+    TextColumn,
+    TimeElapsedColumn,
+)
+from rich.table import Table
+
+from fowt_env.cli_arguments import parse_numbers, parse_pairs, parse_sea, parse_wind
+from fowt_env.errors import ControllerError, InputError, SimulationStopped, unknown
+from fowt_env.outputs import table_path, write_table
+
+EXIT_STOPPED, EXIT_INPUT, EXIT_INTERRUPTED = 1, 2, 130
+
+out = Console()
+err = Console(stderr=True)
+
+app = typer.Typer(
+    name="fowt",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode="rich",
+    pretty_exceptions_enable=False,
+    help="Floating wind turbines under control: simulate, compare controllers, find operating points.",
+    epilog="Start with  [bold]fowt simulate --wind 18 --plot run.png[/bold] ,"
+    " and see  [bold]fowt COMMAND --help[/bold]  for examples.",
+)
+
+
+@app.callback(invoke_without_command=True)
+def version_option(
+    version: Annotated[bool, typer.Option("--version", help="Print the version and exit.")] = False,
+):
+    """Options of the command as a whole."""
+    if version:
+        from fowt_env import __version__
+
+        out.print(__version__, highlight=False)
+        raise typer.Exit
+
+
+def main():
+    """Entry point of the console script."""
+    app()
+
+
+def reported(command):
+    """The command with errors as one clear line on stderr, and an exit code that says what happened."""
+
+    @functools.wraps(command)
+    def run(*args, **kwargs):
+        try:
+            return command(*args, **kwargs)
+        except (SimulationStopped, ControllerError) as error:
+            fail(error, EXIT_STOPPED)
+        except InputError as error:
+            fail(error, EXIT_INPUT)
+        except OSError as error:
+            fail(error, EXIT_INPUT)
+        except KeyboardInterrupt:
+            fail("interrupted", EXIT_INTERRUPTED)
+
+    return run
+
+
+def fail(message, code):
+    """Print the message in red on stderr and end with the exit code."""
+    err.print(f"[red][bold]Error:[/bold] {escape(str(message))}[/red]", soft_wrap=True, highlight=False)
+    raise typer.Exit(code)
+
+
+def note(message):
+    """Print a remark on stderr, so that stdout holds results alone."""
+    err.print(f"[dim]{escape(message)}[/dim]", soft_wrap=True, highlight=False)
+
+
+@contextmanager
+def progress_bar(description, total):
+    """A bar on stderr that disappears when done; yields update(done, text=None, total=None).
+
+    A compilation meanwhile is announced above the bar.
+    """
+    from fowt_env.warmup import compilation_announced
+
+    def say(text):
+        err.print(f"[yellow]{text}[/yellow]", soft_wrap=True, highlight=False)
+
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TaskProgressColumn())
+    bar = Progress(*columns, TimeElapsedColumn(), console=err, transient=True)
+    with bar, compilation_announced(say):
+        task = bar.add_task(description, total=total)
+
+        def update(done, text=None, total=None):
+            bar.update(task, completed=done, description=text or description, total=total)
+
+        yield update
+
+
+PlatformOption = Annotated[str, typer.Option(help="Platform: a built-in name or a path to a TOML file.")]
+OptionOption = Annotated[
+    list[str] | None, typer.Option("--option", metavar="KEY=VALUE", help="Scene option; repeatable.")
+]
+SIMULATE_EXAMPLES = """[bold]Examples[/bold]
+
+[cyan]fowt simulate --wind 18 --sea paper_wind_wave --plot run.png[/cyan]  steady wind, irregular sea
+
+[cyan]fowt simulate --wind ntm:18:B --seed 3 --controller pi_land --out run.csv[/cyan]  turbulence, land gains
+
+[cyan]fowt simulate --wind none --sea regular:3:5 --controller none --start zero[/cyan]  waves alone
+
+[cyan]fowt simulate --wind none --start zero --controller none --initial PtfmSurge=10[/cyan]  free decay
+
+[cyan]fowt simulate --wind '{"kind": "etm", "speed": 18, "class": "A"}'[/cyan]  any wind, as JSON"""
+
+
+@app.command(epilog=SIMULATE_EXAMPLES)
+@reported
+def simulate(
+    platform: PlatformOption = "oc3_hywind",
+    wind: Annotated[
+        str,
+        typer.Option(help="m/s, KIND:SPEED[:CLASS] (ntm:18:B), JSON, a .csv with time and speed, or none."),
+    ] = "18",
+    sea: Annotated[
+        str, typer.Option(help="Name, jonswap:HS:TP[:GAMMA], regular:H:T, JSON, or none (still water).")
+    ] = "none",
+    controller: Annotated[str, typer.Option(help="Name, module:Name of yours, or none (rotor held).")] = "pi",
+    duration: Annotated[float, typer.Option(help="Length of the run, s.")] = 600.0,
+    dt: Annotated[float, typer.Option(help="Physics step, s.")] = 0.05,
+    control_dt: Annotated[float, typer.Option(help="Control period, s; a multiple of dt.")] = 0.1,
+    output_dt: Annotated[float, typer.Option(help="Output period, s; a multiple of dt.")] = 0.1,
+    seed: Annotated[int, typer.Option(help="Seed of wind and waves.")] = 0,
+    rotor: Annotated[str, typer.Option(help="Rotor model: bem, or table (faster).")] = "bem",
+    start: Annotated[str, typer.Option(help="trim (steady state of the mean wind) or zero.")] = "trim",
+    initial: Annotated[
+        list[str] | None, typer.Option(metavar="CHANNEL=VALUE", help="Start value, OpenFAST units; repeats.")
+    ] = None,
+    option: OptionOption = None,
+    out_path: Annotated[str | None, typer.Option("--out", help="Time series: .csv or .parquet.")] = None,
+    plot: Annotated[str | None, typer.Option(help="Stacked plot of the run, e.g. run.png.")] = None,
+):
+    """Simulate one run, print what it was like, and save its time series and plot."""
+    import fowt_env
+
+    if out_path is not None:
+        table_path(out_path)  # a wrong ending should not cost a run
+    options = {"duration": max(700.0, duration), **parse_pairs(option, "option")}
+    scene = fowt_env.build_scene(
+        platform, wind=parse_wind(wind), sea=parse_sea(sea), seed=seed, rotor=rotor, **options
+    )
+    title = f"{platform} · wind {wind} · sea {sea} · controller {controller} · seed {seed}"
+    with progress_bar("simulating", 1.0) as update:
+        try:
+            frame = fowt_env.simulate(
+                scene,
+                controller=None if controller.lower() == "none" else controller,
+                duration=duration,
+                dt=dt,
+                control_dt=control_dt,
+                output_dt=output_dt,
+                start=start,
+                initial=parse_pairs(initial, "initial") or None,
+                progress=update,
+            )
+        except (SimulationStopped, KeyboardInterrupt) as error:
+            rows = getattr(error, "frame", None)  # what there is of the run
+            if rows is not None and len(rows):
+                _save_run(rows, out_path, None, title)
+            raise
+    out.print(_channel_table(frame, title))
+    _save_run(frame, out_path, plot, title)
+
+
+def _save_run(frame, out_path, plot, title):
+    """Write the time series and the plot that were asked for, and say where."""
+    if out_path is not None:
+        note(f"wrote {write_table(frame, out_path)} ({len(frame)} rows)")
+    if plot is not None:
+        from fowt_env.plots import plot_run
+
+        plot_run(frame, plot, title)
+        note(f"wrote {plot}")
+
+
+def _channel_table(frame, title):
+    """Mean, standard deviation and range of the main channels."""
+    from fowt_env.plots import PANELS
+
+    table = Table(title=escape(title), title_justify="left")
+    table.add_column("channel")
+    for name in ("mean", "std", "min", "max"):
+        table.add_column(name, justify="right")
+    for channel in dict.fromkeys([*(channel for _, channel in PANELS), "GenTq_[kN-m]", "RotThrust_[kN]"]):
+        if channel in frame.columns:
+            x = frame[channel]
+            values = (x.mean(), x.std(ddof=0), x.min(), x.max())
+            table.add_row(escape(channel.replace("_", " ")), *(f"{value:.4g}" for value in values))
+    return table
+
+
+EVALUATE_EXAMPLES = """[bold]Examples[/bold]
+
+[cyan]fowt evaluate --controllers pi --cases above_rated[/cyan]  the PI of Eq. (8), 12 to 24 m/s
+
+[cyan]fowt evaluate --controllers pi,pi_land --cases ntm_18,paper_18 --seeds 1,2,3 --jobs 2[/cyan]
+
+[cyan]fowt evaluate --controllers pi,mymodule:Mine --cases steady --duration 300[/cyan]  your own controller
+
+[bold]Files written[/bold]: metrics.csv (a row per run, written as runs end), summary.csv (means over seeds),
+metrics.png, timeseries_CASE.png, spectra_CASE.png, and every run as runs/CONTROLLER/CASE_seedN.parquet."""
+
+
+@app.command(epilog=EVALUATE_EXAMPLES)
+@reported
+def evaluate(
+    controllers: Annotated[str, typer.Option(help="Names or module:Name, separated by commas.")] = "pi",
+    cases: Annotated[
+        str, typer.Option(help="Suites or cases, by commas; see fowt list cases.")
+    ] = "above_rated",
+    seeds: Annotated[str, typer.Option(help="1,2,3 or 1:6:1; the same for each controller.")] = "1",
+    duration: Annotated[float, typer.Option(help="Length of each run, s.")] = 660.0,
+    skip: Annotated[float, typer.Option(help="Seconds at the start that are not scored.")] = 60.0,
+    jobs: Annotated[int, typer.Option(help="Worker processes.")] = 1,
+    out_folder: Annotated[
+        str, typer.Option("--out", help="Folder for what is written.")
+    ] = "results/evaluation",
+    plot: Annotated[bool, typer.Option("--plot/--no-plot", help="Make the plots.")] = True,
+):
+    """Score controllers on load cases: one table of metrics, the runs behind it, and plots."""
+    from training.cases import named_cases
+    from training.evaluate import evaluate as evaluate_controllers
+    from training.evaluate import summary
+
+    folder = Path(out_folder)
+    case_list = named_cases(cases)
+    metrics_path = folder / "metrics.csv"
+    numbers = parse_numbers(seeds, "seeds")
+    if any(number != int(number) for number in numbers):
+        raise InputError(f"seeds = {seeds!r}: must be whole numbers")
+    finished = 0
+    with progress_bar("evaluating", None) as update:
+
+        def report(done, total, _):
+            nonlocal finished
+            finished = done
+            update(done, f"evaluating, {done} of {total} runs done", total)
+
+        try:
+            table = evaluate_controllers(
+                controllers,
+                case_list,
+                duration=duration,
+                skip=skip,
+                seeds=[int(number) for number in numbers],
+                jobs=jobs,
+                progress=report,
+                out=metrics_path,
+                runs_folder=folder / "runs",
+            )
+        except KeyboardInterrupt:
+            fail(f"interrupted; the {finished} finished runs are in {metrics_path}", EXIT_INTERRUPTED)
+    means = summary(table)
+    write_table(means, folder / "summary.csv")
+    width = out.width if out.is_terminal else 200  # a file or a pipe has no width of its own
+    Console(width=width).print(_summary_table(means, width))
+    for row in table[table["status"] != "ok"].to_dict("records"):
+        run = f"{row['controller']}, {row['case']}, seed {row['seed']}"
+        err.print(
+            f"[red]failed: {escape(run)}: {escape(row['reason'])}[/red]", soft_wrap=True, highlight=False
+        )
+    plots = _evaluation_plots(table, folder, case_list, skip) if plot else []
+    note(f"wrote metrics.csv, summary.csv, runs/ and {len(plots)} plots in {folder}")
+
+
+def _summary_table(means, width):
+    """The printed part of an evaluation: one row per controller and case."""
+    from training.report import summary_rows
+
+    headings, rows, failures = summary_rows(means, width)
+    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False)
+    for number, heading in enumerate(headings):
+        table.add_column(heading, justify="left" if number < 2 else "right", vertical="bottom", no_wrap=True)
+    for row, failed in zip(rows, failures, strict=True):
+        table.add_row(*map(escape, row), style="red" if failed else None)
+    return table
+
+
+def _evaluation_plots(table, folder, cases, skip):
+    """Paths of the plots made; none, with a note, where matplotlib is missing."""
+    from training.report import evaluation_plots
+
+    try:
+        with progress_bar("plotting", None):
+            return evaluation_plots(table, folder, cases, skip)
+    except InputError as error:
+        note(f"no plots: {error}")
+        return []
+
+
+TRIM_EXAMPLES = """[bold]Examples[/bold]
+
+[cyan]fowt trim[/cyan]  the floating turbine from cut-in to cut-out
+
+[cyan]fowt trim --winds 8,11.4,18 --fixed --out steady.csv[/cyan]  platform held still, into a file"""
+TRIM_CHANNELS = (
+    "RotSpeed",
+    "BldPitch1",
+    "GenTq",
+    "GenPwr",
+    "RotThrust",
+    "PtfmSurge",
+    "PtfmHeave",
+    "PtfmPitch",
+    "FAIRTEN1",
+)
+
+
+@app.command(epilog=TRIM_EXAMPLES)
+@reported
+def trim(
+    platform: PlatformOption = "oc3_hywind",
+    winds: Annotated[str, typer.Option(help="Steady winds, m/s: 8,11.4,18 or START:STOP:STEP.")] = "4:24:1",
+    fixed: Annotated[bool, typer.Option("--fixed", help="Hold the platform still.")] = False,
+    rotor: Annotated[str, typer.Option(help="Rotor model: bem, or table.")] = "bem",
+    option: OptionOption = None,
+    out_path: Annotated[str | None, typer.Option("--out", help="All channels: .csv or .parquet.")] = None,
+):
+    """Print the steady operating point over wind speed."""
+    import pandas as pd
+
+    import fowt_env
+
+    if out_path is not None:
+        table_path(out_path)
+    speeds = parse_numbers(winds, "winds")
+    options = parse_pairs(option, "option")
+    rows = []
+    with progress_bar("trimming", len(speeds)) as update:
+        for number, speed in enumerate(speeds, 1):
+            scene = fowt_env.build_scene(platform, wind=speed, rotor=rotor, **options)
+            point = fowt_env.trim(scene, platform="fixed" if fixed else "floating")
+            rows.append({"wind": speed, **point})
+            update(number, f"wind {speed:g} m/s")
+    units = {channel.name: channel.unit for channel in scene.channels}
+    title = f"{platform}, {'fixed' if fixed else 'floating'}, steady wind"
+    table = Table(title=escape(title), title_justify="left")
+    shown = [name for name in TRIM_CHANNELS if name in rows[0]]
+    table.add_column("wind\nm/s", justify="right")
+    for name in shown:
+        table.add_column(f"{name}\n{units.get(name, '')}", justify="right")
+    for row in rows:
+        table.add_row(f"{row['wind']:g}", *(f"{row[name]:.4g}" for name in shown))
+    out.print(table)
+    if out_path is not None:
+        names = {"wind": "Wind_[m/s]"} | {name: f"{name}_[{unit}]" for name, unit in units.items()}
+        note(f"wrote {write_table(pd.DataFrame(rows).rename(columns=names), out_path)}")
+
+
+@app.command(name="list")
+@reported
+def list_names(
+    kind: Annotated[
+        str, typer.Argument(help="platforms, turbines, seas, controllers, suites or cases; all if left out.")
+    ] = "all",
+):
+    """List the names that the other commands know."""
+    from controllers import CONTROLLERS
+    from fowt_env.description import names
+    from training.cases import CASES, SUITES
+
+    known = {
+        "platforms": lambda: names("platforms"),
+        "turbines": lambda: names("turbines"),
+        "seas": lambda: names("sea_states"),
+        "controllers": lambda: list(CONTROLLERS),
+        "suites": lambda: [f"{suite} = {cases[0]} ... {cases[-1]}" for suite, cases in SUITES.items()],
+        "cases": lambda: list(CASES),
+    }
+    if kind != "all" and kind not in known:
+        raise unknown("kind of name", kind, ("all", *known))
+    for heading in known if kind == "all" else (kind,):
+        out.print(f"[bold]{heading}[/bold]")
+        out.print(Columns(map(escape, known[heading]()), padding=(0, 3), expand=False), highlight=False)

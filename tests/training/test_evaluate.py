@@ -1,0 +1,124 @@
+import numpy as np
+import pandas as pd
+import pytest
+
+from fowt_env.errors import InputError
+from training.cases import CASES, SUITES, Case, named_cases
+from training.evaluate import COLUMNS, evaluate, summary
+from training.metrics import METRICS
+
+GUSTY = Case(
+    "gusty",
+    {"kind": "ntm", "speed": 18.0, "class": "B"},
+    {"kind": "jonswap", "Hs": 3.0, "Tp": 9.0, "gamma": 2.0},
+)
+CALM = Case("calm", 16.0)
+SHORT = {"duration": 20.0, "skip": 5.0}
+
+
+class Frozen:
+    """A controller that never moves, at module level so that worker processes can load it."""
+
+    def reset(self, measurement):
+        self.command = (measurement.generator_torque, measurement.blade_pitch)
+
+    def act(self, measurement):
+        return self.command
+
+
+class Broken(Frozen):
+    """Returns NaN after ten seconds."""
+
+    def act(self, measurement):
+        return (float("nan"), 0.0) if measurement.time > 10.0 else self.command
+
+
+class Crashing(Frozen):
+    """Has a bug of its own."""
+
+    def act(self, measurement):
+        raise KeyError("lost")
+
+
+def test_every_controller_meets_the_same_wind_and_waves():
+    table = evaluate(["pi", "pi_land"], [GUSTY], seeds=(1, 2), **SHORT)
+    assert list(table.columns) == list(COLUMNS) and len(table) == 4
+    assert (table["status"] == "ok").all()
+    weather = table[["case", "seed", "Wind1VelX_mean_[m/s]", "Wind1VelX_std_[m/s]", "Wave1Elev_std_[m]"]]
+    assert len(weather.drop_duplicates()) == 2  # one realisation per seed
+    assert table.groupby("seed")["BldPitch1_std_[deg]"].nunique().eq(2).all()  # and controllers that differ
+
+
+def test_a_failing_run_is_a_row_with_its_reason_and_the_others_go_on():
+    table = evaluate({"broken": Broken(), "crashing": Crashing(), "fine": Frozen()}, [CALM], **SHORT)
+    rows = table.set_index("controller")
+    assert rows.loc["broken", "status"] == rows.loc["crashing", "status"] == "failed"
+    assert "nan" in rows.loc["broken", "reason"] and "KeyError" in rows.loc["crashing", "reason"]
+    assert rows.loc["broken", "stopped_[s]"] == pytest.approx(10.1, abs=0.11)
+    assert rows.loc[["broken", "crashing"], list(METRICS)].isna().all(axis=None)
+    assert rows.loc["fine", "status"] == "ok"
+    means = summary(table).set_index("controller")
+    assert means.loc["broken", "failed"] == 1 and means.loc["fine", "failed"] == 0
+    assert means.loc["fine", "RotSpeed_mean_[rpm]"] == rows.loc["fine", "RotSpeed_mean_[rpm]"]
+
+
+def test_table_and_runs_on_disk_are_those_returned(tmp_path):
+    out = tmp_path / "deep" / "metrics.csv"
+    table = evaluate("pi", [CALM], out=out, runs_folder=tmp_path / "runs", **SHORT)
+    written = pd.read_csv(out, keep_default_na=False, na_values={name: [""] for name in METRICS})
+    np.testing.assert_allclose(
+        written[list(METRICS)].astype(float), table[list(METRICS)].astype(float), rtol=1e-9
+    )
+    run = pd.read_parquet(tmp_path / "runs" / "pi" / "calm_seed1.parquet")
+    assert run["Time_[s]"].iloc[-1] == pytest.approx(20.0)
+    assert not [path for path in tmp_path.rglob(".*")]  # no temporary file is left
+
+
+def test_an_interrupted_evaluation_leaves_its_finished_rows(tmp_path):
+    out = tmp_path / "metrics.csv"
+
+    def interrupt(done, total, row):
+        if done == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        evaluate("pi", [CALM], seeds=(1, 2, 3), out=out, progress=interrupt, **SHORT)
+    assert pd.read_csv(out)["seed"].tolist() == [1, 2]
+
+
+@pytest.mark.slow
+def test_worker_processes_give_the_same_table():
+    arguments = ({"pi": "pi", "frozen": Frozen()}, [GUSTY, CALM])
+    serial = evaluate(*arguments, seeds=(3,), **SHORT)
+    parallel = evaluate(*arguments, seeds=(3,), jobs=2, **SHORT)
+    pd.testing.assert_frame_equal(serial, parallel, check_exact=True)
+
+
+def test_named_suites_hold_their_cases_once():
+    cases = named_cases("above_rated, ntm_18,paper_18")
+    assert [case.name for case in cases] == [*SUITES["above_rated"], "paper_18"]
+    assert {name for suite in SUITES.values() for name in suite} <= set(CASES)
+    assert cases[3].wind == {"kind": "ntm", "speed": 18.0, "class": "B"}
+    heights = [case.sea.Hs for case in cases[:-1]]
+    assert heights == sorted(heights) and heights[0] < heights[-1]  # rougher sea in stronger wind
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"cases": "above_ratted"}, "above_rated"),
+        ({"controllers": ["pie"]}, "'pi'"),
+        ({"controllers": []}, "controllers"),
+        ({"cases": []}, "none were named|at least one"),
+        ({"seeds": ()}, "seeds"),
+        ({"seeds": (1, 1)}, "differ"),
+        ({"cases": [CALM, CALM]}, "differ"),
+        ({"jobs": 0}, "jobs = 0"),
+        ({"duration": 10.0, "skip": 10.0}, "skip = 10"),
+        ({"out": "table.xlsx"}, "csv"),
+        ({"controllers": {"local": lambda: None}, "jobs": 2, "seeds": (1, 2)}, "jobs = 2|no arguments|reset"),
+    ],
+)
+def test_settings_that_no_run_could_use_are_named(arguments, message):
+    with pytest.raises(InputError, match=message):
+        evaluate(**{"controllers": "pi", "cases": [CALM], **SHORT, **arguments})
