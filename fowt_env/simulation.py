@@ -194,12 +194,16 @@ class _Loop:
             size = max(1, round(CHUNK / (self.dt * self.per_control * self.per_output)))
             size *= self.per_control * self.per_output
         step = 0
-        while step < self.last:
-            if compiled:
-                step = self._compiled(step, min(step + size, self.last))
-            else:
-                step = self._python(step)
-            report(step / self.last)
+        try:
+            while step < self.last:
+                if compiled:
+                    step = self._compiled(step, min(step + size, self.last))
+                else:
+                    step = self._python(step)
+                report(step / self.last)
+        except KeyboardInterrupt as interrupt:
+            interrupt.frame = self.frame()  # what is done is not lost: the caller may keep it
+            raise
         row = output_row(self.box, self.x, self.u, self.last * self.dt, self.rows.shape[1])
         self.rows[self.filled] = row
         self.filled += 1

@@ -71,7 +71,7 @@ def build_waves(sea, *, depth, density, gravity, seed, duration, components=None
     """Waves part of a description.SeaState, or None for still water (exactly no waves).
 
     components: number of components of a spectrum; default one per harmonic of 1/duration, so that
-    the record does not repeat within it, over the band that holds 99.9 % of the energy (at least 200).
+    the record does not repeat within it, over the band that holds 99.8 % of the energy (at least 200).
     """
     if sea is None or sea.kind == "still":
         return None
@@ -109,7 +109,7 @@ def _pack(omega, k, amplitude, phase, heading, depth, density, ramp, random):
 def _spectral_components(significant_height, peak_period, gamma, duration, components):
     """(omega, amplitude) of a spectrum, renormalised so that 4 sqrt(m0) = Hs.
 
-    Band 0.5 to 5 peak frequencies: outside it JONSWAP holds 0.2 % of the variance (gamma 3.3),
+    Band 0.5 to 5 peak frequencies: outside it 0.1 % (gamma 3.3) to 0.2 % (gamma 1) of the variance lies,
     which the renormalisation returns.
     """
     if significant_height == 0.0:
