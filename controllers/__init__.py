@@ -7,6 +7,7 @@ import sys
 from controllers.base import CheckedController, CompiledController, Controller, check_control_dt
 from controllers.constant import constant
 from controllers.eq8 import eq8_literal
+from controllers.openfast import openfast_oc3
 from controllers.pi import pi, pi_land, pi_land_power, pi_unscheduled
 from fowt_env.errors import InputError, unknown
 
@@ -15,6 +16,7 @@ __all__ = ["CONTROLLERS", "CheckedController", "CompiledController", "Controller
 CONTROLLERS = {  # name -> factory(turbine: description.Turbine, control_dt: float) -> controller
     "constant": constant,
     "eq8_literal": eq8_literal,
+    "openfast_oc3": openfast_oc3,
     "pi": pi,
     "pi_land": pi_land,
     "pi_land_power": pi_land_power,

@@ -7,10 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 from fowt_env.dynamics import inertial_load
-from fowt_env.jit import kernel
+from fowt_env.jit import fast_kernel, kernel
+from fowt_env.loads.fast_waves import phasors
 from fowt_env.measurement import Measure
 from fowt_env.state import State, pose_of
-from fowt_env.weather.waves import elevation
+from fowt_env.weather.waves import elevation, ramp_factor
 from fowt_env.weather.wind import wind_at, wind_now
 
 DEG = 180.0 / pi
@@ -128,8 +129,28 @@ def to_inertial(pose, a, b, c):
     )
 
 
+@fast_kernel
+def _component_sum(amplitude, cosine):
+    """Sum of amplitude (n,) times cosine, whose padding beyond n is left out."""
+    total = 0.0
+    for j in range(amplitude.shape[0]):
+        total += amplitude[j] * cosine[j]
+    return total
+
+
 @kernel
-def measure(scene, x, dx, u, t, m):
+def surface_elevation(t, waves, sea, scratch):
+    """Surface elevation at the origin, m: by the fast phasors where the scene has them; 0 without waves."""
+    if sea is None:
+        return elevation(t, 0.0, 0.0, waves)
+    if waves is None:
+        return 0.0
+    phasors(t, 0.0, sea.component, scratch.phasor[0], scratch.phasor[1])
+    return ramp_factor(t, sea.ramp) * _component_sum(waves.amplitude, scratch.phasor[0])
+
+
+@kernel
+def measure(scene, work, x, dx, u, t, m):
     """Fill the measurement array m (N_MEASUREMENTS,) from a state and its derivative."""
     layout = scene.layout
     pose = pose_of(x)
@@ -149,7 +170,7 @@ def measure(scene, x, dx, u, t, m):
     m[Measure.NACELLE_VELOCITY] = pose.vx + pose.wy * top[2] - pose.wz * top[1]
     m[Measure.PLATFORM_PITCH_ACCELERATION] = dx[State.WY]
     m[Measure.WIND_SPEED] = wind[0]
-    m[Measure.WAVE_ELEVATION] = elevation(t, 0.0, 0.0, scene.waves)
+    m[Measure.WAVE_ELEVATION] = surface_elevation(t, scene.waves, scene.sea, work.fast)
 
 
 @kernel
@@ -193,7 +214,7 @@ def record(scene, work, x, dx, u, t, loads, row):
     h = loads.hydro
     row[Out.HYDROFXI], row[Out.HYDROFYI], row[Out.HYDROFZI] = to_inertial(pose, h.fx, h.fy, h.fz)
     row[Out.HYDROMXI], row[Out.HYDROMYI], row[Out.HYDROMZI] = to_inertial(pose, h.mx, h.my, h.mz)
-    row[Out.WAVE1ELEV] = elevation(t, 0.0, 0.0, scene.waves)
+    row[Out.WAVE1ELEV] = surface_elevation(t, scene.waves, scene.sea, work.fast)
     now = wind_now(t, scene.wind)
     wind = wind_at(t, 0.0, 0.0, hub[2], now, scene.wind, scene.wind_field)
     row[Out.WIND1VELX], row[Out.WIND1VELY], row[Out.WIND1VELZ] = wind

@@ -395,3 +395,54 @@ def list_names(
     for heading in known if kind == "all" else (kind,):
         out.print(f"[bold]{heading}[/bold]")
         out.print(Columns(map(escape, known[heading]()), padding=(0, 3), expand=False), highlight=False)
+
+
+VALIDATE_EXAMPLES = """[bold]Examples[/bold]
+
+[cyan]fowt validate --case decays,steady[/cyan]  the quick ones
+
+[cyan]fowt validate[/cyan]  every figure against OpenFAST
+
+[cyan]fowt validate --case all --bts turbsim_18mps.bts[/cyan]  with the cheaper choices, from the full box
+
+[bold]Files written[/bold]: validation.csv and validation.md (every figure with its verdict), and plots."""
+
+
+@app.command(epilog=VALIDATE_EXAMPLES)
+@reported
+def validate(
+    case: Annotated[
+        str, typer.Option(help="decays, steady, floating, waves, steps, turbulence, costs by commas; or all.")
+    ] = "decays,steady,floating,waves,steps,turbulence",
+    out_folder: Annotated[
+        str, typer.Option("--out", help="Folder for what is written.")
+    ] = "results/validation",
+    reference: Annotated[str | None, typer.Option(help="Folder of the OpenFAST series.")] = None,
+    bts: Annotated[str | None, typer.Option(help="Full TurbSim box instead of the stored region.")] = None,
+    plot: Annotated[bool, typer.Option("--plot/--no-plot", help="Make the plots.")] = True,
+):
+    """Compare this plant with OpenFAST on the same cases: every figure with its verdict, and plots."""
+    from training.validate import GROUPS, validate_cases
+    from training.validate_report import write_report
+
+    names = list(GROUPS) if case == "all" else [name.strip() for name in case.split(",") if name.strip()]
+    with progress_bar("validating", None) as update:
+        study = validate_cases(
+            names,
+            folder=reference,
+            bts=bts,
+            report=lambda text, done, total: update(done, f"validating: {text}", total),
+        )
+    table = Table(title="against OpenFAST", title_justify="left")
+    for heading in ("case", "figures", "met", "missed", "reported"):
+        table.add_column(heading, justify="left" if heading == "case" else "right")
+    for name, rows in study.table().groupby("case", sort=False):
+        counts = [int((rows["verdict"] == verdict).sum()) for verdict in ("met", "MISSED", "reported")]
+        missed = f"[red]{counts[1]}[/red]" if counts[1] else "0"
+        table.add_row(escape(name), str(len(rows)), str(counts[0]), missed, str(counts[2]))
+    out.print(table)
+    for row in study.rows:
+        if row.verdict == "MISSED":
+            text = f"{row.case}: {row.quantity}: {row.error:.3g} %, allowed {row.allowed:g} %"
+            out.print(f"[red]missed[/red]  {escape(text)}", highlight=False, soft_wrap=True)
+    note("wrote " + ", ".join(str(path) for path in write_report(study, out_folder, plot)))

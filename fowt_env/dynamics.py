@@ -13,10 +13,12 @@ import numpy as np
 from fowt_env.jit import kernel
 from fowt_env.loads.damping import damping_load
 from fowt_env.loads.drivetrain import pitch_rate, shaft_torque
+from fowt_env.loads.fast_waves import FastScratch, fast_morison_load
 from fowt_env.loads.hydrostatics import hydrostatic_load
 from fowt_env.loads.mooring import mooring_load
 from fowt_env.loads.morison import StripLoad, morison_load
 from fowt_env.loads.rotor import RotorLoad, rotor_load
+from fowt_env.loads.rotor_lookup import rotor_lookup_load
 from fowt_env.loads.rotor_table import rotor_table_load
 from fowt_env.loads.tower import tower_load
 from fowt_env.state import NO_LOAD, State, Wrench, add, pose_of
@@ -47,16 +49,19 @@ class Model(NamedTuple):
     hull: object  # loads.hydrostatics.Hull or None
     strips: object  # loads.morison.Strips or None
     waves: object  # weather.waves.Waves or None
+    lanes: object  # loads.fast_waves.Lanes or None: strip loads by loads.morison
+    sea: object  # loads.fast_waves.FastWaves or None
     current: object  # loads.morison.Current or None
     mooring: object  # loads.mooring.Mooring or None
     damping: object  # loads.damping.LinearDamping or None
     rotor: object  # loads.rotor.BladeElements or None
+    rotor_lookup: object  # loads.rotor_lookup.SectionTable or None
     rotor_table: object  # loads.rotor_table.RotorTable or None
     skew: object  # loads.wake.SkewedWake or None
     wake: object  # loads.wake.DynamicInflow or None
     tower: object  # loads.tower.TowerDrag or None
     wind: object  # weather.wind.WindSeries or None: no aerodynamics at all
-    wind_field: object  # None
+    wind_field: object  # weather.wind_field.WindField or None: the wind series alone
     multistep: object  # integrators.Multistep or None: Runge-Kutta 4
 
 
@@ -92,6 +97,7 @@ class Work(NamedTuple):
     lines: np.ndarray  # (n_lines, 6) mooring warm start and results
     counters: np.ndarray  # (N_COUNTERS,)
     kinematics: np.ndarray  # (7, n_nodes) water kinematics at the strip nodes
+    fast: FastScratch  # the same for fast strip loads
     matrix: np.ndarray  # (6, 6)
     stages: np.ndarray  # (5, n_state) Runge-Kutta stages and stage state
     kept: np.ndarray  # (N_KEPT,)
@@ -103,7 +109,7 @@ class Loads(NamedTuple):
 
     rotor: RotorLoad
     tower: Wrench
-    hydro: Wrench  # buoyancy and strip loads, added mass times acceleration included
+    hydro: Wrench  # buoyancy, strip loads with added mass times acceleration, additional linear terms
     mooring: Wrench
 
 
@@ -186,15 +192,25 @@ def solve_spd(a, b):
 
 
 @kernel
-def rotor_part(t, pose, x, now, scene_wind, wind_field, rotor, rotor_table, skew, wake, dx, counters):
+def rotor_part(t, pose, x, now, wind, field, rotor, lookup, table, skew, wake, dx, counters):
     """Load of whichever rotor model the scene has; none without wind."""
-    if scene_wind is None:
+    if wind is None:
         return RotorLoad(NO_LOAD, 0.0, 0.0)
-    if rotor is None:
-        if rotor_table is None:
-            return RotorLoad(NO_LOAD, 0.0, 0.0)
-        return rotor_table_load(t, pose, x, now, scene_wind, wind_field, rotor_table)
-    return rotor_load(t, pose, x, now, scene_wind, wind_field, rotor, skew, wake, dx, counters)
+    if rotor is not None:
+        return rotor_load(t, pose, x, now, wind, field, rotor, skew, wake, dx, counters)
+    if lookup is not None:
+        return rotor_lookup_load(t, pose, x, now, wind, field, lookup, counters)
+    if table is not None:
+        return rotor_table_load(t, pose, x, now, wind, field, table)
+    return RotorLoad(NO_LOAD, 0.0, 0.0)
+
+
+@kernel
+def strip_part(t, pose, strips, waves, current, kinematics, lanes, sea, scratch):
+    """Strip load of whichever method the scene has."""
+    if lanes is None:
+        return morison_load(t, pose, strips, waves, current, kinematics)
+    return fast_morison_load(t, pose, lanes, sea, current, scratch)
 
 
 @kernel
@@ -223,12 +239,14 @@ def evaluate(t, x, scene, work, dx):
     pose = pose_of(x)
     now = wind_now(t, scene.wind)
     aero = rotor_part(
-        t, pose, x, now, scene.wind, scene.wind_field, scene.rotor, scene.rotor_table,
-        scene.skew, scene.wake, dx, work.counters,
+        t, pose, x, now, scene.wind, scene.wind_field, scene.rotor, scene.rotor_lookup,
+        scene.rotor_table, scene.skew, scene.wake, dx, work.counters,
     )  # fmt: skip
     tower = tower_load(t, pose, now, scene.wind, scene.wind_field, scene.tower)
     buoyancy = hydrostatic_load(pose, scene.hull, work.counters)
-    strips = morison_load(t, pose, scene.strips, scene.waves, scene.current, work.kinematics)
+    strips = strip_part(
+        t, pose, scene.strips, scene.waves, scene.current, work.kinematics, scene.lanes, scene.sea, work.fast
+    )
     mooring = mooring_load(pose, scene.mooring, work.lines, work.counters)
 
     load = add(aero.wrench, tower)
@@ -236,12 +254,13 @@ def evaluate(t, x, scene, work, dx):
     load = add(load, buoyancy)
     load = add(load, strips.wrench)
     load = add(load, mooring)
-    load = add(load, damping_load(pose, x, scene.damping))
+    damping = damping_load(pose, x, scene.damping)
+    load = add(load, damping)
 
     _keep(kept, Kept.TOTAL, load)
     _keep(kept, Kept.ROTOR, aero.wrench)
     _keep(kept, Kept.TOWER, tower)
-    _keep(kept, Kept.HYDRO, add(buoyancy, strips.wrench))
+    _keep(kept, Kept.HYDRO, add(add(buoyancy, strips.wrench), damping))
     _keep(kept, Kept.MOORING, mooring)
     kept[Kept.TORQUE] = aero.torque
     kept[Kept.THRUST] = aero.thrust

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fowt_env.errors import InputError, unknown
-from fowt_env.jit import kernel
+from fowt_env.jit import entry
 from fowt_env.state import State
 from fowt_env.steady import AZIMUTHS, calm, mean_derivative, trim
 
@@ -84,7 +84,7 @@ def modes(a, names, cm_height):
     return sorted(found, key=lambda mode: -mode.period)
 
 
-@kernel
+@entry
 def _shifted(box, x, u, azimuths, dx, mean, index, step, out):
     """Azimuth-averaged derivative with one state moved by step, into out (n_state,)."""
     keep = x[index]

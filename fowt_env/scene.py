@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from math import cos, isfinite, radians, sin
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,18 +15,28 @@ from fowt_env.integrators import INTEGRATORS, build_integrator
 from fowt_env.jit import Box
 from fowt_env.loads.damping import build_damping
 from fowt_env.loads.drivetrain import build_drivetrain, build_pitch_actuator
+from fowt_env.loads.fast_waves import build_fast_waves, build_lanes, can_be_fast, fast_scratch
 from fowt_env.loads.hydrostatics import build_hull
 from fowt_env.loads.mooring import build_mooring
 from fowt_env.loads.morison import Current, build_strips
 from fowt_env.loads.rotor import build_blade_elements
+from fowt_env.loads.rotor_lookup import build_section_table
 from fowt_env.loads.rotor_table import build_rotor_table
 from fowt_env.loads.tower import build_tower_drag
 from fowt_env.loads.wake import build_dynamic_inflow, build_skewed_wake, n_wake_states
 from fowt_env.state import N_RIGID
 from fowt_env.weather.waves import build_waves
-from fowt_env.weather.wind import build_wind, nominal_speed
+from fowt_env.weather.wind import build_wind, make_series, nominal_speed
+from fowt_env.weather.wind_field import hub_speed, is_field, read_box, rotor_average
 
-ROTORS = ("bem", "table")
+ROTORS = ("bem", "lookup", "table")
+FIDELITIES = {
+    # each level's parts; any of them given explicitly overrides its part
+    "reference": {"rotor": "bem", "wave_loads": "exact", "integrator": "rk4"},
+    "standard": {"rotor": "lookup", "wave_loads": "fast", "integrator": "ab4"},
+    "fast": {"rotor": "table", "wave_loads": "fast", "integrator": "ab4"},
+}
+STEPS = {"rk4": 0.05, "heun": 0.05, "abm4": 0.1, "ab4": 0.1}  # s, default step of each integrator
 OPTIONS = {
     # name: (default, allowed values or a description of the allowed range)
     "kinematics_position": ("instantaneous", ("instantaneous", "fixed")),
@@ -37,7 +47,8 @@ OPTIONS = {
     "tower_drag": (True, (False, True)),
     "hydrodynamics": (True, (False, True)),
     "mooring": (True, (False, True)),
-    "integrator": ("rk4", INTEGRATORS),
+    "integrator": (None, (None, *INTEGRATORS)),  # None: the fidelity's
+    "wave_loads": (None, (None, "exact", "fast")),  # None: the fidelity's
     "current": (None, "None, a speed (m/s) or {'speed', 'heading' (deg), 'exponent'}"),
     "duration": (700.0, "seconds of random wind and sea, > 0"),
     "wave_components": (None, "None or a number of components, 1 to 10000"),
@@ -79,11 +90,12 @@ class Scene:
 
     def work(self):
         """Fresh scratch arrays for one plant of this scene."""
-        nodes = 0 if self.model.strips is None else self.model.strips.node_z.shape[0]
+        nodes = 0 if self.model.strips is None else self.model.strips.nodes
         return Work(
             np.zeros((self.n_lines, 6)),
             np.zeros(N_COUNTERS),
             np.zeros((7, nodes)),
+            fast_scratch(self.model.sea, self.model.lanes),
             np.zeros((6, 6)),
             np.zeros((5, self.n_state)),
             np.zeros(N_KEPT),
@@ -100,19 +112,27 @@ class Scene:
         Raises: InputError, also where aerodynamics would appear or vanish (build a scene for that).
         """
         seed = _seed(seed)
-        series, waves = _weather(wind, sea, seed, self.platform, self.turbine, self.options)
-        if (series is None) != (self.model.wind is None):
+        air, waves = _weather(wind, sea, seed, self.platform, self.turbine, self.rotor, self.options)
+        fast = _fast_sea(waves, self.model.strips) if self.model.lanes is not None else None
+        if (air.series is None) != (self.model.wind is None):
             raise InputError(
                 f"wind = {wind!r}: a scene cannot gain or lose its aerodynamics; use build_scene"
             )
+        if (air.field is None) != (self.model.wind_field is None):
+            raise InputError("wind: a scene cannot gain or lose its box of full-field wind; use build_scene")
         return replace(
             self,
-            model=self.model._replace(wind=series, waves=waves),
-            wind=wind,
+            model=self.model._replace(wind=air.series, wind_field=air.field, waves=waves, sea=fast),
+            wind=air.spec,
             sea=sea,
             seed=seed,
-            wind_speed=None if series is None else nominal_speed(wind),
+            wind_speed=air.speed,
         )
+
+    @property
+    def dt(self):
+        """Default physics step of the scene's integrator, s."""
+        return STEPS[self.options["integrator"]]
 
     def with_model(self, **parts):
         """A copy with some parts of the model replaced (same types: no recompilation)."""
@@ -125,16 +145,22 @@ class Scene:
         )
 
 
-def build_scene(platform="oc3_hywind", wind=None, sea=None, *, seed=0, rotor="bem", **options):
+def build_scene(
+    platform="oc3_hywind", wind=None, sea=None, *, seed=0, rotor=None, fidelity="reference", **options
+):
     """Scene of a platform, a wind and a sea.
 
     platform  built-in name, path to a TOML file, or a description.Platform
     wind      None: no aerodynamics; 0.0: still air; a speed (m/s); or a dict with "kind": steady,
-              series, steps, eog, edc, ecd, ews, ewm, ntm, etm (weather/wind.py)
+              series, steps, eog, edc, ecd, ews, ewm, ntm, etm (weather/wind.py), or a box of full-field
+              wind: bts, box, mann (weather/wind_field.py), rotor-averaged for rotor "table"
     sea       None: still water; a named sea state; or a dict with "kind": regular, jonswap,
               pierson_moskowitz, components
     seed      of everything random: the same seed gives the same bits
-    rotor     "bem": blade-element momentum of every blade and station; "table": one table of it
+    rotor     "bem": blade-element momentum solved at every blade and station; "lookup": the same sweep
+              from a table per station; "table": the whole rotor as one table. None: the fidelity's
+    fidelity  "reference": everything solved exactly, Runge-Kutta 4; "standard": every blade and station
+              by look-up, fast wave sums, Adams-Bashforth 4; "fast": the rotor as one table
     options   see OPTIONS; a platform file may set other defaults
 
     Raises: InputError naming the key, the value and what is allowed.
@@ -145,38 +171,84 @@ def build_scene(platform="oc3_hywind", wind=None, sea=None, *, seed=0, rotor="be
     turbine = chosen["turbine"] or platform.turbine
     if not isinstance(turbine, Turbine):
         turbine = read_turbine(turbine)
-    if rotor not in ROTORS:
-        raise unknown("rotor model", rotor, ROTORS)
+    rotor = _parts(fidelity, rotor, chosen)
     seed = _seed(seed)
     site = platform.environment
-    series, waves = _weather(wind, sea, seed, platform, turbine, chosen)
+    air, waves = _weather(wind, sea, seed, platform, turbine, rotor, chosen)
+    series = air.series
     hydrodynamics = chosen["hydrodynamics"]
     aero = series is not None
-    if rotor == "table" and (chosen["dynamic_inflow"] or chosen["skewed_wake"]):
-        raise InputError("rotor = 'table': skewed_wake and dynamic_inflow need rotor = 'bem'")
     elements = build_blade_elements(turbine, site.air_density) if aero else None
+    strips = _strips(platform, chosen) if hydrodynamics else None
+    quick = strips is not None and _quick(chosen, waves, strips)
     model = Model(
         body=build_body(platform, turbine),
         layout=build_layout(platform, turbine),
         drivetrain=build_drivetrain(turbine),
         actuator=build_pitch_actuator(turbine.pitch_drive),
         hull=build_hull(platform.hull, site.water_density, site.gravity) if hydrodynamics else None,
-        strips=_strips(platform, chosen) if hydrodynamics else None,
+        strips=strips,
         waves=waves,
+        lanes=build_lanes(platform.hull, strips) if quick else None,
+        sea=_fast_sea(waves, strips) if quick else None,
         current=_current(chosen["current"]) if hydrodynamics else None,
         mooring=build_mooring(platform.lines) if platform.lines and chosen["mooring"] else None,
         damping=build_damping(platform.hydro) if hydrodynamics else None,
         rotor=elements if rotor == "bem" else None,
+        rotor_lookup=build_section_table(elements) if aero and rotor == "lookup" else None,
         rotor_table=build_rotor_table(elements) if aero and rotor == "table" else None,
         skew=build_skewed_wake() if aero and chosen["skewed_wake"] else None,
         wake=build_dynamic_inflow() if aero and chosen["dynamic_inflow"] else None,
         tower=build_tower_drag(platform.tower, site.air_density) if aero and chosen["tower_drag"] else None,
         wind=series,
-        wind_field=None,
+        wind_field=air.field,
         multistep=build_integrator(chosen["integrator"]),
     )
-    speed = nominal_speed(wind) if aero else None
-    return Scene(model, platform, turbine, wind, sea, seed, rotor, chosen, speed)
+    return Scene(model, platform, turbine, air.spec, sea, seed, rotor, chosen, air.speed)
+
+
+def _parts(fidelity, rotor, chosen):
+    """Rotor model of a fidelity, with the other parts filled into chosen where they were left open."""
+    if fidelity not in FIDELITIES:
+        raise unknown("fidelity", fidelity, FIDELITIES)
+    level = FIDELITIES[fidelity]
+    if rotor is not None and rotor not in ROTORS:
+        raise unknown("rotor model", rotor, ROTORS)
+    # induction is not in the tables; a level falls back to what has it, an explicit wish is refused
+    needs_induction = chosen["dynamic_inflow"] or chosen["skewed_wake"]
+    if needs_induction and rotor not in (None, "bem"):
+        raise InputError(f"rotor = {rotor!r}: skewed_wake and dynamic_inflow need rotor = 'bem'")
+    chosen["fidelity"] = fidelity
+    chosen["explicit_wave_loads"] = chosen["wave_loads"] is not None
+    for part in ("wave_loads", "integrator"):
+        if chosen[part] is None:
+            chosen[part] = level[part]
+    if rotor is None:
+        rotor = "bem" if needs_induction else level["rotor"]
+    return rotor
+
+
+def _quick(chosen, waves, strips):
+    """Whether the strip loads take the fast path; where a level asks for it, seas beyond it go exact."""
+    if chosen["wave_loads"] != "fast":
+        return False
+    if waves is None or can_be_fast(waves, strips):
+        return True
+    if chosen["explicit_wave_loads"]:
+        raise InputError(
+            "wave_loads = 'fast': needs waves of one heading, and surface 'instantaneous' with stretching"
+            " 'wheeler' or surface 'swl' with stretching 'none'; use 'exact'"
+        )
+    return False
+
+
+def _fast_sea(waves, strips):
+    """FastWaves of the waves, None in still water. Raises: InputError for a sea beyond the fast path."""
+    if waves is None:
+        return None
+    if not can_be_fast(waves, strips):
+        raise InputError("sea: several headings cannot be summed fast; build_scene(..., wave_loads='exact')")
+    return build_fast_waves(waves, strips)
 
 
 def _options(given, platform):
@@ -203,22 +275,49 @@ def _options(given, platform):
     return chosen
 
 
-def _weather(wind, sea, seed, platform, turbine, chosen):
-    """(WindSeries or None, Waves or None) of a wind and sea specification."""
+class _Air(NamedTuple):
+    """Wind of a scene: what was asked for (a box once read), its parts, and the mean hub wind of a trim."""
+
+    spec: object
+    series: object  # WindSeries or None
+    field: object  # WindField or None
+    speed: float | None
+
+
+def _air(wind, seed, turbine, rotor, shear, duration):
+    """_Air of a wind specification."""
+    hub, diameter = turbine.rotor.hub_height, 2.0 * turbine.rotor.tip_radius
+    if not is_field(wind):
+        series = build_wind(
+            wind,
+            reference_height=hub,
+            rotor_diameter=diameter,
+            shear_exponent=shear,
+            seed=seed,
+            duration=duration,
+        )
+        return _Air(wind, series, None, None if series is None else nominal_speed(wind))
+    box = read_box(
+        wind, hub_height=hub, rotor_diameter=diameter, shear_exponent=shear, seed=seed, duration=duration
+    )
+    speed = hub_speed(box, hub)
+    like = {"reference_height": hub, "reference_length": diameter, "shear_exponent": 0.0}
+    if rotor == "table":
+        period = box.velocity.shape[0] * box.dt if box.periodic else 0.0
+        return _Air(box, make_series(*rotor_average(box, hub, diameter), period=period, **like), None, speed)
+    mean = make_series(np.zeros(1), np.array([[speed, 0.0, 0.0, 0.0, 0.0]]), **like)
+    return _Air(box, mean, box.field(), speed)
+
+
+def _weather(wind, sea, seed, platform, turbine, rotor, chosen):
+    """(_Air, Waves or None) of a wind and sea specification."""
     site = platform.environment
     shear = site.shear_exponent if chosen["shear_exponent"] is None else chosen["shear_exponent"]
-    series = build_wind(
-        wind,
-        reference_height=turbine.rotor.hub_height,
-        rotor_diameter=2.0 * turbine.rotor.tip_radius,
-        shear_exponent=shear,
-        seed=seed,
-        duration=chosen["duration"],
-    )
+    air = _air(wind, seed, turbine, rotor, shear, chosen["duration"])
     state = sea_state_of(sea)
     _check_sea(state, site.water_depth)
     if not chosen["hydrodynamics"]:
-        return series, None
+        return air, None
     waves = build_waves(
         state,
         depth=site.water_depth,
@@ -228,7 +327,7 @@ def _weather(wind, sea, seed, platform, turbine, chosen):
         duration=chosen["duration"],
         components=chosen["wave_components"],
     )
-    return series, waves
+    return air, waves
 
 
 def _number(name, value, low, high, low_open=False):

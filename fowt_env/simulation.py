@@ -12,6 +12,7 @@ from fowt_env.measurement import N_MEASUREMENTS, Measurement
 from fowt_env.state import State, pose_of
 from fowt_env.steady import trim
 from fowt_env.step import RUNNING, STOP_REASONS, advance, observe, output, output_row, run
+from fowt_env.weather.wind_field import WindBox
 
 CHUNK = 20.0  # simulated seconds per compiled call: Ctrl-C is heard and progress shown between them
 STARTS = ("trim", "zero")
@@ -112,6 +113,11 @@ def check_duration(scene, duration):
     limit = scene.options["duration"]
     random_sea = scene.model.waves is not None and scene.model.waves.omega.shape[0] > 1
     wind = scene.model.wind
+    if isinstance(scene.wind, WindBox) and duration > scene.wind.usable:
+        raise InputError(
+            f"duration = {duration:g} s: the box of wind covers {scene.wind.usable:.1f} s and does not repeat"
+            " (periodic = True makes it repeat)"
+        )
     if wind is not None and wind.period > 0.0 and duration > wind.period + 1e-9:
         raise InputError(
             f"duration = {duration:g} s: this scene's random wind was drawn for {wind.period:g} s and would"
@@ -132,7 +138,7 @@ def simulate(
     scene,
     controller="pi",
     duration=600.0,
-    dt=0.05,
+    dt=None,
     control_dt=0.1,
     output_dt=0.1,
     start="trim",
@@ -145,13 +151,16 @@ def simulate(
                 name of controllers.CONTROLLERS or "module:Class"; or an object with
                 reset(measurement) and act(measurement) -> (generator torque N m, blade pitch rad)
     duration    s; rows run from 0 to duration inclusive, every output_dt
-    dt          physics step, s; must divide control_dt and output_dt, and those the duration
+    dt          physics step, s; must divide control_dt and output_dt, and output_dt the duration.
+                None: the step of the scene's integrator (0.05 s for Runge-Kutta, 0.1 s for Adams)
     start       "trim" or "zero"; initial then sets absolute values of named channels
     progress    True shows a bar; a callable is called with the share done
 
     Raises: InputError before anything runs; SimulationStopped (with the rows so far) on capsize or a
     non-finite state; ControllerError if a controller returns anything but two finite numbers.
     """
+    if dt is None:
+        dt = min(scene.dt, control_dt, output_dt)
     per_control = steps_in("control_dt", control_dt, dt)
     per_output = steps_in("output_dt", output_dt, dt)
     last = steps_in("duration", duration, dt)

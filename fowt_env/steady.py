@@ -10,12 +10,13 @@ from scipy.optimize import brentq
 from fowt_env.channels import to_units
 from fowt_env.dynamics import derivative
 from fowt_env.errors import InputError, unknown
-from fowt_env.jit import kernel
+from fowt_env.jit import entry
 from fowt_env.loads.drivetrain import build_torque_curve, generator_torque
 from fowt_env.loads.rotor import wake_equilibrium
 from fowt_env.state import State, pose_of
 from fowt_env.step import output_row
 from fowt_env.weather.wind import make_series, wind_now
+from fowt_env.weather.wind_field import steady_field
 
 AZIMUTHS = 12  # samples over the 120 degrees after which three blades repeat
 NEWTON_ROUNDS = 40
@@ -70,8 +71,13 @@ def calm(scene, wind_speed=None):
         parts["waves"] = model.waves._replace(
             amplitude=np.zeros_like(model.waves.amplitude), velocity=np.zeros_like(model.waves.velocity)
         )
+    if model.sea is not None:
+        parts["sea"] = model.sea._replace(weight=np.zeros_like(model.sea.weight))
     if model.wind is not None:
         speed = scene.wind_speed if wind_speed is None else wind_speed
+        if model.wind_field is not None:
+            factor = 1.0 if wind_speed is None else wind_speed / scene.wind_speed
+            parts["wind_field"] = steady_field(model.wind_field, factor)
         parts["wind"] = make_series(
             np.zeros(1),
             np.array([[speed, 0.0, 0.0, 0.0, 0.0]]),
@@ -82,7 +88,7 @@ def calm(scene, wind_speed=None):
     return scene.with_model(**parts)
 
 
-@kernel
+@entry
 def mean_derivative(box, x, u, azimuths, dx, mean):
     """Mean of dx over the azimuths, into mean (n_state,)."""
     start = x[State.AZIMUTH]
@@ -95,7 +101,7 @@ def mean_derivative(box, x, u, azimuths, dx, mean):
     x[State.AZIMUTH] = start
 
 
-@kernel
+@entry
 def settle_wake(box, x, dx):
     """Set the wake states of x to their steady values for the rest of it."""
     scene = box.scene

@@ -7,7 +7,7 @@ import numpy as np
 from fowt_env.channels import measure, record
 from fowt_env.dynamics import Kept, loads_of
 from fowt_env.integrators import rates, take_step
-from fowt_env.jit import kernel
+from fowt_env.jit import entry, kernel
 from fowt_env.state import State
 
 RUNNING, NON_FINITE, CAPSIZED = 0, 1, 2
@@ -37,13 +37,13 @@ def advance_scene(scene, work, x, u, first, n, dt):
     return RUNNING
 
 
-@kernel
+@entry
 def advance(box, x, u, first, n, dt):
     """Advance x (n_state,) in place by n steps of dt under constant u (2,); returns the status."""
     return advance_scene(box.scene, box.work, x, u, first, n, dt)
 
 
-@kernel
+@entry
 def observe(box, x, u, t, dx, measurement):
     """Fill dx (n_state,) and measurement (N_MEASUREMENTS,) at time t under u.
 
@@ -52,10 +52,10 @@ def observe(box, x, u, t, dx, measurement):
     """
     scene = box.scene
     rates(t, x, u, scene, box.work, dx)
-    measure(scene, x, dx, u, t, measurement)
+    measure(scene, box.work, x, dx, u, t, measurement)
 
 
-@kernel
+@entry
 def output(box, x, u, t, dx, row):
     """Fill one output row (n_channels,) in SI at time t under u; kept loads as in observe."""
     scene = box.scene
@@ -63,7 +63,7 @@ def output(box, x, u, t, dx, row):
     record(scene, box.work, x, dx, u, t, loads_of(box.work, dx), row)
 
 
-@kernel
+@entry
 def forget(box):
     """Drop kept loads and past derivatives: the state was changed from outside."""
     box.work.kept[Kept.FRESH] = 0.0
@@ -78,7 +78,7 @@ def output_row(box, x, u, t, size):
     return row
 
 
-@kernel
+@entry
 def run(box, x, u, act, parameters, memory, measurement, dx, dt, per_control, per_output, first, last, out):
     """Closed loop over the instants first <= step < last, writing rows of out (k, n_channels).
 

@@ -4,11 +4,11 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from fowt_env.dynamics import derivative
-from fowt_env.jit import kernel
+from fowt_env.jit import entry
 from fowt_env.state import Pose, State
 
 
-@kernel
+@entry
 def _rates(box, t, x, u, dx):
     derivative(t, x, u, box.scene, box.work, dx)
 

@@ -314,7 +314,6 @@ def test_floating_body_on_its_lines_keeps_its_energy_without_fluid_inertia(still
     model = still_scene.model
     strips = model.strips._replace(
         added_mass_coefficient=0.0, drag_coefficient=0.0, heave_added_mass=0.0,
-        s0_below=0.0, s1_below=0.0, s2_below=0.0,
     )  # fmt: skip
     damping = type(model.damping)(*(0.0,) * 7)
     scene = still_scene.with_model(strips=strips, damping=damping)

@@ -27,16 +27,19 @@ U, V, W, DU, DV, DW, P = range(7)
 
 
 class Strips(NamedTuple):
-    """Strip description of the hull. Sections run downwards from the surface one."""
+    """Strip description of the hull. Sections run downwards from the surface one.
 
-    section_top: np.ndarray  # (m,) body z; [0] is replaced by the instantaneous surface
+    Each is cut at the water surface: nodes above it would meet the short waves of a linear sea where
+    their kinematics grow without bound.
+    """
+
+    section_top: np.ndarray  # (m,) body z; the first is still water, in place of the hull's top
     section_bottom: np.ndarray  # (m,)
     cells: np.ndarray  # (m,) int64
     first_node: np.ndarray  # (m,) int64
-    node_z: np.ndarray  # (n,) body z at rest, top to bottom in each section
-    node_weight: np.ndarray  # (n,) m
-    node_diameter: np.ndarray  # (n,)
-    node_area_slope: np.ndarray  # (n,) dA/dz, m
+    diameter_bottom: np.ndarray  # (m,)
+    diameter_slope: np.ndarray  # (m,) per metre of height
+    nodes: int
     density: float
     added_mass_coefficient: float
     drag_coefficient: float
@@ -46,9 +49,6 @@ class Strips(NamedTuple):
     keel_area: float
     top_z: float  # of the hull: the surface integral ends there
     depth: float
-    s0_below: float  # added-mass integrals below the surface section
-    s1_below: float
-    s2_below: float
     instantaneous_position: bool
     instantaneous_surface: bool
     wheeler: bool
@@ -81,31 +81,22 @@ def build_strips(hull, hydro, *, density, depth, position, surface, stretching, 
         bottoms.append(z[i])
         diameters.append((hull.diameter[i], hull.diameter[i + 1]))
     tops[0] = 0.0
-    cells, first, node_z, weight, diameter, slope = [], [], [], [], [], []
-    for number, (top, bottom, (d0, d1)) in enumerate(zip(tops, bottoms, diameters, strict=True)):
-        height = top - bottom
-        n = SURFACE_CELLS if number == 0 else max(2, int(np.ceil(height / cell)))
+    cells, first, nodes = [], [], 0
+    for number, (top, bottom) in enumerate(zip(tops, bottoms, strict=True)):
+        n = SURFACE_CELLS if number == 0 else max(2, int(np.ceil((top - bottom) / cell)))
         cells.append(n)
-        first.append(len(node_z))
-        for c in range(n):
-            for offset in (GAUSS_OFFSET, 1.0 - GAUSS_OFFSET):
-                at = top - height * (c + offset) / n
-                share = (at - bottom) / height if number > 0 else 0.0
-                d = d0 + (d1 - d0) * share
-                node_z.append(at)
-                weight.append(0.5 * height / n)
-                diameter.append(d)
-                slope.append(0.5 * pi * d * (d1 - d0) / height)
-    array = np.array([node_z, weight, diameter, slope])
-    below = first[1] if len(first) > 1 else len(node_z)
-    mass = density * hydro.added_mass_coefficient * 0.25 * pi * array[2, below:] ** 2 * array[1, below:]
-    zb = array[0, below:]
+        first.append(nodes)
+        nodes += 2 * n
+    lower, upper = np.array(diameters).T
+    slope = (upper - lower) / np.subtract(tops, bottoms)
     return Strips(
         np.array(tops, dtype=np.float64),
         np.array(bottoms, dtype=np.float64),
         np.array(cells, dtype=np.int64),
         np.array(first, dtype=np.int64),
-        *(np.ascontiguousarray(row) for row in array),
+        np.ascontiguousarray(lower),
+        np.ascontiguousarray(slope),
+        nodes,
         float(density),
         float(hydro.added_mass_coefficient),
         float(hydro.drag_coefficient),
@@ -115,9 +106,6 @@ def build_strips(hull, hydro, *, density, depth, position, surface, stretching, 
         float(0.25 * pi * hull.diameter[0] ** 2),
         float(hull.z[-1]),
         float(depth),
-        float(mass.sum()),
-        float((mass * zb).sum()),
-        float((mass * zb * zb).sum()),
         position == "instantaneous",
         surface == "instantaneous",
         stretching == "wheeler",
@@ -132,7 +120,7 @@ def axis_surface(t, pose, strips, waves):
         if waves is not None:
             eta = elevation(t, 0.0, 0.0, waves)
         z = eta if strips.instantaneous_surface else 0.0
-        return min(max(z, strips.section_bottom[0]), strips.top_z), eta
+        return min(max(z, strips.keel_z), strips.top_z), eta
     tilt = max(pose.r33, 0.1)
     z = -pose.z / tilt
     if waves is not None:
@@ -145,7 +133,16 @@ def axis_surface(t, pose, strips, waves):
             z = new
             if change < SURFACE_TOLERANCE:
                 break
-    return min(max(z, strips.section_bottom[0]), strips.top_z), eta
+    return min(max(z, strips.keel_z), strips.top_z), eta
+
+
+@kernel
+def wet_cell(section, z_surf, strips):
+    """(top, height of one cell) of a section cut at the surface; a dry section has height 0."""
+    top = z_surf
+    if section > 0:
+        top = min(z_surf, strips.section_top[section])
+    return top, max(top - strips.section_bottom[section], 0.0) / strips.cells[section]
 
 
 @kernel
@@ -181,9 +178,8 @@ def strip_kinematics(t, pose, z_surf, eta, strips, waves, kin):
         for section in range(strips.cells.shape[0]):
             if not alive:
                 break
-            top = z_surf if section == 0 else strips.section_top[section]
+            top, height = wet_cell(section, z_surf, strips)
             cells = strips.cells[section]
-            height = (top - strips.section_bottom[section]) / cells
             node = strips.first_node[section]
             za = top - GAUSS_OFFSET * height
             m = exp(k * base_z + up * za)
@@ -274,43 +270,46 @@ def morison_load(t, pose, strips, waves, current, kin):
     kp = ku = kv = kw = kdu = kdv = kdw = 0.0
     if waves is not None:
         kp, ku, kv, kw, kdu, kdv, kdw = strip_kinematics(t, pose, z_surf, eta, strips, waves, kin)
-    fx = fy = fz = mx = my = 0.0
-    surface_height = (z_surf - strips.section_bottom[0]) / strips.cells[0]
-    surface_scale = (z_surf - strips.section_bottom[0]) / (strips.section_top[0] - strips.section_bottom[0])
-    for n in range(strips.node_z.shape[0]):
-        if n < 2 * strips.cells[0]:
-            weight = 0.5 * surface_height
-            z = z_surf + surface_scale * strips.node_z[n]
-        else:
-            weight = strips.node_weight[n]
-            z = strips.node_z[n]
-        d = strips.node_diameter[n]
-        sx = pose.vx + pose.wy * z
-        sy = pose.vy - pose.wx * z
-        u = v = w = 0.0
-        if waves is not None:
-            u, v, w = kin[U, n], kin[V, n], kin[W, n]
-        if current is not None:
-            cu, cv = current_at(pose.z + pose.r33 * z, strips.depth, current)
-            u += cu
-            v += cv
-        rx = pose.r11 * u + pose.r21 * v + pose.r31 * w - sx
-        ry = pose.r12 * u + pose.r22 * v + pose.r32 * w - sy
-        area = 0.25 * pi * d * d
-        drag = 0.5 * rho * strips.drag_coefficient * d * hypot(rx, ry)
-        inertia = rho * area * ca
-        px = drag * rx - inertia * (pose.wy * pose.vz - pose.wz * sy)
-        py = drag * ry - inertia * (pose.wz * sx - pose.wx * pose.vz)
-        if waves is not None:
-            du, dv, dw = kin[DU, n], kin[DV, n], kin[DW, n]
-            froude = rho * area * (1.0 + ca)
-            px += froude * (pose.r11 * du + pose.r21 * dv + pose.r31 * dw)
-            py += froude * (pose.r12 * du + pose.r22 * dv + pose.r32 * dw)
-            fz += weight * kin[P, n] * strips.node_area_slope[n]
-        fx += weight * px
-        fy += weight * py
-        mx -= weight * z * py
-        my += weight * z * px
+    fx = fy = fz = mx = my = s0 = s1 = s2 = 0.0
+    for section in range(strips.cells.shape[0]):
+        top, height = wet_cell(section, z_surf, strips)
+        weight = 0.5 * height
+        for c in range(strips.cells[section]):
+            for point in range(2):
+                n = strips.first_node[section] + 2 * c + point
+                z = top - height * (c + (GAUSS_OFFSET if point == 0 else 1.0 - GAUSS_OFFSET))
+                d = strips.diameter_bottom[section] + strips.diameter_slope[section] * (
+                    z - strips.section_bottom[section]
+                )
+                sx = pose.vx + pose.wy * z
+                sy = pose.vy - pose.wx * z
+                u = v = w = 0.0
+                if waves is not None:
+                    u, v, w = kin[U, n], kin[V, n], kin[W, n]
+                if current is not None:
+                    cu, cv = current_at(pose.z + pose.r33 * z, strips.depth, current)
+                    u += cu
+                    v += cv
+                rx = pose.r11 * u + pose.r21 * v + pose.r31 * w - sx
+                ry = pose.r12 * u + pose.r22 * v + pose.r32 * w - sy
+                area = 0.25 * pi * d * d
+                drag = 0.5 * rho * strips.drag_coefficient * d * hypot(rx, ry)
+                inertia = rho * area * ca
+                px = drag * rx - inertia * (pose.wy * pose.vz - pose.wz * sy)
+                py = drag * ry - inertia * (pose.wz * sx - pose.wx * pose.vz)
+                if waves is not None:
+                    du, dv, dw = kin[DU, n], kin[DV, n], kin[DW, n]
+                    froude = rho * area * (1.0 + ca)
+                    px += froude * (pose.r11 * du + pose.r21 * dv + pose.r31 * dw)
+                    py += froude * (pose.r12 * du + pose.r22 * dv + pose.r32 * dw)
+                    fz += weight * kin[P, n] * (0.5 * pi * d * strips.diameter_slope[section])
+                fx += weight * px
+                s0 += weight * inertia
+                s1 += weight * inertia * z
+                s2 += weight * inertia * z * z
+                fy += weight * py
+                mx -= weight * z * py
+                my += weight * z * px
     zk = strips.keel_z
     sx = pose.vx + pose.wy * zk
     sy = pose.vy - pose.wx * zk
@@ -323,9 +322,4 @@ def morison_load(t, pose, strips, waves, current, kin):
     fz += kp * strips.keel_area
     fz += strips.heave_added_mass * (az - (pose.wx * sy - pose.wy * sx))
     fz += 0.5 * rho * strips.axial_drag_coefficient * strips.keel_area * abs(rz) * rz
-    zb = strips.section_bottom[0]
-    line = rho * ca * 0.25 * pi * strips.node_diameter[0] ** 2
-    s0 = strips.s0_below + line * (z_surf - zb)
-    s1 = strips.s1_below + line * (z_surf**2 - zb**2) / 2.0
-    s2 = strips.s2_below + line * (z_surf**3 - zb**3) / 3.0
     return StripLoad(Wrench(fx, fy, fz, mx, my, 0.0), s0, s1, s2, strips.heave_added_mass)

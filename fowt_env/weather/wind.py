@@ -1,6 +1,7 @@
 """Wind at any instant and point: a time series at the reference height, sheared over the height.
 
-The series is uniform over the rotor apart from the power law and two linear shears. Frame: inertial,
+The series is uniform over the rotor apart from the power law and two linear shears; a box of full-field
+wind (wind_field.py) takes its place where a scene has one. Frame: inertial,
 x downwind, y left when looking downwind, z up (state.py). What users may ask for is in wind_spec.py.
 """
 
@@ -14,6 +15,7 @@ from fowt_env.jit import kernel
 from fowt_env.weather import gusts
 from fowt_env.weather.iec import EXTREME_SHEAR_EXPONENT, etm_sigma, extreme_speed, ntm_sigma
 from fowt_env.weather.turbulence import SHORTEST_PERIOD, turbulence
+from fowt_env.weather.wind_field import field_at
 from fowt_env.weather.wind_spec import SHARED, Number, Seed, read_wind
 
 OPENING = 60.0  # s; the platform trims to the mean of this much of a user's series
@@ -94,11 +96,19 @@ def wind_at(t, X, Y, Z, now, series, field):
 
     The horizontal wind follows the power law (Z/reference_height)**shear_exponent; the linear shears
     add to u, m/s per reference_length above and to the left (+y) of the reference point. Points below
-    LOWEST_HEIGHT take its wind. now: wind_now(t, series). field: None, the wind is uniform in space
-    apart from its shears.
+    LOWEST_HEIGHT take its wind. now: wind_now(t, series). field: None, or a box of full-field wind
+    (wind_field.WindField) that replaces the series.
     """
     if series is None:
         return 0.0, 0.0, 0.0
+    if field is None:
+        return _series_at(Y, Z, now, series)
+    return field_at(t, X, Y, Z, field)
+
+
+@kernel
+def _series_at(Y, Z, now, series):
+    """(u, v, w) of a series at a height and a distance to the left."""
     height = max(Z, LOWEST_HEIGHT)
     profile = 1.0
     if series.shear_exponent != 0.0:

@@ -81,7 +81,7 @@ def loop_roots(controller, control_dt, lag, time=0.0, states=PI_STATES):
         rotor = LinearRotor(lag)
         rotor.speed, rotor.pitch = RATED_SPEED + z[0], TRIM_PITCH + z[1]
         controller.memory[:] = settled
-        for entry, change in zip(states, z[2:]):
+        for entry, change in zip(states, z[2:], strict=False):
             controller.memory[entry] += change
         torque, command = controller.act(at_speed(rotor.speed, rotor.pitch, time))
         rotor.advance(torque, command, control_dt)
@@ -195,7 +195,7 @@ def test_unknown_settings_gain_sets_and_schedules_get_suggestions():
 def test_the_compiled_law_equals_its_naive_twin(settings, naive, control_dt):
     rng = np.random.default_rng(5)
     controller, twin = oc3(control_dt, **settings), NaivePI(control_dt=control_dt, **naive)
-    for start in range(10):
+    for _start in range(10):
         speed, pitch, torque = rng.uniform(60.0, 140.0), rng.uniform(-0.05, 0.5), rng.uniform(0.0, 5e4)
         controller.reset(at_speed(speed / 97.0, pitch, torque=torque))
         twin.start(97.0 * (speed / 97.0), pitch, torque)
@@ -255,7 +255,7 @@ def test_a_long_stay_above_rated_winds_up_no_further_than_feather():
 def test_the_first_command_is_the_measured_blade_pitch(schedule_on, control_dt):
     controller = oc3(control_dt, schedule_on=schedule_on)
     rng = np.random.default_rng(7)
-    for speed, pitch in zip(rng.uniform(1.15, 1.3, 200), rng.uniform(0.1, 0.5, 200)):
+    for speed, pitch in zip(rng.uniform(1.15, 1.3, 200), rng.uniform(0.1, 0.5, 200), strict=False):
         start = at_speed(speed, pitch)
         controller.reset(start)
         assert controller.bumpless

@@ -82,7 +82,7 @@ def test_a_standing_or_reversed_shaft_gets_no_torque(region3):
 def test_torque_equals_its_naive_twin(power_law):
     curve = build_torque_curve(torque_law(), "constant_power" if power_law else "constant_torque")
     rng = np.random.default_rng(1)
-    for speed, pitch in zip(rng.uniform(1.0, 160.0, 2000), rng.uniform(0.0, 0.035, 2000)):
+    for speed, pitch in zip(rng.uniform(1.0, 160.0, 2000), rng.uniform(0.0, 0.035, 2000), strict=False):
         expected = oc3_torque(speed, pitch, power_law)
         assert generator_torque(speed, pitch, curve) == pytest.approx(expected, rel=1e-12, abs=1e-9)
 
@@ -122,7 +122,7 @@ def test_losses_never_give_power():
     lossless = build_drivetrain(turbine())
     lossy = build_drivetrain(turbine(mesh_loss=0.05, bearing_loss=0.01))
     rng = np.random.default_rng(2)
-    for speed, torque in zip(rng.normal(0.0, 1.0, 500), rng.normal(0.0, 3e4, 500)):
+    for speed, torque in zip(rng.normal(0.0, 1.0, 500), rng.normal(0.0, 3e4, 500), strict=False):
         lost = shaft_torque(0.0, torque, speed, lossless) - shaft_torque(0.0, torque, speed, lossy)
         assert lost * speed > 0.0
 

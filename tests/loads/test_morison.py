@@ -7,7 +7,15 @@ from naive.rigid_body import rotation
 from plant import make_pose
 
 from fowt_env.description import SeaState
-from fowt_env.loads.morison import Current, axis_surface, build_strips, morison_load, strip_kinematics
+from fowt_env.loads.morison import (
+    GAUSS_OFFSET,
+    Current,
+    axis_surface,
+    build_strips,
+    morison_load,
+    strip_kinematics,
+    wet_cell,
+)
 from fowt_env.weather.waves import build_waves, wave_kinematics
 
 SWITCHES = list(itertools.product(("instantaneous", "fixed"), ("instantaneous", "swl"), ("wheeler", "none")))
@@ -60,19 +68,21 @@ def motion(rng, tilt=0.08, heave=0.7):
 
 
 def load(t, motion, strips, waves, current=None):
-    kin = np.zeros((7, strips.node_z.size))
+    kin = np.zeros((7, strips.nodes))
     return morison_load(t, make_pose(*motion), strips, waves, current, kin)
 
 
 def package_nodes(strips, top):
-    """The package's own nodes with the surface section stretched to top, as naive.load takes them."""
-    z, weight = strips.node_z.copy(), strips.node_weight.copy()
-    n = 2 * strips.cells[0]
-    low = strips.section_bottom[0]
-    share = (top - low) / (0.0 - low)
-    z[:n] = low + (z[:n] - low) * share
-    weight[:n] *= share
-    return np.array([z, weight, strips.node_diameter, strips.node_area_slope])
+    """The package's own nodes below a surface at body z = top, as naive.load takes them."""
+    rows = []
+    for section, bottom in enumerate(strips.section_bottom):
+        start, height = wet_cell(section, top, strips)
+        for cell in range(strips.cells[section]):
+            for offset in (GAUSS_OFFSET, 1.0 - GAUSS_OFFSET):
+                z = start - height * (cell + offset)
+                d = strips.diameter_bottom[section] + strips.diameter_slope[section] * (z - bottom)
+                rows.append((z, 0.5 * height, d, 0.5 * np.pi * d * strips.diameter_slope[section]))
+    return np.array(rows).T
 
 
 def test_no_strips_no_load():
@@ -90,7 +100,7 @@ def test_strip_kinematics_are_the_plain_sum_at_the_nodes(switches, platform, sit
         t, moving = rng.uniform(0.0, 100.0), motion(rng)
         pose = make_pose(*moving)
         top, eta = axis_surface(t, pose, strips, waves)
-        kin = np.zeros((7, strips.node_z.size))
+        kin = np.zeros((7, strips.nodes))
         keel = strip_kinematics(t, pose, top, eta, strips, waves, kin)
         z = np.r_[package_nodes(strips, top)[0], strips.keel_z]
         r, R = (moving[0], moving[1]) if switches[0] == "instantaneous" else (np.zeros(3), np.eye(3))
@@ -306,7 +316,7 @@ def test_fixed_spar_has_the_force_amplitudes_of_linear_theory(platform, site):
 def test_load_does_not_depend_on_what_the_scratch_held(platform, site):
     strips, waves = build(platform), waves_of(SEA, site)
     moving = make_pose(*motion(np.random.default_rng(12)))
-    clean, dirty = np.zeros((7, strips.node_z.size)), np.full((7, strips.node_z.size), 1e30)
+    clean, dirty = np.zeros((7, strips.nodes)), np.full((7, strips.nodes), 1e30)
     assert morison_load(2.0, moving, strips, waves, None, clean) == morison_load(
         2.0, moving, strips, waves, None, dirty
     )

@@ -33,7 +33,10 @@ def nodes(spar, surface, points=60):
     out = []
     for i in range(len(spar.z) - 1):
         low, high = spar.z[i], spar.z[i + 1]
-        top = surface if i == len(spar.z) - 2 else high
+        # every section ends at the surface: a deep trough reaches below the upper cylinder
+        top = surface if i == len(spar.z) - 2 else min(high, surface)
+        if top <= low:
+            continue
         z = low + (top - low) * (x + 1.0) / 2.0
         d = spar.diameter[i] + (spar.diameter[i + 1] - spar.diameter[i]) * (z - low) / (high - low)
         slope = np.pi / 2.0 * d * (spar.diameter[i + 1] - spar.diameter[i]) / (high - low)

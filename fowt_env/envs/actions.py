@@ -1,0 +1,171 @@
+"""What the two actions in [-1, 1] mean: the three action modes as physical commands.
+
+The first action belongs to the rotor-speed channel (generator torque), the second to blade pitch.
+"""
+
+from enum import IntEnum
+from math import isfinite, pi
+from typing import NamedTuple
+
+from fowt_env.errors import InputError
+from fowt_env.jit import kernel
+from fowt_env.loads.drivetrain import build_drivetrain, limited
+from fowt_env.measurement import Measure
+
+# Set-point mode: PI on rotor speed through torque, this natural frequency and damping ratio of the
+# rigid rotor. Fast beside the platform's pitch (0.21 rad/s), slow beside the torque rate limit.
+TRACKING_FREQUENCY = 0.5  # rad/s
+TRACKING_DAMPING = 1.0
+
+
+class Mode(IntEnum):
+    """Action modes."""
+
+    DIRECT = 0
+    SETPOINT = 1
+    RESIDUAL = 2
+
+
+MODES = {mode.name.lower(): mode for mode in Mode}
+
+
+class ActionMap(NamedTuple):
+    """Ranges of one action mode; SI."""
+
+    mode: int
+    low: float  # of the first action: N m (direct), rad/s (set-point)
+    high: float
+    pitch_low: float  # of the second action, rad
+    pitch_high: float
+    residual_torque: float  # largest additions of the residual mode, N m
+    residual_pitch: float  # rad
+    maximum_torque: float  # N m
+    torque_step: float  # most that the torque may change in one control period, N m
+    control_dt: float  # s
+    tracking_gain: float  # set-point mode: N m per rad/s of rotor speed
+    tracking_rate: float  # set-point mode: N m/s per rad/s
+
+
+def build_action_map(mode, task, turbine, control_dt):
+    """ActionMap of a Mode, a Task and a description.Turbine.
+
+    Raises: InputError where the pitch action reaches beyond the actuator.
+    """
+    law, drive = turbine.torque_law, turbine.pitch_drive
+    reach = tuple(angle * pi / 180.0 for angle in task.blade_pitch)
+    slack = 1e-9
+    if reach[0] < drive.minimum - slack or reach[1] > drive.maximum + slack or reach[0] >= reach[1]:
+        raise InputError(
+            f"task {task.name!r}: blade_pitch = {task.blade_pitch}: must be a range within"
+            f" [{drive.minimum * 180.0 / pi:g}, {drive.maximum * 180.0 / pi:g}] deg of the pitch actuator"
+        )
+    shaft = build_drivetrain(turbine)
+    inertia = shaft.inertia_row / shaft.gear_ratio
+    low, high = 0.0, law.max_torque
+    if mode == Mode.SETPOINT:
+        low, high = (share * turbine.rated_rotor_speed for share in task.setpoint)
+        if low >= high:
+            raise InputError(f"task {task.name!r}: setpoint = {task.setpoint}: must be a range (low, high)")
+    return ActionMap(
+        mode=int(mode),
+        low=float(low),
+        high=float(high),
+        pitch_low=float(reach[0]),
+        pitch_high=float(reach[1]),
+        residual_torque=float(task.residual_torque * law.rated_torque),
+        residual_pitch=float(task.residual_pitch * pi / 180.0),
+        maximum_torque=float(law.max_torque),
+        torque_step=float(law.max_torque_rate * control_dt),
+        control_dt=float(control_dt),
+        tracking_gain=float(2.0 * TRACKING_DAMPING * TRACKING_FREQUENCY * inertia),
+        tracking_rate=float(TRACKING_FREQUENCY**2 * inertia),
+    )
+
+
+@kernel
+def accept(action, accepted):
+    """Copy an action, clipped to [-1, 1]. Returns 0, 1 if it was clipped, -1 if it is not finite."""
+    clipped = 0
+    for i in range(accepted.shape[0]):
+        if not isfinite(action[i]):
+            return -1
+    for i in range(accepted.shape[0]):
+        accepted[i] = limited(action[i], -1.0, 1.0)
+        if accepted[i] != action[i]:
+            clipped = 1
+    return clipped
+
+
+@kernel
+def spread(action, low, high):
+    """The value in [low, high] that an action in [-1, 1] asks for."""
+    return low + 0.5 * (action + 1.0) * (high - low)
+
+
+@kernel
+def towards(torque, wanted, step):
+    """The torque, moved towards the wanted one by at most a step, and exactly onto it within reach."""
+    change = wanted - torque
+    if change > step:
+        return torque + step
+    if change < -step:
+        return torque - step
+    return wanted
+
+
+@kernel
+def tracking_torque(speed, setpoint, memory, actions):
+    """Torque that drives the rotor speed (rad/s) to its set-point; memory[0]: integral part, N m."""
+    error = speed - setpoint
+    integral = memory[0] + actions.tracking_rate * error * actions.control_dt
+    memory[0] = limited(integral, 0.0, actions.maximum_torque)
+    return limited(actions.tracking_gain * error + memory[0], 0.0, actions.maximum_torque)
+
+
+@kernel
+def baseline_command(law, parameters, memory, measurement, command):
+    """Command of the baseline controller; without one the command stays."""
+    if law is None:
+        return
+    law(parameters, memory, measurement, command)
+
+
+@kernel
+def command_of(action, actions, law, parameters, memory, measurement, u, wanted):
+    """Set u = (generator torque N m, blade pitch rad) from an accepted action; wanted is scratch (2,).
+
+    The torque moves at most as fast as its rate limit; the pitch actuator limits itself.
+    """
+    wanted[0], wanted[1] = u[0], u[1]
+    if actions.mode == Mode.RESIDUAL:
+        baseline_command(law, parameters, memory, measurement, wanted)
+        torque = wanted[0] + action[0] * actions.residual_torque
+        pitch = wanted[1] + action[1] * actions.residual_pitch
+    else:
+        torque = spread(action[0], actions.low, actions.high)
+        pitch = spread(action[1], actions.pitch_low, actions.pitch_high)
+        if actions.mode == Mode.SETPOINT:
+            torque = tracking_torque(measurement[Measure.ROTOR_SPEED], torque, memory, actions)
+    u[0] = towards(u[0], limited(torque, 0.0, actions.maximum_torque), actions.torque_step)
+    u[1] = pitch
+
+
+@kernel
+def action_of(u, rotor_speed, actions, action):
+    """Set the action that asks for what is already there: u, and the rotor speed as set-point.
+
+    In residual mode that is zero: nothing added to the baseline.
+    """
+    if actions.mode == Mode.RESIDUAL:
+        action[0] = 0.0
+        action[1] = 0.0
+        return
+    first = rotor_speed if actions.mode == Mode.SETPOINT else u[0]
+    action[0] = limited(2.0 * (first - actions.low) / (actions.high - actions.low) - 1.0, -1.0, 1.0)
+    pitch = 2.0 * (u[1] - actions.pitch_low) / (actions.pitch_high - actions.pitch_low) - 1.0
+    action[1] = limited(pitch, -1.0, 1.0)
+
+
+def start_tracking(memory, measurement, actions):
+    """Set the integral so that the set-point of the present speed asks for the present torque."""
+    memory[0] = min(max(measurement.generator_torque, 0.0), actions.maximum_torque)

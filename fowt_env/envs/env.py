@@ -1,0 +1,321 @@
+"""The Gymnasium environment: a task, a scene and the compiled control period, glued together."""
+
+from copy import deepcopy
+from dataclasses import replace
+from math import isfinite, pi
+
+import gymnasium
+import numpy as np
+from gymnasium.error import ResetNeeded
+
+from fowt_env.channels import DEG, to_units
+from fowt_env.envs.actions import MODES, Mode, build_action_map, start_tracking
+from fowt_env.envs.kernels import (
+    BAD_ACTION,
+    REASONS,
+    RUNNING,
+    SATURATED,
+    STEP,
+    Run,
+    Setting,
+    act,
+    act_physical,
+    start,
+)
+from fowt_env.envs.observations import N_ACTIONS, PREVIEW, build_observation_map, check_channels, entries
+from fowt_env.envs.rewards import (
+    N_TERMS,
+    TERMS,
+    Reference,
+    build_scales,
+    check_weights,
+    weight_array,
+)
+from fowt_env.envs.tables import task_tables
+from fowt_env.envs.tasks import TASKS, Episode, check_offset, task_of
+from fowt_env.envs.trims import exact_trim, near_trim, plant_key
+from fowt_env.errors import InputError, unknown
+from fowt_env.jit import Box
+from fowt_env.measurement import N_MEASUREMENTS, Measurement
+from fowt_env.scene import build_scene
+from fowt_env.simulation import INITIAL, check_duration, steps_in
+from fowt_env.state import State
+from fowt_env.step import output
+
+SHORTEST_WEATHER = 600.0  # s of random wind and sea: turbulence intensity is defined over 10 min
+BASELINE = "pi"  # controller that the residual mode adds to
+REWARD_KEYS = tuple(f"reward/{name}" for name in TERMS)
+
+
+class FowtEnv(gymnasium.Env):
+    """Floating wind turbine whose generator torque and blade pitch are commanded.
+
+    task         name in TASKS ("above_rated", "full_range", "steady") or a Task
+    platform     built-in name, path or description.Platform
+    rotor        "bem", "lookup" or "table"; None: the task's, or else that of the fidelity
+    action_mode  "direct", "setpoint" or "residual", see the table of actions
+    observation  channel names in place of the task's; "default" among them stands for the task's
+    reward       {term: weight} in place of single weights of the task
+    dt           physics step, s (None: that of the scene's integrator); control_dt: time between
+                 actions, s, a multiple of dt
+    duration     s of an episode; None: the task's
+    wind, sea    in place of the task's, ranges included (None: the task's)
+    wind_preview look-ahead times (s) of the channel wind_preview
+    render_mode  None
+    options      further ones go to build_scene, such as fidelity="standard"
+
+    An episode starts at the operating point of its mean wind, moved by the task's offsets, in wind and
+    sea drawn from the task's ranges with the environment's seed: the same seed gives the same bits.
+    Where the mean wind is drawn, the operating point is linear between exact ones 0.25 m/s apart: right
+    to 0.05 m of surge and 0.03 deg of blade pitch, in the cells next to rated wind to 0.9 m and 0.6 deg.
+    reset(options=...) takes "wind", "sea", "weather_seed" and "offsets" in place of what is drawn; the
+    info of reset has them under "episode", and given as options they replay the episode.
+
+    An action beyond [-1, 1] counts as the nearest end, and info["saturated_actions"] counts the periods
+    in which that happened. The torque moves at most as fast as its rate limit allows, the blade pitch
+    as its actuator does.
+
+    An episode is terminated by failure: rotor speed beyond the turbine file's overspeed, capsize
+    (platform pitch beyond 80 deg) or a state that is not finite; info["termination"] has the reason. It
+    is truncated at the end of its duration.
+
+    info of each step: "time" (s), "saturated_actions", "reward/<term>" for each term before weighting.
+
+    Raises: InputError for settings and actions that cannot be used.
+    """
+
+    metadata = {"render_modes": []}
+
+    def __init__(
+        self,
+        task="above_rated",
+        platform="oc3_hywind",
+        rotor=None,
+        action_mode="direct",
+        observation=None,
+        reward=None,
+        dt=None,
+        control_dt=0.1,
+        duration=None,
+        wind=None,
+        sea=None,
+        wind_preview=None,
+        render_mode=None,
+        **options,
+    ):
+        if render_mode is not None:
+            raise InputError(f"render_mode = {render_mode!r}: allowed None")
+        if action_mode not in MODES:
+            raise unknown("action_mode", action_mode, MODES)
+        self.render_mode = None
+        self.task = task = _adapted(
+            task_of(task), rotor, observation, reward, duration, wind, sea, wind_preview
+        )
+        self.action_mode = action_mode
+        steps_in("duration", task.duration, control_dt)
+        episode = task.draw(np.random.default_rng(0))
+        self.scene = build_scene(
+            platform,
+            wind=episode.wind,
+            sea=episode.sea,
+            rotor=task.rotor,
+            duration=max(task.duration, SHORTEST_WEATHER),
+            **options,
+        )
+        check_duration(self.scene, task.duration)
+        self.control_dt = float(control_dt)
+        self.dt = min(self.scene.dt, self.control_dt) if dt is None else float(dt)
+        per_control = steps_in("control_dt", control_dt, self.dt if dt is None else dt)
+        self._last = per_control * steps_in("duration", task.duration, control_dt)
+        self._key = plant_key(self.scene)
+        self._build(MODES[action_mode], per_control)
+        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (N_ACTIONS,), np.float32)
+        low, high = self._setting.chosen.low, self._setting.chosen.high
+        self.observation_space = gymnasium.spaces.Box(low.astype(np.float32), high.astype(np.float32))
+        self._running = False
+
+    def _build(self, mode, per_control):
+        """Allocate the arrays of a run and fill what never changes."""
+        scene, turbine, task = self.scene, self.scene.turbine, self.task
+        chosen = entries(task.observation, turbine, task.wind_preview)
+        self._law = None
+        self._baseline = None
+        parameters, memory = np.zeros(1), np.zeros(1)
+        if mode == Mode.RESIDUAL:
+            from controllers import make  # looked up only when used: fowt_env imports nothing from it
+
+            self._baseline = make(BASELINE, turbine, self.control_dt)
+            self._law = self._baseline.kernel
+            parameters, memory = self._baseline.parameters, self._baseline.memory
+        self._setting = Setting(
+            model=scene.model,
+            actions=build_action_map(mode, task, turbine, self.control_dt),
+            parameters=parameters,
+            chosen=build_observation_map(chosen, task.wind_preview),
+            scales=build_scales(turbine, self.control_dt),
+            weights=weight_array(task.weights),
+            overspeed=float(turbine.overspeed),
+            dt=self.dt,
+            per_control=per_control,
+        )
+        n = scene.n_state
+        self._run = Run(
+            work=scene.work(),
+            x=np.zeros(n),
+            u=np.zeros(2),
+            memory=memory,
+            action=np.zeros(N_ACTIONS),
+            measurement=np.zeros(N_MEASUREMENTS),
+            observation=np.zeros(len(chosen), dtype=np.float32),
+            counts=np.zeros(2, dtype=np.int64),
+            reference=np.zeros(len(Reference._fields)),
+            before=np.zeros(N_MEASUREMENTS),
+            dx=np.zeros(n),
+            wanted=np.zeros(2),
+            signals=np.zeros(PREVIEW + len(task.wind_preview)),
+            terms=np.zeros(N_TERMS),
+        )
+        self._box = None
+
+    def reset(self, *, seed=None, options=None):
+        """(observation, info) at the start of a new episode.
+
+        options: "wind", "sea", "weather_seed", "offsets" ({channel: added to the operating point}) in
+        place of what is drawn; "exact_start": whether the operating point is exact (it is where the wind
+        is given) or interpolated. Raises: InputError for other keys and values that cannot be used.
+        """
+        super().reset(seed=seed)
+        self._running = False  # until all of it has worked
+        episode = _chosen(self.task.draw(self.np_random), options)
+        self.scene = self.scene.with_weather(episode.wind, episode.sea, episode.weather_seed)
+        check_duration(self.scene, self.task.duration)
+        find = exact_trim if episode.exact_start else near_trim
+        state, command = find(self.scene, self._key, self.scene.wind_speed)
+        # new scratch: its size follows the number of wave components
+        self._run = run = self._run._replace(work=self.scene.work())
+        run.x[:] = state
+        run.u[:] = command
+        reference = Reference(float(state[State.PLATFORM_PITCH]), float(state[State.ROTOR_SPEED]))
+        run.reference[:] = reference
+        self._offset(episode.offsets)
+        self._setting = self._setting._replace(model=self.scene.model)
+        self._box = Box(self._setting, run)
+        start(self._box)
+        if self._baseline is not None:
+            self._baseline.reset(self.measurement())
+        elif self._setting.actions.mode == Mode.SETPOINT:
+            start_tracking(run.memory, self.measurement(), self._setting.actions)
+        self._running = True
+        info = {
+            "time": 0.0,
+            "saturated_actions": 0,
+            "wind_speed": self.scene.wind_speed,
+            "episode": deepcopy(episode._asdict()),
+        }
+        return run.observation.copy(), info
+
+    def _offset(self, offsets):
+        """Move the state by {channel: offset in the channel's unit}."""
+        x, drive = self._run.x, self.scene.turbine.pitch_drive
+        for name, value in offsets.items():
+            index, factor = INITIAL[name]
+            x[index] += value * factor
+        if abs(x[State.PLATFORM_PITCH]) >= 0.5 * pi:
+            raise InputError(
+                f"offsets['PtfmPitch'] = {offsets['PtfmPitch']:g}: leads to"
+                f" {x[State.PLATFORM_PITCH] * DEG:g} deg, must stay inside (-90, 90) deg"
+            )
+        x[State.BLADE_PITCH] = min(max(x[State.BLADE_PITCH], drive.minimum), drive.maximum)
+        self._run.u[1] = x[State.BLADE_PITCH]
+
+    def step(self, action):
+        """(observation, reward, terminated, truncated, info) after one control period."""
+        if not self._running:
+            raise ResetNeeded("call reset() first: no episode is running")
+        try:
+            asked = np.array(action, dtype=np.float64)  # a copy: steady types, whatever was given
+        except (TypeError, ValueError):
+            raise InputError(f"action = {action!r}: must be {N_ACTIONS} numbers") from None
+        if asked.shape != (N_ACTIONS,):
+            raise InputError(f"action has shape {asked.shape}: must be ({N_ACTIONS},)")
+        status, reward = act(self._box, self._law, asked)
+        if status == BAD_ACTION:
+            raise InputError(f"action = {action!r}: must be finite")
+        return self._result(status, reward)
+
+    def step_physical(self, torque, blade_pitch):
+        """As step, under a generator torque (N m) and blade pitch (rad), applied as simulate does.
+
+        No range and no torque rate limit are put on the command: that is up to whoever gives it.
+        """
+        if not self._running:
+            raise ResetNeeded("call reset() first: no episode is running")
+        torque, blade_pitch = float(torque), float(blade_pitch)
+        if not (isfinite(torque) and isfinite(blade_pitch)):
+            raise InputError(f"torque = {torque!r}, blade_pitch = {blade_pitch!r}: must be finite")
+        return self._result(*act_physical(self._box, torque, blade_pitch))
+
+    def _result(self, status, reward):
+        """What step returns, from the status and reward of a control period."""
+        run = self._run
+        step = int(run.counts[STEP])
+        info = dict(zip(REWARD_KEYS, run.terms.tolist(), strict=True))
+        info["time"] = step * self.dt
+        info["saturated_actions"] = int(run.counts[SATURATED])
+        terminated = status != RUNNING
+        truncated = not terminated and step >= self._last
+        if terminated:
+            info["termination"] = REASONS[status]
+        if terminated or truncated:
+            self._running = False
+        return run.observation.copy(), reward, terminated, truncated, info
+
+    def measurement(self):
+        """Measurement that a controller is given now (SI)."""
+        if self._box is None:
+            raise ResetNeeded("call reset() first: nothing has been measured yet")
+        return Measurement(*self._run.measurement.tolist())
+
+    def channels(self):
+        """{OpenFAST channel: value in its unit} of the present instant; leaves the run as it is."""
+        if self._box is None:
+            raise ResetNeeded("call reset() first: there is no state yet")
+        run, scene = self._run, self.scene
+        work = scene.work()
+        for name in ("lines", "stages", "kept"):  # what an evaluation at this instant has left
+            getattr(work, name)[:] = getattr(run.work, name)
+        row = np.empty(len(scene.channels))
+        time = run.counts[STEP] * self.dt
+        output(scene.box(work), run.x, run.u, time, np.zeros_like(run.x), row)
+        values = to_units(row[None, :], scene.n_lines)[0].tolist()
+        return dict(zip((channel.name for channel in scene.channels), values, strict=True))
+
+
+FowtEnv.__doc__ += f"\n{task_tables(TASKS['above_rated'])}"
+
+
+def _adapted(task, rotor, observation, reward, duration, wind, sea, wind_preview):
+    """The task with what the caller gave in place of its own."""
+    given = {"rotor": rotor, "duration": duration, "wind": wind, "sea": sea, "wind_preview": wind_preview}
+    changes = {name: value for name, value in given.items() if value is not None}
+    if observation is not None:
+        changes["observation"] = check_channels("observation", observation, default=task.observation)
+    if reward is not None:
+        changes["weights"] = task.weights | check_weights("reward", reward)
+    return replace(task, **changes)
+
+
+def _chosen(drawn, options):
+    """The drawn Episode with what reset's options give in place of it."""
+    changes = {}
+    for key, value in (options or {}).items():
+        if key not in Episode._fields:
+            raise unknown("option of reset", key, Episode._fields)
+        if key == "offsets":
+            value = {name: check_offset(name, offset) for name, offset in value.items()}
+        if key == "wind" and value is None:
+            raise InputError("options['wind'] = None: an episode needs a wind (0.0 for still air)")
+        changes[key] = value
+    if "wind" in changes:
+        changes.setdefault("exact_start", True)
+    return drawn._replace(**changes)

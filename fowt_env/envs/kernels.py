@@ -1,0 +1,148 @@
+"""One control period of an environment as one compiled call: command, physics, measurement, reward.
+
+Everything that a period reads is a Setting, everything it writes a Run: arrays of one environment,
+so that many environments are rows of larger ones.
+"""
+
+from math import isfinite
+from typing import NamedTuple
+
+import numpy as np
+
+from fowt_env.channels import measure
+from fowt_env.dynamics import Kept, Model, Work
+from fowt_env.envs.actions import ActionMap, accept, action_of, command_of
+from fowt_env.envs.observations import ObservationMap, fill_observation, fill_signals
+from fowt_env.envs.rewards import Scales, fill_terms, weighted_sum
+from fowt_env.integrators import rates
+from fowt_env.jit import entry, kernel
+from fowt_env.measurement import Measure
+from fowt_env.state import State
+from fowt_env.step import NON_FINITE, RUNNING, STOP_REASONS, advance_scene
+
+BAD_ACTION, OVERSPEED = -1, 3  # beside the statuses of step.py
+REASONS = {**STOP_REASONS, OVERSPEED: "overspeed (rotor speed beyond the limit)"}
+STEP, SATURATED = 0, 1  # entries of Run.counts
+
+
+class Setting(NamedTuple):
+    """What stays fixed during an episode."""
+
+    model: Model
+    actions: ActionMap
+    parameters: np.ndarray  # of the baseline law
+    chosen: ObservationMap
+    scales: Scales
+    weights: np.ndarray  # (N_TERMS,)
+    overspeed: float  # rad/s
+    dt: float  # s
+    per_control: int  # physics steps in a control period
+
+
+class Run(NamedTuple):
+    """What moves during an episode; the arrays down to reference are its whole state."""
+
+    work: Work
+    x: np.ndarray  # (n_state,)
+    u: np.ndarray  # (2,) generator torque and blade-pitch command in force
+    memory: np.ndarray  # of the baseline law or the set-point loop
+    action: np.ndarray  # (2,) last accepted action
+    measurement: np.ndarray  # (N_MEASUREMENTS,) at the present instant
+    observation: np.ndarray  # (n,) float32
+    counts: np.ndarray  # int64: physics steps done, control periods with a clipped action
+    reference: np.ndarray  # rewards.Reference of the episode
+    before: np.ndarray  # (N_MEASUREMENTS,) scratch from here on: one control period ago
+    dx: np.ndarray  # (n_state,)
+    wanted: np.ndarray  # (2,) command of the baseline
+    signals: np.ndarray  # what observations are made of
+    terms: np.ndarray  # (N_TERMS,) of the last period
+
+
+@kernel
+def copy_into(target, source):
+    """Copy an array element by element; a slice assignment would allocate in compiled code."""
+    for i in range(target.shape[0]):
+        target[i] = source[i]
+
+
+@kernel
+def look(setting, run):
+    """Measure at the present instant; RUNNING, or NON_FINITE with the last measurement kept."""
+    model = setting.model
+    t = run.counts[STEP] * setting.dt
+    rates(t, run.x, run.u, model, run.work, run.dx)
+    measure(model, run.work, run.x, run.dx, run.u, t, run.measurement)
+    for value in run.measurement:
+        if not isfinite(value):
+            copy_into(run.measurement, run.before)
+            return NON_FINITE
+    return RUNNING
+
+
+@kernel
+def show(setting, run):
+    """Fill the observation from the present measurement."""
+    t = run.counts[STEP] * setting.dt
+    chosen = setting.chosen
+    fill_signals(t, setting.model, run.x, run.measurement, run.action, chosen.preview, run.signals)
+    fill_observation(run.signals, chosen, run.observation)
+
+
+@entry
+def start(box):
+    """Measure and show the first instant of an episode; returns the status."""
+    setting, run = box.scene, box.work
+    run.counts[STEP] = 0
+    run.counts[SATURATED] = 0
+    run.work.kept[Kept.FRESH] = 0.0
+    run.work.kept[Kept.STEPS] = 0.0
+    status = look(setting, run)
+    copy_into(run.before, run.measurement)
+    action_of(run.u, run.x[State.ROTOR_SPEED], setting.actions, run.action)
+    show(setting, run)
+    return status
+
+
+@kernel
+def advance_period(setting, run):
+    """Advance one control period under run.u, measure, observe and pay; returns (status, reward)."""
+    copy_into(run.before, run.measurement)
+    first = run.counts[STEP]
+    status = advance_scene(setting.model, run.work, run.x, run.u, first, setting.per_control, setting.dt)
+    run.counts[STEP] = first + setting.per_control
+    if status != NON_FINITE:
+        seen = look(setting, run)
+        if seen != RUNNING:
+            status = seen
+    if status == RUNNING and run.measurement[Measure.ROTOR_SPEED] > setting.overspeed:
+        status = OVERSPEED
+    show(setting, run)
+    fill_terms(run.measurement, run.before, run.reference, status != RUNNING, setting.scales, run.terms)
+    return status, weighted_sum(setting.weights, run.terms)
+
+
+@entry
+def act(box, law, action):
+    """One control period under an action (2,) in [-1, 1]; returns (status, reward).
+
+    law: control kernel of the baseline, or None. BAD_ACTION leaves everything as it was.
+    """
+    setting, run = box.scene, box.work
+    clipped = accept(action, run.action)
+    if clipped < 0:
+        return BAD_ACTION, 0.0
+    run.counts[SATURATED] += clipped
+    command_of(
+        run.action, setting.actions, law, setting.parameters, run.memory, run.measurement, run.u, run.wanted
+    )
+    return advance_period(setting, run)
+
+
+@entry
+def act_physical(box, torque, blade_pitch):
+    """One control period under a physical command, as simulate applies it; returns (status, reward)."""
+    setting, run = box.scene, box.work
+    run.u[0] = torque
+    run.u[1] = blade_pitch
+    action_of(run.u, run.x[State.ROTOR_SPEED], setting.actions, run.action)
+    return advance_period(setting, run)

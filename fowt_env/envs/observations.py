@@ -1,0 +1,199 @@
+"""Observation channels by name: where each comes from, its unit, centre, scale and bounds.
+
+An entry of the observation is (value - centre)/scale, clipped to the bounds, float32. The bounds lie
+far outside what happens before an episode fails; they are there so that the space is finite.
+"""
+
+from math import pi
+from typing import NamedTuple
+
+import numpy as np
+
+from fowt_env.errors import InputError, unknown
+from fowt_env.jit import kernel
+from fowt_env.measurement import N_MEASUREMENTS, Measure
+from fowt_env.state import State
+from fowt_env.weather.wind import wind_at, wind_now
+
+DEG = pi / 180.0
+SIN_AZIMUTH = N_MEASUREMENTS  # signals that follow the measurements
+COS_AZIMUTH = N_MEASUREMENTS + 1
+FIRST_ACTION = N_MEASUREMENTS + 2
+SECOND_ACTION = N_MEASUREMENTS + 3
+PREVIEW = N_MEASUREMENTS + 4
+N_ACTIONS = 2
+DEFAULT = "default"  # in a list of channels: the task's own
+
+
+class Entry(NamedTuple):
+    """One number of the observation, SI before scaling."""
+
+    name: str
+    unit: str
+    signal: int  # index among the signals
+    centre: float
+    scale: float
+    low: float
+    high: float
+    meaning: str
+
+
+def _symmetric(name, unit, scale, bound, meaning, signal=None):
+    """Entry about zero; without a signal it is the measurement of that name."""
+    signal = Measure[name.upper()] if signal is None else signal
+    return Entry(name, unit, int(signal), 0.0, scale, -bound, bound, meaning)
+
+
+FIXED = (  # channels that look the same for every turbine
+    _symmetric("surge", "m", 20.0, 200.0, "platform position downwind"),
+    _symmetric("sway", "m", 10.0, 200.0, "platform position to the left"),
+    _symmetric("heave", "m", 2.0, 50.0, "platform position upwards"),
+    _symmetric("roll", "rad", 2.0 * DEG, pi, "platform roll"),
+    _symmetric("platform_pitch", "rad", 5.0 * DEG, 0.5 * pi, "platform pitch, positive downwind"),
+    _symmetric("yaw", "rad", 5.0 * DEG, 2.0 * pi, "platform yaw"),
+    _symmetric("surge_rate", "m/s", 1.0, 50.0, "time derivative of surge"),
+    _symmetric("sway_rate", "m/s", 0.5, 50.0, "time derivative of sway"),
+    _symmetric("heave_rate", "m/s", 0.5, 50.0, "time derivative of heave"),
+    _symmetric("roll_rate", "rad/s", 0.5 * DEG, 2.0, "time derivative of roll"),
+    _symmetric("platform_pitch_rate", "rad/s", DEG, 2.0, "time derivative of platform pitch"),
+    _symmetric("yaw_rate", "rad/s", 0.5 * DEG, 2.0, "time derivative of yaw"),
+    _symmetric("nacelle_acceleration", "m/s2", 1.0, 100.0, "fore-aft acceleration of the tower top"),
+    _symmetric("nacelle_velocity", "m/s", 1.0, 100.0, "fore-aft velocity of the tower top"),
+    _symmetric("platform_pitch_acceleration", "rad/s2", 0.5 * DEG, 5.0, "pitch acceleration (body y)"),
+    _symmetric("wave_elevation", "m", 3.0, 50.0, "water surface at the platform's rest position"),
+)
+MOTIONS = ("surge", "sway", "heave", "roll", "platform_pitch", "yaw")
+RATES = tuple(f"{name}_rate" for name in MOTIONS)
+STANDARD = (*MOTIONS, *RATES, "rotor_speed", "blade_pitch", "generator_torque")
+
+
+def _wind(name, signal, meaning):
+    return Entry(name, "m/s", int(signal), 0.0, 15.0, -100.0, 150.0, meaning)
+
+
+def channels(turbine, preview=()):
+    """{channel: tuple of its Entries} for a description.Turbine; preview: look-ahead times (s)."""
+    rated, law, drive = turbine.rated_rotor_speed, turbine.torque_law, turbine.pitch_drive
+    table = {entry.name: (entry,) for entry in FIXED}
+    table["rotor_speed"] = (
+        Entry(
+            "rotor_speed", "rad/s", int(Measure.ROTOR_SPEED), rated, 0.2 * rated, -rated, 3.0 * rated,
+            "rotor speed, about rated",
+        ),
+    )  # fmt: skip
+    table["blade_pitch"] = (
+        Entry(
+            "blade_pitch", "rad", int(Measure.BLADE_PITCH), 0.0, 15.0 * DEG, drive.minimum, drive.maximum,
+            "collective blade pitch, positive to feather",
+        ),
+    )  # fmt: skip
+    table["generator_torque"] = (
+        Entry(
+            "generator_torque", "N m", int(Measure.GENERATOR_TORQUE), 0.0, law.rated_torque,
+            -law.max_torque, law.max_torque, "generator torque on the high-speed shaft",
+        ),
+    )  # fmt: skip
+    table["wind_speed"] = (_wind("wind_speed", Measure.WIND_SPEED, "wind along x at the hub"),)
+    table["azimuth"] = (
+        _symmetric("sin_azimuth", "-", 1.0, 1.0, "sine of the rotor azimuth", SIN_AZIMUTH),
+        _symmetric("cos_azimuth", "-", 1.0, 1.0, "cosine of the rotor azimuth", COS_AZIMUTH),
+    )
+    table["previous_action"] = (
+        _symmetric("previous_action_0", "-", 1.0, 1.0, "first component of the last action", FIRST_ACTION),
+        _symmetric("previous_action_1", "-", 1.0, 1.0, "second component of the last action", SECOND_ACTION),
+    )
+    table["wind_preview"] = tuple(
+        _wind(f"wind_preview_{ahead:g}s", PREVIEW + i, f"wind along x at the hub {ahead:g} s ahead, exact")
+        for i, ahead in enumerate(preview)
+    )
+    return table
+
+
+def check_channels(where, names, default=None):
+    """Tuple of channel names, DEFAULT replaced by the default ones, each once.
+
+    Raises: InputError for unknown names, an empty list, or a string where a list is meant.
+    """
+    if isinstance(names, str):
+        raise InputError(f"{where} = {names!r}: must be a list of channel names, such as ({names!r},)")
+    known = KNOWN if default is None else (*KNOWN, DEFAULT)
+    chosen = []
+    for name in names:
+        if name not in known:
+            raise unknown(f"channel of {where}", name, known)
+        chosen += default if name == DEFAULT else [name]
+    if not chosen:
+        raise InputError(f"{where}: at least one channel is needed; known: {', '.join(KNOWN)}")
+    return tuple(dict.fromkeys(chosen))
+
+
+KNOWN = (
+    *(entry.name for entry in FIXED),
+    "rotor_speed",
+    "blade_pitch",
+    "generator_torque",
+    "wind_speed",
+    "azimuth",
+    "previous_action",
+    "wind_preview",
+)
+
+
+def entries(names, turbine, preview):
+    """Entries of an observation in order. Raises: InputError for a preview without times."""
+    if "wind_preview" in names and not len(preview):
+        raise InputError("wind_preview: give the look-ahead times, for example wind_preview=(2.0, 4.0, 6.0)")
+    table = channels(turbine, preview)
+    return tuple(entry for name in names for entry in table[name])
+
+
+class ObservationMap(NamedTuple):
+    """Entries as arrays (n,), and the look-ahead times of the preview (s)."""
+
+    signal: np.ndarray  # int64
+    centre: np.ndarray
+    scale: np.ndarray
+    low: np.ndarray  # of the scaled entry, representable in float32
+    high: np.ndarray
+    preview: np.ndarray
+
+
+def build_observation_map(chosen, preview):
+    """ObservationMap of Entries."""
+    centre = np.array([entry.centre for entry in chosen])
+    scale = np.array([entry.scale for entry in chosen])
+    low = (np.array([entry.low for entry in chosen]) - centre) / scale
+    high = (np.array([entry.high for entry in chosen]) - centre) / scale
+    return ObservationMap(
+        np.array([entry.signal for entry in chosen], dtype=np.int64),
+        centre,
+        scale,
+        low.astype(np.float32).astype(np.float64),
+        high.astype(np.float32).astype(np.float64),
+        np.ascontiguousarray(preview, dtype=np.float64),
+    )
+
+
+@kernel
+def fill_signals(t, scene, x, measurement, action, preview, signals):
+    """Fill signals (n,): the measurement, azimuth, last action, and the hub wind at t + preview."""
+    for i in range(N_MEASUREMENTS):
+        signals[i] = measurement[i]
+    signals[SIN_AZIMUTH] = np.sin(x[State.AZIMUTH])
+    signals[COS_AZIMUTH] = np.cos(x[State.AZIMUTH])
+    signals[FIRST_ACTION] = action[0]
+    signals[SECOND_ACTION] = action[1]
+    for i in range(preview.shape[0]):
+        ahead = t + preview[i]
+        now = wind_now(ahead, scene.wind)
+        wind = wind_at(ahead, 0.0, 0.0, scene.layout.hub[2], now, scene.wind, scene.wind_field)
+        signals[PREVIEW + i] = wind[0]
+
+
+@kernel
+def fill_observation(signals, chosen, observation):
+    """Fill observation (n,) float32 from the signals; an entry that is not finite keeps its last value."""
+    for i in range(observation.shape[0]):
+        value = (signals[chosen.signal[i]] - chosen.centre[i]) / chosen.scale[i]
+        if np.isfinite(value):
+            observation[i] = np.float32(max(chosen.low[i], min(chosen.high[i], value)))

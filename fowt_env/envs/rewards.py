@@ -1,0 +1,174 @@
+"""Named reward terms: each a function of what is measured, bounded, weighted by the task.
+
+To add one: a kernel, a line in TERMS and one in fill_terms. reward = sum of weight * term.
+"""
+
+from enum import IntEnum
+from math import exp, hypot, isfinite, log, pi
+from typing import NamedTuple
+
+import numpy as np
+
+from fowt_env.errors import InputError, unknown
+from fowt_env.jit import kernel
+from fowt_env.measurement import Measure
+
+AT_MARGIN = 0.1  # value of tolerance() one margin outside its bounds
+STEEPNESS = -log(AT_MARGIN)
+POWER_MARGIN = 0.2  # share of rated power above rated at which the power term has fallen to a tenth
+SPEED_MARGIN = 0.2  # share of rated rotor speed outside the band at which its term has fallen to a tenth
+TILT_MARGIN = 5.0 * pi / 180.0  # rad, amplitude of platform pitch at which its term has fallen to a tenth
+TILT_PERIOD = 30.0  # s, about that of platform pitch: turns its rate into an amplitude
+
+
+class Scales(NamedTuple):
+    """Turbine figures that make terms dimensionless."""
+
+    rated_power: float  # mechanical, at the generator, W
+    rated_speed: float  # rotor, rad/s
+    gear_ratio: float
+    pitch_way: float  # most that the blade pitch can travel in one control period, rad
+    torque_way: float  # most that the torque may change in one control period, N m
+
+
+class Reference(NamedTuple):
+    """Operating point of the episode's mean wind, in the order of the kernels' array."""
+
+    platform_pitch: float  # rad
+    rotor_speed: float  # rad/s
+
+
+class Term(NamedTuple):
+    """Range and meaning of a reward term, for tests and documents."""
+
+    low: float
+    high: float
+    meaning: str
+
+
+TERMS = {
+    "power": Term(
+        0.0, 1.0, "generator power over rated; above rated it falls again, to a tenth at 20 % too much"
+    ),
+    "rotor_speed": Term(
+        0.0,
+        1.0,
+        "1 between the rotor speed of the episode's operating point and rated (above rated wind: at rated),"
+        " a tenth at 20 % of rated outside",
+    ),
+    "platform_motion": Term(
+        0.0,
+        1.0,
+        "1 with the platform pitch at rest at the operating point, a tenth at an oscillation of 5 deg"
+        " amplitude (angle and rate over 2 pi/30 s taken together)",
+    ),
+    "pitch_travel": Term(-1.0, 0.0, "blade-pitch travel over the most that the rate limit allows"),
+    "torque_travel": Term(-1.0, 0.0, "change of generator torque over the most that the rate limit allows"),
+    "failure": Term(-1.0, 0.0, "-1 in the step that ends in failure, else 0"),
+}
+TermIndex = IntEnum("TermIndex", [name.upper() for name in TERMS], start=0)
+N_TERMS = len(TERMS)
+
+
+@kernel
+def tolerance(x, bounds, margin):
+    """1 inside bounds = (low, high), falling outside as a Gaussian to 0.1 one margin away; in [0, 1].
+
+    margin 0: 0 outside. NaN gives 0. Bounds may be infinite.
+    """
+    if bounds[0] <= x <= bounds[1]:
+        return 1.0
+    if not margin > 0.0:
+        return 0.0
+    distance = (bounds[0] - x if x < bounds[0] else x - bounds[1]) / margin
+    value = exp(-STEEPNESS * distance * distance)
+    return value if isfinite(value) else 0.0
+
+
+@kernel
+def clipped(value, low, high):
+    """The value within its range; NaN gives the upper end."""
+    return max(low, min(high, value))
+
+
+@kernel
+def power_term(speed, torque, scales):
+    """Share of rated power, and how well the rest stays below it."""
+    share = scales.gear_ratio * speed * torque / scales.rated_power
+    return clipped(share, 0.0, 1.0) * tolerance(share, (0.0, 1.0), POWER_MARGIN)
+
+
+@kernel
+def rotor_speed_term(speed, steady_speed, scales):
+    """How near the rotor speed (rad/s) is to the band from its steady speed to rated."""
+    low = min(steady_speed, scales.rated_speed) / scales.rated_speed
+    return tolerance(speed / scales.rated_speed, (low, 1.0), SPEED_MARGIN)
+
+
+@kernel
+def platform_motion_term(platform_pitch, rate, steady_pitch):
+    """How small the amplitude of the platform's pitch motion about its steady angle is."""
+    amplitude = hypot(platform_pitch - steady_pitch, rate * TILT_PERIOD / (2.0 * pi))
+    return tolerance(amplitude, (0.0, 0.0), TILT_MARGIN)
+
+
+@kernel
+def travel_term(before, after, way):
+    """Minus the share of the possible travel that was used in one control period."""
+    return -clipped(abs(after - before) / way, 0.0, 1.0)
+
+
+@kernel
+def fill_terms(m, before, reference, failed, scales, terms):
+    """Fill terms (N_TERMS,) from the measurements m and before, one control period apart."""
+    speed = m[Measure.ROTOR_SPEED]
+    torque = m[Measure.GENERATOR_TORQUE]
+    terms[TermIndex.POWER] = power_term(speed, torque, scales)
+    terms[TermIndex.ROTOR_SPEED] = rotor_speed_term(speed, reference[1], scales)
+    terms[TermIndex.PLATFORM_MOTION] = platform_motion_term(
+        m[Measure.PLATFORM_PITCH], m[Measure.PLATFORM_PITCH_RATE], reference[0]
+    )
+    terms[TermIndex.PITCH_TRAVEL] = travel_term(
+        before[Measure.BLADE_PITCH], m[Measure.BLADE_PITCH], scales.pitch_way
+    )
+    terms[TermIndex.TORQUE_TRAVEL] = travel_term(before[Measure.GENERATOR_TORQUE], torque, scales.torque_way)
+    terms[TermIndex.FAILURE] = -1.0 if failed else 0.0
+
+
+@kernel
+def weighted_sum(weights, terms):
+    """sum of weight * term in the order of TERMS."""
+    total = 0.0
+    for i in range(terms.shape[0]):
+        total += weights[i] * terms[i]
+    return total
+
+
+def build_scales(turbine, control_dt):
+    """Scales of a description.Turbine at a control period (s)."""
+    law = turbine.torque_law
+    return Scales(
+        rated_power=float(law.rated_power),
+        rated_speed=float(turbine.rated_rotor_speed),
+        gear_ratio=float(turbine.drivetrain.gear_ratio),
+        pitch_way=float(turbine.pitch_drive.rate_limit * control_dt),
+        torque_way=float(law.max_torque_rate * control_dt),
+    )
+
+
+def check_weights(where, weights):
+    """{term: float} of a mapping of weights. Raises: InputError for unknown terms and bad numbers."""
+    checked = {}
+    for name, weight in dict(weights).items():
+        if name not in TERMS:
+            raise unknown(f"reward term of {where}", name, TERMS)
+        number = isinstance(weight, int | float | np.number) and not isinstance(weight, bool)
+        if not number or not isfinite(weight) or weight < 0.0:
+            raise InputError(f"{where}: weight of {name} = {weight!r}: must be a finite number >= 0")
+        checked[name] = float(weight)
+    return checked
+
+
+def weight_array(weights):
+    """(N_TERMS,) weights in the order of TERMS; 0 where none is given."""
+    return np.array([weights.get(name, 0.0) for name in TERMS])

@@ -1,0 +1,79 @@
+"""Markdown tables of what an environment takes, shows and pays, made from its task."""
+
+from math import isinf
+
+from fowt_env.description import read_platform, read_turbine
+from fowt_env.envs.observations import entries
+from fowt_env.envs.rewards import TERMS
+
+
+def markdown(header, rows):
+    """A markdown table of text cells, columns aligned."""
+    cells = [[str(cell) for cell in row] for row in (header, *rows)]
+    widths = [max(len(row[i]) for row in cells) for i in range(len(header))]
+    lines = ["| " + " | ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)) + " |" for row in cells]
+    lines.insert(1, "|" + "|".join("-" * (w + 2) for w in widths) + "|")
+    return "\n".join(lines)
+
+
+def _figure(value):
+    return str(value) if isinf(value) else f"{value:.4g}"
+
+
+def action_table(task, turbine):
+    """Meaning of the two actions in each mode."""
+    law = turbine.torque_law
+    rpm = 30.0 / 3.141592653589793
+    low, high = (share * turbine.rated_rotor_speed * rpm for share in task.setpoint)
+    pitch = f"blade-pitch command, {task.blade_pitch[0]:g} to {task.blade_pitch[1]:g} deg"
+    rows = [
+        ("direct", 0, f"generator torque, 0 to {law.max_torque * 1e-3:.2f} kN m (high-speed shaft)"),
+        ("direct", 1, pitch),
+        ("setpoint", 0, f"rotor-speed set-point, {low:.2f} to {high:.2f} rpm, followed through the torque"),
+        ("setpoint", 1, pitch),
+        (
+            "residual",
+            0,
+            f"added to the baseline's torque, +-{task.residual_torque * law.rated_torque * 1e-3:.2f} kN m",
+        ),
+        ("residual", 1, f"added to the baseline's blade pitch, +-{task.residual_pitch:g} deg"),
+    ]
+    return markdown(("mode", "action", "from -1 to 1"), rows)
+
+
+def observation_table(task, turbine):
+    """Index, channel, unit, scaling and bounds of each observation entry."""
+    rows = [
+        (
+            index,
+            entry.name,
+            entry.unit,
+            _figure(entry.centre),
+            _figure(entry.scale),
+            _figure((entry.low - entry.centre) / entry.scale),
+            _figure((entry.high - entry.centre) / entry.scale),
+            entry.meaning,
+        )
+        for index, entry in enumerate(entries(task.observation, turbine, task.wind_preview))
+    ]
+    return markdown(("index", "channel", "unit", "centre", "scale", "low", "high", "meaning"), rows)
+
+
+def reward_table(task):
+    """Weight, range and meaning of each reward term."""
+    rows = [
+        (name, f"{task.weights.get(name, 0.0):g}", f"{term.low:g} to {term.high:g}", term.meaning)
+        for name, term in TERMS.items()
+    ]
+    return markdown(("term", "weight", "range", "meaning"), rows)
+
+
+def task_tables(task, turbine=None):
+    """Action, observation and reward tables of a task for a turbine (the NREL 5 MW), as markdown."""
+    if turbine is None:
+        turbine = read_turbine(read_platform("oc3_hywind").turbine)
+    return (
+        f"Actions:\n\n{action_table(task, turbine)}\n\n"
+        f"Observation, (value - centre)/scale:\n\n{observation_table(task, turbine)}\n\n"
+        f"Reward:\n\n{reward_table(task)}\n"
+    )

@@ -1,0 +1,232 @@
+"""Tasks: what an episode is drawn from, what is seen, what is paid, and how long it lasts."""
+
+from dataclasses import dataclass, field
+from math import isfinite
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fowt_env.description import joint_sea_state, joint_tables, sea_state_of
+from fowt_env.envs.observations import STANDARD, check_channels
+from fowt_env.envs.rewards import check_weights
+from fowt_env.errors import InputError, unknown
+from fowt_env.simulation import INITIAL
+from fowt_env.state import State
+from fowt_env.weather.wind import WindSeries, nominal_speed
+from fowt_env.weather.wind_field import is_field
+from fowt_env.weather.wind_spec import read_wind
+
+SITE = "gulf_of_maine_normal"
+LARGEST_SEED = 2**31  # of an episode's weather
+SAMPLED = ("series", "steps", "components")  # kinds whose lists are data, never ranges
+OFFSETS = tuple(name for name, (index, _) in INITIAL.items() if not State.VX <= index <= State.WZ)
+
+
+class Episode(NamedTuple):
+    """One draw: everything that sets an episode apart from others of its task."""
+
+    wind: Any  # as build_scene takes it
+    sea: Any
+    weather_seed: int
+    offsets: dict  # {channel: what is added to the operating point, in the channel's unit}
+    exact_start: bool  # operating point of this very wind, or interpolated between others
+
+
+@dataclass(frozen=True)
+class Task:
+    """What an agent is asked to do.
+
+    wind, sea: as build_scene takes them, where a tuple (low, high) in place of a number is a range
+    from which each episode draws uniformly. sea may also be {"kind": "joint", "table": name}: the
+    JONSWAP state that belongs to the mean wind at a site (its first and last row hold beyond them);
+    None is still water.
+    Raises: InputError naming the task, the key, the value and what is allowed.
+    """
+
+    name: str
+    wind: Any
+    sea: Any = None
+    duration: float = 600.0  # s
+    rotor: str | None = None  # rotor model; None: that of the scene's fidelity
+    observation: tuple = STANDARD
+    weights: dict = field(default_factory=lambda: dict(WEIGHTS))  # {reward term: weight}
+    offsets: dict = field(default_factory=lambda: dict(START))  # {channel: (low, high)} added to the trim
+    blade_pitch: tuple = (0.0, 30.0)  # deg, reach of the pitch action
+    setpoint: tuple = (0.5, 1.15)  # share of rated rotor speed, reach of the set-point action
+    residual_torque: float = 0.1  # largest addition to the baseline's torque, share of rated torque
+    residual_pitch: float = 2.0  # deg, largest addition to the baseline's blade pitch
+    wind_preview: tuple = ()  # s, look-ahead times of the channel wind_preview
+
+    def __post_init__(self):
+        if not isinstance(self.name, str) or not self.name:
+            raise InputError(f"task.name = {self.name!r}: must be a name")
+        where = f"task {self.name!r}"
+        set_field = object.__setattr__
+        _number(f"{where}: duration", self.duration, 0.0, 1e5, low_open=True)
+        set_field(self, "observation", check_channels(f"{where}: observation", self.observation))
+        set_field(self, "weights", check_weights(f"{where}: weights", self.weights))
+        set_field(self, "offsets", _check_offsets(where, self.offsets))
+        set_field(self, "blade_pitch", _range(f"{where}: blade_pitch", self.blade_pitch, -90.0, 180.0))
+        set_field(self, "setpoint", _range(f"{where}: setpoint", self.setpoint, 0.0, 2.0))
+        _number(f"{where}: residual_torque", self.residual_torque, 0.0, 1.0)
+        _number(f"{where}: residual_pitch", self.residual_pitch, 0.0, 90.0)
+        set_field(self, "wind_preview", _check_preview(where, self.wind_preview))
+        if self.wind is None:
+            raise InputError(f"{where}: wind = None: a task needs a wind (0.0 for still air)")
+        for pick in (_lowest, _highest):
+            wind, sea = _weather(self.wind, self.sea, pick)
+            try:
+                if not isinstance(wind, WindSeries) and not is_field(wind):  # those need no reading
+                    read_wind(wind)
+                sea_state_of(sea)
+            except InputError as error:
+                raise InputError(f"{where}: {error}") from None
+
+    def draw(self, rng):
+        """Episode drawn with a numpy Generator; the same generator state gives the same episode."""
+        wind, sea = _weather(self.wind, self.sea, lambda low, high: float(rng.uniform(low, high)))
+        seed = int(rng.integers(LARGEST_SEED))
+        offsets = {name: float(rng.uniform(*bounds)) for name, bounds in self.offsets.items()}
+        return Episode(wind, sea, seed, offsets, self.fixed_wind)
+
+    @property
+    def fixed_wind(self):
+        """Whether every episode has the same mean wind (a box of wind always starts from its own)."""
+        if is_field(self.wind):
+            return True
+        low, _ = _weather(self.wind, None, _lowest)
+        high, _ = _weather(self.wind, None, _highest)
+        return nominal_speed(low) == nominal_speed(high)
+
+
+def _lowest(low, high):
+    return low
+
+
+def _highest(low, high):
+    return high
+
+
+def _weather(wind, sea, pick):
+    """(wind, sea) with each range replaced by pick(low, high), a joint sea by its state at that wind."""
+    wind = _picked("wind", wind, pick)
+    if isinstance(sea, dict) and sea.get("kind") == "joint":
+        rest = {key: value for key, value in sea.items() if key not in ("kind", "table")}
+        rest = _picked("sea", rest, pick)
+        if is_field(wind):
+            raise InputError("sea: a joint sea state needs a wind of known mean speed, not a box; give a sea")
+        sea = _joint(sea.get("table", SITE), nominal_speed(wind)) | rest
+    else:
+        sea = _picked("sea", sea, pick)
+    return wind, sea
+
+
+def _picked(where, spec, pick):
+    """The spec with each range replaced by pick(low, high)."""
+    if isinstance(spec, tuple):
+        return pick(*_range(where, spec, -1e9, 1e9))
+    if not isinstance(spec, dict) or spec.get("kind") in SAMPLED:
+        return spec
+    return {
+        key: pick(*_range(f"{where}.{key}", value, -1e9, 1e9)) if isinstance(value, tuple) else value
+        for key, value in spec.items()
+    }
+
+
+def _joint(table, speed):
+    """JONSWAP sea of a joint table at a wind speed, the speed held within the table."""
+    if isinstance(table, str) and table not in joint_tables():
+        raise unknown("joint sea-state table", table, joint_tables())
+    rows = joint_tables()[table] if isinstance(table, str) else table
+    state = joint_sea_state(table, min(max(speed, rows.wind[0]), rows.wind[-1]))
+    return {"kind": "jonswap", "Hs": state.Hs, "Tp": state.Tp}
+
+
+def _number(where, value, low, high, low_open=False):
+    """Raise InputError unless the value is a number within [low, high]."""
+    good = isinstance(value, int | float | np.number) and not isinstance(value, bool) and isfinite(value)
+    if not good or not low <= value <= high or (low_open and value == low):
+        bracket = "(" if low_open else "["
+        raise InputError(f"{where} = {value!r}: must be a number in {bracket}{low:g}, {high:g}]")
+
+
+def _range(where, value, low, high):
+    """(low, high) of a pair of numbers. Raises: InputError."""
+    if not isinstance(value, tuple | list) or len(value) != 2:
+        raise InputError(f"{where} = {value!r}: must be a pair (low, high)")
+    for number in value:
+        _number(where, number, low, high)
+    if value[0] > value[1]:
+        raise InputError(f"{where} = {value!r}: the low end must not exceed the high end")
+    return float(value[0]), float(value[1])
+
+
+def check_offset(name, value):
+    """The offset (in the channel's unit) of one episode. Raises: InputError."""
+    if name not in OFFSETS:
+        raise unknown("channel of offsets", name, OFFSETS)
+    _number(f"offsets[{name!r}]", value, -360.0, 360.0)
+    return float(value)
+
+
+def _check_offsets(where, offsets):
+    checked = {}
+    for name, bounds in dict(offsets).items():
+        if name not in OFFSETS:
+            raise unknown(f"channel of {where}: offsets", name, OFFSETS)
+        checked[name] = _range(f"{where}: offsets[{name!r}]", bounds, -360.0, 360.0)
+    return checked
+
+
+def _check_preview(where, times):
+    if isinstance(times, int | float):
+        raise InputError(f"{where}: wind_preview = {times!r}: must be a list of times, such as ({times!r},)")
+    for time in times:
+        _number(f"{where}: wind_preview", time, 0.0, 600.0, low_open=True)
+    return tuple(float(time) for time in times)
+
+
+WEIGHTS = {
+    "power": 1.0,
+    "rotor_speed": 1.0,
+    "platform_motion": 0.5,
+    "pitch_travel": 0.2,
+    "torque_travel": 0.1,
+    "failure": 100.0,
+}
+START = {  # of the order of one standard deviation in operation
+    "PtfmSurge": (-2.0, 2.0),
+    "PtfmSway": (-0.5, 0.5),
+    "PtfmHeave": (-0.3, 0.3),
+    "PtfmRoll": (-0.2, 0.2),
+    "PtfmPitch": (-1.0, 1.0),
+    "PtfmYaw": (-0.5, 0.5),
+    "RotSpeed": (-0.5, 0.5),
+    "Azimuth": (0.0, 360.0),
+}
+TASKS = {
+    task.name: task
+    for task in (
+        Task(
+            name="above_rated",
+            wind={"kind": "ntm", "speed": (12.0, 24.0), "class": "B"},
+            sea={"kind": "joint", "table": SITE},
+            setpoint=(0.85, 1.15),
+        ),
+        Task(
+            name="full_range",
+            wind={"kind": "ntm", "speed": (4.0, 25.0), "class": "B"},
+            sea={"kind": "joint", "table": SITE},
+        ),
+        Task(name="steady", wind={"kind": "steady", "speed": (4.0, 25.0)}, sea=None),
+    )
+}
+
+
+def task_of(task):
+    """Task from a name or a Task. Raises: InputError for anything else."""
+    if isinstance(task, Task):
+        return task
+    if not isinstance(task, str) or task not in TASKS:
+        raise unknown("task", task, TASKS)
+    return TASKS[task]

@@ -1,0 +1,63 @@
+"""Operating points to start episodes from, remembered within the process."""
+
+import hashlib
+import pickle
+from dataclasses import replace
+from math import floor
+
+import numpy as np
+
+from fowt_env.steady import trim
+
+GRID = 0.25  # m/s between exact trims; between them the state is linear in the wind speed
+_KNOWN = {}  # (plant, shear exponent, wind speed) -> (state, command)
+
+
+def plant_key(scene):
+    """Hash of all that a trim depends on, apart from the wind."""
+    weather = ("duration", "wave_components")
+    options = {name: value for name, value in scene.options.items() if name not in weather}
+    return hashlib.sha256(pickle.dumps((scene.platform, scene.turbine, scene.rotor, options))).hexdigest()
+
+
+def _one_wave(scene):
+    """The scene with a single wave component: a trim is in flat water, and would sum zeros over all."""
+    waves = scene.model.waves
+    if waves is None:
+        return scene
+    parts = {
+        name: np.ascontiguousarray(value[:1])
+        for name, value in waves._asdict().items()
+        if isinstance(value, np.ndarray)
+    }
+    return scene.with_model(waves=waves._replace(**parts))
+
+
+def exact_trim(scene, key, speed):
+    """(state, command) of trim() at a mean wind speed (m/s); computed once per process.
+
+    The arrays are shared: copy before writing. A box of wind has a profile of its own, so that its
+    trim is not remembered.
+    """
+    if scene.model.wind_field is not None:
+        point = trim(_one_wave(scene))
+        return point.state, point.command
+    entry = (key, scene.model.wind.shear_exponent, float(speed))
+    if entry not in _KNOWN:
+        point = trim(replace(_one_wave(scene), wind_speed=float(speed)))
+        _KNOWN[entry] = (point.state, point.command)
+    return _KNOWN[entry]
+
+
+def near_trim(scene, key, speed):
+    """(state, command) at a mean wind speed (m/s), linear between exact trims GRID apart.
+
+    Exact in the cell that holds the cut-out wind, where the operating point jumps.
+    """
+    cell = floor(speed / GRID)
+    weight = speed / GRID - cell
+    if weight == 0.0 or cell * GRID <= scene.turbine.cut_out_wind_speed < (cell + 1) * GRID:
+        return exact_trim(scene, key, speed)
+    low = exact_trim(scene, key, cell * GRID)
+    high = exact_trim(scene, key, (cell + 1) * GRID)
+    return tuple((1.0 - weight) * a + weight * b for a, b in zip(low, high, strict=True))

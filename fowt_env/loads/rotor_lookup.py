@@ -1,0 +1,345 @@
+"""Rotor loads from a table per blade station: every blade, station and wind sample, without iteration.
+
+Quasi-steady blade element momentum is local (rotor.py): the load of a station over the square of its
+inflow depends on the direction of the inflow and on the blade pitch alone. Both components are tabulated
+once per blade from the kernels of rotor.py, and interpolated linearly in both. Geometry, wind sampling,
+integration and outputs are those of rotor_load.
+
+The table spans the inflows from upwind (v_normal > 0) at any v_tangential, and blade pitches from -5 to
+90 deg. Elsewhere the exact solution is taken, so nothing is lost but time: station by station in
+reversed flow, by rotor_load on a slow or parked rotor (where the induction fades out) and at other blade
+pitches. Where the exact load jumps from one root of the momentum balance to another (deep stall), and
+where it fades within a few hundredths of an angle (a root in nearly axial flow), the table smooths it
+over one cell.
+
+Skewed wake and dynamic inflow need the induction, which is not tabulated: they need rotor_load.
+"""
+
+from math import cos, pi, sin, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from fowt_env.counters import Counter
+from fowt_env.jit import fast_kernel, kernel
+from fowt_env.loads.rotor import (
+    FAST_ROTOR,
+    LARGEST_SPEED,
+    NO_ROTOR_LOAD,
+    SLOW_ROTOR,
+    BladeElements,
+    RotorLoad,
+    blade_section,
+    elements_key,
+    fade,
+    hub_flow,
+    rotor_load,
+)
+from fowt_env.state import State, Wrench
+from fowt_env.weather.wind import LOWEST_HEIGHT, wind_at
+
+# Directions: v_normal/(v_normal + |v_tangential|) in AHEAD cells, from the rotor plane to the shaft (where
+# this has a kink), then on in BEHIND cells to an inflow in the plane from behind (roots in cross wind).
+# Halving the cells of both variables divides the error by three, at four times the memory.
+AHEAD, BEHIND = 512, 64
+DENSE_START, DENSE_END, DENSE_ROWS = -5.0, 30.0, 140  # deg, blade pitches where turbines operate
+COARSE_END, COARSE_ROWS = 90.0, 60  # deg, on to feather
+IN_PLANE = 1e-9  # v_normal of the first direction: the limit from upwind, as the load jumps at zero
+LARGEST_RATIO = 12.0  # highest over lowest point of the rotor, else wind_at: see _profile
+
+
+class SectionTable(NamedTuple):
+    """Loads of the n stations of a blade over blade pitch and inflow direction."""
+
+    load: np.ndarray  # (blade pitches, n, directions, 2) float32, m2; see _fill
+    radius: np.ndarray  # (n,) m
+    arm: np.ndarray  # (n,) m, radius at which the station's share of the blade's force acts
+    elements: BladeElements  # of the exact solution
+
+
+class Profile(NamedTuple):
+    """Power law over the height as scale P(z)/Q(z), z = height/centre - 1."""
+
+    centre: float  # m
+    scale: float  # power law at the centre
+    p1: float
+    p2: float
+    p3: float
+    p4: float
+    p5: float
+    q1: float
+    q2: float
+    q3: float
+    q4: float
+    q5: float
+
+
+class Blade(NamedTuple):
+    """Directions of a blade and the motion along it. e_r = (0, ey, ez) outwards, e_t = (0, -ez, ey)."""
+
+    ey: float
+    ez: float
+    rx: float  # e_r in inertial components
+    ry: float
+    rz: float
+    tx: float  # -e_t in inertial components
+    ty: float
+    tz: float
+    normal_rate: float  # velocity along the shaft per radius, 1/s
+    spin: float  # in-plane velocity per radius, 1/s
+    tangential: float  # part of v_tangential from the motion of the hub, m/s
+
+
+class BladeForce(NamedTuple):
+    """Sums over a blade over the air density: forces normal and tangential, and their moments."""
+
+    force_n: float
+    force_t: float
+    moment_n: float
+    moment_t: float
+    valid: bool  # False: some station lies outside the table
+
+
+@kernel
+def _fill(load, blade_pitch, elements):
+    """Put into load each station's share of the blade's force, normal and tangential, over the air density
+    and the square of v_normal + |v_tangential|."""
+    for i in range(load.shape[0]):
+        for j in range(load.shape[1]):
+            share = elements.weight[j] / elements.air_density
+            for k in range(load.shape[2]):
+                v_tangential = 1.0 - k / AHEAD if k <= AHEAD else -(k - AHEAD) / BEHIND
+                v_normal = max(1.0 - abs(v_tangential), IN_PLANE)
+                section = blade_section(v_normal, v_tangential, blade_pitch[i], j, 1.0, elements)
+                load[i, j, k, 0] = share * section.fn
+                load[i, j, k, 1] = share * section.ft
+
+
+_built = {}  # one table per blade in this process: building takes about a second
+
+
+def build_section_table(elements):
+    """SectionTable of a BladeElements; the same blade, in whatever air, gives the table built before.
+
+    19 stations: 18 MB, 0.8 s compiled; without the compiler many minutes (use rotor_load there).
+    """
+    unit = elements._replace(air_density=1.0)
+    key = elements_key(unit)
+    if key not in _built:
+        dense = np.linspace(DENSE_START, DENSE_END, DENSE_ROWS, endpoint=False)
+        coarse = np.linspace(DENSE_END, COARSE_END, COARSE_ROWS + 1)
+        blade_pitch = np.radians(np.concatenate((dense, coarse)))
+        shape = (len(blade_pitch), len(elements.radius), AHEAD + BEHIND + 1, 2)
+        load = np.zeros(shape, dtype=np.float32)
+        _fill(load, blade_pitch, unit)
+        _built[key] = load
+    arm = np.ascontiguousarray(elements.moment_weight / elements.weight, dtype=np.float64)
+    return SectionTable(_built[key], elements.radius, arm, elements)
+
+
+@kernel
+def _pitch_row(blade_pitch):
+    """Place of a blade pitch (rad) among the rows of the table, in rows; -1 outside."""
+    degrees = blade_pitch * (180.0 / pi)
+    if DENSE_START <= degrees < DENSE_END:
+        return (degrees - DENSE_START) * (DENSE_ROWS / (DENSE_END - DENSE_START))
+    if DENSE_END <= degrees < COARSE_END:
+        return DENSE_ROWS + (degrees - DENSE_END) * (COARSE_ROWS / (COARSE_END - DENSE_END))
+    return -1.0
+
+
+@kernel
+def _profile(low, high, series):
+    """Profile for heights from low to high: the diagonal Pade approximant of order 5 of (1 + z)**exponent.
+
+    Relative error 2 sin(pi exponent) ((r - 1)/(r + 1))**11 at the ends, r = (high/low)**(1/4): with an
+    exponent of 0.14 it is 4e-8 from 27 to 153 m and 2e-6 at LARGEST_RATIO.
+    """
+    a = series.shear_exponent
+    centre = sqrt(low * high)
+    p1 = (5.0 + a) * (5.0 / 10.0)
+    p2 = p1 * (4.0 + a) * (4.0 / 18.0)
+    p3 = p2 * (3.0 + a) * (3.0 / 24.0)
+    p4 = p3 * (2.0 + a) * (2.0 / 28.0)
+    p5 = p4 * (1.0 + a) * (1.0 / 30.0)
+    q1 = (5.0 - a) * (5.0 / 10.0)
+    q2 = q1 * (4.0 - a) * (4.0 / 18.0)
+    q3 = q2 * (3.0 - a) * (3.0 / 24.0)
+    q4 = q3 * (2.0 - a) * (2.0 / 28.0)
+    q5 = q4 * (1.0 - a) * (1.0 / 30.0)
+    scale = (centre / series.reference_height) ** a
+    return Profile(centre, scale, p1, p2, p3, p4, p5, q1, q2, q3, q4, q5)
+
+
+@kernel
+def _blade(psi, rotor_speed, pose, hub):
+    """Blade at the azimuth psi."""
+    ey, ez = -sin(psi), cos(psi)
+    return Blade(
+        ey,
+        ez,
+        pose.r12 * ey + pose.r13 * ez,
+        pose.r22 * ey + pose.r23 * ez,
+        pose.r32 * ey + pose.r33 * ez,
+        pose.r13 * ey - pose.r12 * ez,
+        pose.r23 * ey - pose.r22 * ez,
+        pose.r33 * ey - pose.r32 * ez,
+        pose.wy * ez - pose.wz * ey,
+        rotor_speed + pose.wx,
+        hub.vz * ey - hub.vy * ez,
+    )
+
+
+@fast_kernel
+def _shear(z, profile):
+    """(1 + z)**exponent."""
+    upper = profile.p1 + z * (profile.p2 + z * (profile.p3 + z * (profile.p4 + z * profile.p5)))
+    lower = profile.q1 + z * (profile.q2 + z * (profile.q3 + z * (profile.q4 + z * profile.q5)))
+    return (1.0 + z * upper) / (1.0 + z * lower)
+
+
+@fast_kernel
+def _station_force(v_normal, v_tangential, j, low, high, share):
+    """(normal, tangential) force of station j over the air density, bilinear between two rows of the table.
+
+    Any input is safe; it means something for v_normal > 0.
+    """
+    total = abs(v_normal) + abs(v_tangential)
+    ahead = AHEAD * v_normal
+    place = (ahead if v_tangential >= 0.0 else AHEAD * total - BEHIND * v_tangential) / total
+    place = place if place > 0.0 else 0.0  # not a number too
+    k = min(int(place), AHEAD + BEHIND - 1)
+    part = place - k
+    n0 = (1.0 - share) * float(low[j, k, 0]) + share * float(high[j, k, 0])
+    t0 = (1.0 - share) * float(low[j, k, 1]) + share * float(high[j, k, 1])
+    n1 = (1.0 - share) * float(low[j, k + 1, 0]) + share * float(high[j, k + 1, 0])
+    t1 = (1.0 - share) * float(low[j, k + 1, 1]) + share * float(high[j, k + 1, 1])
+    square = total * total
+    return square * (n0 + part * (n1 - n0)), square * (t0 + part * (t1 - t0))
+
+
+@fast_kernel
+def _sheared_force(pose, hub, blade, now, series, profile, low, high, share, radii, arm):
+    """BladeForce in a wind uniform apart from its shears: v = v0 + v1 radius + v2 profile, no branches."""
+    height, left = hub.Z - series.reference_height, hub.Y
+    linear = (now.vertical_shear * height + now.horizontal_shear * left) / series.reference_length
+    slope = (now.vertical_shear * blade.rz + now.horizontal_shear * blade.ry) / series.reference_length
+    n0 = pose.r11 * linear + pose.r31 * now.w - hub.vx
+    n1 = pose.r11 * slope - blade.normal_rate
+    n2 = profile.scale * (pose.r11 * now.u + pose.r21 * now.v)
+    t0 = blade.tangential - blade.tx * linear - blade.tz * now.w
+    t1 = blade.spin - blade.tx * slope
+    t2 = -profile.scale * (blade.tx * now.u + blade.ty * now.v)
+    z0, z1 = hub.Z / profile.centre - 1.0, blade.rz / profile.centre
+    force_n = force_t = moment_n = moment_t = 0.0
+    outside = 0
+    for j in range(radii.shape[0]):
+        radius = radii[j]
+        shear = _shear(z0 + z1 * radius, profile)
+        v_normal = n0 + n1 * radius + n2 * shear
+        v_tangential = t0 + t1 * radius + t2 * shear
+        outside += 0 if v_normal > 0.0 and v_normal + abs(v_tangential) < LARGEST_SPEED else 1
+        fn, ft = _station_force(v_normal, v_tangential, j, low, high, share)
+        force_n += fn
+        force_t += ft
+        moment_n += arm[j] * fn
+        moment_t += arm[j] * ft
+    return BladeForce(force_n, force_t, moment_n, moment_t, outside == 0)
+
+
+@kernel
+def _sampled_force(t, pose, hub, blade, now, series, field, blade_pitch, low, high, share, table, counters):
+    """BladeForce with the wind sampled station by station, and the exact solution outside the table."""
+    elements = table.elements
+    force_n = force_t = moment_n = moment_t = 0.0
+    for j in range(table.radius.shape[0]):
+        radius = table.radius[j]
+        u, v, w = wind_at(
+            t,
+            hub.X + radius * blade.rx,
+            hub.Y + radius * blade.ry,
+            hub.Z + radius * blade.rz,
+            now,
+            series,
+            field,
+        )
+        v_normal = pose.r11 * u + pose.r21 * v + pose.r31 * w - hub.vx - radius * blade.normal_rate
+        v_tangential = blade.tangential + radius * blade.spin - (blade.tx * u + blade.ty * v + blade.tz * w)
+        if v_normal > 0.0 and v_normal + abs(v_tangential) < LARGEST_SPEED:
+            fn, ft = _station_force(v_normal, v_tangential, j, low, high, share)
+        else:
+            section = blade_section(v_normal, v_tangential, blade_pitch, j, 1.0, elements)
+            if not section.solved:
+                counters[Counter.BEM_FALLBACK] += 1.0
+            # a blade without air has no load here either: the sums are multiplied by the density below
+            weight = elements.weight[j] / elements.air_density if elements.air_density > 0.0 else 0.0
+            fn, ft = weight * section.fn, weight * section.ft
+        force_n += fn
+        force_t += ft
+        moment_n += table.arm[j] * fn
+        moment_t += table.arm[j] * ft
+    return BladeForce(force_n, force_t, moment_n, moment_t, True)
+
+
+@kernel
+def rotor_lookup_load(t, pose, x, now, series, field, table, counters):
+    """RotorLoad of the state x at time t from the tables of the stations. No table or no wind series: zero.
+
+    now, series, field  wind (weather/wind.py); every station has the wind of where it is at this instant
+    counters            as in rotor_load, for the exact solutions outside the table
+    Against rotor_load: rms 1e-4 of the load's standard deviation over all operating states, for thrust and
+    torque; tests/loads/test_rotor_lookup.py has the figures.
+    """
+    if table is None:
+        return NO_ROTOR_LOAD
+    if series is None:
+        return NO_ROTOR_LOAD
+    elements = table.elements
+    hub = hub_flow(t, pose, now, series, field, elements.overhang, elements.hub_height)
+    speed, azimuth, blade_pitch = x[State.ROTOR_SPEED], x[State.AZIMUTH], x[State.BLADE_PITCH]
+    induction = fade(speed * elements.tip_radius, SLOW_ROTOR * hub.speed, FAST_ROTOR * hub.speed)
+    row = _pitch_row(blade_pitch)
+    if not (induction == 1.0 and row >= 0.0):
+        return rotor_load(t, pose, x, now, series, field, elements, None, None, x, counters)
+    i = int(row)
+    share = row - i
+    low, high = table.load[i], table.load[i + 1]
+    bottom, top = hub.Z - elements.tip_radius, hub.Z + elements.tip_radius
+    sheared = field is None and bottom > LOWEST_HEIGHT and top < LARGEST_RATIO * bottom
+    if sheared:
+        profile = _profile(bottom, top, series)
+    else:
+        profile = _profile(1.0, 1.0, series)
+    thrust = torque = fy = fz = my = mz = 0.0
+    for number in range(elements.blades):
+        blade = _blade(azimuth + 2.0 * pi * number / elements.blades, speed, pose, hub)
+        force = BladeForce(0.0, 0.0, 0.0, 0.0, False)
+        if sheared:
+            force = _sheared_force(
+                pose, hub, blade, now, series, profile, low, high, share, table.radius, table.arm
+            )
+        if not force.valid:
+            force = _sampled_force(
+                t, pose, hub, blade, now, series, field, blade_pitch, low, high, share, table, counters
+            )
+        thrust += force.force_n
+        torque += force.moment_t
+        fy -= force.force_t * blade.ez
+        fz += force.force_t * blade.ey
+        my += force.moment_n * blade.ez  # e_r x e_x = -e_t
+        mz -= force.moment_n * blade.ey
+    density = elements.air_density
+    thrust, torque = density * thrust, density * torque
+    fy, fz = density * fy, density * fz
+    return RotorLoad(
+        Wrench(
+            thrust,
+            fy,
+            fz,
+            torque - elements.hub_height * fy,
+            density * my + elements.hub_height * thrust + elements.overhang * fz,
+            density * mz - elements.overhang * fy,
+        ),
+        thrust,
+        torque,
+    )

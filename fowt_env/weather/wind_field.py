@@ -1,0 +1,375 @@
+"""Full-field wind: a box of frozen turbulence that the mean wind carries past the turbine.
+
+u(X, Y, Z, t) = box(t + shift - X/U, Y, Z), trilinear in time and both coordinates, sampled wherever a blade
+station or the tower is. The shift is InflowWind's: half the grid width over the mean wind, so that the
+wind upstream by half a width is known at the start. Outside the grid: below it the wind falls linearly to
+zero at the still-water level, as in InflowWind without tower points; beside and above it the edge's wind
+holds (and scene.py refuses grids that do not hold the rotor).
+
+Sources of boxes: TurbSim files (.bts, read by openfast_io), the user's arrays, Mann turbulence (hipersim).
+"""
+
+from dataclasses import dataclass
+from math import ceil
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from fowt_env.errors import InputError, unknown
+from fowt_env.jit import kernel
+from fowt_env.weather.iec import length_scale, ntm_sigma
+from fowt_env.weather.wind_spec import MOVING, TURBULENCE_CLASS, Flag, Number, Seed
+
+MARGIN = 75.0  # m of platform drift against the wind that a box must still cover at the end of a run
+DISK_RADII, DISK_AZIMUTHS = 12, 36  # points of the rotor average
+PERIODIC = 8  # identifier of a TurbSim file whose box repeats; 7 of one that does not
+
+
+class WindField(NamedTuple):
+    """A box of wind: slices normal to the mean wind, evenly spaced in time, height and across."""
+
+    velocity: np.ndarray  # (n_time, n_z, n_y, 3) float32 u, v, w, m/s
+    rate: float  # slices per second
+    shift: float  # s, added to the time
+    slowness: float  # s/m, 1 over the speed at which the box travels
+    low_y: float  # m, lowest grid line
+    low_z: float
+    inverse_dy: float  # 1/m
+    inverse_dz: float
+    periodic: bool  # False: the first and last slices hold
+
+
+@kernel
+def field_at(t, X, Y, Z, field):
+    """(u, v, w) m/s, inertial components, at the inertial point X, Y, Z (m) and time t (s)."""
+    velocity = field.velocity
+    slices, n_z, n_y = velocity.shape[0], velocity.shape[1], velocity.shape[2]
+    s = (t + field.shift - X * field.slowness) * field.rate
+    if field.periodic:
+        s = s % slices
+    if not s > 0.0:  # also where s is not a number
+        s = 0.0
+    if field.periodic:
+        i = min(int(s), slices - 1)
+        after = (i + 1) % slices
+    else:
+        s = min(s, slices - 1.0)
+        i = max(0, min(int(s), slices - 2))
+        after = min(i + 1, slices - 1)
+    late = s - i
+    y = min(max((Y - field.low_y) * field.inverse_dy, 0.0), n_y - 1.0)
+    z = min(max((Z - field.low_z) * field.inverse_dz, 0.0), n_z - 1.0)
+    if not (y >= 0.0 and z >= 0.0):
+        y = z = 0.0
+    j, k = min(int(y), n_y - 2), min(int(z), n_z - 2)
+    left, up = y - j, z - k
+    ground = 1.0
+    if Z < field.low_z:
+        ground = max(Z, 0.0) / field.low_z
+    a = (1.0 - up) * (1.0 - left) * ground
+    b = (1.0 - up) * left * ground
+    c = up * (1.0 - left) * ground
+    d = up * left * ground
+    u = v = w = 0.0
+    for number in range(2):
+        cut, share = (velocity[i], 1.0 - late) if number == 0 else (velocity[after], late)
+        p, q, r, s = share * a, share * b, share * c, share * d
+        u += p * cut[k, j, 0] + q * cut[k, j + 1, 0] + r * cut[k + 1, j, 0] + s * cut[k + 1, j + 1, 0]
+        v += p * cut[k, j, 1] + q * cut[k, j + 1, 1] + r * cut[k + 1, j, 1] + s * cut[k + 1, j + 1, 1]
+        w += p * cut[k, j, 2] + q * cut[k, j + 1, 2] + r * cut[k + 1, j, 2] + s * cut[k + 1, j + 1, 2]
+    return u, v, w
+
+
+# --------------------------------------------------------------------------- what a user may ask for
+
+
+class Array(NamedTuple):
+    """A non-empty array of finite numbers with a given number of axes."""
+
+    axes: int
+    default: object = None
+
+    def read(self, where, value):
+        try:
+            array = np.asarray(value, dtype=np.float32 if self.axes > 1 else np.float64)
+        except (TypeError, ValueError):
+            raise InputError(f"{where}: must be an array of numbers with {self.axes} axes") from None
+        if array.ndim != self.axes or array.size == 0 or not np.isfinite(array).all():
+            raise InputError(f"{where} has shape {array.shape}: must be finite numbers with {self.axes} axes")
+        return array
+
+
+class Text(NamedTuple):
+    """A path."""
+
+    default: object = None
+
+    def read(self, where, value):
+        if not isinstance(value, str | Path):
+            raise InputError(f"{where} = {value!r}: must be a path")
+        return Path(value).expanduser()
+
+
+REQUIRED = object()
+SHIFT = Number(0.0, 1e5, "s", None)
+KINDS = {  # kind -> {key: (rule, default)}; None: found from the box
+    "bts": {
+        "path": (Text(), REQUIRED),
+        "periodic": (Flag(), None),
+        "shift": (SHIFT, None),
+    },
+    "box": {
+        "u": (Array(3), REQUIRED),
+        "v": (Array(3), None),
+        "w": (Array(3), None),
+        "y": (Array(1), REQUIRED),
+        "z": (Array(1), REQUIRED),
+        "dt": (Number(1e-4, 1e3, "s"), REQUIRED),
+        "speed": (MOVING, REQUIRED),
+        "periodic": (Flag(), False),
+        "shift": (SHIFT, None),
+    },
+    "mann": {
+        "speed": (MOVING, REQUIRED),
+        "class": (TURBULENCE_CLASS, "B"),
+        "seed": (Seed(), None),
+        "dt": (Number(0.05, 1.0, "s"), 0.2),
+        "shear_exponent": (Number(0.0, 1.0, ""), None),
+    },
+}
+
+
+def is_field(spec):
+    """Whether a wind specification asks for a box of full-field wind."""
+    return isinstance(spec, WindBox) or (isinstance(spec, dict) and spec.get("kind") in KINDS)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class WindBox:
+    """A box in memory, before it becomes a WindField: what it is, where its grid lies, how it travels."""
+
+    velocity: np.ndarray  # (n_time, n_z, n_y, 3) float32 m/s
+    y: np.ndarray  # (n_y,) m, evenly increasing
+    z: np.ndarray  # (n_z,) m above still water
+    dt: float  # s between slices
+    speed: float  # m/s at which it travels
+    periodic: bool
+    shift: float  # s
+
+    def __repr__(self):
+        n_time, n_z, n_y, _ = self.velocity.shape
+        return f"WindBox({n_time} x {self.dt:g} s, {n_y} x {n_z} points, {self.speed:g} m/s)"
+
+    @property
+    def usable(self):
+        """Seconds of a run that the box covers, drift of MARGIN metres included; inf if it repeats."""
+        if self.periodic:
+            return float("inf")
+        return (self.velocity.shape[0] - 1) * self.dt - self.shift - MARGIN / self.speed
+
+    def at(self, time, X, Y, Z):
+        """(n, 3) m/s at times (n,) and points, for tables and tests; one call of field_at each."""
+        field = self.field()
+        points = np.broadcast_arrays(*(np.atleast_1d(np.asarray(p, dtype=float)) for p in (time, X, Y, Z)))
+        return np.array([field_at(*point, field) for point in zip(*points, strict=True)])
+
+    def field(self):
+        """WindField of the box."""
+        dy, dz = self.y[1] - self.y[0], self.z[1] - self.z[0]
+        return WindField(
+            np.ascontiguousarray(self.velocity, dtype=np.float32),
+            1.0 / self.dt,
+            float(self.shift),
+            1.0 / self.speed,
+            float(self.y[0]),
+            float(self.z[0]),
+            float(1.0 / dy),
+            float(1.0 / dz),
+            bool(self.periodic),
+        )
+
+
+def read_box(spec, *, hub_height, rotor_diameter, shear_exponent=0.0, seed=0, duration=600.0):
+    """WindBox of a specification with "kind" bts, box or mann (or of a WindBox: itself).
+
+    bts   path; periodic (None: as the file says); shift (s, None: half the grid width over the mean wind)
+    box   u (n_time, n_z, n_y) m/s, optionally v and w; y, z (m); dt (s); speed (m/s)
+    mann  speed (m/s), class of the IEC normal turbulence model, seed, dt; hipersim makes the box
+    Raises: InputError naming the key and what is allowed, and where the grid does not hold the rotor.
+    """
+    if isinstance(spec, WindBox):
+        box = spec
+    else:
+        box = _MAKERS[spec["kind"]](_values(spec), hub_height, rotor_diameter, shear_exponent, seed, duration)
+    reach = 0.5 * rotor_diameter
+    rise = box.z - hub_height
+    if max(box.y[0], rise[0]) > -reach or min(box.y[-1], rise[-1]) < reach:
+        raise InputError(
+            f"wind: the grid from y = {box.y[0]:g} to {box.y[-1]:g} m and z = {box.z[0]:g} to {box.z[-1]:g} m"
+            f" must hold the rotor, {reach:g} m about (0, {hub_height:g})"
+        )
+    return box
+
+
+def _values(spec):
+    """Checked values of every key of a specification."""
+    kind = spec["kind"]
+    keys = KINDS[kind]
+    for key in spec:
+        if key != "kind" and key not in keys:
+            raise unknown(f"key of the {kind} wind", key, keys)
+    values = {}
+    for key, (rule, default) in keys.items():
+        value = spec.get(key, default)
+        if value is REQUIRED:
+            raise InputError(f"wind.{key} is missing: the {kind} wind needs it")
+        values[key] = None if value is None and default is None else rule.read(f"wind.{key}", value)
+    return values
+
+
+def _even(name, line):
+    """A grid line as float64, evenly increasing. Raises: InputError."""
+    steps = np.diff(line)
+    if line.size < 2 or not steps.min() > 0.0 or np.ptp(steps) > 1e-3 * steps.mean():
+        raise InputError(f"wind.{name}: must be at least 2 evenly increasing numbers (m)")
+    return np.linspace(line[0], line[-1], line.size)
+
+
+def _from_arrays(values, hub_height, rotor_diameter, shear_exponent, seed, duration):
+    u, y, z = values["u"], _even("y", values["y"]), _even("z", values["z"])
+    if u.shape[1:] != (z.size, y.size):
+        raise InputError(f"wind.u has shape {u.shape}: must be (n_time, {z.size}, {y.size}), as z and y say")
+    velocity = np.zeros((*u.shape, 3), dtype=np.float32)
+    velocity[..., 0] = u
+    for index, key in ((1, "v"), (2, "w")):
+        if values[key] is not None:
+            if values[key].shape != u.shape:
+                raise InputError(f"wind.{key} has shape {values[key].shape}: must be that of u, {u.shape}")
+            velocity[..., index] = values[key]
+    shift = values["shift"]
+    if shift is None:
+        shift = 0.5 * (y[-1] - y[0]) / values["speed"]
+    return WindBox(velocity, y, z, values["dt"], values["speed"], values["periodic"], float(shift))
+
+
+def _from_bts(values, *_):
+    path = values["path"]
+    if not path.is_file():
+        raise InputError(f"wind.path = {str(path)!r}: no such file")
+    try:
+        from openfast_io.turbsim_file import TurbSimFile
+    except ImportError:
+        raise InputError(
+            "TurbSim boxes are read by openfast_io, which is not installed: pip install 'fowt-env[openfast]'"
+        ) from None
+    try:
+        file = TurbSimFile(str(path))
+    except Exception as error:  # whatever a broken file makes the reader raise
+        raise InputError(f"wind.path = {str(path)!r}: not a TurbSim full-field file ({error})") from None
+    y, z = _even("y", np.asarray(file["y"])), _even("z", np.asarray(file["z"]))
+    speed = float(file["uRef"])
+    shift = values["shift"]
+    periodic = values["periodic"]
+    return WindBox(
+        np.ascontiguousarray(np.transpose(file["u"], (1, 3, 2, 0)), dtype=np.float32),
+        y,
+        z,
+        float(file["dt"]),
+        speed,
+        int(file["ID"]) == PERIODIC if periodic is None else periodic,
+        0.5 * (y[-1] - y[0]) / speed if shift is None else float(shift),
+    )
+
+
+def _from_mann(values, hub_height, rotor_diameter, shear_exponent, seed, duration):
+    """Mann turbulence of the IEC (length 0.8 Lambda_1, anisotropy 3.9), scaled to sigma_1 at the hub."""
+    try:
+        from hipersim import MannTurbulenceField
+    except ImportError:
+        raise InputError(
+            "Mann boxes are made by hipersim, which is not installed: pip install 'fowt-env[mann]'"
+        ) from None
+    speed, dt = values["speed"], values["dt"]
+    n_time = 2 ** ceil(np.log2((duration + 2.0 * rotor_diameter / speed) / dt))
+    n_side = 32
+    step = 1.2 * rotor_diameter / (n_side - 1)
+    made = MannTurbulenceField.generate(
+        L=0.8 * length_scale(hub_height),
+        Gamma=3.9,
+        Nxyz=(n_time, n_side, n_side),
+        dxyz=(speed * dt, step, step),
+        seed=seed if values["seed"] is None else values["seed"],
+    )
+    # x of that box points downwind: the slice that arrives first is the one farthest downstream
+    velocity = np.transpose(np.asarray(made.uvw), (1, 3, 2, 0))[::-1].astype(np.float32)
+    middle = n_side // 2
+    velocity *= ntm_sigma(speed, values["class"]) / velocity[:, middle, middle, 0].std()
+    line = step * (np.arange(n_side) - 0.5 * (n_side - 1))
+    z = hub_height + line
+    exponent = shear_exponent if values["shear_exponent"] is None else values["shear_exponent"]
+    velocity[..., 0] += (speed * (np.maximum(z, 1.0) / hub_height) ** exponent)[None, :, None]
+    return WindBox(velocity, line, z, dt, speed, True, 0.5 * (line[-1] - line[0]) / speed)
+
+
+_MAKERS = {"bts": _from_bts, "box": _from_arrays, "mann": _from_mann}
+
+
+# --------------------------------------------------------------------------- derived winds
+
+
+def steady_field(field, factor=1.0):
+    """The field's mean over time as a steady wind, times a factor; same type, so nothing is compiled anew."""
+    mean = field.velocity.mean(axis=0, dtype=np.float64, keepdims=True) * factor
+    return field._replace(velocity=np.ascontiguousarray(mean, dtype=np.float32))
+
+
+def hub_speed(box, hub_height):
+    """Mean horizontal wind (m/s) of the box at the hub."""
+    field = steady_field(box.field())
+    u, v, _ = field_at(0.0, 0.0, 0.0, float(hub_height), field)
+    return float(np.hypot(u, v))
+
+
+@kernel
+def _average(field, hub_height, radius, weight, azimuths, value):
+    """Fill value (n_time, 5) with the disk means of u, v, w and the two gradients of u times radius."""
+    total = 0.0
+    for r in range(radius.shape[0]):
+        total += weight[r] * azimuths
+    for i in range(value.shape[0]):
+        t = i / field.rate - field.shift
+        second = 0.0
+        for r in range(radius.shape[0]):
+            for a in range(azimuths):
+                angle = 2.0 * np.pi * (a + 0.5) / azimuths
+                y, z = radius[r] * np.cos(angle), radius[r] * np.sin(angle)
+                u, v, w = field_at(t, 0.0, y, hub_height + z, field)
+                share = weight[r] / total
+                value[i, 0] += share * u
+                value[i, 1] += share * v
+                value[i, 2] += share * w
+                value[i, 3] += share * u * z
+                value[i, 4] += share * u * y
+                second += share * z * z
+        value[i, 3] /= second
+        value[i, 4] /= second
+
+
+def rotor_average(box, hub_height, rotor_diameter, weights="area", chord=None):
+    """(time, value): the box averaged over the rotor disk at X = 0, columns as in WindSeries.
+
+    value (n, 5): means of u, v, w over the disk, and the gradients of the plane that fits u best, per
+    rotor diameter. weights: "area", or "chord" with chord = (radius, chord) of the blade: each ring then
+    counts as chord times radius, as its share in thrust does at a given rotor speed.
+    """
+    node, weight = np.polynomial.legendre.leggauss(DISK_RADII)
+    radius = 0.25 * rotor_diameter * (node + 1.0)
+    weight = weight * radius
+    if weights == "chord":
+        weight = weight * np.interp(radius, *chord)
+    field = box.field()
+    value = np.zeros((box.velocity.shape[0], 5))
+    _average(field, float(hub_height), radius, weight, DISK_AZIMUTHS, value)
+    value[:, 3:] *= rotor_diameter
+    return np.arange(len(value)) * box.dt - box.shift, value

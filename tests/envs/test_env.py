@@ -1,0 +1,450 @@
+"""The environment: the promises of the Gymnasium interface and of this project, for every task."""
+
+import hashlib
+import subprocess
+import sys
+import warnings
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.error import ResetNeeded
+from gymnasium.utils.env_checker import check_env
+
+import fowt_env
+from controllers import make
+from fowt_env.envs import TASKS, FowtEnv, Task
+from fowt_env.envs.observations import KNOWN
+from fowt_env.envs.rewards import TERMS
+from fowt_env.envs.trims import GRID, exact_trim, near_trim
+from fowt_env.errors import InputError
+from fowt_env.state import State
+from fowt_env_registration import ENVIRONMENTS
+
+QUICK = {"rotor": "table", "wave_components": 20}
+NTM = {"kind": "ntm", "speed": 18.0, "class": "B"}
+SEA = {"kind": "jonswap", "Hs": 3.0, "Tp": 9.0}
+FIXED = {"wind": NTM, "sea": SEA, "weather_seed": 7, "offsets": {}}
+
+
+def quick(**settings):
+    return FowtEnv(**(QUICK | settings))
+
+
+def rollout(env, seed, n=40):
+    """Bits of an episode under actions that are drawn with the seed."""
+    rng = np.random.default_rng(seed)
+    observation, info = env.reset(seed=seed)
+    parts = [observation.tobytes()]
+    for _ in range(n):
+        observation, reward, terminated, truncated, info = env.step(rng.uniform(-1.0, 1.0, 2))
+        parts += [observation.tobytes(), np.float64(reward).tobytes(), str((terminated, info)).encode()]
+        if terminated or truncated:
+            break
+    return hashlib.sha256(b"".join(parts)).hexdigest()
+
+
+@pytest.mark.parametrize("task", TASKS)
+@pytest.mark.parametrize("name", ENVIRONMENTS)
+def test_gymnasium_and_sb3_checkers_find_nothing(name, task):
+    from stable_baselines3.common.env_checker import check_env as sb3_check_env
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        env = gymnasium.make(name, task=task)
+        check_env(env.unwrapped)
+        sb3_check_env(env)
+
+
+@pytest.mark.parametrize("mode", ["direct", "setpoint", "residual"])
+def test_checkers_find_nothing_in_any_action_mode_with_every_channel(mode):
+    from stable_baselines3.common.env_checker import check_env as sb3_check_env
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        env = gymnasium.make(
+            "fowt_env/OC3Hywind-v0", action_mode=mode, observation=KNOWN, wind_preview=(1.0, 5.0), **QUICK
+        )
+        check_env(env.unwrapped)
+        sb3_check_env(env)
+
+
+def python(code):
+    """What a fresh Python prints."""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip()
+
+
+def test_ids_are_registered_once_whatever_is_imported_first():
+    code = "import warnings; warnings.simplefilter('error')\n{}\nprint(gymnasium.spec({!r}).entry_point)"
+    name = next(iter(ENVIRONMENTS))
+    for imports in (
+        "import gymnasium, fowt_env, fowt_env.envs",
+        "import fowt_env, gymnasium",
+        "import fowt_env.envs, fowt_env, gymnasium",
+    ):
+        assert python(code.format(imports, name)) == ENVIRONMENTS[name]
+
+
+def test_same_seed_same_bits_in_two_environments_and_two_processes():
+    here = rollout(quick(), 11)
+    env = quick()
+    rollout(env, 5)  # what went before leaves no trace
+    assert rollout(env, 11) == here
+    code = (
+        f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r})\n"
+        "from test_env import quick, rollout\nprint(rollout(quick(), 11))"
+    )
+    assert python(code) == here
+
+
+def test_another_seed_gives_another_start_and_another_episode():
+    env = quick()
+    starts = [env.reset(seed=seed)[0] for seed in range(4)]
+    moved = np.ptp(np.array(starts), axis=0) > 0.0
+    # every episode starts from rest, and above rated at rated torque
+    assert np.all(moved[:6]) and not np.any(moved[6:12]) and np.array_equal(moved[12:], [True, True, False])
+    assert rollout(env, 1) != rollout(env, 2)
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_no_observation_entry_is_constant_and_all_stay_in_the_space(task):
+    names = [name for name in KNOWN if task != "steady" or name != "wave_elevation"]  # its sea is still
+    wind = {"kind": "eog", "speed": 14.0, "start": 1.0} if task == "steady" else None
+    env = quick(task=task, observation=names, wind_preview=(3.0,), wind=wind)
+    rng = np.random.default_rng(0)
+    seen = [env.reset(seed=3)[0]]
+    for _ in range(100):
+        observation, _, terminated, _, _ = env.step(rng.uniform(-1.0, 1.0, 2))
+        assert observation.dtype == np.float32 and observation in env.observation_space
+        seen.append(observation)
+        assert not terminated
+    assert np.all(np.ptp(np.array(seen), axis=0) > 0.0)
+
+
+def test_observations_are_of_order_one_in_operation():
+    names = [name for name in KNOWN if name != "previous_action"]
+    env = quick(action_mode="residual", observation=names, wind_preview=(3.0,))
+    largest = 0.0
+    for seed in range(3):
+        observation, _ = env.reset(seed=seed)
+        for _ in range(600):
+            largest = np.maximum(largest, np.abs(observation))
+            observation, *_ = env.step((0.0, 0.0))
+    assert np.all(largest < 6.0) and np.all(largest > 0.05), largest
+
+
+def test_observations_do_not_share_memory():
+    env = quick()
+    first, _ = env.reset(seed=0)
+    kept = first.copy()
+    second = env.step((1.0, 1.0))[0]
+    assert np.array_equal(first, kept) and not np.shares_memory(first, second)
+    second[:] = 1e9
+    assert np.all(env.step((1.0, 1.0))[0] < 1e3)
+
+
+@pytest.mark.parametrize(
+    "action",
+    [0.0, (0.0,), (0.0, 0.0, 0.0), [[0.0, 0.0]], (np.nan, 0.0), (0.0, np.inf), (-np.inf, 0.0), "ab", None,
+     ((0.0, 1.0), 2.0)],
+)  # fmt: skip
+def test_unusable_actions_are_errors_and_leave_the_run_alone(action):
+    env = quick()
+    env.reset(seed=0)
+    untouched = quick()
+    untouched.reset(seed=0)
+    with pytest.raises(InputError, match="action"):
+        env.step(action)
+    assert np.array_equal(env.step((0.1, 0.2))[0], untouched.step((0.1, 0.2))[0])
+
+
+def test_actions_beyond_the_range_saturate_and_are_counted():
+    env, other = quick(), quick()
+    env.reset(seed=0)
+    other.reset(seed=0)
+    for action, count in (((1.0, -1.0), 0), ((1.5, 0.0), 1), ((3.0, -7.0), 2), ((0.0, 1.0), 2)):
+        got, reward, _, _, info = env.step(action)
+        expected, expected_reward, *_ = other.step(np.clip(action, -1.0, 1.0))
+        assert np.array_equal(got, expected) and reward == expected_reward
+        assert info["saturated_actions"] == count
+    assert env.reset(seed=0)[1]["saturated_actions"] == 0
+
+
+def test_action_types_do_not_matter_and_compile_nothing_anew():
+    from fowt_env.envs.kernels import act
+
+    results = []
+    env = quick()
+    frozen = np.array([0.25, -0.5])
+    frozen.flags.writeable = False
+    for action in (
+        (0.25, -0.5), np.array([0.25, -0.5], dtype=np.float32), frozen, np.array([0.25, 9.0, -0.5])[::2],
+    ):  # fmt: skip
+        env.reset(seed=0)
+        results.append(env.step(action)[0])
+        signatures = len(act.signatures) if hasattr(act, "signatures") else 0
+        if len(results) == 1:
+            first = signatures
+    assert all(np.array_equal(r, results[0]) for r in results)
+    assert signatures == first
+
+
+def test_direct_actions_reach_zero_and_full_torque_no_faster_than_the_rate_limit():
+    env = quick()
+    env.reset(options=FIXED | {"wind": 18.0, "sea": "still"})
+    before = env.measurement().generator_torque
+    law = env.scene.turbine.torque_law
+    env.step((1.0, 0.0))
+    assert env.measurement().generator_torque == before + 0.1 * law.max_torque_rate
+    for _ in range(6):
+        env.step((1.0, 0.0))
+    assert env.measurement().generator_torque == law.max_torque
+    for _ in range(32):
+        env.step((-1.0, 1.0))
+    assert env.measurement().generator_torque == 0.0
+
+
+def test_direct_pitch_action_spans_the_task_s_range():
+    env = quick(task=Task("slow", wind=8.0, blade_pitch=(5.0, 25.0), rotor="table"))
+    for action, angle in ((-1.0, 5.0), (0.0, 15.0), (1.0, 25.0)):
+        env.reset(seed=0)
+        for _ in range(60):
+            env.step((1.0, action))
+        assert np.degrees(env.measurement().blade_pitch) == pytest.approx(angle, abs=1e-6)
+
+
+def test_the_action_of_the_start_holds_the_operating_point():
+    env = quick(task="steady", observation=("default", "previous_action"))
+    observation, _ = env.reset(options={"wind": 18.0, "offsets": {}})
+    start = env.measurement()
+    for _ in range(100):
+        env.step(observation[-2:])
+    now = env.measurement()
+    # the operating point is azimuth-averaged; the platform follows the blades' passing
+    assert now.rotor_speed == pytest.approx(start.rotor_speed, rel=2e-3)
+    assert now.platform_pitch == pytest.approx(start.platform_pitch, abs=2e-4)
+
+
+@pytest.mark.parametrize("share", [0.98, 1.05])
+def test_setpoint_mode_brings_the_rotor_to_its_setpoint(share):
+    env = quick(task="steady", action_mode="setpoint", observation=("default", "previous_action"))
+    observation, _ = env.reset(options={"wind": 18.0, "offsets": {}})
+    low, high = env.task.setpoint
+    action = (2.0 * (share - low) / (high - low) - 1.0, observation[-1])
+    for _ in range(900):
+        assert not env.step(action)[2]
+    rated = env.scene.turbine.rated_rotor_speed
+    assert env.measurement().rotor_speed == pytest.approx(share * rated, rel=5e-3)
+
+
+def test_residual_actions_add_to_the_baseline_within_their_limits():
+    plain, moved = quick(action_mode="residual"), quick(action_mode="residual")
+    for env in (plain, moved):
+        env.reset(seed=4, options=FIXED)
+    plain.step((0.0, 0.0))
+    moved.step((-0.2, 1.0))
+    law = moved.scene.turbine.torque_law
+    difference = moved.measurement().generator_torque - plain.measurement().generator_torque
+    assert difference == pytest.approx(-0.2 * 0.1 * law.rated_torque, rel=1e-9)
+    assert moved._run.u[1] - plain._run.u[1] == pytest.approx(np.radians(2.0), rel=1e-9)
+
+
+def channel_rows(env, commands):
+    """Rows of channels at the start and after each control period, until the episode ends."""
+    rows, done = [list(env.channels().values())], False
+    while not done:
+        _, _, terminated, truncated, _ = commands()
+        rows.append(list(env.channels().values()))
+        done = terminated or truncated
+    return np.array(rows)
+
+
+def assert_same_bits(rows, table):
+    """Every channel of the rows equals that of simulate's table, but for those that the command enters.
+
+    At a control instant simulate shows the command from then on, the environment the one until then.
+    """
+    commanded = ("GenTq", "GenPwr", "RotTorq", "RotThrust", "PtfmTA", "PtfmRA", "NcIMU", "TwrBs", "Hydro")
+    compared = 0
+    for column, values in zip(table.columns, rows.T, strict=True):
+        if not column.startswith(commanded):
+            assert np.array_equal(values, table[column].to_numpy()), column
+            compared += 1
+    assert compared >= 26
+    assert np.array_equal(rows[-1], table.to_numpy()[-1])  # at the end no new command was given
+
+
+@pytest.mark.parametrize("rotor", ["table", "bem"])
+@pytest.mark.parametrize("speed", [8.0, 18.0])
+def test_stepping_with_the_pi_s_commands_is_simulate_bit_for_bit(rotor, speed):
+    wind = NTM | {"speed": speed}
+    env = quick(rotor=rotor, duration=10.0)
+    env.reset(seed=1, options=FIXED | {"wind": wind})
+    pi = make("pi", env.scene.turbine, 0.1)
+    pi.reset(env.measurement())
+    rows = channel_rows(env, lambda: env.step_physical(*pi.act(env.measurement())))
+    scene = fowt_env.build_scene(
+        "oc3_hywind", wind=wind, sea=SEA, seed=7, rotor=rotor, duration=600.0, wave_components=20
+    )
+    assert_same_bits(rows, fowt_env.simulate(scene, "pi", duration=10.0))
+
+
+def test_residual_mode_without_residual_is_simulate_with_the_pi_bit_for_bit():
+    env = quick(action_mode="residual", duration=10.0)
+    env.reset(seed=1, options=FIXED)
+    rows = channel_rows(env, lambda: env.step((0.0, 0.0)))
+    assert_same_bits(rows, fowt_env.simulate(env.scene, "pi", duration=10.0, output_dt=0.1))
+
+
+def test_looking_at_channels_leaves_the_run_as_it_is():
+    env, other = quick(), quick()
+    env.reset(seed=2)
+    other.reset(seed=2)
+    for _ in range(20):
+        env.channels()
+        assert np.array_equal(env.step((0.3, 0.1))[0], other.step((0.3, 0.1))[0])
+    assert np.array_equal(env._run.x, other._run.x)
+    assert set(env.channels()) == {c.name for c in env.scene.channels}
+
+
+def test_reward_is_the_weighted_sum_of_its_visible_terms():
+    env = quick(reward={"power": 3.0, "torque_travel": 0.0})
+    env.reset(seed=0)
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        _, reward, _, _, info = env.step(rng.uniform(-1.0, 1.0, 2))
+        terms = {name: info[f"reward/{name}"] for name in TERMS}
+        assert reward == pytest.approx(sum(env.task.weights[n] * v for n, v in terms.items()), rel=1e-12)
+        assert all(TERMS[name].low <= value <= TERMS[name].high for name, value in terms.items())
+    assert env.task.weights["power"] == 3.0 and env.task.weights["rotor_speed"] == 1.0
+
+
+def test_rotor_without_torque_ends_in_overspeed():
+    env = quick()
+    env.reset(seed=1, options={"wind": 18.0})
+    hold = env.measurement().blade_pitch
+    for _ in range(300):
+        observation, reward, terminated, truncated, info = env.step((-1.0, np.degrees(hold) / 15.0 - 1.0))
+        if terminated:
+            break
+        assert "termination" not in info and info["reward/failure"] == 0.0
+    assert terminated and not truncated and info["termination"].startswith("overspeed")
+    assert env.measurement().rotor_speed > env.scene.turbine.overspeed
+    assert info["reward/failure"] == -1.0 and reward < -90.0
+    assert observation in env.observation_space
+
+
+def test_capsize_ends_the_episode():
+    env = quick()
+    env.reset(seed=1, options={"wind": 18.0, "offsets": {"PtfmPitch": 82.0}})
+    observation, _, terminated, _, info = env.step((0.0, 0.0))
+    assert terminated and info["termination"].startswith("capsize")
+    assert observation in env.observation_space
+
+
+def test_a_state_that_is_not_finite_ends_the_episode_with_a_finite_observation():
+    env = quick()
+    env.reset(seed=1)
+    observation, reward, terminated, _, info = env.step_physical(1e300, 0.1)
+    assert terminated and info["termination"] == "non-finite state"
+    assert np.isfinite(reward) and observation in env.observation_space
+
+
+def test_time_truncates_and_a_new_reset_is_needed():
+    env = quick(duration=2.0)
+    with pytest.raises(ResetNeeded):
+        env.step((0.0, 0.0))
+    env.reset(seed=0)
+    for k in range(1, 21):
+        _, _, terminated, truncated, info = env.step((0.5, 0.0))
+        assert not terminated and truncated == (k == 20)
+        assert info["time"] == pytest.approx(0.1 * k, abs=1e-12)
+    with pytest.raises(ResetNeeded):
+        env.step((0.0, 0.0))
+    env.reset()
+    env.step((0.0, 0.0))
+
+
+def test_an_episode_can_be_replayed_from_its_info():
+    env = quick()
+    env.reset(seed=9)
+    _, info = env.reset()
+    first = [env.step((0.2, 0.1))[0] for _ in range(5)]
+    env.reset(seed=1234, options=info["episode"])
+    assert all(np.array_equal(env.step((0.2, 0.1))[0], observation) for observation in first)
+
+
+def test_episodes_start_at_the_operating_point_of_their_mean_wind():
+    env = quick()
+    env.reset(seed=0, options=FIXED)
+    point = fowt_env.trim(env.scene)
+    assert np.array_equal(env._run.x, point.state) and np.array_equal(env._run.u, point.command)
+
+
+def test_interpolated_operating_points_are_near_the_exact_ones():
+    env = quick(task="steady")
+    scene, key = env.scene, env._key
+    bounds = {State.SURGE: 0.06, State.PLATFORM_PITCH: 3e-4, State.BLADE_PITCH: 1e-3, State.ROTOR_SPEED: 4e-3}
+    for speed in (5.125, 7.875, 10.375, 11.375, 11.875, 14.125, 24.875):
+        near, exact = near_trim(scene, key, speed)[0], exact_trim(scene, key, speed)[0]
+        wider = 20.0 if abs(speed - scene.turbine.rated_wind_speed) < GRID else 1.0  # pitch control sets in
+        for index, bound in bounds.items():
+            assert abs(near[index] - exact[index]) < wider * bound, (speed, index)
+    assert near_trim(scene, key, 18.0)[0] is exact_trim(scene, key, 18.0)[0]
+
+
+def test_preview_shows_the_wind_that_comes():
+    env = quick(observation=("wind_speed", "wind_preview"), wind_preview=(0.5, 1.0))
+    shown = [env.reset(seed=0)[0]]
+    shown += [env.step((0.5, 0.1))[0] for _ in range(20)]
+    shown = np.array(shown)
+    np.testing.assert_allclose(shown[5:, 0], shown[:-5, 1], rtol=1e-6)
+    np.testing.assert_allclose(shown[10:, 0], shown[:-10, 2], rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"task": "above_rate"}, "Did you mean 'above_rated'"),
+        ({"action_mode": "dirct"}, "Did you mean 'direct'"),
+        ({"render_mode": "human"}, "render_mode = 'human'"),
+        ({"dt": 0.03}, "does not divide control_dt"),
+        ({"duration": 10.05}, "does not divide duration"),
+        ({"duration": -1.0}, "duration = -1.0"),
+        ({"observation": ("surge", "sureg")}, "Did you mean 'surge'"),
+        ({"observation": ("wind_preview",)}, "look-ahead"),
+        ({"reward": {"powr": 1.0}}, "Did you mean 'power'"),
+        ({"rotor": "tabel"}, "Did you mean 'table'"),
+        ({"wind": {"kind": "series", "time": [0.0, 60.0], "speed": [10.0, 12.0]}}, "wind series ends at 60"),
+        ({"wave_component": 20}, "Did you mean 'wave_components'"),
+        ({"platform": "oc3_hywnd"}, "oc3_hywind"),
+        ({"task": Task("wide", wind=18.0, blade_pitch=(-5.0, 30.0))}, "within \\[0, 90\\] deg"),
+    ],
+)
+def test_bad_settings_are_refused_with_the_key_and_what_is_allowed(settings, message):
+    with pytest.raises(InputError, match=message):
+        quick(**settings)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"wnd": 18.0}, "Did you mean 'wind'"),
+        ({"wind": None}, "needs a wind"),
+        ({"wind": -3.0}, "wind"),
+        ({"sea": "papr_regular"}, "Did you mean 'paper_regular'"),
+        ({"weather_seed": -1}, "seed = -1"),
+        ({"offsets": {"PtfmTVxi": 1.0}}, "unknown channel"),
+        ({"offsets": {"PtfmSurge": float("nan")}}, "nan"),
+        ({"wind": 18.0, "offsets": {"PtfmPitch": 100.0}}, "must stay inside"),
+    ],
+)
+def test_bad_reset_options_are_refused_and_need_a_new_reset(options, message):
+    env = quick()
+    with pytest.raises(InputError, match=message):
+        env.reset(seed=0, options=options)
+    with pytest.raises(ResetNeeded):
+        env.step((0.0, 0.0))

@@ -1,0 +1,126 @@
+"""Tasks: what is drawn, and which tasks are refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fowt_env.envs import TASKS, Task, task_tables
+from fowt_env.envs.observations import DEFAULT, KNOWN, STANDARD, check_channels
+from fowt_env.envs.rewards import TERMS
+from fowt_env.envs.tasks import task_of
+from fowt_env.errors import InputError
+
+WIND = {"kind": "ntm", "speed": (12.0, 24.0), "class": "B"}
+
+
+def draws(task, n=200):
+    rng = np.random.default_rng(3)
+    return [task.draw(rng) for _ in range(n)]
+
+
+def test_the_promised_tasks_exist():
+    assert {"above_rated", "full_range", "steady"} <= set(TASKS)
+    assert all(name == task.name for name, task in TASKS.items())
+
+
+@pytest.mark.parametrize(
+    ("name", "low", "high"), [("above_rated", 12.0, 24.0), ("full_range", 4.0, 25.0), ("steady", 4.0, 25.0)]
+)
+def test_mean_winds_fill_their_range(name, low, high):
+    speeds = np.array([episode.wind["speed"] for episode in draws(TASKS[name])])
+    assert low <= speeds.min() < low + 0.05 * (high - low)
+    assert high - 0.05 * (high - low) < speeds.max() <= high
+
+
+def test_joint_sea_belongs_to_the_wind_of_the_episode():
+    table = {12.0: (1.16, 7.25), 14.0: (1.34, 7.43), 24.0: (3.07, 9.01)}  # rows of gulf_of_maine_normal
+    for episode in draws(TASKS["full_range"]):
+        assert 0.83 <= episode.sea["Hs"] <= 3.07
+        assert 6.9 <= episode.sea["Tp"] <= 9.01
+    for speed, (height, period) in table.items():
+        sea = (
+            replace(TASKS["above_rated"], wind={"kind": "ntm", "speed": speed})
+            .draw(np.random.default_rng(0))
+            .sea
+        )
+        assert (sea["Hs"], sea["Tp"]) == pytest.approx((height, period), rel=1e-12)
+
+
+def test_the_same_generator_state_gives_the_same_episode():
+    assert draws(TASKS["full_range"], 5) == draws(TASKS["full_range"], 5)
+
+
+def test_seeds_and_offsets_differ_between_episodes():
+    episodes = draws(TASKS["above_rated"], 50)
+    assert len({episode.weather_seed for episode in episodes}) == 50
+    for name, (low, high) in TASKS["above_rated"].offsets.items():
+        values = np.array([episode.offsets[name] for episode in episodes])
+        assert np.all((values >= low) & (values <= high)) and np.ptp(values) > 0.5 * (high - low)
+
+
+def test_numbers_without_range_are_kept():
+    task = Task("fixed", wind=18.0, sea={"kind": "regular", "H": 3.0, "T": (5.0, 9.0), "heading": 30.0})
+    episodes = draws(task, 20)
+    assert {episode.wind for episode in episodes} == {18.0}
+    assert all(e.sea["H"] == 3.0 and e.sea["heading"] == 30.0 for e in episodes)
+    assert len({episode.sea["T"] for episode in episodes}) == 20
+    assert task.fixed_wind and not TASKS["above_rated"].fixed_wind
+
+
+def test_lists_of_a_series_are_data_and_not_ranges():
+    wind = {"kind": "series", "time": (0.0, 700.0), "speed": (10.0, 12.0)}
+    assert Task("ramp", wind=wind).draw(np.random.default_rng(0)).wind is wind
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"name": ""}, "task.name"),
+        ({"wind": None}, "needs a wind"),
+        ({"wind": {"kind": "ntm", "speed": (12.0, 240.0)}}, "240.0: must be in"),
+        ({"wind": {"kind": "ntm", "speed": (24.0, 12.0)}}, "low end must not exceed"),
+        ({"wind": {"kind": "ntmm", "speed": 12.0}}, "Did you mean 'ntm'"),
+        ({"sea": {"kind": "joint", "table": "gulf_of_main_normal"}}, "Did you mean 'gulf_of_maine_normal'"),
+        ({"sea": {"kind": "jonswap", "Hs": (-1.0, 2.0), "Tp": 8.0}}, "Hs"),
+        ({"sea": "papr_regular"}, "Did you mean 'paper_regular'"),
+        ({"duration": 0.0}, "duration = 0.0: must be a number in"),
+        ({"duration": float("nan")}, "duration = nan"),
+        ({"observation": ("surge", "pitch_rate")}, "Did you mean 'platform_pitch_rate'"),
+        ({"observation": ()}, "at least one channel"),
+        ({"observation": "surge"}, "must be a list of channel names"),
+        ({"weights": {"power": -1.0}}, "weight of power = -1.0"),
+        ({"offsets": {"PtfmSurg": (0.0, 1.0)}}, "Did you mean 'PtfmSurge'"),
+        ({"offsets": {"PtfmSurge": (1.0, 0.0)}}, "low end must not exceed"),
+        ({"offsets": {"PtfmSurge": 1.0}}, "must be a pair"),
+        ({"offsets": {"PtfmTVxi": (0.0, 1.0)}}, "unknown channel"),
+        ({"blade_pitch": (10.0, -1.0)}, "low end must not exceed"),
+        ({"setpoint": (0.5, float("inf"))}, "inf"),
+        ({"residual_torque": 2.0}, "residual_torque = 2.0"),
+        ({"residual_pitch": -1.0}, "residual_pitch = -1.0"),
+        ({"wind_preview": (1.0, -2.0)}, "wind_preview = -2.0"),
+        ({"wind_preview": 5.0}, "must be a list of times"),
+    ],
+)
+def test_bad_tasks_name_the_key_and_what_is_allowed(changes, message):
+    given = {"name": "mine", "wind": WIND} | changes
+    with pytest.raises(InputError, match=message):
+        Task(**given)
+
+
+def test_unknown_task_names_come_with_a_suggestion():
+    with pytest.raises(InputError, match="Did you mean 'above_rated'"):
+        task_of("above_rate")
+
+
+def test_default_among_the_channels_stands_for_the_task_s_own():
+    assert check_channels("observation", (DEFAULT, "wind_speed"), STANDARD) == (*STANDARD, "wind_speed")
+    assert check_channels("observation", ("yaw", DEFAULT), STANDARD)[0] == "yaw"
+    assert len(check_channels("observation", KNOWN)) == len(KNOWN)
+
+
+def test_tables_show_every_entry_and_every_term():
+    task = replace(TASKS["above_rated"], observation=KNOWN, wind_preview=(2.0, 4.0))
+    text = task_tables(task)
+    for word in (*TERMS, *STANDARD, "wind_preview_4s", "sin_azimuth", "47.40 kN m", "0 to 30 deg"):
+        assert word in text

@@ -1,0 +1,299 @@
+"""Fast strip loads against the plain sum over components, nodes and (uncut sections) morison_load."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from naive.strips import strip_load
+
+from fowt_env.description import read_platform, sea_state_of
+from fowt_env.loads import fast_waves
+from fowt_env.loads.fast_waves import (
+    build_fast_waves,
+    build_lanes,
+    can_be_fast,
+    fast_morison_load,
+    fast_scratch,
+    phasors,
+)
+from fowt_env.loads.morison import Current, axis_surface, build_strips, current_at, morison_load
+from fowt_env.state import N_RIGID, State, pose_of
+from fowt_env.weather.waves import build_waves
+
+PLATFORM = read_platform("oc3_hywind")
+SITE = PLATFORM.environment
+SEAS = {
+    "mild": {"kind": "jonswap", "Hs": 2.5, "Tp": 7.0, "gamma": 1.0, "heading": 20.0},
+    "rough": {"kind": "jonswap", "Hs": 7.5, "Tp": 10.0, "gamma": 3.3},
+    "storm": {"kind": "jonswap", "Hs": 17.0, "Tp": 17.0, "gamma": 2.0, "heading": -130.0},
+    "regular": {"kind": "regular", "H": 3.0, "T": 5.0},
+    "swell": {"kind": "regular", "H": 6.0, "T": 20.0, "heading": 45.0},
+}
+
+
+def strips_for(position="instantaneous", surface="instantaneous", stretching="wheeler"):
+    return build_strips(
+        PLATFORM.hull,
+        PLATFORM.hydro,
+        density=SITE.water_density,
+        depth=SITE.water_depth,
+        position=position,
+        surface=surface,
+        stretching=stretching,
+    )
+
+
+def waves_of(sea, seed=0, **changes):
+    state = sea_state_of({**SEAS[sea], **changes} if isinstance(sea, str) else sea)
+    return build_waves(
+        state,
+        depth=SITE.water_depth,
+        density=SITE.water_density,
+        gravity=SITE.gravity,
+        seed=seed,
+        duration=600.0,
+    )
+
+
+def random_states(count, tilt, seed, drift=10.0):
+    """States of a platform adrift and moving, tilted by tilt degrees in a random direction."""
+    rng = np.random.default_rng(seed)
+    for _ in range(count):
+        x = np.zeros(N_RIGID)
+        direction = rng.uniform(0.0, 2.0 * np.pi)
+        x[: State.ROLL] = rng.normal(size=3) * [drift, drift, 0.5]
+        x[State.ROLL] = np.radians(tilt) * np.cos(direction)
+        x[State.PLATFORM_PITCH] = np.radians(tilt) * np.sin(direction)
+        x[State.YAW] = 0.05 * rng.normal()
+        x[State.VX : State.WX] = rng.normal(size=3) * [1.0, 0.5, 0.5]
+        x[State.WX : State.ROTOR_SPEED] = rng.normal(size=3) * [0.01, 0.01, 0.005]
+        yield rng.uniform(0.0, 600.0), x
+
+
+def naive_load(t, x, strips, waves, current=None):
+    pose = pose_of(x)
+    rotation = np.array([pose[3:6], pose[6:9], pose[9:12]])
+    profile = None if current is None else lambda z: current_at(z, SITE.water_depth, current)
+    wrench, mass = strip_load(
+        t,
+        x[:3],
+        rotation,
+        x[State.VX : State.WX],
+        x[State.WX : State.ROTOR_SPEED],
+        PLATFORM.hull,
+        strips,
+        waves,
+        profile,
+    )
+    return np.concatenate([wrench[:5], mass])
+
+
+def as_array(load):
+    return np.array([*load.wrench[:5], load.s0, load.s1, load.s2])
+
+
+def compare(waves, strips, cases, current=None):
+    """(fast, naive) arrays (n, 8) over the cases."""
+    lanes = build_lanes(PLATFORM.hull, strips)
+    sea = None if waves is None else build_fast_waves(waves, strips)
+    scratch = fast_scratch(sea, lanes)
+    fast = [as_array(fast_morison_load(t, pose_of(x), lanes, sea, current, scratch)) for t, x in cases]
+    return np.array(fast), np.array([naive_load(t, x, strips, waves, current) for t, x in cases])
+
+
+def spread_error(fast, naive):
+    """rms error of force and moment, over the rms of the force, and of the moment, of the whole set."""
+    error = np.sqrt(np.mean((fast - naive) ** 2, axis=0))
+    size = np.sqrt(np.mean(naive**2, axis=0))
+    force, moment = size[:2].max(), size[3:5].max()
+    return max(error[:2].max() / force, error[2] / size[2], error[3:5].max() / moment)
+
+
+@pytest.mark.parametrize(
+    "sea, tilt, bound",
+    [
+        ("mild", 0.0, 3e-4),
+        ("mild", 5.0, 3e-4),
+        ("mild", 10.0, 4e-4),
+        ("rough", 0.0, 2e-4),
+        ("rough", 5.0, 2e-4),
+        ("rough", 10.0, 3e-4),
+        ("storm", 0.0, 2e-4),
+        ("storm", 5.0, 3e-4),
+        ("storm", 10.0, 3e-4),
+        ("regular", 5.0, 3e-4),
+        ("swell", 5.0, 5e-4),
+    ],
+)
+def test_load_is_close_to_the_plain_sum(sea, tilt, bound):
+    fast, naive = compare(waves_of(sea), strips_for(), list(random_states(60, tilt, seed=1)))
+    assert spread_error(fast, naive) < bound
+
+
+def test_load_stays_bounded_and_similar_at_thirty_degrees():
+    fast, naive = compare(waves_of("storm"), strips_for(), list(random_states(60, 30.0, seed=2)))
+    assert spread_error(fast, naive) < 1e-2
+
+
+def test_load_stays_finite_in_any_attitude():
+    strips, waves = strips_for(), waves_of("storm")
+    lanes, sea = build_lanes(PLATFORM.hull, strips), build_fast_waves(waves, strips)
+    scratch = fast_scratch(sea, lanes)
+    rng = np.random.default_rng(3)
+    for t, x in random_states(200, 0.0, seed=3, drift=300.0):
+        x[State.HEAVE : State.VX] = rng.uniform(-1.0, 1.0, 5) * [200.0, np.pi, np.pi, np.pi, 0.0]
+        load = as_array(fast_morison_load(t, pose_of(x), lanes, sea, None, scratch))
+        assert np.all(np.isfinite(load))
+        assert np.abs(load[:2]).max() < 1e9
+
+
+@pytest.mark.parametrize("drift", [0.0, 100.0])
+def test_error_does_not_grow_with_time_or_drift(drift):
+    cases = [(t + 1e4, x) for t, x in random_states(40, 4.0, seed=4, drift=drift)]
+    fast, naive = compare(waves_of("rough"), strips_for(), cases)
+    assert spread_error(fast, naive) < 2e-4
+
+
+def test_phasors_hold_over_a_hundred_thousand_steps():
+    waves = waves_of("rough")
+    sea = build_fast_waves(waves, strips_for())
+    cosine, sine = np.zeros((2, sea.component.shape[1]))
+    n = waves.omega.size
+    for step in (0, 1, 99_999, 100_000):
+        t, distance = 0.1 * step, 37.0 * np.sin(step)
+        phasors(t, distance, sea.component, cosine, sine)
+        phase = waves.wave_number * distance - waves.omega * t + waves.phase
+        assert np.abs(cosine[:n] - np.cos(phase)).max() < 1e-8
+        assert np.abs(sine[:n] - np.sin(phase)).max() < 1e-8
+
+
+@pytest.mark.parametrize("position", ["instantaneous", "fixed"])
+@pytest.mark.parametrize("surface, stretching", [("instantaneous", "wheeler"), ("swl", "none")])
+def test_switches_agree_with_the_plain_sum(position, surface, stretching):
+    strips, waves = strips_for(position, surface, stretching), waves_of("rough")
+    assert can_be_fast(waves, strips)
+    fast, naive = compare(waves, strips, list(random_states(40, 4.0, seed=5)))
+    assert spread_error(fast, naive) < 3e-4
+
+
+def test_load_agrees_with_morison_load_while_the_surface_stays_on_its_section():
+    strips, waves = strips_for(), waves_of("rough")
+    lanes, sea = build_lanes(PLATFORM.hull, strips), build_fast_waves(waves, strips)
+    scratch, nodes = fast_scratch(sea, lanes), np.zeros((7, strips.nodes))
+    fast, exact = [], []
+    for t, x in random_states(100, 4.0, seed=6):
+        pose = pose_of(x)
+        if axis_surface(t, pose, strips, waves)[0] > strips.section_bottom[0] + 0.1:
+            fast.append(as_array(fast_morison_load(t, pose, lanes, sea, None, scratch)))
+            exact.append(as_array(morison_load(t, pose, strips, waves, None, nodes)))
+    assert len(fast) > 80
+    assert spread_error(np.array(fast), np.array(exact)) < 2e-4
+    assert np.allclose(np.array(fast)[:, 5:], np.array(exact)[:, 5:], rtol=1e-5)
+
+
+def test_surface_below_the_top_section_leaves_the_taper_dry():
+    strips, waves = strips_for(), waves_of("storm")
+    cases = []
+    for t, x in random_states(300, 2.0, seed=7):
+        if axis_surface(t, pose_of(x), strips, waves)[0] <= strips.section_bottom[0]:
+            cases.append((t, x))
+    assert len(cases) > 20
+    fast, naive = compare(waves, strips, cases)
+    assert spread_error(fast, naive) < 3e-4
+    assert np.allclose(fast[:, 5:], naive[:, 5:], rtol=2e-5)
+
+
+@pytest.mark.parametrize("exponent", [0.0, 1.0 / 7.0])
+def test_current_adds_to_the_waves(exponent):
+    current = Current(1.2, -0.7, exponent)
+    fast, naive = compare(waves_of("rough"), strips_for(), list(random_states(30, 4.0, seed=8)), current)
+    assert spread_error(fast, naive) < 1e-3
+    fast, naive = compare(None, strips_for(), list(random_states(30, 4.0, seed=8)), current)
+    assert spread_error(fast, naive) < 2e-3
+
+
+def test_still_water_leaves_drag_and_spin_terms_alone():
+    fast, naive = compare(None, strips_for(), list(random_states(30, 4.0, seed=9)))
+    assert spread_error(fast, naive) < 1e-3
+    assert np.allclose(fast[:, 5:], naive[:, 5:], rtol=1e-5)
+    at_rest = compare(None, strips_for(), [(0.0, np.zeros(N_RIGID))])[0]
+    assert np.all(at_rest[:, :5] == 0.0)
+
+
+def test_no_hull_no_load():
+    load = fast_morison_load(0.0, pose_of(np.zeros(N_RIGID)), None, None, None, None)
+    assert as_array(load).tolist() == [0.0] * 8
+
+
+def test_waves_of_vanishing_height_tend_to_still_water():
+    strips, cases = strips_for(), list(random_states(20, 4.0, seed=10))
+    still = compare(None, strips, cases)[0]
+    small = compare(waves_of("rough", Hs=1e-9), strips, cases)[0]
+    assert np.allclose(small, still, rtol=1e-7, atol=1e-2)
+
+
+def test_ramp_raises_the_waves_from_rest():
+    waves = waves_of("rough", ramp=50.0)
+    states = [x for _, x in random_states(5, 4.0, seed=11)]
+    cases = list(zip([0.0, 10.0, 25.0, 49.0, 51.0], states, strict=True))
+    fast, naive = compare(waves, strips_for(), cases)
+    assert spread_error(fast, naive) < 3e-4
+
+
+def test_same_call_gives_the_same_bits_whatever_came_before():
+    strips, waves = strips_for(), waves_of("rough")
+    lanes, sea = build_lanes(PLATFORM.hull, strips), build_fast_waves(waves, strips)
+    used, fresh = fast_scratch(sea, lanes), fast_scratch(sea, lanes)
+    used.phasor[:], used.field[:], used.lanes[:] = np.nan, np.nan, np.nan
+    for t, x in random_states(20, 4.0, seed=12):
+        one = fast_morison_load(t, pose_of(x), lanes, sea, None, used)
+        assert one == fast_morison_load(t, pose_of(x), lanes, sea, None, fresh)
+
+
+def test_spread_seas_and_nodes_above_the_water_are_left_to_the_exact_path():
+    crossed = {"kind": "components", "omega": [0.5, 0.7], "amplitude": [1.0, 1.0], "phase": [0.0, 1.0]}
+    assert not can_be_fast(waves_of({**crossed, "heading": [0.0, 30.0]}), strips_for())
+    assert can_be_fast(waves_of({**crossed, "heading": [30.0, 30.0]}), strips_for())
+    assert not can_be_fast(waves_of("rough"), strips_for(stretching="none"))
+    assert not can_be_fast(waves_of("rough"), strips_for(surface="swl"))
+
+
+def test_a_new_episode_differs_in_its_phases_alone():
+    strips = strips_for()
+    one, two = (build_fast_waves(waves_of("rough", seed), strips) for seed in (0, 1))
+    assert np.array_equal(one.weight, two.weight) and np.array_equal(one.number, two.number)
+    assert not np.array_equal(one.component[fast_waves.TURN], two.component[fast_waves.TURN])
+
+
+def test_wider_bands_are_more_accurate(monkeypatch):
+    cases = list(random_states(40, 4.0, seed=13))
+    monkeypatch.setattr(fast_waves, "SURFACE_NODES", 8)
+    monkeypatch.setattr(fast_waves, "NODES_AT_LEAST", 6)
+    errors = []
+    for band in (4, 6, 8):
+        monkeypatch.setattr(fast_waves, "BAND", band)
+        errors.append(spread_error(*compare(waves_of("rough"), strips_for(), cases)))
+    assert errors[0] > 3.0 * errors[1] > 6.0 * errors[2]
+
+
+def test_plain_python_gives_the_same_load():
+    code = (
+        "import sys; sys.path[:0] = ['.', 'tests']\n"
+        "import importlib.util as u\n"
+        "s = u.spec_from_file_location('m', sys.argv[1])\n"
+        "m = u.module_from_spec(s); s.loader.exec_module(m)\n"
+        "f, n = m.compare(m.waves_of('rough'), m.strips_for(), list(m.random_states(2, 4.0, seed=14)))\n"
+        "print(*f.ravel().tolist())"
+    )
+    run = subprocess.run(
+        [sys.executable, "-c", code, __file__],
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    plain = np.array([float(v) for v in run.stdout.split()]).reshape(2, 8)
+    fast, _ = compare(waves_of("rough"), strips_for(), list(random_states(2, 4.0, seed=14)))
+    assert np.allclose(plain, fast, rtol=1e-9, atol=1e-3)

@@ -1,0 +1,154 @@
+"""Makes the compact reference series of this folder from the full OpenFAST outputs: make.py SOURCE_FOLDER.
+
+Only the columns that are compared, every 0.1 s, with a header that says how the run was made. The box of
+wind is cut to the region that rotor and tower meet, and rounded (see box()).
+"""
+
+import gzip
+import lzma
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+HERE = Path(__file__).resolve().parent
+MOTIONS = ["surge_m", "sway_m", "heave_m", "roll_deg", "pitch_deg", "yaw_deg"]
+TENSIONS = ["fair_tension1_kN", "fair_tension2_kN", "fair_tension3_kN"]
+ROTOR = ["rotor_speed_rpm", "blade_pitch_deg", "gen_power_elec_kW", "aero_thrust_kN", "aero_torque_kNm"]
+HYDRO = ["hydro_Fx_kN", "hydro_Fz_kN", "hydro_My_kNm"]
+MODEL = (
+    "OpenFAST v5.0.0 (2895884d2b), double precision, rigid strip-theory OC3-Hywind with the NREL 5 MW: zero"
+    " tilt and cone, hub at z = 90 m, six platform motions and generator; loose coupling, ConvTol 1e-6"
+)
+STILL = "still water, rotor parked, no aerodynamics; all other states start at zero"
+WIND = "platform starts at zero; DISCON of OC3-Hywind; no waves"
+SEA = (
+    "platform starts at zero, rotor 12.1 rpm, blade pitch 14.92 deg; DISCON of OC3-Hywind; irregular sea"
+    " Hs 7.5 m Tp 10 s"
+)
+CASES = {  # case -> (columns, settings)
+    **{
+        f"decay_{name}": (MOTIONS, f"dt 0.025 s; free decay from {start}; {STILL}")
+        for name, start in (
+            ("surge", "10 m"),
+            ("sway", "10 m"),
+            ("heave", "3 m"),
+            ("roll", "5 deg"),
+            ("pitch", "5 deg"),
+            ("yaw", "8 deg"),
+        )
+    },
+    "float_steady_8mps": (
+        MOTIONS + ROTOR + TENSIONS,
+        f"dt 0.0125 s; uniform steady 8 m/s; rotor 9.16 rpm, blade pitch 0; {WIND}",
+    ),
+    "float_steady_18mps": (
+        MOTIONS + ROTOR + TENSIONS,
+        f"dt 0.0125 s; uniform steady 18 m/s; rotor 12.1 rpm, blade pitch 14.92 deg; {WIND}",
+    ),
+    "float_windsteps_12_24": (
+        MOTIONS + ROTOR + TENSIONS,
+        "dt 0.025 s; uniform wind, 12 m/s, then +1 m/s every 100 s (0.1 s ramp); rotor 12.1 rpm, blade pitch"
+        f" 3.83 deg; {WIND}",
+    ),
+    "regwave_H3T5": (
+        MOTIONS + TENSIONS + HYDRO,
+        f"dt 0.025 s; regular wave H 3 m T 5 s, crest at t = 0, no ramp; WaveDisp 0; {STILL}",
+    ),
+    "regwave_H3T5_displaced": (
+        MOTIONS + TENSIONS + HYDRO,
+        f"dt 0.025 s; regular wave H 3 m T 5 s, crest at t = 0, no ramp; WaveDisp 1; {STILL}",
+    ),
+    "turb_18mps_Hs7.5_uniform": (
+        ["wave_elev_m", *MOTIONS, *ROTOR, *TENSIONS],
+        f"dt 0.0125 s; hub wind of wind_hub_18mps blown uniformly over rotor and tower; {SEA}",
+    ),
+    "turb_18mps_Hs7.5_box": (
+        ["wave_elev_m", *MOTIONS, *ROTOR, *TENSIONS],
+        f"dt 0.0125 s; full-field TurbSim box; {SEA}",
+    ),
+}
+
+
+def write(path, comment, frame):
+    """Gzipped CSV with comment lines, the same bytes whenever it is made."""
+    text = "".join(f"# {line}\n" for line in comment) + frame.to_csv(index=False)
+    path.write_bytes(gzip.compress(text.encode(), compresslevel=9, mtime=0))
+
+
+def series(source):
+    """The time series of every case."""
+    for case, (columns, settings) in CASES.items():
+        full = pd.read_csv(source / f"{case}.csv.gz", usecols=["time_s", *columns])[["time_s", *columns]]
+        every = round(0.1 / (full["time_s"][1] - full["time_s"][0]))
+        frame = full.iloc[::every].copy()
+        for name in columns:  # a motion that stays below 1e-9 of the others is rounding of the solver
+            if np.abs(frame[name]).max() < 1e-7:
+                frame[name] = 0.0
+        write(HERE / f"{case}.csv.gz", (MODEL, settings), frame)
+
+
+def inputs(source):
+    """The steady curve, the wind and the wave components."""
+    steady = pd.read_csv(source / "steady_operating_points.csv")
+    columns = ["wind_mps", "rotor_speed_rpm", "blade_pitch_deg", "aero_thrust_kN", "aero_torque_kNm"]
+    settings = "platform and tower locked, uniform steady wind, DISCON of OC3-Hywind; means of the last 50 s"
+    write(HERE / "steady.csv.gz", (MODEL, settings), steady[columns])
+    wind = pd.read_csv(source / "wind_hub_18mps.csv.gz")
+    settings = "u at the hub point of the TurbSim box (Kaimal, 18 m/s, class B, seed 180018), shift included"
+    write(HERE / "wind_hub_18mps.csv.gz", (settings,), wind[wind["time_s"] <= 601.0])
+    waves = pd.read_csv(source / "waves_hs7.5_tp10.csv")
+    settings = "JONSWAP Hs 7.5 m Tp 10 s gamma 3.3; eta(0, t) = sum amplitude cos(omega t + phase), to +x"
+    write(HERE / "waves_hs7.5_tp10.csv.gz", (settings,), waves[waves["amplitude_m"] > 0.0])
+
+
+# region of the box: columns within this of the axis, rows up to this height, seconds
+SIDE, TOP, LENGTH = 68.0, 162.0, 612.0
+REACH = 78.0  # m from the hub: beyond it no blade station has a corner of its cell
+STEPS = np.array([0.04, 0.08, 0.08])  # m/s, rounding of u, v, w
+
+
+def box(source):
+    """The region of the TurbSim box that rotor and tower meet, rounded to STEPS, differences in time, lzma.
+
+    Points that neither meets are zero.
+    """
+    from openfast_io.turbsim_file import TurbSimFile
+
+    file = TurbSimFile(str(source / "turbsim_18mps.bts"))
+    y, z = np.asarray(file["y"]), np.asarray(file["z"])
+    dt = float(file["dt"])
+    columns, rows = np.abs(y) < SIDE, z < TOP
+    count = round(LENGTH / dt)
+    velocity = np.transpose(file["u"], (1, 3, 2, 0))[:count][:, rows][:, :, columns]
+    y, z = y[columns], z[rows]
+    used = (np.hypot(y[None, :], z[:, None] - 90.0) < REACH) | (np.abs(y[None, :]) < 8.0)
+    codes = np.round(velocity / STEPS).astype(np.int16) * used[None, :, :, None].astype(np.int16)
+    steps = np.diff(codes, axis=0, prepend=np.zeros_like(codes[:1]))
+    # components and points first: each point's history is then one run of bytes
+    packed = np.ascontiguousarray(np.transpose(steps, (3, 1, 2, 0)))
+    shape = (codes.shape[0], z.size, y.size)
+    planes = packed.view(np.uint8).reshape(-1, 2)
+    payload = np.ascontiguousarray(planes.T).tobytes()
+    filters = [{"id": lzma.FILTER_LZMA2, "preset": 9 | lzma.PRESET_EXTREME, "pb": 0, "dict_size": 1 << 26}]
+    np.savez(
+        HERE / "turbsim_18mps_region.npz",
+        about="TurbSim IEC Kaimal 18 m/s class B, seed 180018, 21 x 21 points over 150 x 170 m, shear 0.14;"
+        " region of rotor and tower, rounded; see make.py",
+        shape=shape,
+        steps=STEPS,
+        y=y,
+        z=z,
+        dt=dt,
+        speed=float(file["uRef"]),
+        shift=75.0 / float(file["uRef"]),
+        codes=np.frombuffer(lzma.compress(payload, format=lzma.FORMAT_XZ, filters=filters), dtype=np.uint8),
+    )
+
+
+if __name__ == "__main__":
+    folder = Path(sys.argv[1])
+    series(folder)
+    inputs(folder)
+    box(folder)

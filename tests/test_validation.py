@@ -1,0 +1,211 @@
+"""The plant against OpenFAST on the same cases: each test asserts the figure that was asked for.
+
+Quick here: one decay, the steady curve, the regular wave; the rest is slow. What is missed is asserted with
+its measured value and its cause, in a test whose name says so.
+"""
+
+import gzip
+
+import numpy as np
+import pytest
+
+from controllers import CONTROLLERS
+from fowt_env.channels import Out
+from fowt_env.description import read_platform, read_turbine
+from fowt_env.errors import InputError
+from fowt_env.loads.rotor import build_blade_elements, lift_drag
+from fowt_env.scene import build_scene
+from fowt_env.state import State
+from fowt_env.steady import trim
+from fowt_env.step import output_row
+from fowt_env.weather.wind_field import read_box
+from training.comparison import decay_decrement, decay_period, harmonics, normalised_rms
+from training.openfast import DECAYS, FOLDER, PLATFORM, RUNS, box_wind, hub_wind, reference, steady_reference
+from training.validate import GROUPS, Study, validate_cases
+from training.validate_report import write_report
+
+TIME = "Time_[s]"
+
+
+def failed(study, *exceptions):
+    """Texts of the rows that miss their figure, apart from the known ones."""
+    rows = [row for row in study.rows if row.verdict == "MISSED"]
+    texts = [f"{row.case}: {row.quantity}: {row.error:.3g} % against {row.allowed:g} %" for row in rows]
+    return [text for text in texts if not any(known in text for known in exceptions)]
+
+
+# --------------------------------------------------------------------------- quick
+
+
+def test_total_mass_and_displacement_are_the_decks():
+    platform, scene = read_platform(PLATFORM), build_scene(PLATFORM)
+    assert scene.model.body.mass == pytest.approx(platform.published["total_mass"], abs=1.0)
+    assert trim(scene)["FAIRTEN1"] == pytest.approx(911.4, rel=2e-3)
+
+
+def test_pitch_decay_is_openfasts_within_02_percent_of_period_and_3_percent_of_decrement_and_rms():
+    channel, _, duration = DECAYS["decay_pitch"]
+    ours, theirs = RUNS["decay_pitch"].frame(), reference("decay_pitch")
+    time, mine, wanted = theirs[TIME].to_numpy(), ours[channel].to_numpy(), theirs[channel].to_numpy()
+    centre = wanted[time > 0.5 * duration].mean()
+    assert decay_period(time, mine, centre) == pytest.approx(decay_period(time, wanted, centre), rel=2e-3)
+    for cycle in (1, 3):
+        decrement = decay_decrement(time, wanted, centre, cycle)
+        assert decay_decrement(time, mine, centre, cycle) == pytest.approx(decrement, rel=0.03)
+    assert normalised_rms(mine, wanted) < 0.03
+
+
+def test_steady_winds_with_locked_platform_are_within_02_and_03_percent():
+    study = Study()
+    GROUPS["steady"][0](study)
+    assert len(study.rows) == 4 * len(steady_reference())
+    assert not failed(study)
+
+
+def test_the_tip_node_of_aerodyn_explains_its_thrust_and_torque_to_3e_5_at_every_wind_speed():
+    """AeroDyn gives nodes at the very hub and tip an axial induction of 1; here the line load is zero there.
+
+    Half of the outermost element (0.025 m of each blade) then carries the section's loads at the angle of
+    attack -(twist + blade pitch) and no wind. Compared at OpenFAST's own rotor speed and blade pitch.
+    """
+    rotor = build_blade_elements(read_turbine(read_platform(PLATFORM).turbine), 1.225)
+    width = 0.5 * (rotor.tip_radius - rotor.radius[-1])
+    plain, explained = [], []
+    for row in steady_reference().to_dict("records"):
+        scene = build_scene(PLATFORM, wind=row["wind_mps"])
+        x = np.zeros(scene.n_state)
+        x[State.ROTOR_SPEED] = np.radians(6.0 * row["rotor_speed_rpm"])
+        x[State.BLADE_PITCH] = np.radians(row["blade_pitch_deg"])
+        loads = output_row(scene.box(), x, np.zeros(2), 0.0, len(scene.channels))[
+            [Out.RTFLDFXH, Out.RTFLDMXH]
+        ]
+        lift, drag, _, _ = lift_drag(-(rotor.twist[-1] + x[State.BLADE_PITCH]), rotor.foil[-1], rotor.polars)
+        pressure = 0.5 * rotor.air_density * (x[State.ROTOR_SPEED] * rotor.tip_radius) ** 2
+        tip = rotor.blades * width * pressure * rotor.chord[-1] * np.array([lift, -drag * rotor.tip_radius])
+        theirs = 1e3 * np.array([row["aero_thrust_kN"], row["aero_torque_kNm"]])
+        plain.append(loads / theirs - 1.0)
+        explained.append((loads + tip) / theirs - 1.0)
+    assert np.abs(plain).max() > 8e-4
+    assert np.abs(explained).max() < 3e-5
+
+
+@pytest.mark.parametrize("case", ["regwave_H3T5", "regwave_H3T5_displaced"])
+def test_first_harmonics_in_a_regular_wave_are_within_1_percent(case):
+    pair = [frame[frame[TIME] >= 400.0 - 1e-6] for frame in (RUNS[case].frame(), reference(case))]
+    omega = 2.0 * np.pi / 5.0
+    for channel in ("PtfmSurge_[m]", "PtfmHeave_[m]", "PtfmPitch_[deg]", "FAIRTEN1_[kN]", "FAIRTEN2_[kN]"):
+        mine, wanted = (
+            harmonics(f[TIME].to_numpy()[:-1], f[channel].to_numpy()[:-1], omega)[0] for f in pair
+        )
+        assert abs(mine - wanted) < 0.01 * abs(wanted)
+
+
+def test_references_carry_their_settings_and_stay_small():
+    size = 0
+    for path in FOLDER.iterdir():
+        size += path.stat().st_size
+        if path.suffix == ".gz":
+            with gzip.open(path, "rt") as file:
+                assert file.readline().startswith("# ")
+    assert size < 8e6
+
+
+def test_the_stored_region_of_the_box_holds_the_recorded_hub_wind():
+    box = read_box(box_wind(), hub_height=90.0, rotor_diameter=126.0)
+    theirs = reference("turb_18mps_Hs7.5_box")
+    assert box.usable >= theirs[TIME].iloc[-1]
+    wind = hub_wind()
+    chosen = wind["time"] <= 600.0
+    hub = box.at(wind["time"][chosen], 0.0, 0.0, 90.0)[:, 0]
+    assert np.abs(hub - wind["speed"][chosen]).max() < 0.03  # rounded to 0.04 m/s
+
+
+def test_unknown_cases_and_missing_references_are_named(tmp_path):
+    with pytest.raises(InputError, match="decays"):
+        validate_cases(["decay"])
+    with pytest.raises(InputError, match="reference"):
+        validate_cases(["decays"], folder=tmp_path)
+    assert "openfast_oc3" in CONTROLLERS
+
+
+def test_the_report_has_every_figure_and_its_plots(tmp_path):
+    pytest.importorskip("matplotlib")
+    study = validate_cases(["decays"])
+    assert not failed(study)
+    paths = write_report(study, tmp_path)
+    text = (tmp_path / "validation.md").read_text()
+    assert text.count("| met |") == len(study.rows) == 24
+    assert all(path.stat().st_size > 0 for path in paths) and len(paths) == 3
+
+
+# --------------------------------------------------------------------------- slow
+
+
+@pytest.fixture(scope="module")
+def floating():
+    return validate_cases(["floating"])
+
+
+@pytest.mark.slow
+def test_floating_steady_winds_from_the_same_start_are_within_3_percent(floating):
+    assert not failed(floating, "float_steady_18mps: PtfmPitch, normalised rms error, t >= 100 s")
+
+
+@pytest.mark.slow
+def test_platform_pitch_at_18_mps_after_100_s_misses_3_percent_by_the_tip_node_and_the_undisplaced_strips(
+    floating,
+):
+    """3.9 %: 0.003 deg of a record whose deviation is 0.08 deg.
+
+    With AeroDyn's tip node (0.1 % of thrust, see the quick test) and strip forces along the undisplaced
+    axis, as HydroDyn has them, the same figure is 0.4 % (docs/validation.md).
+    """
+    (row,) = [
+        r
+        for r in floating.rows
+        if r.case == "float_steady_18mps" and r.quantity.startswith("PtfmPitch") and "100 s" in r.quantity
+    ]
+    assert row.error == pytest.approx(3.88, abs=0.2)
+
+
+@pytest.mark.slow
+def test_regular_wave_second_harmonics_come_from_position_and_surface_as_in_openfast():
+    study = validate_cases(["waves"])
+    assert not failed(study)
+    second = {(r.case, r.quantity.split(",")[0]): r for r in study.rows if r.case.startswith("second")}
+    fixed = second["second harmonic, position fixed, surface swl", "PtfmSurge"]
+    moved = second["second harmonic, position instantaneous, surface swl", "PtfmSurge"]
+    surface = second["second harmonic, position fixed, surface instantaneous", "PtfmSurge"]
+    both = second["second harmonic, position instantaneous, surface instantaneous", "PtfmSurge"]
+    assert fixed.here < 0.05 and fixed.openfast < 0.05
+    assert moved.here == pytest.approx(moved.openfast, rel=0.05)
+    assert both.here == pytest.approx(moved.here + surface.here, rel=0.05)
+
+
+@pytest.mark.slow
+def test_wind_steps_are_within_5_percent_rms_at_every_wind_speed():
+    study = validate_cases(["steps"])
+    assert len(study.rows) == 39
+    assert not failed(study)
+
+
+@pytest.mark.slow
+def test_turbulence_with_irregular_waves_meets_every_figure_in_both_winds():
+    study = validate_cases(["turbulence"])
+    assert len(study.rows) == 2 * 21
+    assert not failed(study)
+
+
+@pytest.mark.slow
+def test_cheaper_choices_cost_what_the_documentation_says():
+    study = validate_cases(["costs"])
+    found = {(row.case, row.quantity): row.error for row in study.rows}
+
+    def error(case, quantity):
+        (value,) = [e for (c, q), e in found.items() if c.startswith(case) and q == quantity]
+        return value
+
+    assert error("tabulated rotor", "RotSpeed, normalised rms error") < 2.0
+    assert error("hub wind blown uniformly", "RotSpeed, standard deviation") > 30.0
+    assert abs(error("rotor-averaged wind with", "RotSpeed, standard deviation")) < 10.0
+    assert abs(error("generator", "u: std of the rotor average over that of a point")) < 10.0

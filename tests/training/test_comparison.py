@@ -1,0 +1,54 @@
+"""Measures of the comparison on signals whose answers are known."""
+
+import numpy as np
+import pytest
+
+from fowt_env.errors import InputError
+from training.comparison import (
+    band_energy,
+    decay_decrement,
+    decay_period,
+    harmonics,
+    normalised_rms,
+)
+
+TIME = np.linspace(0.0, 200.0, 2001)
+
+
+def decay(period, decrement, centre):
+    return centre + 3.0 * np.exp(-decrement * TIME / period) * np.cos(2.0 * np.pi * TIME / period)
+
+
+@pytest.mark.parametrize(("period", "decrement"), [(30.0, 0.3), (8.0, 0.05)])
+def test_period_and_decrement_of_a_damped_cosine_are_found(period, decrement):
+    value = decay(period, decrement, 0.7)
+    assert decay_period(TIME, value, 0.7) == pytest.approx(period, rel=1e-4)
+    for cycle in (2, 3):
+        assert decay_decrement(TIME, value, 0.7, cycle) == pytest.approx(decrement, rel=2e-3)
+
+
+def test_a_record_of_too_few_cycles_is_refused():
+    with pytest.raises(InputError, match="9 are needed"):
+        decay_period(TIME, decay(120.0, 0.1, 0.0), 0.0)
+
+
+def test_harmonics_are_exact_beside_a_slow_transient():
+    time, omega = np.linspace(0.0, 200.0, 2001)[:-1], 2.0 * np.pi / 5.0
+    value = 2.0 * np.cos(omega * time + 0.4) + 0.01 * np.cos(2.0 * omega * time - 1.0)
+    slow = 3.0 * np.exp(-time / 100.0) * np.cos(2.0 * np.pi * time / 124.0) + 7.0
+    found = harmonics(time, value + slow, omega)
+    assert found[0] == pytest.approx(2.0 * np.exp(0.4j), abs=1e-3)
+    assert found[1] == pytest.approx(0.01 * np.exp(-1j), abs=2e-4)
+
+
+def test_band_energy_is_the_variance_of_the_components_inside():
+    value = 2.0 * np.sin(2.0 * np.pi * 0.1 * TIME) + 0.5 * np.sin(2.0 * np.pi * 0.3 * TIME)
+    assert band_energy(TIME, value, 0.08, 0.12) == pytest.approx(2.0, rel=2e-3)
+    assert band_energy(TIME, value, 0.25, 0.35) == pytest.approx(0.125, rel=2e-3)
+    assert band_energy(TIME, value, 0.4, 0.6) < 1e-6
+
+
+def test_normalised_rms_of_a_shifted_copy_is_the_shift_over_the_deviation():
+    value = np.random.default_rng(1).standard_normal(1000)
+    assert normalised_rms(value, value) == 0.0
+    assert normalised_rms(value + 0.3, value) == pytest.approx(0.3 / value.std())

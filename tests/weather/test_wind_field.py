@@ -1,0 +1,175 @@
+"""Full-field wind: sampling of a box, its travel, its edges, its averages, and runs in it."""
+
+import numpy as np
+import pytest
+from scipy.interpolate import RegularGridInterpolator
+
+import fowt_env
+from fowt_env.errors import InputError
+from fowt_env.weather.wind_field import WindBox, field_at, hub_speed, read_box, rotor_average, steady_field
+
+HUB, DIAMETER = 90.0, 126.0
+Y = np.linspace(-75.0, 75.0, 11)
+Z = np.linspace(10.0, 170.0, 9)
+
+
+def box_of(u, **changes):
+    spec = {"kind": "box", "u": u, "y": Y, "z": Z, "dt": 0.5, "speed": 12.0}
+    return read_box(spec | changes, hub_height=HUB, rotor_diameter=DIAMETER)
+
+
+def random_box(**changes):
+    rng = np.random.default_rng(3)
+    u, v, w = rng.standard_normal((3, 40, Z.size, Y.size)) + np.array([12.0, 0.0, 0.0])[:, None, None, None]
+    return box_of(u, v=v, w=w, **changes)
+
+
+def test_sampling_is_trilinear_like_a_plain_interpolator():
+    box = random_box()
+    grid = (np.arange(40) * 0.5, Z, Y)
+    plain = RegularGridInterpolator(grid, box.velocity.astype(float))
+    rng = np.random.default_rng(4)
+    n = 300
+    t, X = rng.uniform(0.0, 10.0, n), rng.uniform(-20.0, 20.0, n)
+    y, z = rng.uniform(-75.0, 75.0, n), rng.uniform(10.0, 170.0, n)
+    wanted = plain(np.column_stack([t + box.shift - X / 12.0, z, y]))
+    assert box.at(t, X, y, z) == pytest.approx(wanted, abs=1e-5)
+
+
+def test_the_box_travels_unchanged_with_its_speed_and_inflowwinds_shift():
+    box = random_box()
+    assert box.shift == pytest.approx(75.0 / 12.0)
+    here, there = box.at(3.0, 0.0, 4.0, 80.0), box.at(3.0 + 6.0 / 12.0, 6.0, 4.0, 80.0)
+    assert there == pytest.approx(here, abs=1e-12)
+
+
+def test_below_the_grid_the_wind_falls_linearly_to_zero_and_beside_it_the_edge_holds():
+    box = random_box()
+    assert box.at(1.0, 0.0, 5.0, 5.0) == pytest.approx(0.5 * box.at(1.0, 0.0, 5.0, 10.0), abs=1e-12)
+    assert box.at(1.0, 0.0, 5.0, -3.0) == pytest.approx(np.zeros((1, 3)))
+    assert box.at(1.0, 0.0, 90.0, 60.0) == pytest.approx(box.at(1.0, 0.0, 75.0, 60.0))
+    assert box.at(1.0, 0.0, 0.0, 190.0) == pytest.approx(box.at(1.0, 0.0, 0.0, 170.0))
+
+
+def test_a_periodic_box_repeats_and_another_holds_its_last_slice():
+    repeating, ending = random_box(periodic=True), random_box()
+    assert repeating.at(23.3, 0.0, 1.0, 90.0) == pytest.approx(repeating.at(3.3, 0.0, 1.0, 90.0), abs=1e-9)
+    assert ending.at(1e4, 0.0, 1.0, 90.0) == pytest.approx(ending.at(19.5 - ending.shift, 0.0, 1.0, 90.0))
+    assert repeating.usable == np.inf
+    assert ending.usable == pytest.approx(19.5 - 2.0 * 75.0 / 12.0)
+
+
+def test_time_that_is_not_a_number_is_answered_without_a_crash():
+    assert np.isfinite(field_at(np.nan, 0.0, 0.0, 90.0, random_box().field())).all()
+
+
+def test_rotor_average_finds_mean_and_gradients_of_a_plane():
+    y, z = np.meshgrid(Y, Z)
+    plane = 12.0 + 0.02 * (z - HUB) - 0.01 * y
+    box = box_of(np.repeat(plane[None], 5, axis=0))
+    time, value = rotor_average(box, HUB, DIAMETER)
+    assert time[0] == pytest.approx(-box.shift)
+    assert value[:, 0] == pytest.approx(12.0, abs=1e-5)
+    assert value[:, 3] == pytest.approx(0.02 * DIAMETER, abs=1e-5)
+    assert value[:, 4] == pytest.approx(-0.01 * DIAMETER, abs=1e-5)
+    assert rotor_average(box, HUB, DIAMETER, "chord", ([1.0, 63.0], [4.0, 1.0]))[1][:, 0] == pytest.approx(
+        12.0, abs=1e-5
+    )
+
+
+def test_steady_field_is_the_mean_over_time_at_every_height():
+    box = random_box()
+    mean = steady_field(box.field())
+    wanted = box.velocity[:, 2, 6, 0].mean()
+    assert field_at(77.0, 0.0, 15.0, 50.0, mean)[0] == pytest.approx(wanted, rel=1e-5)
+    assert hub_speed(box, HUB) == pytest.approx(box.velocity[:, 4, 5, :2].mean(axis=0)[0], rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"y": np.linspace(-50.0, 50.0, 11)}, "must hold the rotor"),
+        ({"u": np.zeros((4, 3, 3))}, "as z and y say"),
+        ({"colour": 1}, "colour"),
+        ({"dt": -1.0}, "dt"),
+        ({"u": np.full((4, 9, 11), np.nan)}, "finite"),
+    ],
+)
+def test_bad_boxes_are_refused_by_name(change, words):
+    spec = {"kind": "box", "u": np.full((4, 9, 11), 12.0), "y": Y, "z": Z, "dt": 0.5, "speed": 12.0}
+    with pytest.raises(InputError, match=words):
+        read_box(spec | change, hub_height=HUB, rotor_diameter=DIAMETER)
+
+
+def test_missing_turbsim_file_is_named():
+    with pytest.raises(InputError, match="nowhere.bts"):
+        read_box({"kind": "bts", "path": "nowhere.bts"}, hub_height=HUB, rotor_diameter=DIAMETER)
+
+
+def test_a_turbsim_file_is_read_slice_by_slice(tmp_path):
+    turbsim = pytest.importorskip("openfast_io.turbsim_file")
+    file = turbsim.TurbSimFile()
+    box = random_box()
+    file["u"] = np.transpose(box.velocity, (3, 0, 2, 1)).astype(float)
+    file["y"], file["z"], file["t"] = Y, Z, 0.5 * np.arange(40)
+    file["zTwr"], file["uTwr"] = np.zeros(0), np.zeros((3, 40, 0))
+    file["zRef"], file["uRef"], file["ID"], file["dt"], file["info"] = 90.0, 12.0, 7, 0.5, "test"
+    path = tmp_path / "small.bts"
+    file.write(str(path))
+    read = read_box({"kind": "bts", "path": path}, hub_height=HUB, rotor_diameter=DIAMETER)
+    assert read.velocity == pytest.approx(box.velocity, abs=2e-4)  # 16-bit integers in the file
+    assert (read.dt, read.speed, read.periodic) == (pytest.approx(0.5), pytest.approx(12.0), False)
+    assert read.shift == pytest.approx(box.shift)
+
+
+@pytest.mark.slow
+def test_a_mann_box_has_the_standards_deviation_and_the_sites_shear():
+    pytest.importorskip("hipersim")
+    spec = {"kind": "mann", "speed": 18.0, "class": "B", "seed": 2, "dt": 0.5}
+    box = read_box(spec, hub_height=HUB, rotor_diameter=DIAMETER, shear_exponent=0.14, duration=600.0)
+    hub = box.at(np.arange(0.0, 600.0, 1.0), 0.0, 0.0, HUB)
+    assert hub[:, 0].std() == pytest.approx(0.14 * (0.75 * 18.0 + 5.6), rel=0.15)
+    mean = box.velocity[..., 0].mean(axis=(0, 2))
+    ratio = np.interp(140.0, box.z, mean) / np.interp(90.0, box.z, mean)
+    assert ratio == pytest.approx((140.0 / 90.0) ** 0.14, rel=0.03)
+    assert isinstance(box, WindBox) and box.periodic
+
+
+def scenes():
+    """A steady uniform wind as a box and as a series, on the same platform."""
+    spec = {"kind": "box", "u": np.full((120, 9, 11), 12.0), "y": Y, "z": Z - 10.0, "dt": 0.5, "speed": 12.0}
+    options = {"shear_exponent": 0.0}
+    return (
+        fowt_env.build_scene("oc3_hywind", wind=spec, **options),
+        fowt_env.build_scene("oc3_hywind", wind=12.0, **options),
+    )
+
+
+def test_a_uniform_box_gives_the_run_and_the_trim_of_the_same_steady_wind():
+    box, steady = scenes()
+    points = [fowt_env.trim(scene, platform="fixed") for scene in (box, steady)]
+    assert points[0]["RtFldFxh"] == pytest.approx(points[1]["RtFldFxh"], rel=1e-9)
+    runs = [fowt_env.simulate(scene, duration=20.0) for scene in (box, steady)]
+    for name in ("PtfmPitch_[deg]", "RotSpeed_[rpm]", "TwrBsMyt_[kN-m]"):
+        assert runs[0][name].to_numpy() == pytest.approx(runs[1][name].to_numpy(), rel=1e-7)
+
+
+def test_a_run_longer_than_its_box_is_refused():
+    box, _ = scenes()
+    with pytest.raises(InputError, match="box of wind covers"):
+        fowt_env.simulate(box, duration=60.0)
+
+
+def test_a_scene_with_a_box_takes_another_box_but_no_series():
+    box, _ = scenes()
+    other = {"kind": "box", "u": np.full((120, 9, 11), 15.0), "y": Y, "z": Z - 10.0, "dt": 0.5, "speed": 15.0}
+    assert box.with_weather(other, None, 1).wind_speed == pytest.approx(15.0)
+    with pytest.raises(InputError, match="full-field"):
+        box.with_weather(15.0, None, 1)
+
+
+def test_the_rotor_table_gets_the_rotor_average_of_a_box():
+    spec = {"kind": "box", "u": np.full((120, 9, 11), 12.0), "y": Y, "z": Z, "dt": 0.5, "speed": 12.0}
+    scene = fowt_env.build_scene("oc3_hywind", wind=spec, rotor="table")
+    assert scene.model.wind_field is None
+    assert scene.model.wind.value[:, 0] == pytest.approx(12.0, abs=1e-5)

@@ -1,0 +1,73 @@
+"""Measures of how far one time series is from another: decays, harmonics, band energies, errors."""
+
+import numpy as np
+
+from fowt_env.errors import InputError
+
+
+def crossings(time, value):
+    """Times (n,) at which a series passes zero, linear between samples."""
+    at = np.flatnonzero((value[:-1] > 0.0) != (value[1:] > 0.0))
+    return time[at] - value[at] * (time[at + 1] - time[at]) / (value[at + 1] - value[at])
+
+
+def extrema(time, value):
+    """Values (n,) of the extrema between successive zero crossings, parabolas through the largest samples."""
+    edges = np.flatnonzero((value[:-1] > 0.0) != (value[1:] > 0.0)) + 1
+    result = []
+    for low, high in zip(np.concatenate(([0], edges[:-1])), edges, strict=True):
+        i = low + int(np.argmax(np.abs(value[low:high])))
+        if 0 < i < len(value) - 1:
+            bend = value[i + 1] - 2.0 * value[i] + value[i - 1]
+            slope = 0.5 * (value[i + 1] - value[i - 1])
+            result.append(value[i] - 0.5 * slope * slope / bend if bend != 0.0 else value[i])
+        else:
+            result.append(value[i])
+    return np.array(result)
+
+
+def decay_period(time, value, centre, cycles=4):
+    """Mean period (s) of the first cycles of a decay, between zero crossings about a centre."""
+    at = crossings(time, value - centre)
+    if len(at) < 2 * cycles + 1:
+        raise InputError(f"decay: {len(at)} zero crossings, {2 * cycles + 1} are needed for {cycles} cycles")
+    return float((at[2 * cycles] - at[0]) / cycles)
+
+
+def decay_decrement(time, value, centre, cycle=1):
+    """Logarithmic decrement of a cycle (1 is the first): peak-to-peak against that of a cycle later."""
+    peaks = extrema(time, value - centre)
+    height = np.abs(np.diff(peaks))
+    return float(np.log(height[2 * cycle - 2] / height[2 * cycle]))
+
+
+def normalised_rms(value, reference):
+    """Rms of the difference over the standard deviation of the reference."""
+    value, reference = np.asarray(value), np.asarray(reference)
+    return float(np.sqrt(np.mean((value - reference) ** 2)) / np.std(reference))
+
+
+def harmonics(time, value, omega, count=2):
+    """Complex amplitudes (count,) of the harmonics of omega (rad/s): value ~ Re(sum c_k exp(i k omega t)).
+
+    Projections under a Hann window, whose sidelobes fall so fast that a slow transient in the record
+    (surge, 124 s) does not leak into the second harmonic. time: whole periods, evenly spaced.
+    """
+    window = np.hanning(len(time) + 1)[:-1]
+    fluctuation = value - np.average(value, weights=window)
+    return np.array(
+        [
+            2.0 * np.sum(window * fluctuation * np.exp(-1j * k * omega * time)) / np.sum(window)
+            for k in range(1, count + 1)
+        ]
+    )
+
+
+def band_energy(time, value, low, high):
+    """Variance of a series between two frequencies (Hz): periodogram with a Hann window, mean removed."""
+    step = (time[-1] - time[0]) / (len(time) - 1)
+    window = np.hanning(len(time))
+    transform = np.fft.rfft((value - np.mean(value)) * window)
+    frequency = np.fft.rfftfreq(len(time), step)
+    density = 2.0 * np.abs(transform) ** 2 / np.sum(window**2) / len(time)
+    return float(density[(frequency >= low) & (frequency < high)].sum())

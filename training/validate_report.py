@@ -1,0 +1,240 @@
+"""What a validation leaves behind: the table (CSV and Markdown) and the overlay plots per case."""
+
+from pathlib import Path
+
+import numpy as np
+
+from fowt_env.outputs import replacing, write_table
+from fowt_env.plots import COLOURS, INK, TIME, spectrum
+from fowt_env.plots import _new_figure as new_figure
+from fowt_env.plots import _save as save_figure
+from fowt_env.plots import _style as style_axes
+from training.openfast import DECAYS
+
+LABELS = {
+    "PtfmSurge_[m]": "surge\n(m)",
+    "PtfmSway_[m]": "sway\n(m)",
+    "PtfmHeave_[m]": "heave\n(m)",
+    "PtfmRoll_[deg]": "roll\n(deg)",
+    "PtfmPitch_[deg]": "platform pitch\n(deg)",
+    "PtfmYaw_[deg]": "yaw\n(deg)",
+    "RotSpeed_[rpm]": "rotor speed\n(rpm)",
+    "BldPitch1_[deg]": "blade pitch\n(deg)",
+    "GenPwr_[kW]": "power\n(kW)",
+    "RtFldFxh_[N]": "thrust\n(N)",
+    "FAIRTEN1_[kN]": "tension 1\n(kN)",
+    "FAIRTEN2_[kN]": "tension 2\n(kN)",
+    "Wave1Elev_[m]": "wave\n(m)",
+}
+OPERATING = (
+    "PtfmSurge_[m]", "PtfmHeave_[m]", "PtfmPitch_[deg]", "RotSpeed_[rpm]", "BldPitch1_[deg]", "FAIRTEN1_[kN]",
+)  # fmt: skip
+WAVE = ("PtfmSurge_[m]", "PtfmHeave_[m]", "PtfmPitch_[deg]", "FAIRTEN1_[kN]")
+PLOTS = {  # case -> (channels, seconds shown); spectra of the same channels where asked for
+    "float_steady_8mps": (OPERATING, (0.0, 600.0), False),
+    "float_steady_18mps": (OPERATING, (0.0, 600.0), False),
+    "float_windsteps_12_24": (OPERATING, (0.0, 1300.0), False),
+    "regwave_H3T5": (WAVE, (560.0, 600.0), True),
+    "regwave_H3T5_displaced": (WAVE, (560.0, 600.0), True),
+    "turb_18mps_Hs7.5_uniform": (OPERATING, (100.0, 400.0), True),
+    "turb_18mps_Hs7.5_box": (OPERATING, (100.0, 400.0), True),
+}
+HERE, THERE = "fowt_env", "OpenFAST"
+COST_PLOTS = {  # file -> (title, {legend: run})
+    "costs_rotor": (
+        "rotor models, 18 m/s uniform turbulence and Hs 7.5 m",
+        {
+            "BEM": "uniform wind, no skewed wake",
+            "table": "uniform wind, rotor table",
+            "BEM, skewed wake, dynamic inflow": "uniform wind, dynamic inflow",
+        },
+    ),
+    "costs_wind": (
+        "wind over the rotor, 18 m/s turbulence and Hs 7.5 m",
+        {
+            "full field": "full-field wind",
+            "rotor-averaged": "rotor-averaged wind",
+            "hub wind blown uniformly": "uniform wind",
+        },
+    ),
+    "costs_waves": (
+        "wave kinematics, 18 m/s uniform turbulence and Hs 7.5 m",
+        {
+            "instantaneous, Wheeler": "uniform wind, instantaneous wave kinematics",
+            "fixed, still water": "uniform wind",
+        },
+    ),
+}
+
+
+def _overlay(frames, channels, window, path, title):
+    """Stacked time series of {legend: frame} over each other."""
+    figure = new_figure(9.0, 0.8 + 1.2 * len(channels))
+    rows = figure.subplots(len(channels), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, channel in zip(rows, channels, strict=True):
+        style_axes(axes)
+        for number, (legend, frame) in enumerate(frames.items()):
+            part = frame[(frame[TIME] >= window[0]) & (frame[TIME] <= window[1])]
+            line = "-" if number == 0 else ("--", ":", "-.")[(number - 1) % 3]
+            axes.plot(part[TIME], part[channel], line, color=COLOURS[number], linewidth=1.0, label=legend)
+        axes.set_ylabel(LABELS[channel], fontsize=8, color=INK)
+        axes.margins(x=0.0)
+    rows[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(frames), fontsize=8, frameon=False)
+    rows[-1].set_xlabel("time (s)", fontsize=9, color=INK)
+    figure.align_ylabels(rows)
+    figure.suptitle(title, fontsize=10, color=INK, x=0.01, ha="left")
+    return save_figure(figure, path)
+
+
+def _spectra(frames, channels, path, title, start=100.0, highest=0.7):
+    """Power spectra of {legend: frame} over each other, on logarithmic axes."""
+    figure = new_figure(9.0, 0.8 + 1.5 * len(channels))
+    rows = figure.subplots(len(channels), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, channel in zip(rows, channels, strict=True):
+        style_axes(axes)
+        top = 0.0
+        for number, (legend, frame) in enumerate(frames.items()):
+            part = frame[frame[TIME] >= start]
+            frequency, density = spectrum(part[TIME], part[channel])
+            line = "-" if number == 0 else ("--", ":", "-.")[(number - 1) % 3]
+            axes.loglog(frequency[1:], density[1:], line, color=COLOURS[number], linewidth=1.0, label=legend)
+            top = max(top, density[1:].max())
+        axes.set_ylim(1e-8 * top, 4.0 * top)
+        axes.set_ylabel(LABELS[channel].replace(")", "²/Hz)"), fontsize=8, color=INK)
+    rows[0].set_xlim(0.004, highest)
+    rows[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(frames), fontsize=8, frameon=False)
+    rows[-1].set_xlabel("frequency (Hz)", fontsize=9, color=INK)
+    figure.align_ylabels(rows)
+    figure.suptitle(title, fontsize=10, color=INK, x=0.01, ha="left")
+    return save_figure(figure, path)
+
+
+def _decays(study, path):
+    """The six decays, each in its own motion."""
+    cases = [case for case in DECAYS if case in study.runs]
+    figure = new_figure(9.0, 1.4 * len(cases) + 0.8)
+    rows = figure.subplots(len(cases), 1, squeeze=False)[:, 0]
+    for axes, case in zip(rows, cases, strict=True):
+        style_axes(axes)
+        channel = DECAYS[case][0]
+        for number, (legend, frame) in enumerate(zip((THERE, HERE), reversed(study.runs[case]), strict=True)):
+            line = ("-", "--")[number]
+            axes.plot(frame[TIME], frame[channel], line, color=COLOURS[number], linewidth=1.0, label=legend)
+        axes.set_ylabel(LABELS[channel], fontsize=8, color=INK)
+        axes.margins(x=0.0)
+    rows[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, fontsize=8, frameon=False)
+    rows[-1].set_xlabel("time (s)", fontsize=9, color=INK)
+    figure.align_ylabels(rows)
+    figure.suptitle("free decays", fontsize=10, color=INK, x=0.01, ha="left")
+    return save_figure(figure, path)
+
+
+def _steady(study, path):
+    """Errors of the steady curve over wind speed."""
+    rows = [row for row in study.rows if row.case.startswith("steady_")]
+    figure = new_figure(9.0, 3.2)
+    axes = figure.subplots()
+    style_axes(axes)
+    for number, quantity in enumerate(dict.fromkeys(row.quantity for row in rows)):
+        chosen = [row for row in rows if row.quantity == quantity]
+        wind = [float(row.case.removeprefix("steady_").removesuffix("mps")) for row in chosen]
+        error = [row.error for row in chosen]
+        axes.plot(wind, error, "o-", color=COLOURS[number], markersize=4, label=quantity)
+    axes.set_xlabel("wind (m/s)", fontsize=9, color=INK)
+    axes.set_ylabel("difference to OpenFAST (%)", fontsize=9, color=INK)
+    axes.legend(fontsize=8, frameon=False)
+    return save_figure(figure, path)
+
+
+def _generator(study, path):
+    """Spectra of the wind at a point and averaged over the rotor: box and generator."""
+    box, made = study.runs["spectra of the wind"]
+    figure = new_figure(9.0, 3.6)
+    axes = figure.subplots()
+    style_axes(axes)
+    lines = (
+        (box, "point", "TurbSim box, mean over the points of the disk", 0, "-"),
+        (made, "point", "generator, a point", 1, "--"),
+        (box, "rotor", "TurbSim box, rotor average", 2, "-"),
+        (made, "rotor", "generator, rotor average", 3, "--"),
+    )
+    for frame, name, legend, colour, line in lines:
+        frequency, density = _smooth(frame["frequency"].to_numpy(), frame[name].to_numpy())
+        axes.loglog(frequency, density, line, color=COLOURS[colour], linewidth=1.2, label=legend)
+    axes.set_xlim(0.002, 2.0)
+    axes.set_xlabel("frequency (Hz)", fontsize=9, color=INK)
+    axes.set_ylabel("spectrum of u (m²/s²/Hz)", fontsize=9, color=INK)
+    axes.legend(fontsize=8, frameon=False)
+    return save_figure(figure, path)
+
+
+def _smooth(frequency, density, per_decade=12):
+    """Means over bins of equal width in the logarithm of the frequency."""
+    edges = np.logspace(-3, 1, 4 * per_decade + 1)
+    which = np.digitize(frequency, edges)
+    bins = [which == k for k in range(1, len(edges)) if (which == k).any()]
+    return np.array([frequency[b].mean() for b in bins]), np.array([density[b].mean() for b in bins])
+
+
+def write_plots(study, folder):
+    """Paths of the plots of whatever the study has run."""
+    folder = Path(folder)
+    paths = []
+
+    def path(name):
+        paths.append(folder / f"{name}.png")
+        return paths[-1]
+
+    if any(case in DECAYS for case in study.runs):
+        _decays(study, path("decays"))
+    if any(row.case.startswith("steady_") for row in study.rows):
+        _steady(study, path("steady"))
+    for case, (channels, window, spectra) in PLOTS.items():
+        if case in study.runs:
+            ours, theirs = study.runs[case]
+            frames = {THERE: theirs, HERE: ours}
+            _overlay(frames, channels, window, path(case), case)
+            if spectra:
+                start = 400.0 if case.startswith("regwave") else 100.0
+                _spectra(frames, channels, path(f"{case}_spectra"), case, start)
+    if "spectra of the wind" in study.runs:
+        channels = ("PtfmPitch_[deg]", "PtfmSurge_[m]", "RotSpeed_[rpm]")
+        for name, (title, runs) in COST_PLOTS.items():
+            frames = {legend: study.runs[run][0] for legend, run in runs.items()}
+            _overlay(frames, channels, (100.0, 300.0), path(name), title)
+            _spectra(frames, channels, path(f"{name}_spectra"), title)
+        _generator(study, path("costs_generator"))
+    return paths
+
+
+def _number(value):
+    """A figure as text; empty where there is none."""
+    return "" if not np.isfinite(value) else f"{value:.5g}"
+
+
+def markdown(study):
+    """Markdown of the tables, one per case."""
+    lines = []
+    for case in dict.fromkeys(row.case for row in study.rows):
+        rows = [row for row in study.rows if row.case == case]
+        against = "OpenFAST" if "against" not in case else "reference"
+        lines += [f"### {case}", "", f"| figure | unit | {against} | here | error % | allowed % | verdict |"]
+        lines.append("|---|---|---|---|---|---|---|")
+        for row in rows:
+            quantity = f"{row.quantity} ({row.note})" if row.note else row.quantity
+            error = "" if not np.isfinite(row.error) else f"{row.error:.3g}"
+            allowed = "" if not np.isfinite(row.allowed) else f"{row.allowed:g}"
+            values = (_number(row.openfast), _number(row.here), error, allowed, row.verdict)
+            lines.append("| " + " | ".join((quantity, row.unit, *values)) + " |")
+        lines.append("")
+    return "\n".join(lines)
+
+
+def write_report(study, folder, plots=True):
+    """Paths written: validation.csv, validation.md and, with plots, one or two images per case."""
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = [write_table(study.table(), folder / "validation.csv"), folder / "validation.md"]
+    with replacing(paths[1]) as temporary:
+        temporary.write_text(markdown(study) + "\n", encoding="utf-8")
+    return paths + (write_plots(study, folder) if plots else [])
