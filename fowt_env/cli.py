@@ -114,6 +114,9 @@ PlatformOption = Annotated[str, typer.Option(help="Platform: a built-in name or 
 OptionOption = Annotated[
     list[str] | None, typer.Option("--option", metavar="KEY=VALUE", help="Scene option; repeatable.")
 ]
+RotorOption = Annotated[
+    str | None, typer.Option(help="Rotor model: bem, lookup or table; default: that of the fidelity.")
+]
 SIMULATE_EXAMPLES = """[bold]Examples[/bold]
 
 [cyan]fowt simulate --wind 18 --sea paper_wind_wave --plot run.png[/cyan]  steady wind, irregular sea
@@ -140,11 +143,17 @@ def simulate(
     ] = "none",
     controller: Annotated[str, typer.Option(help="Name, module:Name of yours, or none (rotor held).")] = "pi",
     duration: Annotated[float, typer.Option(help="Length of the run, s.")] = 600.0,
-    dt: Annotated[float, typer.Option(help="Physics step, s.")] = 0.05,
+    dt: Annotated[float | None, typer.Option(help="Physics step, s; default: that of the fidelity.")] = None,
     control_dt: Annotated[float, typer.Option(help="Control period, s; a multiple of dt.")] = 0.1,
     output_dt: Annotated[float, typer.Option(help="Output period, s; a multiple of dt.")] = 0.1,
     seed: Annotated[int, typer.Option(help="Seed of wind and waves.")] = 0,
-    rotor: Annotated[str, typer.Option(help="Rotor model: bem, or table (faster).")] = "bem",
+    fidelity: Annotated[
+        str,
+        typer.Option(
+            help="reference, standard (100 times faster, within 0.1 %), or fast (rotor as a table)."
+        ),
+    ] = "reference",
+    rotor: RotorOption = None,
     start: Annotated[str, typer.Option(help="trim (steady state of the mean wind) or zero.")] = "trim",
     initial: Annotated[
         list[str] | None, typer.Option(metavar="CHANNEL=VALUE", help="Start value, OpenFAST units; repeats.")
@@ -160,7 +169,13 @@ def simulate(
         table_path(out_path)  # a wrong ending should not cost a run
     options = {"duration": max(700.0, duration), **parse_pairs(option, "option")}
     scene = fowt_env.build_scene(
-        platform, wind=parse_wind(wind), sea=parse_sea(sea), seed=seed, rotor=rotor, **options
+        platform,
+        wind=parse_wind(wind),
+        sea=parse_sea(sea),
+        seed=seed,
+        rotor=rotor,
+        fidelity=fidelity,
+        **options,
     )
     title = f"{platform} · wind {wind} · sea {sea} · controller {controller} · seed {seed}"
     with progress_bar("simulating", 1.0) as update:
@@ -335,7 +350,7 @@ def trim(
     platform: PlatformOption = "oc3_hywind",
     winds: Annotated[str, typer.Option(help="Steady winds, m/s: 8,11.4,18 or START:STOP:STEP.")] = "4:24:1",
     fixed: Annotated[bool, typer.Option("--fixed", help="Hold the platform still.")] = False,
-    rotor: Annotated[str, typer.Option(help="Rotor model: bem, or table.")] = "bem",
+    rotor: RotorOption = None,
     option: OptionOption = None,
     out_path: Annotated[str | None, typer.Option("--out", help="All channels: .csv or .parquet.")] = None,
 ):

@@ -351,7 +351,7 @@ def test_a_wrong_polar_is_refused(tmp_path, content, parts):
 
 def test_a_misspelt_name_suggests_the_nearest():
     assert "Did you mean 'oc3_hywind'" in message(read_platform, "oc3_hywnd")
-    assert "Did you mean 'nrel5mw'?" in message(read_turbine, "NREL5MW")
+    assert "Did you mean 'nrel5mw'" in message(read_turbine, "NREL5MW")
     assert "Did you mean 'oc3_5_2'" in message(read_sea_state, "oc3_5.2")
     assert "Did you mean 'north_sea'" in message(lambda table: joint_sea_state(table, 9.0), "north_see")
     assert "Did you mean 'platforms'?" in message(names, "platform")

@@ -115,7 +115,7 @@ def platform_motion_term(platform_pitch, rate, steady_pitch):
 @kernel
 def travel_term(before, after, way):
     """Minus the share of the possible travel that was used in one control period."""
-    return -clipped(abs(after - before) / way, 0.0, 1.0)
+    return 0.0 - clipped(abs(after - before) / way, 0.0, 1.0)
 
 
 @kernel

@@ -277,17 +277,19 @@ def assert_same_bits(rows, table):
     assert np.array_equal(rows[-1], table.to_numpy()[-1])  # at the end no new command was given
 
 
-@pytest.mark.parametrize("rotor", ["table", "bem"])
-@pytest.mark.parametrize("speed", [8.0, 18.0])
-def test_stepping_with_the_pi_s_commands_is_simulate_bit_for_bit(rotor, speed):
+@pytest.mark.parametrize(
+    ("settings", "speed"),
+    [({"rotor": "bem"}, 8.0), ({"rotor": "table"}, 18.0), ({"rotor": None, "fidelity": "fast"}, 18.0)],
+)
+def test_stepping_with_the_pi_s_commands_is_simulate_bit_for_bit(settings, speed):
     wind = NTM | {"speed": speed}
-    env = quick(rotor=rotor, duration=10.0)
+    env = quick(**settings, duration=10.0)
     env.reset(seed=1, options=FIXED | {"wind": wind})
     pi = make("pi", env.scene.turbine, 0.1)
     pi.reset(env.measurement())
     rows = channel_rows(env, lambda: env.step_physical(*pi.act(env.measurement())))
     scene = fowt_env.build_scene(
-        "oc3_hywind", wind=wind, sea=SEA, seed=7, rotor=rotor, duration=600.0, wave_components=20
+        "oc3_hywind", wind=wind, sea=SEA, seed=7, duration=600.0, wave_components=20, **settings
     )
     assert_same_bits(rows, fowt_env.simulate(scene, "pi", duration=10.0))
 
