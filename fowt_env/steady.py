@@ -68,9 +68,12 @@ def calm(scene, wind_speed=None):
     parts = {}
     model = scene.model
     if model.waves is not None:
-        parts["waves"] = model.waves._replace(
-            amplitude=np.zeros_like(model.waves.amplitude), velocity=np.zeros_like(model.waves.velocity)
-        )
+        # one component of no height stands for flat water: summing them all would only take longer
+        waves = model.waves
+        one = {
+            name: getattr(waves, name)[:1].copy() for name in waves._fields if np.ndim(getattr(waves, name))
+        }
+        parts["waves"] = waves._replace(**one | {"amplitude": np.zeros(1), "velocity": np.zeros(1)})
     if model.sea is not None:
         parts["sea"] = model.sea._replace(weight=np.zeros_like(model.sea.weight))
     if model.wind is not None:

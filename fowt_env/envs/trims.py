@@ -5,8 +5,6 @@ import pickle
 from dataclasses import replace
 from math import floor
 
-import numpy as np
-
 from fowt_env.steady import trim
 
 GRID = 0.25  # m/s between exact trims; between them the state is linear in the wind speed
@@ -20,19 +18,6 @@ def plant_key(scene):
     return hashlib.sha256(pickle.dumps((scene.platform, scene.turbine, scene.rotor, options))).hexdigest()
 
 
-def _one_wave(scene):
-    """The scene with a single wave component: a trim is in flat water, and would sum zeros over all."""
-    waves = scene.model.waves
-    if waves is None:
-        return scene
-    parts = {
-        name: np.ascontiguousarray(value[:1])
-        for name, value in waves._asdict().items()
-        if isinstance(value, np.ndarray)
-    }
-    return scene.with_model(waves=waves._replace(**parts))
-
-
 def exact_trim(scene, key, speed):
     """(state, command) of trim() at a mean wind speed (m/s); computed once per process.
 
@@ -40,11 +25,11 @@ def exact_trim(scene, key, speed):
     trim is not remembered.
     """
     if scene.model.wind_field is not None:
-        point = trim(_one_wave(scene))
+        point = trim(scene)
         return point.state, point.command
     entry = (key, scene.model.wind.shear_exponent, float(speed))
     if entry not in _KNOWN:
-        point = trim(replace(_one_wave(scene), wind_speed=float(speed)))
+        point = trim(replace(scene, wind_speed=float(speed)))
         _KNOWN[entry] = (point.state, point.command)
     return _KNOWN[entry]
 
