@@ -62,7 +62,8 @@ class FowtEnv(gymnasium.Env):
     wind, sea    in place of the task's, ranges included (None: the task's)
     wind_preview look-ahead times (s) of the channel wind_preview
     render_mode  None
-    options      further ones go to build_scene, such as fidelity="standard"
+    fidelity     level of build_scene: "reference", "standard" or "fast"
+    options      further ones go to build_scene
 
     An episode starts at the operating point of its mean wind, moved by the task's offsets, in wind and
     sea drawn from the task's ranges with the environment's seed: the same seed gives the same bits.
@@ -101,6 +102,7 @@ class FowtEnv(gymnasium.Env):
         sea=None,
         wind_preview=None,
         render_mode=None,
+        fidelity="standard",
         **options,
     ):
         if render_mode is not None:
@@ -120,6 +122,7 @@ class FowtEnv(gymnasium.Env):
             sea=episode.sea,
             rotor=task.rotor,
             duration=max(task.duration, SHORTEST_WEATHER),
+            fidelity=fidelity,
             **options,
         )
         check_duration(self.scene, task.duration)

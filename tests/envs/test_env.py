@@ -279,7 +279,12 @@ def assert_same_bits(rows, table):
 
 @pytest.mark.parametrize(
     ("settings", "speed"),
-    [({"rotor": "bem"}, 8.0), ({"rotor": "table"}, 18.0), ({"rotor": None, "fidelity": "fast"}, 18.0)],
+    [
+        ({"rotor": "bem", "fidelity": "reference"}, 8.0),
+        ({"rotor": "table", "fidelity": "reference"}, 18.0),
+        ({"rotor": None, "fidelity": "standard"}, 18.0),
+        ({"rotor": None, "fidelity": "fast"}, 18.0),
+    ],
 )
 def test_stepping_with_the_pi_s_commands_is_simulate_bit_for_bit(settings, speed):
     wind = NTM | {"speed": speed}

@@ -1,0 +1,94 @@
+"""Building scenes: what is refused, what a level of fidelity means, and what it costs in accuracy."""
+
+import numpy as np
+import pytest
+
+from fowt_env import build_scene, simulate
+from fowt_env.errors import InputError
+from fowt_env.step import run
+
+NTM = {"kind": "ntm", "speed": 18.0, "class": "B"}
+SEA = {"kind": "jonswap", "Hs": 7.5, "Tp": 10.0, "gamma": 3.3}
+SPREAD = {"kind": "components", "omega": [0.6, 0.9], "amplitude": [1.0, 0.5], "phase": [0.0, 1.0]}
+MOTIONS = ["PtfmSurge", "PtfmSway", "PtfmHeave", "PtfmRoll", "PtfmPitch", "PtfmYaw"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"sea": {"kind": "regular", "H": 400.0, "T": 12.0}}, ["400", "water depth", "320"]),
+        ({"sea": {"kind": "jonswap", "Hs": 330.0, "Tp": 20.0}}, ["330", "water depth"]),
+        ({"platform": "oc3_hywnd"}, ["oc3_hywnd", "Did you mean 'oc3_hywind'"]),
+        ({"rotor": "ben"}, ["ben", "Did you mean 'bem'"]),
+        ({"fidelity": "standart"}, ["standart", "Did you mean 'standard'"]),
+        ({"surfaces": "swl"}, ["surfaces", "Did you mean 'surface'"]),
+        ({"surface": "sea"}, ["surface = 'sea'", "instantaneous", "swl"]),
+        ({"seed": -1}, ["seed = -1", ">= 0"]),
+        ({"seed": 1.5}, ["seed = 1.5"]),
+        ({"duration": 0.0}, ["duration = 0.0"]),
+        ({"duration": float("nan")}, ["duration = nan"]),
+        ({"shear_exponent": 2.0}, ["shear_exponent = 2.0", "[0, 1]"]),
+        ({"wave_components": 0}, ["wave_components = 0", "1 to 10000"]),
+        ({"current": {"sped": 1.0}}, ["sped", "Did you mean 'speed'"]),
+        ({"current": -1.0}, ["current.speed = -1.0"]),
+        ({"wind": 8.0, "rotor": "lookup", "skewed_wake": True}, ["lookup", "skewed_wake", "bem"]),
+        ({"wind": 8.0, "rotor": "table", "dynamic_inflow": True}, ["table", "dynamic_inflow", "bem"]),
+        ({"sea": SPREAD | {"heading": [0.0, 30.0]}, "wave_loads": "fast"}, ["wave_loads", "one heading"]),
+        ({"sea": SEA, "wave_loads": "fast", "stretching": "none"}, ["wave_loads", "exact"]),
+    ],
+)
+def test_what_cannot_be_built_is_refused_by_name_value_and_range(arguments, words):
+    with pytest.raises(InputError) as error:
+        build_scene(**arguments)
+    for word in words:
+        assert word in str(error.value)
+
+
+def test_a_level_falls_back_to_what_the_scene_needs():
+    spread = build_scene(sea=SPREAD | {"heading": [0.0, 30.0]}, fidelity="standard")
+    assert spread.model.sea is None and spread.model.lanes is None
+    skewed = build_scene(wind=8.0, fidelity="standard", skewed_wake=True)
+    assert skewed.rotor == "bem" and skewed.model.rotor_lookup is None
+
+
+def test_an_explicit_part_overrides_its_level():
+    scene = build_scene(wind=8.0, sea=SEA, fidelity="standard", rotor="bem", integrator="rk4")
+    assert scene.model.rotor is not None and scene.model.multistep is None
+    assert scene.model.sea is not None
+    assert scene.dt == 0.05
+
+
+def test_new_weather_cannot_add_or_remove_aerodynamics():
+    scene = build_scene(wind=8.0)
+    with pytest.raises(InputError, match="aerodynamics"):
+        scene.with_weather(None, None, 1)
+
+
+def test_new_weather_is_that_of_a_scene_built_with_it():
+    moved = build_scene(wind=NTM, sea=SEA, seed=1).with_weather(NTM | {"speed": 14.0}, SEA, 5)
+    built = build_scene(wind=NTM | {"speed": 14.0}, sea=SEA, seed=5)
+    assert np.array_equal(moved.model.wind.value, built.model.wind.value)
+    assert np.array_equal(moved.model.waves.phase, built.model.waves.phase)
+    assert moved.wind_speed == built.wind_speed == 14.0
+
+
+def test_standard_stays_within_a_thousandth_of_reference():
+    """Root-mean-square difference over the standard deviation; 60 components keep the exact run short."""
+    frames = []
+    for fidelity in ("reference", "standard"):
+        scene = build_scene(wind=NTM, sea=SEA, seed=2, wave_components=60, fidelity=fidelity)
+        frames.append(simulate(scene, "pi", duration=200.0))
+    exact, quick = frames
+    for name in (*MOTIONS, "RotSpeed", "FAIRTEN1"):
+        column = next(c for c in exact.columns if c.startswith(f"{name}_["))
+        error = np.sqrt(np.mean((quick[column] - exact[column]) ** 2)) / exact[column].std()
+        assert error < 1e-3, (name, error)
+
+
+def test_scenes_of_one_kind_share_one_compiled_run():
+    kinds = len(run.signatures)
+    for seed, components in ((1, 30), (2, 40)):
+        scene = build_scene(wind=NTM, sea=SEA, seed=seed, wave_components=components, fidelity="standard")
+        simulate(scene, "pi", duration=1.0)
+        simulate(scene, "pi_land", duration=1.0)
+    assert len(run.signatures) <= kinds + 1
