@@ -10,6 +10,7 @@ import sys
 from importlib.machinery import PathFinder
 
 ENVIRONMENTS = {"fowt_env/OC3Hywind-v0": "fowt_env.envs:FowtEnv"}
+VECTOR_ENTRY_POINT = "fowt_env.envs:FowtVectorEnv"  # of each of them
 
 
 def register_envs():
@@ -18,7 +19,7 @@ def register_envs():
 
     for name, entry_point in ENVIRONMENTS.items():
         if name not in registry:
-            register(id=name, entry_point=entry_point)
+            register(id=name, entry_point=entry_point, vector_entry_point=VECTOR_ENTRY_POINT)
 
 
 class _GymnasiumWatch:

@@ -77,7 +77,7 @@ def platform_pitch_damping(winds, gain_sets, platform="oc3_hywind", **options):
         model = linearize(scene, trim(scene))
         for name, changes in gain_sets.items():
             a, names = closed_loop_matrix(model, PISettings.published(scene.turbine, **changes))
-            pitching = [m for m in modes(a, names, model.cm_height) if m.name == "platform_pitch"]
+            pitching = [m for m in modes(a, names, model.cm_height, model.arm) if m.name == "platform_pitch"]
             # the rotor loop may come near; the platform's own period tells them apart
             table[name].append(min(pitching, key=lambda m: abs(m.period - PLATFORM_PERIOD)).damping_ratio)
     return table

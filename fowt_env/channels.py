@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fowt_env.dynamics import inertial_load
-from fowt_env.jit import fast_kernel, kernel
+from fowt_env.jit import kernel
 from fowt_env.loads.fast_waves import phasors
 from fowt_env.measurement import Measure
 from fowt_env.state import State, pose_of
@@ -129,7 +129,7 @@ def to_inertial(pose, a, b, c):
     )
 
 
-@fast_kernel
+@kernel
 def _component_sum(amplitude, cosine):
     """Sum of amplitude (n,) times cosine, whose padding beyond n is left out."""
     total = 0.0

@@ -1,4 +1,4 @@
-"""The `fowt` command: simulate, evaluate, trim and list. Thin: it parses, calls the library and prints."""
+"""The `fowt` command: simulate, evaluate, trim, list, validate, paper. Thin: it parses, calls, prints."""
 
 import functools
 from contextlib import contextmanager
@@ -461,3 +461,137 @@ def validate(
             text = f"{row.case}: {row.quantity}: {row.error:.3g} %, allowed {row.allowed:g} %"
             out.print(f"[red]missed[/red]  {escape(text)}", highlight=False, soft_wrap=True)
     note("wrote " + ", ".join(str(path) for path in write_report(study, out_folder, plot)))
+
+
+PAPER_EXAMPLES = """[bold]Examples[/bold]
+
+[cyan]fowt paper LC5[/cyan]  one load case of the 1:50 model
+
+[cyan]fowt paper all[/cyan]  LC1 to LC12 with the paper's claims checked
+
+[cyan]fowt paper full_scale[/cyan]  decays, regular wave, wind and waves at full scale
+
+[bold]Files written[/bold]: runs/CASE.parquet, statistics.csv, paper.md (claims and tables), and plots."""
+
+
+@app.command(epilog=PAPER_EXAMPLES)
+@reported
+def paper(
+    case: Annotated[str, typer.Argument(help="LC1 to LC12 by commas, all (of them), or full_scale.")] = "all",
+    out_folder: Annotated[str, typer.Option("--out", help="Folder for what is written.")] = "results/paper",
+    plot: Annotated[bool, typer.Option("--plot/--no-plot", help="Make the plots.")] = True,
+):
+    """Run the paper's load cases and check its claims."""
+    from training.paper import run_paper, statistics, wanted_cases
+    from training.paper_report import write_report
+
+    names = wanted_cases(case)
+    with progress_bar("paper", None) as update:
+        study = run_paper(names, lambda text, done, total: update(done, f"paper: {text}", total))
+    if study.runs:
+        values = statistics(study.runs)
+        table = Table(title="model scale", title_justify="left")
+        for heading in ("case", "channel", "mean", "std", "min", "max"):
+            table.add_column(heading, justify="left" if heading in ("case", "channel") else "right")
+        for row in values[values["channel"].isin(("PtfmSurge_[m]", "PtfmPitch_[deg]"))].to_dict("records"):
+            figures = (f"{row[name]:.4g}" for name in ("mean", "std", "min", "max"))
+            table.add_row(row["case"], escape(row["channel"].replace("_", " ")), *figures)
+        out.print(table)
+    for claim in study.claims:
+        verdict = "[green]holds[/green]" if claim.holds else "[red]FAILS[/red]"
+        text = f"Fig. {claim.figure}: {claim.text}: {claim.found}"
+        out.print(f"{verdict}  {escape(text)}", highlight=False, soft_wrap=True)
+    note("wrote " + ", ".join(str(path) for path in write_report(study, out_folder, plot)))
+
+
+benchmarks = typer.Typer(no_args_is_help=True, rich_markup_mode="rich", help="Measure speed and accuracy.")
+app.add_typer(benchmarks, name="benchmark")
+SPEED_EXAMPLES = """[bold]Examples[/bold]
+
+[cyan]fowt benchmark speed[/cyan]  every kind of scene, load by load (some minutes: each kind is compiled)
+
+[cyan]fowt benchmark speed --kinds "full, standard;full, fast" --starts[/cyan]  two kinds, and start times
+
+[bold]File written[/bold]: speed.csv, headed by machine, versions, commit and calibration."""
+ACCURACY_EXAMPLES = """[bold]Examples[/bold]
+
+[cyan]fowt benchmark accuracy[/cyan]  every variant, three seeds of 600 s: an hour
+
+[cyan]fowt benchmark accuracy --seeds 1 --duration 100 --axes "all together"[/cyan]  a first look
+
+[bold]Files written[/bold]: accuracy.csv (a row as each run ends; a new start goes on), accuracy.png."""
+
+
+@benchmarks.command(epilog=SPEED_EXAMPLES)
+@reported
+def speed(
+    kinds: Annotated[str | None, typer.Option(help="Kinds of scene, by semicolons; default: all.")] = None,
+    seconds: Annotated[float, typer.Option(help="Simulated seconds of a run.")] = 600.0,
+    repeats: Annotated[int, typer.Option(help="Repeats; the median counts.")] = 5,
+    starts: Annotated[bool, typer.Option("--starts", help="Also time the first and a later start.")] = False,
+    out_path: Annotated[str, typer.Option("--out", help="CSV to write.")] = "results/benchmark/speed.csv",
+):
+    """Time each kind of scene: a step, the closed loop, simulate end to end, and each load."""
+    from training import benchmark as bench
+
+    names = None if kinds is None else [name.strip() for name in kinds.split(";") if name.strip()]
+    with progress_bar("benchmark", None) as update:
+        table = bench.speed(
+            names, seconds, repeats, progress=lambda text, done, total: update(done, f"timing: {text}", total)
+        )
+        times = bench.start_times() if starts else {}
+    shown = Table(title="CPU time of one thread", title_justify="left")
+    shown.add_column("")
+    for name in table["kind"]:
+        shown.add_column(escape(name), justify="right")
+    for column in table.columns.drop(["kind", "absent"]):
+        values = (value if isinstance(value, str) else f"{value:.4g}" for value in table[column])
+        shown.add_row(escape(column), *values)
+    Console(width=out.width if out.is_terminal else 250).print(shown)
+    remarks = [f"{name}: {value:.2f}" for name, value in times.items()]
+    for line in remarks:
+        out.print(line, highlight=False)
+    note(f"wrote {bench.write_csv(table, out_path, remarks)}")
+
+
+@benchmarks.command(epilog=ACCURACY_EXAMPLES)
+@reported
+def accuracy(
+    seeds: Annotated[str, typer.Option(help="1,2,3 or 1:6:1.")] = "1,2,3",
+    duration: Annotated[float, typer.Option(help="Length of each run, s.")] = 600.0,
+    finest: Annotated[float, typer.Option(help="Step of the reference, s.")] = 0.00625,
+    axes: Annotated[str | None, typer.Option(help="Axes of the sweep, by commas; default: all.")] = None,
+    repeats: Annotated[int, typer.Option(help="Timed repeats; the median counts.")] = 1,
+    out_folder: Annotated[
+        str, typer.Option("--out", help="Folder for what is written.")
+    ] = "results/benchmark",
+    plot: Annotated[bool, typer.Option("--plot/--no-plot", help="Make the plot.")] = True,
+):
+    """Measure error against run time over integrators, steps, rotor models and wave sums."""
+    from training import benchmark_accuracy as study
+
+    chosen = None if axes is None else study.select([name.strip() for name in axes.split(",")])
+    folder = Path(out_folder)
+    numbers = [int(number) for number in parse_numbers(seeds, "seeds")]
+    with progress_bar("accuracy", None) as update:
+        table = study.accuracy(
+            numbers,
+            duration,
+            finest,
+            chosen,
+            folder / "accuracy.csv",
+            repeats=repeats,
+            progress=lambda text, done, total: update(done, text, total),
+        )
+    shown = Table(title="rms difference over standard deviation, and speed of simulate", title_justify="left")
+    for heading in ("variant", "worst", "of", "x real time", "front"):
+        shown.add_column(heading, justify="left" if heading in ("variant", "of") else "right")
+    for row in study.summary(table).to_dict("records"):
+        figures = (f"{row['worst']:.3g}", row["worst_of"], f"{row['real_time_factor']:.0f}")
+        shown.add_row(escape(row["variant"]), *figures, "*" if row["front"] else "")
+    out.print(shown)
+    files = [folder / "accuracy.csv"]
+    if plot:
+        study.plot_accuracy(table, folder / "accuracy.png")
+        files.append(folder / "accuracy.png")
+    note("wrote " + ", ".join(map(str, files)))

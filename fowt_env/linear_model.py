@@ -35,6 +35,7 @@ class LinearModel:
     inputs: tuple
     point: object
     cm_height: float  # of the whole turbine, body z, m
+    arm: float  # m, half the draft: weighs angles against translations when modes are named
 
     def index(self, name):
         """Row of a state. Raises: InputError for an unknown name."""
@@ -44,7 +45,7 @@ class LinearModel:
 
     def modes(self):
         """[Mode] of the plant without control, slowest first."""
-        return modes(self.A, self.states, self.cm_height)
+        return modes(self.A, self.states, self.cm_height, self.arm)
 
 
 class Mode(NamedTuple):
@@ -56,11 +57,11 @@ class Mode(NamedTuple):
     frequency: float  # rad/s
 
 
-def modes(a, names, cm_height):
+def modes(a, names, cm_height, arm):
     """[Mode] of a system matrix a (n, n) with these state names, slowest first.
 
     A mode is named by its largest motion: translations of the centre of mass (at the water line a
-    platform-pitch mode moves more in surge than in pitch), angles times 60 m, rotor speed times 5 m s.
+    platform-pitch mode moves more in surge than in pitch), angles times arm (m), rotor speed times arm/12 s.
     """
     values, vectors = np.linalg.eig(a)
     found = []
@@ -72,10 +73,10 @@ def modes(a, names, cm_height):
             "surge": abs(part["surge"] + cm_height * part["platform_pitch"]),
             "sway": abs(part["sway"] - cm_height * part["roll"]),
             "heave": abs(part["heave"]),
-            "roll": 60.0 * abs(part["roll"]),
-            "platform_pitch": 60.0 * abs(part["platform_pitch"]),
-            "yaw": 60.0 * abs(part["yaw"]),
-            "rotor_speed": 5.0 * abs(part["rotor_speed"]),
+            "roll": arm * abs(part["roll"]),
+            "platform_pitch": arm * abs(part["platform_pitch"]),
+            "yaw": arm * abs(part["yaw"]),
+            "rotor_speed": arm / 12.0 * abs(part["rotor_speed"]),
         }
         name = max(share, key=share.get)
         found.append(
@@ -135,14 +136,15 @@ def linearize(scene, operating_point=None):
             out[:] = mean
         b[:, 2] = (up[rows] - down[rows]) / (2.0 * step)
     cm_height = body.s_z / body.mass
-    return LinearModel(a, b, STATES, INPUTS, point, cm_height)
+    arm = -0.5 * scene.platform.hull.z[0]
+    return LinearModel(a, b, STATES, INPUTS, point, cm_height, arm)
 
 
 def natural_periods(scene):
     """{motion: undamped natural period s} of the six motions about the trim, from stiffness and mass.
 
     A motion without restoring (no moorings) gets inf. Modes are named by their largest motion, angles
-    weighted with 60 m.
+    weighted with half the draft.
     """
     model = linearize(scene)
     n = len(MOTIONS)
@@ -150,7 +152,7 @@ def natural_periods(scene):
     kinematics = model.A[:n, n : 2 * n]
     stiffness = model.A[n : 2 * n, :n]
     values, vectors = np.linalg.eig(kinematics @ stiffness)
-    scale = np.array([1.0, 1.0, 1.0, 60.0, 60.0, 60.0])
+    scale = np.array([1.0, 1.0, 1.0, model.arm, model.arm, model.arm])
     shapes = np.abs(vectors) * scale[:, None]
     periods = {}
     free = set(range(n))

@@ -227,6 +227,27 @@ def trim(scene, platform="floating"):
     return _point(scene, steady, platform)
 
 
+def trim_held(scene, rotor_speed, blade_pitch, platform="floating"):
+    """OperatingPoint with the rotor driven at a speed (rad/s) and a locked blade pitch (rad).
+
+    For model tests, where a motor holds the rotor speed: theory.md Eq. (20). Mean wind, waves flat.
+    Raises: InputError for an unknown platform mode, or if no steady state is found.
+    """
+    if platform not in PLATFORM_MODES:
+        raise unknown("platform mode of trim_held", platform, PLATFORM_MODES)
+    body = scene.model.body._replace(platform_held=platform == "fixed", rotor_held=True)
+    steady = _Steady(calm(scene).with_model(body=body))
+    steady.x[State.ROTOR_SPEED] = rotor_speed
+    steady.x[State.BLADE_PITCH] = steady.u[1] = blade_pitch
+    if platform == "floating":
+        remaining = steady.settle_platform()
+        if not remaining < 1e3 * TOLERANCE:
+            raise InputError(
+                f"no steady state found for {scene!r}: remaining acceleration {remaining:.2e} m/s2 or rad/s2"
+            )
+    return _point(scene, steady, platform)
+
+
 def _point(scene, steady, platform):
     """OperatingPoint at the present state, channels averaged over the azimuth."""
     state, command = steady.x.copy(), steady.u.copy()

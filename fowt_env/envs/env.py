@@ -1,6 +1,6 @@
 """The Gymnasium environment: a task, a scene and the compiled control period, glued together."""
 
-from copy import deepcopy
+from copy import copy, deepcopy
 from dataclasses import replace
 from math import isfinite, pi
 
@@ -31,6 +31,7 @@ from fowt_env.envs.rewards import (
     check_weights,
     weight_array,
 )
+from fowt_env.envs.snapshot import CARRIED, WORK_CARRIED, Snapshot
 from fowt_env.envs.tables import task_tables
 from fowt_env.envs.tasks import TASKS, Episode, check_offset, task_of
 from fowt_env.envs.trims import exact_trim, near_trim, plant_key
@@ -136,6 +137,17 @@ class FowtEnv(gymnasium.Env):
         low, high = self._setting.chosen.low, self._setting.chosen.high
         self.observation_space = gymnasium.spaces.Box(low.astype(np.float32), high.astype(np.float32))
         self._running = False
+        # what a snapshot must agree with: the same numbers then mean the same
+        seen = (task.observation, task.wind_preview)
+        self._kind = (self._key, action_mode, *seen, self.dt, self.control_dt, self._last)
+
+    def twin(self):
+        """Another environment of the same settings, before its first reset; shares what is never written."""
+        other = copy(self)
+        other._np_random = other._np_random_seed = None
+        other._running = False
+        other._build(MODES[self.action_mode], self._setting.per_control)
+        return other
 
     def _build(self, mode, per_control):
         """Allocate the arrays of a run and fill what never changes."""
@@ -190,19 +202,17 @@ class FowtEnv(gymnasium.Env):
         super().reset(seed=seed)
         self._running = False  # until all of it has worked
         episode = _chosen(self.task.draw(self.np_random), options)
-        self.scene = self.scene.with_weather(episode.wind, episode.sea, episode.weather_seed)
-        check_duration(self.scene, self.task.duration)
+        scene = self.scene.with_weather(episode.wind, episode.sea, episode.weather_seed)
+        check_duration(scene, self.task.duration)
         find = exact_trim if episode.exact_start else near_trim
-        state, command = find(self.scene, self._key, self.scene.wind_speed)
-        # new scratch: its size follows the number of wave components
-        self._run = run = self._run._replace(work=self.scene.work())
+        state, command = find(scene, self._key, scene.wind_speed)
+        self._enter(scene)
+        run = self._run
         run.x[:] = state
         run.u[:] = command
         reference = Reference(float(state[State.PLATFORM_PITCH]), float(state[State.ROTOR_SPEED]))
         run.reference[:] = reference
         self._offset(episode.offsets)
-        self._setting = self._setting._replace(model=self.scene.model)
-        self._box = Box(self._setting, run)
         start(self._box)
         if self._baseline is not None:
             self._baseline.reset(self.measurement())
@@ -272,6 +282,51 @@ class FowtEnv(gymnasium.Env):
         if terminated or truncated:
             self._running = False
         return run.observation.copy(), reward, terminated, truncated, info
+
+    def get_state(self):
+        """Snapshot of all that decides how the run goes on: plant, controller, counters, weather, draws.
+
+        For what-if: set_state(get_state()) and the same actions give the same bits, in this environment
+        or in another of the same settings. The weather is shared, not copied; a snapshot can be pickled.
+        """
+        if self._box is None:
+            raise ResetNeeded("call reset() first: there is no state yet")
+        run = self._run
+        arrays = [getattr(run, name).copy() for name in CARRIED]
+        arrays += [getattr(run.work, name).copy() for name in WORK_CARRIED]
+        generator = None if self._np_random is None else self._np_random.bit_generator.state
+        return Snapshot(self._kind, self.scene, tuple(arrays), self._running, generator, self._np_random_seed)
+
+    def set_state(self, snapshot):
+        """Go on from a Snapshot. Raises: InputError for one from an environment of other settings."""
+        if not isinstance(snapshot, Snapshot):
+            raise InputError(f"state = {type(snapshot).__name__}: must be what get_state() returned")
+        if snapshot.kind != self._kind:
+            raise InputError(
+                "state: is of an environment with another plant, action mode, observation, duration or time"
+                " step; must be of one with these settings"
+            )
+        if snapshot.scene is not self.scene or self._box is None:
+            self._enter(snapshot.scene)
+        run, work = self._run, self._run.work
+        arrays = iter(snapshot.arrays)
+        for name in CARRIED:
+            getattr(run, name)[:] = next(arrays)
+        for name in WORK_CARRIED:
+            getattr(work, name)[:] = next(arrays)
+        self._running = snapshot.running
+        if snapshot.generator is None:
+            self._np_random = None
+        else:
+            self.np_random.bit_generator.state = snapshot.generator
+        self._np_random_seed = snapshot.seed
+
+    def _enter(self, scene):
+        """Run in the scene's weather from now on, with new scratch: its size follows the wave components."""
+        self.scene = scene
+        self._run = self._run._replace(work=scene.work())
+        self._setting = self._setting._replace(model=scene.model)
+        self._box = Box(self._setting, self._run)
 
     def measurement(self):
         """Measurement that a controller is given now (SI)."""

@@ -25,7 +25,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fowt_env.jit import fast_kernel
+from fowt_env.jit import kernel
 from fowt_env.loads.morison import StripLoad, current_at
 from fowt_env.state import NO_LOAD, Wrench, add
 from fowt_env.weather.waves import ramp_factor
@@ -234,7 +234,7 @@ def fast_scratch(sea, lanes):
     )
 
 
-@fast_kernel
+@kernel
 def phasors(t, distance, component, cosine, sine):
     """Fill cosine and sine (n,) of every component's phase at a distance along the heading.
 
@@ -264,7 +264,7 @@ def phasors(t, distance, component, cosine, sine):
         sine[j] = 2.0 * s * c
 
 
-@fast_kernel
+@kernel
 def compress(scale, band, weight, number, cosine, sine, field):
     """Fill field (N_FIELD, M): complex sums of the components' velocity and rate at each K, times scale.
 
@@ -295,7 +295,7 @@ def compress(scale, band, weight, number, cosine, sine, field):
     return e0, e1, e2, e3
 
 
-@fast_kernel
+@kernel
 def fast_surface(pose, lanes, lean, reach, e0, e1, e2, e3):
     """(z_surf, eta) as morison.axis_surface, from the surface's Taylor series e0..e3 (see compress).
 
@@ -315,7 +315,7 @@ def fast_surface(pose, lanes, lean, reach, e0, e1, e2, e3):
     return (eta - pose.z) / tilt, eta
 
 
-@fast_kernel
+@kernel
 def small_exp(x, y):
     """exp(16 (x + i y)) as (real, imaginary), from Taylor's fifth power at |x + i y| below START."""
     er, ei = 1.0 + x / 5.0, y / 5.0
@@ -329,7 +329,7 @@ def small_exp(x, y):
     return er * er - ei * ei, 2.0 * er * ei
 
 
-@fast_kernel
+@kernel
 def chain_start(pose_z, rise, sway, z_ref, stretch, drop, scale, lead, lane):
     """Start both squaring chains of a block: exp(K zeta) for K_0 and K_1; Z' stays below 0.
 
@@ -349,14 +349,14 @@ def chain_start(pose_z, rise, sway, z_ref, stretch, drop, scale, lead, lane):
             lane[BR * LANES + n], lane[BI * LANES + n] = br * br - bi * bi, 2.0 * br * bi
 
 
-@fast_kernel
+@kernel
 def wave_terms(vr, vi, gr, gi, er, ei):
     """(u, w, u', w', rate) of one K: u + i w = v e, u' + i w' = -i g e, pressure = rho / K rate."""
     rate, turn = gr * er - gi * ei, gr * ei + gi * er
     return vr * er - vi * ei, vr * ei + vi * er, turn, -rate, rate
 
 
-@fast_kernel
+@kernel
 def add_echo(number, field, m, lane):
     """Add the seabed's reflection of K_m and K_{m+1}: conjugate amplitudes times exp(-K (2 h + zeta))."""
     vr, vi, gr, gi = field[VR, m], field[VI, m], field[GR, m], field[GI, m]
@@ -376,7 +376,7 @@ def add_echo(number, field, m, lane):
         lane[P * LANES + n] += pa * ra + pb * rb
 
 
-@fast_kernel
+@kernel
 def chain_sums(number, n_echo, field, lane):
     """Water velocity, acceleration and pressure at a block's nodes: two K at a time, then square."""
     for n in range(LANES):
@@ -405,7 +405,7 @@ def chain_sums(number, n_echo, field, lane):
             lane[BR * LANES + n], lane[BI * LANES + n] = br * br - bi * bi, 2.0 * br * bi
 
 
-@fast_kernel
+@kernel
 def place_nodes(z_surf, node, lane):
     """Body z and weight of a block's nodes for the surface at z_surf. node: a block of Lanes.table."""
     for n in range(LANES):
@@ -415,7 +415,7 @@ def place_nodes(z_surf, node, lane):
         lane[WEIGHT * LANES + n] = wet * node[SPREAD * LANES + n]
 
 
-@fast_kernel
+@kernel
 def lane_current(pose, depth, current, lane):
     """Current at a block's nodes, inertial axes."""
     if current is None:
@@ -427,7 +427,7 @@ def lane_current(pose, depth, current, lane):
         lane[CV * LANES + n] = cv
 
 
-@fast_kernel
+@kernel
 def lane_load(pose, lanes, node, sea, current, lane):
     """StripLoad of a block: Eq. (16) and the pressure on the taper, without the keel."""
     added_line = 0.25 * pi * lanes.density * lanes.added_mass_coefficient
@@ -473,7 +473,7 @@ def lane_load(pose, lanes, node, sea, current, lane):
     return StripLoad(Wrench(fx, fy, fz, mx, my, 0.0), s0, s1, s2, 0.0)
 
 
-@fast_kernel
+@kernel
 def keel_load(pose, lanes, sea, current, lane):
     """Axial force on the keel: dynamic pressure, added mass and drag (theory.md, 5.4)."""
     zk = lanes.keel_z
@@ -492,7 +492,7 @@ def keel_load(pose, lanes, sea, current, lane):
     return force + lanes.axial_drag * abs(rz) * rz
 
 
-@fast_kernel
+@kernel
 def fast_field(t, pose, lanes, sea, scratch):
     """(z_surf, eta, height of the reference point on the axis) with scratch.field filled."""
     z_ref = distance = lean = 0.0
@@ -511,7 +511,7 @@ def fast_field(t, pose, lanes, sea, scratch):
     return z_surf, eta, z_ref
 
 
-@fast_kernel
+@kernel
 def still_surface(pose, lanes):
     """Body z where the axis meets still water."""
     if not lanes.instantaneous_position:
@@ -519,7 +519,7 @@ def still_surface(pose, lanes):
     return -pose.z / max(pose.r33, 0.1)
 
 
-@fast_kernel
+@kernel
 def lane_kinematics(pose, z_ref, eta, lanes, sea, field, lane):
     """Fill a block's U, W, DU, DW (along the heading and up) and P; nothing in still water."""
     if sea is None:
@@ -538,7 +538,7 @@ def lane_kinematics(pose, z_ref, eta, lanes, sea, field, lane):
     chain_sums(sea.number, sea.n_echo, field, lane)
 
 
-@fast_kernel
+@kernel
 def fast_morison_load(t, pose, lanes, sea, current, scratch):
     """Strip load as morison.morison_load gives it, from Lanes and FastWaves (None: still water)."""
     if lanes is None:

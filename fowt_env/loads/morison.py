@@ -14,7 +14,9 @@ from fowt_env.jit import kernel
 from fowt_env.state import Wrench
 from fowt_env.weather.waves import NEGLIGIBLE, elevation, ramp_factor
 
-CELL = 2.0  # m, longest cell below the surface section: 1e-5 of the first harmonic at T = 5 s
+CELLS_PER_DRAFT = (
+    60  # at least, below the surface section (2 m of OC3): 1e-5 of the first harmonic at T = 5 s
+)
 SURFACE_CELLS = 4  # cells between the last joint and the moving surface
 SURFACE_ROUNDS = 8  # fixed-point rounds for the surface on the axis; slope*tilt contracts by 10 or more
 SURFACE_TOLERANCE = 1e-10  # m
@@ -72,9 +74,15 @@ class StripLoad(NamedTuple):
     a33: float
 
 
-def build_strips(hull, hydro, *, density, depth, position, surface, stretching, cell=CELL):
-    """Strips from description.Hull and description.Hydro with the three kinematics switches."""
+def build_strips(hull, hydro, *, density, depth, position, surface, stretching, cell=None):
+    """Strips from description.Hull and description.Hydro with the three kinematics switches.
+
+    cell: longest cell below the surface section, m; None: a share of the draft, so that models of any
+    scale are cut alike.
+    """
     z = list(hull.z)
+    if cell is None:
+        cell = -z[0] / CELLS_PER_DRAFT
     tops, bottoms, diameters = [], [], []
     for i in range(len(z) - 2, -1, -1):
         tops.append(z[i + 1])
@@ -83,7 +91,7 @@ def build_strips(hull, hydro, *, density, depth, position, surface, stretching, 
     tops[0] = 0.0
     cells, first, nodes = [], [], 0
     for number, (top, bottom) in enumerate(zip(tops, bottoms, strict=True)):
-        n = SURFACE_CELLS if number == 0 else max(2, int(np.ceil((top - bottom) / cell)))
+        n = SURFACE_CELLS if number == 0 else max(2, int(np.ceil((top - bottom) / cell - 1e-9)))
         cells.append(n)
         first.append(nodes)
         nodes += 2 * n

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fowt_env.counters import Counter
-from fowt_env.jit import fast_kernel, kernel
+from fowt_env.jit import kernel
 from fowt_env.loads.rotor import (
     FAST_ROTOR,
     LARGEST_SPEED,
@@ -190,7 +190,7 @@ def _blade(psi, rotor_speed, pose, hub):
     )
 
 
-@fast_kernel
+@kernel
 def _shear(z, profile):
     """(1 + z)**exponent."""
     upper = profile.p1 + z * (profile.p2 + z * (profile.p3 + z * (profile.p4 + z * profile.p5)))
@@ -198,7 +198,7 @@ def _shear(z, profile):
     return (1.0 + z * upper) / (1.0 + z * lower)
 
 
-@fast_kernel
+@kernel
 def _station_force(v_normal, v_tangential, j, low, high, share):
     """(normal, tangential) force of station j over the air density, bilinear between two rows of the table.
 
@@ -218,7 +218,7 @@ def _station_force(v_normal, v_tangential, j, low, high, share):
     return square * (n0 + part * (n1 - n0)), square * (t0 + part * (t1 - t0))
 
 
-@fast_kernel
+@kernel
 def _sheared_force(pose, hub, blade, now, series, profile, low, high, share, radii, arm):
     """BladeForce in a wind uniform apart from its shears: v = v0 + v1 radius + v2 profile, no branches."""
     height, left = hub.Z - series.reference_height, hub.Y

@@ -91,7 +91,7 @@ def test_the_nonlinear_run_shows_the_damping_of_the_linear_platform_mode(above_r
     """Small platform-pitch decay at 18 m/s under the PI; viscous drag vanishes with the amplitude."""
     scene, model = above_rated
     a, names = closed_loop_matrix(model, PISettings.published(scene.turbine))
-    mode = min(modes(a, names, model.cm_height), key=lambda m: abs(m.period - 33.4))
+    mode = min(modes(a, names, model.cm_height, model.arm), key=lambda m: abs(m.period - 33.4))
     df = simulate(scene, "pi", duration=120.0, initial={"PtfmPitch": model.point["PtfmPitch"] + 0.05})
     time, pitch = df["Time_[s]"].to_numpy(), df["PtfmPitch_[deg]"].to_numpy()
     # the slow surge mode rides below: remove it with a cubic before the peaks are taken

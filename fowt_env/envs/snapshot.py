@@ -1,0 +1,19 @@
+"""The whole state of an environment at one instant, for what-if, tree search and predictive control."""
+
+from typing import Any, NamedTuple
+
+# arrays of kernels.Run that outlive a control period, and of dynamics.Work: those that carry over, and
+# stages, whose first row holds the wake's rates as long as the kept loads are fresh
+CARRIED = ("x", "u", "memory", "action", "measurement", "observation", "counts", "reference", "terms")
+WORK_CARRIED = ("lines", "counters", "stages", "kept", "history")
+
+
+class Snapshot(NamedTuple):
+    """What FowtEnv.get_state returns; read only."""
+
+    kind: tuple  # settings that an environment must share to go on from here
+    scene: Any  # scene.Scene with the weather of the episode
+    arrays: tuple  # copies, in the order of CARRIED and WORK_CARRIED
+    running: bool
+    generator: dict | None  # state of the random generator; None before the first draw
+    seed: int | None  # that the generator was made from

@@ -1,0 +1,349 @@
+"""Many environments stepped by one compiled call: Gymnasium's vector interface without a Python loop."""
+
+from copy import deepcopy
+
+import gymnasium
+import numba
+import numpy as np
+from gymnasium.error import ResetNeeded
+from gymnasium.vector import AutoresetMode
+from gymnasium.vector.utils import batch_space
+
+from fowt_env.envs.batch import act_all, act_all_parallel, thread_limit
+from fowt_env.envs.env import REWARD_KEYS, FowtEnv
+from fowt_env.envs.kernels import REASONS, RUNNING, SATURATED, STEP
+from fowt_env.envs.observations import N_ACTIONS
+from fowt_env.envs.rewards import N_TERMS
+from fowt_env.errors import InputError, unknown
+from fowt_env.jit import Box
+
+MODES = {mode.value: mode for mode in AutoresetMode}
+
+
+class FowtVectorEnv(gymnasium.vector.VectorEnv):
+    """num_envs environments, each with its own weather, random generator and, if wished, settings.
+
+    num_envs         how many
+    autoreset_mode   a gymnasium.vector.AutoresetMode or its value: "NextStep" (as Gymnasium's own vector
+                     environments: the step after the last one resets, its action is ignored and its reward
+                     0), "SameStep" (the step that ends an episode returns the first observation of the
+                     next; the last one is in infos["final_obs"], its info in infos["final_info"]) or
+                     "Disabled" (reset(options={"reset_mask": mask}) is up to the caller)
+    threads          of the compiled call; None: as many as numba uses, at most num_envs
+    per_env          settings of single environments: num_envs dicts that are put over the common settings.
+                     All environments must have the same spaces and the same loads (one compiled kind):
+                     wind, sea, platform, turbine, task and reward may differ, rotor and options seldom
+    settings         of all environments, see FowtEnv
+
+    One environment of the batch gives the same bits as a FowtEnv with its seed and its actions, whatever
+    the number of threads. reset(seed=s) seeds the environments s, s + 1, ...; a list seeds each. Options of
+    reset go to every environment that is reset, those of a list of num_envs dicts to one each.
+
+    infos are those of Gymnasium's SyncVectorEnv, but infos["episode"][i] is a dict, which replays the
+    episode as options of a reset.
+
+    envs are the single environments; what moves one of them on its own must go through call().
+
+    An action that is not finite is refused for all before any environment moves.
+    """
+
+    metadata = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}
+
+    def __init__(
+        self, num_envs=1, autoreset_mode=AutoresetMode.NEXT_STEP, threads=None, per_env=None, **settings
+    ):
+        self.num_envs = _count("num_envs", num_envs, 10**6)
+        if isinstance(autoreset_mode, str):
+            if autoreset_mode not in MODES:
+                raise unknown("autoreset_mode", autoreset_mode, MODES)
+            autoreset_mode = MODES[autoreset_mode]
+        if not isinstance(autoreset_mode, AutoresetMode):
+            raise unknown("autoreset_mode", autoreset_mode, MODES)
+        self.autoreset_mode = autoreset_mode
+        self.metadata = self.metadata | {"autoreset_mode": autoreset_mode}
+        most = numba.config.NUMBA_NUM_THREADS
+        self.threads = min(numba.get_num_threads(), num_envs) if threads is None else threads
+        _count("threads", self.threads, most)
+        self.envs = tuple(_environments(num_envs, per_env, settings))
+        first = self.envs[0]
+        self.render_mode = None
+        self.single_observation_space = first.observation_space
+        self.single_action_space = first.action_space
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._law = first._law
+        self._share_rows()
+        self._statuses = np.full(num_envs, RUNNING, dtype=np.int64)
+        self._rewards = np.zeros(num_envs)
+        self._last = np.array([env._last for env in self.envs])
+        self._dt = np.array([env.dt for env in self.envs])
+        self._ended = np.zeros(num_envs, dtype=bool)  # waiting for the reset of the next step
+        self._boxes = None
+        self._held = [None] * num_envs  # what the compiled list holds, for comparison
+
+    def _share_rows(self):
+        """Make the arrays that the outside reads rows of common ones."""
+        n = self.num_envs
+        self._observations = np.zeros((n, *self.single_observation_space.shape), dtype=np.float32)
+        self._counts = np.zeros((n, 2), dtype=np.int64)
+        self._terms = np.zeros((n, N_TERMS))
+        for i, env in enumerate(self.envs):
+            env._run = env._run._replace(
+                observation=self._observations[i], counts=self._counts[i], terms=self._terms[i]
+            )
+
+    def reset(self, *, seed=None, options=None):
+        """(observations, infos) at the start of new episodes, of all or of options["reset_mask"] (n,) bool.
+
+        Raises: InputError, also for what FowtEnv.reset refuses.
+        """
+        n = self.num_envs
+        if seed is None or isinstance(seed, int | np.integer):
+            seeds = [None if seed is None else int(seed) + i for i in range(n)]
+        else:
+            seeds = list(seed)
+            if len(seeds) != n:
+                raise InputError(f"seed has {len(seeds)} entries: must be a number or {n} of them")
+        chosen = range(n)
+        if isinstance(options, list):
+            if len(options) != n:
+                raise InputError(f"options has {len(options)} entries: must be a dict or {n} of them")
+        else:
+            options = dict(options or {})
+            if "reset_mask" in options:
+                chosen = np.flatnonzero(self._mask(options.pop("reset_mask")))
+            options = [options] * n
+        infos = {}
+        for i in chosen:
+            infos = self._reset_one(i, infos, seeds[i], options[i])
+        return self._observations.copy(), infos
+
+    def _mask(self, mask):
+        """The reset mask, checked."""
+        if not isinstance(mask, np.ndarray) or mask.shape != (self.num_envs,) or mask.dtype != np.bool_:
+            raise InputError(f"options['reset_mask']: must be a bool array of shape ({self.num_envs},)")
+        if not mask.any():
+            raise InputError("options['reset_mask']: must name at least one environment")
+        if self._boxes is None and not mask.all():
+            raise ResetNeeded("call reset() of all environments first")
+        return mask
+
+    def _reset_one(self, i, infos, seed=None, options=None):
+        """Reset one environment; returns the infos with its own added."""
+        _, info = self.envs[i].reset(seed=seed, options=options or None)
+        self._ended[i] = False
+        self._renew(i)
+        episode = info.pop("episode")
+        infos = self._add_info(infos, info, int(i))
+        nothing = np.full(self.num_envs, None), np.zeros(self.num_envs, dtype=bool)
+        for key, empty, value in zip(("episode", "_episode"), nothing, (episode, True), strict=True):
+            infos.setdefault(key, empty)[i] = value
+        return infos
+
+    def _renew(self, i):
+        """Put the environment's present box, if it is another than before, into the compiled list."""
+        box = self.envs[i]._box
+        if box is self._held[i]:
+            return
+        self._held[i] = box
+        if self._boxes is None:
+            if any(held is None for held in self._held):
+                return
+            self._boxes = numba.typed.List(self._held)
+        else:
+            self._boxes[i] = box
+
+    def step(self, actions):
+        """(observations, rewards, terminations, truncations, infos) after one control period of each."""
+        if self._boxes is None:
+            raise ResetNeeded("call reset() first: no episode is running")
+        resets = np.flatnonzero(self._ended)
+        if len(resets) and self.autoreset_mode == AutoresetMode.DISABLED:
+            raise ResetNeeded(f"environment {resets[0]} has ended: reset it with options['reset_mask']")
+        active = ~self._ended
+        self._act(actions, active)
+        statuses = self._statuses
+        statuses[resets] = RUNNING
+        rewards = self._rewards.copy()
+        rewards[resets] = 0.0
+        terminations = statuses != RUNNING
+        truncations = active & ~terminations & (self._counts[:, STEP] >= self._last)
+        ended = terminations | truncations
+        infos = {}
+        if ended.any():
+            for i in np.flatnonzero(ended):
+                self.envs[i]._running = False
+            if self.autoreset_mode == AutoresetMode.SAME_STEP:
+                infos = self._finals(ended)
+                active &= ~ended
+                resets = np.flatnonzero(ended)
+                ended = np.zeros_like(ended)
+        infos = self._infos(infos, active, terminations)
+        for i in resets:
+            infos = self._reset_one(i, infos)
+        self._ended = ended
+        return self._observations.copy(), rewards, terminations, truncations, infos
+
+    def _act(self, actions, active):
+        """One control period of the active environments under checked actions."""
+        try:
+            asked = np.array(actions, dtype=np.float64)  # a copy: steady types, whatever was given
+        except (TypeError, ValueError):
+            raise InputError(
+                f"actions = {actions!r}: must be ({self.num_envs}, {N_ACTIONS}) numbers"
+            ) from None
+        if asked.shape != (self.num_envs, N_ACTIONS):
+            raise InputError(f"actions have shape {asked.shape}: must be ({self.num_envs}, {N_ACTIONS})")
+        given = (self._boxes, self._law, asked, active, self._statuses, self._rewards)
+        if self.threads == 1:
+            bad = act_all(*given)
+        else:
+            with thread_limit(self.threads):
+                bad = act_all_parallel(*given, self.threads)
+        if bad >= 0:
+            raise InputError(f"action of environment {bad} = {asked[bad].tolist()}: must be finite")
+
+    def _infos(self, infos, shown, terminations):
+        """Infos of a step with those of the shown environments added, as _add_info would."""
+        if not shown.any():
+            return infos
+        everyone = shown.all()
+        columns = dict(zip(REWARD_KEYS, self._terms.T, strict=True))
+        columns["time"] = self._counts[:, STEP] * self._dt
+        columns["saturated_actions"] = self._counts[:, SATURATED]
+        for key, values in columns.items():
+            infos[key] = values.copy() if everyone else np.where(shown, values, 0)
+            infos[f"_{key}"] = shown.copy()
+        failed = np.flatnonzero(shown & terminations)
+        for i in failed:
+            infos = self._add_info(infos, {"termination": REASONS[self._statuses[i]]}, int(i))
+        return infos
+
+    def _finals(self, ended):
+        """Infos with the last observation and the last info of the ended environments."""
+        infos = {}
+        for i in np.flatnonzero(ended):
+            final = {"final_obs": self._observations[i].copy(), "final_info": self.last_info(i)}
+            infos = self._add_info(infos, final, int(i))
+        return infos
+
+    def last_info(self, i):
+        """Info of the last step of one environment, as its own step would give it."""
+        info = dict(zip(REWARD_KEYS, self._terms[i].tolist(), strict=True))
+        info["time"] = float(self._counts[i, STEP] * self._dt[i])
+        info["saturated_actions"] = int(self._counts[i, SATURATED])
+        if self._statuses[i] != RUNNING:
+            info["termination"] = REASONS[self._statuses[i]]
+        return info
+
+    def get_state(self):
+        """Tuple of the environments' Snapshots."""
+        return tuple(env.get_state() for env in self.envs)
+
+    def set_state(self, snapshots):
+        """Go on from one Snapshot per environment, or all from the same one.
+
+        An environment that had ended then waits for its reset as it did. Raises: InputError.
+        """
+        if not isinstance(snapshots, list) and hasattr(snapshots, "arrays"):
+            snapshots = [snapshots] * self.num_envs
+        if len(snapshots) != self.num_envs:
+            raise InputError(f"state: {len(snapshots)} snapshots: must be one, or {self.num_envs}")
+        for i, (env, snapshot) in enumerate(zip(self.envs, snapshots, strict=True)):
+            env.set_state(snapshot)
+            self._ended[i] = not snapshot.running
+            self._renew(i)
+
+    def call(self, name, *args, indices=None, **kwargs):
+        """Tuple of what an attribute is, or returns when called, in each (or each chosen) environment."""
+        results = []
+        for i in range(self.num_envs) if indices is None else indices:
+            found = self.envs[i].get_wrapper_attr(name)
+            results.append(found(*args, **kwargs) if callable(found) else found)
+            self._renew(i)
+        return tuple(results)
+
+    def get_attr(self, name):
+        """Tuple of an attribute of each environment."""
+        return tuple(env.get_wrapper_attr(name) for env in self.envs)
+
+    @property
+    def np_random(self):
+        """Tuple of the environments' random generators."""
+        return self.get_attr("np_random")
+
+    @property
+    def np_random_seed(self):
+        """Tuple of the seeds that they were made from."""
+        return self.get_attr("np_random_seed")
+
+
+def of_one(infos, i, but=()):
+    """The info of environment i, as its own step would give it, out of those of a vector environment."""
+    own = {}
+    for key, values in infos.items():
+        if key in but or f"_{key}" not in infos or not infos[f"_{key}"][i]:
+            continue
+        if isinstance(values, dict):
+            own[key] = of_one(values, i)
+        else:
+            own[key] = values[i].item() if isinstance(values[i], np.generic) else values[i]
+    return own
+
+
+def _count(name, value, most):
+    """A whole number in [1, most]. Raises: InputError."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not 1 <= value <= most:
+        raise InputError(f"{name} = {value!r}: must be a whole number from 1 to {most}")
+    return int(value)
+
+
+def _environments(num_envs, per_env, settings):
+    """List of environments; those of equal settings share what is never written.
+
+    Raises: InputError unless all have the same spaces and compiled kind.
+    """
+    if per_env is None:
+        per_env = [{}] * num_envs
+    if isinstance(per_env, dict) or len(per_env) != num_envs:
+        raise InputError(f"per_env: must be a list of {num_envs} dicts of settings")
+    built, envs = [], []
+    for i, own in enumerate(per_env):
+        same = next((env for known, env in built if known is own or _equal(known, own)), None)
+        if same is not None:
+            envs.append(same.twin())
+            continue
+        env = FowtEnv(**deepcopy(settings | own) if own else settings)
+        if envs:
+            _check_alike(i, env, envs[0])
+        built.append((own, env))
+        envs.append(env)
+    return envs
+
+
+def _equal(one, other):
+    """Whether two dicts of settings are surely the same; arrays in them count as different."""
+    try:
+        return bool(one == other)
+    except ValueError:
+        return False
+
+
+def _check_alike(i, env, first):
+    """Raise InputError unless one compiled loop can step both environments."""
+    if env.observation_space != first.observation_space:
+        raise InputError(
+            f"per_env[{i}]: its observation differs from that of the first; all must be the same"
+        )
+    if env.action_mode != first.action_mode:
+        raise InputError(f"per_env[{i}]: action_mode = {env.action_mode!r}: must be {first.action_mode!r}")
+    if numba.config.DISABLE_JIT:
+        return
+    kinds = [numba.typeof(Box(e._setting, e._run)) for e in (first, env)]
+    if kinds[0] == kinds[1]:
+        return
+    models = [e.scene.model._asdict() for e in (first, env)]
+    parts = [n for n in models[0] if numba.typeof(models[0][n]) != numba.typeof(models[1][n])]
+    raise InputError(
+        f"per_env[{i}]: another compiled kind than the first, in {', '.join(parts)}; use the same"
+    )

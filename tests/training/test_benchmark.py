@@ -1,0 +1,86 @@
+"""The benchmarks on tiny settings: what they compute and write, never how fast this machine is."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from fowt_env.errors import InputError
+from training import benchmark, benchmark_accuracy
+
+STILL = "still water, no wind"
+TINY = {"seconds": 2.0, "repeats": 1, "calls": 20}
+
+
+def test_a_kind_of_scene_has_a_time_for_every_load_and_none_for_absent_ones():
+    row = benchmark.speed([STILL], **TINY).iloc[0]
+    assert row["kind"] == STILL
+    assert row["wave_components"] == 0
+    for load in benchmark.LOADS:
+        assert row[f"{load} (us)"] >= 0.0
+    for figure in ("step_us", "step_x", "loop_x", "simulate_x", "calibration_ms"):
+        assert row[figure] > 0.0
+    scene = benchmark.KINDS[STILL].scene()
+    assert scene.model.wind is None and scene.model.waves is None
+
+
+def test_an_unknown_kind_is_refused_by_name():
+    with pytest.raises(InputError, match="full, standart"):
+        benchmark.speed(["full, standart"], **TINY)
+
+
+def test_the_table_is_headed_by_machine_versions_and_commit(tmp_path):
+    table = pd.DataFrame({"kind": ["a"], "step_us": [1.5]})
+    path = benchmark.write_csv(table, tmp_path / "speed.csv", ["start: 2"])
+    comments = [line for line in path.read_text().splitlines() if line.startswith("#")]
+    for key in ("machine:", "versions:", "commit:", "calibration:", "start: 2"):
+        assert any(key in line for line in comments)
+    pd.testing.assert_frame_equal(pd.read_csv(path, comment="#"), table)
+
+
+def test_the_calibration_is_a_recurrence_that_cannot_be_skipped():
+    x = 1.0
+    for _ in range(5):
+        x = x * 0.9 + 0.2
+    assert benchmark.multiply_adds(5, 0.9, 0.2) == pytest.approx(x, rel=1e-15)
+
+
+def test_the_front_keeps_what_nothing_beats():
+    error = [1.0, 0.1, 0.1, 0.5, np.nan]
+    speed = [100.0, 10.0, 20.0, 5.0, 1000.0]
+    assert benchmark_accuracy.pareto(error, speed).tolist() == [True, False, True, False, False]
+
+
+def test_openfast_points_divide_largest_differences_by_standard_deviations():
+    points = {name: (error, factor) for name, error, factor in benchmark_accuracy.openfast_points()}
+    assert points["DT 0.05 s, strips 4 m"] == (pytest.approx(0.0133 / 0.827), 15.0)
+
+
+def test_a_study_goes_on_where_it_was_interrupted_and_errs_by_nothing_against_itself(tmp_path):
+    out = tmp_path / "accuracy.csv"
+    base = benchmark_accuracy.Variant("integrator and step", "rk4", 0.05, "bem", "exact")
+    sea = {"kind": "regular", "H": 3.0, "T": 8.0}
+    arguments = {"duration": 5.0, "finest": 0.05, "wind": 18.0, "sea": sea, "out": out}
+    first = benchmark_accuracy.accuracy((1,), chosen=[base], **arguments)
+    # the check at twice the step differs from the reference, the reference's own step does not
+    assert first["worst"][0] > 0.0
+    assert first["worst"][1] == 0.0
+    said = []
+    coarse = replace(base, dt=0.1)
+    second = benchmark_accuracy.accuracy(
+        (1,), chosen=[base, coarse], progress=lambda text, done, total: said.append(text), **arguments
+    )
+    assert [text.split(": ")[1] for text in said] == ["reference", coarse.name]
+    assert second["variant"].tolist() == pd.read_csv(out, comment="#")["variant"].tolist()
+    assert second["worst"][2] == pytest.approx(first["worst"][0], rel=1e-6)  # the check's step
+
+
+def test_the_plot_of_a_study_is_written(tmp_path):
+    columns = {name: [0.1, 0.01] for name in benchmark_accuracy.CHANNELS}
+    table = pd.DataFrame(
+        {"variant": ["a", "b"], "axis": ["rotor", "waves"], "worst": [0.1, 0.01], "worst_of": ["yaw", "sway"],
+         "real_time_factor": [1000.0, 100.0], **columns}
+    )  # fmt: skip
+    benchmark_accuracy.plot_accuracy(table, tmp_path / "accuracy.png")
+    assert (tmp_path / "accuracy.png").stat().st_size > 1000

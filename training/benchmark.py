@@ -1,0 +1,360 @@
+"""How fast a scene of each kind is stepped: end to end, by the kernel alone, and load by load.
+
+Times are CPU times of one thread, medians of several repeats, beside the time of a fixed calibration kernel
+measured in the same minute: figures of two machines compare through it.
+"""
+
+import os
+import platform
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numba
+import numpy as np
+import pandas as pd
+
+from controllers import make
+from fowt_env.channels import measure, record
+from fowt_env.dynamics import loads_of, respond, rotor_part, strip_part
+from fowt_env.errors import InputError, unknown
+from fowt_env.jit import entry, kernel
+from fowt_env.loads.hydrostatics import hydrostatic_load
+from fowt_env.loads.mooring import mooring_load
+from fowt_env.loads.tower import tower_load
+from fowt_env.measurement import N_MEASUREMENTS, Measurement
+from fowt_env.outputs import replacing
+from fowt_env.scene import build_scene
+from fowt_env.simulation import _Hold, initial_state, simulate
+from fowt_env.state import State, pose_of
+from fowt_env.step import advance, forget, observe, output, run
+from fowt_env.weather.wind import wind_now
+
+CALIBRATION_STEPS = 10_000_000
+REPEATS = 5
+CHUNK = 2000  # steps or calls in one timing of the kernel or of a load
+SEA = {"kind": "jonswap", "Hs": 7.5, "Tp": 10.0}  # 315 components
+TURBULENCE = {"kind": "ntm", "speed": 18.0, "class": "B"}
+LOADS = (
+    "pose and loop", "wind now", "rotor", "tower", "strips and waves", "mooring", "hydrostatics",
+    "pose and 6x6 solve", "measure", "record",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of scene: arguments of build_scene, and what is held still."""
+
+    wind: object = None
+    sea: object = None
+    fidelity: str = "standard"
+    options: dict = field(default_factory=dict)
+    platform_held: bool = False
+    parked: bool = False  # rotor at rest, blades feathered
+    absent: str = ""  # what this kind leaves out of the compiled code
+
+    @property
+    def controlled(self):
+        return self.wind is not None and not self.parked
+
+    def scene(self, seed=1, duration=700.0):
+        """Scene of this kind, with what it holds still."""
+        wind = self.wind() if callable(self.wind) else self.wind
+        scene = build_scene(
+            wind=wind, sea=self.sea, seed=seed, fidelity=self.fidelity, duration=duration, **self.options
+        )
+        if not self.platform_held:
+            return scene
+        return scene.with_model(body=scene.model.body._replace(platform_held=True))
+
+    def start(self, scene):
+        """(state, command) that runs of this kind begin with."""
+        x, u = initial_state(scene)
+        if self.parked:
+            x[State.ROTOR_SPEED] = u[0] = 0.0
+            x[State.BLADE_PITCH] = u[1] = scene.turbine.pitch_drive.maximum
+        return x, u
+
+
+def _box():
+    from training.openfast import box_wind
+
+    return box_wind()
+
+
+KINDS = {
+    "full, reference": Kind(TURBULENCE, SEA, "reference"),
+    "full, standard": Kind(TURBULENCE, SEA, "standard"),
+    "full, fast": Kind(TURBULENCE, SEA, "fast"),
+    "full-field box, standard": Kind(_box, SEA, "standard"),
+    "exact waves, look-up rotor": Kind(TURBULENCE, SEA, "standard", {"wave_loads": "exact"}),
+    "BEM rotor, fast waves": Kind(TURBULENCE, SEA, "standard", {"rotor": "bem"}),
+    "still water, wind": Kind(TURBULENCE, None, absent="waves"),
+    "no wind, waves": Kind(None, SEA, absent="wind, rotor, tower drag"),
+    "still water, no wind": Kind(None, None, absent="waves, wind, rotor, tower drag"),
+    "parked in a storm": Kind(40.0, SEA, parked=True),
+    "no mooring": Kind(TURBULENCE, SEA, options={"mooring": False}, absent="mooring"),
+    "platform held": Kind(TURBULENCE, SEA, platform_held=True, absent="6x6 solve (at run time)"),
+    "no water": Kind(
+        TURBULENCE,
+        None,
+        options={"hydrodynamics": False, "mooring": False},
+        platform_held=True,
+        absent="strips, waves, buoyancy, mooring; 6x6 solve (at run time)",
+    ),  # fmt: skip
+}
+
+
+@kernel
+def multiply_adds(n, a, b):
+    """Result of n multiply-adds that wait for each other: the calibration of a machine's clock."""
+    x = 1.0
+    for _ in range(n):
+        x = x * a + b
+    return x
+
+
+def calibration(repeats=3):
+    """Milliseconds of CPU time of CALIBRATION_STEPS dependent multiply-adds."""
+    multiply_adds(10, 0.999, 0.1)
+    return 1e3 * median_time(lambda: multiply_adds(CALIBRATION_STEPS, 0.999, 0.1), repeats)
+
+
+def median_time(call, repeats=REPEATS):
+    """Median CPU time of this thread in a call, s; the first call is not counted."""
+    call()
+    times = []
+    for _ in range(repeats):
+        start = time.thread_time()
+        call()
+        times.append(time.thread_time() - start)
+    return float(np.median(times))
+
+
+@kernel
+def _repeat(part, scene, work, x, u, dx, m, row, n, dt):
+    """n calls of one of LOADS at changing times and places; returns a sum that keeps them from vanishing."""
+    total = 0.0
+    for i in range(n):
+        t = i * dt
+        x[State.SURGE] += 1e-7  # nothing is the same as before: no call can be left out
+        if part == 7:
+            respond(x, u, scene, work, dx)
+            total += dx[State.VX]
+            continue
+        if part == 8:
+            measure(scene, work, x, dx, u, t, m)
+            total += m[0]
+            continue
+        if part == 9:
+            record(scene, work, x, dx, u, t, loads_of(work, dx), row)
+            total += row[0]
+            continue
+        pose = pose_of(x)
+        now = wind_now(t, scene.wind) if part == 1 else wind_now(0.0, scene.wind)
+        total += pose.r11 + pose.r23 + now.u
+        if part == 2:
+            aero = rotor_part(
+                t, pose, x, now, scene.wind, scene.wind_field, scene.rotor, scene.rotor_lookup,
+                scene.rotor_table, scene.skew, scene.wake, dx, work.counters,
+            )  # fmt: skip
+            total += aero.thrust + aero.wrench.mz
+        elif part == 3:
+            total += tower_load(t, pose, now, scene.wind, scene.wind_field, scene.tower).my
+        elif part == 4:
+            strips = strip_part(
+                t, pose, scene.strips, scene.waves, scene.current, work.kinematics, scene.lanes, scene.sea,
+                work.fast,
+            )  # fmt: skip
+            total += strips.wrench.my
+        elif part == 5:
+            total += mooring_load(pose, scene.mooring, work.lines, work.counters).my
+        elif part == 6:
+            total += hydrostatic_load(pose, scene.hull, work.counters).my
+    return total
+
+
+@entry
+def _repeat_in(box, part, x, u, dx, m, row, n, dt):
+    return _repeat(part, box.scene, box.work, x, u, dx, m, row, n, dt)
+
+
+def load_times(scene, x, u, calls=CHUNK, repeats=REPEATS):
+    """{load: microseconds of one call} near a state; the loop and the pose are taken off the others."""
+    box = scene.box()
+    dx, m = np.zeros_like(x), np.zeros(N_MEASUREMENTS)
+    row = np.zeros(len(scene.channels))
+    forget(box)
+    output(box, x, u, 0.0, dx, row)  # fills the kept loads that measure and record read
+    micro = {}
+    for part, name in enumerate(LOADS):
+        micro[name] = (
+            1e6
+            * median_time(lambda p=part: _repeat_in(box, p, x.copy(), u, dx, m, row, calls, 0.1), repeats)
+            / calls
+        )
+    base = micro[LOADS[0]]
+    for name in LOADS[1:7]:
+        micro[name] = max(0.0, micro[name] - base)
+    return micro
+
+
+def step_time(scene, x, u, dt, steps=CHUNK, repeats=REPEATS):
+    """Microseconds of one physics step under a constant command."""
+    box = scene.box()
+
+    def go():
+        y = x.copy()
+        forget(box)
+        advance(box, y, u, 0, steps, dt)
+
+    return 1e6 * median_time(go, repeats) / steps
+
+
+def loop_time(scene, kind, x, u, dt, seconds, repeats=REPEATS):
+    """CPU seconds of the compiled closed loop, controller at 10 Hz, with one row of output."""
+    controller = make("pi", scene.turbine, 0.1) if kind.controlled else _Hold()
+    box, dx, m = scene.box(), np.zeros_like(x), np.zeros(N_MEASUREMENTS)
+    rows = np.zeros((1, len(scene.channels)))
+    per_control, last = round(0.1 / dt), round(seconds / dt)
+
+    def go():
+        y, v = x.copy(), u.copy()
+        forget(box)
+        observe(box, y, v, 0.0, dx, m)
+        controller.reset(Measurement(*m.tolist()))
+        run(
+            box, y, v, controller.kernel, controller.parameters, controller.memory, m, dx, dt, per_control,
+            last + 1, 0, last, rows,
+        )  # fmt: skip
+
+    return median_time(go, repeats)
+
+
+def measure_kind(name, seconds=600.0, repeats=REPEATS, calls=CHUNK):
+    """Row (dict) of one kind of scene: times per step, real-time factors and microseconds per load."""
+    if name not in KINDS:
+        raise unknown("kind of scene", name, KINDS)
+    kind = KINDS[name]
+    scene = kind.scene()
+    if hasattr(scene.wind, "usable"):  # a box of wind has an end
+        seconds = min(seconds, 10.0 * int(scene.wind.usable // 10.0))
+    x, u = kind.start(scene)
+    dt = scene.dt
+    held = scene
+    if not kind.controlled:
+        held = scene.with_model(body=scene.model.body._replace(rotor_held=True))
+    waves = scene.model.waves
+    row = {
+        "kind": name,
+        "integrator": scene.options["integrator"],
+        "dt_s": dt,
+        "wave_components": 0 if waves is None else waves.omega.shape[0],
+        "absent": kind.absent,
+        "calibration_ms": calibration(),
+        "step_us": step_time(held, x, u, dt, calls, repeats),
+    }
+    row["step_x"] = 1e6 * dt / row["step_us"]
+    row["loop_x"] = seconds / loop_time(held, kind, x, u, dt, seconds, repeats)
+    row["simulate_x"] = float("nan")
+    if not kind.parked:  # simulate starts from the running rotor
+        whole = median_time(
+            lambda: simulate(scene, "pi" if kind.controlled else None, duration=seconds), repeats
+        )
+        row["simulate_x"] = seconds / whole
+    row.update({f"{load} (us)": value for load, value in load_times(held, x, u, calls, repeats).items()})
+    return row
+
+
+def speed(kinds=None, seconds=600.0, repeats=REPEATS, calls=CHUNK, progress=None):
+    """DataFrame with a row per kind of scene (all by default).
+
+    seconds   simulated, for the real-time factors of the closed loop and of simulate
+    progress  called with (text, done, total)
+    Raises: InputError for an unknown kind.
+    """
+    names = list(kinds or KINDS)
+    for name in names:
+        if name not in KINDS:
+            raise unknown("kind of scene", name, KINDS)
+    rows = []
+    for done, name in enumerate(names):
+        if progress is not None:
+            progress(name, done, len(names))
+        rows.append(measure_kind(name, seconds, repeats, calls))
+    return pd.DataFrame(rows)
+
+
+START_CODE = """
+import time
+start = time.perf_counter()
+import fowt_env
+imported = time.perf_counter()
+scene = fowt_env.build_scene(wind=18.0, sea={"kind": "jonswap", "Hs": 7.5, "Tp": 10.0}, fidelity="FIDELITY")
+fowt_env.simulate(scene, "pi", duration=10.0)
+print(imported - start, time.perf_counter() - start)
+"""
+
+
+def start_times(fidelity="standard"):
+    """{what: seconds}: a first run with an empty cache of kernels and a later one, each in a new process."""
+    root = Path(__file__).resolve().parent.parent
+    times = {}
+    with tempfile.TemporaryDirectory() as folder:
+        for name in ("first", "later"):
+            done = subprocess.run(
+                [sys.executable, "-c", START_CODE.replace("FIDELITY", fidelity)],
+                env={**os.environ, "FOWT_CACHE_DIR": folder}, cwd=root, capture_output=True, text=True,
+                check=False,
+            )  # fmt: skip
+            if done.returncode != 0:
+                raise InputError(f"start times: the run in a new process failed: {done.stderr[-400:]}")
+            imported, whole = map(float, done.stdout.split())
+            times[f"{name} start, import (s)"] = imported
+            times[f"{name} start, import, scene and 10 s run (s)"] = whole
+    return times
+
+
+def header():
+    """Lines (list of str) that say where and with what figures were taken."""
+    root = Path(__file__).resolve().parent.parent
+    git = ["git", "-C", str(root)]
+    try:
+        commit = subprocess.run([*git, "rev-parse", "HEAD"], capture_output=True, text=True, check=False)
+        changed = subprocess.run([*git, "status", "--porcelain"], capture_output=True, text=True, check=False)
+        state = commit.stdout.strip() + (" with changes" if changed.stdout.strip() else "")
+    except OSError:  # no git on this machine
+        state = ""
+    load = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")
+    return [
+        f"date: {datetime.now(UTC):%Y-%m-%d %H:%M} UTC",
+        f"machine: {_processor()}, {os.cpu_count()} cores, {platform.system()}, load {load:.2f}",
+        f"versions: Python {platform.python_version()}, numba {numba.__version__}, numpy {np.__version__}",
+        f"commit: {state or 'unknown'}",
+        f"calibration: {calibration():.2f} ms for {CALIBRATION_STEPS:g} dependent multiply-adds",
+    ]
+
+
+def _processor():
+    """Name of the processor."""
+    info = Path("/proc/cpuinfo")
+    if info.is_file():
+        for line in info.read_text().splitlines():
+            if line.startswith("model name"):
+                return line.split(":", 1)[1].strip()
+    return platform.processor() or platform.machine()
+
+
+def write_csv(table, path, remarks=()):
+    """Write a table with the header and remarks as comment lines before it; returns the path."""
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(path) as temporary, Path(temporary).open("w", encoding="utf-8", newline="") as file:
+        for line in (*header(), *remarks):
+            file.write(f"# {line}\n")
+        table.to_csv(file, index=False, float_format="%.6g")
+    return path

@@ -1,0 +1,265 @@
+"""Run time against error of the whole model: what every cheaper choice costs, and what it saves.
+
+Reference of a seed: the exact parts (BEM rotor, exact waves, Runge-Kutta 4) at the finest step; half as fine
+a step shows that it has converged. Error of a variant: rms difference over the standard deviation of the
+reference, of each motion, the rotor speed and a fairlead tension; the worst of them counts. The wind and the
+sea of a seed are the same for all variants, and the controller acts at 10 Hz whatever the step. Cost: the
+CPU time of simulate, as a real-time factor.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from fowt_env.errors import InputError, unknown
+from fowt_env.scene import INTEGRATORS, build_scene
+from fowt_env.simulation import simulate
+from training.benchmark import SEA, TURBULENCE, calibration, header, median_time
+from training.comparison import normalised_rms
+
+CHANNELS = {
+    "surge": "PtfmSurge_[m]",
+    "sway": "PtfmSway_[m]",
+    "heave": "PtfmHeave_[m]",
+    "roll": "PtfmRoll_[deg]",
+    "platform_pitch": "PtfmPitch_[deg]",
+    "yaw": "PtfmYaw_[deg]",
+    "rotor_speed": "RotSpeed_[rpm]",
+    "fairlead_tension": "FAIRTEN1_[kN]",
+}
+EXACT = {"rotor": "bem", "wave_loads": "exact", "integrator": "rk4"}
+COLUMNS = (
+    "seed", "variant", "axis", "integrator", "dt_s", "rotor", "wave_loads", "components", "seconds",
+    "finest_s", "worst", "worst_of", *CHANNELS, "real_time_factor", "calibration_ms",
+)  # fmt: skip
+# OpenFAST on the rigid model, 18 m/s uniform turbulence, Hs 7.5 m: (setting, real-time factor (CPU), largest
+# |difference| in 40 s to its own reference: surge m, platform pitch deg, rotor speed rpm), and the
+# standard deviations of the same case over 500 s that turn them into shares
+OPENFAST = (
+    ("DT 0.0125 s, strips 2 m", 2.9, (0.0025, 0.0013, 0.0009)),
+    ("DT 0.025 s, strips 2 m", 6.0, (0.0062, 0.0044, 0.0036)),
+    ("DT 0.05 s, strips 4 m", 15.0, (0.0214, 0.0133, 0.0133)),
+    ("r-test style, tight coupling", 1.1, (0.0199, 0.0156, 0.0088)),
+)
+OPENFAST_STD = (1.851, 0.827, 1.128)
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One choice of parts and step, with the axis that it is a point of."""
+
+    axis: str
+    integrator: str
+    dt: float
+    rotor: str
+    wave_loads: str
+    components: int | None = None  # None: the sea's own number
+
+    @property
+    def name(self):
+        parts = f"{self.integrator} {self.dt:g} s, {self.rotor}, {self.wave_loads} waves"
+        return parts if self.components is None else f"{parts}, {self.components} components"
+
+
+def variants():
+    """Every variant of the sweep, cheapest parts last."""
+    steps = {"rk4": (0.025, 0.05, 0.1), "heun": (0.0125, 0.025, 0.05), "abm4": (0.025, 0.05, 0.1),
+             "ab4": (0.025, 0.05, 0.1)}  # fmt: skip
+    found = [
+        Variant("integrator and step", name, dt, "bem", "exact") for name in INTEGRATORS for dt in steps[name]
+    ]
+    found += [Variant("rotor", "rk4", 0.025, rotor, "exact") for rotor in ("lookup", "table")]
+    found += [Variant("waves", "rk4", 0.025, "bem", "fast")]
+    found += [Variant("wave components", "rk4", 0.025, "bem", "fast", n) for n in (200, 100, 50)]
+    found += [
+        Variant("all together", name, dt, rotor, "fast")
+        for rotor in ("lookup", "table")
+        for name in INTEGRATORS
+        for dt in steps[name][-2:]
+    ]
+    return found
+
+
+def _scene(variant, seed, duration, wind, sea):
+    return build_scene(
+        wind=wind, sea=sea, seed=seed, duration=max(100.0, duration), rotor=variant.rotor,
+        wave_loads=variant.wave_loads, integrator=variant.integrator, wave_components=variant.components,
+    )  # fmt: skip
+
+
+def _run(variant, seed, duration, wind, sea):
+    """DataFrame of a run of this variant."""
+    return simulate(_scene(variant, seed, duration, wind, sea), "pi", duration=duration, dt=variant.dt)
+
+
+def errors(frame, reference):
+    """{quantity: rms difference over standard deviation} of a run."""
+    return {name: normalised_rms(frame[channel], reference[channel]) for name, channel in CHANNELS.items()}
+
+
+def accuracy(
+    seeds=(1, 2, 3),
+    duration=600.0,
+    finest=0.00625,
+    chosen=None,
+    out=None,
+    wind=None,
+    sea=None,
+    repeats=1,
+    progress=None,
+):
+    """DataFrame with a row per seed and variant; the first of a seed is the reference at twice its step.
+
+    finest    step of the reference, s
+    chosen    variants (default: variants())
+    out       CSV that grows by a row as each run ends; rows already there are kept and not run again
+    progress  called with (text, done, total)
+    """
+    wind, sea = wind or TURBULENCE, SEA if sea is None else sea
+    check = Variant("convergence", "rk4", 2.0 * finest, "bem", "exact")
+    plan = [check, *(variants() if chosen is None else chosen)]
+    rows = _finished(out)
+    known = {(row["seed"], row["axis"], row["variant"], row["seconds"], row["finest_s"]) for row in rows}
+    total, done = len(seeds) * len(plan), 0
+    for seed in seeds:
+        missing = [v for v in plan if (seed, v.axis, v.name, float(duration), float(finest)) not in known]
+        done += len(plan) - len(missing)
+        if not missing:
+            continue
+        if progress is not None:
+            progress(f"seed {seed}: reference", done, total)
+        reference = _run(Variant("reference", "rk4", finest, "bem", "exact"), seed, duration, wind, sea)
+        for variant in missing:
+            if progress is not None:
+                progress(f"seed {seed}: {variant.name}", done, total)
+            rows.append(_row(variant, seed, duration, finest, reference, wind, sea, repeats))
+            _append(out, rows[-1])
+            done += 1
+    return pd.DataFrame(rows, columns=COLUMNS)
+
+
+def _row(variant, seed, duration, finest, reference, wind, sea, repeats):
+    scene = _scene(variant, seed, duration, wind, sea)
+    frames = []
+
+    def go():
+        frames[:] = [simulate(scene, "pi", duration=duration, dt=variant.dt)]
+
+    simulate(scene, "pi", duration=1.0, dt=variant.dt)  # compiles
+    cost = median_time(go, repeats) if variant.axis != "convergence" else float("nan")
+    if not frames:
+        go()
+    found = errors(frames[0], reference)
+    worst = max(found, key=found.get)
+    waves = scene.model.waves
+    return {
+        "seed": seed, "variant": variant.name, "axis": variant.axis, "integrator": variant.integrator,
+        "dt_s": variant.dt, "rotor": variant.rotor, "wave_loads": variant.wave_loads,
+        "components": 0 if waves is None else int(waves.omega.shape[0]), "seconds": float(duration),
+        "finest_s": float(finest), "worst": found[worst], "worst_of": worst, **found,
+        "real_time_factor": duration / cost, "calibration_ms": calibration(),
+    }  # fmt: skip
+
+
+def _finished(out):
+    """Rows (list of dict) of an earlier, perhaps interrupted study."""
+    if out is None:
+        return []
+    out = Path(out)
+    if out.suffix.lower() != ".csv":
+        raise InputError(f"accuracy table {str(out)!r}: must end with .csv")
+    if not out.is_file():
+        return []
+    table = pd.read_csv(out, comment="#")
+    if tuple(table.columns) != COLUMNS:
+        raise InputError(f"accuracy table {str(out)!r}: holds other columns; move it away")
+    return table.to_dict("records")
+
+
+def _append(out, row):
+    """Add a row to the CSV, which begins with where it was made."""
+    if out is None:
+        return
+    out = Path(out)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    new = not out.is_file()
+    with out.open("a", encoding="utf-8", newline="") as file:
+        if new:
+            for line in header():
+                file.write(f"# {line}\n")
+        pd.DataFrame([row], columns=COLUMNS).to_csv(file, index=False, header=new, float_format="%.8g")
+
+
+def summary(table):
+    """DataFrame by variant: seeds' mean of error and real-time factor, and whether it is on the front."""
+    if table.empty:
+        raise InputError("nothing to summarise: the table has no rows")
+    groups = table.groupby(["variant", "axis"], sort=False)
+    mean = groups[["worst", "real_time_factor", *CHANNELS]].mean().reset_index()
+    mean["worst_of"] = groups["worst_of"].agg(lambda names: names.mode()[0]).to_numpy()
+    mean["front"] = pareto(mean["worst"], mean["real_time_factor"])
+    return mean
+
+
+def pareto(error, speed):
+    """(n,) bool: no other point is as fast and more accurate, or as accurate and faster. NaN: never."""
+    error, speed = np.asarray(error, dtype=float), np.asarray(speed, dtype=float)
+    front = np.isfinite(error) & np.isfinite(speed)
+    for i in np.flatnonzero(front):
+        better = (error <= error[i]) & (speed >= speed[i]) & ((error < error[i]) | (speed > speed[i]))
+        front[i] = not better.any()
+    return front
+
+
+def openfast_points():
+    """[(setting, error, real-time factor)] of OpenFAST.
+
+    Its differences are the largest in 40 s, in surge, platform pitch and rotor speed: divided by the standard
+    deviations of the case they are upper bounds of the rms measure used here, over fewer quantities.
+    """
+    return [
+        (name, max(d / s for d, s in zip(largest, OPENFAST_STD, strict=True)), factor)
+        for name, factor, largest in OPENFAST
+    ]
+
+
+def plot_accuracy(table, path=None):
+    """Figure: error over real-time factor, both logarithmic, with the Pareto front and OpenFAST's points."""
+    from fowt_env.plots import COLOURS, INK, _new_figure, _save, _style
+
+    points = summary(table)
+    points = points[np.isfinite(points["real_time_factor"]) & (points["worst"] > 0.0)]
+    figure = _new_figure(7.5, 5.0)
+    axes = figure.subplots()
+    _style(axes)
+    for index, (axis, group) in enumerate(points.groupby("axis", sort=False)):
+        axes.loglog(
+            group["real_time_factor"], group["worst"], "o", markersize=5, color=COLOURS[index], label=axis
+        )
+    front = points[points["front"]].sort_values("real_time_factor")
+    axes.loglog(front["real_time_factor"], front["worst"], color=INK, linewidth=1.0, label="Pareto front")
+    theirs = openfast_points()
+    axes.loglog(
+        [p[2] for p in theirs], [p[1] for p in theirs], "k^", markersize=6, markerfacecolor="none",
+        label="OpenFAST (largest difference in 40 s of\nsurge, pitch, rotor speed over std)",
+    )  # fmt: skip
+    for row in front.to_dict("records"):
+        axes.annotate(
+            row["variant"], (row["real_time_factor"], row["worst"]), fontsize=5, color=INK,
+            xytext=(4, 3), textcoords="offset points",
+        )  # fmt: skip
+    axes.set_xlabel("real-time factor of simulate (CPU, one core)", color=INK, fontsize=9)
+    axes.set_ylabel("worst rms difference / standard deviation", color=INK, fontsize=9)
+    axes.legend(fontsize=7, frameon=False)
+    return _save(figure, path)
+
+
+def select(names):
+    """Variants of the axes named. Raises: InputError for an unknown axis."""
+    known = list(dict.fromkeys(v.axis for v in variants()))
+    for name in names:
+        if name not in known:
+            raise unknown("axis", name, known)
+    return [v for v in variants() if v.axis in names]

@@ -1,0 +1,148 @@
+"""Speed of the environments: single, native batch, and Gymnasium's batches of single ones, in one run."""
+
+import time
+from collections import Counter
+from itertools import count
+
+import numpy as np
+import pandas as pd
+from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
+
+from fowt_env.envs import FowtEnv, FowtVectorEnv
+from fowt_env.envs.batch import act_all
+
+SIZES = (1, 16, 256, 4096)
+THREADS = (1, 2)
+HOLD = np.zeros(2)  # residual mode: the baseline alone, so that no episode fails
+ROUNDS = 10
+
+
+def timed(action, seconds, most=100_000):
+    """Time of a call (s) in the fastest of several rounds that together take about the given seconds."""
+    action()
+    begin = time.perf_counter()
+    action()
+    once = time.perf_counter() - begin
+    calls = int(min(max(seconds / ROUNDS / max(once, 1e-7), 1), most))
+    best = np.inf
+    for _ in range(ROUNDS):
+        begin = time.perf_counter()
+        for _ in range(calls):
+            action()
+        best = min(best, (time.perf_counter() - begin) / calls)
+    return best
+
+
+def arrays_of(part):
+    """Arrays of a NamedTuple and of the parts in it."""
+    for value in part:
+        if isinstance(value, np.ndarray):
+            yield value
+        elif isinstance(value, tuple):
+            yield from arrays_of(value)
+
+
+def own_bytes(envs):
+    """Mean bytes of the arrays that each environment has for itself: those no other one holds."""
+    held = [{id(a): a.nbytes for a in (*arrays_of(env._setting), *arrays_of(env._run))} for env in envs]
+    holders = Counter(key for own in held for key in own)
+    return sum(n for own in held for key, n in own.items() if holders[key] == 1) / len(envs)
+
+
+def single_costs(env, seconds):
+    """{step_us, physics_us, overhead_us, reset_ms} of one environment.
+
+    The physics are those of the compiled call for a batch of 16 such environments, over 16; the overhead is
+    what a step takes beyond them. The resets draw new wind, sea and offsets, with all trims known.
+    """
+    few = 16
+    batch = FowtVectorEnv(few, threads=1, **env)
+    batch.reset(seed=0)
+    actions = np.zeros((few, 2))
+    active = np.ones(few, dtype=bool)
+    given = (batch._boxes, batch._law, actions, active, batch._statuses, batch._rewards)
+    physics = timed(lambda: act_all(*given), seconds, most=100) / few
+    single = batch.envs[0].twin()
+    single.reset(seed=0)
+    step = timed(lambda: single.step(HOLD), seconds, most=500)
+    seeds = count()
+    for seed in range(60):  # the trims of the winds that are drawn, once per process
+        single.reset(seed=seed)
+    reset = timed(lambda: single.reset(seed=next(seeds) % 60), seconds)
+    return {
+        "step_us": step * 1e6,
+        "physics_us": physics * 1e6,
+        "overhead_us": (step - physics) * 1e6,
+        "reset_ms": reset * 1e3,
+    }
+
+
+def row_of(kind, n, threads, per_step, memory=np.nan, reset=np.nan):
+    """One row of the table from the time of a step of all n environments (s)."""
+    return {
+        "kind": kind,
+        "envs": n,
+        "threads": threads,
+        "env_steps_per_s": n / per_step,
+        "us_per_env_step": per_step / n * 1e6,
+        "reset_ms_per_env": reset * 1e3,
+        "memory_kB_per_env": memory,
+    }
+
+
+def native_rows(settings, sizes, threads, seconds):
+    """Rows of FowtVectorEnv, each size on each number of threads."""
+    rows = []
+    for n in sizes:
+        batch = FowtVectorEnv(n, threads=1, **settings)
+        begin = time.perf_counter()
+        batch.reset(seed=0)
+        reset = (time.perf_counter() - begin) / n
+        memory = own_bytes(batch.envs) / 1024.0 if n > 1 else np.nan
+        actions = np.zeros((n, 2))
+        for number in sorted({min(number, n) for number in threads}):
+            batch.threads = number
+            per_step = timed(lambda batch=batch, actions=actions: batch.step(actions), seconds, most=50)
+            rows.append(row_of("FowtVectorEnv", n, number, per_step, memory, reset))
+        del batch
+    return rows
+
+
+def gymnasium_rows(settings, n, seconds):
+    """Rows of Gymnasium's vector environments of n single ones."""
+    model = FowtEnv(**settings)
+    model.reset(seed=0)
+    model.step(HOLD)  # compiled before processes fork
+    rows = []
+    for kind in (AsyncVectorEnv, SyncVectorEnv):
+        envs = kind([model.twin] * n)
+        envs.reset(seed=0)
+        actions = np.zeros((n, 2), dtype=np.float32)
+        per_step = timed(lambda envs=envs, actions=actions: envs.step(actions), seconds, most=50)
+        rows.append(row_of(kind.__name__, n, "processes" if kind is AsyncVectorEnv else 1, per_step))
+        envs.close()
+    return rows
+
+
+def benchmark_envs(
+    fidelity="standard", sizes=SIZES, threads=THREADS, seconds=1.0, gymnasium_envs=16, **settings
+):
+    """(table, single): a pandas table of env steps per second, and the costs of a single environment.
+
+    An env step is one control period (0.1 s) of the task above_rated in residual mode without residual:
+    turbulent wind, irregular sea, the PI, observation, reward and info included. seconds: per measurement.
+    The first reset of a size includes trims that are not known yet; single["reset_ms"] does not.
+    """
+    settings = {"fidelity": fidelity, "action_mode": "residual"} | settings
+    rows = gymnasium_rows(settings, gymnasium_envs, seconds)  # first: they fork, before threads are started
+    single = single_costs(settings, seconds)
+    rows = [row_of("FowtEnv", 1, 1, single["step_us"] * 1e-6, reset=single["reset_ms"] * 1e-3), *rows]
+    rows += native_rows(settings, sizes, threads, seconds)
+    return pd.DataFrame(rows), single
+
+
+if __name__ == "__main__":
+    for level in ("standard", "fast"):
+        table, single = benchmark_envs(level, seconds=0.5)
+        print(f"fidelity = {level!r}; single:", {key: round(value, 2) for key, value in single.items()})
+        print(table.round(2).to_string(index=False))

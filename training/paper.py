@@ -1,0 +1,420 @@
+"""The paper's load cases: LC1 to LC12 on the 1:50 model, and the full-scale runs of its Figures 13 to 16.
+
+Rotor speed and blade pitch are prescribed at model scale, theory.md Eq. (20). A run starts at its steady
+state in the mean wind; waves start at once, as a wave maker's do, so that a record holds the transient of
+its start. The wind is the printed one, with a turbulence intensity of 3 %, a choice: the paper says "low" and
+prints no value. What is identified and what is not: training/identify_model.py.
+"""
+
+from dataclasses import dataclass, field
+from math import hypot, pi
+
+import numpy as np
+import pandas as pd
+
+import fowt_env
+from fowt_env.description import read_platform
+from fowt_env.errors import InputError, unknown
+from fowt_env.loads.mooring import catenary
+from fowt_env.plots import spectrum
+from fowt_env.steady import trim_held
+from fowt_env.weather.turbulence import turbulence
+from training.comparison import harmonics
+
+PLATFORM = "liu_1_50"
+TIME, SURGE, PITCH = "Time_[s]", "PtfmSurge_[m]", "PtfmPitch_[deg]"
+MOTIONS = (
+    SURGE, "PtfmSway_[m]", "PtfmHeave_[m]", "PtfmRoll_[deg]", PITCH, "PtfmYaw_[deg]",
+)  # fmt: skip
+DURATION = 500.0  # s at model scale, 59 min at full scale
+SKIP = 100.0  # s left out of statistics, ten surge periods
+SEGMENT = 125.0  # s of a spectrum's window: 12 surge periods
+STEP, OUTPUT = 0.01, 0.05  # s; 0.07 and 0.35 s at full scale
+INTENSITY = 0.03  # of the wind's turbulence, a choice
+RPM = pi / 30.0
+FULL_SCALE = "full_scale"
+
+
+@dataclass(frozen=True)
+class Case:
+    """One load case at model scale, as Table 2 of the paper has it."""
+
+    wind: float | None  # m/s; None: no wind
+    rotor_rpm: float = 0.0
+    blade_pitch_deg: float = 0.0
+    sea: dict | None = None
+
+
+SEAS = (
+    {"kind": "regular", "H": 0.06, "T": 1.07},
+    {"kind": "jonswap", "Hs": 0.11, "Tp": 1.5, "gamma": 2.8},
+    {"kind": "jonswap", "Hs": 0.14, "Tp": 1.7, "gamma": 3.3},
+    {"kind": "jonswap", "Hs": 0.18, "Tp": 2.18, "gamma": 3.8},
+)
+WINDS = ((2.02, 62.8, 0.0), (3.36, 85.6, 0.0), (3.56, 85.6, 14.9), (5.93, 0.0, 90.0))
+CASES = {
+    **{f"LC{i}": Case(*wind) for i, wind in enumerate(WINDS, 1)},
+    **{f"LC{i}": Case(None, sea=sea) for i, sea in enumerate(SEAS, 5)},
+    **{f"LC{i}": Case(*wind, sea) for i, (wind, sea) in enumerate(zip(WINDS, SEAS, strict=True), 9)},
+}
+GROUPS = {
+    "wind": ("LC1", "LC2", "LC3", "LC4"),
+    "waves": ("LC5", "LC6", "LC7", "LC8"),
+    "wind and waves": ("LC9", "LC10", "LC11", "LC12"),
+}
+
+
+def wanted_cases(text):
+    """Case names of "LC5", "LC1,LC2", "all" or "full_scale". Raises: InputError for an unknown one."""
+    names = [name.strip() for name in text.split(",") if name.strip()]
+    if not names:
+        raise InputError(f"case = {text!r}: must name at least one case, e.g. LC5, all or {FULL_SCALE}")
+    chosen = []
+    for name in names:
+        key = name.upper() if name.upper() in CASES else name.lower()
+        if key == "all":
+            chosen += [*CASES]
+        elif key in CASES or key == FULL_SCALE:
+            chosen.append(key)
+        else:
+            raise unknown("case of the paper", name, (*CASES, "all", FULL_SCALE))
+    return list(dict.fromkeys(chosen))
+
+
+def model_wind(speed, hub_height, diameter, duration, seed):
+    """Wind specification: rotor-averaged Kaimal turbulence of low intensity about a mean speed (m/s)."""
+    period, value = turbulence(
+        speed, INTENSITY * speed, height=hub_height, diameter=diameter, period=duration, seed=seed,
+        shear_turbulence=False,
+    )  # fmt: skip
+    time = np.linspace(0.0, period, len(value))
+    return {"kind": "series", "time": time, "speed": speed + value[:, 0]}
+
+
+def case_scene(name, duration=DURATION, seed=1, **options):
+    """Scene of a model-scale load case; options as in build_scene."""
+    case = CASES[name]
+    platform = read_platform(PLATFORM)
+    wind = None
+    if case.wind is not None:
+        rotor = fowt_env.description.read_turbine(platform.turbine).rotor
+        wind = model_wind(case.wind, rotor.hub_height, 2.0 * rotor.tip_radius, duration, seed)
+    options = {"fidelity": "standard", "integrator": "rk4", "duration": duration} | options
+    return fowt_env.build_scene(platform, wind=wind, sea=case.sea, seed=seed, **options)
+
+
+def case_point(scene, name):
+    """OperatingPoint of a load case's scene with its prescribed rotor speed and blade pitch."""
+    case = CASES[name]
+    return trim_held(scene, case.rotor_rpm * RPM, case.blade_pitch_deg * pi / 180.0)
+
+
+def run_case(name, duration=DURATION, seed=1, progress=False, **options):
+    """DataFrame of a model-scale load case, started from its steady state."""
+    scene = case_scene(name, duration, seed, **options)
+    case, point = CASES[name], case_point(scene, name)
+    initial = {column.split("_[")[0]: point[column.split("_[")[0]] for column in MOTIONS}
+    return fowt_env.simulate(
+        scene,
+        controller=None,
+        duration=duration,
+        dt=STEP,
+        control_dt=0.1,
+        output_dt=OUTPUT,
+        start="zero",
+        initial=initial | {"RotSpeed": case.rotor_rpm, "BldPitch1": case.blade_pitch_deg},
+        progress=progress,
+    )
+
+
+def settled(frame, skip=SKIP):
+    """Rows from skip seconds on."""
+    return frame[frame[TIME] >= skip - 1e-6]
+
+
+def statistics(runs):
+    """DataFrame: mean, standard deviation, extremes and quartiles of the channels of {case: frame}."""
+    rows = []
+    for case, frame in runs.items():
+        part = settled(frame)
+        channels = [*MOTIONS, "RtFldFxh_[N]", *(c for c in frame.columns if c.startswith("FAIRTEN"))]
+        for channel in channels:
+            x = part[channel].to_numpy()
+            quartiles = np.percentile(x, (25.0, 50.0, 75.0))
+            row = {"case": case, "channel": channel, "mean": x.mean(), "std": x.std(), "min": x.min()}
+            rows.append(row | dict(zip(("q1", "median", "q3"), quartiles, strict=True)) | {"max": x.max()})
+    return pd.DataFrame(rows)
+
+
+def case_spectrum(frame, channel, skip=0.0):
+    """(frequency Hz, density) of a channel from skip seconds on."""
+    part = settled(frame, skip)
+    return spectrum(part[TIME], part[channel], segment=SEGMENT)
+
+
+def prominence(frame, channel, frequency, skip=0.0, width=0.1, reach=0.35):
+    """Height of a spectral peak near a frequency (Hz) over its surroundings; above 1 where there is one.
+
+    The largest density within width (relative) of the frequency, over the larger of the medians of the
+    density on its two sides, up to reach away. 0 if the largest is at the edge, i.e. a slope and no peak.
+    """
+    f, density = case_spectrum(frame, channel, skip)
+    near = np.flatnonzero(np.abs(f / frequency - 1.0) <= width)
+    top = near[np.argmax(density[near])]
+    if not density[top] > max(density[top - 1], density[top + 1]):
+        return 0.0
+    left = density[(f < f[near[0]]) & (f >= (1.0 - reach) * frequency)]
+    right = density[(f > f[near[-1]]) & (f <= (1.0 + reach) * frequency)]
+    return float(density[top] / max(np.median(left), np.median(right)))
+
+
+# --------------------------------------------------------------------------- claims
+
+PEAK = 2.0  # a peak rises to at least this many times its surroundings ...
+VISIBLE = 1e-5  # ... and to this share of the highest one, five decades of a logarithmic axis
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One qualitative claim of the paper, what was found here, and whether it holds."""
+
+    figure: str
+    text: str
+    found: str
+    holds: bool
+
+
+@dataclass
+class PaperStudy:
+    """Runs and findings of `fowt paper`."""
+
+    runs: dict = field(default_factory=dict)  # model-scale case -> frame
+    claims: list = field(default_factory=list)
+    full: dict = field(default_factory=dict)  # name -> frame or table
+
+
+def natural_frequencies():
+    """{motion: Hz} of the 1:50 model."""
+    scene = fowt_env.build_scene(PLATFORM)
+    return {motion: 1.0 / period for motion, period in fowt_env.natural_periods(scene).items()}
+
+
+def claims(runs, natural):
+    """[Claim] of section 8 that the given model-scale runs can judge."""
+    having = set(runs)
+    found = []
+    for needs, judge in (
+        ({"LC1"}, _steady_surge),
+        ({"LC2"}, _rated_surge_peak),
+        (set(GROUPS["wind"]), _pitch_over_wind),
+        ({"LC5"}, _regular_wave_peaks),
+        (set(GROUPS["waves"]), _waves_have_no_mean),
+        ({"LC11"}, _combined_peaks),
+        ({*GROUPS["wind"], *GROUPS["waves"], *GROUPS["wind and waves"]}, _mean_and_range),
+    ):
+        if needs <= having:
+            found += judge(runs, natural)
+    return found
+
+
+def _pitch(runs, name):
+    return settled(runs[name])[PITCH].to_numpy()
+
+
+def _peak(figure, text, runs, case, channel, frequency):
+    height = prominence(runs[case], channel, frequency)
+    f, density = case_spectrum(runs[case], channel)
+    share = density[np.abs(f / frequency - 1.0) <= 0.1].max() / density.max()
+    found = f"at {frequency:.3f} Hz {height:.3g} times its surroundings, {share:.2g} of the highest"
+    return Claim(figure, text, found, bool(height >= PEAK and share >= VISIBLE))
+
+
+def _steady_surge(runs, natural):
+    surge = settled(runs["LC1"])[SURGE]
+    text = f"mean {surge.mean():.4f} m, std {surge.std():.4f} m"
+    return [Claim("6", "LC1: surge is nearly steady", text, bool(surge.std() < 0.1 * surge.mean()))]
+
+
+def _rated_surge_peak(runs, natural):
+    f = natural["platform_pitch"]
+    return [_peak("7", "LC2: surge spectrum peaks at the pitch frequency", runs, "LC2", SURGE, f)]
+
+
+def _pitch_over_wind(runs, natural):
+    mean = {name: _pitch(runs, name).mean() for name in GROUPS["wind"]}
+    text = ", ".join(f"{name} {value:.2f}" for name, value in mean.items()) + " deg"
+    return [
+        Claim("8", "mean pitch is largest at rated wind (LC2)", text, max(mean, key=mean.get) == "LC2"),
+        Claim(
+            "8",
+            "mean pitch falls above rated (LC2 > LC3 > LC4)",
+            text,
+            bool(mean["LC2"] > mean["LC3"] > mean["LC4"]),
+        ),
+    ]
+
+
+def _regular_wave_peaks(runs, natural):
+    wave = 1.0 / SEAS[0]["T"]
+    places = {
+        "the surge frequency": natural["surge"],
+        "the pitch frequency": natural["platform_pitch"],
+        "the wave frequency": wave,
+        "twice the wave frequency": 2.0 * wave,
+    }
+    return [
+        _peak("9", f"LC5: surge spectrum peaks at {where}", runs, "LC5", SURGE, frequency)
+        for where, frequency in places.items()
+    ]
+
+
+def _waves_have_no_mean(runs, natural):
+    spread = {name: _pitch(runs, name).std() for name in GROUPS["waves"]}
+    still = _pitch(runs, "LC5").mean()
+    shift = max(abs(_pitch(runs, name).mean() - still) for name in GROUPS["waves"])
+    text = ", ".join(f"{name} {value:.2f}" for name, value in spread.items())
+    return [
+        Claim("10", "LC5 to LC8: the range grows with the waves", f"std {text} deg",
+              list(spread.values()) == sorted(spread.values())),
+        Claim("10", "LC5 to LC8: waves leave the mean alone", f"means within {shift:.3f} deg",
+              bool(shift < 0.1 * spread["LC8"])),
+    ]  # fmt: skip
+
+
+def _combined_peaks(runs, natural):
+    wave = 1.0 / SEAS[2]["Tp"]
+    return [
+        _peak("11", "LC11: pitch spectrum peaks at the pitch frequency", runs, "LC11", PITCH,
+              natural["platform_pitch"]),
+        _peak("11", "LC11: pitch spectrum peaks at the wave frequency", runs, "LC11", PITCH, wave),
+    ]  # fmt: skip
+
+
+def _mean_and_range(runs, natural):
+    means, spreads = [], []
+    for wind, wave, both in zip(*GROUPS.values(), strict=True):
+        means.append((_pitch(runs, both).mean(), _pitch(runs, wind).mean(), _pitch(runs, wave).mean()))
+        spreads.append((_pitch(runs, both).std(), _pitch(runs, wind).std(), _pitch(runs, wave).std()))
+    shift = max(abs(both - wind) for both, wind, _ in means)
+    largest = max(wind for _, wind, _ in means)
+    ratios = [both / wave for both, _, wave in spreads]
+    nearer = all(abs(both - wave) < abs(both - wind) for both, wind, wave in spreads[1:])
+    text = ", ".join(
+        f"{name} {ratio:.2f}" for name, ratio in zip(GROUPS["wind and waves"], ratios, strict=True)
+    )
+    return [
+        Claim("12", "LC9 to LC12: wind sets the mean", f"within {shift:.2f} deg of the mean in wind alone",
+              bool(shift < 0.1 * largest)),
+        Claim("12", "LC10 to LC12: waves set the range", f"std over that in waves alone: {text}", nearer),
+    ]  # fmt: skip
+
+
+# --------------------------------------------------------------------------- mooring
+
+
+def static_pull(platform, direction, offsets):
+    """DataFrame: restoring force (N) and line tensions (N) of the moorings at offsets (m) along a direction.
+
+    direction: "surge" or "sway". The hull is moved without turning, as in the paper's Fig. 5.
+    """
+    axis = ("surge", "sway").index(direction)
+    rows = []
+    for offset in offsets:
+        force, tensions = 0.0, {}
+        for number, line in enumerate(platform.lines, 1):
+            place = np.array(line.fairlead)
+            place[axis] += offset
+            dx, dy, dz = np.array(line.anchor) - place
+            span = hypot(dx, dy)
+            state = catenary(span, -dz, line.length, line.wet_weight, line.EA, line.seabed_friction, 0.0)
+            force -= state.H * (dx, dy)[axis] / span
+            tensions[f"tension_{number}_[N]"] = state.fairlead_tension
+        rows.append({"offset_[m]": float(offset), "force_[N]": force} | tensions)
+    return pd.DataFrame(rows)
+
+
+# --------------------------------------------------------------------------- full scale
+
+COMBINATIONS = (  # kinematics position, surface, stretching; theory.md, section 8
+    ("fixed", "swl", "none"),
+    ("instantaneous", "swl", "none"),
+    ("fixed", "instantaneous", "wheeler"),
+    ("instantaneous", "instantaneous", "wheeler"),
+)
+EXPECTED_DOUBLE = ((0.02, 0.02), (0.34, 0.34), (0.60, 0.52), (0.92, 0.83))  # %, theory.md, section 8
+DECAYS = {"surge decay": ("PtfmSurge", 10.0, SURGE, 600.0), "pitch decay": ("PtfmPitch", 5.0, PITCH, 300.0)}
+
+
+def decay(channel, start, duration):
+    """Frame of a free decay of OC3-Hywind in still water."""
+    scene = fowt_env.build_scene("oc3_hywind")
+    return fowt_env.simulate(
+        scene, controller=None, duration=duration, dt=0.05, start="trim", initial={channel: start}
+    )
+
+
+def regular_wave(position, surface, stretching, duration=460.0):
+    """Frame of OC3-Hywind in the regular wave H 3 m, T 5 s of Fig. 15 with given wave kinematics."""
+    scene = fowt_env.build_scene(
+        "oc3_hywind", sea={"kind": "regular", "H": 3.0, "T": 5.0, "ramp": 50.0}, kinematics_position=position,
+        surface=surface, stretching=stretching,
+    )  # fmt: skip
+    return fowt_env.simulate(scene, controller=None, duration=duration, dt=0.1)
+
+
+def double_frequency(frame, start=260.0, period=5.0):
+    """{channel: (first harmonic, second over first in %)} of surge and pitch in a regular wave."""
+    part = frame[(frame[TIME] >= start) & (frame[TIME] < frame[TIME].iloc[-1] - 1e-6)]
+    time = part[TIME].to_numpy()
+    found = {}
+    for channel in (SURGE, PITCH):
+        first, second = np.abs(harmonics(time, part[channel].to_numpy(), 2.0 * pi / period))
+        found[channel] = (float(first), float(100.0 * second / first))
+    return found
+
+
+def wind_and_waves(duration=1000.0, seed=1):
+    """Frame of Fig. 16: 18 m/s (turbulence class B, a choice), JONSWAP Hs 7.5 m, Tp 10 s, under control."""
+    scene = fowt_env.build_scene(
+        "oc3_hywind", wind={"kind": "ntm", "speed": 18.0, "class": "B"}, sea="paper_wind_wave", seed=seed,
+        fidelity="standard", duration=duration,
+    )  # fmt: skip
+    return fowt_env.simulate(scene, controller="pi", duration=duration)
+
+
+def full_scale(say=None):
+    """{name: frame or table} of the full-scale studies."""
+    say = say or (lambda text: None)
+    found = {}
+    for name, (channel, start, _, duration) in DECAYS.items():
+        say(name)
+        found[name] = decay(channel, start, duration)
+    for combination in COMBINATIONS:
+        say("regular wave: " + ", ".join(combination[:2]))
+        found[combination] = regular_wave(*combination)
+    say("wind and waves")
+    found["wind and waves"] = wind_and_waves()
+    return found
+
+
+def run_paper(names, report=None):
+    """PaperStudy of the named cases; report(text, done, total) is called before each run."""
+    study = PaperStudy()
+    models = [name for name in names if name in CASES]
+    total = len(models) + (len(DECAYS) + len(COMBINATIONS) + 1 if FULL_SCALE in names else 0)
+    done = 0
+
+    def say(text):
+        nonlocal done
+        if report is not None:
+            report(text, done, total)
+        done += 1
+
+    for name in models:
+        say(name)
+        study.runs[name] = run_case(name)
+    if models:
+        study.claims = claims(study.runs, natural_frequencies())
+    if FULL_SCALE in names:
+        study.full = full_scale(say)
+    return study

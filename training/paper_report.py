@@ -1,0 +1,246 @@
+"""What `fowt paper` leaves behind: time series, statistics, claims, and plots like the paper's."""
+
+from pathlib import Path
+
+import numpy as np
+
+import fowt_env
+from fowt_env.description import read_platform
+from fowt_env.outputs import replacing, write_table
+from fowt_env.plots import COLOURS, INK, TIME, plot_run, spectrum
+from fowt_env.plots import _new_figure as new_figure
+from fowt_env.plots import _save as save_figure
+from fowt_env.plots import _style as style_axes
+from training import paper
+
+LABELS = {
+    paper.SURGE: "surge (m)",
+    "PtfmHeave_[m]": "heave (m)",
+    paper.PITCH: "platform pitch (deg)",
+    "FAIRTEN1_[kN]": "tension 1 (kN)",
+    "FAIRTEN2_[kN]": "tension 2 (kN)",
+}
+PULLS = {"model": (paper.PLATFORM, 0.25), "OC3-Hywind": ("oc3_hywind", 20.0)}  # platform, largest offset m
+
+
+def _axes(figure, rows, columns=1, **options):
+    axes = figure.subplots(rows, columns, squeeze=False, **options)
+    for one in axes.ravel():
+        style_axes(one)
+    return axes
+
+
+def _groups(runs):
+    """{group: [case]} of the groups with at least one run."""
+    having = {name: [case for case in cases if case in runs] for name, cases in paper.GROUPS.items()}
+    return {name: cases for name, cases in having.items() if cases}
+
+
+def box_plots(runs, channel, path=None):
+    """Box plots of a channel per case, like Figs 8, 10 and 12: quartiles, median and extremes."""
+    groups = _groups(runs)
+    figure = new_figure(9.0, 3.2)
+    for axes, (name, cases) in zip(
+        _axes(figure, 1, len(groups), sharey=True)[0], groups.items(), strict=True
+    ):
+        values = [paper.settled(runs[case])[channel].to_numpy() for case in cases]
+        axes.boxplot(values, tick_labels=cases, whis=(0, 100), medianprops={"color": COLOURS[1]})
+        axes.set_title(name, fontsize=9, color=INK)
+    figure.axes[0].set_ylabel(LABELS[channel], fontsize=9, color=INK)
+    return save_figure(figure, path)
+
+
+def time_series(runs, channel, path=None, window=(0.0, 200.0)):
+    """A channel of every case over time, a panel per case."""
+    figure = new_figure(9.0, 0.6 + 0.9 * len(runs))
+    rows = _axes(figure, len(runs), sharex=True)[:, 0]
+    for axes, (case, frame) in zip(rows, runs.items(), strict=True):
+        part = frame[(frame[TIME] >= window[0]) & (frame[TIME] <= window[1])]
+        axes.plot(part[TIME], part[channel], color=COLOURS[0], linewidth=0.8)
+        axes.set_ylabel(case, fontsize=8, color=INK)
+        axes.margins(x=0.0)
+    rows[-1].set_xlabel("time (s, model scale)", fontsize=9, color=INK)
+    figure.suptitle(LABELS[channel], fontsize=10, color=INK, x=0.01, ha="left")
+    return save_figure(figure, path)
+
+
+def spectra(runs, channel, natural, path=None):
+    """Power spectra of a channel, a panel per group, with the natural and wave frequencies marked."""
+    groups = _groups(runs)
+    figure = new_figure(9.0, 0.6 + 2.2 * len(groups))
+    for axes, (name, cases) in zip(
+        _axes(figure, len(groups), sharex=True)[:, 0], groups.items(), strict=True
+    ):
+        top = 0.0
+        for number, case in enumerate(cases):
+            frequency, density = paper.case_spectrum(runs[case], channel)
+            axes.loglog(frequency[1:], density[1:], color=COLOURS[number], linewidth=0.9, label=case)
+            top = max(top, density[1:].max())
+        for motion in ("surge", "heave", "platform_pitch"):
+            axes.axvline(natural[motion], color=INK, linestyle=":", linewidth=0.8)
+        axes.set_ylim(1e-10 * top, 4.0 * top)
+        axes.set_xlim(0.03, 3.0)
+        axes.set_title(f"{name}  (dotted: surge, pitch, heave)", fontsize=9, color=INK, loc="left")
+        axes.legend(fontsize=8, frameon=False, loc="upper right", ncols=4)
+    figure.axes[-1].set_xlabel("frequency (Hz, model scale)", fontsize=9, color=INK)
+    figure.supylabel(f"power density of {LABELS[channel]}, squared per Hz", fontsize=9, color=INK)
+    return save_figure(figure, path)
+
+
+def static_pulls(path=None):
+    """Pull and line tensions over offset, like Fig. 5, of the model and of OC3-Hywind."""
+    figure = new_figure(9.0, 6.4)
+    for row, (name, (platform, reach)) in zip(_axes(figure, 2, 2), PULLS.items(), strict=True):
+        for axes, direction in zip(row, ("surge", "sway"), strict=True):
+            table = paper.static_pull(read_platform(platform), direction, np.linspace(-reach, reach, 81))
+            unit, factor = ("N", 1.0) if platform == paper.PLATFORM else ("kN", 1e-3)
+            offset = table["offset_[m]"]
+            axes.plot(offset, factor * table["force_[N]"], color=INK, label="restoring force")
+            tensions = [column for column in table if column.startswith("tension")]
+            for number, column in enumerate(tensions):
+                line = ("-", "--")[number // 3]
+                label = column.removesuffix("_[N]").replace("_", " ")
+                axes.plot(
+                    offset,
+                    factor * table[column],
+                    line,
+                    color=COLOURS[number % 3],
+                    linewidth=0.9,
+                    label=label,
+                )
+            axes.set_xlabel(f"{direction} (m)", fontsize=9, color=INK)
+            axes.set_ylabel(unit, fontsize=9, color=INK)
+            axes.set_title(f"{name}: {direction}", fontsize=9, color=INK, loc="left")
+            axes.legend(fontsize=7, frameon=False)
+    return save_figure(figure, path)
+
+
+def decays(full, path=None):
+    """The surge and pitch decays of Figs 13 and 14."""
+    figure = new_figure(9.0, 4.4)
+    for axes, (name, (_, _, channel, _)) in zip(_axes(figure, 2)[:, 0], paper.DECAYS.items(), strict=True):
+        axes.plot(full[name][TIME], full[name][channel], color=COLOURS[0], linewidth=1.0)
+        axes.set_ylabel(LABELS[channel], fontsize=9, color=INK)
+        axes.margins(x=0.0)
+    figure.axes[-1].set_xlabel("time (s)", fontsize=9, color=INK)
+    return save_figure(figure, path)
+
+
+def regular_waves(full, path=None, window=(420.0, 450.0)):
+    """Fig. 15: surge, pitch and tension in the regular wave, and spectra for the four combinations."""
+    channels = (paper.SURGE, paper.PITCH, "FAIRTEN1_[kN]")
+    figure = new_figure(9.0, 6.4)
+    for row, channel in zip(_axes(figure, len(channels), 2), channels, strict=True):
+        for number, combination in enumerate(paper.COMBINATIONS):
+            frame = full[combination]
+            label = f"{combination[0]} position, {combination[1]} surface"
+            part = frame[(frame[TIME] >= window[0]) & (frame[TIME] <= window[1])]
+            row[0].plot(part[TIME], part[channel], color=COLOURS[number], linewidth=0.9, label=label)
+            part = frame[frame[TIME] >= 260.0]
+            frequency, density = spectrum(part[TIME], part[channel], segment=100.0)
+            row[1].semilogy(frequency[1:], density[1:], color=COLOURS[number], linewidth=0.9)
+        row[1].set_xlim(0.0, 0.7)
+        row[0].set_ylabel(LABELS[channel], fontsize=9, color=INK)
+        row[0].margins(x=0.0)
+    lines, labels = figure.axes[0].get_legend_handles_labels()
+    figure.legend(lines, labels, fontsize=8, frameon=False, loc="outside upper center", ncols=2)
+    figure.axes[-2].set_xlabel("time (s)", fontsize=9, color=INK)
+    figure.axes[-1].set_xlabel("frequency (Hz), power density per Hz", fontsize=9, color=INK)
+    return save_figure(figure, path)
+
+
+def claims_table(study):
+    """Markdown table of the claims with their verdicts."""
+    lines = ["| figure | claim of the paper | found here | verdict |", "|---|---|---|---|"]
+    for claim in study.claims:
+        lines.append(f"| {claim.figure} | {claim.text} | {claim.found} | {_verdict(claim)} |")
+    return "\n".join(lines)
+
+
+def _verdict(claim):
+    return "holds" if claim.holds else "FAILS"
+
+
+def double_frequency_table(full):
+    """Markdown table of second over first harmonics for the four combinations."""
+    lines = [
+        "| position | surface | surge (m) | pitch (deg) | surge, 2nd/1st | pitch, 2nd/1st | theory.md |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for combination, expected in zip(paper.COMBINATIONS, paper.EXPECTED_DOUBLE, strict=True):
+        found = paper.double_frequency(full[combination])
+        (surge, surge2), (pitch, pitch2) = found[paper.SURGE], found[paper.PITCH]
+        lines.append(
+            f"| {combination[0]} | {combination[1]} | {surge:.4f} | {pitch:.4f}"
+            f" | {surge2:.2f} % | {pitch2:.2f} % |"
+            f" {expected[0]:.2f} %, {expected[1]:.2f} % |"
+        )
+    return "\n".join(lines)
+
+
+def statistics_table(runs):
+    """Markdown table of pitch and surge per case."""
+    table = paper.statistics(runs)
+    lines = [
+        "| case | pitch mean | std | min | max (deg) | surge mean | std | min | max (m) | thrust mean (N) |",
+        "|---|---|---|---|---|---|---|---|---|---|",
+    ]
+    for case in runs:
+        rows = table[table["case"] == case].set_index("channel")
+        cells = [case]
+        for channel, digits in ((paper.PITCH, 2), (paper.SURGE, 3)):
+            cells += [f"{rows.loc[channel, name]:.{digits}f}" for name in ("mean", "std", "min", "max")]
+        cells.append(f"{rows.loc['RtFldFxh_[N]', 'mean']:.2f}")
+        lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+def periods_table():
+    """Markdown table of the natural periods of the 1:50 model against Table 1."""
+    published = read_platform(paper.PLATFORM).published["natural_periods"]
+    lines = ["| motion | paper, computed (s) | here (s) | difference |", "|---|---|---|---|"]
+    for motion, period in fowt_env.natural_periods(fowt_env.build_scene(paper.PLATFORM)).items():
+        wanted = published[motion.removeprefix("platform_")]
+        lines.append(f"| {motion} | {wanted:.2f} | {period:.3f} | {100.0 * (period / wanted - 1.0):+.2f} % |")
+    return "\n".join(lines)
+
+
+def write_report(study, folder, plot=True):
+    """Write everything that a study holds into a folder; returns the paths."""
+    folder = Path(folder)
+    paths, text = [], ["# Against the paper", "", "Written by `fowt paper`.", ""]
+    if study.runs:
+        for case, frame in study.runs.items():
+            paths.append(Path(write_table(frame, folder / "runs" / f"{case}.parquet")))
+        paths.append(Path(write_table(paper.statistics(study.runs), folder / "statistics.csv")))
+        text += ["## Natural periods of the model", "", periods_table(), "", "## Claims", ""]
+        text += [claims_table(study), "", "## Statistics, model scale", "", statistics_table(study.runs), ""]
+    if study.full:
+        text += ["## Double frequency, H 3 m, T 5 s, full scale", "", double_frequency_table(study.full), ""]
+    with replacing(folder / "paper.md") as temporary:
+        temporary.write_text("\n".join(text))
+    paths.append(folder / "paper.md")
+    return paths + (_plots(study, folder) if plot else [])
+
+
+def _plots(study, folder):
+    """Paths of all plots."""
+    made = {}
+    if study.runs:
+        natural = paper.natural_frequencies()
+        for name, channel in (("pitch", paper.PITCH), ("surge", paper.SURGE)):
+            made[f"box_{name}"] = lambda path, c=channel: box_plots(study.runs, c, path)
+            made[f"spectra_{name}"] = lambda path, c=channel: spectra(study.runs, c, natural, path)
+            made[f"series_{name}"] = lambda path, c=channel: time_series(study.runs, c, path)
+        made["static_pull"] = static_pulls
+    if study.full:
+        made["full_decays"] = lambda path: decays(study.full, path)
+        made["full_regular_wave"] = lambda path: regular_waves(study.full, path)
+        made["full_wind_and_waves"] = lambda path: plot_run(
+            study.full["wind and waves"], path, "18 m/s, Hs 7.5 m, Tp 10 s"
+        )
+    paths = []
+    for name, make in made.items():
+        paths.append(folder / f"{name}.png")
+        make(paths[-1])
+    return paths
