@@ -181,7 +181,7 @@ def test_the_judge_sees_no_peaks_of_the_other_case(runs, natural):
     assert not found["LC11: pitch spectrum peaks at the wave frequency"]
 
 
-def test_the_surge_and_pitch_peaks_of_a_regular_wave_are_its_start(runs, natural):
+def test_the_pitch_peak_of_a_regular_wave_is_its_start(runs, natural):
     late = paper.settled(runs["LC5"], 300.0)
     late = late.assign(**{paper.TIME: late[paper.TIME] - 300.0})
     found = verdicts({"LC5": late}, natural)
