@@ -349,11 +349,10 @@ def _check_sea(state, depth):
     """Refuse a sea that does not fit into the water."""
     if state is None:
         return
-    height = {"regular": getattr(state, "H", None), "jonswap": getattr(state, "Hs", None)}.get(
-        state.kind, getattr(state, "Hs", None)
-    )
     if state.kind == "components":
-        height = 2.0 * float(np.sum(np.abs(state.amplitude)))
+        height = 2.0 * float(np.sum(state.amplitude))
+    else:
+        height = state.H if state.kind == "regular" else state.Hs
     if height is not None and height > depth:
         raise InputError(f"sea: wave height {height:g} m: must not exceed the water depth of {depth:g} m")
 
