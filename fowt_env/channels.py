@@ -6,8 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fowt_env.dynamics import inertial_load
-from fowt_env.jit import kernel
+from fowt_env.dynamics import Kept, inertial_load
+from fowt_env.jit import inlined_kernel, kernel
+from fowt_env.lane_sums import SUM_LANES, lane_dot
 from fowt_env.loads.fast_waves import phasors
 from fowt_env.measurement import Measure
 from fowt_env.state import State, pose_of
@@ -132,8 +133,10 @@ def to_inertial(pose, a, b, c):
 @kernel
 def _component_sum(amplitude, cosine):
     """Sum of amplitude (n,) times cosine, whose padding beyond n is left out."""
-    total = 0.0
-    for j in range(amplitude.shape[0]):
+    n = amplitude.shape[0]
+    whole = n - n % SUM_LANES
+    total = lane_dot(amplitude, cosine, whole)
+    for j in range(whole, n):
         total += amplitude[j] * cosine[j]
     return total
 
@@ -150,6 +153,15 @@ def surface_elevation(t, waves, sea, scratch):
 
 
 @kernel
+def kept_elevation(t, waves, sea, scratch, kept):
+    """surface_elevation, computed once for all outputs of an instant."""
+    if kept[Kept.ELEVATED] < 0.5:
+        kept[Kept.ELEVATION] = surface_elevation(t, waves, sea, scratch)
+        kept[Kept.ELEVATED] = 1.0
+    return kept[Kept.ELEVATION]
+
+
+@inlined_kernel
 def measure(scene, work, x, dx, u, t, m):
     """Fill the measurement array m (N_MEASUREMENTS,) from a state and its derivative."""
     layout = scene.layout
@@ -170,10 +182,10 @@ def measure(scene, work, x, dx, u, t, m):
     m[Measure.NACELLE_VELOCITY] = pose.vx + pose.wy * top[2] - pose.wz * top[1]
     m[Measure.PLATFORM_PITCH_ACCELERATION] = dx[State.WY]
     m[Measure.WIND_SPEED] = wind[0]
-    m[Measure.WAVE_ELEVATION] = surface_elevation(t, scene.waves, scene.sea, work.fast)
+    m[Measure.WAVE_ELEVATION] = kept_elevation(t, scene.waves, scene.sea, work.fast, work.kept)
 
 
-@kernel
+@inlined_kernel
 def record(scene, work, x, dx, u, t, loads, row):
     """Fill one output row (n_channels,), SI, in the order of channels()."""
     layout = scene.layout
@@ -214,7 +226,7 @@ def record(scene, work, x, dx, u, t, loads, row):
     h = loads.hydro
     row[Out.HYDROFXI], row[Out.HYDROFYI], row[Out.HYDROFZI] = to_inertial(pose, h.fx, h.fy, h.fz)
     row[Out.HYDROMXI], row[Out.HYDROMYI], row[Out.HYDROMZI] = to_inertial(pose, h.mx, h.my, h.mz)
-    row[Out.WAVE1ELEV] = surface_elevation(t, scene.waves, scene.sea, work.fast)
+    row[Out.WAVE1ELEV] = kept_elevation(t, scene.waves, scene.sea, work.fast, work.kept)
     now = wind_now(t, scene.wind)
     wind = wind_at(t, 0.0, 0.0, hub[2], now, scene.wind, scene.wind_field)
     row[Out.WIND1VELX], row[Out.WIND1VELY], row[Out.WIND1VELZ] = wind
@@ -224,7 +236,7 @@ def record(scene, work, x, dx, u, t, loads, row):
         row[N_FIXED + n + i] = work.lines[i, 3]
 
 
-@kernel
+@inlined_kernel
 def tower_base(pose, x, dx, loads, body, layout, row):
     """Loads carried at the tower base: aerodynamics and weight above it less the momentum rate there.
 

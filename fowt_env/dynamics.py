@@ -1,16 +1,16 @@
 """The equation of motion: sum of loads to accelerations, theory.md Eq. (9).
 
 Unknowns (v', w', w_b'): one symmetric positive-definite system. The rotor row is eliminated, which
-leaves a 6x6 Cholesky solve.
+leaves a 6x6 solve.
 """
 
 from enum import IntEnum
-from math import cos, sin, sqrt
+from math import cos, sin
 from typing import NamedTuple
 
 import numpy as np
 
-from fowt_env.jit import kernel
+from fowt_env.jit import inlined_kernel, kernel
 from fowt_env.loads.damping import damping_load
 from fowt_env.loads.drivetrain import pitch_rate, shaft_torque
 from fowt_env.loads.fast_waves import FastScratch, fast_morison_load
@@ -86,9 +86,11 @@ class Kept(IntEnum):
     HYDRO = 26  # buoyancy and strips
     MOORING = 32
     TIME = 38
+    ELEVATED = 39  # 1 while ELEVATION, of the surface at the origin, is of TIME
+    ELEVATION = 40
 
 
-N_KEPT = 39
+N_KEPT = 41
 
 
 class Work(NamedTuple):
@@ -168,27 +170,32 @@ def attitude_rate(x, dx):
 
 @kernel
 def solve_spd(a, b):
-    """Solve a b = b in place by Cholesky; a is (6, 6) symmetric positive definite and is overwritten."""
-    n = b.shape[0]
-    for i in range(n):
-        for j in range(i + 1):
+    """Solve a b = b in place; a is (6, 6) symmetric positive definite and is overwritten.
+
+    L D L^T with the reciprocals of D kept on the diagonal: six divisions and no root.
+    """
+    for i in range(6):  # a known count, which the compiler unrolls
+        for j in range(i):
             total = a[i, j]
             for k in range(j):
                 total -= a[i, k] * a[j, k]
-            if i == j:
-                a[i, i] = sqrt(total)
-            else:
-                a[i, j] = total / a[j, j]
-    for i in range(n):
+            a[i, j] = total  # L D
+        pivot = a[i, i]
+        for j in range(i):
+            scaled = a[i, j] * a[j, j]
+            pivot -= scaled * a[i, j]
+            a[i, j] = scaled  # L
+        a[i, i] = 1.0 / pivot
+    for i in range(6):
         total = b[i]
         for k in range(i):
             total -= a[i, k] * b[k]
-        b[i] = total / a[i, i]
-    for i in range(n - 1, -1, -1):
-        total = b[i]
-        for k in range(i + 1, n):
+        b[i] = total
+    for i in range(5, -1, -1):
+        total = b[i] * a[i, i]
+        for k in range(i + 1, 6):
             total -= a[k, i] * b[k]
-        b[i] = total / a[i, i]
+        b[i] = total
 
 
 @kernel
@@ -270,7 +277,7 @@ def evaluate(t, x, scene, work, dx):
     kept[Kept.A33] = strips.a33
 
 
-@kernel
+@inlined_kernel
 def respond(x, u, scene, work, dx):
     """Rates of the state under the command u with the loads of the last evaluate at this state."""
     kept = work.kept
@@ -283,7 +290,7 @@ def respond(x, u, scene, work, dx):
     accelerate(pose, x, _kept_wrench(kept, Kept.TOTAL), torque, strips, scene.body, work.matrix, dx)
 
 
-@kernel
+@inlined_kernel
 def derivative(t, x, u, scene, work, dx):
     """dx = f(t, x, u). u: generator torque (N m) and blade-pitch command (rad)."""
     work.kept[Kept.FRESH] = 0.0

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from fowt_env.dynamics import Kept, attitude_rate, derivative, evaluate, respond
 from fowt_env.errors import unknown
-from fowt_env.jit import kernel
+from fowt_env.jit import inlined_kernel, kernel
 from fowt_env.loads.drivetrain import followed_pitch, limited
 from fowt_env.state import State
 
@@ -33,41 +33,18 @@ def build_integrator(name):
     return Multistep(name == "heun", name == "abm4")
 
 
-@kernel
-def refresh(t, x, scene, work):
-    """Evaluate the loads (wake rates into stages[0]) unless those kept belong to this instant and state."""
+@inlined_kernel
+def rates(t, x, u, scene, work, dx):
+    """dx at an instant under u, from the kept loads where they are fresh."""
     kept = work.kept
     if kept[Kept.FRESH] < 0.5 or kept[Kept.TIME] != t:
         evaluate(t, x, scene, work, work.stages[0])
         kept[Kept.FRESH] = 1.0
         kept[Kept.TIME] = t
-
-
-@kernel
-def rates(t, x, u, scene, work, dx):
-    """dx at an instant under u, from the kept loads where they are fresh."""
-    refresh(t, x, scene, work)
+        kept[Kept.ELEVATED] = 0.0
     for i in range(State.WAKE, x.shape[0]):
         dx[i] = work.stages[0, i]
     respond(x, u, scene, work, dx)
-
-
-@kernel
-def rk4(t, x, u, dt, scene, work):
-    """One classical Runge-Kutta step of x in place."""
-    k1, k2, k3, k4, y = work.stages[0], work.stages[1], work.stages[2], work.stages[3], work.stages[4]
-    rates(t, x, u, scene, work, k1)
-    for i in range(x.shape[0]):
-        y[i] = x[i] + 0.5 * dt * k1[i]
-    derivative(t + 0.5 * dt, y, u, scene, work, k2)
-    for i in range(x.shape[0]):
-        y[i] = x[i] + 0.5 * dt * k2[i]
-    derivative(t + 0.5 * dt, y, u, scene, work, k3)
-    for i in range(x.shape[0]):
-        y[i] = x[i] + dt * k3[i]
-    derivative(t + dt, y, u, scene, work, k4)
-    for i in range(x.shape[0]):
-        x[i] += dt / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i])
 
 
 @kernel
@@ -89,7 +66,31 @@ def pitch_after(blade_pitch, command, dt, actuator):
     return target - error * exp(-dt / lag)
 
 
-@kernel
+@inlined_kernel
+def rk4(t, x, u, dt, scene, work):
+    """One classical Runge-Kutta step of x in place, blade pitch exact at every stage."""
+    k1, k2, k3, k4, y = work.stages[0], work.stages[1], work.stages[2], work.stages[3], work.stages[4]
+    half = pitch_after(x[State.BLADE_PITCH], u[1], 0.5 * dt, scene.actuator)
+    whole = pitch_after(x[State.BLADE_PITCH], u[1], dt, scene.actuator)
+    rates(t, x, u, scene, work, k1)
+    for i in range(x.shape[0]):
+        y[i] = x[i] + 0.5 * dt * k1[i]
+    y[State.BLADE_PITCH] = half
+    derivative(t + 0.5 * dt, y, u, scene, work, k2)
+    for i in range(x.shape[0]):
+        y[i] = x[i] + 0.5 * dt * k2[i]
+    y[State.BLADE_PITCH] = half
+    derivative(t + 0.5 * dt, y, u, scene, work, k3)
+    for i in range(x.shape[0]):
+        y[i] = x[i] + dt * k3[i]
+    y[State.BLADE_PITCH] = whole
+    derivative(t + dt, y, u, scene, work, k4)
+    for i in range(x.shape[0]):
+        x[i] += dt / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i])
+    x[State.BLADE_PITCH] = whole
+
+
+@inlined_kernel
 def heun(t, x, u, dt, scene, work):
     """One step of the explicit trapezoidal rule, blade pitch exact."""
     k1, k2, y = work.stages[0], work.stages[1], work.stages[4]
@@ -126,7 +127,7 @@ def moulton(order, new, i, history):
     return (9.0 * new + 19.0 * history[0, i] - 5.0 * history[1, i] + history[2, i]) / 24.0
 
 
-@kernel
+@inlined_kernel
 def adams(t, x, u, dt, scene, work):
     """One Adams step: velocities by Adams-Bashforth 4, positions by Adams-Moulton 4 with the new velocities.
 
@@ -159,7 +160,7 @@ def adams(t, x, u, dt, scene, work):
     kept[Kept.STEPS] = steps + 1.0
 
 
-@kernel
+@inlined_kernel
 def take_step(t, x, u, dt, scene, multistep, work):
     """One step of the scene's integrator, x in place."""
     pitch = followed_pitch(x[State.BLADE_PITCH], u[1], dt, scene.actuator)

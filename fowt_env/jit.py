@@ -71,7 +71,11 @@ kernel = numba.njit(**_HOUSE, _nrt=False)
 
 # No fastmath anywhere: LLVM then orders a sum differently in each caller's copy of a function, and a
 # process that compiles gets other last bits than one that loads from disk (seen on the look-up rotor
-# and the wave sums, which would take 0.14 instead of 0.23 us a blade and 0.8 instead of 1.8 us).
+# and the wave sums). Where a sum's time counts, lane_sums.py writes it in a fixed order of lanes.
+
+# A kernel put into its caller whatever its size. A call hands over a scene by value, some 400 words: that
+# takes longer than most loads, so what lies between a run and its loads is put into the run.
+inlined_kernel = numba.njit(**_HOUSE, _nrt=False, forceinline=True)
 
 # Functions that take a Box, which is a counted reference, or that allocate.
 entry = numba.njit(**_HOUSE)

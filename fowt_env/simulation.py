@@ -1,6 +1,7 @@
 """One run of a scene with a controller, to a table of OpenFAST channels."""
 
 from math import isfinite, pi
+from time import perf_counter
 
 import numpy as np
 import pandas as pd
@@ -14,7 +15,10 @@ from fowt_env.steady import trim
 from fowt_env.step import RUNNING, STOP_REASONS, advance, observe, output, output_row, run
 from fowt_env.weather.wind_field import WindBox
 
-CHUNK = 20.0  # simulated seconds per compiled call: Ctrl-C is heard and progress shown between them
+# Ctrl-C is heard and progress shown between compiled calls. A call by itself costs 1e-4 s, so they
+# grow longer until they last about CHUNK_TIME.
+FIRST_CHUNK = 20.0  # simulated seconds
+CHUNK_TIME = 0.05  # s of the clock
 STARTS = ("trim", "zero")
 INITIAL = {  # channel: (state, factor to SI)
     "PtfmSurge": (State.SURGE, 1.0),
@@ -175,6 +179,7 @@ def simulate(
     if held:
         scene = scene.with_model(body=scene.model.body._replace(rotor_held=True))
         controller = _Hold()
+        per_control = last  # nobody reads the measurements
     loop = _Loop(scene, controller, x, u, dt, per_control, per_output, last)
     with _bar(progress) as report:
         loop.go(report)
@@ -200,13 +205,15 @@ class _Loop:
         self.controller.reset(Measurement(*self.measurement.tolist()))
         compiled = hasattr(self.controller, "kernel")
         if compiled:
-            size = max(1, round(CHUNK / (self.dt * self.per_control * self.per_output)))
-            size *= self.per_control * self.per_output
+            size = max(1, round(FIRST_CHUNK / self.dt))
         step = 0
         try:
             while step < self.last:
                 if compiled:
+                    began = perf_counter()
                     step = self._compiled(step, min(step + size, self.last))
+                    if perf_counter() - began < 0.25 * CHUNK_TIME:
+                        size *= 4
                 else:
                     step = self._python(step)
                 report(step / self.last)

@@ -23,6 +23,13 @@ NEWTON_ROUNDS = 40
 TOLERANCE = 1e-11  # m/s2 and rad/s2 of remaining acceleration
 OUTER_ROUNDS = 30
 FEATHERED = 0.5 * pi
+HALVINGS = 12
+STEPS = {  # of the differences, m, rad and rad/s
+    **dict.fromkeys((0, 1, 2), 1e-3),
+    **dict.fromkeys((3, 4, 5), 1e-5),
+    int(State.ROTOR_SPEED): 1e-4,
+    int(State.BLADE_PITCH): 1e-5,
+}
 PLATFORM_MODES = ("floating", "fixed")
 
 
@@ -169,31 +176,73 @@ class _Steady:
         speed = brentq(lambda w: self.rotor_acceleration(w, finest), slow, rated, xtol=1e-14, rtol=1e-14)
         self.rotor_acceleration(speed, finest)
 
-    def settle_platform(self):
-        """Newton on the six motions for zero acceleration; returns the remaining one."""
-        steps = np.array([1e-3, 1e-3, 1e-3, 1e-5, 1e-5, 1e-5])
+    def free_states(self):
+        """Indices of the states that a floating trim finds: motions, pitch or speed of a turning rotor."""
+        motions = list(range(6))
+        wind = self.scene.wind_speed
+        if wind is None or not 0.0 < wind <= self.scene.turbine.cut_out_wind_speed:
+            return motions
+        rotor_speed, blade_pitch = self.x[State.ROTOR_SPEED], self.x[State.BLADE_PITCH]
+        if blade_pitch > self.scene.turbine.pitch_drive.minimum:
+            return [*motions, int(State.BLADE_PITCH)]
+        return [*motions, int(State.ROTOR_SPEED)] if rotor_speed > 0.0 else motions
+
+    def residual(self, free):
+        """Accelerations that vanish in the steady state, of the platform and of a rotor that is free."""
+        if len(free) > 6:
+            self.rotor_acceleration(self.x[State.ROTOR_SPEED], self.x[State.BLADE_PITCH])
+        else:
+            self.rates()
+        accelerations = [*range(State.VX, State.WZ + 1), int(State.ROTOR_SPEED)]
+        return self.mean[accelerations[: len(free)]]
+
+    def jacobian(self, free):
+        """Derivatives of the residual by the free states, central differences."""
+        columns = []
+        for index in free:
+            step = STEPS[index]
+            keep = self.x[index]
+            self.x[index] = keep + step
+            up = self.residual(free)
+            self.x[index] = keep - step
+            down = self.residual(free)
+            self.x[index] = keep
+            columns.append((up - down) / (2.0 * step))
+        return np.array(columns).T
+
+    def settle(self, free):
+        """Newton on the free states for zero acceleration; returns the remaining one.
+
+        The Jacobian is kept while it brings the residual down tenfold a round. A step that does not
+        lower the residual is halved: far from the solution lines go taut within metres.
+        """
+        residual = self.residual(free)
+        size = np.max(np.abs(residual))
+        jacobian = None
         for _ in range(NEWTON_ROUNDS):
-            residual = self.rates()[State.VX : State.WZ + 1].copy()
-            size = np.max(np.abs(residual))
             if size < TOLERANCE:
-                return size
-            jacobian = np.empty((6, 6))
-            for j in range(6):
-                keep = self.x[j]
-                self.x[j] = keep + steps[j]
-                up = self.rates()[State.VX : State.WZ + 1].copy()
-                self.x[j] = keep - steps[j]
-                down = self.rates()[State.VX : State.WZ + 1].copy()
-                self.x[j] = keep
-                jacobian[:, j] = (up - down) / (2.0 * steps[j])
+                break
+            fresh = jacobian is None
+            if fresh:
+                jacobian = self.jacobian(free)
             # least squares: without moorings nothing restores surge and sway, which then stay as they are
             change = np.linalg.lstsq(jacobian, -residual, rcond=1e-9)[0]
-            # far from the solution lines go taut within metres: limit one round to what they allow
-            largest = np.max(np.abs(change) / np.array([5.0, 5.0, 5.0, 0.1, 0.1, 0.1]))
-            if largest > 1.0:
-                change /= largest
-            self.x[:6] += change
-        return np.max(np.abs(self.rates()[State.VX : State.WZ + 1]))
+            before, start = size, self.x[free].copy()
+            for _ in range(HALVINGS):
+                self.x[free] = start + change
+                residual = self.residual(free)
+                size = np.max(np.abs(residual))
+                if size < before:
+                    break
+                change *= 0.5
+            if not size < 0.1 * before:
+                if not size < before and not fresh:
+                    self.x[free] = start  # the old Jacobian does not serve here
+                    residual, size = self.residual(free), before
+                elif not size < before:
+                    break  # as near as rounding lets it
+                jacobian = None
+        return size
 
 
 def trim(scene, platform="floating"):
@@ -210,17 +259,16 @@ def trim(scene, platform="floating"):
     held = platform == "fixed"
     body = scene.model.body._replace(platform_held=held, rotor_held=False)
     steady = _Steady(calm(scene).with_model(body=body))
-    remaining = 0.0
-    if held:
-        steady.settle_rotor()
-    else:
+    steady.settle_rotor()
+    if not held:
         for _ in range(OUTER_ROUNDS):
-            before = steady.x[: State.WAKE].copy()
+            # which of pitch and speed is free follows from the rotor's balance on the platform as it is
+            free = steady.free_states()
+            remaining = steady.settle(free)
             steady.settle_rotor()
-            remaining = steady.settle_platform()
-            if np.max(np.abs(steady.x[: State.WAKE] - before)) < 1e-12:
+            if steady.free_states() == free and np.max(np.abs(steady.residual(free))) < 1e3 * TOLERANCE:
                 break
-        if not remaining < 1e3 * TOLERANCE:
+        else:
             raise InputError(
                 f"no steady state found for {scene!r}: remaining acceleration {remaining:.2e} m/s2 or rad/s2"
             )
@@ -240,7 +288,7 @@ def trim_held(scene, rotor_speed, blade_pitch, platform="floating"):
     steady.x[State.ROTOR_SPEED] = rotor_speed
     steady.x[State.BLADE_PITCH] = steady.u[1] = blade_pitch
     if platform == "floating":
-        remaining = steady.settle_platform()
+        remaining = steady.settle(list(range(6)))
         if not remaining < 1e3 * TOLERANCE:
             raise InputError(
                 f"no steady state found for {scene!r}: remaining acceleration {remaining:.2e} m/s2 or rad/s2"

@@ -7,7 +7,7 @@ import numpy as np
 from fowt_env.channels import measure, record
 from fowt_env.dynamics import Kept, loads_of
 from fowt_env.integrators import rates, take_step
-from fowt_env.jit import entry, kernel
+from fowt_env.jit import entry, inlined_kernel, kernel
 from fowt_env.state import State
 
 RUNNING, NON_FINITE, CAPSIZED = 0, 1, 2
@@ -43,6 +43,20 @@ def advance(box, x, u, first, n, dt):
     return advance_scene(box.scene, box.work, x, u, first, n, dt)
 
 
+@inlined_kernel
+def observe_scene(scene, work, x, u, t, dx, measurement):
+    """Fill dx and measurement as observe does."""
+    rates(t, x, u, scene, work, dx)
+    measure(scene, work, x, dx, u, t, measurement)
+
+
+@inlined_kernel
+def output_scene(scene, work, x, u, t, dx, row):
+    """Fill dx and one output row as output does."""
+    rates(t, x, u, scene, work, dx)
+    record(scene, work, x, dx, u, t, loads_of(work, dx), row)
+
+
 @entry
 def observe(box, x, u, t, dx, measurement):
     """Fill dx (n_state,) and measurement (N_MEASUREMENTS,) at time t under u.
@@ -50,17 +64,13 @@ def observe(box, x, u, t, dx, measurement):
     The loads kept by the work arrays are used where they are fresh: after changing x from outside,
     call forget first.
     """
-    scene = box.scene
-    rates(t, x, u, scene, box.work, dx)
-    measure(scene, box.work, x, dx, u, t, measurement)
+    observe_scene(box.scene, box.work, x, u, t, dx, measurement)
 
 
 @entry
 def output(box, x, u, t, dx, row):
     """Fill one output row (n_channels,) in SI at time t under u; kept loads as in observe."""
-    scene = box.scene
-    rates(t, x, u, scene, box.work, dx)
-    record(scene, box.work, x, dx, u, t, loads_of(box.work, dx), row)
+    output_scene(box.scene, box.work, x, u, t, dx, row)
 
 
 @entry
@@ -78,26 +88,34 @@ def output_row(box, x, u, t, size):
     return row
 
 
+@kernel
+def run_scene(
+    scene, work, x, u, act, parameters, memory, measurement, dx, dt, per_control, per_output, first, last, out
+):
+    """Closed loop as in run."""
+    rows = 0
+    for step in range(first, last):
+        t = step * dt
+        if step % per_control == 0:
+            observe_scene(scene, work, x, u, t, dx, measurement)
+            act(parameters, memory, measurement, u)
+        if step % per_output == 0:
+            output_scene(scene, work, x, u, t, dx, out[rows])
+            rows += 1
+        take_step(t, x, u, dt, scene, scene.multistep, work)
+        status = status_of(x)
+        if status != RUNNING:
+            return status, step + 1, rows
+    return RUNNING, last, rows
+
+
 @entry
 def run(box, x, u, act, parameters, memory, measurement, dx, dt, per_control, per_output, first, last, out):
     """Closed loop over the instants first <= step < last, writing rows of out (k, n_channels).
 
     act: a control kernel (jit.control_kernel). Returns (status, step reached, rows written).
     """
-    rows = 0
-    step = first
-    while step < last:
-        t = step * dt
-        if step % per_control == 0:
-            observe(box, x, u, t, dx, measurement)
-            act(parameters, memory, measurement, u)
-        if step % per_output == 0:
-            output(box, x, u, t, dx, out[rows])
-            rows += 1
-        # on to the next instant at which something happens
-        n = min(per_control - step % per_control, per_output - step % per_output, last - step)
-        status = advance_scene(box.scene, box.work, x, u, step, n, dt)
-        step += n
-        if status != RUNNING:
-            return status, step, rows
-    return RUNNING, step, rows
+    return run_scene(
+        box.scene, box.work, x, u, act, parameters, memory, measurement, dx, dt, per_control, per_output,
+        first, last, out,
+    )  # fmt: skip

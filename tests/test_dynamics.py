@@ -8,7 +8,7 @@ from naive import rigid_body
 from plant import integrate, make_pose, random_state, rates, state
 from scipy.integrate import solve_ivp
 
-from fowt_env.dynamics import accelerate, gravity_load, inertial_load
+from fowt_env.dynamics import accelerate, gravity_load, inertial_load, solve_spd
 from fowt_env.loads.drivetrain import build_drivetrain, shaft_torque
 from fowt_env.loads.hydrostatics import submerged
 from fowt_env.loads.mooring import mooring_load
@@ -125,6 +125,18 @@ def test_mass_matrix_has_the_published_entries(platform, turbine):
     assert m[3, 3] - steiner == pytest.approx(6.8022e10, rel=2e-5)
     assert m[4, 4] - steiner == pytest.approx(6.8007e10, rel=2e-5)
     assert m[5, 5] == pytest.approx(1.9079e8, rel=2e-5)
+
+
+def test_the_solver_agrees_with_numpy_on_badly_scaled_systems():
+    rng = np.random.default_rng(5)
+    for _ in range(50):
+        root = rng.normal(size=(6, 6))
+        scale = np.array([1e4, 1e4, 1e4, 1e6, 1e6, 1e5])
+        a = (root @ root.T + 0.1 * np.eye(6)) * np.outer(scale, scale)
+        right = rng.normal(size=6) * scale
+        b = right.copy()
+        solve_spd(a.copy(), b)
+        np.testing.assert_allclose(b * scale, np.linalg.solve(a, right) * scale, rtol=1e-10)
 
 
 def test_gyroscopic_terms_do_no_work(platform, turbine):

@@ -174,7 +174,8 @@ def test_law_called_from_python_gives_the_bits_of_the_compiled_loop(storm_scene,
 
 def test_run_in_chunks_is_one_run(storm_scene, monkeypatch):
     whole = run(storm_scene, controller="pi", duration=12.0)
-    monkeypatch.setattr(simulation, "CHUNK", 0.7)
+    monkeypatch.setattr(simulation, "FIRST_CHUNK", 0.7)
+    monkeypatch.setattr(simulation, "CHUNK_TIME", 0.0)  # chunks stay as short as the first
     shares = []
     chunked = run(storm_scene, controller="pi", duration=12.0, progress=shares.append)
     pd.testing.assert_frame_equal(whole, chunked, check_exact=True)

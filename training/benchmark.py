@@ -20,7 +20,7 @@ import pandas as pd
 
 from controllers import make
 from fowt_env.channels import measure, record
-from fowt_env.dynamics import loads_of, respond, rotor_part, strip_part
+from fowt_env.dynamics import Kept, loads_of, respond, rotor_part, strip_part
 from fowt_env.errors import InputError, unknown
 from fowt_env.jit import entry, kernel
 from fowt_env.loads.hydrostatics import hydrostatic_load
@@ -147,10 +147,12 @@ def _repeat(part, scene, work, x, u, dx, m, row, n, dt):
             total += dx[State.VX]
             continue
         if part == 8:
+            work.kept[Kept.ELEVATED] = 0.0
             measure(scene, work, x, dx, u, t, m)
             total += m[0]
             continue
         if part == 9:
+            work.kept[Kept.ELEVATED] = 0.0
             record(scene, work, x, dx, u, t, loads_of(work, dx), row)
             total += row[0]
             continue

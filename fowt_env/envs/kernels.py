@@ -9,16 +9,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fowt_env.channels import measure
 from fowt_env.dynamics import Kept, Model, Work
 from fowt_env.envs.actions import ActionMap, accept, action_of, command_of
 from fowt_env.envs.observations import ObservationMap, fill_observation, fill_signals
 from fowt_env.envs.rewards import Scales, fill_terms, weighted_sum
-from fowt_env.integrators import rates
 from fowt_env.jit import entry, kernel
 from fowt_env.measurement import Measure
 from fowt_env.state import State
-from fowt_env.step import NON_FINITE, RUNNING, STOP_REASONS, advance_scene
+from fowt_env.step import NON_FINITE, RUNNING, STOP_REASONS, advance_scene, observe_scene
 
 BAD_ACTION, OVERSPEED = -1, 3  # beside the statuses of step.py
 REASONS = {**STOP_REASONS, OVERSPEED: "overspeed (rotor speed beyond the limit)"}
@@ -70,8 +68,7 @@ def look(setting, run):
     """Measure at the present instant; RUNNING, or NON_FINITE with the last measurement kept."""
     model = setting.model
     t = run.counts[STEP] * setting.dt
-    rates(t, run.x, run.u, model, run.work, run.dx)
-    measure(model, run.work, run.x, run.dx, run.u, t, run.measurement)
+    observe_scene(model, run.work, run.x, run.u, t, run.dx, run.measurement)
     for value in run.measurement:
         if not isfinite(value):
             copy_into(run.measurement, run.before)

@@ -26,6 +26,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fowt_env.jit import kernel
+from fowt_env.lane_sums import crossed_sums
 from fowt_env.loads.morison import StripLoad, current_at
 from fowt_env.state import NO_LOAD, Wrench, add
 from fowt_env.weather.waves import ramp_factor
@@ -274,14 +275,9 @@ def compress(scale, band, weight, number, cosine, sine, field):
     for m in range(band.shape[1]):
         a, b = band[FIRST, m], band[OFFSET, m]
         n = band[LAST, m] - a
-        v, g = weight[0, b : b + n], weight[1, b : b + n]
-        c, s = cosine[a : a + n], sine[a : a + n]
-        vr = vi = gr = gi = 0.0
-        for j in range(n):
-            vr += v[j] * c[j]
-            vi += v[j] * s[j]
-            gr += g[j] * c[j]
-            gi += g[j] * s[j]
+        vr, vi, gr, gi = crossed_sums(
+            weight[0, b : b + n], weight[1, b : b + n], cosine[a : a + n], sine[a : a + n], n
+        )
         field[VR, m] = scale * vr
         field[VI, m] = scale * vi
         field[GR, m] = scale * gr
