@@ -51,6 +51,7 @@ class Model(NamedTuple):
     waves: object  # weather.waves.Waves or None
     lanes: object  # loads.fast_waves.Lanes or None: strip loads by loads.morison
     sea: object  # loads.fast_waves.FastWaves or None
+    diffraction: object  # StripDiffraction or, with lanes, LaneDiffraction, or None: 1 + C_A throughout
     current: object  # loads.morison.Current or None
     mooring: object  # loads.mooring.Mooring or None
     damping: object  # loads.damping.LinearDamping or None
@@ -206,11 +207,11 @@ def rotor_part(t, pose, x, now, wind, field, rotor, lookup, table, skew, wake, d
 
 
 @kernel
-def strip_part(t, pose, strips, waves, current, kinematics, lanes, sea, scratch):
+def strip_part(t, pose, strips, waves, current, kinematics, lanes, sea, scratch, diffraction):
     """Strip load of whichever method the scene has."""
     if lanes is None:
-        return morison_load(t, pose, strips, waves, current, kinematics)
-    return fast_morison_load(t, pose, lanes, sea, current, scratch)
+        return morison_load(t, pose, strips, waves, current, kinematics, diffraction)
+    return fast_morison_load(t, pose, lanes, sea, current, scratch, diffraction)
 
 
 @kernel
@@ -245,8 +246,9 @@ def evaluate(t, x, scene, work, dx):
     tower = tower_load(t, pose, now, scene.wind, scene.wind_field, scene.tower)
     buoyancy = hydrostatic_load(pose, scene.hull, work.counters)
     strips = strip_part(
-        t, pose, scene.strips, scene.waves, scene.current, work.kinematics, scene.lanes, scene.sea, work.fast
-    )
+        t, pose, scene.strips, scene.waves, scene.current, work.kinematics, scene.lanes, scene.sea, work.fast,
+        scene.diffraction,
+    )  # fmt: skip
     mooring = mooring_load(pose, scene.mooring, work.lines, work.counters)
 
     load = add(aero.wrench, tower)

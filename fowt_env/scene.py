@@ -14,8 +14,15 @@ from fowt_env.errors import InputError, unknown
 from fowt_env.integrators import INTEGRATORS, build_integrator
 from fowt_env.jit import Box
 from fowt_env.loads.damping import build_damping
+from fowt_env.loads.diffraction import build_strip_diffraction
 from fowt_env.loads.drivetrain import build_drivetrain, build_pitch_actuator
-from fowt_env.loads.fast_waves import build_fast_waves, build_lanes, can_be_fast, fast_scratch
+from fowt_env.loads.fast_waves import (
+    build_fast_waves,
+    build_lane_diffraction,
+    build_lanes,
+    can_be_fast,
+    fast_scratch,
+)
 from fowt_env.loads.hydrostatics import build_hull
 from fowt_env.loads.mooring import build_mooring
 from fowt_env.loads.morison import Current, build_strips
@@ -42,6 +49,7 @@ OPTIONS = {
     "kinematics_position": ("instantaneous", ("instantaneous", "fixed")),
     "surface": ("instantaneous", ("instantaneous", "swl")),
     "stretching": ("wheeler", ("wheeler", "none")),
+    "diffraction": (None, (None, "none", "maccamy_fuchs")),
     "skewed_wake": (False, (False, True)),
     "dynamic_inflow": (False, (False, True)),
     "tower_drag": (True, (False, True)),
@@ -114,6 +122,7 @@ class Scene:
         seed = _seed(seed)
         air, waves = _weather(wind, sea, seed, self.platform, self.turbine, self.rotor, self.options)
         fast = _fast_sea(waves, self.model.strips) if self.model.lanes is not None else None
+        diffraction = _diffraction(self.options, waves, self.model.strips, fast, self.model.lanes)
         if (air.series is None) != (self.model.wind is None):
             raise InputError(
                 f"wind = {wind!r}: a scene cannot gain or lose its aerodynamics; use build_scene"
@@ -122,7 +131,9 @@ class Scene:
             raise InputError("wind: a scene cannot gain or lose its box of full-field wind; use build_scene")
         return replace(
             self,
-            model=self.model._replace(wind=air.series, wind_field=air.field, waves=waves, sea=fast),
+            model=self.model._replace(
+                wind=air.series, wind_field=air.field, waves=waves, sea=fast, diffraction=diffraction
+            ),
             wind=air.spec,
             sea=sea,
             seed=seed,
@@ -181,6 +192,8 @@ def build_scene(
     elements = build_blade_elements(turbine, site.air_density) if aero else None
     strips = _strips(platform, chosen) if hydrodynamics else None
     quick = strips is not None and _quick(chosen, waves, strips)
+    lanes = build_lanes(platform.hull, strips) if quick else None
+    fast = _fast_sea(waves, strips) if quick else None
     model = Model(
         body=build_body(platform, turbine),
         layout=build_layout(platform, turbine),
@@ -189,8 +202,9 @@ def build_scene(
         hull=build_hull(platform.hull, site.water_density, site.gravity) if hydrodynamics else None,
         strips=strips,
         waves=waves,
-        lanes=build_lanes(platform.hull, strips) if quick else None,
-        sea=_fast_sea(waves, strips) if quick else None,
+        lanes=lanes,
+        sea=fast,
+        diffraction=_diffraction(chosen, waves, strips, fast, lanes),
         current=_current(chosen["current"]) if hydrodynamics else None,
         mooring=build_mooring(platform.lines) if platform.lines and chosen["mooring"] else None,
         damping=build_damping(platform.hydro) if hydrodynamics else None,
@@ -249,6 +263,13 @@ def _fast_sea(waves, strips):
     if not can_be_fast(waves, strips):
         raise InputError("sea: several headings cannot be summed fast; build_scene(..., wave_loads='exact')")
     return build_fast_waves(waves, strips)
+
+
+def _diffraction(chosen, waves, strips, sea, lanes):
+    """Diffraction part of whichever strip load the scene has, None where it is off or there are no waves."""
+    if chosen["diffraction"] in (None, "none") or waves is None:
+        return None
+    return build_strip_diffraction(waves, strips) if lanes is None else build_lane_diffraction(sea, lanes)
 
 
 def _options(given, platform):
