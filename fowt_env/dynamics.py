@@ -51,7 +51,8 @@ class Model(NamedTuple):
     waves: object  # weather.waves.Waves or None
     lanes: object  # loads.fast_waves.Lanes or None: strip loads by loads.morison
     sea: object  # loads.fast_waves.FastWaves or None
-    diffraction: object  # StripDiffraction or, with lanes, LaneDiffraction, or None: 1 + C_A throughout
+    diffraction: object  # loads.diffraction.StripDiffraction or None: 1 + C_A in every wave
+    lane_diffraction: object  # loads.fast_waves.LaneDiffraction, the same for lanes, or None
     current: object  # loads.morison.Current or None
     mooring: object  # loads.mooring.Mooring or None
     damping: object  # loads.damping.LinearDamping or None
@@ -207,11 +208,13 @@ def rotor_part(t, pose, x, now, wind, field, rotor, lookup, table, skew, wake, d
 
 
 @kernel
-def strip_part(t, pose, strips, waves, current, kinematics, lanes, sea, scratch, diffraction):
+def strip_part(
+    t, pose, strips, waves, current, kinematics, lanes, sea, scratch, diffraction, lane_diffraction
+):
     """Strip load of whichever method the scene has."""
     if lanes is None:
         return morison_load(t, pose, strips, waves, current, kinematics, diffraction)
-    return fast_morison_load(t, pose, lanes, sea, current, scratch, diffraction)
+    return fast_morison_load(t, pose, lanes, sea, current, scratch, lane_diffraction)
 
 
 @kernel
@@ -247,7 +250,7 @@ def evaluate(t, x, scene, work, dx):
     buoyancy = hydrostatic_load(pose, scene.hull, work.counters)
     strips = strip_part(
         t, pose, scene.strips, scene.waves, scene.current, work.kinematics, scene.lanes, scene.sea, work.fast,
-        scene.diffraction,
+        scene.diffraction, scene.lane_diffraction,
     )  # fmt: skip
     mooring = mooring_load(pose, scene.mooring, work.lines, work.counters)
 

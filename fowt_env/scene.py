@@ -122,7 +122,6 @@ class Scene:
         seed = _seed(seed)
         air, waves = _weather(wind, sea, seed, self.platform, self.turbine, self.rotor, self.options)
         fast = _fast_sea(waves, self.model.strips) if self.model.lanes is not None else None
-        diffraction = _diffraction(self.options, waves, self.model.strips, fast, self.model.lanes)
         if (air.series is None) != (self.model.wind is None):
             raise InputError(
                 f"wind = {wind!r}: a scene cannot gain or lose its aerodynamics; use build_scene"
@@ -132,7 +131,11 @@ class Scene:
         return replace(
             self,
             model=self.model._replace(
-                wind=air.series, wind_field=air.field, waves=waves, sea=fast, diffraction=diffraction
+                wind=air.series,
+                wind_field=air.field,
+                waves=waves,
+                sea=fast,
+                **_diffraction(self.options, waves, self.model.strips, fast, self.model.lanes),
             ),
             wind=air.spec,
             sea=sea,
@@ -204,7 +207,7 @@ def build_scene(
         waves=waves,
         lanes=lanes,
         sea=fast,
-        diffraction=_diffraction(chosen, waves, strips, fast, lanes),
+        **_diffraction(chosen, waves, strips, fast, lanes),
         current=_current(chosen["current"]) if hydrodynamics else None,
         mooring=build_mooring(platform.lines) if platform.lines and chosen["mooring"] else None,
         damping=build_damping(platform.hydro) if hydrodynamics else None,
@@ -266,10 +269,14 @@ def _fast_sea(waves, strips):
 
 
 def _diffraction(chosen, waves, strips, sea, lanes):
-    """Diffraction part of whichever strip load the scene has, None where it is off or there are no waves."""
-    if chosen["diffraction"] in (None, "none") or waves is None:
-        return None
-    return build_strip_diffraction(waves, strips) if lanes is None else build_lane_diffraction(sea, lanes)
+    """{part of Model: diffraction}, one for either strip load, None where it is off or in still water."""
+    parts = {"diffraction": None, "lane_diffraction": None}
+    if chosen["diffraction"] == "maccamy_fuchs" and waves is not None:
+        if lanes is None:
+            parts["diffraction"] = build_strip_diffraction(waves, strips)
+        else:
+            parts["lane_diffraction"] = build_lane_diffraction(sea, lanes)
+    return parts
 
 
 def _options(given, platform):

@@ -12,7 +12,7 @@ from scipy.special import h1vp
 
 from fowt_env.jit import kernel
 
-TERMS = 4  # of the polynomial: 2e-5 of the coefficient on the taper of OC3 at 4 s, and less in longer waves
+TERMS = 6  # of the polynomial: within 3e-6 of the coefficient on the taper of OC3 down to 2.5 s
 
 
 class StripDiffraction(NamedTuple):
