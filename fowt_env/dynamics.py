@@ -51,6 +51,8 @@ class Model(NamedTuple):
     waves: object  # weather.waves.Waves or None
     lanes: object  # loads.fast_waves.Lanes or None: strip loads by loads.morison
     sea: object  # loads.fast_waves.FastWaves or None
+    diffraction: object  # loads.diffraction.StripDiffraction or None: 1 + C_A in every wave
+    lane_diffraction: object  # loads.fast_waves.LaneDiffraction, the same for lanes, or None
     current: object  # loads.morison.Current or None
     mooring: object  # loads.mooring.Mooring or None
     damping: object  # loads.damping.LinearDamping or None
@@ -213,11 +215,13 @@ def rotor_part(t, pose, x, now, wind, field, rotor, lookup, table, skew, wake, d
 
 
 @kernel
-def strip_part(t, pose, strips, waves, current, kinematics, lanes, sea, scratch):
+def strip_part(
+    t, pose, strips, waves, current, kinematics, lanes, sea, scratch, diffraction, lane_diffraction
+):
     """Strip load of whichever method the scene has."""
     if lanes is None:
-        return morison_load(t, pose, strips, waves, current, kinematics)
-    return fast_morison_load(t, pose, lanes, sea, current, scratch)
+        return morison_load(t, pose, strips, waves, current, kinematics, diffraction)
+    return fast_morison_load(t, pose, lanes, sea, current, scratch, lane_diffraction)
 
 
 @kernel
@@ -252,8 +256,9 @@ def evaluate(t, x, scene, work, dx):
     tower = tower_load(t, pose, now, scene.wind, scene.wind_field, scene.tower)
     buoyancy = hydrostatic_load(pose, scene.hull, work.counters)
     strips = strip_part(
-        t, pose, scene.strips, scene.waves, scene.current, work.kinematics, scene.lanes, scene.sea, work.fast
-    )
+        t, pose, scene.strips, scene.waves, scene.current, work.kinematics, scene.lanes, scene.sea, work.fast,
+        scene.diffraction, scene.lane_diffraction,
+    )  # fmt: skip
     mooring = mooring_load(pose, scene.mooring, work.lines, work.counters)
 
     load = add(aero.wrench, tower)

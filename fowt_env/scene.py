@@ -14,8 +14,15 @@ from fowt_env.errors import InputError, unknown
 from fowt_env.integrators import INTEGRATORS, build_integrator
 from fowt_env.jit import Box
 from fowt_env.loads.damping import build_damping
+from fowt_env.loads.diffraction import build_strip_diffraction
 from fowt_env.loads.drivetrain import build_drivetrain, build_pitch_actuator
-from fowt_env.loads.fast_waves import build_fast_waves, build_lanes, can_be_fast, fast_scratch
+from fowt_env.loads.fast_waves import (
+    build_fast_waves,
+    build_lane_diffraction,
+    build_lanes,
+    can_be_fast,
+    fast_scratch,
+)
 from fowt_env.loads.hydrostatics import build_hull
 from fowt_env.loads.mooring import build_mooring
 from fowt_env.loads.morison import Current, build_strips
@@ -42,6 +49,7 @@ OPTIONS = {
     "kinematics_position": ("instantaneous", ("instantaneous", "fixed")),
     "surface": ("instantaneous", ("instantaneous", "swl")),
     "stretching": ("wheeler", ("wheeler", "none")),
+    "diffraction": (None, (None, "none", "maccamy_fuchs")),
     "skewed_wake": (False, (False, True)),
     "dynamic_inflow": (False, (False, True)),
     "tower_drag": (True, (False, True)),
@@ -122,7 +130,13 @@ class Scene:
             raise InputError("wind: a scene cannot gain or lose its box of full-field wind; use build_scene")
         return replace(
             self,
-            model=self.model._replace(wind=air.series, wind_field=air.field, waves=waves, sea=fast),
+            model=self.model._replace(
+                wind=air.series,
+                wind_field=air.field,
+                waves=waves,
+                sea=fast,
+                **_diffraction(self.options, waves, self.model.strips, fast, self.model.lanes),
+            ),
             wind=air.spec,
             sea=sea,
             seed=seed,
@@ -181,6 +195,8 @@ def build_scene(
     elements = build_blade_elements(turbine, site.air_density) if aero else None
     strips = _strips(platform, chosen) if hydrodynamics else None
     quick = strips is not None and _quick(chosen, waves, strips)
+    lanes = build_lanes(platform.hull, strips) if quick else None
+    fast = _fast_sea(waves, strips) if quick else None
     model = Model(
         body=build_body(platform, turbine),
         layout=build_layout(platform, turbine),
@@ -189,8 +205,9 @@ def build_scene(
         hull=build_hull(platform.hull, site.water_density, site.gravity) if hydrodynamics else None,
         strips=strips,
         waves=waves,
-        lanes=build_lanes(platform.hull, strips) if quick else None,
-        sea=_fast_sea(waves, strips) if quick else None,
+        lanes=lanes,
+        sea=fast,
+        **_diffraction(chosen, waves, strips, fast, lanes),
         current=_current(chosen["current"]) if hydrodynamics else None,
         mooring=build_mooring(platform.lines) if platform.lines and chosen["mooring"] else None,
         damping=build_damping(platform.hydro) if hydrodynamics else None,
@@ -249,6 +266,17 @@ def _fast_sea(waves, strips):
     if not can_be_fast(waves, strips):
         raise InputError("sea: several headings cannot be summed fast; build_scene(..., wave_loads='exact')")
     return build_fast_waves(waves, strips)
+
+
+def _diffraction(chosen, waves, strips, sea, lanes):
+    """{part of Model: diffraction}, one for either strip load, None where it is off or in still water."""
+    parts = {"diffraction": None, "lane_diffraction": None}
+    if chosen["diffraction"] == "maccamy_fuchs" and waves is not None:
+        if lanes is None:
+            parts["diffraction"] = build_strip_diffraction(waves, strips)
+        else:
+            parts["lane_diffraction"] = build_lane_diffraction(sea, lanes)
+    return parts
 
 
 def _options(given, platform):

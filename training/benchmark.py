@@ -170,7 +170,7 @@ def _repeat(part, scene, work, x, u, dx, m, row, n, dt):
         elif part == 4:
             strips = strip_part(
                 t, pose, scene.strips, scene.waves, scene.current, work.kinematics, scene.lanes, scene.sea,
-                work.fast,
+                work.fast, scene.diffraction, scene.lane_diffraction,
             )  # fmt: skip
             total += strips.wrench.my
         elif part == 5:

@@ -27,6 +27,7 @@ import numpy as np
 
 from fowt_env.jit import kernel
 from fowt_env.lane_sums import crossed_sums
+from fowt_env.loads.diffraction import TERMS, coefficient_series
 from fowt_env.loads.morison import StripLoad, current_at
 from fowt_env.state import NO_LOAD, Wrench, add
 from fowt_env.weather.waves import ramp_factor
@@ -92,6 +93,13 @@ class FastWaves(NamedTuple):
     sin_heading: float
     ramp: float
     reach: float  # m, see REACH
+
+
+class LaneDiffraction(NamedTuple):
+    """Coefficient over 1 + C_A (loads/diffraction.py) of every K at every lane; 1 at the keel's."""
+
+    series: np.ndarray  # (blocks, M, 2 TERMS LANES): powers of z - centre, real parts first
+    centre: np.ndarray  # (blocks, LANES) body z
 
 
 class FastScratch(NamedTuple):
@@ -192,6 +200,28 @@ def build_fast_waves(waves, strips):
         float(waves.sin_heading[0]),
         float(waves.ramp),
         float(REACH / k[-1]),
+    )
+
+
+def build_lane_diffraction(sea, lanes):
+    """LaneDiffraction of FastWaves and Lanes.
+
+    The coefficient varies with ln K as smoothly as exp(K zeta) does, so the bands carry their product.
+    """
+    rows = lanes.table.reshape(-1, N_TABLE, LANES).transpose(1, 0, 2).reshape(N_TABLE, -1)
+    bottom, top = rows[BOTTOM], rows[TOP]
+    lower, upper = rows[D0] + rows[D1] * bottom, rows[D0] + rows[D1] * top
+    series = np.zeros((sea.number.shape[1], TERMS, bottom.size), dtype=complex)
+    series[:, 0] = 1.0
+    for n in range(lanes.keel):
+        section = bottom[n], top[n], lower[n], upper[n]
+        series[:, :, n] = coefficient_series(sea.number[WAVE_NUMBER], *section)
+        series[:, :, n] /= 1.0 + lanes.added_mass_coefficient
+    blocks = lanes.table.shape[0]
+    parts = np.concatenate([series.real, series.imag], axis=1).reshape(-1, 2 * TERMS, blocks, LANES)
+    return LaneDiffraction(
+        _aligned(parts.transpose(2, 0, 1, 3).reshape(blocks, -1, 2 * TERMS * LANES)),
+        _aligned((0.5 * (bottom + top)).reshape(blocks, LANES)),
     )
 
 
@@ -353,7 +383,19 @@ def wave_terms(vr, vi, gr, gi, er, ei):
 
 
 @kernel
-def add_echo(number, field, m, lane):
+def lane_factor(diffraction, block, m, n, z):
+    """(real, imaginary) coefficient over 1 + C_A of K_m at body z of a lane."""
+    series = diffraction.series
+    x = z - diffraction.centre[block, n]
+    re, im = 0.0, 0.0
+    for i in range(TERMS - 1, -1, -1):
+        re = series[block, m, i * LANES + n] + x * re
+        im = series[block, m, (TERMS + i) * LANES + n] + x * im
+    return re, im
+
+
+@kernel
+def add_echo(number, field, m, lane, diffraction, block):
     """Add the seabed's reflection of K_m and K_{m+1}: conjugate amplitudes times exp(-K (2 h + zeta))."""
     vr, vi, gr, gi = field[VR, m], field[VI, m], field[GR, m], field[GI, m]
     hr, hi, qr, qi = field[VR, m + 1], field[VI, m + 1], field[GR, m + 1], field[GI, m + 1]
@@ -367,14 +409,23 @@ def add_echo(number, field, m, lane):
         ub, wb, db, zb, rb = wave_terms(hr, -hi, qr, -qi, sb * br, -sb * bi)
         lane[U * LANES + n] += ua + ub
         lane[W * LANES + n] += wa + wb
+        if diffraction is not None:
+            # conjugate, as the amplitudes are
+            fr, fi = lane_factor(diffraction, block, m, n, lane[Z * LANES + n])
+            da, za = da * fr + za * fi, za * fr - da * fi
+            fr, fi = lane_factor(diffraction, block, m + 1, n, lane[Z * LANES + n])
+            db, zb = db * fr + zb * fi, zb * fr - db * fi
         lane[DU * LANES + n] -= da + db
         lane[DW * LANES + n] -= za + zb
         lane[P * LANES + n] += pa * ra + pb * rb
 
 
 @kernel
-def chain_sums(number, n_echo, field, lane):
-    """Water velocity, acceleration and pressure at a block's nodes: two K at a time, then square."""
+def chain_sums(number, n_echo, field, lane, diffraction, block):
+    """Water velocity, acceleration and pressure at a block's nodes: two K at a time, then square.
+
+    diffraction: LaneDiffraction, which scales and turns the accelerations, or None.
+    """
     for n in range(LANES):
         lane[U * LANES + n] = 0.0
         lane[W * LANES + n] = 0.0
@@ -383,7 +434,7 @@ def chain_sums(number, n_echo, field, lane):
         lane[P * LANES + n] = 0.0
     for m in range(0, number.shape[1], 2):
         if m < n_echo:
-            add_echo(number, field, m, lane)
+            add_echo(number, field, m, lane, diffraction, block)
         vr, vi, gr, gi = field[VR, m], field[VI, m], field[GR, m], field[GI, m]
         hr, hi, qr, qi = field[VR, m + 1], field[VI, m + 1], field[GR, m + 1], field[GI, m + 1]
         pa, pb = number[PRESSURE, m], number[PRESSURE, m + 1]
@@ -392,6 +443,11 @@ def chain_sums(number, n_echo, field, lane):
             br, bi = lane[BR * LANES + n], lane[BI * LANES + n]
             ua, wa, da, za, ra = wave_terms(vr, vi, gr, gi, ar, ai)
             ub, wb, db, zb, rb = wave_terms(hr, hi, qr, qi, br, bi)
+            if diffraction is not None:
+                fr, fi = lane_factor(diffraction, block, m, n, lane[Z * LANES + n])
+                da, za = da * fr - za * fi, za * fr + da * fi
+                fr, fi = lane_factor(diffraction, block, m + 1, n, lane[Z * LANES + n])
+                db, zb = db * fr - zb * fi, zb * fr + db * fi
             lane[U * LANES + n] += ua + ub
             lane[W * LANES + n] += wa + wb
             lane[DU * LANES + n] += da + db
@@ -516,7 +572,7 @@ def still_surface(pose, lanes):
 
 
 @kernel
-def lane_kinematics(pose, z_ref, eta, lanes, sea, field, lane):
+def lane_kinematics(pose, z_ref, eta, lanes, sea, field, lane, diffraction, block):
     """Fill a block's U, W, DU, DW (along the heading and up) and P; nothing in still water."""
     if sea is None:
         return
@@ -531,12 +587,15 @@ def lane_kinematics(pose, z_ref, eta, lanes, sea, field, lane):
         chain_start(pose.z, pose.r33, sway, z_ref, stretch, drop, scale, sea.lead, lane)
     else:
         chain_start(0.0, 1.0, 0.0, 0.0, stretch, drop, scale, sea.lead, lane)
-    chain_sums(sea.number, sea.n_echo, field, lane)
+    chain_sums(sea.number, sea.n_echo, field, lane, diffraction, block)
 
 
 @kernel
-def fast_morison_load(t, pose, lanes, sea, current, scratch):
-    """Strip load as morison.morison_load gives it, from Lanes and FastWaves (None: still water)."""
+def fast_morison_load(t, pose, lanes, sea, current, scratch, diffraction=None):
+    """Strip load as morison.morison_load gives it, from Lanes and FastWaves (None: still water).
+
+    diffraction: LaneDiffraction or None, which leaves 1 + C_A.
+    """
     if lanes is None:
         return StripLoad(NO_LOAD, 0.0, 0.0, 0.0, 0.0)
     eta = z_ref = 0.0
@@ -549,7 +608,7 @@ def fast_morison_load(t, pose, lanes, sea, current, scratch):
     for block in range(scratch.lanes.shape[0]):
         node, lane = lanes.table[block], scratch.lanes[block]
         place_nodes(z_surf, node, lane)
-        lane_kinematics(pose, z_ref, eta, lanes, sea, scratch.field, lane)
+        lane_kinematics(pose, z_ref, eta, lanes, sea, scratch.field, lane, diffraction, block)
         lane_current(pose, lanes.depth, current, lane)
         part = lane_load(pose, lanes, node, sea, current, lane)
         load = add(load, part.wrench)

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fowt_env.jit import kernel
+from fowt_env.loads.diffraction import factor_at
 from fowt_env.state import Wrench
 from fowt_env.weather.waves import NEGLIGIBLE, elevation, ramp_factor
 
@@ -154,10 +155,11 @@ def wet_cell(section, z_surf, strips):
 
 
 @kernel
-def strip_kinematics(t, pose, z_surf, eta, strips, waves, kin):
+def strip_kinematics(t, pose, z_surf, eta, strips, waves, kin, diffraction=None):
     """Fill kin (7, n_nodes) with velocity, acceleration (inertial axes) and dynamic pressure at the nodes.
 
     z_surf, eta   from axis_surface
+    diffraction   StripDiffraction or None; scales and turns the nodes' accelerations, not the keel's
     Returns the keel's (p, u, v, w, du, dv, dw), in Pa, m/s and m/s2.
     """
     kin[:] = 0.0
@@ -208,7 +210,11 @@ def strip_kinematics(t, pose, z_surf, eta, strips, waves, kin):
                 rb = ra * exp(up * gap)
                 car, cai = cos(phase + rate * za), sin(phase + rate * za)
                 cbr, cbi = car * c - cai * s, car * s + cai * c
-            for _ in range(cells):
+            tapered, gr, gi = False, 1.0, 0.0
+            if diffraction is not None:
+                tapered = strips.diameter_slope[section] != 0.0
+                gr, gi = factor_at(diffraction.series[j, section], 0.0)
+            for cell in range(cells):
                 for point in range(2):
                     er, ei = (ar, ai) if point == 0 else (br, bi)
                     fr = fi = 0.0
@@ -222,6 +228,13 @@ def strip_kinematics(t, pose, z_surf, eta, strips, waves, kin):
                     kin[U, node] += even_c * cb
                     kin[V, node] += even_c * sb
                     kin[W, node] += odd_s
+                    if diffraction is not None:
+                        if tapered:
+                            share = GAUSS_OFFSET if point == 0 else 1.0 - GAUSS_OFFSET
+                            x = top - height * (cell + share) - diffraction.centre[section]
+                            gr, gi = factor_at(diffraction.series[j, section], x)
+                        even_s = gr * even_s + gi * even_c
+                        odd_c = gr * odd_c - gi * odd_s
                     kin[DU, node] += om * even_s * cb
                     kin[DV, node] += om * even_s * sb
                     kin[DW, node] -= om * odd_c
@@ -266,10 +279,11 @@ def current_at(z, depth, current):
 
 
 @kernel
-def morison_load(t, pose, strips, waves, current, kin):
+def morison_load(t, pose, strips, waves, current, kin, diffraction=None):
     """Strip load from the keel to the surface, Eqs (16)-(17), with the axial terms of theory.md 5.4.
 
-    kin: (7, n_nodes) scratch. The section-acceleration term is returned as S_k for the left-hand side.
+    kin: (7, n_nodes) scratch. diffraction: StripDiffraction or None, which leaves 1 + C_A.
+    The section-acceleration term is returned as S_k for the left-hand side.
     """
     if strips is None:
         return StripLoad(Wrench(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0, 0.0)
@@ -277,7 +291,9 @@ def morison_load(t, pose, strips, waves, current, kin):
     z_surf, eta = axis_surface(t, pose, strips, waves)
     kp = ku = kv = kw = kdu = kdv = kdw = 0.0
     if waves is not None:
-        kp, ku, kv, kw, kdu, kdv, kdw = strip_kinematics(t, pose, z_surf, eta, strips, waves, kin)
+        kp, ku, kv, kw, kdu, kdv, kdw = strip_kinematics(
+            t, pose, z_surf, eta, strips, waves, kin, diffraction
+        )
     fx = fy = fz = mx = my = s0 = s1 = s2 = 0.0
     for section in range(strips.cells.shape[0]):
         top, height = wet_cell(section, z_surf, strips)
