@@ -21,6 +21,7 @@ from rich.progress import (
 from rich.table import Table
 
 from fowt_env.cli_arguments import parse_numbers, parse_pairs, parse_sea, parse_wind
+from fowt_env.cli_doctor import DOCTOR_EXAMPLES, doctor
 from fowt_env.errors import ControllerError, InputError, SimulationStopped, unknown
 from fowt_env.outputs import table_path, write_table
 
@@ -411,6 +412,8 @@ def list_names(
         out.print(f"[bold]{heading}[/bold]")
         out.print(Columns(map(escape, known[heading]()), padding=(0, 3), expand=False), highlight=False)
 
+
+app.command(epilog=DOCTOR_EXAMPLES)(reported(doctor))
 
 VALIDATE_EXAMPLES = """[bold]Examples[/bold]
 
