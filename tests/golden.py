@@ -1,0 +1,70 @@
+"""The stored trajectory of each registered environment, and the command that makes it anew.
+
+`python tests/golden.py` (in the folder of the checkout) rewrites tests/reference/golden/*.csv. Do that only
+together with a new version of the environment's name, see CONTRIBUTING.md.
+"""
+
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+import pandas as pd
+
+from fowt_env.envs.env import REWARD_KEYS
+from fowt_env.outputs import replacing
+
+FOLDER = Path(__file__).parent / "reference" / "golden"
+ENVIRONMENTS = ("fowt_env/OC3Hywind-v0",)
+TASKS = ("above_rated", "full_range", "steady")  # every task that a name stands for
+SEED = 7
+STEPS = 100  # control periods; the first rows show the start, the last the physics added up
+EVERY = 10  # rows are stored at step 0, 10, 20, ...
+
+
+def path_of(name, task):
+    """CSV file of an environment and task."""
+    return FOLDER / f"{name.split('/')[-1]}_{task}.csv"
+
+
+def actions():
+    """(STEPS, 2) fixed actions within [-1, 1]: slow sweeps with a ripple, no random generator involved."""
+    k = np.arange(STEPS)
+    torque = 0.6 + 0.3 * np.sin(0.11 * k)
+    blade_pitch = -0.1 + 0.3 * np.sin(0.07 * k) + 0.05 * np.cos(1.3 * k)
+    return np.stack([torque, blade_pitch], axis=1)
+
+
+def trajectory(name, task, **options):
+    """DataFrame of step, reward, its terms and the observation entries, every EVERY steps."""
+    env = gymnasium.make(name, task=task, **options)
+    observation, info = env.reset(seed=SEED)
+    rows = [_row(0, 0.0, observation, info)]
+    for step, action in enumerate(actions(), 1):
+        observation, reward, terminated, truncated, info = env.step(action)
+        assert not (terminated or truncated), f"{name} {task}: the episode ended at step {step}"
+        if step % EVERY == 0:
+            rows.append(_row(step, reward, observation, info))
+    return pd.DataFrame(rows)
+
+
+def _row(step, reward, observation, info):
+    terms = {key: float(info.get(key, 0.0)) for key in REWARD_KEYS}  # reset pays nothing
+    seen = {f"observation_{i}": float(value) for i, value in enumerate(observation)}
+    return {"step": step, "reward": float(reward), **terms, **seen}
+
+
+def write():
+    """Paths of the files written anew."""
+    paths = []
+    for name in ENVIRONMENTS:
+        for task in TASKS:
+            path = path_of(name, task)
+            with replacing(path) as temporary:
+                trajectory(name, task).to_csv(temporary, index=False, float_format="%.9g")
+            paths.append(path)
+    return paths
+
+
+if __name__ == "__main__":
+    for written in write():
+        print(written)
