@@ -11,7 +11,7 @@ INSTALL = $(BIN)/python -m pip install --quiet --constraint constraints.txt --ed
 help:
 	@echo "make demo        score the PI controller of Eq. (8) above rated: table and plots under results/demo"
 	@echo "make test        all tests (make test-quick: without the slow ones)"
-	@echo "make lint        ruff;  make format: let ruff mend what it can"
+	@echo "make lint        ruff and mypy;  make format: let ruff mend what it can"
 	@echo "make clean       remove results and build leftovers (the environment stays; rm -r $(VENV) removes it)"
 
 $(BIN)/python:
@@ -36,10 +36,11 @@ test-quick: $(VENV)/.installed-dev
 
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .
+	$(BIN)/mypy
 
 format: $(VENV)/.installed-dev
 	$(BIN)/ruff check --fix .
 
 clean:
-	rm -rf results build dist *.egg-info .pytest_cache .ruff_cache .hypothesis
+	rm -rf results build dist *.egg-info .pytest_cache .ruff_cache .mypy_cache .hypothesis
 	find . -name __pycache__ -not -path "./$(VENV)/*" -prune -exec rm -rf {} +

@@ -1,13 +1,15 @@
 """What a controller is: the protocol, its compiled form, and the check of a Python one's answers."""
 
+from collections.abc import Callable
 from math import isfinite
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
+import numpy.typing as npt
 
 from fowt_env.errors import ControllerError, InputError
 from fowt_env.jit import kernel
-from fowt_env.measurement import N_MEASUREMENTS
+from fowt_env.measurement import N_MEASUREMENTS, Measurement
 
 N_COMMANDS = 2  # command[0]: generator torque, N m, high-speed shaft; command[1]: blade pitch, rad
 LONGEST_CONTROL_DT = 1.0  # s; beyond it the sampled loop no longer resembles the design
@@ -17,10 +19,10 @@ LONGEST_CONTROL_DT = 1.0  # s; beyond it the sampled loop no longer resembles th
 class Controller(Protocol):
     """Any object with these two methods can control a run (SI, radians)."""
 
-    def reset(self, measurement):
+    def reset(self, measurement: Measurement) -> object:
         """Start afresh from a Measurement, so that the first command does not bump the plant."""
 
-    def act(self, measurement):
+    def act(self, measurement: Measurement) -> tuple[float, float]:
         """(generator torque N m on the high-speed shaft, blade pitch rad) held until the next call."""
 
 
@@ -38,18 +40,18 @@ class CompiledController:
     entries. The compiled loop calls kernel on these arrays; act() calls the same law from Python.
     """
 
-    kernel = None
+    kernel: Callable[..., None] | None = None
 
-    def __init__(self, name, parameters, n_memory):
+    def __init__(self, name: str, parameters: npt.ArrayLike, n_memory: int) -> None:
         self.name = str(name)
         self.parameters = np.ascontiguousarray(parameters, dtype=np.float64)
         self.memory = np.zeros(n_memory)
 
-    def reset(self, measurement):
+    def reset(self, measurement: Measurement) -> None:
         """Set memory from a Measurement, forgetting everything before."""
         raise NotImplementedError(f"{type(self).__name__} must define reset(measurement)")
 
-    def act(self, measurement):
+    def act(self, measurement: Measurement) -> tuple[float, float]:
         """(generator torque, blade pitch) for a Measurement; advances the memory by one period."""
         values = np.array(measurement, dtype=np.float64)
         if values.shape != (N_MEASUREMENTS,):
@@ -62,15 +64,15 @@ class CompiledController:
 class CheckedController:
     """A Python controller whose every answer is checked to be two finite numbers."""
 
-    def __init__(self, controller, name=None):
+    def __init__(self, controller: Any, name: str | None = None) -> None:
         self.controller = controller
         self.name = str(name or getattr(controller, "name", type(controller).__name__))
 
-    def reset(self, measurement):
+    def reset(self, measurement: Measurement) -> None:
         """Reset the controller inside."""
         self.controller.reset(measurement)
 
-    def act(self, measurement):
+    def act(self, measurement: Measurement) -> tuple[float, float]:
         """(generator torque, blade pitch) as floats.
 
         Raises: ControllerError naming the controller, the time and what it returned.
@@ -93,7 +95,7 @@ class CheckedController:
         )
 
 
-def check_control_dt(control_dt):
+def check_control_dt(control_dt: float) -> float:
     """The control period as a float. Raises: InputError outside (0, 1] s."""
     if not 0.0 < control_dt <= LONGEST_CONTROL_DT:
         raise InputError(f"control_dt = {control_dt}: must be in (0, {LONGEST_CONTROL_DT:g}] s")

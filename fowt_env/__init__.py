@@ -4,8 +4,22 @@ Public names are loaded on first use, so that importing the package costs nothin
 """
 
 from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 from fowt_env_registration import register_with_gymnasium
+
+if TYPE_CHECKING:  # the names below, for editors and type checkers
+    from fowt_env.errors import ControllerError as ControllerError
+    from fowt_env.errors import InputError as InputError
+    from fowt_env.errors import SimulationStopped as SimulationStopped
+    from fowt_env.linear_model import linearize as linearize
+    from fowt_env.linear_model import natural_periods as natural_periods
+    from fowt_env.measurement import Measurement as Measurement
+    from fowt_env.scene import Scene as Scene
+    from fowt_env.scene import build_scene as build_scene
+    from fowt_env.simulation import simulate as simulate
+    from fowt_env.steady import OperatingPoint as OperatingPoint
+    from fowt_env.steady import trim as trim
 
 __version__ = "0.1.0"
 
@@ -25,7 +39,7 @@ _PUBLIC = {
 __all__ = sorted(_PUBLIC)
 
 
-def __getattr__(name):
+def __getattr__(name: str) -> Any:
     if name in _PUBLIC:
         value = getattr(import_module(_PUBLIC[name]), name)
         globals()[name] = value
@@ -33,7 +47,7 @@ def __getattr__(name):
     raise AttributeError(f"module 'fowt_env' has no attribute {name!r}")
 
 
-def __dir__():
+def __dir__() -> list[str]:
     return sorted({*globals(), *__all__})
 
 

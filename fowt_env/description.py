@@ -415,7 +415,7 @@ def _turbine_file(name):
     return DATA / "turbines" / name / "turbine.toml"
 
 
-def read_platform(name_or_path):
+def read_platform(name_or_path: str | Path) -> Platform:
     """Platform from a built-in name (names("platforms")) or a user's TOML file.
 
     The turbine of the result is a built-in name or an absolute path; in the file it is relative to the file.
@@ -449,7 +449,7 @@ class _MooringFile(Record):
     mooring: MooringSpread
 
 
-def read_turbine(name_or_path):
+def read_turbine(name_or_path: str | Path) -> Turbine:
     """Turbine from a built-in name (names("turbines")) or a user's TOML file.
 
     blade.stations and blade.polars are paths relative to the file or, if not there, to the folder of the

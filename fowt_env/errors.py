@@ -1,6 +1,8 @@
 """The errors that users meet. Each message names the key, the value and what is allowed."""
 
 import difflib
+from collections.abc import Iterable
+from typing import Any
 
 
 class InputError(ValueError):
@@ -13,19 +15,19 @@ class SimulationStopped(RuntimeError):
     Attributes: reason (str), time (s), frame (the rows up to the stop, or None).
     """
 
-    def __init__(self, message, reason, time, frame=None):
+    def __init__(self, message: str, reason: str, time: float, frame: Any = None) -> None:
         super().__init__(message)
         self.reason = reason
         self.time = time
         self.frame = frame
 
 
-def unknown(kind, name, known):
+def unknown(kind: str, name: object, known: Iterable[object]) -> InputError:
     """InputError for a name that is not known, with the nearest known one as a suggestion."""
-    known = sorted(str(k) for k in known)
-    close = difflib.get_close_matches(str(name), known, n=1)
+    names = sorted(str(k) for k in known)
+    close = difflib.get_close_matches(str(name), names, n=1)
     hint = f" Did you mean {close[0]!r}?" if close else ""
-    return InputError(f"unknown {kind} {name!r}.{hint} Known: {', '.join(known)}")
+    return InputError(f"unknown {kind} {name!r}.{hint} Known: {', '.join(names)}")
 
 
 class ControllerError(RuntimeError):
@@ -34,7 +36,7 @@ class ControllerError(RuntimeError):
     Attributes: controller (its name), time (s), returned (what it gave back).
     """
 
-    def __init__(self, message, controller, time, returned):
+    def __init__(self, message: str, controller: str, time: float, returned: object) -> None:
         super().__init__(message)
         self.controller = controller
         self.time = time

@@ -1,12 +1,14 @@
 """From descriptions to a scene: everything that a run needs, checked, typed and built once."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import cos, isfinite, radians, sin
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from fowt_env.channels import Layout, channels
+from fowt_env.channels import Channel, Layout, channels
 from fowt_env.counters import N_COUNTERS
 from fowt_env.description import Platform, Turbine, read_platform, read_turbine, sea_state_of
 from fowt_env.dynamics import N_KEPT, Body, Model, Work
@@ -31,10 +33,15 @@ from fowt_env.loads.rotor_lookup import build_section_table
 from fowt_env.loads.rotor_table import build_rotor_table
 from fowt_env.loads.tower import build_tower_drag
 from fowt_env.loads.wake import build_dynamic_inflow, build_skewed_wake, n_wake_states
+from fowt_env.sea_states import SeaState
 from fowt_env.state import N_RIGID
 from fowt_env.weather.waves import build_waves
-from fowt_env.weather.wind import build_wind, make_series, nominal_speed
-from fowt_env.weather.wind_field import hub_speed, is_field, read_box, rotor_average
+from fowt_env.weather.wind import WindSeries, build_wind, make_series, nominal_speed
+from fowt_env.weather.wind_field import WindBox, hub_speed, is_field, read_box, rotor_average
+
+# what users may give as wind and sea, see build_scene
+Wind = float | dict[str, Any] | WindSeries | WindBox | None
+Sea = str | Path | Mapping[str, Any] | SeaState | None
 
 ROTORS = ("bem", "lookup", "table")
 FIDELITIES = {
@@ -73,7 +80,7 @@ class Scene:
     state vector and the scratch of a run belong to the run.
     """
 
-    model: Model
+    model: Any  # a dynamics.Model; its parts have many types
     platform: Platform
     turbine: Turbine
     wind: Any  # as asked for
@@ -84,19 +91,19 @@ class Scene:
     wind_speed: float | None  # mean hub wind that a trim uses; None without aerodynamics
 
     @property
-    def n_lines(self):
+    def n_lines(self) -> int:
         return 0 if self.model.mooring is None else self.model.mooring.length.shape[0]
 
     @property
-    def n_state(self):
+    def n_state(self) -> int:
         return N_RIGID + n_wake_states(self.model.rotor, self.model.wake)
 
     @property
-    def channels(self):
+    def channels(self) -> tuple[Channel, ...]:
         """Output channels of this scene, in row order."""
         return channels(self.n_lines)
 
-    def work(self):
+    def work(self) -> Work:
         """Fresh scratch arrays for one plant of this scene."""
         nodes = 0 if self.model.strips is None else self.model.strips.nodes
         return Work(
@@ -110,11 +117,11 @@ class Scene:
             np.zeros((4, self.n_state)),
         )
 
-    def box(self, work=None):
+    def box(self, work: Work | None = None) -> Box:
         """The scene and scratch in the form that kernels take from Python."""
         return Box(self.model, self.work() if work is None else work)
 
-    def with_weather(self, wind, sea, seed):
+    def with_weather(self, wind: Wind, sea: Sea, seed: int) -> "Scene":
         """A copy in other weather of the same kind: only wind and sea are drawn anew.
 
         Raises: InputError, also where aerodynamics would appear or vanish (build a scene for that).
@@ -144,11 +151,11 @@ class Scene:
         )
 
     @property
-    def dt(self):
+    def dt(self) -> float:
         """Default physics step of the scene's integrator, s."""
         return STEPS[self.options["integrator"]]
 
-    def with_model(self, **parts):
+    def with_model(self, **parts: Any) -> "Scene":
         """A copy with some parts of the model replaced (same types: no recompilation)."""
         return replace(self, model=self.model._replace(**parts))
 
@@ -160,8 +167,15 @@ class Scene:
 
 
 def build_scene(
-    platform="oc3_hywind", wind=None, sea=None, *, seed=0, rotor=None, fidelity="reference", **options
-):
+    platform: str | Path | Platform = "oc3_hywind",
+    wind: Wind = None,
+    sea: Sea = None,
+    *,
+    seed: int = 0,
+    rotor: str | None = None,
+    fidelity: str = "reference",
+    **options: Any,
+) -> Scene:
     """Scene of a platform, a wind and a sea.
 
     platform  built-in name, path to a TOML file, or a description.Platform

@@ -1,7 +1,9 @@
 """One run of a scene with a controller, to a table of OpenFAST channels."""
 
+from collections.abc import Callable
 from math import isfinite, pi
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -10,6 +12,7 @@ from fowt_env.channels import DEG, RPM, to_units
 from fowt_env.errors import InputError, SimulationStopped, unknown
 from fowt_env.jit import control_kernel
 from fowt_env.measurement import N_MEASUREMENTS, Measurement
+from fowt_env.scene import Scene
 from fowt_env.state import State, pose_of
 from fowt_env.steady import trim
 from fowt_env.step import RUNNING, STOP_REASONS, advance, observe, output, output_row, run
@@ -55,7 +58,7 @@ class _Hold:
         """Nothing to start."""
 
 
-def steps_in(name, period, dt):
+def steps_in(name: str, period: float, dt: float) -> int:
     """Number of physics steps in a period. Raises: InputError if dt does not divide it."""
     for key, value in ((name, period), ("dt", dt)):
         good = isinstance(value, int | float | np.number) and not isinstance(value, bool)
@@ -67,7 +70,9 @@ def steps_in(name, period, dt):
     return count
 
 
-def initial_state(scene, start="trim", initial=None):
+def initial_state(
+    scene: Scene, start: str = "trim", initial: dict[str, float] | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """(state, command) that a run begins with.
 
     start: "trim" the floating steady state in the mean wind; "zero" all platform states zero, with
@@ -112,7 +117,7 @@ def initial_state(scene, start="trim", initial=None):
     return x, u
 
 
-def check_duration(scene, duration):
+def check_duration(scene: Scene, duration: float) -> None:
     """Refuse a run that is longer than the scene's random or recorded weather."""
     limit = scene.options["duration"]
     random_sea = scene.model.waves is not None and scene.model.waves.omega.shape[0] > 1
@@ -139,16 +144,16 @@ def check_duration(scene, duration):
 
 
 def simulate(
-    scene,
-    controller="pi",
-    duration=600.0,
-    dt=None,
-    control_dt=0.1,
-    output_dt=0.1,
-    start="trim",
-    initial=None,
-    progress=False,
-):
+    scene: Scene,
+    controller: Any = "pi",
+    duration: float = 600.0,
+    dt: float | None = None,
+    control_dt: float = 0.1,
+    output_dt: float = 0.1,
+    start: str = "trim",
+    initial: dict[str, float] | None = None,
+    progress: bool | Callable[[float], object] = False,
+) -> pd.DataFrame:
     """DataFrame of one run, columns named as OpenFAST writes them (`PtfmPitch_[deg]`).
 
     controller  None: the rotor is held at the trim's speed and blade pitch (at rest without wind); a

@@ -13,6 +13,7 @@ from fowt_env.errors import InputError, unknown
 from fowt_env.jit import entry
 from fowt_env.loads.drivetrain import build_torque_curve, generator_torque
 from fowt_env.loads.rotor import wake_equilibrium
+from fowt_env.scene import Scene
 from fowt_env.state import State, pose_of
 from fowt_env.step import output_row
 from fowt_env.weather.wind import make_series, wind_now
@@ -245,7 +246,7 @@ class _Steady:
         return size
 
 
-def trim(scene, platform="floating"):
+def trim(scene: Scene, platform: str = "floating") -> OperatingPoint:
     """OperatingPoint of a scene: steady state in its mean wind, waves flat.
 
     platform: "floating" finds the six motions too; "fixed" holds them at zero. Rotor speed and

@@ -1,14 +1,19 @@
 """The Gymnasium environment: a task, a scene and the compiled control period, glued together."""
 
+from collections.abc import Mapping, Sequence
 from copy import copy, deepcopy
 from dataclasses import replace
 from math import isfinite, pi
+from pathlib import Path
+from typing import Any
 
 import gymnasium
 import numpy as np
+import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
 from fowt_env.channels import DEG, to_units
+from fowt_env.description import Platform
 from fowt_env.envs.actions import MODES, Mode, build_action_map, start_tracking
 from fowt_env.envs.kernels import (
     BAD_ACTION,
@@ -33,7 +38,7 @@ from fowt_env.envs.rewards import (
 )
 from fowt_env.envs.snapshot import CARRIED, WORK_CARRIED, Snapshot
 from fowt_env.envs.tables import task_tables
-from fowt_env.envs.tasks import TASKS, Episode, check_offset, task_of
+from fowt_env.envs.tasks import TASKS, Episode, Task, check_offset, task_of
 from fowt_env.envs.trims import exact_trim, near_trim, plant_key
 from fowt_env.errors import InputError, unknown
 from fowt_env.jit import Box
@@ -45,10 +50,11 @@ from fowt_env.step import output
 
 SHORTEST_WEATHER = 600.0  # s of random wind and sea: turbulence intensity is defined over 10 min
 BASELINE = "pi"  # controller that the residual mode adds to
+StepResult = tuple[np.ndarray, float, bool, bool, dict[str, Any]]
 REWARD_KEYS = tuple(f"reward/{name}" for name in TERMS)
 
 
-class FowtEnv(gymnasium.Env):
+class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     """Floating wind turbine whose generator torque and blade pitch are commanded.
 
     task         name in TASKS ("above_rated", "full_range", "steady") or a Task
@@ -90,30 +96,29 @@ class FowtEnv(gymnasium.Env):
 
     def __init__(
         self,
-        task="above_rated",
-        platform="oc3_hywind",
-        rotor=None,
-        action_mode="direct",
-        observation=None,
-        reward=None,
-        dt=None,
-        control_dt=0.1,
-        duration=None,
-        wind=None,
-        sea=None,
-        wind_preview=None,
-        render_mode=None,
-        fidelity="standard",
-        **options,
-    ):
+        task: str | Task = "above_rated",
+        platform: str | Path | Platform = "oc3_hywind",
+        rotor: str | None = None,
+        action_mode: str = "direct",
+        observation: Sequence[str] | None = None,
+        reward: Mapping[str, float] | None = None,
+        dt: float | None = None,
+        control_dt: float = 0.1,
+        duration: float | None = None,
+        wind: Any = None,
+        sea: Any = None,
+        wind_preview: Sequence[float] | None = None,
+        render_mode: str | None = None,
+        fidelity: str = "standard",
+        **options: Any,
+    ) -> None:
         if render_mode is not None:
             raise InputError(f"render_mode = {render_mode!r}: allowed None")
         if action_mode not in MODES:
             raise unknown("action_mode", action_mode, MODES)
         self.render_mode = None
-        self.task = task = _adapted(
-            task_of(task), rotor, observation, reward, duration, wind, sea, wind_preview
-        )
+        task = _adapted(task_of(task), rotor, observation, reward, duration, wind, sea, wind_preview)
+        self.task = task
         self.action_mode = action_mode
         steps_in("duration", task.duration, control_dt)
         episode = task.draw(np.random.default_rng(0))
@@ -141,7 +146,7 @@ class FowtEnv(gymnasium.Env):
         seen = (task.observation, task.wind_preview)
         self._kind = (self._key, action_mode, *seen, self.dt, self.control_dt, self._last)
 
-    def twin(self):
+    def twin(self) -> "FowtEnv":
         """Another environment of the same settings, before its first reset; shares what is never written."""
         other = copy(self)
         other._np_random = other._np_random_seed = None
@@ -192,7 +197,9 @@ class FowtEnv(gymnasium.Env):
         )
         self._box = None
 
-    def reset(self, *, seed=None, options=None):
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[np.ndarray, dict[str, Any]]:
         """(observation, info) at the start of a new episode.
 
         options: "wind", "sea", "weather_seed", "offsets" ({channel: added to the operating point}) in
@@ -241,7 +248,7 @@ class FowtEnv(gymnasium.Env):
         x[State.BLADE_PITCH] = min(max(x[State.BLADE_PITCH], drive.minimum), drive.maximum)
         self._run.u[1] = x[State.BLADE_PITCH]
 
-    def step(self, action):
+    def step(self, action: npt.ArrayLike) -> StepResult:
         """(observation, reward, terminated, truncated, info) after one control period."""
         if not self._running:
             raise ResetNeeded("call reset() first: no episode is running")
@@ -256,7 +263,7 @@ class FowtEnv(gymnasium.Env):
             raise InputError(f"action = {action!r}: must be finite")
         return self._result(status, reward)
 
-    def step_physical(self, torque, blade_pitch):
+    def step_physical(self, torque: float, blade_pitch: float) -> StepResult:
         """As step, under a generator torque (N m) and blade pitch (rad), applied as simulate does.
 
         No range and no torque rate limit are put on the command: that is up to whoever gives it.
@@ -283,7 +290,7 @@ class FowtEnv(gymnasium.Env):
             self._running = False
         return run.observation.copy(), reward, terminated, truncated, info
 
-    def get_state(self):
+    def get_state(self) -> Snapshot:
         """Snapshot of all that decides how the run goes on: plant, controller, counters, weather, draws.
 
         For what-if: set_state(get_state()) and the same actions give the same bits, in this environment
@@ -297,7 +304,7 @@ class FowtEnv(gymnasium.Env):
         generator = None if self._np_random is None else self._np_random.bit_generator.state
         return Snapshot(self._kind, self.scene, tuple(arrays), self._running, generator, self._np_random_seed)
 
-    def set_state(self, snapshot):
+    def set_state(self, snapshot: Snapshot) -> None:
         """Go on from a Snapshot. Raises: InputError for one from an environment of other settings."""
         if not isinstance(snapshot, Snapshot):
             raise InputError(f"state = {type(snapshot).__name__}: must be what get_state() returned")
@@ -328,13 +335,13 @@ class FowtEnv(gymnasium.Env):
         self._setting = self._setting._replace(model=scene.model)
         self._box = Box(self._setting, self._run)
 
-    def measurement(self):
+    def measurement(self) -> Measurement:
         """Measurement that a controller is given now (SI)."""
         if self._box is None:
             raise ResetNeeded("call reset() first: nothing has been measured yet")
         return Measurement(*self._run.measurement.tolist())
 
-    def channels(self):
+    def channels(self) -> dict[str, float]:
         """{OpenFAST channel: value in its unit} of the present instant; leaves the run as it is."""
         if self._box is None:
             raise ResetNeeded("call reset() first: there is no state yet")
@@ -349,10 +356,19 @@ class FowtEnv(gymnasium.Env):
         return dict(zip((channel.name for channel in scene.channels), values, strict=True))
 
 
-FowtEnv.__doc__ += f"\n{task_tables(TASKS['above_rated'])}"
+FowtEnv.__doc__ = f"{FowtEnv.__doc__}\n{task_tables(TASKS['above_rated'])}"
 
 
-def _adapted(task, rotor, observation, reward, duration, wind, sea, wind_preview):
+def _adapted(
+    task: Task,
+    rotor: Any,
+    observation: Any,
+    reward: Any,
+    duration: Any,
+    wind: Any,
+    sea: Any,
+    wind_preview: Any,
+) -> Task:
     """The task with what the caller gave in place of its own."""
     given = {"rotor": rotor, "duration": duration, "wind": wind, "sea": sea, "wind_preview": wind_preview}
     changes = {name: value for name, value in given.items() if value is not None}

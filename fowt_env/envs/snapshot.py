@@ -1,5 +1,6 @@
 """The whole state of an environment at one instant, for what-if, tree search and predictive control."""
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 # arrays of kernels.Run that outlive a control period, and of dynamics.Work: those that carry over, and
@@ -15,5 +16,5 @@ class Snapshot(NamedTuple):
     scene: Any  # scene.Scene with the weather of the episode
     arrays: tuple  # copies, in the order of CARRIED and WORK_CARRIED
     running: bool
-    generator: dict | None  # state of the random generator; None before the first draw
+    generator: Mapping[str, Any] | None  # state of the random generator; None before the first draw
     seed: int | None  # that the generator was made from

@@ -223,7 +223,7 @@ TASKS = {
 }
 
 
-def task_of(task):
+def task_of(task: str | Task) -> Task:
     """Task from a name or a Task. Raises: InputError for anything else."""
     if isinstance(task, Task):
         return task

@@ -1,10 +1,13 @@
 """Many environments stepped by one compiled call: Gymnasium's vector interface without a Python loop."""
 
+from collections.abc import Sequence
 from copy import deepcopy
+from typing import Any
 
 import gymnasium
 import numba
 import numpy as np
+import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
@@ -14,6 +17,7 @@ from fowt_env.envs.env import REWARD_KEYS, FowtEnv
 from fowt_env.envs.kernels import REASONS, RUNNING, SATURATED, STEP
 from fowt_env.envs.observations import N_ACTIONS
 from fowt_env.envs.rewards import N_TERMS
+from fowt_env.envs.snapshot import Snapshot
 from fowt_env.errors import InputError, unknown
 from fowt_env.jit import Box
 
@@ -50,8 +54,13 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
     metadata = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}
 
     def __init__(
-        self, num_envs=1, autoreset_mode=AutoresetMode.NEXT_STEP, threads=None, per_env=None, **settings
-    ):
+        self,
+        num_envs: int = 1,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        threads: int | None = None,
+        per_env: list[dict[str, Any]] | None = None,
+        **settings: Any,
+    ) -> None:
         self.num_envs = _count("num_envs", num_envs, 10**6)
         if isinstance(autoreset_mode, str):
             if autoreset_mode not in MODES:
@@ -61,7 +70,7 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
             raise unknown("autoreset_mode", autoreset_mode, MODES)
         self.autoreset_mode = autoreset_mode
         self.metadata = self.metadata | {"autoreset_mode": autoreset_mode}
-        most = numba.config.NUMBA_NUM_THREADS
+        most = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined] # set when numba starts
         self.threads = min(numba.get_num_threads(), num_envs) if threads is None else threads
         _count("threads", self.threads, most)
         self.envs = tuple(_environments(num_envs, per_env, settings))
@@ -92,7 +101,12 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
                 observation=self._observations[i], counts=self._counts[i], terms=self._terms[i]
             )
 
-    def reset(self, *, seed=None, options=None):
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | list[dict[str, Any]] | None = None,
+    ) -> tuple[np.ndarray, dict[str, Any]]:
         """(observations, infos) at the start of new episodes, of all or of options["reset_mask"] (n,) bool.
 
         Raises: InputError, also for what FowtEnv.reset refuses.
@@ -104,16 +118,16 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
             seeds = list(seed)
             if len(seeds) != n:
                 raise InputError(f"seed has {len(seeds)} entries: must be a number or {n} of them")
-        chosen = range(n)
+        chosen: Sequence[int] = range(n)
         if isinstance(options, list):
             if len(options) != n:
                 raise InputError(f"options has {len(options)} entries: must be a dict or {n} of them")
         else:
             options = dict(options or {})
             if "reset_mask" in options:
-                chosen = np.flatnonzero(self._mask(options.pop("reset_mask")))
+                chosen = np.flatnonzero(self._mask(options.pop("reset_mask"))).tolist()
             options = [options] * n
-        infos = {}
+        infos: dict[str, Any] = {}
         for i in chosen:
             infos = self._reset_one(i, infos, seeds[i], options[i])
         return self._observations.copy(), infos
@@ -153,7 +167,9 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         else:
             self._boxes[i] = box
 
-    def step(self, actions):
+    def step(
+        self, actions: npt.ArrayLike
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """(observations, rewards, terminations, truncations, infos) after one control period of each."""
         if self._boxes is None:
             raise ResetNeeded("call reset() first: no episode is running")
@@ -227,7 +243,7 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
             infos = self._add_info(infos, final, int(i))
         return infos
 
-    def last_info(self, i):
+    def last_info(self, i: int) -> dict[str, Any]:
         """Info of the last step of one environment, as its own step would give it."""
         info = dict(zip(REWARD_KEYS, self._terms[i].tolist(), strict=True))
         info["time"] = float(self._counts[i, STEP] * self._dt[i])
@@ -236,16 +252,16 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
             info["termination"] = REASONS[self._statuses[i]]
         return info
 
-    def get_state(self):
+    def get_state(self) -> tuple[Snapshot, ...]:
         """Tuple of the environments' Snapshots."""
         return tuple(env.get_state() for env in self.envs)
 
-    def set_state(self, snapshots):
+    def set_state(self, snapshots: Snapshot | Sequence[Snapshot]) -> None:
         """Go on from one Snapshot per environment, or all from the same one.
 
         An environment that had ended then waits for its reset as it did. Raises: InputError.
         """
-        if not isinstance(snapshots, list) and hasattr(snapshots, "arrays"):
+        if isinstance(snapshots, Snapshot):
             snapshots = [snapshots] * self.num_envs
         if len(snapshots) != self.num_envs:
             raise InputError(f"state: {len(snapshots)} snapshots: must be one, or {self.num_envs}")
@@ -254,7 +270,9 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
             self._ended[i] = not snapshot.running
             self._renew(i)
 
-    def call(self, name, *args, indices=None, **kwargs):
+    def call(
+        self, name: str, *args: Any, indices: Sequence[int] | None = None, **kwargs: Any
+    ) -> tuple[Any, ...]:
         """Tuple of what an attribute is, or returns when called, in each (or each chosen) environment."""
         results = []
         for i in range(self.num_envs) if indices is None else indices:
@@ -263,22 +281,22 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
             self._renew(i)
         return tuple(results)
 
-    def get_attr(self, name):
+    def get_attr(self, name: str) -> tuple[Any, ...]:
         """Tuple of an attribute of each environment."""
         return tuple(env.get_wrapper_attr(name) for env in self.envs)
 
-    @property
-    def np_random(self):
+    @property  # type: ignore[misc]
+    def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override] # as SyncVectorEnv
         """Tuple of the environments' random generators."""
         return self.get_attr("np_random")
 
     @property
-    def np_random_seed(self):
+    def np_random_seed(self) -> tuple[int | None, ...]:  # type: ignore[override]
         """Tuple of the seeds that they were made from."""
         return self.get_attr("np_random_seed")
 
 
-def of_one(infos, i, but=()):
+def of_one(infos: dict[str, Any], i: int, but: Sequence[str] = ()) -> dict[str, Any]:
     """The info of environment i, as its own step would give it, out of those of a vector environment."""
     own = {}
     for key, values in infos.items():
