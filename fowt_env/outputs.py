@@ -4,8 +4,12 @@ import os
 import tempfile
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from fowt_env.errors import InputError
+
+if TYPE_CHECKING:
+    from fowt_env.linear_model import LinearModel
 
 TABLE_SUFFIXES = (".csv", ".parquet")
 
@@ -66,3 +70,36 @@ def read_table(path):
     if not path.is_file():
         raise InputError(f"file {str(path)!r}: not found")
     return pd.read_csv(path) if path.suffix.lower() == ".csv" else pd.read_parquet(path)
+
+
+def write_mat(model: "LinearModel", path: str | Path) -> Path:
+    """The path written: a MATLAB file (version 5) of a LinearModel, SI and radians.
+
+    It holds the model's matrices by their names (A, B and those of outputs where it has them), the cell
+    arrays states, inputs and outputs, and the operating point: x0 and u0 in the order of states and inputs
+    (a wind speed that there is none of is NaN) and the struct operating_point of its OpenFAST channels.
+    In MATLAB: m = load("model.mat"); plant = ss(m.A, m.B, eye(size(m.A)), 0, "StateName", m.states).
+    Raises: InputError if the path does not end with .mat.
+    """
+    import numpy as np
+    from scipy.io import savemat
+
+    from fowt_env.linear_model import STATE_INDEX
+
+    path = Path(path)
+    if path.suffix.lower() != ".mat":
+        raise InputError(f"output file {str(path)!r}: must end with .mat")
+    point: Any = model.point  # an OperatingPoint
+    wind = np.nan if point.wind_speed is None else point.wind_speed
+    content = {name: getattr(model, name) for name in "ABCDEF" if hasattr(model, name)}
+    for name in ("states", "inputs", "outputs"):
+        if hasattr(model, name):
+            content[name] = np.array(getattr(model, name), dtype=object)
+    content |= {
+        "x0": point.state[list(STATE_INDEX)][:, None],
+        "u0": np.array([*point.command, wind])[:, None],
+        "operating_point": dict(point),
+    }
+    with replacing(path) as temporary:
+        savemat(temporary, content, appendmat=False, oned_as="column")
+    return path

@@ -1,10 +1,13 @@
 import os
 
+import numpy as np
 import pandas as pd
 import pytest
+from scipy.io import loadmat
 
+from fowt_env import build_scene, linearize
 from fowt_env.errors import InputError
-from fowt_env.outputs import read_table, replacing, write_table
+from fowt_env.outputs import read_table, replacing, write_mat, write_table
 
 FRAME = pd.DataFrame({"Time_[s]": [0.0, 0.1], "PtfmPitch_[deg]": [1.0 / 3.0, -2e-7]})
 
@@ -38,3 +41,23 @@ def test_wrong_endings_and_missing_files_are_named(tmp_path):
         write_table(FRAME, tmp_path / "run.xlsx")
     with pytest.raises(InputError, match="not found"):
         read_table(tmp_path / "run.csv")
+
+
+@pytest.mark.parametrize("wind", [18.0, None])
+def test_a_linear_model_comes_back_from_its_mat_file_whole(tmp_path, wind):
+    model = linearize(build_scene("oc3_hywind", wind=wind, fidelity="standard"))
+    read = loadmat(write_mat(model, tmp_path / "model.mat"), squeeze_me=True, chars_as_strings=True)
+    np.testing.assert_array_equal(read["A"], model.A)
+    np.testing.assert_array_equal(read["B"], model.B)
+    assert tuple(read["states"]) == model.states and tuple(read["inputs"]) == model.inputs
+    assert read["x0"].shape == (14,) and read["u0"].shape == (3,)
+    index = model.index("platform_pitch")
+    channel = read["operating_point"]["PtfmPitch"].item()
+    assert np.degrees(read["x0"][index]) == pytest.approx(channel, rel=1e-9)
+    assert read["u0"][2] == wind if wind else np.isnan(read["u0"][2])
+    assert [path.name for path in tmp_path.iterdir()] == ["model.mat"]
+
+
+def test_a_mat_file_needs_its_ending(tmp_path):
+    with pytest.raises(InputError, match=r"model.txt.*\.mat"):
+        write_mat(None, tmp_path / "model.txt")
