@@ -5,7 +5,6 @@ from typing import Annotated
 import typer
 from rich.console import Console
 from rich.markup import escape
-from rich.table import Table
 
 from fowt_env.errors import InputError
 
@@ -51,14 +50,12 @@ def _print_extras(health):
     except InputError as error:
         out.print(f"  [yellow]{escape(str(error))}[/yellow]", soft_wrap=True, highlight=False)
         return
-    table = Table(box=None, padding=(0, 2, 0, 2), show_header=False)
     for extra, packages in extras.items():
         missing = [package.name for package in packages if package.version is None]
         names = ", ".join(f"{package.name} {package.version or 'missing'}" for package in packages)
         state = "[green]found[/green]" if not missing else "[yellow]missing[/yellow]"
-        advice = f'pip install "{health.DISTRIBUTION}[{extra}]"' if missing else ""
-        table.add_row(extra, state, escape(names), escape(advice))
-    out.print(table, highlight=False)
+        advice = f': pip install "{health.DISTRIBUTION}[{extra}]"' if missing else ""
+        out.print(f"  {extra:14} {state}  {escape(names + advice)}", highlight=False, soft_wrap=True)
 
 
 def _print_cache(state):
