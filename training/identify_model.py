@@ -263,12 +263,12 @@ def polar_factor(platform):
     return brentq(excess, 0.2, 1.0, xtol=1e-9)
 
 
-def _value(value):
+def toml_value(value):
     """A TOML value, numbers to 10 digits."""
     if isinstance(value, str):
         return f'"{value}"'
     if isinstance(value, list | tuple):
-        return "[" + ", ".join(_value(item) for item in value) + "]"
+        return "[" + ", ".join(toml_value(item) for item in value) + "]"
     return repr(value) if isinstance(value, int) else f"{float(value):.10g}"
 
 
@@ -329,10 +329,10 @@ def write_turbine(factor):
         path.write_text("\n".join(rows) + "\n")
     tables = model_turbine()
     text = [TURBINE_HEADER]
-    text += [f"{key} = {_value(value)}" for key, value in tables.items() if not isinstance(value, dict)]
+    text += [f"{key} = {toml_value(value)}" for key, value in tables.items() if not isinstance(value, dict)]
     for name, table in tables.items():
         if isinstance(table, dict):
-            text += [f"\n[{name}]", *(f"{key} = {_value(value)}" for key, value in table.items())]
+            text += [f"\n[{name}]", *(f"{key} = {toml_value(value)}" for key, value in table.items())]
     with replacing(folder / "turbine.toml") as path:
         path.write_text("\n".join(text) + "\n")
 
@@ -347,14 +347,15 @@ def write():
     text.append('source = "Liu et al. 2023, J. Vib. Eng. 36(4) 892-902; OC3-Hywind by Froude\'s law"')
     for name in ("environment", "ballast", "hull", "hydro", "tower"):
         text.append(f"\n[{name}]  # {MARKS[name]}")
-        text += [f"{key} = {_value(value)}" for key, value in getattr(platform, name).model_dump().items()]
+        values = getattr(platform, name).model_dump()
+        text += [f"{key} = {toml_value(value)}" for key, value in values.items()]
     text.append(
         "\n# Three taut lines, each a pair from anchor to two points of the hull, 60 deg to either side: that"
         "\n# stands for the delta connection. EA (wire, spring), length, anchor radius: identified; fairlead"
         "\n# radius and depth: Froude; wet weight, anchor depth, bridle angle: choice."
     )
     for line in platform.lines:
-        text += ["\n[[lines]]", *(f"{key} = {_value(value)}" for key, value in line.model_dump().items())]
+        text += ["\n[[lines]]", *(f"{key} = {toml_value(value)}" for key, value in line.model_dump().items())]
     text += [
         "\n[published]",
         f"polar_factor = {factor:.8g}  # identified, already in the polars: Froude-scaled 703 kN in LC2",

@@ -1,0 +1,214 @@
+"""A platform and turbine of another size by Froude's law, as description files.
+
+Lengths by the scale L, speeds and times by sqrt(L), masses and forces by L^3 (water and air stay as they
+are), power by L^3.5: 10 MW from 5 MW is L = 2^(1/3.5) = 1.219. Blade twist, polars and all coefficients stay.
+
+The result is similar to its original, not a design: masses of real turbines grow less than L^3, rated wind
+speed does not grow with size, and nobody has built it. It shows that the description carries another size,
+and serves where a control law is to be tried on one.
+
+`python -m training.scale_model --help` has the settings; without any it writes the built-in oc3_froude_10mw.
+"""
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from fowt_env.description import DATA, read_platform, read_turbine
+from fowt_env.errors import InputError
+from fowt_env.outputs import replacing
+from training.identify_model import toml_value
+
+PLATFORM, TURBINE = "oc3_hywind", "nrel5mw"
+POWER_EXPONENT = 3.5
+SAME, TIME, SPEED, RATE = 0.0, 0.5, 0.5, -0.5  # exponents of the scale; RATE: per time
+LENGTH, MASS, FORCE, INERTIA, MOMENT = 1.0, 3.0, 3.0, 5.0, 4.0
+EXPONENTS = {  # record: {field: exponent of the scale, or one for each entry}
+    "environment": {
+        "gravity": SAME, "water_density": SAME, "air_density": SAME, "water_depth": LENGTH,
+        "shear_exponent": SAME,
+    },
+    "ballast": {"mass": MASS, "cm_depth": LENGTH, "inertia": INERTIA},
+    "hull": {"z": LENGTH, "diameter": LENGTH},
+    "hydro": {
+        "added_mass_coefficient": SAME, "drag_coefficient": SAME, "heave_added_mass": MASS,
+        "axial_drag_coefficient": SAME, "yaw_stiffness": MOMENT,
+        "linear_damping": (*[FORCE - SPEED] * 3, *[MOMENT - RATE] * 3),
+    },
+    "tower": {
+        "mass": MASS, "cm_height": LENGTH, "inertia": INERTIA, "base_height": LENGTH, "top_height": LENGTH,
+        "base_diameter": LENGTH, "top_diameter": LENGTH, "drag_coefficient": SAME,
+    },
+    "lines": {
+        "anchor": LENGTH, "fairlead": LENGTH, "length": LENGTH, "wet_weight": FORCE - LENGTH, "EA": FORCE,
+        "seabed_friction": SAME,
+    },
+    "turbine": {
+        "rated_rotor_speed": RATE, "rated_wind_speed": SPEED, "cut_in_wind_speed": SPEED,
+        "cut_out_wind_speed": SPEED, "overspeed": RATE,
+    },
+    "rotor": {
+        "blades": SAME, "mass": MASS, "overhang": LENGTH, "hub_height": LENGTH, "hub_radius": LENGTH,
+        "tip_radius": LENGTH, "inertia": INERTIA, "inertia_diameter": INERTIA,
+    },
+    "nacelle": {"mass": MASS, "cm_downwind": LENGTH, "cm_height": LENGTH, "inertia": INERTIA},
+    "drivetrain": {  # the gear ratio stays: generator speed falls with the rotor's
+        "gear_ratio": SAME, "generator_inertia": INERTIA, "mesh_loss": SAME, "bearing_loss": SAME,
+        "generator_efficiency": SAME,
+    },
+    "pitch_drive": {"time_constant": TIME, "rate_limit": RATE, "minimum": SAME, "maximum": SAME},
+    "torque_law": {
+        "rated_torque": MOMENT, "rated_power": POWER_EXPONENT, "rated_speed": RATE, "cut_in_speed": RATE,
+        "region2_start_speed": RATE, "region2_constant": MOMENT - 2.0 * RATE, "transition_speed": RATE,
+        "slip_percent": SAME, "region3_min_pitch": SAME, "max_torque": MOMENT,
+        "max_torque_rate": MOMENT - TIME, "speed_filter_corner": RATE,
+    },
+    "gains": {"KP": TIME, "KI": SAME, "gain_schedule_pitch": SAME},
+}  # fmt: skip
+PUBLISHED = {  # figures of the original that the scaled one must show; others are not carried over
+    "displaced_volume": 3.0, "total_mass": MASS, "weight": FORCE, "buoyancy": FORCE, "mooring_preload": FORCE,
+    "waterplane_stiffness": 2.0,
+}  # fmt: skip
+LABEL = """\
+# FROUDE-SCALED FROM {origin}, NOT A REAL {what}: every figure is that of {origin} times a power of
+# the scale {scale:.6g}, lengths by the first, times and speeds by its root, masses and forces by the third.
+# Nobody designed or built it; a turbine of this power would be lighter and reach its rated power at
+# less wind. SI units (kg, m, s, N, rad). Written by training/scale_model.py."""
+
+
+def scaled(record, name, scale):
+    """{field: value} of a description record times its powers of the scale. name: key of EXPONENTS."""
+    result = {}
+    for field, value in record.model_dump().items():
+        if field not in EXPONENTS[name]:
+            continue
+        exponent = EXPONENTS[name][field]
+        if isinstance(value, int):
+            result[field] = value
+        elif isinstance(value, float):
+            result[field] = value * scale**exponent
+        else:
+            result[field] = (np.asarray(value) * scale ** np.asarray(exponent)).tolist()
+    return result
+
+
+def _table(heading, values):
+    """Lines of a TOML table."""
+    return ["", f"[{heading}]", *(f"{key} = {toml_value(value)}" for key, value in values.items())]
+
+
+def turbine_text(turbine, name, scale, polars="polars"):
+    """Text of the turbine file of a description.Turbine times the scale. polars: their folder."""
+    lines = [LABEL.format(origin=turbine.name, what="TURBINE", scale=scale), "", f'name = "{name}"']
+    lines.append(f'source = "{turbine.name} by Froude\'s law, scale {scale:.6g}; not a real turbine"')
+    lines += [f"{key} = {toml_value(value)}" for key, value in scaled(turbine, "turbine", scale).items()]
+    for part in ("rotor", "nacelle", "drivetrain", "pitch_drive", "torque_law"):
+        lines += _table(part, scaled(getattr(turbine, part), part, scale))
+    for gain_set, gains in turbine.gains.items():
+        lines += _table(f"gains.{gain_set}", scaled(gains, "gains", scale))
+    lines += _table("blade", {"stations": "blade.csv", "polars": polars})
+    return "\n".join(lines) + "\n"
+
+
+def platform_text(platform, name, turbine_name, scale):
+    """Text of the platform file of a description.Platform times the scale."""
+    lines = [LABEL.format(origin=platform.name, what="PLATFORM", scale=scale), ""]
+    lines += [f'name = "{name}"', f'turbine = "{turbine_name}"']
+    lines.append(f'source = "{platform.name} by Froude\'s law, scale {scale:.6g}; not a real platform"')
+    for part in ("environment", "ballast", "hull", "hydro", "tower"):
+        lines += _table(part, scaled(getattr(platform, part), part, scale))
+    for line in platform.lines:
+        values = scaled(line, "lines", scale)
+        lines += ["", "[[lines]]", *(f"{key} = {toml_value(value)}" for key, value in values.items())]
+    if platform.options:
+        lines += _table("options", platform.options)
+    figures = {k: platform.published[k] * scale**e for k, e in PUBLISHED.items() if k in platform.published}
+    if figures:
+        lines += _table("published", figures)
+    periods = platform.published.get("natural_periods", {})
+    if periods:
+        lines += _table("published.natural_periods", {k: v * scale**TIME for k, v in periods.items()})
+    return "\n".join(lines) + "\n"
+
+
+def stations_text(turbine, scale):
+    """Text of the blade file of a description.Turbine, lengths times the scale."""
+    blade = turbine.blade
+    rows = [
+        f"# Blade of {turbine.name}, lengths times {scale:.6g}, twist as it is (training/scale_model.py).",
+        "radius_m,chord_m,twist_deg,airfoil",
+    ]
+    for radius, chord, twist, airfoil in zip(
+        blade.radius * scale, blade.chord * scale, np.degrees(blade.twist), blade.airfoil, strict=True
+    ):
+        rows.append(f"{radius:.10g},{chord:.10g},{twist:.10g},{airfoil}")
+    return "\n".join(rows) + "\n"
+
+
+def _polar_files(turbine):
+    """{file name: text} of its polars."""
+    files = {}
+    for name, polar in turbine.blade.polars.items():
+        rows = [f"# {name} of {turbine.name}, unchanged (training/scale_model.py).", "alpha_deg,cl,cd,cm"]
+        for alpha, *values in polar:
+            rows.append(",".join(f"{value:.10g}" for value in (np.degrees(alpha), *values)))
+        files[f"{name}.csv"] = "\n".join(rows) + "\n"
+    return files
+
+
+def write(scale, folder, name, platform=PLATFORM, turbine=TURBINE):
+    """Path of the platform file, written with its turbine into folder/platforms and folder/turbines/<name>.
+
+    scale: of lengths, > 0. platform, turbine: the originals, as read_platform and read_turbine take them.
+    Raises: InputError for a scale or descriptions that cannot be used.
+    """
+    if not (np.isfinite(scale) and 0.001 <= scale <= 100.0):
+        raise InputError(f"scale = {scale!r}: must be a number in [0.001, 100]")
+    folder = Path(folder)
+    machine = read_turbine(turbine)
+    home = folder / "turbines" / name
+    texts = {home / "blade.csv": stations_text(machine, scale)}
+    polars = "polars"
+    if (DATA / "turbines" / str(turbine) / polars).is_dir():
+        polars = f"{turbine}/polars"  # those of a built-in turbine are found from anywhere
+    else:
+        texts |= {home / polars / file: text for file, text in _polar_files(machine).items()}
+    texts[home / "turbine.toml"] = turbine_text(machine, name, scale, polars)
+    path = folder / "platforms" / f"{name}.toml"
+    where = name if folder == DATA else f"../turbines/{name}/turbine.toml"
+    texts[path] = platform_text(read_platform(platform), name, where, scale)
+    for file, text in texts.items():
+        with replacing(file) as temporary:
+            temporary.write_text(text)
+    return path
+
+
+def scale_of_power(power, turbine=TURBINE):
+    """Scale of lengths at which the turbine's rated electrical power becomes `power` (W)."""
+    machine = read_turbine(turbine)
+    own = machine.torque_law.rated_power * machine.drivetrain.generator_efficiency
+    if not (np.isfinite(power) and power > 0.0):
+        raise InputError(f"power = {power!r}: must be a positive number of watts")
+    return float((power / own) ** (1.0 / POWER_EXPONENT))
+
+
+def main(
+    power: Annotated[float, typer.Option(help="Rated electrical power, MW.")] = 10.0,
+    name: Annotated[str, typer.Option(help="Name of the platform and turbine.")] = "oc3_froude_10mw",
+    out: Annotated[str | None, typer.Option(help="Folder; default: the built-in descriptions.")] = None,
+    platform: Annotated[str, typer.Option(help="Original platform.")] = PLATFORM,
+    turbine: Annotated[str, typer.Option(help="Original turbine.")] = TURBINE,
+) -> None:
+    """Write a Froude-scaled platform and turbine as description files."""
+    try:
+        scale = scale_of_power(power * 1e6, turbine)
+        path = write(scale, DATA if out is None else out, name, platform, turbine)
+    except InputError as error:
+        raise SystemExit(f"Error: {error}") from None
+    print(f"{path}: scale {scale:.6g}")
+
+
+if __name__ == "__main__":
+    typer.run(main)
