@@ -5,10 +5,12 @@ another file a cached caller would go on returning the old result. So the cache 
 named by a hash of every source file of the packages that hold kernels.
 """
 
+import atexit
 import hashlib
 import os
 import shutil
 import sys
+import tempfile
 import time
 from pathlib import Path
 
@@ -40,7 +42,11 @@ def cache_root():
 
 
 def _use_cache_folder():
-    """Point numba at this source version's folder; drop the oldest others. Returns the folder."""
+    """Point numba at this source version's folder; drop the oldest others. Returns the folder.
+
+    None where it cannot be written: kernels then go to a folder of this process alone, gone with it, since
+    numba refuses to define a cached function that has nowhere to go.
+    """
     root = cache_root()
     folder = root / _source_hash()
     try:
@@ -54,8 +60,12 @@ def _use_cache_folder():
         for old in others[: max(0, len(others) - KEEP_CACHES)]:
             if old.stat().st_mtime < day_ago:
                 shutil.rmtree(old, ignore_errors=True)
+        tempfile.TemporaryFile(dir=folder).close()
     except OSError:
-        return None  # read-only home: numba falls back to its own choice
+        own = tempfile.mkdtemp(prefix="fowt_env_")  # private: caches are code
+        atexit.register(shutil.rmtree, own, ignore_errors=True)
+        numba.config.CACHE_DIR = own
+        return None
     numba.config.CACHE_DIR = str(folder)
     return folder
 

@@ -16,10 +16,16 @@ TABLE_SUFFIXES = (".csv", ".parquet")
 
 @contextmanager
 def replacing(path):
-    """Path of a temporary file beside `path` that takes its place when the block ends well."""
+    """Path of a temporary file beside `path` that takes its place when the block ends well.
+
+    Raises: OSError naming the path where there cannot be one.
+    """
     path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}-", suffix=path.suffix)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}-", suffix=path.suffix)
+    except OSError as error:  # which names the temporary file
+        raise OSError(error.errno, f"cannot be written: {error.strerror}", str(path)) from error
     os.close(handle)
     try:
         yield Path(name)
@@ -55,7 +61,7 @@ def write_table(frame, path):
         if path.suffix.lower() == ".csv":
             frame.to_csv(temporary, index=False, float_format="%.10g")
         else:
-            frame.to_parquet(temporary, index=False)
+            frame.to_parquet(temporary.absolute(), index=False)  # "a:b/c" alone would be read as a URI
     return path
 
 
@@ -69,7 +75,7 @@ def read_table(path):
     path = table_path(path)
     if not path.is_file():
         raise InputError(f"file {str(path)!r}: not found")
-    return pd.read_csv(path) if path.suffix.lower() == ".csv" else pd.read_parquet(path)
+    return pd.read_csv(path) if path.suffix.lower() == ".csv" else pd.read_parquet(path.absolute())
 
 
 def write_mat(model: "LinearModel", path: str | Path) -> Path:

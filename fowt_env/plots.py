@@ -57,6 +57,8 @@ def _save(figure, path):
     """The figure, written to `path` (format by its ending, default PNG) unless that is None."""
     if path is not None:
         path = Path(path)
+        if not path.name:
+            raise InputError(f"plot file {str(path)!r}: must name a file")
         if not path.suffix:
             path = path.with_suffix(".png")
         supported = figure.canvas.get_supported_filetypes()

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from math import cos, isfinite, radians, sin
+from math import cos, radians, sin
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -240,7 +240,7 @@ def build_scene(
 
 def _parts(fidelity, rotor, chosen):
     """Rotor model of a fidelity, with the other parts filled into chosen where they were left open."""
-    if fidelity not in FIDELITIES:
+    if fidelity not in tuple(FIDELITIES):  # which may be unhashable
         raise unknown("fidelity", fidelity, FIDELITIES)
     level = FIDELITIES[fidelity]
     if rotor is not None and rotor not in ROTORS:
@@ -374,8 +374,8 @@ def _weather(wind, sea, seed, platform, turbine, rotor, chosen):
 
 def _number(name, value, low, high, low_open=False):
     """The value as a float inside [low, high]. Raises: InputError."""
-    good = isinstance(value, int | float | np.number) and not isinstance(value, bool) and isfinite(value)
-    if not good or value > high or value < low or (low_open and value == low):
+    good = isinstance(value, int | float | np.number) and not isinstance(value, bool)
+    if not good or not low <= value <= high or (low_open and value == low):  # NaN is in no range
         bracket = "(" if low_open else "["
         raise InputError(f"{name} = {value!r}: must be a number in {bracket}{low:g}, {high:g}]")
     return float(value)

@@ -36,6 +36,9 @@ SEA_KEYS = {  # kind -> (required keys, optional keys); the common keys may be g
 COMMON_SEA_KEYS = ("name", "kind", "heading", "ramp", "wind", "source", "confidence")
 
 
+Period = bounded(ge=0.01, le=10_000.0)  # s; far beyond any sea or tank, and the sums over waves stay finite
+
+
 class SeaState(Record):
     """Waves of one kind; the fields of other kinds are None.
 
@@ -52,10 +55,10 @@ class SeaState(Record):
     ramp: NonNegative = 0.0  # s: waves grow from nothing over this time
     wind: NonNegative | None = None  # m/s at hub height that belongs to this sea state
     H: NonNegative | None = None
-    T: Positive | None = None
+    T: Period | None = None
     phase: NumberOrArray | None = None
     Hs: NonNegative | None = None
-    Tp: Positive | None = None
+    Tp: Period | None = None
     gamma: bounded(ge=1, le=10) | None = None
     omega: FloatArray | None = None
     amplitude: FloatArray | None = None

@@ -1,7 +1,7 @@
 """One run of a scene with a controller, to a table of OpenFAST channels."""
 
 from collections.abc import Callable
-from math import isfinite, pi
+from math import pi
 from time import perf_counter
 from typing import Any
 
@@ -12,6 +12,7 @@ from fowt_env.channels import DEG, RPM, to_units
 from fowt_env.errors import InputError, SimulationStopped, unknown
 from fowt_env.jit import control_kernel
 from fowt_env.measurement import N_MEASUREMENTS, Measurement
+from fowt_env.records import is_number
 from fowt_env.scene import Scene
 from fowt_env.state import State, pose_of
 from fowt_env.steady import trim
@@ -61,8 +62,7 @@ class _Hold:
 def steps_in(name: str, period: float, dt: float) -> int:
     """Number of physics steps in a period. Raises: InputError if dt does not divide it."""
     for key, value in ((name, period), ("dt", dt)):
-        good = isinstance(value, int | float | np.number) and not isinstance(value, bool)
-        if not good or not isfinite(value) or value <= 0.0:
+        if not is_number(value) or value <= 0.0:
             raise InputError(f"{key} = {value!r}: must be a positive number of seconds")
     count = round(period / dt)
     if count < 1 or abs(count * dt - period) > 1e-9 * period:
@@ -87,8 +87,7 @@ def initial_state(
         key = str(name).split("_[")[0]
         if key not in INITIAL:
             raise unknown("channel of initial", name, INITIAL)
-        good = isinstance(value, int | float | np.number) and not isinstance(value, bool)
-        if not good or not isfinite(value):
+        if not is_number(value):
             raise InputError(f"initial[{name!r}] = {value!r}: must be a finite number")
         index, factor = INITIAL[key]
         if State.VX <= index <= State.WZ:

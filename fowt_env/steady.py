@@ -167,15 +167,24 @@ class _Steady:
         finest = drive.minimum
         if self.rotor_acceleration(rated, finest) > 0.0:
             high = 0.8
-            beta = brentq(lambda b: self.rotor_acceleration(rated, b), finest, high, xtol=1e-14, rtol=1e-14)
+            beta = self._root(lambda b: self.rotor_acceleration(rated, b), finest, high)
             self.rotor_acceleration(rated, beta)
             return
         slow = 0.02 * rated
         if self.rotor_acceleration(slow, finest) <= 0.0:
             self.rotor_acceleration(0.0, finest)
             return
-        speed = brentq(lambda w: self.rotor_acceleration(w, finest), slow, rated, xtol=1e-14, rtol=1e-14)
+        speed = self._root(lambda w: self.rotor_acceleration(w, finest), slow, rated)
         self.rotor_acceleration(speed, finest)
+
+    def _root(self, excess, low, high):
+        """Zero of the rotor's acceleration. Raises: InputError where a falling platform leaves none."""
+        if not excess(low) * excess(high) <= 0.0:
+            raise InputError(
+                f"no steady state found for {self.scene!r}: no rotor speed and blade pitch balance the torque"
+                " at the platform's place; has it buoyancy and moorings?"
+            )
+        return brentq(excess, low, high, xtol=1e-14, rtol=1e-14)
 
     def free_states(self):
         """Indices of the states that a floating trim finds: motions, pitch or speed of a turning rotor."""

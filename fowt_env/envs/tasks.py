@@ -1,7 +1,6 @@
 """Tasks: what an episode is drawn from, what is seen, what is paid, and how long it lasts."""
 
 from dataclasses import dataclass, field
-from math import isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -144,7 +143,7 @@ def _joint(table, speed):
 
 def _number(where, value, low, high, low_open=False):
     """Raise InputError unless the value is a number within [low, high]."""
-    good = isinstance(value, int | float | np.number) and not isinstance(value, bool) and isfinite(value)
+    good = isinstance(value, int | float | np.number) and not isinstance(value, bool)
     if not good or not low <= value <= high or (low_open and value == low):
         bracket = "(" if low_open else "["
         raise InputError(f"{where} = {value!r}: must be a number in {bracket}{low:g}, {high:g}]")

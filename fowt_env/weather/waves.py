@@ -14,6 +14,7 @@ from fowt_env.jit import kernel
 
 # Beyond this k*depth-like product an exponential is below 1e-12 of its surface value.
 NEGLIGIBLE = 27.6
+MOST_COMPONENTS = 1_000_000  # of a sea drawn without a number of them: more take minutes and gigabytes
 
 
 class Waves(NamedTuple):
@@ -120,6 +121,11 @@ def _spectral_components(significant_height, peak_period, gamma, duration, compo
         components = max(200, int(np.ceil((high - low) * duration / (2.0 * pi))))
     if components < 1:
         raise InputError(f"wave_components = {components}: must be at least 1")
+    if components > MOST_COMPONENTS:
+        raise InputError(
+            f"sea: Tp = {peak_period:g} s over duration = {duration:g} s needs {components} wave components,"
+            f" more than {MOST_COMPONENTS}; give wave_components, a longer Tp or a shorter duration"
+        )
     step = (high - low) / components
     omega = low + step * (np.arange(components) + 0.5)
     amplitude = np.sqrt(2.0 * jonswap(omega, significant_height, peak_period, gamma) * step)

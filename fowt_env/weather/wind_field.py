@@ -142,7 +142,8 @@ KINDS = {  # kind -> {key: (rule, default)}; None: found from the box
 
 def is_field(spec):
     """Whether a wind specification asks for a box of full-field wind."""
-    return isinstance(spec, WindBox) or (isinstance(spec, dict) and spec.get("kind") in KINDS)
+    kind = spec.get("kind") if isinstance(spec, dict) else None
+    return isinstance(spec, WindBox) or (isinstance(kind, str) and kind in KINDS)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

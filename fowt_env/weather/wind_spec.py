@@ -72,7 +72,7 @@ class Samples(NamedTuple):
     def read(self, where, value):
         try:
             array = np.array(value, dtype=np.float64)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise InputError(f"{where} = {value!r}: must be a list of numbers") from None
         if array.ndim != 1 or array.size == 0:
             raise InputError(
@@ -105,7 +105,7 @@ def as_float(where, value):
         raise InputError(f"{where} = {value!r}: must be a number")
     try:
         return float(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"{where} = {value!r}: must be a number") from None
 
 
