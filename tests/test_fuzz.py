@@ -97,7 +97,7 @@ def test_simulate_works_or_names_what_is_wrong(case):
 
 
 @pytest.mark.slow
-@examples(3000)
+@examples(1000)
 @given(simulate_arguments())
 def test_simulate_works_or_names_what_is_wrong_thousands_of_times(case):
     check_command(["simulate", *case[0]], case[1])
