@@ -562,6 +562,9 @@ def accuracy(
     finest: Annotated[float, typer.Option(help="Step of the reference, s.")] = 0.00625,
     axes: Annotated[str | None, typer.Option(help="Axes of the sweep, by commas; default: all.")] = None,
     repeats: Annotated[int, typer.Option(help="Timed repeats; the median counts.")] = 1,
+    box: Annotated[
+        bool, typer.Option("--box", help="Wind of the stored full-field TurbSim box instead.")
+    ] = False,
     out_folder: Annotated[
         str, typer.Option("--out", help="Folder for what is written.")
     ] = "results/benchmark",
@@ -569,6 +572,7 @@ def accuracy(
 ):
     """Measure error against run time over integrators, steps, rotor models and wave sums."""
     from training import benchmark_accuracy as study
+    from training.openfast import box_wind
 
     chosen = None if axes is None else study.select([name.strip() for name in axes.split(",")])
     folder = Path(out_folder)
@@ -580,6 +584,7 @@ def accuracy(
             finest,
             chosen,
             folder / "accuracy.csv",
+            wind=box_wind() if box else None,
             repeats=repeats,
             progress=lambda text, done, total: update(done, text, total),
         )

@@ -60,6 +60,8 @@ OPTIONS = {
     "current": (None, "None, a speed (m/s) or {'speed', 'heading' (deg), 'exponent'}"),
     "duration": (700.0, "seconds of random wind and sea, > 0"),
     "wave_components": (None, "None or a number of components, 1 to 10000"),
+    "blade_stations": (None, "None (the turbine file's) or a number of them, 3 up to the file's"),
+    "strip_length": (None, "None (a share of the draft) or metres, > 0: exact wave loads below the surface"),
     "shear_exponent": (None, "None (the platform file's) or 0 to 1"),
     "turbine": (None, "None (the platform file's), a name, a path or a description.Turbine"),
 }
@@ -192,7 +194,8 @@ def build_scene(
     series = air.series
     hydrodynamics = chosen["hydrodynamics"]
     aero = series is not None
-    elements = build_blade_elements(turbine, site.air_density) if aero else None
+    stations = _stations(chosen["blade_stations"], turbine)
+    elements = build_blade_elements(turbine, site.air_density, stations) if aero else None
     strips = _strips(platform, chosen) if hydrodynamics else None
     quick = strips is not None and _quick(chosen, waves, strips)
     lanes = build_lanes(platform.hull, strips) if quick else None
@@ -296,6 +299,8 @@ def _options(given, platform):
     chosen["duration"] = _number("duration", chosen["duration"], 0.0, 1e6, low_open=True)
     if chosen["shear_exponent"] is not None:
         chosen["shear_exponent"] = _number("shear_exponent", chosen["shear_exponent"], 0.0, 1.0)
+    if chosen["strip_length"] is not None:
+        chosen["strip_length"] = _number("strip_length", chosen["strip_length"], 0.0, 1e3, low_open=True)
     if chosen["wave_components"] is not None:
         count = chosen["wave_components"]
         if isinstance(count, bool) or not isinstance(count, int | np.integer) or not 1 <= count <= 10000:
@@ -367,6 +372,16 @@ def _number(name, value, low, high, low_open=False):
     return float(value)
 
 
+def _stations(count, turbine):
+    """Indices of that many of the file's blade stations, root and tip among them; None: all."""
+    if count is None:
+        return None
+    known = len(turbine.blade.radius)
+    if isinstance(count, bool) or not isinstance(count, int | np.integer) or not 3 <= count <= known:
+        raise InputError(f"blade_stations = {count!r}: must be a whole number from 3 to {known}")
+    return np.round(np.linspace(0, known - 1, count)).astype(int)
+
+
 def _seed(seed):
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
         raise InputError(f"seed = {seed!r}: must be a whole number >= 0")
@@ -395,6 +410,7 @@ def _strips(platform, chosen):
         position=chosen["kinematics_position"],
         surface=chosen["surface"],
         stretching=chosen["stretching"],
+        cell=chosen["strip_length"],
     )
 
 

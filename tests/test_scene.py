@@ -92,3 +92,23 @@ def test_scenes_of_one_kind_share_one_compiled_run():
         simulate(scene, "pi", duration=1.0)
         simulate(scene, "pi_land", duration=1.0)
     assert len(run.signatures) <= kinds + 1
+
+
+@pytest.mark.parametrize("count", [2, 1000, 5.0, True])
+def test_a_number_of_stations_that_the_blade_lacks_is_refused(count):
+    with pytest.raises(InputError, match="blade_stations = .*: must be a whole number from 3 to"):
+        build_scene(wind=18.0, blade_stations=count)
+
+
+def test_stations_are_left_out_between_root_and_tip():
+    every = build_scene(wind=18.0).model.rotor.radius
+    some = build_scene(wind=18.0, blade_stations=5).model.rotor.radius
+    assert some.size == 5 and some[0] == every[0] and some[-1] == every[-1]
+    assert set(some) <= set(every)
+
+
+def test_strips_are_no_longer_than_asked_for():
+    fine, coarse = (build_scene(strip_length=length).model.strips for length in (3.0, 12.0))
+    assert fine.nodes > coarse.nodes
+    with pytest.raises(InputError, match="strip_length = 0.0: must be a number in"):
+        build_scene(strip_length=0.0)
