@@ -150,9 +150,9 @@ def simulate(
     fidelity: Annotated[
         str,
         typer.Option(
-            help="reference, standard (100 times faster, within 0.1 %), or fast (rotor as a table)."
+            help="reference, standard (1000 times faster, within 0.1 %), or fast (rotor as a table)."
         ),
-    ] = "reference",
+    ] = "standard",
     rotor: RotorOption = None,
     start: Annotated[str, typer.Option(help="trim (steady state of the mean wind) or zero.")] = "trim",
     initial: Annotated[
