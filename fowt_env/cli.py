@@ -595,3 +595,6 @@ def accuracy(
         study.plot_accuracy(table, folder / "accuracy.png")
         files.append(folder / "accuracy.png")
     note("wrote " + ", ".join(map(str, files)))
+
+
+from fowt_env import cli_report  # noqa: E402, F401 - adds its commands to the app
