@@ -92,8 +92,8 @@ def test_the_first_blade_points_up_at_azimuth_zero_and_feathers_with_blade_pitch
 def yellow_lean(picture):
     """Slope dx/dz of the middle of the yellow part above the water."""
     red, green, blue = (picture[..., k].astype(int) for k in range(3))
-    rows, columns = np.nonzero((red > 140) & (green > 100) & (blue < 90) & (red > green))
-    height = np.unique(rows)
+    rows, columns = np.nonzero((red > 110) & (blue < 0.45 * red) & (red > green) & (green > 0.65 * red))
+    height = np.unique(rows)[7:-7]  # the ends are cut at right angles to the axis, not level
     middle = [columns[rows == row].mean() for row in height]
     assert len(height) > 10
     return -np.polyfit(height, middle, 1)[0]
