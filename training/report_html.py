@@ -22,11 +22,23 @@ from fowt_env.errors import InputError, unknown
 from fowt_env.outputs import read_table, replacing
 from fowt_env.plots import PANELS, SPECTRA, TIME, frequency_marks, spectrum
 from training.evaluate import run_file
-from training.report import HEADLINE
 
 TABLES = ("results.csv", "metrics.csv")  # the first that is there
 KEYS = ("controller", "case", "seed", "status")
 NO_METRIC = (*KEYS, "reason", "stopped_[s]", "scored_[s]")
+# columns that the leaderboard shows at once, those of them that the table has
+HEADLINE = (
+    "RotSpeed_std_[rpm]",
+    "overspeed_[%]",
+    "PtfmPitch_std_[deg]",
+    "PtfmPitch_max_[deg]",
+    "blade_pitch_travel_[deg/s]",
+    "GenPwr_mean_[kW]",
+    "GenPwr_std_[kW]",
+    "TwrBsMyt_DEL_[kN-m]",
+    "FAIRTEN_DEL_[kN]",
+    "NcIMUTAxs_rms_[m/s^2]",
+)
 PARETO = ("PtfmPitch_std_[deg]", "RotSpeed_std_[rpm]", "blade_pitch_travel_[deg/s]")  # across, up, size
 ALL_CASES = ""
 MEAN, DIFFERENCE = "mean", "difference"
@@ -35,7 +47,7 @@ DISPLAY_RATE = 2.0  # Hz
 MAX_POINTS = 3000  # of one drawn series
 MAX_SERIES_RUNS = 64  # whose time series are in the page, unless cases are named
 SPECTRUM_RANGE = (0.002, 1.0)  # Hz
-SPECTRUM_SPAN = 1e-9  # of the peak: what lies lower is not drawn
+SPECTRUM_SPAN = 1e-7  # of the peak: what lies lower is not drawn
 PERCENTILES = (1.0, 25.0, 50.0, 75.0, 99.0)
 SAMPLED = (  # channels whose samples have boxes
     "RotSpeed_[rpm]",
@@ -307,7 +319,7 @@ def _schedule(platform, say):
 def _metric_columns(table):
     """[{name, label, unit, headline, better}] of the table's metrics, the headline ones first."""
     names = [name for name in table.columns if name not in NO_METRIC and table[name].notna().any()]
-    first = [name for _, name, _ in HEADLINE if name in names]
+    first = [name for name in HEADLINE if name in names]
     columns = []
     for name in [*first, *(name for name in names if name not in first)]:
         label, _, unit = name.partition("_[")
@@ -512,7 +524,9 @@ def _provenance(table, manifest, board_file):
         facts |= {"suite": suite, "created": manifest.get("created"), "plant sources": manifest.get("plant")}
         for key in ("versions", "options", "controllers"):
             if isinstance(manifest.get(key), dict):
-                facts[key] = ", ".join(f"{name} {_brief(value)}" for name, value in manifest[key].items())
+                facts[key] = ", ".join(
+                    f"{name} {_brief(name, value)}" for name, value in manifest[key].items()
+                )
     else:
         facts["evaluation"] = "the folder has no manifest.json: the versions that made its runs are not known"
     if board_file.get("baseline") is not None:
@@ -532,11 +546,12 @@ def _provenance(table, manifest, board_file):
     )
 
 
-def _brief(value):
-    """A manifest's value in a few characters: a controller's hash, a setting."""
-    if isinstance(value, dict):
-        return " ".join(f"{key}={item}" for key, item in value.items())
-    return str(value)
+def _brief(label, value):
+    """A manifest's value in a few characters: a controller's name, where it has another, and its hash."""
+    if not isinstance(value, dict):
+        return str(value)
+    words = [str(item) for key, item in value.items() if not (key == "name" and item == label)]
+    return f"({', '.join(words)})"
 
 
 def _version(name):

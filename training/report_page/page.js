@@ -148,7 +148,7 @@ function drawPareto() {
     x: [row.values[across]], y: [row.values[up]], textfont: { size: 13 }, showlegend: false, cliponaxis: false,
     marker: {
       color: colour(DATA.controllers.indexOf(row.controller)), opacity: 0.85, line: { color: css("--card"), width: 1 },
-      size: [8 + 34 * Math.sqrt(Math.max(0, row.values[size] || 0) / most)],
+      size: [Math.max(5, 42 * Math.sqrt(Math.max(0, row.values[size] || 0) / most))],
     },
     hovertemplate: `<b>${plain(row.controller)}</b><br>platform pitch std %{x:.4g} deg<br>rotor speed std %{y:.4g} rpm<br>`
       + `blade-pitch travel ${figure(row.values[size])} deg/s<extra></extra>`,
