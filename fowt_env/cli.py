@@ -22,7 +22,7 @@ from rich.table import Table
 
 from fowt_env.cli_arguments import parse_numbers, parse_pairs, parse_sea, parse_wind
 from fowt_env.errors import ControllerError, InputError, SimulationStopped, unknown
-from fowt_env.outputs import table_path, write_table
+from fowt_env.outputs import SERIES_SUFFIXES, table_path, write_table
 
 EXIT_STOPPED, EXIT_INPUT, EXIT_INTERRUPTED = 1, 2, 130
 
@@ -136,7 +136,9 @@ def simulate(
     platform: PlatformOption = "oc3_hywind",
     wind: Annotated[
         str,
-        typer.Option(help="m/s, KIND:SPEED[:CLASS] (ntm:18:B), JSON, a .csv with time and speed, or none."),
+        typer.Option(
+            help="m/s, KIND:SPEED[:CLASS] (ntm:18:B), JSON, a .csv of time and speed, a .wnd or .hh, or none."
+        ),
     ] = "18",
     sea: Annotated[
         str, typer.Option(help="Name, jonswap:HS:TP[:GAMMA], regular:H:T, JSON, or none (still water).")
@@ -159,14 +161,14 @@ def simulate(
         list[str] | None, typer.Option(metavar="CHANNEL=VALUE", help="Start value, OpenFAST units; repeats.")
     ] = None,
     option: OptionOption = None,
-    out_path: Annotated[str | None, typer.Option("--out", help="Time series: .csv or .parquet.")] = None,
+    out_path: Annotated[str | None, typer.Option("--out", help="Series: .csv, .parquet or .outb.")] = None,
     plot: Annotated[str | None, typer.Option(help="Stacked plot of the run, e.g. run.png.")] = None,
 ):
     """Simulate one run, print what it was like, and save its time series and plot."""
     import fowt_env
 
     if out_path is not None:
-        table_path(out_path)  # a wrong ending should not cost a run
+        table_path(out_path, SERIES_SUFFIXES)  # a wrong ending should not cost a run
     options = {"duration": max(700.0, duration), **parse_pairs(option, "option")}
     scene = fowt_env.build_scene(
         platform,
@@ -600,3 +602,6 @@ def accuracy(
         study.plot_accuracy(table, folder / "accuracy.png")
         files.append(folder / "accuracy.png")
     note("wrote " + ", ".join(map(str, files)))
+
+
+from fowt_env import cli_report  # noqa: E402, F401 - adds its commands to the app

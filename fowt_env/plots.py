@@ -157,7 +157,7 @@ def plot_spectra(runs, path=None, title=None, skip=0.0, platform_pitch_period=No
         raise InputError(f"nothing to plot: none of {', '.join(entry[1] for entry in SPECTRA)} is in the run")
     figure = _new_figure(9.0, 0.9 + 2.1 * len(shown))
     rows = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
-    marks = _frequency_marks(next(iter(runs.values())), platform_pitch_period)
+    marks = frequency_marks(next(iter(runs.values())), platform_pitch_period)
     for axes, (label, channel, unit) in zip(rows, shown, strict=True):
         _style(axes)
         top = 0.0
@@ -193,7 +193,7 @@ def plot_spectra(runs, path=None, title=None, skip=0.0, platform_pitch_period=No
     return _save(figure, path)
 
 
-def _frequency_marks(frame, platform_pitch_period):
+def frequency_marks(frame, platform_pitch_period=None):
     """[(name, Hz)] of the platform-pitch natural frequency, the wave peak and 1P, where there are such."""
     marks = []
     if platform_pitch_period is not None:
