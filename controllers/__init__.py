@@ -9,9 +9,10 @@ from controllers.constant import constant
 from controllers.eq8 import eq8_literal
 from controllers.openfast import openfast_oc3
 from controllers.pi import pi, pi_land, pi_land_power, pi_unscheduled
+from fowt_env.description import read_turbine
 from fowt_env.errors import InputError, unknown
 
-__all__ = ["CONTROLLERS", "CheckedController", "CompiledController", "Controller", "make"]
+__all__ = ["CONTROLLERS", "CheckedController", "CompiledController", "Controller", "information", "make"]
 
 CONTROLLERS = {  # name -> factory(turbine: description.Turbine, control_dt: float) -> controller
     "constant": constant,
@@ -53,6 +54,14 @@ def make(controller, turbine, control_dt):
     if isinstance(controller, CompiledController | CheckedController):
         return controller
     return CheckedController(controller, name)
+
+
+def information(name):
+    """What a controller of CONTROLLERS uses: Measurement fields and entries of base.EXTRA.
+
+    Raises: InputError for an unknown name.
+    """
+    return make(name, read_turbine("nrel5mw"), 0.1).information
 
 
 def _imported(path):

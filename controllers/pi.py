@@ -268,6 +268,7 @@ class PI(CompiledController):
     """
 
     kernel = staticmethod(pi_law)
+    information = ("generator_speed", "blade_pitch")
 
     def __init__(self, settings, control_dt, name="pi"):
         super().__init__(name, settings.parameters(check_control_dt(control_dt)), len(Memory))

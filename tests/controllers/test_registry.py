@@ -10,7 +10,8 @@ import pytest
 from naive.turbine import turbine
 
 import controllers
-from controllers import CONTROLLERS, CheckedController, make
+from controllers import CONTROLLERS, CheckedController, information, make
+from controllers.base import EXTRA
 from controllers.constant import Constant
 from fowt_env.errors import ControllerError, InputError
 from fowt_env.measurement import Measurement
@@ -86,6 +87,28 @@ def test_every_controller_survives_pickling(name):
 def test_every_name_says_what_it_is(name):
     assert CONTROLLERS[name].__doc__
     assert make(name, turbine(), 0.1).name == name
+
+
+@pytest.mark.parametrize("name", sorted(CONTROLLERS))
+def test_every_name_says_what_it_uses(name):
+    used = information(name)
+    assert used
+    assert set(used) <= {*Measurement._fields, *EXTRA}
+
+
+def test_a_scene_reaches_only_controllers_that_ask_for_it():
+    class Asking(Steady):
+        information = ("blade_pitch", "wind_preview")
+
+        def prepare(self, scene):
+            self.scene = scene
+
+    asking = make(Asking, turbine(), 0.1)
+    asking.prepare("a scene")
+    assert asking.controller.scene == "a scene"
+    assert asking.information == ("blade_pitch", "wind_preview")
+    make(Steady, turbine(), 0.1).prepare("a scene")
+    make("pi", turbine(), 0.1).prepare("a scene")
 
 
 def test_constant_holds_what_was_measured_or_given():
