@@ -7,8 +7,11 @@ import sys
 from controllers.base import CheckedController, CompiledController, Controller, check_control_dt
 from controllers.constant import constant
 from controllers.eq8 import eq8_literal
+from controllers.floating import floating_feedback
+from controllers.gspi import gspi_land, gspi_oc3
 from controllers.openfast import openfast_oc3
 from controllers.pi import pi, pi_land, pi_land_power, pi_unscheduled
+from controllers.preview import preview
 from fowt_env.description import read_turbine
 from fowt_env.errors import InputError, unknown
 
@@ -17,11 +20,15 @@ __all__ = ["CONTROLLERS", "CheckedController", "CompiledController", "Controller
 CONTROLLERS = {  # name -> factory(turbine: description.Turbine, control_dt: float) -> controller
     "constant": constant,
     "eq8_literal": eq8_literal,
+    "floating_feedback": floating_feedback,
+    "gspi_land": gspi_land,
+    "gspi_oc3": gspi_oc3,
     "openfast_oc3": openfast_oc3,
     "pi": pi,
     "pi_land": pi_land,
     "pi_land_power": pi_land_power,
     "pi_unscheduled": pi_unscheduled,
+    "preview": preview,
 }
 
 

@@ -13,6 +13,7 @@ import controllers
 from controllers import CONTROLLERS, CheckedController, information, make
 from controllers.base import EXTRA
 from controllers.constant import Constant
+from fowt_env import build_scene
 from fowt_env.errors import ControllerError, InputError
 from fowt_env.measurement import Measurement
 
@@ -46,9 +47,21 @@ class Returning:
         return self.answer
 
 
-@pytest.mark.parametrize("name", sorted(CONTROLLERS))
-def test_every_controller_commands_within_the_turbines_limits(name):
+@pytest.fixture(scope="module")
+def scene():
+    return build_scene("oc3_hywind", wind=18.0, duration=100.0, fidelity="standard")
+
+
+def prepared(name, scene):
+    """A controller by name, told of a scene."""
     controller = make(name, turbine(), 0.1)
+    controller.prepare(scene)
+    return controller
+
+
+@pytest.mark.parametrize("name", sorted(CONTROLLERS))
+def test_every_controller_commands_within_the_turbines_limits(name, scene):
+    controller = prepared(name, scene)
     rng = np.random.default_rng(4)
     controller.reset(RATED)
     for k in range(500):
@@ -60,8 +73,8 @@ def test_every_controller_commands_within_the_turbines_limits(name):
 
 
 @pytest.mark.parametrize("name", sorted(CONTROLLERS))
-def test_reset_forgets(name):
-    controller = make(name, turbine(), 0.1)
+def test_reset_forgets(name, scene):
+    controller = prepared(name, scene)
 
     def run():
         controller.reset(RATED)
@@ -74,8 +87,8 @@ def test_reset_forgets(name):
 
 
 @pytest.mark.parametrize("name", sorted(CONTROLLERS))
-def test_every_controller_survives_pickling(name):
-    controller = make(name, turbine(), 0.1)
+def test_every_controller_survives_pickling(name, scene):
+    controller = prepared(name, scene)
     controller.reset(RATED)
     controller.act(RATED)
     twin = pickle.loads(pickle.dumps(controller))
