@@ -12,6 +12,7 @@ from controllers.gspi import gspi_land, gspi_oc3
 from controllers.openfast import openfast_oc3
 from controllers.pi import pi, pi_land, pi_land_power, pi_unscheduled
 from controllers.preview import preview
+from controllers.rosco import rosco, rosco_float
 from fowt_env.description import read_turbine
 from fowt_env.errors import InputError, unknown
 
@@ -29,6 +30,8 @@ CONTROLLERS = {  # name -> factory(turbine: description.Turbine, control_dt: flo
     "pi_land_power": pi_land_power,
     "pi_unscheduled": pi_unscheduled,
     "preview": preview,
+    "rosco": rosco,
+    "rosco_float": rosco_float,
 }
 
 
