@@ -201,7 +201,7 @@ def rotor_part(t, pose, x, now, wind, field, rotor, lookup, table, skew, wake, d
     if lookup is not None:
         return rotor_lookup_load(t, pose, x, now, wind, field, lookup, counters)
     if table is not None:
-        return rotor_table_load(t, pose, x, now, wind, field, table)
+        return rotor_table_load(pose, x, now, wind, table)
     return RotorLoad(NO_LOAD, 0.0, 0.0)
 
 
