@@ -12,7 +12,7 @@ Left out: what fluctuates with the azimuth (three times per turn and faster), an
 wind over the disk. A box of full-field wind has to be averaged over the rotor first (scene.py does).
 """
 
-from math import atan2, cos, pi, sin, sqrt
+from math import atan2, cos, sin, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -41,7 +41,7 @@ CELLS = 1024  # of the tables that find an interval of theta or blade pitch
 # rad, change of the inflow direction of a station for its derivatives: sqrt(3/4) of the amplitude that
 # shear or cross wind have in operation, for which central differences give the mean over a turn to the
 # next order too
-TURN = 0.017
+TURN = 0.03
 MEAN_SQUARE = 0.6  # of the radius over the tip's: where curvature of the wind counts for the torque
 HIGHER_SQUARE = 0.7  # the same for the highest orders of the power law, which are small
 
@@ -101,8 +101,8 @@ class RotorTable(NamedTuple):
 class Inflow(NamedTuple):
     """Wind relative to the moving rotor about the hub, body components, m/s; radii over the tip's.
 
-    On a ring of radius r, at the direction (y, z) of the disk and psi from z: axial + bend (r^2 - MEAN_SQUARE)
-    + r (gradient + r^2 cubic) . (y, z) + bend r^2 cos(2 psi).
+    On a ring of radius r, in the direction e = (y, z) at the angle psi from z, the axial wind is
+    axial + bend (r^2 - MEAN_SQUARE + r^2 cos(2 psi)) + r (gradient + r^2 cubic) . e
     """
 
     axial: float
@@ -235,7 +235,8 @@ def table_coefficients(wind, tip_speed, blade_pitch, table):
     i, p = _interval(atan2(tip_speed, wind), table.theta)
     k, b = _interval(blade_pitch, table.blade_pitch)
     w00, w01, w10, w11 = (1.0 - p) * (1.0 - b), (1.0 - p) * b, p * (1.0 - b), p * b
-    c00, c01, c10, c11 = table.load[i, k], table.load[i, k + 1], table.load[i + 1, k], table.load[i + 1, k + 1]
+    c00, c01 = table.load[i, k], table.load[i, k + 1]
+    c10, c11 = table.load[i + 1, k], table.load[i + 1, k + 1]
     return Coefficients(
         w00 * c00[0] + w01 * c01[0] + w10 * c10[0] + w11 * c11[0],
         w00 * c00[1] + w01 * c01[1] + w10 * c10[1] + w11 * c11[1],
@@ -283,12 +284,11 @@ def _inflow(pose, now, series, table):
     cubic = 0.125 * a * (a - 1.0) * (a - 2.0) * size * square * odd * axial
     vertical, left = radius / length * now.vertical_shear, radius / length * now.horizontal_shear
     up, side = a * size * axial + pose.r11 * vertical, pose.r11 * left
-    turning = pose.r33 * (a * size * cross_y + pose.r12 * vertical) - pose.r32 * (
-        a * size * cross_z + pose.r13 * vertical
-    )
+    y_up, z_up = a * size * cross_y + pose.r12 * vertical, a * size * cross_z + pose.r13 * vertical
+    curl = pose.r33 * y_up + pose.r23 * pose.r12 * left - pose.r32 * z_up - pose.r22 * pose.r13 * left
     return Inflow(
         hub.wx + MEAN_SQUARE * bend,
-        0.5 * turning,
+        0.5 * curl,
         bend,
         pose.r32 * up + pose.r22 * side + radius * pose.wz,
         pose.r33 * up + pose.r23 * side - radius * pose.wy,
@@ -301,7 +301,10 @@ def _inflow(pose, now, series, table):
 
 @kernel
 def rotor_table_load(pose, x, now, series, table):
-    """RotorLoad averaged over a turn, from the wind relative to the moving rotor. Without table or wind: zero."""
+    """RotorLoad of the state x, averaged over a turn of the rotor. No table or no wind series: zero.
+
+    now, series  wind (weather/wind.py), taken where the moving rotor is
+    """
     if table is None:
         return NO_ROTOR_LOAD
     if series is None:
