@@ -85,6 +85,18 @@ def test_standard_stays_within_a_thousandth_of_reference():
         assert error < 1e-3, (name, error)
 
 
+def test_fast_stays_within_two_hundredths_of_standard():
+    frames = []
+    for fidelity in ("standard", "fast"):
+        scene = build_scene(wind=NTM, sea=SEA, seed=2, fidelity=fidelity)
+        frames.append(simulate(scene, "pi", duration=600.0))
+    exact, quick = frames
+    for name in (*MOTIONS, "RotSpeed", "FAIRTEN1"):
+        column = next(c for c in exact.columns if c.startswith(f"{name}_["))
+        error = np.sqrt(np.mean((quick[column] - exact[column]) ** 2)) / exact[column].std()
+        assert error < 2e-2, (name, error)
+
+
 def test_scenes_of_one_kind_share_one_compiled_run():
     kinds = len(run.signatures)
     for seed, components in ((1, 30), (2, 40)):

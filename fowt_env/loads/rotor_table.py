@@ -38,9 +38,9 @@ PITCH_STEPS = ((-10.0, 1.0), (-4.0, 0.25), (26.0, 1.0), (40.0, 2.5))  # deg, bla
 THETA_END, PITCH_END = 180.0, 100.0
 CELLS = 1024  # of the tables that find an interval of theta or blade pitch
 
-# rad, change of the inflow direction of a station for its derivatives: sqrt(3/4) of the amplitude that
-# shear or cross wind have in operation, for which central differences give the mean over a turn to the
-# next order too
+# rad, change of the inflow direction of a station for its derivatives. Gusts turn it by about this over a
+# turn; with sqrt(3/4) of their amplitude a central difference gives their mean effect to the next order too.
+# The worst error of a run at 18 m/s is 0.018 to 0.021 with 0.017, 0.009 to 0.016 with 0.03.
 TURN = 0.03
 MEAN_SQUARE = 0.6  # of the radius over the tip's: where curvature of the wind counts for the torque
 HIGHER_SQUARE = 0.7  # the same for the highest orders of the power law, which are small
