@@ -170,15 +170,16 @@ class _Steady:
         self.rotor_acceleration(speed, finest)
 
     def settle_platform(self):
-        """Newton on the six motions for zero acceleration; returns the remaining one."""
+        """Newton on the motions that the scene has for zero acceleration; returns the remaining one."""
         steps = np.array([1e-3, 1e-3, 1e-3, 1e-5, 1e-5, 1e-5])
+        free = [0, 1, 2, 3, 4, 5] if self.scene.model.body.plane is None else [0, 2, 4]
         for _ in range(NEWTON_ROUNDS):
             residual = self.rates()[State.VX : State.WZ + 1].copy()
             size = np.max(np.abs(residual))
             if size < TOLERANCE:
                 return size
-            jacobian = np.empty((6, 6))
-            for j in range(6):
+            jacobian = np.zeros((6, 6))
+            for j in free:
                 keep = self.x[j]
                 self.x[j] = keep + steps[j]
                 up = self.rates()[State.VX : State.WZ + 1].copy()
@@ -187,7 +188,8 @@ class _Steady:
                 self.x[j] = keep
                 jacobian[:, j] = (up - down) / (2.0 * steps[j])
             # least squares: without moorings nothing restores surge and sway, which then stay as they are
-            change = np.linalg.lstsq(jacobian, -residual, rcond=1e-9)[0]
+            change = np.zeros(6)
+            change[free] = np.linalg.lstsq(jacobian[np.ix_(free, free)], -residual[free], rcond=1e-9)[0]
             # far from the solution lines go taut within metres: limit one round to what they allow
             largest = np.max(np.abs(change) / np.array([5.0, 5.0, 5.0, 0.1, 0.1, 0.1]))
             if largest > 1.0:

@@ -35,6 +35,12 @@ MOTIONS = ["PtfmSurge", "PtfmSway", "PtfmHeave", "PtfmRoll", "PtfmPitch", "PtfmY
         ({"wind": 8.0, "rotor": "table", "dynamic_inflow": True}, ["table", "dynamic_inflow", "bem"]),
         ({"sea": SPREAD | {"heading": [0.0, 30.0]}, "wave_loads": "fast"}, ["wave_loads", "one heading"]),
         ({"sea": SEA, "wave_loads": "fast", "stretching": "none"}, ["wave_loads", "exact"]),
+        ({"planar": 1.5}, ["planar = 1.5", "False", "True"]),
+        ({"planar": True, "sea": SPREAD | {"heading": [30.0, 30.0]}}, ["heading", "0 or 180", "planar"]),
+        ({"planar": True, "current": {"speed": 1.0, "heading": 90.0}}, ["current.heading", "planar"]),
+        ({"planar": True, "wind": {"kind": "steady", "speed": 9.0, "direction": 5.0}}, ["0.78", "planar"]),
+        ({"planar": True, "wind": NTM | {"direction": 5.0}}, ["cross wind", "planar"]),
+        ({"planar": True, "wind": {"kind": "ecd", "speed": 12.0}}, ["cross wind", "planar"]),
     ],
 )
 def test_what_cannot_be_built_is_refused_by_name_value_and_range(arguments, words):
