@@ -345,7 +345,9 @@ def _in_plane(air):
     if air.series is None:
         return air
     if air.field is not None:
-        raise InputError("wind: a box of full-field wind is not planar; use rotor = 'table' or planar = False")
+        raise InputError(
+            "wind: a box of full-field wind is not planar; use rotor = 'table' or planar = False"
+        )
     value = air.series.value.copy()
     across = np.abs(value[:, [1, 4]]).max()
     if across <= IN_PLANE * np.abs(value[:, 0]).max():

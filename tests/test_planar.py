@@ -37,7 +37,9 @@ def test_a_decay_in_still_water_is_that_of_the_full_model():
 
 @pytest.mark.parametrize("heading", [0.0, 180.0])
 def test_waves_along_the_plane_move_it_as_the_full_model(heading):
-    planar, full = both(sea=SEA | {"heading": heading}, wave_components=40, initial=OFFSET, fidelity="standard")
+    planar, full = both(
+        sea=SEA | {"heading": heading}, wave_components=40, initial=OFFSET, fidelity="standard"
+    )
     assert worst(planar, full, IN_PLANE) < 1e-9
 
 
@@ -69,7 +71,8 @@ def test_trim_and_linear_model_stay_in_the_plane():
 
 
 @pytest.mark.parametrize(
-    "name, value", [("PtfmSway", 1.0), ("PtfmRoll", 0.1), ("PtfmYaw", -0.1), ("PtfmTVyi", 0.1), ("PtfmRVzi", 0.1)]
+    "name, value",
+    [("PtfmSway", 1.0), ("PtfmRoll", 0.1), ("PtfmYaw", -0.1), ("PtfmTVyi", 0.1), ("PtfmRVzi", 0.1)],
 )
 def test_offsets_out_of_the_plane_are_refused(name, value):
     scene = build_scene(planar=True)

@@ -177,6 +177,7 @@ def test_cross_wind_pushes_and_tilts_as_by_the_sections(U, speed, beta):
 
 def test_turning_the_disturbance_about_the_shaft_turns_the_loads():
     """Horizontal shear and vertical wind are vertical shear and cross wind a quarter of a turn on."""
+
     def series(v, w, vertical, horizontal):
         return make_series(
             [0.0], [[15.0, v, w, vertical, horizontal]],
