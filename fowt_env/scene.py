@@ -47,7 +47,7 @@ OPTIONS = {
     "dynamic_inflow": (False, (False, True)),
     "tower_drag": (True, (False, True)),
     "hydrodynamics": (True, (False, True)),
-    "mooring": (True, (False, True)),
+    "mooring": (True, (False, True, "table")),  # "table": tensions tabulated about rest, solved beyond
     "planar": (False, (False, True)),
     "integrator": (None, (None, *INTEGRATORS)),  # None: the fidelity's
     "wave_loads": (None, (None, "exact", "fast")),  # None: the fidelity's
@@ -198,7 +198,7 @@ def build_scene(
         lanes=build_lanes(platform.hull, strips) if quick else None,
         sea=_fast_sea(waves, strips) if quick else None,
         current=current,
-        mooring=build_mooring(platform.lines) if platform.lines and chosen["mooring"] else None,
+        mooring=_mooring(platform.lines, chosen["mooring"]),
         damping=build_damping(platform.hydro) if hydrodynamics else None,
         rotor=elements if rotor == "bem" else None,
         rotor_lookup=build_section_table(elements) if aero and rotor == "lookup" else None,
@@ -436,6 +436,11 @@ def _current(spec):
     if speed == 0.0:
         return None
     return Current(speed * cos(heading), speed * sin(heading), exponent)
+
+
+def _mooring(lines, wanted):
+    """Mooring part, None without lines or where none is wanted."""
+    return build_mooring(lines, tabulated=wanted == "table") if wanted else None
 
 
 def assemble(bodies):
