@@ -151,7 +151,7 @@ def adams(t, x, u, dt, scene, work):
         for i in range(State.VX, x.shape[0]):
             y[i] = x[i] + dt * moulton(order, new[i], i, history)
         y[State.BLADE_PITCH] = pitch
-    attitude_rate(y, new)
+    attitude_rate(y, new, scene.body.plane)
     new[State.AZIMUTH] = y[State.ROTOR_SPEED]
     for i in range(State.VX):
         x[i] += dt * moulton(order, new[i], i, history)

@@ -43,6 +43,7 @@ FIDELITIES = {
     "standard": {"rotor": "lookup", "wave_loads": "fast", "integrator": "ab4"},
     "fast": {"rotor": "table", "wave_loads": "fast", "integrator": "ab4"},
 }
+IN_PLANE = 1e-9  # share of a vector out of the plane of a planar scene that rounding may leave
 STEPS = {"rk4": 0.05, "heun": 0.05, "abm4": 0.1, "ab4": 0.1}  # s, default step of each integrator
 REFERENCE_STEP = 0.0125  # s, of rk4 at fidelity "reference": errs 2e-6 in heave, 2e-7 elsewhere
 OPTIONS = {
@@ -55,7 +56,8 @@ OPTIONS = {
     "dynamic_inflow": (False, (False, True)),
     "tower_drag": (True, (False, True)),
     "hydrodynamics": (True, (False, True)),
-    "mooring": (True, (False, True)),
+    "mooring": (True, (False, True, "table")),  # "table": tensions tabulated about rest, solved beyond
+    "planar": (False, (False, True)),
     "integrator": (None, (None, *INTEGRATORS)),  # None: the fidelity's
     "wave_loads": (None, (None, "exact", "fast")),  # None: the fidelity's
     "current": (None, "None, a speed (m/s) or {'speed', 'heading' (deg), 'exponent'}"),
@@ -180,7 +182,8 @@ def build_scene(
               from a table per station; "table": the whole rotor as one table. None: the fidelity's
     fidelity  "reference": everything solved exactly, Runge-Kutta 4; "standard": every blade and station
               by look-up, fast wave sums, Adams-Bashforth 4; "fast": the rotor as one table
-    options   see OPTIONS; a platform file may set other defaults
+    options   see OPTIONS; a platform file may set other defaults. planar: surge, heave and platform pitch
+              alone move; of ntm and etm turbulence the part in the plane is kept
 
     Raises: InputError naming the key, the value and what is allowed.
     """
@@ -203,8 +206,11 @@ def build_scene(
     quick = strips is not None and _quick(chosen, waves, strips)
     lanes = build_lanes(platform.hull, strips) if quick else None
     fast = _fast_sea(waves, strips) if quick else None
+    current = _current(chosen["current"]) if hydrodynamics else None
+    if chosen["planar"]:
+        _check_symmetry(platform.lines if chosen["mooring"] else (), current)
     model = Model(
-        body=build_body(platform, turbine),
+        body=build_body(platform, turbine, plane=True if chosen["planar"] else None),
         layout=build_layout(platform, turbine),
         drivetrain=build_drivetrain(turbine),
         actuator=build_pitch_actuator(turbine.pitch_drive),
@@ -214,8 +220,8 @@ def build_scene(
         lanes=lanes,
         sea=fast,
         **_diffraction(chosen, waves, strips, fast, lanes),
-        current=_current(chosen["current"]) if hydrodynamics else None,
-        mooring=build_mooring(platform.lines) if platform.lines and chosen["mooring"] else None,
+        current=current,
+        mooring=_mooring(platform.lines, chosen["mooring"]),
         damping=build_damping(platform.hydro) if hydrodynamics else None,
         rotor=elements if rotor == "bem" else None,
         rotor_lookup=build_section_table(elements) if aero and rotor == "lookup" else None,
@@ -350,6 +356,8 @@ def _weather(wind, sea, seed, platform, turbine, rotor, chosen):
     site = platform.environment
     shear = site.shear_exponent if chosen["shear_exponent"] is None else chosen["shear_exponent"]
     air = _air(wind, seed, turbine, rotor, shear, chosen["duration"])
+    if chosen["planar"]:
+        air = _in_plane(air)
     state = sea_state_of(sea)
     _check_sea(state, site.water_depth)
     if not chosen["hydrodynamics"]:
@@ -363,7 +371,48 @@ def _weather(wind, sea, seed, platform, turbine, rotor, chosen):
         duration=chosen["duration"],
         components=chosen["wave_components"],
     )
+    if chosen["planar"] and waves is not None and np.abs(waves.sin_heading).max() > IN_PLANE:
+        raise InputError("sea: the heading must be 0 or 180 deg in a planar scene")
     return air, waves
+
+
+def _in_plane(air):
+    """The _Air of a planar scene; of turbulence the part in the plane. Raises: InputError for cross wind."""
+    if air.series is None:
+        return air
+    if air.field is not None:
+        raise InputError(
+            "wind: a box of full-field wind is not planar; use rotor = 'table' or planar = False"
+        )
+    value = air.series.value.copy()
+    across = np.abs(value[:, [1, 4]]).max()
+    if across <= IN_PLANE * np.abs(value[:, 0]).max():
+        return air
+    kind = air.spec.get("kind") if isinstance(air.spec, dict) else getattr(air.spec, "kind", None)
+    if kind not in ("ntm", "etm") or abs(value[:, 1].mean()) > 1e-3 * abs(value[:, 0].mean()):
+        raise InputError(
+            f"wind: cross wind or horizontal shear of up to {across:g} m/s; a planar scene has neither"
+            " (planar = False)"
+        )
+    value[:, [1, 4]] = 0.0
+    return air._replace(series=air.series._replace(value=value))
+
+
+def _check_symmetry(lines, current):
+    """Refuse what pulls a planar scene out of its plane."""
+    if current is not None and abs(current.v) > IN_PLANE * abs(current.u):
+        raise InputError("current.heading: must be 0 or 180 deg in a planar scene")
+    mirror = np.array([1.0, -1.0, 1.0, 1.0, -1.0, 1.0, 1.0, 1.0, 1.0, 1.0])
+    rows = [
+        np.array([*line.anchor, *line.fairlead, line.length, line.wet_weight, line.EA, line.seabed_friction])
+        for line in lines
+    ]
+    for row in rows:
+        if not any(np.allclose(other, mirror * row, rtol=1e-6, atol=1e-3) for other in rows):
+            raise InputError(
+                f"mooring line anchored at y = {row[1]:g} m has no mirror image at {-row[1]:g} m; a planar"
+                " scene needs one (planar = False)"
+            )
 
 
 def _number(name, value, low, high, low_open=False):
@@ -436,6 +485,11 @@ def _current(spec):
     return Current(speed * cos(heading), speed * sin(heading), exponent)
 
 
+def _mooring(lines, wanted):
+    """Mooring part, None without lines or where none is wanted."""
+    return build_mooring(lines, tabulated=wanted == "table") if wanted else None
+
+
 def assemble(bodies):
     """(6, 6) mass matrix about the body origin of rigid bodies (mass, centre (3,), inertia (3,) about it)."""
     matrix = np.zeros((6, 6))
@@ -463,8 +517,8 @@ def _upper_bodies(platform, turbine):
     ]
 
 
-def build_body(platform, turbine, platform_held=False, rotor_held=False):
-    """Body part: Eq. (10) from the four rigid bodies."""
+def build_body(platform, turbine, platform_held=False, rotor_held=False, plane=None):
+    """Body part: Eq. (10) from the four rigid bodies. plane: True holds sway, roll and yaw at zero."""
     ballast = platform.ballast
     matrix = assemble(
         [(ballast.mass, (0.0, 0.0, -ballast.cm_depth), ballast.inertia), *_upper_bodies(platform, turbine)]
@@ -480,6 +534,7 @@ def build_body(platform, turbine, platform_held=False, rotor_held=False):
         drivetrain.inertia_row,
         platform_held,
         rotor_held,
+        plane,
     )
 
 

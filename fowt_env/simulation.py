@@ -10,7 +10,7 @@ from fowt_env.channels import DEG, RPM, to_units
 from fowt_env.errors import InputError, SimulationStopped, unknown
 from fowt_env.jit import control_kernel
 from fowt_env.measurement import N_MEASUREMENTS, Measurement
-from fowt_env.state import State, pose_of
+from fowt_env.state import OUT_OF_PLANE, State, pose_of
 from fowt_env.steady import trim
 from fowt_env.step import RUNNING, STOP_REASONS, advance, observe, output, output_row, run
 from fowt_env.weather.wind_field import WindBox
@@ -86,6 +86,8 @@ def initial_state(scene, start="trim", initial=None):
         if not good or not isfinite(value):
             raise InputError(f"initial[{name!r}] = {value!r}: must be a finite number")
         index, factor = INITIAL[key]
+        if scene.model.body.plane is not None and index in OUT_OF_PLANE and value != 0.0:
+            raise InputError(f"initial[{name!r}] = {value:g}: must be 0 in a planar scene")
         if State.VX <= index <= State.WZ:
             rates[index] = value * factor
         else:

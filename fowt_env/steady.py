@@ -176,9 +176,13 @@ class _Steady:
         speed = brentq(lambda w: self.rotor_acceleration(w, finest), slow, rated, xtol=1e-14, rtol=1e-14)
         self.rotor_acceleration(speed, finest)
 
+    def motions(self):
+        """Indices of the positions that the scene's platform can change."""
+        return [0, 1, 2, 3, 4, 5] if self.scene.model.body.plane is None else [0, 2, 4]
+
     def free_states(self):
         """Indices of the states that a floating trim finds: motions, pitch or speed of a turning rotor."""
-        motions = list(range(6))
+        motions = self.motions()
         wind = self.scene.wind_speed
         if wind is None or not 0.0 < wind <= self.scene.turbine.cut_out_wind_speed:
             return motions
@@ -189,12 +193,14 @@ class _Steady:
 
     def residual(self, free):
         """Accelerations that vanish in the steady state, of the platform and of a rotor that is free."""
-        if len(free) > 6:
+        motions = self.motions()
+        accelerations = [State.VX + motion for motion in motions]
+        if len(free) > len(motions):
             self.rotor_acceleration(self.x[State.ROTOR_SPEED], self.x[State.BLADE_PITCH])
+            accelerations.append(State.ROTOR_SPEED)
         else:
             self.rates()
-        accelerations = [*range(State.VX, State.WZ + 1), int(State.ROTOR_SPEED)]
-        return self.mean[accelerations[: len(free)]]
+        return self.mean[accelerations]
 
     def jacobian(self, free):
         """Derivatives of the residual by the free states, central differences."""
@@ -288,7 +294,7 @@ def trim_held(scene, rotor_speed, blade_pitch, platform="floating"):
     steady.x[State.ROTOR_SPEED] = rotor_speed
     steady.x[State.BLADE_PITCH] = steady.u[1] = blade_pitch
     if platform == "floating":
-        remaining = steady.settle(list(range(6)))
+        remaining = steady.settle(steady.motions())
         if not remaining < 1e3 * TOLERANCE:
             raise InputError(
                 f"no steady state found for {scene!r}: remaining acceleration {remaining:.2e} m/s2 or rad/s2"

@@ -35,6 +35,12 @@ MOTIONS = ["PtfmSurge", "PtfmSway", "PtfmHeave", "PtfmRoll", "PtfmPitch", "PtfmY
         ({"wind": 8.0, "rotor": "table", "dynamic_inflow": True}, ["table", "dynamic_inflow", "bem"]),
         ({"sea": SPREAD | {"heading": [0.0, 30.0]}, "wave_loads": "fast"}, ["wave_loads", "one heading"]),
         ({"sea": SEA, "wave_loads": "fast", "stretching": "none"}, ["wave_loads", "exact"]),
+        ({"planar": 1.5}, ["planar = 1.5", "False", "True"]),
+        ({"planar": True, "sea": SPREAD | {"heading": [30.0, 30.0]}}, ["heading", "0 or 180", "planar"]),
+        ({"planar": True, "current": {"speed": 1.0, "heading": 90.0}}, ["current.heading", "planar"]),
+        ({"planar": True, "wind": {"kind": "steady", "speed": 9.0, "direction": 5.0}}, ["0.78", "planar"]),
+        ({"planar": True, "wind": NTM | {"direction": 5.0}}, ["cross wind", "planar"]),
+        ({"planar": True, "wind": {"kind": "ecd", "speed": 12.0}}, ["cross wind", "planar"]),
     ],
 )
 def test_what_cannot_be_built_is_refused_by_name_value_and_range(arguments, words):
@@ -83,6 +89,18 @@ def test_standard_stays_within_a_thousandth_of_reference():
         column = next(c for c in exact.columns if c.startswith(f"{name}_["))
         error = np.sqrt(np.mean((quick[column] - exact[column]) ** 2)) / exact[column].std()
         assert error < 1e-3, (name, error)
+
+
+def test_fast_stays_within_two_hundredths_of_standard():
+    frames = []
+    for fidelity in ("standard", "fast"):
+        scene = build_scene(wind=NTM, sea=SEA, seed=2, fidelity=fidelity)
+        frames.append(simulate(scene, "pi", duration=600.0))
+    exact, quick = frames
+    for name in (*MOTIONS, "RotSpeed", "FAIRTEN1"):
+        column = next(c for c in exact.columns if c.startswith(f"{name}_["))
+        error = np.sqrt(np.mean((quick[column] - exact[column]) ** 2)) / exact[column].std()
+        assert error < 2e-2, (name, error)
 
 
 def test_scenes_of_one_kind_share_one_compiled_run():

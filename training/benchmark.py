@@ -97,6 +97,9 @@ KINDS = {
     "no wind, waves": Kind(None, SEA, absent="wind, rotor, tower drag"),
     "still water, no wind": Kind(None, None, absent="waves, wind, rotor, tower drag"),
     "parked in a storm": Kind(40.0, SEA, parked=True),
+    "planar, fast": Kind(
+        TURBULENCE, SEA, "fast", {"planar": True}, absent="sway, roll, yaw: 3x3 instead of 6x6 solve"
+    ),
     "no mooring": Kind(TURBULENCE, SEA, options={"mooring": False}, absent="mooring"),
     "platform held": Kind(TURBULENCE, SEA, platform_held=True, absent="6x6 solve (at run time)"),
     "no water": Kind(
