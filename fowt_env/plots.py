@@ -261,3 +261,67 @@ def plot_evaluation(table, metrics, path=None, title=None):
     if title:
         figure.suptitle(title, fontsize=11, color=INK)
     return _save(figure, path)
+
+
+PARETO = ("RotSpeed_std_[rpm]", "PtfmPitch_std_[deg]", "blade_pitch_travel_[deg/s]", "overspeed_[%]")
+LARGEST_MARK = 900.0  # points squared, of the controller that travels most
+
+
+def plot_pareto(board, path=None, title=None):
+    """Rotor-speed against platform-pitch deviation of each controller; the mark's area is its pitch travel.
+
+    board: mapping of training.leaderboard.leaderboard. Bars are its intervals; the stepped line joins the
+    controllers that no other betters in both deviations. Labels give the travel and the greatest overspeed.
+    """
+    entries = []
+    for entry in board["controllers"]:
+        figures = [entry["metrics"][name] for name in PARETO]
+        if all(np.isfinite([figure["mean"] for figure in figures])) and figures[0]["mean"] > 0.0:
+            entries.append((entry["controller"], entry["failed"], figures))
+    if not entries:
+        raise InputError("nothing to plot: no controller has finished a run")
+    figure = _new_figure(8.0, 5.6)
+    axes = figure.subplots()
+    _style(axes)
+    axes.margins(0.18)
+    points = np.array([[f["mean"] for f in figures[:3]] for _, _, figures in entries])
+    most = points[:, 2].max()
+    front = sorted(
+        (x, y)
+        for x, y, _ in points
+        if not ((points[:, :2] <= (x, y)).all(1) & (points[:, :2] < (x, y)).any(1)).any()
+    )
+    if len(front) > 1:
+        axes.step(*zip(*front, strict=True), where="post", color=INK, linewidth=0.8, linestyle=":", zorder=1)
+    for number, ((name, failed, figures), (x, y, travel)) in enumerate(zip(entries, points, strict=True)):
+        colour = COLOURS[number % len(COLOURS)]
+        bars = [[[max(0.0, f["mean"] - f["low"])], [max(0.0, f["high"] - f["mean"])]] for f in figures[:2]]
+        if np.isfinite(bars).all():
+            axes.errorbar(x, y, xerr=bars[0], yerr=bars[1], color=colour, linewidth=1.0, capsize=2, zorder=2)
+        area = LARGEST_MARK * travel / most if most > 0.0 else 0.1 * LARGEST_MARK
+        axes.scatter(
+            [x], [y], s=[max(area, 4.0)], color=colour, alpha=0.55, linewidth=1.0, edgecolor=colour, zorder=3
+        )
+        lost = f", {failed} failed" if failed else ""
+        text = f"{name}\n{travel:.3f} deg/s, overspeed {figures[3]['worst']:.0f} %{lost}"
+        reach = 5.0 + 0.5 * np.sqrt(max(area, 4.0))
+        axes.annotate(
+            text,
+            (x, y),
+            xytext=(0.75 * reach, 0.75 * reach),
+            textcoords="offset points",
+            fontsize=7.5,
+            color=INK,
+        )
+    axes.set_xlabel("standard deviation of rotor speed (rpm)", fontsize=9, color=INK)
+    axes.set_ylabel("standard deviation of platform pitch (deg)", fontsize=9, color=INK)
+    level = round(100 * board["interval"]["level"])
+    axes.set_title(
+        f"area: blade-pitch travel; bars: {level} % intervals; beneath each name: travel and greatest overspeed",
+        fontsize=8,
+        color=INK,
+        loc="left",
+    )
+    if title:
+        figure.suptitle(title, fontsize=11, color=INK)
+    return _save(figure, path)
