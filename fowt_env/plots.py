@@ -317,7 +317,7 @@ def plot_pareto(board, path=None, title=None):
     axes.set_ylabel("standard deviation of platform pitch (deg)", fontsize=9, color=INK)
     level = round(100 * board["interval"]["level"])
     axes.set_title(
-        f"area: blade-pitch travel; bars: {level} % intervals; beneath each name: travel and greatest overspeed",
+        f"area: blade-pitch travel; bars: {level} % intervals; below a name: travel, greatest overspeed",
         fontsize=8,
         color=INK,
         loc="left",

@@ -95,6 +95,11 @@ def test_a_wind_series_file_drives_the_run(tmp_path):
         (("simulate", "--rotor", "bemm"), "bem"),
         (("simulate", "--out", "run.xls"), "run.xls"),
         (("evaluate", "--cases", "above_ratted"), "above_rated"),
+        (("evaluate", "--suite", "above_ratted"), "above_rated"),
+        (("evaluate", "--suite", "above_rated", "--cases", "ntm_13"), "ntm_12"),
+        (("evaluate", "--controllers", "pie"), "'pi'"),
+        (("evaluate", "--controllers", "pi", "--baseline", "pi_lnd"), "pi"),
+        (("evaluate", "--engine", "rai"), "ray"),
         (("evaluate", "--seeds", "1.5"), "whole numbers"),
         (("evaluate", "--skip", "700"), "skip = 700"),
         (("trim", "--winds", "24:4:1"), "START:STOP:STEP"),
@@ -175,7 +180,7 @@ def test_an_interrupted_evaluation_says_where_its_rows_are(tmp_path, monkeypatch
     )
     _, stderr = fowt("evaluate", *arguments, code=130)
     assert "1 finished" in stderr
-    assert len(pd.read_csv(tmp_path / "metrics.csv")) == 1
+    assert len(pd.read_csv(tmp_path / "results.csv")) == 1
 
 
 def test_evaluate_writes_table_runs_and_plots(tmp_path):
@@ -185,14 +190,14 @@ def test_evaluate_writes_table_runs_and_plots(tmp_path):
     )  # fmt: skip
     assert "pi_land" in stdout and "ntm_18" in stdout
     assert "tension" in stdout and "…" not in stdout  # piped output keeps every column whole
-    table = pd.read_csv(tmp_path / "metrics.csv")
+    table = pd.read_csv(tmp_path / "results.csv")
     assert table[["controller", "case"]].values.tolist() == [
         ["pi", "steady_16"], ["pi_land", "steady_16"], ["pi", "ntm_18"], ["pi_land", "ntm_18"],
     ]  # fmt: skip
     assert (table["status"] == "ok").all() and len(pd.read_csv(tmp_path / "summary.csv")) == 4
     pictures = sorted(path.name for path in tmp_path.glob("*.png"))
     assert pictures == [
-        "metrics.png", "spectra_ntm_18.png", "spectra_steady_16.png", "timeseries_ntm_18.png",
+        "metrics.png", "pareto.png", "spectra_ntm_18.png", "spectra_steady_16.png", "timeseries_ntm_18.png",
         "timeseries_steady_16.png",
     ]  # fmt: skip
     assert all(path.stat().st_size > 10_000 for path in tmp_path.glob("*.png"))

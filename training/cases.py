@@ -29,6 +29,7 @@ from fowt_env.weather.wind_field import KINDS as FIELD_KINDS
 from fowt_env.weather.wind_field import REQUIRED, is_field
 from fowt_env.weather.wind_spec import read_wind
 from training.faults import Fault
+from training.metrics import METRICS
 
 FOLDER = Path(__file__).parent / "suites"
 WIND_KINDS = ("rotor-averaged", "full-field")
@@ -203,6 +204,7 @@ def _read(path):
     problems += [f"case {name!r}: named twice" for name in sorted(set(names)) if names.count(name) > 1]
     if not file.case:
         problems.append("case is missing: at least one [[case]] is needed")
+    problems += _score_problems(file.score)
     for case in cases:
         duration, skip = case.duration or file.duration, file.skip if case.skip is None else case.skip
         if not duration > skip:
@@ -222,6 +224,14 @@ def _read(path):
     return Suite(path.stem, cases=tuple(cases), **fields, **rest)
 
 
+def _score_problems(score):
+    """One line per metric of a Score that there is not."""
+    named = [] if score is None else [term.metric for term in score.term] + list(score.limits)
+    if score is not None and score.power is not None:
+        named.append(score.power)
+    return [f"score: {unknown('metric', name, METRICS)}" for name in named if name not in METRICS]
+
+
 def _spread(entry, file, folder):
     """Cases of a CaseEntry: one, or one per speed. Raises: InputError."""
     if entry.speed is None:
@@ -234,6 +244,8 @@ def _spread(entry, file, folder):
 def _case(entry, speed, file, folder):
     """Case of a CaseEntry at a mean wind speed (None: it has none to fill in)."""
     label = "" if speed is None else f"{speed:g}".replace(".", "_")
+    if entry.parked and entry.fault is not None:
+        raise InputError("parked: a parked turbine has no controller that a fault could act on")
     options = {**file.options, **entry.options}
     for key in options:
         if key not in (*OPTIONS, "fidelity", "rotor"):

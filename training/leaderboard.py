@@ -88,7 +88,7 @@ class _Grid:
 
 
 def _figures(values, weights):
-    """(estimate, low, high), each (metrics,), of values (cases, seeds, metrics): means over cases and seeds."""
+    """(estimate, low, high), each (metrics,), of the mean of values (cases, seeds, metrics)."""
     used = np.isfinite(values).any(axis=(1, 2))
     if not used.any():
         empty = np.full(values.shape[-1], np.nan)

@@ -114,9 +114,9 @@ def metrics(df, skip=0.0, rated_speed_rpm=12.1, pitch_rate_limit=8.0):
     pitch_rate_limit  of the blade-pitch drive, deg/s: the actuator duty is the mean rate in percent of it
     Standard deviations are about the run's own mean (N in the denominator). Travel is the sum of
     absolute steps per second. DEL: 1 Hz damage-equivalent load, exponent 4 (tower base fore-aft, shaft
-    torque) or 3 (fairlead). FAIRTEN: the line for which the figure is greatest. beyond: seconds past a constraint
-    (blade-pitch rate 10 deg/s, tower-top acceleration 3.3 m/s2, rotor speed 1.3 times rated), violations: how
-    often it was passed.
+    torque) or 3 (fairlead). FAIRTEN: the line for which the figure is greatest. beyond: seconds past a
+    constraint (blade-pitch rate 10 deg/s, tower-top acceleration 3.3 m/s2, rotor speed 1.3 times rated),
+    violations: how often it was passed.
     Raises: InputError for missing columns or if skip leaves fewer than two rows.
     """
     kept = _kept(df, skip)
