@@ -100,15 +100,16 @@ WIND = "wind = 16.0"
         (f'[[case]]\nname = "a"\n{WIND}\noptions = {{surfac = "swl"}}', ["'surface'"]),
         (f'[[case]]\nname = "a"\n{WIND}\nskip = 200.0', ["skip = 200", "below duration = 100"]),
         (f'[[case]]\nname = "a"\n{WIND}\nfault = {{kind = "grid_los", time = 50}}', ["'grid_loss'"]),
-        (f'[[case]]\nname = "a"\n{WIND}\nfault = {{kind = "grid_loss", time = 500.0}}', ["fault.time = 500"]),
+        (f'[[case]]\nname = "a"\n{WIND}\nfault = {{kind = "grid_loss", time = 500}}', ["fault.time = 500"]),
         ('[[case]]\nname = "a"\nwind = {kind = "mann", speed = 12}', ["does not fit"]),
         (
-            f'[[case]]\nname = "a"\n{WIND}\nparked = true\nfault = {{kind = "grid_loss", time = 5}}',
-            ["parked"],
+            '[[case]]\nname = "a"\nparked = true\nfault = {kind = "stuck_pitch", time = 5}',
+            ["parked:"],
         ),
         (f'[[case]]\nname = "a"\n{WIND}\nplatform = "oc3_hywnd"', ["oc3_hywind"]),
         (
-            f'[[case]]\nname = "a"\n{WIND}\n[score]\nbaseline = "pi"\n[[score.term]]\nmetric = "x"\nweight = 1',
+            f'[[case]]\nname = "a"\n{WIND}\n[score]\nbaseline = "pi"\n'
+            '[[score.term]]\nmetric = "x"\nweight = 1',
             ["'x'"],
         ),
     ],
