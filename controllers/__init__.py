@@ -9,6 +9,7 @@ from controllers.constant import constant
 from controllers.eq8 import eq8_literal
 from controllers.openfast import openfast_oc3
 from controllers.pi import pi, pi_land, pi_land_power, pi_unscheduled
+from controllers.pi_tuned import pi_tuned
 from fowt_env.errors import InputError, unknown
 
 __all__ = ["CONTROLLERS", "CheckedController", "CompiledController", "Controller", "make"]
@@ -20,6 +21,7 @@ CONTROLLERS = {  # name -> factory(turbine: description.Turbine, control_dt: flo
     "pi": pi,
     "pi_land": pi_land,
     "pi_land_power": pi_land_power,
+    "pi_tuned": pi_tuned,
     "pi_unscheduled": pi_unscheduled,
 }
 

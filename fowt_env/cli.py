@@ -639,3 +639,32 @@ def accuracy(
         study.plot_accuracy(table, folder / "accuracy.png")
         files.append(folder / "accuracy.png")
     note("wrote " + ", ".join(map(str, files)))
+
+
+@benchmarks.command()
+@reported
+def evaluation(
+    count: Annotated[int, typer.Option(help="Runs that are timed.")] = 21,
+    suite: Annotated[str, typer.Option(help="Suite whose cases are run.")] = "above_rated",
+    controller: Annotated[str, typer.Option(help="Controller.")] = "pi",
+    with_ray: Annotated[bool, typer.Option("--ray", help="Also time a local Ray worker.")] = False,
+    out_path: Annotated[
+        str, typer.Option("--out", help="CSV to write.")
+    ] = "results/benchmark/evaluation.csv",
+):
+    """Time the runs of an evaluation on one core, and with --ray what handing them out costs."""
+    from training import benchmark as bench
+    from training import benchmark_evaluation as study
+
+    with progress_bar("timing runs", None):
+        table = study.evaluation_cost(count, suite, controller)
+        tables = [table, study.ray_cost(controller=controller, suite=suite)] if with_ray else [table]
+    for frame in tables:
+        shown = Table()
+        for name in frame.columns:
+            shown.add_column(escape(name), justify="left" if frame[name].dtype == object else "right")
+        for row in frame.itertuples(index=False):
+            shown.add_row(*(value if isinstance(value, str) else f"{value:.4g}" for value in row))
+        out.print(shown)
+    remarks = [f"{row[0]}: {row[1]:.4g} ms" for frame in tables[1:] for row in frame.itertuples(index=False)]
+    note(f"wrote {bench.write_csv(table, out_path, remarks)}")

@@ -292,6 +292,7 @@ def plot_pareto(board, path=None, title=None):
     marks = []
     for number, ((name, failed, figures), (x, y, travel)) in enumerate(zip(entries, points, strict=True)):
         colour = COLOURS[number % len(COLOURS)]
+        square = number // len(COLOURS) % 2  # its area is the whole box of its size, a circle's pi/4 of it
         bars = [[[max(0.0, f["mean"] - f["low"])], [max(0.0, f["high"] - f["mean"])]] for f in figures[:2]]
         if np.isfinite(bars).all():
             axes.errorbar(x, y, xerr=bars[0], yerr=bars[1], color=colour, linewidth=1.0, capsize=2, zorder=2)
@@ -300,8 +301,8 @@ def plot_pareto(board, path=None, title=None):
             axes.scatter(
                 [x],
                 [y],
-                s=[areas[number]],
-                marker="osD^"[number // len(COLOURS) % 4],
+                s=[areas[number] * (np.pi / 4.0 if square else 1.0)],
+                marker="s" if square else "o",
                 color=colour,
                 alpha=0.55,
                 edgecolor=colour,
@@ -343,7 +344,7 @@ def _label_marks(figure, axes, names, points, areas):
     size = 8.0
     per_point = figure.dpi / 72.0
     centres = axes.transData.transform(points) / per_point  # in points
-    radii = np.sqrt(areas / np.pi)
+    radii = 0.5 * np.sqrt(areas)
     taken = [
         (x - r, y - r, x + r, y + r) for (x, y), r in zip(centres, radii, strict=True)
     ]  # boxes, in points

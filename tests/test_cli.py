@@ -204,6 +204,37 @@ def test_evaluate_writes_table_runs_and_plots(tmp_path):
     assert len(list((tmp_path / "runs").rglob("*.parquet"))) == 4
 
 
+def test_evaluate_takes_a_suite_of_the_users_own_compares_and_resumes(tmp_path):
+    suite = tmp_path / "mine.toml"
+    suite.write_text(
+        'version = 2\ndescription = "d"\nsource = "s"\nwind = "rotor-averaged"\nseeds = [1, 2, 3]\n'
+        'duration = 15.0\nskip = 5.0\n[[case]]\nname = "gusty"\nwind = {kind = "ntm", speed = 18.0}\n'
+    )
+    out = tmp_path / "out"
+    arguments = (
+        "evaluate",
+        "--suite",
+        str(suite),
+        "--controllers",
+        "pi,pi_land",
+        "--no-plot",
+        "--out",
+        str(out),
+    )
+    stdout, _ = fowt(*arguments)
+    assert "suite mine 2" in stdout and "difference from pi" in stdout and "[" in stdout
+    board = json.loads((out / "leaderboard.json").read_text())
+    assert board["suite"]["version"] == 2 and board["seeds"] == [1, 2, 3] and board["baseline"] == "pi"
+    assert [entry["controller"] for entry in board["controllers"]] == ["pi", "pi_land"]
+    before = {path: path.stat().st_mtime_ns for path in out.rglob("*.parquet")}
+    assert len(before) == 6
+    again, _ = fowt(*arguments, "--baseline", "pi_land")
+    assert "difference from pi_land" in again
+    assert before == {path: path.stat().st_mtime_ns for path in out.rglob("*.parquet")}
+    _, stderr = fowt(*arguments, "--duration", "20", code=2)
+    assert "--out" in stderr
+
+
 def test_trim_prints_the_operating_points_of_trim(tmp_path):
     out = tmp_path / "steady.csv"
     stdout, _ = fowt("trim", "--winds", "8,18", "--out", str(out))

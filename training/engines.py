@@ -4,6 +4,7 @@ Every engine yields (index, what the function returns) as runs end, in any order
 for all, so are its bits.
 """
 
+import itertools
 import multiprocessing
 import os
 import pickle
@@ -17,6 +18,7 @@ from fowt_env.errors import InputError, unknown
 from fowt_env.warmup import kernels_compiled
 
 ENGINES = ("processes", "ray")
+WINDOW = 4  # Ray tasks handed out per processor
 ATTEMPTS = 3  # pools or Ray tries of one run before a worker that dies on it is taken as its own doing
 
 
@@ -119,8 +121,14 @@ def _ray(function, tasks, jobs, address):
     try:
         # arguments are small and the code is installed on every node: only results travel far
         remote = ray.remote(num_cpus=1, max_retries=ATTEMPTS - 1)(function)
-        waiting = {remote.remote(task): index for index, task in enumerate(tasks)}
-        while waiting:
+        # enough to keep every worker busy; all at once would make each wait look through all of them
+        window = WINDOW * max(1, int(ray.cluster_resources().get("CPU", jobs)))
+        waiting, left = {}, iter(enumerate(tasks))
+        while True:
+            for index, task in itertools.islice(left, window - len(waiting)):
+                waiting[remote.remote(task)] = index
+            if not waiting:
+                return
             done, _ = ray.wait(list(waiting), num_returns=1)
             for reference in done:
                 yield waiting.pop(reference), ray.get(reference)

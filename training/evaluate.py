@@ -113,6 +113,14 @@ def evaluate(
     return table
 
 
+def planned(controllers, cases, duration=None, skip=None, seeds=None, runs_folder=None, **options):
+    """List of the Runs that evaluate would make of these arguments, for score."""
+    suite = cases if isinstance(cases, Suite) else None
+    return _plan(
+        _labelled(controllers), _case_list(cases), suite, duration, skip, seeds, runs_folder, options
+    )
+
+
 def _go(runs, total, jobs, progress, engine, address, keep):
     """{run key: row} of the runs; keep(row) and progress are called as each ends."""
     report = progress or (lambda done, total, row: None)

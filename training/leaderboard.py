@@ -6,6 +6,8 @@ phases, so its cases are not independent of each other. Seeds are resampled, wit
 """
 
 import numpy as np
+from scipy.stats import norm as normal
+from scipy.stats import t as student
 
 from fowt_env.errors import unknown
 from training.metrics import METRICS
@@ -15,8 +17,9 @@ RESAMPLES = 10_000
 RANDOM_SEED = 20191
 BASELINES = ("gspi_oc3", "pi")  # the first of these that was evaluated, unless one is named
 METHOD = (
-    "percentile bootstrap over seeds, each with all its cases, widened by sqrt(n/(n-1)) for n seeds; every"
-    " case counts alike; differences are paired by case and seed"
+    "percentile bootstrap over seeds, each with all its cases, widened for n seeds by sqrt(n/(n-1)) and by"
+    " Student's t with n-1 degrees of freedom over the normal; every case counts alike; differences are"
+    " paired by case and seed"
 )
 
 
@@ -42,11 +45,19 @@ def case_means(values, weights):
 
 
 def interval(estimate, resampled, n):
-    """(low, high) of the estimate (metrics,) from resampled ones (resamples, metrics); NaN for one seed."""
+    """(low, high) of the estimate (metrics,) from resampled ones (resamples, metrics); NaN for one seed.
+
+    Percentiles of n resampled values are too narrow for small n: of 6 normal ones they hold the truth in
+    84 % of trials. Widening them as Student's interval is wider than the normal one makes it 94 %, and
+    keeps their skewness. Hesterberg, The American Statistician 69(4), 2015, section 5.3, does the same
+    with the percentiles' levels.
+    """
     if n < 2:
         return np.full_like(estimate, np.nan), np.full_like(estimate, np.nan)
     tails = [50.0 * (1.0 - LEVEL), 50.0 * (1.0 + LEVEL)]
-    spread = np.nanpercentile(_known(resampled) - estimate, tails, axis=0) * np.sqrt(n / (n - 1.0))
+    upper = 0.5 * (1.0 + LEVEL)
+    widening = np.sqrt(n / (n - 1.0)) * student.ppf(upper, n - 1) / normal.ppf(upper)
+    spread = np.nanpercentile(_known(resampled) - estimate, tails, axis=0) * widening
     return estimate + spread[0], estimate + spread[1]
 
 

@@ -9,6 +9,7 @@ A run is done when its Parquet file is there, and that file appears whole or not
 leaderboard.json are made from those files, so an interrupted evaluation loses and repeats nothing.
 """
 
+import ast
 import fcntl
 import hashlib
 import importlib.util
@@ -117,12 +118,11 @@ def plant_code():
 def controller_code(controller):
     """{"name", "code"}: what a controller is called, and a hash of the sources that define it.
 
-    A name of CONTROLLERS: all of the package controllers; "module:Name", a class or an object: the file
-    that it comes from.
+    A name of CONTROLLERS: its module, those of the package that this imports, and the package's data;
+    "module:Name", a class or an object: the file that it comes from.
     """
-    import controllers
+    from controllers import CONTROLLERS
 
-    folder = Path(controllers.__file__).parent
     if not isinstance(controller, str):
         kind = (
             controller if inspect.isroutine(controller) or inspect.isclass(controller) else type(controller)
@@ -130,10 +130,7 @@ def controller_code(controller):
         file = getattr(sys.modules.get(kind.__module__), "__file__", None)
         return {"name": f"{kind.__module__}:{kind.__qualname__}", "code": _digest([file] if file else [])}
     if ":" not in controller:
-        files = sorted(
-            path for path in folder.rglob("*") if path.is_file() and "__pycache__" not in path.parts
-        )
-        return {"name": controller, "code": _digest(files)}
+        return {"name": controller, "code": _digest(_package_files(CONTROLLERS.get(controller)))}
     module = controller.partition(":")[0]
     sys.path.insert(0, "")
     try:
@@ -144,6 +141,30 @@ def controller_code(controller):
         sys.path.remove("")
     file = None if spec is None or not spec.has_location else spec.origin
     return {"name": controller, "code": _digest([file] if file else [])}
+
+
+def _package_files(factory):
+    """Sorted files of the package controllers that a factory of it depends on; all of them for any other."""
+    import controllers
+
+    folder = Path(controllers.__file__).parent
+    files = [path for path in folder.rglob("*") if path.is_file() and "__pycache__" not in path.parts]
+    data = {path for path in files if path.suffix != ".py"}
+    start = getattr(factory, "__module__", None) or ""
+    if not start.startswith("controllers."):
+        return sorted(files)
+    found, names = set(), [start]
+    while names:
+        path = folder.joinpath(*names.pop().split(".")[1:]).with_suffix(".py")
+        if path in found or not path.exists():
+            continue
+        found.add(path)
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("controllers."):
+                names.append(node.module)
+            elif isinstance(node, ast.Import):
+                names += [alias.name for alias in node.names if alias.name.startswith("controllers.")]
+    return sorted(found | data)
 
 
 def versions():

@@ -14,6 +14,7 @@ import pandas as pd
 import pytest
 
 import fowt_env
+from controllers import CONTROLLERS
 from fowt_env.errors import InputError
 from training import results
 from training.cases import Case, Suite
@@ -130,6 +131,17 @@ def test_other_settings_and_versions_are_refused_with_what_to_do(tmp_path, monke
         patch.setattr("training.evaluate.controller_code", lambda controller: {"name": "pi", "code": "new"})
         with pytest.raises(InputError, match="code of controller 'pi' has changed"):
             evaluate("pi", suite(), folder=tmp_path)
+
+
+def test_a_controllers_code_is_its_module_and_what_that_imports():
+    names = {path.name for path in results._package_files(CONTROLLERS["eq8_literal"])}
+    assert {"eq8.py", "pi.py", "base.py"} <= names
+    assert "constant.py" not in names and "__init__.py" not in names
+    assert {"constant.py", "__init__.py"} <= {path.name for path in results._package_files(print)}
+    codes = [results.controller_code(name)["code"] for name in ("pi", "pi_land", "constant")]
+    assert codes[0] == codes[1] != codes[2]
+    own = results.controller_code(Broken())
+    assert own["name"].endswith(":Broken") and own["code"] != codes[0]
 
 
 @pytest.mark.parametrize("content", ["{", "[]", '{"format": 99}'])
