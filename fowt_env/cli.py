@@ -316,6 +316,13 @@ def evaluate(
     board = write_leaderboard(table, folder, baseline)
     means = summary(table)
     write_table(means, folder / "summary.csv")
+    _print_evaluation(table, means, board)
+    plots = _evaluation_plots(table, board, folder) if plot else []
+    note(f"wrote results.csv, leaderboard.json, summary.csv, runs/ and {len(plots)} plots in {folder}")
+
+
+def _print_evaluation(table, means, board):
+    """Print metrics by case and the leaderboard, and on stderr what failed or passed a limit of the score."""
     width = out.width if out.is_terminal else 200  # a file or a pipe has no width of its own
     Console(width=width).print(_summary_table(means, width))
     Console(width=width).print(_leaderboard_table(board, width))
@@ -324,8 +331,9 @@ def evaluate(
         err.print(
             f"[red]failed: {escape(run)}: {escape(row['reason'])}[/red]", soft_wrap=True, highlight=False
         )
-    plots = _evaluation_plots(table, board, folder) if plot else []
-    note(f"wrote results.csv, leaderboard.json, summary.csv, runs/ and {len(plots)} plots in {folder}")
+    for entry in board["controllers"]:
+        if entry["score"] and not entry["score"]["valid"]:
+            note(f"no valid score of {entry['controller']}: {entry['score']['why']}")
 
 
 def _leaderboard_table(board, width):
