@@ -37,6 +37,12 @@ class FaultedController:
         self.feathered = float(feathered)  # rad
         self.step = radians(fault.rate) * check_control_dt(control_dt)  # rad per control period
         self.stuck = self.target = None
+        self.information = tuple(getattr(inner, "information", ()))
+
+    def prepare(self, scene):
+        """Hand the scene of the coming run to the inner controller, where it asks for it."""
+        if hasattr(self.inner, "prepare"):
+            self.inner.prepare(scene)
 
     def reset(self, measurement):
         """Start the inner controller afresh, with the fault still to come."""

@@ -35,7 +35,7 @@ from fowt_env.outputs import replacing, write_table
 FORMAT = 1  # of the folder; raised when files or their meaning change
 ROW_KEY = b"fowt_env.row"
 TABLE_EVERY = 2.0  # s between rewritings of results.csv while runs go on
-PACKAGES = ("numpy", "numba", "scipy", "pandas", "rainflow")
+PACKAGES = ("numpy", "numba", "scipy", "pandas", "rainflow", "rosco", "hipersim")
 # sources that shape no figure of a run
 UNRELATED = ("cli.py", "cli_arguments.py", "plots.py", "warmup.py")
 
@@ -178,7 +178,7 @@ def versions():
         try:
             found[name] = version(name)
         except PackageNotFoundError:
-            found[name] = "unknown"
+            continue
     return found
 
 

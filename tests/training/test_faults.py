@@ -69,6 +69,20 @@ def test_a_stuck_pitch_stays_where_it_was_measured_and_the_torque_goes_on():
     assert controller.act(measured(10.0, 0.1)) == (1010.0, 0.1)
 
 
+def test_the_inner_controller_is_handed_the_scene():
+    class Asking(Ramp):
+        information = ("wind_preview",)
+
+        def prepare(self, scene):
+            self.scene = scene
+
+    inner = Asking()
+    controller = FaultedController(inner, Fault(kind="grid_loss", time=1.0), radians(90.0), DT)
+    controller.prepare("the scene")
+    assert inner.scene == "the scene" and controller.information == ("wind_preview",)
+    FaultedController(Ramp(), Fault(kind="grid_loss", time=1.0), radians(90.0), DT).prepare("any")
+
+
 def test_wrong_faults_are_refused():
     for wrong in ({"kind": "fire", "time": 1.0}, {"kind": "grid_loss", "time": -1.0}, {"kind": "grid_loss"}):
         with pytest.raises(ValueError):
