@@ -14,6 +14,7 @@ from controllers.pi import pi, pi_land, pi_land_power, pi_unscheduled
 from controllers.preview import preview
 from controllers.rosco import rosco, rosco_float
 from fowt_env.description import read_turbine
+from controllers.pi_tuned import pi_tuned
 from fowt_env.errors import InputError, unknown
 
 __all__ = ["CONTROLLERS", "CheckedController", "CompiledController", "Controller", "information", "make"]
@@ -28,6 +29,7 @@ CONTROLLERS = {  # name -> factory(turbine: description.Turbine, control_dt: flo
     "pi": pi,
     "pi_land": pi_land,
     "pi_land_power": pi_land_power,
+    "pi_tuned": pi_tuned,
     "pi_unscheduled": pi_unscheduled,
     "preview": preview,
     "rosco": rosco,

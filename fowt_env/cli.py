@@ -231,43 +231,66 @@ def _channel_table(frame, title):
 
 EVALUATE_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt evaluate --controllers pi --cases above_rated[/cyan]  the PI of Eq. (8), 12 to 24 m/s
+[cyan]fowt evaluate --suite above_rated --controllers pi,pi_land --jobs 2[/cyan]  the headline comparison
+
+[cyan]fowt evaluate --controllers pi --cases above_rated[/cyan]  the PI of Eq. (8), 12 to 24 m/s, one seed
 
 [cyan]fowt evaluate --controllers pi,pi_land --cases ntm_18,paper_18 --seeds 1,2,3 --jobs 2[/cyan]
 
-[cyan]fowt evaluate --controllers pi,mymodule:Mine --cases steady --duration 300[/cyan]  your own controller
+[cyan]fowt evaluate --suite mysuite.toml --controllers pi,mymodule:Mine --baseline pi[/cyan]  your own cases
 
-[bold]Files written[/bold]: metrics.csv (a row per run, written as runs end), summary.csv (means over seeds),
-metrics.png, timeseries_CASE.png, spectra_CASE.png, and every run as runs/CONTROLLER/CASE_seedN.parquet."""
+[bold]Files written[/bold]: runs/CONTROLLER/CASE_seedN.parquet, results.csv (a row per run), leaderboard.json
+(means, intervals, paired differences, versions), manifest.json (what was asked for), summary.csv (means by
+case), pareto.png, metrics.png, timeseries_CASE.png, spectra_CASE.png. The same command goes on where it was
+stopped; further controllers, cases or seeds are added to the folder."""
 
 
 @app.command(epilog=EVALUATE_EXAMPLES)
 @reported
 def evaluate(
     controllers: Annotated[str, typer.Option(help="Names or module:Name, separated by commas.")] = "pi",
+    suite: Annotated[
+        str | None, typer.Option(help="Suite: a name of fowt list suites, or a path to a TOML file.")
+    ] = None,
     cases: Annotated[
-        str, typer.Option(help="Suites or cases, by commas; see fowt list cases.")
-    ] = "above_rated",
-    seeds: Annotated[str, typer.Option(help="1,2,3 or 1:6:1; the same for each controller.")] = "1",
-    duration: Annotated[float, typer.Option(help="Length of each run, s.")] = 660.0,
-    skip: Annotated[float, typer.Option(help="Seconds at the start that are not scored.")] = 60.0,
+        str | None,
+        typer.Option(
+            help="Cases or suites, by commas; with --suite: those of its cases. Default: above_rated."
+        ),
+    ] = None,
+    seeds: Annotated[
+        str | None,
+        typer.Option(help="1,2,3 or 1:6:1, same for each controller. Default: the suite's, else 1."),
+    ] = None,
+    duration: Annotated[
+        float | None, typer.Option(help="Length of each run, s. Default: the suite's, else 660.")
+    ] = None,
+    skip: Annotated[
+        float | None, typer.Option(help="Seconds at the start not scored. Default: the suite's, else 60.")
+    ] = None,
+    baseline: Annotated[
+        str | None, typer.Option(help="Controller of the paired differences. Default: gspi_oc3, else pi.")
+    ] = None,
     jobs: Annotated[int, typer.Option(help="Worker processes.")] = 1,
+    engine: Annotated[str, typer.Option(help="processes, or ray.")] = "processes",
+    address: Annotated[str | None, typer.Option(help="Address of a running Ray cluster.")] = None,
     out_folder: Annotated[
         str, typer.Option("--out", help="Folder for what is written.")
     ] = "results/evaluation",
     plot: Annotated[bool, typer.Option("--plot/--no-plot", help="Make the plots.")] = True,
 ):
-    """Score controllers on load cases: one table of metrics, the runs behind it, and plots."""
-    from training.cases import named_cases
+    """Score controllers on load cases: a leaderboard with intervals, metrics by case, the runs, and plots."""
     from training.evaluate import evaluate as evaluate_controllers
     from training.evaluate import summary
+    from training.report import chosen_cases, write_leaderboard
 
     folder = Path(out_folder)
-    case_list = named_cases(cases)
-    metrics_path = folder / "metrics.csv"
-    numbers = parse_numbers(seeds, "seeds")
-    if any(number != int(number) for number in numbers):
+    chosen = chosen_cases(suite, cases)
+    numbers = None if seeds is None else parse_numbers(seeds, "seeds")
+    if any(number != int(number) for number in numbers or ()):
         raise InputError(f"seeds = {seeds!r}: must be whole numbers")
+    if baseline is not None and baseline not in (names := [name.strip() for name in controllers.split(",")]):
+        raise unknown("baseline among --controllers", baseline, names)
     finished = 0
     with progress_bar("evaluating", None) as update:
 
@@ -279,28 +302,57 @@ def evaluate(
         try:
             table = evaluate_controllers(
                 controllers,
-                case_list,
+                chosen,
                 duration=duration,
                 skip=skip,
-                seeds=[int(number) for number in numbers],
+                seeds=None if numbers is None else [int(number) for number in numbers],
                 jobs=jobs,
                 progress=report,
-                out=metrics_path,
-                runs_folder=folder / "runs",
+                folder=folder,
+                engine=engine,
+                address=address,
             )
         except KeyboardInterrupt:
-            fail(f"interrupted; the {finished} finished runs are in {metrics_path}", EXIT_INTERRUPTED)
+            place = f"in {folder / 'results.csv'}; the same command goes on with the others"
+            fail(f"interrupted; the {finished} finished runs are {place}", EXIT_INTERRUPTED)
+    board = write_leaderboard(table, folder, baseline)
     means = summary(table)
     write_table(means, folder / "summary.csv")
+    _print_evaluation(table, means, board)
+    plots = _evaluation_plots(table, board, folder) if plot else []
+    note(f"wrote results.csv, leaderboard.json, summary.csv, runs/ and {len(plots)} plots in {folder}")
+
+
+def _print_evaluation(table, means, board):
+    """Print metrics by case and the leaderboard, and on stderr what failed or passed a limit of the score."""
     width = out.width if out.is_terminal else 200  # a file or a pipe has no width of its own
     Console(width=width).print(_summary_table(means, width))
+    Console(width=width).print(_leaderboard_table(board, width))
     for row in table[table["status"] != "ok"].to_dict("records"):
         run = f"{row['controller']}, {row['case']}, seed {row['seed']}"
         err.print(
             f"[red]failed: {escape(run)}: {escape(row['reason'])}[/red]", soft_wrap=True, highlight=False
         )
-    plots = _evaluation_plots(table, folder, case_list, skip) if plot else []
-    note(f"wrote metrics.csv, summary.csv, runs/ and {len(plots)} plots in {folder}")
+    for entry in board["controllers"]:
+        if entry["score"] and not entry["score"]["valid"]:
+            note(f"no valid score of {entry['controller']}: {entry['score']['why']}")
+
+
+def _leaderboard_table(board, width):
+    """The printed leaderboard: one row per controller, intervals and paired differences in it."""
+    from training.report import leaderboard_rows
+
+    title, headings, rows = leaderboard_rows(board, width)
+    table = Table(
+        title=escape(title), title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False
+    )
+    for number, heading in enumerate(headings):
+        table.add_column(
+            escape(heading), justify="right" if number else "left", vertical="bottom", no_wrap=True
+        )
+    for row in rows:
+        table.add_row(*map(escape, row))
+    return table
 
 
 def _summary_table(means, width):
@@ -316,13 +368,13 @@ def _summary_table(means, width):
     return table
 
 
-def _evaluation_plots(table, folder, cases, skip):
+def _evaluation_plots(table, board, folder):
     """Paths of the plots made; none, with a note, where matplotlib is missing."""
     from training.report import evaluation_plots
 
     try:
         with progress_bar("plotting", None):
-            return evaluation_plots(table, folder, cases, skip)
+            return evaluation_plots(table, board, folder)
     except InputError as error:
         note(f"no plots: {error}")
         return []
@@ -397,15 +449,15 @@ def list_names(
     """List the names that the other commands know."""
     from controllers import CONTROLLERS
     from fowt_env.description import names
-    from training.cases import CASES, SUITES
+    from training.cases import all_cases, read_suite, suite_names
 
     known = {
         "platforms": lambda: names("platforms"),
         "turbines": lambda: names("turbines"),
         "seas": lambda: names("sea_states"),
         "controllers": lambda: list(CONTROLLERS),
-        "suites": lambda: [f"{suite} = {cases[0]} ... {cases[-1]}" for suite, cases in SUITES.items()],
-        "cases": lambda: list(CASES),
+        "suites": lambda: [f"{suite} ({len(read_suite(suite).cases)} cases)" for suite in suite_names()],
+        "cases": lambda: list(all_cases()),
     }
     if kind != "all" and kind not in known:
         raise unknown("kind of name", kind, ("all", *known))
@@ -618,6 +670,35 @@ def accuracy(
         study.plot_accuracy(table, folder / "accuracy.png")
         files.append(folder / "accuracy.png")
     note("wrote " + ", ".join(map(str, files)))
+
+
+@benchmarks.command()
+@reported
+def evaluation(
+    count: Annotated[int, typer.Option(help="Runs that are timed.")] = 21,
+    suite: Annotated[str, typer.Option(help="Suite whose cases are run.")] = "above_rated",
+    controller: Annotated[str, typer.Option(help="Controller.")] = "pi",
+    with_ray: Annotated[bool, typer.Option("--ray", help="Also time a local Ray worker.")] = False,
+    out_path: Annotated[
+        str, typer.Option("--out", help="CSV to write.")
+    ] = "results/benchmark/evaluation.csv",
+):
+    """Time the runs of an evaluation on one core, and with --ray what handing them out costs."""
+    from training import benchmark as bench
+    from training import benchmark_evaluation as study
+
+    with progress_bar("timing runs", None):
+        table = study.evaluation_cost(count, suite, controller)
+        tables = [table, study.ray_cost(controller=controller, suite=suite)] if with_ray else [table]
+    for frame in tables:
+        shown = Table()
+        for name in frame.columns:
+            shown.add_column(escape(name), justify="left" if frame[name].dtype == object else "right")
+        for row in frame.itertuples(index=False):
+            shown.add_row(*(value if isinstance(value, str) else f"{value:.4g}" for value in row))
+        out.print(shown)
+    remarks = [f"{row[0]}: {row[1]:.4g} ms" for frame in tables[1:] for row in frame.itertuples(index=False)]
+    note(f"wrote {bench.write_csv(table, out_path, remarks)}")
 
 
 from fowt_env import cli_report  # noqa: E402, F401 - adds its commands to the app
