@@ -12,9 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from controllers import make
+from fowt_env.channels import measure
 from fowt_env.counters import Counter
 from fowt_env.errors import InputError, unknown
-from fowt_env.integrators import build_integrator
+from fowt_env.integrators import build_integrator, rates, take_step
 from fowt_env.jit import entry, kernel
 from fowt_env.loads.hydrostatics import submerged
 from fowt_env.loads.mooring import mooring_load
@@ -23,7 +24,7 @@ from fowt_env.outputs import replacing
 from fowt_env.scene import FIDELITIES, build_scene
 from fowt_env.simulation import hold
 from fowt_env.state import State, pose_of
-from fowt_env.step import NON_FINITE, RUNNING, STOP_REASONS, advance_scene, observe
+from fowt_env.step import NON_FINITE, RUNNING, STOP_REASONS, observe, status_of
 
 DURATION = 30.0  # s of each case: three wave periods, one of platform pitch
 WEATHER = 60.0  # s of random wind and sea
@@ -53,18 +54,13 @@ def platform_energy(x, mass_matrix):
     return total
 
 
-@entry
-def run_case(
-    box, x, u, act, parameters, memory, measurement, dx, commands, per_control, per_segment, last, dt, peak
-):
-    """Advance x by last steps of dt; returns (status, steps done).
-
-    Open loop where commands (k, 2) has rows, each held for per_segment steps; else the law act, called
-    every per_control steps. peak (4,): largest platform kinetic energy (J), tilt (rad), distance from
-    the origin (m) and rotor speed (rad/s).
-    """
-    scene = box.scene
-    peak[:] = 0.0
+@kernel
+def _run_case(
+    scene, work, x, u, act, parameters, memory, measurement, dx, commands, per_control, per_segment, last, dt,
+    peak,
+):  # fmt: skip
+    for i in range(peak.shape[0]):
+        peak[i] = 0.0
     for step in range(last):
         if commands.shape[0] > 0:
             if step % per_segment == 0:
@@ -72,16 +68,34 @@ def run_case(
                 u[0] = commands[row, 0]
                 u[1] = commands[row, 1]
         elif step % per_control == 0:
-            observe(box, x, u, step * dt, dx, measurement)
+            rates(step * dt, x, u, scene, work, dx)
+            measure(scene, work, x, dx, u, step * dt, measurement)
             act(parameters, memory, measurement, u)
-        status = advance_scene(scene, box.work, x, u, step, 1, dt)
+        take_step(step * dt, x, u, dt, scene, scene.multistep, work)
+        status = status_of(x)
         if status != RUNNING:
             return status, step + 1
         peak[0] = max(peak[0], platform_energy(x, scene.body.mass_matrix))
         peak[1] = max(peak[1], max(abs(x[State.ROLL]), abs(x[State.PLATFORM_PITCH])))
-        peak[2] = max(peak[2], (x[0] * x[0] + x[1] * x[1] + x[2] * x[2]) ** 0.5)
+        peak[2] = max(peak[2], sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]))
         peak[3] = max(peak[3], abs(x[State.ROTOR_SPEED]))
     return RUNNING, last
+
+
+@entry
+def run_case(
+    box, x, u, act, parameters, memory, measurement, dx, commands, per_control, per_segment, last, dt, peak
+):
+    """Advance x by last steps of dt; returns (status, steps done).
+
+    Open loop where commands (k, 2) has rows, each held for per_segment steps; else the law act, called
+    every per_control steps. peak (4,): largest platform kinetic energy (J), roll or pitch (rad), distance
+    from the origin (m) and rotor speed (rad/s).
+    """
+    return _run_case(
+        box.scene, box.work, x, u, act, parameters, memory, measurement, dx, commands, per_control,
+        per_segment, last, dt, peak,
+    )  # fmt: skip
 
 
 @dataclass

@@ -11,7 +11,7 @@ from math import exp, log
 import numpy as np
 import pandas as pd
 
-from fowt_env.integrators import INTEGRATORS, build_integrator
+from fowt_env.integrators import INTEGRATORS, build_integrator, feathering
 from fowt_env.linear_model import MOTIONS, STATE_INDEX, STATES, linearize
 from fowt_env.scene import STEPS, build_scene
 from fowt_env.state import State
@@ -79,7 +79,9 @@ KINDS = {
     "no wind, waves": Kind(wind=None),
     "still water, wind": Kind(sea=None),
     "parked, 50 m/s, Hs 15 m": Kind(wind=50.0, sea=STORM, rotor_held=True),
-    "idling, 50 m/s, Hs 15 m": Kind(wind=50.0, sea=STORM),
+    "idling feathered, 26 m/s": Kind(wind=26.0),
+    "idling feathered, 50 m/s, Hs 15 m": Kind(wind=50.0, sea=STORM),
+    "idling feathered, 70 m/s, Hs 15 m": Kind(wind=70.0, sea=STORM),
     "no mooring": Kind(options={"mooring": False}),
     "platform held": Kind(platform_held=True),
 }
@@ -243,8 +245,9 @@ def stability_map(kinds=None, integrators=INTEGRATORS, duration=DURATION, progre
             scene = _named(scene, integrator)
             default = STEPS[integrator]
             found = measured_limit(scene, point, fine, duration)
-            theory = first_unstable(lambda h, m=model, i=integrator: stable(m.A, h, i, duration), default)
-            mode = limiting_state(model.A, theory * SCAN, integrator) if theory < np.inf else ""
+            scheme = "abm4" if integrator == "ab4" and feathering(point.state, base.model) else integrator
+            theory = first_unstable(lambda h, m=model, i=scheme: stable(m.A, h, i, duration), default)
+            mode = limiting_state(model.A, theory * SCAN, scheme) if theory < np.inf else ""
             rows.append(
                 {
                     "kind": name, "integrator": integrator, "default_s": default, "measured_s": found,
