@@ -11,6 +11,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+import numba
 import numpy as np
 
 from fowt_env.envs import FowtEnv, FowtVectorEnv
@@ -129,6 +130,8 @@ def differences(given=None):
 
 def main():
     """Run the jobs of a pickle and store their numbers."""
+    if not numba.config.DISABLE_JIT:
+        raise SystemExit("NUMBA_DISABLE_JIT=1 must be in the environment")
     given = pickle.loads(Path(sys.argv[1]).read_bytes())
     np.savez(sys.argv[2], **{name: result(job) for name, job in given.items()})
 
