@@ -21,7 +21,8 @@ from training.benchmark import header
 
 MEMORY_MB = 5.0  # growth that counts as none: less than a byte per step of the documented run
 # relative changes of the free body over 10000000 default steps: kinetic energy, linear momentum, angular
-# momentum about the centre of mass, in inertial axes. They turn with the error of the attitude, which grows with time at each order.
+# momentum about the centre of mass, in inertial axes. The momenta turn with the error of the attitude, which
+# grows with time.
 DRIFT = {
     "rk4": {"energy": 1e-10, "linear": 1e-8, "angular": 1e-8},
     "heun": {"energy": 1e-5, "linear": 1e-3, "angular": 1e-4},
