@@ -11,10 +11,10 @@ from controllers.floating import floating_feedback
 from controllers.gspi import gspi_land, gspi_oc3
 from controllers.openfast import openfast_oc3
 from controllers.pi import pi, pi_land, pi_land_power, pi_unscheduled
+from controllers.pi_tuned import pi_tuned
 from controllers.preview import preview
 from controllers.rosco import rosco, rosco_float
 from fowt_env.description import read_turbine
-from controllers.pi_tuned import pi_tuned
 from fowt_env.errors import InputError, unknown
 
 __all__ = ["CONTROLLERS", "CheckedController", "CompiledController", "Controller", "information", "make"]

@@ -574,7 +574,9 @@ def paper(
     note("wrote " + ", ".join(str(path) for path in write_report(study, out_folder, plot)))
 
 
-benchmarks = typer.Typer(no_args_is_help=True, rich_markup_mode="rich", help="Measure speed and accuracy.")
+benchmarks = typer.Typer(
+    no_args_is_help=True, rich_markup_mode="rich", help="Measure speed, accuracy and stability."
+)
 app.add_typer(benchmarks, name="benchmark")
 SPEED_EXAMPLES = """[bold]Examples[/bold]
 
@@ -622,6 +624,19 @@ def speed(
     for line in remarks:
         out.print(line, highlight=False)
     note(f"wrote {bench.write_csv(table, out_path, remarks)}")
+
+
+STABILITY_EXAMPLES = """[bold]Examples[/bold]
+
+[cyan]fowt benchmark stability[/cyan]  every part on small counts: some minutes
+
+[cyan]fowt benchmark stability --cases 100000 --steps 10000000 --hostile 3000[/cyan]  as documented: an hour
+
+[cyan]fowt benchmark stability --parts map,extremes[/cyan]  two parts; the report joins those of the folder
+
+[cyan]fowt benchmark stability --replay results/stability/failures/case_0000.json[/cyan]  a failure again
+
+[bold]Files written[/bold]: a JSON file per part, failures/case_NNNN.json, robustness.md."""
 
 
 @benchmarks.command(epilog=ACCURACY_EXAMPLES)
@@ -699,6 +714,45 @@ def evaluation(
         out.print(shown)
     remarks = [f"{row[0]}: {row[1]:.4g} ms" for frame in tables[1:] for row in frame.itertuples(index=False)]
     note(f"wrote {bench.write_csv(table, out_path, remarks)}")
+
+
+@benchmarks.command(epilog=STABILITY_EXAMPLES)
+@reported
+def stability(
+    parts: Annotated[str | None, typer.Option(help="Parts, by commas; default: all.")] = None,
+    cases: Annotated[int, typer.Option(min=1, help="Random scenes and states.")] = 2000,
+    steps: Annotated[int, typer.Option(min=1000, help="Steps of the long runs.")] = 200_000,
+    hostile: Annotated[int, typer.Option(min=1, help="Control periods of each hostile policy.")] = 600,
+    seed: Annotated[int, typer.Option(min=0, help="Of everything random.")] = 0,
+    out_folder: Annotated[
+        str, typer.Option("--out", help="Folder for what is written.")
+    ] = "results/stability",
+    report: Annotated[str | None, typer.Option(help="Report; default: robustness.md in --out.")] = None,
+    replay: Annotated[str | None, typer.Option(help="Run a stored case again, nothing else.")] = None,
+):
+    """Try to break the simulator: steps, random scenes, hostile actions, extremes, long runs."""
+    from training import stability as stress
+    from training.stability_cases import replay as run_again
+
+    if replay is not None:
+        outcome = run_again(replay)
+        out.print(f"reached {outcome.time:.2f} s: {outcome.told}", highlight=False)
+        raise typer.Exit(1 if outcome.failure else 0)
+    chosen = None if parts is None else [name.strip() for name in parts.split(",") if name.strip()]
+    sizes = stress.Sizes(cases=cases, steps=steps, hostile_steps=hostile, seed=seed)
+    with progress_bar("stability", None) as update:
+        results = stress.study(
+            out_folder, chosen, sizes, progress=lambda text, done, total: update(done, text, total)
+        )
+    claims = [claim for found in results.values() for claim in found.claims]
+    for claim in claims:
+        verdict = "[green]holds[/green] " if claim.holds else "[red]MISSED[/red]"
+        text = f"{claim.what} ({claim.count}): {claim.found}"
+        out.print(f"{verdict} {escape(text)}", highlight=False, soft_wrap=True)
+    path = stress.write_report(out_folder, report or Path(out_folder) / "robustness.md")
+    note(f"wrote {path}")
+    if not all(claim.holds for claim in claims):
+        raise typer.Exit(1)
 
 
 from fowt_env import cli_report  # noqa: E402, F401 - adds its commands to the app
