@@ -1,6 +1,6 @@
 """From descriptions to a scene: everything that a run needs, checked, typed and built once."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import cos, isfinite, radians, sin
 from typing import Any, NamedTuple
 
@@ -39,9 +39,9 @@ from fowt_env.weather.wind_field import hub_speed, is_field, read_box, rotor_ave
 ROTORS = ("bem", "lookup", "table")
 FIDELITIES = {
     # each level's parts; any of them given explicitly overrides its part
-    "reference": {"rotor": "bem", "wave_loads": "exact", "integrator": "rk4"},
-    "standard": {"rotor": "lookup", "wave_loads": "fast", "integrator": "ab4"},
-    "fast": {"rotor": "table", "wave_loads": "fast", "integrator": "ab4"},
+    "reference": {"rotor": "bem", "wave_loads": "exact", "integrator": "rk4", "mooring": "catenary"},
+    "standard": {"rotor": "lookup", "wave_loads": "fast", "integrator": "ab4", "mooring": "catenary"},
+    "fast": {"rotor": "table", "wave_loads": "fast", "integrator": "ab4", "mooring": "table"},
 }
 IN_PLANE = 1e-9  # share of a vector out of the plane of a planar scene that rounding may leave
 STEPS = {"rk4": 0.05, "heun": 0.05, "abm4": 0.1, "ab4": 0.1}  # s, default step of each integrator
@@ -56,7 +56,8 @@ OPTIONS = {
     "dynamic_inflow": (False, (False, True)),
     "tower_drag": (True, (False, True)),
     "hydrodynamics": (True, (False, True)),
-    "mooring": (True, (False, True, "table")),  # "table": tensions tabulated about rest, solved beyond
+    # True: the fidelity's; "table": tensions tabulated about rest, solved beyond
+    "mooring": (True, (False, True, "catenary", "table")),
     "planar": (False, (False, True)),
     "integrator": (None, (None, *INTEGRATORS)),  # None: the fidelity's
     "wave_loads": (None, (None, "exact", "fast")),  # None: the fidelity's
@@ -87,6 +88,7 @@ class Scene:
     rotor: str
     options: dict
     wind_speed: float | None  # mean hub wind that a trim uses; None without aerodynamics
+    trims: dict = field(default_factory=dict, init=False, repr=False)  # {platform mode: OperatingPoint} found
 
     @property
     def n_lines(self):
@@ -252,6 +254,8 @@ def _parts(fidelity, rotor, chosen):
     for part in ("wave_loads", "integrator"):
         if chosen[part] is None:
             chosen[part] = level[part]
+    if chosen["mooring"] is True:
+        chosen["mooring"] = level["mooring"]
     if rotor is None:
         rotor = "bem" if needs_induction else level["rotor"]
     return rotor

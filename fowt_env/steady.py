@@ -64,6 +64,12 @@ class OperatingPoint(Mapping):
     def __len__(self):
         return len(self._values)
 
+    def copy(self):
+        """The same point with arrays of its own."""
+        return OperatingPoint(
+            dict(self._values), self.state.copy(), self.command.copy(), self.wind_speed, self.platform
+        )
+
     def __repr__(self):
         shown = ("RotSpeed", "BldPitch1", "GenPwr", "RotThrust", "PtfmSurge", "PtfmPitch")
         text = ", ".join(f"{name} {self._values[name]:.4g}" for name in shown)
@@ -262,6 +268,13 @@ def trim(scene, platform="floating"):
     """
     if platform not in PLATFORM_MODES:
         raise unknown("platform mode of trim", platform, PLATFORM_MODES)
+    if platform not in scene.trims:
+        scene.trims[platform] = _trim(scene, platform)
+    return scene.trims[platform].copy()
+
+
+def _trim(scene, platform):
+    """What trim gives, found anew."""
     held = platform == "fixed"
     body = scene.model.body._replace(platform_held=held, rotor_held=False)
     steady = _Steady(calm(scene).with_model(body=body))

@@ -357,8 +357,9 @@ def performance(rotor, tip_speed_ratio, blade_pitch):
     """
     ratio = np.ascontiguousarray(tip_speed_ratio, dtype=np.float64)
     blade_pitch = np.ascontiguousarray(blade_pitch, dtype=np.float64)
-    load = np.zeros((len(ratio), len(blade_pitch), 3))
-    _fill(np.arctan(ratio), blade_pitch, load, rotor)
-    square = 1.0 + ratio[:, None] ** 2
-    torque = square * load[:, :, 1]
-    return ratio[:, None] * torque, square * load[:, :, 0], torque
+    load = np.zeros((len(ratio), len(blade_pitch), N_COEFFICIENTS))
+    _fill(np.arctan(ratio), blade_pitch, load, rotor._replace(air_density=1.0))
+    # the table's are on rho R^2 (and R) and the speed of wind and tip together
+    scale = 2.0 / np.pi * (1.0 + ratio[:, None] ** 2)
+    torque = scale * load[:, :, 1]
+    return ratio[:, None] * torque, scale * load[:, :, 0], torque
