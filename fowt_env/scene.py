@@ -17,6 +17,7 @@ from fowt_env.loads.damping import build_damping
 from fowt_env.loads.diffraction import build_strip_diffraction
 from fowt_env.loads.drivetrain import build_drivetrain, build_pitch_actuator
 from fowt_env.loads.fast_waves import (
+    STILL_REFINEMENT,
     build_fast_waves,
     build_lane_diffraction,
     build_lanes,
@@ -206,7 +207,7 @@ def build_scene(
     elements = build_blade_elements(turbine, site.air_density, stations) if aero else None
     strips = _strips(platform, chosen) if hydrodynamics else None
     quick = strips is not None and _quick(chosen, waves, strips)
-    lanes = build_lanes(platform.hull, strips) if quick else None
+    lanes = build_lanes(platform.hull, strips, 1 if waves else STILL_REFINEMENT) if quick else None
     fast = _fast_sea(waves, strips) if quick else None
     current = _current(chosen["current"]) if hydrodynamics else None
     if chosen["planar"]:
