@@ -1,4 +1,12 @@
-"""What a controller is: the protocol, its compiled form, and the check of a Python one's answers."""
+"""What a controller is: the protocol, its compiled form, and the check of a Python one's answers.
+
+Beside reset and act a controller may have
+
+- prepare(scene), called once per run before reset: for what a measurement does not carry, such as steady
+  operating points, a preview of the wind or the rotor's performance table;
+- information, a tuple of the Measurement fields that it uses and of whatever else it is told (EXTRA), so
+  that a comparison can say who knew what.
+"""
 
 from math import isfinite
 from typing import Protocol, runtime_checkable
@@ -10,6 +18,10 @@ from fowt_env.jit import kernel
 from fowt_env.measurement import N_MEASUREMENTS
 
 N_COMMANDS = 2  # command[0]: generator torque, N m, high-speed shaft; command[1]: blade pitch, rad
+EXTRA = {  # what a controller may be told beyond Measurement
+    "wind_preview": "the rotor-averaged wind, some seconds before it arrives",
+    "plant_model": "the plant's own equations: trims, linear models or performance tables of the scene",
+}
 LONGEST_CONTROL_DT = 1.0  # s; beyond it the sampled loop no longer resembles the design
 
 
@@ -39,11 +51,15 @@ class CompiledController:
     """
 
     kernel = None
+    information = ()  # what the law uses: Measurement fields and entries of EXTRA
 
     def __init__(self, name, parameters, n_memory):
         self.name = str(name)
         self.parameters = np.ascontiguousarray(parameters, dtype=np.float64)
         self.memory = np.zeros(n_memory)
+
+    def prepare(self, scene):
+        """Take what the law needs of the scene of the coming run; called once before reset()."""
 
     def reset(self, measurement):
         """Set memory from a Measurement, forgetting everything before."""
@@ -65,6 +81,12 @@ class CheckedController:
     def __init__(self, controller, name=None):
         self.controller = controller
         self.name = str(name or getattr(controller, "name", type(controller).__name__))
+        self.information = tuple(getattr(controller, "information", ()))
+
+    def prepare(self, scene):
+        """Hand the scene of the coming run to the controller inside, where it asks for it."""
+        if hasattr(self.controller, "prepare"):
+            self.controller.prepare(scene)
 
     def reset(self, measurement):
         """Reset the controller inside."""

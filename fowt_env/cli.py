@@ -409,7 +409,23 @@ def list_names(
         raise unknown("kind of name", kind, ("all", *known))
     for heading in known if kind == "all" else (kind,):
         out.print(f"[bold]{heading}[/bold]")
+        if heading == "controllers":
+            out.print(_controller_table(CONTROLLERS))
+            continue
         out.print(Columns(map(escape, known[heading]()), padding=(0, 3), expand=False), highlight=False)
+
+
+def _controller_table(factories):
+    """Table of controllers: name, what each is, and what it is told."""
+    from controllers import information
+
+    table = Table(box=None, padding=(0, 2, 0, 0))
+    for column in ("name", "what it is", "what it uses"):
+        table.add_column(column, header_style="dim")
+    for name, factory in factories.items():
+        first = factory.__doc__.splitlines()[0]
+        table.add_row(escape(name), escape(first), escape(", ".join(information(name))))
+    return table
 
 
 VALIDATE_EXAMPLES = """[bold]Examples[/bold]

@@ -149,7 +149,8 @@ def simulate(
 
     controller  None: the rotor is held at the trim's speed and blade pitch (at rest without wind); a
                 name of controllers.CONTROLLERS or "module:Class"; or an object with
-                reset(measurement) and act(measurement) -> (generator torque N m, blade pitch rad)
+                reset(measurement) and act(measurement) -> (generator torque N m, blade pitch rad), and
+                prepare(scene) where it needs more than measurements (controllers/base.py)
     duration    s; rows run from 0 to duration inclusive, every output_dt
     dt          physics step, s; must divide control_dt and output_dt, and output_dt the duration.
                 None: the step of the scene's integrator (0.05 s for Runge-Kutta, 0.1 s for Adams)
@@ -171,6 +172,7 @@ def simulate(
         from controllers import make  # looked up only when used: fowt_env imports nothing from it
 
         controller = make(controller, scene.turbine, control_dt)
+        controller.prepare(scene)
     x, u = initial_state(scene, start, initial)
     if held:
         scene = scene.with_model(body=scene.model.body._replace(rotor_held=True))

@@ -215,6 +215,7 @@ class FowtEnv(gymnasium.Env):
         self._offset(episode.offsets)
         start(self._box)
         if self._baseline is not None:
+            self._baseline.prepare(scene)
             self._baseline.reset(self.measurement())
         elif self._setting.actions.mode == Mode.SETPOINT:
             start_tracking(run.memory, self.measurement(), self._setting.actions)

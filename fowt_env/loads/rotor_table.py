@@ -192,3 +192,17 @@ def rotor_table_load(t, pose, x, now, series, field, table):
         thrust,
         torque,
     )
+
+
+def performance(rotor, tip_speed_ratio, blade_pitch):
+    """(cp, ct, cq), each (n, m): power, thrust and torque coefficients of a BladeElements in axial wind.
+
+    tip_speed_ratio (n,); blade_pitch (m,) rad. The usual ones: on rho V^2/2 times the area (and the radius).
+    """
+    ratio = np.ascontiguousarray(tip_speed_ratio, dtype=np.float64)
+    blade_pitch = np.ascontiguousarray(blade_pitch, dtype=np.float64)
+    load = np.zeros((len(ratio), len(blade_pitch), 3))
+    _fill(np.arctan(ratio), blade_pitch, load, rotor)
+    square = 1.0 + ratio[:, None] ** 2
+    torque = square * load[:, :, 1]
+    return ratio[:, None] * torque, square * load[:, :, 0], torque
