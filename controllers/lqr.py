@@ -131,7 +131,9 @@ def lqr_step(p, memory, measurement, command):
     """One period of the sampled law."""
     dt, rated = p[Head.CONTROL_DT], p[Head.RATED_SPEED]
     last = p[Head.FIRST_WIND] + (p[Head.WINDS] - 1.0) * p[Head.WIND_STEP]
-    place = (limited(memory[OPERATING_WIND], p[Head.FIRST_WIND], last) - p[Head.FIRST_WIND]) / p[Head.WIND_STEP]
+    place = (limited(memory[OPERATING_WIND], p[Head.FIRST_WIND], last) - p[Head.FIRST_WIND]) / p[
+        Head.WIND_STEP
+    ]
     node = min(int(place), int(p[Head.WINDS]) - 2)
     share = place - node
     low = BLOCKS + node * BLOCK
@@ -222,7 +224,9 @@ class LQR(CompiledController):
         if scene.model.wind is None:
             raise InputError(f"controller {self.name!r}: needs a scene with wind to linearise")
         models = design.design_models(scene)
-        self.install(models[0].wind, blocks(models, self.weights, self.turbine.rated_rotor_speed, self.control_dt))
+        self.install(
+            models[0].wind, blocks(models, self.weights, self.turbine.rated_rotor_speed, self.control_dt)
+        )
 
     def install(self, first_wind, table):
         """Take the blocks of winds 1 m/s apart."""
@@ -271,8 +275,10 @@ class LQR(CompiledController):
             memory[i] = np.interp(wind, winds, table[:, TRIM + i])
         memory[1], memory[3] = measurement.platform_pitch, measurement.platform_pitch_rate
         memory[ROTOR], memory[ROTOR + 1] = speed, measurement.blade_pitch
-        memory[WIND : WAVE] = memory[OPERATING_WIND] = wind
-        memory[PITCH_COMMAND] = min(max(measurement.blade_pitch, p[Head.PITCH_MINIMUM]), p[Head.PITCH_MAXIMUM])
+        memory[WIND:WAVE] = memory[OPERATING_WIND] = wind
+        memory[PITCH_COMMAND] = min(
+            max(measurement.blade_pitch, p[Head.PITCH_MINIMUM]), p[Head.PITCH_MAXIMUM]
+        )
         torque = measurement.generator_torque
         if not np.isfinite(torque):
             torque = np.interp(wind, winds, table[:, TORQUE])
