@@ -88,7 +88,7 @@ def deviate(p, low, share, memory):
 
 @kernel
 def correct(p, low, share, memory, measurement):
-    """Correct the estimate with what is measured: generator speed, blade pitch, platform and nacelle motion."""
+    """Correct the estimate with what is measured of rotor, blades, platform and nacelle."""
     y = memory[INNOVATION : INNOVATION + N_SENSORS]
     y[0] = measurement[Measure.GENERATOR_SPEED] / p[Head.GEAR_RATIO] - between(p, low, share, TRIM + ROTOR)
     y[1] = measurement[Measure.BLADE_PITCH] - between(p, low, share, TRIM + ROTOR + 1)
@@ -286,5 +286,5 @@ class LQR(CompiledController):
 
 
 def lqr(turbine, control_dt):
-    """LQG on torque and blade pitch with estimated wind, tuned on training seeds (fowt design lqr --sweep)."""
+    """LQG on torque and blade pitch with estimated wind, tuned on training seeds (fowt design lqr)."""
     return LQR(turbine, control_dt)

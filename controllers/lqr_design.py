@@ -77,7 +77,7 @@ class Weights:
 class DesignModel:
     """One wind speed's plant with its weather: dx = A x + B (torque, pitch command) + G noise (SI).
 
-    x: N_STATE states (PLANT, wind filter, wind speed, wave, wave quadrature, moment), deviations from the trim.
+    x: N_STATE states (PLANT, wind filter, wind speed, wave, wave quadrature, moment), less the trim.
     """
 
     wind: float

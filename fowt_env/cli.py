@@ -21,6 +21,7 @@ from rich.progress import (
 from rich.table import Table
 
 from fowt_env.cli_arguments import parse_numbers, parse_pairs, parse_sea, parse_wind
+from fowt_env.cli_design import register as register_design
 from fowt_env.errors import ControllerError, InputError, SimulationStopped, unknown
 from fowt_env.outputs import table_path, write_table
 
@@ -611,3 +612,5 @@ def accuracy(
         study.plot_accuracy(table, folder / "accuracy.png")
         files.append(folder / "accuracy.png")
     note("wrote " + ", ".join(map(str, files)))
+
+register_design(app, reported, progress_bar, out, note)
