@@ -175,7 +175,7 @@ def modes(a, names, cm_height, arm):
 
 @entry
 def _mean_response(box, x, u, force, azimuths, dx, measurement, row, rates, measured, recorded):
-    """Azimuth means of state rates, measurement and output row under u and further forces (6,) on the hull."""
+    """Azimuth means of state rates, measurement and output row under u and further hull forces (6,)."""
     scene, work = box.scene, box.work
     start = x[State.AZIMUTH]
     rates[:] = 0.0
