@@ -9,6 +9,7 @@ from controllers.constant import constant
 from controllers.eq8 import eq8_literal
 from controllers.floating import floating_feedback
 from controllers.gspi import gspi_land, gspi_oc3
+from controllers.lqr import lqr
 from controllers.openfast import openfast_oc3
 from controllers.pi import pi, pi_land, pi_land_power, pi_unscheduled
 from controllers.pi_tuned import pi_tuned
@@ -25,6 +26,7 @@ CONTROLLERS = {  # name -> factory(turbine: description.Turbine, control_dt: flo
     "floating_feedback": floating_feedback,
     "gspi_land": gspi_land,
     "gspi_oc3": gspi_oc3,
+    "lqr": lqr,
     "openfast_oc3": openfast_oc3,
     "pi": pi,
     "pi_land": pi_land,

@@ -21,6 +21,7 @@ from rich.progress import (
 from rich.table import Table
 
 from fowt_env.cli_arguments import parse_numbers, parse_pairs, parse_sea, parse_wind
+from fowt_env.cli_design import register as register_design
 from fowt_env.errors import ControllerError, InputError, SimulationStopped, unknown
 from fowt_env.outputs import SERIES_SUFFIXES, table_path, write_table
 
@@ -756,3 +757,4 @@ def stability(
 
 
 from fowt_env import cli_report  # noqa: E402, F401 - adds its commands to the app
+register_design(app, reported, progress_bar, out, note)
