@@ -4,9 +4,10 @@
 
 Every setting of a small grid runs in the training cases: 13, 17 and 21 m/s, NTM class B with the site's
 normal sea, seeds 1001 and 1002, which are apart from the winds and seeds that controllers are scored on. Its
-figures are divided by those of gspi_oc3 in the same case and averaged. The best setting has the least mean of the standard deviations of platform pitch and rotor speed,
-among those with a blade-pitch travel within TRAVEL of gspi_oc3's. Writes controllers/tuned.toml, which the
-controllers read, and tune_<name>.csv with the whole grid.
+figures are divided by those of gspi_oc3 in the same case and averaged. The best setting has the least mean
+of the standard deviations of platform pitch and rotor speed, among those with a blade-pitch travel within
+TRAVEL of gspi_oc3's. Writes controllers/tuned.toml, which the controllers read, and tune_<name>.csv with the
+whole grid.
 """
 
 import argparse

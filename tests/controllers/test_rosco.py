@@ -21,7 +21,9 @@ needs_library = pytest.mark.skipif(
     reason="needs the ROSCO library: pip install --no-deps rosco",
 )
 RATED = Measurement(*[0.0] * len(Measurement._fields))._replace(
-    rotor_speed=1.267109, generator_speed=122.9096, generator_torque=43093.55, blade_pitch=0.26, wind_speed=18.0
+    rotor_speed=1.267109,
+    generator_speed=122.9096,
+    generator_torque=43093.55, wind_speed=18.0, blade_pitch=0.26
 )
 
 
@@ -102,7 +104,7 @@ def test_a_broken_library_is_named(scene, tmp_path, monkeypatch):
     broken = tmp_path / "libdiscon.so"
     broken.write_text("no library")
     needed = find_library()[1]
-    monkeypatch.setattr("controllers.rosco.find_library", lambda: (broken, needed))
+    monkeypatch.setattr(sys.modules[Rosco.__module__], "find_library", lambda: (broken, needed))
     controller = make("rosco", scene.turbine, 0.1)
     controller.prepare(scene)
     with pytest.raises(InputError, match="cannot be used"):
