@@ -23,6 +23,7 @@ $(VENV)/.installed-plot: $(PROJECT) | $(BIN)/python
 
 $(VENV)/.installed-dev: $(PROJECT) | $(BIN)/python
 	$(INSTALL) ".[dev]"
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --no-deps rosco
 	@touch $@ $(VENV)/.installed-plot
 
 demo: $(VENV)/.installed-plot

@@ -8,7 +8,9 @@ Beside reset and act a controller may have
   that a comparison can say who knew what.
 """
 
+import tomllib
 from math import isfinite
+from pathlib import Path
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -17,6 +19,7 @@ from fowt_env.errors import ControllerError, InputError
 from fowt_env.jit import kernel
 from fowt_env.measurement import N_MEASUREMENTS
 
+TUNED = Path(__file__).parent / "tuned.toml"  # written by training/tune_controllers.py
 N_COMMANDS = 2  # command[0]: generator torque, N m, high-speed shaft; command[1]: blade pitch, rad
 EXTRA = {  # what a controller may be told beyond Measurement
     "wind_preview": "the rotor-averaged wind, some seconds before it arrives",
@@ -113,6 +116,11 @@ class CheckedController:
             time=time,
             returned=returned,
         )
+
+
+def tuned(name):
+    """{setting: value} of a controller that training/tune_controllers.py has tuned."""
+    return tomllib.loads(TUNED.read_text())[name]["settings"]
 
 
 def check_control_dt(control_dt):

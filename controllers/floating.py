@@ -17,7 +17,7 @@ from math import exp, inf, isfinite
 
 import numpy as np
 
-from controllers.base import check_control_dt
+from controllers.base import check_control_dt, tuned
 from controllers.pi import (
     PI,
     Memory,
@@ -42,8 +42,8 @@ SIGNALS = {"nacelle_velocity": Measure.NACELLE_VELOCITY, "platform_pitch_rate": 
 class FeedbackSettings:
     """What is fed back and how. Raises: InputError naming the key, value and allowed range.
 
-    The defaults are the best of the grid of training/tune_controllers.py on its training cases
-    (training/tuned.toml has the figures).
+    The controller of that name takes the best of the grid of training/tune_controllers.py on its training
+    cases; controllers/tuned.toml has them with their figures.
     """
 
     signal: str = "nacelle_velocity"
@@ -151,4 +151,5 @@ class FloatingFeedback(PI):
 
 def floating_feedback(turbine, control_dt):
     """OC3 gains with nacelle-velocity feedback to the blade pitch, which damps the platform's pitch."""
-    return FloatingFeedback(PISettings.published(turbine), FeedbackSettings(), control_dt)
+    settings = FeedbackSettings(**tuned("floating_feedback"))
+    return FloatingFeedback(PISettings.published(turbine), settings, control_dt)

@@ -19,7 +19,6 @@ import os
 import shutil
 import sys
 import tempfile
-import tomllib
 import weakref
 from _ctypes import dlclose
 from contextlib import contextmanager
@@ -31,12 +30,11 @@ import numpy as np
 from scipy.interpolate import RectBivariateSpline
 from scipy.optimize import brentq
 
-from controllers.base import check_control_dt
+from controllers.base import check_control_dt, tuned
 from fowt_env.errors import ControllerError, InputError
 from fowt_env.loads.rotor import build_blade_elements
 from fowt_env.loads.rotor_table import performance
 
-TUNED = Path(__file__).parent / "tuned.toml"
 INSTALL = "pip install --no-deps rosco"
 PRELOADED = ("libquadmath", "libgfortran", "libmvec")  # bundled with it; a copy elsewhere cannot find them
 SWAP_SIZE = 4096  # floats: the library touches entries beyond 3,300 whatever the interface
@@ -331,8 +329,8 @@ def deck(turbine, density, table, settings):
         (
             "LoggingLevel", "DT_Out", "Ext_Interface", "Echo",
             "IPC_ControlMode", "VS_FBP", "Y_ControlMode", "PRC_Mode", "PS_Mode", "SU_Mode", "SD_Mode",
-            "TD_Mode", "TRA_Mode", "Flp_Mode", "OL_Mode", "PA_Mode", "PF_Mode", "AWC_Mode", "Ext_Mode", "ZMQ_Mode",
-            "CC_Mode", "StC_Mode", "F_NumNotchFilts", "F_GenSpdNotch_N", "F_TwrTopNotch_N",
+            "TD_Mode", "TRA_Mode", "Flp_Mode", "OL_Mode", "PA_Mode", "PF_Mode", "AWC_Mode", "Ext_Mode",
+            "ZMQ_Mode", "CC_Mode", "StC_Mode", "F_NumNotchFilts", "F_GenSpdNotch_N", "F_TwrTopNotch_N",
         ),
         0,
     )  # fmt: skip
@@ -431,5 +429,4 @@ def rosco(turbine, control_dt):
 
 def rosco_float(turbine, control_dt):
     """The ROSCO library with the published OC3 gains and its floating feedback, tuned on training cases."""
-    tuned = tomllib.loads(TUNED.read_text())["rosco_float"]["settings"]
-    return Rosco(RoscoSettings(**tuned), control_dt, "rosco_float")
+    return Rosco(RoscoSettings(**tuned("rosco_float")), control_dt, "rosco_float")

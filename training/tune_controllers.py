@@ -2,11 +2,12 @@
 
     python -m training.tune_controllers --jobs 2
 
-Every setting of a small grid runs in the training cases, whose winds and seeds no suite uses: 13, 17 and 21 m/s,
-NTM class B with the site's normal sea, seeds 1001 and 1002. Its figures are divided by those of gspi_oc3 in the same
-case and averaged. The best setting has the least mean of the standard deviations of platform pitch and rotor speed,
-among those with a blade-pitch travel within TRAVEL of gspi_oc3's. Writes controllers/tuned.toml, which the
-controllers read, and tune_<name>.csv with the whole grid.
+Every setting of a small grid runs in the training cases: 13, 17 and 21 m/s, NTM class B with the site's
+normal sea, seeds 1001 and 1002, which are apart from the winds and seeds that controllers are scored on. Its
+figures are divided by those of gspi_oc3 in the same case and averaged. The best setting has the least mean
+of the standard deviations of platform pitch and rotor speed, among those with a blade-pitch travel within
+TRAVEL of gspi_oc3's. Writes controllers/tuned.toml, which the controllers read, and tune_<name>.csv with the
+whole grid.
 """
 
 import argparse
@@ -16,9 +17,10 @@ from pathlib import Path
 
 import pandas as pd
 
+from controllers.base import TUNED
 from controllers.floating import FeedbackSettings, FloatingFeedback
 from controllers.pi import PISettings
-from controllers.rosco import TUNED, Rosco, RoscoSettings
+from controllers.rosco import Rosco, RoscoSettings
 from fowt_env.description import joint_sea_state, read_turbine
 from fowt_env.errors import unknown
 from fowt_env.outputs import replacing, write_table
