@@ -756,5 +756,6 @@ def stability(
         raise typer.Exit(1)
 
 
-from fowt_env import cli_report  # noqa: E402, F401 - adds its commands to the app
 register_design(app, reported, progress_bar, out, note)
+
+from fowt_env import cli_report  # noqa: E402, F401 - adds its commands to the app
