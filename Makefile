@@ -23,16 +23,17 @@ $(VENV)/.installed-plot: $(PROJECT) | $(BIN)/python
 
 $(VENV)/.installed-dev: $(PROJECT) | $(BIN)/python
 	$(INSTALL) ".[dev]"
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --no-deps rosco
 	@touch $@ $(VENV)/.installed-plot
 
 demo: $(VENV)/.installed-plot
 	$(BIN)/fowt evaluate --controllers pi --cases above_rated --seeds 1 --jobs 2 --out results/demo
 
 test: $(VENV)/.installed-dev
-	$(BIN)/python -m pytest -m "" --durations=10
+	$(BIN)/python -m pytest -m "" --numprocesses auto --dist loadfile --durations=20
 
 test-quick: $(VENV)/.installed-dev
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest --numprocesses auto --dist loadfile
 
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .

@@ -7,20 +7,35 @@ import sys
 from controllers.base import CheckedController, CompiledController, Controller, check_control_dt
 from controllers.constant import constant
 from controllers.eq8 import eq8_literal
+from controllers.floating import floating_feedback
+from controllers.gspi import gspi_land, gspi_oc3
+from controllers.lqr import lqr
 from controllers.openfast import openfast_oc3
 from controllers.pi import pi, pi_land, pi_land_power, pi_unscheduled
+from controllers.pi_tuned import pi_tuned
+from controllers.preview import preview
+from controllers.rosco import rosco, rosco_float
+from fowt_env.description import read_turbine
 from fowt_env.errors import InputError, unknown
 
-__all__ = ["CONTROLLERS", "CheckedController", "CompiledController", "Controller", "make"]
+__all__ = ["CONTROLLERS", "CheckedController", "CompiledController", "Controller", "information", "make"]
 
 CONTROLLERS = {  # name -> factory(turbine: description.Turbine, control_dt: float) -> controller
     "constant": constant,
     "eq8_literal": eq8_literal,
+    "floating_feedback": floating_feedback,
+    "gspi_land": gspi_land,
+    "gspi_oc3": gspi_oc3,
+    "lqr": lqr,
     "openfast_oc3": openfast_oc3,
     "pi": pi,
     "pi_land": pi_land,
     "pi_land_power": pi_land_power,
+    "pi_tuned": pi_tuned,
     "pi_unscheduled": pi_unscheduled,
+    "preview": preview,
+    "rosco": rosco,
+    "rosco_float": rosco_float,
 }
 
 
@@ -53,6 +68,14 @@ def make(controller, turbine, control_dt):
     if isinstance(controller, CompiledController | CheckedController):
         return controller
     return CheckedController(controller, name)
+
+
+def information(name):
+    """What a controller of CONTROLLERS uses: Measurement fields and entries of base.EXTRA.
+
+    Raises: InputError for an unknown name.
+    """
+    return make(name, read_turbine("nrel5mw"), 0.1).information
 
 
 def _imported(path):

@@ -1,7 +1,17 @@
-"""What a controller is: the protocol, its compiled form, and the check of a Python one's answers."""
+"""What a controller is: the protocol, its compiled form, and the check of a Python one's answers.
 
+Beside reset and act a controller may have
+
+- prepare(scene), called once per run before reset: for what a measurement does not carry, such as steady
+  operating points, a preview of the wind or the rotor's performance table;
+- information, a tuple of the Measurement fields that it uses and of whatever else it is told (EXTRA), so
+  that a comparison can say who knew what.
+"""
+
+import tomllib
 from collections.abc import Callable
 from math import isfinite
+from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -11,7 +21,12 @@ from fowt_env.errors import ControllerError, InputError
 from fowt_env.jit import kernel
 from fowt_env.measurement import N_MEASUREMENTS, Measurement
 
+TUNED = Path(__file__).parent / "tuned.toml"  # written by training/tune_controllers.py
 N_COMMANDS = 2  # command[0]: generator torque, N m, high-speed shaft; command[1]: blade pitch, rad
+EXTRA = {  # what a controller may be told beyond Measurement
+    "wind_preview": "the rotor-averaged wind, some seconds before it arrives",
+    "plant_model": "the plant's own equations: trims, linear models or performance tables of the scene",
+}
 LONGEST_CONTROL_DT = 1.0  # s; beyond it the sampled loop no longer resembles the design
 
 
@@ -41,11 +56,15 @@ class CompiledController:
     """
 
     kernel: Callable[..., None] | None = None
+    information: tuple[str, ...] = ()  # what the law uses: Measurement fields and entries of EXTRA
 
     def __init__(self, name: str, parameters: npt.ArrayLike, n_memory: int) -> None:
         self.name = str(name)
         self.parameters = np.ascontiguousarray(parameters, dtype=np.float64)
         self.memory = np.zeros(n_memory)
+
+    def prepare(self, scene: Any) -> None:
+        """Take what the law needs of the scene of the coming run; called once before reset()."""
 
     def reset(self, measurement: Measurement) -> None:
         """Set memory from a Measurement, forgetting everything before."""
@@ -67,6 +86,12 @@ class CheckedController:
     def __init__(self, controller: Any, name: str | None = None) -> None:
         self.controller = controller
         self.name = str(name or getattr(controller, "name", type(controller).__name__))
+        self.information = tuple(getattr(controller, "information", ()))
+
+    def prepare(self, scene: Any) -> None:
+        """Hand the scene of the coming run to the controller inside, where it asks for it."""
+        if hasattr(self.controller, "prepare"):
+            self.controller.prepare(scene)
 
     def reset(self, measurement: Measurement) -> None:
         """Reset the controller inside."""
@@ -93,6 +118,11 @@ class CheckedController:
             time=time,
             returned=returned,
         )
+
+
+def tuned(name: str) -> dict[str, Any]:
+    """{setting: value} of a controller that training/tune_controllers.py has tuned."""
+    return tomllib.loads(TUNED.read_text())[name]["settings"]
 
 
 def check_control_dt(control_dt: float) -> float:

@@ -31,6 +31,7 @@ class Constant(CompiledController):
     """
 
     kernel = staticmethod(constant_law)
+    information = ("generator_torque", "blade_pitch")
 
     def __init__(self, torque=None, blade_pitch=None, name="constant"):
         for key, value in (("torque", torque), ("blade_pitch", blade_pitch)):

@@ -38,11 +38,11 @@ def literal_gain(time, parameters):
 @kernel
 def literal_step(parameters, memory, measurement, command):
     """One period of the printed law; filter, schedule, limits and torque are those of the PI law."""
-    error = speed_error(parameters, memory, measurement)
-    pitch = schedule_pitch_of(parameters, memory, measurement)
+    error = speed_error(parameters, memory, measurement[Measure.GENERATOR_SPEED])
+    pitch = schedule_pitch_of(parameters, memory, measurement[Measure.BLADE_PITCH])
     time = measurement[Measure.TIME] - memory[LiteralMemory.START_TIME]
     gain = schedule_gain(pitch, parameters[Parameter.SCHEDULE_PITCH]) * literal_gain(time, parameters)
-    write_commands(pitch, memory[LiteralMemory.START_PITCH] + gain * error, parameters, memory, command)
+    write_commands(pitch, memory[LiteralMemory.START_PITCH] + gain * error, 0.0, parameters, memory, command)
 
 
 @control_kernel
@@ -58,6 +58,7 @@ class Eq8Literal(CompiledController):
     """
 
     kernel = staticmethod(literal_law)
+    information = ("time", "generator_speed", "blade_pitch")
 
     def __init__(self, settings, control_dt, name="eq8_literal"):
         parameters = settings.parameters(check_control_dt(control_dt))

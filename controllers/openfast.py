@@ -77,6 +77,7 @@ class Discon(CompiledController):
     """OC3-Hywind DISCON law as OpenFAST calls it, every control_dt."""
 
     kernel = staticmethod(discon_law)
+    information = ("generator_speed", "blade_pitch")
 
     def __init__(self, settings, control_dt, name="openfast_oc3"):
         super().__init__(name, settings.parameters(check_control_dt(control_dt)), len(Memory))

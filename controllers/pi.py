@@ -194,35 +194,39 @@ def schedule_gain(blade_pitch, schedule_pitch):
 
 
 @kernel
-def schedule_pitch_of(parameters, memory, measurement):
+def schedule_pitch_of(parameters, memory, measured_pitch):
     """Blade pitch that sets the gain and the torque region: the last command or the measured one."""
     if parameters[Parameter.SCHEDULE_MEASURED] > 0.5:
         low, high = parameters[Parameter.PITCH_MINIMUM], parameters[Parameter.PITCH_MAXIMUM]
-        return limited(measurement[Measure.BLADE_PITCH], low, high)
+        return limited(measured_pitch, low, high)
     return memory[Memory.PITCH_COMMAND]
 
 
 @kernel
-def speed_error(parameters, memory, measurement):
+def speed_error(parameters, memory, generator_speed):
     """Error e = w_f - w_b0 of the filtered rotor speed, rad/s; advances the filter by one period.
 
     The filter is a single pole held exactly over the period (exponential smoothing).
     """
     decay = parameters[Parameter.FILTER_DECAY]
-    speed = (1.0 - decay) * measurement[Measure.GENERATOR_SPEED] + decay * memory[Memory.FILTERED_SPEED]
+    speed = (1.0 - decay) * generator_speed + decay * memory[Memory.FILTERED_SPEED]
     memory[Memory.FILTERED_SPEED] = speed
     return speed / parameters[Parameter.GEAR_RATIO] - parameters[Parameter.RATED_SPEED]
 
 
 @kernel
-def write_commands(blade_pitch, target, parameters, memory, command):
+def write_commands(blade_pitch, target, extra_torque, parameters, memory, command):
     """Write the torque of the curve and the pitch target, both within their limits of value and rate.
 
-    blade_pitch: the one that may force region 3. The rates are those of the commands, per period.
+    blade_pitch: the one that may force region 3; extra_torque is added to the curve. The rates are those
+    of the commands, per period.
     """
     dt = parameters[Parameter.CONTROL_DT]
     torque, pitch = memory[Memory.TORQUE_COMMAND], memory[Memory.PITCH_COMMAND]
-    wanted = generator_torque(memory[Memory.FILTERED_SPEED], blade_pitch, curve_of(parameters))
+    curve = curve_of(parameters)
+    wanted = generator_torque(memory[Memory.FILTERED_SPEED], blade_pitch, curve)
+    if extra_torque != 0.0:
+        wanted = limited(wanted + extra_torque, 0.0, curve.maximum_torque)
     step = dt * parameters[Parameter.TORQUE_RATE_LIMIT]
     torque += limited(wanted - torque, -step, step)
     wanted = limited(target, parameters[Parameter.PITCH_MINIMUM], parameters[Parameter.PITCH_MAXIMUM])
@@ -235,13 +239,12 @@ def write_commands(blade_pitch, target, parameters, memory, command):
 
 
 @kernel
-def pi_step(parameters, memory, measurement, command):
-    """One period of the sampled PI law, theory.md Eq. (8), with the torque law of section 3.
+def pi_target(pitch, error, parameters, memory):
+    """Blade pitch that the PI law asks for, rad, before its limits; advances the integral by one period.
 
-    Anti-windup: the integral term GK (G/tau_i) I_e stays within the pitch limits.
+    pitch: the one that sets the gain. Anti-windup: the integral term GK (G/tau_i) I_e stays within the
+    pitch limits.
     """
-    error = speed_error(parameters, memory, measurement)
-    pitch = schedule_pitch_of(parameters, memory, measurement)
     gain = schedule_gain(pitch, parameters[Parameter.SCHEDULE_PITCH])
     slope = gain * parameters[Parameter.INTEGRAL]
     integral = limited(
@@ -250,14 +253,23 @@ def pi_step(parameters, memory, measurement, command):
         parameters[Parameter.PITCH_MAXIMUM] / slope,
     )
     memory[Memory.INTEGRAL] = integral
-    target = gain * parameters[Parameter.PROPORTIONAL] * error + slope * integral
-    write_commands(pitch, target, parameters, memory, command)
+    return gain * parameters[Parameter.PROPORTIONAL] * error + slope * integral
+
+
+@kernel
+def pi_step(parameters, memory, generator_speed, measured_pitch, command):
+    """One period of the sampled PI law, theory.md Eq. (8), with the torque law of section 3."""
+    error = speed_error(parameters, memory, generator_speed)
+    pitch = schedule_pitch_of(parameters, memory, measured_pitch)
+    target = pi_target(pitch, error, parameters, memory)
+    write_commands(pitch, target, 0.0, parameters, memory, command)
 
 
 @control_kernel
 def pi_law(parameters, memory, measurement, command):
     """Compiled form of pi_step, one type for all control laws."""
-    pi_step(parameters, memory, measurement, command)
+    speed, pitch = measurement[Measure.GENERATOR_SPEED], measurement[Measure.BLADE_PITCH]
+    pi_step(parameters, memory, speed, pitch, command)
 
 
 class PI(CompiledController):
@@ -268,6 +280,7 @@ class PI(CompiledController):
     """
 
     kernel = staticmethod(pi_law)
+    information = ("generator_speed", "blade_pitch")
 
     def __init__(self, settings, control_dt, name="pi"):
         super().__init__(name, settings.parameters(check_control_dt(control_dt)), len(Memory))

@@ -21,9 +21,10 @@ from rich.progress import (
 from rich.table import Table
 
 from fowt_env.cli_arguments import parse_numbers, parse_pairs, parse_sea, parse_wind
+from fowt_env.cli_design import register as register_design
 from fowt_env.cli_doctor import DOCTOR_EXAMPLES, doctor
 from fowt_env.errors import ControllerError, InputError, SimulationStopped, unknown
-from fowt_env.outputs import table_path, write_table
+from fowt_env.outputs import SERIES_SUFFIXES, table_path, write_table
 
 EXIT_STOPPED, EXIT_INPUT, EXIT_INTERRUPTED = 1, 2, 130
 
@@ -137,7 +138,9 @@ def simulate(
     platform: PlatformOption = "oc3_hywind",
     wind: Annotated[
         str,
-        typer.Option(help="m/s, KIND:SPEED[:CLASS] (ntm:18:B), JSON, a .csv with time and speed, or none."),
+        typer.Option(
+            help="m/s, KIND:SPEED[:CLASS] (ntm:18:B), JSON, a .csv of time and speed, a .wnd or .hh, or none."
+        ),
     ] = "18",
     sea: Annotated[
         str, typer.Option(help="Name, jonswap:HS:TP[:GAMMA], regular:H:T, JSON, or none (still water).")
@@ -151,23 +154,23 @@ def simulate(
     fidelity: Annotated[
         str,
         typer.Option(
-            help="reference, standard (100 times faster, within 0.1 %), or fast (rotor as a table)."
+            help="reference, standard (1000 times faster, within 0.1 %), or fast (rotor as a table)."
         ),
-    ] = "reference",
+    ] = "standard",
     rotor: RotorOption = None,
     start: Annotated[str, typer.Option(help="trim (steady state of the mean wind) or zero.")] = "trim",
     initial: Annotated[
         list[str] | None, typer.Option(metavar="CHANNEL=VALUE", help="Start value, OpenFAST units; repeats.")
     ] = None,
     option: OptionOption = None,
-    out_path: Annotated[str | None, typer.Option("--out", help="Time series: .csv or .parquet.")] = None,
+    out_path: Annotated[str | None, typer.Option("--out", help="Series: .csv, .parquet or .outb.")] = None,
     plot: Annotated[str | None, typer.Option(help="Stacked plot of the run, e.g. run.png.")] = None,
 ):
     """Simulate one run, print what it was like, and save its time series and plot."""
     import fowt_env
 
     if out_path is not None:
-        table_path(out_path)  # a wrong ending should not cost a run
+        table_path(out_path, SERIES_SUFFIXES)  # a wrong ending should not cost a run
     options = {"duration": max(700.0, duration), **parse_pairs(option, "option")}
     scene = fowt_env.build_scene(
         platform,
@@ -230,43 +233,66 @@ def _channel_table(frame, title):
 
 EVALUATE_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt evaluate --controllers pi --cases above_rated[/cyan]  the PI of Eq. (8), 12 to 24 m/s
+[cyan]fowt evaluate --suite above_rated --controllers pi,pi_land --jobs 2[/cyan]  the headline comparison
+
+[cyan]fowt evaluate --controllers pi --cases above_rated[/cyan]  the PI of Eq. (8), 12 to 24 m/s, one seed
 
 [cyan]fowt evaluate --controllers pi,pi_land --cases ntm_18,paper_18 --seeds 1,2,3 --jobs 2[/cyan]
 
-[cyan]fowt evaluate --controllers pi,mymodule:Mine --cases steady --duration 300[/cyan]  your own controller
+[cyan]fowt evaluate --suite mysuite.toml --controllers pi,mymodule:Mine --baseline pi[/cyan]  your own cases
 
-[bold]Files written[/bold]: metrics.csv (a row per run, written as runs end), summary.csv (means over seeds),
-metrics.png, timeseries_CASE.png, spectra_CASE.png, and every run as runs/CONTROLLER/CASE_seedN.parquet."""
+[bold]Files written[/bold]: runs/CONTROLLER/CASE_seedN.parquet, results.csv (a row per run), leaderboard.json
+(means, intervals, paired differences, versions), manifest.json (what was asked for), summary.csv (means by
+case), pareto.png, metrics.png, timeseries_CASE.png, spectra_CASE.png. The same command goes on where it was
+stopped; further controllers, cases or seeds are added to the folder."""
 
 
 @app.command(epilog=EVALUATE_EXAMPLES)
 @reported
 def evaluate(
     controllers: Annotated[str, typer.Option(help="Names or module:Name, separated by commas.")] = "pi",
+    suite: Annotated[
+        str | None, typer.Option(help="Suite: a name of fowt list suites, or a path to a TOML file.")
+    ] = None,
     cases: Annotated[
-        str, typer.Option(help="Suites or cases, by commas; see fowt list cases.")
-    ] = "above_rated",
-    seeds: Annotated[str, typer.Option(help="1,2,3 or 1:6:1; the same for each controller.")] = "1",
-    duration: Annotated[float, typer.Option(help="Length of each run, s.")] = 660.0,
-    skip: Annotated[float, typer.Option(help="Seconds at the start that are not scored.")] = 60.0,
+        str | None,
+        typer.Option(
+            help="Cases or suites, by commas; with --suite: those of its cases. Default: above_rated."
+        ),
+    ] = None,
+    seeds: Annotated[
+        str | None,
+        typer.Option(help="1,2,3 or 1:6:1, same for each controller. Default: the suite's, else 1."),
+    ] = None,
+    duration: Annotated[
+        float | None, typer.Option(help="Length of each run, s. Default: the suite's, else 660.")
+    ] = None,
+    skip: Annotated[
+        float | None, typer.Option(help="Seconds at the start not scored. Default: the suite's, else 60.")
+    ] = None,
+    baseline: Annotated[
+        str | None, typer.Option(help="Controller of the paired differences. Default: gspi_oc3, else pi.")
+    ] = None,
     jobs: Annotated[int, typer.Option(help="Worker processes.")] = 1,
+    engine: Annotated[str, typer.Option(help="processes, or ray.")] = "processes",
+    address: Annotated[str | None, typer.Option(help="Address of a running Ray cluster.")] = None,
     out_folder: Annotated[
         str, typer.Option("--out", help="Folder for what is written.")
     ] = "results/evaluation",
     plot: Annotated[bool, typer.Option("--plot/--no-plot", help="Make the plots.")] = True,
 ):
-    """Score controllers on load cases: one table of metrics, the runs behind it, and plots."""
-    from training.cases import named_cases
+    """Score controllers on load cases: a leaderboard with intervals, metrics by case, the runs, and plots."""
     from training.evaluate import evaluate as evaluate_controllers
     from training.evaluate import summary
+    from training.report import chosen_cases, write_leaderboard
 
     folder = Path(out_folder)
-    case_list = named_cases(cases)
-    metrics_path = folder / "metrics.csv"
-    numbers = parse_numbers(seeds, "seeds")
-    if any(number != int(number) for number in numbers):
+    chosen = chosen_cases(suite, cases)
+    numbers = None if seeds is None else parse_numbers(seeds, "seeds")
+    if any(number != int(number) for number in numbers or ()):
         raise InputError(f"seeds = {seeds!r}: must be whole numbers")
+    if baseline is not None and baseline not in (names := [name.strip() for name in controllers.split(",")]):
+        raise unknown("baseline among --controllers", baseline, names)
     finished = 0
     with progress_bar("evaluating", None) as update:
 
@@ -278,28 +304,57 @@ def evaluate(
         try:
             table = evaluate_controllers(
                 controllers,
-                case_list,
+                chosen,
                 duration=duration,
                 skip=skip,
-                seeds=[int(number) for number in numbers],
+                seeds=None if numbers is None else [int(number) for number in numbers],
                 jobs=jobs,
                 progress=report,
-                out=metrics_path,
-                runs_folder=folder / "runs",
+                folder=folder,
+                engine=engine,
+                address=address,
             )
         except KeyboardInterrupt:
-            fail(f"interrupted; the {finished} finished runs are in {metrics_path}", EXIT_INTERRUPTED)
+            place = f"in {folder / 'results.csv'}; the same command goes on with the others"
+            fail(f"interrupted; the {finished} finished runs are {place}", EXIT_INTERRUPTED)
+    board = write_leaderboard(table, folder, baseline)
     means = summary(table)
     write_table(means, folder / "summary.csv")
+    _print_evaluation(table, means, board)
+    plots = _evaluation_plots(table, board, folder) if plot else []
+    note(f"wrote results.csv, leaderboard.json, summary.csv, runs/ and {len(plots)} plots in {folder}")
+
+
+def _print_evaluation(table, means, board):
+    """Print metrics by case and the leaderboard, and on stderr what failed or passed a limit of the score."""
     width = out.width if out.is_terminal else 200  # a file or a pipe has no width of its own
     Console(width=width).print(_summary_table(means, width))
+    Console(width=width).print(_leaderboard_table(board, width))
     for row in table[table["status"] != "ok"].to_dict("records"):
         run = f"{row['controller']}, {row['case']}, seed {row['seed']}"
         err.print(
             f"[red]failed: {escape(run)}: {escape(row['reason'])}[/red]", soft_wrap=True, highlight=False
         )
-    plots = _evaluation_plots(table, folder, case_list, skip) if plot else []
-    note(f"wrote metrics.csv, summary.csv, runs/ and {len(plots)} plots in {folder}")
+    for entry in board["controllers"]:
+        if entry["score"] and not entry["score"]["valid"]:
+            note(f"no valid score of {entry['controller']}: {entry['score']['why']}")
+
+
+def _leaderboard_table(board, width):
+    """The printed leaderboard: one row per controller, intervals and paired differences in it."""
+    from training.report import leaderboard_rows
+
+    title, headings, rows = leaderboard_rows(board, width)
+    table = Table(
+        title=escape(title), title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False
+    )
+    for number, heading in enumerate(headings):
+        table.add_column(
+            escape(heading), justify="right" if number else "left", vertical="bottom", no_wrap=True
+        )
+    for row in rows:
+        table.add_row(*map(escape, row))
+    return table
 
 
 def _summary_table(means, width):
@@ -315,13 +370,13 @@ def _summary_table(means, width):
     return table
 
 
-def _evaluation_plots(table, folder, cases, skip):
+def _evaluation_plots(table, board, folder):
     """Paths of the plots made; none, with a note, where matplotlib is missing."""
     from training.report import evaluation_plots
 
     try:
         with progress_bar("plotting", None):
-            return evaluation_plots(table, folder, cases, skip)
+            return evaluation_plots(table, board, folder)
     except InputError as error:
         note(f"no plots: {error}")
         return []
@@ -396,21 +451,37 @@ def list_names(
     """List the names that the other commands know."""
     from controllers import CONTROLLERS
     from fowt_env.description import names
-    from training.cases import CASES, SUITES
+    from training.cases import all_cases, read_suite, suite_names
 
     known = {
         "platforms": lambda: names("platforms"),
         "turbines": lambda: names("turbines"),
         "seas": lambda: names("sea_states"),
         "controllers": lambda: list(CONTROLLERS),
-        "suites": lambda: [f"{suite} = {cases[0]} ... {cases[-1]}" for suite, cases in SUITES.items()],
-        "cases": lambda: list(CASES),
+        "suites": lambda: [f"{suite} ({len(read_suite(suite).cases)} cases)" for suite in suite_names()],
+        "cases": lambda: list(all_cases()),
     }
     if kind != "all" and kind not in known:
         raise unknown("kind of name", kind, ("all", *known))
     for heading in known if kind == "all" else (kind,):
         out.print(f"[bold]{heading}[/bold]")
+        if heading == "controllers":
+            out.print(_controller_table(CONTROLLERS))
+            continue
         out.print(Columns(map(escape, known[heading]()), padding=(0, 3), expand=False), highlight=False)
+
+
+def _controller_table(factories):
+    """Table of controllers: name, what each is, and what it is told."""
+    from controllers import information
+
+    table = Table(box=None, padding=(0, 2, 0, 0))
+    for column in ("name", "what it is", "what it uses"):
+        table.add_column(column, header_style="dim")
+    for name, factory in factories.items():
+        first = factory.__doc__.splitlines()[0]
+        table.add_row(escape(name), escape(first), escape(", ".join(information(name))))
+    return table
 
 
 app.command(epilog=DOCTOR_EXAMPLES)(reported(doctor))
@@ -507,7 +578,9 @@ def paper(
     note("wrote " + ", ".join(str(path) for path in write_report(study, out_folder, plot)))
 
 
-benchmarks = typer.Typer(no_args_is_help=True, rich_markup_mode="rich", help="Measure speed and accuracy.")
+benchmarks = typer.Typer(
+    no_args_is_help=True, rich_markup_mode="rich", help="Measure speed, accuracy and stability."
+)
 app.add_typer(benchmarks, name="benchmark")
 SPEED_EXAMPLES = """[bold]Examples[/bold]
 
@@ -557,6 +630,19 @@ def speed(
     note(f"wrote {bench.write_csv(table, out_path, remarks)}")
 
 
+STABILITY_EXAMPLES = """[bold]Examples[/bold]
+
+[cyan]fowt benchmark stability[/cyan]  every part on small counts: some minutes
+
+[cyan]fowt benchmark stability --cases 100000 --steps 10000000 --hostile 3000[/cyan]  as documented: an hour
+
+[cyan]fowt benchmark stability --parts map,extremes[/cyan]  two parts; the report joins those of the folder
+
+[cyan]fowt benchmark stability --replay results/stability/failures/case_0000.json[/cyan]  a failure again
+
+[bold]Files written[/bold]: a JSON file per part, failures/case_NNNN.json, robustness.md."""
+
+
 @benchmarks.command(epilog=ACCURACY_EXAMPLES)
 @reported
 def accuracy(
@@ -565,6 +651,9 @@ def accuracy(
     finest: Annotated[float, typer.Option(help="Step of the reference, s.")] = 0.00625,
     axes: Annotated[str | None, typer.Option(help="Axes of the sweep, by commas; default: all.")] = None,
     repeats: Annotated[int, typer.Option(help="Timed repeats; the median counts.")] = 1,
+    box: Annotated[
+        bool, typer.Option("--box", help="Wind of the stored full-field TurbSim box instead.")
+    ] = False,
     out_folder: Annotated[
         str, typer.Option("--out", help="Folder for what is written.")
     ] = "results/benchmark",
@@ -572,6 +661,7 @@ def accuracy(
 ):
     """Measure error against run time over integrators, steps, rotor models and wave sums."""
     from training import benchmark_accuracy as study
+    from training.openfast import box_wind
 
     chosen = None if axes is None else study.select([name.strip() for name in axes.split(",")])
     folder = Path(out_folder)
@@ -583,6 +673,7 @@ def accuracy(
             finest,
             chosen,
             folder / "accuracy.csv",
+            wind=box_wind() if box else None,
             repeats=repeats,
             progress=lambda text, done, total: update(done, text, total),
         )
@@ -598,3 +689,76 @@ def accuracy(
         study.plot_accuracy(table, folder / "accuracy.png")
         files.append(folder / "accuracy.png")
     note("wrote " + ", ".join(map(str, files)))
+
+
+@benchmarks.command()
+@reported
+def evaluation(
+    count: Annotated[int, typer.Option(help="Runs that are timed.")] = 21,
+    suite: Annotated[str, typer.Option(help="Suite whose cases are run.")] = "above_rated",
+    controller: Annotated[str, typer.Option(help="Controller.")] = "pi",
+    with_ray: Annotated[bool, typer.Option("--ray", help="Also time a local Ray worker.")] = False,
+    out_path: Annotated[
+        str, typer.Option("--out", help="CSV to write.")
+    ] = "results/benchmark/evaluation.csv",
+):
+    """Time the runs of an evaluation on one core, and with --ray what handing them out costs."""
+    from training import benchmark as bench
+    from training import benchmark_evaluation as study
+
+    with progress_bar("timing runs", None):
+        table = study.evaluation_cost(count, suite, controller)
+        tables = [table, study.ray_cost(controller=controller, suite=suite)] if with_ray else [table]
+    for frame in tables:
+        shown = Table()
+        for name in frame.columns:
+            shown.add_column(escape(name), justify="left" if frame[name].dtype == object else "right")
+        for row in frame.itertuples(index=False):
+            shown.add_row(*(value if isinstance(value, str) else f"{value:.4g}" for value in row))
+        out.print(shown)
+    remarks = [f"{row[0]}: {row[1]:.4g} ms" for frame in tables[1:] for row in frame.itertuples(index=False)]
+    note(f"wrote {bench.write_csv(table, out_path, remarks)}")
+
+
+@benchmarks.command(epilog=STABILITY_EXAMPLES)
+@reported
+def stability(
+    parts: Annotated[str | None, typer.Option(help="Parts, by commas; default: all.")] = None,
+    cases: Annotated[int, typer.Option(min=1, help="Random scenes and states.")] = 2000,
+    steps: Annotated[int, typer.Option(min=1000, help="Steps of the long runs.")] = 200_000,
+    hostile: Annotated[int, typer.Option(min=1, help="Control periods of each hostile policy.")] = 600,
+    seed: Annotated[int, typer.Option(min=0, help="Of everything random.")] = 0,
+    out_folder: Annotated[
+        str, typer.Option("--out", help="Folder for what is written.")
+    ] = "results/stability",
+    report: Annotated[str | None, typer.Option(help="Report; default: robustness.md in --out.")] = None,
+    replay: Annotated[str | None, typer.Option(help="Run a stored case again, nothing else.")] = None,
+):
+    """Try to break the simulator: steps, random scenes, hostile actions, extremes, long runs."""
+    from training import stability as stress
+    from training.stability_cases import replay as run_again
+
+    if replay is not None:
+        outcome = run_again(replay)
+        out.print(f"reached {outcome.time:.2f} s: {outcome.told}", highlight=False)
+        raise typer.Exit(1 if outcome.failure else 0)
+    chosen = None if parts is None else [name.strip() for name in parts.split(",") if name.strip()]
+    sizes = stress.Sizes(cases=cases, steps=steps, hostile_steps=hostile, seed=seed)
+    with progress_bar("stability", None) as update:
+        results = stress.study(
+            out_folder, chosen, sizes, progress=lambda text, done, total: update(done, text, total)
+        )
+    claims = [claim for found in results.values() for claim in found.claims]
+    for claim in claims:
+        verdict = "[green]holds[/green] " if claim.holds else "[red]MISSED[/red]"
+        text = f"{claim.what} ({claim.count}): {claim.found}"
+        out.print(f"{verdict} {escape(text)}", highlight=False, soft_wrap=True)
+    path = stress.write_report(out_folder, report or Path(out_folder) / "robustness.md")
+    note(f"wrote {path}")
+    if not all(claim.holds for claim in claims):
+        raise typer.Exit(1)
+
+
+register_design(app, reported, progress_bar, out, note)
+
+from fowt_env import cli_report  # noqa: E402, F401 - adds its commands to the app

@@ -5,6 +5,7 @@ import math
 from pathlib import Path
 
 from fowt_env.errors import InputError
+from fowt_env.openfast_files import read_uniform_wind
 from fowt_env.outputs import read_table
 
 SEA_KEYS = {"jonswap": ("Hs", "Tp", "gamma"), "pierson_moskowitz": ("Hs", "Tp"), "regular": ("H", "T")}
@@ -24,9 +25,13 @@ def parse_wind(text):
         return _json(text, "wind")
     if Path(text).suffix.lower() in (".csv", ".parquet"):
         return _wind_series(text)
+    if Path(text).suffix.lower() in (".wnd", ".hh"):
+        return read_uniform_wind(text)
     kind, *rest = text.split(":")
     if not rest or len(rest) > 2 or _number(rest[0]) is None:
-        allowed = "a speed (18), KIND:SPEED[:CLASS] (ntm:18:B), JSON, a .csv or .parquet series, or none"
+        allowed = (
+            "a speed (18), KIND:SPEED[:CLASS] (ntm:18:B), JSON, a .csv, .parquet, .wnd or .hh file, or none"
+        )
         raise InputError(f"wind = {text!r}: must be {allowed}")
     spec = {"kind": kind, "speed": _number(rest[0])}
     return spec | {"class": rest[1]} if len(rest) == 2 else spec

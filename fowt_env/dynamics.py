@@ -5,7 +5,7 @@ leaves a 6x6 solve.
 """
 
 from enum import IntEnum
-from math import cos, sin
+from math import cos, sin, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +21,7 @@ from fowt_env.loads.rotor import RotorLoad, rotor_load
 from fowt_env.loads.rotor_lookup import rotor_lookup_load
 from fowt_env.loads.rotor_table import rotor_table_load
 from fowt_env.loads.tower import tower_load
-from fowt_env.state import NO_LOAD, State, Wrench, add, pose_of
+from fowt_env.state import NO_LOAD, State, Wrench, add, pose_in, pose_of
 from fowt_env.weather.wind import wind_now
 
 
@@ -37,6 +37,7 @@ class Body(NamedTuple):
     rotor_row: float  # I_rx = I_rotor + N_g^2 I_g
     platform_held: bool
     rotor_held: bool
+    plane: object = None  # True: surge, heave and platform pitch alone move; None: all six motions
 
 
 class Model(NamedTuple):
@@ -156,8 +157,15 @@ def inertial_load(pose, rotor_speed, mass_matrix, coupling):
 
 
 @kernel
-def attitude_rate(x, dx):
+def attitude_rate(x, dx, plane):
     """Position and Euler-angle rates: r' = R v, phi' = J^-1 w (singular at 90 deg of platform pitch)."""
+    if plane is not None:
+        pose = pose_in(x, plane)
+        dx[State.SURGE] = pose.r11 * pose.vx + pose.r13 * pose.vz
+        dx[State.HEAVE] = pose.r31 * pose.vx + pose.r33 * pose.vz
+        dx[State.PLATFORM_PITCH] = pose.wy
+        dx[State.SWAY] = dx[State.ROLL] = dx[State.YAW] = 0.0
+        return
     pose = pose_of(x)
     dx[State.SURGE] = pose.r11 * pose.vx + pose.r12 * pose.vy + pose.r13 * pose.vz
     dx[State.SWAY] = pose.r21 * pose.vx + pose.r22 * pose.vy + pose.r23 * pose.vz
@@ -210,7 +218,7 @@ def rotor_part(t, pose, x, now, wind, field, rotor, lookup, table, skew, wake, d
     if lookup is not None:
         return rotor_lookup_load(t, pose, x, now, wind, field, lookup, counters)
     if table is not None:
-        return rotor_table_load(t, pose, x, now, wind, field, table)
+        return rotor_table_load(pose, x, now, wind, table)
     return RotorLoad(NO_LOAD, 0.0, 0.0)
 
 
@@ -247,7 +255,7 @@ def _kept_wrench(kept, start):
 def evaluate(t, x, scene, work, dx):
     """Every load at a state, kept in work.kept; writes only the wake rates of dx. The command has no part."""
     body, kept = scene.body, work.kept
-    pose = pose_of(x)
+    pose = pose_in(x, body.plane)
     now = wind_now(t, scene.wind)
     aero = rotor_part(
         t, pose, x, now, scene.wind, scene.wind_field, scene.rotor, scene.rotor_lookup,
@@ -286,9 +294,9 @@ def evaluate(t, x, scene, work, dx):
 def respond(x, u, scene, work, dx):
     """Rates of the state under the command u with the loads of the last evaluate at this state."""
     kept = work.kept
-    pose = pose_of(x)
+    pose = pose_in(x, scene.body.plane)
     torque = shaft_torque(kept[Kept.TORQUE], u[0], x[State.ROTOR_SPEED], scene.drivetrain)
-    attitude_rate(x, dx)
+    attitude_rate(x, dx, scene.body.plane)
     dx[State.AZIMUTH] = x[State.ROTOR_SPEED]
     dx[State.BLADE_PITCH] = pitch_rate(x[State.BLADE_PITCH], u[1], scene.actuator)
     strips = StripLoad(NO_LOAD, kept[Kept.S0], kept[Kept.S1], kept[Kept.S2], kept[Kept.A33])
@@ -329,12 +337,39 @@ def added_mass_load(strips, dx):
 
 
 @kernel
+def accelerate_in_plane(pose, load, torque, strips, body, dx):
+    """The same with sway, roll and yaw held: the rotor then turns apart from the platform."""
+    m, vx, vz, wy = body.mass_matrix, pose.vx, pose.vz, pose.wy
+    px = m[0, 0] * vx + m[0, 2] * vz + m[0, 4] * wy
+    pz = m[2, 0] * vx + m[2, 2] * vz + m[2, 4] * wy
+    b1, b2 = load.fx - wy * pz, load.fz + wy * px
+    b3 = load.my - vz * px + vx * pz
+    l11 = sqrt(m[0, 0] + strips.s0)
+    l21, l31 = m[2, 0] / l11, (m[4, 0] + strips.s1) / l11
+    l22 = sqrt(m[2, 2] + strips.a33 - l21 * l21)
+    l32 = (m[4, 2] - l31 * l21) / l22
+    square = m[4, 4] + strips.s2 - l31 * l31 - l32 * l32
+    b1 /= l11
+    b2 = (b2 - l21 * b1) / l22
+    b3 = (b3 - l31 * b1 - l32 * b2) / square
+    b2 = (b2 - l32 * b3) / l22
+    dx[State.VX] = (b1 - l21 * b2 - l31 * b3) / l11
+    dx[State.VZ] = b2
+    dx[State.WY] = b3
+    dx[State.VY] = dx[State.WX] = dx[State.WZ] = 0.0
+    dx[State.ROTOR_SPEED] = 0.0 if body.rotor_held else torque / body.rotor_row
+
+
+@kernel
 def accelerate(pose, x, load, torque, strips, body, matrix, dx):
     """Solve (M1 + A_a, M2; M2^T, I_rx) (nu', w_b') = loads - C1 nu - C2 w_b into dx."""
     b = dx[State.VX : State.WZ + 1]
     if body.platform_held:
         b[:] = 0.0
         dx[State.ROTOR_SPEED] = 0.0 if body.rotor_held else torque / body.rotor_row
+        return
+    if body.plane is not None:
+        accelerate_in_plane(pose, load, torque, strips, body, dx)
         return
     c = inertial_load(pose, x[State.ROTOR_SPEED], body.mass_matrix, body.coupling)
     b[0] = load.fx - c.fx

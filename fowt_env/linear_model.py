@@ -1,14 +1,20 @@
 """Linear models of a scene about an operating point, by central differences of the nonlinear plant."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
+from math import pi
 from typing import NamedTuple
 
 import numpy as np
 
+from fowt_env.channels import N_FIXED, Out, measure, record
+from fowt_env.dynamics import Kept, evaluate, loads_of, respond
 from fowt_env.errors import InputError, unknown
 from fowt_env.jit import entry
+from fowt_env.measurement import N_MEASUREMENTS, Measure
 from fowt_env.state import State
-from fowt_env.steady import AZIMUTHS, calm, mean_derivative, trim
+from fowt_env.steady import AZIMUTHS, calm, trim
+from fowt_env.wave_force import fit_wave_filter, wave_force
 
 STATES = (
     "surge", "sway", "heave", "roll", "platform_pitch", "yaw",
@@ -19,23 +25,41 @@ STATE_INDEX = tuple(State[name.upper()] for name in STATES)
 STEPS = np.array([1e-3, 1e-3, 1e-3, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-7, 1e-7, 1e-7, 1e-4, 1e-5])
 INPUTS = ("generator_torque", "blade_pitch_command", "wind_speed")
 INPUT_STEPS = np.array([1.0, 1e-5, 1e-3])
+FORCES = ("fx", "fy", "fz", "mx", "my", "mz")  # on the hull, body components about the body origin
+FORCE_STEPS = np.array([1e2, 1e2, 1e2, 1e4, 1e4, 1e4])  # N, N m
+MEASURED = (
+    "rotor_speed", "generator_speed", "blade_pitch", "surge", "heave", "platform_pitch",
+    "platform_pitch_rate", "nacelle_acceleration", "nacelle_velocity",
+)  # fmt: skip
+RECORDED = {  # output: column of the output row, SI
+    "power": Out.GENPWR,
+    "rotor_thrust": Out.RTFLDFXH,
+    "tower_base_moment": Out.TWRBSMYT,
+}
 MOTIONS = ("surge", "sway", "heave", "roll", "platform_pitch", "yaw")
 
 
 @dataclass(frozen=True)
 class LinearModel:
-    """dx/dt = A dx + B du about an operating point, azimuth-averaged (SI, radians).
+    """dx/dt = A dx + B du + E df, dy = C dx + D du + F df about an operating point, azimuth-averaged (SI).
 
-    A (14, 14) and B (14, 3) with the names in states and inputs; point is the OperatingPoint.
+    A (14, 14), B (14, 3), C (n, 14), D (n, 3) with the names in states, inputs and outputs; E (14, 6)
+    and F (n, 6) take further forces on the hull (FORCES). point is the OperatingPoint.
     """
 
     A: np.ndarray
     B: np.ndarray
+    C: np.ndarray
+    D: np.ndarray
+    E: np.ndarray
+    F: np.ndarray
     states: tuple
     inputs: tuple
+    outputs: tuple
     point: object
     cm_height: float  # of the whole turbine, body z, m
     arm: float  # m, half the draft: weighs angles against translations when modes are named
+    scene: object = field(repr=False)
 
     def index(self, name):
         """Row of a state. Raises: InputError for an unknown name."""
@@ -43,9 +67,73 @@ class LinearModel:
             raise unknown("state", name, self.states)
         return self.states.index(name)
 
+    def output_index(self, name):
+        """Row of an output. Raises: InputError for an unknown name."""
+        if name not in self.outputs:
+            raise unknown("output", name, self.outputs)
+        return self.outputs.index(name)
+
     def modes(self):
         """[Mode] of the plant without control, slowest first."""
         return modes(self.A, self.states, self.cm_height, self.arm)
+
+    @cached_property
+    def wave_filter(self):
+        """WaveFilter: the causal model of the wave force that to_statespace() uses."""
+        return fit_wave_filter(self.scene, self.point.state)
+
+    def response(self, omega, inputs=("generator_torque", "blade_pitch_command", "wind_speed")):
+        """(n, outputs, inputs) complex frequency response at omega (n,) rad/s, waves without any fit.
+
+        inputs: names of inputs or "wave_elevation", the elevation at the hull's mean place.
+        """
+        omega = np.atleast_1d(np.asarray(omega, dtype=float))
+        result = np.empty((omega.size, len(self.outputs), len(inputs)), dtype=complex)
+        force = wave_force(self.scene, self.point.state, omega) if "wave_elevation" in inputs else None
+        eye = np.eye(len(self.states))
+        for i, w in enumerate(omega):
+            for j, name in enumerate(inputs):
+                if name == "wave_elevation":
+                    b, d = self.E @ force[i], self.F @ force[i]
+                elif name in self.inputs:
+                    b, d = self.B[:, self.inputs.index(name)], self.D[:, self.inputs.index(name)]
+                else:
+                    raise unknown("input", name, (*self.inputs, "wave_elevation"))
+                result[i, :, j] = self.C @ np.linalg.solve(1j * w * eye - self.A, b) + d
+        return result
+
+    def to_statespace(self):
+        """control.StateSpace with named states, inputs and outputs (SI).
+
+        Its fourth input, wave_elevation, is the elevation at the hull's mean place wave_filter.lead
+        seconds ahead: the force of waves at depth is not a causal function of the elevation. The states
+        wave_1 ... are those of the filter, whose errors wave_filter.errors lists by band.
+        Raises: InputError that names the extra to install.
+        """
+        try:
+            import control
+        except ImportError as error:
+            raise InputError(
+                f'to_statespace needs python-control ({error}): pip install "fowt-env[design]"'
+            ) from error
+        waves = self.wave_filter
+        n, m = len(self.states), waves.B.size
+        a = np.zeros((n + m, n + m))
+        a[:n, :n], a[:n, n:], a[n:, n:] = self.A, self.E @ waves.C, waves.A
+        b = np.zeros((n + m, 4))
+        b[:n, :3], b[n:, 3] = self.B, waves.B
+        c = np.hstack([self.C, self.F @ waves.C])
+        d = np.hstack([self.D, np.zeros((len(self.outputs), 1))])
+        return control.ss(
+            a,
+            b,
+            c,
+            d,
+            states=[*self.states, *(f"wave_{i + 1}" for i in range(m))],
+            inputs=[*self.inputs, "wave_elevation"],
+            outputs=list(self.outputs),
+            name="fowt",
+        )
 
 
 class Mode(NamedTuple):
@@ -86,58 +174,93 @@ def modes(a, names, cm_height, arm):
 
 
 @entry
-def _shifted(box, x, u, azimuths, dx, mean, index, step, out):
-    """Azimuth-averaged derivative with one state moved by step, into out (n_state,)."""
-    keep = x[index]
-    x[index] = keep + step
-    mean_derivative(box, x, u, azimuths, dx, mean)
-    x[index] = keep
-    out[:] = mean
+def _mean_response(box, x, u, force, azimuths, dx, measurement, row, rates, measured, recorded):
+    """Azimuth means of state rates, measurement and output row under u and further hull forces (6,)."""
+    scene, work = box.scene, box.work
+    start = x[State.AZIMUTH]
+    rates[:] = 0.0
+    measured[:] = 0.0
+    recorded[:] = 0.0
+    for i in range(azimuths):
+        x[State.AZIMUTH] = start + i * (2.0 * pi / 3.0) / azimuths
+        evaluate(0.0, x, scene, work, dx)
+        for j in range(6):
+            work.kept[Kept.TOTAL + j] += force[j]
+            work.kept[Kept.HYDRO + j] += force[j]
+        respond(x, u, scene, work, dx)
+        measure(scene, work, x, dx, u, 0.0, measurement)
+        record(scene, work, x, dx, u, 0.0, loads_of(work, dx), row)
+        rates += dx / azimuths
+        measured += measurement / azimuths
+        recorded += row / azimuths
+    x[State.AZIMUTH] = start
+    work.kept[Kept.FRESH] = 0.0
+
+
+class _Plant:
+    """State rates and outputs of a calm scene at any state, command and further force."""
+
+    def __init__(self, scene, n_lines):
+        self.box = scene.box()
+        self.columns = [*RECORDED.values(), *range(N_FIXED, N_FIXED + n_lines)]
+        self.measures = [Measure[name.upper()] for name in MEASURED]
+        rows = len(scene.channels)
+        self.scratch = (np.zeros(scene.n_state), np.zeros(N_MEASUREMENTS), np.zeros(rows))
+        self.means = (np.zeros(scene.n_state), np.zeros(N_MEASUREMENTS), np.zeros(rows))
+
+    def __call__(self, x, u, force):
+        """(14 + n_outputs,) rates of STATES and the outputs."""
+        _mean_response(self.box, x, u, force, AZIMUTHS, *self.scratch, *self.means)
+        rates, measured, recorded = self.means
+        return np.r_[rates[list(STATE_INDEX)], measured[self.measures], recorded[self.columns]]
 
 
 def linearize(scene, operating_point=None):
     """LinearModel of a scene about an operating point (default: its floating trim).
 
-    The wind input moves the hub wind with its shear; waves are flat. Drag has no linear part at rest
-    in still water, so viscous damping is absent there. Dynamic inflow is not linearised.
+    The wind input moves the hub wind with its shear; waves are flat, and their small force comes in by
+    wave_force. Drag has no linear part at rest in still water, so viscous damping is absent there.
+    Dynamic inflow is not linearised.
 
     Raises: InputError if the scene has dynamic inflow.
     """
     if scene.model.wake is not None:
         raise InputError("linearize: build the scene with dynamic_inflow=False")
     point = trim(scene) if operating_point is None else operating_point
-    held = point.platform == "fixed"
-    body = scene.model.body._replace(platform_held=held)
-    steady = calm(scene, point.wind_speed).with_model(body=body)
-    box = steady.box()
-    x, u = point.state.copy(), point.command.copy()
-    x[State.BLADE_PITCH] = point.state[State.BLADE_PITCH]
-    dx, mean = np.zeros_like(x), np.zeros_like(x)
-    up, down = np.zeros_like(x), np.zeros_like(x)
-    rows = list(STATE_INDEX)
-    a = np.empty((len(rows), len(rows)))
-    for j, index in enumerate(rows):
-        _shifted(box, x, u, AZIMUTHS, dx, mean, int(index), STEPS[j], up)
-        _shifted(box, x, u, AZIMUTHS, dx, mean, int(index), -STEPS[j], down)
-        a[:, j] = (up[rows] - down[rows]) / (2.0 * STEPS[j])
-    b = np.zeros((len(rows), len(INPUTS)))
-    for j in range(2):
-        for sign, out in ((1.0, up), (-1.0, down)):
-            moved = u.copy()
-            moved[j] += sign * INPUT_STEPS[j]
-            mean_derivative(box, x, moved, AZIMUTHS, dx, mean)
-            out[:] = mean
-        b[:, j] = (up[rows] - down[rows]) / (2.0 * INPUT_STEPS[j])
+    body = scene.model.body._replace(platform_held=point.platform == "fixed")
+    plant = _Plant(calm(scene, point.wind_speed).with_model(body=body), scene.n_lines)
+    x, u, force = point.state.copy(), point.command.copy(), np.zeros(6)
+
+    def slopes(vector, indices, steps):
+        columns = []
+        for index, step in zip(indices, steps, strict=True):
+            keep = vector[index]
+            vector[index] = keep + step
+            up = plant(x, u, force)
+            vector[index] = keep - step
+            down = plant(x, u, force)
+            vector[index] = keep
+            columns.append((up - down) / (2.0 * step))
+        return np.array(columns).T
+
+    of_states = slopes(x, [int(i) for i in STATE_INDEX], STEPS)
+    of_inputs = np.zeros((of_states.shape[0], len(INPUTS)))
+    of_inputs[:, :2] = slopes(u, range(2), INPUT_STEPS[:2])
+    of_forces = slopes(force, range(6), FORCE_STEPS)
     if point.wind_speed is not None:
         step = INPUT_STEPS[2]
-        for sign, out in ((1.0, up), (-1.0, down)):
-            other = calm(scene, point.wind_speed + sign * step).with_model(body=body).box()
-            mean_derivative(other, x, u, AZIMUTHS, dx, mean)
-            out[:] = mean
-        b[:, 2] = (up[rows] - down[rows]) / (2.0 * step)
-    cm_height = body.s_z / body.mass
-    arm = -0.5 * scene.platform.hull.z[0]
-    return LinearModel(a, b, STATES, INPUTS, point, cm_height, arm)
+        sides = []
+        for sign in (1.0, -1.0):
+            air = calm(scene, point.wind_speed + sign * step).with_model(body=body)
+            sides.append(_Plant(air, scene.n_lines)(x, u, force))
+        of_inputs[:, 2] = (sides[0] - sides[1]) / (2.0 * step)
+    n = len(STATES)
+    tensions = tuple(f"fairlead_tension_{i + 1}" for i in range(scene.n_lines))
+    return LinearModel(
+        of_states[:n], of_inputs[:n], of_states[n:], of_inputs[n:], of_forces[:n], of_forces[n:],
+        STATES, INPUTS, (*MEASURED, *RECORDED, *tensions),
+        point, body.s_z / body.mass, -0.5 * scene.platform.hull.z[0], scene,
+    )  # fmt: skip
 
 
 def natural_periods(scene):

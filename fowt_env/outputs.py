@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from fowt_env.linear_model import LinearModel
 
 TABLE_SUFFIXES = (".csv", ".parquet")
+SERIES_SUFFIXES = (*TABLE_SUFFIXES, ".outb")  # of a time series, which OpenFAST's format can hold too
 
 
 @contextmanager
@@ -43,23 +44,27 @@ def _umask():
     return mask
 
 
-def table_path(path):
-    """`path` as a Path, once its ending is known to be one that write_table can write.
+def table_path(path, allowed=TABLE_SUFFIXES):
+    """`path` as a Path, once its ending is known to be one of those allowed.
 
     Raises: InputError for another ending.
     """
     path = Path(path)
-    if path.suffix.lower() not in TABLE_SUFFIXES:
-        raise InputError(f"output file {str(path)!r}: must end with {' or '.join(TABLE_SUFFIXES)}")
+    if path.suffix.lower() not in allowed:
+        raise InputError(f"output file {str(path)!r}: must end with {' or '.join(allowed)}")
     return path
 
 
 def write_table(frame, path):
-    """The path written: CSV (10 significant digits) or Parquet (exact), by its ending."""
-    path = table_path(path)
+    """The path written: CSV (10 significant digits), Parquet or OpenFAST's .outb (exact), by its ending."""
+    path = table_path(path, SERIES_SUFFIXES)
     with replacing(path) as temporary:
         if path.suffix.lower() == ".csv":
             frame.to_csv(temporary, index=False, float_format="%.10g")
+        elif path.suffix.lower() == ".outb":
+            from fowt_env.openfast_files import write_outb
+
+            write_outb(frame, temporary)
         else:
             frame.to_parquet(temporary.absolute(), index=False)  # "a:b/c" alone would be read as a URI
     return path

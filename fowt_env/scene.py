@@ -1,7 +1,7 @@
 """From descriptions to a scene: everything that a run needs, checked, typed and built once."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import cos, radians, sin
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -19,6 +19,7 @@ from fowt_env.loads.damping import build_damping
 from fowt_env.loads.diffraction import build_strip_diffraction
 from fowt_env.loads.drivetrain import build_drivetrain, build_pitch_actuator
 from fowt_env.loads.fast_waves import (
+    STILL_REFINEMENT,
     build_fast_waves,
     build_lane_diffraction,
     build_lanes,
@@ -46,11 +47,13 @@ Sea = str | Path | Mapping[str, Any] | SeaState | None
 ROTORS = ("bem", "lookup", "table")
 FIDELITIES = {
     # each level's parts; any of them given explicitly overrides its part
-    "reference": {"rotor": "bem", "wave_loads": "exact", "integrator": "rk4"},
-    "standard": {"rotor": "lookup", "wave_loads": "fast", "integrator": "ab4"},
-    "fast": {"rotor": "table", "wave_loads": "fast", "integrator": "ab4"},
+    "reference": {"rotor": "bem", "wave_loads": "exact", "integrator": "rk4", "mooring": "catenary"},
+    "standard": {"rotor": "lookup", "wave_loads": "fast", "integrator": "ab4", "mooring": "catenary"},
+    "fast": {"rotor": "table", "wave_loads": "fast", "integrator": "ab4", "mooring": "table"},
 }
+IN_PLANE = 1e-9  # share of a vector out of the plane of a planar scene that rounding may leave
 STEPS = {"rk4": 0.05, "heun": 0.05, "abm4": 0.1, "ab4": 0.1}  # s, default step of each integrator
+REFERENCE_STEP = 0.0125  # s, of rk4 at fidelity "reference": errs 2e-6 in heave, 2e-7 elsewhere
 OPTIONS = {
     # name: (default, allowed values or a description of the allowed range)
     "kinematics_position": ("instantaneous", ("instantaneous", "fixed")),
@@ -61,12 +64,16 @@ OPTIONS = {
     "dynamic_inflow": (False, (False, True)),
     "tower_drag": (True, (False, True)),
     "hydrodynamics": (True, (False, True)),
-    "mooring": (True, (False, True)),
+    # True: the fidelity's; "table": tensions tabulated about rest, solved beyond
+    "mooring": (True, (False, True, "catenary", "table")),
+    "planar": (False, (False, True)),
     "integrator": (None, (None, *INTEGRATORS)),  # None: the fidelity's
     "wave_loads": (None, (None, "exact", "fast")),  # None: the fidelity's
     "current": (None, "None, a speed (m/s) or {'speed', 'heading' (deg), 'exponent'}"),
     "duration": (700.0, "seconds of random wind and sea, > 0"),
     "wave_components": (None, "None or a number of components, 1 to 10000"),
+    "blade_stations": (None, "None (the turbine file's) or a number of them, 3 up to the file's"),
+    "strip_length": (None, "None (a share of the draft) or metres, > 0: exact wave loads below the surface"),
     "shear_exponent": (None, "None (the platform file's) or 0 to 1"),
     "turbine": (None, "None (the platform file's), a name, a path or a description.Turbine"),
 }
@@ -89,6 +96,7 @@ class Scene:
     rotor: str
     options: dict
     wind_speed: float | None  # mean hub wind that a trim uses; None without aerodynamics
+    trims: dict = field(default_factory=dict, init=False, repr=False)  # {platform mode: OperatingPoint} found
 
     @property
     def n_lines(self) -> int:
@@ -152,7 +160,9 @@ class Scene:
 
     @property
     def dt(self) -> float:
-        """Default physics step of the scene's integrator, s."""
+        """Default physics step, s: that of the scene's integrator, finer at fidelity "reference"."""
+        if self.options["fidelity"] == "reference" and self.options["integrator"] == "rk4":
+            return REFERENCE_STEP
         return STEPS[self.options["integrator"]]
 
     def with_model(self, **parts: Any) -> "Scene":
@@ -189,7 +199,8 @@ def build_scene(
               from a table per station; "table": the whole rotor as one table. None: the fidelity's
     fidelity  "reference": everything solved exactly, Runge-Kutta 4; "standard": every blade and station
               by look-up, fast wave sums, Adams-Bashforth 4; "fast": the rotor as one table
-    options   see OPTIONS; a platform file may set other defaults
+    options   see OPTIONS; a platform file may set other defaults. planar: surge, heave and platform pitch
+              alone move; of ntm and etm turbulence the part in the plane is kept
 
     Raises: InputError naming the key, the value and what is allowed.
     """
@@ -206,13 +217,17 @@ def build_scene(
     series = air.series
     hydrodynamics = chosen["hydrodynamics"]
     aero = series is not None
-    elements = build_blade_elements(turbine, site.air_density) if aero else None
+    stations = _stations(chosen["blade_stations"], turbine)
+    elements = build_blade_elements(turbine, site.air_density, stations) if aero else None
     strips = _strips(platform, chosen) if hydrodynamics else None
     quick = strips is not None and _quick(chosen, waves, strips)
-    lanes = build_lanes(platform.hull, strips) if quick else None
+    lanes = build_lanes(platform.hull, strips, 1 if waves else STILL_REFINEMENT) if quick else None
     fast = _fast_sea(waves, strips) if quick else None
+    current = _current(chosen["current"]) if hydrodynamics else None
+    if chosen["planar"]:
+        _check_symmetry(platform.lines if chosen["mooring"] else (), current)
     model = Model(
-        body=build_body(platform, turbine),
+        body=build_body(platform, turbine, plane=True if chosen["planar"] else None),
         layout=build_layout(platform, turbine),
         drivetrain=build_drivetrain(turbine),
         actuator=build_pitch_actuator(turbine.pitch_drive),
@@ -222,8 +237,8 @@ def build_scene(
         lanes=lanes,
         sea=fast,
         **_diffraction(chosen, waves, strips, fast, lanes),
-        current=_current(chosen["current"]) if hydrodynamics else None,
-        mooring=build_mooring(platform.lines) if platform.lines and chosen["mooring"] else None,
+        current=current,
+        mooring=_mooring(platform.lines, chosen["mooring"]),
         damping=build_damping(platform.hydro) if hydrodynamics else None,
         rotor=elements if rotor == "bem" else None,
         rotor_lookup=build_section_table(elements) if aero and rotor == "lookup" else None,
@@ -254,6 +269,8 @@ def _parts(fidelity, rotor, chosen):
     for part in ("wave_loads", "integrator"):
         if chosen[part] is None:
             chosen[part] = level[part]
+    if chosen["mooring"] is True:
+        chosen["mooring"] = level["mooring"]
     if rotor is None:
         rotor = "bem" if needs_induction else level["rotor"]
     return rotor
@@ -310,6 +327,8 @@ def _options(given, platform):
     chosen["duration"] = _number("duration", chosen["duration"], 0.0, 1e6, low_open=True)
     if chosen["shear_exponent"] is not None:
         chosen["shear_exponent"] = _number("shear_exponent", chosen["shear_exponent"], 0.0, 1.0)
+    if chosen["strip_length"] is not None:
+        chosen["strip_length"] = _number("strip_length", chosen["strip_length"], 0.0, 1e3, low_open=True)
     if chosen["wave_components"] is not None:
         count = chosen["wave_components"]
         if isinstance(count, bool) or not isinstance(count, int | np.integer) or not 1 <= count <= 10000:
@@ -356,6 +375,8 @@ def _weather(wind, sea, seed, platform, turbine, rotor, chosen):
     site = platform.environment
     shear = site.shear_exponent if chosen["shear_exponent"] is None else chosen["shear_exponent"]
     air = _air(wind, seed, turbine, rotor, shear, chosen["duration"])
+    if chosen["planar"]:
+        air = _in_plane(air)
     state = sea_state_of(sea)
     _check_sea(state, site.water_depth)
     if not chosen["hydrodynamics"]:
@@ -369,7 +390,48 @@ def _weather(wind, sea, seed, platform, turbine, rotor, chosen):
         duration=chosen["duration"],
         components=chosen["wave_components"],
     )
+    if chosen["planar"] and waves is not None and np.abs(waves.sin_heading).max() > IN_PLANE:
+        raise InputError("sea: the heading must be 0 or 180 deg in a planar scene")
     return air, waves
+
+
+def _in_plane(air):
+    """The _Air of a planar scene; of turbulence the part in the plane. Raises: InputError for cross wind."""
+    if air.series is None:
+        return air
+    if air.field is not None:
+        raise InputError(
+            "wind: a box of full-field wind is not planar; use rotor = 'table' or planar = False"
+        )
+    value = air.series.value.copy()
+    across = np.abs(value[:, [1, 4]]).max()
+    if across <= IN_PLANE * np.abs(value[:, 0]).max():
+        return air
+    kind = air.spec.get("kind") if isinstance(air.spec, dict) else getattr(air.spec, "kind", None)
+    if kind not in ("ntm", "etm") or abs(value[:, 1].mean()) > 1e-3 * abs(value[:, 0].mean()):
+        raise InputError(
+            f"wind: cross wind or horizontal shear of up to {across:g} m/s; a planar scene has neither"
+            " (planar = False)"
+        )
+    value[:, [1, 4]] = 0.0
+    return air._replace(series=air.series._replace(value=value))
+
+
+def _check_symmetry(lines, current):
+    """Refuse what pulls a planar scene out of its plane."""
+    if current is not None and abs(current.v) > IN_PLANE * abs(current.u):
+        raise InputError("current.heading: must be 0 or 180 deg in a planar scene")
+    mirror = np.array([1.0, -1.0, 1.0, 1.0, -1.0, 1.0, 1.0, 1.0, 1.0, 1.0])
+    rows = [
+        np.array([*line.anchor, *line.fairlead, line.length, line.wet_weight, line.EA, line.seabed_friction])
+        for line in lines
+    ]
+    for row in rows:
+        if not any(np.allclose(other, mirror * row, rtol=1e-6, atol=1e-3) for other in rows):
+            raise InputError(
+                f"mooring line anchored at y = {row[1]:g} m has no mirror image at {-row[1]:g} m; a planar"
+                " scene needs one (planar = False)"
+            )
 
 
 def _number(name, value, low, high, low_open=False):
@@ -379,6 +441,16 @@ def _number(name, value, low, high, low_open=False):
         bracket = "(" if low_open else "["
         raise InputError(f"{name} = {value!r}: must be a number in {bracket}{low:g}, {high:g}]")
     return float(value)
+
+
+def _stations(count, turbine):
+    """Indices of that many of the file's blade stations, root and tip among them; None: all."""
+    if count is None:
+        return None
+    known = len(turbine.blade.radius)
+    if isinstance(count, bool) or not isinstance(count, int | np.integer) or not 3 <= count <= known:
+        raise InputError(f"blade_stations = {count!r}: must be a whole number from 3 to {known}")
+    return np.round(np.linspace(0, known - 1, count)).astype(int)
 
 
 def _seed(seed):
@@ -409,6 +481,7 @@ def _strips(platform, chosen):
         position=chosen["kinematics_position"],
         surface=chosen["surface"],
         stretching=chosen["stretching"],
+        cell=chosen["strip_length"],
     )
 
 
@@ -429,6 +502,11 @@ def _current(spec):
     if speed == 0.0:
         return None
     return Current(speed * cos(heading), speed * sin(heading), exponent)
+
+
+def _mooring(lines, wanted):
+    """Mooring part, None without lines or where none is wanted."""
+    return build_mooring(lines, tabulated=wanted == "table") if wanted else None
 
 
 def assemble(bodies):
@@ -458,8 +536,8 @@ def _upper_bodies(platform, turbine):
     ]
 
 
-def build_body(platform, turbine, platform_held=False, rotor_held=False):
-    """Body part: Eq. (10) from the four rigid bodies."""
+def build_body(platform, turbine, platform_held=False, rotor_held=False, plane=None):
+    """Body part: Eq. (10) from the four rigid bodies. plane: True holds sway, roll and yaw at zero."""
     ballast = platform.ballast
     matrix = assemble(
         [(ballast.mass, (0.0, 0.0, -ballast.cm_depth), ballast.inertia), *_upper_bodies(platform, turbine)]
@@ -475,6 +553,7 @@ def build_body(platform, turbine, platform_held=False, rotor_held=False):
         drivetrain.inertia_row,
         platform_held,
         rotor_held,
+        plane,
     )
 
 

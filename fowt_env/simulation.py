@@ -14,7 +14,7 @@ from fowt_env.jit import control_kernel
 from fowt_env.measurement import N_MEASUREMENTS, Measurement
 from fowt_env.records import is_number
 from fowt_env.scene import Scene
-from fowt_env.state import State, pose_of
+from fowt_env.state import OUT_OF_PLANE, State, pose_of
 from fowt_env.steady import trim
 from fowt_env.step import RUNNING, STOP_REASONS, advance, observe, output, output_row, run
 from fowt_env.weather.wind_field import WindBox
@@ -90,6 +90,8 @@ def initial_state(
         if not is_number(value):
             raise InputError(f"initial[{name!r}] = {value!r}: must be a finite number")
         index, factor = INITIAL[key]
+        if scene.model.body.plane is not None and index in OUT_OF_PLANE and value != 0.0:
+            raise InputError(f"initial[{name!r}] = {value:g}: must be 0 in a planar scene")
         if State.VX <= index <= State.WZ:
             rates[index] = value * factor
         else:
@@ -157,10 +159,11 @@ def simulate(
 
     controller  None: the rotor is held at the trim's speed and blade pitch (at rest without wind); a
                 name of controllers.CONTROLLERS or "module:Class"; or an object with
-                reset(measurement) and act(measurement) -> (generator torque N m, blade pitch rad)
+                reset(measurement) and act(measurement) -> (generator torque N m, blade pitch rad), and
+                prepare(scene) where it needs more than measurements (controllers/base.py)
     duration    s; rows run from 0 to duration inclusive, every output_dt
     dt          physics step, s; must divide control_dt and output_dt, and output_dt the duration.
-                None: the step of the scene's integrator (0.05 s for Runge-Kutta, 0.1 s for Adams)
+                None: scene.dt (0.0125 s at fidelity "reference", 0.1 s at the others)
     start       "trim" or "zero"; initial then sets absolute values of named channels
     progress    True shows a bar; a callable is called with the share done
 
@@ -179,6 +182,7 @@ def simulate(
         from controllers import make  # looked up only when used: fowt_env imports nothing from it
 
         controller = make(controller, scene.turbine, control_dt)
+        controller.prepare(scene)
     x, u = initial_state(scene, start, initial)
     if held:
         scene = scene.with_model(body=scene.model.body._replace(rotor_held=True))

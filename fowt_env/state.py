@@ -82,6 +82,21 @@ class Pose(NamedTuple):
     wz: float
 
 
+OUT_OF_PLANE = (State.SWAY, State.ROLL, State.YAW, State.VY, State.WX, State.WZ)
+
+
+@kernel
+def pose_in(x, plane):
+    """pose_of a state; with a plane (not None) that of a platform whose OUT_OF_PLANE states are zero."""
+    if plane is None:
+        return pose_of(x)
+    s, c = sin(x[State.PLATFORM_PITCH]), cos(x[State.PLATFORM_PITCH])
+    vx, vz, wy = x[State.VX], x[State.VZ], x[State.WY]
+    return Pose(
+        x[State.SURGE], 0.0, x[State.HEAVE], c, 0.0, s, 0.0, 1.0, 0.0, -s, 0.0, c, vx, 0.0, vz, 0.0, wy, 0.0
+    )
+
+
 @kernel
 def pose_of(x):
     """Pose of a state vector; R = Rz(yaw) Ry(pitch) Rx(roll), theory.md Eq. (1)."""

@@ -65,6 +65,12 @@ class OperatingPoint(Mapping):
     def __len__(self):
         return len(self._values)
 
+    def copy(self):
+        """The same point with arrays of its own."""
+        return OperatingPoint(
+            dict(self._values), self.state.copy(), self.command.copy(), self.wind_speed, self.platform
+        )
+
     def __repr__(self):
         shown = ("RotSpeed", "BldPitch1", "GenPwr", "RotThrust", "PtfmSurge", "PtfmPitch")
         text = ", ".join(f"{name} {self._values[name]:.4g}" for name in shown)
@@ -186,9 +192,13 @@ class _Steady:
             )
         return brentq(excess, low, high, xtol=1e-14, rtol=1e-14)
 
+    def motions(self):
+        """Indices of the positions that the scene's platform can change."""
+        return [0, 1, 2, 3, 4, 5] if self.scene.model.body.plane is None else [0, 2, 4]
+
     def free_states(self):
         """Indices of the states that a floating trim finds: motions, pitch or speed of a turning rotor."""
-        motions = list(range(6))
+        motions = self.motions()
         wind = self.scene.wind_speed
         if wind is None or not 0.0 < wind <= self.scene.turbine.cut_out_wind_speed:
             return motions
@@ -199,12 +209,14 @@ class _Steady:
 
     def residual(self, free):
         """Accelerations that vanish in the steady state, of the platform and of a rotor that is free."""
-        if len(free) > 6:
+        motions = self.motions()
+        accelerations = [State.VX + motion for motion in motions]
+        if len(free) > len(motions):
             self.rotor_acceleration(self.x[State.ROTOR_SPEED], self.x[State.BLADE_PITCH])
+            accelerations.append(State.ROTOR_SPEED)
         else:
             self.rates()
-        accelerations = [*range(State.VX, State.WZ + 1), int(State.ROTOR_SPEED)]
-        return self.mean[accelerations[: len(free)]]
+        return self.mean[accelerations]
 
     def jacobian(self, free):
         """Derivatives of the residual by the free states, central differences."""
@@ -266,6 +278,13 @@ def trim(scene: Scene, platform: str = "floating") -> OperatingPoint:
     """
     if platform not in PLATFORM_MODES:
         raise unknown("platform mode of trim", platform, PLATFORM_MODES)
+    if platform not in scene.trims:
+        scene.trims[platform] = _trim(scene, platform)
+    return scene.trims[platform].copy()
+
+
+def _trim(scene, platform):
+    """What trim gives, found anew."""
     held = platform == "fixed"
     body = scene.model.body._replace(platform_held=held, rotor_held=False)
     steady = _Steady(calm(scene).with_model(body=body))
@@ -298,7 +317,7 @@ def trim_held(scene, rotor_speed, blade_pitch, platform="floating"):
     steady.x[State.ROTOR_SPEED] = rotor_speed
     steady.x[State.BLADE_PITCH] = steady.u[1] = blade_pitch
     if platform == "floating":
-        remaining = steady.settle(list(range(6)))
+        remaining = steady.settle(steady.motions())
         if not remaining < 1e3 * TOLERANCE:
             raise InputError(
                 f"no steady state found for {scene!r}: remaining acceleration {remaining:.2e} m/s2 or rad/s2"

@@ -1,9 +1,13 @@
 """Scenes shared by the tests, so that each kind is built and compiled once."""
 
+import os
+
 import pytest
 
 from fowt_env.description import read_platform, read_turbine
 from fowt_env.scene import build_scene
+
+os.environ.setdefault("SDL_VIDEODRIVER", "dummy")  # windows of render mode "human" without a display
 
 
 @pytest.fixture(scope="session")

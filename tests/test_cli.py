@@ -95,6 +95,11 @@ def test_a_wind_series_file_drives_the_run(tmp_path):
         (("simulate", "--rotor", "bemm"), "bem"),
         (("simulate", "--out", "run.xls"), "run.xls"),
         (("evaluate", "--cases", "above_ratted"), "above_rated"),
+        (("evaluate", "--suite", "above_ratted"), "above_rated"),
+        (("evaluate", "--suite", "above_rated", "--cases", "ntm_13"), "ntm_12"),
+        (("evaluate", "--controllers", "pie"), "'pi'"),
+        (("evaluate", "--controllers", "pi", "--baseline", "pi_lnd"), "pi"),
+        (("evaluate", "--engine", "rai"), "ray"),
         (("evaluate", "--seeds", "1.5"), "whole numbers"),
         (("evaluate", "--skip", "700"), "skip = 700"),
         (("trim", "--winds", "24:4:1"), "START:STOP:STEP"),
@@ -175,7 +180,7 @@ def test_an_interrupted_evaluation_says_where_its_rows_are(tmp_path, monkeypatch
     )
     _, stderr = fowt("evaluate", *arguments, code=130)
     assert "1 finished" in stderr
-    assert len(pd.read_csv(tmp_path / "metrics.csv")) == 1
+    assert len(pd.read_csv(tmp_path / "results.csv")) == 1
 
 
 def test_evaluate_writes_table_runs_and_plots(tmp_path):
@@ -185,18 +190,49 @@ def test_evaluate_writes_table_runs_and_plots(tmp_path):
     )  # fmt: skip
     assert "pi_land" in stdout and "ntm_18" in stdout
     assert "tension" in stdout and "…" not in stdout  # piped output keeps every column whole
-    table = pd.read_csv(tmp_path / "metrics.csv")
+    table = pd.read_csv(tmp_path / "results.csv")
     assert table[["controller", "case"]].values.tolist() == [
         ["pi", "steady_16"], ["pi_land", "steady_16"], ["pi", "ntm_18"], ["pi_land", "ntm_18"],
     ]  # fmt: skip
     assert (table["status"] == "ok").all() and len(pd.read_csv(tmp_path / "summary.csv")) == 4
     pictures = sorted(path.name for path in tmp_path.glob("*.png"))
     assert pictures == [
-        "metrics.png", "spectra_ntm_18.png", "spectra_steady_16.png", "timeseries_ntm_18.png",
+        "metrics.png", "pareto.png", "spectra_ntm_18.png", "spectra_steady_16.png", "timeseries_ntm_18.png",
         "timeseries_steady_16.png",
     ]  # fmt: skip
     assert all(path.stat().st_size > 10_000 for path in tmp_path.glob("*.png"))
     assert len(list((tmp_path / "runs").rglob("*.parquet"))) == 4
+
+
+def test_evaluate_takes_a_suite_of_the_users_own_compares_and_resumes(tmp_path):
+    suite = tmp_path / "mine.toml"
+    suite.write_text(
+        'version = 2\ndescription = "d"\nsource = "s"\nwind = "rotor-averaged"\nseeds = [1, 2, 3]\n'
+        'duration = 15.0\nskip = 5.0\n[[case]]\nname = "gusty"\nwind = {kind = "ntm", speed = 18.0}\n'
+    )
+    out = tmp_path / "out"
+    arguments = (
+        "evaluate",
+        "--suite",
+        str(suite),
+        "--controllers",
+        "pi,pi_land",
+        "--no-plot",
+        "--out",
+        str(out),
+    )
+    stdout, _ = fowt(*arguments)
+    assert "suite mine 2" in stdout and "difference from pi" in stdout and "[" in stdout
+    board = json.loads((out / "leaderboard.json").read_text())
+    assert board["suite"]["version"] == 2 and board["seeds"] == [1, 2, 3] and board["baseline"] == "pi"
+    assert [entry["controller"] for entry in board["controllers"]] == ["pi", "pi_land"]
+    before = {path: path.stat().st_mtime_ns for path in out.rglob("*.parquet")}
+    assert len(before) == 6
+    again, _ = fowt(*arguments, "--baseline", "pi_land")
+    assert "difference from pi_land" in again
+    assert before == {path: path.stat().st_mtime_ns for path in out.rglob("*.parquet")}
+    _, stderr = fowt(*arguments, "--duration", "20", code=2)
+    assert "--out" in stderr
 
 
 def test_trim_prints_the_operating_points_of_trim(tmp_path):

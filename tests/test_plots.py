@@ -128,3 +128,33 @@ def test_plotting_leaves_pyplot_alone():
         "assert 'matplotlib.pyplot' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def pareto_board(controllers):
+    figure = {"low": np.nan, "high": np.nan}
+    entries = []
+    for name, (speed, pitch, travel) in controllers.items():
+        values = dict(zip(plots.PARETO, (speed, pitch, travel, 20.0), strict=True))
+        figures = {key: figure | {"mean": value, "worst": value} for key, value in values.items()}
+        entries.append({"controller": name, "failed": 0, "metrics": figures})
+    return {"controllers": entries, "cases": ["a"], "interval": {"level": 0.95}}
+
+
+def test_pareto_marks_have_areas_in_the_ratio_of_pitch_travel_and_names_that_do_not_overlap(tmp_path):
+    controllers = {f"controller_{i}": (1.0 + 0.004 * i, 0.9, 0.1 * (i + 1)) for i in range(9)}
+    controllers["failed"] = (np.nan, np.nan, np.nan)
+    figure = plots.plot_pareto(pareto_board(controllers), tmp_path / "pareto.png")
+    axes = figure.axes[0]
+    sizes = [mark.get_sizes()[0] for mark in axes.collections if hasattr(mark, "get_sizes")]
+    assert len(sizes) == 9  # what never finished a run has no place
+    assert sizes[3] / sizes[0] == pytest.approx(4.0)
+    assert sizes[8] / sizes[0] == pytest.approx(9.0 * np.pi / 4.0)  # a square: all of its box
+    figure.draw_without_rendering()
+    boxes = [text.get_window_extent() for text in axes.texts]
+    assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
+    assert (tmp_path / "pareto.png").stat().st_size > 10_000
+
+
+def test_a_pareto_plot_of_failures_alone_is_refused():
+    with pytest.raises(InputError, match="nothing to plot"):
+        plots.plot_pareto(pareto_board({"x": (np.nan, np.nan, np.nan)}))

@@ -35,6 +35,12 @@ MOTIONS = ["PtfmSurge", "PtfmSway", "PtfmHeave", "PtfmRoll", "PtfmPitch", "PtfmY
         ({"wind": 8.0, "rotor": "table", "dynamic_inflow": True}, ["table", "dynamic_inflow", "bem"]),
         ({"sea": SPREAD | {"heading": [0.0, 30.0]}, "wave_loads": "fast"}, ["wave_loads", "one heading"]),
         ({"sea": SEA, "wave_loads": "fast", "stretching": "none"}, ["wave_loads", "exact"]),
+        ({"planar": 1.5}, ["planar = 1.5", "False", "True"]),
+        ({"planar": True, "sea": SPREAD | {"heading": [30.0, 30.0]}}, ["heading", "0 or 180", "planar"]),
+        ({"planar": True, "current": {"speed": 1.0, "heading": 90.0}}, ["current.heading", "planar"]),
+        ({"planar": True, "wind": {"kind": "steady", "speed": 9.0, "direction": 5.0}}, ["0.78", "planar"]),
+        ({"planar": True, "wind": NTM | {"direction": 5.0}}, ["cross wind", "planar"]),
+        ({"planar": True, "wind": {"kind": "ecd", "speed": 12.0}}, ["cross wind", "planar"]),
     ],
 )
 def test_what_cannot_be_built_is_refused_by_name_value_and_range(arguments, words):
@@ -85,6 +91,18 @@ def test_standard_stays_within_a_thousandth_of_reference():
         assert error < 1e-3, (name, error)
 
 
+def test_fast_stays_within_two_hundredths_of_standard():
+    frames = []
+    for fidelity in ("standard", "fast"):
+        scene = build_scene(wind=NTM, sea=SEA, seed=2, fidelity=fidelity)
+        frames.append(simulate(scene, "pi", duration=600.0))
+    exact, quick = frames
+    for name in (*MOTIONS, "RotSpeed", "FAIRTEN1"):
+        column = next(c for c in exact.columns if c.startswith(f"{name}_["))
+        error = np.sqrt(np.mean((quick[column] - exact[column]) ** 2)) / exact[column].std()
+        assert error < 2e-2, (name, error)
+
+
 def test_scenes_of_one_kind_share_one_compiled_run():
     kinds = len(run.signatures)
     for seed, components in ((1, 30), (2, 40)):
@@ -92,3 +110,23 @@ def test_scenes_of_one_kind_share_one_compiled_run():
         simulate(scene, "pi", duration=1.0)
         simulate(scene, "pi_land", duration=1.0)
     assert len(run.signatures) <= kinds + 1
+
+
+@pytest.mark.parametrize("count", [2, 1000, 5.0, True])
+def test_a_number_of_stations_that_the_blade_lacks_is_refused(count):
+    with pytest.raises(InputError, match="blade_stations = .*: must be a whole number from 3 to"):
+        build_scene(wind=18.0, blade_stations=count)
+
+
+def test_stations_are_left_out_between_root_and_tip():
+    every = build_scene(wind=18.0).model.rotor.radius
+    some = build_scene(wind=18.0, blade_stations=5).model.rotor.radius
+    assert some.size == 5 and some[0] == every[0] and some[-1] == every[-1]
+    assert set(some) <= set(every)
+
+
+def test_strips_are_no_longer_than_asked_for():
+    fine, coarse = (build_scene(strip_length=length).model.strips for length in (3.0, 12.0))
+    assert fine.nodes > coarse.nodes
+    with pytest.raises(InputError, match="strip_length = 0.0: must be a number in"):
+        build_scene(strip_length=0.0)

@@ -194,6 +194,22 @@ def test_control_instants_are_control_dt_apart(storm_scene, turbine):
     assert np.allclose(Clock.times, 0.2 * np.arange(10), rtol=0.0, atol=1e-12)
 
 
+def test_a_controller_that_asks_is_given_the_scene_once_before_it_starts(storm_scene):
+    class Asking(Delegate):
+        calls = []
+
+        def prepare(self, scene):
+            self.calls.append(scene)
+
+        def reset(self, measurement):
+            self.calls.append("reset")
+            super().reset(measurement)
+
+    asking = Asking(storm_scene.turbine, 0.1)
+    run(storm_scene, controller=asking, duration=1.0)
+    assert asking.calls == [storm_scene, "reset"]
+
+
 def test_controller_that_returns_nan_is_named(storm_scene, turbine):
     class Broken(Delegate):
         def act(self, measurement):

@@ -58,6 +58,11 @@ class Kind:
     absent: str = ""  # what this kind leaves out of the compiled code
 
     @property
+    def begin(self):
+        """start of simulate: without lines no floating steady state withstands the wind."""
+        return "zero" if self.options.get("mooring", True) is False else "trim"
+
+    @property
     def controlled(self):
         return self.wind is not None and not self.parked
 
@@ -73,7 +78,7 @@ class Kind:
 
     def start(self, scene):
         """(state, command) that runs of this kind begin with."""
-        x, u = initial_state(scene)
+        x, u = initial_state(scene, self.begin)
         if self.parked:
             x[State.ROTOR_SPEED] = u[0] = 0.0
             x[State.BLADE_PITCH] = u[1] = scene.turbine.pitch_drive.maximum
@@ -97,6 +102,11 @@ KINDS = {
     "no wind, waves": Kind(None, SEA, absent="wind, rotor, tower drag"),
     "still water, no wind": Kind(None, None, absent="waves, wind, rotor, tower drag"),
     "parked in a storm": Kind(40.0, SEA, parked=True),
+    "planar, fast": Kind(
+        TURBULENCE, SEA, "fast", {"planar": True}, absent="sway, roll, yaw: 3x3 instead of 6x6 solve"
+    ),
+    "planar": Kind(TURBULENCE, SEA, options={"planar": True}, absent="sway, roll, yaw; 3x3 solve"),
+    "mooring by table": Kind(TURBULENCE, SEA, options={"mooring": "table"}, absent="catenary iterations"),
     "no mooring": Kind(TURBULENCE, SEA, options={"mooring": False}, absent="mooring"),
     "platform held": Kind(TURBULENCE, SEA, platform_held=True, absent="6x6 solve (at run time)"),
     "no water": Kind(
@@ -265,7 +275,10 @@ def measure_kind(name, seconds=600.0, repeats=REPEATS, calls=CHUNK):
     row["simulate_x"] = float("nan")
     if not kind.parked:  # simulate starts from the running rotor
         whole = median_time(
-            lambda: simulate(scene, "pi" if kind.controlled else None, duration=seconds), repeats
+            lambda: simulate(
+                scene, "pi" if kind.controlled else None, duration=seconds, start=kind.begin
+            ),
+            repeats,
         )
         row["simulate_x"] = seconds / whole
     row.update({f"{load} (us)": value for load, value in load_times(held, x, u, calls, repeats).items()})

@@ -29,6 +29,7 @@ CHANNELS = {
     "rotor_speed": "RotSpeed_[rpm]",
     "fairlead_tension": "FAIRTEN1_[kN]",
 }
+UNITS = {"wave_components": "components", "blade_stations": "stations", "strip_length": "m strips"}
 EXACT = {"rotor": "bem", "wave_loads": "exact", "integrator": "rk4"}
 COLUMNS = (
     "seed", "variant", "axis", "integrator", "dt_s", "rotor", "wave_loads", "components", "seconds",
@@ -55,12 +56,12 @@ class Variant:
     dt: float
     rotor: str
     wave_loads: str
-    components: int | None = None  # None: the sea's own number
+    options: tuple = ()  # further options of build_scene, as (name, value)
 
     @property
     def name(self):
-        parts = f"{self.integrator} {self.dt:g} s, {self.rotor}, {self.wave_loads} waves"
-        return parts if self.components is None else f"{parts}, {self.components} components"
+        parts = [f"{self.integrator} {self.dt:g} s", self.rotor, f"{self.wave_loads} waves"]
+        return ", ".join(parts + [f"{value:g} {UNITS[name]}" for name, value in self.options])
 
 
 def variants():
@@ -72,7 +73,15 @@ def variants():
     ]
     found += [Variant("rotor", "rk4", 0.025, rotor, "exact") for rotor in ("lookup", "table")]
     found += [Variant("waves", "rk4", 0.025, "bem", "fast")]
-    found += [Variant("wave components", "rk4", 0.025, "bem", "fast", n) for n in (200, 100, 50)]
+    found += [
+        Variant(axis, "rk4", 0.025, "bem", waves, ((option, value),))
+        for axis, option, waves, values in (
+            ("wave components", "wave_components", "fast", (200, 100, 50)),
+            ("stations per blade", "blade_stations", "exact", (13, 9, 6)),
+            ("strips", "strip_length", "exact", (1.5, 6.0, 12.0)),
+        )
+        for value in values
+    ]
     found += [
         Variant("all together", name, dt, rotor, "fast")
         for rotor in ("lookup", "table")
@@ -85,7 +94,7 @@ def variants():
 def _scene(variant, seed, duration, wind, sea):
     return build_scene(
         wind=wind, sea=sea, seed=seed, duration=max(100.0, duration), rotor=variant.rotor,
-        wave_loads=variant.wave_loads, integrator=variant.integrator, wave_components=variant.components,
+        wave_loads=variant.wave_loads, integrator=variant.integrator, **dict(variant.options),
     )  # fmt: skip
 
 

@@ -1,22 +1,37 @@
 """What one run is judged by, computed from its OpenFAST-named columns."""
 
 import numpy as np
+import rainflow
 
 from fowt_env.errors import InputError
 
 TIME = "Time_[s]"
+ALL = ("mean", "std", "min", "max")
 # channel -> statistics; a channel that a run lacks (mooring without lines) gives NaN
 STATISTICS = {
-    "Wind1VelX_[m/s]": ("mean", "std"),
-    "Wave1Elev_[m]": ("std",),
-    "RotSpeed_[rpm]": ("mean", "std", "min", "max"),
-    "GenPwr_[kW]": ("mean", "std", "min", "max"),
-    "PtfmPitch_[deg]": ("mean", "std", "min", "max"),
-    "PtfmSurge_[m]": ("mean", "std", "min", "max"),
-    "BldPitch1_[deg]": ("mean", "std", "min", "max"),
-    "TwrBsMyt_[kN-m]": ("std", "max"),
-    "NcIMUTAxs_[m/s^2]": ("rms",),
+    "Wind1VelX_[m/s]": ALL,
+    "Wave1Elev_[m]": ALL,
+    "RotSpeed_[rpm]": ALL,
+    "GenPwr_[kW]": ALL,
+    "GenTq_[kN-m]": ALL,
+    "PtfmPitch_[deg]": ALL,
+    "PtfmSurge_[m]": ALL,
+    "PtfmHeave_[m]": ALL,
+    "PtfmRoll_[deg]": ALL,
+    "PtfmYaw_[deg]": ALL,
+    "BldPitch1_[deg]": ALL,
+    "RotThrust_[kN]": ALL,
+    "RotTorq_[kN-m]": ALL,
+    "TwrBsMyt_[kN-m]": ALL,
+    "NcIMUTAxs_[m/s^2]": (*ALL, "rms"),
 }
+# Inverse slopes m of the S-N curves. Welded steel of the tower: 4, the usual choice for tubular towers in
+# IEC 61400-1 practice. Stud or studless chain at the fairlead: 3 (DNV-OS-E301, T-N curves; 5 is wire rope's).
+TOWER_EXPONENT, CHAIN_EXPONENT = 4.0, 3.0
+# The constraints of the ATLAS Offshore contest (ARPA-E, 2019).
+BLADE_PITCH_RATE_LIMIT = 10.0  # deg/s
+TOWER_TOP_ACCELERATION_LIMIT = 3.3  # m/s2
+ROTOR_SPEED_LIMIT = 1.3  # of rated: 15.73 rpm
 REQUIRED = (
     TIME,
     "RotSpeed_[rpm]",
@@ -44,10 +59,21 @@ def _metric_name(channel, statistic):
 METRICS = (
     *(_metric_name(channel, s) for channel, statistics in STATISTICS.items() for s in statistics),
     "overspeed_[%]",
+    "energy_[kWh]",
     "blade_pitch_travel_[deg/s]",
+    "actuator_duty_[%]",
     "torque_travel_[kN-m/s]",
     "FAIRTEN_std_[kN]",
     "FAIRTEN_max_[kN]",
+    "TwrBsMyt_DEL_[kN-m]",
+    "RotTorq_DEL_[kN-m]",
+    "FAIRTEN_DEL_[kN]",
+    "blade_pitch_rate_beyond_[s]",
+    "blade_pitch_rate_violations_[-]",
+    "tower_top_acceleration_beyond_[s]",
+    "tower_top_acceleration_violations_[-]",
+    "rotor_speed_beyond_[s]",
+    "rotor_speed_violations_[-]",
 )
 
 
@@ -56,16 +82,75 @@ def travel(time, value):
     return float(np.sum(np.abs(np.diff(value))) / (time[-1] - time[0]))
 
 
-def metrics(df, skip=0.0, rated_speed_rpm=12.1):
+def damage_equivalent_load(values, duration, exponent):
+    """Range (unit of values) of the 1 Hz cycles that do the same fatigue damage in this time.
+
+    (sum n_i S_i^m / duration)^(1/m) over the rainflow cycles of the series (ASTM E1049-85, 5.4.4): ranges
+    S_i, counts n_i (what is left over counts half), m the inverse slope of the S-N curve, duration in s.
+    No mean-load correction. NaN anywhere gives NaN.
+    """
+    values = np.asarray(values, dtype=np.float64)
+    if not np.isfinite(values).all():
+        return float("nan")
+    damage = sum(count * cycle**exponent for cycle, _, count, _, _ in rainflow.extract_cycles(values))
+    return float((damage / duration) ** (1.0 / exponent))
+
+
+def beyond(time, value, limit):
+    """(seconds that evenly spaced values spend above a limit, times that they come to do so); NaN of NaN."""
+    if not np.isfinite(value).all():
+        return float("nan"), float("nan")
+    above = value > limit
+    rises = int(np.sum(above[1:] & ~above[:-1])) + int(above[0])
+    return float(np.sum(above) * (time[-1] - time[0]) / (len(time) - 1)), float(rises)
+
+
+def metrics(df, skip=0.0, rated_speed_rpm=12.1, pitch_rate_limit=8.0):
     """{metric: value} of a run, in the order and with the names of METRICS.
 
-    df               output of simulate: evenly spaced rows
-    skip             seconds at the start that are left out (start-up transient)
-    rated_speed_rpm  overspeed is the greatest rotor speed above this, in percent of it
+    df                output of simulate: evenly spaced rows
+    skip              seconds at the start that are left out (start-up transient)
+    rated_speed_rpm   overspeed is the greatest rotor speed above this, in percent of it
+    pitch_rate_limit  of the blade-pitch drive, deg/s: the actuator duty is the mean rate in percent of it
     Standard deviations are about the run's own mean (N in the denominator). Travel is the sum of
-    absolute steps per second. FAIRTEN: the line for which the figure is greatest.
+    absolute steps per second. DEL: 1 Hz damage-equivalent load, exponent 4 (tower base fore-aft, shaft
+    torque) or 3 (fairlead). FAIRTEN: the line for which the figure is greatest. beyond: seconds past a
+    constraint (blade-pitch rate 10 deg/s, tower-top acceleration 3.3 m/s2, rotor speed 1.3 times rated),
+    violations: how often it was passed.
     Raises: InputError for missing columns or if skip leaves fewer than two rows.
     """
+    kept = _kept(df, skip)
+    time = kept[TIME].to_numpy()
+    length = time[-1] - time[0]
+    result = {}
+    for channel, statistics in STATISTICS.items():
+        values = kept[channel].to_numpy() if channel in kept.columns else None
+        for statistic in statistics:
+            value = np.nan if values is None else REDUCTIONS[statistic](values)
+            result[_metric_name(channel, statistic)] = float(value)
+    fastest = result["RotSpeed_max_[rpm]"]
+    # a plain max() would turn NaN into 0
+    result["overspeed_[%]"] = float(np.maximum(0.0, 100.0 * (fastest / rated_speed_rpm - 1.0)))
+    result["energy_[kWh]"] = float(np.trapezoid(kept["GenPwr_[kW]"], time) / 3600.0)
+    blade_pitch = kept["BldPitch1_[deg]"].to_numpy()
+    result["blade_pitch_travel_[deg/s]"] = travel(time, blade_pitch)
+    result["actuator_duty_[%]"] = 100.0 * result["blade_pitch_travel_[deg/s]"] / pitch_rate_limit
+    result["torque_travel_[kN-m/s]"] = travel(time, kept["GenTq_[kN-m]"].to_numpy())
+    lines = kept[[name for name in kept.columns if name.startswith("FAIRTEN")]].to_numpy()
+    result["FAIRTEN_std_[kN]"] = float(lines.std(axis=0).max()) if lines.size else np.nan
+    result["FAIRTEN_max_[kN]"] = float(lines.max()) if lines.size else np.nan
+    loads = [damage_equivalent_load(line, length, CHAIN_EXPONENT) for line in lines.T]
+    result["FAIRTEN_DEL_[kN]"] = float(np.max(loads)) if loads else np.nan
+    for name in ("TwrBsMyt", "RotTorq"):
+        load = kept.get(f"{name}_[kN-m]")
+        value = np.nan if load is None else damage_equivalent_load(load, length, TOWER_EXPONENT)
+        result[f"{name}_DEL_[kN-m]"] = value
+    result |= _violations(kept, time, blade_pitch, rated_speed_rpm)
+    return {name: result[name] for name in METRICS}
+
+
+def _kept(df, skip):
+    """The scored rows of a run. Raises: InputError."""
     missing = [name for name in REQUIRED if name not in df.columns]
     if missing:
         raise InputError(f"metrics: the run lacks the columns {', '.join(missing)}")
@@ -76,19 +161,25 @@ def metrics(df, skip=0.0, rated_speed_rpm=12.1):
     if len(kept) < 2:
         length = time[-1] - time[0] if len(time) else 0.0
         raise InputError(f"skip = {skip} s: leaves fewer than two rows of a run of {length:g} s")
-    time = kept[TIME].to_numpy()
+    return kept
+
+
+def _violations(kept, time, blade_pitch, rated_speed_rpm):
+    """The metrics of the constraints; the acceleration is the horizontal one, fore-aft and side to side."""
+    rate = np.abs(np.diff(blade_pitch) / np.diff(time))
+    axes = [
+        kept[name].to_numpy() for name in ("NcIMUTAxs_[m/s^2]", "NcIMUTAys_[m/s^2]") if name in kept.columns
+    ]
+    found = {
+        "blade_pitch_rate": (time[1:], rate, BLADE_PITCH_RATE_LIMIT) if len(rate) > 1 else None,
+        "tower_top_acceleration": (time, np.hypot.reduce(axes), TOWER_TOP_ACCELERATION_LIMIT)
+        if axes
+        else None,
+        "rotor_speed": (time, kept["RotSpeed_[rpm]"].to_numpy(), ROTOR_SPEED_LIMIT * rated_speed_rpm),
+    }
     result = {}
-    for channel, statistics in STATISTICS.items():
-        values = kept[channel].to_numpy() if channel in kept.columns else None
-        for statistic in statistics:
-            value = np.nan if values is None else REDUCTIONS[statistic](values)
-            result[_metric_name(channel, statistic)] = float(value)
-    fastest = result["RotSpeed_max_[rpm]"]
-    # a plain max() would turn NaN into 0
-    result["overspeed_[%]"] = float(np.maximum(0.0, 100.0 * (fastest / rated_speed_rpm - 1.0)))
-    result["blade_pitch_travel_[deg/s]"] = travel(time, kept["BldPitch1_[deg]"].to_numpy())
-    result["torque_travel_[kN-m/s]"] = travel(time, kept["GenTq_[kN-m]"].to_numpy())
-    lines = kept[[name for name in kept.columns if name.startswith("FAIRTEN")]].to_numpy()
-    result["FAIRTEN_std_[kN]"] = float(lines.std(axis=0).max()) if lines.size else np.nan
-    result["FAIRTEN_max_[kN]"] = float(lines.max()) if lines.size else np.nan
-    return {name: result[name] for name in METRICS}
+    for name, series in found.items():
+        seconds, count = (np.nan, np.nan) if series is None else beyond(*series)
+        result[f"{name}_beyond_[s]"] = seconds
+        result[f"{name}_violations_[-]"] = count
+    return result

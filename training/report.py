@@ -1,9 +1,15 @@
 """What people look at after an evaluation: the printed table and the plots."""
 
+import json
+from dataclasses import replace
+
 from fowt_env.description import Platform, read_platform
+from fowt_env.errors import unknown
 from fowt_env.outputs import read_table
-from fowt_env.plots import plot_evaluation, plot_runs, plot_spectra
-from training.evaluate import run_file
+from fowt_env.plots import plot_evaluation, plot_pareto, plot_runs, plot_spectra
+from training.cases import Score, named_cases, read_suite
+from training.leaderboard import leaderboard
+from training.results import run_file, write_json
 
 # printed columns: heading, metric, format
 HEADLINE = (
@@ -57,30 +63,153 @@ def summary_rows(means, width):
     return headings, list(zip(*texts, strict=True)), list(means["failed"])
 
 
-def evaluation_plots(table, folder, cases, skip=0.0):
-    """Paths of the plots made of an evaluation of Cases whose runs lie in folder/runs.
+def chosen_cases(suite, cases):
+    """Suite or list of Cases for the names of a suite and of cases, either of which may be None.
 
-    metrics.png compares the controllers over all cases; timeseries_CASE.png and spectra_CASE.png show
-    the first seed of each case that went well. skip: s left out of the spectra.
+    Raises: InputError for an unknown name, and for a case that the suite does not hold.
     """
+    if suite is None:
+        return named_cases("above_rated" if cases is None else cases)
+    whole = read_suite(suite)
+    if cases is None:
+        return whole
+    known = {case.name: case for case in whole.cases}
+    wanted = [name.strip() for name in cases.split(",") if name.strip()]
+    for name in wanted:
+        if name not in known:
+            raise unknown(f"case of suite {whole.name!r}", name, known)
+    return replace(whole, cases=tuple(known[name] for name in dict.fromkeys(wanted)))
+
+
+def write_leaderboard(table, folder, baseline=None):
+    """Mapping of the leaderboard of a results folder, also written to leaderboard.json in it.
+
+    The settings are those of the folder's manifest.json.
+    Raises: InputError for a baseline that was not evaluated.
+    """
+    manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
+    rule = (manifest["suite"] or {}).get("score")
+    board = {
+        key: manifest[key]
+        for key in ("format", "fowt_env", "plant", "versions", "suite", "options", "created")
+    } | leaderboard(table, baseline, None if rule is None else Score(**rule))
+    write_json(board, folder / "leaderboard.json")
+    return board
+
+
+# the printed leaderboard: heading, metric, format, with its interval, with its paired difference
+LEADERBOARD = (
+    ("rotor speed std\nrpm", "RotSpeed_std_[rpm]", ".3f", True, True),
+    ("platform pitch std\ndeg", "PtfmPitch_std_[deg]", ".3f", True, True),
+    ("pitch travel\ndeg/s", "blade_pitch_travel_[deg/s]", ".3f", True, True),
+    ("overspeed\nmax %", "overspeed_[%]", ".1f", False, False),
+    ("power mean\nkW", "GenPwr_mean_[kW]", ".0f", False, True),
+    ("tower DEL\nMN m", "TwrBsMyt_DEL_[kN-m]", ".1f", False, True),
+    ("fairlead DEL\nkN", "FAIRTEN_DEL_[kN]", ".1f", False, True),
+)
+LEADERBOARD_SCALES = {"TwrBsMyt_DEL_[kN-m]": 1e-3}
+# left out one by one where the terminal is narrow; travel and overspeed stay beside the deviations
+LEADERBOARD_DROPS = ("FAIRTEN_DEL_[kN]", "TwrBsMyt_DEL_[kN-m]", "GenPwr_mean_[kW]")
+
+
+def leaderboard_rows(board, width=200):
+    """(title, headings, rows of texts) of a leaderboard mapping, at most `width` characters wide if possible.
+
+    A difference is in percent of the baseline, "*" where its interval leaves out zero.
+    """
+    level = round(100 * board["interval"]["level"])
+    baseline = board["baseline"]
+    name = "" if not board.get("suite") else f"suite {board['suite']['name']} {board['suite']['version']}, "
+    title = (
+        f"{name}{len(board['cases'])} cases, seeds {_ranges(board['seeds'])}: mean over cases"
+        f" [{level} % interval], paired difference from {baseline} (* interval without zero)"
+    )
+    dropped = set()
+    for drop in (None, *LEADERBOARD_DROPS):
+        dropped.add(drop)
+        columns = [("controller", [entry["controller"] for entry in board["controllers"]])]
+        columns.append(("runs", [f"{e['runs'] - e['failed']}/{e['runs']}" for e in board["controllers"]]))
+        if any(entry["score"] for entry in board["controllers"]):
+            columns.append(("score", [_score_text(entry["score"]) for entry in board["controllers"]]))
+        for heading, metric, form, with_interval, with_difference in LEADERBOARD:
+            if metric not in dropped:
+                texts = [
+                    _cell(
+                        entry,
+                        metric,
+                        form,
+                        with_interval,
+                        with_difference and entry["controller"] != baseline,
+                    )
+                    for entry in board["controllers"]
+                ]
+                columns.append((heading, texts))
+        if sum(2 + max(map(len, [*heading.split("\n"), *texts])) for heading, texts in columns) <= width:
+            break
+    headings, texts = zip(*columns, strict=True)
+    return title, headings, list(zip(*texts, strict=True))
+
+
+def _ranges(seeds):
+    """ "1-6, 9" for [1, 2, 3, 4, 5, 6, 9]."""
+    parts = []
+    for seed in seeds:
+        if parts and seed == parts[-1][1] + 1:
+            parts[-1][1] = seed
+        else:
+            parts.append([seed, seed])
+    return ", ".join(str(low) if low == high else f"{low}-{high}" for low, high in parts)
+
+
+def _cell(entry, metric, form, with_interval, with_difference):
+    """Text of one figure: mean [low, high] difference %."""
+    figure, gap = entry["metrics"][metric], entry["difference"][metric]
+    scale = LEADERBOARD_SCALES.get(metric, 1.0)
+    if figure["mean"] != figure["mean"]:
+        return "-"
+    if metric == "overspeed_[%]":
+        return format(figure["worst"], form)
+    text = format(scale * figure["mean"], form)
+    if with_interval and figure["low"] == figure["low"]:
+        text += f" [{format(scale * figure['low'], form)}, {format(scale * figure['high'], form)}]"
+    if with_difference and gap["percent"] == gap["percent"]:
+        sure = gap["low"] > 0.0 or gap["high"] < 0.0
+        text += f" {gap['percent']:+.1f}%{'*' if sure else ' '}"
+    return text
+
+
+def _score_text(score):
+    """Text of a score; in brackets where a limit is passed."""
+    if score is None or score["mean"] is None:
+        return "-"
+    return f"{score['mean']:.3f}" if score["valid"] else f"({score['mean']:.3f})"
+
+
+def evaluation_plots(table, board, folder):
+    """Paths of the plots made of a results folder, its table and its leaderboard.
+
+    pareto.png sets rotor-speed against platform-pitch deviation; metrics.png compares the controllers over
+    all cases; timeseries_CASE.png and spectra_CASE.png show the first seed of each case that went well.
+    """
+    manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
     good = table[table["status"] == "ok"]
     if good.empty:
         return []
-    paths = [folder / "metrics.png"]
-    plot_evaluation(table, [name for _, name, _ in HEADLINE], paths[0], "Mean over seeds, with their range")
-    for case in cases:
-        rows = good[good["case"] == case.name]
+    paths = [folder / "pareto.png", folder / "metrics.png"]
+    plot_pareto(board, paths[0])
+    plot_evaluation(table, [name for _, name, _ in HEADLINE], paths[1], "Mean over seeds, with their range")
+    for case, about in manifest["cases"].items():
+        rows = good[good["case"] == case]
         if rows.empty:
             continue
         seed = rows["seed"].iloc[0]
         names = rows.loc[rows["seed"] == seed, "controller"]
-        runs = {name: read_table(run_file(folder / "runs", name, case.name, seed)) for name in names}
-        paths += [folder / f"timeseries_{case.name}.png", folder / f"spectra_{case.name}.png"]
-        title = f"{case.name}, seed {seed}"
+        runs = {name: read_table(run_file(folder / "runs", name, case, seed)) for name in names}
+        paths += [folder / f"timeseries_{case}.png", folder / f"spectra_{case}.png"]
+        title = f"{case}, seed {seed}"
         plot_runs(runs, paths[-2], title)
-        plot_spectra(
-            runs, paths[-1], title, skip, platform_pitch_period=_platform_pitch_period(case.platform)
-        )
+        period = _platform_pitch_period(about["platform"])
+        plot_spectra(runs, paths[-1], title, about["skip"], platform_pitch_period=period)
     return paths
 
 

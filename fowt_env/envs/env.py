@@ -68,7 +68,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     duration     s of an episode; None: the task's
     wind, sea    in place of the task's, ranges included (None: the task's)
     wind_preview look-ahead times (s) of the channel wind_preview
-    render_mode  None
+    render_mode  None, "rgb_array" (render() returns a picture) or "human" (every step shows one in a window)
     fidelity     level of build_scene: "reference", "standard" or "fast"
     options      further ones go to build_scene
 
@@ -87,12 +87,14 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     (platform pitch beyond 80 deg) or a state that is not finite; info["termination"] has the reason. It
     is truncated at the end of its duration.
 
+    A picture shows one control period, so that 30 of them a second are three times real time.
+
     info of each step: "time" (s), "saturated_actions", "reward/<term>" for each term before weighting.
 
     Raises: InputError for settings and actions that cannot be used.
     """
 
-    metadata = {"render_modes": []}
+    metadata = {"render_modes": ["human", "rgb_array"], "render_fps": 30}
 
     def __init__(
         self,
@@ -113,10 +115,15 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         **options: Any,
     ) -> None:
         if render_mode is not None:
-            raise InputError(f"render_mode = {render_mode!r}: allowed None")
+            if render_mode not in self.metadata["render_modes"]:
+                raise unknown("render_mode", render_mode, self.metadata["render_modes"])
+            from fowt_env.envs.rendering import load_pygame  # nobody else pays for it
+
+            load_pygame()
         if action_mode not in MODES:
             raise unknown("action_mode", action_mode, MODES)
-        self.render_mode = None
+        self.render_mode = render_mode
+        self._view: Any = None
         task = _adapted(task_of(task), rotor, observation, reward, duration, wind, sea, wind_preview)
         self.task = task
         self.action_mode = action_mode
@@ -151,6 +158,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         other = copy(self)
         other._np_random = other._np_random_seed = None
         other._running = False
+        other._view = None
         other._build(MODES[self.action_mode], self._setting.per_control)
         return other
 
@@ -222,6 +230,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self._offset(episode.offsets)
         start(self._box)
         if self._baseline is not None:
+            self._baseline.prepare(scene)
             self._baseline.reset(self.measurement())
         elif self._setting.actions.mode == Mode.SETPOINT:
             start_tracking(run.memory, self.measurement(), self._setting.actions)
@@ -232,6 +241,8 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             "wind_speed": self.scene.wind_speed,
             "episode": deepcopy(episode._asdict()),
         }
+        if self.render_mode == "human":
+            self.render()
         return run.observation.copy(), info
 
     def _offset(self, offsets):
@@ -288,6 +299,8 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             info["termination"] = REASONS[status]
         if terminated or truncated:
             self._running = False
+        if self.render_mode == "human":
+            self.render()
         return run.observation.copy(), reward, terminated, truncated, info
 
     def get_state(self) -> Snapshot:
@@ -354,6 +367,34 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         output(scene.box(work), run.x, run.u, time, np.zeros_like(run.x), row)
         values = to_units(row[None, :], scene.n_lines)[0].tolist()
         return dict(zip((channel.name for channel in scene.channels), values, strict=True))
+
+    def render(self) -> np.ndarray | None:
+        """Picture of the present instant, (640, 960, 3) uint8; None in mode "human", which shows it.
+
+        Without a render mode it warns, as Gymnasium's own environments do, and returns None.
+        """
+        if self.render_mode is None:
+            gymnasium.logger.warn("render() needs a render_mode: FowtEnv(..., render_mode='rgb_array')")
+            return None
+        from fowt_env.envs.rendering import View
+
+        row = self.channels()
+        if self._view is None:
+            self._view = View([self.scene])
+        elif self._view.panels[0].scene is not self.scene:
+            self._view.enter(self.scene)
+        self._view.draw([row])
+        if self.render_mode == "rgb_array":
+            return self._view.array()
+        self._view.show(self.metadata["render_fps"])
+        return None
+
+    def close(self) -> None:
+        """Close the window of render mode "human"."""
+        if self._view is not None:
+            self._view.close()
+            self._view = None
+        super().close()
 
 
 FowtEnv.__doc__ = f"{FowtEnv.__doc__}\n{task_tables(TASKS['above_rated'])}"

@@ -5,6 +5,7 @@ import pickle
 from dataclasses import replace
 from math import floor
 
+from fowt_env.records import Record
 from fowt_env.steady import trim
 
 GRID = 0.25  # m/s between exact trims; between them the state is linear in the wind speed
@@ -12,10 +13,16 @@ _KNOWN = {}  # (plant, shear exponent, wind speed) -> (state, command)
 
 
 def plant_key(scene):
-    """Hash of all that a trim depends on, apart from the wind."""
+    """Hash of all that a trim depends on, apart from the wind; the same in every process."""
     weather = ("duration", "wave_components")
-    options = {name: value for name, value in scene.options.items() if name not in weather}
-    return hashlib.sha256(pickle.dumps((scene.platform, scene.turbine, scene.rotor, options))).hexdigest()
+    options = {name: _values(value) for name, value in scene.options.items() if name not in weather}
+    parts = (_values(scene.platform), _values(scene.turbine), scene.rotor, options)
+    return hashlib.sha256(pickle.dumps(parts)).hexdigest()
+
+
+def _values(part):
+    """A record as plain values: as an object it carries a set, whose order is each process's own."""
+    return part.model_dump() if isinstance(part, Record) else part
 
 
 def exact_trim(scene, key, speed):

@@ -70,6 +70,10 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
             raise unknown("autoreset_mode", autoreset_mode, MODES)
         self.autoreset_mode = autoreset_mode
         self.metadata = self.metadata | {"autoreset_mode": autoreset_mode}
+        if settings.get("render_mode") is not None:
+            raise InputError(
+                f"render_mode = {settings['render_mode']!r}: a vector environment has no pictures"
+            )
         most = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined] # set when numba starts
         self.threads = min(numba.get_num_threads(), num_envs) if threads is None else threads
         _count("threads", self.threads, most)

@@ -42,6 +42,8 @@ LANES = 16  # nodes computed side by side; a hull with more of them takes severa
 SURFACE_NODES = 4  # Gauss nodes of the surface section
 # Gauss nodes of a section below: this + this * ln(depth ratio); 3 of the taper, 8 of the cylinder of OC3
 NODES_AT_LEAST, NODES_PER_LOG = -2, 4.2
+# in still water a node costs next to nothing, and a decay's drag may turn its sign along the hull
+STILL_REFINEMENT = 2
 
 # rows of a block of Lanes.table: the section's ends (body z), the node's share of the wet height
 # above the bottom, its weight's share of it, and its diameter D0 + D1 z
@@ -110,8 +112,11 @@ class FastScratch(NamedTuple):
     lanes: np.ndarray  # (blocks, N_ROWS * LANES)
 
 
-def build_lanes(hull, strips):
-    """Lanes of a hull (description.Hull) with the constants of its exact twin, a Strips part."""
+def build_lanes(hull, strips, refinement=1):
+    """Lanes of a hull (description.Hull) with the constants of its exact twin, a Strips part.
+
+    refinement: times as many nodes below the surface section.
+    """
     columns = []
     sections = list(zip(hull.z[:-1], hull.z[1:], hull.diameter[:-1], hull.diameter[1:], strict=True))[::-1]
     for number, (bottom, top, lower, upper) in enumerate(sections):
@@ -121,7 +126,7 @@ def build_lanes(hull, strips):
         else:
             # Gauss in the logarithm of depth: wave motion at depth D varies over D
             stretch = log(bottom / top)
-            at, weight = _gauss(NODES_AT_LEAST + round(NODES_PER_LOG * stretch))
+            at, weight = _gauss(refinement * (NODES_AT_LEAST + round(NODES_PER_LOG * stretch)))
             z = top * np.exp(stretch * at)
             share, spread = (z - bottom) / (top - bottom), -weight * z * stretch / (top - bottom)
         slope = (upper - lower) / (top - bottom)

@@ -27,7 +27,20 @@ NEWTON_STEPS = 30
 MAX_STEPS = 120  # enough halvings (of the logarithm) for any bracket of finite doubles
 BRACKET_WIDTH = 4e-16  # relative: no double is left in between
 DEEPEST_SAG = 300.0  # above any root for spans that NEGLIGIBLE lets through; its sinh is finite
+# m: points of a LineTable, from so far inwards of the line's place at rest to so far outwards
+TABLE_X, TABLE_Z = 0.5, 1.0
+TABLE_INWARD, TABLE_OUTWARD, TABLE_HEIGHT = 60.0, 32.0, 30.0
 NEGLIGIBLE = 1e-100  # spans over L below this count as none, far below the rounding of any real one
+
+
+class LineTable(NamedTuple):
+    """Tensions of n lines at the fairlead over its place, C1 in both spans; a quarter of Newton's time.
+
+    tension: (n, places, heights, 2) H and V, N, at TABLE_X, TABLE_Z metres from origin.
+    """
+
+    origin: np.ndarray  # (n, 2) horizontal and vertical span of the first point, m
+    tension: np.ndarray
 
 
 class Mooring(NamedTuple):
@@ -39,6 +52,7 @@ class Mooring(NamedTuple):
     weight: np.ndarray  # (n,), in water per unstretched length, N/m
     EA: np.ndarray  # (n,), N
     friction: np.ndarray  # (n,), seabed friction coefficient C_B
+    table: object = None  # LineTable, or None: every line solved
 
 
 class Catenary(NamedTuple):
@@ -53,15 +67,15 @@ class Catenary(NamedTuple):
     converged: bool
 
 
-def build_mooring(lines):
-    """Mooring of a platform's `description.Line` records; None where it has no lines."""
+def build_mooring(lines, tabulated=False):
+    """Mooring of a platform's `description.Line` records (tabulated: with a LineTable); None without any."""
     if not lines:
         return None
 
     def column(name):
         return np.ascontiguousarray([getattr(line, name) for line in lines], dtype=np.float64)
 
-    return Mooring(
+    mooring = Mooring(
         anchor=column("anchor"),
         fairlead=column("fairlead"),
         length=column("length"),
@@ -69,6 +83,38 @@ def build_mooring(lines):
         EA=column("EA"),
         friction=column("seabed_friction"),
     )
+    return mooring._replace(table=_line_table(mooring)) if tabulated else mooring
+
+
+def _line_table(mooring):
+    """LineTable of a Mooring about its lines' spans at rest."""
+    span = mooring.anchor - mooring.fairlead
+    rest = np.column_stack([np.hypot(span[:, 0], span[:, 1]), -span[:, 2]])
+    first = rest - [TABLE_INWARD, 0.5 * TABLE_HEIGHT]
+    first[:, 0] = np.maximum(first[:, 0], TABLE_X)
+    counts = (int((TABLE_INWARD + TABLE_OUTWARD) / TABLE_X) + 1, int(TABLE_HEIGHT / TABLE_Z) + 1)
+    tension = np.zeros((len(rest), *counts, 2))
+    _fill_tensions(first, tension, mooring)
+    return LineTable(np.ascontiguousarray(first), tension)
+
+
+@kernel
+def _fill_tensions(origin, tension, mooring):
+    """Put the solutions at the points of a LineTable into tension."""
+    for i in range(tension.shape[0]):
+        for j in range(tension.shape[1]):
+            for k in range(tension.shape[2]):
+                line = catenary(
+                    origin[i, 0] + TABLE_X * j,
+                    origin[i, 1] + TABLE_Z * k,
+                    mooring.length[i],
+                    mooring.weight[i],
+                    mooring.EA[i],
+                    mooring.friction[i],
+                    0.0,
+                )
+                tension[i, j, k, 0] = line.H
+                tension[i, j, k, 1] = line.V
 
 
 @kernel
@@ -235,6 +281,51 @@ def catenary(x_f, z_f, length, weight, EA, friction, h0):
 
 
 @kernel
+def _cubic(x):
+    """Weights of four evenly spaced points for a value x of the way from the second to the third, C1."""
+    rest = 1.0 - x
+    return (
+        -0.5 * x * rest * rest,
+        1.0 + x * x * (1.5 * x - 2.5),
+        x * (0.5 + x * (2.0 - 1.5 * x)),
+        -0.5 * x * x * rest,
+    )
+
+
+@kernel
+def _tensions(x_f, z_f, i, table):
+    """(inside, H, V) of line i between the points of the table."""
+    x, z = (x_f - table.origin[i, 0]) / TABLE_X, (z_f - table.origin[i, 1]) / TABLE_Z
+    value = table.tension[i]
+    if not (1.0 <= x < value.shape[0] - 2.0 and 1.0 <= z < value.shape[1] - 2.0):
+        return False, 0.0, 0.0
+    j, k = int(x), int(z)
+    across, up = _cubic(x - j), _cubic(z - k)
+    H = V = 0.0
+    for n in range(4):
+        row = value[j - 1 + n]
+        a, b, c, d = row[k - 1], row[k], row[k + 1], row[k + 2]
+        H += across[n] * (up[0] * a[0] + up[1] * b[0] + up[2] * c[0] + up[3] * d[0])
+        V += across[n] * (up[0] * a[1] + up[1] * b[1] + up[2] * c[1] + up[3] * d[1])
+    return H > 0.0, H, V
+
+
+@kernel
+def line_state(x_f, z_f, i, mooring, table, start):
+    """Catenary of line i; from the table where there is one and it reaches, else solved from H = start."""
+    length, weight, friction = mooring.length[i], mooring.weight[i], mooring.friction[i]
+    if table is not None:
+        inside, H, V = _tensions(x_f, z_f, i, table)
+        if inside:
+            W = weight * length
+            if V < W:
+                anchor = max(H - friction * (W - V), 0.0)
+                return Catenary(H, V, hypot(H, V), anchor, length * (1.0 - V / W), TOUCHDOWN, True)
+            return Catenary(H, V, hypot(H, V), hypot(H, V - W), 0.0, SUSPENDED, True)
+    return catenary(x_f, z_f, length, weight, mooring.EA[i], friction, start)
+
+
+@kernel
 def mooring_load(pose, mooring, lines, counters):
     """Wrench of all mooring lines on the platform, body axes, about the body origin (theory.md, 5.5).
 
@@ -253,15 +344,7 @@ def mooring_load(pose, mooring, lines, counters):
         dy = mooring.anchor[i, 1] - (pose.y + pose.r21 * bx + pose.r22 * by + pose.r23 * bz)
         z_f = pose.z + pose.r31 * bx + pose.r32 * by + pose.r33 * bz - mooring.anchor[i, 2]
         x_f = hypot(dx, dy)
-        line = catenary(
-            x_f,
-            z_f,
-            mooring.length[i],
-            mooring.weight[i],
-            mooring.EA[i],
-            mooring.friction[i],
-            lines[i, 0],
-        )
+        line = line_state(x_f, z_f, i, mooring, mooring.table, lines[i, 0])
         lines[i, 0] = line.H
         lines[i, 1] = line.V
         lines[i, 2] = line.fairlead_tension

@@ -10,8 +10,10 @@ import pytest
 from naive.turbine import turbine
 
 import controllers
-from controllers import CONTROLLERS, CheckedController, make
+from controllers import CONTROLLERS, CheckedController, information, make
+from controllers.base import EXTRA
 from controllers.constant import Constant
+from fowt_env import build_scene
 from fowt_env.errors import ControllerError, InputError
 from fowt_env.measurement import Measurement
 
@@ -20,6 +22,9 @@ QUIET = Measurement(*[0.0] * len(Measurement._fields))
 RATED = QUIET._replace(
     rotor_speed=1.267109, generator_speed=122.9096, generator_torque=43093.55, blade_pitch=0.2
 )
+
+
+ROSCO = {"rosco", "rosco_float"}  # not part of the package: tests of them are skipped without the library
 
 
 class Steady:
@@ -45,9 +50,23 @@ class Returning:
         return self.answer
 
 
-@pytest.mark.parametrize("name", sorted(CONTROLLERS))
-def test_every_controller_commands_within_the_turbines_limits(name):
+@pytest.fixture(scope="module")
+def scene():
+    return build_scene("oc3_hywind", wind=18.0, duration=100.0, fidelity="standard")
+
+
+def prepared(name, scene):
+    """A controller by name, told of a scene."""
+    if name in ROSCO:
+        pytest.importorskip("rosco", reason="needs the ROSCO library: pip install --no-deps rosco")
     controller = make(name, turbine(), 0.1)
+    controller.prepare(scene)
+    return controller
+
+
+@pytest.mark.parametrize("name", sorted(CONTROLLERS))
+def test_every_controller_commands_within_the_turbines_limits(name, scene):
+    controller = prepared(name, scene)
     rng = np.random.default_rng(4)
     controller.reset(RATED)
     for k in range(500):
@@ -59,8 +78,8 @@ def test_every_controller_commands_within_the_turbines_limits(name):
 
 
 @pytest.mark.parametrize("name", sorted(CONTROLLERS))
-def test_reset_forgets(name):
-    controller = make(name, turbine(), 0.1)
+def test_reset_forgets(name, scene):
+    controller = prepared(name, scene)
 
     def run():
         controller.reset(RATED)
@@ -72,9 +91,9 @@ def test_reset_forgets(name):
     assert run() == first
 
 
-@pytest.mark.parametrize("name", sorted(CONTROLLERS))
-def test_every_controller_survives_pickling(name):
-    controller = make(name, turbine(), 0.1)
+@pytest.mark.parametrize("name", sorted(set(CONTROLLERS) - ROSCO))
+def test_every_controller_of_ours_survives_pickling(name, scene):
+    controller = prepared(name, scene)
     controller.reset(RATED)
     controller.act(RATED)
     twin = pickle.loads(pickle.dumps(controller))
@@ -86,6 +105,28 @@ def test_every_controller_survives_pickling(name):
 def test_every_name_says_what_it_is(name):
     assert CONTROLLERS[name].__doc__
     assert make(name, turbine(), 0.1).name == name
+
+
+@pytest.mark.parametrize("name", sorted(CONTROLLERS))
+def test_every_name_says_what_it_uses(name):
+    used = information(name)
+    assert used
+    assert set(used) <= {*Measurement._fields, *EXTRA}
+
+
+def test_a_scene_reaches_only_controllers_that_ask_for_it():
+    class Asking(Steady):
+        information = ("blade_pitch", "wind_preview")
+
+        def prepare(self, scene):
+            self.scene = scene
+
+    asking = make(Asking, turbine(), 0.1)
+    asking.prepare("a scene")
+    assert asking.controller.scene == "a scene"
+    assert asking.information == ("blade_pitch", "wind_preview")
+    make(Steady, turbine(), 0.1).prepare("a scene")
+    make("pi", turbine(), 0.1).prepare("a scene")
 
 
 def test_constant_holds_what_was_measured_or_given():

@@ -417,7 +417,7 @@ def test_preview_shows_the_wind_that_comes():
     [
         ({"task": "above_rate"}, "Did you mean 'above_rated'"),
         ({"action_mode": "dirct"}, "Did you mean 'direct'"),
-        ({"render_mode": "human"}, "render_mode = 'human'"),
+        ({"render_mode": "humann"}, "'human'"),
         ({"dt": 0.03}, "does not divide control_dt"),
         ({"duration": 10.05}, "does not divide duration"),
         ({"duration": -1.0}, "duration = -1.0"),

@@ -1,6 +1,10 @@
 """Snapshots: a run goes on from one as if nothing had happened."""
 
+import os
 import pickle
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -119,3 +123,16 @@ def test_snapshots_of_other_settings_are_refused():
             quick(**settings).set_state(saved)
     with pytest.raises(InputError, match="must be what get_state"):
         env.set_state({"x": 0.0})
+
+
+def test_a_snapshot_is_of_the_same_kind_in_every_process():
+    code = "from fowt_env.envs import FowtEnv; print(*FowtEnv(rotor='bem', wave_components=20)._kind)"
+    root = Path(__file__).resolve().parents[2]
+    kinds = {
+        subprocess.run(
+            [sys.executable, "-c", code], env={**os.environ, "PYTHONHASHSEED": seed}, cwd=root,
+            capture_output=True, text=True, check=True,
+        ).stdout
+        for seed in ("1", "2")
+    }  # fmt: skip
+    assert len(kinds) == 1

@@ -556,3 +556,47 @@ def test_line_shape_ends_at_the_fairlead_and_strains_as_its_tension_says(x_f, z_
     strain += (ds * curvature) ** 2 / 24.0  # a chord is that much shorter than its arc
     whole = np.abs(V) > W * ds  # a segment that is part on the seabed, part lifted has no one tension
     assert strain[whole] == pytest.approx((T / EA)[whole], rel=1e-4, abs=1e-8)
+
+
+# The table
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.5])
+def test_tabulated_lines_pull_as_the_solved_ones(friction):
+    """Rms error over standard deviation of the wrench, in motions of operation and storms."""
+    exact, table = build_mooring(oc3_lines(friction)), build_mooring(oc3_lines(friction), tabulated=True)
+    rng = np.random.default_rng(5)
+    reach = np.array([25.0, 15.0, 6.0, 0.1, 0.15, 0.2])
+    motions = rng.uniform(-reach, reach, (500, 6))
+    a, b = (np.array([wrench(motion, mooring) for motion in motions]) for mooring in (table, exact))
+    assert np.all(np.std(a - b, axis=0) < 1e-4 * np.std(b, axis=0))
+
+
+def test_tabulated_lines_report_the_same_state():
+    exact, table = build_mooring(oc3_lines(0.5)), build_mooring(oc3_lines(0.5), tabulated=True)
+    for motion in ([0.0] * 6, [20.0, 3.0, 1.0, 0.0, 0.05, 0.1], [-8.0, 0.0, -2.0, 0.02, 0.0, 0.0]):
+        rows = np.zeros((2, 3, N_LINE))
+        for row, mooring in zip(rows, (table, exact), strict=True):
+            wrench(motion, mooring, row)
+        assert np.array_equal(rows[0, :, 5], rows[1, :, 5])
+        assert np.allclose(rows[0], rows[1], rtol=1e-4, atol=1e-2)
+
+
+def test_beyond_the_table_lines_are_solved():
+    exact, table = build_mooring(oc3_lines()), build_mooring(oc3_lines(), tabulated=True)
+    for motion in ([80.0, 0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 40.0, 0.0, 0.0, 0.0]):
+        lines = np.zeros((3, N_LINE)), np.zeros((3, N_LINE))
+        pulls = [wrench(motion, mooring, row) for mooring, row in zip((table, exact), lines, strict=True)]
+        outside = np.all(lines[0] == lines[1], axis=1)
+        assert outside.any()
+        assert np.allclose(*pulls, rtol=1e-4, atol=1e2)
+    assert np.all(np.isnan(wrench([np.nan, 0.0, 0.0, 0.0, 0.0, 0.0], table)[:3]))
+
+
+def test_the_tabulated_pull_has_no_steps():
+    """Neighbouring places differ by the stiffness times the distance, across the cells of the table too."""
+    table = build_mooring(oc3_lines(), tabulated=True)
+    surge = np.linspace(5.0, 6.0, 20001)
+    pull = np.array([wrench([s, 0.0, 0.0, 0.0, 0.0, 0.0], table)[0] for s in surge])
+    slope = np.diff(pull) / np.diff(surge)
+    assert np.abs(np.diff(slope)).max() < 0.01 * np.abs(slope).mean()

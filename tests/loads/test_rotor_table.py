@@ -37,7 +37,7 @@ def state(speed, blade_pitch, azimuth=0.0, velocity=(0,) * 6):
 
 
 def from_table(x, series, table=TABLE):
-    return rotor_table_load(0.0, pose_of(x), x, wind_now(0.0, series), series, None, table)
+    return rotor_table_load(pose_of(x), x, wind_now(0.0, series), series, table)
 
 
 def from_sections(x, series):
@@ -70,13 +70,14 @@ def test_same_rotor_is_tabulated_once():
 
 def test_every_coefficient_is_finite_and_bounded():
     assert np.all(np.isfinite(TABLE.load))
-    assert np.abs(TABLE.load).max() < 2.0
+    assert np.abs(TABLE.load[:, :, :2]).max() < np.pi  # twice the area and the dynamic pressure
+    assert np.abs(TABLE.load[:, :, 2:]).max() < 10.0
 
 
 def test_table_is_the_blade_element_momentum_solution_at_its_points():
     rng = np.random.default_rng(0)
     for _ in range(200):
-        theta, beta = rng.choice(TABLE.theta), rng.choice(TABLE.blade_pitch)
+        theta, beta = rng.choice(TABLE.theta.point), rng.choice(TABLE.blade_pitch.point)
         if abs(theta) == np.pi or np.cos(theta) == 0.0:
             continue
         wind, speed = 20 * np.cos(theta), 20 * np.sin(theta) / ROTOR.tip_radius
@@ -128,19 +129,77 @@ def test_table_covers_standstill_overspeed_feather_and_reversed_wind():
 
 @pytest.mark.parametrize("U, speed, beta", OPERATION)
 def test_shear_is_seen_in_the_mean_and_in_the_tilting_moment(U, speed, beta):
-    """Second order in the shear is left out, most visible in the small torque margin at high wind."""
     series, x = wind_series(U, shear=0.14), state(speed, beta)
     mean, table = over_azimuth(x.copy(), series), from_table(x, series)
-    assert table.thrust == pytest.approx(mean[6], rel=0.015)
-    assert table.torque == pytest.approx(mean[7], rel=0.035)
+    assert table.thrust == pytest.approx(mean[6], rel=0.002)
+    assert table.torque == pytest.approx(mean[7], rel=0.002, abs=0.002 * RATED_TORQUE)
     tilt_mean = mean[4] - ROTOR.hub_height * mean[6]
     tilt_table = table.wrench.my - ROTOR.hub_height * table.thrust
-    assert tilt_table == pytest.approx(tilt_mean, rel=0.1)
+    assert tilt_table == pytest.approx(tilt_mean, rel=0.04)
+    assert table.wrench.fy == pytest.approx(mean[1], rel=0.04, abs=50.0)
+
+
+def hub_loads(wrench):
+    """Three forces and three moments about the hub."""
+    fx, fy, fz, mx, my, mz = wrench[:6]
+    height, overhang = ROTOR.hub_height, ROTOR.overhang
+    return np.array([fx, fy, fz, mx + height * fy, my - height * fx - overhang * fz, mz + overhang * fy])
+
+
+def test_random_gusts_and_motions_give_the_loads_of_the_sections_over_a_turn():
+    """Error over standard deviation, with wind, shear and motion as in 18 m/s turbulence and Hs 7.5 m."""
+    rng = np.random.default_rng(3)
+    table, sections = [], []
+    for _ in range(200):
+        gust = rng.normal(size=5) * [1.8, 1.2, 0.5, 2.8, 2.8]
+        series = make_series(
+            [0.0], [gust + [18.0, 0.0, 0.0, 0.0, 0.0]],
+            reference_height=90.0, reference_length=126.0, shear_exponent=0.14,
+        )  # fmt: skip
+        x = state(1.267 + 0.1 * rng.normal(), 0.26 + 0.012 * gust[0] + 0.01 * rng.normal())
+        attitude = rng.normal(size=3) * [0.004, 0.015, 0.015] + [0.0, 0.05, 0.0]
+        x[[State.ROLL, State.PLATFORM_PITCH, State.YAW]] = attitude
+        x[State.VX : State.WZ + 1] = rng.normal(size=6) * [0.5, 0.1, 0.3, 0.002, 0.008, 0.003]
+        table.append(hub_loads(from_table(x, series).wrench))
+        sections.append(hub_loads(over_azimuth(x.copy(), series, 16)))
+    error = np.std(np.subtract(table, sections), axis=0) / np.std(sections, axis=0)
+    assert np.all(error < [0.01, 0.02, 0.02, 0.01, 0.015, 0.01])
+
+
+@pytest.mark.parametrize("U, speed, beta", OPERATION)
+def test_cross_wind_pushes_and_tilts_as_by_the_sections(U, speed, beta):
+    series, x = wind_series(U, v=0.03 * U), state(speed, beta)
+    table, mean = hub_loads(from_table(x, series).wrench), hub_loads(over_azimuth(x.copy(), series))
+    scale = np.array([RATED_THRUST] * 3 + [RATED_TORQUE] * 3)
+    assert np.all(np.abs(table - mean) < 1e-3 * scale)
+    assert table[4] == pytest.approx(mean[4], rel=0.1)
+
+
+def test_turning_the_disturbance_about_the_shaft_turns_the_loads():
+    """Horizontal shear and vertical wind are vertical shear and cross wind a quarter of a turn on."""
+
+    def series(v, w, vertical, horizontal):
+        return make_series(
+            [0.0], [[15.0, v, w, vertical, horizontal]],
+            reference_height=90.0, reference_length=126.0, shear_exponent=0.0,
+        )  # fmt: skip
+
+    x = state(1.267, 0.18)
+    a = hub_loads(from_table(x, series(1.0, 0.0, 0.0, 3.0)).wrench)
+    b = hub_loads(from_table(x, series(0.0, 1.0, 3.0, 0.0)).wrench)
+    c = hub_loads(from_table(x, series(0.0, 1.0, -3.0, 0.0)).wrench)
+    d = hub_loads(from_table(x, series(-1.0, 0.0, 0.0, -3.0)).wrench)
+    # y of the disk goes to z, z to -y
+    turned = hub_loads(from_table(x, series(-1.0, 0.0, 0.0, 3.0)).wrench)
+    assert np.allclose(a[[0, 3]], d[[0, 3]], rtol=1e-12)
+    assert np.allclose(a[[1, 2, 4, 5]], -d[[1, 2, 4, 5]], atol=1e-6)
+    assert np.allclose(b, [a[0], -a[2], a[1], a[3], -a[5], a[4]], atol=1e-6)
+    assert not np.allclose(b[1:3], c[1:3]) and not np.allclose(a[1:3], turned[1:3])
 
 
 @pytest.mark.parametrize("U, speed, beta", OPERATION)
 def test_platform_motion_is_damped_as_by_the_sections(U, speed, beta):
-    """Derivatives of surge force and pitch moment with surge velocity and pitch rate, within 2 %."""
+    """Derivatives with surge velocity, pitch and yaw rate, within 2 %."""
     series = wind_series(U)
     for axis, row, step in ((0, 0, 0.2), (4, 4, 0.004), (5, 5, 0.004)):
         velocity = np.zeros(6)
@@ -154,5 +213,5 @@ def test_platform_motion_is_damped_as_by_the_sections(U, speed, beta):
             down = evaluate(state(speed, beta, velocity=-velocity))
             slopes.append((up[row] - down[row]) / (2 * step))
         assert slopes[1] < 0.0
-        # yaw rate also moves the rotor sideways, which only the sections see
-        assert slopes[0] == pytest.approx(slopes[1], rel=0.02 if axis != 5 else 0.15)
+        # the moment's own derivative is taken over the width of gusts, that of the thrust is exact
+        assert slopes[0] == pytest.approx(slopes[1], rel=0.02 if axis != 5 else 0.05)

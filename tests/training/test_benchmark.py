@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from fowt_env.errors import InputError
-from training import benchmark, benchmark_accuracy
+from training import benchmark, benchmark_accuracy, benchmark_evaluation
 
 STILL = "still water, no wind"
 TINY = {"seconds": 2.0, "repeats": 1, "calls": 20}
@@ -84,3 +84,18 @@ def test_the_plot_of_a_study_is_written(tmp_path):
     )  # fmt: skip
     benchmark_accuracy.plot_accuracy(table, tmp_path / "accuracy.png")
     assert (tmp_path / "accuracy.png").stat().st_size > 1000
+
+
+def test_the_cost_of_an_evaluation_has_a_row_per_stage_and_the_size_of_a_run(tmp_path):
+    suite = tmp_path / "tiny.toml"
+    suite.write_text(
+        'version = 1\ndescription = "d"\nsource = "s"\nwind = "rotor-averaged"\nduration = 15.0\nskip = 5.0\n'
+        '[[case]]\nname = "a"\nwind = 16.0\n'
+    )
+    table = benchmark_evaluation.evaluation_cost(2, suite, "pi").set_index("stage")
+    assert tuple(table.index) == benchmark_evaluation.STAGES
+    assert (table["ms per run"] > 0.0).all()
+    assert table.loc["reading its row", "ms per run"] < table.loc["whole run", "ms per run"]
+    assert 0.01 < table.loc["whole run", "MB per run"] < 1.0
+    with pytest.raises(InputError, match="count = 0"):
+        benchmark_evaluation.evaluation_cost(0, suite)

@@ -3,7 +3,7 @@ import pandas as pd
 import pytest
 
 from fowt_env.errors import InputError
-from training.cases import CASES, SUITES, Case, named_cases
+from training.cases import Case, all_cases, named_cases, read_suite
 from training.evaluate import COLUMNS, evaluate, summary
 from training.metrics import METRICS
 
@@ -96,8 +96,8 @@ def test_worker_processes_give_the_same_table():
 
 def test_named_suites_hold_their_cases_once():
     cases = named_cases("above_rated, ntm_18,paper_18")
-    assert [case.name for case in cases] == [*SUITES["above_rated"], "paper_18"]
-    assert {name for suite in SUITES.values() for name in suite} <= set(CASES)
+    assert [case.name for case in cases] == [*(c.name for c in read_suite("above_rated").cases), "paper_18"]
+    assert {case.name for case in cases} <= set(all_cases())
     assert cases[3].wind == {"kind": "ntm", "speed": 18.0, "class": "B"}
     heights = [case.sea.Hs for case in cases[:-1]]
     assert heights == sorted(heights) and heights[0] < heights[-1]  # rougher sea in stronger wind

@@ -3,7 +3,7 @@ import pandas as pd
 import pytest
 
 from fowt_env.errors import InputError
-from training.metrics import METRICS, metrics
+from training.metrics import METRICS, damage_equivalent_load, metrics
 
 
 def synthetic_run(duration=100.0, dt=0.1, **columns):
@@ -98,3 +98,79 @@ def test_wrong_input_is_named():
     for skip in (-1.0, float("nan")):
         with pytest.raises(InputError, match="skip = "):
             metrics(synthetic_run(), skip=skip)
+
+
+# ------------------------------------------------------------------ fatigue and constraints
+
+
+@pytest.mark.parametrize("exponent", [3.0, 4.0, 10.0])
+def test_whole_cycles_of_one_range_have_the_load_of_their_frequency(exponent):
+    # 100 cycles of range 6 in 50 s, by hand: (100 * 6^m / 50)^(1/m); at 1 Hz it is the range itself
+    points = np.tile([3.0, -3.0], 100)
+    series = np.append(points, 3.0)
+    expected = 6.0 * (100.0 / 50.0) ** (1.0 / exponent)
+    assert damage_equivalent_load(series, 50.0, exponent) == pytest.approx(expected, rel=1e-12)
+    assert damage_equivalent_load(series, 100.0, exponent) == pytest.approx(6.0, rel=1e-12)
+
+
+def test_the_example_of_the_standard_has_its_counted_cycles():
+    # ASTM E1049-85, figure 6: half cycles of 3, 4, 8, 9, 8, 6 and one whole cycle of 4
+    series = [-2.0, 1.0, -3.0, 5.0, -1.0, 3.0, -4.0, 4.0, -2.0]
+    damage = 0.5 * (3.0**4 + 4.0**4 + 8.0**4 + 9.0**4 + 8.0**4 + 6.0**4) + 4.0**4
+    assert damage_equivalent_load(series, 1.0, 4.0) == pytest.approx(damage**0.25, rel=1e-12)
+
+
+def test_a_small_cycle_inside_a_large_one_is_counted_apart():
+    # rainflow sees the swing 0 to 10 and, within it, 6 to 4; plain peak counting would not
+    series = [0.0, 6.0, 4.0, 10.0, 0.0]
+    damage = 2.0**3 + 0.5 * (10.0**3 + 10.0**3)
+    assert damage_equivalent_load(series, 2.0, 3.0) == pytest.approx((damage / 2.0) ** (1.0 / 3.0), rel=1e-12)
+
+
+def test_a_constant_load_does_no_damage_and_a_broken_one_is_nan():
+    assert damage_equivalent_load(np.full(100, 7.0), 10.0, 4.0) == 0.0
+    assert np.isnan(damage_equivalent_load([0.0, np.nan, 1.0], 2.0, 4.0))
+
+
+def test_the_metrics_hold_the_loads_of_tower_and_worst_line():
+    run = synthetic_run(
+        **{
+            "TwrBsMyt_[kN-m]": lambda t: 5e4 + 1e4 * np.cos(2.0 * np.pi * t / 5.0),
+            "FAIRTEN2_[kN]": lambda t: 900.0 + 50.0 * np.cos(2.0 * np.pi * t / 10.0),
+        }
+    )
+    result = metrics(run)
+    assert result["TwrBsMyt_DEL_[kN-m]"] == pytest.approx(2e4 * 0.2 ** (1 / 4), rel=1e-9)
+    assert result["FAIRTEN_DEL_[kN]"] == pytest.approx(100.0 * 0.1 ** (1 / 3), rel=1e-9)
+    assert np.isnan(result["RotTorq_DEL_[kN-m]"])
+
+
+def test_energy_is_the_integral_of_power_and_duty_the_share_of_the_rate_limit():
+    run = synthetic_run(**{"GenPwr_[kW]": lambda t: 36.0 * t, "BldPitch1_[deg]": lambda t: 0.4 * t})
+    result = metrics(run)
+    assert result["energy_[kWh]"] == pytest.approx(36.0 * 0.5 * 100.0**2 / 3600.0, rel=1e-9)
+    assert result["actuator_duty_[%]"] == pytest.approx(5.0, rel=1e-9)
+
+
+def test_constraint_violations_are_counted_and_timed():
+    run = synthetic_run(
+        **{
+            "RotSpeed_[rpm]": lambda t: np.where(((t > 9.95) & (t < 14.95)) | (t > 89.95), 16.0, 12.0),
+            "NcIMUTAxs_[m/s^2]": lambda t: np.where(np.abs(t - 50.0) < 0.55, -3.0, 0.0),
+            "NcIMUTAys_[m/s^2]": lambda t: np.where(np.abs(t - 50.0) < 0.55, 2.0, 0.0),
+            "BldPitch1_[deg]": lambda t: 5.0 + 1.5 * (t > 30.05),
+        }
+    )
+    result = metrics(run)
+    assert result["rotor_speed_violations_[-]"] == 2 and result["rotor_speed_beyond_[s]"] == pytest.approx(
+        15.1
+    )
+    assert result["tower_top_acceleration_violations_[-]"] == 1  # 3.6 m/s2 in both directions together
+    assert result["tower_top_acceleration_beyond_[s]"] == pytest.approx(1.1)
+    assert result["blade_pitch_rate_violations_[-]"] == 1  # 15 deg/s for one row
+    assert result["blade_pitch_rate_beyond_[s]"] == pytest.approx(0.1)
+
+
+def test_a_limit_is_not_passed_by_touching_it():
+    result = metrics(synthetic_run(**{"RotSpeed_[rpm]": 1.3 * 12.1, "NcIMUTAxs_[m/s^2]": 3.3}))
+    assert result["rotor_speed_violations_[-]"] == result["tower_top_acceleration_beyond_[s]"] == 0.0

@@ -1,0 +1,155 @@
+"""PI law with feedback of the platform's fore-aft motion to blade pitch and torque.
+
+A turbine that holds its speed with the blades lets the thrust fall when the wind on the rotor rises. When
+the platform leans into the wind that takes its aerodynamic damping away. Feathering while the tower top
+moves downwind, by FEEDBACK (rad) per m/s, gives it back. Rotor speed pays for it: where the pitch loop alone
+would have given way, the rotor now slows and speeds up with the platform; the torque channel can carry part
+of that.
+
+The fed-back signal passes a first-order high pass, since a mean motion needs no damping, and two equal
+first-order low passes, which leave out most of the waves. The blade-pitch part fades in over the first
+degree (the region-3 pitch) of what the PI law asks for, so that nothing is fed back below rated.
+"""
+
+from dataclasses import dataclass
+from enum import IntEnum
+from math import exp, inf, isfinite
+
+import numpy as np
+
+from controllers.base import check_control_dt, tuned
+from controllers.pi import (
+    PI,
+    Memory,
+    Parameter,
+    PISettings,
+    curve_of,
+    pi_target,
+    schedule_gain,
+    schedule_pitch_of,
+    speed_error,
+    write_commands,
+)
+from fowt_env.errors import InputError, unknown
+from fowt_env.jit import control_kernel, kernel
+from fowt_env.loads.drivetrain import TorqueCurve, limited
+from fowt_env.measurement import Measure
+
+SIGNALS = {"nacelle_velocity": Measure.NACELLE_VELOCITY, "platform_pitch_rate": Measure.PLATFORM_PITCH_RATE}
+
+
+@dataclass(frozen=True)
+class FeedbackSettings:
+    """What is fed back and how. Raises: InputError naming the key, value and allowed range.
+
+    The controller of that name takes the best of the grid of training/tune_controllers.py on its training
+    cases; controllers/tuned.toml has them with their figures.
+    """
+
+    signal: str = "nacelle_velocity"
+    pitch_gain: float = 0.01  # rad per m/s of nacelle velocity, or per rad/s of platform pitch rate
+    torque_gain: float = 0.0  # N m on the high-speed shaft per the same
+    high_pass: float = 0.02  # rad/s
+    low_pass: float = 0.5  # rad/s, of each of the two poles; inf: none
+    scheduled: bool = False  # pitch_gain times the PI law's gain schedule
+
+    def __post_init__(self):
+        if self.signal not in SIGNALS:
+            raise unknown("signal", self.signal, SIGNALS)
+        for key in ("pitch_gain", "torque_gain"):
+            if not isfinite(getattr(self, key)):
+                raise InputError(f"{key} = {getattr(self, key)}: must be finite")
+        if not (isfinite(self.high_pass) and self.high_pass >= 0.0):
+            raise InputError(f"high_pass = {self.high_pass}: must be >= 0 rad/s and finite; 0: none")
+        if not self.low_pass > self.high_pass:
+            raise InputError(
+                f"low_pass = {self.low_pass}: must exceed high_pass = {self.high_pass} rad/s; inf: none"
+            )
+
+
+class FeedbackParameter(IntEnum):
+    """Entries of the law's parameter array beyond those it shares with the PI law."""
+
+    SIGNAL = Parameter.CURVE + len(TorqueCurve._fields)  # index of the fed-back entry of the measurement
+    PITCH_GAIN = SIGNAL + 1
+    TORQUE_GAIN = SIGNAL + 2
+    HIGH_DECAY = SIGNAL + 3  # share of the slow part that one period leaves
+    LOW_DECAY = SIGNAL + 4  # share of each low pass that one period leaves
+    SCHEDULED = SIGNAL + 5  # 1: pitch_gain follows the gain schedule
+
+
+class FeedbackMemory(IntEnum):
+    """Entries of the law's memory array beyond those it shares with the PI law."""
+
+    SLOW = len(Memory)  # what the high pass takes out, in the unit of the signal
+    LOW_ONE = len(Memory) + 1
+    LOW_TWO = len(Memory) + 2
+
+
+@kernel
+def band_passed(signal, parameters, memory):
+    """The signal after high pass and low passes; advances them by one period."""
+    decay = parameters[FeedbackParameter.HIGH_DECAY]
+    slow = (1.0 - decay) * signal + decay * memory[FeedbackMemory.SLOW]
+    memory[FeedbackMemory.SLOW] = slow
+    decay = parameters[FeedbackParameter.LOW_DECAY]
+    one = (1.0 - decay) * (signal - slow) + decay * memory[FeedbackMemory.LOW_ONE]
+    two = (1.0 - decay) * one + decay * memory[FeedbackMemory.LOW_TWO]
+    memory[FeedbackMemory.LOW_ONE] = one
+    memory[FeedbackMemory.LOW_TWO] = two
+    return two
+
+
+@control_kernel
+def feedback_law(parameters, memory, measurement, command):
+    """One period: the PI law, plus the band-passed motion on blade pitch and torque."""
+    p = parameters
+    error = speed_error(p, memory, measurement[Measure.GENERATOR_SPEED])
+    pitch = schedule_pitch_of(p, memory, measurement[Measure.BLADE_PITCH])
+    target = pi_target(pitch, error, p, memory)
+    motion = band_passed(measurement[int(p[FeedbackParameter.SIGNAL])], p, memory)
+    fade = limited(target / curve_of(p).region3_min_pitch, 0.0, 1.0)
+    gain = fade * p[FeedbackParameter.PITCH_GAIN]
+    if p[FeedbackParameter.SCHEDULED] > 0.5:
+        gain *= schedule_gain(pitch, p[Parameter.SCHEDULE_PITCH])
+    extra_torque = fade * p[FeedbackParameter.TORQUE_GAIN] * motion
+    write_commands(pitch, target + gain * motion, extra_torque, p, memory, command)
+
+
+class FloatingFeedback(PI):
+    """PI of a PISettings with the motion feedback of a FeedbackSettings."""
+
+    kernel = staticmethod(feedback_law)
+
+    def __init__(self, settings, feedback, control_dt, name="floating_feedback"):
+        control_dt = check_control_dt(control_dt)
+        super().__init__(settings, control_dt, name)
+        self.feedback = feedback
+        self.information = (*PI.information, feedback.signal)
+        low = feedback.low_pass
+        own = {
+            FeedbackParameter.SIGNAL: SIGNALS[feedback.signal],
+            FeedbackParameter.PITCH_GAIN: feedback.pitch_gain,
+            FeedbackParameter.TORQUE_GAIN: feedback.torque_gain,
+            FeedbackParameter.HIGH_DECAY: exp(-control_dt * feedback.high_pass),
+            FeedbackParameter.LOW_DECAY: 0.0 if low == inf else exp(-control_dt * low),
+            FeedbackParameter.SCHEDULED: feedback.scheduled,
+        }
+        self.parameters = np.append(self.parameters, np.zeros(len(own)))
+        for entry, value in own.items():
+            self.parameters[entry] = value
+        self.memory = np.zeros(len(Memory) + len(FeedbackMemory))
+
+    def reset(self, measurement):
+        """Start as PI.reset, with the present motion taken as the mean one: nothing is fed back yet."""
+        super().reset(measurement)
+        self.memory[FeedbackMemory.SLOW] = getattr(measurement, self.feedback.signal)
+        if self.feedback.high_pass == 0.0:
+            self.memory[FeedbackMemory.SLOW] = 0.0
+        self.memory[FeedbackMemory.LOW_ONE] = self.memory[FeedbackMemory.LOW_TWO] = 0.0
+
+
+def floating_feedback(turbine, control_dt):
+    """OC3 gains with nacelle-velocity feedback to the blade pitch, which damps the platform's pitch."""
+    settings = FeedbackSettings(**tuned("floating_feedback"))
+    return FloatingFeedback(PISettings.published(turbine), settings, control_dt)

@@ -1,0 +1,79 @@
+"""Jonkman's gain-scheduled PI controllers of the NREL 5 MW turbine, sampled as they were published.
+
+Sources: NREL/TP-500-38060 (land: constant power above rated) and NREL/TP-500-47535 (OC3-Hywind: detuned
+gains, constant torque above rated). The published laws run at every step of FAST, 0.0125 s. A plant stepped
+more coarsely is sampled every control_dt; in between the law runs its own periods of at most SAMPLING on the
+straight line through the last two measured speeds, so that filter, integral and rate limits are those of the
+published sampling; only the command waits for the next control instant.
+
+It departs from the published code in one way: the rate limit of the blade pitch counts from the last
+command. The code counts from the measured pitch, which with an actuator lag of 0.2 s would hold the blades
+to 0.5 deg/s. controllers/openfast.py keeps that too, for the deck without an actuator.
+"""
+
+from enum import IntEnum
+from math import ceil, isnan, nan
+
+import numpy as np
+
+from controllers.base import check_control_dt
+from controllers.pi import PI, Memory, Parameter, PISettings, pi_step
+from fowt_env.jit import control_kernel
+from fowt_env.loads.drivetrain import TorqueCurve
+from fowt_env.measurement import Measure
+
+SAMPLING = 0.0125  # s, longest period of the law itself
+
+
+class SampledParameter(IntEnum):
+    """Entries of the law's parameter array beyond those it shares with the PI law."""
+
+    PERIODS = Parameter.CURVE + len(TorqueCurve._fields)  # of the law in one control_dt
+
+
+class SampledMemory(IntEnum):
+    """Entries of the law's memory array beyond those it shares with the PI law."""
+
+    LAST_SPEED = len(Memory)  # generator speed measured at the last call, rad/s; NaN before the first
+
+
+@control_kernel
+def gspi_law(parameters, memory, measurement, command):
+    """One control_dt: the PI law at its own periods, on the line from the last to this measured speed."""
+    periods = int(parameters[SampledParameter.PERIODS])
+    speed, pitch = measurement[Measure.GENERATOR_SPEED], measurement[Measure.BLADE_PITCH]
+    last = memory[SampledMemory.LAST_SPEED]
+    if isnan(last):  # the first call: no time has passed yet
+        periods, last = 1, speed
+    for k in range(1, periods + 1):
+        share = k / periods
+        pi_step(parameters, memory, (1.0 - share) * last + share * speed, pitch, command)
+    memory[SampledMemory.LAST_SPEED] = speed
+
+
+class GSPI(PI):
+    """Gain-scheduled PI of a PISettings with periods of at most SAMPLING inside each control_dt."""
+
+    kernel = staticmethod(gspi_law)
+
+    def __init__(self, settings, control_dt, name="gspi"):
+        control_dt = check_control_dt(control_dt)
+        self.periods = max(1, ceil(control_dt / SAMPLING - 1e-9))
+        super().__init__(settings, control_dt / self.periods, name)
+        self.parameters = np.append(self.parameters, float(self.periods))
+        self.memory = np.zeros(len(Memory) + len(SampledMemory))
+
+    def reset(self, measurement):
+        """Start so that act() on this same measurement commands the measured blade pitch, as PI.reset."""
+        super().reset(measurement)
+        self.memory[SampledMemory.LAST_SPEED] = nan
+
+
+def gspi_oc3(turbine, control_dt):
+    """Jonkman's gain-scheduled PI with the OC3-Hywind changes: detuned, constant torque above rated."""
+    return GSPI(PISettings.published(turbine), control_dt, "gspi_oc3")
+
+
+def gspi_land(turbine, control_dt):
+    """Jonkman's gain-scheduled PI as published for land: constant power above rated. For comparison only."""
+    return GSPI(PISettings.published(turbine, "land", "constant_power"), control_dt, "gspi_land")

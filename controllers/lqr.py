@@ -1,0 +1,290 @@
+"""LQG control of torque and blade pitch with a wind-speed estimator, scheduled over the wind.
+
+A Kalman filter on measured channels estimates platform, rotor-averaged wind and waves; state feedback on
+the estimates moves both commands by their rates, so limits need no further care. The models, trims and
+gains of controllers/lqr_design.py are interpolated in a slow mean of the estimated wind. Where the pitch
+rests near its minimum the torque law of theory.md, section 3, takes over.
+"""
+
+from enum import IntEnum
+from math import exp
+
+import numpy as np
+
+from controllers import lqr_design as design
+from controllers.base import CompiledController, check_control_dt
+from controllers.lqr_design import MOMENT, N_FEEDBACK, N_PLANT, N_SENSORS, N_STATE, WAVE, WIND, Weights
+from fowt_env.errors import InputError
+from fowt_env.jit import control_kernel, kernel
+from fowt_env.loads.drivetrain import TorqueCurve, build_torque_curve, generator_torque, limited
+from fowt_env.measurement import Measure
+
+HANDOVER = (0.01745, 0.05236)  # rad of pitch command: torque by the curve below, by feedback above
+TORQUE_RANGE = (0.5, 1.1)  # of rated, for the feedback's torque
+INTEGRAL_LIMIT = 1.0  # rad, of the speed integral
+ROTOR = 4  # place of the rotor speed in PLANT
+
+
+class Head(IntEnum):
+    """First entries of the parameter array; the torque curve follows, then a block per wind."""
+
+    CONTROL_DT = 0
+    RATED_SPEED = 1
+    RATED_TORQUE = 2
+    GEAR_RATIO = 3
+    PITCH_MINIMUM = 4
+    PITCH_MAXIMUM = 5
+    PITCH_RATE_LIMIT = 6
+    TORQUE_RATE_LIMIT = 7
+    FIRST_WIND = 8
+    WIND_STEP = 9
+    WINDS = 10
+    SCHEDULE_DECAY = 11
+    TORQUE_LOW = 12
+    TORQUE_HIGH = 13
+    HANDOVER_LOW = 14
+    HANDOVER_HIGH = 15
+    CURVE = 16
+
+
+BLOCKS = Head.CURVE + len(TorqueCurve._fields)
+# places within the block of one wind
+TRIM = 0
+TORQUE = TRIM + N_PLANT
+PITCH = TORQUE + 1
+A = PITCH + 1
+B = A + N_STATE * N_STATE
+C = B + N_STATE * 2
+L = C + N_SENSORS * N_STATE
+K = L + N_STATE * N_SENSORS
+BLOCK = K + 2 * N_FEEDBACK
+# places in the memory: absolute estimate, then
+OPERATING_WIND = N_STATE
+INTEGRAL = OPERATING_WIND + 1
+TORQUE_COMMAND = INTEGRAL + 1
+PITCH_COMMAND = TORQUE_COMMAND + 1
+INNOVATION = PITCH_COMMAND + 1
+DEVIATION = INNOVATION + N_SENSORS
+FED_BACK = DEVIATION + N_STATE
+N_MEMORY = FED_BACK + N_FEEDBACK
+
+
+@kernel
+def between(p, low, share, place):
+    """Entry of the blocks at `place`, between two winds."""
+    return (1.0 - share) * p[low + place] + share * p[low + BLOCK + place]
+
+
+@kernel
+def deviate(p, low, share, memory):
+    """Fill DEVIATION: estimate less the trim of the operating wind."""
+    for i in range(N_STATE):
+        memory[DEVIATION + i] = memory[i]
+    for i in range(N_PLANT):
+        memory[DEVIATION + i] -= between(p, low, share, TRIM + i)
+    memory[DEVIATION + WIND] -= memory[OPERATING_WIND]
+    memory[DEVIATION + WIND + 1] -= memory[OPERATING_WIND]
+
+
+@kernel
+def correct(p, low, share, memory, measurement):
+    """Correct the estimate with what is measured of rotor, blades, platform and nacelle."""
+    y = memory[INNOVATION : INNOVATION + N_SENSORS]
+    y[0] = measurement[Measure.GENERATOR_SPEED] / p[Head.GEAR_RATIO] - between(p, low, share, TRIM + ROTOR)
+    y[1] = measurement[Measure.BLADE_PITCH] - between(p, low, share, TRIM + ROTOR + 1)
+    y[2] = measurement[Measure.PLATFORM_PITCH] - between(p, low, share, TRIM + 1)
+    y[3] = measurement[Measure.PLATFORM_PITCH_RATE]
+    y[4] = measurement[Measure.NACELLE_ACCELERATION]
+    deviate(p, low, share, memory)
+    for i in range(N_SENSORS):
+        for j in range(N_STATE):
+            y[i] -= between(p, low, share, C + i * N_STATE + j) * memory[DEVIATION + j]
+    for i in range(N_STATE):
+        for j in range(N_SENSORS):
+            memory[i] += between(p, low, share, L + i * N_SENSORS + j) * y[j]
+
+
+@kernel
+def predict(p, low, share, memory, torque, pitch):
+    """Advance the estimate by one period under the commands."""
+    deviate(p, low, share, memory)
+    torque -= between(p, low, share, TORQUE)
+    pitch -= between(p, low, share, PITCH)
+    for i in range(N_STATE):
+        change = between(p, low, share, B + 2 * i) * torque + between(p, low, share, B + 2 * i + 1) * pitch
+        for j in range(N_STATE):
+            change += between(p, low, share, A + i * N_STATE + j) * memory[DEVIATION + j]
+        memory[i] += change - memory[DEVIATION + i]
+
+
+@kernel
+def feed_back(p, low, share, memory, row):
+    """Rate that row 0 (torque, rated torques a second) or 1 (pitch command, rad/s) of the gain asks for."""
+    total = 0.0
+    for j in range(N_FEEDBACK):
+        total -= between(p, low, share, K + row * N_FEEDBACK + j) * memory[FED_BACK + j]
+    return total
+
+
+@kernel
+def lqr_step(p, memory, measurement, command):
+    """One period of the sampled law."""
+    dt, rated = p[Head.CONTROL_DT], p[Head.RATED_SPEED]
+    last = p[Head.FIRST_WIND] + (p[Head.WINDS] - 1.0) * p[Head.WIND_STEP]
+    place = (limited(memory[OPERATING_WIND], p[Head.FIRST_WIND], last) - p[Head.FIRST_WIND]) / p[
+        Head.WIND_STEP
+    ]
+    node = min(int(place), int(p[Head.WINDS]) - 2)
+    share = place - node
+    low = BLOCKS + node * BLOCK
+    correct(p, low, share, memory, measurement)
+
+    speed_error = measurement[Measure.GENERATOR_SPEED] / p[Head.GEAR_RATIO] - rated
+    pitch, torque = memory[PITCH_COMMAND], memory[TORQUE_COMMAND]
+    if pitch > p[Head.HANDOVER_LOW] or speed_error > 0.0:
+        memory[INTEGRAL] = limited(memory[INTEGRAL] + dt * speed_error, -INTEGRAL_LIMIT, INTEGRAL_LIMIT)
+    else:
+        memory[INTEGRAL] *= 1.0 - 0.1 * dt  # forgotten in 10 s while the pitch rests
+
+    deviate(p, low, share, memory)
+    for i in range(N_PLANT):
+        memory[FED_BACK + i] = memory[DEVIATION + i]
+    memory[FED_BACK + ROTOR] = memory[ROTOR] - rated
+    memory[FED_BACK + N_PLANT] = torque / p[Head.RATED_TORQUE] - 1.0
+    memory[FED_BACK + N_PLANT + 1] = pitch - between(p, low, share, PITCH)
+    memory[FED_BACK + N_PLANT + 2] = memory[INTEGRAL]
+    for i in range(MOMENT - WIND):
+        memory[FED_BACK + N_PLANT + 3 + i] = memory[DEVIATION + WIND + i]
+
+    rate = limited(feed_back(p, low, share, memory, 1), -p[Head.PITCH_RATE_LIMIT], p[Head.PITCH_RATE_LIMIT])
+    pitch = limited(pitch + dt * rate, p[Head.PITCH_MINIMUM], p[Head.PITCH_MAXIMUM])
+    i = Head.CURVE
+    curve = TorqueCurve(
+        p[i], p[i + 1], p[i + 2], p[i + 3], p[i + 4], p[i + 5],
+        p[i + 6], p[i + 7], p[i + 8], p[i + 9], p[i + 10], p[i + 11],
+    )  # fmt: skip
+    wanted = torque + dt * p[Head.RATED_TORQUE] * feed_back(p, low, share, memory, 0)
+    wanted = limited(wanted, p[Head.TORQUE_LOW], p[Head.TORQUE_HIGH])
+    by_curve = generator_torque(p[Head.GEAR_RATIO] * memory[ROTOR], pitch, curve)
+    blend = limited((pitch - p[Head.HANDOVER_LOW]) / (p[Head.HANDOVER_HIGH] - p[Head.HANDOVER_LOW]), 0.0, 1.0)
+    wanted = blend * wanted + (1.0 - blend) * by_curve
+    step = dt * p[Head.TORQUE_RATE_LIMIT]
+    torque += limited(wanted - torque, -step, step)
+
+    predict(p, low, share, memory, torque, pitch)
+    decay = p[Head.SCHEDULE_DECAY]
+    memory[OPERATING_WIND] = decay * memory[OPERATING_WIND] + (1.0 - decay) * memory[WIND + 1]
+    memory[PITCH_COMMAND], memory[TORQUE_COMMAND] = pitch, torque
+    command[0], command[1] = torque, pitch
+
+
+@control_kernel
+def lqr_law(parameters, memory, measurement, command):
+    """Compiled form of lqr_step, one type for all control laws."""
+    lqr_step(parameters, memory, measurement, command)
+
+
+def blocks(models, weights, rated_speed, dt):
+    """(n, BLOCK) trims, estimator and feedback of each wind, sampled every dt."""
+    lowest = next(m for m in models if m.wind >= design.LOWEST_DESIGN_WIND)
+    rows = []
+    for model in models:
+        a, b = design.sampled(model.A, model.B, dt)
+        gain = design.feedback_gain(model if model.wind >= lowest.wind else lowest, weights, rated_speed)
+        parts = (model.trim, model.torque, model.pitch, a, b, model.C, design.estimator_gain(model, dt), gain)
+        rows.append(np.concatenate([np.ravel(part) for part in parts]))
+    return np.array(rows)
+
+
+class LQR(CompiledController):
+    """LQG law of Weights; prepare(scene) designs it on the scene's platform unless blocks are given."""
+
+    kernel = staticmethod(lqr_law)
+    information = (
+        "generator_speed",
+        "blade_pitch",
+        "generator_torque",
+        "nacelle_acceleration",
+        "platform_pitch",
+        "platform_pitch_rate",
+        "plant_model",
+    )
+
+    def __init__(self, turbine, control_dt, weights=None, name="lqr"):
+        super().__init__(name, np.zeros(BLOCKS), N_MEMORY)
+        self.turbine, self.control_dt = turbine, check_control_dt(control_dt)
+        self.weights = Weights() if weights is None else weights
+        self.prepared = False
+
+    def prepare(self, scene):
+        """Linearise the scene's platform over the winds and design the gains (remembered per platform).
+
+        Raises: InputError for a scene without wind.
+        """
+        if scene.model.wind is None:
+            raise InputError(f"controller {self.name!r}: needs a scene with wind to linearise")
+        models = design.design_models(scene)
+        self.install(
+            models[0].wind, blocks(models, self.weights, self.turbine.rated_rotor_speed, self.control_dt)
+        )
+
+    def install(self, first_wind, table):
+        """Take the blocks of winds 1 m/s apart."""
+        turbine, law, drive = self.turbine, self.turbine.torque_law, self.turbine.pitch_drive
+        head = np.zeros(BLOCKS)
+        values = {
+            Head.CONTROL_DT: self.control_dt,
+            Head.RATED_SPEED: turbine.rated_rotor_speed,
+            Head.RATED_TORQUE: law.rated_torque,
+            Head.GEAR_RATIO: turbine.drivetrain.gear_ratio,
+            Head.PITCH_MINIMUM: drive.minimum,
+            Head.PITCH_MAXIMUM: drive.maximum,
+            Head.PITCH_RATE_LIMIT: drive.rate_limit,
+            Head.TORQUE_RATE_LIMIT: law.max_torque_rate,
+            Head.FIRST_WIND: first_wind,
+            Head.WIND_STEP: 1.0,
+            Head.WINDS: len(table),
+            Head.SCHEDULE_DECAY: exp(-self.control_dt / self.weights.schedule_time),
+            Head.TORQUE_LOW: TORQUE_RANGE[0] * law.rated_torque,
+            Head.TORQUE_HIGH: min(TORQUE_RANGE[1] * law.rated_torque, law.max_torque),
+            Head.HANDOVER_LOW: HANDOVER[0],
+            Head.HANDOVER_HIGH: HANDOVER[1],
+        }
+        for entry, value in values.items():
+            head[entry] = value
+        head[Head.CURVE :] = build_torque_curve(law)
+        self.parameters = np.concatenate([head, np.ravel(table)])
+        self.prepared = True
+
+    def reset(self, measurement):
+        """Start the estimate at the trim whose pitch (or, at the pitch minimum, rotor speed) is measured.
+
+        Raises: InputError where prepare() was not called.
+        """
+        if not self.prepared:
+            raise InputError(f"controller {self.name!r}: call prepare(scene) before reset(measurement)")
+        p, memory = self.parameters, self.memory
+        table = p[BLOCKS:].reshape(-1, BLOCK)
+        winds = p[Head.FIRST_WIND] + p[Head.WIND_STEP] * np.arange(len(table))
+        speed = measurement.generator_speed / p[Head.GEAR_RATIO]
+        # one increasing quantity over all winds: speed below rated, pitch above
+        known = table[:, TRIM + ROTOR] / p[Head.RATED_SPEED] + table[:, TRIM + ROTOR + 1]
+        wind = np.interp(speed / p[Head.RATED_SPEED] + measurement.blade_pitch, known, winds)
+        memory[:] = 0.0
+        for i in range(N_PLANT):
+            memory[i] = np.interp(wind, winds, table[:, TRIM + i])
+        memory[1], memory[3] = measurement.platform_pitch, measurement.platform_pitch_rate
+        memory[ROTOR], memory[ROTOR + 1] = speed, measurement.blade_pitch
+        memory[WIND:WAVE] = memory[OPERATING_WIND] = wind
+        memory[PITCH_COMMAND] = min(
+            max(measurement.blade_pitch, p[Head.PITCH_MINIMUM]), p[Head.PITCH_MAXIMUM]
+        )
+        torque = measurement.generator_torque
+        if not np.isfinite(torque):
+            torque = np.interp(wind, winds, table[:, TORQUE])
+        memory[TORQUE_COMMAND] = torque
+
+
+def lqr(turbine, control_dt):
+    """LQG on torque and blade pitch with estimated wind, tuned on training seeds (fowt design lqr)."""
+    return LQR(turbine, control_dt)

@@ -1,0 +1,168 @@
+"""PI law with feedforward of the wind that is still on its way, as a lidar on the nacelle would see it.
+
+The steady schedule beta_ss(V) says how far the blades have to turn for a change of wind: d beta = (d
+beta_ss/dV) dV. The law adds these increments to what its integral holds, so anti-windup, schedule and limits
+stay those of the PI law, and whatever the schedule gets wrong the integral takes back. The wind is the
+rotor-averaged one, `preview_time` ahead of the rotor and without measuring error: an upper bound of what a
+lidar can give. Two equal first-order low passes whose delay, with that of the blade-pitch actuator and half
+a control period, adds up to the preview time, keep the blades from following every gust.
+"""
+
+from dataclasses import dataclass, replace
+from enum import IntEnum
+from math import exp, isfinite
+
+import numpy as np
+from scipy.signal import lfilter
+
+from controllers.base import check_control_dt
+from controllers.pi import (
+    PI,
+    Memory,
+    Parameter,
+    PISettings,
+    pi_target,
+    schedule_gain,
+    schedule_pitch_of,
+    speed_error,
+    write_commands,
+)
+from fowt_env.errors import InputError
+from fowt_env.jit import control_kernel, kernel
+from fowt_env.loads.drivetrain import TorqueCurve
+from fowt_env.measurement import Measure
+from fowt_env.state import State
+from fowt_env.steady import calm, trim
+from fowt_env.weather.wind_field import WindBox, rotor_average
+
+SCHEDULE_SPEEDS = 15  # trims from rated to cut-out wind, square-root spaced: the schedule is steep at rated
+BELOW_RATED = 0.5  # m/s below the published rated wind that the schedule starts
+
+
+@dataclass(frozen=True)
+class PreviewSettings:
+    """How the preview is used. Raises: InputError naming the key, value and allowed range."""
+
+    preview_time: float = 3.0  # s that the wind is known ahead
+    gain: float = 1.0  # share of the steady schedule that is fed forward
+
+    def __post_init__(self):
+        if not (isfinite(self.preview_time) and 0.5 <= self.preview_time <= 60.0):
+            raise InputError(f"preview_time = {self.preview_time}: must be in [0.5, 60] s")
+        if not (isfinite(self.gain) and 0.0 <= self.gain <= 2.0):
+            raise InputError(f"gain = {self.gain}: must be in [0, 2]")
+
+
+class PreviewParameter(IntEnum):
+    """Entries of the law's parameter array beyond those of the PI law; the foreseen pitch follows SERIES."""
+
+    STEP = Parameter.CURVE + len(TorqueCurve._fields)  # s between entries of the series
+    LAST = STEP + 1  # index of its last entry
+    SERIES = STEP + 2
+
+
+class PreviewMemory(IntEnum):
+    """Entries of the law's memory array beyond those it shares with the PI law."""
+
+    FORESEEN = len(Memory)  # blade pitch of the schedule at the last call, rad
+
+
+@kernel
+def foreseen_pitch(time, parameters):
+    """Filtered blade pitch of the steady schedule for the wind foreseen at a time (s), rad; ends are held."""
+    last = int(parameters[PreviewParameter.LAST])
+    place = max(time / parameters[PreviewParameter.STEP], 0.0)
+    if place >= last:
+        return parameters[PreviewParameter.SERIES + last]
+    i = int(place)
+    share = place - i
+    first = PreviewParameter.SERIES + i
+    return (1.0 - share) * parameters[first] + share * parameters[first + 1]
+
+
+@control_kernel
+def preview_law(parameters, memory, measurement, command):
+    """One period: what the wind's change asks for goes into the integral, then the PI law."""
+    p = parameters
+    foreseen = foreseen_pitch(measurement[Measure.TIME], p)
+    error = speed_error(p, memory, measurement[Measure.GENERATOR_SPEED])
+    pitch = schedule_pitch_of(p, memory, measurement[Measure.BLADE_PITCH])
+    slope = schedule_gain(pitch, p[Parameter.SCHEDULE_PITCH]) * p[Parameter.INTEGRAL]
+    memory[Memory.INTEGRAL] += (foreseen - memory[PreviewMemory.FORESEEN]) / slope
+    memory[PreviewMemory.FORESEEN] = foreseen
+    write_commands(pitch, pi_target(pitch, error, p, memory), 0.0, p, memory, command)
+
+
+class Preview(PI):
+    """PI of a PISettings with the feedforward of a PreviewSettings; needs prepare(scene) before reset."""
+
+    kernel = staticmethod(preview_law)
+    information = (*PI.information, "time", "wind_preview", "plant_model")
+
+    def __init__(self, settings, preview, control_dt, name="preview"):
+        super().__init__(settings, control_dt, name)
+        self.preview = preview
+        self.control_dt = check_control_dt(control_dt)
+        self.memory = np.zeros(len(Memory) + len(PreviewMemory))
+        self.prepared = False
+
+    def prepare(self, scene):
+        """Look up the steady pitch of the coming wind, filter it, and keep it as a series.
+
+        Raises: InputError for a scene without wind.
+        """
+        if scene.model.wind is None:
+            raise InputError(f"controller {self.name!r}: needs a scene with wind to look ahead")
+        time, speed, period = rotor_wind(scene)
+        step = self.control_dt
+        grid = step * np.arange(int(np.ceil(max(time[-1], scene.options["duration"]) / step)) + 1)
+        seen = np.interp(grid + self.preview.preview_time, time, speed, period=period)
+        pitch = self.preview.gain * np.interp(seen, *steady_pitch(scene))
+        delay = self.preview.preview_time - scene.turbine.pitch_drive.time_constant - 0.5 * step
+        if delay <= 0.0:
+            raise InputError(
+                f"preview_time = {self.preview.preview_time} s: must exceed the actuator's lag and half a"
+                f" control period, {self.preview.preview_time - delay:g} s"
+            )
+        pitch = twice_low_passed(pitch, exp(-2.0 * step / delay))
+        head = self.parameters[: PreviewParameter.STEP]
+        self.parameters = np.concatenate([head, [step, len(pitch) - 1.0], pitch])
+        self.prepared = True
+
+    def reset(self, measurement):
+        """Start as PI.reset, nothing foreseen yet. Raises: InputError where prepare() was not called."""
+        if not self.prepared:
+            raise InputError(f"controller {self.name!r}: call prepare(scene) before reset(measurement)")
+        super().reset(measurement)
+        self.memory[PreviewMemory.FORESEEN] = foreseen_pitch(float(measurement.time), self.parameters)
+
+
+def rotor_wind(scene):
+    """(time s, wind m/s, period s or None): wind along x averaged over the rotor, as the scene has it."""
+    if isinstance(scene.wind, WindBox):
+        rotor, box = scene.turbine.rotor, scene.wind
+        time, value = rotor_average(box, rotor.hub_height, 2.0 * rotor.tip_radius)
+        return time, value[:, 0], len(value) * box.dt if box.periodic else None
+    series = scene.model.wind
+    return series.time, series.value[:, 0], series.period if series.period > 0.0 else None
+
+
+def steady_pitch(scene):
+    """(wind m/s, blade pitch rad) of the steady schedule, platform held, from below rated to cut-out."""
+    turbine = scene.turbine
+    low, high = turbine.rated_wind_speed - BELOW_RATED, turbine.cut_out_wind_speed
+    speeds = low + (high - low) * np.linspace(0.0, 1.0, SCHEDULE_SPEEDS) ** 2
+    steady = (trim(replace(calm(scene, speed), wind_speed=speed), platform="fixed") for speed in speeds)
+    return speeds, np.array([point.state[State.BLADE_PITCH] for point in steady])
+
+
+def twice_low_passed(value, decay):
+    """(n,) the series after two first-order low passes that start settled at its first entry."""
+    for _ in range(2):
+        value, _ = lfilter([1.0 - decay], [1.0, -decay], value, zi=[decay * value[0]])
+    return value
+
+
+def preview(turbine, control_dt):
+    """OC3 gains with feedforward of the rotor-averaged wind 3 s ahead, known without error."""
+    return Preview(PISettings.published(turbine), PreviewSettings(), control_dt)

@@ -1,0 +1,432 @@
+"""ROSCO, the reference open-source controller, through its own library, with the published OC3 gains.
+
+Abbas et al., Wind Energ. Sci. 7, 2022. The library (libdiscon of the PyPI wheel `rosco`, installed with
+--no-deps: its toolbox is not used) is called like OpenFAST calls it, by the Bladed interface. What it is
+told of the plant is written for the scene at hand: DISCON.IN from the turbine's description, and the Cp, Ct,
+Cq table from this project's blade elements. Gains and schedule of the blade pitch are those published for
+OC3-Hywind, as no ROSCO tuning of it is published and the automatic one turns the proportional gain positive
+beyond 16 deg; torque above rated is constant as there. Below rated ROSCO does what it does by default: an
+extended Kalman filter estimates the wind and the torque tracks the best tip-speed ratio, with the set-point
+smoother between the regions and no peak shaving.
+
+A loaded library is one controller that can be started once. So every reset() loads a private copy of the
+file and drops the one before.
+"""
+
+import ctypes
+import importlib.util
+import os
+import shutil
+import sys
+import tempfile
+import weakref
+from _ctypes import dlclose
+from contextlib import contextmanager
+from dataclasses import dataclass
+from math import isfinite, pi
+from pathlib import Path
+
+import numpy as np
+from scipy.interpolate import RectBivariateSpline
+from scipy.optimize import brentq
+
+from controllers.base import check_control_dt, tuned
+from fowt_env.errors import ControllerError, InputError
+from fowt_env.loads.rotor import build_blade_elements
+from fowt_env.loads.rotor_table import performance
+
+INSTALL = "pip install --no-deps rosco"
+PRELOADED = ("libquadmath", "libgfortran", "libmvec")  # bundled with it; a copy elsewhere cannot find them
+SWAP_SIZE = 4096  # floats: the library touches entries beyond 3,300 whatever the interface
+TEXT_SIZE = 1024  # of the message that the library returns
+RATIOS = np.linspace(2.0, 20.0, 37)  # tip-speed ratios of the table
+PITCHES = np.radians(np.concatenate([np.arange(-5.0, 30.0, 1.0), np.linspace(30.0, 90.0, 13)]))
+SCHEDULE = 0.5 * pi * np.linspace(0.0, 1.0, 40) ** 2  # blade pitch of the gain table, rad
+POLE_SPEEDS = 45  # winds of the estimator's table of poles
+TORQUE_FREQUENCY, TORQUE_DAMPING = 0.15, 0.7  # rad/s, of the torque loop in ROSCO's NREL 5 MW deck
+
+
+@dataclass(frozen=True)
+class RoscoSettings:
+    """Floating feedback of ROSCO (Fl_Mode). Raises: InputError naming the key, value and allowed range."""
+
+    mode: int = 0  # Fl_Mode: 0 none, 1 of the tower-top acceleration, 2 of the nacelle's pitch acceleration
+    gain: float = 0.0  # Fl_Kp, rad per m/s (mode 1) or s (mode 2); negative damps the platform
+    low_pass: float = 0.21  # rad/s, second-order low pass with damping ratio 1
+    high_pass: float = 0.01  # rad/s, first-order high pass
+
+    def __post_init__(self):
+        if self.mode not in (0, 1, 2):
+            raise InputError(f"mode = {self.mode}: must be 0, 1 or 2")
+        if not (isfinite(self.gain) and self.gain <= 0.0):
+            raise InputError(f"gain = {self.gain}: must be finite and <= 0 (beyond it drives the platform)")
+        for key in ("low_pass", "high_pass"):
+            value = getattr(self, key)
+            if not (isfinite(value) and value > 0.0):
+                raise InputError(f"{key} = {value}: must be positive and finite, rad/s")
+
+
+def find_library():
+    """(path of libdiscon, [paths of the libraries that it needs]) of the installed wheel.
+
+    Raises: InputError with what to install.
+    """
+    spec = importlib.util.find_spec("rosco")  # finds without importing: the toolbox needs far more
+    if spec is None or not spec.submodule_search_locations:
+        raise InputError(f"controller 'rosco': the ROSCO library is not installed; {INSTALL}")
+    package = Path(next(iter(spec.submodule_search_locations)))
+    library = package / "lib" / "libdiscon.so"
+    if not library.is_file():
+        raise InputError(f"controller 'rosco': {library} is missing; {INSTALL} --force-reinstall")
+    bundled = sorted((package.parent / "rosco.libs").glob("lib*.so*"))
+    return library, [path for name in PRELOADED for path in bundled if path.name.startswith(name)]
+
+
+def _load(path):
+    """The library at a path. Raises: InputError saying what is wrong with it."""
+    try:
+        library = ctypes.CDLL(str(path))
+        library.DISCON.argtypes = [ctypes.c_void_p, ctypes.c_void_p, *[ctypes.c_char_p] * 3]
+        library.DISCON.restype = None
+    except (OSError, AttributeError) as error:
+        raise InputError(f"controller 'rosco': {path} cannot be used ({error}); {INSTALL}") from error
+    return library
+
+
+_needed = []  # libraries of the wheel, loaded once per process
+
+
+def _preload(paths):
+    """Load what private copies of libdiscon need. Raises: InputError if that fails."""
+    if not _needed:
+        try:
+            _needed.extend(ctypes.CDLL(str(path), mode=ctypes.RTLD_GLOBAL) for path in paths)
+        except OSError as error:
+            raise InputError(f"controller 'rosco': cannot load what it needs ({error}); {INSTALL}") from error
+
+
+def _flush():
+    """Write out what the Fortran library has buffered for standard output."""
+    for library in _needed:
+        if hasattr(library, "_gfortran_flush_i4"):
+            library._gfortran_flush_i4(None)
+
+
+@contextmanager
+def _quiet():
+    """File descriptor 1 leads nowhere: the library greets every start with six lines there."""
+    sys.stdout.flush()
+    _flush()
+    kept = os.dup(1)
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 1)
+    try:
+        yield
+        _flush()
+    finally:
+        os.dup2(kept, 1)
+        os.close(kept)
+        os.close(nowhere)
+
+
+class Rosco:
+    """One ROSCO controller; needs prepare(scene) before reset. See the module's text."""
+
+    def __init__(self, settings, control_dt, name="rosco"):
+        self.settings = settings
+        self.control_dt = check_control_dt(control_dt)
+        self.name = str(name)
+        felt = {0: (), 1: ("nacelle_acceleration",), 2: ("platform_pitch_acceleration",)}[settings.mode]
+        used = ("time", "rotor_speed", "generator_speed", "generator_torque", "blade_pitch", "wind_speed")
+        self.information = (*used, *felt, "plant_model")
+        self._forget()
+
+    def _forget(self):
+        self._files = self._library = self._first = None
+
+    def __getstate__(self):
+        """Everything but the running library: a copy needs prepare() and reset() of its own."""
+        return {"settings": self.settings, "control_dt": self.control_dt, "name": self.name}
+
+    def __setstate__(self, state):
+        self.__init__(**state)
+
+    def prepare(self, scene):
+        """Write DISCON.IN and the rotor's table for a scene. Raises: InputError without wind or library."""
+        if scene.model.wind is None:
+            raise InputError(f"controller {self.name!r}: needs a scene with wind, for the rotor's table")
+        self._source, needed = find_library()
+        _preload(needed)
+        turbine, density = scene.turbine, scene.platform.environment.air_density
+        self._efficiency = turbine.drivetrain.generator_efficiency
+        table = _table(turbine, density)
+        self._files = _Folder()
+        self._files.write("rotor.txt", table_text(table))
+        self._files.write("DISCON.IN", deck_text(deck(turbine, density, table, self.settings)))
+
+    def reset(self, measurement):
+        """Load a fresh copy of the library and start it at a Measurement.
+
+        Raises: InputError where prepare() was not called or the library does not load; ControllerError with
+        ROSCO's own words where it refuses to start.
+        """
+        if self._files is None:
+            raise InputError(f"controller {self.name!r}: call prepare(scene) before reset(measurement)")
+        self._library = _Copy(self._source, self._files.path)
+        self._swap = np.zeros(SWAP_SIZE, dtype=np.float32)
+        self._deck = str(self._files.path / "DISCON.IN").encode()
+        with _quiet():
+            self._first = (measurement.time, self._call(0, measurement))
+
+    def act(self, measurement):
+        """(generator torque, blade pitch). Raises: ControllerError with ROSCO's own words where it fails."""
+        if self._first is not None:
+            time, commands = self._first
+            self._first = None
+            if time == measurement.time:  # reset() has made this call
+                return commands
+        return self._call(1, measurement)
+
+    def _call(self, status, m):
+        s = self._swap
+        s[0], s[1], s[2] = status, m.time, self.control_dt
+        s[3] = s[32] = s[33] = m.blade_pitch
+        power = m.generator_torque * m.generator_speed
+        s[13], s[14] = power, self._efficiency * power
+        s[19], s[20], s[22], s[26] = m.generator_speed, m.rotor_speed, m.generator_torque, m.wind_speed
+        s[48], s[49], s[50] = TEXT_SIZE, len(self._deck), len(OUT_NAME)
+        s[52], s[82] = m.nacelle_acceleration, m.platform_pitch_acceleration
+        s[60] = 3.0
+        failed = self._library.call(s, self._deck)
+        if failed is not None:
+            raise ControllerError(
+                f"controller {self.name!r} failed at t = {m.time:.3f} s: ROSCO says {failed!r}",
+                controller=self.name,
+                time=m.time,
+                returned=None,
+            )
+        return float(s[46]), float(s[41])
+
+
+OUT_NAME = b"rosco"  # root of the files that ROSCO would write at higher logging levels
+
+
+class _Folder:
+    """A temporary folder that goes with its owner."""
+
+    def __init__(self):
+        self.path = Path(tempfile.mkdtemp(prefix="fowt_rosco_"))
+        self._end = weakref.finalize(self, shutil.rmtree, str(self.path), ignore_errors=True)
+
+    def write(self, name, text):
+        (self.path / name).write_text(text)
+
+
+class _Copy:
+    """A private copy of libdiscon, unloaded with its owner."""
+
+    def __init__(self, source, folder):
+        handle, path = tempfile.mkstemp(suffix=".so", dir=folder)
+        os.close(handle)
+        shutil.copyfile(source, path)
+        try:
+            library = _load(path)
+        finally:
+            os.unlink(path)  # once loaded the file is not needed
+        self._discon = library.DISCON
+        self._message = ctypes.create_string_buffer(TEXT_SIZE)
+        self._failure = ctypes.c_int32(0)
+        self._end = weakref.finalize(self, dlclose, library._handle)
+
+    def call(self, swap, deck):
+        """Call DISCON on the swap array; None, or its message where it fails."""
+        self._discon(swap.ctypes.data, ctypes.addressof(self._failure), deck, OUT_NAME, self._message)
+        if self._failure.value < 0:
+            return self._message.value.decode(errors="replace").strip()
+        return None
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """Rotor performance over tip-speed ratio (n,) and blade pitch (m,) rad; coefficients (n, m)."""
+
+    ratio: np.ndarray
+    blade_pitch: np.ndarray
+    cp: np.ndarray
+    ct: np.ndarray
+    cq: np.ndarray
+
+
+_tables = {}  # (id of the turbine, density) -> (turbine, Table): runs of one scene share it
+
+
+def _table(turbine, density):
+    """Table of a turbine's blade elements."""
+    key = (id(turbine), density)
+    if key not in _tables:
+        cp, ct, cq = performance(build_blade_elements(turbine, density), RATIOS, PITCHES)
+        _tables[key] = turbine, Table(RATIOS, PITCHES, cp, ct, cq)
+    return _tables[key][1]
+
+
+def poles(turbine, density, table):
+    """(wind m/s, pole 1/s) of the rotor speed alone at its steady states, from cut-in to cut-out."""
+    radius = turbine.rotor.tip_radius
+    scale = 0.5 * density * pi * radius**3
+    inertia = _inertia(turbine)
+    rated, finest = turbine.rated_rotor_speed, turbine.pitch_drive.minimum
+    torque = turbine.torque_law.rated_torque * turbine.drivetrain.gear_ratio
+    cq = RectBivariateSpline(table.ratio, table.blade_pitch, table.cq)
+    best = best_ratio(turbine, table)
+    winds = np.linspace(turbine.cut_in_wind_speed, turbine.cut_out_wind_speed, POLE_SPEEDS)
+    values = np.empty(POLE_SPEEDS)
+    for i, wind in enumerate(winds):
+        ratio, pitch = min(best, rated * radius / wind), finest
+        surplus = lambda b, w=wind, r=ratio: scale * w * w * cq(r, b)[0, 0] - torque  # noqa: E731
+        if ratio < best and surplus(finest) > 0.0:
+            pitch = brentq(surplus, finest, table.blade_pitch[-1])
+        # torque = scale V^2 Cq(omega R/V, pitch)
+        values[i] = scale * wind * radius * cq(ratio, pitch, dx=1)[0, 0] / inertia
+    return winds, values
+
+
+def best_ratio(turbine, table):
+    """Tip-speed ratio of most power at the finest blade pitch."""
+    power = RectBivariateSpline(table.ratio, table.blade_pitch, table.cp)
+    fine = np.linspace(table.ratio[0], table.ratio[-1], 2000)
+    return float(fine[np.argmax(power(fine, turbine.pitch_drive.minimum)[:, 0])])
+
+
+def _inertia(turbine):
+    """Of rotor and generator about the low-speed shaft, kg m2."""
+    drive = turbine.drivetrain
+    return turbine.rotor.inertia + drive.gear_ratio**2 * drive.generator_inertia
+
+
+def pitch_gains(turbine, gain_set="oc3"):
+    """(KP, KI), each (n,), over SCHEDULE in ROSCO's sign: blade pitch over reference less measured speed.
+
+    Raises: InputError where a proportional gain would not be negative.
+    """
+    published = turbine.gains[gain_set]
+    schedule = 1.0 / (1.0 + SCHEDULE / published.gain_schedule_pitch)
+    proportional, integral = -published.KP * schedule, -published.KI * schedule
+    if not (proportional < 0.0).all():
+        raise InputError(f"turbine {turbine.name!r}, gains.{gain_set}: KP over the schedule must be negative")
+    return proportional, integral
+
+
+def deck(turbine, density, table, settings):
+    """{name: value} of DISCON.IN for a turbine; values are numbers, texts or sequences of numbers."""
+    law, drive, ratio = turbine.torque_law, turbine.pitch_drive, turbine.drivetrain.gear_ratio
+    inertia, radius = _inertia(turbine), turbine.rotor.tip_radius
+    winds, pole = poles(turbine, density, table)
+    near_rated = float(np.interp(turbine.rated_wind_speed - 0.5, winds, pole))
+    slope = -(ratio**2) / inertia  # of generator acceleration over generator torque
+    best = best_ratio(turbine, table)
+    proportional, integral = pitch_gains(turbine)
+    flags = dict.fromkeys(
+        (
+            "LoggingLevel", "DT_Out", "Ext_Interface", "Echo",
+            "IPC_ControlMode", "VS_FBP", "Y_ControlMode", "PRC_Mode", "PS_Mode", "SU_Mode", "SD_Mode",
+            "TD_Mode", "TRA_Mode", "Flp_Mode", "OL_Mode", "PA_Mode", "PF_Mode", "AWC_Mode", "Ext_Mode",
+            "ZMQ_Mode", "CC_Mode", "StC_Mode", "F_NumNotchFilts", "F_GenSpdNotch_N", "F_TwrTopNotch_N",
+        ),
+        0,
+    )  # fmt: skip
+    return flags | {
+        "F_LPFType": 1,
+        "VS_ControlMode": 2,
+        "VS_ConstPower": 0,
+        "PC_ControlMode": 1,
+        "SS_Mode": 1,
+        "WE_Mode": 2,
+        "Fl_Mode": settings.mode,
+        "F_LPFCornerFreq": law.speed_filter_corner,
+        "F_LPFDamping": 0.0,
+        "F_SSCornerFreq": 0.6283,
+        "F_WECornerFreq": 0.20944,
+        "F_YawErr": 0.17952,
+        "F_FlCornerFreq": (settings.low_pass, 1.0),
+        "F_FlHighPassFreq": settings.high_pass,
+        "F_FlpCornerFreq": (1.0, 1.0),
+        "F_VSRefSpdCornerFreq": 0.20944,
+        "PC_GS_n": len(SCHEDULE),
+        "PC_GS_angles": SCHEDULE,
+        "PC_GS_KP": proportional,
+        "PC_GS_KI": integral,
+        "PC_GS_KD": np.zeros(len(SCHEDULE)),
+        "PC_GS_TF": np.zeros(len(SCHEDULE)),
+        "PC_MaxPit": drive.maximum,
+        "PC_MinPit": drive.minimum,
+        "PC_MaxRat": drive.rate_limit,
+        "PC_MinRat": -drive.rate_limit,
+        "PC_RefSpd": law.rated_speed,
+        "PC_FinePit": drive.minimum,
+        "PC_Switch": law.region3_min_pitch,
+        "VS_GenEff": 100.0 * turbine.drivetrain.generator_efficiency,
+        "VS_ArSatTq": law.rated_torque,
+        "VS_MaxRat": law.max_torque_rate,
+        "VS_MaxTq": law.max_torque,
+        "VS_MinTq": 0.0,
+        "VS_MinOMSpd": ratio * best * turbine.cut_in_wind_speed / radius,
+        "VS_Rgn2K": law.region2_constant,
+        "VS_RtPwr": turbine.drivetrain.generator_efficiency * law.rated_power,
+        "VS_RtTq": law.rated_torque,
+        "VS_RefSpd": law.rated_speed,
+        "VS_n": 1,
+        "VS_KP": (2.0 * TORQUE_DAMPING * TORQUE_FREQUENCY + near_rated) / slope,
+        "VS_KI": TORQUE_FREQUENCY**2 / slope,
+        "VS_TSRopt": best,
+        "SS_VSGain": 1.0,
+        "SS_PCGain": 0.05,
+        "WE_BladeRadius": radius,
+        "WE_Gamma": 0.0,
+        "WE_GearboxRatio": ratio,
+        "WE_Jtot": inertia,
+        "WE_RhoAir": density,
+        "PerfFileName": '"rotor.txt"',
+        "PerfTableSize": (len(table.blade_pitch), len(table.ratio)),
+        "WE_FOPoles_N": len(winds),
+        "WE_FOPoles_v": winds,
+        "WE_FOPoles": pole,
+        "Fl_n": 1,
+        "Fl_Kp": settings.gain,
+        "Fl_U": 0.0,
+    }
+
+
+def _words(value):
+    """Text of a value of the deck."""
+    if isinstance(value, str):
+        return value
+    if isinstance(value, int):
+        return str(value)
+    return " ".join(str(v) if isinstance(v, int) else f"{v:.8g}" for v in np.atleast_1d(value).tolist())
+
+
+def deck_text(values):
+    """DISCON.IN of a deck: a value and its name on each line."""
+    lines = ["! ROSCO deck, written for one run"]
+    return "\n".join([*lines, *(f"{_words(value)}   ! {name} -" for name, value in values.items()), ""])
+
+
+def table_text(table):
+    """Text of a Table as ROSCO reads it."""
+    lines = ["# Rotor performance", "#", "#", "# Pitch angle vector (deg)"]
+    lines += [_words(np.degrees(table.blade_pitch)), "# TSR vector", _words(table.ratio)]
+    lines += ["# Wind speed vector", "0", ""]
+    for name in ("cp", "ct", "cq"):
+        rows = (" ".join(f"{value:.6f}" for value in row) for row in getattr(table, name))
+        lines += [f"# {name}", "", *rows, "", ""]
+    return "\n".join(lines)
+
+
+def rosco(turbine, control_dt):
+    """The ROSCO library with the published OC3 gains, constant torque above rated, no floating feedback."""
+    return Rosco(RoscoSettings(), control_dt, "rosco")
+
+
+def rosco_float(turbine, control_dt):
+    """The ROSCO library with the published OC3 gains and its floating feedback, tuned on training cases."""
+    return Rosco(RoscoSettings(**tuned("rosco_float")), control_dt, "rosco_float")

@@ -1,0 +1,138 @@
+"""Moving pictures of finished runs: GIF or MP4 of one to four controllers side by side.
+
+Needs pygame and pillow (GIF), and imageio with ffmpeg for MP4: pip install "fowt-env[render]" or "[video]".
+"""
+
+from itertools import chain
+from pathlib import Path
+
+import numpy as np
+
+from fowt_env.envs.rendering import AT_REST, COLOURS, LOOSE, TIGHT, TRACES, YELLOW, View
+from fowt_env.errors import InputError
+from fowt_env.outputs import replacing
+
+SUFFIXES = (".gif", ".mp4")
+MOST_RUNS = 4
+DRAWN = (
+    "Time",
+    "PtfmSurge",
+    "PtfmSway",
+    "PtfmHeave",
+    "PtfmRoll",
+    "PtfmPitch",
+    "PtfmYaw",
+    "Azimuth",
+    "RotSpeed",
+)
+GIF_COLOURS = 128
+# small or rare in a picture, but to be kept in the palette: this many rows of the sample are given to them
+KEY_COLOURS = (*COLOURS, YELLOW, LOOSE, AT_REST, TIGHT)
+SWATCH = 160
+
+
+def animate(scene, runs, path, *, speed=4.0, fps=20, size=(960, 540), start=0.0, progress=None):
+    """The path written: an animation of runs {label: frame of simulate} of one scene.
+
+    speed     seconds of the run per second of the animation
+    fps       pictures a second; a GIF counts in hundredths of a second and takes the nearest
+    size      pixels, both even
+    start     time of the first picture, s: what comes before is not shown
+    progress  called as progress(done, total)
+    Raises: InputError for settings that cannot be used, or where a library is missing.
+    """
+    path = animation_path(path)
+    if not 1 <= len(runs) <= MOST_RUNS:
+        raise InputError(f"animation: {len(runs)} runs; must be 1 to {MOST_RUNS}")
+    for name, value, top in (("speed", speed, 1000.0), ("fps", fps, 60.0)):
+        if not 0.0 < value <= top:
+            raise InputError(f"{name} = {value}: must be in (0, {top:g}]")
+    if any(side % 2 or not 160 <= side <= 4000 for side in size):
+        raise InputError(f"size = {size}: both must be even and in [160, 4000]")
+    pause = max(2, round(100.0 / fps)) if path.suffix.lower() == ".gif" else 100.0 / fps  # 1/100 s
+    tracks = [_Track(label, frame) for label, frame in runs.items()]
+    end = max(track.time[-1] for track in tracks)
+    if not tracks[0].time[0] <= start < end:
+        raise InputError(f"start = {start}: must be in [{tracks[0].time[0]:g}, {end:g}) s")
+    times = np.arange(start, end, 0.01 * pause * speed)
+    view = View([scene] * len(tracks), labels=None if list(runs) == [""] else list(runs), size=tuple(size))
+
+    def pictures():
+        for number, time in enumerate(times):
+            view.draw([track.at(time) for track in tracks])
+            if progress is not None:
+                progress(number + 1, len(times))
+            yield view.array()
+
+    with replacing(path) as temporary:
+        write = _write_gif if path.suffix.lower() == ".gif" else _write_mp4
+        write(pictures(), temporary, pause)
+    return path
+
+
+def animation_path(path):
+    """`path` as a Path. Raises: InputError for an ending that is none of SUFFIXES."""
+    path = Path(path)
+    if path.suffix.lower() not in SUFFIXES:
+        raise InputError(f"animation {str(path)!r}: must end with {' or '.join(SUFFIXES)}")
+    return path
+
+
+class _Track:
+    """The channels of one run that are drawn, at any time; after its end it stands still."""
+
+    def __init__(self, label, frame):
+        wanted = dict.fromkeys((*DRAWN, *(channel for _, channel, *_ in TRACES)))
+        columns = {name.partition("_[")[0]: name for name in frame.columns}
+        missing = [name for name in wanted if name not in columns]
+        if missing or len(frame) < 2:
+            raise InputError(f"run {label!r}: needs at least two rows and the channels {', '.join(wanted)}")
+        self.values = {name: frame[columns[name]].to_numpy(dtype=float) for name in wanted}
+        self.values["Azimuth"] = np.unwrap(self.values["Azimuth"], period=360.0)
+        self.time = self.values["Time"]
+
+    def at(self, time):
+        """Row of channels at a time, linear between the run's own."""
+        row = {name: float(np.interp(time, self.time, values)) for name, values in self.values.items()}
+        return row | {"Time": time}
+
+
+def _write_gif(pictures, path, pause):
+    """Write pictures as a looping GIF that share one palette: of the first picture and KEY_COLOURS."""
+    try:
+        from PIL import Image
+    except ImportError as error:
+        raise InputError(f'a GIF needs pillow ({error}): pip install "fowt-env[render]"') from error
+    first = Image.fromarray(next(pictures))
+    swatches = np.repeat(np.array(KEY_COLOURS, dtype=np.uint8), SWATCH // len(KEY_COLOURS), axis=0)
+    sample = np.vstack(
+        [np.asarray(first), np.broadcast_to(swatches[:, None], (len(swatches), first.width, 3))]
+    )
+    palette = Image.fromarray(sample).quantize(GIF_COLOURS, method=Image.Quantize.MEDIANCUT)
+    reduced = (
+        Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE)
+        for picture in chain([np.asarray(first)], pictures)
+    )
+    next(reduced).save(
+        path, format="GIF", save_all=True, append_images=reduced, duration=10 * pause, loop=0, optimize=False
+    )
+
+
+def _write_mp4(pictures, path, pause):
+    """Write pictures as H.264 video."""
+    try:
+        import imageio_ffmpeg
+    except ImportError as error:
+        raise InputError(f'an MP4 needs imageio-ffmpeg ({error}): pip install "fowt-env[video]"') from error
+    first = next(pictures)
+    height, width = first.shape[:2]
+    writer = imageio_ffmpeg.write_frames(
+        str(path), (width, height), fps=100.0 / pause, quality=7, macro_block_size=2, ffmpeg_log_level="error"
+    )
+    try:
+        writer.send(None)
+        writer.send(first)
+        for picture in pictures:
+            writer.send(picture)
+    finally:
+        writer.close()

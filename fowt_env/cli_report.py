@@ -1,0 +1,113 @@
+"""The commands that make things to look at: report, animate."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from fowt_env.cli import OptionOption, app, note, progress_bar, reported
+from fowt_env.cli_arguments import parse_numbers, parse_pairs, parse_sea, parse_wind
+from fowt_env.errors import InputError
+
+REPORT_EXAMPLES = """[bold]Examples[/bold]
+
+[cyan]fowt report results/demo[/cyan]  results/demo/report.html
+
+[cyan]fowt report results/suite --cases ntm_12,ntm_24 --seeds 1,2 --rate 5 --out page.html[/cyan]
+
+The page works offline: plotly.js and all data are in it."""
+
+
+@app.command(epilog=REPORT_EXAMPLES)
+@reported
+def report(
+    folder: Annotated[str, typer.Argument(help="Folder that fowt evaluate wrote.")],
+    out_path: Annotated[
+        str | None, typer.Option("--out", help="The page; default: report.html in the folder.")
+    ] = None,
+    cases: Annotated[
+        str | None, typer.Option(help="Cases whose time series go in, by commas; default: up to 64 runs.")
+    ] = None,
+    seeds: Annotated[
+        str | None, typer.Option(help="Seeds whose time series go in: 1,2; default: the first.")
+    ] = None,
+    rate: Annotated[
+        float | None, typer.Option(help="Samples per second of the time series; default: 2 or less.")
+    ] = None,
+    platform: Annotated[
+        str | None, typer.Option(help="Whose steady schedule; default: that of the evaluation.")
+    ] = None,
+    schedule: Annotated[bool, typer.Option("--schedule/--no-schedule", help="Show it.")] = True,
+):
+    """Make one HTML page of an evaluation: leaderboard, Pareto and box plots, time series, spectra."""
+    from training.report_html import write_report
+
+    names = None if cases is None else [name.strip() for name in cases.split(",") if name.strip()]
+    numbers = None if seeds is None else parse_numbers(seeds, "seeds")
+    if numbers is not None and any(number != int(number) for number in numbers):
+        raise InputError(f"seeds = {seeds!r}: must be whole numbers")
+    with progress_bar("report", None) as update:
+        path = write_report(
+            Path(folder),
+            out_path,
+            names,
+            None if numbers is None else [int(number) for number in numbers],
+            rate,
+            platform,
+            schedule,
+            lambda done, total, text: update(done, f"report: {text}", total),
+        )
+    note(f"wrote {path} ({path.stat().st_size / 1e6:.1f} MB)")
+
+
+ANIMATE_EXAMPLES = """[bold]Examples[/bold]
+
+[cyan]fowt animate gust.gif[/cyan]  OC3 and land gains in an extreme operating gust at 18 m/s
+
+[cyan]fowt animate run.mp4 --controllers pi --wind ntm:14:B --sea jonswap:4:9 --duration 120[/cyan]"""
+
+
+@app.command(epilog=ANIMATE_EXAMPLES)
+@reported
+def animate(
+    out_path: Annotated[str, typer.Argument(help="The animation: .gif or .mp4.")],
+    controllers: Annotated[str, typer.Option(help="One to four, by commas; see fowt list.")] = "pi,pi_land",
+    platform: Annotated[str, typer.Option(help="Platform: a name or a path.")] = "oc3_hywind",
+    wind: Annotated[
+        str, typer.Option(help="As for fowt simulate.")
+    ] = '{"kind": "eog", "speed": 18, "start": 20}',
+    sea: Annotated[str, typer.Option(help="As for fowt simulate.")] = "jonswap:4:10",
+    duration: Annotated[float, typer.Option(help="Length of the runs, s.")] = 80.0,
+    seed: Annotated[int, typer.Option(help="Seed of wind and waves.")] = 0,
+    speed: Annotated[float, typer.Option(help="How many times faster than real time.")] = 5.0,
+    fps: Annotated[float, typer.Option(help="Pictures a second.")] = 15.0,
+    width: Annotated[int, typer.Option(help="Pixels.")] = 960,
+    height: Annotated[int, typer.Option(help="Pixels.")] = 540,
+    fidelity: Annotated[str, typer.Option(help="reference, standard or fast.")] = "standard",
+    option: OptionOption = None,
+):
+    """Write an animation of one or several controllers in the same wind and waves, side by side."""
+    import fowt_env
+    from fowt_env.animation import animate as animate_runs
+    from fowt_env.animation import animation_path
+
+    path = animation_path(out_path)  # a wrong ending should not cost a run
+    names = list(dict.fromkeys(name.strip() for name in controllers.split(",") if name.strip()))
+    options = {"duration": max(700.0, duration), **parse_pairs(option, "option")}
+    scene = fowt_env.build_scene(
+        platform, wind=parse_wind(wind), sea=parse_sea(sea), seed=seed, fidelity=fidelity, **options
+    )
+    runs = {}
+    with progress_bar("simulating", None) as update:
+        for name in names:
+            runs[name] = fowt_env.simulate(scene, controller=name, duration=duration)
+        animate_runs(
+            scene,
+            runs,
+            path,
+            speed=speed,
+            fps=fps,
+            size=(width, height),
+            progress=lambda done, total: update(done, "drawing", total),
+        )
+    note(f"wrote {path} ({path.stat().st_size / 1e6:.1f} MB)")

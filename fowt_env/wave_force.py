@@ -1,0 +1,145 @@
+"""First-order wave force on a hull over frequency, and a causal state-space model fitted to it.
+
+The force of a wave on the strips is not a causal function of the elevation at the hull: water deep down is
+moved by an average over elevations before and after. So the state-space model takes the elevation some
+seconds ahead (its lead), and says how well it fits in which band. The elevation is that at the hull's
+mean place, not at the origin: the way between is dispersive, and no low-order model fits that.
+"""
+
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+
+from fowt_env.description import sea_state_of
+from fowt_env.jit import entry
+from fowt_env.loads.morison import morison_load
+from fowt_env.state import State, pose_of
+from fowt_env.weather.waves import build_waves
+
+BAND = (0.15, 2.0)  # rad/s, of the fit: periods of 3.1 to 42 s
+GRID = 150  # frequencies of the fit
+AMPLITUDE = 1e-3  # m; the force is odd in it but for drag, which is left out: first order to 1e-6
+PAIRS = 8  # pairs of poles: 16 states
+POLE_DAMPING = 0.5  # neighbours then overlap
+LEADS = np.arange(0.0, 12.01, 0.5)  # s, of which the best fit is taken
+WEIGHT_FLOOR = 0.1  # share of a component's largest force below which errors count as absolute
+BANDS = ((0.2, 0.4), (0.4, 0.8), (0.8, 1.2), (1.2, 1.8))  # rad/s, for the report of the fit
+
+
+@entry
+def _strip_force(strips, waves, x, t, kinematics, out):
+    """Strip wrench at a state into out (6,)."""
+    load = morison_load(t, pose_of(x), strips, waves, None, kinematics).wrench
+    out[0], out[1], out[2] = load.fx, load.fy, load.fz
+    out[3], out[4], out[5] = load.mx, load.my, load.mz
+
+
+def wave_force(scene, state, omega):
+    """(n, 6) complex force (N/m, N m/m; body components about the body origin) per elevation at the hull.
+
+    Force and elevation are the real parts of these times exp(i omega t), for waves travelling along x
+    past the hull at rest in `state`. Computed by the scene's own strip load for a small regular wave,
+    without drag, which is quadratic. omega: (n,) rad/s. Zero without hydrodynamics.
+    """
+    omega = np.atleast_1d(np.asarray(omega, dtype=float))
+    result = np.zeros((omega.size, 6), dtype=complex)
+    strips = scene.model.strips
+    if strips is None:
+        return result
+    strips = strips._replace(drag_coefficient=0.0, axial_drag_coefficient=0.0)
+    x = np.zeros_like(state)
+    x[: State.AZIMUTH] = state[: State.AZIMUTH]
+    x[State.SURGE] = x[State.SWAY] = 0.0  # the wave's phase counts from the hull
+    site = scene.platform.environment
+    kinematics = np.zeros((7, strips.nodes))
+    quarters = np.zeros((4, 6))
+    for i, frequency in enumerate(omega):
+        waves = build_waves(
+            sea_state_of({"kind": "regular", "H": 2.0 * AMPLITUDE, "T": 2.0 * pi / frequency}),
+            depth=site.water_depth,
+            density=site.water_density,
+            gravity=site.gravity,
+            seed=0,
+            duration=1.0,
+        )
+        waves = waves._replace(ramp=0.0)
+        for quarter in range(4):
+            t = quarter * 0.5 * pi / frequency
+            _strip_force(strips, waves, x, t, kinematics, quarters[quarter])
+        change = (quarters[0] - quarters[2]) - 1j * (quarters[1] - quarters[3])
+        result[i] = change / (2.0 * AMPLITUDE)
+    return result
+
+
+@dataclass(frozen=True)
+class WaveFilter:
+    """State-space model of the wave force: dz/dt = A z + B eta(t + lead), force = C z.
+
+    A (m, m), B (m,), C (6, m); lead in s; errors {(low, high) rad/s: largest error of the force vector
+    in that band over its size, each component in shares of its greatest}.
+    """
+
+    A: np.ndarray
+    B: np.ndarray
+    C: np.ndarray
+    lead: float
+    errors: dict
+
+    def response(self, omega):
+        """(n, 6) complex force per elevation at the hull (the lead taken back)."""
+        omega = np.atleast_1d(np.asarray(omega, dtype=float))
+        eye = np.eye(self.A.shape[0])
+        filtered = np.array([np.linalg.solve(1j * w * eye - self.A, self.B) for w in omega])
+        return filtered @ self.C.T * np.exp(1j * omega * self.lead)[:, None]
+
+
+def fit_wave_filter(scene, state):
+    """WaveFilter fitted to wave_force over BAND, with the lead of LEADS that fits best.
+
+    Poles are fixed, evenly spread over the band, so the fit is linear least squares and the model stable.
+    """
+    omega = np.linspace(*BAND, GRID)
+    force = wave_force(scene, state, omega)
+    a, b = _resonators(np.linspace(BAND[0], 1.15 * BAND[1], PAIRS))
+    eye = np.eye(a.shape[0])
+    basis = np.array([np.linalg.solve(1j * w * eye - a, b) for w in omega])
+    size = np.abs(force)
+    weight = 1.0 / (size + WEIGHT_FLOOR * size.max(axis=0) + (size.max(axis=0) == 0.0))
+    best = None
+    for lead in LEADS:
+        target = force * np.exp(-1j * omega * lead)[:, None]
+        c = np.zeros((6, b.size))
+        for row in range(6):
+            left = basis * weight[:, row, None]
+            right = target[:, row] * weight[:, row]
+            both = (np.r_[left.real, left.imag], np.r_[right.real, right.imag])
+            c[row] = np.linalg.lstsq(*both, rcond=1e-10)[0]
+        miss = np.linalg.norm((basis @ c.T - target) * weight)
+        if best is None or miss < best[0]:
+            best = (miss, float(lead), c)
+    model = WaveFilter(a, b, best[2], best[1], {})
+    model.errors.update(_band_errors(omega, force, model.response(omega)))
+    return model
+
+
+def _resonators(frequencies):
+    """(A, B) of second-order resonators side by side, all driven by the input."""
+    n = len(frequencies)
+    a, b = np.zeros((2 * n, 2 * n)), np.zeros(2 * n)
+    for i, frequency in enumerate(frequencies):
+        block = slice(2 * i, 2 * i + 2)
+        a[block, block] = [[0.0, frequency], [-frequency, -2.0 * POLE_DAMPING * frequency]]
+        b[2 * i + 1] = frequency
+    return a, b
+
+
+def _band_errors(omega, force, fitted):
+    """{band: largest relative error of the force vector} with each component in shares of its greatest."""
+    scale = np.abs(force).max(axis=0)
+    used = scale > 1e-9 * scale.max()
+    if not used.any():
+        return dict.fromkeys(BANDS, 0.0)
+    force, fitted = force[:, used] / scale[used], fitted[:, used] / scale[used]
+    error = np.linalg.norm(fitted - force, axis=1) / np.linalg.norm(force, axis=1)
+    return {band: float(error[(omega >= band[0]) & (omega <= band[1])].max()) for band in BANDS}

@@ -1,0 +1,35 @@
+"""lqr on a training seed beside the baseline, and what it refuses."""
+
+import pytest
+
+from controllers.lqr import LQR
+from controllers.lqr_design import Weights
+from fowt_env import build_scene, simulate
+from fowt_env.errors import InputError
+from training.cases import named_cases
+from training.metrics import metrics
+
+
+def test_lqr_betters_the_baseline_at_no_more_pitch_travel_on_a_training_seed():
+    (case,) = named_cases("ntm_16")
+    scene = build_scene(case.platform, wind=case.wind, sea=case.sea, seed=1003, **case.options)
+    ours, theirs = (metrics(simulate(scene, name, duration=660.0), 60.0) for name in ("lqr", "gspi_oc3"))
+    for name in ("RotSpeed_std_[rpm]", "PtfmPitch_std_[deg]"):
+        assert ours[name] < 0.9 * theirs[name]
+    assert ours["blade_pitch_travel_[deg/s]"] <= 1.02 * theirs["blade_pitch_travel_[deg/s]"]
+
+
+@pytest.mark.parametrize("wind", [8.0, 14.0, 24.0])
+def test_lqr_stays_at_the_steady_state(wind):
+    frame = simulate(build_scene("oc3_hywind", wind=wind, fidelity="standard"), "lqr", duration=120.0)
+    assert frame["RotSpeed_[rpm]"].std() < 0.05
+    assert frame["PtfmPitch_[deg]"].std() < 0.1
+
+
+def test_bad_weights_are_named(turbine):
+    with pytest.raises(InputError, match="pitch_rate = -1.0: must be finite and positive"):
+        Weights(pitch_rate=-1.0)
+    with pytest.raises(InputError, match="pitch_rate"):
+        Weights().changed(pich_rate=1.0)
+    with pytest.raises(InputError, match="prepare"):
+        LQR(turbine, 0.1).reset(None)

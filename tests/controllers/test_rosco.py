@@ -1,0 +1,136 @@
+"""The ROSCO library in the loop: its deck, instances that do not disturb each other, and what it does."""
+
+import os
+import pickle
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from controllers import make
+from controllers.rosco import Rosco, RoscoSettings, find_library, pitch_gains
+from fowt_env import build_scene, simulate
+from fowt_env.errors import InputError
+from fowt_env.measurement import Measurement
+
+needs_library = pytest.mark.skipif(
+    find_spec("rosco") is None,
+    reason="needs the ROSCO library: pip install --no-deps rosco",
+)
+RATED = Measurement(*[0.0] * len(Measurement._fields))._replace(
+    rotor_speed=1.267109,
+    generator_speed=122.9096,
+    generator_torque=43093.55, wind_speed=18.0, blade_pitch=0.26
+)
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return build_scene("oc3_hywind", wind=18.0, duration=100.0, fidelity="standard")
+
+
+def started(scene, name="rosco"):
+    controller = make(name, scene.turbine, 0.1)
+    controller.prepare(scene)
+    controller.reset(RATED)
+    return controller
+
+
+def answers(controller, speeds):
+    return [
+        controller.act(RATED._replace(time=0.1 * k, generator_speed=speed, rotor_speed=speed / 97.0))
+        for k, speed in enumerate(speeds)
+    ]
+
+
+def test_the_proportional_gain_is_negative_over_the_whole_schedule(scene):
+    proportional, integral = pitch_gains(scene.turbine)
+    assert (proportional < 0.0).all() and (integral < 0.0).all()
+    assert proportional[0] == -0.006275604
+
+
+@needs_library
+def test_instances_in_one_process_do_not_disturb_each_other(scene):
+    up, down = 123.0 + np.linspace(0.0, 8.0, 60), 123.0 - np.linspace(0.0, 8.0, 60)
+    alone = answers(started(scene), up)
+    first, second = started(scene), started(scene)
+    together = []
+    for k in range(60):
+        for controller, speeds in ((second, down), (first, up)):
+            m = RATED._replace(time=0.1 * k, generator_speed=speeds[k], rotor_speed=speeds[k] / 97.0)
+            answer = controller.act(m)
+        together.append(answer)
+    assert together == alone
+
+
+@needs_library
+def test_a_pickled_one_starts_afresh_once_prepared(scene):
+    speeds = 123.0 + np.linspace(0.0, 5.0, 20)
+    original = started(scene, "rosco_float")
+    twin = pickle.loads(pickle.dumps(original))
+    with pytest.raises(InputError, match="prepare"):
+        twin.reset(RATED)
+    twin.prepare(scene)
+    twin.reset(RATED)
+    assert answers(twin, speeds) == answers(original, speeds)
+
+
+@needs_library
+def test_its_greeting_and_its_files_stay_out_of_sight(tmp_path):
+    code = (
+        "from fowt_env import build_scene, simulate\n"
+        "s = build_scene('oc3_hywind', wind=18.0, duration=10.0, fidelity='standard')\n"
+        "print('before'); simulate(s, 'rosco', duration=2.0); print('after')\n"
+    )
+    root = str(Path(__file__).resolve().parents[2])
+    env = os.environ | {"PYTHONPATH": root, "TMPDIR": str(tmp_path)}
+    done = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, timeout=600)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split() == ["before", "after"]
+    assert not list(tmp_path.glob("fowt_rosco_*"))
+
+
+def test_without_the_library_the_message_says_what_to_install(scene, monkeypatch):
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    with pytest.raises(InputError, match="pip install --no-deps rosco"):
+        make("rosco", scene.turbine, 0.1).prepare(scene)
+
+
+@needs_library
+def test_a_broken_library_is_named(scene, tmp_path, monkeypatch):
+    broken = tmp_path / "libdiscon.so"
+    broken.write_text("no library")
+    needed = find_library()[1]
+    monkeypatch.setattr(sys.modules[Rosco.__module__], "find_library", lambda: (broken, needed))
+    controller = make("rosco", scene.turbine, 0.1)
+    controller.prepare(scene)
+    with pytest.raises(InputError, match="cannot be used"):
+        controller.reset(RATED)
+
+
+@needs_library
+@pytest.mark.parametrize("wind", [13.0, 18.0, 24.0])
+def test_it_settles_where_the_published_law_settles(wind):
+    scene = build_scene("oc3_hywind", wind=wind, duration=200.0, fidelity="standard")
+    last = {name: simulate(scene, name, duration=200.0).iloc[-1] for name in ("rosco", "gspi_oc3")}
+    for channel in ("BldPitch1_[deg]", "GenTq_[kN-m]", "RotSpeed_[rpm]"):
+        assert last["rosco"][channel] == pytest.approx(last["gspi_oc3"][channel], rel=1e-3)
+
+
+@needs_library
+def test_floating_feedback_damps_the_platform():
+    scene = build_scene("oc3_hywind", wind=18.0, duration=300.0, fidelity="standard")
+    left = {}
+    for name in ("rosco", "rosco_float"):
+        frame = simulate(scene, name, duration=300.0, initial={"PtfmPitch": 6.0})
+        left[name] = frame["PtfmPitch_[deg]"].iloc[1500:].std()
+    assert left["rosco_float"] < 0.5 * left["rosco"]
+
+
+@pytest.mark.parametrize("key, value", [("mode", 3), ("gain", 0.1), ("low_pass", 0.0), ("high_pass", -1.0)])
+def test_settings_out_of_range_are_named(key, value):
+    with pytest.raises(InputError, match=key):
+        Rosco(RoscoSettings(**{key: value}), 0.1)

@@ -1,0 +1,132 @@
+"""Suite files: what they expand to, and what is said about wrong ones."""
+
+import json
+
+import pytest
+
+from fowt_env.errors import InputError
+from training.cases import all_cases, described, read_suite, suite_names
+
+SUITES = ("above_rated", "above_rated_fullfield", "atlas", "dlc", "full_range", "gusts", "oc3", "paper")
+HEAD = """
+version = 3
+description = "d"
+source = "s"
+wind = "rotor-averaged"
+seeds = [1, 2]
+duration = 100.0
+skip = 20.0
+"""
+
+
+def written(tmp_path, text, head=HEAD):
+    path = tmp_path / "mine.toml"
+    path.write_text(head + text)
+    return path
+
+
+def test_the_built_in_suites_can_be_read_and_say_where_they_come_from():
+    assert set(SUITES) | {"sea_states", "steady"} == set(suite_names())
+    for name in suite_names():
+        suite = read_suite(name)
+        assert suite.name == name and suite.description and suite.source and suite.cases and suite.seeds
+        json.dumps([described(case) for case in suite.cases], allow_nan=False)
+
+
+def test_a_name_that_several_suites_hold_is_the_same_case_in_each():
+    known = {name: described(case) for name, case in all_cases().items()}
+    for suite in map(read_suite, suite_names()):
+        for case in suite.cases:
+            assert described(case) == known[case.name]
+
+
+def test_the_headline_is_what_the_brief_of_the_benchmark_says():
+    suite = read_suite("above_rated")
+    assert [case.wind["speed"] for case in suite.cases] == [12, 14, 16, 18, 20, 22, 24]
+    assert {(case.wind["kind"], case.wind["class"]) for case in suite.cases} == {("ntm", "B")}
+    assert len(suite.seeds) == 6 and suite.duration - suite.skip == 600.0 and suite.skip > 0.0
+    assert suite.wind == "rotor-averaged"
+    other = read_suite("above_rated_fullfield")
+    assert other.wind == "full-field"
+    same = zip(suite.cases, other.cases, strict=True)
+    assert all(a.wind["speed"] == b.wind["speed"] and a.sea == b.sea for a, b in same)
+
+
+def test_the_faults_of_the_design_load_cases_come_within_their_runs():
+    cases = [case for case in read_suite("dlc").cases if case.fault is not None]
+    assert {case.fault.kind for case in cases} == {"grid_loss", "stuck_pitch", "emergency_stop"}
+    assert all(case.fault.time < case.duration for case in cases)
+
+
+def test_a_few_lines_make_a_suite_of_ones_own(tmp_path):
+    text = """
+[[case]]
+name = "windy_{speed}"
+speed = [13, 17.5]
+wind = {kind = "ntm", class = "A"}
+sea = {table = "north_sea"}
+
+[[case]]
+name = "calm"
+wind = 16.0
+seeds = 1
+"""
+    suite = read_suite(written(tmp_path, text))
+    assert (suite.name, suite.version, suite.seeds) == ("mine", 3, (1, 2))
+    assert [case.name for case in suite.cases] == ["windy_13", "windy_17_5", "calm"]
+    assert suite.cases[1].wind == {"kind": "ntm", "class": "A", "speed": 17.5}
+    assert 3.1 < suite.cases[1].sea.Hs < 4.1
+    assert suite.cases[2].wind == 16.0 and suite.cases[2].seeds == (1,)
+
+
+WIND = "wind = 16.0"
+
+
+@pytest.mark.parametrize(
+    ("text", "messages"),
+    [
+        ("", ["case is missing"]),
+        (f'[[case]]\nname = "a"\n{WIND}\n[[case]]\nname = "a"\n{WIND}', ["'a': named twice"]),
+        (f'[[case]]\nnam = "a"\n{WIND}', ["nam: unknown key. Did you mean 'name'?", "name is missing"]),
+        ('[[case]]\nname = "a"\nwind = {kind = "ntn", speed = 12}', ["case.1 (a)", "'ntm'"]),
+        ('[[case]]\nname = "a"\nwind = {kind = "ntm"}', ["wind.speed is missing"]),
+        ('[[case]]\nname = "a"\nspeed = 12\nwind = {kind = "ntm", speed = 11}', ["given twice"]),
+        ('[[case]]\nname = "a"\nspeed = [12, 13]\nwind = {kind = "ntm"}', ["{speed}"]),
+        ('[[case]]\nname = "a"\nspeed = -1.0\nwind = {kind = "ntm"}', ["speed", "> 0"]),
+        ('[[case]]\nname = "a"\nwind = "strong"', ["'strong'"]),
+        (f'[[case]]\nname = "a"\n{WIND}\nsea = "paper_wnd_wave"', ["paper_wind_wave"]),
+        (f'[[case]]\nname = "a"\n{WIND}\nsea = {{table = "north_see", speed = 12}}', ["north_sea"]),
+        (f'[[case]]\nname = "a"\n{WIND}\nsea = {{table = "north_sea"}}', ["sea.speed is missing"]),
+        (f'[[case]]\nname = "a"\n{WIND}\noptions = {{surfac = "swl"}}', ["'surface'"]),
+        (f'[[case]]\nname = "a"\n{WIND}\nskip = 200.0', ["skip = 200", "below duration = 100"]),
+        (f'[[case]]\nname = "a"\n{WIND}\nfault = {{kind = "grid_los", time = 50}}', ["'grid_loss'"]),
+        (f'[[case]]\nname = "a"\n{WIND}\nfault = {{kind = "grid_loss", time = 500}}', ["fault.time = 500"]),
+        ('[[case]]\nname = "a"\nwind = {kind = "mann", speed = 12}', ["does not fit"]),
+        (
+            '[[case]]\nname = "a"\nparked = true\nfault = {kind = "stuck_pitch", time = 5}',
+            ["parked:"],
+        ),
+        (f'[[case]]\nname = "a"\n{WIND}\nplatform = "oc3_hywnd"', ["oc3_hywind"]),
+        (
+            f'[[case]]\nname = "a"\n{WIND}\n[score]\nbaseline = "pi"\n'
+            '[[score.term]]\nmetric = "x"\nweight = 1',
+            ["'x'"],
+        ),
+    ],
+)
+def test_a_wrong_suite_is_refused_with_its_case_and_key(tmp_path, text, messages):
+    path = written(tmp_path, text)
+    with pytest.raises(InputError) as error:
+        read_suite(path)
+    assert "mine.toml" in str(error.value)
+    for message in messages:
+        assert message in str(error.value)
+
+
+def test_an_unknown_suite_suggests_and_a_broken_file_is_named(tmp_path):
+    with pytest.raises(InputError, match="above_rated"):
+        read_suite("above_ratted")
+    with pytest.raises(InputError, match="does not exist"):
+        read_suite(tmp_path / "none.toml")
+    with pytest.raises(InputError, match="not valid TOML"):
+        read_suite(written(tmp_path, "", head="version ="))

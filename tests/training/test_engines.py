@@ -1,0 +1,140 @@
+"""Engines: the same outcomes wherever the tasks run, and a dead worker costs a retry."""
+
+import os
+import signal
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from fowt_env.errors import InputError
+from training.cases import Case
+from training.engines import outcomes
+from training.evaluate import evaluate
+
+GUSTY = Case(
+    "gusty",
+    {"kind": "ntm", "speed": 18.0, "class": "B"},
+    {"kind": "jonswap", "Hs": 3.0, "Tp": 9.0, "gamma": 2.0},
+)
+CALM = Case("calm", 16.0)
+SHORT = {"duration": 20.0, "skip": 5.0}
+
+
+def square(task):
+    return task * task
+
+
+def dies_once(task):
+    """The task's name; the first worker that gets it dies as if it had been killed."""
+    mark = Path(task)
+    if mark.suffix == ".dies" and not mark.exists():
+        mark.write_text("")
+        os._exit(9)
+    return mark.name
+
+
+def always_dies(task):
+    os._exit(9)
+
+
+def test_every_engine_refuses_what_it_cannot_do():
+    for arguments, message in (
+        ({"engine": "raz"}, "'ray'"),
+        ({"jobs": 0}, "jobs = 0"),
+        ({"address": "auto"}, "address = 'auto'"),
+        ({"jobs": 2, "tasks": [lambda: None] * 3}, "jobs = 2"),
+    ):
+        with pytest.raises(InputError, match=message):
+            list(outcomes(square, arguments.pop("tasks", [1, 2]), **arguments))
+    assert list(outcomes(square, [], jobs=3)) == []
+
+
+def test_ray_that_is_not_installed_is_named_with_its_extra(monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "ray", None)
+    with pytest.raises(InputError, match=r"fowt-env\[ray\]"):
+        list(outcomes(square, [1], engine="ray"))
+
+
+@pytest.mark.slow
+def test_a_killed_worker_process_costs_its_task_a_retry(tmp_path):
+    names = [str(tmp_path / name) for name in ("a", "b.dies", "c", "d.dies", "e")]
+    assert dict(outcomes(dies_once, names, jobs=2)) == dict(enumerate(["a", "b.dies", "c", "d.dies", "e"]))
+
+
+@pytest.mark.slow
+def test_workers_that_always_die_end_with_a_message():
+    with pytest.raises(RuntimeError, match="died 3 times.*2 runs are left"):
+        list(outcomes(always_dies, [1, 2], jobs=2))
+
+
+# ------------------------------------------------------------------ Ray
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    """A local Ray cluster of two workers."""
+    ray = pytest.importorskip("ray", reason="Ray is not installed: pip install 'fowt-env[ray]'")
+    ray.init(num_cpus=2, include_dashboard=False, log_to_driver=False, logging_level="error")
+    yield ray
+    ray.shutdown()
+
+
+@pytest.mark.slow
+def test_ray_gives_the_bits_of_the_serial_evaluation(cluster, tmp_path):
+    arguments = ("pi,pi_land", [GUSTY, CALM])
+    serial = evaluate(*arguments, seeds=(3, 4), folder=tmp_path / "serial", **SHORT)
+    spread = evaluate(*arguments, seeds=(3, 4), folder=tmp_path / "ray", engine="ray", jobs=2, **SHORT)
+    pd.testing.assert_frame_equal(serial, spread, check_exact=True)
+    for path in (tmp_path / "serial" / "runs").rglob("*.parquet"):
+        other = tmp_path / "ray" / path.relative_to(tmp_path / "serial")
+        np.testing.assert_array_equal(pd.read_parquet(path), pd.read_parquet(other))
+
+
+@pytest.mark.slow
+def test_a_ray_worker_killed_half_way_costs_its_task_a_retry(cluster, tmp_path):
+    names = [str(tmp_path / name) for name in ("a", "b.dies", "c")]
+    assert dict(outcomes(dies_once, names, jobs=2, engine="ray")) == {0: "a", 1: "b.dies", 2: "c"}
+    assert (tmp_path / "b.dies").exists()
+
+
+class Slow:
+    """Holds still, with a pause in every tenth command; says in a file which process it runs in."""
+
+    def __init__(self, mark):
+        self.mark = mark
+
+    def reset(self, measurement):
+        self.command, self.calls = (measurement.generator_torque, measurement.blade_pitch), 0
+        if not self.mark.exists():
+            self.mark.write_text(str(os.getpid()))
+
+    def act(self, measurement):
+        self.calls += 1
+        if self.calls % 10 == 0:
+            time.sleep(0.1)
+        return self.command
+
+
+@pytest.mark.slow
+def test_an_evaluation_whose_ray_worker_is_killed_has_the_bits_of_one_that_was_not(cluster, tmp_path):
+    mark = tmp_path / "process"
+
+    def kill_at_work():
+        deadline = time.monotonic() + 120.0
+        while time.monotonic() < deadline and not (mark.exists() and mark.read_text()):
+            time.sleep(0.02)
+        time.sleep(0.3)
+        os.kill(int(mark.read_text()), signal.SIGKILL)
+
+    hunter = threading.Thread(target=kill_at_work)
+    hunter.start()
+    options = {"seeds": (1, 2), **SHORT}
+    table = evaluate({"slow": Slow(mark)}, [CALM], folder=tmp_path / "out", engine="ray", jobs=2, **options)
+    hunter.join()
+    assert not Path(f"/proc/{mark.read_text()}").exists() and (table["status"] == "ok").all()
+    whole = evaluate({"slow": Slow(mark)}, [CALM], **options)
+    pd.testing.assert_frame_equal(table, whole, check_exact=True)

@@ -1,0 +1,288 @@
+import json
+import re
+import shutil
+
+import numpy as np
+import pandas as pd
+import pytest
+from typer.testing import CliRunner
+
+pytest.importorskip("plotly", reason="plotly is not installed: the extra `report` is missing")
+
+import fowt_env  # noqa: E402
+from fowt_env import cli  # noqa: E402
+from fowt_env.errors import InputError  # noqa: E402
+from training.evaluate import run_file  # noqa: E402
+from training.report_html import SCHEDULE_WINDS, read_results, write_report  # noqa: E402
+
+EVIL = "<img src=x onerror=alert(1)></script>&"
+CONTROLLERS = ("calm", "busy", EVIL)
+CASES = ("ntm_14", "ntm_18")
+SKIP = 20.0
+
+
+def run(number, seed, shift=0, end=120.0):
+    """A run of 0.1 s rows whose rotor and platform swing at 0.05 Hz, wider for greater numbers."""
+    t = np.arange(0.0, end + 0.05, 0.1)
+    swing = np.sin(0.1 * np.pi * t + seed + 10.0 * shift)
+    return pd.DataFrame(
+        {
+            "Time_[s]": t,
+            "Wind1VelX_[m/s]": 18.0 + np.sin(0.3 * t + seed),
+            "Wave1Elev_[m]": 2.0 * np.cos(0.2 * np.pi * t),
+            "RotSpeed_[rpm]": 12.0 + 0.1 * (number + 1) * swing,
+            "BldPitch1_[deg]": 15.0 + swing,
+            "GenPwr_[kW]": 5000.0 + 40.0 * (number + 1) * swing,
+            "PtfmPitch_[deg]": 3.0 + (0.3 - 0.1 * number) * swing,
+        }
+    )
+
+
+def write_folder(folder):
+    """An evaluation of three controllers on two cases and two seeds, one run of which failed."""
+    rows = []
+    for case in CASES:
+        for seed in (1, 2):
+            for number, controller in enumerate(CONTROLLERS):
+                frame = run(number, seed, CASES.index(case))
+                failed = (case, seed, number) == ("ntm_18", 2, 1)
+                frame = frame[frame["Time_[s]"] < 50.0] if failed else frame
+                path = run_file(folder / "runs", controller, case, seed)
+                path.parent.mkdir(parents=True, exist_ok=True)
+                frame.to_parquet(path)
+                scored = frame[frame["Time_[s]"] >= SKIP]
+                figures = {
+                    "RotSpeed_std_[rpm]": scored["RotSpeed_[rpm]"].std(ddof=0),
+                    "PtfmPitch_std_[deg]": scored["PtfmPitch_[deg]"].std(ddof=0),
+                    "blade_pitch_travel_[deg/s]": 0.1 * (number + 1),
+                    "novelty_[-]": 7.0 - number,
+                }
+                status = ("failed", f"lost {EVIL}") if failed else ("ok", "")
+                rows.append(
+                    {
+                        "controller": controller,
+                        "case": case,
+                        "seed": seed,
+                        **dict(zip(("status", "reason"), status, strict=True)),
+                        "scored_[s]": 120.0 - SKIP,
+                        **(dict.fromkeys(figures, np.nan) if failed else figures),
+                    }
+                )
+    table = pd.DataFrame(rows)
+    table.to_csv(folder / "results.csv", index=False)
+    return table
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    path = tmp_path_factory.mktemp("evaluation")
+    write_folder(path)
+    return path
+
+
+def data_of(page):
+    """What the page's script reads."""
+    text = page.read_text(encoding="utf-8")
+    return json.loads(re.search(r'id="data">(.*?)</script>', text, re.DOTALL).group(1))
+
+
+def decoded(packed):
+    """The values of a packed series, as the page's script decodes them."""
+    import base64
+
+    codes = np.frombuffer(base64.b64decode(packed["codes"]), dtype="<u2").astype(float)
+    return packed["low"] + (codes - 1.0) * (packed["high"] - packed["low"]) / 65534.0
+
+
+def test_the_page_holds_everything_and_asks_nothing_of_a_network(folder, tmp_path):
+    page = write_report(folder, tmp_path / "page.html", schedule=False)
+    text = page.read_text(encoding="utf-8")
+    assert text.count("* plotly.js v") == 1
+    assert not re.search(r"<(script|link|img|iframe)[^>]*\b(src|href)=[\"']?(https?:)?//", text)
+    assert page.stat().st_size < 8e6
+
+
+def test_names_are_shown_and_never_read_as_markup(folder, tmp_path):
+    text = write_report(folder, tmp_path / "page.html", schedule=False).read_text(encoding="utf-8")
+    assert "<img src=x" not in text
+    assert "&lt;img src=x onerror=alert(1)&gt;&lt;/script&gt;&amp;" in text
+    assert data_of(tmp_path / "page.html")["controllers"] == list(CONTROLLERS)
+
+
+def test_means_count_every_case_alike_and_leave_failed_runs_out(folder, tmp_path):
+    table = write_folder(tmp_path)
+    data = data_of(write_report(folder, tmp_path / "page.html", schedule=False))
+    rows = {row["controller"]: row for row in data["board"]["mean"][""]}
+    good = table[(table["controller"] == "busy") & (table["status"] == "ok")]
+    expected = good.groupby("case")["RotSpeed_std_[rpm]"].mean().mean()
+    assert rows["busy"]["values"]["RotSpeed_std_[rpm]"] == pytest.approx(expected, rel=1e-5)
+    assert (rows["busy"]["failed"], rows["busy"]["runs"]) == (1, 4)
+    assert "novelty_[-]" in [metric["name"] for metric in data["metrics"]]  # metrics of other versions
+
+
+def test_drawn_series_are_block_means_and_spectra_keep_the_peak(folder, tmp_path):
+    data = data_of(write_report(folder, tmp_path / "page.html", schedule=False))
+    drawn = data["series"]["ntm_14"]["1"]["calm"]
+    packed = drawn["series"]["RotSpeed_[rpm]"]
+    frame = run(0, 1)
+    means = frame["RotSpeed_[rpm]"].to_numpy()[:1200].reshape(-1, 5).mean(axis=1)
+    assert (packed["step"], packed["start"]) == (pytest.approx(0.5), pytest.approx(0.2))
+    np.testing.assert_allclose(decoded(packed), means, atol=np.ptp(means) / 65534.0)
+    assert drawn["skip"] == pytest.approx(SKIP)
+    power = drawn["spectra"]["Wave1Elev_[m]"]
+    values = decoded(power)
+    assert power["start"] + power["step"] * values.argmax() == pytest.approx(0.1, abs=power["step"])
+
+
+def test_the_first_seed_of_each_case_is_drawn_unless_others_are_named(folder, tmp_path):
+    data = data_of(write_report(folder, tmp_path / "a.html", schedule=False))
+    assert {case: list(seeds) for case, seeds in data["series"].items()} == {case: ["1"] for case in CASES}
+    data = data_of(write_report(folder, tmp_path / "b.html", cases=["ntm_18"], seeds=[2], schedule=False))
+    assert {case: list(seeds) for case, seeds in data["series"].items()} == {"ntm_18": ["2"]}
+    assert len(data["quantiles"]["RotSpeed_[rpm]"]["calm"]) == 2  # boxes have every case all the same
+
+
+def test_a_leaderboard_file_gives_its_intervals_and_differences(folder, tmp_path):
+    copy = tmp_path / "copy"
+    shutil.copytree(folder, copy)
+    figure = {"RotSpeed_std_[rpm]": {"mean": 0.25, "low": 0.2, "high": 0.3}}
+    part = {"runs": 4, "failed": 0, "metrics": figure, "difference": figure}
+    score = {"mean": 0.9, "low": 0.8, "high": 1.0}
+    entries = [{"controller": "calm", **part, "score": score, "cases": {"ntm_14": part}}]
+    board = {"baseline": "busy", "interval": {"level": 0.95, "method": "bootstrap"}, "controllers": entries}
+    (copy / "leaderboard.json").write_text(json.dumps(board))
+    data = data_of(write_report(copy, schedule=False))
+    row = data["board"]["mean"][""][0]
+    assert row["intervals"] == {"RotSpeed_std_[rpm]": [0.2, 0.3], "score": [0.8, 1.0]}
+    assert data["views"]["difference"] == "differences to busy" and data["sort"] == "score"
+    assert data["board"]["mean"]["ntm_18"] == []
+    (copy / "leaderboard.json").write_text('{"rows": []}')
+    with pytest.raises(InputError, match="leaderboard.json is not of this version"):
+        write_report(copy, schedule=False)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"cases": ["ntm_19"]}, "ntm_18"),
+        ({"seeds": [9]}, "unknown seed"),
+        ({"out": "page.pdf"}, "html"),
+        ({"rate": 0.0}, "rate = 0"),
+        ({"rate": float("nan")}, "rate = nan"),
+    ],
+)
+def test_settings_that_cannot_be_used_are_named(folder, arguments, message):
+    with pytest.raises(InputError, match=message):
+        write_report(folder, schedule=False, **arguments)
+
+
+def test_a_folder_without_results_is_refused(tmp_path):
+    with pytest.raises(InputError, match="holds no results.csv"):
+        write_report(tmp_path)
+    with pytest.raises(InputError, match="is no folder"):
+        write_report(tmp_path / "none")
+    for text, message in (("", "cannot be read"), ("a,b\n1,2\n", "lacks the columns controller")):
+        (tmp_path / "results.csv").write_text(text)
+        with pytest.raises(InputError, match=message):
+            read_results(tmp_path)
+    (tmp_path / "results.csv").write_text("controller,case,seed,status\npi,a,first,ok\n")
+    with pytest.raises(InputError, match="seed must hold whole numbers"):
+        read_results(tmp_path)
+
+
+def test_the_schedule_is_the_steady_point_of_each_wind(folder, tmp_path):
+    page = tmp_path / "page.html"
+    result = CliRunner().invoke(cli.app, ["report", str(folder), "--out", str(page)])
+    assert result.exit_code == 0, result.stderr
+    schedule = data_of(page)["schedule"]
+    panels = {panel["label"]: panel["values"] for panel in schedule["panels"]}
+    point = fowt_env.trim(fowt_env.build_scene("oc3_hywind", wind=18.0))
+    at = SCHEDULE_WINDS.index(18.0)
+    assert panels["blade pitch (deg)"][at] == pytest.approx(point["BldPitch1"], rel=1e-5)
+    assert panels["thrust (kN)"][at] == pytest.approx(point["RotThrust"], rel=1e-5)
+
+
+def test_the_command_names_what_is_wrong(tmp_path):
+    result = CliRunner().invoke(cli.app, ["report", str(tmp_path)])
+    assert result.exit_code == cli.EXIT_INPUT and "holds no results.csv" in result.stderr
+
+
+@pytest.fixture(scope="module")
+def browser():
+    sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    path = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    if path is None:
+        pytest.skip("no Chromium is installed: the page is not opened in a browser")
+    with sync_api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def opened(browser, folder, tmp_path):
+    """The page in an offline browser; no message of its console may be left at the end."""
+    context = browser.new_context(offline=True)
+    page = context.new_page()
+    page.set_default_timeout(15_000)
+    messages = []
+    page.on("console", lambda message: messages.append(message.text))
+    page.on("pageerror", lambda error: messages.append(str(error)))
+    page.goto(write_report(folder, tmp_path / "page.html", schedule=False).as_uri())
+    page.wait_for_selector("#series-plot .scatterlayer path.js-line")
+    yield page
+    context.close()
+    assert messages == []
+
+
+def data_of_opened(page):
+    """The data of the page that a browser has open."""
+    return json.loads(page.locator("#data").text_content())
+
+
+def test_a_click_on_a_heading_sorts_and_a_second_one_turns_the_order_round(opened):
+    def names():
+        return opened.locator("#table tbody td:first-child").all_inner_texts()
+
+    heading = opened.locator('#table th[data-key="PtfmPitch_std_[deg]"] button')
+    heading.click()
+    assert names() == [EVIL, "busy", "calm"]
+    assert opened.locator("#table th[aria-sort]").get_attribute("aria-sort") == "ascending"
+    heading.click()
+    assert names() == ["calm", "busy", EVIL]
+    opened.locator('#table th[data-key="controller"] button').click()
+    assert names() == [EVIL, "busy", "calm"]
+
+
+def test_every_plot_is_drawn_and_names_are_text_in_it(opened):
+    assert opened.locator("#pareto-plot .points path").count() == len(CONTROLLERS)
+    assert opened.locator("#box-plot path.box").count() == len(CONTROLLERS) * len(CASES)
+    assert opened.locator("#spectra-plot path.js-line").count() >= len(CONTROLLERS)
+    assert opened.locator("img").count() == 0
+    assert EVIL in opened.locator("#series-plot .legendtext").all_text_contents()
+
+
+def test_another_case_and_another_theme_change_what_is_drawn(opened):
+    drawn = "[...document.querySelectorAll('#series-plot path.js-line')].map(p => p.getAttribute('d')).join()"
+    before = opened.evaluate(drawn)
+    opened.select_option("#series-case", "ntm_18")
+    opened.wait_for_function(f"{drawn} !== {json.dumps(before)}")
+    shown = opened.evaluate("document.getElementById('series-plot').data.map(line => line.y)")
+    expected = decoded(data_of_opened(opened)["series"]["ntm_18"]["1"]["calm"]["series"]["RotSpeed_[rpm]"])
+    assert any(len(y) == len(expected) and np.allclose(y, expected, atol=1e-9) for y in shown)
+    light = opened.evaluate("getComputedStyle(document.body).backgroundColor")
+    opened.click("#theme")
+    assert opened.evaluate("getComputedStyle(document.body).backgroundColor") != light
+
+
+def test_zooming_narrows_the_time_axis_of_every_panel(opened):
+    panel = opened.locator("#series-plot .nsewdrag").first
+    panel.scroll_into_view_if_needed()
+    box = panel.bounding_box()
+    opened.mouse.move(box["x"] + 0.3 * box["width"], box["y"] + 5)
+    opened.mouse.down()
+    opened.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 8, steps=4)
+    opened.mouse.up()
+    opened.wait_for_function("document.getElementById('series-plot').layout.xaxis.range[0] > 10")
+    low, high = opened.evaluate("document.getElementById('series-plot').layout.xaxis.range")
+    assert 20.0 < low < 50.0 < high < 90.0

@@ -1,0 +1,217 @@
+"""Controllers compared on equal seeds: means with intervals, paired differences, and a suite's score.
+
+The unit of chance is the seed: one seed draws the wind and waves of every case from the same random
+phases, so its cases are not independent of each other. Seeds are resampled, with all their cases
+(cluster bootstrap), and each case counts alike in a mean over cases.
+"""
+
+import numpy as np
+from scipy.stats import norm as normal
+from scipy.stats import t as student
+
+from fowt_env.errors import unknown
+from training.metrics import METRICS
+
+LEVEL = 0.95
+RESAMPLES = 10_000
+RANDOM_SEED = 20191
+BASELINES = ("gspi_oc3", "pi")  # the first of these that was evaluated, unless one is named
+METHOD = (
+    "percentile bootstrap over seeds, each with all its cases, widened for n seeds by sqrt(n/(n-1)) and by"
+    " Student's t with n-1 degrees of freedom over the normal; every case counts alike; differences are"
+    " paired by case and seed"
+)
+
+
+def resample_weights(n, resamples=RESAMPLES, random_seed=RANDOM_SEED):
+    """(resamples, n) counts of how often each of n seeds is drawn, n draws with replacement."""
+    draws = np.random.default_rng(random_seed).integers(n, size=(resamples, n))
+    return np.stack([(draws == seed).sum(axis=1) for seed in range(n)], axis=1).astype(np.float64)
+
+
+def case_means(values, weights):
+    """(resamples, metrics) weighted means over the seeds of values (seeds, metrics); NaN is no value.
+
+    With a single value there is nothing to resample: it is the mean of every resample. A resample that has
+    drawn no value is NaN.
+    """
+    there = np.isfinite(values)
+    filled = np.where(there, values, 0.0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        means = (weights @ filled) / (weights @ there.astype(np.float64))
+    single = there.sum(axis=0) == 1
+    means[:, single] = filled[:, single].sum(axis=0)
+    return means
+
+
+def interval(estimate, resampled, n):
+    """(low, high) of the estimate (metrics,) from resampled ones (resamples, metrics); NaN for one seed.
+
+    Percentiles of n resampled values are too narrow for small n: of 6 normal ones they hold the truth in
+    84 % of trials. Widening them as Student's interval is wider than the normal one makes it 94 %, and
+    keeps their skewness. Hesterberg, The American Statistician 69(4), 2015, section 5.3, does the same
+    with the percentiles' levels.
+    """
+    if n < 2:
+        return np.full_like(estimate, np.nan), np.full_like(estimate, np.nan)
+    tails = [50.0 * (1.0 - LEVEL), 50.0 * (1.0 + LEVEL)]
+    upper = 0.5 * (1.0 + LEVEL)
+    widening = np.sqrt(n / (n - 1.0)) * student.ppf(upper, n - 1) / normal.ppf(upper)
+    spread = np.nanpercentile(_known(resampled) - estimate, tails, axis=0) * widening
+    return estimate + spread[0], estimate + spread[1]
+
+
+def _known(values):
+    """The array with zeros in columns that are NaN throughout: their estimate is NaN, so their result is."""
+    return np.where(np.isnan(values).all(axis=0), 0.0, values)
+
+
+def default_baseline(controllers, baseline=None):
+    """Name of the controller that others are compared with. Raises: InputError if it was not evaluated."""
+    if baseline is not None:
+        if baseline not in controllers:
+            raise unknown("baseline among the evaluated controllers", baseline, controllers)
+        return baseline
+    return next((name for name in BASELINES if name in controllers), next(iter(controllers), None))
+
+
+class _Grid:
+    """Metrics of a table by controller, case and seed; NaN where a run failed or was not made."""
+
+    def __init__(self, table):
+        self.controllers = list(dict.fromkeys(table["controller"]))
+        self.cases = list(dict.fromkeys(table["case"]))
+        self.seeds = sorted(set(table["seed"]))
+        self.runs = np.zeros((len(self.controllers), len(self.cases), len(self.seeds)), dtype=bool)
+        self.failed = self.runs.copy()
+        self.values = np.full((*self.runs.shape, len(METRICS)), np.nan)
+        figures = table[list(METRICS)].to_numpy(dtype=np.float64)
+        places = [
+            {name: number for number, name in enumerate(axis)}
+            for axis in (self.controllers, self.cases, self.seeds)
+        ]
+        for number, key in enumerate(zip(table["controller"], table["case"], table["seed"], strict=True)):
+            at = tuple(place[name] for place, name in zip(places, key, strict=True))
+            self.runs[at] = True
+            self.failed[at] = table["status"].iloc[number] != "ok"
+            if not self.failed[at]:
+                self.values[at] = figures[number]
+
+
+def _figures(values, weights):
+    """(estimate, low, high), each (metrics,), of the mean of values (cases, seeds, metrics)."""
+    used = np.isfinite(values).any(axis=(1, 2))
+    if not used.any():
+        empty = np.full(values.shape[-1], np.nan)
+        return empty, empty, empty
+    one = np.ones((1, values.shape[1]))
+    with np.errstate(invalid="ignore"):
+        estimate = np.mean([case_means(case, one)[0] for case in values[used]], axis=0)
+        resampled = np.mean([case_means(case, weights) for case in values[used]], axis=0)
+    seeds = int(np.isfinite(values).any(axis=(0, 2)).sum())
+    return estimate, *interval(estimate, resampled, seeds)
+
+
+def _named(estimate, low, high, **more):
+    """{metric: {"mean", "low", "high", ...}} of arrays over METRICS."""
+    columns = {"mean": estimate, "low": low, "high": high, **more}
+    return {
+        name: {key: float(column[i]) for key, column in columns.items()} for i, name in enumerate(METRICS)
+    }
+
+
+def leaderboard(table, baseline=None, score=None, cases=None):
+    """Mapping of plain values: how the controllers of an evaluation's table compare.
+
+    baseline   controller of the paired differences; None: gspi_oc3, else pi, else the first
+    score      training.cases.Score of a suite, or None
+    cases      names of the cases that count; None: all
+    Keys: baseline, interval (level, method, resamples), cases, seeds, controllers: a list of mappings with
+    controller, runs, failed, metrics {metric: mean, low, high, worst}, difference {metric: mean, low, high,
+    percent, pairs}, score (mean, low, high, valid, why; None without one), cases {case: runs, failed,
+    metrics, difference}. worst is the greatest over all runs; percent the mean difference over the
+    baseline's mean of the same runs.
+    Raises: InputError for a baseline that was not evaluated.
+    """
+    if cases is not None:
+        table = table[table["case"].isin(cases)]
+    grid = _Grid(table)
+    baseline = default_baseline(
+        [name for name in grid.controllers if name != "parked"] or grid.controllers, baseline
+    )
+    weights = resample_weights(max(1, len(grid.seeds)))
+    base = grid.values[grid.controllers.index(baseline)] if grid.controllers else None
+    entries = []
+    for number, name in enumerate(grid.controllers):
+        values, runs, failed = grid.values[number], grid.runs[number], grid.failed[number]
+        entry = {"controller": name, **_entry(values, base, runs, failed, weights)}
+        entry["score"] = None if score is None else _score(score, grid, number, weights)
+        entry["cases"] = {
+            case: _entry(values[i : i + 1], base[i : i + 1], runs[i : i + 1], failed[i : i + 1], weights)
+            for i, case in enumerate(grid.cases)
+            if runs[i].any()
+        }
+        entries.append(entry)
+    return {
+        "baseline": baseline,
+        "interval": {"level": LEVEL, "method": METHOD, "resamples": RESAMPLES},
+        "cases": grid.cases,
+        "seeds": [int(seed) for seed in grid.seeds],
+        "controllers": entries,
+    }
+
+
+def _entry(values, base, runs, failed, weights):
+    """Figures of one controller over some cases; arrays (cases, seeds[, metrics])."""
+    estimate, low, high = _figures(values, weights)
+    with np.errstate(all="ignore"):
+        filled = np.where(np.isfinite(values), values, -np.inf).max(axis=(0, 1))
+    worst = np.where(np.isfinite(filled), filled, np.nan)
+    pairs = np.isfinite(values - base)
+    gap, gap_low, gap_high = _figures(values - base, weights)
+    # the baseline over the same runs, so that a failed run does not shift it
+    reference = _figures(np.where(pairs, base, np.nan), np.ones((1, weights.shape[1])))[0]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        percent = np.where(np.abs(reference) > 0.0, 100.0 * gap / np.abs(reference), np.nan)
+    return {
+        "runs": int(runs.sum()),
+        "failed": int(failed.sum()),
+        "metrics": _named(estimate, low, high, worst=worst),
+        "difference": _named(
+            gap, gap_low, gap_high, percent=percent, pairs=pairs.sum(axis=(0, 1)).astype(float)
+        ),
+    }
+
+
+def _score(score, grid, number, weights):
+    """{"mean", "low", "high", "valid", "why"} of a controller by a Score; figures are None with a reason."""
+    nothing = {"mean": None, "low": None, "high": None, "valid": False}
+    if score.baseline not in grid.controllers:
+        return nothing | {"why": f"needs the controller {score.baseline!r} in the evaluation"}
+    if grid.failed[number].any():
+        return nothing | {"why": f"{int(grid.failed[number].sum())} failed runs"}
+    base = grid.values[grid.controllers.index(score.baseline)]
+    own = grid.values[number]
+    shared = np.isfinite(own).any(axis=(1, 2)) & np.isfinite(base).any(axis=(1, 2))
+    if not shared.any():
+        return nothing | {"why": "no run in common with the baseline"}
+
+    def value(weights):
+        ratios = np.array(
+            [case_means(a, weights) / case_means(b, weights) for a, b in zip(own, base, strict=True)]
+        )
+        ratio = {name: ratios[shared, :, i].mean(axis=0) for i, name in enumerate(METRICS)}
+        total = sum(term.weight * ratio[term.metric] for term in score.term)
+        total = total / sum(term.weight for term in score.term)
+        return (total if score.power is None else total / ratio[score.power])[:, None]
+
+    with np.errstate(all="ignore"):
+        estimate = value(np.ones((1, len(grid.seeds))))[0]
+        low, high = interval(estimate, value(weights), len(grid.seeds))
+    why = []
+    for name, limit in score.limits.items():
+        worst = np.nanmax(own[..., METRICS.index(name)])
+        if worst > limit:
+            why.append(f"{name} = {worst:g}, allowed {limit:g}")
+    figures = {"mean": float(estimate[0]), "low": float(low[0]), "high": float(high[0])}
+    return figures | {"valid": not why, "why": "; ".join(why)}

@@ -1,0 +1,98 @@
+"""What linear models say over the wind: modes, zeros of blade pitch to rotor speed, and weight sweeps of lqr.
+
+Run as fowt linearize and fowt design; every function returns a table that can be written as it is.
+"""
+
+import numpy as np
+import pandas as pd
+from scipy.linalg import eigvals
+
+from controllers.lqr import LQR
+from controllers.lqr_design import Weights, scene_at
+from fowt_env.errors import InputError
+from fowt_env.linear_model import linearize
+from fowt_env.outputs import write_table
+from fowt_env.simulation import simulate
+from training.cases import named_cases
+from training.evaluate import SHORTEST_WEATHER
+from training.metrics import metrics
+
+FIRST_TRAINING_SEED = 1000  # seeds below are for scoring
+INFINITE = 1e3  # rad/s: generalised eigenvalues beyond are zeros at infinity
+SHOWN = ("RotSpeed_std_[rpm]", "PtfmPitch_std_[deg]", "GenPwr_std_[kW]", "blade_pitch_travel_[deg/s]")
+
+
+def models_over(scene, winds, progress=None):
+    """{wind m/s: LinearModel} of a scene in steady winds."""
+    models = {}
+    for number, wind in enumerate(winds, 1):
+        models[float(wind)] = linearize(scene_at(scene, wind))
+        if progress is not None:
+            progress(number, len(winds))
+    return models
+
+
+def mode_table(models):
+    """DataFrame: wind, mode, period (s), damping ratio of every oscillating mode, pitch and torque held."""
+    rows = [
+        {"wind_[m/s]": wind, "mode": m.name, "period_[s]": m.period, "damping_[-]": m.damping_ratio}
+        for wind, model in models.items()
+        for m in model.modes()
+    ]
+    return pd.DataFrame(rows)
+
+
+def transmission_zeros(model, source="blade_pitch_command", output="rotor_speed"):
+    """Finite zeros (rad/s, complex) from an input of LinearModel.inputs to one of its outputs."""
+    b = model.B[:, [model.inputs.index(source)]]
+    row = model.output_index(output)
+    c, d = model.C[[row]], model.D[[row]][:, [model.inputs.index(source)]]
+    n = b.shape[0]
+    left = np.block([[model.A, b], [c, d]])
+    right = np.zeros_like(left)
+    right[:n, :n] = np.eye(n)
+    values = eigvals(left, right)
+    return values[np.isfinite(values) & (np.abs(values) < INFINITE)]
+
+
+def zero_table(models):
+    """DataFrame: wind, real and imaginary part (rad/s) of the right-half-plane zeros of pitch to speed."""
+    rows = [
+        {"wind_[m/s]": wind, "real_[rad/s]": z.real, "imag_[rad/s]": z.imag}
+        for wind, model in models.items()
+        for z in transmission_zeros(model)
+        if z.real > 1e-6 and z.imag >= 0.0
+    ]
+    return pd.DataFrame(rows, columns=["wind_[m/s]", "real_[rad/s]", "imag_[rad/s]"])
+
+
+def sweep(variants, cases, seeds, out=None, progress=None, duration=660.0, skip=60.0):
+    """DataFrame of lqr with each variant of its weights ({name: value} each) and of gspi_oc3, seed by seed.
+
+    seeds must be training seeds, FIRST_TRAINING_SEED and above: the others are for scoring. out: CSV.
+    Raises: InputError for other seeds or unknown weights.
+    """
+    import fowt_env
+
+    if min(seeds) < FIRST_TRAINING_SEED:
+        raise InputError(f"seeds = {list(seeds)}: tune on seeds of {FIRST_TRAINING_SEED} and above")
+    weights = [(str(variant or "default"), Weights().changed(**variant)) for variant in variants]
+    rows, total = [], len(named_cases(cases)) * len(seeds) * (len(weights) + 1)
+    for case in named_cases(cases):
+        for seed in seeds:
+            options = {"duration": max(SHORTEST_WEATHER, duration), **case.options}
+            scene = fowt_env.build_scene(
+                case.platform, wind=case.wind, sea=case.sea, seed=int(seed), **options
+            )
+            runs = [("gspi_oc3", "gspi_oc3")]
+            runs += [(label, LQR(scene.turbine, 0.1, chosen)) for label, chosen in weights]
+            for label, controller in runs:
+                frame = simulate(scene, controller=controller, duration=duration)
+                found = metrics(frame, skip, scene.turbine.rated_rotor_speed * 30.0 / np.pi)
+                rows.append({"variant": label, "case": case.name, "seed": int(seed), **found})
+                if progress is not None:
+                    progress(len(rows), total)
+    table = pd.DataFrame(rows)
+    if out is not None:
+        write_table(table, out)
+    return table

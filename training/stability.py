@@ -1,0 +1,417 @@
+"""Stability under stress: the parts of the study, what each claims, and the report docs/robustness.md.
+
+Each part stores what it found as JSON beside the others, so that a report can join runs of several days.
+"""
+
+import json
+import time
+from dataclasses import asdict, dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+
+from fowt_env.errors import unknown
+from fowt_env.integrators import INTEGRATORS
+from fowt_env.outputs import replacing
+from fowt_env.scene import STEPS
+from fowt_env.step import RUNNING
+from training import stability_cases, stability_extremes, stability_long, stability_map, stability_plain
+from training.benchmark import header
+
+MEMORY_MB = 5.0  # growth that counts as none: less than a byte per step of the documented run
+# relative changes of the free body over 10000000 default steps: kinetic energy, linear momentum, angular
+# momentum about the centre of mass, in inertial axes. The momenta turn with the error of the attitude, which
+# grows with time.
+DRIFT = {
+    "rk4": {"energy": 1e-10, "linear": 1e-8, "angular": 1e-8},
+    "heun": {"energy": 1e-5, "linear": 1e-3, "angular": 1e-4},
+    "abm4": {"energy": 1e-8, "linear": 1e-6, "angular": 1e-6},
+    "ab4": {"energy": 1e-7, "linear": 1e-5, "angular": 1e-6},
+}
+FLOATING_DRIFT = {"rk4": 1e-5, "ab4": 1e-2}  # of the energy of motion, over as many
+SECULAR_STEPS = 10_000  # 600 s are 6000 to 12000 default steps
+ORDER_SLACK = 0.35  # that a measured order may lie below the method's
+TURNED = 1e-6  # entries of a rotation matrix
+PLAIN = 1e-9  # rounding of functions that Python and the compiler take from different libraries
+STEP_CHANGE = 0.05  # of an extreme's peak with half the step
+
+
+@dataclass
+class Claim:
+    """One row of the summary."""
+
+    what: str
+    count: str
+    found: str
+    target: str
+    holds: bool
+
+
+@dataclass
+class Found:
+    """What a part came to: claims, and tables as (title, columns, rows of texts)."""
+
+    claims: list = field(default_factory=list)
+    tables: list = field(default_factory=list)
+
+    def claim(self, what, count, found, target, holds):
+        """Add a Claim."""
+        self.claims.append(Claim(what, str(count), found, target, bool(holds)))
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """How much is run; the documented run has 100000 cases and 10000000 steps."""
+
+    cases: int = 2000
+    per_weather: int = stability_cases.PER_WEATHER
+    steps: int = 200_000
+    hostile_steps: int = 600
+    seed: int = 0
+    kinds: tuple | None = None  # of the map; None: all
+    extremes: tuple | None = None
+    map_duration: float = stability_map.DURATION
+
+
+def map_part(sizes, folder, progress):
+    """Found of the stability map."""
+    table = stability_map.stability_map(sizes.kinds, duration=sizes.map_duration, progress=progress)
+    found = Found()
+    for integrator in INTEGRATORS:
+        rows = table[table["integrator"] == integrator]
+        least = rows.loc[rows["margin"].idxmin()]
+        found.claim(
+            f"{integrator}: default step of {STEPS[integrator]:g} s",
+            f"{len(rows)} kinds of scene",
+            f"least margin {least['margin']:.1f} ({least['kind']})",
+            f"factor {stability_map.MARGIN:g} below the first blow-up",
+            least["margin"] >= stability_map.MARGIN,
+        )
+    both = table[np.isfinite(table["theory_s"]) & np.isfinite(table["measured_s"])]
+    ratio = both["measured_s"] / both["theory_s"]
+    found.claim(
+        "measured limit over that of theory",
+        f"{len(table)} limits, {len(both)} below {stability_map.LARGEST_STEP:g} s in both",
+        f"{ratio.min():.2f} to {ratio.max():.2f}, median {ratio.median():.3f}" if len(both) else "none",
+        "none below 0.8: theory misses no faster mode",
+        len(both) == 0 or ratio.min() > 0.8,
+    )
+    rows = [
+        [row["kind"], row["integrator"], f"{row['default_s']:g}", _limit(row["measured_s"]),
+         _limit(row["theory_s"]), _factor(row["margin"]), row["mode"].replace("_", " "),
+         f"{row['fastest_1_per_s']:.2f}"]
+        for row in table.to_dict("records")
+    ]  # fmt: skip
+    columns = ["scene", "integrator", "default, s", "largest stable step, s", "theory, s", "margin",
+               "grows first", "fastest mode, 1/s"]  # fmt: skip
+    found.tables.append(["Largest step without blow-up", columns, rows])
+    return found
+
+
+def _limit(value):
+    return f"{value:.3f}" if np.isfinite(value) else f"> {stability_map.LARGEST_STEP:g}"
+
+
+def _factor(value):
+    return f"{value:.1f}" if np.isfinite(value) else "-"
+
+
+def cases_part(sizes, folder, progress):
+    """Found of the random scenes and states; failures are stored as replayable files in folder/failures."""
+    tally = stability_cases.random_cases(sizes.cases, sizes.seed, sizes.per_weather, progress=progress)
+    paths = stability_cases.store(tally.failures, Path(folder) / "failures")
+    reasons = [reason for _, reason in tally.failures]
+    broken = sum("exception" in reason or "non-finite" in reason for reason in reasons)
+    found = Found()
+    spread = ", ".join(f"{count} {plant}" for plant, count in tally.per_plant.items())
+    what = f"{tally.cases} states in {tally.weathers} weathers ({spread})"
+    found.claim("random scenes and states: NaN or exception", what, f"{broken}", "none", broken == 0)
+    found.claim(
+        "random scenes and states: kinetic energy and rotor speed bounded",
+        f"{tally.cases}",
+        f"{len(reasons) - broken} beyond; largest share of the energy bound {tally.worst_share:.2f}",
+        "none beyond the bound, no stop or peak that a finer step does not have",
+        len(reasons) == broken,
+    )
+    found.claim(
+        "the most energetic case of every twentieth weather at a quarter of the step",
+        f"{tally.checked}",
+        f"peak energies differ by at most {tally.difference:.2%}",
+        f"{stability_cases.AGREE:.0%}",
+        tally.difference <= stability_cases.AGREE,
+    )
+    found.claim(
+        "mooring lines that missed their tolerance", f"{tally.cases}", f"{tally.unconverged}", "none",
+        tally.unconverged == 0,
+    )  # fmt: skip
+    peak = tally.peak
+    rows = [
+        ["kinetic energy of the platform", f"{peak[0] * 1e-6:.0f} MJ"],
+        ["roll or platform pitch", f"{np.degrees(peak[1]):.1f} deg"],
+        ["distance of the body origin from rest", f"{peak[2]:.1f} m"],
+        ["rotor speed", f"{peak[3] * 30.0 / np.pi:.1f} rpm"],
+        ["capsizes, each confirmed at a quarter of the step", f"{tally.capsizes}"],
+    ]
+    found.tables.append(["Largest values over all random cases that ran to their end", ["", "largest"], rows])
+    if paths:
+        rows = [[path.name, reason] for path, reason in zip(paths, reasons, strict=True)]
+        found.tables.append(["Failures, stored for --replay", ["file", "reason"], rows[:100]])
+    return found
+
+
+def hostile_part(sizes, folder, progress):
+    """Found of hostile actions on the environment."""
+    table = stability_extremes.hostile(steps=sizes.hostile_steps, progress=progress)
+    found = Found()
+    refused = table["policy"] == "NaN and infinity"
+    attacks = table[~refused]
+    found.claim(
+        "hostile actions: state, observation and reward finite, or an end with its reason",
+        f"{int(attacks['steps'].sum())} control periods, {len(attacks)} policies, modes and tasks",
+        f"{int((~attacks['finite']).sum())} not finite",
+        "none",
+        attacks["finite"].all(),
+    )
+    found.claim(
+        "actions of NaN or infinity refused, the state left as it was",
+        f"{int(table[refused]['steps'].sum())}",
+        f"{int((~table[refused]['finite']).sum())} kinds of environment that were not",
+        "all refused",
+        table[refused]["finite"].all(),
+    )
+    rows = [
+        [row["task"], row["mode"], row["policy"], str(row["steps"]),
+         "; ".join(f"{reason}: {count}" for reason, count in row["ends"].items()) or "none",
+         "finite" if row["finite"] else "NOT FINITE"]
+        for row in table.to_dict("records")
+    ]  # fmt: skip
+    columns = ["task", "action mode", "policy", "periods", "episodes ended early, by reason", "verdict"]
+    found.tables.append(["Hostile actions", columns, rows])
+    return found
+
+
+def extremes_part(sizes, folder, progress):
+    """Found of the extreme events."""
+    table = stability_extremes.extremes(sizes.extremes, seed=sizes.seed + 1, progress=progress)
+    found = Found()
+    for group, rows in table.groupby("group", sort=False):
+        stops = rows[~rows["verdict"].str.startswith("finite")]
+        told = f"{int((~rows['finite']).sum())} not finite, {len(stops)} stopped with their reason"
+        found.claim(f"{group}: state finite", f"{len(rows)} runs", told, "all finite", rows["finite"].all())
+    changes = table["step_change"].dropna()
+    found.claim(
+        "peaks of the extremes with half the step",
+        f"{len(changes)} runs",
+        f"largest change {changes.max():.2%}" if len(changes) else "none",
+        f"{STEP_CHANGE:.0%}",
+        (changes <= STEP_CHANGE).all(),
+    )
+    columns = ["run", "rotor, rpm", "tilt, deg", "yaw, deg", "offset, m", "heave, m", "tension, MN",
+               "change with half the step", "verdict"]  # fmt: skip
+    rows = [
+        [row["case"], *(f"{row[key]:.2f}" for key in stability_extremes.PEAKS),
+         "-" if np.isnan(row["step_change"]) else f"{row['step_change']:.2%}", row["verdict"]]
+        for row in table.to_dict("records")
+    ]  # fmt: skip
+    found.tables.append(["Extremes: largest values from the start of the run on", columns, rows])
+    return found
+
+
+def long_part(sizes, folder, progress):
+    """Found of the long runs, the orders and the quaternion."""
+    long, found = stability_long, Found()
+    for integrator in INTEGRATORS:
+        for steps, when in ((min(SECULAR_STEPS, sizes.steps), "at the default step"), (sizes.steps, "long")):
+            drift = long.free_drift(integrator, steps, progress=progress)
+            limits = DRIFT[integrator]
+            told = ", ".join(f"{key} {drift[key]:.1e}" for key in limits)
+            good = drift["status"] == RUNNING and all(drift[key] <= limits[key] for key in limits)
+            target = ", ".join(f"{key} {most:.0e}" for key, most in limits.items())
+            found.claim(
+                f"free body, {integrator}, {when}: relative change of energy and momenta",
+                f"{steps} steps of {STEPS[integrator]:g} s", told, target, good,
+            )  # fmt: skip
+    for integrator, most in FLOATING_DRIFT.items():
+        drift = long.floating_drift(integrator, sizes.steps, progress=progress)
+        found.claim(
+            f"undamped floating body on its lines, {integrator}: change of energy over that of motion",
+            f"{sizes.steps} steps of {STEPS[integrator]:g} s", f"{drift['energy']:.1e}",
+            f"{most:.0e}", drift["status"] == RUNNING and drift["energy"] <= most,
+        )  # fmt: skip
+    memory = long.plant_memory(sizes.steps, progress)
+    found.claim(
+        "resident memory, full plant under the PI in turbulence and waves", f"{memory['steps']} steps",
+        f"{memory['growth_MB']:.2f} MB after the first tenth", f"{MEMORY_MB:g} MB",
+        memory["status"] == RUNNING and memory["growth_MB"] <= MEMORY_MB,
+    )  # fmt: skip
+    memory = long.environment_memory(max(2000, sizes.steps // 50), progress)
+    found.claim(
+        "resident memory, environment", f"{memory['steps']} control periods, {memory['resets']} resets",
+        f"{memory['growth_MB']:.2f} MB after the first tenth", f"{MEMORY_MB:g} MB",
+        memory["growth_MB"] <= MEMORY_MB,
+    )  # fmt: skip
+    for integrator, order in long.measured_orders().items():
+        least = long.ORDERS[integrator] - ORDER_SLACK
+        found.claim(
+            f"order of {integrator}", "steps of 0.05 and 0.025 s", f"{order:.2f}", f"{least:.2f} or more",
+            order >= least,
+        )  # fmt: skip
+    difference, turned = long.quaternion_difference()
+    found.claim(
+        "tumbling body: Euler angles against a quaternion", "60 s, 61 instants",
+        f"rotation matrices differ by {difference:.1e}, turned by {np.degrees(turned):.0f} deg",
+        f"{TURNED:.0e}", difference <= TURNED,
+    )  # fmt: skip
+    return found
+
+
+def plain_part(sizes, folder, progress):
+    """Found of the runs without the compiler."""
+    found = Found()
+    if progress is not None:
+        progress("runs without the compiler", 0, 1)
+    differences = stability_plain.differences()
+    worst = max(differences, key=differences.get)
+    found.claim(
+        "NUMBA_DISABLE_JIT=1 against compiled, scenes by integrators and environments",
+        f"{len(differences)} runs", f"largest difference {differences[worst]:.1e} ({worst})",
+        f"{PLAIN:.0e} of the larger of 1 and the number", differences[worst] <= PLAIN,
+    )  # fmt: skip
+    rows = [[name, f"{value:.1e}"] for name, value in differences.items()]
+    found.tables.append(["Without the compiler: largest difference", ["run", "difference"], rows])
+    return found
+
+
+PARTS = {
+    "map": map_part,
+    "cases": cases_part,
+    "hostile": hostile_part,
+    "extremes": extremes_part,
+    "long": long_part,
+    "plain": plain_part,
+}
+TITLES = {
+    "map": "Stability map",
+    "cases": "Random scenes and initial states",
+    "hostile": "Hostile actions",
+    "extremes": "Extremes",
+    "long": "Long runs, order and attitude",
+    "plain": "Without the compiler",
+}
+
+
+def study(folder, parts=None, sizes=None, progress=None):
+    """{part: Found} of the chosen parts (default: all); each is written to folder/<part>.json as it ends.
+
+    progress: called with (text, done, total). Raises: InputError for an unknown part.
+    """
+    sizes = Sizes() if sizes is None else sizes
+    chosen = list(parts or PARTS)
+    for part in chosen:
+        if part not in PARTS:
+            raise unknown("part", part, PARTS)
+    results = {}
+    for part in chosen:
+        began = time.perf_counter()
+        found = PARTS[part](sizes, folder, progress)
+        results[part] = found
+        stored = {
+            "about": header(),
+            "minutes": (time.perf_counter() - began) / 60.0,
+            "date": f"{datetime.now(UTC):%Y-%m-%d}",
+            "sizes": asdict(sizes),
+            "claims": [asdict(claim) for claim in found.claims],
+            "tables": found.tables,
+        }
+        with replacing(Path(folder) / f"{part}.json") as temporary:
+            Path(temporary).write_text(json.dumps(stored, indent=1) + "\n")
+    return results
+
+
+def stored_parts(folder):
+    """{part: what study stored of it} of a folder, in the order of PARTS."""
+    paths = {part: Path(folder) / f"{part}.json" for part in PARTS}
+    return {part: json.loads(path.read_text()) for part, path in paths.items() if path.is_file()}
+
+
+def _table(columns, rows):
+    """Lines of a Markdown table."""
+    lines = ["| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
+    return lines + ["| " + " | ".join(str(cell).replace("|", "/") for cell in row) + " |" for row in rows]
+
+
+def write_report(folder, path):
+    """Write the Markdown report of every part that the folder holds; returns the path."""
+    parts = stored_parts(folder)
+    claims = [(TITLES[part], claim) for part, stored in parts.items() for claim in stored["claims"]]
+    failed = sum(not claim["holds"] for _, claim in claims)
+    lines = [
+        "# Robustness: what was done to break the simulator, and what came of it", "",
+        f"Made by `fowt benchmark stability`; {len(claims)} checks, {failed} of them missed. Figures of each"
+        " part hold for the sizes in its rows.", "",
+    ]  # fmt: skip
+    columns = ["part", "check", "count", "found", "target", "verdict"]
+    rows = [
+        [title, c["what"], c["count"], c["found"], c["target"], "holds" if c["holds"] else "**MISSED**"]
+        for title, c in claims
+    ]
+    lines += _table(columns, rows)
+    for part, stored in parts.items():
+        lines += ["", f"## {TITLES[part]}", "", METHODS[part], ""]
+        lines.append(f"Run on {stored['date']}, {stored['minutes']:.1f} minutes.")
+        for title, columns, rows in stored["tables"]:
+            lines += ["", f"**{title}**", "", *_table(columns, rows)]
+    with replacing(path) as temporary:
+        Path(temporary).write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return Path(path)
+
+
+METHODS = {
+    "map": (
+        f"Each run starts off its operating point in every state, keeps its command, and lasts"
+        f" {stability_map.DURATION:g} s. It has blown up where it stops, or where a state's peak over the"
+        f" second half is more than {stability_map.GROWTH:g} times that of a run with"
+        f" {stability_map.FINE_STEP:g} s steps. Steps grow by {stability_map.SCAN - 1:.0%} from the default"
+        " until the first blow-up, then bisection. Theory is the amplification matrix of the very scheme on"
+        " the linear model about the same point: blade pitch by its own exact law in all but Runge-Kutta,"
+        " Adams positions by Adams-Moulton from the new velocities. Its limit is where errors double over"
+        " the run beyond what the plant itself does. The linear model has no drag, which the runs have:"
+        " that is why some limits are higher than theory's. The actuator (5 1/s) limits Runge-Kutta, yaw"
+        " and rotor the others. The feathered blades of an idling rotor damp its speed by up to 4.5 1/s:"
+        " there ab4 corrects its step, as abm4 does everywhere (`integrators.FEATHERING`). By itself it"
+        " would keep less than a factor of two from 26 m/s on, and blow up at 0.1 s from 50 m/s on."
+    ),
+    "cases": (
+        f"Wind from still air to 70 m/s (steady, NTM, ETM, the turbulent extreme wind, gusts; from any"
+        " direction), seas to Hs 17 m or a regular wave to 30 m as steep as it may be, from any side;"
+        " offsets to 30 m (lines taut on one side and slack on the other), tilt to 30 deg, yaw to 30 deg,"
+        " speeds to 3 m/s and 0.1 rad/s, rotor from rest to 150 %, any blade pitch; a third under the PI, a"
+        f" third under a constant command, a third under a new random command every second."
+        f" {stability_cases.DURATION:g} s each. The bound on the platform's kinetic energy is"
+        f" {stability_cases.FACTOR:g} times the sum of the energy it starts with, its own at the speed of"
+        " the water, and the work that the wind's thrust can do over the hub's travel; that on the rotor"
+        f" speed a tip-speed ratio of {stability_cases.FASTEST_TIP:g}. A failure is stored as JSON and runs"
+        " again by `fowt benchmark stability --replay FILE`."
+    ),
+    "hostile": (
+        "The environment at its defaults. An episode that ends early is started anew until the periods are"
+        " spent; `step` must give finite observations and rewards throughout."
+    ),
+    "extremes": (
+        f"Standard fidelity, {stability_extremes.DURATION:g} s, the event at {stability_extremes.EVENT:g} s,"
+        " PI control where the rotor runs. The catenary has no breaking strength and the rotor no"
+        " aerodynamic brake: tensions and overspeeds are what the rigid model has, and say that it stays"
+        " finite, not that a turbine survives."
+    ),
+    "long": (
+        "The free body drifts and nutates in empty space with its rotor turning. The floating body has its"
+        " hull, weight and lines, but no drag, damping or added mass, so that its energy is known."
+        " Angular momentum is about the centre of mass."
+        " Momenta and energies are computed from the mass matrix outside the stepping code."
+    ),
+    "plain": (
+        f"{stability_plain.STEPS} steps of each scene by each integrator, and {stability_plain.ENV_STEPS}"
+        " control periods of environments, in a process without the compiler, with the scenes handed over."
+    ),
+}

@@ -1,0 +1,476 @@
+"""Random scenes and initial states over the whole valid range: does the plant stay finite and bounded?
+
+Weathers are drawn anew for a scene, and many states run in each. A case is a plain dict that holds
+everything to run it again (`fowt benchmark stability --replay FILE`); each failure is stored as one.
+"""
+
+import json
+from dataclasses import dataclass, field, replace
+from math import cos, hypot, pi, radians, sin, sqrt
+from pathlib import Path
+
+import numpy as np
+
+from controllers import make
+from fowt_env.channels import measure
+from fowt_env.counters import Counter
+from fowt_env.errors import InputError, unknown
+from fowt_env.integrators import build_integrator, rates, take_step
+from fowt_env.jit import entry, kernel
+from fowt_env.loads.hydrostatics import submerged
+from fowt_env.loads.mooring import mooring_load
+from fowt_env.measurement import N_MEASUREMENTS, Measurement
+from fowt_env.outputs import replacing
+from fowt_env.scene import FIDELITIES, build_scene
+from fowt_env.simulation import hold
+from fowt_env.state import State, pose_of
+from fowt_env.step import NON_FINITE, RUNNING, STOP_REASONS, observe, status_of
+
+DURATION = 30.0  # s of each case: three wave periods, one of platform pitch
+WEATHER = 60.0  # s of random wind and sea
+CONTROL_DT = 0.1  # s
+SEGMENT = 1.0  # s between changes of an open-loop command
+PER_WEATHER = 50  # initial states in each weather
+PLANTS = ("standard",) * 44 + ("reference",) + ("fast",) * 5  # fidelity of each weather, in turn
+KEYS = ("fidelity", "integrator", "dt", "duration", "wind", "sea", "seed", "state", "commands")
+
+STEEPEST = 0.142  # height over length of a regular wave in deep water before it breaks (Michell)
+FASTEST_TIP = 16.0  # tip-speed ratio that no freely turning rotor reaches
+WIND_LOAD = 1.3  # thrust coefficient over any angle and speed ratio that the wind's work is bounded with
+HUB_TRAVEL = 180.0  # m: hub from one side of the sea to the other, over which the wind may do work
+FACTOR = 2.0  # on the energy bound: waves and wind may act together with the initial motion
+FINER = 4  # ratio of steps of the run by which stops and the largest peaks are checked
+QUADRATURE = np.polynomial.legendre.leggauss(40)  # of the energy of a line
+AGREE = 0.1  # relative difference of peak energies up to which they are the plant's and not the step's
+
+
+@kernel
+def platform_energy(x, mass_matrix):
+    """Kinetic energy of the platform's six motions (rotor turning with it), J."""
+    total = 0.0
+    for i in range(6):
+        for j in range(6):
+            total += 0.5 * x[State.VX + i] * mass_matrix[i, j] * x[State.VX + j]
+    return total
+
+
+@kernel
+def _run_case(
+    scene, work, x, u, act, parameters, memory, measurement, dx, commands, per_control, per_segment, last, dt,
+    peak,
+):  # fmt: skip
+    for i in range(peak.shape[0]):
+        peak[i] = 0.0
+    for step in range(last):
+        if commands.shape[0] > 0:
+            if step % per_segment == 0:
+                row = min(step // per_segment, commands.shape[0] - 1)
+                u[0] = commands[row, 0]
+                u[1] = commands[row, 1]
+        elif step % per_control == 0:
+            rates(step * dt, x, u, scene, work, dx)
+            measure(scene, work, x, dx, u, step * dt, measurement)
+            act(parameters, memory, measurement, u)
+        take_step(step * dt, x, u, dt, scene, scene.multistep, work)
+        status = status_of(x)
+        if status != RUNNING:
+            return status, step + 1
+        peak[0] = max(peak[0], platform_energy(x, scene.body.mass_matrix))
+        peak[1] = max(peak[1], max(abs(x[State.ROLL]), abs(x[State.PLATFORM_PITCH])))
+        peak[2] = max(peak[2], sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]))
+        peak[3] = max(peak[3], abs(x[State.ROTOR_SPEED]))
+    return RUNNING, last
+
+
+@entry
+def run_case(
+    box, x, u, act, parameters, memory, measurement, dx, commands, per_control, per_segment, last, dt, peak
+):
+    """Advance x by last steps of dt; returns (status, steps done).
+
+    Open loop where commands (k, 2) has rows, each held for per_segment steps; else the law act, called
+    every per_control steps. peak (4,): largest platform kinetic energy (J), roll or pitch (rad), distance
+    from the origin (m) and rotor speed (rad/s).
+    """
+    return _run_case(
+        box.scene, box.work, x, u, act, parameters, memory, measurement, dx, commands, per_control,
+        per_segment, last, dt, peak,
+    )  # fmt: skip
+
+
+@dataclass
+class Outcome:
+    """What a case did."""
+
+    status: int
+    time: float  # s reached
+    peak: np.ndarray  # (4,) as run_case has it
+    energy_bound: float  # J, of the platform's kinetic energy
+    speed_bound: float  # rad/s, of the rotor
+    unconverged: int  # mooring lines that missed their tolerance
+    failure: str = ""  # empty: none
+
+    @property
+    def capsized(self):
+        return self.status not in (RUNNING, NON_FINITE)
+
+    @property
+    def told(self):
+        """The outcome in words."""
+        if self.failure:
+            return self.failure
+        ended = STOP_REASONS[self.status] if self.status != RUNNING else "ran to its end"
+        energy, tilt, speed = self.peak[0], np.degrees(self.peak[1]), self.peak[3]
+        return f"{ended}; kinetic energy {energy:.3g} J, tilt {tilt:.1f} deg, rotor {speed:.3g} rad/s at most"
+
+
+@kernel
+def line_energy(H, V, length, weight, EA, node, share):
+    """Elastic and gravity energy (J) of a frictionless line under fairlead tensions H and V.
+
+    node, share: points and weights of Gauss-Legendre quadrature over [-1, 1].
+    """
+    lying = max(0.0, length - V / weight)
+    start = V - weight * (length - lying)
+    total = lying * H * H / (2.0 * EA)
+    for i in range(node.shape[0]):
+        hanging = (length - lying) * (node[i] + 1.0) / 2.0
+        vertical = start + weight * hanging
+        tension = hypot(H, vertical)
+        height = (tension - hypot(H, start)) / weight
+        height += (vertical * vertical - start * start) / (2.0 * EA * weight)
+        total += share[i] * (length - lying) / 2.0 * (tension * tension / (2.0 * EA) + weight * height)
+    return total
+
+
+@entry
+def _potential_energy(box, x, node, share):
+    model, work, pose = box.scene, box.work, pose_of(x)
+    body = model.body
+    total = body.gravity * (body.mass * pose.z + body.s_x * pose.r31 + body.s_z * pose.r33)
+    if model.hull is not None:
+        volume, qx, qy, qz = submerged(pose, model.hull, work.counters)
+        depth = volume * pose.z + qx * pose.r31 + qy * pose.r32 + qz * pose.r33
+        total -= model.hull.specific_weight * depth
+    if model.mooring is not None:
+        lines = model.mooring
+        mooring_load(pose, lines, work.lines, work.counters)
+        for i in range(lines.length.shape[0]):
+            H, V = work.lines[i, 0], work.lines[i, 1]
+            total += line_energy(H, V, lines.length[i], lines.weight[i], lines.EA[i], node, share)
+    return total
+
+
+def potential_energy(box, x):
+    """Energy (J) of gravity, still-water buoyancy and moorings of a state, up to a constant."""
+    return _potential_energy(box, x, *QUADRATURE)
+
+
+def weather_speeds(scene):
+    """(fastest wind at the rotor, fastest water at the surface) of a scene, m/s, generous."""
+    wind = water = 0.0
+    series = scene.model.wind
+    if series is not None:
+        value = np.abs(series.value)
+        level = np.sqrt((value[:, :3] ** 2).sum(axis=1)) + 0.5 * value[:, 3:].sum(axis=1)
+        wind = 1.1 * float(level.max()) + 10.0  # shear over the rotor's height; the hub's own motion
+    waves = scene.model.waves
+    if waves is not None:
+        rms = sqrt(0.5 * float(np.sum((waves.amplitude * waves.omega) ** 2)))
+        largest = float(np.sum(waves.amplitude * waves.omega))
+        water = min(largest, 4.5 * rms)  # 4.5 standard deviations of a Gaussian sea
+    return wind, water
+
+
+class Runner:
+    """Runs cases in one scene; what they share is built once."""
+
+    def __init__(self, scene, dt):
+        self.scene, self.dt = scene, float(dt)
+        self.work = scene.work()
+        self.box = scene.box(self.work)
+        self.rest = potential_energy(self.box, np.zeros(scene.n_state))
+        self.speeds = weather_speeds(scene)
+        self.controller = make("pi", scene.turbine, CONTROL_DT) if scene.model.wind is not None else None
+        self.dx = np.zeros(scene.n_state)
+        self.measurement = np.zeros(N_MEASUREMENTS)
+
+    def bounds(self, x):
+        """(J, rad/s) that the platform's kinetic energy and the rotor speed must stay below from x on.
+
+        FACTOR times the sum of: the state's kinetic energy and its potential energy above that of the
+        upright platform; the platform with its added mass at the speed of the water; and the work of the
+        wind's thrust over HUB_TRAVEL. Rotor: its start, or FASTEST_TIP times the wind over the radius.
+        """
+        wind, water = self.speeds
+        body, rotor = self.scene.model.body, self.scene.turbine.rotor
+        density = self.scene.platform.environment.air_density
+        thrust = WIND_LOAD * 0.5 * density * pi * rotor.tip_radius**2 * wind**2
+        energy = platform_energy(x, body.mass_matrix)
+        energy += max(0.0, potential_energy(self.box, x) - self.rest)
+        energy += body.mass * water**2 + thrust * HUB_TRAVEL
+        return FACTOR * energy, max(1.05 * abs(x[State.ROTOR_SPEED]), FASTEST_TIP * wind / rotor.tip_radius)
+
+    def run(self, state, commands, duration):
+        """Outcome of a state (n,) under commands (k, 2), or under the PI where commands is empty."""
+        dt, box, work = self.dt, self.box, self.work
+        x = np.array(state, dtype=float)
+        commands = np.array(commands, dtype=float).reshape(-1, 2)
+        u = np.array([0.0, x[State.BLADE_PITCH]])
+        energy, speed = self.bounds(x)
+        for carried in (work.lines, work.counters, work.kept, work.history):
+            carried[:] = 0.0  # as in a scene of its own: a case runs alike alone and among others
+        law, parameters, memory = hold, np.zeros(1), np.zeros(1)
+        if len(commands) == 0:
+            observe(box, x, u, 0.0, self.dx, self.measurement)
+            self.controller.reset(Measurement(*self.measurement.tolist()))
+            law, parameters, memory = (
+                self.controller.kernel,
+                self.controller.parameters,
+                self.controller.memory,
+            )
+        peak = np.zeros(4)
+        status, steps = run_case(
+            box, x, u, law, parameters, memory, self.measurement, self.dx, commands,
+            round(CONTROL_DT / dt), round(SEGMENT / dt), round(duration / dt), dt, peak,
+        )  # fmt: skip
+        unconverged = int(work.counters[Counter.MOORING_UNCONVERGED])
+        outcome = Outcome(int(status), steps * dt, peak, energy, speed, unconverged)
+        outcome.failure = judged(outcome)
+        return outcome
+
+
+def judged(outcome):
+    """Why an outcome is a failure, or an empty text. A capsize is the plant's to judge by a finer run."""
+    if outcome.status == NON_FINITE:
+        return STOP_REASONS[NON_FINITE]
+    if not outcome.peak[0] <= outcome.energy_bound:
+        return f"kinetic energy {outcome.peak[0]:.3g} J above the bound {outcome.energy_bound:.3g} J"
+    if not outcome.peak[3] <= outcome.speed_bound:
+        return f"rotor speed {outcome.peak[3]:.3g} rad/s above the bound {outcome.speed_bound:.3g} rad/s"
+    return ""
+
+
+def draw_wind(rng):
+    """A wind specification from still air to 70 m/s, from any direction."""
+    kind = rng.choice(
+        ["steady", "ntm", "etm", "ewm", "eog", "ecd", "edc", "ews", "still"],
+        p=[0.3, 0.2, 0.15, 0.1, 0.05, 0.05, 0.05, 0.05, 0.05],
+    )
+    direction = float(rng.uniform(-180.0, 180.0))
+    if kind == "still":
+        return {"kind": "steady", "speed": 0.0}
+    if kind == "steady":
+        return {
+            "kind": "steady", "speed": float(rng.uniform(0.0, 70.0)), "direction": direction,
+            "vertical": float(rng.uniform(-5.0, 5.0)),
+        }  # fmt: skip
+    if kind == "ewm":
+        return {
+            "kind": "ewm", "turbine_class": str(rng.choice(["I", "II", "III"])), "turbulent": True,
+            "recurrence": int(rng.choice([1, 50])), "direction": direction,
+        }  # fmt: skip
+    if kind in ("ntm", "etm"):
+        return {
+            "kind": str(kind), "speed": float(rng.uniform(1.0, 60.0 if kind == "ntm" else 50.0)),
+            "class": str(rng.choice(["A", "B", "C"])), "direction": direction,
+        }  # fmt: skip
+    gust = {"kind": str(kind), "speed": float(rng.uniform(1.0, 50.0)), "start": float(rng.uniform(0.0, 15.0))}
+    if kind != "eog":
+        gust["sign"] = int(rng.choice([1, -1]))
+    if kind == "ews":
+        gust["orientation"] = str(rng.choice(["vertical", "horizontal"]))
+    return gust
+
+
+def draw_sea(rng):
+    """A sea specification from flat water to Hs 17 m or a regular wave about to break, from any direction."""
+    heading = float(rng.uniform(-180.0, 180.0))
+    kind = str(rng.choice(["jonswap", "pierson_moskowitz", "regular"], p=[0.6, 0.15, 0.25]))
+    if kind == "regular":
+        height = float(rng.uniform(0.0, 30.0))
+        shortest = max(3.0, sqrt(2.0 * pi * height / (STEEPEST * 9.80665)))
+        return {"kind": kind, "H": height, "T": shortest + float(rng.uniform(0.0, 12.0)), "heading": heading}
+    height = float(rng.uniform(0.0, 17.0))
+    shortest = max(3.0, 3.6 * sqrt(height))  # steeper irregular seas break
+    period = shortest + float(rng.uniform(0.0, 12.0))
+    sea = {"kind": kind, "Hs": height, "Tp": period, "heading": heading}
+    if kind == "jonswap":
+        sea["gamma"] = float(rng.uniform(1.0, 5.0))
+    return sea
+
+
+def draw_state(rng, turbine):
+    """(15,) state anywhere in the valid range: lines taut to slack, 30 deg of tilt, rotor to 150 %."""
+    x = np.zeros(15)
+    offset, bearing = rng.uniform(0.0, 30.0), rng.uniform(0.0, 2.0 * pi)
+    x[:3] = offset * cos(bearing), offset * sin(bearing), rng.uniform(-8.0, 8.0)
+    tilt, towards = radians(rng.uniform(0.0, 30.0)), rng.uniform(0.0, 2.0 * pi)
+    x[3:6] = tilt * cos(towards), tilt * sin(towards), radians(rng.uniform(-30.0, 30.0))
+    x[State.AZIMUTH] = rng.uniform(0.0, 2.0 * pi)
+    x[7:10] = rng.uniform(-1.0, 1.0, 3) * [3.0, 3.0, 2.0]
+    x[10:13] = rng.uniform(-1.0, 1.0, 3) * [0.05, 0.05, 0.1]
+    stopped = rng.random() < 0.1
+    x[State.ROTOR_SPEED] = 0.0 if stopped else rng.uniform(0.0, 1.5) * turbine.rated_rotor_speed
+    drive = turbine.pitch_drive
+    x[State.BLADE_PITCH] = rng.uniform(drive.minimum, drive.maximum)
+    return x
+
+
+def draw_commands(rng, turbine, duration):
+    """Commands (k, 2): none (the PI), one constant, or a new one anywhere in the range every SEGMENT."""
+    drive = turbine.pitch_drive
+    count = (0, 1, round(duration / SEGMENT))[rng.integers(3)]
+    torque = rng.uniform(0.0, turbine.torque_law.max_torque, count)
+    return np.column_stack([torque, rng.uniform(drive.minimum, drive.maximum, count)])
+
+
+def _case(scene, wind, sea, seed, state, commands, duration):
+    """The replayable dict of a case."""
+    return {
+        "fidelity": scene.options["fidelity"], "integrator": scene.options["integrator"], "dt": scene.dt,
+        "duration": duration, "wind": wind, "sea": sea, "seed": seed,
+        "state": [float(value) for value in state],
+        "commands": np.asarray(commands).tolist(),
+    }  # fmt: skip
+
+
+def case_scene(case):
+    """Scene of a case."""
+    return build_scene(
+        wind=case["wind"], sea=case["sea"], seed=case["seed"], fidelity=case["fidelity"],
+        integrator=case["integrator"], duration=WEATHER,
+    )  # fmt: skip
+
+
+def replay(case):
+    """Outcome of a case dict, or of the JSON file that holds one. Raises: InputError if keys are missing."""
+    if not isinstance(case, dict):
+        path = Path(case)
+        if not path.is_file():
+            raise InputError(f"replay = {str(path)!r}: not found")
+        try:
+            case = json.loads(path.read_text())
+        except json.JSONDecodeError as error:
+            raise InputError(f"replay = {str(path)!r}: is not JSON: {error}") from None
+        if not isinstance(case, dict):
+            raise InputError(f"replay = {str(path)!r}: must hold one case, an object with {', '.join(KEYS)}")
+    missing = [key for key in KEYS if key not in case]
+    if missing:
+        raise InputError(f"case: {', '.join(missing)} missing; needs {', '.join(KEYS)}")
+    return Runner(case_scene(case), case["dt"]).run(case["state"], case["commands"], case["duration"])
+
+
+def finer(scene, case):
+    """Outcome of a case by Runge-Kutta 4 at a FINER-th of its step, in its own scene."""
+    other = replace(
+        scene.with_model(multistep=build_integrator("rk4")), options=scene.options | {"integrator": "rk4"}
+    )
+    return Runner(other, case["dt"] / FINER).run(case["state"], case["commands"], case["duration"])
+
+
+@dataclass
+class Tally:
+    """What a batch of random cases came to."""
+
+    cases: int = 0
+    weathers: int = 0
+    failures: list = field(default_factory=list)  # (case dict, reason)
+    capsizes: int = 0  # confirmed by a finer step
+    unconverged: int = 0
+    worst_share: float = 0.0  # largest peak of energy over its bound
+    peak: np.ndarray = field(default_factory=lambda: np.zeros(4))
+    checked: int = 0  # most energetic cases compared with a finer step
+    difference: float = 0.0  # largest relative difference of their peak energies
+    per_plant: dict = field(default_factory=dict)
+
+
+def random_cases(count, seed=0, per_weather=PER_WEATHER, duration=DURATION, plants=PLANTS, progress=None):
+    """Tally of count random cases, per_weather states in each weather; the same seed gives the same cases.
+
+    Every capsize, and the most energetic case of each weather in twenty, runs again by Runge-Kutta 4 at
+    a quarter of the step: a capsize that the finer run does not have, or a peak energy that differs by
+    more than AGREE, is a failure.
+    progress: called with (text, done, total).
+    """
+    for plant in plants:
+        if plant not in FIDELITIES:
+            raise unknown("fidelity", plant, FIDELITIES)
+    sequence = np.random.SeedSequence(seed)
+    tally, bases = Tally(), {}
+    weather = 0
+    while tally.cases < count:
+        rng = np.random.default_rng(sequence.spawn(1)[0])
+        plant = plants[weather % len(plants)]
+        number = min(per_weather, count - tally.cases)
+        _one_weather(tally, bases, plant, rng, number, duration, weather % 20 == 0)
+        weather += 1
+        if progress is not None:
+            progress(f"random cases, {len(tally.failures)} failures", tally.cases, count)
+    tally.weathers = weather
+    return tally
+
+
+def _one_weather(tally, bases, plant, rng, number, duration, check):
+    """Run number cases in one weather drawn from rng, into the tally."""
+    wind, sea, seed = draw_wind(rng), draw_sea(rng), int(rng.integers(2**31))
+    tally.per_plant[plant] = tally.per_plant.get(plant, 0) + number
+    try:
+        if plant not in bases:
+            bases[plant] = build_scene(wind=wind, sea=sea, seed=seed, fidelity=plant, duration=WEATHER)
+        scene = bases[plant].with_weather(wind, sea, seed)
+        runner = Runner(scene, scene.dt)
+    except Exception as error:  # any exception is what this looks for
+        case = {"fidelity": plant, "wind": wind, "sea": sea, "seed": seed}
+        tally.failures.append((case, f"exception: {error!r}"))
+        tally.cases += number
+        return
+    hardest = None
+    for _ in range(number):
+        state = draw_state(rng, scene.turbine)
+        commands = draw_commands(rng, scene.turbine, duration)
+        case = _case(scene, wind, sea, seed, state, commands, duration)
+        tally.cases += 1
+        try:
+            outcome = runner.run(state, commands, duration)
+        except Exception as error:
+            tally.failures.append((case, f"exception: {error!r}"))
+            continue
+        _count(tally, scene, case, outcome)
+        if outcome.status == RUNNING and (hardest is None or outcome.peak[0] > hardest[1].peak[0]):
+            hardest = (case, outcome)
+    if check and hardest is not None:
+        case, outcome = hardest
+        fine = finer(scene, case)
+        change = abs(fine.peak[0] - outcome.peak[0]) / fine.peak[0]
+        tally.checked += 1
+        tally.difference = max(tally.difference, change)
+        if not change <= AGREE:
+            tally.failures.append((case, f"peak energy differs by {change:.1%} from a finer step's"))
+
+
+def _count(tally, scene, case, outcome):
+    """Add an outcome to the tally."""
+    tally.unconverged += outcome.unconverged
+    if outcome.failure:
+        tally.failures.append((case, outcome.failure))
+        return
+    if outcome.capsized:
+        if finer(scene, case).status == outcome.status:
+            tally.capsizes += 1
+        else:
+            tally.failures.append((case, f"{STOP_REASONS[outcome.status]}, but not at a finer step"))
+        return
+    tally.worst_share = max(tally.worst_share, outcome.peak[0] / outcome.energy_bound)
+    np.maximum(tally.peak, outcome.peak, out=tally.peak)
+
+
+def store(failures, folder):
+    """Write each (case, reason) as a JSON file for replay; returns the paths."""
+    paths = []
+    for number, (case, reason) in enumerate(failures):
+        path = Path(folder) / f"case_{number:04d}.json"
+        with replacing(path) as temporary:
+            Path(temporary).write_text(json.dumps(case | {"reason": reason}, indent=1) + "\n")
+        paths.append(path)
+    return paths

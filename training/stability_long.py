@@ -1,0 +1,280 @@
+"""Long runs: invariants and memory over millions of steps, order of the integrators, quaternion attitude."""
+
+import resource
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
+
+from fowt_env.dynamics import Kept
+from fowt_env.envs import FowtEnv
+from fowt_env.integrators import INTEGRATORS, START_STEPS, build_integrator
+from fowt_env.measurement import N_MEASUREMENTS
+from fowt_env.scene import STEPS, build_scene
+from fowt_env.simulation import initial_state
+from fowt_env.state import State
+from fowt_env.step import RUNNING, advance, forget, observe
+from training.stability_cases import Runner, platform_energy, potential_energy
+
+CHUNK = 100_000  # steps between looks at the invariants
+ORDERS = {"rk4": 4, "heun": 2, "abm4": 4, "ab4": 4}
+WEATHER_SEA = {"kind": "jonswap", "Hs": 6.0, "Tp": 10.0}
+
+
+def with_integrator(scene, name):
+    """The scene with another integrator."""
+    return replace(
+        scene.with_model(multistep=build_integrator(name)), options=scene.options | {"integrator": name}
+    )
+
+
+def free_scene():
+    """The turbine in empty space without weight and without losses in the shaft."""
+    scene = build_scene(hydrodynamics=False, mooring=False)
+    model = scene.model
+    shaft = model.drivetrain._replace(bearing_loss_coefficient=0.0, mesh_loss=0.0)
+    return scene.with_model(body=model.body._replace(gravity=0.0), drivetrain=shaft)
+
+
+def floating_scene():
+    """The turbine afloat on its lines in still water without drag, damping and fluid inertia."""
+    scene = build_scene()
+    model = scene.model
+    strips = model.strips._replace(added_mass_coefficient=0.0, drag_coefficient=0.0, heave_added_mass=0.0)
+    damping = type(model.damping)(*(0.0,) * len(model.damping))
+    shaft = model.drivetrain._replace(bearing_loss_coefficient=0.0, mesh_loss=0.0)
+    return scene.with_model(strips=strips, damping=damping, drivetrain=shaft)
+
+
+def free_start():
+    """State (15,) of a body that drifts, nutates and keeps its platform pitch off the singular 90 deg."""
+    x = np.zeros(15)
+    x[3:6] = 0.2, -0.15, 0.4
+    x[7:10] = 0.1, 0.05, -0.08
+    x[10:13] = 0.01, 0.004, 0.006
+    x[State.ROTOR_SPEED] = 1.2671
+    return x
+
+
+def floating_start():
+    """State (15,) of a platform set free at an offset, with its rotor turning."""
+    x = np.zeros(15)
+    x[:6] = 5.0, 2.0, 0.5, 0.02, 0.06, 0.03
+    x[State.ROTOR_SPEED] = 1.2671
+    return x
+
+
+def kinetic_energy(scene, x):
+    """Kinetic energy of platform and rotor, J."""
+    body, speed = scene.model.body, x[State.ROTOR_SPEED]
+    spin = 0.5 * body.rotor_row * speed**2 + body.coupling * speed * x[State.WX]
+    return platform_energy(x, body.mass_matrix) + spin
+
+
+def rotation(x):
+    """Rotation of the platform, body to inertial axes."""
+    return Rotation.from_euler("ZYX", [x[State.YAW], x[State.PLATFORM_PITCH], x[State.ROLL]])
+
+
+def momenta(scene, x):
+    """(linear, angular about the inertial origin) momentum of the whole turbine, inertial axes, (3,) each."""
+    body, turn = scene.model.body, rotation(x)
+    body_momentum = body.mass_matrix @ x[7:13]
+    body_momentum[3] += body.coupling * x[State.ROTOR_SPEED]
+    linear = turn.apply(body_momentum[:3])
+    return linear, np.cross(x[:3], linear) + turn.apply(body_momentum[3:])
+
+
+def own_momenta(scene, x):
+    """(linear, angular about the centre of mass) momentum, inertial axes: both constant in free flight."""
+    linear, angular = momenta(scene, x)
+    body = scene.model.body
+    centre = x[:3] + rotation(x).apply([body.s_x / body.mass, 0.0, body.s_z / body.mass])
+    return linear, angular - np.cross(centre, linear)
+
+
+def free_drift(integrator, steps, dt=None, progress=None):
+    """{energy, linear, angular: largest relative change; status} of the free body over so many steps."""
+    scene = with_integrator(free_scene(), integrator)
+    dt = STEPS[integrator] if dt is None else dt
+    x, u, box = free_start(), np.zeros(2), scene.box()
+    energy0, (linear0, angular0) = kinetic_energy(scene, x), own_momenta(scene, x)
+    drift = {"energy": 0.0, "linear": 0.0, "angular": 0.0}
+    forget(box)
+    status, done = RUNNING, 0
+    while done < steps and status == RUNNING:
+        n = min(CHUNK, steps - done)
+        status = advance(box, x, u, done, n, dt)
+        done += n
+        linear, angular = own_momenta(scene, x)
+        drift["energy"] = max(drift["energy"], abs(kinetic_energy(scene, x) / energy0 - 1.0))
+        drift["linear"] = max(drift["linear"], _relative(linear, linear0))
+        drift["angular"] = max(drift["angular"], _relative(angular, angular0))
+        if progress is not None:
+            progress(f"free body, {integrator}", done, steps)
+    return drift | {"status": int(status), "steps": done}
+
+
+def _relative(vector, first):
+    return float(np.linalg.norm(vector - first) / np.linalg.norm(first))
+
+
+def floating_drift(integrator, steps, dt=None, progress=None):
+    """{energy: largest change over that of the motion; status} of the undamped floating body.
+
+    The energy of the motion is kinetic (without the rotor's spin) and potential energy above rest.
+    """
+    scene = with_integrator(floating_scene(), integrator)
+    dt = STEPS[integrator] if dt is None else dt
+    x, u, box = floating_start(), np.zeros(2), scene.box()
+    start = kinetic_energy(scene, x) + potential_energy(box, x)
+    moving = potential_energy(box, x) - potential_energy(box, np.zeros(15))
+    forget(box)
+    worst, status, done = 0.0, RUNNING, 0
+    while done < steps and status == RUNNING:
+        n = min(CHUNK, steps - done)
+        status = advance(box, x, u, done, n, dt)
+        done += n
+        now = kinetic_energy(scene, x) + potential_energy(box, x)
+        worst = max(worst, abs(now - start) / moving)
+        if progress is not None:
+            progress(f"floating body, {integrator}", done, steps)
+    return {"energy": worst, "status": int(status), "steps": done}
+
+
+def resident():
+    """Resident memory of this process, MB; its largest so far where the system does not tell the present."""
+    statm = Path("/proc/self/statm")
+    if statm.is_file():
+        return int(statm.read_text().split()[1]) * resource.getpagesize() / 1e6
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak / (1e6 if sys.platform == "darwin" else 1e3)
+
+
+def plant_memory(steps, progress=None):
+    """{growth_MB, status, steps}: memory after a tenth of the steps of the full plant and after all."""
+    scene = build_scene(
+        wind={"kind": "ntm", "speed": 18.0, "class": "B"}, sea=WEATHER_SEA, fidelity="standard", seed=1
+    )
+    runner = Runner(scene, scene.dt)
+    x = np.zeros(scene.n_state)
+    x[State.ROTOR_SPEED], x[State.BLADE_PITCH] = 1.2671, 0.26
+    chunk = min(6000, max(1, steps // 10))  # a run of ten minutes under the PI, again and again
+    done, first, status = 0, None, RUNNING
+    while done < steps and status == RUNNING:
+        status = runner.run(x, [], chunk * scene.dt).status
+        done += chunk
+        if first is None and done >= steps // 10:
+            first = resident()
+        if progress is not None:
+            progress("memory of the plant", done, steps)
+    return {"growth_MB": resident() - first, "status": int(status), "steps": done}
+
+
+def environment_memory(steps, progress=None):
+    """{growth_MB, steps, resets} of an environment with episodes of 20 s, after a tenth and after all."""
+    env = FowtEnv(duration=20.0)
+    env.reset(seed=0)
+    first, resets = None, 0
+    for step in range(steps):
+        _, _, terminated, truncated, _ = env.step(np.zeros(2))
+        if terminated or truncated:
+            env.reset()
+            resets += 1
+        if step == steps // 10:
+            first = resident()
+        if progress is not None and step % 1000 == 0:
+            progress("memory of the environment", step, steps)
+    return {"growth_MB": resident() - first, "steps": steps, "resets": resets}
+
+
+def measured_orders(duration=20.0, steps=(0.1, 0.05, 0.025), finest=0.003125):
+    """{integrator: order of convergence} in a regular wave, from the error at the two smallest steps.
+
+    Without drag, whose |u| u is not smooth where the flow turns. The Adams methods get the derivatives of
+    their first three steps from the fine run: their own starting steps are of lower order, which leaves
+    an error of third order that would hide the method's.
+    """
+    base = build_scene(sea={"kind": "regular", "H": 6.0, "T": 8.0})
+    base = base.with_model(strips=base.model.strips._replace(drag_coefficient=0.0))
+    x0, u = initial_state(base)
+    rows = np.r_[0:6, 7:13]
+    exact_scene = with_integrator(base, "rk4")
+
+    def exact(time):
+        x, box = x0.copy(), exact_scene.box()
+        forget(box)
+        advance(box, x, u, 0, round(time / finest), finest)
+        return x
+
+    def end(name, dt):
+        scene = with_integrator(base, name)
+        if scene.model.multistep is None or scene.model.multistep.heun:
+            x, box = x0.copy(), scene.box()
+            forget(box)
+            advance(box, x, u, 0, round(duration / dt), dt)
+            return x[rows]
+        work = scene.work()
+        box = scene.box(work)
+        for k in range(START_STEPS):
+            forget(box)
+            observe(
+                box, exact(k * dt), u, k * dt, work.history[START_STEPS - 1 - k], np.zeros(N_MEASUREMENTS)
+            )
+        forget(box)
+        work.kept[Kept.STEPS] = START_STEPS
+        x = exact(START_STEPS * dt)
+        advance(box, x, u, START_STEPS, round(duration / dt) - START_STEPS, dt)
+        return x[rows]
+
+    last = exact(duration)[rows]
+    found = {}
+    for name in INTEGRATORS:
+        errors = np.array([np.linalg.norm(end(name, dt) - last) for dt in steps])
+        found[name] = float(np.log2(errors[-2] / errors[-1]))
+    return found
+
+
+def quaternion_difference(duration=60.0, integrator="rk4", dt=None):
+    """(largest entry by which the rotation matrices differ, rad turned): Euler angles against a quaternion.
+
+    A body tumbling in free space by the plant's own step, and its twin whose attitude is a quaternion
+    integrated by an eighth-order method; body rates come from the plant's equation of motion in both.
+    """
+    scene = with_integrator(free_scene(), integrator)
+    dt = STEPS[integrator] if dt is None else dt
+    x = np.zeros(15)
+    x[3:6], x[10:13] = (0.5, 0.3, -1.0), (0.6, 0.02, 0.25)
+    x[State.ROTOR_SPEED] = 1.2671
+    box, u = scene.box(), np.zeros(2)
+    dx, measurement = np.zeros(15), np.zeros(N_MEASUREMENTS)
+
+    def rate(t, y):
+        state = np.zeros(15)
+        turn = Rotation.from_quat(y[:4])
+        state[5], state[4], state[3] = turn.as_euler("ZYX")
+        state[7:13], state[State.ROTOR_SPEED] = y[4:10], y[10]
+        forget(box)
+        observe(box, state, u, 0.0, dx, measurement)
+        a, w = y[:4], y[7:10]
+        spin = np.r_[a[3] * w + np.cross(a[:3], w), -a[:3] @ w]  # q (0, w), scalar last
+        return np.r_[0.5 * spin, dx[7:13], dx[State.ROTOR_SPEED]]
+
+    times = np.linspace(0.0, duration, 61)
+    y0 = np.r_[rotation(x).as_quat(), x[7:13], x[State.ROTOR_SPEED]]
+    twin = solve_ivp(rate, (0.0, duration), y0, method="DOP853", rtol=1e-12, atol=1e-13, t_eval=times)
+    own = scene.box()
+    forget(own)
+    worst, turned, step = 0.0, 0.0, 0
+    for i, time in enumerate(times):
+        n = round(time / dt) - step
+        if advance(own, x, u, step, n, dt) != RUNNING:
+            return float("inf"), turned
+        step += n
+        difference = rotation(x).as_matrix() - Rotation.from_quat(twin.y[:4, i]).as_matrix()
+        worst = max(worst, float(np.abs(difference).max()))
+        turned = max(turned, float(np.abs(x[3:6]).max()))
+    return worst, turned

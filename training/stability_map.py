@@ -1,0 +1,263 @@
+"""Largest stable step of each integrator and kind of scene: measured on the plant, and as theory has it.
+
+Theory is the amplification matrix of the very scheme of fowt_env/integrators.py applied to the linear
+model of the scene: Runge-Kutta 4 through every state; the others with the blade pitch exact and, for the
+Adams methods, positions by Adams-Moulton from the new velocities.
+"""
+
+from dataclasses import dataclass, field, replace
+from math import exp, log
+
+import numpy as np
+import pandas as pd
+
+from fowt_env.integrators import INTEGRATORS, build_integrator, feathering
+from fowt_env.linear_model import MOTIONS, STATE_INDEX, STATES, linearize
+from fowt_env.scene import STEPS, build_scene
+from fowt_env.state import State
+from fowt_env.steady import OperatingPoint, trim
+from fowt_env.step import RUNNING, advance, forget
+
+DURATION = 300.0  # s of each run: hundreds of steps even at the largest
+FINE_STEP = 0.0125  # s, of the run that others are judged by
+GROWTH = 2.0  # a run has blown up where a state's later peak is more than this times the fine run's
+LARGEST_STEP = 3.0  # s; the search ends here
+SCAN = 1.15  # ratio of one step to the next until the first blow-up
+RESOLUTION = 0.01  # relative, of the bisection after it
+MARGIN = 2.0  # that the default step must keep
+# moved from the operating point, so that every mode is excited; SI and radians, order of linear_model.STATES
+EXCITATION = np.array([1.0, 1.0, 0.3, 0.01, 0.01, 0.03, 0.05, 0.05, 0.05, 1e-3, 1e-3, 1e-3, 0.02, 2e-3])
+# what counts as motion at all beside the fine run's peak, in the same order
+FLOOR = np.array([0.1, 0.1, 0.1, 2e-3, 2e-3, 2e-3, 0.02, 0.02, 0.02, 5e-4, 5e-4, 5e-4, 5e-3, 5e-4])
+BASHFORTH = np.array([55.0, -59.0, 37.0, -9.0]) / 24.0  # of the derivatives, latest first
+MOULTON = np.array([9.0, 19.0, -5.0, 1.0]) / 24.0  # of the new derivative and the latest three
+N = len(STATES)
+PITCH = STATES.index("blade_pitch")
+SEA = {"kind": "jonswap", "Hs": 7.5, "Tp": 10.0}
+STORM = {"kind": "jonswap", "Hs": 15.0, "Tp": 16.0}
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of scene of the map: arguments of build_scene, and what is held still."""
+
+    wind: object = 18.0
+    sea: object = field(default_factory=lambda: dict(SEA))
+    fidelity: str = "standard"
+    options: dict = field(default_factory=dict)
+    platform_held: bool = False
+    rotor_held: bool = False
+
+    def scene(self, integrator="rk4"):
+        """Scene of this kind with one of INTEGRATORS."""
+        scene = build_scene(
+            wind=self.wind, sea=self.sea, seed=1, fidelity=self.fidelity, integrator=integrator,
+            **self.options,
+        )  # fmt: skip
+        body = scene.model.body._replace(platform_held=self.platform_held, rotor_held=self.rotor_held)
+        return scene.with_model(body=body)
+
+    def point(self, scene):
+        """OperatingPoint about which runs start and theory is linear.
+
+        Without moorings nothing balances the thrust: then the upright platform, which drifts from there.
+        """
+        if not self.platform_held and self.options.get("mooring", True):
+            return trim(scene)
+        fixed = trim(scene, platform="fixed")
+        if self.platform_held:
+            return fixed
+        return OperatingPoint(dict(fixed), fixed.state, fixed.command, fixed.wind_speed, platform="floating")
+
+
+KINDS = {
+    "full, look-up rotor": Kind(),
+    "full, BEM rotor": Kind(fidelity="reference", options={"wave_components": 40}),
+    "full, table rotor": Kind(fidelity="fast"),
+    "full, rated wind": Kind(wind=11.4),
+    "full, cut-out wind": Kind(wind=25.0),
+    "no wind, waves": Kind(wind=None),
+    "still water, wind": Kind(sea=None),
+    "parked, 50 m/s, Hs 15 m": Kind(wind=50.0, sea=STORM, rotor_held=True),
+    "idling feathered, 26 m/s": Kind(wind=26.0),
+    "idling feathered, 50 m/s, Hs 15 m": Kind(wind=50.0, sea=STORM),
+    "idling feathered, 70 m/s, Hs 15 m": Kind(wind=70.0, sea=STORM),
+    "no mooring": Kind(options={"mooring": False}),
+    "platform held": Kind(platform_held=True),
+}
+
+
+def runge_kutta(a, h):
+    """(N, N) matrix of one classical Runge-Kutta step of x' = a x."""
+    z = h * a
+    square = z @ z
+    return np.eye(N) + z + square / 2.0 + square @ z / 6.0 + square @ square / 24.0
+
+
+def exact_pitch(a, h):
+    """Factor that the blade pitch's own law leaves of it after a step h."""
+    return exp(a[PITCH, PITCH] * h)
+
+
+def trapezoid(a, h):
+    """(N, N) matrix of one step of heun: explicit trapezoidal rule, blade pitch exact."""
+    predicted = np.eye(N) + h * a
+    predicted[PITCH] = 0.0
+    predicted[PITCH, PITCH] = exact_pitch(a, h)
+    matrix = np.eye(N) + 0.5 * h * (a + a @ predicted)
+    matrix[PITCH] = predicted[PITCH]
+    return matrix
+
+
+def adams(a, h, corrector):
+    """(4 N, 4 N) matrix of one Adams step of the state and its three latest derivatives.
+
+    Of each the derivative now is a x; what is carried are x and the derivatives one, two and three
+    steps ago.
+    """
+    now = np.zeros((N, 4 * N))
+    now[:, :N] = np.eye(N)
+    past = [a @ now]
+    for k in range(1, 4):
+        block = np.zeros((N, 4 * N))
+        block[:, k * N : (k + 1) * N] = np.eye(N)
+        past.append(block)
+    pitch = np.zeros(4 * N)
+    pitch[PITCH] = exact_pitch(a, h)
+    moved = now + h * sum(c * f for c, f in zip(BASHFORTH, past, strict=True))
+    moved[PITCH] = pitch
+    if corrector:
+        new = a @ moved
+        speeds = now + h * (MOULTON[0] * new + sum(c * f for c, f in zip(MOULTON[1:], past[:3], strict=True)))
+        moved[len(MOTIONS) :] = speeds[len(MOTIONS) :]
+        moved[PITCH] = pitch
+    new = a @ moved
+    places = now + h * (MOULTON[0] * new + sum(c * f for c, f in zip(MOULTON[1:], past[:3], strict=True)))
+    moved[: len(MOTIONS)] = places[: len(MOTIONS)]
+    return np.vstack([moved, *past[:3]])
+
+
+def amplification(a, h, integrator):
+    """Matrix of one step h of an integrator on x' = a x, a (N, N) in the order of linear_model.STATES."""
+    if integrator == "rk4":
+        return runge_kutta(a, h)
+    if integrator == "heun":
+        return trapezoid(a, h)
+    return adams(a, h, integrator == "abm4")
+
+
+def stable(a, h, integrator, duration=DURATION):
+    """Whether errors grow no more than GROWTH times beyond the plant itself over the duration."""
+    radius = np.abs(np.linalg.eigvals(amplification(a, h, integrator))).max()
+    own = max(0.0, np.linalg.eigvals(a).real.max())
+    return duration / h * log(radius) <= own * duration + log(GROWTH)
+
+
+def limiting_state(a, h, integrator):
+    """Name of the state with the largest share, EXCITATION as unit, of the fastest-growing vector."""
+    values, vectors = np.linalg.eig(amplification(a, h, integrator))
+    share = np.abs(vectors[:N, np.argmax(np.abs(values))]) / EXCITATION
+    return STATES[int(np.argmax(share))]
+
+
+def first_unstable(holds, start):
+    """Largest step (s) up to the first that does not hold: scan by SCAN, then bisection. inf: all do.
+
+    0.0 where the start itself does not hold.
+    """
+    low, high = 0.0, start
+    while holds(high):
+        low, high = high, high * SCAN
+        if high > LARGEST_STEP:
+            return float("inf")
+    if low == 0.0:
+        return 0.0
+    while high / low > 1.0 + RESOLUTION:
+        middle = (low * high) ** 0.5
+        if holds(middle):
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+def excursions(scene, point, dt, duration=DURATION):
+    """(peaks over the run, peaks over its second half): largest |state - operating point|, (N,) each.
+
+    The run starts off the operating point by EXCITATION and keeps its command. inf once it has stopped.
+    """
+    x, u = point.state.copy(), point.command.copy()
+    rows = np.array(STATE_INDEX)
+    moved = EXCITATION.copy()
+    if scene.model.body.platform_held:
+        moved[: 2 * len(MOTIONS)] = 0.0
+    if scene.model.body.rotor_held:
+        moved[STATES.index("rotor_speed")] = 0.0
+    centre = x[rows].copy()
+    x[rows] += moved
+    if x[State.BLADE_PITCH] > scene.turbine.pitch_drive.maximum:
+        x[State.BLADE_PITCH] -= 2.0 * EXCITATION[PITCH]
+    box = scene.box()
+    forget(box)
+    peaks, late = np.zeros(N), np.zeros(N)
+    steps = round(duration / dt)
+    for i in range(steps):
+        if advance(box, x, u, i, 1, dt) != RUNNING:
+            return np.full(N, np.inf), np.full(N, np.inf)
+        np.maximum(peaks, np.abs(x[rows] - centre), out=peaks)
+        if i == steps // 2:
+            late = np.abs(x[rows] - centre)
+        elif i > steps // 2:
+            np.maximum(late, np.abs(x[rows] - centre), out=late)
+    return peaks, late
+
+
+def measured_limit(scene, point, fine, duration=DURATION):
+    """Largest step (s) without blow-up of a scene's integrator; fine: peaks of the fine run."""
+
+    def holds(dt):
+        return bool(np.all(excursions(scene, point, dt, duration)[1] <= GROWTH * (fine + FLOOR)))
+
+    return first_unstable(holds, STEPS[scene.options["integrator"]])
+
+
+def stability_map(kinds=None, integrators=INTEGRATORS, duration=DURATION, progress=None):
+    """DataFrame with a row per kind of scene and integrator.
+
+    Columns: kind, integrator, default_s, measured_s, theory_s (largest steps; inf beyond LARGEST_STEP),
+    margin (measured over default), mode (state that grows first), fastest_1_per_s (largest eigenvalue
+    of the plant but for the blade-pitch actuator).
+    """
+    names = list(kinds or KINDS)
+    rows = []
+    for done, name in enumerate(names):
+        if progress is not None:
+            progress(f"stability map: {name}", done, len(names))
+        kind = KINDS[name]
+        base = kind.scene()
+        point = kind.point(base)
+        model = linearize(base, point)
+        fine, _ = excursions(base, point, FINE_STEP, duration)
+        others = [i for i in range(N) if i != PITCH]
+        fastest = np.abs(np.linalg.eigvals(model.A[np.ix_(others, others)])).max()
+        for integrator in integrators:
+            scene = base.with_model(multistep=build_integrator(integrator))
+            scene = _named(scene, integrator)
+            default = STEPS[integrator]
+            found = measured_limit(scene, point, fine, duration)
+            scheme = "abm4" if integrator == "ab4" and feathering(point.state, base.model) else integrator
+            theory = first_unstable(lambda h, m=model, i=scheme: stable(m.A, h, i, duration), default)
+            mode = limiting_state(model.A, theory * SCAN, scheme) if theory < np.inf else ""
+            rows.append(
+                {
+                    "kind": name, "integrator": integrator, "default_s": default, "measured_s": found,
+                    "theory_s": theory, "margin": found / default, "mode": mode,
+                    "fastest_1_per_s": fastest,
+                }
+            )  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+def _named(scene, integrator):
+    """The scene with the integrator's name in its options, where its default step is looked up."""
+    return replace(scene, options=scene.options | {"integrator": integrator})

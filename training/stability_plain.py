@@ -1,0 +1,140 @@
+"""The same small runs with and without the compiler: numbers must agree to rounding.
+
+As a program (`python -m training.stability_plain IN OUT`) it runs what IN, a pickle of jobs, asks for; with
+NUMBA_DISABLE_JIT=1 in its environment every kernel is then plain Python.
+"""
+
+import os
+import pickle
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numba
+import numpy as np
+
+from fowt_env.envs import FowtEnv, FowtVectorEnv
+from fowt_env.errors import InputError
+from fowt_env.integrators import INTEGRATORS, build_integrator
+from fowt_env.scene import build_scene
+from fowt_env.state import State
+from fowt_env.step import advance, output_row
+
+STEPS = 5
+ENV_STEPS = 3
+SEA = {"kind": "jonswap", "Hs": 6.0, "Tp": 10.0}
+ENV = {"rotor": "bem", "wind": 18.0, "wave_components": 8}
+SCENES = {
+    "look-up rotor, fast waves": dict(wind=18.0, sea=SEA, fidelity="standard", wave_components=12),
+    "BEM rotor, exact waves": dict(wind=18.0, sea=SEA, wave_components=12),
+    "table rotor": dict(wind=18.0, sea=SEA, fidelity="fast", wave_components=12),
+    "skewed wake, dynamic inflow, current": dict(
+        wind={"kind": "steady", "speed": 14.0, "direction": 20.0}, sea=SEA, skewed_wake=True,
+        dynamic_inflow=True, current=0.5, wave_components=12,
+    ),
+    "no wind": dict(sea=SEA, wave_components=12),
+    "still water": dict(),
+    "no mooring": dict(wind=18.0, mooring=False),
+    "empty space": dict(hydrodynamics=False, mooring=False),
+}  # fmt: skip
+
+
+def start(scene):
+    """State in rough motion."""
+    x = np.zeros(scene.n_state)
+    x[:6] = 4.0, -3.0, 0.5, 0.05, 0.08, -0.1
+    x[7:13] = 0.5, -0.3, 0.2, 0.01, 0.02, -0.02
+    x[State.AZIMUTH], x[State.ROTOR_SPEED], x[State.BLADE_PITCH] = 0.7, 1.2, 0.2
+    x[State.WAKE :] = 1.0
+    return x
+
+
+def jobs(scenes=SCENES, environments=True):
+    """{name: job} of pickled runs: scenes by every integrator, one environment and a vector of them.
+
+    Scenes and snapshots are made here and handed over: trims and tables would take long without the compiler.
+    """
+    found = {}
+    for name, options in scenes.items():
+        scene = build_scene(**options)
+        for integrator in INTEGRATORS:
+            made = scene.with_model(multistep=build_integrator(integrator))
+            found[f"{name}, {integrator}"] = ("scene", made)
+    if environments:
+        for mode in ("direct", "residual"):
+            env = FowtEnv(action_mode=mode, **ENV)
+            env.reset(seed=5)
+            found[f"environment, {mode}"] = ("env", mode, env.get_state())
+            batch = FowtVectorEnv(2, threads=1, action_mode=mode, **ENV)
+            batch.reset(seed=6)
+            found[f"vector environment, {mode}"] = ("vector", mode, batch.get_state())
+    return found
+
+
+def result(job):
+    """(n,) numbers that a job comes to."""
+    kind, *given = job
+    if kind == "scene":
+        scene = given[0]
+        x, box = start(scene), scene.box()
+        u = np.array([4.0e4, 0.25])
+        status = advance(box, x, u, 100, STEPS, 0.05)
+        row = output_row(scene.box(), x, u, 5.0 + STEPS * 0.05, len(scene.channels))
+        return np.r_[status, x, row]
+    mode, snapshot = given
+    rng = np.random.default_rng(3)
+    if kind == "env":
+        env = FowtEnv(action_mode=mode, **ENV)
+        env.set_state(snapshot)
+        found = []
+        for _ in range(ENV_STEPS):
+            observation, reward, terminated, _, _ = env.step(rng.uniform(-1.0, 1.0, 2))
+            found += [observation.astype(float), [reward, float(terminated)]]
+        return np.concatenate(found)
+    batch = FowtVectorEnv(2, threads=1, action_mode=mode, **ENV)
+    batch.set_state(list(snapshot))
+    found = []
+    for _ in range(ENV_STEPS):
+        observations, rewards, terminated, _, _ = batch.step(rng.uniform(-1.0, 1.0, (2, 2)))
+        found += [observations.astype(float).ravel(), rewards, terminated.astype(float)]
+    return np.concatenate(found)
+
+
+def differences(given=None):
+    """{job: largest difference over max(1, largest number)} between compiled and plain Python runs.
+
+    The measure is entry by entry, |a - b| / max(1, |a|). Raises: InputError if the plain process fails.
+    """
+    given = jobs() if given is None else given
+    compiled = {name: result(job) for name, job in given.items()}
+    with tempfile.TemporaryDirectory() as folder:
+        ask, answer = Path(folder) / "ask.pickle", Path(folder) / "answer.npz"
+        ask.write_bytes(pickle.dumps(given))
+        root = Path(__file__).resolve().parent.parent
+        path = os.pathsep.join(filter(None, (str(root), os.environ.get("PYTHONPATH"))))
+        done = subprocess.run(
+            [sys.executable, "-m", "training.stability_plain", str(ask), str(answer)],
+            env={**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": path}, cwd=root,
+            capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        if done.returncode != 0:
+            raise InputError(f"run without the compiler failed: {done.stderr[-800:]}")
+        with np.load(answer) as stored:
+            plain = {name: stored[name] for name in stored.files}
+    return {
+        name: float(np.max(np.abs(compiled[name] - plain[name]) / np.maximum(1.0, np.abs(compiled[name]))))
+        for name in given
+    }
+
+
+def main():
+    """Run the jobs of a pickle and store their numbers."""
+    if not numba.config.DISABLE_JIT:
+        raise SystemExit("NUMBA_DISABLE_JIT=1 must be in the environment")
+    given = pickle.loads(Path(sys.argv[1]).read_bytes())
+    np.savez(sys.argv[2], **{name: result(job) for name, job in given.items()})
+
+
+if __name__ == "__main__":
+    main()

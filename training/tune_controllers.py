@@ -1,0 +1,151 @@
+"""Tune the motion feedback of floating_feedback and rosco_float on training cases.
+
+    python -m training.tune_controllers --jobs 2
+
+Every setting of a small grid runs in the training cases: 13, 17 and 21 m/s, NTM class B with the site's
+normal sea, seeds 1001 and 1002, which are apart from the winds and seeds that controllers are scored on. Its
+figures are divided by those of gspi_oc3 in the same case and averaged. The best setting has the least mean
+of the standard deviations of platform pitch and rotor speed, among those with a blade-pitch travel within
+TRAVEL of gspi_oc3's. Writes controllers/tuned.toml, which the controllers read, and tune_<name>.csv with the
+whole grid.
+"""
+
+import argparse
+import sys
+from itertools import product
+from pathlib import Path
+
+import pandas as pd
+
+from controllers.base import TUNED
+from controllers.floating import FeedbackSettings, FloatingFeedback
+from controllers.pi import PISettings
+from controllers.rosco import Rosco, RoscoSettings
+from fowt_env.description import joint_sea_state, read_turbine
+from fowt_env.errors import unknown
+from fowt_env.outputs import replacing, write_table
+from training.cases import Case
+from training.evaluate import evaluate
+
+WINDS = (13.0, 17.0, 21.0)
+SEEDS = (1001, 1002)
+SITE = "gulf_of_maine_normal"
+CONTROL_DT = 0.1
+BASELINE = "gspi_oc3"
+TRAVEL = 1.5
+FIGURES = {
+    "platform_pitch": "PtfmPitch_std_[deg]",
+    "rotor_speed": "RotSpeed_std_[rpm]",
+    "tower_base": "TwrBsMyt_std_[kN-m]",
+    "pitch_travel": "blade_pitch_travel_[deg/s]",
+}
+FEEDBACK_GRID = {
+    "pitch_gain": (0.005, 0.01, 0.02, 0.03, 0.045),
+    "low_pass": (0.2, 0.5, 1.0),
+    "high_pass": (0.02,),
+    "torque_gain": (0.0,),
+}
+ROSCO_GRID = {
+    "mode": (1, 2),
+    "gain": (-0.005, -0.01, -0.02, -0.03, -0.045),  # per m/s; mode 2: times the hub height
+    "low_pass": (0.2, 0.4, 1.0),
+    "high_pass": (0.01,),
+}
+
+
+def training_case(wind):
+    """Case of normal operation at a wind, m/s."""
+    turbulent = {"kind": "ntm", "speed": wind, "class": "B"}
+    return Case(f"train_{wind:g}", turbulent, joint_sea_state(SITE, wind))
+
+
+def settings_of(grid):
+    """List of {key: value}, every combination of a grid."""
+    return [dict(zip(grid, values, strict=True)) for values in product(*grid.values())]
+
+
+def feedback_settings(turbine):
+    """[(settings, controller)] of floating_feedback."""
+    published = PISettings.published(turbine)
+    return [
+        (each, FloatingFeedback(published, FeedbackSettings(**each), CONTROL_DT))
+        for each in settings_of(FEEDBACK_GRID)
+    ]
+
+
+def rosco_settings(turbine):
+    """[(settings, controller)] of rosco_float; gains of mode 2 are the same motion of the hub."""
+    found = []
+    for each in settings_of(ROSCO_GRID):
+        if each["mode"] == 2:
+            each["gain"] = round(each["gain"] * turbine.rotor.hub_height, 6)
+        found.append((each, Rosco(RoscoSettings(**each), CONTROL_DT)))
+    return found
+
+
+TUNABLE = {"floating_feedback": feedback_settings, "rosco_float": rosco_settings}
+
+
+def tune(name, jobs=1, duration=660.0, winds=WINDS, seeds=SEEDS, progress=None):
+    """DataFrame of a controller's grid, best first: its settings and its FIGURES over those of BASELINE.
+
+    Settings with a failed run or too much travel come last, with a NaN cost. Raises: InputError for
+    an unknown name.
+    """
+    if name not in TUNABLE:
+        raise unknown("controller to tune", name, TUNABLE)
+    candidates = TUNABLE[name](read_turbine("nrel5mw"))
+    labelled = {str(i): controller for i, (_, controller) in enumerate(candidates)}
+    table = evaluate(
+        {BASELINE: BASELINE, **labelled},
+        [training_case(wind) for wind in winds],
+        duration=duration, seeds=seeds, jobs=jobs, progress=progress, control_dt=CONTROL_DT,
+    )  # fmt: skip
+    columns = list(FIGURES.values())
+    values = table.set_index(["controller", "case", "seed"])[columns]
+    base = values.loc[BASELINE]
+    rows = []
+    for label, (settings, _) in zip(labelled, candidates, strict=True):
+        ratios = (values.loc[label] / base).mean(skipna=False)
+        row = settings | {key: ratios[column] for key, column in FIGURES.items()}
+        cost = 0.5 * (row["platform_pitch"] + row["rotor_speed"])
+        rows.append(row | {"cost": cost if row["pitch_travel"] <= TRAVEL else float("nan")})
+    return pd.DataFrame(rows).sort_values("cost", ignore_index=True)
+
+
+def tuned_text(tables):
+    """Text of controllers/tuned.toml for {controller: table of tune()}."""
+    lines = [
+        "# Settings chosen on training cases by `python -m training.tune_controllers`; that file says how.",
+        "# Figures are means over the cases of the ratio to gspi_oc3.",
+    ]
+    for name, table in tables.items():
+        best = table.iloc[0]
+        grid = FEEDBACK_GRID if name == "floating_feedback" else ROSCO_GRID
+        lines += ["", f"[{name}.settings]"]
+        lines += [f"{key} = {int(best[key]) if key == 'mode' else float(best[key])!r}" for key in grid]
+        lines += ["", f"[{name}.figures]", *(f"{key} = {best[key]:.4f}" for key in (*FIGURES, "cost"))]
+    return "\n".join(lines) + "\n"
+
+
+def main(arguments=None):
+    """Tune the controllers named, print each grid and write what was chosen."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--out", default="results/tune", help="folder of the grids")
+    given = parser.parse_args(arguments)
+    tables = {}
+    for name in TUNABLE:
+        tables[name] = tune(name, given.jobs, progress=_report)
+        print(f"\n{name}\n{tables[name].round(4).to_string()}")
+        write_table(tables[name], Path(given.out) / f"tune_{name}.csv")
+    with replacing(TUNED) as temporary:
+        temporary.write_text(tuned_text(tables))
+
+
+def _report(done, total, row):
+    print(f"\r{done}/{total}", end="", file=sys.stderr, flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,45 @@
+"""Boxes of full-field wind, made once and kept: a box takes far longer to make than a run in it."""
+
+import hashlib
+import json
+
+import numpy as np
+
+from fowt_env.description import Platform, Turbine, read_platform, read_turbine
+from fowt_env.jit import cache_root
+from fowt_env.outputs import replacing
+from fowt_env.weather.wind_field import WindBox, read_box
+
+FORMAT = 1  # of the files; raised when read_box makes other boxes of the same specification
+ARRAYS, NUMBERS = ("velocity", "y", "z"), ("dt", "speed", "periodic", "shift")
+
+
+def cached_box(spec, platform, seed, options):
+    """WindBox of a specification for a platform's turbine, from the user's cache folder where it is there.
+
+    Only generated boxes (kind "mann") are kept; files and arrays are read as they are.
+    """
+    description = platform if isinstance(platform, Platform) else read_platform(platform)
+    turbine = options.get("turbine") or description.turbine
+    rotor = (turbine if isinstance(turbine, Turbine) else read_turbine(turbine)).rotor
+    shear = options.get("shear_exponent")
+    arguments = {
+        "hub_height": rotor.hub_height,
+        "rotor_diameter": 2.0 * rotor.tip_radius,
+        "shear_exponent": description.environment.shear_exponent if shear is None else shear,
+        "seed": seed,
+        "duration": options["duration"],
+    }
+    if isinstance(spec, WindBox) or spec["kind"] != "mann":
+        return read_box(spec, **arguments)
+    text = json.dumps([FORMAT, spec, arguments], sort_keys=True)
+    name = hashlib.sha256(text.encode()).hexdigest()[:24]
+    path = cache_root() / "wind_boxes" / f"{name}.npz"
+    if path.exists():
+        with np.load(path) as file:
+            values = {key: file[key] for key in ARRAYS}
+            return WindBox(**values, **{key: file[key].item() for key in NUMBERS})
+    box = read_box(spec, **arguments)
+    with replacing(path) as temporary:
+        np.savez(temporary, **{key: getattr(box, key) for key in (*ARRAYS, *NUMBERS)})
+    return box
