@@ -139,19 +139,24 @@ def _ray_module():
     return ray
 
 
+def _unpacked(function, packed):
+    """function(task) of a pickled task: Ray's own way of sending would leave its arrays read-only."""
+    return function(pickle.loads(packed))
+
+
 def _ray(function, tasks, jobs, address):
     """Yield outcomes of Ray tasks; Ray itself tries a task again whose worker dies."""
     ray = _ray_module()
     _sendable(tasks, jobs)
     with session("ray", jobs, address):
         # arguments are small and the code is installed on every node: only results travel far
-        remote = ray.remote(num_cpus=1, max_retries=ATTEMPTS - 1)(function)
+        remote = ray.remote(num_cpus=1, max_retries=ATTEMPTS - 1)(_unpacked)
         # enough to keep every worker busy; all at once would make each wait look through all of them
         window = WINDOW * max(1, int(ray.cluster_resources().get("CPU", jobs)))
         waiting, left = {}, iter(enumerate(tasks))
         while True:
             for index, task in itertools.islice(left, window - len(waiting)):
-                waiting[remote.remote(task)] = index
+                waiting[remote.remote(function, ray.cloudpickle.dumps(task))] = index
             if not waiting:
                 return
             done, _ = ray.wait(list(waiting), num_returns=1)

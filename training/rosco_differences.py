@@ -77,10 +77,10 @@ class InsideIntegral:
 
 
 def outside_factor(blade_pitch, schedule_pitch):
-    """Share of its gains that a law keeps, for small changes, whose schedule stands outside the integral.
+    """Share of its scheduled gains that a law has for small changes if the schedule multiplies its integral.
 
     beta = GK(beta) (KP e + KI I): a change of beta moves GK too, and with the steady GK KI I = beta,
-    d beta (1 + beta/(beta_K + beta)) = GK (KP de + KI e dt).
+    d beta (1 + beta/(beta_K + beta)) = GK (KP de + KI e dt): theory.md (A7) over GK.
     """
     return 1.0 / (1.0 + blade_pitch / (schedule_pitch + blade_pitch))
 
