@@ -100,6 +100,20 @@ def test_the_stored_choice_lies_inside_its_grid_and_within_the_travel(name):
     assert stored["figures"]["cost"] < 1.0
 
 
+def test_the_command_writes_the_grids_and_the_choice(tmp_path, monkeypatch):
+    def stored(name, **engine):
+        assert engine["jobs"] == 3 and engine["engine"] == "processes"
+        values = {key: grid[0] for key, grid in GRIDS[name].items()}
+        return pd.DataFrame([values | dict.fromkeys((*FIGURES, "unfed_travel", "cost"), 0.5)])
+
+    monkeypatch.setattr(tune_controllers, "tune", stored)
+    monkeypatch.setattr(tune_controllers, "TUNED", tmp_path / "tuned.toml")
+    tune_controllers.main(["--jobs", "3", "--out", str(tmp_path / "grids")])
+    read = tomllib.loads((tmp_path / "tuned.toml").read_text())
+    assert {name: read[name]["settings"]["low_pass"] for name in read} == dict.fromkeys(TUNABLE, 0.05)
+    assert pd.read_csv(tmp_path / "grids" / "tune_rosco_float.csv")["cost"].tolist() == [0.5]
+
+
 @pytest.mark.slow
 def test_ray_tunes_to_the_same_table(small):
     pytest.importorskip("ray", reason="Ray is not installed: pip install 'fowt-env[ray]'")
