@@ -1,8 +1,10 @@
 """PI law with feedforward of the wind that is still on its way, as a lidar on the nacelle would see it.
 
 The steady schedule beta_ss(V) says how far the blades have to turn for a change of wind: d beta = (d
-beta_ss/dV) dV. The law adds these increments to what its integral holds, so anti-windup, schedule and limits
-stay those of the PI law, and whatever the schedule gets wrong the integral takes back. The wind is the
+beta_ss/dV) dV. The law adds to its integral what moves its own pitch by these increments, so anti-windup,
+schedule and limits stay those of the PI law, and whatever beta_ss gets wrong the integral takes back. The
+gain schedule multiplies the integral and falls as the blades turn: at rest beta = GK(beta) KI I, so
+dI = d beta (1 + 2 beta/beta_K)/KI, theory.md (A7). The wind is the
 rotor-averaged one, `preview_time` ahead of the rotor and without measuring error: an upper bound of what a
 lidar can give. Two equal first-order low passes whose delay, with that of the blade-pitch actuator and half
 a control period, adds up to the preview time, keep the blades from following every gust.
@@ -22,7 +24,6 @@ from controllers.pi import (
     Parameter,
     PISettings,
     pi_target,
-    schedule_gain,
     schedule_pitch_of,
     speed_error,
     write_commands,
@@ -87,8 +88,8 @@ def preview_law(parameters, memory, measurement, command):
     foreseen = foreseen_pitch(measurement[Measure.TIME], p)
     error = speed_error(p, memory, measurement[Measure.GENERATOR_SPEED])
     pitch = schedule_pitch_of(p, memory, measurement[Measure.BLADE_PITCH])
-    slope = schedule_gain(pitch, p[Parameter.SCHEDULE_PITCH]) * p[Parameter.INTEGRAL]
-    memory[Memory.INTEGRAL] += (foreseen - memory[PreviewMemory.FORESEEN]) / slope
+    share = (1.0 + 2.0 * pitch / p[Parameter.SCHEDULE_PITCH]) / p[Parameter.INTEGRAL]  # dI/d beta
+    memory[Memory.INTEGRAL] += share * (foreseen - memory[PreviewMemory.FORESEEN])
     memory[PreviewMemory.FORESEEN] = foreseen
     write_commands(pitch, pi_target(pitch, error, p, memory), 0.0, p, memory, command)
 

@@ -17,11 +17,10 @@ import ctypes
 import importlib.util
 import os
 import shutil
-import sys
 import tempfile
+import threading
 import weakref
 from _ctypes import dlclose
-from contextlib import contextmanager
 from dataclasses import dataclass
 from math import isfinite, pi
 from pathlib import Path
@@ -31,7 +30,7 @@ from scipy.interpolate import RectBivariateSpline
 from scipy.optimize import brentq
 
 from controllers.base import check_control_dt, tuned
-from fowt_env.errors import ControllerError, InputError
+from fowt_env.errors import ControllerError, InputError, unknown
 from fowt_env.loads.rotor import build_blade_elements
 from fowt_env.loads.rotor_table import performance
 
@@ -106,34 +105,25 @@ def _preload(paths):
 
 
 def _flush():
-    """Write out what the Fortran library has buffered for standard output."""
+    """Function that writes out what the Fortran library has buffered for standard output."""
     for library in _needed:
         if hasattr(library, "_gfortran_flush_i4"):
-            library._gfortran_flush_i4(None)
+            return library._gfortran_flush_i4
+    return lambda unit: None
 
 
-@contextmanager
-def _quiet():
-    """File descriptor 1 leads nowhere: the library greets every start with six lines there."""
-    sys.stdout.flush()
-    _flush()
-    kept = os.dup(1)
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, 1)
-    try:
-        yield
-        _flush()
-    finally:
-        os.dup2(kept, 1)
-        os.close(kept)
-        os.close(nowhere)
+_redirecting = threading.Lock()  # of two threads at it, one would keep the other's redirection for good
 
 
 class Rosco:
-    """One ROSCO controller; needs prepare(scene) before reset. See the module's text."""
+    """One ROSCO controller; needs prepare(scene) before reset. See the module's text.
 
-    def __init__(self, settings, control_dt, name="rosco"):
+    changes: {name in DISCON.IN: value} that replace what is written there for a scene.
+    """
+
+    def __init__(self, settings, control_dt, name="rosco", changes=None):
         self.settings = settings
+        self.changes = dict(changes or {})
         self.control_dt = check_control_dt(control_dt)
         self.name = str(name)
         felt = {0: (), 1: ("nacelle_acceleration",), 2: ("platform_pitch_acceleration",)}[settings.mode]
@@ -146,13 +136,17 @@ class Rosco:
 
     def __getstate__(self):
         """Everything but the running library: a copy needs prepare() and reset() of its own."""
-        return {"settings": self.settings, "control_dt": self.control_dt, "name": self.name}
+        kept = ("settings", "control_dt", "name", "changes")
+        return {key: getattr(self, key) for key in kept}
 
     def __setstate__(self, state):
         self.__init__(**state)
 
     def prepare(self, scene):
-        """Write DISCON.IN and the rotor's table for a scene. Raises: InputError without wind or library."""
+        """Write DISCON.IN and the rotor's table for a scene.
+
+        Raises: InputError without wind or library, and for a change of what DISCON.IN does not have.
+        """
         if scene.model.wind is None:
             raise InputError(f"controller {self.name!r}: needs a scene with wind, for the rotor's table")
         self._source, needed = find_library()
@@ -160,9 +154,13 @@ class Rosco:
         turbine, density = scene.turbine, scene.platform.environment.air_density
         self._efficiency = turbine.drivetrain.generator_efficiency
         table = _table(turbine, density)
+        values = deck(turbine, density, table, self.settings)
+        for key in self.changes:
+            if key not in values:
+                raise unknown("entry of DISCON.IN", key, values)
         self._files = _Folder()
         self._files.write("rotor.txt", table_text(table))
-        self._files.write("DISCON.IN", deck_text(deck(turbine, density, table, self.settings)))
+        self._files.write("DISCON.IN", deck_text(values | self.changes))
 
     def reset(self, measurement):
         """Load a fresh copy of the library and start it at a Measurement.
@@ -175,8 +173,7 @@ class Rosco:
         self._library = _Copy(self._source, self._files.path)
         self._swap = np.zeros(SWAP_SIZE, dtype=np.float32)
         self._deck = str(self._files.path / "DISCON.IN").encode()
-        with _quiet():
-            self._first = (measurement.time, self._call(0, measurement))
+        self._first = (measurement.time, self._call(0, measurement))
 
     def act(self, measurement):
         """(generator torque, blade pitch). Raises: ControllerError with ROSCO's own words where it fails."""
@@ -236,14 +233,34 @@ class _Copy:
         self._discon = library.DISCON
         self._message = ctypes.create_string_buffer(TEXT_SIZE)
         self._failure = ctypes.c_int32(0)
-        self._end = weakref.finalize(self, dlclose, library._handle)
+        self._flush = _flush()
+        self._nowhere = os.open(os.devnull, os.O_WRONLY)
+        self._end = weakref.finalize(self, _unload, library._handle, self._nowhere)
 
     def call(self, swap, deck):
-        """Call DISCON on the swap array; None, or its message where it fails."""
-        self._discon(swap.ctypes.data, ctypes.addressof(self._failure), deck, OUT_NAME, self._message)
+        """Call DISCON on the swap array; None, or its message where it fails.
+
+        File descriptor 1 leads nowhere meanwhile: the library greets every start with six lines there, and
+        says once a run that its wind estimator has left its bounds, whatever its logging level.
+        """
+        with _redirecting:
+            kept = os.dup(1)
+            os.dup2(self._nowhere, 1)
+            try:
+                self._discon(swap.ctypes.data, ctypes.addressof(self._failure), deck, OUT_NAME, self._message)
+                self._flush(None)
+            finally:
+                os.dup2(kept, 1)
+                os.close(kept)
         if self._failure.value < 0:
             return self._message.value.decode(errors="replace").strip()
         return None
+
+
+def _unload(library, nowhere):
+    """Drop a library by its handle, and the file that its words went to."""
+    dlclose(library)
+    os.close(nowhere)
 
 
 @dataclass(frozen=True, eq=False)

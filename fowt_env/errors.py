@@ -9,6 +9,10 @@ class InputError(ValueError):
     """A description, option or argument that cannot be used; raised before anything runs."""
 
 
+class ControllerInputError(InputError):
+    """An InputError that a controller raised while it was prepared, reset or asked: it alone is at fault."""
+
+
 class SimulationStopped(RuntimeError):
     """A run that cannot go on (capsize, non-finite state).
 

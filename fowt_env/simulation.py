@@ -1,6 +1,7 @@
 """One run of a scene with a controller, to a table of OpenFAST channels."""
 
 from collections.abc import Callable
+from contextlib import contextmanager
 from math import pi
 from time import perf_counter
 from typing import Any
@@ -9,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from fowt_env.channels import DEG, RPM, to_units
-from fowt_env.errors import InputError, SimulationStopped, unknown
+from fowt_env.errors import ControllerInputError, InputError, SimulationStopped, unknown
 from fowt_env.jit import control_kernel
 from fowt_env.measurement import N_MEASUREMENTS, Measurement
 from fowt_env.records import is_number
@@ -167,7 +168,8 @@ def simulate(
     start       "trim" or "zero"; initial then sets absolute values of named channels
     progress    True shows a bar; a callable is called with the share done
 
-    Raises: InputError before anything runs; SimulationStopped (with the rows so far) on capsize or a
+    Raises: InputError before anything runs (ControllerInputError where the controller raised it, whenever
+    that is); SimulationStopped (with the rows so far) on capsize or a
     non-finite state; ControllerError if a controller returns anything but two finite numbers.
     """
     if dt is None:
@@ -182,16 +184,26 @@ def simulate(
         from controllers import make  # looked up only when used: fowt_env imports nothing from it
 
         controller = make(controller, scene.turbine, control_dt)
-        controller.prepare(scene)
+        with _controllers_own():
+            controller.prepare(scene)
     x, u = initial_state(scene, start, initial)
     if held:
         scene = scene.with_model(body=scene.model.body._replace(rotor_held=True))
         controller = _Hold()
         per_control = last  # nobody reads the measurements
     loop = _Loop(scene, controller, x, u, dt, per_control, per_output, last)
-    with _bar(progress) as report:
+    with _bar(progress) as report, _controllers_own():
         loop.go(report)
     return loop.frame()
+
+
+@contextmanager
+def _controllers_own():
+    """An InputError raised inside becomes a ControllerInputError with the same words."""
+    try:
+        yield
+    except InputError as error:
+        raise ControllerInputError(str(error)) from error
 
 
 class _Loop:

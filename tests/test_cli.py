@@ -32,7 +32,7 @@ def test_simulate_prints_statistics_and_writes_what_simulate_returns(tmp_path):
     out, plot = tmp_path / "run.csv", tmp_path / "run.png"
     stdout, stderr = fowt("simulate", *SHORT, "--seed", "4", "--out", str(out), "--plot", str(plot))
     assert "PtfmPitch [deg]" in stdout and "run.csv" in stderr
-    scene = fowt_env.build_scene("oc3_hywind", wind=18.0, sea=None, seed=4)
+    scene = fowt_env.build_scene("oc3_hywind", wind=18.0, sea=None, seed=4, fidelity="standard")
     expected = fowt_env.simulate(scene, controller="pi", duration=10.0)
     np.testing.assert_allclose(pd.read_csv(out), expected, rtol=1e-9, atol=1e-12)
     assert plot.read_bytes().startswith(b"\x89PNG")

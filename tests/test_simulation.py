@@ -75,7 +75,7 @@ def test_output_step_does_not_change_the_motion(wave_scene):
     [
         (dict(dt=0.03), ("dt = 0.03", "control_dt = 0.1")),
         (dict(dt=0.05, control_dt=0.1, output_dt=0.12), ("dt = 0.05", "output_dt = 0.12")),
-        (dict(duration=1.02), ("dt = 0.05", "duration = 1.02")),
+        (dict(duration=1.02), ("dt = 0.0125", "duration = 1.02")),
         (dict(duration=1.05), ("dt = 0.1", "duration = 1.05")),
         (dict(dt=0.0), ("dt = 0.0", "positive")),
         (dict(duration=-5.0), ("duration = -5.0", "positive")),

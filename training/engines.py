@@ -13,6 +13,7 @@ import threading
 import time
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 
 from fowt_env.errors import InputError, unknown
 from fowt_env.warmup import kernels_compiled
@@ -107,31 +108,57 @@ def _start_worker(parent):
     threading.Thread(target=watch, daemon=True).start()
 
 
-def _ray(function, tasks, jobs, address):
-    """Yield outcomes of Ray tasks; Ray itself tries a task again whose worker dies."""
+@contextmanager
+def session(engine, jobs=1, address=None):
+    """Context that stays connected to Ray, so that several evaluations inside share its warm workers.
+
+    Does nothing for other engines, nor where this process is connected already.
+    Raises: InputError where Ray is not installed.
+    """
+    if engine != "ray":
+        yield
+        return
+    ray = _ray_module()
+    if ray.is_initialized():
+        yield
+        return
+    options = {"address": address} if address else {"num_cpus": jobs, "include_dashboard": False}
+    ray.init(log_to_driver=False, logging_level="error", **options)
+    try:
+        yield
+    finally:
+        ray.shutdown()
+
+
+def _ray_module():
+    """Ray. Raises: InputError where it is not installed."""
     try:
         import ray
     except ImportError:
         raise InputError("engine = 'ray': Ray is not installed: pip install 'fowt-env[ray]'") from None
+    return ray
+
+
+def _unpacked(function, packed):
+    """function(task) of a pickled task: Ray's own way of sending would leave its arrays read-only."""
+    return function(pickle.loads(packed))
+
+
+def _ray(function, tasks, jobs, address):
+    """Yield outcomes of Ray tasks; Ray itself tries a task again whose worker dies."""
+    ray = _ray_module()
     _sendable(tasks, jobs)
-    ours = not ray.is_initialized()
-    if ours:
-        options = {"address": address} if address else {"num_cpus": jobs, "include_dashboard": False}
-        ray.init(log_to_driver=False, logging_level="error", **options)
-    try:
+    with session("ray", jobs, address):
         # arguments are small and the code is installed on every node: only results travel far
-        remote = ray.remote(num_cpus=1, max_retries=ATTEMPTS - 1)(function)
+        remote = ray.remote(num_cpus=1, max_retries=ATTEMPTS - 1)(_unpacked)
         # enough to keep every worker busy; all at once would make each wait look through all of them
         window = WINDOW * max(1, int(ray.cluster_resources().get("CPU", jobs)))
         waiting, left = {}, iter(enumerate(tasks))
         while True:
             for index, task in itertools.islice(left, window - len(waiting)):
-                waiting[remote.remote(task)] = index
+                waiting[remote.remote(function, ray.cloudpickle.dumps(task))] = index
             if not waiting:
                 return
             done, _ = ray.wait(list(waiting), num_returns=1)
             for reference in done:
                 yield waiting.pop(reference), ray.get(reference)
-    finally:
-        if ours:
-            ray.shutdown()

@@ -19,7 +19,7 @@ import pyarrow.parquet as pq
 
 import fowt_env
 from controllers import make
-from fowt_env.errors import ControllerError, InputError, SimulationStopped
+from fowt_env.errors import ControllerError, ControllerInputError, InputError, SimulationStopped
 from fowt_env.outputs import replacing, write_table
 from fowt_env.weather.wind_field import is_field
 from training.cases import Case, Suite, described, named_cases
@@ -88,7 +88,8 @@ def evaluate(
                   done again, and the table is that of the whole folder
     engine        "processes" or "ray" (address: of a running cluster)
     options       further options of simulate: dt, control_dt, output_dt, start
-    Failed runs have status "failed", the reason, and NaN metrics. A parked turbine has no controller: such a
+    Failed runs have status "failed", the reason, and NaN metrics; so have those of a controller that cannot
+    be prepared, as where its library is missing. A parked turbine has no controller: such a
     case is run once, under the name "parked".
     Raises: InputError for settings that no run could use.
     """
@@ -277,9 +278,9 @@ def _scored(run):
         row |= metrics(
             frame, run.skip, degrees(turbine.rated_rotor_speed) / 6.0, degrees(turbine.pitch_drive.rate_limit)
         )
-    except InputError:
-        raise
-    except Exception as error:  # whatever a user's controller raises costs its run, not the evaluation
+    except Exception as error:  # whatever a controller raises costs its run, not the evaluation
+        if isinstance(error, InputError) and not isinstance(error, ControllerInputError):
+            raise  # the run's settings, which no controller could use
         frame = getattr(error, "frame", None)
         stopped = getattr(error, "time", float("nan"))
         row |= {"status": "failed", "reason": _reason(error), "stopped_[s]": stopped}
@@ -301,7 +302,7 @@ def _reason(error):
     """One line that says why a run failed."""
     if isinstance(error, SimulationStopped):
         return str(error.reason)
-    if isinstance(error, ControllerError):
+    if isinstance(error, ControllerError | ControllerInputError):
         return str(error)
     return f"{type(error).__name__}: {error}"
 

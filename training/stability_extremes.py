@@ -131,11 +131,16 @@ EXTREMES = {**_gusts(), **_storms(), **_faults()}
 
 
 def without_line(scene, line):
-    """The scene with one mooring line (0, 1, ..) gone. Raises: InputError if there is no such line."""
+    """The scene with one mooring line (0, 1, ..) gone, the others solved as catenaries.
+
+    Raises: InputError if there is no such line.
+    """
     if not 0 <= line < scene.n_lines:
         raise InputError(f"line = {line}: must be a whole number from 0 to {scene.n_lines - 1}")
-    left = [np.delete(array, line, axis=0) for array in scene.model.mooring]
-    return scene.with_model(mooring=Mooring(*(np.ascontiguousarray(array) for array in left)))
+    # a table is about the rest position of all lines, which is not where the platform goes
+    arrays = scene.model.mooring._replace(table=None)[:-1]
+    left = [np.ascontiguousarray(np.delete(array, line, axis=0)) for array in arrays]
+    return scene.with_model(mooring=Mooring(*left))
 
 
 class _Run:

@@ -1,13 +1,16 @@
 """Tune the motion feedback of floating_feedback and rosco_float on training cases.
 
     python -m training.tune_controllers --jobs 2
+    python -m training.tune_controllers --engine ray --address ray://head:10001
 
-Every setting of a small grid runs in the training cases: 13, 17 and 21 m/s, NTM class B with the site's
-normal sea, seeds 1001 and 1002, which are apart from the winds and seeds that controllers are scored on. Its
+Every setting of a grid runs in the training cases: 13, 17 and 21 m/s, NTM class B with the site's normal
+sea, seeds 1001 and 1002, which are apart from the winds and seeds that controllers are scored on. Its
 figures are divided by those of gspi_oc3 in the same case and averaged. The best setting has the least mean
-of the standard deviations of platform pitch and rotor speed, among those with a blade-pitch travel within
-TRAVEL of gspi_oc3's. Writes controllers/tuned.toml, which the controllers read, and tune_<name>.csv with the
-whole grid.
+of the standard deviations of platform pitch and rotor speed, among those whose blades travel no further than
+those of the same law without feedback (UNFED): feedback that buys its damping with the pitch drive does not
+count. For floating_feedback that law is gspi_oc3; for rosco_float it is rosco, whose blades travel more than
+those of gspi_oc3 before anything is fed back. Writes controllers/tuned.toml, which the controllers read, and
+tune_<name>.csv with the whole grid.
 """
 
 import argparse
@@ -22,9 +25,10 @@ from controllers.floating import FeedbackSettings, FloatingFeedback
 from controllers.pi import PISettings
 from controllers.rosco import Rosco, RoscoSettings
 from fowt_env.description import joint_sea_state, read_turbine
-from fowt_env.errors import unknown
+from fowt_env.errors import InputError, unknown
 from fowt_env.outputs import replacing, write_table
 from training.cases import Case
+from training.engines import session
 from training.evaluate import evaluate
 
 WINDS = (13.0, 17.0, 21.0)
@@ -32,7 +36,8 @@ SEEDS = (1001, 1002)
 SITE = "gulf_of_maine_normal"
 CONTROL_DT = 0.1
 BASELINE = "gspi_oc3"
-TRAVEL = 1.5
+UNFED = {"floating_feedback": "gspi_oc3", "rosco_float": "rosco"}
+TRAVEL = 1.0  # most blade-pitch travel, over that of the law without feedback
 FIGURES = {
     "platform_pitch": "PtfmPitch_std_[deg]",
     "rotor_speed": "RotSpeed_std_[rpm]",
@@ -40,15 +45,16 @@ FIGURES = {
     "pitch_travel": "blade_pitch_travel_[deg/s]",
 }
 FEEDBACK_GRID = {
-    "pitch_gain": (0.005, 0.01, 0.02, 0.03, 0.045),
-    "low_pass": (0.2, 0.5, 1.0),
+    "pitch_gain": (0.01, 0.02, 0.03, 0.045, 0.06, 0.08, 0.11, 0.15),
+    "low_pass": (0.05, 0.1, 0.15, 0.2, 0.3, 0.4),
     "high_pass": (0.02,),
     "torque_gain": (0.0,),
 }
 ROSCO_GRID = {
     "mode": (1, 2),
-    "gain": (-0.005, -0.01, -0.02, -0.03, -0.045),  # per m/s; mode 2: times the hub height
-    "low_pass": (0.2, 0.4, 1.0),
+    # per m/s; mode 2: times the hub height
+    "gain": (-0.01, -0.02, -0.03, -0.045, -0.06, -0.08, -0.11, -0.15),
+    "low_pass": (0.05, 0.1, 0.15, 0.2, 0.3, 0.4),
     "high_pass": (0.01,),
 }
 
@@ -84,47 +90,57 @@ def rosco_settings(turbine):
 
 
 TUNABLE = {"floating_feedback": feedback_settings, "rosco_float": rosco_settings}
+GRIDS = {"floating_feedback": FEEDBACK_GRID, "rosco_float": ROSCO_GRID}
 
 
-def tune(name, jobs=1, duration=660.0, winds=WINDS, seeds=SEEDS, progress=None):
+def tune(name, duration=660.0, winds=WINDS, seeds=SEEDS, **engine):
     """DataFrame of a controller's grid, best first: its settings and its FIGURES over those of BASELINE.
 
-    Settings with a failed run or too much travel come last, with a NaN cost. Raises: InputError for
-    an unknown name.
+    engine: jobs, progress, engine and address of evaluate. Settings with a failed run or with more travel
+    than TRAVEL allows (column unfed_travel) come last, with a NaN cost.
+    Raises: InputError for an unknown name.
     """
     if name not in TUNABLE:
         raise unknown("controller to tune", name, TUNABLE)
     candidates = TUNABLE[name](read_turbine("nrel5mw"))
     labelled = {str(i): controller for i, (_, controller) in enumerate(candidates)}
+    unfed = UNFED[name]
     table = evaluate(
-        {BASELINE: BASELINE, **labelled},
+        {BASELINE: BASELINE, unfed: unfed, **labelled},
         [training_case(wind) for wind in winds],
-        duration=duration, seeds=seeds, jobs=jobs, progress=progress, control_dt=CONTROL_DT,
+        duration=duration, seeds=seeds, control_dt=CONTROL_DT, **engine,
     )  # fmt: skip
     columns = list(FIGURES.values())
-    values = table.set_index(["controller", "case", "seed"])[columns]
+    values = table.set_index(["controller", "case", "seed"])[columns].sort_index()
     base = values.loc[BASELINE]
+    travel = FIGURES["pitch_travel"]
     rows = []
     for label, (settings, _) in zip(labelled, candidates, strict=True):
         ratios = (values.loc[label] / base).mean(skipna=False)
         row = settings | {key: ratios[column] for key, column in FIGURES.items()}
+        row["unfed_travel"] = (values.loc[label, travel] / values.loc[unfed, travel]).mean(skipna=False)
         cost = 0.5 * (row["platform_pitch"] + row["rotor_speed"])
-        rows.append(row | {"cost": cost if row["pitch_travel"] <= TRAVEL else float("nan")})
+        rows.append(row | {"cost": cost if row["unfed_travel"] <= TRAVEL else float("nan")})
     return pd.DataFrame(rows).sort_values("cost", ignore_index=True)
 
 
 def tuned_text(tables):
-    """Text of controllers/tuned.toml for {controller: table of tune()}."""
+    """Text of controllers/tuned.toml for {controller: table of tune()}.
+
+    Raises: InputError where no setting of a table can be chosen.
+    """
     lines = [
         "# Settings chosen on training cases by `python -m training.tune_controllers`; that file says how.",
-        "# Figures are means over the cases of the ratio to gspi_oc3.",
+        "# Figures are means over the cases of the ratio to gspi_oc3; unfed_travel of that to the law unfed.",
     ]
     for name, table in tables.items():
         best = table.iloc[0]
-        grid = FEEDBACK_GRID if name == "floating_feedback" else ROSCO_GRID
+        if best["cost"] != best["cost"]:
+            raise InputError(f"controller {name!r}: no setting ran with a travel within {TRAVEL:g}")
         lines += ["", f"[{name}.settings]"]
-        lines += [f"{key} = {int(best[key]) if key == 'mode' else float(best[key])!r}" for key in grid]
-        lines += ["", f"[{name}.figures]", *(f"{key} = {best[key]:.4f}" for key in (*FIGURES, "cost"))]
+        lines += [f"{key} = {int(best[key]) if key == 'mode' else float(best[key])!r}" for key in GRIDS[name]]
+        figures = (*FIGURES, "unfed_travel", "cost")
+        lines += ["", f"[{name}.figures]", *(f"{key} = {best[key]:.4f}" for key in figures)]
     return "\n".join(lines) + "\n"
 
 
@@ -132,13 +148,18 @@ def main(arguments=None):
     """Tune the controllers named, print each grid and write what was chosen."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--engine", default="processes", help="where the runs go: processes or ray")
+    parser.add_argument("--address", help="of a Ray cluster that is running")
     parser.add_argument("--out", default="results/tune", help="folder of the grids")
     given = parser.parse_args(arguments)
     tables = {}
-    for name in TUNABLE:
-        tables[name] = tune(name, given.jobs, progress=_report)
-        print(f"\n{name}\n{tables[name].round(4).to_string()}")
-        write_table(tables[name], Path(given.out) / f"tune_{name}.csv")
+    with session(given.engine, given.jobs, given.address):
+        for name in TUNABLE:
+            tables[name] = tune(
+                name, jobs=given.jobs, progress=_report, engine=given.engine, address=given.address
+            )
+            print(f"\n{name}\n{tables[name].round(4).to_string()}")
+            write_table(tables[name], Path(given.out) / f"tune_{name}.csv")
     with replacing(TUNED) as temporary:
         temporary.write_text(tuned_text(tables))
 

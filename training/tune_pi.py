@@ -21,6 +21,7 @@ from fowt_env.errors import InputError
 from fowt_env.outputs import replacing
 from fowt_env.scene import build_scene
 from training.cases import read_suite
+from training.engines import session
 from training.evaluate import evaluate
 
 FACTORS = ("KP", "KI", "gain_schedule_pitch")
@@ -39,9 +40,9 @@ def candidate(turbine, factors, control_dt=CONTROL_DT):
     return PI(PISettings.published(turbine, **changes), control_dt, "pi_tuned")
 
 
-def relative_means(controller, reference, suite, seeds, jobs=1):
+def relative_means(controller, reference, suite, seeds, **engine):
     """{metric: mean over cases and seeds, over that of the reference}, or None where a run failed."""
-    table = evaluate({"candidate": controller}, suite, seeds=seeds, jobs=jobs)
+    table = evaluate({"candidate": controller}, suite, seeds=seeds, **engine)
     if (table["status"] != "ok").any():
         return None
     return {name: float(table[name].mean() / reference[name]) for name in (*WEIGHED, TRAVEL)}
@@ -55,22 +56,23 @@ def cost(relative):
     return float(np.mean([relative[name] for name in WEIGHED]) + PENALTY * excess)
 
 
-def search(seeds, suite="above_rated", evaluations=60, jobs=1, report=None):
+def search(seeds, suite="above_rated", evaluations=60, report=None, **engine):
     """(best factors, its relative means, [(factors, relative means)] of all tried) by Nelder and Mead.
 
+    engine: jobs, engine and address of evaluate.
     Raises: InputError for seeds below 1000, which are those of the suites.
     """
     if any(seed < FIRST_TRAINING_SEED for seed in seeds):
         raise InputError(f"seeds = {list(seeds)}: training seeds must be {FIRST_TRAINING_SEED} or more")
     chosen = read_suite(suite)
     turbine = build_scene(chosen.cases[0].platform).turbine
-    table = evaluate("pi", chosen, seeds=seeds, jobs=jobs)
+    table = evaluate("pi", chosen, seeds=seeds, **engine)
     reference = {name: float(table[name].mean()) for name in (*WEIGHED, TRAVEL)}
     tried = []
 
     def value(logarithms):
         factors = {name: exp(x) for name, x in zip(FACTORS, logarithms, strict=True)}
-        relative = relative_means(candidate(turbine, factors), reference, chosen, seeds, jobs)
+        relative = relative_means(candidate(turbine, factors), reference, chosen, seeds, **engine)
         tried.append((factors, relative))
         if report is not None:
             report(factors, relative, cost(relative))
@@ -99,6 +101,8 @@ def main(
     suite: Annotated[str, typer.Option(help="Suite whose cases are run.")] = "above_rated",
     evaluations: Annotated[int, typer.Option(help="Sets of gains tried.")] = 60,
     jobs: Annotated[int, typer.Option(help="Worker processes.")] = 1,
+    engine: Annotated[str, typer.Option(help="Where the runs go: processes or ray.")] = "processes",
+    address: Annotated[str | None, typer.Option(help="Of a Ray cluster that is running.")] = None,
     out: Annotated[str, typer.Option(help="File to write.")] = "controllers/data/pi_tuned.toml",
 ):
     """Search the gains of pi_tuned and write them."""
@@ -110,7 +114,10 @@ def main(
             "  ".join(f"{k} {v:.3f}" for k, v in factors.items()), f"  cost {value:.4f}  {shown}", flush=True
         )
 
-    factors, relative, _ = search(numbers, suite, evaluations, jobs, report)
+    with session(engine, jobs, address):
+        factors, relative, _ = search(
+            numbers, suite, evaluations, report, jobs=jobs, engine=engine, address=address
+        )
     speed, pitch, travel = (relative[name] for name in (*WEIGHED, TRAVEL))
     text = TEXT.format(
         suite=suite, seeds=seeds, evaluations=evaluations, speed=speed, pitch=pitch, travel=travel, **factors

@@ -93,6 +93,31 @@ def test_its_greeting_and_its_files_stay_out_of_sight(tmp_path):
     assert not list(tmp_path.glob("fowt_rosco_*"))
 
 
+@needs_library
+def test_its_warnings_stay_out_of_sight(scene, capfd):
+    controller = started(scene)
+    for k in range(50):  # a rotor at a tenth of its speed: the wind estimator leaves its bounds
+        controller.act(RATED._replace(time=0.1 * k, generator_speed=12.0, rotor_speed=0.12))
+    module = sys.modules[Rosco.__module__]
+    module._flush()(None)
+    print("afterwards")
+    assert capfd.readouterr().out == "afterwards\n"
+
+
+@needs_library
+def test_an_entry_of_its_deck_can_be_changed_and_an_unknown_one_is_named(scene):
+    changed = Rosco(RoscoSettings(), 0.1, changes={"PC_GS_KP": 0.5 * pitch_gains(scene.turbine)[0]})
+    speeds = 123.0 + np.linspace(0.0, 5.0, 20)
+    for controller in (changed, twin := pickle.loads(pickle.dumps(changed))):
+        controller.prepare(scene)
+        controller.reset(RATED)
+    softer = answers(changed, speeds)
+    assert softer == answers(twin, speeds)
+    assert softer[-1][1] < answers(started(scene), speeds)[-1][1]
+    with pytest.raises(InputError, match="'PC_GS_PK'. Did you mean 'PC_GS_KP'"):
+        Rosco(RoscoSettings(), 0.1, changes={"PC_GS_PK": 1.0}).prepare(scene)
+
+
 def test_without_the_library_the_message_says_what_to_install(scene, monkeypatch):
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     with pytest.raises(InputError, match="pip install --no-deps rosco"):

@@ -4,12 +4,14 @@ import os
 import signal
 import threading
 import time
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from controllers import make
 from fowt_env.errors import InputError
 from training.cases import Case
 from training.engines import outcomes
@@ -71,6 +73,15 @@ def test_workers_that_always_die_end_with_a_message():
         list(outcomes(always_dies, [1, 2], jobs=2))
 
 
+@pytest.mark.slow
+def test_rosco_in_worker_processes_gives_the_bits_of_one_process():
+    pytest.importorskip("rosco", reason="needs the ROSCO library: pip install --no-deps rosco")
+    serial = evaluate("rosco,rosco_float", [GUSTY], seeds=(3, 4), **SHORT)
+    spread = evaluate("rosco,rosco_float", [GUSTY], seeds=(3, 4), jobs=2, **SHORT)
+    assert (serial["status"] == "ok").all()
+    pd.testing.assert_frame_equal(serial, spread, check_exact=True)
+
+
 # ------------------------------------------------------------------ Ray
 
 
@@ -92,6 +103,17 @@ def test_ray_gives_the_bits_of_the_serial_evaluation(cluster, tmp_path):
     for path in (tmp_path / "serial" / "runs").rglob("*.parquet"):
         other = tmp_path / "ray" / path.relative_to(tmp_path / "serial")
         np.testing.assert_array_equal(pd.read_parquet(path), pd.read_parquet(other))
+
+
+@pytest.mark.slow
+def test_ray_takes_controllers_of_every_kind(cluster, turbine):
+    """Compiled ones write into arrays of theirs, which must not arrive read-only."""
+    laws = {"name": "pi", "compiled": make("pi", turbine, 0.1)}
+    if find_spec("rosco") is not None:
+        laws["library"] = make("rosco_float", turbine, 0.1)
+    table = evaluate(laws, [CALM], engine="ray", jobs=2, **SHORT).set_index("controller")
+    assert table["reason"].tolist() == [""] * len(laws)
+    assert table.loc["compiled", "BldPitch1_mean_[deg]"] == table.loc["name", "BldPitch1_mean_[deg]"]
 
 
 @pytest.mark.slow

@@ -40,6 +40,29 @@ class Crashing(Frozen):
         raise KeyError("lost")
 
 
+class Unusable(Frozen):
+    """Raises an InputError when prepared, reset or asked, as one does whose library is missing."""
+
+    def __init__(self, moment):
+        self.moment = moment
+
+    def prepare(self, scene):
+        self.fail_in("prepare")
+
+    def reset(self, measurement):
+        self.fail_in("reset")
+        super().reset(measurement)
+
+    def act(self, measurement):
+        if measurement.time > 5.0:
+            self.fail_in("act")
+        return self.command
+
+    def fail_in(self, moment):
+        if moment == self.moment:
+            raise InputError(f"no library in {moment}")
+
+
 def test_every_controller_meets_the_same_wind_and_waves():
     table = evaluate(["pi", "pi_land"], [GUSTY], seeds=(1, 2), **SHORT)
     assert list(table.columns) == list(COLUMNS) and len(table) == 4
@@ -60,6 +83,26 @@ def test_a_failing_run_is_a_row_with_its_reason_and_the_others_go_on():
     means = summary(table).set_index("controller")
     assert means.loc["broken", "failed"] == 1 and means.loc["fine", "failed"] == 0
     assert means.loc["fine", "RotSpeed_mean_[rpm]"] == rows.loc["fine", "RotSpeed_mean_[rpm]"]
+
+
+def test_a_controller_that_cannot_be_used_costs_its_own_runs_only(tmp_path):
+    moments = {moment: Unusable(moment) for moment in ("prepare", "reset", "act")}
+    table = evaluate({**moments, "fine": Frozen()}, [CALM], folder=tmp_path / "out", **SHORT)
+    rows = table.set_index("controller")
+    for moment in moments:
+        assert rows.loc[moment, "status"] == "failed" and rows.loc[moment, list(METRICS)].isna().all()
+        assert rows.loc[moment, "reason"] == f"no library in {moment}"
+    assert rows.loc["fine", "status"] == "ok"
+    again = evaluate({**moments, "fine": Frozen()}, [CALM], folder=tmp_path / "out", **SHORT)
+    pd.testing.assert_frame_equal(again, table)
+
+
+def test_without_the_rosco_library_its_runs_fail_and_say_what_to_install(monkeypatch):
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    rows = evaluate("rosco,pi", [CALM], **SHORT).set_index("controller")
+    assert rows.loc["rosco", "status"] == "failed"
+    assert "pip install --no-deps rosco" in rows.loc["rosco", "reason"]
+    assert rows.loc["pi", "status"] == "ok"
 
 
 def test_table_and_runs_on_disk_are_those_returned(tmp_path):
@@ -116,6 +159,8 @@ def test_named_suites_hold_their_cases_once():
         ({"jobs": 0}, "jobs = 0"),
         ({"duration": 10.0, "skip": 10.0}, "skip = 10"),
         ({"out": "table.xlsx"}, "csv"),
+        ({"dt": 0.03}, "dt = 0.03"),
+        ({"cases": [Case("squall", {"kind": "squall", "speed": 12.0})]}, "squall"),
         ({"controllers": {"local": lambda: None}, "jobs": 2, "seeds": (1, 2)}, "jobs = 2|no arguments|reset"),
     ],
 )

@@ -210,10 +210,12 @@ def test_the_command_names_what_is_wrong(tmp_path):
 @pytest.fixture(scope="module")
 def browser():
     sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    path = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-    if path is None:
-        pytest.skip("no Chromium is installed: the page is not opened in a browser")
     with sync_api.sync_playwright() as playwright:
+        found = [*map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))]
+        found.append(shutil.which(playwright.chromium.executable_path))  # of `playwright install chromium`
+        path = next(filter(None, found), None)
+        if path is None:
+            pytest.skip("no Chromium is installed: the page is not opened in a browser")
         browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
         yield browser
         browser.close()

@@ -1,5 +1,7 @@
 """The search for the gains of pi_tuned, and that what it found is what the controller has."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from controllers.pi import pi
 from controllers.pi_tuned import FACTORS_FILE, pi_tuned
 from fowt_env.errors import InputError
 from training import tune_pi
+from training.engines import session
 from training.tune_pi import FAILED, PENALTY, TRAVEL, WEIGHED, candidate, cost, search
 
 ONES = dict.fromkeys(tune_pi.FACTORS, 1.0)
@@ -26,7 +29,7 @@ def test_the_cost_is_the_mean_deviation_and_forbids_more_travel():
 def test_the_search_starts_from_the_published_gains_and_takes_the_cheapest(monkeypatch):
     import pandas as pd
 
-    def paraboloid(controllers, suite, seeds, jobs):
+    def paraboloid(controllers, suite, seeds):
         """Deviations with their least at KP 1.5 times the published, whatever the rest."""
         name, controller = ("pi", None) if controllers == "pi" else next(iter(controllers.items()))
         ratio = 1.0 if controller is None else controller.settings.KP / published
@@ -43,6 +46,15 @@ def test_the_search_starts_from_the_published_gains_and_takes_the_cheapest(monke
     assert tried[0][0] == ONES and tried[0][1][TRAVEL] == 1.0
     assert factors["KP"] == pytest.approx(1.5, rel=0.02)
     assert relative == min((pair[1] for pair in tried), key=cost)
+
+
+@pytest.mark.slow
+def test_ray_searches_as_one_process_does():
+    pytest.importorskip("ray", reason="Ray is not installed: pip install 'fowt-env[ray]'")
+    cases = Path(__file__).with_name("tune_pi_suite.toml")
+    serial = search((1001,), cases, evaluations=3)
+    with session("ray", jobs=2):
+        assert search((1001,), cases, evaluations=3, jobs=2, engine="ray") == serial
 
 
 def test_seeds_that_the_suites_are_scored_on_are_refused():

@@ -1,0 +1,40 @@
+"""docs/controllers.md against the controllers that there are."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from controllers import CONTROLLERS, make
+from controllers.base import tuned
+from fowt_env import build_scene, simulate
+
+TEXT = (Path(__file__).resolve().parents[2] / "docs" / "controllers.md").read_text(encoding="utf-8")
+
+
+def rows(heading):
+    """{first cell: cells} of the table below a heading."""
+    part = TEXT.split(f"\n## {heading}")[1].split("\n## ")[0]
+    lines = [line.strip("| ").split(" | ") for line in part.splitlines() if line.startswith("|")]
+    return {cells[0].strip("`"): cells for cells in lines[2:]}
+
+
+def test_every_controller_is_documented_and_no_other():
+    assert set(rows("The built-in ones")) == set(CONTROLLERS)
+
+
+@pytest.mark.parametrize("name", ["floating_feedback", "rosco_float"])
+def test_the_documented_tuning_is_the_stored_one(name):
+    stored = tuned(name)
+    gain = stored["pitch_gain" if name == "floating_feedback" else "gain"]
+    cells = rows("Feedback of the platform's motion")[name]
+    assert [float(cell.split()[0]) for cell in cells[1:3]] == [gain, stored["low_pass"]]
+
+
+def test_the_example_of_ones_own_controller_runs():
+    code = re.search(r"```python\n(.*?)```", TEXT, re.DOTALL).group(1)
+    names = {}
+    exec(code, names)
+    scene = build_scene("oc3_hywind", wind=18.0, duration=100.0, fidelity="standard")
+    frame = simulate(scene, make(names["Mine"], scene.turbine, 0.1), duration=30.0)
+    assert frame["RotSpeed_[rpm]"].iloc[-1] == pytest.approx(12.1, abs=0.3)

@@ -1,0 +1,135 @@
+"""What makes ROSCO with the OC3 gains differ from the published law with the same gains, one thing at a time.
+
+    python -m training.rosco_differences --jobs 2
+
+From the published law towards ROSCO: its periods, the place of the gain schedule, the pitch that sets it.
+From ROSCO towards the published law: the set-point smoother, the torque law, and gains that undo the place of
+the schedule. The training cases of training/tune_controllers.py; docs/controllers.md has the outcome.
+"""
+
+import argparse
+from math import exp
+
+import numpy as np
+import pandas as pd
+
+from controllers.gspi import gspi_oc3
+from controllers.pi import (
+    PI,
+    Memory,
+    Parameter,
+    PISettings,
+    pi,
+    schedule_gain,
+    speed_error,
+    write_commands,
+)
+from controllers.rosco import SCHEDULE, Rosco, RoscoSettings, pitch_gains
+from fowt_env.description import read_turbine
+from training.evaluate import evaluate
+from training.tune_controllers import BASELINE, CONTROL_DT, SEEDS, WINDS, training_case
+
+SHOWN = {
+    "rotor speed std": "RotSpeed_std_[rpm]",
+    "platform pitch std": "PtfmPitch_std_[deg]",
+    "pitch travel": "blade_pitch_travel_[deg/s]",
+    "overspeed": "overspeed_[%]",
+    "power std": "GenPwr_std_[kW]",
+}
+
+
+class InsideIntegral:
+    """The PI law with the gain schedule inside the integral, as ROSCO has it: I += GK KI e dt.
+
+    filtered: the schedule follows the measured blade pitch after the filter of the speed, as in ROSCO,
+    instead of the last command.
+    """
+
+    def __init__(self, settings, control_dt, filtered=False):
+        self.law = PI(settings, control_dt)
+        self.filtered = filtered
+        self.decay = exp(-control_dt * settings.speed_filter_corner)
+
+    def reset(self, measurement):
+        """Start as PI.reset; the integral is then a blade pitch, rad."""
+        self.law.reset(measurement)
+        p, memory = self.law.parameters, self.law.memory
+        self.pitch = memory[Memory.PITCH_COMMAND]
+        gain = schedule_gain(self.pitch, p[Parameter.SCHEDULE_PITCH])
+        memory[Memory.INTEGRAL] *= gain * p[Parameter.INTEGRAL]
+
+    def act(self, measurement):
+        """(generator torque N m, blade pitch rad) of one period."""
+        p, memory = self.law.parameters, self.law.memory
+        if self.filtered:
+            self.pitch += (1.0 - self.decay) * (measurement.blade_pitch - self.pitch)
+        else:
+            self.pitch = memory[Memory.PITCH_COMMAND]
+        error = speed_error(p, memory, measurement.generator_speed)
+        gain = schedule_gain(self.pitch, p[Parameter.SCHEDULE_PITCH])
+        integral = memory[Memory.INTEGRAL] + gain * p[Parameter.INTEGRAL] * error * p[Parameter.CONTROL_DT]
+        integral = min(max(integral, p[Parameter.PITCH_MINIMUM]), p[Parameter.PITCH_MAXIMUM])
+        memory[Memory.INTEGRAL] = integral
+        command = np.zeros(2)
+        target = gain * p[Parameter.PROPORTIONAL] * error + integral
+        write_commands(self.pitch, target, 0.0, p, memory, command)
+        return float(command[0]), float(command[1])
+
+
+def outside_factor(blade_pitch, schedule_pitch):
+    """Share of its scheduled gains that a law has for small changes if the schedule multiplies its integral.
+
+    beta = GK(beta) (KP e + KI I): a change of beta moves GK too, and with the steady GK KI I = beta,
+    d beta (1 + beta/(beta_K + beta)) = GK (KP de + KI e dt): theory.md (A7) over GK.
+    """
+    return 1.0 / (1.0 + blade_pitch / (schedule_pitch + blade_pitch))
+
+
+def variants(turbine):
+    """{what is switched: controller}, from the published law to ROSCO."""
+    published = PISettings.published(turbine)
+    kept = outside_factor(SCHEDULE, turbine.gains["oc3"].gain_schedule_pitch)
+    proportional, integral = pitch_gains(turbine)
+    outside = {"PC_GS_KP": kept * proportional, "PC_GS_KI": kept * integral}
+
+    def rosco(**changes):
+        return Rosco(RoscoSettings(), CONTROL_DT, changes=changes)
+
+    return {
+        BASELINE: gspi_oc3(turbine, CONTROL_DT),
+        "pi: the same in periods of 0.1 s": pi(turbine, CONTROL_DT),
+        "pi, schedule inside the integral": InsideIntegral(published, CONTROL_DT),
+        "pi, schedule inside, by filtered pitch": InsideIntegral(published, CONTROL_DT, filtered=True),
+        "rosco": rosco(),
+        "rosco, no set-point smoother": rosco(SS_Mode=0),
+        "rosco, no smoother, torque K w^2": rosco(SS_Mode=0, VS_ControlMode=1),
+        "rosco, gains of a schedule outside": rosco(**outside),
+        "rosco, gains outside, no smoother": rosco(SS_Mode=0, **outside),
+        "rosco, gains outside, no smoother, K w^2": rosco(SS_Mode=0, VS_ControlMode=1, **outside),
+    }
+
+
+def differences(winds=WINDS, seeds=SEEDS, duration=660.0, names=None, jobs=1):
+    """DataFrame of the variants: SHOWN over those of gspi_oc3, means over the cases.
+
+    names: of variants, gspi_oc3 aside; None: all.
+    """
+    laws = variants(read_turbine("nrel5mw"))
+    if names is not None:
+        laws = {name: laws[name] for name in (BASELINE, *names)}
+    cases = [training_case(wind) for wind in winds]
+    table = evaluate(laws, cases, duration=duration, seeds=seeds, jobs=jobs, control_dt=CONTROL_DT)
+    values = table.set_index(["controller", "case", "seed"])[list(SHOWN.values())].sort_index()
+    ratios = {name: (values.loc[name] / values.loc[BASELINE]).mean(skipna=False) for name in laws}
+    return pd.DataFrame(ratios).T.set_axis(list(SHOWN), axis=1)
+
+
+def main(arguments=None):
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--jobs", type=int, default=1)
+    print(differences(jobs=parser.parse_args(arguments).jobs).round(3).to_string())
+
+
+if __name__ == "__main__":
+    main()
