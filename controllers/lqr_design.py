@@ -90,6 +90,18 @@ class DesignModel:
     pitch: float
 
 
+MODEL_SHAPES = {  # of the fields of DesignModel
+    "wind": (),
+    "A": (N_STATE, N_STATE),
+    "B": (N_STATE, 2),
+    "G": (N_STATE, 2),
+    "C": (N_SENSORS, N_STATE),
+    "trim": (N_PLANT,),
+    "torque": (),
+    "pitch": (),
+}
+
+
 @lru_cache(maxsize=64)
 def wind_filter(speed, height, diameter):
     """(T1, T2, noise): v = noise white / ((1 + T1 s)(1 + T2 s)) like the rotor-averaged Kaimal wind.

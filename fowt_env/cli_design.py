@@ -8,6 +8,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from fowt_env.cli_arguments import parse_numbers, parse_pairs
+from fowt_env.errors import InputError
 
 LINEARIZE_EXAMPLES = """[bold]Examples[/bold]
 
@@ -17,13 +18,35 @@ LINEARIZE_EXAMPLES = """[bold]Examples[/bold]
 
 Modes are those of the plant with torque and blade pitch held. A right-half-plane zero from blade pitch to
 rotor speed bounds how fast any pitch controller on speed alone may be."""
+PI_EXAMPLES = """[bold]Examples[/bold]
+
+[cyan]fowt design pi --omega 0.2 --zeta 0.7 --out my.json[/cyan]  the published aim, on this rotor
+
+[cyan]fowt evaluate --controllers gspi_oc3,design:my.json --cases ntm_18[/cyan]  score it
+
+slope: rotor acceleration per blade pitch; KP, KI, omega, zeta: of the rotor loop at that wind;
+platform_zeta: damping of platform pitch under these gains, without viscous drag, negative where unstable."""
 LQR_EXAMPLES = """[bold]Examples[/bold]
 
 [cyan]fowt design lqr[/cyan]  the shipped weights against gspi_oc3 on training seeds
 
 [cyan]fowt design lqr --vary pitch_rate=3,6,12 --out sweep.csv[/cyan]  a front: less travel, more speed error
 
+[cyan]fowt design lqr --weight pitch_rate=9 --out my.json[/cyan]  save one, to be run as design:my.json
+
 Raising pitch_rate saves travel, platform_pitch calms the platform, power holds the power and spends speed."""
+
+
+def save_lqr(weights, path):
+    """The path written: lqr with these weights ({name: value}) on the models of OC3-Hywind."""
+    import fowt_env
+    from controllers.lqr_design import Weights, design_models
+    from controllers.saved_design import lqr_settings, save_design
+
+    chosen = Weights().changed(**weights)
+    scene = fowt_env.build_scene("oc3_hywind", wind=18.0)
+    command = " ".join(["fowt design lqr", *(f"--weight {key}={value}" for key, value in weights.items())])
+    return save_design(path, "lqr", scene, lqr_settings(chosen, design_models(scene)), command)
 
 
 def register(app, reported, progress_bar, out, note):
@@ -64,6 +87,46 @@ def register(app, reported, progress_bar, out, note):
         if out_path is not None:
             note(f"wrote {write_table(modes, out_path)}")
 
+    @design.command(epilog=PI_EXAMPLES)
+    @reported
+    def pi(
+        omega: Annotated[float, typer.Option(help="Frequency of the rotor loop, rad/s.")] = 0.2,
+        zeta: Annotated[float, typer.Option(help="Its damping ratio.")] = 0.7,
+        schedule: Annotated[
+            str, typer.Option(help="loop (as designed at every wind) or published (Jonkman's, slower).")
+        ] = "loop",
+        winds: Annotated[str, typer.Option(help="Winds, m/s: 12,18 or START:STOP:STEP.")] = "12:25:1",
+        platform: Annotated[str, typer.Option(help="Platform: a name or a path.")] = "oc3_hywind",
+        out_path: Annotated[str | None, typer.Option("--out", help="Design: .json.")] = None,
+    ):
+        """Gains of a scheduled PI from a wanted frequency and damping ratio, and the platform's damping."""
+        import pandas as pd
+
+        import fowt_env
+        from controllers.pi_design import design_pi
+        from controllers.saved_design import save_design
+        from training.linear_design import models_over
+
+        speeds = parse_numbers(winds, "winds")
+        scene = fowt_env.build_scene(platform, wind=speeds[0])
+        with progress_bar("linearising", len(speeds)) as update:
+            models = models_over(scene, speeds, lambda done, total: update(done, total=total))
+        found = design_pi(models, scene.turbine, omega, zeta, schedule)
+        show(pd.DataFrame(found.table), f"{platform}: rotor loop {omega:g} rad/s, damping {zeta:g}")
+        unstable = [row["wind_[m/s]"] for row in found.table if row["platform_zeta_[-]"] < 0.0]
+        if unstable:
+            out.print(f"the platform is unstable at {', '.join(f'{w:g}' for w in unstable)} m/s: lower omega")
+        out.print(
+            f"KP = {found.KP:.6g} s, KI = {found.KI:.6g}, schedule pitch = {found.gain_schedule_pitch:.6g} rad"
+        )
+        if out_path is not None:
+            settings = {key: getattr(found, key) for key in ("KP", "KI", "gain_schedule_pitch")}
+            command = (
+                f"fowt design pi --omega {omega:g} --zeta {zeta:g} --schedule {schedule}"
+                f" --winds {winds} --platform {platform}"
+            )
+            note(f"wrote {save_design(out_path, 'pi', scene, settings, command, table=found.table)}")
+
     @design.command(epilog=LQR_EXAMPLES)
     @reported
     def lqr(
@@ -75,12 +138,19 @@ def register(app, reported, progress_bar, out, note):
         ] = None,
         cases: Annotated[str, typer.Option(help="Cases or suites.")] = "ntm_14,ntm_18,ntm_22",
         seeds: Annotated[str, typer.Option(help="Training seeds, 1000 and above.")] = "1001,1002",
-        out_path: Annotated[str | None, typer.Option("--out", help="All runs: .csv.")] = None,
+        out_path: Annotated[
+            str | None, typer.Option("--out", help="All runs: .csv; or, without runs, the design: .json.")
+        ] = None,
     ):
-        """Sweep the weights of lqr on training seeds, beside gspi_oc3."""
+        """Sweep the weights of lqr on training seeds, beside gspi_oc3; or save one design (--out .json)."""
         from training.linear_design import SHOWN, sweep
 
         fixed = parse_pairs(weight, "weight")
+        if out_path is not None and out_path.lower().endswith(".json"):
+            if vary:
+                raise InputError(f"--vary {vary[0]}: a design has one value per weight; use --weight")
+            note(f"wrote {save_lqr(fixed, out_path)}")
+            return
         variants = [fixed]
         for pair in vary or ():
             name, _, values = pair.partition("=")

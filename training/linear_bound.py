@@ -1,0 +1,227 @@
+"""How well any linear controller can do: fronts of rotor-speed against platform-pitch deviation.
+
+    python -m training.linear_bound          (or fowt design bound --wind 12,14,16,18,20,22,24)
+
+Per wind speed, on the plant of controllers/lqr_design.py (surge, platform pitch, rotor, pitch actuator; the
+rotor-averaged Kaimal wind and the site's sea as shaped white noise): standard deviations from Lyapunov
+equations, for the least weighted sum of both variances at no more blade-pitch travel and no more power
+deviation than gspi_oc3 has on the same model. Both limits are met by multipliers in the quadratic cost, so
+with full information, and with the measured channels and their noise, each point is optimal among all
+linear controllers. Feedback that is not told of wind or waves is optimal where those are white noise. The
+linear model has no limits of torque, pitch or their rates, and nothing is sampled.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import isfinite, pi, sqrt
+
+import numpy as np
+import pandas as pd
+from scipy.linalg import solve_continuous_are, solve_continuous_lyapunov
+
+from controllers.lqr_design import (
+    MOMENT,
+    N_FEEDBACK,
+    N_PLANT,
+    PLANT,
+    SENSOR_NOISE,
+    design_model,
+    feedback_plant,
+)  # fmt: skip
+from controllers.pi import PISettings, schedule_gain
+from fowt_env.errors import InputError
+
+WINDS = (12.0, 14.0, 16.0, 18.0, 20.0, 22.0, 24.0)  # m/s
+INFORMATION = {  # what the feedback knows: what it is called in plots
+    "full": "state, wind and waves",
+    "wind": "state and wind",
+    "state": "state only",
+    "measured": "measured channels (Kalman)",
+}
+SHARES = np.linspace(0.02, 0.98, 13)  # of platform pitch in the weighted sum
+TORQUE_RATE = 1e-3  # cost of (torque rate / 5 % of rated a second)^2: keeps the problem well posed
+COMMAND_RATE = 1e-4  # cost of (rate of the pitch command / 0.2 deg/s)^2: the same
+SAMPLE_TIME = 0.1  # s, at which SENSOR_NOISE holds per sample
+TOLERANCE = 2e-3  # of the limits, relative
+ROUNDS = 80
+STEP = 2.0  # of the multipliers' logarithms per relative excess
+LOWEST, HIGHEST = np.log(1e-6), np.log(1e6)  # of a multiplier
+GAUSSIAN_MEAN = sqrt(2.0 / pi)  # mean |x| of a Gaussian over its standard deviation
+SPEED, LEAN, BLADE = (PLANT.index(name) for name in ("rotor_speed", "platform_pitch", "blade_pitch"))
+TORQUE, COMMAND, INTEGRAL, WIND, WAVE = N_PLANT, N_PLANT + 1, N_PLANT + 2, N_PLANT + 3, N_PLANT + 5
+
+
+@dataclass(frozen=True)
+class Deviations:
+    """Standard deviations of a closed loop: rad/s, rad, mean |rad/s|, shares of rated power and torque."""
+
+    rotor_speed: float
+    platform_pitch: float
+    travel: float
+    power: float
+    torque: float
+
+
+class Problem:
+    """The plant of one wind with its weather, in the states of lqr_design.feedback_plant."""
+
+    def __init__(self, model, turbine):
+        rated = turbine.rated_rotor_speed
+        self.model, self.turbine = model, turbine
+        self.a, self.b, self.g = feedback_plant(model, rated)
+        rate, power = self.a[BLADE].copy(), np.zeros(N_FEEDBACK)
+        power[SPEED], power[TORQUE] = 1.0 / rated, 1.0
+        eye = np.eye(N_FEEDBACK)
+        self.rows = {  # output rows, each in units of which one is of order one
+            "rotor_speed": eye[SPEED] / (0.05 * rated),
+            "platform_pitch": eye[LEAN] / np.radians(1.0),
+            "travel": rate / np.radians(0.2),
+            "power": power / 0.05,
+        }
+        self.scales = {"rotor_speed": 0.05 * rated, "platform_pitch": np.radians(1.0)}
+        self.scales |= {"travel": GAUSSIAN_MEAN * np.radians(0.2), "power": 0.05}
+
+    def deviations(self, covariance):
+        """Deviations for a covariance (13, 13) of the states."""
+        found = {
+            name: self.scales[name] * sqrt(max(row @ covariance @ row, 0.0))
+            for name, row in self.rows.items()
+        }
+        return Deviations(**found, torque=sqrt(max(covariance[TORQUE, TORQUE], 0.0)))
+
+    def cost(self, share, travel, power):
+        """(Q, R) with a share of platform pitch and multipliers on travel and power."""
+        weights = {"rotor_speed": 1.0 - share, "platform_pitch": share, "travel": travel, "power": power}
+        q = sum(weight * np.outer(self.rows[name], self.rows[name]) for name, weight in weights.items())
+        # the integral is not scored; a trace of it makes its mode stable
+        q[INTEGRAL, INTEGRAL] += 1e-4 / (0.5 * self.turbine.rated_rotor_speed) ** 2
+        return q, np.diag([TORQUE_RATE / 0.05**2, COMMAND_RATE / np.radians(0.2) ** 2])
+
+    @cached_property
+    def kalman(self):
+        """(A, C, L, R) of the estimator of plant and weather from the channels of lqr_design.SENSORS.
+
+        The torque and the pitch command are known to the controller, and so is the integral.
+        """
+        a, c = self.model.A[:MOMENT, :MOMENT], self.model.C[:, :MOMENT]
+        g, r = self.model.G[:MOMENT], np.diag(np.square(SENSOR_NOISE)) * SAMPLE_TIME
+        p = solve_continuous_are(a.T, c.T, g @ g.T, r)
+        return a, c, p @ c.T @ np.linalg.inv(r), r
+
+    def closed(self, information, q, r):
+        """Covariance (13, 13) under the feedback that is best for (q, r) with this information."""
+        known = {"full": N_FEEDBACK, "wind": WAVE, "state": WIND, "measured": N_FEEDBACK}[information]
+        # what is not known is white noise to the feedback: it acts on the plant but is not fed back
+        a, b = self.a[:known, :known], self.b[:known]
+        k = np.zeros((2, N_FEEDBACK))
+        k[:, :known] = np.linalg.solve(r, b.T @ solve_continuous_are(a, b, q[:known, :known], r))
+        noise = self.g @ self.g.T
+        if information != "measured":
+            return solve_continuous_lyapunov(self.a - self.b @ k, -noise)
+        return self._estimated(k, noise)
+
+    def _estimated(self, k, noise):
+        """Covariance of the states under gain k on the Kalman filter's estimates."""
+        n, m = N_FEEDBACK, MOMENT
+        ae, ce, gain, r = self.kalman
+        places = [*range(N_PLANT), *range(WIND, N_FEEDBACK)]  # of the estimated states among all
+        both, drive = np.zeros((n + m, n + m)), np.zeros((n + m, n + m))
+        both[:n, :n] = self.a - self.b @ k
+        both[:n, n:] = self.b @ k[:, places]  # the error (state less estimate) acts against the feedback
+        both[n:, n:] = ae - gain @ ce
+        g = np.vstack([self.g, self.g[places]])
+        drive[:, :] = g @ g.T
+        drive[n:, n:] += gain @ r @ gain.T
+        return solve_continuous_lyapunov(both, -drive)[:n, :n]
+
+
+def gspi_covariance(problem, settings=None):
+    """(Deviations, closed-loop matrix) of gspi_oc3, linear, on the states and weather of a Problem.
+
+    The law in continuous time, with the slope of its schedule (theory.md, Eq. (A7)) and its speed filter.
+    """
+    settings = PISettings.published(problem.turbine) if settings is None else settings
+    model, ratio = problem.model, settings.gear_ratio
+    gain = schedule_gain(model.pitch, settings.gain_schedule_pitch)
+    gain *= ratio / (2.0 - gain)
+    # the places of torque and command now hold the filtered speed; the command follows at once
+    a = problem.a.copy()
+    a[:, [TORQUE, COMMAND]] = 0.0
+    command = np.zeros(N_FEEDBACK)
+    command[TORQUE], command[INTEGRAL] = gain * settings.KP, gain * settings.KI
+    a += np.outer(problem.a[:, COMMAND], command)
+    a[TORQUE] = 0.0
+    a[TORQUE, [SPEED, TORQUE]] = settings.speed_filter_corner, -settings.speed_filter_corner
+    a[INTEGRAL] = 0.0
+    a[INTEGRAL, TORQUE] = 1.0
+    keep = [i for i in range(N_FEEDBACK) if i != COMMAND]
+    x = solve_continuous_lyapunov(a[np.ix_(keep, keep)], -(problem.g @ problem.g.T)[np.ix_(keep, keep)])
+    rate = a[BLADE, keep]
+    rated = problem.turbine.rated_rotor_speed
+    speed = sqrt(x[SPEED, SPEED])
+    found = Deviations(
+        speed, sqrt(x[LEAN, LEAN]), GAUSSIAN_MEAN * sqrt(rate @ x @ rate), speed / rated, 0.0
+    )  # constant torque: power goes with speed
+    return found, a[np.ix_(keep, keep)]
+
+
+def front(problem, limits, information, shares=SHARES):
+    """[(share, Deviations)] that are best for each share of platform pitch, within limits (Deviations).
+
+    Multipliers of travel and power grow while a limit is exceeded and shrink while there is room.
+    Raises: InputError where the limits cannot be met.
+    """
+    found, multipliers = [], np.log([1.0, 0.3])
+    wanted = np.array([limits.travel, limits.power])
+    for share in shares:
+        for _ in range(ROUNDS):
+            q, r = problem.cost(share, *np.exp(multipliers))
+            reached = problem.deviations(problem.closed(information, q, r))
+            excess = np.log(np.array([reached.travel, reached.power]) / wanted)
+            slack = (excess < 0.0) & (multipliers <= LOWEST)
+            if np.all((np.abs(excess) < TOLERANCE) | slack):
+                break
+            multipliers = np.clip(multipliers + STEP * excess, LOWEST, HIGHEST)
+        else:
+            if excess.max() > 5.0 * TOLERANCE:
+                continue  # these limits cannot be met with this information
+        found.append((float(share), reached))
+    if not found:
+        raise InputError(f"information {information!r}: no gains meet the limits of gspi_oc3")
+    return found
+
+
+def bound_table(scene, winds=WINDS, information=tuple(INFORMATION), progress=None):
+    """DataFrame: per wind and information the front, beside gspi_oc3; absolute and over gspi_oc3's.
+
+    Raises: InputError for winds that are not above rated.
+    """
+    rows = []
+    for number, wind in enumerate(winds, 1):
+        if not (isfinite(wind) and scene.turbine.rated_wind_speed < wind <= scene.turbine.cut_out_wind_speed):
+            low, high = scene.turbine.rated_wind_speed, scene.turbine.cut_out_wind_speed
+            raise InputError(f"wind = {wind}: must be above {low:g} and at most {high:g} m/s")
+        problem = Problem(design_model(scene, wind), scene.turbine)
+        base, _ = gspi_covariance(problem)
+        rows.append(_row(wind, "gspi_oc3", float("nan"), base, base))
+        for name in information:
+            rows += [_row(wind, name, share, d, base) for share, d in front(problem, base, name)]
+        if progress is not None:
+            progress(number, len(winds))
+    return pd.DataFrame(rows)
+
+
+def _row(wind, information, share, found, base):
+    """One row of bound_table."""
+    return {
+        "wind_[m/s]": float(wind),
+        "information": information,
+        "share_[-]": share,
+        "RotSpeed_std_[rpm]": found.rotor_speed * 30.0 / pi,
+        "PtfmPitch_std_[deg]": np.degrees(found.platform_pitch),
+        "blade_pitch_travel_[deg/s]": np.degrees(found.travel),
+        "power_std_[%]": 100.0 * found.power,
+        "torque_std_[%]": 100.0 * found.torque,
+        "speed_ratio_[-]": found.rotor_speed / base.rotor_speed,
+        "pitch_ratio_[-]": found.platform_pitch / base.platform_pitch,
+    }
