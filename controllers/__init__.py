@@ -45,9 +45,9 @@ def make(controller, turbine, control_dt):
 
     controller: a name of CONTROLLERS; "design:FILE" with a file of `fowt design`; "module:Name" with Name a
     class, a factory or a controller (looked for in the working folder too); such a class or factory
-    itself; or an object with reset(measurement) and act(measurement). Classes and factories are called with (turbine,
-    control_dt) where they take two arguments, else with none. Compiled controllers come back as they
-    are, others inside a CheckedController.
+    itself; or an object with reset(measurement) and act(measurement). Classes and factories are called
+    with (turbine, control_dt) where they take two arguments, else with none. Compiled controllers come
+    back as they are, others inside a CheckedController.
     Raises: InputError for unknown names (with a suggestion), paths that cannot be imported, designs that
     cannot be used, and objects without reset and act.
     """

@@ -51,7 +51,8 @@ class Weights:
     speed_integral: float = 0.02  # over 5 % of rated times 10 s
     pitch_rate: float = 5.8  # blade-pitch command, over 0.2 deg/s
     torque_rate: float = 0.02  # over 5 % of rated torque a second
-    pitch_rate_growth: float = 1.5  # pitch_rate holds at 18 m/s and goes with this power of the wind
+    pitch_rate_growth: float = 1.5  # pitch_rate holds at 18 m/s and below goes with this power of the wind
+    pitch_rate_growth_above: float = 1.5  # the same above 18 m/s
     power_growth: float = -2.0  # the same for power
     schedule_time: float = 80.0  # s, over which the operating wind follows the estimate; no cost
 
@@ -59,7 +60,7 @@ class Weights:
         for item in fields(self):
             value = getattr(self, item.name)
             positive = item.name in ("pitch_rate", "torque_rate", "schedule_time")
-            signed = item.name.endswith("_growth")
+            signed = "_growth" in item.name
             good = isinstance(value, int | float) and isfinite(value)
             if not good or not (signed or value > 0.0 or (value == 0.0 and not positive)):
                 allowed = "of either sign" if signed else "positive" if positive else "0 or more"
@@ -250,7 +251,8 @@ def cost(weights, wind, rated_speed):
     ratio = wind / WEIGHT_WIND
     q += weights.power * ratio**weights.power_growth / 0.05**2 * np.outer(power, power)
     q[n + 2, n + 2] += weights.speed_integral / (0.5 * rated_speed) ** 2
-    pitch_rate = weights.pitch_rate * ratio**weights.pitch_rate_growth
+    growth = weights.pitch_rate_growth if ratio < 1.0 else weights.pitch_rate_growth_above
+    pitch_rate = weights.pitch_rate * ratio**growth
     r = np.diag([weights.torque_rate / 0.05**2, pitch_rate / np.radians(0.2) ** 2])
     return q, r
 

@@ -43,13 +43,12 @@ def design_pi(models, turbine, omega, zeta, schedule="loop"):
             raise InputError(f"{key} = {value}: must be in (0, {high:g}]")
     if schedule not in SCHEDULES:
         raise unknown("schedule", schedule, SCHEDULES)
-    drive, ratio = turbine.pitch_drive, turbine.drivetrain.gear_ratio
+    ratio = turbine.drivetrain.gear_ratio
     winds, pitches, slopes = [], [], []
     for wind, model in models.items():
-        pitch = float(model.point.state[State.BLADE_PITCH])
-        if drive.minimum + 1e-6 < pitch < drive.maximum - 1e-6:
+        if not model.pitch_rests:
             winds.append(wind)
-            pitches.append(pitch)
+            pitches.append(float(model.point.state[State.BLADE_PITCH]))
             slopes.append(-model.A[model.index("rotor_speed"), model.index("blade_pitch")])
     if len(winds) < 2:
         raise InputError("winds: at least two with the blade pitch off its limits are needed, above rated")

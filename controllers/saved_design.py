@@ -154,7 +154,8 @@ def _lqr(settings, where):
         step = models[i].wind - models[i - 1].wind
         if not math.isclose(step, SPACING, rel_tol=1e-9):
             raise InputError(
-                f"{where}: settings.models[{i}].wind = {models[i].wind:g}: must be {SPACING:g} m/s above the last"
+                f"{where}: settings.models[{i}].wind = {models[i].wind:g}: must be {SPACING:g} m/s above"
+                " the last"
             )
     if models[-1].wind < LOWEST_DESIGN_WIND:
         raise InputError(

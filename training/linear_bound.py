@@ -5,14 +5,16 @@
 Per wind speed, on the plant of controllers/lqr_design.py (surge, platform pitch, rotor, pitch actuator; the
 rotor-averaged Kaimal wind and the site's sea as shaped white noise): standard deviations from Lyapunov
 equations, for the least weighted sum of both variances at no more blade-pitch travel and no more power
-deviation than gspi_oc3 has on the same model. Both limits are met by multipliers in the quadratic cost, so
+deviation than gspi_oc3 has on the same model, and a torque deviation that the drivetrain can give (the
+torque's own maximum is 10 % above rated). The limits are met by multipliers in the quadratic cost, so
 with full information, and with the measured channels and their noise, each point is optimal among all
 linear controllers. Feedback that is not told of wind or waves is optimal where those are white noise. The
 linear model has no limits of torque, pitch or their rates, and nothing is sampled.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from math import isfinite, pi, sqrt
 
 import numpy as np
@@ -27,18 +29,19 @@ from controllers.lqr_design import (
     SENSOR_NOISE,
     design_model,
     feedback_plant,
-)  # fmt: skip
+)
 from controllers.pi import PISettings, schedule_gain
 from fowt_env.errors import InputError
 
 WINDS = (12.0, 14.0, 16.0, 18.0, 20.0, 22.0, 24.0)  # m/s
 INFORMATION = {  # what the feedback knows: what it is called in plots
-    "full": "state, wind and waves",
+    "full": "state, wind and waves: the bound",
     "wind": "state and wind",
     "state": "state only",
     "measured": "measured channels (Kalman)",
 }
-SHARES = np.linspace(0.02, 0.98, 13)  # of platform pitch in the weighted sum
+SHARES = (0.02, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.68, 0.75, 0.82, 0.88, 0.93, 0.97, 0.99)  # of platform pitch
+TORQUE_STD = 0.05  # of rated torque: twice this is the way to the torque's maximum
 TORQUE_RATE = 1e-3  # cost of (torque rate / 5 % of rated a second)^2: keeps the problem well posed
 COMMAND_RATE = 1e-4  # cost of (rate of the pitch command / 0.2 deg/s)^2: the same
 SAMPLE_TIME = 0.1  # s, at which SENSOR_NOISE holds per sample
@@ -47,6 +50,7 @@ ROUNDS = 80
 STEP = 2.0  # of the multipliers' logarithms per relative excess
 LOWEST, HIGHEST = np.log(1e-6), np.log(1e6)  # of a multiplier
 GAUSSIAN_MEAN = sqrt(2.0 / pi)  # mean |x| of a Gaussian over its standard deviation
+LIMITED = ("travel", "power", "torque")  # fields of Deviations
 SPEED, LEAN, BLADE = (PLANT.index(name) for name in ("rotor_speed", "platform_pitch", "blade_pitch"))
 TORQUE, COMMAND, INTEGRAL, WIND, WAVE = N_PLANT, N_PLANT + 1, N_PLANT + 2, N_PLANT + 3, N_PLANT + 5
 
@@ -77,9 +81,10 @@ class Problem:
             "platform_pitch": eye[LEAN] / np.radians(1.0),
             "travel": rate / np.radians(0.2),
             "power": power / 0.05,
+            "torque": eye[TORQUE] / 0.05,
         }
         self.scales = {"rotor_speed": 0.05 * rated, "platform_pitch": np.radians(1.0)}
-        self.scales |= {"travel": GAUSSIAN_MEAN * np.radians(0.2), "power": 0.05}
+        self.scales |= {"travel": GAUSSIAN_MEAN * np.radians(0.2), "power": 0.05, "torque": 0.05}
 
     def deviations(self, covariance):
         """Deviations for a covariance (13, 13) of the states."""
@@ -87,11 +92,12 @@ class Problem:
             name: self.scales[name] * sqrt(max(row @ covariance @ row, 0.0))
             for name, row in self.rows.items()
         }
-        return Deviations(**found, torque=sqrt(max(covariance[TORQUE, TORQUE], 0.0)))
+        return Deviations(**found)
 
-    def cost(self, share, travel, power):
-        """(Q, R) with a share of platform pitch and multipliers on travel and power."""
-        weights = {"rotor_speed": 1.0 - share, "platform_pitch": share, "travel": travel, "power": power}
+    def cost(self, share, *multipliers):
+        """(Q, R) with a share of platform pitch and multipliers on travel, power and torque."""
+        weights = {"rotor_speed": 1.0 - share, "platform_pitch": share}
+        weights |= dict(zip(LIMITED, multipliers, strict=True))
         q = sum(weight * np.outer(self.rows[name], self.rows[name]) for name, weight in weights.items())
         # the integral is not scored; a trace of it makes its mode stable
         q[INTEGRAL, INTEGRAL] += 1e-4 / (0.5 * self.turbine.rated_rotor_speed) ** 2
@@ -166,36 +172,39 @@ def gspi_covariance(problem, settings=None):
 
 
 def front(problem, limits, information, shares=SHARES):
-    """[(share, Deviations)] that are best for each share of platform pitch, within limits (Deviations).
+    """[(share, Deviations)] that are best for each share of platform pitch, limits (Deviations) kept.
 
-    Multipliers of travel and power grow while a limit is exceeded and shrink while there is room.
-    Raises: InputError where the limits cannot be met.
+    Each multiplier grows while its limit is exceeded and shrinks while there is room. Shares at which the
+    limits cannot be met are left out.
+    Raises: InputError where that is all of them.
     """
-    found, multipliers = [], np.log([1.0, 0.3])
-    wanted = np.array([limits.travel, limits.power])
+    found, multipliers = [], np.log([1.0, 0.3, 0.1])
+    wanted = np.array([getattr(limits, name) for name in LIMITED])
     for share in shares:
         for _ in range(ROUNDS):
-            q, r = problem.cost(share, *np.exp(multipliers))
-            reached = problem.deviations(problem.closed(information, q, r))
-            excess = np.log(np.array([reached.travel, reached.power]) / wanted)
+            reached = problem.deviations(
+                problem.closed(information, *problem.cost(share, *np.exp(multipliers)))
+            )
+            excess = np.log(np.array([getattr(reached, name) for name in LIMITED]) / wanted)
             slack = (excess < 0.0) & (multipliers <= LOWEST)
             if np.all((np.abs(excess) < TOLERANCE) | slack):
                 break
             multipliers = np.clip(multipliers + STEP * excess, LOWEST, HIGHEST)
-        else:
-            if excess.max() > 5.0 * TOLERANCE:
-                continue  # these limits cannot be met with this information
-        found.append((float(share), reached))
+        if excess.max() < 2.0 * TOLERANCE:
+            found.append((float(share), reached))
     if not found:
         raise InputError(f"information {information!r}: no gains meet the limits of gspi_oc3")
     return found
 
 
-def bound_table(scene, winds=WINDS, information=tuple(INFORMATION), progress=None):
+def bound_table(scene, winds=WINDS, information=tuple(INFORMATION), torque_std=TORQUE_STD, progress=None):
     """DataFrame: per wind and information the front, beside gspi_oc3; absolute and over gspi_oc3's.
 
-    Raises: InputError for winds that are not above rated.
+    torque_std: limit, as a share of rated torque; inf for none.
+    Raises: InputError for winds that are not above rated, or a torque_std that is not positive.
     """
+    if not torque_std > 0.0:
+        raise InputError(f"torque_std = {torque_std}: must be positive (inf: no limit)")
     rows = []
     for number, wind in enumerate(winds, 1):
         if not (isfinite(wind) and scene.turbine.rated_wind_speed < wind <= scene.turbine.cut_out_wind_speed):
@@ -204,8 +213,9 @@ def bound_table(scene, winds=WINDS, information=tuple(INFORMATION), progress=Non
         problem = Problem(design_model(scene, wind), scene.turbine)
         base, _ = gspi_covariance(problem)
         rows.append(_row(wind, "gspi_oc3", float("nan"), base, base))
+        limits = replace(base, torque=torque_std)
         for name in information:
-            rows += [_row(wind, name, share, d, base) for share, d in front(problem, base, name)]
+            rows += [_row(wind, name, share, d, base) for share, d in front(problem, limits, name)]
         if progress is not None:
             progress(number, len(winds))
     return pd.DataFrame(rows)
@@ -225,3 +235,37 @@ def _row(wind, information, share, found, base):
         "speed_ratio_[-]": found.rotor_speed / base.rotor_speed,
         "pitch_ratio_[-]": found.platform_pitch / base.platform_pitch,
     }
+
+
+def fraction_of_bound(table, wind, speed_ratio, pitch_ratio, information="full"):
+    """Share of what the front allows that a controller reaches, along the line from gspi_oc3 through it.
+
+    speed_ratio, pitch_ratio: its deviations over those of gspi_oc3. 1: on the front; 0: no better than
+    gspi_oc3; NaN where the line meets no front (or the controller betters neither).
+    """
+    here = table[(table["wind_[m/s]"] == float(wind)) & (table["information"] == information)]
+    line = efficient(here[["speed_ratio_[-]", "pitch_ratio_[-]"]])
+    way = 1.0 - np.array([speed_ratio, pitch_ratio])
+    if not len(line) or not np.any(way > 0.0):
+        return float("nan")
+    # the front goes on straight up and to the right from its ends
+    line = np.vstack([[line[0, 0], 10.0], line, [10.0, line[-1, 1]]])
+    for start, end in pairwise(1.0 - line):
+        try:
+            along, place = np.linalg.solve(np.column_stack([way, start - end]), start)
+        except np.linalg.LinAlgError:
+            continue
+        if along > 0.0 and 0.0 <= place <= 1.0:
+            return float(1.0 / along)
+    return float("nan")
+
+
+def efficient(points):
+    """The rows of (n, 2) points that no other betters in both columns, by rising first column."""
+    points = np.asarray(points, dtype=float)
+    best, kept = np.inf, []
+    for x, y in points[np.lexsort((points[:, 1], points[:, 0]))]:
+        if y < best:
+            kept.append((x, y))
+            best = y
+    return np.array(kept).reshape(-1, 2)
