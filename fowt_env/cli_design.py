@@ -92,7 +92,7 @@ def register(app, reported, progress_bar, out, note):
         winds: Annotated[str, typer.Option(help="Winds, m/s: 12,18 or START:STOP:STEP.")] = "4:25:1",
         out_path: Annotated[
             str | None,
-            typer.Option("--out", help="Modes: .csv, .parquet; models: .json, .npz; all, with plots: a folder."),
+            typer.Option("--out", help="Modes: .csv, .parquet; models: .json, .npz; with plots: a folder."),
         ] = None,
     ):
         """Print modes and right-half-plane zeros of the floating turbine over the wind."""
