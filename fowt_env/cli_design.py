@@ -40,6 +40,9 @@ BOUND_EXAMPLES = """[bold]Examples[/bold]
 
 Deviations are shown over those of gspi_oc3 on the same model, at no more pitch travel and power deviation.
 The front for the measured channels is what a controller without further sensors can hope for."""
+FRONT_EXAMPLES = """[bold]Example[/bold]
+
+[cyan]fowt design front --runs sweep.csv --bound bound.csv --plot front.png[/cyan]  lqr and the bound"""
 LQR_EXAMPLES = """[bold]Examples[/bold]
 
 [cyan]fowt design lqr[/cyan]  the shipped weights against gspi_oc3 on training seeds
@@ -208,6 +211,29 @@ def register(app, reported, progress_bar, out, note):
             from fowt_env.plots_design import plot_bound
 
             plot_bound(table, INFORMATION, path=plot)
+            note(f"wrote {plot}")
+
+    @design.command(epilog=FRONT_EXAMPLES)
+    @reported
+    def front(
+        runs: Annotated[str, typer.Option(help="Table of fowt design lqr --out.")],
+        bound_path: Annotated[str, typer.Option("--bound", help="Table of fowt design bound --out.")],
+        out_path: Annotated[str | None, typer.Option("--out", help="Ratios: .csv or .parquet.")] = None,
+        plot: Annotated[str | None, typer.Option(help="Pareto plot, e.g. front.png.")] = None,
+    ):
+        """Simulated designs over gspi_oc3, beside the linear bound, and the share of it that they reach."""
+        from fowt_env.outputs import read_table, write_table
+        from training.linear_bound import INFORMATION, ratio_table
+
+        fronts = read_table(bound_path)
+        table = ratio_table(read_table(runs), fronts)
+        show(table, "over gspi_oc3; of_bound: 1 on the bound")
+        if out_path is not None:
+            note(f"wrote {write_table(table, out_path)}")
+        if plot is not None:
+            from fowt_env.plots_design import plot_bound
+
+            plot_bound(fronts, INFORMATION, table, path=plot)
             note(f"wrote {plot}")
 
     @design.command(epilog=LQR_EXAMPLES)

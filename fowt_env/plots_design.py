@@ -25,6 +25,7 @@ BODE = (  # input, output, title, factor to the unit shown, unit
     ("wind_speed", "platform_pitch", "wind to platform pitch", 180.0 / np.pi, "deg/(m/s)"),
 )
 WIND = "wind_[m/s]"
+TRAVEL = {"cmap": "coolwarm", "vmin": 0.5, "vmax": 1.5}  # colours of the travel's ratio: white at 1
 
 
 def _wind_colours(winds):
@@ -156,50 +157,68 @@ def _right_angles():
     return MultipleLocator(90.0)
 
 
-def plot_bound(table, names, simulated=None, path=None, title=None):
-    """Fronts of training.linear_bound.bound_table over gspi_oc3's, a panel per wind.
+def plot_bound(table, names, points=None, path=None, title=None):
+    """Fronts of training.linear_bound.bound_table over gspi_oc3's, a panel per wind, and simulated points.
 
-    names: {information: legend text}, in order. simulated: {label: {wind: (speed ratio, platform-pitch ratio,
-    travel ratio)}} of simulated controllers, drawn as points whose area goes with the pitch travel.
+    names: {information: legend text}, in order. points: training.linear_bound.ratio_table of simulated
+    controllers, coloured by their blade-pitch travel over that of gspi_oc3. Winds without points are left
+    out where there are points at all.
     """
     from training.linear_bound import efficient
 
     winds = sorted(table[WIND].unique())
+    if points is not None:
+        winds = [wind for wind in winds if wind in set(points[WIND])]
+    if not winds:
+        raise InputError("nothing to plot: no wind has both a front and simulated points")
     columns = min(4, len(winds))
-    rows = -(-(len(winds) + (len(winds) > 1)) // columns)
-    figure = _new_figure(3.0 * columns + 0.4, 2.9 * rows + (0.9 if len(winds) == 1 else 0.5))
+    rows = -(-(len(winds) + (len(winds) > 3)) // columns)
+    figure = _new_figure(3.0 * columns + 0.8, 2.9 * rows + (1.2 if len(winds) <= 3 else 0.5))
     places = list(figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).flat)
-    limit = 1.15
     for axes, wind in zip(places, winds, strict=False):
         _style(axes)
         here = table[table[WIND] == wind]
         for index, (information, text) in enumerate(names.items()):
-            points = here[here["information"] == information][["speed_ratio_[-]", "pitch_ratio_[-]"]]
-            if len(points):
-                line = efficient(points)
+            front = here[here["information"] == information][["speed_ratio_[-]", "pitch_ratio_[-]"]]
+            if len(front):
+                line = efficient(front)
                 style = {"color": COLOURS[index], "linewidth": 1.6 if index == 0 else 1.2}
                 axes.plot(line[:, 0], line[:, 1], label=text, ls=("-", "--", ":", "-.")[index % 4], **style)
         axes.scatter(1.0, 1.0, marker="+", s=70, color=INK, label="gspi_oc3", zorder=4)
-        for index, (label, ratios) in enumerate((simulated or {}).items()):
-            if wind in ratios:
-                speed, lean, travel = ratios[wind]
-                mark, colour = MARKS[index % len(MARKS)], COLOURS[(index + 4) % len(COLOURS)]
-                axes.scatter(
-                    speed, lean, s=45.0 * travel, marker=mark, color=colour, edgecolor=INK, linewidth=0.5,
-                    label=f"{label}, simulated", zorder=5,
-                )  # fmt: skip
-        axes.set_xlim(0.0, limit)
-        axes.set_ylim(0.0, limit)
+        if points is not None:
+            shown = points[points[WIND] == wind]
+            drawn = axes.scatter(
+                shown["speed_ratio_[-]"],
+                shown["pitch_ratio_[-]"],
+                c=shown["travel_ratio_[-]"],
+                **TRAVEL,
+                s=30,
+                edgecolor=INK,
+                linewidth=0.5,
+                label="lqr, simulated",
+                zorder=5,
+            )
+        axes.set_xlim(0.0, 1.25)
+        axes.set_ylim(0.0, 1.15)
         axes.set_title(f"{wind:g} m/s", fontsize=9, color=INK)
-    for axes in places[len(winds) :]:
-        axes.set_axis_off()
-    handles, labels = places[0].get_legend_handles_labels()
-    if len(places) > len(winds):
-        places[len(winds)].legend(handles, labels, fontsize=8, frameon=False, loc="center")
-    else:
-        figure.legend(handles, labels, loc="outside lower center", ncols=2, fontsize=7, frameon=False)
+    if points is not None:
+        bar = figure.colorbar(drawn, ax=places, pad=0.01)
+        bar.set_label("blade-pitch travel over that of gspi_oc3", fontsize=8)
+    _place_legend(figure, places, len(winds))
     figure.supxlabel("rotor-speed deviation over that of gspi_oc3", fontsize=9, color=INK)
     figure.supylabel("platform-pitch deviation over that of gspi_oc3", fontsize=9, color=INK)
     if title:
         figure.suptitle(title, fontsize=10, color=INK)
     return _save(figure, path)
+
+
+def _place_legend(figure, places, used):
+    """The legend in the first spare place of a grid, or below it; the spare places emptied."""
+    for axes in places[used:]:
+        axes.set_axis_off()
+    handles, labels = places[0].get_legend_handles_labels()
+    if len(places) > used:
+        places[used].legend(handles, labels, fontsize=8, frameon=False, loc="center")
+    else:
+        columns = 1 if used == 1 else 3
+        figure.legend(handles, labels, loc="outside upper center", ncols=columns, fontsize=8, frameon=False)

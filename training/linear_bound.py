@@ -42,6 +42,12 @@ INFORMATION = {  # what the feedback knows: what it is called in plots
 }
 SHARES = (0.02, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.68, 0.75, 0.82, 0.88, 0.93, 0.97, 0.99)  # of platform pitch
 TORQUE_STD = 0.05  # of rated torque: twice this is the way to the torque's maximum
+RATIOS = {  # column of ratio_table: metric
+    "speed_ratio_[-]": "RotSpeed_std_[rpm]",
+    "pitch_ratio_[-]": "PtfmPitch_std_[deg]",
+    "power_ratio_[-]": "GenPwr_std_[kW]",
+    "travel_ratio_[-]": "blade_pitch_travel_[deg/s]",
+}
 TORQUE_RATE = 1e-3  # cost of (torque rate / 5 % of rated a second)^2: keeps the problem well posed
 COMMAND_RATE = 1e-4  # cost of (rate of the pitch command / 0.2 deg/s)^2: the same
 SAMPLE_TIME = 0.1  # s, at which SENSOR_NOISE holds per sample
@@ -258,6 +264,37 @@ def fraction_of_bound(table, wind, speed_ratio, pitch_ratio, information="full")
         if along > 0.0 and 0.0 <= place <= 1.0:
             return float(1.0 / along)
     return float("nan")
+
+
+def ratio_table(runs, bound=None):
+    """DataFrame of a sweep's means over seeds (training.linear_design.sweep) over those of its gspi_oc3.
+
+    Columns: wind, variant, ratios of speed, platform pitch, power and travel; with a bound_table also the
+    fractions of the bound and of the front for measured channels. Cases are named kind_WIND.
+    Raises: InputError for a table without the columns, without gspi_oc3, or with other cases.
+    """
+    needed = ("case", "variant", "seed", *RATIOS.values())
+    missing = [name for name in needed if name not in runs]
+    if missing:
+        raise InputError(f"runs: column {missing[0]!r} is missing; make the table with fowt design lqr --out")
+    means = runs.groupby(["case", "variant"], sort=False)[list(RATIOS.values())].mean()
+    rows = []
+    for (case, variant), mean in means.iterrows():
+        if variant == "gspi_oc3":
+            continue
+        try:
+            wind, base = float(case.rpartition("_")[2]), means.loc[(case, "gspi_oc3")]
+        except (ValueError, KeyError):
+            raise InputError(f"runs: case {case!r} has no wind speed in its name or no gspi_oc3") from None
+        row = {"wind_[m/s]": wind, "variant": variant}
+        row |= {name: float(mean[column] / base[column]) for name, column in RATIOS.items()}
+        if bound is not None:
+            for information, name in (("full", "of_bound_[-]"), ("measured", "of_measured_[-]")):
+                row[name] = fraction_of_bound(
+                    bound, wind, row["speed_ratio_[-]"], row["pitch_ratio_[-]"], information
+                )
+        rows.append(row)
+    return pd.DataFrame(rows)
 
 
 def efficient(points):

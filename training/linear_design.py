@@ -24,6 +24,7 @@ FIRST_TRAINING_SEED = 1000  # seeds below are for scoring
 INFINITE = 1e3  # rad/s: generalised eigenvalues beyond are zeros at infinity
 MODEL_SUFFIXES = (".json", ".npz")
 SHOWN = ("RotSpeed_std_[rpm]", "PtfmPitch_std_[deg]", "GenPwr_std_[kW]", "blade_pitch_travel_[deg/s]")
+KEPT = (*SHOWN, "RotSpeed_max_[rpm]", "GenPwr_mean_[kW]", "TwrBsMyt_DEL_[kN-m]")
 
 
 def models_over(scene, winds, progress=None):
@@ -117,7 +118,8 @@ def save_study(models, folder):
 def sweep(variants, cases, seeds, out=None, progress=None, duration=660.0, skip=60.0):
     """DataFrame of lqr with each variant of its weights ({name: value} each) and of gspi_oc3, seed by seed.
 
-    seeds must be training seeds, FIRST_TRAINING_SEED and above: the others are for scoring. out: CSV.
+    Of the metrics it has those of KEPT. seeds must be training seeds, FIRST_TRAINING_SEED and above: the
+    others are for scoring. out: CSV.
     Raises: InputError for other seeds or unknown weights.
     """
     import fowt_env
@@ -137,7 +139,8 @@ def sweep(variants, cases, seeds, out=None, progress=None, duration=660.0, skip=
             for label, controller in runs:
                 frame = simulate(scene, controller=controller, duration=duration)
                 found = metrics(frame, skip, scene.turbine.rated_rotor_speed * 30.0 / np.pi)
-                rows.append({"variant": label, "case": case.name, "seed": int(seed), **found})
+                kept = {name: found[name] for name in KEPT}
+                rows.append({"variant": label, "case": case.name, "seed": int(seed), **kept})
                 if progress is not None:
                     progress(len(rows), total)
     table = pd.DataFrame(rows)
