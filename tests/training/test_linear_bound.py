@@ -1,6 +1,7 @@
 """The linear bound: its covariances by other ways, its optimum against other gains, its weather."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -12,12 +13,16 @@ from fowt_env import build_scene
 from fowt_env.description import joint_sea_state, sea_state_of
 from fowt_env.errors import InputError
 from fowt_env.linear_model import linearize
+from fowt_env.plots_design import plot_bound
 from fowt_env.wave_force import wave_force
 from fowt_env.weather.iec import ntm_sigma
 from fowt_env.weather.turbulence import amplitudes
 from fowt_env.weather.waves import jonswap
+from training import linear_bound
 from training.linear_bound import (
+    INFORMATION,
     LIMITED,
+    RATIOS,
     SPEED,
     WIND,
     Problem,
@@ -26,6 +31,7 @@ from training.linear_bound import (
     fraction_of_bound,
     front,
     gspi_covariance,
+    ratio_table,
 )
 
 HEIGHT, DIAMETER = 90.0, 126.0
@@ -205,3 +211,64 @@ def test_the_fraction_of_the_bound_is_one_on_the_front_and_none_at_the_baseline(
     assert fraction_of_bound(table, 18.0, 0.8, 0.8) == pytest.approx(0.5)
     assert fraction_of_bound(table, 18.0, 0.75, 1.0) == pytest.approx(0.5)  # straight to the left
     assert np.isnan(fraction_of_bound(table, 18.0, 1.1, 1.0))
+
+
+def runs_table():
+    rows = [
+        ("ntm_18", "gspi_oc3", 1, 1.0, 0.8, 300.0, 0.1),
+        ("ntm_18", "gspi_oc3", 2, 3.0, 0.8, 300.0, 0.1),
+        ("ntm_18", "a", 1, 0.5, 0.4, 150.0, 0.05),
+        ("ntm_18", "a", 2, 2.5, 0.4, 150.0, 0.15),
+    ]
+    return pd.DataFrame(rows, columns=["case", "variant", "seed", *RATIOS.values()])
+
+
+def small_front():
+    return pd.DataFrame(
+        {
+            "wind_[m/s]": 18.0,
+            "information": ["full", "full", "measured", "measured"],
+            "speed_ratio_[-]": [0.5, 0.9, 0.7, 0.9],
+            "pitch_ratio_[-]": [0.9, 0.5, 0.9, 0.6],
+        }
+    )
+
+
+def test_ratios_are_of_means_over_seeds():
+    (row,) = ratio_table(runs_table(), small_front()).to_dict("records")
+    assert row["wind_[m/s]"] == 18.0 and row["variant"] == "a"
+    assert row["speed_ratio_[-]"] == pytest.approx(0.75)
+    assert row["pitch_ratio_[-]"] == pytest.approx(0.5)
+    assert row["travel_ratio_[-]"] == pytest.approx(1.0)
+    assert 0.0 < row["of_bound_[-]"] < row["of_measured_[-]"]
+
+
+def test_runs_that_cannot_be_compared_are_named():
+    with pytest.raises(InputError, match="column 'seed' is missing"):
+        ratio_table(runs_table().drop(columns="seed"))
+    with pytest.raises(InputError, match="case 'ntm_18' has no wind speed in its name or no gspi_oc3"):
+        ratio_table(runs_table().query("variant == 'a'"))
+
+
+def test_the_plot_shows_fronts_and_points_of_the_winds_that_have_both(tmp_path):
+    pytest.importorskip("matplotlib")
+    fronts = small_front()
+    both = pd.concat([fronts, fronts.assign(**{"wind_[m/s]": 20.0})])
+    figure = plot_bound(both, INFORMATION, path=tmp_path / "b.png")
+    assert [axes.get_title() for axes in figure.axes][:2] == ["18 m/s", "20 m/s"]
+    assert [len(axes.lines) for axes in figure.axes[:2]] == [2, 2]
+    with_points = plot_bound(both, INFORMATION, ratio_table(runs_table()))
+    assert [axes.get_title() for axes in with_points.axes if axes.get_title()] == ["18 m/s"]
+    assert (tmp_path / "b.png").stat().st_size > 1000
+    with pytest.raises(InputError, match="nothing to plot"):
+        plot_bound(fronts.assign(**{"wind_[m/s]": 20.0}), INFORMATION, ratio_table(runs_table()))
+
+
+def test_the_published_fronts_are_those_of_today(windy):
+    """training/data/linear_bound.csv, as fowt design bound wrote it."""
+    stored = pd.read_csv(Path(linear_bound.__file__).parent / "data" / "linear_bound.csv")
+    stored = stored[(stored["wind_[m/s]"] == 18.0) & (stored["information"] != "state")]
+    fresh = bound_table(windy, (18.0,), ("full", "wind", "measured"))
+    assert list(stored["information"]) == list(fresh["information"])
+    for name in ("speed_ratio_[-]", "pitch_ratio_[-]", "RotSpeed_std_[rpm]"):
+        np.testing.assert_allclose(fresh[name], stored[name], rtol=0.01)
