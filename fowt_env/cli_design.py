@@ -83,7 +83,7 @@ def register(app, reported, progress_bar, out, note):
     def show(frame, title):
         table = Table(title=escape(title), title_justify="left")
         for name in frame.columns:
-            table.add_column(escape(name.replace("_[", "\n[")), justify="right")
+            table.add_column(escape(name.replace("_", "\n")), justify="right")
         for row in frame.itertuples(index=False):
             table.add_row(*(escape(v) if isinstance(v, str) else f"{v:.4g}" for v in row))
         out.print(table)

@@ -180,8 +180,8 @@ def gspi_covariance(problem, settings=None):
 def front(problem, limits, information, shares=SHARES):
     """[(share, Deviations)] that are best for each share of platform pitch, limits (Deviations) kept.
 
-    Each multiplier grows while its limit is exceeded and shrinks while there is room. Shares at which the
-    limits cannot be met are left out.
+    Each multiplier grows while its limit is exceeded and shrinks while there is room. Shares at which ROUNDS
+    rounds of that end outside the limits are left out.
     Raises: InputError where that is all of them.
     """
     found, multipliers = [], np.log([1.0, 0.3, 0.1])
