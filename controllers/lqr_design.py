@@ -42,7 +42,7 @@ MOMENT_NOISE = 2e5  # N m per root second: random walk of what no other state ex
 
 @dataclass(frozen=True)
 class Weights:
-    """Cost of each squared term in units of the scale in its comment; tuned on training seeds 1001 to 1004."""
+    """Cost of each squared term in units of the scale in its comment; tuned on seeds 1001 to 1004."""
 
     speed: float = 1.0  # rotor speed, over 5 % of rated
     platform_pitch: float = 1.5  # over 1 deg
