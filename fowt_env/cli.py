@@ -144,7 +144,7 @@ def simulate(
     sea: Annotated[
         str, typer.Option(help="Name, jonswap:HS:TP[:GAMMA], regular:H:T, JSON, or none (still water).")
     ] = "none",
-    controller: Annotated[str, typer.Option(help="Name, module:Name, design:FILE, or none (rotor held).")] = "pi",
+    controller: Annotated[str, typer.Option(help="Name, module:Name, design:FILE or none (held).")] = "pi",
     duration: Annotated[float, typer.Option(help="Length of the run, s.")] = 600.0,
     dt: Annotated[float | None, typer.Option(help="Physics step, s; default: that of the fidelity.")] = None,
     control_dt: Annotated[float, typer.Option(help="Control period, s; a multiple of dt.")] = 0.1,
