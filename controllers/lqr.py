@@ -197,7 +197,7 @@ def blocks(models, weights, rated_speed, dt):
 
 
 class LQR(CompiledController):
-    """LQG law of Weights; prepare(scene) designs it on the scene's platform unless blocks are given."""
+    """LQG law of Weights; prepare(scene) designs it on the scene's platform unless models are given."""
 
     kernel = staticmethod(lqr_law)
     information = (
@@ -210,23 +210,30 @@ class LQR(CompiledController):
         "plant_model",
     )
 
-    def __init__(self, turbine, control_dt, weights=None, name="lqr"):
+    def __init__(self, turbine, control_dt, weights=None, name="lqr", models=None):
         super().__init__(name, np.zeros(BLOCKS), N_MEMORY)
         self.turbine, self.control_dt = turbine, check_control_dt(control_dt)
         self.weights = Weights() if weights is None else weights
         self.prepared = False
+        self.designed = models is not None
+        if self.designed:
+            self.take(models)
 
     def prepare(self, scene):
         """Linearise the scene's platform over the winds and design the gains (remembered per platform).
 
+        Models given on making stay as they are: such a controller does not know the scene's plant.
         Raises: InputError for a scene without wind.
         """
         if scene.model.wind is None:
             raise InputError(f"controller {self.name!r}: needs a scene with wind to linearise")
-        models = design.design_models(scene)
-        self.install(
-            models[0].wind, blocks(models, self.weights, self.turbine.rated_rotor_speed, self.control_dt)
-        )
+        if not self.designed:
+            self.take(design.design_models(scene))
+
+    def take(self, models):
+        """Take the gains for DesignModels of winds 1 m/s apart."""
+        rated = self.turbine.rated_rotor_speed
+        self.install(models[0].wind, blocks(models, self.weights, rated, self.control_dt))
 
     def install(self, first_wind, table):
         """Take the blocks of winds 1 m/s apart."""

@@ -145,7 +145,7 @@ def simulate(
     sea: Annotated[
         str, typer.Option(help="Name, jonswap:HS:TP[:GAMMA], regular:H:T, JSON, or none (still water).")
     ] = "none",
-    controller: Annotated[str, typer.Option(help="Name, module:Name of yours, or none (rotor held).")] = "pi",
+    controller: Annotated[str, typer.Option(help="Name, module:Name, design:FILE or none (held).")] = "pi",
     duration: Annotated[float, typer.Option(help="Length of the run, s.")] = 600.0,
     dt: Annotated[float | None, typer.Option(help="Physics step, s; default: that of the fidelity.")] = None,
     control_dt: Annotated[float, typer.Option(help="Control period, s; a multiple of dt.")] = 0.1,
@@ -250,7 +250,7 @@ stopped; further controllers, cases or seeds are added to the folder."""
 @app.command(epilog=EVALUATE_EXAMPLES)
 @reported
 def evaluate(
-    controllers: Annotated[str, typer.Option(help="Names or module:Name, separated by commas.")] = "pi",
+    controllers: Annotated[str, typer.Option(help="Names, module:Name or design:FILE, by commas.")] = "pi",
     suite: Annotated[
         str | None, typer.Option(help="Suite: a name of fowt list suites, or a path to a TOML file.")
     ] = None,

@@ -73,6 +73,12 @@ class LinearModel:
             raise unknown("output", name, self.outputs)
         return self.outputs.index(name)
 
+    @property
+    def pitch_rests(self):
+        """Whether the blade pitch rests on a limit: below rated, where no controller moves it."""
+        drive, pitch = self.scene.turbine.pitch_drive, self.point.state[State.BLADE_PITCH]
+        return not drive.minimum + 1e-6 < pitch < drive.maximum - 1e-6
+
     def modes(self):
         """[Mode] of the plant without control, slowest first."""
         return modes(self.A, self.states, self.cm_height, self.arm)

@@ -3,6 +3,9 @@
 Run as fowt linearize and fowt design; every function returns a table that can be written as it is.
 """
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 from scipy.linalg import eigvals
@@ -10,8 +13,8 @@ from scipy.linalg import eigvals
 from controllers.lqr import LQR
 from controllers.lqr_design import Weights, scene_at
 from fowt_env.errors import InputError
-from fowt_env.linear_model import linearize
-from fowt_env.outputs import write_table
+from fowt_env.linear_model import FORCES, STATE_INDEX, linearize
+from fowt_env.outputs import replacing, write_table
 from fowt_env.simulation import simulate
 from training.cases import named_cases
 from training.evaluate import SHORTEST_WEATHER
@@ -19,7 +22,9 @@ from training.metrics import metrics
 
 FIRST_TRAINING_SEED = 1000  # seeds below are for scoring
 INFINITE = 1e3  # rad/s: generalised eigenvalues beyond are zeros at infinity
+MODEL_SUFFIXES = (".json", ".npz")
 SHOWN = ("RotSpeed_std_[rpm]", "PtfmPitch_std_[deg]", "GenPwr_std_[kW]", "blade_pitch_travel_[deg/s]")
+KEPT = (*SHOWN, "RotSpeed_max_[rpm]", "GenPwr_mean_[kW]", "TwrBsMyt_DEL_[kN-m]")
 
 
 def models_over(scene, winds, progress=None):
@@ -56,20 +61,65 @@ def transmission_zeros(model, source="blade_pitch_command", output="rotor_speed"
 
 
 def zero_table(models):
-    """DataFrame: wind, real and imaginary part (rad/s) of the right-half-plane zeros of pitch to speed."""
+    """DataFrame: wind, real and imaginary part (rad/s) of the right-half-plane zeros of pitch to speed.
+
+    Winds at which the blade pitch rests on its minimum are left out: there is no pitch control.
+    """
     rows = [
         {"wind_[m/s]": wind, "real_[rad/s]": z.real, "imag_[rad/s]": z.imag}
         for wind, model in models.items()
-        for z in transmission_zeros(model)
+        for z in (() if model.pitch_rests else transmission_zeros(model))
         if z.real > 1e-6 and z.imag >= 0.0
     ]
     return pd.DataFrame(rows, columns=["wind_[m/s]", "real_[rad/s]", "imag_[rad/s]"])
 
 
+def save_models(models, path):
+    """The path written: {wind: LinearModel} as .json or .npz, SI.
+
+    winds (n,), states, inputs, outputs, forces (names), A (n, 14, 14), B, C, D, E, F as in LinearModel, and
+    the operating points: x (n, 14) in the order of states, u (n, 2) torque and blade pitch.
+    Raises: InputError for another ending.
+    """
+    path = Path(path)
+    if path.suffix.lower() not in MODEL_SUFFIXES:
+        raise InputError(f"models file {str(path)!r}: must end with {' or '.join(MODEL_SUFFIXES)}")
+    first = next(iter(models.values()))
+    content = {"winds": np.array(list(models))}
+    content |= {key: np.array(getattr(first, key)) for key in ("states", "inputs", "outputs")}
+    content["forces"] = np.array(FORCES)
+    for key in "ABCDEF":
+        content[key] = np.array([getattr(model, key) for model in models.values()])
+    content["x"] = np.array([model.point.state[list(STATE_INDEX)] for model in models.values()])
+    content["u"] = np.array([model.point.command[:2] for model in models.values()])
+    with replacing(path) as temporary:
+        if path.suffix.lower() == ".npz":
+            np.savez_compressed(temporary, **content)
+        else:
+            text = json.dumps({key: value.tolist() for key, value in content.items()}, allow_nan=False)
+            temporary.write_text(text + "\n", encoding="utf-8")
+    return path
+
+
+def save_study(models, folder):
+    """The paths written into a folder: modes.csv, zeros.csv, models.json, models.npz and three plots."""
+    from fowt_env.plots_design import plot_bode, plot_damping, plot_poles
+
+    folder = Path(folder)
+    written = [write_table(mode_table(models), folder / "modes.csv")]
+    written.append(write_table(zero_table(models), folder / "zeros.csv"))
+    written += [save_models(models, folder / f"models{suffix}") for suffix in MODEL_SUFFIXES]
+    for name, plot in (("poles", plot_poles), ("damping", plot_damping), ("bode", plot_bode)):
+        written.append(folder / f"{name}.png")
+        plot(models, written[-1])
+    return written
+
+
 def sweep(variants, cases, seeds, out=None, progress=None, duration=660.0, skip=60.0):
     """DataFrame of lqr with each variant of its weights ({name: value} each) and of gspi_oc3, seed by seed.
 
-    seeds must be training seeds, FIRST_TRAINING_SEED and above: the others are for scoring. out: CSV.
+    Of the metrics it has those of KEPT. seeds must be training seeds, FIRST_TRAINING_SEED and above: the
+    others are for scoring. out: CSV.
     Raises: InputError for other seeds or unknown weights.
     """
     import fowt_env
@@ -89,7 +139,8 @@ def sweep(variants, cases, seeds, out=None, progress=None, duration=660.0, skip=
             for label, controller in runs:
                 frame = simulate(scene, controller=controller, duration=duration)
                 found = metrics(frame, skip, scene.turbine.rated_rotor_speed * 30.0 / np.pi)
-                rows.append({"variant": label, "case": case.name, "seed": int(seed), **found})
+                kept = {name: found[name] for name in KEPT}
+                rows.append({"variant": label, "case": case.name, "seed": int(seed), **kept})
                 if progress is not None:
                     progress(len(rows), total)
     table = pd.DataFrame(rows)

@@ -119,9 +119,9 @@ def controller_code(controller):
     """{"name", "code"}: what a controller is called, and a hash of the sources that define it.
 
     A name of CONTROLLERS: its module, those of the package that this imports, and the package's data;
-    "module:Name", a class or an object: the file that it comes from.
+    "design:FILE": the file and the package; "module:Name", a class or an object: the file that it comes from.
     """
-    from controllers import CONTROLLERS
+    from controllers import CONTROLLERS, saved_design
 
     if not isinstance(controller, str):
         kind = (
@@ -131,6 +131,9 @@ def controller_code(controller):
         return {"name": f"{kind.__module__}:{kind.__qualname__}", "code": _digest([file] if file else [])}
     if ":" not in controller:
         return {"name": controller, "code": _digest(_package_files(CONTROLLERS.get(controller)))}
+    if controller.startswith(saved_design.PREFIX):
+        files = [controller.removeprefix(saved_design.PREFIX), *_package_files(saved_design.load_design)]
+        return {"name": controller, "code": _digest(files)}
     module = controller.partition(":")[0]
     sys.path.insert(0, "")
     try:

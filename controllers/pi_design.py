@@ -1,0 +1,87 @@
+"""PI gains and gain schedule from a wanted frequency and damping ratio, on linear models over the wind.
+
+The rotor alone, as in the published design (theory.md, Eq. (A6)): its acceleration per blade pitch is taken
+from each linear model, the aerodynamic damping of its speed is left out. What the platform makes of the
+gains is computed afterwards from the whole plant.
+"""
+
+from dataclasses import dataclass
+from math import isfinite
+
+import numpy as np
+
+from controllers.closed_loop import PLATFORM_PERIOD, closed_loop_matrix
+from controllers.pi import PISettings, schedule_gain
+from fowt_env.errors import InputError, unknown
+from fowt_env.linear_model import modes
+from fowt_env.state import State
+
+SCHEDULES = ("loop", "published")
+
+
+@dataclass(frozen=True)
+class PIDesign:
+    """Gains on generator speed and what they give: table has one row per wind above rated."""
+
+    KP: float  # s, at zero pitch
+    KI: float
+    gain_schedule_pitch: float  # rad
+    table: list
+
+
+def design_pi(models, turbine, omega, zeta, schedule="loop"):
+    """PIDesign of a turbine for a rotor loop of frequency omega (rad/s) and damping ratio zeta.
+
+    models: {wind: LinearModel}; those whose pitch rests on a limit are passed over. The rotor's response to
+    blade pitch is fitted by s (1 + pitch/p). schedule "loop" makes the small-signal gain of the scheduled
+    law follow its inverse: since the schedule multiplies the integral (theory.md, Eq. (A7)) that takes
+    gain_schedule_pitch = 2 p. "published" takes p, as Jonkman did, and its loop is slower than designed.
+    Raises: InputError for omega or zeta outside their ranges, or fewer than two winds above rated.
+    """
+    for key, value, high in (("omega", omega, 3.0), ("zeta", zeta, 5.0)):
+        if not (isfinite(value) and 0.0 < value <= high):
+            raise InputError(f"{key} = {value}: must be in (0, {high:g}]")
+    if schedule not in SCHEDULES:
+        raise unknown("schedule", schedule, SCHEDULES)
+    ratio = turbine.drivetrain.gear_ratio
+    winds, pitches, slopes = [], [], []
+    for wind, model in models.items():
+        if not model.pitch_rests:
+            winds.append(wind)
+            pitches.append(float(model.point.state[State.BLADE_PITCH]))
+            slopes.append(-model.A[model.index("rotor_speed"), model.index("blade_pitch")])
+    if len(winds) < 2:
+        raise InputError("winds: at least two with the blade pitch off its limits are needed, above rated")
+    pitches, slopes = np.array(pitches), np.array(slopes)
+    columns = np.column_stack([np.ones(len(winds)), pitches]) / slopes[:, None]
+    at_zero, growth = np.linalg.lstsq(columns, np.ones(len(winds)), rcond=None)[0]
+    doubling = at_zero / growth
+    gain_schedule_pitch = float(2.0 * doubling if schedule == "loop" else doubling)
+    kp, ki = (float(x / (at_zero * ratio)) for x in (2.0 * zeta * omega, omega**2))
+    settings = PISettings.published(turbine, KP=kp, KI=ki, gain_schedule_pitch=gain_schedule_pitch)
+    table = []
+    for wind, pitch, slope in zip(winds, pitches, slopes, strict=True):
+        gain = schedule_gain(pitch, gain_schedule_pitch)
+        small = gain / (2.0 - gain)
+        frequency = np.sqrt(slope * small * ki * ratio)
+        table.append(
+            {
+                "wind_[m/s]": float(wind),
+                "pitch_[deg]": float(np.degrees(pitch)),
+                "slope_[1/s2]": float(-slope),
+                "KP_[s]": float(small * kp),
+                "KI_[-]": float(small * ki),
+                "omega_[rad/s]": float(frequency),
+                "zeta_[-]": float(0.5 * slope * small * kp * ratio / frequency),
+                "platform_zeta_[-]": _platform_damping(models[wind], settings),
+            }
+        )
+    return PIDesign(kp, ki, gain_schedule_pitch, table)
+
+
+def _platform_damping(model, settings):
+    """Damping ratio of the platform-pitch mode of the whole plant under a PI law."""
+    a, names = closed_loop_matrix(model, settings)
+    found = modes(a, names, model.cm_height, model.arm)
+    pitching = [mode for mode in found if mode.name == "platform_pitch"]
+    return min(pitching or found, key=lambda mode: abs(mode.period - PLATFORM_PERIOD)).damping_ratio

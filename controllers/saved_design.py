@@ -1,0 +1,195 @@
+"""Controllers saved as files: plain JSON with a version, whose every value is checked when it is read.
+
+A design of kind "pi" holds gains and schedule; one of kind "lqr" holds weights and the linear models they
+act on, so that it can be run at any control period and does not know a plant that was changed since.
+Used by name as design:FILE.
+"""
+
+import json
+import math
+from dataclasses import asdict, fields
+from pathlib import Path
+
+import numpy as np
+
+from controllers.lqr import LQR
+from controllers.lqr_design import LOWEST_DESIGN_WIND, MODEL_SHAPES, DesignModel, Weights
+from controllers.pi import PI, PISettings
+from fowt_env.errors import InputError, unknown
+from fowt_env.outputs import replacing
+from fowt_env.textfiles import read_text
+
+PREFIX = "design:"
+FORMAT, VERSION = "fowt-design", 1
+KEYS = ("format", "version", "kind", "platform", "turbine", "command", "settings")
+PI_KEYS = ("KP", "KI", "gain_schedule_pitch")
+SPACING = 1.0  # m/s, between the models of a design of kind "lqr"
+
+
+def save_design(path, kind, scene, settings, command, **further):
+    """The path written: a design for the scene's platform and turbine.
+
+    settings: PI_KEYS, or Weights and "models" for kind "lqr" (lqr_settings); command: what made it, to be
+    read by people; further: tables of the design, which are not read back.
+    Raises: InputError unless path ends with .json and the settings are those of the kind.
+    """
+    path = Path(path)
+    if path.suffix.lower() != ".json":
+        raise InputError(f"design file {str(path)!r}: must end with .json")
+    content = {
+        "format": FORMAT,
+        "version": VERSION,
+        "kind": kind,
+        "platform": scene.platform.name,
+        "turbine": scene.turbine.name,
+        "command": command,
+        "settings": settings,
+        **further,
+    }
+    _factory(content, f"design file {str(path)!r}")
+    text = json.dumps(content, indent=1, allow_nan=False)
+    with replacing(path) as temporary:
+        temporary.write_text(text + "\n", encoding="utf-8")
+    return path
+
+
+def lqr_settings(weights, models):
+    """Settings of kind "lqr" for save_design."""
+    rows = [{key: np.asarray(value).tolist() for key, value in vars(model).items()} for model in models]
+    return {"weights": asdict(weights), "models": rows}
+
+
+def load_design(path):
+    """Factory (turbine, control_dt) -> controller of a saved design.
+
+    Raises: InputError that names file, key and value; on the call, for a turbine it was not made for.
+    """
+    where = f"design file {str(path)!r}"
+    text = read_text(Path(path), "design")
+    try:
+        content = json.loads(text, parse_constant=_not_a_number)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{where} is not valid JSON: {error}") from None
+    return _factory(content, where, Path(path).stem)
+
+
+def _not_a_number(text):
+    raise ValueError(f"{text} is not a number of JSON")
+
+
+def _factory(content, where, name="design"):
+    """Factory of the checked contents of a design."""
+    if not isinstance(content, dict) or content.get("format") != FORMAT:
+        raise InputError(f'{where}: no design of a controller ("format" must be {FORMAT!r})')
+    if content.get("version") != VERSION:
+        raise InputError(
+            f"{where}: version = {content.get('version')!r}: this program reads {VERSION};"
+            " make the design again (its command is in the file)"
+        )
+    for key in KEYS:
+        if key not in content:
+            raise InputError(f"{where}: {key} is missing")
+    if content["kind"] not in KINDS:
+        raise InputError(f"{where}: {unknown('kind', content['kind'], KINDS)}")
+    _check_keys(content["settings"], KINDS[content["kind"]][0], "settings", where)
+    make, turbine_name = KINDS[content["kind"]][1], content["turbine"]
+    make = make(content["settings"], where)
+
+    def factory(turbine, control_dt):
+        if turbine.name != turbine_name:
+            raise InputError(f"{where}: turbine = {turbine_name!r}: cannot control {turbine.name!r}")
+        try:
+            return make(turbine, control_dt, name)
+        except InputError as error:
+            raise InputError(f"{where}: {error}") from None
+
+    return factory
+
+
+def _check_keys(given, expected, place, where):
+    """Raises InputError unless given is a table with exactly the expected keys."""
+    if not isinstance(given, dict):
+        raise InputError(f"{where}: {place}: must be an object with {', '.join(expected)}")
+    for key in given:
+        if key not in expected:
+            raise InputError(f"{where}: {unknown(f'key in {place}:', key, expected)}")
+    for key in expected:
+        if key not in given:
+            raise InputError(f"{where}: {place}.{key} is missing")
+
+
+def _number(value, place, where):
+    """A finite number. Raises: InputError naming the place and the value."""
+    good = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    if not good:
+        raise InputError(f"{where}: {place} = {str(value)[:60]}: must be a finite number")
+    return float(value)
+
+
+def _pi(settings, where):
+    """Maker of a PI controller from its settings; a gain_schedule_pitch of null means no schedule."""
+    values = {}
+    for key, value in settings.items():
+        free = key == "gain_schedule_pitch" and value is None
+        values[key] = math.inf if free else _number(value, f"settings.{key}", where)
+    return lambda turbine, control_dt, name: PI(PISettings.published(turbine, **values), control_dt, name)
+
+
+def _lqr(settings, where):
+    """Maker of an lqr controller from its weights and models."""
+    known = [item.name for item in fields(Weights)]
+    _check_keys(settings["weights"], known, "settings.weights", where)
+    values = {
+        key: _number(value, f"settings.weights.{key}", where) for key, value in settings["weights"].items()
+    }
+    try:
+        weights = Weights(**values)
+    except InputError as error:
+        raise InputError(f"{where}: settings.weights: {error}") from None
+    rows = settings["models"]
+    if not isinstance(rows, list) or len(rows) < 2:
+        raise InputError(f"{where}: settings.models: must list models of two winds or more")
+    models = [_model(row, f"settings.models[{i}]", where) for i, row in enumerate(rows)]
+    for i in range(1, len(models)):
+        step = models[i].wind - models[i - 1].wind
+        if not math.isclose(step, SPACING, rel_tol=1e-9):
+            raise InputError(
+                f"{where}: settings.models[{i}].wind = {models[i].wind:g}: must be {SPACING:g} m/s above"
+                " the last"
+            )
+    if models[-1].wind < LOWEST_DESIGN_WIND:
+        raise InputError(
+            f"{where}: settings.models: the last wind is {models[-1].wind:g} m/s; one of"
+            f" {LOWEST_DESIGN_WIND} m/s or more is needed"
+        )
+
+    def make(turbine, control_dt, name):
+        try:
+            return LQR(turbine, control_dt, weights, name, models=models)
+        except (np.linalg.LinAlgError, ValueError) as error:
+            if isinstance(error, InputError):
+                raise
+            raise InputError(f"models: no gains stabilise them: {error}") from None
+
+    return make
+
+
+def _model(row, place, where):
+    """DesignModel of one entry of settings.models."""
+    _check_keys(row, MODEL_SHAPES, place, where)
+    values = {}
+    for key, shape in MODEL_SHAPES.items():
+        if not shape:
+            values[key] = _number(row[key], f"{place}.{key}", where)
+            continue
+        try:
+            array = np.array(row[key], dtype=float)
+        except (TypeError, ValueError):
+            array = np.empty(0)
+        if array.shape != shape or not np.isfinite(array).all():
+            raise InputError(f"{where}: {place}.{key}: must be {' x '.join(map(str, shape))} finite numbers")
+        values[key] = array
+    return DesignModel(**values)
+
+
+KINDS = {"pi": (PI_KEYS, _pi), "lqr": (("weights", "models"), _lqr)}  # kind: keys of settings, maker's maker

@@ -1,0 +1,224 @@
+"""Plots of linear design: poles and damping over the wind, Bode plots, and fronts beside the linear bound.
+
+As in plots.py every function returns a matplotlib Figure and, if given a path, writes it there.
+Needs matplotlib: pip install "fowt-env[plot]".
+"""
+
+import numpy as np
+
+from fowt_env.errors import InputError
+from fowt_env.plots import COLOURS, INK, _new_figure, _save, _style
+
+MOTIONS = ("surge", "sway", "heave", "roll", "platform_pitch", "yaw", "rotor_speed")
+MARKS = ("o", "s", "^", "D", "v", "P", "X")
+SLOW = 0.4  # rad/s: below it surge, platform pitch and heave, above it yaw
+FREQUENCIES = np.geomspace(0.01, 4.0, 400)  # rad/s
+BODE = (  # input, output, title, factor to the unit shown, unit
+    (
+        "blade_pitch_command",
+        "rotor_speed",
+        "blade pitch to rotor speed",
+        30.0 / np.pi * np.pi / 180.0,
+        "rpm/deg",
+    ),
+    ("generator_torque", "rotor_speed", "torque to rotor speed", 30.0 / np.pi * 1e3, "rpm/(kN m)"),
+    ("wind_speed", "platform_pitch", "wind to platform pitch", 180.0 / np.pi, "deg/(m/s)"),
+)
+WIND = "wind_[m/s]"
+TRAVEL = {"cmap": "coolwarm", "vmin": 0.5, "vmax": 1.5}  # colours of the travel's ratio: white at 1
+
+
+def _wind_colours(winds):
+    """{wind: colour} from dark (low) to light along one scale, and the scale for a colour bar."""
+    from matplotlib import colormaps
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    low, high = min(winds), max(winds)
+    scale = ScalarMappable(Normalize(low, high if high > low else low + 1.0), colormaps["viridis"])
+    return {wind: scale.to_rgba(wind) for wind in winds}, scale
+
+
+def plot_poles(models, path=None, title=None):
+    """Pole map over the wind of {wind: LinearModel}, whole and near the origin; colour by wind."""
+    if not models:
+        raise InputError("nothing to plot: no linear models were given")
+    colours, scale = _wind_colours(list(models))
+    found = [(wind, mode) for wind, model in models.items() for mode in model.modes()]
+    figure = _new_figure(11.0, 4.8)
+    panels = figure.subplots(1, 2)
+    for axes, slow in zip(panels, (False, True), strict=True):
+        _style(axes)
+        shown = [(w, m) for w, m in found if not slow or m.frequency < SLOW]
+        for wind, mode in shown:
+            mark = MARKS[MOTIONS.index(mode.name)]
+            place = (-mode.damping_ratio * mode.frequency, 2.0 * np.pi / mode.period)
+            axes.scatter(
+                *place, marker=mark, s=36, color=colours[wind], edgecolor=INK, linewidth=0.3, zorder=3
+            )
+        _damping_lines(axes)
+        axes.set_xlabel("real part (1/s)", fontsize=9, color=INK)
+    for name, mark in zip(MOTIONS, MARKS, strict=True):
+        if name in {mode.name for _, mode in found}:
+            panels[0].scatter([], [], marker=mark, color="#888888", label=name.replace("_", " "))
+    panels[0].legend(fontsize=8, frameon=False, loc="center left", bbox_to_anchor=(0.02, 0.55))
+    panels[0].set_ylabel("imaginary part (rad/s)", fontsize=9, color=INK)
+    panels[1].set_title(f"slower than {SLOW:g} rad/s", fontsize=9, color=INK)
+    panels[0].set_title("all", fontsize=9, color=INK)
+    figure.colorbar(scale, ax=panels, label="wind (m/s)", pad=0.01)
+    figure.suptitle(
+        title or "poles, torque and blade pitch held; grey: damping ratio", fontsize=10, color=INK
+    )
+    return _save(figure, path)
+
+
+def _damping_lines(axes):
+    """Lines of equal damping ratio behind the poles, within the limits that these have set."""
+    low, high = min(1.08 * axes.dataLim.x0, -1e-3), 1.08 * axes.dataLim.y1
+    axes.set_xlim(low, max(-0.04 * low, 1.08 * axes.dataLim.x1))
+    axes.set_ylim(0.0, high)
+    for damping in (0.02, 0.05, 0.1, 0.2, 0.3):
+        slope = np.sqrt(1.0 - damping**2) / damping
+        axes.plot([0.0, low], [0.0, -slope * low], color="#BBBBBB", linewidth=0.9, zorder=1)
+        end = (low, -slope * low) if -slope * low < high else (-high / slope, high)
+        axes.annotate(
+            f"{damping:g}", end, fontsize=7, color="#777777", xytext=(2, -9), textcoords="offset points"
+        )
+    axes.axvline(0.0, color=INK, linewidth=0.8)
+
+
+def plot_damping(models, path=None, title=None):
+    """Period and damping ratio of every mode over the wind of {wind: LinearModel}."""
+    if not models:
+        raise InputError("nothing to plot: no linear models were given")
+    figure = _new_figure(9.0, 5.6)
+    panels = figure.subplots(2, 1, sharex=True)
+    for index, name in enumerate(MOTIONS):
+        found = [
+            (wind, mode) for wind, model in models.items() for mode in model.modes() if mode.name == name
+        ]
+        if not found:
+            continue
+        winds = [wind for wind, _ in found]
+        style = {"color": COLOURS[index], "marker": MARKS[index], "markersize": 4, "linewidth": 1.0}
+        panels[0].plot(winds, [mode.period for _, mode in found], label=name.replace("_", " "), **style)
+        panels[1].plot(winds, [mode.damping_ratio for _, mode in found], **style)
+    for axes, label in zip(panels, ("period (s)", "damping ratio"), strict=True):
+        _style(axes)
+        axes.set_ylabel(label, fontsize=9, color=INK)
+    panels[0].set_yscale("log")
+    panels[0].set_yticks([8, 10, 20, 30, 50, 100, 150], ["8", "10", "20", "30", "50", "100", "150"])
+    panels[0].minorticks_off()
+    panels[1].axhline(0.0, color=INK, linewidth=0.8)
+    panels[1].set_xlabel("wind (m/s)", fontsize=9, color=INK)
+    panels[0].legend(fontsize=8, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    figure.suptitle(title or "modes over the wind, torque and blade pitch held", fontsize=10, color=INK)
+    return _save(figure, path)
+
+
+def plot_bode(models, path=None, title=None):
+    """Gain and phase of BODE for {wind: LinearModel}: what pitch, torque and wind do to rotor and platform.
+
+    Blade pitch is shown where it is free to move: not at winds where it rests on its limit.
+    """
+    if not models:
+        raise InputError("nothing to plot: no linear models were given")
+    colours, scale = _wind_colours(list(models))
+    figure = _new_figure(12.0, 5.6)
+    panels = figure.subplots(2, len(BODE), sharex=True)
+    for column, (source, output, name, factor, unit) in enumerate(BODE):
+        gain, phase = panels[:, column]
+        for wind, model in models.items():
+            response = model.response(FREQUENCIES, (source,))[:, model.output_index(output), 0] * factor
+            if source == "blade_pitch_command" and model.pitch_rests:
+                continue
+            gain.loglog(FREQUENCIES, np.abs(response), color=colours[wind], linewidth=1.0)
+            angle = np.degrees(np.unwrap(np.angle(response)))
+            angle -= 360.0 * np.ceil((angle[-1] - 135.0) / 360.0)  # high frequencies agree, lags differ
+            phase.semilogx(FREQUENCIES, angle, color=colours[wind], linewidth=1.0)
+        gain.set_title(name, fontsize=9, color=INK)
+        gain.set_ylabel(unit, fontsize=8, color=INK)
+        phase.set_ylabel("phase (deg)", fontsize=8, color=INK)
+        phase.set_xlabel("frequency (rad/s)", fontsize=9, color=INK)
+        phase.yaxis.set_major_locator(_right_angles())
+        for axes in (gain, phase):
+            _style(axes)
+            axes.set_xlim(FREQUENCIES[0], FREQUENCIES[-1])
+    figure.colorbar(scale, ax=panels, label="wind (m/s)", pad=0.01)
+    if title:
+        figure.suptitle(title, fontsize=10, color=INK)
+    return _save(figure, path)
+
+
+def _right_angles():
+    """Ticks at multiples of 90 degrees."""
+    from matplotlib.ticker import MultipleLocator
+
+    return MultipleLocator(90.0)
+
+
+def plot_bound(table, names, points=None, path=None, title=None):
+    """Fronts of training.linear_bound.bound_table over gspi_oc3's, a panel per wind, and simulated points.
+
+    names: {information: legend text}, in order. points: training.linear_bound.ratio_table of simulated
+    controllers, coloured by their blade-pitch travel over that of gspi_oc3. Winds without points are left
+    out where there are points at all.
+    """
+    from training.linear_bound import efficient
+
+    winds = sorted(table[WIND].unique())
+    if points is not None:
+        winds = [wind for wind in winds if wind in set(points[WIND])]
+    if not winds:
+        raise InputError("nothing to plot: no wind has both a front and simulated points")
+    columns = min(4, len(winds))
+    rows = -(-(len(winds) + (len(winds) > 3)) // columns)
+    figure = _new_figure(3.0 * columns + 0.8, 2.9 * rows + (1.2 if len(winds) <= 3 else 0.5))
+    places = list(figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).flat)
+    for axes, wind in zip(places, winds, strict=False):
+        _style(axes)
+        here = table[table[WIND] == wind]
+        for index, (information, text) in enumerate(names.items()):
+            front = here[here["information"] == information][["speed_ratio_[-]", "pitch_ratio_[-]"]]
+            if len(front):
+                line = efficient(front)
+                style = {"color": COLOURS[index], "linewidth": 1.6 if index == 0 else 1.2}
+                axes.plot(line[:, 0], line[:, 1], label=text, ls=("-", "--", ":", "-.")[index % 4], **style)
+        axes.scatter(1.0, 1.0, marker="+", s=70, color=INK, label="gspi_oc3", zorder=4)
+        if points is not None:
+            shown = points[points[WIND] == wind]
+            drawn = axes.scatter(
+                shown["speed_ratio_[-]"],
+                shown["pitch_ratio_[-]"],
+                c=shown["travel_ratio_[-]"],
+                **TRAVEL,
+                s=30,
+                edgecolor=INK,
+                linewidth=0.5,
+                label="lqr, simulated",
+                zorder=5,
+            )
+        axes.set_xlim(0.0, 1.25)
+        axes.set_ylim(0.0, 1.15)
+        axes.set_title(f"{wind:g} m/s", fontsize=9, color=INK)
+    if points is not None:
+        bar = figure.colorbar(drawn, ax=places, pad=0.01)
+        bar.set_label("blade-pitch travel over that of gspi_oc3", fontsize=8)
+    _place_legend(figure, places, len(winds))
+    figure.supxlabel("rotor-speed deviation over that of gspi_oc3", fontsize=9, color=INK)
+    figure.supylabel("platform-pitch deviation over that of gspi_oc3", fontsize=9, color=INK)
+    if title:
+        figure.suptitle(title, fontsize=10, color=INK)
+    return _save(figure, path)
+
+
+def _place_legend(figure, places, used):
+    """The legend in the first spare place of a grid, or below it; the spare places emptied."""
+    for axes in places[used:]:
+        axes.set_axis_off()
+    handles, labels = places[0].get_legend_handles_labels()
+    if len(places) > used:
+        places[used].legend(handles, labels, fontsize=8, frameon=False, loc="center")
+    else:
+        columns = 1 if used == 1 else 3
+        figure.legend(handles, labels, loc="outside upper center", ncols=columns, fontsize=8, frameon=False)
