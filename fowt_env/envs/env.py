@@ -44,7 +44,6 @@ from fowt_env.state import State
 from fowt_env.step import output
 
 SHORTEST_WEATHER = 600.0  # s of random wind and sea: turbulence intensity is defined over 10 min
-BASELINE = "pi"  # controller that the residual mode adds to
 REWARD_KEYS = tuple(f"reward/{name}" for name in TERMS)
 
 
@@ -55,6 +54,7 @@ class FowtEnv(gymnasium.Env):
     platform     built-in name, path or description.Platform
     rotor        "bem", "lookup" or "table"; None: the task's, or else that of the fidelity
     action_mode  "direct", "setpoint" or "residual", see the table of actions
+    baseline     compiled controller, by name, that the residual mode adds to
     observation  channel names in place of the task's; "default" among them stands for the task's
     reward       {term: weight} in place of single weights of the task
     dt           physics step, s (None: that of the scene's integrator); control_dt: time between
@@ -96,6 +96,7 @@ class FowtEnv(gymnasium.Env):
         platform="oc3_hywind",
         rotor=None,
         action_mode="direct",
+        baseline="pi",
         observation=None,
         reward=None,
         dt=None,
@@ -122,6 +123,7 @@ class FowtEnv(gymnasium.Env):
             task_of(task), rotor, observation, reward, duration, wind, sea, wind_preview
         )
         self.action_mode = action_mode
+        self.baseline = baseline
         steps_in("duration", task.duration, control_dt)
         episode = task.draw(np.random.default_rng(0))
         self.scene = build_scene(
@@ -146,7 +148,7 @@ class FowtEnv(gymnasium.Env):
         self._running = False
         # what a snapshot must agree with: the same numbers then mean the same
         seen = (task.observation, task.wind_preview)
-        self._kind = (self._key, action_mode, *seen, self.dt, self.control_dt, self._last)
+        self._kind = (self._key, action_mode, baseline, *seen, self.dt, self.control_dt, self._last)
 
     def twin(self):
         """Another environment of the same settings, before its first reset; shares what is never written."""
@@ -165,9 +167,7 @@ class FowtEnv(gymnasium.Env):
         self._baseline = None
         parameters, memory = np.zeros(1), np.zeros(1)
         if mode == Mode.RESIDUAL:
-            from controllers import make  # looked up only when used: fowt_env imports nothing from it
-
-            self._baseline = make(BASELINE, turbine, self.control_dt)
+            self._baseline = _baseline(self.baseline, turbine, self.control_dt)
             self._law = self._baseline.kernel
             parameters, memory = self._baseline.parameters, self._baseline.memory
         self._setting = Setting(
@@ -402,6 +402,17 @@ def _adapted(task, rotor, observation, reward, duration, wind, sea, wind_preview
     if reward is not None:
         changes["weights"] = task.weights | check_weights("reward", reward)
     return replace(task, **changes)
+
+
+def _baseline(name, turbine, control_dt):
+    """Compiled controller of that name. Raises: InputError for unknown ones and those written in Python."""
+    from controllers import make  # looked up only when used: fowt_env imports nothing from it
+    from controllers.base import CompiledController
+
+    baseline = make(name, turbine, control_dt)
+    if not isinstance(baseline, CompiledController):
+        raise InputError(f"baseline = {name!r}: must be a compiled controller, such as 'pi' or 'gspi_oc3'")
+    return baseline
 
 
 def _chosen(drawn, options):
