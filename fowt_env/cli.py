@@ -621,3 +621,4 @@ def accuracy(
 
 
 from fowt_env import cli_report  # noqa: E402, F401 - adds its commands to the app
+from fowt_env import cli_train  # noqa: E402, F401 - adds its commands to the app
