@@ -11,6 +11,7 @@ from controllers.floating import floating_feedback
 from controllers.gspi import gspi_land, gspi_oc3
 from controllers.openfast import openfast_oc3
 from controllers.pi import pi, pi_land, pi_land_power, pi_unscheduled
+from controllers.policy import PREFIX, policy
 from controllers.preview import preview
 from controllers.rosco import rosco, rosco_float
 from fowt_env.description import read_turbine
@@ -38,7 +39,7 @@ CONTROLLERS = {  # name -> factory(turbine: description.Turbine, control_dt: flo
 def make(controller, turbine, control_dt):
     """Controller ready for a run, from a name, an import path or an object.
 
-    controller: a name of CONTROLLERS; "module:Name" with Name a class, a factory or a controller
+    controller: a name of CONTROLLERS; "policy:NAME" or "policy:PATH" of a trained agent; "module:Name" with Name a class, a factory or a controller
     (looked for in the working folder too); such a class or factory itself; or an object with
     reset(measurement) and act(measurement). Classes and factories are called with (turbine,
     control_dt) where they take two arguments, else with none. Compiled controllers come back as they
@@ -50,7 +51,10 @@ def make(controller, turbine, control_dt):
     name = None
     if isinstance(controller, str):
         name = controller
-        controller = _imported(name) if ":" in name else CONTROLLERS.get(name)
+        if name.startswith(PREFIX):
+            controller = policy(name)
+        else:
+            controller = _imported(name) if ":" in name else CONTROLLERS.get(name)
         if controller is None:
             raise unknown("controller", name, CONTROLLERS)
     if isinstance(controller, type) or not isinstance(controller, Controller):
@@ -67,7 +71,7 @@ def make(controller, turbine, control_dt):
 
 
 def information(name):
-    """What a controller of CONTROLLERS uses: Measurement fields and entries of base.EXTRA.
+    """What a controller of CONTROLLERS, or a trained agent, uses: Measurement fields and entries of base.EXTRA.
 
     Raises: InputError for an unknown name.
     """
