@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from fowt_env.cli import EXIT_INTERRUPTED, app, note, progress_bar, reported
+from fowt_env.cli import EXIT_INTERRUPTED, app, benchmarks, note, out, progress_bar, reported
 from fowt_env.cli_arguments import parse_pairs
 from fowt_env.errors import InputError
 
@@ -80,3 +80,20 @@ def export_policy(
         )
     note(f"warning: executing code from the checkpoint in {folder}, as asked")
     note(f"wrote {export_run(folder, out_path)}")
+
+
+@benchmarks.command()
+@reported
+def training(
+    envs: Annotated[int, typer.Option(help="Environments in a batch.")] = 64,
+    steps: Annotated[int, typer.Option(help="Steps of PPO that are timed.")] = 50_000,
+    out_path: Annotated[str, typer.Option("--out", help="CSV to write.")] = "results/benchmark/training.csv",
+):
+    """Time PPO on each kind of vector environment, and say what physics, torch and Python take."""
+    from training.benchmark import write_csv
+    from training.benchmark_training import benchmark_training
+
+    with progress_bar("training speed", None) as update:
+        table = benchmark_training(envs, steps, progress=lambda done, total, kind: update(done, kind, total))
+    out.print(table.round(3).to_string(index=False), highlight=False)
+    note(f"wrote {write_csv(table, out_path)}")
