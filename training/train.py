@@ -163,10 +163,11 @@ def _sea_at(speed):
 
 
 def make_envs(settings):
-    """(training VecNormalize, validation VecNormalize) of resolved settings."""
+    """(training VecNormalize, validation VecNormalize) of resolved settings; only training is randomised."""
     from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
 
     from training.decision_env import DecisionVecEnv, ValidationVecEnv
+    from training.randomisation import randomised
     from training.sb3_env import FowtSB3VecEnv
 
     chosen = environment_settings(settings)
@@ -174,13 +175,9 @@ def make_envs(settings):
     normalise = {"gamma": settings["algorithm"].get("gamma", 0.99)} | settings["normalise"]
     n = settings["environment"].get("num_envs", 1)
     plants = settings["environment"].get("randomise")
-    if plants:
-        from training.randomisation import randomised
-
-        chosen["per_env"] = randomised(plants, n, settings["seed"])
-    base = FowtSB3VecEnv(n, threads=1, **chosen)
-    env = VecNormalize(VecMonitor(DecisionVecEnv(base, decisions)), **normalise)
-    chosen.pop("per_env", None)
+    per_env, sensors = (None, None) if not plants else randomised(plants, n, settings["seed"])
+    base = FowtSB3VecEnv(n, threads=1, per_env=per_env, **chosen)
+    env = VecNormalize(VecMonitor(DecisionVecEnv(base, decisions, sensors)), **normalise)
     fixed = ValidationVecEnv(
         validation_episodes(settings), settings["validation"].get("skip", 60.0), threads=1, **chosen
     )
