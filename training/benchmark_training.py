@@ -1,4 +1,4 @@
-"""Speed of PPO on the native vector environment and on others, with the shares of physics, torch and Python."""
+"""Speed of PPO on the native vector environment and others: shares of physics, torch and Python."""
 
 import time
 
@@ -39,7 +39,7 @@ class Clock:
 
 
 def nothing_env(env):
-    """A VecEnv of env's spaces that returns the same random numbers at no cost: what is left is PPO itself."""
+    """A VecEnv of env's spaces that returns the same numbers at no cost: what is left is PPO itself."""
     from stable_baselines3.common.vec_env import VecEnvWrapper
 
     rng = np.random.default_rng(0)
@@ -141,7 +141,7 @@ def measured(kind, n, steps, settings, decisions, algorithm):
 
 
 def benchmark_training(n=64, steps=50_000, kinds=KINDS, progress=None):
-    """DataFrame with a row per kind of vector environment, PPO with the shipped settings and one torch thread.
+    """DataFrame with a row per kind of vector environment, PPO as shipped on one torch thread.
 
     An env step is one control period (0.1 s) of the task above_rated at fidelity "standard", residual mode;
     a step is what PPO learns from: the same, or a decision. physics: the compiled call; torch: PPO's update

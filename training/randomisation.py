@@ -141,8 +141,8 @@ def randomised(spec, n, seed):
 class Sensors:
     """Readings of n environments: late by whole control periods, with white noise; scaled observations.
 
-    noise (n,): standard deviations; delay (n,): control periods. sensed: (channels,) bool, which channels are
-    sensors' (an agent knows its own last action exactly); all, until set. Raises: InputError for negative ones.
+    noise (n,): standard deviations; delay (n,): control periods. sensed (channels,) bool: which channels are
+    sensors' (an agent knows its own last action exactly); all, until set. Raises: InputError below 0.
     """
 
     def __init__(self, noise, delay, seed):

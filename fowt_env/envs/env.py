@@ -167,7 +167,7 @@ class FowtEnv(gymnasium.Env):
         self._baseline = None
         parameters, memory = np.zeros(1), np.zeros(1)
         if mode == Mode.RESIDUAL:
-            self._baseline = _baseline(self.baseline, turbine, self.control_dt)
+            self._baseline = named_baseline(self.baseline, turbine, self.control_dt)
             self._law = self._baseline.kernel
             parameters, memory = self._baseline.parameters, self._baseline.memory
         self._setting = Setting(
@@ -224,9 +224,7 @@ class FowtEnv(gymnasium.Env):
         start(self._box)
         if self._baseline is not None:
             self._baseline.prepare(scene)
-            self._baseline.reset(self.measurement())
-        elif self._setting.actions.mode == Mode.SETPOINT:
-            start_tracking(run.memory, self.measurement(), self._setting.actions)
+        self.restart_loops()
         self._running = True
         info = {
             "time": 0.0,
@@ -237,6 +235,16 @@ class FowtEnv(gymnasium.Env):
         if self.render_mode == "human":
             self.render()
         return run.observation.copy(), info
+
+    def restart_loops(self):
+        """Start the baseline of residual mode, or the loop of set-point mode, from what is measured now.
+
+        For whoever took over through step_physical and hands back: the loops have not followed.
+        """
+        if self._baseline is not None:
+            self._baseline.reset(self.measurement())
+        elif self._setting.actions.mode == Mode.SETPOINT:
+            start_tracking(self._run.memory, self.measurement(), self._setting.actions)
 
     def _offset(self, offsets):
         """Move the state by {channel: offset in the channel's unit}."""
@@ -404,7 +412,7 @@ def _adapted(task, rotor, observation, reward, duration, wind, sea, wind_preview
     return replace(task, **changes)
 
 
-def _baseline(name, turbine, control_dt):
+def named_baseline(name, turbine, control_dt):
     """Compiled controller of that name. Raises: InputError for unknown ones and those written in Python."""
     from controllers import make  # looked up only when used: fowt_env imports nothing from it
     from controllers.base import CompiledController
