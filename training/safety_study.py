@@ -104,7 +104,7 @@ def episode_figures(agent, env, options):
 
 
 def safety_study(agents, progress=print):
-    """DataFrame: one row per agent, without and with the layer; means over episodes, overspeed the largest."""
+    """DataFrame: a row per agent, without and with the layer; means over episodes, largest overspeed."""
     episodes = validation_episodes(resolve("ppo", "above_rated", 0, 1))[::2]
     rows = []
     for label, agent in [(name, Trained(name)) for name in agents] + [
