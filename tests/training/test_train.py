@@ -1,6 +1,8 @@
 """Training: what a run leaves behind, how it stops and goes on, and what it refuses."""
 
 import json
+import shlex
+import tomllib
 
 import numpy as np
 import pytest
@@ -11,9 +13,13 @@ pytest.importorskip("sb3_contrib")
 
 import torch
 
+from controllers import information
+from controllers.policy import shipped_agents
+from fowt_env.cli_arguments import parse_pairs
 from fowt_env.errors import InputError
+from training import publish as publishing
 from training import train_callbacks
-from training.train import Training, baseline_figures, decision_env, judged, make_envs, resolve
+from training.train import AGENTS, Training, baseline_figures, decision_env, judged, make_envs, resolve
 
 from .small_run import small
 
@@ -112,3 +118,32 @@ def test_wrong_settings_are_named(tmp_path):
         Training(small("ppo", **{"algorithm.n_stepps": 3}), tmp_path / "b").run()
     with pytest.raises(InputError, match="holds no checkpoint"):
         Training(None, tmp_path / "c", resume=True)
+
+
+def test_a_published_agent_has_a_card_whose_command_makes_the_same_settings(tmp_path, monkeypatch):
+    settings = small("ppo")
+    run = Training(settings, tmp_path / "run")
+    run.run()
+    monkeypatch.setattr(publishing, "AGENTS", tmp_path)
+    policy, card = publishing.publish(run.folder, "small", "a test")
+    assert policy.read_bytes() == (run.folder / "best.npz").read_bytes()
+    with card.open("rb") as file:
+        found = tomllib.load(file)
+    words = shlex.split(found["command"])
+    changes = parse_pairs([words[i + 1] for i, word in enumerate(words) if word == "--set"], "set")
+    given = {key: words[words.index(f"--{key}") + 1] for key in ("algo", "task", "seed", "steps")}
+    again = resolve(given["algo"], given["task"], int(given["seed"]), int(given["steps"]), changes)
+    assert again == settings
+    assert found["information"][:2] == ["generator_speed", "blade_pitch"]
+    assert found["validation"]["score"] == pytest.approx(min(row["score"] for row in run.rows), abs=1e-4)
+
+
+def test_every_shipped_agent_has_a_card_and_is_small():
+    for name in shipped_agents():
+        assert (AGENTS / f"{name}.npz").stat().st_size < publishing.LARGEST_FILE
+        with (AGENTS / f"{name}.toml").open("rb") as file:
+            card = tomllib.load(file)
+        assert {"command", "seed", "wall_time", "machine", "information", "validation", "versions"} <= set(
+            card
+        )
+        assert tuple(card["information"]) == information(f"policy:{name}")
