@@ -1,5 +1,10 @@
 """Learning curves of one or several runs as a picture."""
 
+import argparse
+from pathlib import Path
+
+import pandas as pd
+
 from fowt_env.plots import COLOURS, _new_figure, _save, _style
 
 PANELS = (
@@ -30,3 +35,49 @@ def plot_learning_curve(runs, path):
     axes[-1].set_xlabel("decisions (millions)")
     _save(figure, path)
     return path
+
+
+def plot_front(runs, path):
+    """Path of a plot of what motions cost in blade-pitch travel: every validation of the runs, as ratios.
+
+    runs: {label: list of validation rows}. Large marks: the policy that was kept.
+    """
+    figure = _new_figure(8.0, 4.0)
+    axes = figure.subplots(1, 2, sharex=True)
+    for axis, (name, label) in zip(axes, PANELS[1:3], strict=True):
+        for number, (run, rows) in enumerate(runs.items()):
+            colour = COLOURS[number % len(COLOURS)]
+            travel = [row["blade_pitch_travel_ratio"] for row in rows]
+            axis.plot(travel, [row[name] for row in rows], ".", color=colour, alpha=0.4)
+            best = min(rows, key=lambda row: row["score"])
+            axis.plot(best["blade_pitch_travel_ratio"], best[name], "o", color=colour, label=run)
+        axis.axhline(1.0, color="0.6", linewidth=0.8)
+        axis.axvline(1.0, color="0.6", linewidth=0.8)
+        axis.set_xlabel("blade-pitch travel / baseline")
+        axis.set_ylabel(label, fontsize=8)
+        _style(axis)
+    axes[0].legend(fontsize=8)
+    _save(figure, path)
+    return path
+
+
+def main(arguments=None):
+    """Plot the learning curves and the front of several runs.
+
+    python -m training.learning_curve measured=runs/a preview=runs/b --out results/rl
+    """
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("runs", nargs="+", metavar="LABEL=FOLDER")
+    parser.add_argument("--out", default="results/rl", help="folder of the pictures")
+    given = parser.parse_args(arguments)
+    runs = {}
+    for text in given.runs:
+        label, _, folder = text.rpartition("=")
+        table = pd.read_csv(Path(folder) / "validation.csv")
+        runs[label or folder] = table.to_dict("records")
+    print(plot_learning_curve(runs, Path(given.out) / "rl_learning_curves.png"))
+    print(plot_front(runs, Path(given.out) / "rl_front.png"))
+
+
+if __name__ == "__main__":
+    main()
