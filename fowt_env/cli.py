@@ -244,7 +244,7 @@ metrics.png, timeseries_CASE.png, spectra_CASE.png, and every run as runs/CONTRO
 @app.command(epilog=EVALUATE_EXAMPLES)
 @reported
 def evaluate(
-    controllers: Annotated[str, typer.Option(help="Names or module:Name, separated by commas.")] = "pi",
+    controllers: Annotated[str, typer.Option(help="Names, policy:NAME or module:Name, by commas.")] = "pi",
     cases: Annotated[
         str, typer.Option(help="Suites or cases, by commas; see fowt list cases.")
     ] = "above_rated",
@@ -391,11 +391,12 @@ def trim(
 @reported
 def list_names(
     kind: Annotated[
-        str, typer.Argument(help="platforms, turbines, seas, controllers, suites or cases; all if left out.")
+        str, typer.Argument(help="platforms, turbines, seas, controllers, agents, suites or cases; or all.")
     ] = "all",
 ):
     """List the names that the other commands know."""
     from controllers import CONTROLLERS
+    from controllers.policy import shipped_agents
     from fowt_env.description import names
     from training.cases import CASES, SUITES
 
@@ -404,6 +405,7 @@ def list_names(
         "turbines": lambda: names("turbines"),
         "seas": lambda: names("sea_states"),
         "controllers": lambda: list(CONTROLLERS),
+        "agents": lambda: [f"policy:{name}" for name in shipped_agents()],
         "suites": lambda: [f"{suite} = {cases[0]} ... {cases[-1]}" for suite, cases in SUITES.items()],
         "cases": lambda: list(CASES),
     }
