@@ -622,5 +622,7 @@ def accuracy(
     note("wrote " + ", ".join(map(str, files)))
 
 
-from fowt_env import cli_report  # noqa: E402, F401 - adds its commands to the app
-from fowt_env import cli_train  # noqa: E402, F401 - adds its commands to the app
+from fowt_env import (
+    cli_report,  # noqa: E402, F401 - adds its commands to the app
+    cli_train,  # noqa: E402, F401 - adds its commands to the app
+)
