@@ -622,7 +622,4 @@ def accuracy(
     note("wrote " + ", ".join(map(str, files)))
 
 
-from fowt_env import (
-    cli_report,  # noqa: E402, F401 - adds its commands to the app
-    cli_train,  # noqa: E402, F401 - adds its commands to the app
-)
+from fowt_env import cli_report, cli_train  # noqa: E402, F401 - add their commands to the app
