@@ -39,11 +39,11 @@ CONTROLLERS = {  # name -> factory(turbine: description.Turbine, control_dt: flo
 def make(controller, turbine, control_dt):
     """Controller ready for a run, from a name, an import path or an object.
 
-    controller: a name of CONTROLLERS; "policy:NAME" or "policy:PATH" of a trained agent; "module:Name" with Name a class, a factory or a controller
-    (looked for in the working folder too); such a class or factory itself; or an object with
-    reset(measurement) and act(measurement). Classes and factories are called with (turbine,
-    control_dt) where they take two arguments, else with none. Compiled controllers come back as they
-    are, others inside a CheckedController.
+    controller: a name of CONTROLLERS; "policy:NAME" or "policy:PATH" of a trained agent; "module:Name"
+    with Name a class, a factory or a controller (looked for in the working folder too); such a class or
+    factory itself; or an object with reset(measurement) and act(measurement). Classes and factories are
+    called with (turbine, control_dt) where they take two arguments, else with none. Compiled
+    controllers come back as they are, others inside a CheckedController.
     Raises: InputError for unknown names (with a suggestion), paths that cannot be imported, and
     objects without reset and act.
     """
@@ -71,7 +71,7 @@ def make(controller, turbine, control_dt):
 
 
 def information(name):
-    """What a controller of CONTROLLERS, or a trained agent, uses: Measurement fields and entries of base.EXTRA.
+    """What a controller of CONTROLLERS or an agent uses: Measurement fields and entries of base.EXTRA.
 
     Raises: InputError for an unknown name.
     """

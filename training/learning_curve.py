@@ -25,13 +25,14 @@ def plot_learning_curve(runs, path):
     for axis, (name, label) in zip(axes, PANELS, strict=True):
         for number, (run, rows) in enumerate(runs.items()):
             steps = [row["decisions"] / 1e6 for row in rows]
-            colour = COLOURS[number % len(COLOURS)]
-            axis.plot(steps, [row[name] for row in rows], label=run, color=colour, marker=".")
+            colour, line = COLOURS[number % len(COLOURS)], "-" if number < len(COLOURS) else "--"
+            axis.plot(steps, [row[name] for row in rows], label=run, color=colour, marker=".", linestyle=line)
         if name.endswith("ratio"):
             axis.axhline(1.0, color="0.6", linewidth=0.8)
         axis.set_ylabel(label, fontsize=8)
         _style(axis)
-    axes[0].legend(fontsize=8)
+    handles, labels = axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, fontsize=8, loc="outside lower center", ncols=3)
     axes[-1].set_xlabel("decisions (millions)")
     _save(figure, path)
     return path
@@ -42,7 +43,7 @@ def plot_front(runs, path):
 
     runs: {label: list of validation rows}. Large marks: the policy that was kept.
     """
-    figure = _new_figure(8.0, 4.0)
+    figure = _new_figure(8.0, 4.5)
     axes = figure.subplots(1, 2, sharex=True)
     for axis, (name, label) in zip(axes, PANELS[1:3], strict=True):
         for number, (run, rows) in enumerate(runs.items()):
@@ -50,13 +51,15 @@ def plot_front(runs, path):
             travel = [row["blade_pitch_travel_ratio"] for row in rows]
             axis.plot(travel, [row[name] for row in rows], ".", color=colour, alpha=0.4)
             best = min(rows, key=lambda row: row["score"])
-            axis.plot(best["blade_pitch_travel_ratio"], best[name], "o", color=colour, label=run)
+            mark = "o" if number < len(COLOURS) else "s"
+            axis.plot(best["blade_pitch_travel_ratio"], best[name], mark, color=colour, label=run)
         axis.axhline(1.0, color="0.6", linewidth=0.8)
         axis.axvline(1.0, color="0.6", linewidth=0.8)
         axis.set_xlabel("blade-pitch travel / baseline")
         axis.set_ylabel(label, fontsize=8)
         _style(axis)
-    axes[0].legend(fontsize=8)
+    handles, labels = axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, fontsize=8, loc="outside lower center", ncols=3)
     _save(figure, path)
     return path
 
