@@ -13,9 +13,12 @@ from controllers.lqr import lqr
 from controllers.openfast import openfast_oc3
 from controllers.pi import pi, pi_land, pi_land_power, pi_unscheduled
 from controllers.pi_tuned import pi_tuned
+from controllers.policy import PREFIX as POLICY
+from controllers.policy import policy
 from controllers.preview import preview
 from controllers.rosco import rosco, rosco_float
-from controllers.saved_design import PREFIX, load_design
+from controllers.saved_design import PREFIX as DESIGN
+from controllers.saved_design import load_design
 from fowt_env.description import read_turbine
 from fowt_env.errors import InputError, unknown
 
@@ -43,20 +46,23 @@ CONTROLLERS = {  # name -> factory(turbine: description.Turbine, control_dt: flo
 def make(controller, turbine, control_dt):
     """Controller ready for a run, from a name, an import path or an object.
 
-    controller: a name of CONTROLLERS; "design:FILE" with a file of `fowt design`; "module:Name" with Name a
-    class, a factory or a controller (looked for in the working folder too); such a class or factory
-    itself; or an object with reset(measurement) and act(measurement). Classes and factories are called
-    with (turbine, control_dt) where they take two arguments, else with none. Compiled controllers come
-    back as they are, others inside a CheckedController.
-    Raises: InputError for unknown names (with a suggestion), paths that cannot be imported, designs that
-    cannot be used, and objects without reset and act.
+    controller: a name of CONTROLLERS; "policy:NAME" or "policy:PATH" of a trained agent; "design:FILE" with
+    a file of `fowt design`; "module:Name" with Name a class, a factory or a controller (looked for in
+    the working folder too); such a class or factory itself; or an object with reset(measurement) and
+    act(measurement). Classes and factories are called with (turbine, control_dt) where they take two
+    arguments, else with none. Compiled controllers come back as they are, others inside a
+    CheckedController.
+    Raises: InputError for unknown names (with a suggestion), paths that cannot be imported, agents and
+    designs that cannot be used, and objects without reset and act.
     """
     control_dt = check_control_dt(control_dt)
     name = None
     if isinstance(controller, str):
         name = controller
-        if name.startswith(PREFIX):
-            controller = load_design(name.removeprefix(PREFIX))
+        if name.startswith(DESIGN):
+            controller = load_design(name.removeprefix(DESIGN))
+        elif name.startswith(POLICY):
+            controller = policy(name)
         else:
             controller = _imported(name) if ":" in name else CONTROLLERS.get(name)
         if controller is None:
@@ -75,7 +81,7 @@ def make(controller, turbine, control_dt):
 
 
 def information(name):
-    """What a controller of CONTROLLERS uses: Measurement fields and entries of base.EXTRA.
+    """What a controller of CONTROLLERS or an agent uses: Measurement fields and entries of base.EXTRA.
 
     Raises: InputError for an unknown name.
     """

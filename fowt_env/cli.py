@@ -250,7 +250,9 @@ stopped; further controllers, cases or seeds are added to the folder."""
 @app.command(epilog=EVALUATE_EXAMPLES)
 @reported
 def evaluate(
-    controllers: Annotated[str, typer.Option(help="Names, module:Name or design:FILE, by commas.")] = "pi",
+    controllers: Annotated[
+        str, typer.Option(help="Names, policy:NAME, design:FILE or module:Name, by commas.")
+    ] = "pi",
     suite: Annotated[
         str | None, typer.Option(help="Suite: a name of fowt list suites, or a path to a TOML file.")
     ] = None,
@@ -445,11 +447,12 @@ def trim(
 @reported
 def list_names(
     kind: Annotated[
-        str, typer.Argument(help="platforms, turbines, seas, controllers, suites or cases; all if left out.")
+        str, typer.Argument(help="platforms, turbines, seas, controllers, agents, suites or cases; or all.")
     ] = "all",
 ):
     """List the names that the other commands know."""
     from controllers import CONTROLLERS
+    from controllers.policy import shipped_agents
     from fowt_env.description import names
     from training.cases import all_cases, read_suite, suite_names
 
@@ -458,6 +461,7 @@ def list_names(
         "turbines": lambda: names("turbines"),
         "seas": lambda: names("sea_states"),
         "controllers": lambda: list(CONTROLLERS),
+        "agents": lambda: [f"policy:{name}" for name in shipped_agents()],
         "suites": lambda: [f"{suite} ({len(read_suite(suite).cases)} cases)" for suite in suite_names()],
         "cases": lambda: list(all_cases()),
     }
@@ -761,4 +765,4 @@ def stability(
 
 register_design(app, reported, progress_bar, out, note)
 
-from fowt_env import cli_report  # noqa: E402, F401 - adds its commands to the app
+from fowt_env import cli_report, cli_train  # noqa: E402, F401 - add their commands to the app

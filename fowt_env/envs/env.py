@@ -49,7 +49,6 @@ from fowt_env.state import State
 from fowt_env.step import output
 
 SHORTEST_WEATHER = 600.0  # s of random wind and sea: turbulence intensity is defined over 10 min
-BASELINE = "pi"  # controller that the residual mode adds to
 StepResult = tuple[np.ndarray, float, bool, bool, dict[str, Any]]
 REWARD_KEYS = tuple(f"reward/{name}" for name in TERMS)
 
@@ -61,6 +60,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     platform     built-in name, path or description.Platform
     rotor        "bem", "lookup" or "table"; None: the task's, or else that of the fidelity
     action_mode  "direct", "setpoint" or "residual", see the table of actions
+    baseline     compiled controller, by name, that the residual mode adds to
     observation  channel names in place of the task's; "default" among them stands for the task's
     reward       {term: weight} in place of single weights of the task
     dt           physics step, s (None: that of the scene's integrator); control_dt: time between
@@ -102,6 +102,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         platform: str | Path | Platform = "oc3_hywind",
         rotor: str | None = None,
         action_mode: str = "direct",
+        baseline: str = "pi",
         observation: Sequence[str] | None = None,
         reward: Mapping[str, float] | None = None,
         dt: float | None = None,
@@ -127,6 +128,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         task = _adapted(task_of(task), rotor, observation, reward, duration, wind, sea, wind_preview)
         self.task = task
         self.action_mode = action_mode
+        self.baseline = baseline
         steps_in("duration", task.duration, control_dt)
         episode = task.draw(np.random.default_rng(0))
         self.scene = build_scene(
@@ -151,7 +153,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self._running = False
         # what a snapshot must agree with: the same numbers then mean the same
         seen = (task.observation, task.wind_preview)
-        self._kind = (self._key, action_mode, *seen, self.dt, self.control_dt, self._last)
+        self._kind = (self._key, action_mode, baseline, *seen, self.dt, self.control_dt, self._last)
 
     def twin(self) -> "FowtEnv":
         """Another environment of the same settings, before its first reset; shares what is never written."""
@@ -170,9 +172,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self._baseline = None
         parameters, memory = np.zeros(1), np.zeros(1)
         if mode == Mode.RESIDUAL:
-            from controllers import make  # looked up only when used: fowt_env imports nothing from it
-
-            self._baseline = make(BASELINE, turbine, self.control_dt)
+            self._baseline = named_baseline(self.baseline, turbine, self.control_dt)
             self._law = self._baseline.kernel
             parameters, memory = self._baseline.parameters, self._baseline.memory
         self._setting = Setting(
@@ -231,9 +231,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         start(self._box)
         if self._baseline is not None:
             self._baseline.prepare(scene)
-            self._baseline.reset(self.measurement())
-        elif self._setting.actions.mode == Mode.SETPOINT:
-            start_tracking(run.memory, self.measurement(), self._setting.actions)
+        self.restart_loops()
         self._running = True
         info = {
             "time": 0.0,
@@ -244,6 +242,16 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         if self.render_mode == "human":
             self.render()
         return run.observation.copy(), info
+
+    def restart_loops(self):
+        """Start the baseline of residual mode, or the loop of set-point mode, from what is measured now.
+
+        For whoever took over through step_physical and hands back: the loops have not followed.
+        """
+        if self._baseline is not None:
+            self._baseline.reset(self.measurement())
+        elif self._setting.actions.mode == Mode.SETPOINT:
+            start_tracking(self._run.memory, self.measurement(), self._setting.actions)
 
     def _offset(self, offsets):
         """Move the state by {channel: offset in the channel's unit}."""
@@ -418,6 +426,17 @@ def _adapted(
     if reward is not None:
         changes["weights"] = task.weights | check_weights("reward", reward)
     return replace(task, **changes)
+
+
+def named_baseline(name, turbine, control_dt):
+    """Compiled controller of that name. Raises: InputError for unknown ones and those written in Python."""
+    from controllers import make  # looked up only when used: fowt_env imports nothing from it
+    from controllers.base import CompiledController
+
+    baseline = make(name, turbine, control_dt)
+    if not isinstance(baseline, CompiledController):
+        raise InputError(f"baseline = {name!r}: must be a compiled controller, such as 'pi' or 'gspi_oc3'")
+    return baseline
 
 
 def _chosen(drawn, options):

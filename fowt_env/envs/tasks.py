@@ -55,6 +55,7 @@ class Task:
     residual_torque: float = 0.1  # largest addition to the baseline's torque, share of rated torque
     residual_pitch: float = 2.0  # deg, largest addition to the baseline's blade pitch
     wind_preview: tuple = ()  # s, look-ahead times of the channel wind_preview
+    weather_seeds: tuple = (0, LARGEST_SEED)  # range (low, below) from which an episode's weather is drawn
 
     def __post_init__(self):
         if not isinstance(self.name, str) or not self.name:
@@ -70,6 +71,7 @@ class Task:
         _number(f"{where}: residual_torque", self.residual_torque, 0.0, 1.0)
         _number(f"{where}: residual_pitch", self.residual_pitch, 0.0, 90.0)
         set_field(self, "wind_preview", _check_preview(where, self.wind_preview))
+        _check_seeds(where, self.weather_seeds)
         if self.wind is None:
             raise InputError(f"{where}: wind = None: a task needs a wind (0.0 for still air)")
         for pick in (_lowest, _highest):
@@ -84,7 +86,7 @@ class Task:
     def draw(self, rng):
         """Episode drawn with a numpy Generator; the same generator state gives the same episode."""
         wind, sea = _weather(self.wind, self.sea, lambda low, high: float(rng.uniform(low, high)))
-        seed = int(rng.integers(LARGEST_SEED))
+        seed = int(rng.integers(*self.weather_seeds))
         offsets = {name: float(rng.uniform(*bounds)) for name, bounds in self.offsets.items()}
         return Episode(wind, sea, seed, offsets, self.fixed_wind)
 
@@ -183,6 +185,16 @@ def _check_preview(where, times):
     for time in times:
         _number(f"{where}: wind_preview", time, 0.0, 600.0, low_open=True)
     return tuple(float(time) for time in times)
+
+
+def _check_seeds(where, seeds):
+    """Raise InputError unless seeds are whole numbers (low, below) with 0 <= low < below <= 2**31."""
+    good = isinstance(seeds, tuple) and len(seeds) == 2 and all(type(seed) is int for seed in seeds)
+    if not good or not 0 <= seeds[0] < seeds[1] <= LARGEST_SEED:
+        raise InputError(
+            f"{where}: weather_seeds = {seeds!r}: must be whole numbers (low, below)"
+            f" with 0 <= low < below <= {LARGEST_SEED}"
+        )
 
 
 WEIGHTS = {

@@ -1,0 +1,252 @@
+"""Exported policy network as a controller: plain arrays, evaluated with numpy alone.
+
+A policy file is a .npz of arrays and one JSON text (FORMAT below), read without pickle, so that loading one
+runs no code of its author. training/export.py writes it. `policy:NAME` is a file of training/agents,
+`policy:PATH` any other; a stable-baselines3 zip is refused here, since loading one executes code from it.
+"""
+
+import json
+import zipfile
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from controllers.base import CompiledController, check_control_dt
+from fowt_env.envs.actions import MODES, Mode, action_of, build_action_map, command_of, start_tracking
+from fowt_env.envs.decisions import Decisions, DecisionSettings
+from fowt_env.envs.observations import (
+    FIRST_ACTION,
+    N_ACTIONS,
+    PREVIEW,
+    build_observation_map,
+    entries,
+    fill_observation,
+)
+from fowt_env.envs.tasks import Task
+from fowt_env.errors import InputError, unknown
+from fowt_env.measurement import N_MEASUREMENTS, Measure, Measurement
+
+PREFIX = "policy:"
+AGENTS = Path(__file__).resolve().parent.parent / "training" / "agents"
+FORMAT = 1
+ACTIVATIONS = {"tanh": np.tanh, "relu": lambda x: np.maximum(x, 0.0)}
+SQUASHES = {"clip": lambda x: np.clip(x, -1.0, 1.0), "tanh": np.tanh}
+KEYS = (
+    "format", "activation", "squash", "layers", "clip_observation", "control_dt", "decisions", "action_mode",
+    "baseline", "observation", "wind_preview", "blade_pitch", "setpoint", "residual_torque", "residual_pitch",
+    "about",
+)  # fmt: skip
+
+
+def shipped_agents():
+    """Sorted names of the agents in training/agents."""
+    return sorted(path.stem for path in AGENTS.glob("*.npz"))
+
+
+def policy_path(name):
+    """Path of a policy file from what follows "policy:". Raises: InputError."""
+    path = Path(name)
+    if path.suffix == ".zip":
+        raise InputError(
+            f"controller 'policy:{name}': a stable-baselines3 zip runs code of its author when it is loaded;"
+            " turn one that you trust into a policy file with fowt export-policy --trust-zip"
+        )
+    if path.suffix == ".npz":
+        if not path.is_file():
+            raise InputError(f"controller 'policy:{name}': there is no such file")
+        return path
+    if name not in shipped_agents():
+        raise unknown("policy", name, shipped_agents() or ("a path that ends with .npz",))
+    return AGENTS / f"{name}.npz"
+
+
+class Network:
+    """A multilayer perceptron on normalised features, float32.
+
+    weights, biases: lists of (out, in) and (out,) arrays; mean, scale: of the features; clip: of the
+    normalised features. Calling it with features (..., size) returns actions (..., 2) in [-1, 1].
+    """
+
+    def __init__(self, weights, biases, activation, squash, mean, scale, clip):
+        self.weights = [np.ascontiguousarray(w, dtype=np.float32) for w in weights]
+        self.biases = [np.ascontiguousarray(b, dtype=np.float32) for b in biases]
+        self.activation, self.squash = ACTIVATIONS[activation], SQUASHES[squash]
+        self.mean = np.asarray(mean, dtype=np.float64)
+        self.scale = np.asarray(scale, dtype=np.float64)
+        self.clip = float(clip)
+
+    def __call__(self, features):
+        normal = np.clip((features - self.mean) / self.scale, -self.clip, self.clip)
+        x = normal.astype(np.float32)
+        for weight, bias in zip(self.weights[:-1], self.biases[:-1], strict=True):
+            x = self.activation(x @ weight.T + bias)
+        return self.squash(x @ self.weights[-1].T + self.biases[-1])
+
+
+def read_policy(path):
+    """(settings dict, Network) of a policy file.
+
+    Raises: InputError naming the file and what is wrong with it.
+    """
+    path = Path(path)
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            arrays = {name: file[name] for name in file.files}
+        settings = json.loads(str(arrays["settings"]))
+        layers = range(settings["layers"])
+        weights = [arrays[f"weight_{i}"] for i in layers]
+        biases = [arrays[f"bias_{i}"] for i in layers]
+        mean, scale = arrays["mean"], arrays["scale"]
+    except (OSError, KeyError, TypeError, ValueError, zipfile.BadZipFile) as error:
+        raise InputError(f"policy file {str(path)!r}: cannot be read: {error}") from error
+    for key in KEYS:
+        if key not in settings:
+            raise InputError(f"policy file {str(path)!r}: the setting {key!r} is missing")
+    if settings["format"] != FORMAT:
+        raise InputError(f"policy file {str(path)!r}: format {settings['format']!r}: must be {FORMAT}")
+    for key, known in (("activation", ACTIVATIONS), ("squash", SQUASHES), ("action_mode", MODES)):
+        if settings[key] not in known:
+            raise unknown(f"{key} of policy file {str(path)!r}", settings[key], known)
+    _check_shapes(path, weights, biases, mean, scale)
+    network = Network(
+        weights, biases, settings["activation"], settings["squash"], mean, scale, settings["clip_observation"]
+    )
+    return settings, network
+
+
+def _check_shapes(path, weights, biases, mean, scale):
+    """Raise InputError unless the arrays form one network of finite numbers with two outputs."""
+    size = mean.shape
+    good = len(weights) > 0 and len(size) == 1 and scale.shape == size and bool(np.all(scale > 0.0))
+    for weight, bias in zip(weights, biases, strict=True):
+        good = good and weight.ndim == 2 and (weight.shape[1],) == size and weight.shape[:1] == bias.shape
+        size = bias.shape
+    finite = all(bool(np.all(np.isfinite(array))) for array in (*weights, *biases, mean, scale))
+    if not (good and finite and size == (N_ACTIONS,)):
+        raise InputError(f"policy file {str(path)!r}: its arrays do not form a network with two outputs")
+
+
+class PolicyController:
+    """The agent of a policy file; what it sees, how it decides and acts is as in its training.
+
+    information: measurements that it or its baseline uses, "wind_preview" where it is told the wind ahead.
+    Raises: InputError where the file, the turbine or the control period do not fit.
+    """
+
+    def __init__(self, path, turbine, control_dt, name):
+        self.name = str(name)
+        self.settings, self.network = read_policy(path)
+        settings = self.settings
+        where = f"policy file {str(path)!r}"
+        if abs(check_control_dt(control_dt) - settings["control_dt"]) > 1e-9:
+            raise InputError(f"{where}: control_dt = {control_dt}: must be {settings['control_dt']:g} s")
+        self._mode = MODES[settings["action_mode"]]
+        preview = tuple(settings["wind_preview"])
+        names = tuple(settings["observation"])
+        if "azimuth" in names:
+            raise InputError(f"{where}: the rotor's azimuth is not among the measurements of a controller")
+        chosen = entries(names, turbine, preview)
+        self._chosen = build_observation_map(chosen, preview)
+        self._decisions = Decisions(1, len(chosen), DecisionSettings(**settings["decisions"]), control_dt)
+        if self.network.mean.shape != (self._decisions.size,):
+            raise InputError(
+                f"{where}: {self.network.mean.size} inputs: its observation has {self._decisions.size}"
+            )
+        task = replace(
+            Task(name=self.name, wind=0.0, offsets={}),
+            blade_pitch=tuple(settings["blade_pitch"]),
+            setpoint=tuple(settings["setpoint"]),
+            residual_torque=settings["residual_torque"],
+            residual_pitch=settings["residual_pitch"],
+        )
+        self._actions = build_action_map(self._mode, task, turbine, control_dt)
+        self._baseline = self._law = None
+        self._parameters, self._memory = np.zeros(1), np.zeros(1)
+        if self._mode == Mode.RESIDUAL:
+            from controllers import make
+
+            self._baseline = make(settings["baseline"], turbine, control_dt)
+            if not isinstance(self._baseline, CompiledController):
+                raise InputError(f"{where}: baseline {settings['baseline']!r} is not a compiled controller")
+            self._law = self._baseline.kernel
+        self._signals = np.zeros(PREVIEW + len(preview))
+        self._seen = np.zeros(len(chosen), dtype=np.float32)
+        self._u, self._wanted = np.zeros(2), np.zeros(2)
+        self._accepted = np.zeros(N_ACTIONS)
+        self._calls = 0
+        self._wind = None
+        self.information = self._information(names)
+
+    def _information(self, names):
+        """Measurements and extras that the agent and its baseline use, each once."""
+        used = [] if self._baseline is None else list(self._baseline.information)
+        used += [name for name in names if name in Measurement._fields or name == "wind_preview"]
+        if self._mode == Mode.SETPOINT:
+            used.append("rotor_speed")
+        return tuple(dict.fromkeys(used))
+
+    def prepare(self, scene):
+        """Take the coming wind, where the agent sees it, and what the baseline needs of the scene."""
+        if self._baseline is not None:
+            self._baseline.prepare(scene)
+        if len(self._chosen.preview):
+            from controllers.preview import rotor_wind
+
+            if scene.model.wind is None:
+                raise InputError(f"controller {self.name!r}: needs a scene with wind to look ahead")
+            self._wind = rotor_wind(scene)
+
+    def reset(self, measurement):
+        """Start afresh: the command in force is the measured one, the history is empty."""
+        if len(self._chosen.preview) and self._wind is None:
+            raise InputError(f"controller {self.name!r}: call prepare(scene) before reset(measurement)")
+        self._u[:] = measurement.generator_torque, measurement.blade_pitch
+        if self._baseline is not None:
+            self._baseline.reset(measurement)
+            self._parameters, self._memory = self._baseline.parameters, self._baseline.memory
+        elif self._mode == Mode.SETPOINT:
+            start_tracking(self._memory, measurement, self._actions)
+        action_of(self._u, float(measurement.rotor_speed), self._actions, self._accepted)
+        self._calls = 0
+
+    def act(self, measurement):
+        """(generator torque, blade pitch); every `hold` calls the network decides anew."""
+        values = np.array(measurement, dtype=np.float64)
+        decisions = self._decisions
+        if self._calls % decisions.settings.hold == 0:
+            self._look(values)
+            if self._calls == 0:
+                decisions.restart(0, self._seen, self._accepted)
+            else:
+                decisions.see(self._seen[None])
+            self._decision = self.network(decisions.features())
+        self._calls += 1
+        self._accepted[:] = np.clip(decisions.smooth(self._decision)[0], -1.0, 1.0)
+        command_of(
+            self._accepted,
+            self._actions,
+            self._law,
+            self._parameters,
+            self._memory,
+            values,
+            self._u,
+            self._wanted,
+        )
+        return float(self._u[0]), float(self._u[1])
+
+    def _look(self, values):
+        """Fill the observation from measurements (N_MEASUREMENTS,)."""
+        self._signals[:N_MEASUREMENTS] = values
+        self._signals[FIRST_ACTION : FIRST_ACTION + N_ACTIONS] = self._accepted
+        if len(self._chosen.preview):
+            time, speed, period = self._wind
+            ahead = values[Measure.TIME] + self._chosen.preview
+            self._signals[PREVIEW:] = np.interp(ahead, time, speed, period=period)
+        fill_observation(self._signals, self._chosen, self._seen)
+
+
+def policy(name):
+    """Factory (turbine, control_dt) of the agent that "policy:NAME" or "policy:PATH" names."""
+    path = policy_path(name.removeprefix(PREFIX))
+    return lambda turbine, control_dt: PolicyController(path, turbine, control_dt, name)

@@ -1,0 +1,97 @@
+"""A guard over an agent: a known controller takes over where rotor or platform move too fast."""
+
+from math import isfinite, pi
+
+import gymnasium
+
+from fowt_env.errors import InputError
+
+AHEAD = 1.0  # s: the rotor speed is judged by where it will be, since feathering takes its time
+
+
+class SafetyLayer(gymnasium.Wrapper):
+    """FowtEnv in which a baseline controller takes over for a while when a limit is passed.
+
+    env             a FowtEnv, wrapped or not
+    overspeed       rotor speed over rated, AHEAD of now as it accelerates, that hands over; while it lasts,
+                    the blades are feathered as fast as their drive can
+    platform_rate   platform-pitch rate (deg/s), either way, that hands over
+    calm            s that both must stay within `release` of their limits (rotor speed: of the way from
+                    rated to the limit) before the agent has the turbine back
+    baseline        name of the compiled controller that takes over
+
+    What an agent asks for meanwhile is ignored; observations and rewards go on. info of each step has
+    "guarded" (bool, whether this period was the guard's) and "guarded_periods" (of the episode so far).
+
+    Raises: InputError for limits that cannot be used.
+    """
+
+    def __init__(self, env, overspeed=1.2, platform_rate=1.2, calm=10.0, release=0.5, baseline="gspi_oc3"):
+        super().__init__(env)
+        from fowt_env.envs.env import named_baseline
+
+        for name, value, low in (("overspeed", overspeed, 1.0), ("platform_rate", platform_rate, 0.0)):
+            if not (isfinite(value) and value > low):
+                raise InputError(f"{name} = {value!r}: must be finite and above {low:g}")
+        if not (isfinite(calm) and calm >= 0.0):
+            raise InputError(f"calm = {calm!r}: must be 0 or more seconds")
+        if not 0.0 < release <= 1.0:
+            raise InputError(f"release = {release!r}: must be in (0, 1]")
+        plant = env.unwrapped
+        rated = plant.scene.turbine.rated_rotor_speed
+        self._fastest = overspeed * rated
+        self._slow = rated + release * (overspeed - 1.0) * rated
+        self._steepest = platform_rate * pi / 180.0
+        self._gentle = release * self._steepest
+        self._calm = round(calm / plant.control_dt)
+        self._baseline = named_baseline(baseline, plant.scene.turbine, plant.control_dt)
+        drive = plant.scene.turbine.pitch_drive
+        # a command this far ahead of the blades keeps a first-order drive at its limit until the next one
+        self._feather = drive.rate_limit * (drive.time_constant + plant.control_dt)
+        self._highest = drive.maximum
+        self._last_speed = None
+        self._left = 0  # control periods until the agent has the turbine back; 0: it has
+        self.guarded_periods = 0
+
+    def reset(self, **options):
+        """As the environment's; the agent has the turbine."""
+        observation, info = self.env.reset(**options)
+        self._baseline.prepare(self.env.unwrapped.scene)
+        self._left = 0
+        self._last_speed = None
+        self.guarded_periods = 0
+        return observation, info
+
+    def step(self, action):
+        """One control period under the action, or under the guard's command."""
+        plant = self.env.unwrapped
+        measured = plant.measurement()
+        speed, rate = self._projected(measured.rotor_speed), abs(measured.platform_pitch_rate)
+        if speed > self._fastest or rate > self._steepest:
+            if self._left == 0:
+                self._baseline.reset(measured)
+            self._left = max(self._calm, 1)
+        elif self._left > 0 and speed < self._slow and rate < self._gentle:
+            self._left -= 1
+            if self._left == 0:
+                plant.restart_loops()
+        guarded = self._left > 0
+        if guarded:
+            torque, blade_pitch = self._baseline.act(measured)
+            if speed > self._fastest:
+                blade_pitch = min(max(blade_pitch, measured.blade_pitch + self._feather), self._highest)
+                self._baseline.reset(measured)  # goes on from where the blades are
+            self.guarded_periods += 1
+            result = plant.step_physical(torque, blade_pitch)
+        else:
+            result = self.env.step(action)
+        info = result[-1]
+        info["guarded"] = guarded
+        info["guarded_periods"] = self.guarded_periods
+        return result
+
+    def _projected(self, speed):
+        """Rotor speed (rad/s) AHEAD of now; a falling one counts as it is."""
+        last = speed if self._last_speed is None else self._last_speed
+        self._last_speed = speed
+        return speed + AHEAD * max(0.0, speed - last) / self.env.unwrapped.control_dt

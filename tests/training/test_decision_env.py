@@ -1,0 +1,103 @@
+"""Decisions: the vector environment against a plain loop over one environment."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip("stable_baselines3")
+
+from fowt_env.envs import FowtEnv
+from fowt_env.envs.decisions import Decisions, DecisionSettings
+from fowt_env.errors import InputError
+from training.decision_env import DecisionVecEnv
+from training.sb3_env import FowtSB3VecEnv
+
+QUICK = {"rotor": "table", "wave_components": 10, "wind": 18.0, "duration": 8.0}
+
+
+def plain_features(seen):
+    """Newest observation, then each change, one number at a time."""
+    features = list(seen[0])
+    for newer, older in zip(seen[:-1], seen[1:], strict=True):
+        features += [np.float32(a - b) for a, b in zip(newer, older, strict=True)]
+    return np.array(features, dtype=np.float32)
+
+
+@pytest.mark.parametrize("mode", ["residual", "direct"])
+def test_a_decision_is_its_control_periods_one_by_one(mode):
+    settings = DecisionSettings(hold=4, smoothing=0.3, history=3)
+    env = DecisionVecEnv(FowtSB3VecEnv(1, threads=1, action_mode=mode, **QUICK), settings)
+    env.seed(5)
+    features = env.reset()
+    single = FowtEnv(action_mode=mode, **QUICK)
+    observation, _ = single.reset(seed=5)
+    seen = [observation] * 4
+    action = np.array(single._run.action)
+    rng = np.random.default_rng(1)
+    share = 1.0 - np.exp(-0.1 / 0.3)
+    for _ in range(19):
+        assert np.array_equal(features[0], plain_features(seen))
+        decision = rng.uniform(-0.3, 0.3, 2).astype(np.float32)
+        features, rewards, dones, _ = env.step(decision[None])
+        total = 0.0
+        for _ in range(4):
+            action = action + share * (np.float64(decision) - action)
+            observation, reward, terminated, truncated, _ = single.step(action)
+            total += float(np.float32(reward))
+        seen = [observation, *seen[:-1]]
+        assert rewards[0] == np.float32(total / 4)
+        assert not (dones[0] or terminated or truncated)
+    features, _, dones, infos = env.step(decision[None])
+    for _ in range(4):
+        action = action + share * (np.float64(decision) - action)
+        observation, *_ = single.step(action)
+    assert dones[0] and infos[0]["TimeLimit.truncated"]
+    assert np.array_equal(infos[0]["terminal_observation"], plain_features([observation, *seen[:-1]]))
+    assert np.all(features[0, len(observation) :] == 0.0)
+
+
+def test_an_episode_that_fails_within_a_decision_is_paid_up_to_its_failure_only():
+    settings = DecisionSettings(hold=50, smoothing=0.0, history=1)
+    base = FowtSB3VecEnv(2, threads=1, action_mode="direct", reward={"failure": 50.0}, **QUICK)
+    env = DecisionVecEnv(base, settings)
+    env.seed(0)
+    env.reset()
+    held = np.array(base.env.envs[1]._run.action)
+    rewards, dones = None, np.zeros(2, dtype=bool)
+    for _ in range(3):
+        if not dones[0]:
+            _, rewards, dones, infos = env.step(np.array([[-1.0, -1.0], held]))
+    assert dones.tolist() == [True, False] and "overspeed" in infos[0]["termination"]
+    assert rewards[0] < 0.0 < rewards[1]
+    assert base.env.envs[0]._run.measurement[0] > 0.0  # the next episode has begun
+
+
+def test_the_state_of_a_batch_goes_on_in_another():
+    settings = DecisionSettings(hold=2, smoothing=0.5, history=2)
+    one, other = (DecisionVecEnv(FowtSB3VecEnv(2, threads=1, **QUICK), settings) for _ in range(2))
+    one.seed(1)
+    one.reset()
+    actions = np.random.default_rng(0).uniform(-0.2, 0.2, (60, 2, 2))
+    for action in actions[:9]:
+        features = one.step(action)[0]
+    state = one.get_state()
+    expected = [one.step(action) for action in actions[9:]]
+    other.reset()
+    assert np.array_equal(other.set_state(state), features)
+    for action, want in zip(actions[9:], expected, strict=True):
+        got = other.step(action)
+        assert all(np.array_equal(a, b) for a, b in zip(got[:3], want[:3], strict=True))
+    assert any(want[2].any() for want in expected)  # through the end of an episode
+
+
+def test_restarting_one_row_leaves_the_others():
+    decisions = Decisions(2, 1, DecisionSettings(history=2), 0.1)
+    for value in (1.0, 2.0, 4.0):
+        decisions.see(np.full((2, 1), value))
+    decisions.restart(0, np.array([7.0]), np.array([0.1, 0.2]))
+    assert decisions.features().tolist() == [[7.0, 0.0, 0.0], [4.0, 2.0, 1.0]]
+
+
+@pytest.mark.parametrize("changes", [{"hold": 0}, {"history": -1}, {"smoothing": -0.1}, {"hold": 2.0}])
+def test_settings_out_of_range_are_named(changes):
+    with pytest.raises(InputError, match=f"decisions.{next(iter(changes))} = "):
+        DecisionSettings(**changes)

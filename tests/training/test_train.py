@@ -1,0 +1,149 @@
+"""Training: what a run leaves behind, how it stops and goes on, and what it refuses."""
+
+import json
+import shlex
+import tomllib
+
+import numpy as np
+import pytest
+import yaml
+
+pytest.importorskip("stable_baselines3")
+pytest.importorskip("sb3_contrib")
+
+import torch
+
+from controllers import information
+from controllers.policy import shipped_agents
+from fowt_env.cli_arguments import parse_pairs
+from fowt_env.errors import InputError
+from training import publish as publishing
+from training import train_callbacks
+from training.train import AGENTS, Training, baseline_figures, decision_env, judged, make_envs, resolve
+
+from .small_run import small
+
+
+def parameters(run):
+    return {name: value.clone() for name, value in run.model.policy.state_dict().items()}
+
+
+def stopped_run(settings, folder, monkeypatch, after):
+    """A run that was asked to stop after some decisions."""
+    monkeypatch.setattr(train_callbacks, "REPORT_EVERY", 0.0)
+    run = Training(settings, folder)
+
+    def report(done, total, text):
+        run.stop = run.stop or done >= after
+
+    assert not run.run(report)
+    return run
+
+
+@pytest.mark.parametrize("algo", ["ppo", "sac", "tqc"])
+def test_a_stopped_and_resumed_run_ends_with_the_bits_of_one_that_went_through(algo, tmp_path, monkeypatch):
+    through = Training(small(algo), tmp_path / "through")
+    assert through.run()
+    stopped_run(small(algo), tmp_path / "parts", monkeypatch, after=80)
+    resumed = Training(None, tmp_path / "parts", resume=True)
+    assert resumed.run()
+    assert resumed.model.num_timesteps == through.model.num_timesteps
+    for name, value in parameters(through).items():
+        assert torch.equal(value, parameters(resumed)[name]), name
+    assert np.array_equal(through.env.obs_rms.mean, resumed.env.obs_rms.mean)
+    if algo != "ppo":
+        buffers = (through.model.replay_buffer, resumed.model.replay_buffer)
+        assert buffers[0].pos == buffers[1].pos > 20
+        assert np.array_equal(buffers[0].observations, buffers[1].observations)
+    for a, b in zip(through.rows, resumed.rows, strict=True):
+        assert {k: v for k, v in a.items() if k != "seconds"} == {
+            k: v for k, v in b.items() if k != "seconds"
+        }
+
+
+def test_a_run_leaves_settings_versions_checkpoint_policies_table_and_plot(tmp_path):
+    run = Training(small("ppo"), tmp_path / "run")
+    assert run.run()
+    folder = tmp_path / "run"
+    with (folder / "settings.yml").open() as file:
+        assert yaml.safe_load(file) == run.settings
+    assert json.loads((folder / "versions.json").read_text())["stable-baselines3"]
+    checkpoint = folder / "checkpoints" / f"step_{run.model.num_timesteps}"
+    assert [p.name for p in (folder / "checkpoints").iterdir()] == [checkpoint.name]
+    for name in ("best.npz", "last.npz", "validation.csv", "learning_curve.png"):
+        assert (folder / name).stat().st_size > 100
+    assert len(run.rows) == 2 and all(np.isfinite(row["score"]) for row in run.rows)
+    assert any((folder / "tensorboard").iterdir())
+
+
+def test_validation_repeats_the_same_episodes_bit_for_bit():
+    _, judge = make_envs(small("ppo"))
+    rng = np.random.default_rng(0)
+    actions = rng.uniform(-1.0, 1.0, (24, 2, 2))
+    found = []
+    for _ in range(2):
+        judge.reset()
+        for action in actions:
+            judge.step(action)
+        found.append(decision_env(judge).base.figures())
+    assert found[0].keys() == found[1].keys()
+    for name, values in found[0].items():
+        assert np.array_equal(values, found[1][name]) and np.all(np.isfinite(values))
+    assert found[0]["rotor_speed_std_[rpm]"][0] != found[0]["rotor_speed_std_[rpm]"][1]
+
+
+def test_the_baseline_is_judged_one_against_itself_and_travel_beyond_it_costs():
+    reference = baseline_figures(small("ppo"))
+    row = judged(reference, reference)
+    assert row["score"] == pytest.approx(1.0) and row["failed"] == 0.0
+    busy = reference | {"blade_pitch_travel_[deg/s]": 1.5 * reference["blade_pitch_travel_[deg/s]"]}
+    assert judged(busy, reference)["score"] == pytest.approx(2.0)
+    nothing = {name: np.full_like(values, np.nan) for name, values in reference.items()}
+    with pytest.warns(RuntimeWarning):
+        assert judged(nothing | {"failed": np.ones(2)}, reference)["score"] == np.inf
+
+
+def test_wrong_settings_are_named(tmp_path):
+    with pytest.raises(InputError, match="unknown algorithm 'pop'. Did you mean 'ppo'"):
+        resolve("pop", "above_rated", 0, 10)
+    with pytest.raises(InputError, match="unknown task of training/agents/ppo.yml"):
+        resolve("ppo", "above_ratted", 0, 10)
+    with pytest.raises(InputError, match="steps = 0"):
+        resolve("ppo", "above_rated", 0, 0)
+    with pytest.raises(InputError, match="unknown setting 'algoritm.gamma'"):
+        resolve("ppo", "above_rated", 0, 10, {"algoritm.gamma": 1.0})
+    with pytest.raises(InputError, match="unknown observation set 'mesured'. Did you mean 'measured'"):
+        Training(small("ppo", **{"environment.observation": "mesured"}), tmp_path / "a").run()
+    with pytest.raises(InputError, match="ppo does not take these settings.*n_stepps"):
+        Training(small("ppo", **{"algorithm.n_stepps": 3}), tmp_path / "b").run()
+    with pytest.raises(InputError, match="holds no checkpoint"):
+        Training(None, tmp_path / "c", resume=True)
+
+
+def test_a_published_agent_has_a_card_whose_command_makes_the_same_settings(tmp_path, monkeypatch):
+    settings = small("ppo")
+    run = Training(settings, tmp_path / "run")
+    run.run()
+    monkeypatch.setattr(publishing, "AGENTS", tmp_path)
+    policy, card = publishing.publish(run.folder, "small", "a test")
+    assert policy.read_bytes() == (run.folder / "best.npz").read_bytes()
+    with card.open("rb") as file:
+        found = tomllib.load(file)
+    words = shlex.split(found["command"])
+    changes = parse_pairs([words[i + 1] for i, word in enumerate(words) if word == "--set"], "set")
+    given = {key: words[words.index(f"--{key}") + 1] for key in ("algo", "task", "seed", "steps")}
+    again = resolve(given["algo"], given["task"], int(given["seed"]), int(given["steps"]), changes)
+    assert again == settings
+    assert found["information"][:2] == ["generator_speed", "blade_pitch"]
+    assert found["validation"]["score"] == pytest.approx(min(row["score"] for row in run.rows), abs=1e-4)
+
+
+def test_every_shipped_agent_has_a_card_and_is_small():
+    for name in shipped_agents():
+        assert (AGENTS / f"{name}.npz").stat().st_size < publishing.LARGEST_FILE
+        with (AGENTS / f"{name}.toml").open("rb") as file:
+            card = tomllib.load(file)
+        assert {"command", "seed", "wall_time", "machine", "information", "validation", "versions"} <= set(
+            card
+        )
+        assert tuple(card["information"]) == information(f"policy:{name}")

@@ -1,0 +1,165 @@
+"""Speed of PPO on the native vector environment and others: shares of physics, torch and Python."""
+
+import time
+
+import numpy as np
+import pandas as pd
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
+
+from fowt_env.envs import FowtEnv
+from fowt_env.envs.decisions import DecisionSettings
+from training.train import environment_settings, resolve
+
+EPISODE = 600.0  # s
+
+
+class Clock:
+    """Seconds spent inside wrapped calls; nested calls of wrapped functions count once, outermost."""
+
+    def __init__(self):
+        self.seconds = {}
+        self._inside = False
+
+    def watch(self, owner, name, label):
+        """Replace owner.name by itself, timed under the label."""
+        call = getattr(owner, name)
+
+        def timed(*args, **kwargs):
+            if self._inside:
+                return call(*args, **kwargs)
+            self._inside = True
+            begin = time.perf_counter()
+            try:
+                return call(*args, **kwargs)
+            finally:
+                self.seconds[label] = self.seconds.get(label, 0.0) + time.perf_counter() - begin
+                self._inside = False
+
+        setattr(owner, name, timed)
+
+
+def nothing_env(env):
+    """A VecEnv of env's spaces that returns the same numbers at no cost: what is left is PPO itself."""
+    from stable_baselines3.common.vec_env import VecEnvWrapper
+
+    rng = np.random.default_rng(0)
+    n = env.num_envs
+    observations = rng.normal(size=(n, *env.observation_space.shape)).astype(np.float32)
+    result = observations, np.zeros(n, dtype=np.float32), np.zeros(n, dtype=bool), [{} for _ in range(n)]
+
+    class Nothing(VecEnvWrapper):
+        def reset(self):
+            return observations
+
+        def step_async(self, actions):
+            pass
+
+        def step_wait(self):
+            return result
+
+    return Nothing(env)
+
+
+def sync_env(n, settings):
+    """FowtSB3VecEnv whose batch is Gymnasium's SyncVectorEnv of n single environments."""
+    from training.sb3_env import FowtSB3VecEnv
+
+    class SyncSB3VecEnv(FowtSB3VecEnv):
+        def reset(self):
+            return self.env.reset(seed=self._seeds)[0]
+
+    env = SyncSB3VecEnv(n, threads=1, **settings)
+    first = env.env.envs[0]
+    env.env = SyncVectorEnv([first.twin] * n, autoreset_mode=AutoresetMode.SAME_STEP)
+    return env
+
+
+def _plain(n, settings, kind):
+    """stable-baselines3's own vector environment of single ones."""
+    first = FowtEnv(**settings)
+    first.reset(seed=0)
+    first.step(np.zeros(2))  # compiled before processes start
+    return kind([first.twin] * n)
+
+
+def subject(kind, n, settings, decisions):
+    """(VecEnv, control periods per step, its FowtVectorEnv or None) of a named kind."""
+    from stable_baselines3.common.vec_env import SubprocVecEnv
+
+    from training.decision_env import DecisionVecEnv
+    from training.sb3_env import FowtSB3VecEnv
+
+    if kind == "SubprocVecEnv":
+        return _plain(n, settings, lambda makers: SubprocVecEnv(makers, start_method="fork")), 1, None
+    if kind == "SyncVectorEnv":
+        return sync_env(n, settings), 1, None
+    native = FowtSB3VecEnv(n, threads=1, **settings)
+    if kind in ("native", "torch alone"):
+        env, hold = native, 1
+    else:
+        env, hold = DecisionVecEnv(native, decisions), decisions.hold
+    if kind.startswith("torch alone"):
+        return nothing_env(env), hold, None
+    return env, hold, native.env
+
+
+KINDS = (
+    "SubprocVecEnv", "SyncVectorEnv", "native", "torch alone", "native, decisions", "torch alone, decisions",
+)  # fmt: skip
+
+
+def measured(kind, n, steps, settings, decisions, algorithm):
+    """Row of the table: PPO on one kind of vector environment."""
+    from stable_baselines3 import PPO
+
+    env, hold, native = subject(kind, n, settings, decisions)
+    model = PPO("MlpPolicy", env, seed=0, device="cpu", **algorithm)
+    rollout = algorithm["n_steps"] * n
+    model.learn(rollout)  # compiled, allocated
+    clock = Clock()
+    if native is not None:
+        clock.watch(native, "_act", "physics")
+    clock.watch(model, "train", "torch")
+    clock.watch(model.policy, "forward", "torch")
+    rounds = max(1, round(steps / rollout))
+    begin = time.perf_counter()
+    model.learn(rounds * rollout, reset_num_timesteps=False)
+    wall = time.perf_counter() - begin
+    env.close()
+    shares = {label: seconds / wall for label, seconds in clock.seconds.items()}
+    physics, torch = shares.get("physics", np.nan), shares.get("torch", np.nan)
+    return {
+        "kind": kind,
+        "envs": n,
+        "steps_per_s": rounds * rollout / wall,
+        "env_steps_per_s": rounds * rollout * hold / wall,
+        "physics_share": physics,
+        "torch_share": torch,
+        "python_share": 1.0 - physics - torch,
+        "minutes_for_10M_env_steps": 1e7 / (rounds * rollout * hold / wall) / 60.0,
+    }
+
+
+def benchmark_training(n=64, steps=50_000, kinds=KINDS, progress=None):
+    """DataFrame with a row per kind of vector environment, PPO as shipped on one torch thread.
+
+    An env step is one control period (0.1 s) of the task above_rated at fidelity "standard", residual mode;
+    a step is what PPO learns from: the same, or a decision. physics: the compiled call; torch: PPO's update
+    and its forward pass during the rollout; Python: the rest. The slow kinds do a tenth of the steps.
+    """
+    import torch
+
+    torch.set_num_threads(1)
+    resolved = resolve("ppo", "above_rated", 0, 1)
+    settings = environment_settings(resolved) | {"duration": EPISODE}
+    decisions = DecisionSettings(**resolved["decisions"])
+    chosen = resolved["algorithm"]
+    algorithm = {key: chosen[key] for key in ("n_steps", "batch_size", "n_epochs", "gamma", "gae_lambda")}
+    algorithm["policy_kwargs"] = {"net_arch": chosen["policy_kwargs"]["net_arch"]}
+    rows = []
+    for kind in kinds:
+        if progress is not None:
+            progress(len(rows), len(kinds), kind)
+        few = steps // 10 if kind in ("SubprocVecEnv", "SyncVectorEnv") else steps
+        rows.append(measured(kind, n, few, settings, decisions, algorithm))
+    return pd.DataFrame(rows)

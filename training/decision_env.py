@@ -1,0 +1,165 @@
+"""stable-baselines3 environment whose steps are an agent's decisions, and the one it is validated in."""
+
+import numpy as np
+from gymnasium.spaces import Box
+from stable_baselines3.common.vec_env import VecEnvWrapper
+
+from fowt_env.envs.decisions import Decisions
+from fowt_env.envs.observations import entries
+from fowt_env.measurement import Measure
+from training.sb3_env import FowtSB3VecEnv
+
+RPM = 30.0 / np.pi
+RECORDED = (Measure.ROTOR_SPEED, Measure.PLATFORM_PITCH, Measure.BLADE_PITCH, Measure.GENERATOR_TORQUE)
+
+
+class DecisionVecEnv(VecEnvWrapper):
+    """FowtSB3VecEnv in which one step is one decision of DecisionSettings: several control periods.
+
+    The reward is the mean over the control periods of the decision. An episode that ends before its
+    decision does is followed by the next one under the action that asks for what is there already, until
+    the others are through.
+
+    sensors: a randomisation.Sensors between the plants and the agent; None: what is measured is seen.
+    """
+
+    def __init__(self, venv, settings, sensors=None):
+        self.base = venv
+        self.settings = settings
+        self.sensors = sensors
+        self.channels = venv.observation_space.shape[0]
+        if sensors is not None:
+            task, turbine = venv.env.envs[0].task, venv.env.envs[0].scene.turbine
+            names = [entry.name for entry in entries(task.observation, turbine, task.wind_preview)]
+            sensors.sensed = np.array([not name.startswith("previous_action") for name in names])
+        control_dt = venv.env.envs[0].control_dt
+        self.decisions = Decisions(venv.num_envs, self.channels, settings, control_dt)
+        repeats = settings.history
+        low, high = venv.observation_space.low, venv.observation_space.high
+        space = Box(
+            np.concatenate([low, np.tile(low - high, repeats)]),
+            np.concatenate([high, np.tile(high - low, repeats)]),
+        )
+        super().__init__(venv, observation_space=space)
+        self._decision = np.zeros_like(self.decisions.action)
+
+    def _actions_in_force(self):
+        return np.array([env._run.action for env in self.base.env.envs])
+
+    def reset(self):
+        """Features (n, size) at the start of new episodes."""
+        observations = self.venv.reset()
+        if self.sensors is not None:
+            self.sensors.restart(slice(None), observations)
+            observations = self.sensors.read()
+        self.decisions.restart(slice(None), observations, self._actions_in_force())
+        return self.decisions.features()
+
+    def step_async(self, actions):
+        """Keep the decisions for step_wait."""
+        self._decision = np.array(actions, dtype=np.float64)
+
+    def step_wait(self):
+        """(features, rewards, dones, infos) after one decision."""
+        n, decisions = self.num_envs, self.decisions
+        total = np.zeros(n)
+        ended = np.zeros(n, dtype=bool)
+        infos = None
+        for _ in range(self.settings.hold):
+            self.venv.step_async(decisions.smooth(self._decision))
+            observations, rewards, dones, new = self.venv.step_wait()
+            total += np.where(ended, 0.0, rewards)
+            if self.sensors is not None:
+                self.sensors.take(observations)
+            infos = (
+                new if infos is None else [o if e else i for o, i, e in zip(infos, new, ended, strict=True)]
+            )
+            for i in np.flatnonzero(dones):
+                if not ended[i]:
+                    last = infos[i]["terminal_observation"]
+                    infos[i]["terminal_observation"] = decisions.last_features(i, last)
+                ended[i] = True
+                if self.sensors is not None:
+                    self.sensors.restart(i, observations[i])
+                decisions.action[i] = self.base.env.envs[i]._run.action
+                self._decision[i] = decisions.action[i]
+        if self.sensors is not None:
+            observations = self.sensors.read()
+        decisions.see(observations)
+        for i in np.flatnonzero(ended):
+            decisions.restart(i, observations[i], decisions.action[i])
+        return decisions.features(), (total / self.settings.hold).astype(np.float32), ended, infos
+
+    def get_state(self):
+        """Everything that decides how the episodes go on, to be pickled: plants, histories, actions."""
+        sensors = None if self.sensors is None else self.sensors.get_state()
+        return self.base.env.get_state(), self.decisions.seen.copy(), self.decisions.action.copy(), sensors
+
+    def set_state(self, state):
+        """Go on from what get_state returned; returns the features there."""
+        plants, seen, action, sensors = state
+        if self.sensors is not None:
+            self.sensors.set_state(sensors)
+        self.base.env.set_state(list(plants))
+        self.decisions.seen[:] = seen
+        self.decisions.action[:] = action
+        return self.decisions.features()
+
+
+class ValidationVecEnv(FowtSB3VecEnv):
+    """One environment per fixed episode, which every reset starts again; records what it is judged by.
+
+    episodes: options of FowtEnv.reset, one dict each. After all episodes have ended once, figures() has the
+    metrics of each, without its first `skip` seconds.
+    """
+
+    def __init__(self, episodes, skip=60.0, **settings):
+        super().__init__(len(episodes), **settings)
+        self.episodes = [{"offsets": {}} | episode for episode in episodes]
+        first = self.env.envs[0]
+        self.skip = round(skip / first.control_dt)
+        self._record = np.full((round(first.task.duration / first.control_dt), len(episodes), 4), np.nan)
+        self._clock = 0
+        self._over = np.zeros(len(episodes), dtype=bool)
+        self._failed = np.zeros(len(episodes), dtype=bool)
+
+    def reset(self):
+        """Observations at the start of the fixed episodes; their randomness is the same each time."""
+        self._seeds = list(range(self.num_envs))
+        self._options = [dict(episode) for episode in self.episodes]
+        self._record[:] = np.nan
+        self._clock = 0
+        self._over[:] = False
+        self._failed[:] = False
+        return super().reset()
+
+    def step_wait(self):
+        """As FowtSB3VecEnv; keeps the measurements of each environment's first episode."""
+        result = super().step_wait()
+        _, _, dones, infos = result
+        for i in np.flatnonzero(dones & ~self._over):
+            self._failed[i] = not infos[i]["TimeLimit.truncated"]
+        self._over |= dones
+        if self._clock < len(self._record):
+            row = np.array([env._run.measurement for env in self.env.envs])[:, RECORDED]
+            self._record[self._clock, ~self._over] = row[~self._over]
+        self._clock += 1
+        return result
+
+    def figures(self):
+        """{metric: (n,)} of the recorded episodes; NaN for those that failed."""
+        record = np.where(self._failed[:, None], np.nan, self._record[self.skip : self._clock - 1])
+        speed, platform_pitch, blade_pitch, torque = np.moveaxis(record, 2, 0)
+        envs = self.env.envs
+        ratio = envs[0].scene.turbine.drivetrain.gear_ratio
+        power = speed * torque * ratio * 1e-3
+        seconds = envs[0].control_dt * (len(record) - 1)
+        return {
+            "rotor_speed_std_[rpm]": speed.std(axis=0) * RPM,
+            "platform_pitch_std_[deg]": np.degrees(platform_pitch.std(axis=0)),
+            "blade_pitch_travel_[deg/s]": np.degrees(np.abs(np.diff(blade_pitch, axis=0)).sum(axis=0))
+            / seconds,
+            "shaft_power_mean_[kW]": power.mean(axis=0),
+            "shaft_power_std_[kW]": power.std(axis=0),
+            "failed": self._failed.astype(float),
+        }

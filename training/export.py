@@ -1,0 +1,97 @@
+"""Trained policies as plain array files, which controllers/policy.py reads with numpy alone."""
+
+import json
+import pickle
+
+import numpy as np
+
+from controllers.policy import FORMAT
+from fowt_env.errors import InputError
+from fowt_env.outputs import replacing
+
+ACTIVATION_NAMES = {"Tanh": "tanh", "ReLU": "relu"}
+
+
+def layers_of(model):
+    """(list of torch Linear layers, activation name, squash name) of the deterministic policy of a model.
+
+    Raises: InputError for policies that are not multilayer perceptrons with one known activation.
+    """
+    if hasattr(model.policy, "mlp_extractor"):
+        modules = [*model.policy.mlp_extractor.policy_net, model.policy.action_net]
+        squash = "clip"
+    else:
+        modules = [*model.actor.latent_pi, model.actor.mu]
+        squash = "tanh"
+    linear = [module for module in modules if type(module).__name__ == "Linear"]
+    names = {type(module).__name__ for module in modules} - {"Linear"}
+    if len(names) > 1 or not names <= set(ACTIVATION_NAMES):
+        raise InputError(
+            f"activations {', '.join(sorted(names))}: must be one of {', '.join(ACTIVATION_NAMES)}"
+        )
+    return linear, ACTIVATION_NAMES[names.pop()] if names else "tanh", squash
+
+
+def export_policy(model, normalisation, single, decisions, path, about):
+    """Path written: the deterministic policy of a model as a .npz without pickled objects.
+
+    normalisation: the VecNormalize it was trained through; single: one of its FowtEnvs; decisions: its
+    DecisionSettings; about: dict of text and numbers on where it comes from.
+    """
+    linear, activation, squash = layers_of(model)
+    task = single.task
+    statistics = normalisation.obs_rms
+    settings = {
+        "format": FORMAT,
+        "activation": activation,
+        "squash": squash,
+        "layers": len(linear),
+        "clip_observation": float(normalisation.clip_obs),
+        "control_dt": single.control_dt,
+        "decisions": {
+            "hold": decisions.hold,
+            "smoothing": decisions.smoothing,
+            "history": decisions.history,
+        },
+        "action_mode": single.action_mode,
+        "baseline": single.baseline,
+        "observation": list(task.observation),
+        "wind_preview": list(task.wind_preview),
+        "blade_pitch": list(task.blade_pitch),
+        "setpoint": list(task.setpoint),
+        "residual_torque": task.residual_torque,
+        "residual_pitch": task.residual_pitch,
+        "about": about,
+    }
+    arrays = {
+        "settings": np.array(json.dumps(settings)),
+        "mean": statistics.mean,
+        "scale": np.sqrt(statistics.var + normalisation.epsilon),
+    }
+    for i, layer in enumerate(linear):
+        arrays[f"weight_{i}"] = layer.weight.detach().cpu().numpy()
+        arrays[f"bias_{i}"] = layer.bias.detach().cpu().numpy()
+    with replacing(path) as temporary, temporary.open("wb") as file:
+        np.savez_compressed(file, **arrays)
+    return path
+
+
+def export_run(folder, path):
+    """Path written: the policy of a run's newest checkpoint. Loading it executes code from the checkpoint.
+
+    Raises: InputError where the folder holds no checkpoint.
+    """
+    from fowt_env.envs import FowtEnv
+    from fowt_env.envs.decisions import DecisionSettings
+    from training.train import Training, environment_settings, make_algorithm
+
+    run = Training(None, folder, resume=True)
+    settings, checkpoint = run.settings, run.newest()
+    model = make_algorithm(settings["algo"]).load(checkpoint / "model.zip", device="cpu")
+    with (checkpoint / "normalisation.pkl").open("rb") as file:
+        normalisation = pickle.load(file)
+    about = {key: settings[key] for key in ("algo", "name", "seed")} | {"steps": int(model.num_timesteps)}
+    decisions = DecisionSettings(**settings["decisions"])
+    return export_policy(
+        model, normalisation, FowtEnv(**environment_settings(settings)), decisions, path, about
+    )

@@ -1,0 +1,102 @@
+"""Ship the best policy of a training run: its .npz in training/agents, and a card that says where it is from.
+
+    python -m training.publish runs/above_rated_ppo_1 ppo_measured --machine "two shared cores of a Xeon"
+
+The card has the command that makes the run again, its seed, wall time and machine, what the agent is told,
+its figures on the validation episodes, and the versions that the run was made with.
+"""
+
+import argparse
+import json
+import shutil
+from pathlib import Path
+
+import pandas as pd
+import yaml
+
+from controllers import information
+from controllers.policy import read_policy
+from fowt_env.errors import InputError
+from fowt_env.outputs import replacing
+from training.train import AGENTS, resolve
+
+LARGEST_FILE = 200_000  # bytes of a policy that is kept in the repository
+
+
+def changes_of(settings):
+    """{dotted key: value} by which the settings of a run differ from those of its algorithm's YAML now."""
+    now = resolve(settings["algo"], settings["name"], settings["seed"], settings["steps"])
+    changes = {}
+
+    def compare(here, there, prefix):
+        for key, value in here.items():
+            if isinstance(value, dict) and isinstance(there.get(key), dict):
+                compare(value, there[key], f"{prefix}{key}.")
+            elif key not in there or there[key] != value:
+                changes[prefix + key] = value
+
+    compare(settings, now, "")
+    return changes
+
+
+def command_of(settings):
+    """Command line that makes the run again."""
+    given = "".join(f" --set '{key}={json.dumps(value)}'" for key, value in changes_of(settings).items())
+    return (
+        f"fowt train --algo {settings['algo']} --task {settings['name']} --seed {settings['seed']}"
+        f" --steps {settings['steps']}{given}"
+    )
+
+
+def publish(folder, name, machine):
+    """(policy path, card path) written from the best validation of a run. Raises: InputError."""
+    folder = Path(folder)
+    policy, table = folder / "best.npz", folder / "validation.csv"
+    if not policy.is_file() or not table.is_file():
+        raise InputError(f"{folder}: holds no best.npz and validation.csv of a run")
+    if policy.stat().st_size > LARGEST_FILE:
+        raise InputError(f"{policy}: {policy.stat().st_size} bytes: at most {LARGEST_FILE} are kept")
+    with (folder / "settings.yml").open(encoding="utf-8") as file:
+        settings = yaml.safe_load(file)
+    rows = pd.read_csv(table)
+    about = read_policy(policy)[0]["about"]
+    best = rows.loc[rows["score"].idxmin()]
+    versions = json.loads((folder / "versions.json").read_text(encoding="utf-8"))
+    known = information(f"policy:{policy}")
+    lines = [
+        f"command = {json.dumps(command_of(settings))}",
+        f"seed = {settings['seed']}",
+        f"decisions = {about['steps']}  # of the policy that was kept",
+        f"decisions_trained = {int(rows['decisions'].iloc[-1])}",
+        f"wall_time = {float(rows['seconds'].iloc[-1]):.0f}  # s, of the run up to its last validation",
+        f"machine = {json.dumps(machine)}",
+        f"information = {json.dumps(list(known))}",
+        f"history = {settings['decisions']['history']}  # earlier decision instants it remembers",
+        "",
+        "[validation]  # ratios to gspi_oc3, means over the validation episodes",
+        *(f"{key} = {float(best[key]):.4f}" for key in rows.columns if key not in ("decisions", "seconds")),
+        "",
+        "[versions]",
+        *(f"{json.dumps(key)} = {json.dumps(str(value))}" for key, value in versions.items()),
+    ]
+    target, card = AGENTS / f"{name}.npz", AGENTS / f"{name}.toml"
+    with replacing(target) as temporary:
+        shutil.copyfile(policy, temporary)
+    with replacing(card) as temporary:
+        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return target, card
+
+
+def main(arguments=None):
+    """Publish one run."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder")
+    parser.add_argument("name")
+    parser.add_argument("--machine", required=True, help="the kind of machine that made it, in words")
+    given = parser.parse_args(arguments)
+    for path in publish(given.folder, given.name, given.machine):
+        print(path)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,136 @@
+"""Agents with and without the safety layer on validation episodes.
+
+    python -m training.safety_study --agents ppo_measured --out results/safety.csv
+
+Beside the trained agents two careless ones with direct commands are run: one that asks for new random
+torque and blade pitch every 5 s, and one that asks for no torque and flat blades.
+"""
+
+import argparse
+from dataclasses import replace
+from math import degrees
+
+import numpy as np
+import pandas as pd
+
+from controllers.policy import policy_path, read_policy
+from fowt_env.envs import TASKS, FowtEnv, SafetyLayer
+from fowt_env.envs.decisions import Decisions, DecisionSettings
+from fowt_env.outputs import write_table
+from training.train import TASK_FIELDS, resolve, validation_episodes
+
+CARELESS = ("random direct", "no torque, flat blades")
+
+
+class Trained:
+    """An agent of a policy file, acting on observations of its environment."""
+
+    def __init__(self, name):
+        self.settings, self.network = read_policy(policy_path(name))
+        self.decisions = None
+
+    def env(self):
+        """Environment of the agent's training."""
+        s = self.settings
+        reach = {name: tuple(s[name]) if isinstance(s[name], list) else s[name] for name in TASK_FIELDS}
+        return FowtEnv(
+            replace(TASKS["above_rated"], **reach),
+            action_mode=s["action_mode"],
+            baseline=s["baseline"],
+            observation=tuple(s["observation"]),
+            wind_preview=tuple(s["wind_preview"]) or None,
+        )
+
+    def reset(self, env, observation):
+        """Start an episode."""
+        settings = DecisionSettings(**self.settings["decisions"])
+        self.decisions = Decisions(1, len(observation), settings, self.settings["control_dt"])
+        self.decisions.restart(0, observation, env.unwrapped._run.action)
+        self.periods = 0
+
+    def act(self, observation):
+        """Action of the coming control period."""
+        if self.periods % self.decisions.settings.hold == 0:
+            if self.periods:
+                self.decisions.see(observation[None])
+            self.decision = self.network(self.decisions.features())
+        self.periods += 1
+        return self.decisions.smooth(self.decision)[0]
+
+
+class Careless:
+    """Direct commands without looking: random ones, or no torque and flat blades."""
+
+    def __init__(self, kind):
+        self.kind = kind
+
+    def env(self):
+        """An environment of direct commands."""
+        return FowtEnv("above_rated", action_mode="direct")
+
+    def reset(self, env, observation):
+        """Start an episode, the same each time."""
+        self.rng = np.random.default_rng(0)
+        self.periods = 0
+        self.action = np.array([-1.0, -1.0])
+
+    def act(self, observation):
+        """Action of the coming control period."""
+        if self.kind == CARELESS[0] and self.periods % 50 == 0:
+            self.action = self.rng.uniform(-1.0, 1.0, 2)
+        self.periods += 1
+        return self.action
+
+
+def episode_figures(agent, env, options):
+    """{figure: number} of one episode."""
+    observation, _ = env.reset(seed=0, options=options | {"offsets": {}})
+    agent.reset(env, observation)
+    rated = env.unwrapped.scene.turbine.rated_rotor_speed
+    speeds, tilts, over, info = [], [], False, {}
+    while not over:
+        observation, _, terminated, truncated, info = env.step(agent.act(observation))
+        measured = env.unwrapped.measurement()
+        speeds.append(measured.rotor_speed / rated)
+        tilts.append(degrees(measured.platform_pitch))
+        over = terminated or truncated
+    return {
+        "failed": float("termination" in info),
+        "overspeed_[%]": 100.0 * (max(speeds) - 1.0),
+        "guarded_[%]": 100.0 * info.get("guarded_periods", 0) / len(speeds),
+        "rotor_speed_std_[%]": 100.0 * np.std(speeds),
+        "platform_pitch_std_[deg]": np.std(tilts),
+    }
+
+
+def safety_study(agents, progress=print):
+    """DataFrame: a row per agent, without and with the layer; means over episodes, largest overspeed."""
+    episodes = validation_episodes(resolve("ppo", "above_rated", 0, 1))[::2]
+    rows = []
+    for label, agent in [(name, Trained(name)) for name in agents] + [
+        (kind, Careless(kind)) for kind in CARELESS
+    ]:
+        for layer in (False, True):
+            env = SafetyLayer(agent.env()) if layer else agent.env()
+            table = pd.DataFrame([episode_figures(agent, env, options) for options in episodes])
+            row = {"agent": label, "safety_layer": layer, "episodes": len(table)} | table.mean().to_dict()
+            row["failed"] = int(table["failed"].sum())
+            row["overspeed_[%]"] = float(table["overspeed_[%]"].max())
+            rows.append(row)
+            progress(f"{label}, {'with' if layer else 'without'} the layer: {row['failed']} failed")
+    return pd.DataFrame(rows)
+
+
+def main(arguments=None):
+    """Run the study, print and write it."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--agents", default="", help="names or paths of policies, by commas")
+    parser.add_argument("--out", default="results/safety.csv")
+    given = parser.parse_args(arguments)
+    table = safety_study([name for name in given.agents.split(",") if name])
+    print(table.round(2).to_string(index=False))
+    write_table(table, given.out)
+
+
+if __name__ == "__main__":
+    main()

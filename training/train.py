@@ -1,0 +1,464 @@
+"""Training of agents: settings from one YAML per algorithm, checkpoints that can be gone on from, validation.
+
+    from training.train import Training, resolve
+    Training(resolve("ppo", "above_rated", seed=0, steps=2_000_000), "runs/ppo_0").run()
+
+A run folder holds settings.yml and versions.json; checkpoints/step_N (model, normalisation, environments,
+replay buffer, random states); validation.csv with a row per validation; best.npz, the policy that scored
+best there, and last.npz; learning_curve.png; and TensorBoard's files.
+
+What a resumed run repeats exactly: PPO's checkpoints lie between an update and the next rollout and hold all
+that decides how the run goes on (parameters, optimiser, environments in mid-episode, normalisation, the
+states of every random generator), so a run that was stopped and resumed gives the bits of one that was not,
+on the same machine with the same number of torch threads. SAC and TQC are saved between two calls of their
+update, with the replay buffer. What is not repeated: wall times, and with them the rates that are shown.
+"""
+
+import json
+import os
+import pickle
+import random
+import shutil
+import signal
+import sys
+import time
+from collections import deque
+from contextlib import contextmanager
+from copy import deepcopy
+from dataclasses import replace
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+import numpy as np
+
+from fowt_env.envs.decisions import DecisionSettings
+from fowt_env.envs.tasks import SITE, task_of
+from fowt_env.errors import InputError, unknown
+from fowt_env.outputs import replacing
+from training.seeds import TRAINING, seeds_for
+
+AGENTS = Path(__file__).parent / "agents"
+ALGORITHMS = ("ppo", "sac", "tqc")
+OBSERVATIONS = {  # information sets that agents are compared with
+    # what a turbine of today measures: drive train, blade pitch, motion of nacelle and hull
+    "measured": (
+        "rotor_speed", "blade_pitch", "generator_torque", "platform_pitch", "platform_pitch_rate",
+        "nacelle_acceleration", "previous_action",
+    ),
+    "state": ("default", "nacelle_acceleration", "previous_action"),  # all motions and rates of the platform
+    "preview": (
+        "rotor_speed", "blade_pitch", "generator_torque", "platform_pitch", "platform_pitch_rate",
+        "nacelle_acceleration", "previous_action", "wind_speed", "wind_preview",
+    ),
+    "blade": ("rotor_speed", "blade_pitch", "previous_action"),
+}  # fmt: skip
+SECTIONS = ("environment", "decisions", "algorithm", "normalise", "validation", "checkpoint_minutes", "task")
+TASK_FIELDS = ("residual_pitch", "residual_torque", "blade_pitch", "setpoint")
+VERSIONS = ("fowt-env", "stable-baselines3", "sb3-contrib", "torch", "numpy", "numba", "gymnasium")
+RATIOS = ("rotor_speed_std_[rpm]", "platform_pitch_std_[deg]", "blade_pitch_travel_[deg/s]")
+FAILURE_COST = 10.0  # of the validation score, per share of episodes that failed
+TRAVEL_COST = 2.0  # of the validation score, per unit of blade-pitch travel beyond the baseline's
+
+
+def resolve(algo, task, seed, steps, changes=None):
+    """Dict of all settings of a run: those of training/agents/ALGO.yml for the task, changed.
+
+    changes: {dotted key: value}, such as {"environment.action_mode": "direct"}.
+    Raises: InputError for unknown names, keys, and numbers outside their range.
+    """
+    import yaml
+
+    if algo not in ALGORITHMS:
+        raise unknown("algorithm", algo, ALGORITHMS)
+    with (AGENTS / f"{algo}.yml").open(encoding="utf-8") as file:
+        table = yaml.safe_load(file)
+    tasks = [name for name in table if not name.startswith("_")]
+    if task not in tasks:
+        raise unknown(f"task of training/agents/{algo}.yml", task, tasks)
+    for key, value, low in (("seed", seed, 0), ("steps", steps, 1)):
+        if type(value) is not int or value < low:
+            raise InputError(f"{key} = {value!r}: must be a whole number of at least {low}")
+    settings = deepcopy(table[task])
+    for key, value in (changes or {}).items():
+        _change(settings, key, value)
+    return {"algo": algo, "name": task, "seed": seed, "steps": steps} | settings
+
+
+def _change(settings, key, value):
+    """Set a dotted key. Raises: InputError for a section that does not exist."""
+    *sections, last = key.split(".")
+    if (sections or [last])[0] not in SECTIONS:
+        raise unknown("setting", key, (f"{section}.*" for section in SECTIONS))
+    place = settings
+    for section in sections:
+        place = place.setdefault(section, {})
+        if not isinstance(place, dict):
+            raise InputError(f"setting {key!r}: {section!r} holds no further settings")
+    place[last] = value
+
+
+def environment_settings(settings):
+    """Settings of FowtEnv for training: the task with its own reach, information set and weather seeds."""
+    given = dict(settings["environment"])
+    given.pop("num_envs", None)
+    given.pop("randomise", None)
+    task = task_of(settings["task"])
+    reach = {name: given.pop(name) for name in TASK_FIELDS if name in given}
+    reach = {name: tuple(value) if isinstance(value, list) else value for name, value in reach.items()}
+    task = replace(task, weather_seeds=(TRAINING.start, TRAINING.stop), **reach)
+    chosen = given.pop("observation", "measured")
+    if isinstance(chosen, str):
+        if chosen not in OBSERVATIONS:
+            raise unknown("observation set", chosen, OBSERVATIONS)
+        chosen = OBSERVATIONS[chosen]
+    return {"task": task, "observation": chosen} | given
+
+
+def make_algorithm(name):
+    """Algorithm class. Raises: InputError where its library is missing."""
+    try:
+        if name == "tqc":
+            from sb3_contrib import TQC
+
+            return TQC
+        import stable_baselines3
+
+        return getattr(stable_baselines3, name.upper())
+    except ImportError as error:
+        raise InputError(f"training with {name} needs pip install 'fowt-env[train]' ({error})") from error
+
+
+def versions():
+    """{package: version} of what shapes a result, and the platform."""
+    found = {"python": sys.version.split()[0], "processors": os.cpu_count()}
+    for name in VERSIONS:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = None
+    return found
+
+
+def validation_episodes(settings):
+    """List of reset options: each wind of the settings with each of its validation seeds, fixed."""
+    chosen = settings["validation"]
+    seeds = seeds_for("validation", int(chosen["first"]), int(chosen["seeds"]))
+    return [
+        {
+            "wind": {"kind": "ntm", "speed": float(speed), "class": "B"},
+            "sea": _sea_at(float(speed)),
+            "weather_seed": seed,
+        }
+        for speed in chosen["winds"]
+        for seed in seeds
+    ]
+
+
+def _sea_at(speed):
+    """JONSWAP sea of the site's normal sea state at a wind speed (m/s)."""
+    from fowt_env.description import joint_sea_state
+
+    state = joint_sea_state(SITE, speed)
+    return {"kind": "jonswap", "Hs": state.Hs, "Tp": state.Tp}
+
+
+def make_envs(settings):
+    """(training VecNormalize, validation VecNormalize) of resolved settings; only training is randomised."""
+    from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
+
+    from training.decision_env import DecisionVecEnv, ValidationVecEnv
+    from training.randomisation import randomised
+    from training.sb3_env import FowtSB3VecEnv
+
+    chosen = environment_settings(settings)
+    decisions = DecisionSettings(**settings["decisions"])
+    normalise = {"gamma": settings["algorithm"].get("gamma", 0.99)} | settings["normalise"]
+    n = settings["environment"].get("num_envs", 1)
+    plants = settings["environment"].get("randomise")
+    per_env, sensors = (None, None) if not plants else randomised(plants, n, settings["seed"])
+    base = FowtSB3VecEnv(n, threads=1, per_env=per_env, **chosen)
+    env = VecNormalize(VecMonitor(DecisionVecEnv(base, decisions, sensors)), **normalise)
+    fixed = ValidationVecEnv(
+        validation_episodes(settings), settings["validation"].get("skip", 60.0), threads=1, **chosen
+    )
+    judge = VecNormalize(VecMonitor(DecisionVecEnv(fixed, decisions)), training=False, **normalise)
+    judge.norm_reward = False
+    return env, judge
+
+
+def decision_env(env):
+    """The DecisionVecEnv inside wrappers."""
+    while type(env).__name__ != "DecisionVecEnv":
+        env = env.venv
+    return env
+
+
+def baseline_figures(settings, reference="gspi_oc3"):
+    """{metric: (n,)} of a compiled controller on the validation episodes of resolved settings."""
+    from training.decision_env import ValidationVecEnv
+
+    chosen = environment_settings(settings) | {"action_mode": "residual", "baseline": reference}
+    skip = settings["validation"].get("skip", 60.0)
+    env = ValidationVecEnv(validation_episodes(settings), skip, threads=1, **chosen)
+    env.reset()
+    nothing = np.zeros((env.num_envs, 2))
+    while not env._over.all():
+        env.step(nothing)
+    return env.figures()
+
+
+def judged(figures, reference):
+    """{ratio or score: number}: means over episodes of figures over those of the reference; lower is better.
+
+    score: mean of the ratios of rotor-speed and platform-pitch standard deviation, plus what travel beyond
+    the reference's and failures cost.
+    """
+    ratios = {name: float(np.nanmean(figures[name] / reference[name])) for name in RATIOS}
+    failed = float(figures["failed"].mean())
+    speed, platform, travel = (ratios[name] for name in RATIOS)
+    score = 0.5 * (speed + platform) + TRAVEL_COST * max(0.0, travel - 1.0) + FAILURE_COST * failed
+    row = {f"{name.split('_[')[0]}_ratio": ratio for name, ratio in ratios.items()}
+    for name in ("shaft_power_mean_[kW]", "shaft_power_std_[kW]"):
+        row[f"{name.split('_[')[0]}_ratio"] = float(np.nanmean(figures[name] / reference[name]))
+    return row | {"failed": failed, "score": score if np.isfinite(score) else float("inf")}
+
+
+class Training:
+    """One run in one folder. resume: go on from its newest checkpoint.
+
+    Raises: InputError where the folder holds another run, or none to resume.
+    """
+
+    def __init__(self, settings, folder, resume=False):
+        import yaml
+
+        self.folder = Path(folder)
+        self.checkpoints = self.folder / "checkpoints"
+        path = self.folder / "settings.yml"
+        self.resume = resume
+        if resume:
+            if not path.exists() or self.newest() is None:
+                raise InputError(f"--resume: {self.folder} holds no checkpoint of a run")
+            with path.open(encoding="utf-8") as file:
+                stored = yaml.safe_load(file)
+            if settings is not None:
+                stored["steps"] = settings["steps"]
+            settings = stored
+        elif path.exists():
+            raise InputError(
+                f"{self.folder} holds a run already: use --resume to go on with it, or another --out"
+            )
+        self.settings = settings
+        self.stop = False
+        self.rows = []
+
+    def newest(self):
+        """Folder of the newest checkpoint, or None."""
+        found = [p for p in self.checkpoints.glob("step_*") if p.name.removeprefix("step_").isdigit()]
+        return max(found, key=lambda p: int(p.name.removeprefix("step_")), default=None)
+
+    def run(self, report=None):
+        """Train to the end, or to an interrupt; returns whether the end was reached.
+
+        report(done, total, text): called about once a second.
+        """
+        import torch
+        from stable_baselines3.common.utils import set_random_seed
+
+        from training.train_callbacks import Judge, Keeper, Stopped, callbacks
+
+        settings = self.settings
+        torch.set_num_threads(int(os.environ.get("FOWT_TORCH_THREADS", "1")))
+        kind = make_algorithm(settings["algo"])
+        env, judge = make_envs(settings)
+        self._write_settings()
+        self.reference = baseline_figures(settings)
+        set_random_seed(settings["seed"])
+        if self.resume:
+            model, state = self._load(kind, env)
+        else:
+            env.seed(settings["seed"])
+            model = _new_model(kind, settings, env)
+            state = None
+        self.model, self.env = model, env
+        from stable_baselines3.common.logger import configure
+
+        model.set_logger(configure(str(self.folder / "tensorboard"), ["tensorboard"]))
+        keeper = Keeper(self, report)
+        judge_after = Judge(self)
+        listeners = callbacks(self, judge, judge_after, keeper)
+        if state is not None:
+            listeners[0].n_calls = state["evaluation_calls"]
+            judge_after.best = state["best"]
+            keeper.before = state["seconds"]
+        self.evaluation, self.judge, self.keeper = listeners[0], judge_after, keeper
+        left = settings["steps"] - model.num_timesteps
+        finished = True
+        with self._signals():
+            if left > 0:
+                try:
+                    model.learn(left, callback=listeners, reset_num_timesteps=state is None)
+                except Stopped:
+                    finished = False
+        if finished:
+            self.save()
+        self.export("last.npz")
+        self.plot()
+        return finished
+
+    @contextmanager
+    def _signals(self):
+        """Within the block the first interrupt or termination asks for a checkpoint and an orderly end."""
+
+        def ask(number, frame):
+            if self.stop:
+                raise KeyboardInterrupt
+            self.stop = True
+
+        before = {}
+        for number in (signal.SIGINT, signal.SIGTERM):
+            before[number] = signal.signal(number, ask)
+        try:
+            yield
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
+
+    def _write_settings(self):
+        import yaml
+
+        with replacing(self.folder / "settings.yml") as path:
+            path.write_text(yaml.safe_dump(self.settings, sort_keys=False), encoding="utf-8")
+        with replacing(self.folder / "versions.json") as path:
+            path.write_text(json.dumps(versions(), indent=1), encoding="utf-8")
+
+    def save(self):
+        """Write a checkpoint of the present instant, whole or not at all; the one before it goes."""
+        import torch
+
+        model, env = self.model, self.env
+        target = self.checkpoints / f"step_{model.num_timesteps}"
+        if target.exists():
+            return
+        temporary = self.checkpoints / f".writing_{os.getpid()}"
+        shutil.rmtree(temporary, ignore_errors=True)
+        temporary.mkdir(parents=True)
+        model.save(temporary / "model.zip")
+        env.save(str(temporary / "normalisation.pkl"))
+        if hasattr(model, "replay_buffer"):
+            model.save_replay_buffer(temporary / "replay_buffer.pkl")
+        monitor = env.venv
+        state = {
+            "environments": decision_env(env).get_state(),
+            "monitor": (
+                monitor.episode_returns.copy(),
+                monitor.episode_lengths.copy(),
+                monitor.episode_count,
+            ),
+            "returns": env.returns.copy(),
+            "original": (deepcopy(env.old_obs), deepcopy(env.old_reward)),
+            "random": random.getstate(),
+            "numpy": np.random.get_state(),
+            "torch": torch.get_rng_state(),
+            "action_space": model.action_space.np_random.bit_generator.state,
+            "evaluation_calls": self.evaluation.n_calls,
+            "best": self.judge.best,
+            "rows": self.rows,
+            "seconds": self.keeper.seconds(),
+            "episodes": list(model.ep_info_buffer),
+        }
+        with (temporary / "state.pkl").open("wb") as file:
+            pickle.dump(state, file)
+        os.replace(temporary, target)
+        for old in self.checkpoints.glob("step_*"):
+            if old != target:
+                shutil.rmtree(old, ignore_errors=True)
+
+    def _load(self, kind, env):
+        """(model, state) of the newest checkpoint, everything put back in its place."""
+        import torch
+        from stable_baselines3.common.vec_env import VecNormalize
+
+        folder = self.newest()
+        with (folder / "state.pkl").open("rb") as file:
+            state = pickle.load(file)
+        stored = VecNormalize.load(str(folder / "normalisation.pkl"), env.venv)
+        for name in ("obs_rms", "ret_rms"):
+            setattr(env, name, getattr(stored, name))
+        env.venv.reset()
+        decision_env(env).set_state(state["environments"])
+        monitor = env.venv
+        monitor.episode_returns, monitor.episode_lengths, monitor.episode_count = state["monitor"]
+        env.returns = state["returns"]
+        env.old_obs, env.old_reward = state["original"]
+        model = kind.load(
+            folder / "model.zip",
+            env=env,
+            device="cpu",
+            force_reset=False,
+            custom_objects=_schedules(self.settings),
+        )
+        if hasattr(model, "replay_buffer"):
+            model.load_replay_buffer(folder / "replay_buffer.pkl")
+        model.ep_info_buffer = deque(state["episodes"], maxlen=100)
+        model.action_space.np_random.bit_generator.state = state["action_space"]
+        random.setstate(state["random"])
+        np.random.set_state(state["numpy"])
+        torch.set_rng_state(state["torch"])
+        self.rows = state["rows"]
+        return model, state
+
+    def export(self, name):
+        """Path of the present policy written as a plain array file in the run folder."""
+        from training.export import export_policy
+
+        about = {key: self.settings[key] for key in ("algo", "name", "seed")}
+        about["steps"] = int(self.model.num_timesteps)
+        inner = decision_env(self.env)
+        single = inner.base.env.envs[0]
+        return export_policy(self.model, self.env, single, inner.settings, self.folder / name, about)
+
+    def plot(self):
+        """Path of the plot of the learning curve, or None before the first validation."""
+        from training.learning_curve import plot_learning_curve
+
+        if not self.rows:
+            return None
+        return plot_learning_curve({self.folder.name: self.rows}, self.folder / "learning_curve.png")
+
+
+def _schedules(settings):
+    """Learning rate and clipping of a run as stable-baselines3 wants them: numbers, or falling linearly."""
+    from stable_baselines3.common.utils import LinearSchedule
+
+    chosen = {}
+    for key in ("learning_rate", "clip_range"):
+        value = settings["algorithm"].get(key)
+        if isinstance(value, list):
+            if len(value) != 2:
+                raise InputError(f"algorithm.{key} = {value!r}: must be a number or a pair [start, end]")
+            chosen[key] = LinearSchedule(float(value[0]), float(value[1]), 1.0)
+    return chosen
+
+
+def _new_model(kind, settings, env):
+    """Untrained model of resolved settings. Raises: InputError for a keyword that the algorithm lacks."""
+    import torch
+
+    given = dict(settings["algorithm"]) | _schedules(settings)
+    policy = dict(given.pop("policy_kwargs", {}))
+    if "activation" in policy:
+        known = {"tanh": torch.nn.Tanh, "relu": torch.nn.ReLU}
+        name = policy.pop("activation")
+        if name not in known:
+            raise unknown("activation", name, known)
+        policy["activation_fn"] = known[name]
+    try:
+        return kind("MlpPolicy", env, policy_kwargs=policy, seed=settings["seed"], device="cpu", **given)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"algorithm: {settings['algo']} does not take these settings: {error}") from error
+
+
+def seconds_text(seconds):
+    """A duration as h:mm:ss."""
+    return time.strftime("%H:%M:%S", time.gmtime(max(0.0, seconds)))

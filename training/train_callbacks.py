@@ -1,0 +1,97 @@
+"""While an agent learns: validation, the best policy kept, checkpoints, progress, an orderly stop."""
+
+import time
+
+import numpy as np
+import pandas as pd
+from stable_baselines3.common.callbacks import BaseCallback, EvalCallback
+
+from fowt_env.outputs import write_table
+from training.train import decision_env, judged, seconds_text
+
+REPORT_EVERY = 1.0  # s
+
+
+class Stopped(Exception):
+    """The run was asked to end, and its checkpoint is written."""
+
+
+class Judge(BaseCallback):
+    """After each validation: physical figures against the baseline's, a row of the table, the best policy."""
+
+    def __init__(self, training):
+        super().__init__()
+        self.training = training
+        self.best = float("inf")
+
+    def _on_step(self):
+        training, evaluation = self.training, self.parent
+        figures = decision_env(evaluation.eval_env).base.figures()
+        row = {"decisions": self.num_timesteps, "seconds": training.keeper.seconds()}
+        row |= {"reward": evaluation.last_mean_reward} | judged(figures, training.reference)
+        training.rows.append(row)
+        for name, value in row.items():
+            self.logger.record(f"validation/{name}", value)
+        write_table(pd.DataFrame(training.rows), training.folder / "validation.csv")
+        if row["score"] < self.best:
+            self.best = row["score"]
+            training.export("best.npz")
+        return True
+
+
+class Keeper(BaseCallback):
+    """Checkpoints between an update and the next rollout, progress, and the stop that was asked for."""
+
+    def __init__(self, training, report):
+        super().__init__()
+        self.training = training
+        self.report = report
+        self.before = 0.0  # s, of the sittings before this one
+        self._begin = self._saved = self._reported = time.monotonic()
+        self._first = None
+
+    def seconds(self):
+        """Wall time of the run so far, s, over all its sittings."""
+        return self.before + time.monotonic() - self._begin
+
+    def _on_training_start(self):
+        self._begin = self._saved = time.monotonic()
+        self._first = self.num_timesteps
+
+    def _on_rollout_start(self):
+        now = time.monotonic()
+        if self.training.stop or now - self._saved > 60.0 * self.training.settings["checkpoint_minutes"]:
+            self.training.save()
+            self._saved = time.monotonic()
+        if self.training.stop:
+            raise Stopped
+
+    def _on_step(self):
+        now = time.monotonic()
+        if self.report is not None and now - self._reported > REPORT_EVERY:
+            self._reported = now
+            total = self.training.settings["steps"]
+            rate = (self.num_timesteps - self._first) / max(now - self._begin, 1e-9)
+            hold = self.training.settings["decisions"]["hold"]
+            left = seconds_text((total - self.num_timesteps) / max(rate, 1e-9))
+            returns = [episode["r"] for episode in self.model.ep_info_buffer]
+            shown = f"{np.mean(returns):.1f}" if returns else "-"
+            text = f"{rate:.0f} decisions/s ({rate * hold:.0f} env steps/s), return {shown}, {left} left"
+            if self.training.rows:
+                text += f", score {self.training.rows[-1]['score']:.3f}"
+            self.report(self.num_timesteps, total, text)
+        return True
+
+
+def callbacks(training, judge_env, judge, keeper):
+    """[EvalCallback on the validation episodes, Keeper] of a training.train.Training."""
+    every = max(1, training.settings["validation"]["every"] // training.env.num_envs)
+    evaluation = EvalCallback(
+        judge_env,
+        callback_after_eval=judge,
+        n_eval_episodes=judge_env.num_envs,
+        eval_freq=every,
+        deterministic=True,
+        verbose=0,
+    )
+    return [evaluation, keeper]
