@@ -8,6 +8,8 @@ from fowt_env.description import read_platform, read_turbine
 from fowt_env.scene import build_scene
 
 os.environ.setdefault("SDL_VIDEODRIVER", "dummy")  # windows of render mode "human" without a display
+# workers of pytest-xdist have the width of its terminal set, which the command's console would keep for good
+os.environ.pop("COLUMNS", None)
 
 
 @pytest.fixture(scope="session")

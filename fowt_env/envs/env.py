@@ -243,7 +243,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             self.render()
         return run.observation.copy(), info
 
-    def restart_loops(self):
+    def restart_loops(self) -> None:
         """Start the baseline of residual mode, or the loop of set-point mode, from what is measured now.
 
         For whoever took over through step_physical and hands back: the loops have not followed.
