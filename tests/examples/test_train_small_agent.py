@@ -7,7 +7,7 @@ import pytest
 
 pytest.importorskip("stable_baselines3")
 
-EXAMPLE = Path(__file__).parents[2] / "examples" / "train_small_agent.py"
+EXAMPLE = Path(__file__).parents[2] / "examples" / "10_train_small_agent.py"
 
 
 @pytest.mark.slow

@@ -1,7 +1,7 @@
 """Train a small agent and compare it with the unscheduled PI on validation episodes.
 
-    python examples/train_small_agent.py            # some minutes on two cores
-    python examples/train_small_agent.py --steps 20000   # a first look
+    python examples/10_train_small_agent.py            # some minutes on two cores
+    python examples/10_train_small_agent.py --steps 20000   # a first look
 
 Needs pip install "fowt-env[train,plot]". The agent sees what a turbine measures, with four seconds of
 history, and adds to the gain-scheduled PI; it never learned from the validation episodes. Its policy ends up
