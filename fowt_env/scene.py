@@ -73,7 +73,7 @@ OPTIONS = {
     "duration": (700.0, "seconds of random wind and sea, > 0"),
     "wave_components": (None, "None or a number of components, 1 to 10000"),
     "blade_stations": (None, "None (the turbine file's) or a number of them, 3 up to the file's"),
-    "strip_length": (None, "None (a share of the draft) or metres, > 0: exact wave loads below the surface"),
+    "strip_length": (None, "None (a share of the draft) or metres, 0.01 to 1000: cells of exact wave loads"),
     "shear_exponent": (None, "None (the platform file's) or 0 to 1"),
     "turbine": (None, "None (the platform file's), a name, a path or a description.Turbine"),
 }
@@ -328,7 +328,7 @@ def _options(given, platform):
     if chosen["shear_exponent"] is not None:
         chosen["shear_exponent"] = _number("shear_exponent", chosen["shear_exponent"], 0.0, 1.0)
     if chosen["strip_length"] is not None:
-        chosen["strip_length"] = _number("strip_length", chosen["strip_length"], 0.0, 1e3, low_open=True)
+        chosen["strip_length"] = _number("strip_length", chosen["strip_length"], 0.01, 1e3)
     if chosen["wave_components"] is not None:
         count = chosen["wave_components"]
         if isinstance(count, bool) or not isinstance(count, int | np.integer) or not 1 <= count <= 10000:
