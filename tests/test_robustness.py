@@ -58,7 +58,8 @@ def test_random_scenes_and_states_stay_finite_and_bounded():
 @pytest.mark.slow
 def test_many_random_scenes_and_states_of_every_fidelity_stay_finite_and_bounded():
     plants = ("standard", "fast", "standard", "standard", "reference")
-    assert no_failure(stability_cases.random_cases(3000, seed=12, plants=plants))
+    # `fowt benchmark stability --cases N` runs more
+    assert no_failure(stability_cases.random_cases(1000, seed=12, plants=plants))
 
 
 @pytest.mark.slow
