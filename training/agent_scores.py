@@ -1,7 +1,7 @@
 """How agents compare with rivals on the same runs: interquartile mean of ratios, with 95 % intervals.
 
     fowt evaluate --controllers policy:ppo_measured,gspi_oc3,rosco_float --seeds 1:6:1 --out results/rl
-    python -m training.agent_scores results/rl/metrics.csv --rivals gspi_oc3,rosco_float
+    python -m training.agent_scores results/rl/results.csv --rivals gspi_oc3,rosco_float
 
 Each ratio is of one metric of an agent over that of a rival in the same wind and waves. Intervals are
 percentile bootstraps over these runs; they say nothing about other training seeds.
@@ -76,9 +76,9 @@ def agent_scores(table, rivals, agents=None):
 
 
 def main(arguments=None):
-    """Print the table of one or several metrics.csv."""
+    """Print the table of one or several results.csv."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("tables", nargs="+", help="metrics.csv of fowt evaluate; several are put together")
+    parser.add_argument("tables", nargs="+", help="results.csv of fowt evaluate; several are put together")
     parser.add_argument("--rivals", default="gspi_oc3,rosco_float")
     given = parser.parse_args(arguments)
     table = pd.concat([pd.read_csv(path) for path in given.tables]).drop_duplicates(
