@@ -21,7 +21,6 @@ from rich.progress import (
 from rich.table import Table
 
 from fowt_env.cli_arguments import parse_numbers, parse_pairs, parse_sea, parse_wind
-from fowt_env.cli_design import register as register_design
 from fowt_env.cli_doctor import DOCTOR_EXAMPLES, doctor
 from fowt_env.errors import ControllerError, InputError, SimulationStopped, unknown
 from fowt_env.outputs import SERIES_SUFFIXES, table_path, write_table
@@ -763,6 +762,4 @@ def stability(
         raise typer.Exit(1)
 
 
-register_design(app, reported, progress_bar, out, note)
-
-from fowt_env import cli_report, cli_train  # noqa: E402, F401 - add their commands to the app
+from fowt_env import cli_design, cli_report, cli_train  # noqa: E402, F401 - add their commands to the app

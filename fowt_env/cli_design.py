@@ -8,8 +8,12 @@ import typer
 from rich.markup import escape
 from rich.table import Table
 
+from fowt_env.cli import app, note, out, progress_bar, reported
 from fowt_env.cli_arguments import parse_numbers, parse_pairs
 from fowt_env.errors import InputError
+
+design = typer.Typer(no_args_is_help=True, rich_markup_mode="rich", help="Tune controllers.")
+app.add_typer(design, name="design")
 
 LINEARIZE_EXAMPLES = """[bold]Examples[/bold]
 
@@ -75,200 +79,201 @@ def _balanced(table):
     return table.loc[best, columns]
 
 
-def register(app, reported, progress_bar, out, note):
-    """Add the design commands to the fowt app."""
-    design = typer.Typer(no_args_is_help=True, rich_markup_mode="rich", help="Tune controllers.")
-    app.add_typer(design, name="design")
+def show(frame, title):
+    """Print a DataFrame as a table."""
+    table = Table(title=escape(title), title_justify="left")
+    for name in frame.columns:
+        table.add_column(escape(name.replace("_", "\n")), justify="right")
+    for row in frame.itertuples(index=False):
+        table.add_row(*(escape(v) if isinstance(v, str) else f"{v:.4g}" for v in row))
+    out.print(table)
 
-    def show(frame, title):
-        table = Table(title=escape(title), title_justify="left")
-        for name in frame.columns:
-            table.add_column(escape(name.replace("_", "\n")), justify="right")
-        for row in frame.itertuples(index=False):
-            table.add_row(*(escape(v) if isinstance(v, str) else f"{v:.4g}" for v in row))
-        out.print(table)
 
-    @app.command(epilog=LINEARIZE_EXAMPLES)
-    @reported
-    def linearize(
-        platform: Annotated[str, typer.Option(help="Platform: a name or a path.")] = "oc3_hywind",
-        winds: Annotated[str, typer.Option(help="Winds, m/s: 12,18 or START:STOP:STEP.")] = "4:25:1",
-        out_path: Annotated[
-            str | None,
-            typer.Option("--out", help="Modes: .csv, .parquet; models: .json, .npz; with plots: a folder."),
-        ] = None,
-    ):
-        """Print modes and right-half-plane zeros of the floating turbine over the wind."""
-        import fowt_env
-        from fowt_env.outputs import TABLE_SUFFIXES, write_table
-        from training.linear_design import (
-            MODEL_SUFFIXES,
-            mode_table,
-            models_over,
-            save_models,
-            save_study,
-            zero_table,
-        )
+@app.command(epilog=LINEARIZE_EXAMPLES)
+@reported
+def linearize(
+    platform: Annotated[str, typer.Option(help="Platform: a name or a path.")] = "oc3_hywind",
+    winds: Annotated[str, typer.Option(help="Winds, m/s: 12,18 or START:STOP:STEP.")] = "4:25:1",
+    out_path: Annotated[
+        str | None,
+        typer.Option("--out", help="Modes: .csv, .parquet; models: .json, .npz; with plots: a folder."),
+    ] = None,
+):
+    """Print modes and right-half-plane zeros of the floating turbine over the wind."""
+    import fowt_env
+    from fowt_env.outputs import TABLE_SUFFIXES, write_table
+    from training.linear_design import (
+        MODEL_SUFFIXES,
+        mode_table,
+        models_over,
+        save_models,
+        save_study,
+        zero_table,
+    )
 
-        suffix = "" if out_path is None else Path(out_path).suffix.lower()
-        if suffix and suffix not in (*TABLE_SUFFIXES, *MODEL_SUFFIXES):
-            allowed = ", ".join((*TABLE_SUFFIXES, *MODEL_SUFFIXES))
-            raise InputError(f"--out {out_path}: must be a folder or end with {allowed}")
-        speeds = parse_numbers(winds, "winds")
-        scene = fowt_env.build_scene(platform, wind=speeds[0])
-        with progress_bar("linearising", len(speeds)) as update:
-            models = models_over(scene, speeds, lambda done, total: update(done, total=total))
-        modes, zeros = mode_table(models), zero_table(models)
-        show(modes, f"{platform}: modes, torque and blade pitch held")
-        if len(zeros):
-            show(zeros, "right-half-plane zeros, blade pitch to rotor speed")
-        else:
-            out.print("no right-half-plane zeros from blade pitch to rotor speed")
-        resting = [wind for wind, model in models.items() if model.pitch_rests]
-        if resting:
-            out.print(
-                f"up to {max(resting):g} m/s the blade pitch rests on its minimum: pitch control is off"
-                " there, so these winds are left out of what concerns it"
-            )
-        if out_path is None:
-            return
-        if suffix in TABLE_SUFFIXES:
-            written = [write_table(modes, out_path)]
-        elif suffix:
-            written = [save_models(models, out_path)]
-        else:
-            written = save_study(models, out_path)
-        for path in written:
-            note(f"wrote {path}")
-
-    @design.command(epilog=PI_EXAMPLES)
-    @reported
-    def pi(
-        omega: Annotated[float, typer.Option(help="Frequency of the rotor loop, rad/s.")] = 0.2,
-        zeta: Annotated[float, typer.Option(help="Its damping ratio.")] = 0.7,
-        schedule: Annotated[
-            str, typer.Option(help="loop (as designed at every wind) or published (Jonkman's, slower).")
-        ] = "loop",
-        winds: Annotated[str, typer.Option(help="Winds, m/s: 12,18 or START:STOP:STEP.")] = "12:25:1",
-        platform: Annotated[str, typer.Option(help="Platform: a name or a path.")] = "oc3_hywind",
-        out_path: Annotated[str | None, typer.Option("--out", help="Design: .json.")] = None,
-    ):
-        """Gains of a scheduled PI from a wanted frequency and damping ratio, and the platform's damping."""
-        import pandas as pd
-
-        import fowt_env
-        from controllers.pi_design import design_pi
-        from controllers.saved_design import save_design
-        from training.linear_design import models_over
-
-        speeds = parse_numbers(winds, "winds")
-        scene = fowt_env.build_scene(platform, wind=speeds[0])
-        with progress_bar("linearising", len(speeds)) as update:
-            models = models_over(scene, speeds, lambda done, total: update(done, total=total))
-        found = design_pi(models, scene.turbine, omega, zeta, schedule)
-        show(pd.DataFrame(found.table), f"{platform}: rotor loop {omega:g} rad/s, damping {zeta:g}")
-        unstable = [row["wind_[m/s]"] for row in found.table if row["platform_zeta_[-]"] < 0.0]
-        if unstable:
-            out.print(f"the platform is unstable at {', '.join(f'{w:g}' for w in unstable)} m/s: lower omega")
+    suffix = "" if out_path is None else Path(out_path).suffix.lower()
+    if suffix and suffix not in (*TABLE_SUFFIXES, *MODEL_SUFFIXES):
+        allowed = ", ".join((*TABLE_SUFFIXES, *MODEL_SUFFIXES))
+        raise InputError(f"--out {out_path}: must be a folder or end with {allowed}")
+    speeds = parse_numbers(winds, "winds")
+    scene = fowt_env.build_scene(platform, wind=speeds[0])
+    with progress_bar("linearising", len(speeds)) as update:
+        models = models_over(scene, speeds, lambda done, total: update(done, total=total))
+    modes, zeros = mode_table(models), zero_table(models)
+    show(modes, f"{platform}: modes, torque and blade pitch held")
+    if len(zeros):
+        show(zeros, "right-half-plane zeros, blade pitch to rotor speed")
+    else:
+        out.print("no right-half-plane zeros from blade pitch to rotor speed")
+    resting = [wind for wind, model in models.items() if model.pitch_rests]
+    if resting:
         out.print(
-            f"KP = {found.KP:.6g} s, KI = {found.KI:.6g},"
-            f" gain_schedule_pitch = {found.gain_schedule_pitch:.6g} rad"
+            f"up to {max(resting):g} m/s the blade pitch rests on its minimum: pitch control is off"
+            " there, so these winds are left out of what concerns it"
         )
-        if out_path is not None:
-            settings = {key: getattr(found, key) for key in ("KP", "KI", "gain_schedule_pitch")}
-            command = (
-                f"fowt design pi --omega {omega:g} --zeta {zeta:g} --schedule {schedule}"
-                f" --winds {winds} --platform {platform}"
-            )
-            note(f"wrote {save_design(out_path, 'pi', scene, settings, command, table=found.table)}")
+    if out_path is None:
+        return
+    if suffix in TABLE_SUFFIXES:
+        written = [write_table(modes, out_path)]
+    elif suffix:
+        written = [save_models(models, out_path)]
+    else:
+        written = save_study(models, out_path)
+    for path in written:
+        note(f"wrote {path}")
 
-    @design.command(epilog=BOUND_EXAMPLES)
-    @reported
-    def bound(
-        wind: Annotated[str, typer.Option(help="Winds above rated, m/s.")] = "12:24:2",
-        torque_std: Annotated[float, typer.Option(help="Limit of the torque's deviation, %; or inf.")] = 5.0,
-        platform: Annotated[str, typer.Option(help="Platform: a name or a path.")] = "oc3_hywind",
-        out_path: Annotated[str | None, typer.Option("--out", help="Fronts: .csv or .parquet.")] = None,
-        plot: Annotated[str | None, typer.Option(help="Plot of the fronts, e.g. bound.png.")] = None,
-    ):
-        """Least rotor-speed and platform-pitch deviations of any linear feedback, by what it knows."""
-        import fowt_env
-        from fowt_env.outputs import table_path, write_table
-        from training.linear_bound import INFORMATION, bound_table
 
-        if out_path is not None:
-            table_path(out_path)
-        scene = fowt_env.build_scene(platform, wind=18.0)
-        speeds = parse_numbers(wind, "wind")
-        with progress_bar("designing", len(speeds)) as update:
-            table = bound_table(
-                scene, speeds, torque_std=0.01 * torque_std, progress=lambda done, n: update(done, total=n)
-            )
-        show(table if len(speeds) == 1 else _balanced(table), f"{platform}: least deviations")
-        if out_path is not None:
-            note(f"wrote {write_table(table, out_path)}")
-        if plot is not None:
-            from fowt_env.plots_design import plot_bound
+@design.command(epilog=PI_EXAMPLES)
+@reported
+def pi(
+    omega: Annotated[float, typer.Option(help="Frequency of the rotor loop, rad/s.")] = 0.2,
+    zeta: Annotated[float, typer.Option(help="Its damping ratio.")] = 0.7,
+    schedule: Annotated[
+        str, typer.Option(help="loop (as designed at every wind) or published (Jonkman's, slower).")
+    ] = "loop",
+    winds: Annotated[str, typer.Option(help="Winds, m/s: 12,18 or START:STOP:STEP.")] = "12:25:1",
+    platform: Annotated[str, typer.Option(help="Platform: a name or a path.")] = "oc3_hywind",
+    out_path: Annotated[str | None, typer.Option("--out", help="Design: .json.")] = None,
+):
+    """Gains of a scheduled PI from a wanted frequency and damping ratio, and the platform's damping."""
+    import pandas as pd
 
-            plot_bound(table, INFORMATION, path=plot)
-            note(f"wrote {plot}")
+    import fowt_env
+    from controllers.pi_design import design_pi
+    from controllers.saved_design import save_design
+    from training.linear_design import models_over
 
-    @design.command(epilog=FRONT_EXAMPLES)
-    @reported
-    def front(
-        runs: Annotated[str, typer.Option(help="Table of fowt design lqr --out.")],
-        bound_path: Annotated[str, typer.Option("--bound", help="Table of fowt design bound --out.")],
-        out_path: Annotated[str | None, typer.Option("--out", help="Ratios: .csv or .parquet.")] = None,
-        plot: Annotated[str | None, typer.Option(help="Pareto plot, e.g. front.png.")] = None,
-    ):
-        """Simulated designs over gspi_oc3, beside the linear bound, and the share of it that they reach."""
-        from fowt_env.outputs import read_table, write_table
-        from training.linear_bound import INFORMATION, ratio_table
+    speeds = parse_numbers(winds, "winds")
+    scene = fowt_env.build_scene(platform, wind=speeds[0])
+    with progress_bar("linearising", len(speeds)) as update:
+        models = models_over(scene, speeds, lambda done, total: update(done, total=total))
+    found = design_pi(models, scene.turbine, omega, zeta, schedule)
+    show(pd.DataFrame(found.table), f"{platform}: rotor loop {omega:g} rad/s, damping {zeta:g}")
+    unstable = [row["wind_[m/s]"] for row in found.table if row["platform_zeta_[-]"] < 0.0]
+    if unstable:
+        out.print(f"the platform is unstable at {', '.join(f'{w:g}' for w in unstable)} m/s: lower omega")
+    out.print(
+        f"KP = {found.KP:.6g} s, KI = {found.KI:.6g},"
+        f" gain_schedule_pitch = {found.gain_schedule_pitch:.6g} rad"
+    )
+    if out_path is not None:
+        settings = {key: getattr(found, key) for key in ("KP", "KI", "gain_schedule_pitch")}
+        command = (
+            f"fowt design pi --omega {omega:g} --zeta {zeta:g} --schedule {schedule}"
+            f" --winds {winds} --platform {platform}"
+        )
+        note(f"wrote {save_design(out_path, 'pi', scene, settings, command, table=found.table)}")
 
-        fronts = read_table(bound_path)
-        table = ratio_table(read_table(runs), fronts)
-        show(table, "over gspi_oc3; of_bound: 1 on the bound")
-        if out_path is not None:
-            note(f"wrote {write_table(table, out_path)}")
-        if plot is not None:
-            from fowt_env.plots_design import plot_bound
 
-            plot_bound(fronts, INFORMATION, table, path=plot)
-            note(f"wrote {plot}")
+@design.command(epilog=BOUND_EXAMPLES)
+@reported
+def bound(
+    wind: Annotated[str, typer.Option(help="Winds above rated, m/s.")] = "12:24:2",
+    torque_std: Annotated[float, typer.Option(help="Limit of the torque's deviation, %; or inf.")] = 5.0,
+    platform: Annotated[str, typer.Option(help="Platform: a name or a path.")] = "oc3_hywind",
+    out_path: Annotated[str | None, typer.Option("--out", help="Fronts: .csv or .parquet.")] = None,
+    plot: Annotated[str | None, typer.Option(help="Plot of the fronts, e.g. bound.png.")] = None,
+):
+    """Least rotor-speed and platform-pitch deviations of any linear feedback, by what it knows."""
+    import fowt_env
+    from fowt_env.outputs import table_path, write_table
+    from training.linear_bound import INFORMATION, bound_table
 
-    @design.command(epilog=LQR_EXAMPLES)
-    @reported
-    def lqr(
-        vary: Annotated[
-            list[str] | None, typer.Option(metavar="WEIGHT=A,B,C", help="Weight and its values; repeats.")
-        ] = None,
-        weight: Annotated[
-            list[str] | None, typer.Option(metavar="WEIGHT=VALUE", help="A weight for all variants; repeats.")
-        ] = None,
-        cases: Annotated[str, typer.Option(help="Cases or suites.")] = "ntm_14,ntm_18,ntm_22",
-        seeds: Annotated[str, typer.Option(help="Training seeds, 1000 and above.")] = "1001,1002",
-        out_path: Annotated[
-            str | None, typer.Option("--out", help="All runs: .csv; or, without runs, the design: .json.")
-        ] = None,
-    ):
-        """Sweep the weights of lqr on training seeds, beside gspi_oc3; or save one design (--out .json)."""
-        from training.linear_design import SHOWN, sweep
+    if out_path is not None:
+        table_path(out_path)
+    scene = fowt_env.build_scene(platform, wind=18.0)
+    speeds = parse_numbers(wind, "wind")
+    with progress_bar("designing", len(speeds)) as update:
+        table = bound_table(
+            scene, speeds, torque_std=0.01 * torque_std, progress=lambda done, n: update(done, total=n)
+        )
+    show(table if len(speeds) == 1 else _balanced(table), f"{platform}: least deviations")
+    if out_path is not None:
+        note(f"wrote {write_table(table, out_path)}")
+    if plot is not None:
+        from fowt_env.plots_design import plot_bound
 
-        fixed = parse_pairs(weight, "weight")
-        if out_path is not None and out_path.lower().endswith(".json"):
-            if vary:
-                raise InputError(f"--vary {vary[0]}: a design has one value per weight; use --weight")
-            note(f"wrote {save_lqr(fixed, out_path)}")
-            return
-        variants = [fixed]
-        for pair in vary or ():
-            name, _, values = pair.partition("=")
-            numbers = parse_numbers(values, f"weight {name}")
-            variants = [variant | {name: number} for variant in variants for number in numbers]
-        numbers = [int(number) for number in parse_numbers(seeds, "seeds")]
-        with progress_bar("simulating", None) as update:
-            table = sweep(variants, cases, numbers, out_path, lambda done, total: update(done, total=total))
-        means = table.groupby(["case", "variant"], sort=False)[list(SHOWN)].mean().reset_index()
-        show(means, f"means over seeds {json.dumps(numbers)}")
-        if out_path is not None:
-            note(f"wrote {out_path}")
+        plot_bound(table, INFORMATION, path=plot)
+        note(f"wrote {plot}")
+
+
+@design.command(epilog=FRONT_EXAMPLES)
+@reported
+def front(
+    runs: Annotated[str, typer.Option(help="Table of fowt design lqr --out.")],
+    bound_path: Annotated[str, typer.Option("--bound", help="Table of fowt design bound --out.")],
+    out_path: Annotated[str | None, typer.Option("--out", help="Ratios: .csv or .parquet.")] = None,
+    plot: Annotated[str | None, typer.Option(help="Pareto plot, e.g. front.png.")] = None,
+):
+    """Simulated designs over gspi_oc3, beside the linear bound, and the share of it that they reach."""
+    from fowt_env.outputs import read_table, write_table
+    from training.linear_bound import INFORMATION, ratio_table
+
+    fronts = read_table(bound_path)
+    table = ratio_table(read_table(runs), fronts)
+    show(table, "over gspi_oc3; of_bound: 1 on the bound")
+    if out_path is not None:
+        note(f"wrote {write_table(table, out_path)}")
+    if plot is not None:
+        from fowt_env.plots_design import plot_bound
+
+        plot_bound(fronts, INFORMATION, table, path=plot)
+        note(f"wrote {plot}")
+
+
+@design.command(epilog=LQR_EXAMPLES)
+@reported
+def lqr(
+    vary: Annotated[
+        list[str] | None, typer.Option(metavar="WEIGHT=A,B,C", help="Weight and its values; repeats.")
+    ] = None,
+    weight: Annotated[
+        list[str] | None, typer.Option(metavar="WEIGHT=VALUE", help="A weight for all variants; repeats.")
+    ] = None,
+    cases: Annotated[str, typer.Option(help="Cases or suites.")] = "ntm_14,ntm_18,ntm_22",
+    seeds: Annotated[str, typer.Option(help="Training seeds, 1000 and above.")] = "1001,1002",
+    out_path: Annotated[
+        str | None, typer.Option("--out", help="All runs: .csv; or, without runs, the design: .json.")
+    ] = None,
+):
+    """Sweep the weights of lqr on training seeds, beside gspi_oc3; or save one design (--out .json)."""
+    from training.linear_design import SHOWN, sweep
+
+    fixed = parse_pairs(weight, "weight")
+    if out_path is not None and out_path.lower().endswith(".json"):
+        if vary:
+            raise InputError(f"--vary {vary[0]}: a design has one value per weight; use --weight")
+        note(f"wrote {save_lqr(fixed, out_path)}")
+        return
+    variants = [fixed]
+    for pair in vary or ():
+        name, _, values = pair.partition("=")
+        numbers = parse_numbers(values, f"weight {name}")
+        variants = [variant | {name: number} for variant in variants for number in numbers]
+    numbers = [int(number) for number in parse_numbers(seeds, "seeds")]
+    with progress_bar("simulating", None) as update:
+        table = sweep(variants, cases, numbers, out_path, lambda done, total: update(done, total=total))
+    means = table.groupby(["case", "variant"], sort=False)[list(SHOWN)].mean().reset_index()
+    show(means, f"means over seeds {json.dumps(numbers)}")
+    if out_path is not None:
+        note(f"wrote {out_path}")
