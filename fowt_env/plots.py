@@ -35,7 +35,7 @@ SPECTRA = (
 )
 
 
-def _new_figure(width, height):
+def new_figure(width, height):
     """An empty Figure in the house style. Raises: InputError that names the extra to install."""
     try:
         from matplotlib.figure import Figure
@@ -44,7 +44,7 @@ def _new_figure(width, height):
     return Figure(figsize=(width, height), layout="constrained", facecolor="white")
 
 
-def _style(axes):
+def style_axes(axes):
     """Light grid, no box, quiet ticks."""
     axes.grid(True, color=FAINT, linewidth=0.6)
     axes.set_axisbelow(True)
@@ -53,7 +53,7 @@ def _style(axes):
     axes.tick_params(colors=INK, labelsize=8)
 
 
-def _save(figure, path):
+def save_figure(figure, path):
     """The figure, written to `path` (format by its ending, default PNG) unless that is None."""
     if path is not None:
         path = Path(path)
@@ -70,7 +70,7 @@ def _save(figure, path):
     return figure
 
 
-def _named_runs(runs):
+def named_runs(runs):
     """{label: frame} with at least one non-empty run, each with a time column."""
     if not runs:
         raise InputError("nothing to plot: no runs were given")
@@ -103,15 +103,15 @@ def plot_run(frame, path=None, title=None):
 
 def plot_runs(runs, path=None, title=None):
     """Stacked time series of several runs over each other, {label: frame}."""
-    runs = _named_runs(runs)
+    runs = named_runs(runs)
     panels = [panel for panel in PANELS if any(panel[1] in frame.columns for frame in runs.values())]
     if not panels:
         wanted = ", ".join(channel for _, channel in PANELS)
         raise InputError(f"nothing to plot: none of {wanted} is in the run")
-    figure = _new_figure(9.0, 0.9 + 1.15 * len(panels))
+    figure = new_figure(9.0, 0.9 + 1.15 * len(panels))
     rows = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
     for axes, (label, channel) in zip(rows, panels, strict=True):
-        _style(axes)
+        style_axes(axes)
         for text, colour, frame in _lines(runs, channel):
             axes.plot(frame[TIME], frame[channel], color=colour, linewidth=0.9, label=text)
         axes.set_ylabel(label, fontsize=8, color=INK)
@@ -128,7 +128,7 @@ def plot_runs(runs, path=None, title=None):
     figure.align_ylabels(rows)
     if title:
         figure.suptitle(title, fontsize=11, color=INK)
-    return _save(figure, path)
+    return save_figure(figure, path)
 
 
 def spectrum(time, value, segment=None):
@@ -152,16 +152,16 @@ def plot_spectra(runs, path=None, title=None, skip=0.0, platform_pitch_period=No
     Vertical lines mark the wave peak, 1P (mean rotor speed of the first run) and, if its period
     is given (s), the platform-pitch natural frequency. The first `skip` seconds are left out.
     """
-    runs = _named_runs(runs if isinstance(runs, dict) else {"": runs})
-    runs = _named_runs({label: f[f[TIME] >= f[TIME].iloc[0] + skip] for label, f in runs.items()})
+    runs = named_runs(runs if isinstance(runs, dict) else {"": runs})
+    runs = named_runs({label: f[f[TIME] >= f[TIME].iloc[0] + skip] for label, f in runs.items()})
     shown = [entry for entry in SPECTRA if any(entry[1] in frame.columns for frame in runs.values())]
     if not shown:
         raise InputError(f"nothing to plot: none of {', '.join(entry[1] for entry in SPECTRA)} is in the run")
-    figure = _new_figure(9.0, 0.9 + 2.1 * len(shown))
+    figure = new_figure(9.0, 0.9 + 2.1 * len(shown))
     rows = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
     marks = frequency_marks(next(iter(runs.values())), platform_pitch_period)
     for axes, (label, channel, unit) in zip(rows, shown, strict=True):
-        _style(axes)
+        style_axes(axes)
         top = 0.0
         for text, colour, frame in _lines(runs, channel):
             frequency, density = spectrum(frame[TIME], frame[channel])
@@ -192,7 +192,7 @@ def plot_spectra(runs, path=None, title=None, skip=0.0, platform_pitch_period=No
     figure.align_ylabels(rows)
     if title:
         figure.suptitle(title, fontsize=11, color=INK)
-    return _save(figure, path)
+    return save_figure(figure, path)
 
 
 def frequency_marks(frame, platform_pitch_period=None):
@@ -223,13 +223,13 @@ def plot_evaluation(table, metrics, path=None, title=None):
         raise InputError("nothing to plot: the table has no rows or none of the metrics")
     columns = min(3, len(metrics))
     rows = -(-len(metrics) // columns)
-    figure = _new_figure(4.0 * columns, 0.9 + 2.2 * rows)
+    figure = new_figure(4.0 * columns, 0.9 + 2.2 * rows)
     panels = list(figure.subplots(rows, columns, sharex=True, squeeze=False).flat)
     cases = list(dict.fromkeys(table["case"]))
     controllers = list(dict.fromkeys(table["controller"]))
     good = table[table["status"] == "ok"]
     for axes, name in zip(panels, metrics, strict=False):
-        _style(axes)
+        style_axes(axes)
         for index, controller in enumerate(controllers):
             groups = good[good["controller"] == controller].groupby("case")[name]
             mean, low, high = (getattr(groups, what)().reindex(cases) for what in ("mean", "min", "max"))
@@ -262,7 +262,7 @@ def plot_evaluation(table, metrics, path=None, title=None):
     )
     if title:
         figure.suptitle(title, fontsize=11, color=INK)
-    return _save(figure, path)
+    return save_figure(figure, path)
 
 
 PARETO = ("RotSpeed_std_[rpm]", "PtfmPitch_std_[deg]", "blade_pitch_travel_[deg/s]", "overspeed_[%]")
@@ -282,9 +282,9 @@ def plot_pareto(board, path=None, title=None):
             entries.append((entry["controller"], entry["failed"], figures))
     if not entries:
         raise InputError("nothing to plot: no controller has finished a run")
-    figure = _new_figure(9.0, 5.6)
+    figure = new_figure(9.0, 5.6)
     axes = figure.subplots()
-    _style(axes)
+    style_axes(axes)
     axes.margins(0.12)
     points = np.array([[f["mean"] for f in figures[:3]] for _, _, figures in entries])
     areas = np.maximum(LARGEST_MARK * points[:, 2] / max(points[:, 2].max(), 1e-9), 4.0)
@@ -331,7 +331,7 @@ def plot_pareto(board, path=None, title=None):
     if title:
         figure.suptitle(title, fontsize=11, color=INK)
     _label_marks(figure, axes, [name for name, _, _ in entries], points[:, :2], areas)
-    return _save(figure, path)
+    return save_figure(figure, path)
 
 
 def _undominated(points):

@@ -7,7 +7,7 @@ Needs matplotlib: pip install "fowt-env[plot]".
 import numpy as np
 
 from fowt_env.errors import InputError
-from fowt_env.plots import COLOURS, INK, _new_figure, _save, _style
+from fowt_env.plots import COLOURS, INK, new_figure, save_figure, style_axes
 
 MOTIONS = ("surge", "sway", "heave", "roll", "platform_pitch", "yaw", "rotor_speed")
 MARKS = ("o", "s", "^", "D", "v", "P", "X")
@@ -45,10 +45,10 @@ def plot_poles(models, path=None, title=None):
         raise InputError("nothing to plot: no linear models were given")
     colours, scale = _wind_colours(list(models))
     found = [(wind, mode) for wind, model in models.items() for mode in model.modes()]
-    figure = _new_figure(11.0, 4.8)
+    figure = new_figure(11.0, 4.8)
     panels = figure.subplots(1, 2)
     for axes, slow in zip(panels, (False, True), strict=True):
-        _style(axes)
+        style_axes(axes)
         shown = [(w, m) for w, m in found if not slow or m.frequency < SLOW]
         for wind, mode in shown:
             mark = MARKS[MOTIONS.index(mode.name)]
@@ -69,7 +69,7 @@ def plot_poles(models, path=None, title=None):
     figure.suptitle(
         title or "poles, torque and blade pitch held; grey: damping ratio", fontsize=10, color=INK
     )
-    return _save(figure, path)
+    return save_figure(figure, path)
 
 
 def _damping_lines(axes):
@@ -91,7 +91,7 @@ def plot_damping(models, path=None, title=None):
     """Period and damping ratio of every mode over the wind of {wind: LinearModel}."""
     if not models:
         raise InputError("nothing to plot: no linear models were given")
-    figure = _new_figure(9.0, 5.6)
+    figure = new_figure(9.0, 5.6)
     panels = figure.subplots(2, 1, sharex=True)
     for index, name in enumerate(MOTIONS):
         found = [
@@ -104,7 +104,7 @@ def plot_damping(models, path=None, title=None):
         panels[0].plot(winds, [mode.period for _, mode in found], label=name.replace("_", " "), **style)
         panels[1].plot(winds, [mode.damping_ratio for _, mode in found], **style)
     for axes, label in zip(panels, ("period (s)", "damping ratio"), strict=True):
-        _style(axes)
+        style_axes(axes)
         axes.set_ylabel(label, fontsize=9, color=INK)
     panels[0].set_yscale("log")
     panels[0].set_yticks([8, 10, 20, 30, 50, 100, 150], ["8", "10", "20", "30", "50", "100", "150"])
@@ -113,7 +113,7 @@ def plot_damping(models, path=None, title=None):
     panels[1].set_xlabel("wind (m/s)", fontsize=9, color=INK)
     panels[0].legend(fontsize=8, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
     figure.suptitle(title or "modes over the wind, torque and blade pitch held", fontsize=10, color=INK)
-    return _save(figure, path)
+    return save_figure(figure, path)
 
 
 def plot_bode(models, path=None, title=None):
@@ -124,7 +124,7 @@ def plot_bode(models, path=None, title=None):
     if not models:
         raise InputError("nothing to plot: no linear models were given")
     colours, scale = _wind_colours(list(models))
-    figure = _new_figure(12.0, 5.6)
+    figure = new_figure(12.0, 5.6)
     panels = figure.subplots(2, len(BODE), sharex=True)
     for column, (source, output, name, factor, unit) in enumerate(BODE):
         gain, phase = panels[:, column]
@@ -142,12 +142,12 @@ def plot_bode(models, path=None, title=None):
         phase.set_xlabel("frequency (rad/s)", fontsize=9, color=INK)
         phase.yaxis.set_major_locator(_right_angles())
         for axes in (gain, phase):
-            _style(axes)
+            style_axes(axes)
             axes.set_xlim(FREQUENCIES[0], FREQUENCIES[-1])
     figure.colorbar(scale, ax=panels, label="wind (m/s)", pad=0.01)
     if title:
         figure.suptitle(title, fontsize=10, color=INK)
-    return _save(figure, path)
+    return save_figure(figure, path)
 
 
 def _right_angles():
@@ -173,10 +173,10 @@ def plot_bound(table, names, points=None, path=None, title=None):
         raise InputError("nothing to plot: no wind has both a front and simulated points")
     columns = min(4, len(winds))
     rows = -(-(len(winds) + (len(winds) > 3)) // columns)
-    figure = _new_figure(3.0 * columns + 0.8, 2.9 * rows + (1.2 if len(winds) <= 3 else 0.5))
+    figure = new_figure(3.0 * columns + 0.8, 2.9 * rows + (1.2 if len(winds) <= 3 else 0.5))
     places = list(figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).flat)
     for axes, wind in zip(places, winds, strict=False):
-        _style(axes)
+        style_axes(axes)
         here = table[table[WIND] == wind]
         for index, (information, text) in enumerate(names.items()):
             front = here[here["information"] == information][["speed_ratio_[-]", "pitch_ratio_[-]"]]
@@ -209,7 +209,7 @@ def plot_bound(table, names, points=None, path=None, title=None):
     figure.supylabel("platform-pitch deviation over that of gspi_oc3", fontsize=9, color=INK)
     if title:
         figure.suptitle(title, fontsize=10, color=INK)
-    return _save(figure, path)
+    return save_figure(figure, path)
 
 
 def _place_legend(figure, places, used):

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.signal import csd, welch
 
 from fowt_env.errors import InputError
-from fowt_env.plots import COLOURS, INK, TIME, _named_runs, _new_figure, _save, _style
+from fowt_env.plots import COLOURS, INK, TIME, named_runs, new_figure, save_figure, style_axes
 
 WAVE = "Wave1Elev_[m]"
 WIND = "Wind_[m/s]"  # column of `fowt trim --out`
@@ -41,12 +41,12 @@ MOTIONS = (
 def _grid(panels, columns, width, height):
     """(figure, panels in reading order) of a grid whose spare places are empty."""
     rows = -(-len(panels) // columns)
-    figure = _new_figure(width * columns, 0.7 + height * rows)
+    figure = new_figure(width * columns, 0.7 + height * rows)
     places = list(figure.subplots(rows, columns, squeeze=False).flat)
     for axes in places[len(panels) :]:
         axes.set_visible(False)
     for axes in places[: len(panels)]:
-        _style(axes)
+        style_axes(axes)
     return figure, places[: len(panels)]
 
 
@@ -76,8 +76,8 @@ def plot_boxes(cases, path=None, title=None, skip=0.0):
         raise InputError("nothing to plot: no cases were given")
     kept = {}
     for case, runs in cases.items():
-        late = {label: f[f[TIME] >= f[TIME].iloc[0] + skip] for label, f in _named_runs(runs).items()}
-        kept[case] = _named_runs(late)
+        late = {label: f[f[TIME] >= f[TIME].iloc[0] + skip] for label, f in named_runs(runs).items()}
+        kept[case] = named_runs(late)
     labels = list(dict.fromkeys(label for runs in kept.values() for label in runs))
     panels = _shown(BOXES, [frame for runs in kept.values() for frame in runs.values()], "run")
     figure, places = _grid(panels, min(3, len(panels)), 4.2, 2.4)
@@ -109,7 +109,7 @@ def plot_boxes(cases, path=None, title=None, skip=0.0):
     _legend(figure, places[0], labels)
     if title:
         figure.suptitle(title, fontsize=11, color=INK)
-    return _save(figure, path)
+    return save_figure(figure, path)
 
 
 def plot_schedule(points, path=None, title=None):
@@ -133,7 +133,7 @@ def plot_schedule(points, path=None, title=None):
     _legend(figure, places[0], list(tables))
     if title:
         figure.suptitle(title, fontsize=11, color=INK)
-    return _save(figure, path)
+    return save_figure(figure, path)
 
 
 def response_operator(frame, channel, skip=0.0, segment=None):
@@ -175,7 +175,7 @@ def plot_raos(runs, path=None, title=None, skip=0.0, segment=None):
 
     Solid where the coherence is above one half, faint below: there other things than waves move it.
     """
-    runs = _named_runs(runs if isinstance(runs, dict) else {"": runs})
+    runs = named_runs(runs if isinstance(runs, dict) else {"": runs})
     panels = _shown(MOTIONS, list(runs.values()), "run")
     figure, places = _grid(panels, min(2, len(panels)), 4.6, 2.4)
     for axes, (name, channel) in zip(places, panels, strict=True):
@@ -199,4 +199,4 @@ def plot_raos(runs, path=None, title=None, skip=0.0, segment=None):
     _legend(figure, places[0], list(runs))
     if title:
         figure.suptitle(title, fontsize=11, color=INK)
-    return _save(figure, path)
+    return save_figure(figure, path)

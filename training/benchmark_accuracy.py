@@ -236,13 +236,13 @@ def openfast_points():
 
 def plot_accuracy(table, path=None):
     """Figure: error over real-time factor, both logarithmic, with the Pareto front and OpenFAST's points."""
-    from fowt_env.plots import COLOURS, INK, _new_figure, _save, _style
+    from fowt_env.plots import COLOURS, INK, new_figure, save_figure, style_axes
 
     points = summary(table)
     points = points[np.isfinite(points["real_time_factor"]) & (points["worst"] > 0.0)]
-    figure = _new_figure(7.5, 5.0)
+    figure = new_figure(7.5, 5.0)
     axes = figure.subplots()
-    _style(axes)
+    style_axes(axes)
     for index, (axis, group) in enumerate(points.groupby("axis", sort=False)):
         axes.loglog(
             group["real_time_factor"], group["worst"], "o", markersize=5, color=COLOURS[index], label=axis
@@ -262,7 +262,7 @@ def plot_accuracy(table, path=None):
     axes.set_xlabel("real-time factor of simulate (CPU, one core)", color=INK, fontsize=9)
     axes.set_ylabel("worst rms difference / standard deviation", color=INK, fontsize=9)
     axes.legend(fontsize=7, frameon=False)
-    return _save(figure, path)
+    return save_figure(figure, path)
 
 
 def select(names):

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from fowt_env.plots import COLOURS, _new_figure, _save, _style
+from fowt_env.plots import COLOURS, new_figure, save_figure, style_axes
 
 PANELS = (
     ("reward", "validation return"),
@@ -20,7 +20,7 @@ def plot_learning_curve(runs, path):
 
     Raises: InputError where matplotlib is missing.
     """
-    figure = _new_figure(8.0, 9.0)
+    figure = new_figure(8.0, 9.0)
     axes = figure.subplots(len(PANELS), 1, sharex=True)
     for axis, (name, label) in zip(axes, PANELS, strict=True):
         for number, (run, rows) in enumerate(runs.items()):
@@ -30,11 +30,11 @@ def plot_learning_curve(runs, path):
         if name.endswith("ratio"):
             axis.axhline(1.0, color="0.6", linewidth=0.8)
         axis.set_ylabel(label, fontsize=8)
-        _style(axis)
+        style_axes(axis)
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, fontsize=8, loc="outside lower center", ncols=3)
     axes[-1].set_xlabel("decisions (millions)")
-    _save(figure, path)
+    save_figure(figure, path)
     return path
 
 
@@ -43,7 +43,7 @@ def plot_front(runs, path):
 
     runs: {label: list of validation rows}. Large marks: the policy that was kept.
     """
-    figure = _new_figure(8.0, 4.5)
+    figure = new_figure(8.0, 4.5)
     axes = figure.subplots(1, 2, sharex=True)
     for axis, (name, label) in zip(axes, PANELS[1:3], strict=True):
         for number, (run, rows) in enumerate(runs.items()):
@@ -57,10 +57,10 @@ def plot_front(runs, path):
         axis.axvline(1.0, color="0.6", linewidth=0.8)
         axis.set_xlabel("blade-pitch travel / baseline")
         axis.set_ylabel(label, fontsize=8)
-        _style(axis)
+        style_axes(axis)
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, fontsize=8, loc="outside lower center", ncols=3)
-    _save(figure, path)
+    save_figure(figure, path)
     return path
 
 

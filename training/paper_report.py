@@ -7,10 +7,7 @@ import numpy as np
 import fowt_env
 from fowt_env.description import read_platform
 from fowt_env.outputs import replacing, write_table
-from fowt_env.plots import COLOURS, INK, TIME, plot_run, spectrum
-from fowt_env.plots import _new_figure as new_figure
-from fowt_env.plots import _save as save_figure
-from fowt_env.plots import _style as style_axes
+from fowt_env.plots import COLOURS, INK, TIME, new_figure, plot_run, save_figure, spectrum, style_axes
 from training import paper
 
 LABELS = {

@@ -5,10 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from fowt_env.outputs import replacing, write_table
-from fowt_env.plots import COLOURS, INK, TIME, spectrum
-from fowt_env.plots import _new_figure as new_figure
-from fowt_env.plots import _save as save_figure
-from fowt_env.plots import _style as style_axes
+from fowt_env.plots import COLOURS, INK, TIME, new_figure, save_figure, spectrum, style_axes
 from training.openfast import DECAYS
 
 LABELS = {
