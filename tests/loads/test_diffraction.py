@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from naive import diffraction as naive
 from naive import morison as naive_strips
+from naive.morison import spar_of
 from naive.rigid_body import rotation
 from plant import make_pose
 
@@ -66,15 +67,6 @@ def waves_of(sea, site):
     return build_waves(
         sea_state_of(sea), depth=site.water_depth, density=site.water_density, gravity=site.gravity,
         seed=0, duration=600.0,
-    )  # fmt: skip
-
-
-def spar_of(platform, *switches):
-    hydro, site = platform.hydro, platform.environment
-    return naive_strips.Spar(
-        np.array(platform.hull.z), np.array(platform.hull.diameter),
-        hydro.added_mass_coefficient, hydro.drag_coefficient, hydro.axial_drag_coefficient,
-        hydro.heave_added_mass, site.water_density, site.gravity, site.water_depth, *switches,
     )  # fmt: skip
 
 

@@ -3,6 +3,7 @@ import itertools
 import numpy as np
 import pytest
 from naive import morison as naive
+from naive.morison import spar_of
 from naive.rigid_body import rotation
 from plant import make_pose
 
@@ -39,15 +40,6 @@ def build(platform, position="instantaneous", surface="instantaneous", stretchin
     return build_strips(
         platform.hull, platform.hydro, density=site.water_density, depth=site.water_depth,
         position=position, surface=surface, stretching=stretching, **options,
-    )  # fmt: skip
-
-
-def spar_of(platform, *switches):
-    hydro, site = platform.hydro, platform.environment
-    return naive.Spar(
-        np.array(platform.hull.z), np.array(platform.hull.diameter),
-        hydro.added_mass_coefficient, hydro.drag_coefficient, hydro.axial_drag_coefficient,
-        hydro.heave_added_mass, site.water_density, site.gravity, site.water_depth, *switches,
     )  # fmt: skip
 
 

@@ -27,6 +27,16 @@ class Spar:
     stretching: str = "wheeler"
 
 
+def spar_of(platform, *switches):
+    """Spar of a description.Platform with the switches from position on."""
+    hydro, site = platform.hydro, platform.environment
+    return Spar(
+        np.array(platform.hull.z), np.array(platform.hull.diameter),
+        hydro.added_mass_coefficient, hydro.drag_coefficient, hydro.axial_drag_coefficient,
+        hydro.heave_added_mass, site.water_density, site.gravity, site.water_depth, *switches,
+    )  # fmt: skip
+
+
 def nodes(spar, surface, points=60):
     """(z, weight, diameter, dA/dz), each (n,), of Gauss points in every section up to the surface."""
     x, w = np.polynomial.legendre.leggauss(points)
