@@ -15,6 +15,7 @@ from fowt_env.dynamics import N_KEPT, Body, Model, Work
 from fowt_env.errors import InputError, unknown
 from fowt_env.integrators import INTEGRATORS, build_integrator
 from fowt_env.jit import Box
+from fowt_env.loads.blade_elements import build_blade_elements
 from fowt_env.loads.damping import build_damping
 from fowt_env.loads.diffraction import build_strip_diffraction
 from fowt_env.loads.drivetrain import build_drivetrain, build_pitch_actuator
@@ -29,7 +30,6 @@ from fowt_env.loads.fast_waves import (
 from fowt_env.loads.hydrostatics import build_hull
 from fowt_env.loads.mooring import build_mooring
 from fowt_env.loads.morison import Current, build_strips
-from fowt_env.loads.rotor import build_blade_elements
 from fowt_env.loads.rotor_lookup import build_section_table
 from fowt_env.loads.rotor_table import build_rotor_table
 from fowt_env.loads.tower import build_tower_drag

@@ -13,7 +13,7 @@ from controllers import CONTROLLERS
 from fowt_env.channels import Out
 from fowt_env.description import read_platform, read_turbine
 from fowt_env.errors import InputError
-from fowt_env.loads.rotor import build_blade_elements, lift_drag
+from fowt_env.loads.blade_elements import build_blade_elements, lift_drag
 from fowt_env.scene import build_scene
 from fowt_env.state import State
 from fowt_env.steady import trim

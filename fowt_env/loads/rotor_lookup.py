@@ -1,8 +1,8 @@
 """Rotor loads from a table per blade station: every blade, station and wind sample, without iteration.
 
-Quasi-steady blade element momentum is local (rotor.py): the load of a station over the square of its
-inflow depends on the direction of the inflow and on the blade pitch alone. Both components are tabulated
-once per blade from the kernels of rotor.py, and interpolated linearly in both. Geometry, wind sampling,
+Quasi-steady blade element momentum is local (blade_elements.py): the load of a station over the square
+of its inflow depends on the direction of the inflow and on the blade pitch alone. Both components are
+tabulated once per blade from the kernels there, and interpolated linearly in both. Geometry, wind sampling,
 integration and outputs are those of rotor_load.
 
 The table spans the inflows from upwind (v_normal > 0) at any v_tangential, and blade pitches from -5 to
@@ -22,16 +22,18 @@ import numpy as np
 
 from fowt_env.counters import Counter
 from fowt_env.jit import kernel
-from fowt_env.loads.rotor import (
-    FAST_ROTOR,
+from fowt_env.loads.blade_elements import (
     LARGEST_SPEED,
-    NO_ROTOR_LOAD,
-    SLOW_ROTOR,
     BladeElements,
-    RotorLoad,
     blade_section,
     elements_key,
     fade,
+)
+from fowt_env.loads.rotor import (
+    FAST_ROTOR,
+    NO_ROTOR_LOAD,
+    SLOW_ROTOR,
+    RotorLoad,
     hub_flow,
     rotor_load,
 )

@@ -18,16 +18,8 @@ from typing import NamedTuple
 import numpy as np
 
 from fowt_env.jit import kernel
-from fowt_env.loads.rotor import (
-    FAST_ROTOR,
-    NO_ROTOR_LOAD,
-    SLOW_ROTOR,
-    RotorLoad,
-    blade_section,
-    elements_key,
-    fade,
-    hub_flow,
-)
+from fowt_env.loads.blade_elements import blade_section, elements_key, fade
+from fowt_env.loads.rotor import FAST_ROTOR, NO_ROTOR_LOAD, SLOW_ROTOR, RotorLoad, hub_flow
 from fowt_env.state import State, Wrench
 
 # Angle theta = atan2(speed * tip radius, axial wind): 0 parked, 90 deg no wind, 180 deg parked in reversed

@@ -10,13 +10,8 @@ from numba import njit
 from fowt_env.counters import N_COUNTERS, Counter
 from fowt_env.description import read_turbine
 from fowt_env.errors import InputError
-from fowt_env.loads.rotor import (
-    NO_ROTOR_LOAD,
-    bem_residual,
-    blade_section,
-    build_blade_elements,
-    rotor_load,
-)
+from fowt_env.loads.blade_elements import bem_residual, blade_section, build_blade_elements
+from fowt_env.loads.rotor import NO_ROTOR_LOAD, rotor_load
 from fowt_env.state import N_RIGID, State, pose_of
 from fowt_env.weather.wind import make_series, wind_at, wind_now
 
@@ -398,7 +393,8 @@ def test_infinite_or_missing_numbers_come_back_as_nan():
 
 PLAIN = """
 import numpy as np
-from fowt_env.loads.rotor import build_blade_elements, rotor_load
+from fowt_env.loads.blade_elements import build_blade_elements
+from fowt_env.loads.rotor import rotor_load
 from fowt_env.description import read_turbine
 from fowt_env.state import pose_of
 from fowt_env.weather.wind import make_series, wind_now

@@ -8,7 +8,8 @@ from numba import config, njit
 
 from fowt_env.counters import N_COUNTERS
 from fowt_env.description import read_turbine
-from fowt_env.loads.rotor import NO_ROTOR_LOAD, blade_section, build_blade_elements, rotor_load
+from fowt_env.loads.blade_elements import blade_section, build_blade_elements
+from fowt_env.loads.rotor import NO_ROTOR_LOAD, rotor_load
 from fowt_env.loads.rotor_lookup import (
     AHEAD,
     BEHIND,
@@ -298,7 +299,7 @@ PLAIN = """
 import sys
 import numpy as np
 from fowt_env.description import read_turbine
-from fowt_env.loads.rotor import build_blade_elements
+from fowt_env.loads.blade_elements import build_blade_elements
 from fowt_env.loads.rotor_lookup import SectionTable, rotor_lookup_load
 from fowt_env.state import pose_of
 from fowt_env.weather.wind import make_series, wind_now

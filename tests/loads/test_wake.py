@@ -3,7 +3,8 @@ import pytest
 
 from fowt_env.counters import N_COUNTERS
 from fowt_env.description import read_turbine
-from fowt_env.loads.rotor import blade_section, build_blade_elements, hub_flow, rotor_load, wake_equilibrium
+from fowt_env.loads.blade_elements import blade_section, build_blade_elements
+from fowt_env.loads.rotor import hub_flow, rotor_load, wake_equilibrium
 from fowt_env.loads.wake import (
     PER_ELEMENT,
     build_dynamic_inflow,
