@@ -1,4 +1,4 @@
-"""Users' own loads: statics, springs and dampers against formulas, and their way into every use of a scene."""
+"""Loads of one's own: statics, springs, dampers against formulas, and their part in every use of a scene."""
 
 import os
 import pickle
