@@ -52,14 +52,18 @@ def plot(
 
 
 def _names(files):
-    """{shortest ending of the path that tells it from the others, without its suffix: path}."""
-    paths = [Path(file).with_suffix("") for file in files]
-    if len(set(paths)) < len(paths):
+    """{what tells the path from the others, folders and endings that all share left out: path}."""
+    if len(set(files)) < len(files):
         raise InputError(f"files {', '.join(files)}: each must be given once")
-    depth = 1
-    while len({path.parts[-depth:] for path in paths}) < len(paths):
-        depth += 1
-    return {"/".join(path.parts[-depth:]): file for path, file in zip(paths, files, strict=True)}
+    parts = [[*Path(file).parts[:-1], Path(file).stem] for file in files]
+    for end in (0, -1):
+        while len({own[end] for own in parts}) == 1 and min(map(len, parts)) > 1:
+            for own in parts:
+                own.pop(end)
+    names = ["/".join(own) for own in parts]
+    if len(set(names)) < len(names):  # the same run as .csv and as .parquet
+        names = files
+    return dict(zip(names, files, strict=True))
 
 
 def _draw(kind, frames, path, title, skip, platform):

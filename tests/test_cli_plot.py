@@ -5,6 +5,8 @@ import pandas as pd
 import pytest
 from test_cli import fowt
 
+from fowt_env.cli_plot import _names
+
 pytest.importorskip("matplotlib", reason="matplotlib is not installed: the extra `plot` is missing")
 
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -35,6 +37,16 @@ def test_every_kind_is_one_call_on_saved_runs(kind, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     fowt("plot", kind, files[0])
     assert (tmp_path / f"{kind}.png").read_bytes().startswith(PNG)
+
+
+def test_runs_are_named_by_what_tells_them_apart():
+    files = ["out/runs/pi/ntm_18_seed1.parquet", "out/runs/lqr/ntm_18_seed1.parquet"]
+    assert list(_names(files)) == ["pi", "lqr"]
+    assert list(_names(["a/one.csv", "a/two.csv"])) == ["one", "two"]
+    assert list(_names(["a/run.csv", "a/run.parquet"])) == ["a/run.csv", "a/run.parquet"]
+    assert list(_names(["run.csv", "b/run.csv"])) == ["run", "b/run"] and list(_names(["x/run.csv"])) == [
+        "run"
+    ]
 
 
 def test_trim_plots_the_schedule_and_plot_does_so_from_its_table(tmp_path):
