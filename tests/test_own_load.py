@@ -76,7 +76,7 @@ def failing_later(parameters, motion, force):
 
 @load_kernel
 def failing_in_wind(parameters, motion, force):
-    force[0] = sqrt(10.0 - motion[Motion.WIND_X])
+    force[0] = sqrt(5.0 - motion[Motion.WIND_X])
 
 
 def still(*loads, platform="oc3_hywind", **options):
@@ -318,7 +318,7 @@ with compilation_announced(said.append):
     for loads in ((), (Load("Own", kernel, [strength]),)):
         frame = simulate(build_scene(fidelity="standard", loads=loads), None, duration=float(sys.argv[2]),
                          start="zero", initial={"PtfmPitch": 5.0})
-        print(repr(frame["PtfmPitch_[deg]"].iloc[-1]))
+        print(repr(float(frame["PtfmPitch_[deg]"].iloc[-1])))
 print(len(said))
 """
 
@@ -341,7 +341,7 @@ def test_another_load_in_another_process_compiles_no_kernel_of_the_package():
 
 
 def test_without_the_jit_a_load_gives_the_same_figures():
-    compiled, plain = process("1", "2"), process("1", "2", NUMBA_DISABLE_JIT="1")
+    compiled, plain = process("1", "0.5"), process("1", "0.5", NUMBA_DISABLE_JIT="1")
     assert float(plain[1]) == pytest.approx(float(compiled[1]), rel=1e-9)
     assert plain[1] != plain[0]
 
