@@ -18,7 +18,7 @@ from training.report_html import write_report
 
 FOLDER = Path("results/examples/report")
 
-table = evaluate("pi,pi_land", "ntm_14,ntm_18", duration=120.0, skip=30.0, seeds=(1, 2, 3), folder=FOLDER)
+table = evaluate("pi,pi_land", "ntm_14,ntm_18", duration=300.0, skip=60.0, seeds=range(1, 7), folder=FOLDER)
 board = write_leaderboard(table, FOLDER, baseline="pi")
 for entry in board["controllers"]:
     figure = entry["metrics"]["PtfmPitch_std_[deg]"]

@@ -18,7 +18,7 @@ from pathlib import Path
 from training.evaluate import evaluate
 
 FOLDER = Path("results/examples/resume")
-STEPS = 8_000  # decisions: enough to be interrupted, far too few to learn
+STEPS = 4_000  # decisions: enough to be interrupted, far too few to learn
 
 
 def interrupted_evaluation():
@@ -42,7 +42,7 @@ def interrupted_training():
     """Send a training the signal of Ctrl-C, and resume it from its checkpoint."""
     from training.train import Training, resolve
 
-    changes = {"decisions.envs": 8, "validation.every": STEPS}
+    changes = {"environment.num_envs": 8, "validation.winds": [18], "validation.every": STEPS}
     settings = resolve("ppo", "above_rated", 0, STEPS, changes)
 
     def interrupt(done, total, text):
