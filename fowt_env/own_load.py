@@ -39,7 +39,8 @@ class LoadKernel(types.WrapperAddressProtocol):
         self.__name__ = function.__name__
         self.__qualname__ = function.__qualname__
         self.__doc__ = function.__doc__
-        self._compiled = None if numba.config.DISABLE_JIT else _compiled(function)
+        without_jit = numba.config.DISABLE_JIT  # type: ignore[attr-defined] # set when numba starts
+        self._compiled: Any = None if without_jit else _compiled(function)
 
     def __wrapper_address__(self) -> int:
         return self._compiled.address
@@ -126,7 +127,8 @@ class Load:
                 tower base it counts in the tower-base loads
     axes        "inertial" or "body": of velocities and force
     water       whether the kernel reads the motion of the water at its point (Motion.WATER_X ...), whose
-                sum over all wave components costs as much as the hull's wave loads in an exact scene
+                sum over 225 wave components takes 6 microseconds, as three steps at fidelity "standard"
+                without wind (a load without it: 0.4, eight of them: 0.6 a step)
 
     It may depend on the wind, the waves, the rotor and the time, and not on accelerations: give mass and
     added mass to the platform file. The rotor shaft feels it through the platform alone. A trim and a
