@@ -74,21 +74,22 @@ def _compiled(function):
         raise InputError(f"load kernel {function.__name__!r}: numba cannot compile it: {reason}") from error
 
 
-def _meaning(function):
-    """Code, constants and outer numbers of a function, as plain values."""
+def _meaning(function, above=()):
+    """Code, constants and outer numbers of a function and of those it calls, as plain values."""
     code = function.__code__
     outer = {name: function.__globals__.get(name) for name in code.co_names}
-    outer |= dict(
-        zip(code.co_freevars, (cell.cell_contents for cell in function.__closure__ or ()), strict=True)
-    )
-    plain = {name: value for name, value in outer.items() if isinstance(value, int | float | tuple)}
-    called = {
-        name: _meaning(getattr(value, "py_func", value))
-        for name, value in outer.items()
-        if isinstance(getattr(value, "py_func", None), FunctionType)
-    }
-    constants = [repr(c) for c in code.co_consts if not isinstance(c, CodeType)]
-    return code.co_code.hex(), code.co_names, constants, sorted(plain.items()), sorted(called.items())
+    cells = (cell.cell_contents for cell in function.__closure__ or ())
+    outer |= dict(zip(code.co_freevars, cells, strict=True))
+    known = {}
+    for name, value in sorted(outer.items()):
+        if isinstance(value, int | float | tuple):
+            known[name] = value
+        elif isinstance(value, np.ndarray):
+            known[name] = value.dtype.str, value.shape, value.tobytes()
+        elif isinstance(called := getattr(value, "py_func", None), FunctionType) and called not in above:
+            known[name] = _meaning(called, (*above, function))
+    constants = [repr(constant) for constant in code.co_consts if not isinstance(constant, CodeType)]
+    return code.co_code.hex(), code.co_names, constants, known
 
 
 def load_kernel(function: Callable[..., None]) -> LoadKernel:

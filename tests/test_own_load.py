@@ -402,6 +402,20 @@ def test_what_cannot_be_a_load_is_refused_by_name(make, words):
         make()
 
 
+def test_kernels_that_differ_in_an_outer_number_alone_are_told_apart():
+    """Trims are remembered by what a load does, not by its name."""
+
+    def spring(stiffness, table):
+        def kernel(parameters, motion, force):
+            force[0] = -stiffness * motion[Motion.X] + table[0]
+
+        return Load("Spring", load_kernel(kernel)).key()
+
+    same, zeros = spring(1.0, np.zeros(1)), np.zeros(1)
+    assert spring(1.0, zeros) == same
+    assert spring(2.0, zeros) != same and spring(1.0, np.ones(1)) != same
+
+
 def test_a_kernel_that_numba_cannot_compile_is_refused_by_name():
     with pytest.raises(InputError, match="load kernel 'wordy': numba cannot compile it"):
 

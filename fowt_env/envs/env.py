@@ -70,7 +70,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     wind_preview look-ahead times (s) of the channel wind_preview
     render_mode  None, "rgb_array" (render() returns a picture) or "human" (every step shows one in a window)
     fidelity     level of build_scene: "reference", "standard" or "fast"
-    options      further ones go to build_scene
+    options      further ones go to build_scene, loads of one's own (fowt_env.Load) among them
 
     An episode starts at the operating point of its mean wind, moved by the task's offsets, in wind and
     sea drawn from the task's ranges with the environment's seed: the same seed gives the same bits.
