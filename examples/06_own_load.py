@@ -1,29 +1,55 @@
-"""A load of your own, by adding to a part of the plant: the wind drag of the nacelle.
+"""A load of your own, compiled into the plant: a heave plate under the keel.
 
-The model has no nacelle drag. A scene's model is a tuple of parts, each of plain numbers and arrays, that
-the compiled kernels read; with_model() puts a changed part in place, without compiling anew. Here the
-tower's drag, which is summed over points along its axis, gets one more point at the nacelle. What no part
-can express needs a kernel in the package: CONTRIBUTING.md, "Adding a load".
+A load is a small function that numba compiles, a few numbers, and the point of the platform where it acts.
+The function reads what it needs from `motion` (fowt_env.Motion lists it: where the point is, how it moves,
+wind, water, time) and writes a force and a moment into `force`. It then is a part of the plant like any
+other: trims, linear models, environments and runs have it, and its force is a channel of the output.
+
+The plate is a disk of 20 m: water dragged along with it brakes the heave. Its drag is quadratic in the
+velocity relative to the water, which moves too (water=True). The water that the plate carries with it would
+be added mass: that belongs into the platform file (hydro.heave_added_mass).
 """
 
-import numpy as np
+from math import pi
+from typing import NamedTuple
 
-import fowt_env
+from fowt_env import Load, Motion, build_scene, load_kernel, simulate
 
-AREA = 30.0  # m2, nacelle seen from the front
-DRAG_COEFFICIENT = 0.8
-HEIGHT = 89.35  # m above still water
 
-scene = fowt_env.build_scene(wind=24.0, fidelity="standard")
-factor = 0.5 * scene.platform.environment.air_density * DRAG_COEFFICIENT * AREA  # force / speed^2
-tower = scene.model.tower
-tower = tower._replace(z=np.append(tower.z, HEIGHT), factor=np.append(tower.factor, factor))
-loaded = scene.with_model(tower=tower)
+class Plate(NamedTuple):
+    """What the kernel is given, in this order."""
 
-before, after = (fowt_env.trim(s) for s in (scene, loaded))
-print(f"platform pitch {before['PtfmPitch']:.3f} -> {after['PtfmPitch']:.3f} deg")
-print(f"surge          {before['PtfmSurge']:.3f} -> {after['PtfmSurge']:.3f} m")
-print(f"drag on the nacelle at rest: {factor * 24.0**2 / 1e3:.1f} kN")
+    factor: float  # 1/2 water density x drag coefficient x area, kg/m
 
-run = fowt_env.simulate(loaded, controller="pi", duration=60.0)
-print(f"simulated: surge {run['PtfmSurge_[m]'].iloc[-1]:.2f} m after 60 s")
+
+@load_kernel
+def plate_drag(parameters, motion, force):
+    """Drag along the axis of the spar: the axes are those of the body."""
+    speed = motion[Motion.WATER_Z] - motion[Motion.VZ]
+    force[2] = parameters[0] * abs(speed) * speed
+
+
+DIAMETER, DRAG_COEFFICIENT, KEEL = 20.0, 4.0, -120.0  # m, of a thin disk at small strokes, m
+plate = Load(
+    "Plate",
+    plate_drag,
+    Plate(0.5 * 1025.0 * DRAG_COEFFICIENT * 0.25 * pi * DIAMETER**2),
+    point=(0.0, 0.0, KEEL),
+    axes="body",
+    water=True,
+)
+
+if __name__ == "__main__":
+    still = {"fidelity": "standard"}
+    swell = {"fidelity": "standard", "sea": {"kind": "jonswap", "Hs": 6.0, "Tp": 14.0}}
+    for name, loads in (("bare spar", ()), ("with plate", (plate,))):
+        decay = simulate(
+            build_scene(loads=loads, **still), None, 120.0, start="zero", initial={"PtfmHeave": 4.0}
+        )
+        heave = decay["PtfmHeave_[m]"]
+        waves = simulate(build_scene(loads=loads, **swell), None, 300.0)
+        print(
+            f"{name:10}  heave from 4 m, after 90 to 120 s up to {heave.iloc[-300:].abs().max():.2f} m;"
+            f"  in swell std {waves['PtfmHeave_[m]'].std():.3f} m"
+        )
+    print(f"largest force of the plate in swell: {waves['PlateFzi_[N]'].abs().max() / 1e3:.0f} kN")

@@ -6,13 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fowt_env.dynamics import Kept, inertial_load
+from fowt_env.dynamics import N_KEPT, Kept, inertial_load
 from fowt_env.jit import inlined_kernel, kernel
-from fowt_env.lane_sums import SUM_LANES, lane_dot
-from fowt_env.loads.fast_waves import phasors
+from fowt_env.loads.fast_waves import surface_elevation
+from fowt_env.loads.own import record_own, to_inertial
 from fowt_env.measurement import Measure
 from fowt_env.state import State, pose_of
-from fowt_env.weather.waves import elevation, ramp_factor
 from fowt_env.weather.wind import wind_at, wind_now
 
 DEG = 180.0 / pi
@@ -82,15 +81,24 @@ FIXED_CHANNELS = (
 )
 Out = IntEnum("Out", [c.name.upper() for c in FIXED_CHANNELS], start=0)
 N_FIXED = len(FIXED_CHANNELS)
+LOAD_CHANNELS = (  # of each of the user's loads: about the body origin, inertial axes, as HydroFxi
+    ("Fxi", "N"),
+    ("Fyi", "N"),
+    ("Fzi", "N"),
+    ("Mxi", "N-m"),
+    ("Myi", "N-m"),
+    ("Mzi", "N-m"),
+)
 
 
-def channels(n_lines):
-    """Every output channel of a scene with n_lines mooring lines, in row order."""
+def channels(n_lines, loads=()):
+    """Every output channel of a scene with n_lines mooring lines and loads of these names, in row order."""
     lines = range(1, n_lines + 1)
     return (
         *FIXED_CHANNELS,
         *(Channel(f"FAIRTEN{i}", "kN", 1e-3) for i in lines),
         *(Channel(f"ANCHTEN{i}", "kN", 1e-3) for i in lines),
+        *(Channel(f"{name}{end}", unit, 1.0) for name in loads for end, unit in LOAD_CHANNELS),
     )
 
 
@@ -118,38 +126,6 @@ def point_acceleration(pose, dx, px, py, pz):
     ay = dx[State.VY] + dx[State.WZ] * px - dx[State.WX] * pz + wz * ux - wx * uz
     az = dx[State.VZ] + dx[State.WX] * py - dx[State.WY] * px + wx * uy - wy * ux
     return ax, ay, az
-
-
-@kernel
-def to_inertial(pose, a, b, c):
-    """R (a, b, c)."""
-    return (
-        pose.r11 * a + pose.r12 * b + pose.r13 * c,
-        pose.r21 * a + pose.r22 * b + pose.r23 * c,
-        pose.r31 * a + pose.r32 * b + pose.r33 * c,
-    )
-
-
-@kernel
-def _component_sum(amplitude, cosine):
-    """Sum of amplitude (n,) times cosine, whose padding beyond n is left out."""
-    n = amplitude.shape[0]
-    whole = n - n % SUM_LANES
-    total = lane_dot(amplitude, cosine, whole)
-    for j in range(whole, n):
-        total += amplitude[j] * cosine[j]
-    return total
-
-
-@kernel
-def surface_elevation(t, waves, sea, scratch):
-    """Surface elevation at the origin, m: by the fast phasors where the scene has them; 0 without waves."""
-    if sea is None:
-        return elevation(t, 0.0, 0.0, waves)
-    if waves is None:
-        return 0.0
-    phasors(t, 0.0, sea.component, scratch.phasor[0], scratch.phasor[1])
-    return ramp_factor(t, sea.ramp) * _component_sum(waves.amplitude, scratch.phasor[0])
 
 
 @kernel
@@ -234,6 +210,15 @@ def record(scene, work, x, dx, u, t, loads, row):
     for i in range(n):
         row[N_FIXED + i] = work.lines[i, 2]
         row[N_FIXED + n + i] = work.lines[i, 3]
+    _record_own(pose, scene.own, work.kept, row, N_FIXED + 2 * n)
+
+
+@kernel
+def _record_own(pose, own, kept, row, start):
+    """Fill the channels of the user's loads from start on; nothing without any."""
+    if own is None:
+        return
+    record_own(pose, own, kept[N_KEPT:], row[start:])
 
 
 @inlined_kernel
@@ -271,6 +256,6 @@ def tower_base(pose, x, dx, loads, body, layout, row):
     row[Out.TWRBSMZT] = mz
 
 
-def to_units(rows, n_lines):
-    """Rows (k, n_channels) in SI -> a copy in the channels' units."""
-    return rows * np.array([c.scale for c in channels(n_lines)])
+def to_units(rows, n_lines, loads=()):
+    """Rows (k, n_channels) in SI -> a copy in the units of channels(n_lines, loads)."""
+    return rows * np.array([c.scale for c in channels(n_lines, loads)])

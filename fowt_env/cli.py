@@ -242,8 +242,8 @@ EVALUATE_EXAMPLES = """[bold]Examples[/bold]
 
 [bold]Files written[/bold]: runs/CONTROLLER/CASE_seedN.parquet, results.csv (a row per run), leaderboard.json
 (means, intervals, paired differences, versions), manifest.json (what was asked for), summary.csv (means by
-case), pareto.png, metrics.png, timeseries_CASE.png, spectra_CASE.png. The same command goes on where it was
-stopped; further controllers, cases or seeds are added to the folder."""
+case), pareto.png, metrics.png, boxes.png, timeseries_CASE.png, spectra_CASE.png. The same command
+goes on where it was stopped; further controllers, cases or seeds are added to the folder."""
 
 
 @app.command(epilog=EVALUATE_EXAMPLES)
@@ -387,7 +387,9 @@ TRIM_EXAMPLES = """[bold]Examples[/bold]
 
 [cyan]fowt trim[/cyan]  the floating turbine from cut-in to cut-out
 
-[cyan]fowt trim --winds 8,11.4,18 --fixed --out steady.csv[/cyan]  platform held still, into a file"""
+[cyan]fowt trim --winds 8,11.4,18 --fixed --out steady.csv[/cyan]  platform held still, into a file
+
+[cyan]fowt trim --plot schedule.png[/cyan]  the steady schedule as a picture"""
 TRIM_CHANNELS = (
     "RotSpeed",
     "BldPitch1",
@@ -410,6 +412,7 @@ def trim(
     rotor: RotorOption = None,
     option: OptionOption = None,
     out_path: Annotated[str | None, typer.Option("--out", help="All channels: .csv or .parquet.")] = None,
+    plot: Annotated[str | None, typer.Option(help="Plot of the schedule, e.g. schedule.png.")] = None,
 ):
     """Print the steady operating point over wind speed."""
     import pandas as pd
@@ -437,9 +440,15 @@ def trim(
     for row in rows:
         table.add_row(f"{row['wind']:g}", *(f"{row[name]:.4g}" for name in shown))
     out.print(table)
+    names = {"wind": "Wind_[m/s]"} | {name: f"{name}_[{unit}]" for name, unit in units.items()}
+    points = pd.DataFrame(rows).rename(columns=names)
     if out_path is not None:
-        names = {"wind": "Wind_[m/s]"} | {name: f"{name}_[{unit}]" for name, unit in units.items()}
-        note(f"wrote {write_table(pd.DataFrame(rows).rename(columns=names), out_path)}")
+        note(f"wrote {write_table(points, out_path)}")
+    if plot is not None:
+        from fowt_env.plots_response import plot_schedule
+
+        plot_schedule(points, plot, title)
+        note(f"wrote {plot}")
 
 
 @app.command(name="list")
@@ -762,4 +771,4 @@ def stability(
         raise typer.Exit(1)
 
 
-from fowt_env import cli_design, cli_report, cli_train  # noqa: E402, F401 - add their commands to the app
+from fowt_env import cli_design, cli_plot, cli_report, cli_train  # noqa: E402, F401 - add their commands to the app

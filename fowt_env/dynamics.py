@@ -17,6 +17,7 @@ from fowt_env.loads.fast_waves import FastScratch, fast_morison_load
 from fowt_env.loads.hydrostatics import hydrostatic_load
 from fowt_env.loads.mooring import mooring_load
 from fowt_env.loads.morison import StripLoad, morison_load
+from fowt_env.loads.own import evaluate_own, with_own
 from fowt_env.loads.rotor import RotorLoad, rotor_load
 from fowt_env.loads.rotor_lookup import rotor_lookup_load
 from fowt_env.loads.rotor_table import rotor_table_load
@@ -66,6 +67,7 @@ class Model(NamedTuple):
     wind: object  # weather.wind.WindSeries or None: no aerodynamics at all
     wind_field: object  # weather.wind_field.WindField or None: the wind series alone
     multistep: object  # integrators.Multistep or None: Runge-Kutta 4
+    own: object = None  # loads.own.OwnLoads, the user's, or None
 
 
 class Kept(IntEnum):
@@ -105,7 +107,7 @@ class Work(NamedTuple):
     fast: FastScratch  # the same for fast strip loads
     matrix: np.ndarray  # (6, 6)
     stages: np.ndarray  # (5, n_state) Runge-Kutta stages and stage state
-    kept: np.ndarray  # (N_KEPT,)
+    kept: np.ndarray  # (N_KEPT + room,), room of the user's loads (loads.own.room_of)
     history: np.ndarray  # (4, n_state) derivatives of past steps, latest first
 
 
@@ -113,7 +115,7 @@ class Loads(NamedTuple):
     """Loads of one evaluation, for outputs (body components about the body origin)."""
 
     rotor: RotorLoad
-    tower: Wrench
+    tower: Wrench  # drag, and the user's loads above the tower base
     hydro: Wrench  # buoyancy, strip loads with added mass times acceleration, additional linear terms
     mooring: Wrench
 
@@ -233,6 +235,22 @@ def strip_part(
 
 
 @kernel
+def own_part(t, pose, x, now, wind, field, waves, sea, current, scratch, own, kept):
+    """Have the user's loads evaluated into the end of kept; nothing without any."""
+    if own is None:
+        return
+    evaluate_own(t, pose, x, now, wind, field, waves, sea, current, scratch, own, kept[N_KEPT:])
+
+
+@kernel
+def with_own_part(load, above, own, kept):
+    """The load with the user's loads above the tower base, or the others, added; as it is without any."""
+    if own is None:
+        return load
+    return with_own(load, above, own, kept[N_KEPT:])
+
+
+@kernel
 def _keep(kept, start, wrench):
     """Store a wrench in six entries of kept."""
     kept[start] = wrench.fx
@@ -268,6 +286,11 @@ def evaluate(t, x, scene, work, dx):
         scene.diffraction, scene.lane_diffraction,
     )  # fmt: skip
     mooring = mooring_load(pose, scene.mooring, work.lines, work.counters)
+    own_part(
+        t, pose, x, now, scene.wind, scene.wind_field, scene.waves, scene.sea, scene.current, work.fast,
+        scene.own, kept,
+    )  # fmt: skip
+    tower = with_own_part(tower, True, scene.own, kept)
 
     load = add(aero.wrench, tower)
     load = add(load, gravity_load(pose, body))
@@ -276,6 +299,7 @@ def evaluate(t, x, scene, work, dx):
     load = add(load, mooring)
     damping = damping_load(pose, x, scene.damping)
     load = add(load, damping)
+    load = with_own_part(load, False, scene.own, kept)
 
     _keep(kept, Kept.TOTAL, load)
     _keep(kept, Kept.ROTOR, aero.wrench)

@@ -13,6 +13,7 @@ from fowt_env.plots import COLOURS, INK, TIME, named_runs, new_figure, save_figu
 WAVE = "Wave1Elev_[m]"
 WIND = "Wind_[m/s]"  # column of `fowt trim --out`
 WHISKERS = (1.0, 99.0)  # percentiles
+HATCHES = ("", "/////", "....", "xxxx")  # of boxes, for each further round of colours
 ENERGETIC = 0.02  # of the peak of the wave spectrum: an RAO is shown where the waves have more
 BOXES = (
     ("rotor speed\n(rpm)", "RotSpeed_[rpm]"),
@@ -103,8 +104,12 @@ def plot_boxes(cases, path=None, title=None, skip=0.0):
             )
             for box in boxes["boxes"]:
                 box.set(facecolor=colour, alpha=0.65, edgecolor=colour)
+                box.set_hatch(HATCHES[number // len(COLOURS) % len(HATCHES)])
+            for line in (*boxes["whiskers"], *boxes["caps"]):
+                line.set(color=colour, linewidth=0.9)
         axes.set_ylabel(name, fontsize=8, color=INK)
-        axes.set_xticks(np.arange(len(kept)), list(kept), fontsize=8)
+        named = list(kept) != [""]
+        axes.set_xticks(np.arange(len(kept)) if named else [], list(kept) if named else [], fontsize=8)
         axes.set_xlim(-0.6, len(kept) - 0.4)
     _legend(figure, places[0], labels)
     if title:

@@ -1,6 +1,6 @@
 """From descriptions to a scene: everything that a run needs, checked, typed and built once."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import cos, radians, sin
 from pathlib import Path
@@ -30,10 +30,12 @@ from fowt_env.loads.fast_waves import (
 from fowt_env.loads.hydrostatics import build_hull
 from fowt_env.loads.mooring import build_mooring
 from fowt_env.loads.morison import Current, build_strips
+from fowt_env.loads.own import room_of
 from fowt_env.loads.rotor_lookup import build_section_table
 from fowt_env.loads.rotor_table import build_rotor_table
 from fowt_env.loads.tower import build_tower_drag
 from fowt_env.loads.wake import build_dynamic_inflow, build_skewed_wake, n_wake_states
+from fowt_env.own_load import Load, blamed, build_own_loads, checked_loads
 from fowt_env.sea_states import SeaState
 from fowt_env.state import N_RIGID
 from fowt_env.weather.waves import build_waves
@@ -96,11 +98,16 @@ class Scene:
     rotor: str
     options: dict
     wind_speed: float | None  # mean hub wind that a trim uses; None without aerodynamics
+    loads: tuple[Load, ...] = ()  # the user's own
     trims: dict = field(default_factory=dict, init=False, repr=False)  # {platform mode: OperatingPoint} found
 
     @property
     def n_lines(self) -> int:
         return 0 if self.model.mooring is None else self.model.mooring.length.shape[0]
+
+    @property
+    def load_names(self) -> tuple[str, ...]:
+        return tuple(load.name for load in self.loads)
 
     @property
     def n_state(self) -> int:
@@ -109,7 +116,7 @@ class Scene:
     @property
     def channels(self) -> tuple[Channel, ...]:
         """Output channels of this scene, in row order."""
-        return channels(self.n_lines)
+        return channels(self.n_lines, self.load_names)
 
     def work(self) -> Work:
         """Fresh scratch arrays for one plant of this scene."""
@@ -121,13 +128,17 @@ class Scene:
             fast_scratch(self.model.sea, self.model.lanes),
             np.zeros((6, 6)),
             np.zeros((5, self.n_state)),
-            np.zeros(N_KEPT),
+            np.zeros(N_KEPT + room_of(len(self.loads))),
             np.zeros((4, self.n_state)),
         )
 
     def box(self, work: Work | None = None) -> Box:
         """The scene and scratch in the form that kernels take from Python."""
         return Box(self.model, self.work() if work is None else work)
+
+    def blamed(self, work: Work) -> str | None:
+        """Words for the load of the user's that spoilt a run with this scratch; None where none did."""
+        return blamed(self.loads, work.kept[N_KEPT:])
 
     def with_weather(self, wind: Wind, sea: Sea, seed: int) -> "Scene":
         """A copy in other weather of the same kind: only wind and sea are drawn anew.
@@ -184,6 +195,7 @@ def build_scene(
     seed: int = 0,
     rotor: str | None = None,
     fidelity: str = "reference",
+    loads: Sequence[Load] = (),
     **options: Any,
 ) -> Scene:
     """Scene of a platform, a wind and a sea.
@@ -199,6 +211,7 @@ def build_scene(
               from a table per station; "table": the whole rotor as one table. None: the fidelity's
     fidelity  "reference": everything solved exactly, Runge-Kutta 4; "standard": every blade and station
               by look-up, fast wave sums, Adams-Bashforth 4; "fast": the rotor as one table
+    loads     further loads on platform and tower, of one's own (own_load.Load)
     options   see OPTIONS; a platform file may set other defaults. planar: surge, heave and platform pitch
               alone move; of ntm and etm turbulence the part in the plane is kept
 
@@ -226,6 +239,8 @@ def build_scene(
     current = _current(chosen["current"]) if hydrodynamics else None
     if chosen["planar"]:
         _check_symmetry(platform.lines if chosen["mooring"] else (), current)
+    mooring = _mooring(platform.lines, chosen["mooring"])
+    own = checked_loads(loads, 0 if mooring is None else mooring.length.shape[0], chosen["planar"])
     model = Model(
         body=build_body(platform, turbine, plane=True if chosen["planar"] else None),
         layout=build_layout(platform, turbine),
@@ -238,7 +253,7 @@ def build_scene(
         sea=fast,
         **_diffraction(chosen, waves, strips, fast, lanes),
         current=current,
-        mooring=_mooring(platform.lines, chosen["mooring"]),
+        mooring=mooring,
         damping=build_damping(platform.hydro) if hydrodynamics else None,
         rotor=elements if rotor == "bem" else None,
         rotor_lookup=build_section_table(elements) if aero and rotor == "lookup" else None,
@@ -249,8 +264,9 @@ def build_scene(
         wind=series,
         wind_field=air.field,
         multistep=build_integrator(chosen["integrator"]),
+        own=build_own_loads(own, platform.tower.base_height, site.water_depth),
     )
-    return Scene(model, platform, turbine, air.spec, sea, seed, rotor, chosen, air.speed)
+    return Scene(model, platform, turbine, air.spec, sea, seed, rotor, chosen, air.speed, own)
 
 
 def _parts(fidelity, rotor, chosen):

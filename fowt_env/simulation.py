@@ -212,7 +212,8 @@ class _Loop:
     def __init__(self, scene, controller, x, u, dt, per_control, per_output, last):
         self.scene = scene
         self.controller = controller
-        self.box = scene.box()
+        self.work = scene.work()
+        self.box = scene.box(self.work)
         self.x, self.u, self.dt = x, u, float(dt)
         self.per_control, self.per_output, self.last = per_control, per_output, last
         self.dx = np.zeros_like(x)
@@ -273,11 +274,13 @@ class _Loop:
     def _check(self, status, step):
         if status != RUNNING:
             reason, time = STOP_REASONS[status], step * self.dt
+            if fault := self.scene.blamed(self.work):
+                reason = f"{reason}: {fault}"
             raise SimulationStopped(f"stopped at t = {time:.3f} s: {reason}", reason, time, self.frame())
 
     def frame(self):
         """Rows so far in channel units."""
-        values = to_units(self.rows[: self.filled], self.scene.n_lines)
+        values = to_units(self.rows[: self.filled], self.scene.n_lines, self.scene.load_names)
         return pd.DataFrame(values, columns=[c.column for c in self.scene.channels])
 
 

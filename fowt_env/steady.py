@@ -135,7 +135,8 @@ class _Steady:
     scene: object
 
     def __post_init__(self):
-        self.box = self.scene.box()
+        self.work = self.scene.work()
+        self.box = self.scene.box(self.work)
         self.x = np.zeros(self.scene.n_state)
         self.u = np.zeros(2)
         self.dx = np.zeros_like(self.x)
@@ -147,6 +148,8 @@ class _Steady:
         if self.scene.model.wake is not None:
             settle_wake(self.box, self.x, self.dx)
         mean_derivative(self.box, self.x, self.u, AZIMUTHS, self.dx, self.mean)
+        if fault := self.scene.blamed(self.work):
+            raise InputError(f"no steady state found for {self.scene!r}: {fault}")
         return self.mean
 
     def rotor_acceleration(self, rotor_speed, blade_pitch):
@@ -333,7 +336,7 @@ def _point(scene, steady, platform):
         x = state.copy()
         x[State.AZIMUTH] += i * (2.0 * pi / 3.0) / AZIMUTHS
         rows.append(output_row(steady.box, x, command, 0.0, len(scene.channels)))
-    row = to_units(np.mean(rows, axis=0), scene.n_lines)
+    row = to_units(np.mean(rows, axis=0), scene.n_lines, scene.load_names)
     names = [channel.name for channel in scene.channels]
     values = {name: float(value) for name, value in zip(names, row, strict=True)}
     values["Azimuth"] = 0.0

@@ -197,8 +197,8 @@ def test_evaluate_writes_table_runs_and_plots(tmp_path):
     assert (table["status"] == "ok").all() and len(pd.read_csv(tmp_path / "summary.csv")) == 4
     pictures = sorted(path.name for path in tmp_path.glob("*.png"))
     assert pictures == [
-        "metrics.png", "pareto.png", "spectra_ntm_18.png", "spectra_steady_16.png", "timeseries_ntm_18.png",
-        "timeseries_steady_16.png",
+        "boxes.png", "metrics.png", "pareto.png", "spectra_ntm_18.png", "spectra_steady_16.png",
+        "timeseries_ntm_18.png", "timeseries_steady_16.png",
     ]  # fmt: skip
     assert all(path.stat().st_size > 10_000 for path in tmp_path.glob("*.png"))
     assert len(list((tmp_path / "runs").rglob("*.parquet"))) == 4
@@ -252,7 +252,7 @@ def test_list_names_everything_that_the_other_commands_take():
     assert "oc3_hywind" not in fowt("list", "controllers")[0]
 
 
-@pytest.mark.parametrize("command", ["simulate", "evaluate", "trim"])
+@pytest.mark.parametrize("command", ["simulate", "evaluate", "trim", "plot"])
 def test_help_shows_examples_whose_options_exist(command):
     stdout, _ = fowt(command, "--help")
     assert "Examples" in stdout

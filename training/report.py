@@ -6,7 +6,8 @@ from dataclasses import replace
 from fowt_env.description import Platform, read_platform
 from fowt_env.errors import unknown
 from fowt_env.outputs import read_table
-from fowt_env.plots import plot_evaluation, plot_pareto, plot_runs, plot_spectra
+from fowt_env.plots import TIME, plot_evaluation, plot_pareto, plot_runs, plot_spectra
+from fowt_env.plots_response import BOXES, plot_boxes
 from training.cases import Score, named_cases, read_suite
 from training.leaderboard import leaderboard
 from training.results import run_file, write_json
@@ -189,7 +190,8 @@ def evaluation_plots(table, board, folder):
     """Paths of the plots made of a results folder, its table and its leaderboard.
 
     pareto.png sets rotor-speed against platform-pitch deviation; metrics.png compares the controllers over
-    all cases; timeseries_CASE.png and spectra_CASE.png show the first seed of each case that went well.
+    all cases; boxes.png has quartiles and extremes, timeseries_CASE.png and spectra_CASE.png the series
+    and spectra, of the first seed of each case that went well.
     """
     manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
     good = table[table["status"] == "ok"]
@@ -198,6 +200,7 @@ def evaluation_plots(table, board, folder):
     paths = [folder / "pareto.png", folder / "metrics.png"]
     plot_pareto(board, paths[0])
     plot_evaluation(table, [name for _, name, _ in HEADLINE], paths[1], "Mean over seeds, with their range")
+    boxes = {}
     for case, about in manifest["cases"].items():
         rows = good[good["case"] == case]
         if rows.empty:
@@ -210,7 +213,16 @@ def evaluation_plots(table, board, folder):
         plot_runs(runs, paths[-2], title)
         period = _platform_pitch_period(about["platform"])
         plot_spectra(runs, paths[-1], title, about["skip"], platform_pitch_period=period)
+        boxes[case] = {name: _scored_rows(frame, about["skip"]) for name, frame in runs.items()}
+    paths.append(folder / "boxes.png")
+    plot_boxes(boxes, paths[-1], "First seed of each case: quartiles, and 1 to 99 %")
     return paths
+
+
+def _scored_rows(frame, skip):
+    """The drawn channels of a run after what is not scored."""
+    columns = [TIME, *(channel for _, channel in BOXES if channel in frame.columns)]
+    return frame.loc[frame[TIME] >= skip, columns]
 
 
 def _platform_pitch_period(platform):

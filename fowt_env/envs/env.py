@@ -70,7 +70,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     wind_preview look-ahead times (s) of the channel wind_preview
     render_mode  None, "rgb_array" (render() returns a picture) or "human" (every step shows one in a window)
     fidelity     level of build_scene: "reference", "standard" or "fast"
-    options      further ones go to build_scene
+    options      further ones go to build_scene, loads of one's own (fowt_env.Load) among them
 
     An episode starts at the operating point of its mean wind, moved by the task's offsets, in wind and
     sea drawn from the task's ranges with the environment's seed: the same seed gives the same bits.
@@ -304,12 +304,17 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         terminated = status != RUNNING
         truncated = not terminated and step >= self._last
         if terminated:
-            info["termination"] = REASONS[status]
+            info["termination"] = self._reason(status)
         if terminated or truncated:
             self._running = False
         if self.render_mode == "human":
             self.render()
         return run.observation.copy(), reward, terminated, truncated, info
+
+    def _reason(self, status):
+        """Why an episode was terminated, with the load of the user's that is to blame, if one is."""
+        fault = self.scene.blamed(self._run.work)
+        return f"{REASONS[status]}: {fault}" if fault else REASONS[status]
 
     def get_state(self) -> Snapshot:
         """Snapshot of all that decides how the run goes on: plant, controller, counters, weather, draws.
@@ -373,7 +378,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         row = np.empty(len(scene.channels))
         time = run.counts[STEP] * self.dt
         output(scene.box(work), run.x, run.u, time, np.zeros_like(run.x), row)
-        values = to_units(row[None, :], scene.n_lines)[0].tolist()
+        values = to_units(row[None, :], scene.n_lines, scene.load_names)[0].tolist()
         return dict(zip((channel.name for channel in scene.channels), values, strict=True))
 
     def render(self) -> np.ndarray | None:

@@ -16,7 +16,8 @@ def plant_key(scene):
     """Hash of all that a trim depends on, apart from the wind; the same in every process."""
     weather = ("duration", "wave_components")
     options = {name: _values(value) for name, value in scene.options.items() if name not in weather}
-    parts = (_values(scene.platform), _values(scene.turbine), scene.rotor, options)
+    loads = tuple(load.key() for load in scene.loads)
+    parts = (_values(scene.platform), _values(scene.turbine), scene.rotor, options, loads)
     return hashlib.sha256(pickle.dumps(parts)).hexdigest()
 
 

@@ -14,7 +14,7 @@ from gymnasium.vector.utils import batch_space
 
 from fowt_env.envs.batch import act_all, act_all_parallel, thread_limit
 from fowt_env.envs.env import REWARD_KEYS, FowtEnv
-from fowt_env.envs.kernels import REASONS, RUNNING, SATURATED, STEP
+from fowt_env.envs.kernels import RUNNING, SATURATED, STEP
 from fowt_env.envs.observations import N_ACTIONS
 from fowt_env.envs.rewards import N_TERMS
 from fowt_env.envs.snapshot import Snapshot
@@ -236,7 +236,7 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
             infos[f"_{key}"] = shown.copy()
         failed = np.flatnonzero(shown & terminations)
         for i in failed:
-            infos = self._add_info(infos, {"termination": REASONS[self._statuses[i]]}, int(i))
+            infos = self._add_info(infos, {"termination": self.envs[i]._reason(self._statuses[i])}, int(i))
         return infos
 
     def _finals(self, ended):
@@ -253,7 +253,7 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         info["time"] = float(self._counts[i, STEP] * self._dt[i])
         info["saturated_actions"] = int(self._counts[i, SATURATED])
         if self._statuses[i] != RUNNING:
-            info["termination"] = REASONS[self._statuses[i]]
+            info["termination"] = self.envs[i]._reason(self._statuses[i])
         return info
 
     def get_state(self) -> tuple[Snapshot, ...]:

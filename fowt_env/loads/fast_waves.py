@@ -26,11 +26,11 @@ from typing import NamedTuple
 import numpy as np
 
 from fowt_env.jit import kernel
-from fowt_env.lane_sums import crossed_sums
+from fowt_env.lane_sums import SUM_LANES, crossed_sums, lane_dot
 from fowt_env.loads.diffraction import TERMS, coefficient_series
 from fowt_env.loads.morison import StripLoad, current_at
 from fowt_env.state import NO_LOAD, Wrench, add
-from fowt_env.weather.waves import ramp_factor
+from fowt_env.weather.waves import elevation, ramp_factor
 
 BAND = 6  # wave numbers K that share one component; 4: 1e-3, 6: 1e-4, 8: 4e-5 of one component
 RATIO = sqrt(2.0)  # of neighbouring K; the squaring chains need a square root of 2
@@ -298,6 +298,28 @@ def phasors(t, distance, component, cosine, sine):
         c = 1.0 - q * (0.5 - q * c)
         cosine[j] = 1.0 - 2.0 * s * s
         sine[j] = 2.0 * s * c
+
+
+@kernel
+def _component_sum(amplitude, cosine):
+    """Sum of amplitude (n,) times cosine, whose padding beyond n is left out."""
+    n = amplitude.shape[0]
+    whole = n - n % SUM_LANES
+    total = lane_dot(amplitude, cosine, whole)
+    for j in range(whole, n):
+        total += amplitude[j] * cosine[j]
+    return total
+
+
+@kernel
+def surface_elevation(t, waves, sea, scratch):
+    """Surface elevation at the origin, m: by the fast phasors where the scene has them; 0 without waves."""
+    if sea is None:
+        return elevation(t, 0.0, 0.0, waves)
+    if waves is None:
+        return 0.0
+    phasors(t, 0.0, sea.component, scratch.phasor[0], scratch.phasor[1])
+    return ramp_factor(t, sea.ramp) * _component_sum(waves.amplitude, scratch.phasor[0])
 
 
 @kernel

@@ -1,0 +1,90 @@
+"""The command that makes a picture of files that the others wrote: fowt plot."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from fowt_env.cli import app, note, reported
+from fowt_env.errors import InputError, unknown
+
+KINDS = ("series", "spectra", "boxes", "raos", "schedule")
+PLOT_EXAMPLES = """[bold]Examples[/bold]
+
+[cyan]fowt plot series run.csv[/cyan]  stacked time series, into series.png
+
+[cyan]fowt plot spectra pi.csv lqr.csv --skip 100 --out spectra.png[/cyan]  two runs over each other
+
+[cyan]fowt plot boxes results/demo/runs/*/ntm_18_seed1.parquet --out boxes.png[/cyan]  a box for each run
+
+[cyan]fowt plot raos waves.parquet --skip 100[/cyan]  motion per metre of wave, of a run in irregular waves
+
+[cyan]fowt plot schedule steady.csv[/cyan]  operating points that fowt trim --out wrote
+
+Runs are files of fowt simulate --out and of an evaluation's runs folder (.csv, .parquet)."""
+
+
+@app.command(epilog=PLOT_EXAMPLES)
+@reported
+def plot(
+    kind: Annotated[str, typer.Argument(help="series, spectra, boxes, raos or schedule.")],
+    files: Annotated[list[str], typer.Argument(help="Tables, .csv or .parquet; one line or box for each.")],
+    out_path: Annotated[
+        str | None, typer.Option("--out", help="Picture: .png, .svg, .pdf ...; default: KIND.png.")
+    ] = None,
+    skip: Annotated[float, typer.Option(min=0.0, help="Seconds at the start left out; not of series.")] = 0.0,
+    title: Annotated[str | None, typer.Option(help="Heading.")] = None,
+    platform: Annotated[
+        str, typer.Option(help="Whose natural period of platform pitch the spectra mark; or none.")
+    ] = "oc3_hywind",
+):
+    """Plot saved runs: time series, spectra, box plots, response to waves; or the steady schedule."""
+    from fowt_env.outputs import read_table
+
+    if kind not in KINDS:
+        raise unknown("kind of plot", kind, KINDS)
+    frames = {name: read_table(path) for name, path in _names(files).items()}
+    if len(frames) == 1:  # nothing to tell apart
+        frames = {"": next(iter(frames.values()))}
+    out_path = f"{kind}.png" if out_path is None else out_path
+    _draw(kind, frames, out_path, title, skip, platform)
+    note(f"wrote {out_path}")
+
+
+def _names(files):
+    """{what tells the path from the others, folders and endings that all share left out: path}."""
+    if len(set(files)) < len(files):
+        raise InputError(f"files {', '.join(files)}: each must be given once")
+    parts = [[*Path(file).parts[:-1], Path(file).stem] for file in files]
+    for end in (0, -1):
+        while len({own[end] for own in parts}) == 1 and min(map(len, parts)) > 1:
+            for own in parts:
+                own.pop(end)
+    names = ["/".join(own) for own in parts]
+    if len(set(names)) < len(names):  # the same run as .csv and as .parquet
+        names = files
+    return dict(zip(names, files, strict=True))
+
+
+def _draw(kind, frames, path, title, skip, platform):
+    """Write the picture of a kind."""
+    from fowt_env import plots, plots_response
+
+    if kind == "series":
+        plots.plot_runs(frames, path, title)
+    elif kind == "spectra":
+        period = None if platform.lower() == "none" else _platform_pitch_period(platform)
+        plots.plot_spectra(frames, path, title, skip, platform_pitch_period=period)
+    elif kind == "boxes":
+        plots_response.plot_boxes({"": frames}, path, title, skip)
+    elif kind == "raos":
+        plots_response.plot_raos(frames, path, title, skip)
+    else:
+        plots_response.plot_schedule(frames, path, title)
+
+
+def _platform_pitch_period(platform):
+    """Natural period (s) of platform pitch that a platform's file states, or None."""
+    from fowt_env.description import read_platform
+
+    return read_platform(platform).published.get("natural_periods", {}).get("pitch")

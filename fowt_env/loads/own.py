@@ -1,0 +1,260 @@
+"""Users' own loads as a part of the plant: what their kernels are given, and the sum of what they return.
+
+A kernel is a first-class function of fixed signature: its address is data, so that a scene with loads is
+compiled once, whatever they are, and comes from the cache of compiled kernels afterwards.
+"""
+
+from enum import IntEnum
+from math import isfinite
+from typing import NamedTuple
+
+import numpy as np
+
+from fowt_env.jit import inlined_kernel, kernel
+from fowt_env.loads.fast_waves import surface_elevation
+from fowt_env.loads.morison import current_at
+from fowt_env.state import State, Wrench, add
+from fowt_env.weather.waves import wave_kinematics
+from fowt_env.weather.wind import wind_at
+
+MOST_LOADS = 8
+
+
+class Motion(IntEnum):
+    """Entries of the array `motion` that a load kernel reads (SI, radians).
+
+    Position and rotation are in inertial axes. Velocities, wind and water are in the axes of the load:
+    inertial ones, or those of the body where it was built with axes="body".
+    """
+
+    TIME = 0
+    X = 1  # the load's point, inertial, m
+    Y = 2
+    Z = 3
+    VX = 4  # its velocity, m/s
+    VY = 5
+    VZ = 6
+    WX = 7  # angular velocity of the platform, rad/s
+    WY = 8
+    WZ = 9
+    SURGE = 10  # the body origin, inertial, m
+    SWAY = 11
+    HEAVE = 12
+    ROLL = 13  # 3-2-1 Euler angles (yaw first), rad
+    PLATFORM_PITCH = 14
+    YAW = 15
+    R11 = 16  # rotation from body to inertial axes, row by row
+    R12 = 17
+    R13 = 18
+    R21 = 19
+    R22 = 20
+    R23 = 21
+    R31 = 22
+    R32 = 23
+    R33 = 24
+    ROTOR_SPEED = 25  # rad/s
+    AZIMUTH = 26
+    BLADE_PITCH = 27
+    WIND_X = 28  # undisturbed wind at the point, m/s; zero without aerodynamics
+    WIND_Y = 29
+    WIND_Z = 30
+    ELEVATION = 31  # surface at the inertial origin, m
+    WATER_X = 32  # velocity of waves and current at the point, m/s; zero unless the load asks for water
+    WATER_Y = 33
+    WATER_Z = 34
+    WATER_AX = 35  # acceleration of the waves there, m/s2
+    WATER_AY = 36
+    WATER_AZ = 37
+
+
+N_MOTION = len(Motion)
+
+
+class OwnLoads(NamedTuple):
+    """Up to MOST_LOADS loads, n of them in use."""
+
+    parameters: np.ndarray  # of all loads, one after the other
+    first: np.ndarray  # (n + 1,) where those of each load start, int64
+    point: np.ndarray  # (n, 3) where each acts, body axes, m
+    body_axes: np.ndarray  # (n,) bool: axes of velocities and of the force
+    above: np.ndarray  # (n,) bool: above the tower base, which then carries it
+    water: np.ndarray  # (n,) bool: wants the motion of the water
+    depth: float  # m
+    kernel0: object  # first-class functions; a tuple of them makes numba warn at every use
+    kernel1: object
+    kernel2: object
+    kernel3: object
+    kernel4: object
+    kernel5: object
+    kernel6: object
+    kernel7: object
+
+
+def room_of(count):
+    """Entries of Work.kept that this many loads need: six of each, the first to fail, and Motion."""
+    return 6 * count + 1 + N_MOTION if count else 0
+
+
+@inlined_kernel
+def call_kernel(i, own, parameters, motion, force):
+    """Have load i write its force and moment (6,)."""
+    if i == 0:
+        own.kernel0(parameters, motion, force)
+    elif i == 1:
+        own.kernel1(parameters, motion, force)
+    elif i == 2:
+        own.kernel2(parameters, motion, force)
+    elif i == 3:
+        own.kernel3(parameters, motion, force)
+    elif i == 4:
+        own.kernel4(parameters, motion, force)
+    elif i == 5:
+        own.kernel5(parameters, motion, force)
+    elif i == 6:
+        own.kernel6(parameters, motion, force)
+    else:
+        own.kernel7(parameters, motion, force)
+
+
+@kernel
+def to_body(pose, a, b, c):
+    """R^T (a, b, c)."""
+    return (
+        pose.r11 * a + pose.r21 * b + pose.r31 * c,
+        pose.r12 * a + pose.r22 * b + pose.r32 * c,
+        pose.r13 * a + pose.r23 * b + pose.r33 * c,
+    )
+
+
+@kernel
+def to_inertial(pose, a, b, c):
+    """R (a, b, c)."""
+    return (
+        pose.r11 * a + pose.r12 * b + pose.r13 * c,
+        pose.r21 * a + pose.r22 * b + pose.r23 * c,
+        pose.r31 * a + pose.r32 * b + pose.r33 * c,
+    )
+
+
+@kernel
+def fill_common(t, pose, x, elevation, motion):
+    """Fill what is the same for every load."""
+    motion[Motion.TIME] = t
+    motion[Motion.SURGE], motion[Motion.SWAY], motion[Motion.HEAVE] = pose.x, pose.y, pose.z
+    motion[Motion.ROLL] = x[State.ROLL]
+    motion[Motion.PLATFORM_PITCH] = x[State.PLATFORM_PITCH]
+    motion[Motion.YAW] = x[State.YAW]
+    motion[Motion.R11], motion[Motion.R12], motion[Motion.R13] = pose.r11, pose.r12, pose.r13
+    motion[Motion.R21], motion[Motion.R22], motion[Motion.R23] = pose.r21, pose.r22, pose.r23
+    motion[Motion.R31], motion[Motion.R32], motion[Motion.R33] = pose.r31, pose.r32, pose.r33
+    motion[Motion.ROTOR_SPEED] = x[State.ROTOR_SPEED]
+    motion[Motion.AZIMUTH] = x[State.AZIMUTH]
+    motion[Motion.BLADE_PITCH] = x[State.BLADE_PITCH]
+    motion[Motion.ELEVATION] = elevation
+
+
+@kernel
+def put(motion, start, pose, body_axes, a, b, c):
+    """Store a vector given in inertial axes in three entries, in the axes of the load."""
+    if body_axes:
+        a, b, c = to_body(pose, a, b, c)
+    motion[start] = a
+    motion[start + 1] = b
+    motion[start + 2] = c
+
+
+@kernel
+def fill_place(pose, px, py, pz, body_axes, motion):
+    """Fill where the point (body axes) is and how it moves."""
+    a, b, c = to_inertial(pose, px, py, pz)
+    motion[Motion.X], motion[Motion.Y], motion[Motion.Z] = pose.x + a, pose.y + b, pose.z + c
+    u = pose.vx + pose.wy * pz - pose.wz * py
+    v = pose.vy + pose.wz * px - pose.wx * pz
+    w = pose.vz + pose.wx * py - pose.wy * px
+    a, b, c = to_inertial(pose, u, v, w)
+    put(motion, Motion.VX, pose, body_axes, a, b, c)
+    a, b, c = to_inertial(pose, pose.wx, pose.wy, pose.wz)
+    put(motion, Motion.WX, pose, body_axes, a, b, c)
+
+
+@kernel
+def fill_water(t, pose, waves, current, depth, wanted, body_axes, motion):
+    """Fill the motion of the water at the point, above the still surface that at it; zero if not wanted."""
+    u = v = w = du = dv = dw = 0.0
+    if wanted:
+        z = min(motion[Motion.Z], 0.0)
+        u, v = current_at(z, depth, current)
+        if waves is not None:
+            moved = wave_kinematics(t, motion[Motion.X], motion[Motion.Y], z, waves)
+            u, v, w = u + moved.u, v + moved.v, moved.w
+            du, dv, dw = moved.du, moved.dv, moved.dw
+    put(motion, Motion.WATER_X, pose, body_axes, u, v, w)
+    put(motion, Motion.WATER_AX, pose, body_axes, du, dv, dw)
+
+
+@kernel
+def body_wrench(pose, px, py, pz, body_axes, force):
+    """Wrench about the body origin, body axes, of a force and moment (6,) at a point, in the load's axes."""
+    fx, fy, fz, mx, my, mz = force[0], force[1], force[2], force[3], force[4], force[5]
+    if not body_axes:
+        fx, fy, fz = to_body(pose, fx, fy, fz)
+        mx, my, mz = to_body(pose, mx, my, mz)
+    return Wrench(fx, fy, fz, mx + py * fz - pz * fy, my + pz * fx - px * fz, mz + px * fy - py * fx)
+
+
+@kernel
+def evaluate_own(t, pose, x, now, wind, field, waves, sea, current, scratch, own, room):
+    """Fill room (room_of(n),): the wrench of each load, body axes about the body origin.
+
+    room[6 n] becomes the number, from 1, of the first load that gave a number that is not finite while
+    what it was given was finite.
+    """
+    n = own.point.shape[0]
+    motion = room[6 * n + 1 :]
+    fill_common(t, pose, x, surface_elevation(t, waves, sea, scratch), motion)
+    for i in range(n):
+        px, py, pz = own.point[i, 0], own.point[i, 1], own.point[i, 2]
+        axes = own.body_axes[i]
+        fill_place(pose, px, py, pz, axes, motion)
+        u, v, w = wind_at(t, motion[Motion.X], motion[Motion.Y], motion[Motion.Z], now, wind, field)
+        put(motion, Motion.WIND_X, pose, axes, u, v, w)
+        fill_water(t, pose, waves, current, own.depth, own.water[i], axes, motion)
+        force = room[6 * i : 6 * i + 6]
+        for j in range(6):
+            force[j] = 0.0
+        call_kernel(i, own, own.parameters[own.first[i] : own.first[i + 1]], motion, force)
+        total = given = 0.0
+        for j in range(6):
+            total += force[j]
+        for j in range(N_MOTION):
+            given += motion[j]
+        if room[6 * n] == 0.0 and not isfinite(total) and isfinite(given):
+            room[6 * n] = i + 1.0
+        load = body_wrench(pose, px, py, pz, axes, force)
+        force[0], force[1], force[2] = load.fx, load.fy, load.fz
+        force[3], force[4], force[5] = load.mx, load.my, load.mz
+
+
+@kernel
+def own_wrench(i, room):
+    """Wrench of load i, as evaluate_own left it."""
+    k = 6 * i
+    return Wrench(room[k], room[k + 1], room[k + 2], room[k + 3], room[k + 4], room[k + 5])
+
+
+@kernel
+def with_own(load, above, own, room):
+    """The load with those own loads added that act above the tower base, or those that do not."""
+    for i in range(own.point.shape[0]):
+        if own.above[i] == above:
+            load = add(load, own_wrench(i, room))
+    return load
+
+
+@kernel
+def record_own(pose, own, room, row):
+    """Fill six channels of each load into row: force and moment about the body origin, inertial axes."""
+    for i in range(own.point.shape[0]):
+        load = own_wrench(i, room)
+        row[6 * i], row[6 * i + 1], row[6 * i + 2] = to_inertial(pose, load.fx, load.fy, load.fz)
+        row[6 * i + 3], row[6 * i + 4], row[6 * i + 5] = to_inertial(pose, load.mx, load.my, load.mz)

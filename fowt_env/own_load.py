@@ -1,0 +1,295 @@
+"""Loads of one's own, compiled into the plant: a kernel, its numbers and the point where it acts."""
+
+import inspect
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from hashlib import sha256
+from math import isfinite
+from types import CodeType, FunctionType
+from typing import Any
+
+import numba
+import numpy as np
+from numba import types
+from numba.core.errors import NumbaError
+
+from fowt_env.channels import channels
+from fowt_env.errors import InputError
+from fowt_env.jit import FLOATS
+from fowt_env.loads.own import MOST_LOADS, N_MOTION, Motion, OwnLoads
+from fowt_env.records import is_number
+
+AXES = ("inertial", "body")
+SIGNATURE = types.void(FLOATS, FLOATS, FLOATS)
+ARGUMENTS = 3
+IN_PLANE = 1e-9  # share of a force out of the plane of a planar scene that rounding may leave
+TRIALS = (  # states that a load is tried in: surge, sway, heave, roll, pitch, yaw, and their rates
+    (np.zeros(6), np.zeros(6)),
+    (np.array([12.0, -3.0, -1.5, 0.01, 0.07, -0.02]), np.array([0.7, -0.2, 0.4, 0.002, 0.01, 0.001])),
+    (np.array([-4.0, 2.0, 1.0, -0.02, -0.03, 0.03]), np.array([-0.9, 0.3, -0.6, 0.003, -0.02, 0.002])),
+)
+
+
+class LoadKernel(types.WrapperAddressProtocol):
+    """What load_kernel makes of a function: callable, and a first-class function to compiled code."""
+
+    def __init__(self, function: Callable[..., None]) -> None:
+        self.function = function
+        self.__module__ = function.__module__
+        self.__name__ = function.__name__
+        self.__qualname__ = function.__qualname__
+        self.__doc__ = function.__doc__
+        without_jit = numba.config.DISABLE_JIT  # type: ignore[attr-defined] # set when numba starts
+        self._compiled: Any = None if without_jit else _compiled(function)
+
+    def __wrapper_address__(self) -> int:
+        return self._compiled.address
+
+    def signature(self) -> Any:
+        """Its numba signature."""
+        return SIGNATURE
+
+    def __call__(self, parameters: np.ndarray, motion: np.ndarray, force: np.ndarray) -> None:
+        """Run it as plain Python."""
+        self.function(parameters, motion, force)
+
+    def __reduce__(self) -> str:
+        return self.__qualname__  # pickled by name, as functions are
+
+    def __repr__(self) -> str:
+        return f"<load kernel {self.__module__}.{self.__qualname__}>"
+
+    def fingerprint(self) -> str:
+        """Hash of what it does, the same in every process."""
+        return sha256(repr(_meaning(self.function)).encode()).hexdigest()
+
+
+def _compiled(function):
+    """The function as a numba.cfunc. Compiled anew in each process, a tenth of a second: numba's cache on
+    disk would not notice an edit of what it calls in another file."""
+    try:
+        return numba.cfunc(SIGNATURE, error_model="numpy")(function)
+    except NumbaError as error:
+        reason = "\n".join(line for line in str(error).splitlines() if line.strip())
+        raise InputError(f"load kernel {function.__name__!r}: numba cannot compile it: {reason}") from error
+
+
+def _meaning(function, above=()):
+    """Code, constants and outer numbers of a function and of those it calls, as plain values."""
+    code = function.__code__
+    outer = {name: function.__globals__.get(name) for name in code.co_names}
+    cells = (cell.cell_contents for cell in function.__closure__ or ())
+    outer |= dict(zip(code.co_freevars, cells, strict=True))
+    known = {}
+    for name, value in sorted(outer.items()):
+        if isinstance(value, int | float | tuple):
+            known[name] = value
+        elif isinstance(value, np.ndarray):
+            known[name] = value.dtype.str, value.shape, value.tobytes()
+        elif isinstance(called := getattr(value, "py_func", None), FunctionType) and called not in above:
+            known[name] = _meaning(called, (*above, function))
+    constants = [repr(constant) for constant in code.co_consts if not isinstance(constant, CodeType)]
+    return code.co_code.hex(), code.co_names, constants, known
+
+
+def load_kernel(function: Callable[..., None]) -> LoadKernel:
+    """LoadKernel of a function (parameters, motion, force) that numba can compile; a decorator.
+
+    parameters  (n,) numbers of the Load; read only
+    motion      (N_MOTION,) what the load may depend on, indexed by Motion; read only
+    force       (6,) zeros, to be filled: force (N) at the load's point and moment (N m) about it, in the
+                axes of the load
+
+    It must be a function of a module (for worker processes find it by its name), depend on nothing else
+    than its arguments, and keep nothing from call to call: several calls make one step.
+
+    Raises: InputError for another number of arguments, or what numba cannot compile.
+    """
+    if isinstance(function, LoadKernel):
+        return function
+    if not isinstance(function, FunctionType):
+        raise InputError(f"load_kernel: {function!r} must be a plain Python function")
+    if len(inspect.signature(function).parameters) != ARGUMENTS:
+        raise InputError(
+            f"load kernel {function.__name__!r}: must take three arguments (parameters, motion, force)"
+        )
+    return LoadKernel(function)
+
+
+@dataclass(frozen=True)
+class Load:
+    """A load of one's own on the floating platform or the tower and nacelle, for build_scene(loads=...).
+
+    name        begins the names of its output channels: NAMEFxi ... NAMEMzi, force (N) and moment about
+                the body origin (N m) in inertial axes
+    kernel      made with load_kernel
+    parameters  numbers that the kernel is given: a list, an array or a NamedTuple
+    point       where it acts, body axes, m: x downwind, z up from the still-water level. At or above the
+                tower base it counts in the tower-base loads
+    axes        "inertial" or "body": of velocities and force
+    water       whether the kernel reads the motion of the water at its point (Motion.WATER_X ...), whose
+                sum over 225 wave components takes 6 microseconds, as three steps at fidelity "standard"
+                without wind (a load without it: 0.4, eight of them: 0.6 a step)
+
+    It may depend on the wind, the waves, the rotor and the time, and not on accelerations: give mass and
+    added mass to the platform file. The rotor shaft feels it through the platform alone. A trim and a
+    linear model take it at time 0.
+
+    Raises: InputError that names the load, and what of it cannot be used.
+    """
+
+    name: str
+    kernel: LoadKernel
+    parameters: Sequence[float] = ()
+    point: Sequence[float] = (0.0, 0.0, 0.0)
+    axes: str = "inertial"
+    water: bool = False
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.name, str) or not self.name.isidentifier():
+            raise InputError(f"load: name = {self.name!r}: must be a word of letters, digits and _")
+        where = f"load {self.name!r}"
+        if not isinstance(self.kernel, LoadKernel):
+            raise InputError(
+                f"{where}: kernel = {self.kernel!r}: must be a function decorated with @fowt_env.load_kernel"
+            )
+        object.__setattr__(self, "parameters", _numbers(where, "parameters", self.parameters))
+        object.__setattr__(self, "point", _numbers(where, "point", self.point))
+        if len(self.point) != 3:
+            raise InputError(f"{where}: point = {self.point!r}: must be three numbers (x, y, z), m")
+        if self.axes not in AXES:
+            raise InputError(f"{where}: axes = {self.axes!r}: allowed 'inertial', 'body'")
+        if not isinstance(self.water, bool):
+            raise InputError(f"{where}: water = {self.water!r}: allowed False, True")
+
+    def key(self) -> tuple:
+        """All that it does, as plain values that are the same in every process."""
+        return self.name, self.kernel.fingerprint(), self.parameters, self.point, self.axes, self.water
+
+
+def _numbers(where, key, values):
+    """The values as a tuple of floats. Raises: InputError."""
+    try:
+        listed = tuple(values)
+    except TypeError:
+        listed = (None,)
+    if isinstance(values, str) or not all(is_number(value) for value in listed):
+        raise InputError(f"{where}: {key} = {values!r}: must be a list of finite numbers")
+    return tuple(float(value) for value in listed)
+
+
+def checked_loads(loads: Any, n_lines: int, planar: bool) -> tuple[Load, ...]:
+    """The loads as a tuple, each tried as plain Python in some states.
+
+    Raises: InputError that names the load.
+    """
+    if isinstance(loads, Load):
+        loads = (loads,)
+    try:
+        listed = tuple(loads or ())
+    except TypeError:
+        listed = (loads,)
+    for load in listed:
+        if not isinstance(load, Load):
+            raise InputError(f"loads: {load!r}: must be a fowt_env.Load")
+    if len(listed) > MOST_LOADS:
+        raise InputError(f"loads: {len(listed)} of them: at most {MOST_LOADS}; a kernel may hold several")
+    taken = {channel.name for channel in channels(n_lines)}
+    for load in listed:
+        own = {channel.name for channel in channels(0, (load.name,))} - {c.name for c in channels(0)}
+        if taken & own or not own:
+            raise InputError(
+                f"load {load.name!r}: its channel {load.name}Fxi exists already: choose another name"
+            )
+        taken |= own
+        for position, rate in TRIALS:
+            _try(load, position, rate, planar)
+    return listed
+
+
+def _rotation(roll, pitch, yaw):
+    """Body to inertial axes of 3-2-1 Euler angles."""
+    (s1, s2, s3), (c1, c2, c3) = np.sin([roll, pitch, yaw]), np.cos([roll, pitch, yaw])
+    return np.array(
+        [
+            [c3 * c2, c3 * s2 * s1 - s3 * c1, c3 * s2 * c1 + s3 * s1],
+            [s3 * c2, s3 * s2 * s1 + c3 * c1, s3 * s2 * c1 - c3 * s1],
+            [-s2, c2 * s1, c2 * c1],
+        ]
+    )
+
+
+def _motion(load, position, rate):
+    """Motion array of a state: six positions, and velocity and angular velocity in inertial axes."""
+    turn = _rotation(*position[3:])
+    arm = turn @ load.point
+    axes = turn.T if load.axes == "body" else np.eye(3)
+    motion = np.zeros(N_MOTION)
+    motion[Motion.X : Motion.Z + 1] = position[:3] + arm
+    motion[Motion.VX : Motion.VZ + 1] = axes @ (rate[:3] + np.cross(rate[3:], arm))
+    motion[Motion.WX : Motion.WZ + 1] = axes @ rate[3:]
+    motion[Motion.SURGE : Motion.YAW + 1] = position
+    motion[Motion.R11 : Motion.R33 + 1] = turn.ravel()
+    motion[Motion.ROTOR_SPEED] = 1.2
+    return motion
+
+
+def _try(load, position, rate, planar):
+    """Run the load as plain Python, where wrong indices show, in a state. Raises: InputError."""
+    if planar:
+        position, rate = position.copy(), rate.copy()
+        position[[1, 3, 5]] = rate[[1, 3, 5]] = 0.0
+    where = f"load {load.name!r}"
+    motion, force = _motion(load, position, rate), np.zeros(6)
+    parameters = np.array(load.parameters)
+    motion.flags.writeable = parameters.flags.writeable = False
+    try:
+        with np.errstate(all="ignore"):
+            returned = load.kernel(parameters, motion, force)
+    except Exception as error:  # whatever a user's code may raise
+        raise InputError(f"{where}: its kernel failed: {type(error).__name__}: {error}") from error
+    if returned is not None:
+        raise InputError(
+            f"{where}: its kernel returned {returned!r}: must write to its third argument instead"
+        )
+    if not all(isfinite(value) for value in force):
+        raise InputError(f"{where}: its kernel gave force = {force.tolist()}: must be six finite numbers")
+    if planar:
+        arm = _rotation(*position[3:]) @ load.point if load.axes == "inertial" else np.array(load.point)
+        moment = force[3:] + np.cross(arm, force[:3])
+        out = max(abs(force[1]), abs(moment[0]) / 100.0, abs(moment[2]) / 100.0)  # over an arm of 100 m
+        if out > IN_PLANE * np.abs(force[[0, 2]]).max():
+            raise InputError(
+                f"{where}: pushes out of the plane, force = {force.tolist()}; a planar scene needs loads"
+                " in it (planar = False)"
+            )
+
+
+def build_own_loads(loads: Sequence[Load], base_height: float, depth: float) -> OwnLoads | None:
+    """OwnLoads part of checked loads, None without any."""
+    if not loads:
+        return None
+    sizes = [len(load.parameters) for load in loads]
+    spare = [loads[0].kernel] * (MOST_LOADS - len(loads))  # never called
+    return OwnLoads(
+        np.array([value for load in loads for value in load.parameters], dtype=np.float64),
+        np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64),
+        np.array([load.point for load in loads], dtype=np.float64).reshape(-1, 3),
+        np.array([load.axes == "body" for load in loads]),
+        np.array([load.point[2] >= base_height for load in loads]),
+        np.array([load.water for load in loads]),
+        float(depth),
+        *(load.kernel for load in loads),
+        *spare,
+    )
+
+
+def blamed(loads: Sequence[Load], room: np.ndarray) -> str | None:
+    """Words for the load that first gave a number that is not finite; None where none did.
+
+    room: what loads.own.evaluate_own filled.
+    """
+    if not loads or not room[6 * len(loads)]:
+        return None
+    load = loads[int(room[6 * len(loads)]) - 1]
+    return f"load {load.name!r} gave a force that is not finite"
