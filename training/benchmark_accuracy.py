@@ -30,22 +30,23 @@ CHANNELS = {
     "rotor_speed": "RotSpeed_[rpm]",
     "fairlead_tension": "FAIRTEN1_[kN]",
 }
-UNITS = {"wave_components": "components", "blade_stations": "stations", "strip_length": "m strips"}
+UNITS = {"strongest": "strongest components", "blade_stations": "stations", "strip_length": "m strips"}
 TIMED = 1.0  # s of CPU time: shorter runs are repeated until then, longer ones timed once
 COLUMNS = (
     "seed", "variant", "axis", "integrator", "dt_s", "rotor", "wave_loads", "components", "seconds",
     "finest_s", "worst", "worst_of", *CHANNELS, "real_time_factor", "kernel_factor", "calibration_ms",
 )  # fmt: skip
-# OpenFAST on the rigid model, 18 m/s uniform turbulence, Hs 7.5 m: (setting, real-time factor (CPU), largest
+# OpenFAST on the rigid model, 18 m/s uniform turbulence, Hs 7.5 m: (step and strips, real-time factor (CPU), largest
 # |difference| in 40 s to its own reference: surge m, platform pitch deg, rotor speed rpm), and the
 # standard deviations of the same case over 500 s that turn them into shares
 OPENFAST = (
-    ("DT 0.0125 s, strips 2 m", 2.9, (0.0025, 0.0013, 0.0009)),
-    ("DT 0.025 s, strips 2 m", 6.0, (0.0062, 0.0044, 0.0036)),
-    ("DT 0.05 s, strips 4 m", 15.0, (0.0214, 0.0133, 0.0133)),
-    ("r-test style, tight coupling", 1.1, (0.0199, 0.0156, 0.0088)),
+    ("0.0125 s, 1 m: its reference", 1.9, (0.0, 0.0, 0.0)),
+    ("0.0125 s, 2 m", 2.9, (0.0025, 0.0013, 0.0009)),
+    ("0.025 s, 2 m", 6.0, (0.0062, 0.0044, 0.0036)),
+    ("0.05 s, 4 m", 15.0, (0.0214, 0.0133, 0.0133)),
+    ("0.0125 s, 0.5 m, tight coupling", 1.1, (0.0199, 0.0156, 0.0088)),
 )
-OPENFAST_STD = (1.851, 0.827, 1.128)
+OPENFAST_STD = (2.005, 1.308, 1.617)
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,8 @@ class Variant:
     dt: float
     rotor: str
     wave_loads: str
-    options: tuple = ()  # further options of build_scene, as (name, value)
+    # further options of build_scene, as (name, value); "strongest": that many of the sea's components
+    options: tuple = ()
 
     @property
     def name(self):
@@ -90,7 +92,7 @@ def variants():
     found += [
         Variant(axis, "rk4", 0.025, "bem", waves, ((option, value),))
         for axis, option, waves, values in (
-            ("wave components", "wave_components", "fast", (200, 100, 50)),
+            ("wave components", "strongest", "fast", (200, 100, 50)),
             ("stations per blade", "blade_stations", "exact", (13, 9, 6)),
             ("strips", "strip_length", "exact", (1.5, 6.0, 12.0)),
         )
@@ -114,10 +116,26 @@ LEVELS = {
 
 
 def _scene(variant, seed, duration, wind, sea):
-    return build_scene(
-        wind=wind, sea=sea, seed=seed, duration=max(100.0, duration), rotor=variant.rotor,
-        wave_loads=variant.wave_loads, integrator=variant.integrator, **dict(variant.options),
-    )  # fmt: skip
+    options = dict(variant.options)
+    strongest = options.pop("strongest", None)
+
+    def build(sea):
+        return build_scene(
+            wind=wind, sea=sea, seed=seed, duration=max(100.0, duration), rotor=variant.rotor,
+            wave_loads=variant.wave_loads, integrator=variant.integrator, **options,
+        )  # fmt: skip
+
+    return build(sea if strongest is None else _thinned(build(sea).model.waves, strongest))
+
+
+def _thinned(waves, count):
+    """Sea (dict) of the strongest components of Waves: the same sea, which another number would not be."""
+    kept = np.sort(np.argsort(waves.amplitude)[-count:])
+    heading = np.degrees(np.arctan2(waves.sin_heading, waves.cos_heading))
+    return {
+        "kind": "components", "omega": waves.omega[kept], "amplitude": waves.amplitude[kept],
+        "phase": waves.phase[kept], "heading": heading[kept], "ramp": waves.ramp,
+    }  # fmt: skip
 
 
 def _run(variant, seed, duration, wind, sea):
@@ -271,35 +289,67 @@ def plot_accuracy(table, path=None):
 
     points = summary(table)
     points = points[np.isfinite(points["real_time_factor"]) & (points["worst"] > 0.0)]
-    figure = new_figure(7.5, 5.0)
+    figure = new_figure(8.5, 6.0)
     axes = figure.subplots()
     style_axes(axes)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
     for index, (axis, group) in enumerate(points.groupby("axis", sort=False)):
-        axes.loglog(
-            group["real_time_factor"], group["worst"], "o", markersize=5, color=COLOURS[index], label=axis
-        )
-    front = points[points["front"]].sort_values("real_time_factor")
-    axes.loglog(front["real_time_factor"], front["worst"], color=INK, linewidth=1.0, label="Pareto front")
-    theirs = openfast_points()
-    axes.loglog(
-        [p[2] for p in theirs], [p[1] for p in theirs], "k^", markersize=6, markerfacecolor="none",
-        label="OpenFAST (largest difference in 40 s of\nsurge, pitch, rotor speed over std)",
-    )  # fmt: skip
-    for row in front.to_dict("records"):
-        axes.annotate(
-            row["variant"], (row["real_time_factor"], row["worst"]), fontsize=5, color=INK,
-            xytext=(4, 3), textcoords="offset points",
+        axes.plot(
+            group["real_time_factor"], group["worst"], "osD"[index // len(COLOURS)], markersize=5,
+            color=COLOURS[index % len(COLOURS)], label=axis, linestyle="none",
         )  # fmt: skip
+    front = points[points["front"]].sort_values("real_time_factor")
+    axes.plot(front["real_time_factor"], front["worst"], color=INK, linewidth=1.0, label="Pareto front")
+    _draw_openfast(axes)
+    _name_front(axes, front)
     axes.set_xlabel("real-time factor of simulate (CPU, one core)", color=INK, fontsize=9)
     axes.set_ylabel("worst rms difference / standard deviation", color=INK, fontsize=9)
-    axes.legend(fontsize=7, frameon=False)
+    axes.margins(x=0.12)
+    axes.legend(fontsize=7, frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return save_figure(figure, path)
 
 
+def _draw_openfast(axes):
+    """OpenFAST's points; its reference, which differs by nothing from itself, on the lower edge."""
+    from fowt_env.plots import INK
+
+    theirs = openfast_points()
+    style = {"color": "black", "markersize": 6, "markerfacecolor": "none", "linestyle": "none"}
+    differing = [p for p in theirs if p[1] > 0.0]
+    axes.plot(
+        [p[2] for p in differing], [p[1] for p in differing], marker="^", **style,
+        label="OpenFAST, step and strips\n(largest difference in 40 s of\nsurge, pitch, rotor speed over std)",
+    )  # fmt: skip
+    note = {"fontsize": 6, "color": INK, "textcoords": "offset points"}
+    for name, error, factor in differing:
+        axes.annotate(name, (factor, error), xytext=(6, -2), **note)
+    for name, _, factor in (p for p in theirs if p[1] == 0.0):
+        edge = axes.get_xaxis_transform()
+        axes.plot([factor], [0.015], marker="v", transform=edge, clip_on=False, **style)
+        axes.annotate(name, (factor, 0.015), xycoords=edge, xytext=(6, -2), **note)
+
+
+def _name_front(axes, front):
+    """Names beside the points of the front, those of the levels of build_scene bold."""
+    from fowt_env.plots import INK
+
+    for row in front.to_dict("records"):
+        level = LEVELS.get(row["variant"])
+        axes.annotate(
+            row["variant"] if level is None else f'"{level}": {row["variant"]}',
+            (row["real_time_factor"], row["worst"]), fontsize=6, color=INK, ha="left", va="top",
+            fontweight="normal" if level is None else "bold", xytext=(5, -3), textcoords="offset points",
+        )  # fmt: skip
+
+
 def select(names):
-    """Variants of the axes named; "reference" adds none to those of every study. Raises: InputError."""
-    known = [REFERENCE, *dict.fromkeys(v.axis for v in variants())]
+    """Variants of the axes named. Raises: InputError for an unknown axis.
+
+    "levels" stands for those that are levels of build_scene; "reference" adds none to those of every study.
+    """
+    known = [REFERENCE, "levels", *dict.fromkeys(v.axis for v in variants())]
     for name in names:
         if name not in known:
             raise unknown("axis", name, known)
-    return [v for v in variants() if v.axis in names]
+    return [v for v in variants() if v.axis in names or ("levels" in names and v.name in LEVELS)]
