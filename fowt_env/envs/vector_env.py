@@ -1,5 +1,6 @@
 """Many environments stepped by one compiled call: Gymnasium's vector interface without a Python loop."""
 
+import os
 from collections.abc import Sequence
 from copy import deepcopy
 from typing import Any
@@ -20,6 +21,12 @@ from fowt_env.envs.rewards import N_TERMS
 from fowt_env.envs.snapshot import Snapshot
 from fowt_env.errors import InputError, unknown
 from fowt_env.jit import Box
+
+# GNU's OpenMP, which runs numba's threads on Linux, lets an idle thread spin for milliseconds: best between
+# steps on a quiet machine, ruinous beside other programs (docs/performance.md). This many turns are some 50
+# microseconds, longer than what lies between two steps. Read when numba starts its threads.
+if "OMP_WAIT_POLICY" not in os.environ:
+    os.environ.setdefault("GOMP_SPINCOUNT", "3000")
 
 MODES = {mode.value: mode for mode in AutoresetMode}
 INFO_KEYS = (*REWARD_KEYS, "time")  # those of every step that are float64
