@@ -44,7 +44,7 @@ OPENFAST = (
     ("0.0125 s, 2 m", 2.9, (0.0025, 0.0013, 0.0009)),
     ("0.025 s, 2 m", 6.0, (0.0062, 0.0044, 0.0036)),
     ("0.05 s, 4 m", 15.0, (0.0214, 0.0133, 0.0133)),
-    ("0.0125 s, 0.5 m, tight coupling", 1.1, (0.0199, 0.0156, 0.0088)),
+    ("0.0125 s, 0.5 m,\ntight coupling", 1.1, (0.0199, 0.0156, 0.0088)),
 )
 OPENFAST_STD = (2.005, 1.308, 1.617)
 
@@ -289,7 +289,7 @@ def plot_accuracy(table, path=None):
 
     points = summary(table)
     points = points[np.isfinite(points["real_time_factor"]) & (points["worst"] > 0.0)]
-    figure = new_figure(8.5, 6.0)
+    figure = new_figure(8.5, 5.5)
     axes = figure.subplots()
     style_axes(axes)
     axes.set_xscale("log")
@@ -327,20 +327,24 @@ def _draw_openfast(axes):
     for name, _, factor in (p for p in theirs if p[1] == 0.0):
         edge = axes.get_xaxis_transform()
         axes.plot([factor], [0.015], marker="v", transform=edge, clip_on=False, **style)
-        axes.annotate(name, (factor, 0.015), xycoords=edge, xytext=(6, -2), **note)
+        axes.annotate(name, (factor, 0.015), xycoords=edge, xytext=(-5, 8), **note)
 
 
 def _name_front(axes, front):
-    """Names beside the points of the front, those of the levels of build_scene bold."""
+    """Numbers at the points of the front and their names beside the figure; the levels of build_scene named."""
     from fowt_env.plots import INK
 
-    for row in front.to_dict("records"):
+    lines = []
+    for number, row in enumerate(front.to_dict("records"), 1):
         level = LEVELS.get(row["variant"])
+        name = row["variant"].replace(", mooring", ",\n    mooring")
+        lines.append(f"{number}  {name}")
         axes.annotate(
-            row["variant"] if level is None else f'"{level}": {row["variant"]}',
-            (row["real_time_factor"], row["worst"]), fontsize=6, color=INK, ha="left", va="top",
-            fontweight="normal" if level is None else "bold", xytext=(5, -3), textcoords="offset points",
+            str(number) if level is None else f"{number} {level}", (row["real_time_factor"], row["worst"]),
+            fontsize=7 if level is None else 9, color=INK, ha="left", va="top", xytext=(4, -3),
+            fontweight="normal" if level is None else "bold", textcoords="offset points",
         )  # fmt: skip
+    axes.text(1.02, 0.02, "\n".join(lines), transform=axes.transAxes, fontsize=7, color=INK, va="bottom")
 
 
 def select(names):
