@@ -36,8 +36,8 @@ COLUMNS = (
     "seed", "variant", "axis", "integrator", "dt_s", "rotor", "wave_loads", "components", "seconds",
     "finest_s", "worst", "worst_of", *CHANNELS, "real_time_factor", "kernel_factor", "calibration_ms",
 )  # fmt: skip
-# OpenFAST on the rigid model, 18 m/s uniform turbulence, Hs 7.5 m: (step and strips, real-time factor (CPU), largest
-# |difference| in 40 s to its own reference: surge m, platform pitch deg, rotor speed rpm), and the
+# OpenFAST on the rigid model, 18 m/s uniform turbulence, Hs 7.5 m: (step and strips, real-time factor
+# (CPU), largest |difference| in 40 s to its own reference: surge m, platform pitch deg, rotor speed rpm), and the
 # standard deviations of the same case over 500 s that turn them into shares
 OPENFAST = (
     ("0.0125 s, 1 m: its reference", 1.9, (0.0, 0.0, 0.0)),
@@ -319,7 +319,8 @@ def _draw_openfast(axes):
     differing = [p for p in theirs if p[1] > 0.0]
     axes.plot(
         [p[2] for p in differing], [p[1] for p in differing], marker="^", **style,
-        label="OpenFAST, step and strips\n(largest difference in 40 s of\nsurge, pitch, rotor speed over std)",
+        label="OpenFAST, step and strips\n(largest difference in 40 s of\n"
+        "surge, pitch, rotor speed over std)",
     )  # fmt: skip
     note = {"fontsize": 6, "color": INK, "textcoords": "offset points"}
     for name, error, factor in differing:
@@ -331,7 +332,7 @@ def _draw_openfast(axes):
 
 
 def _name_front(axes, front):
-    """Numbers at the points of the front and their names beside the figure; the levels of build_scene named."""
+    """Numbers at the points of the front, those of the levels with their names; all names beside it."""
     from fowt_env.plots import INK
 
     lines = []

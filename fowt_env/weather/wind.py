@@ -189,7 +189,7 @@ def build_wind(spec, *, reference_height, rotor_diameter, shear_exponent, seed, 
 
 @lru_cache(maxsize=8)
 def _even_times(period, samples):
-    """Sample times (samples,) from 0 to the period, s: one array for all series of a length, never written."""
+    """Sample times (samples,) from 0 to the period, s: one array for all series alike, never written."""
     return np.linspace(0.0, period, samples)
 
 
