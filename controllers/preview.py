@@ -15,7 +15,6 @@ from enum import IntEnum
 from math import exp, isfinite
 
 import numpy as np
-from scipy.signal import lfilter
 
 from controllers.base import check_control_dt
 from controllers.pi import (
@@ -159,6 +158,8 @@ def steady_pitch(scene):
 
 def twice_low_passed(value, decay):
     """(n,) the series after two first-order low passes that start settled at its first entry."""
+    from scipy.signal import lfilter  # takes a third of a second to load, at every start otherwise
+
     for _ in range(2):
         value, _ = lfilter([1.0 - decay], [1.0, -decay], value, zi=[decay * value[0]])
     return value

@@ -132,6 +132,11 @@ else:
         """
 
         def __new__(cls, scene, work):
-            return structref.StructRefProxy.__new__(cls, scene, work)
+            return _filled_box(scene, work)
 
     structref.define_proxy(Box, _BoxType, ["scene", "work"])
+
+    @entry
+    def _filled_box(scene, work):
+        """A Box; numba's own constructor would be compiled anew, for a second, in every process."""
+        return Box(scene, work)

@@ -4,9 +4,10 @@ Reference of a seed: the exact parts (BEM rotor, exact waves, Runge-Kutta 4) at 
 a step shows that it has converged. Error of a variant: rms difference over the standard deviation of the
 reference, of each motion, the rotor speed and a fairlead tension; the worst of them counts. The wind and the
 sea of a seed are the same for all variants, and the controller acts at 10 Hz whatever the step. Cost: the
-CPU time of simulate, as a real-time factor.
+CPU time of simulate and of the compiled loop alone, as real-time factors.
 """
 
+import time
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,9 +15,9 @@ import numpy as np
 import pandas as pd
 
 from fowt_env.errors import InputError, unknown
-from fowt_env.scene import INTEGRATORS, build_scene
-from fowt_env.simulation import simulate
-from training.benchmark import SEA, TURBULENCE, calibration, header, median_time
+from fowt_env.scene import INTEGRATORS, REFERENCE_STEP, build_scene
+from fowt_env.simulation import initial_state, simulate
+from training.benchmark import SEA, TURBULENCE, Kind, calibration, header, loop_time
 from training.comparison import normalised_rms
 
 CHANNELS = {
@@ -29,22 +30,23 @@ CHANNELS = {
     "rotor_speed": "RotSpeed_[rpm]",
     "fairlead_tension": "FAIRTEN1_[kN]",
 }
-UNITS = {"wave_components": "components", "blade_stations": "stations", "strip_length": "m strips"}
-EXACT = {"rotor": "bem", "wave_loads": "exact", "integrator": "rk4"}
+UNITS = {"strongest": "strongest components", "blade_stations": "stations", "strip_length": "m strips"}
+TIMED = 1.0  # s of CPU time: shorter runs are repeated until then, longer ones timed once
 COLUMNS = (
     "seed", "variant", "axis", "integrator", "dt_s", "rotor", "wave_loads", "components", "seconds",
-    "finest_s", "worst", "worst_of", *CHANNELS, "real_time_factor", "calibration_ms",
+    "finest_s", "worst", "worst_of", *CHANNELS, "real_time_factor", "kernel_factor", "calibration_ms",
 )  # fmt: skip
-# OpenFAST on the rigid model, 18 m/s uniform turbulence, Hs 7.5 m: (setting, real-time factor (CPU), largest
-# |difference| in 40 s to its own reference: surge m, platform pitch deg, rotor speed rpm), and the
-# standard deviations of the same case over 500 s that turn them into shares
+# OpenFAST on the rigid model, 18 m/s uniform turbulence, Hs 7.5 m: (step and strips, real-time factor
+# (CPU), largest |difference| in 40 s to its own reference: surge m, platform pitch deg, rotor speed rpm),
+# and the standard deviations of the same case over 500 s that turn them into shares
 OPENFAST = (
-    ("DT 0.0125 s, strips 2 m", 2.9, (0.0025, 0.0013, 0.0009)),
-    ("DT 0.025 s, strips 2 m", 6.0, (0.0062, 0.0044, 0.0036)),
-    ("DT 0.05 s, strips 4 m", 15.0, (0.0214, 0.0133, 0.0133)),
-    ("r-test style, tight coupling", 1.1, (0.0199, 0.0156, 0.0088)),
+    ("0.0125 s, 1 m: its reference", 1.9, (0.0, 0.0, 0.0)),
+    ("0.0125 s, 2 m", 2.9, (0.0025, 0.0013, 0.0009)),
+    ("0.025 s, 2 m", 6.0, (0.0062, 0.0044, 0.0036)),
+    ("0.05 s, 4 m", 15.0, (0.0214, 0.0133, 0.0133)),
+    ("0.0125 s, 0.5 m,\ntight coupling", 1.1, (0.0199, 0.0156, 0.0088)),
 )
-OPENFAST_STD = (1.851, 0.827, 1.128)
+OPENFAST_STD = (2.005, 1.308, 1.617)
 
 
 @dataclass(frozen=True)
@@ -56,46 +58,84 @@ class Variant:
     dt: float
     rotor: str
     wave_loads: str
-    options: tuple = ()  # further options of build_scene, as (name, value)
+    # further options of build_scene, as (name, value); "strongest": that many of the sea's components
+    options: tuple = ()
 
     @property
     def name(self):
         parts = [f"{self.integrator} {self.dt:g} s", self.rotor, f"{self.wave_loads} waves"]
-        return ", ".join(parts + [f"{value:g} {UNITS[name]}" for name, value in self.options])
+        for name, value in self.options:
+            parts.append(f"{value:g} {UNITS[name]}" if name in UNITS else f"{name} by {value}")
+        return ", ".join(parts)
+
+
+REFERENCE = "reference"  # axis of the runs at twice the finest step
+STEPS = {"rk4": (0.025, 0.05, 0.1), "heun": (0.0125, 0.025, 0.05), "abm4": (0.025, 0.05, 0.1),
+         "ab4": (0.025, 0.05, 0.1)}  # fmt: skip
+TABLED = (("mooring", "table"),)
 
 
 def variants():
-    """Every variant of the sweep, cheapest parts last."""
-    steps = {"rk4": (0.025, 0.05, 0.1), "heun": (0.0125, 0.025, 0.05), "abm4": (0.025, 0.05, 0.1),
-             "ab4": (0.025, 0.05, 0.1)}  # fmt: skip
+    """Every variant of the sweep: one part changed at a time, then all together, cheapest parts last.
+
+    ab4 evaluates the loads once per step, so that its rows with the BEM rotor show the BEM solved once per
+    step against at every stage (rk4 of the same step).
+    """
     found = [
-        Variant("integrator and step", name, dt, "bem", "exact") for name in INTEGRATORS for dt in steps[name]
+        Variant("BEM once per step" if name == "ab4" else "integrator and step", name, dt, "bem", "exact")
+        for name in INTEGRATORS
+        for dt in STEPS[name]
     ]
     found += [Variant("rotor", "rk4", 0.025, rotor, "exact") for rotor in ("lookup", "table")]
     found += [Variant("waves", "rk4", 0.025, "bem", "fast")]
+    found += [Variant("mooring", "rk4", 0.025, "bem", "exact", TABLED)]
     found += [
         Variant(axis, "rk4", 0.025, "bem", waves, ((option, value),))
         for axis, option, waves, values in (
-            ("wave components", "wave_components", "fast", (200, 100, 50)),
+            ("wave components", "strongest", "fast", (200, 100, 50)),
             ("stations per blade", "blade_stations", "exact", (13, 9, 6)),
             ("strips", "strip_length", "exact", (1.5, 6.0, 12.0)),
         )
         for value in values
     ]
     found += [
-        Variant("all together", name, dt, rotor, "fast")
-        for rotor in ("lookup", "table")
+        Variant("all together", name, dt, rotor, "fast", options)
+        for rotor, options in (("lookup", ()), ("table", TABLED))
         for name in INTEGRATORS
-        for dt in steps[name][-2:]
+        for dt in STEPS[name][-2:]
     ]
     return found
 
 
+# which variants are the levels of build_scene; its reference has the step of scene.REFERENCE_STEP
+LEVELS = {
+    "ab4 0.1 s, lookup, fast waves": "standard",
+    "ab4 0.1 s, table, fast waves, mooring by table": "fast",
+    f"rk4 {REFERENCE_STEP:g} s, bem, exact waves": "reference",
+}
+
+
 def _scene(variant, seed, duration, wind, sea):
-    return build_scene(
-        wind=wind, sea=sea, seed=seed, duration=max(100.0, duration), rotor=variant.rotor,
-        wave_loads=variant.wave_loads, integrator=variant.integrator, **dict(variant.options),
-    )  # fmt: skip
+    options = dict(variant.options)
+    strongest = options.pop("strongest", None)
+
+    def build(sea):
+        return build_scene(
+            wind=wind, sea=sea, seed=seed, duration=max(100.0, duration), rotor=variant.rotor,
+            wave_loads=variant.wave_loads, integrator=variant.integrator, **options,
+        )  # fmt: skip
+
+    return build(sea if strongest is None else _thinned(build(sea).model.waves, strongest))
+
+
+def _thinned(waves, count):
+    """Sea (dict) of the strongest components of Waves: the same sea, which another number would not be."""
+    kept = np.sort(np.argsort(waves.amplitude)[-count:])
+    heading = np.degrees(np.arctan2(waves.sin_heading, waves.cos_heading))
+    return {
+        "kind": "components", "omega": waves.omega[kept], "amplitude": waves.amplitude[kept],
+        "phase": waves.phase[kept], "heading": heading[kept], "ramp": waves.ramp,
+    }  # fmt: skip
 
 
 def _run(variant, seed, duration, wind, sea):
@@ -116,18 +156,19 @@ def accuracy(
     out=None,
     wind=None,
     sea=None,
-    repeats=1,
+    repeats=5,
     progress=None,
 ):
     """DataFrame with a row per seed and variant; the first of a seed is the reference at twice its step.
 
     finest    step of the reference, s
-    chosen    variants (default: variants())
+    repeats   of the timing of runs shorter than TIMED; the median counts
+    chosen    variants (default: variants()); () leaves the reference at twice its step
     out       CSV that grows by a row as each run ends; rows already there are kept and not run again
     progress  called with (text, done, total)
     """
     wind, sea = wind or TURBULENCE, SEA if sea is None else sea
-    check = Variant("convergence", "rk4", 2.0 * finest, "bem", "exact")
+    check = Variant(REFERENCE, "rk4", 2.0 * finest, "bem", "exact")
     plan = [check, *(variants() if chosen is None else chosen)]
     rows = _finished(out)
     known = {(row["seed"], row["axis"], row["variant"], row["seconds"], row["finest_s"]) for row in rows}
@@ -139,7 +180,7 @@ def accuracy(
             continue
         if progress is not None:
             progress(f"seed {seed}: reference", done, total)
-        reference = _run(Variant("reference", "rk4", finest, "bem", "exact"), seed, duration, wind, sea)
+        reference = _run(Variant(REFERENCE, "rk4", finest, "bem", "exact"), seed, duration, wind, sea)
         for variant in missing:
             if progress is not None:
                 progress(f"seed {seed}: {variant.name}", done, total)
@@ -151,16 +192,13 @@ def accuracy(
 
 def _row(variant, seed, duration, finest, reference, wind, sea, repeats):
     scene = _scene(variant, seed, duration, wind, sea)
-    frames = []
-
-    def go():
-        frames[:] = [simulate(scene, "pi", duration=duration, dt=variant.dt)]
-
     simulate(scene, "pi", duration=1.0, dt=variant.dt)  # compiles
-    cost = median_time(go, repeats) if variant.axis != "convergence" else float("nan")
-    if not frames:
-        go()
-    found = errors(frames[0], reference)
+    frame, cost = _timed(lambda: simulate(scene, "pi", duration=duration, dt=variant.dt), repeats)
+    kernel_seconds = min(duration, max(1.0, float(round(0.2 * TIMED * duration / cost))))
+    kernel = loop_time(
+        scene, Kind(wind=wind), *initial_state(scene), variant.dt, kernel_seconds, repeats
+    )  # fmt: skip
+    found = errors(frame, reference)
     worst = max(found, key=found.get)
     waves = scene.model.waves
     return {
@@ -168,8 +206,19 @@ def _row(variant, seed, duration, finest, reference, wind, sea, repeats):
         "dt_s": variant.dt, "rotor": variant.rotor, "wave_loads": variant.wave_loads,
         "components": 0 if waves is None else int(waves.omega.shape[0]), "seconds": float(duration),
         "finest_s": float(finest), "worst": found[worst], "worst_of": worst, **found,
-        "real_time_factor": duration / cost, "calibration_ms": calibration(),
+        "real_time_factor": duration / cost, "kernel_factor": kernel_seconds / kernel,
+        "calibration_ms": calibration(),
     }  # fmt: skip
+
+
+def _timed(call, repeats):
+    """(result, CPU time of this thread) of a call: the median of repeats, or of the first beyond TIMED s."""
+    times = []
+    while len(times) < repeats and sum(times) < TIMED:
+        start = time.thread_time()
+        result = call()
+        times.append(time.thread_time() - start)
+    return result, float(np.median(times))
 
 
 def _finished(out):
@@ -206,7 +255,7 @@ def summary(table):
     if table.empty:
         raise InputError("nothing to summarise: the table has no rows")
     groups = table.groupby(["variant", "axis"], sort=False)
-    mean = groups[["worst", "real_time_factor", *CHANNELS]].mean().reset_index()
+    mean = groups[["worst", "real_time_factor", "kernel_factor", *CHANNELS]].mean().reset_index()
     mean["worst_of"] = groups["worst_of"].agg(lambda names: names.mode()[0]).to_numpy()
     mean["front"] = pareto(mean["worst"], mean["real_time_factor"])
     return mean
@@ -240,35 +289,72 @@ def plot_accuracy(table, path=None):
 
     points = summary(table)
     points = points[np.isfinite(points["real_time_factor"]) & (points["worst"] > 0.0)]
-    figure = new_figure(7.5, 5.0)
+    figure = new_figure(8.5, 5.5)
     axes = figure.subplots()
     style_axes(axes)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
     for index, (axis, group) in enumerate(points.groupby("axis", sort=False)):
-        axes.loglog(
-            group["real_time_factor"], group["worst"], "o", markersize=5, color=COLOURS[index], label=axis
-        )
-    front = points[points["front"]].sort_values("real_time_factor")
-    axes.loglog(front["real_time_factor"], front["worst"], color=INK, linewidth=1.0, label="Pareto front")
-    theirs = openfast_points()
-    axes.loglog(
-        [p[2] for p in theirs], [p[1] for p in theirs], "k^", markersize=6, markerfacecolor="none",
-        label="OpenFAST (largest difference in 40 s of\nsurge, pitch, rotor speed over std)",
-    )  # fmt: skip
-    for row in front.to_dict("records"):
-        axes.annotate(
-            row["variant"], (row["real_time_factor"], row["worst"]), fontsize=5, color=INK,
-            xytext=(4, 3), textcoords="offset points",
+        axes.plot(
+            group["real_time_factor"], group["worst"], "osD"[index // len(COLOURS)], markersize=5,
+            color=COLOURS[index % len(COLOURS)], label=axis, linestyle="none",
         )  # fmt: skip
+    front = points[points["front"]].sort_values("real_time_factor")
+    axes.plot(front["real_time_factor"], front["worst"], color=INK, linewidth=1.0, label="Pareto front")
+    _draw_openfast(axes)
+    _name_front(axes, front)
     axes.set_xlabel("real-time factor of simulate (CPU, one core)", color=INK, fontsize=9)
     axes.set_ylabel("worst rms difference / standard deviation", color=INK, fontsize=9)
-    axes.legend(fontsize=7, frameon=False)
+    axes.margins(x=0.12)
+    axes.legend(fontsize=7, frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return save_figure(figure, path)
 
 
+def _draw_openfast(axes):
+    """OpenFAST's points; its reference, which differs by nothing from itself, on the lower edge."""
+    from fowt_env.plots import INK
+
+    theirs = openfast_points()
+    style = {"color": "black", "markersize": 6, "markerfacecolor": "none", "linestyle": "none"}
+    differing = [p for p in theirs if p[1] > 0.0]
+    axes.plot(
+        [p[2] for p in differing], [p[1] for p in differing], marker="^", **style,
+        label="OpenFAST, step and strips\n(largest difference in 40 s of\n"
+        "surge, pitch, rotor speed over std)",
+    )  # fmt: skip
+    note = {"fontsize": 6, "color": INK, "textcoords": "offset points"}
+    for name, error, factor in differing:
+        axes.annotate(name, (factor, error), xytext=(6, -2), **note)
+    for name, _, factor in (p for p in theirs if p[1] == 0.0):
+        edge = axes.get_xaxis_transform()
+        axes.plot([factor], [0.015], marker="v", transform=edge, clip_on=False, **style)
+        axes.annotate(name, (factor, 0.015), xycoords=edge, xytext=(-5, 8), **note)
+
+
+def _name_front(axes, front):
+    """Numbers at the points of the front, those of the levels with their names; all names beside it."""
+    from fowt_env.plots import INK
+
+    lines = []
+    for number, row in enumerate(front.to_dict("records"), 1):
+        level = LEVELS.get(row["variant"])
+        name = row["variant"].replace(", mooring", ",\n    mooring")
+        lines.append(f"{number}  {name}")
+        axes.annotate(
+            str(number) if level is None else f"{number} {level}", (row["real_time_factor"], row["worst"]),
+            fontsize=7 if level is None else 9, color=INK, ha="left", va="top", xytext=(4, -3),
+            fontweight="normal" if level is None else "bold", textcoords="offset points",
+        )  # fmt: skip
+    axes.text(1.02, 0.02, "\n".join(lines), transform=axes.transAxes, fontsize=7, color=INK, va="bottom")
+
+
 def select(names):
-    """Variants of the axes named. Raises: InputError for an unknown axis."""
-    known = list(dict.fromkeys(v.axis for v in variants()))
+    """Variants of the axes named. Raises: InputError for an unknown axis.
+
+    "levels" stands for those that are levels of build_scene; "reference" adds none to those of every study.
+    """
+    known = [REFERENCE, "levels", *dict.fromkeys(v.axis for v in variants())]
     for name in names:
         if name not in known:
             raise unknown("axis", name, known)
-    return [v for v in variants() if v.axis in names]
+    return [v for v in variants() if v.axis in names or ("levels" in names and v.name in LEVELS)]

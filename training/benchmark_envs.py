@@ -4,33 +4,56 @@ import time
 from collections import Counter
 from itertools import count
 
+import numba
 import numpy as np
 import pandas as pd
 from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
 
 from fowt_env.envs import FowtEnv, FowtVectorEnv
-from fowt_env.envs.batch import act_all
+from fowt_env.envs.batch import act_all, thread_limit
+from fowt_env.jit import parallel_entry
+from training.benchmark import header, multiply_adds
 
 SIZES = (1, 16, 256, 4096)
 THREADS = (1, 2)
 HOLD = np.zeros(2)  # residual mode: the baseline alone, so that no episode fails
-ROUNDS = 10
+ROUND = 1e-3  # s
 
 
-def timed(action, seconds, most=100_000):
-    """Time of a call (s) in the fastest of several rounds that together take about the given seconds."""
+def timed(action, seconds):
+    """Time of a call (s) in the fastest of many rounds of ROUND seconds, in about the given seconds.
+
+    Rounds as short as that fall between the turns of other programs even on a busy machine.
+    """
     action()
     begin = time.perf_counter()
     action()
     once = time.perf_counter() - begin
-    calls = int(min(max(seconds / ROUNDS / max(once, 1e-7), 1), most))
-    best = np.inf
-    for _ in range(ROUNDS):
+    calls = max(1, round(ROUND / max(once, 1e-7)))
+    best, end = np.inf, time.perf_counter() + seconds
+    while time.perf_counter() < end:
         begin = time.perf_counter()
         for _ in range(calls):
             action()
         best = min(best, (time.perf_counter() - begin) / calls)
     return best
+
+
+@parallel_entry
+def multiply_adds_side_by_side(parts, n, results):
+    """Fill results (parts,), each with the calibration of n multiply-adds, on as many threads as allowed."""
+    for part in numba.prange(parts):
+        results[part] = multiply_adds(n, 0.999, 0.1)
+
+
+def ceiling(threads, seconds):
+    """How many times one thread's work so many threads do in the same time, where nothing is shared."""
+    n, results = 300_000, np.zeros(threads)
+    with thread_limit(1):
+        one = timed(lambda: multiply_adds_side_by_side(1, n, results), seconds)
+    with thread_limit(threads):
+        many = timed(lambda: multiply_adds_side_by_side(threads, n, results), seconds)
+    return threads * one / many
 
 
 def arrays_of(part):
@@ -50,7 +73,7 @@ def own_bytes(envs):
 
 
 def single_costs(env, seconds):
-    """{step_us, physics_us, overhead_us, reset_ms} of one environment.
+    """{step_us, physics_us, overhead_us, get_state_us, set_state_us, reset_ms} of one environment.
 
     The physics are those of the compiled call for a batch of 16 such environments, over 16; the overhead is
     what a step takes beyond them. The resets draw new wind, sea and offsets, with all trims known.
@@ -61,10 +84,18 @@ def single_costs(env, seconds):
     actions = np.zeros((few, 2))
     active = np.ones(few, dtype=bool)
     given = (batch._boxes, batch._law, actions, active, batch._statuses, batch._rewards)
-    physics = timed(lambda: act_all(*given), seconds, most=100) / few
+    physics = timed(lambda: act_all(*given), seconds) / few
     single = batch.envs[0].twin()
     single.reset(seed=0)
-    step = timed(lambda: single.step(HOLD), seconds, most=500)
+    state = single.get_state()
+    get, put = timed(single.get_state, seconds), timed(lambda: single.set_state(state), seconds)
+
+    def replay():  # from the same state each time: the episode never ends
+        single.set_state(state)
+        for _ in range(100):
+            single.step(HOLD)
+
+    step = timed(replay, seconds) / 100
     seeds = count()
     for seed in range(60):  # the trims of the winds that are drawn, once per process
         single.reset(seed=seed)
@@ -73,18 +104,25 @@ def single_costs(env, seconds):
         "step_us": step * 1e6,
         "physics_us": physics * 1e6,
         "overhead_us": (step - physics) * 1e6,
+        "get_state_us": get * 1e6,
+        "set_state_us": put * 1e6,
         "reset_ms": reset * 1e3,
     }
 
 
-def row_of(kind, n, threads, per_step, memory=np.nan, reset=np.nan):
-    """One row of the table from the time of a step of all n environments (s)."""
+def row_of(kind, n, threads, per_step, memory=np.nan, reset=np.nan, one=np.nan, most=np.nan):
+    """One row of the table from the time of a step of all n environments (s).
+
+    one: that time on one thread; most: ceiling of so many threads.
+    """
     return {
         "kind": kind,
         "envs": n,
         "threads": threads,
         "env_steps_per_s": n / per_step,
         "us_per_env_step": per_step / n * 1e6,
+        "times_one_thread": one / per_step,
+        "ceiling": most,
         "reset_ms_per_env": reset * 1e3,
         "memory_kB_per_env": memory,
     }
@@ -99,11 +137,13 @@ def native_rows(settings, sizes, threads, seconds):
         batch.reset(seed=0)
         reset = (time.perf_counter() - begin) / n
         memory = own_bytes(batch.envs) / 1024.0 if n > 1 else np.nan
-        actions = np.zeros((n, 2))
+        actions, one = np.zeros((n, 2)), np.nan
         for number in sorted({min(number, n) for number in threads}):
             batch.threads = number
-            per_step = timed(lambda batch=batch, actions=actions: batch.step(actions), seconds, most=50)
-            rows.append(row_of("FowtVectorEnv", n, number, per_step, memory, reset))
+            per_step = timed(lambda batch=batch, actions=actions: batch.step(actions), seconds)
+            one = per_step if number == 1 else one
+            most = ceiling(number, 0.2 * seconds)
+            rows.append(row_of("FowtVectorEnv", n, number, per_step, memory, reset, one, most))
         del batch
     return rows
 
@@ -118,7 +158,7 @@ def gymnasium_rows(settings, n, seconds):
         envs = kind([model.twin] * n)
         envs.reset(seed=0)
         actions = np.zeros((n, 2), dtype=np.float32)
-        per_step = timed(lambda envs=envs, actions=actions: envs.step(actions), seconds, most=50)
+        per_step = timed(lambda envs=envs, actions=actions: envs.step(actions), seconds)
         rows.append(row_of(kind.__name__, n, "processes" if kind is AsyncVectorEnv else 1, per_step))
         envs.close()
     return rows
@@ -142,6 +182,7 @@ def benchmark_envs(
 
 
 if __name__ == "__main__":
+    print("\n".join(header()))
     for level in ("standard", "fast"):
         table, single = benchmark_envs(level, seconds=0.5)
         print(f"fidelity = {level!r}; single:", {key: round(value, 2) for key, value in single.items()})

@@ -57,6 +57,9 @@ def act_all_parallel(boxes, law, actions, active, statuses, rewards, parts):
 def thread_limit(threads):
     """Within the block, compiled loops use this many threads; afterwards as many as before."""
     before = numba.get_num_threads()
+    if threads == before:  # set_num_threads takes microseconds
+        yield
+        return
     numba.set_num_threads(threads)
     try:
         yield

@@ -168,13 +168,14 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         """Allocate the arrays of a run and fill what never changes."""
         scene, turbine, task = self.scene, self.scene.turbine, self.task
         chosen = entries(task.observation, turbine, task.wind_preview)
-        self._law = None
         self._baseline = None
+        law = None
         parameters, memory = np.zeros(1), np.zeros(1)
         if mode == Mode.RESIDUAL:
             self._baseline = named_baseline(self.baseline, turbine, self.control_dt)
-            self._law = self._baseline.kernel
+            law = self._baseline.kernel
             parameters, memory = self._baseline.parameters, self._baseline.memory
+        self._law = Box(None, law)
         self._setting = Setting(
             model=scene.model,
             actions=build_action_map(mode, task, turbine, self.control_dt),

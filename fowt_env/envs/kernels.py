@@ -122,7 +122,8 @@ def advance_period(setting, run):
 def act(box, law, action):
     """One control period under an action (2,) in [-1, 1]; returns (status, reward).
 
-    law: control kernel of the baseline, or None. BAD_ACTION leaves everything as it was.
+    law: Box whose work is the control kernel of the baseline, or None; Python takes ten times as long to
+    hand over the kernel itself. BAD_ACTION leaves everything as it was.
     """
     setting, run = box.scene, box.work
     clipped = accept(action, run.action)
@@ -130,8 +131,9 @@ def act(box, law, action):
         return BAD_ACTION, 0.0
     run.counts[SATURATED] += clipped
     command_of(
-        run.action, setting.actions, law, setting.parameters, run.memory, run.measurement, run.u, run.wanted
-    )
+        run.action, setting.actions, law.work, setting.parameters, run.memory, run.measurement, run.u,
+        run.wanted,
+    )  # fmt: skip
     return advance_period(setting, run)
 
 

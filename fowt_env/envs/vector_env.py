@@ -1,5 +1,6 @@
 """Many environments stepped by one compiled call: Gymnasium's vector interface without a Python loop."""
 
+import os
 from collections.abc import Sequence
 from copy import deepcopy
 from typing import Any
@@ -21,7 +22,15 @@ from fowt_env.envs.snapshot import Snapshot
 from fowt_env.errors import InputError, unknown
 from fowt_env.jit import Box
 
+# GNU's OpenMP, which runs numba's threads on Linux, lets an idle thread spin for milliseconds: best between
+# steps on a quiet machine, ruinous beside other programs (docs/performance.md). This many turns are some 50
+# microseconds, longer than what lies between two steps. Read when numba starts its threads.
+if "OMP_WAIT_POLICY" not in os.environ:
+    os.environ.setdefault("GOMP_SPINCOUNT", "3000")
+
 MODES = {mode.value: mode for mode in AutoresetMode}
+INFO_KEYS = (*REWARD_KEYS, "time")  # those of every step that are float64
+INFO_MASKS = tuple(f"_{key}" for key in INFO_KEYS)
 
 
 class FowtVectorEnv(gymnasium.vector.VectorEnv):
@@ -177,17 +186,19 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         """(observations, rewards, terminations, truncations, infos) after one control period of each."""
         if self._boxes is None:
             raise ResetNeeded("call reset() first: no episode is running")
-        resets = np.flatnonzero(self._ended)
+        resets = self._ended.nonzero()[0]
         if len(resets) and self.autoreset_mode == AutoresetMode.DISABLED:
             raise ResetNeeded(f"environment {resets[0]} has ended: reset it with options['reset_mask']")
         active = ~self._ended
         self._act(actions, active)
         statuses = self._statuses
-        statuses[resets] = RUNNING
         rewards = self._rewards.copy()
-        rewards[resets] = 0.0
+        if len(resets):
+            statuses[resets] = RUNNING
+            rewards[resets] = 0.0
         terminations = statuses != RUNNING
-        truncations = active & ~terminations & (self._counts[:, STEP] >= self._last)
+        truncations = self._counts[:, STEP] >= self._last
+        truncations &= active & ~terminations
         ended = terminations | truncations
         infos = {}
         if ended.any():
@@ -227,16 +238,21 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         """Infos of a step with those of the shown environments added, as _add_info would."""
         if not shown.any():
             return infos
-        everyone = shown.all()
-        columns = dict(zip(REWARD_KEYS, self._terms.T, strict=True))
-        columns["time"] = self._counts[:, STEP] * self._dt
-        columns["saturated_actions"] = self._counts[:, SATURATED]
-        for key, values in columns.items():
-            infos[key] = values.copy() if everyone else np.where(shown, values, 0)
-            infos[f"_{key}"] = shown.copy()
-        failed = np.flatnonzero(shown & terminations)
-        for i in failed:
-            infos = self._add_info(infos, {"termination": self.envs[i]._reason(self._statuses[i])}, int(i))
+        columns = np.empty((len(INFO_KEYS), self.num_envs))
+        columns[:N_TERMS] = self._terms.T
+        np.multiply(self._counts[:, STEP], self._dt, out=columns[N_TERMS])
+        saturated = self._counts[:, SATURATED].copy()
+        if not shown.all():
+            columns[:, ~shown] = 0.0
+            saturated[~shown] = 0
+        masks = np.empty((len(INFO_KEYS), self.num_envs), dtype=bool)
+        masks[:] = shown  # a row each: a reset adds itself to some of them
+        infos.update(zip(INFO_KEYS, columns, strict=True))
+        infos.update(zip(INFO_MASKS, masks, strict=True))
+        infos["saturated_actions"], infos["_saturated_actions"] = saturated, shown.copy()
+        if terminations.any():
+            for i in (shown & terminations).nonzero()[0]:
+                infos = self._add_info(infos, {"termination": self.envs[i]._reason(self._statuses[i])}, int(i))
         return infos
 
     def _finals(self, ended):

@@ -5,6 +5,7 @@ wind (wind_field.py) takes its place where a scene has one. Frame: inertial,
 x downwind, y left when looking downwind, z up (state.py). What users may ask for is in wind_spec.py.
 """
 
+from functools import lru_cache
 from math import cos, hypot, radians, sin
 from typing import NamedTuple
 
@@ -167,7 +168,7 @@ def build_wind(spec, *, reference_height, rotor_diameter, shear_exponent, seed, 
         time = spec["start"] + np.linspace(0.0, length, len(value))
     elif _is_turbulent(spec):
         period, value = _turbulent(spec, height, diameter, seed, duration)
-        time = np.linspace(0.0, period, len(value))
+        time = _even_times(period, len(value))
     elif spec.kind == "series":
         time, value = _given(spec)
     elif spec.kind == "steps":
@@ -184,6 +185,12 @@ def build_wind(spec, *, reference_height, rotor_diameter, shear_exponent, seed, 
         shear_exponent=exponent,
         period=period,
     )
+
+
+@lru_cache(maxsize=8)
+def _even_times(period, samples):
+    """Sample times (samples,) from 0 to the period, s: one array for all series alike, never written."""
+    return np.linspace(0.0, period, samples)
 
 
 def nominal_speed(spec):

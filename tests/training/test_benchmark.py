@@ -6,8 +6,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from fowt_env.envs import FowtEnv
 from fowt_env.errors import InputError
-from training import benchmark, benchmark_accuracy, benchmark_evaluation
+from fowt_env.scene import build_scene
+from training import benchmark, benchmark_accuracy, benchmark_envs, benchmark_evaluation
 
 STILL = "still water, no wind"
 TINY = {"seconds": 2.0, "repeats": 1, "calls": 20}
@@ -54,7 +56,7 @@ def test_the_front_keeps_what_nothing_beats():
 
 def test_openfast_points_divide_largest_differences_by_standard_deviations():
     points = {name: (error, factor) for name, error, factor in benchmark_accuracy.openfast_points()}
-    assert points["DT 0.05 s, strips 4 m"] == (pytest.approx(0.0133 / 0.827), 15.0)
+    assert points["0.05 s, 4 m"] == (pytest.approx(0.0214 / 2.005), 15.0)
 
 
 def test_a_study_goes_on_where_it_was_interrupted_and_errs_by_nothing_against_itself(tmp_path):
@@ -76,11 +78,53 @@ def test_a_study_goes_on_where_it_was_interrupted_and_errs_by_nothing_against_it
     assert second["worst"][2] == pytest.approx(first["worst"][0], rel=1e-6)  # the check's step
 
 
+@pytest.mark.parametrize("level", ["standard", "fast"])
+def test_the_variant_named_a_level_has_the_parts_and_the_step_of_that_level(level):
+    found = {benchmark_accuracy.LEVELS[v.name]: v for v in benchmark_accuracy.select(["levels"])}[level]
+    scene = build_scene(wind=18.0, fidelity=level)
+    parts = (scene.rotor, *(scene.options[part] for part in ("wave_loads", "integrator")))
+    assert (found.rotor, found.wave_loads, found.integrator) == parts
+    assert found.dt == scene.dt
+    assert dict(found.options).get("mooring", "catenary") == scene.options["mooring"]
+
+
+def test_every_axis_of_the_sweep_has_a_mark_of_its_own_in_the_plot(tmp_path):
+    axes = list(dict.fromkeys(v.axis for v in benchmark_accuracy.variants()))
+    count = len(axes)
+    columns = {name: [0.1] * count for name in benchmark_accuracy.CHANNELS}
+    table = pd.DataFrame(
+        {"variant": axes, "axis": axes, "worst": [0.1] * count, "worst_of": ["yaw"] * count,
+         "real_time_factor": [100.0] * count, "kernel_factor": [110.0] * count, **columns}
+    )  # fmt: skip
+    figure = benchmark_accuracy.plot_accuracy(table)
+    lines = {line.get_label(): line for line in figure.axes[0].get_lines()}
+    assert len({(lines[axis].get_marker(), lines[axis].get_color()) for axis in axes}) == count
+
+
+def test_a_thinned_sea_keeps_the_strongest_components_with_their_phases():
+    sea = {"kind": "jonswap", "Hs": 6.0, "Tp": 11.0, "heading": 30.0}
+    waves = build_scene(sea=sea, seed=4).model.waves
+    few = build_scene(sea=benchmark_accuracy._thinned(waves, 7)).model.waves
+    kept = np.isin(waves.omega, few.omega)
+    assert kept.sum() == 7
+    assert waves.amplitude[kept].min() > waves.amplitude[~kept].max()
+    for name in ("amplitude", "phase", "cos_heading", "sin_heading"):
+        np.testing.assert_allclose(getattr(few, name), getattr(waves, name)[kept], rtol=1e-12, atol=1e-12)
+
+
+def test_memory_of_an_environment_is_what_no_other_one_holds():
+    envs = [FowtEnv(fidelity="fast", duration=10.0)]
+    envs.append(envs[0].twin())
+    own = benchmark_envs.own_bytes(envs)
+    shared = max(a.nbytes for a in benchmark_envs.arrays_of(envs[0]._setting))
+    assert 100.0 < own < shared
+
+
 def test_the_plot_of_a_study_is_written(tmp_path):
     columns = {name: [0.1, 0.01] for name in benchmark_accuracy.CHANNELS}
     table = pd.DataFrame(
         {"variant": ["a", "b"], "axis": ["rotor", "waves"], "worst": [0.1, 0.01], "worst_of": ["yaw", "sway"],
-         "real_time_factor": [1000.0, 100.0], **columns}
+         "real_time_factor": [1000.0, 100.0], "kernel_factor": [1100.0, 110.0], **columns}
     )  # fmt: skip
     benchmark_accuracy.plot_accuracy(table, tmp_path / "accuracy.png")
     assert (tmp_path / "accuracy.png").stat().st_size > 1000

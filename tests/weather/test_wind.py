@@ -219,6 +219,12 @@ def test_turbulence_lasts_at_least_as_long_as_asked():
     assert build({"kind": "ntm", "speed": 12.0, "period": 1200.0}).period == pytest.approx(1200.0)
 
 
+def test_turbulence_of_one_length_shares_its_times_but_not_its_values():
+    one, other = (build({"kind": "ntm", "speed": 18.0, "class": "B"}, seed=seed) for seed in (1, 2))
+    assert one.time is other.time
+    assert not np.array_equal(one.value, other.value)
+
+
 def test_turned_turbulence_is_the_same_wind_along_its_own_axes():
     plain = build({"kind": "ntm", "speed": 18.0}).value
     turned = build({"kind": "ntm", "speed": 18.0, "direction": -40.0}).value
