@@ -51,6 +51,16 @@ OBSERVATIONS = {  # information sets that agents are compared with
         "nacelle_acceleration", "previous_action", "wind_speed", "wind_preview",
     ),
     "blade": ("rotor_speed", "blade_pitch", "previous_action"),
+    # as measured, and what the estimator of lqr makes of it: wind, surge and waves
+    "estimate": (
+        "rotor_speed", "blade_pitch", "generator_torque", "platform_pitch", "platform_pitch_rate",
+        "nacelle_acceleration", "previous_action", "estimated_wind", "estimated_platform", "estimated_waves",
+    ),
+    "estimate_preview": (
+        "rotor_speed", "blade_pitch", "generator_torque", "platform_pitch", "platform_pitch_rate",
+        "nacelle_acceleration", "previous_action", "estimated_wind", "estimated_platform", "estimated_waves",
+        "wind_speed", "wind_preview",
+    ),
 }  # fmt: skip
 SECTIONS = ("environment", "decisions", "algorithm", "normalise", "validation", "checkpoint_minutes", "task")
 TASK_FIELDS = ("residual_pitch", "residual_torque", "blade_pitch", "setpoint")

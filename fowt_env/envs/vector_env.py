@@ -84,7 +84,7 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         self.single_action_space = first.action_space
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
-        self._law = first._law
+        self._law, self._watch = first._law, first._watch
         self._share_rows()
         self._statuses = np.full(num_envs, RUNNING, dtype=np.int64)
         self._rewards = np.zeros(num_envs)
@@ -214,7 +214,7 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
             ) from None
         if asked.shape != (self.num_envs, N_ACTIONS):
             raise InputError(f"actions have shape {asked.shape}: must be ({self.num_envs}, {N_ACTIONS})")
-        given = (self._boxes, self._law, asked, active, self._statuses, self._rewards)
+        given = (self._boxes, self._law, self._watch, asked, active, self._statuses, self._rewards)
         if self.threads == 1:
             bad = act_all(*given)
         else:
