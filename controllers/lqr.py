@@ -143,7 +143,7 @@ def block_of(p, memory):
 
 @kernel
 def estimate(p, memory, measurement, command):
-    """Bring the estimate to the present instant: over the last period under its command, then what is measured.
+    """Bring the estimate to the present: over the last period under its command, then what is measured.
 
     At the first instant reset has left the estimate, and no command has acted.
     """

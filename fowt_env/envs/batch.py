@@ -49,7 +49,17 @@ def act_all_parallel(boxes, law, estimator, actions, active, statuses, rewards, 
         n = len(boxes)
         for part in numba.prange(parts):
             k = np.int64(part)  # prange counts unsigned
-            act_some(boxes, law, estimator, actions, active, statuses, rewards, k * n // parts, (k + 1) * n // parts)
+            act_some(
+                boxes,
+                law,
+                estimator,
+                actions,
+                active,
+                statuses,
+                rewards,
+                k * n // parts,
+                (k + 1) * n // parts,
+            )
     return bad
 
 

@@ -455,7 +455,10 @@ def _adapted(
 
 
 def named_baseline(name, turbine, control_dt):
-    """Compiled controller of a name, as controllers.make takes it. Raises: InputError for unknown ones and those written in Python."""
+    """Compiled controller of a name, as controllers.make takes it.
+
+    Raises: InputError for unknown ones and those written in Python.
+    """
     from controllers import make  # looked up only when used: fowt_env imports nothing from it
     from controllers.base import CompiledController
 

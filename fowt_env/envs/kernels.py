@@ -141,7 +141,8 @@ def advance_period(setting, run, estimator):
 def act(box, law, estimator, action):
     """One control period under an action (2,) in [-1, 1]; returns (status, reward).
 
-    law, estimator: control kernels of the baseline and the estimator, or None. BAD_ACTION leaves everything as it was.
+    law, estimator: control kernels of the baseline and the estimator, or None. BAD_ACTION leaves
+    everything as it was.
     """
     setting, run = box.scene, box.work
     clipped = accept(action, run.action)

@@ -84,9 +84,7 @@ def _estimated(name):
 ESTIMATE_CHANNELS = {  # made by the estimator of lqr from what a turbine measures
     "estimated_wind": (
         _wind("estimated_wind", _estimated("wind"), "rotor-averaged wind, estimated"),
-        _wind(
-            "estimated_wind_tendency", _estimated("wind_tendency"), "what the estimated wind is moving towards"
-        ),
+        _wind("estimated_wind_tendency", _estimated("wind_tendency"), "what the estimated wind follows"),
         _wind("estimated_mean_wind", _estimated("mean_wind"), "estimated wind, low pass of some 80 s"),
     ),
     "estimated_platform": (

@@ -1,4 +1,4 @@
-"""Estimated channels and baselines that need the scene: lqr under the residual, the observer beside the plant."""
+"""Estimated channels, and baselines that need the scene: lqr and preview under the residual."""
 
 import numpy as np
 import pytest
@@ -96,7 +96,8 @@ def test_a_snapshot_holds_baseline_and_estimate_for_an_environment_that_was_neve
     saved = env.get_state()
     expected = [env.step(action)[0] for action in actions(20, seed=1)]
     other.set_state(saved)
-    assert all(np.array_equal(other.step(a)[0], e) for a, e in zip(actions(20, seed=1), expected, strict=True))
+    for action, observation in zip(actions(20, seed=1), expected, strict=True):
+        assert np.array_equal(other.step(action)[0], observation)
 
 
 def test_a_preview_baseline_is_told_the_wind_of_its_own_episode():
