@@ -304,6 +304,7 @@ class Training:
             listeners[0].n_calls = state["evaluation_calls"]
             judge_after.best = state["best"]
             keeper.before = state["seconds"]
+            keeper.torch_state = state["torch"]
         self.evaluation, self.judge, self.keeper = listeners[0], judge_after, keeper
         left = settings["steps"] - model.num_timesteps
         finished = True
@@ -389,7 +390,6 @@ class Training:
 
     def _load(self, kind, env):
         """(model, state) of the newest checkpoint, everything put back in its place."""
-        import torch
         from stable_baselines3.common.vec_env import VecNormalize
 
         folder = self.newest()
@@ -417,7 +417,6 @@ class Training:
         model.action_space.np_random.bit_generator.state = state["action_space"]
         random.setstate(state["random"])
         np.random.set_state(state["numpy"])
-        torch.set_rng_state(state["torch"])
         self.rows = state["rows"]
         return model, state
 

@@ -1,4 +1,4 @@
-"""The ablation: its file names real settings, its runs go on where they were, its report says what there is."""
+"""The ablation: its file names real settings, its runs go on, its report says what there is."""
 
 import pytest
 import yaml
