@@ -78,17 +78,11 @@ def _marks(axes, rows, name, colour, mark, cut):
                 axes.annotate(f"{x:.2f}, {y:.2f}", edge, fontsize=6, color=colour, ha="right", va="top")
                 axes.scatter(*edge, marker=mark, s=14, color=colour, label=name)
             continue
-        axes.scatter(
-            x,
-            y,
-            marker=mark,
-            s=46 if whole else 12,
-            facecolor=colour if row["within"] else "none",
-            edgecolor=colour if not (whole and row["within"]) else INK,
-            linewidth=1.2 if not row["within"] else 0.4,
-            label=name if whole else None,
-            zorder=6 if whole else 5,
-        )
+        style = {"facecolor": colour, "edgecolor": INK if whole else "white", "linewidth": 0.5}
+        if not row["within"]:
+            style = {"facecolor": "white" if whole else "none", "edgecolor": colour, "linewidth": 1.2}
+        size, level = (46, 6) if whole else (14, 7)  # the seeds lie upon their mean
+        axes.scatter(x, y, marker=mark, s=size, label=name if whole else None, zorder=level, **style)
 
 
 def plot_gust(runs, path=None, title=None, start=None, end=None):
