@@ -1,6 +1,5 @@
 """The commands that score agents: scores rivals, cases, bound, gust."""
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -92,11 +91,11 @@ def rivals(
 
 CASES_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt evaluate --suite shifted --controllers policy:ppo_measured,lqr,gspi_oc3 --out results/shifted[/cyan]
+[cyan]fowt evaluate --suite shifted --controllers policy:ppo_measured,gspi_oc3 --out results/shifted[/cyan]
 
 [cyan]fowt scores cases results/shifted --out results/shifted/scores[/cyan]  every shifted plant by itself
 
-[cyan]fowt scores cases results/gusts --figures "rotor-speed std,tower-base DEL"[/cyan]"""
+[cyan]fowt scores cases results/gusts --figures "RotSpeed_max_[rpm],PtfmPitch_max_[deg]"[/cyan]  any metric"""
 
 
 @scores.command(name="cases", epilog=CASES_EXAMPLES)
@@ -108,16 +107,16 @@ def by_cases(
     agents: AgentsOption = None,
     cases: CasesOption = None,
     figures: Annotated[
-        str, typer.Option(help="Figures whose tables are printed, by commas; CSV has all.")
+        str, typer.Option(help="Figures or metrics whose tables are made, by commas.")
     ] = "rotor-speed std,platform-pitch std,blade-pitch travel,tower-base DEL",
     out_path: OutOption = None,
 ):
     """Compare agents with one rival on each kind of case (its winds together), and count what failed."""
-    from training.agent_scores import by_kind, kinds_markdown, read_results
+    from training.agent_scores import by_kind, figures_named, kinds_markdown, read_results
 
-    table = read_results(results, _names(cases))
-    found, counts = by_kind(table, against, _groups(group), _names(agents))
-    _shown(kinds_markdown(found, counts, _names(figures)), {"": found, "counts": counts}, out_path)
+    table, chosen = read_results(results, _names(cases)), figures_named(_names(figures))
+    found, counts = by_kind(table, against, _groups(group), _names(agents), chosen)
+    _shown(kinds_markdown(found, counts), {"": found, "counts": counts}, out_path)
 
 
 BOUND_EXAMPLES = """[bold]Examples[/bold]
@@ -146,9 +145,7 @@ def bound(
     from training.bound_scores import bound_fractions, bound_markdown, read_bound
 
     fronts = read_bound(table_path)
-    found = bound_fractions(
-        read_results(results, _names(cases)), fronts, _groups(group), _names(agents)
-    )
+    found = bound_fractions(read_results(results, _names(cases)), fronts, _groups(group), _names(agents))
     text = "\n".join(bound_markdown(found, column) for column in ("of_bound_[-]", "of_measured_[-]"))
     _shown(text, {"": found}, out_path)
     if plot is not None:

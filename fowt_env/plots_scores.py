@@ -27,7 +27,7 @@ def look(number):
 
 
 def plot_shares(fractions, bound, path=None, title=None):
-    """Rotor-speed against platform-pitch deviation over gspi_oc3's, a panel per wind, with the bound's fronts.
+    """Rotor-speed against platform-pitch deviation over gspi_oc3's, a panel per wind, with the fronts.
 
     fractions: training.bound_scores.bound_fractions; bound: training.linear_bound.bound_table. Large marks:
     agents; small ones of the same kind: their training seeds. Hollow: more travel or power deviation than
@@ -49,7 +49,9 @@ def plot_shares(fractions, bound, path=None, title=None):
         style_axes(axes)
         here = bound[bound[WIND] == wind]
         for information, line_style, text in FRONTS:
-            front = efficient(here[here["information"] == information][["speed_ratio_[-]", "pitch_ratio_[-]"]])
+            front = efficient(
+                here[here["information"] == information][["speed_ratio_[-]", "pitch_ratio_[-]"]]
+            )
             if len(front):
                 axes.plot(front[:, 0], front[:, 1], color=INK, ls=line_style, linewidth=1.2, label=text)
         axes.scatter(1.0, 1.0, marker="+", s=80, color=INK, label="gspi_oc3", zorder=4)

@@ -27,14 +27,14 @@ KEY = ["controller", "case", "seed"]
 
 @dataclass(frozen=True)
 class Figure:
-    """A metric that is scored as ratio to a rival's, and what is aimed at: first, then.
+    """A metric that is scored as ratio to a rival's, and what is aimed at: first, then; None: nothing.
 
     more: whether the ratio is to be at least the aim; else at most.
     """
 
     name: str
     metric: str
-    first: float
+    first: float | None = None
     then: float | None = None
     more: bool = False
 
@@ -55,7 +55,7 @@ class Figure:
 
         "then, first*": the ratio reaches the second aim, the whole interval the first.
         """
-        if not np.isfinite(ratio):
+        if self.first is None or not np.isfinite(ratio):
             return ""
         found = self.level(ratio)
         if not np.isfinite(high):
@@ -84,6 +84,19 @@ COUNTS = {  # constraint: metric that counts how often it was passed
 }
 
 
+def figures_named(names):
+    """List of the Figures of names: those of FIGURES, and metrics as figures without an aim.
+
+    Raises: InputError for other names.
+    """
+    known = {figure.name: figure for figure in FIGURES}
+    known |= {metric: Figure(metric, metric) for metric in METRICS}
+    for name in names:
+        if name not in known:
+            raise unknown("figure", name, known)
+    return [known[name] for name in names]
+
+
 def read_results(paths, cases=None):
     """DataFrame of one or several results of fowt evaluate: folders, or CSV files. cases: names to keep.
 
@@ -93,7 +106,7 @@ def read_results(paths, cases=None):
     for path in map(Path, paths):
         file = path / "results.csv" if path.is_dir() else path
         if not file.is_file():
-            raise InputError(f"results {str(file)!r}: there is no such file; make it with fowt evaluate --out")
+            raise InputError(f"results {str(file)!r}: no such file; make it with fowt evaluate --out")
         table = pd.read_csv(file)
         missing = [name for name in (*KEY, "status", *METRICS) if name not in table]
         if missing:
@@ -143,7 +156,7 @@ def _values(runs, labels, cases, seeds, metric):
     return runs[metric].reindex(index).to_numpy(dtype=float).reshape(len(labels), len(cases), len(seeds))
 
 
-def agent_scores(table, rivals, groups=None, agents=None):
+def agent_scores(table, rivals, groups=None, agents=None, figures=FIGURES):
     """DataFrame: per agent or group, rival and figure the ratio, its interval, and what that reaches.
 
     table: what training.evaluate.evaluate returns; groups, agents: as grouped takes them. Columns: agent,
@@ -151,10 +164,10 @@ def agent_scores(table, rivals, groups=None, agents=None):
     runs, training_seeds, verdict (Figure.verdict). Where the rival's figure is 0 there is no ratio.
     Raises: InputError for labels that were not run, or where no run of both went well.
     """
-    return _scores(table, rivals, grouped(table, rivals, groups, agents))
+    return _scores(table, rivals, grouped(table, rivals, groups, agents), figures)
 
 
-def _scores(table, rivals, chosen):
+def _scores(table, rivals, chosen, figures):
     """agent_scores of {name: labels}."""
     good = table.set_index(KEY).sort_index()
     made = good.index
@@ -165,7 +178,7 @@ def _scores(table, rivals, chosen):
         runs = int(made.get_level_values(0).isin(labels).sum())
         for rival in rivals:
             pairs_at_all = 0
-            for figure in FIGURES:
+            for figure in figures:
                 own = _values(good, list(labels), cases, seeds, figure.metric)
                 other = _values(good, [rival], cases, seeds, figure.metric)
                 with np.errstate(divide="ignore", invalid="ignore"):
@@ -220,7 +233,7 @@ def kind_of(case):
     return re.sub(r"(_\d+){1,2}$", "", case)
 
 
-def by_kind(table, rival, groups=None, agents=None):
+def by_kind(table, rival, groups=None, agents=None, figures=FIGURES):
     """(scores, counts) as agent_scores and agent_counts give, for each kind of case by itself.
 
     Both have a further first column, kind. A kind in which an agent has no run that went well has NaN
@@ -232,10 +245,10 @@ def by_kind(table, rival, groups=None, agents=None):
         counts.append(_counts(here, chosen | {rival: (rival,)}).assign(kind=kind))
         for name, labels in chosen.items():
             try:
-                scores.append(_scores(here, [rival], {name: labels}).assign(kind=kind))
+                scores.append(_scores(here, [rival], {name: labels}, figures).assign(kind=kind))
             except InputError:  # all failed or none was made, which the counts say
                 blank = {"agent": name, "rival": rival, "kind": kind, "pairs": 0, "verdict": ""}
-                scores.append(pd.DataFrame([blank | {"figure": figure.name} for figure in FIGURES]))
+                scores.append(pd.DataFrame([blank | {"figure": figure.name} for figure in figures]))
     whole = pd.concat(scores, ignore_index=True), pd.concat(counts, ignore_index=True)
     return tuple(frame[["kind", *frame.columns.drop("kind")]] for frame in whole)
 
@@ -264,7 +277,7 @@ def scores_markdown(scores, counts):
             text=[f"{ratio_text(row)} {row['verdict']}".rstrip() for _, row in rows.iterrows()]
         )
         wide = shown.pivot(index="figure", columns="agent", values="text")
-        wide = wide.loc[[figure.name for figure in FIGURES], names]
+        wide = wide.loc[list(dict.fromkeys(scores["figure"])), names]
         wide.index.name = f"over `{rival}`"
         wide.columns = [f"`{name}`" for name in names]
         parts.append(markdown_table(wide))
@@ -276,14 +289,11 @@ def scores_markdown(scores, counts):
 
 
 def kinds_markdown(scores, counts, figures=None):
-    """Markdown text of by_kind: a table for each figure (names; None: all), kinds by agents, one of failures."""
+    """Markdown text of by_kind: a table for each of its figures (names; None: all), one of failures."""
     parts = []
     names = list(dict.fromkeys(scores["agent"]))
     kinds = list(dict.fromkeys(scores["kind"]))
-    known = [figure.name for figure in FIGURES]
-    for name in figures or known:
-        if name not in known:
-            raise unknown("figure", name, known)
+    for name in figures or list(dict.fromkeys(scores["figure"])):
         rows = scores[scores["figure"] == name]
         shown = rows.assign(text=[ratio_text(row) for _, row in rows.iterrows()])
         wide = shown.pivot(index="kind", columns="agent", values="text").loc[kinds, names]
@@ -303,7 +313,7 @@ def kinds_markdown(scores, counts, figures=None):
 
 
 def write_scores(tables, text, path):
-    """Paths written: PATH.md of the text, and each of {suffix: DataFrame} as PATH_suffix.csv ("": PATH.csv)."""
+    """Paths written: PATH.md of the text, and PATH_suffix.csv of {suffix: DataFrame} ("": PATH.csv)."""
     path = Path(path)
     written = [path.with_name(path.name + ".md")]
     with replacing(written[0]) as temporary:

@@ -78,9 +78,7 @@ def crossed_estimate(values, resamples=RESAMPLES):
             continue
         drawn = resample_weights(values.shape[axis], resamples, RANDOM_SEED + axis)
         place = np.nonzero(there)[axis]
-        low, high = interval(
-            np.array([estimate]), interquartile_mean(known, drawn[:, place])[:, None], n
-        )
+        low, high = interval(np.array([estimate]), interquartile_mean(known, drawn[:, place])[:, None], n)
         down.append(max(0.0, float(estimate - low[0])))
         up.append(max(0.0, float(high[0] - estimate)))
     if not down:

@@ -13,6 +13,7 @@ from training.agent_scores import (
     agent_counts,
     agent_scores,
     by_kind,
+    figures_named,
     kind_of,
     kinds_markdown,
     read_results,
@@ -32,9 +33,7 @@ def table(agents, cases=("ntm_18",)):
             for name, ratios in {"rival": [1.0] * seeds, **agents}.items():
                 row = dict.fromkeys(COLUMNS, 0.0)
                 row |= {"controller": name, "case": case, "seed": seed, "status": "ok", "reason": ""}
-                rows.append(
-                    row | {figure.metric: ratios[seed] * (c + seed + 1.0) for figure in FIGURES}
-                )
+                rows.append(row | {figure.metric: ratios[seed] * (c + seed + 1.0) for figure in FIGURES})
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
@@ -134,7 +133,15 @@ def test_wrong_names_and_groups_are_refused():
         with pytest.raises(InputError, match="needs a name that no controller has"):
             agent_scores(runs, ["rival"], groups)
     with pytest.raises(InputError, match="unknown figure 'rotor'"):
-        kinds_markdown(*by_kind(runs, "rival"), ["rotor"])
+        figures_named(["rotor"])
+
+
+def test_any_metric_may_be_a_figure_without_an_aim():
+    runs = table({"agent": [0.5, 0.6]})
+    runs["PtfmPitch_max_[deg]"] = runs["PtfmPitch_std_[deg]"]
+    scores, _ = by_kind(runs, "rival", figures=figures_named(["PtfmPitch_max_[deg]", "power std"]))
+    assert list(scores["figure"]) == ["PtfmPitch_max_[deg]", "power std"]
+    assert scores["ratio"].to_numpy() == pytest.approx(0.55) and list(scores["verdict"]) == ["", "met"]
 
 
 def test_results_are_joined_and_a_run_with_two_answers_is_refused(tmp_path):
@@ -146,7 +153,7 @@ def test_results_are_joined_and_a_run_with_two_answers_is_refused(tmp_path):
         read_results([one, two])
     with pytest.raises(InputError, match="unknown case of the evaluation"):
         read_results([one], ["ntm_19"])
-    with pytest.raises(InputError, match="there is no such file"):
+    with pytest.raises(InputError, match="no such file"):
         read_results([tmp_path / "none"])
 
 

@@ -11,7 +11,7 @@ def test_the_interquartile_mean_leaves_out_a_quarter_at_each_end():
 
 
 def test_a_value_on_a_quartile_counts_in_part():
-    # of five values the middle half is 2.5 of them: three quarters of the second, the third, and of the fourth
+    # of five values the middle half is 2.5: the third, and three quarters of the second and the fourth
     assert interquartile_mean([10.0, 0.0, 1.0, 3.0, 2.0]) == pytest.approx((0.75 * 1 + 2 + 0.75 * 3) / 2.5)
     assert interquartile_mean([7.0]) == 7.0
 

@@ -96,7 +96,7 @@ def test_the_picture_has_a_panel_per_wind_and_a_mark_for_each_agent_and_training
 def test_a_gust_is_drawn_for_every_controller_within_its_seconds(tmp_path):
     time = np.arange(0.0, 20.0, 0.1)
     frames = {
-        name: pd.DataFrame({"Time_[s]": time, "Wind1VelX_[m/s]": 18.0 + 0.0 * time, "RotSpeed_[rpm]": time + k})
+        name: pd.DataFrame({"Time_[s]": time, "Wind1VelX_[m/s]": 18.0, "RotSpeed_[rpm]": time + k})
         for k, name in enumerate("abcdefghij")
     }  # fmt: skip
     figure = plot_gust(frames, tmp_path / "gust.png", start=5.0, end=10.0)

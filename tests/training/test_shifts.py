@@ -1,4 +1,4 @@
-"""Shifted plants: the run is on them, the controller is told of the nominal one, noise is on readings alone."""
+"""Shifted plants: the run is on them, the controller knows the nominal one, noise is on readings alone."""
 
 import json
 
@@ -45,6 +45,16 @@ class Recorder:
     def act(self, measurement):
         self.seen.append(measurement)
         return self.inner.act(measurement)
+
+
+class Deaf:
+    """Commands that no reading changes."""
+
+    def reset(self, measurement):
+        pass
+
+    def act(self, measurement):
+        return 43093.55, 0.26
 
 
 def measured(time, **values):
@@ -102,8 +112,7 @@ def test_the_run_is_on_the_shifted_plant_and_the_controller_knows_the_nominal_on
 
 def test_a_shifted_mooring_changes_the_motions_and_an_empty_shift_no_bit():
     plain, same, soft = (
-        short(["gspi_oc3"], windy(shift)).iloc[0]
-        for shift in (None, Shift(), Shift(mooring_stiffness=0.8))
+        short(["gspi_oc3"], windy(shift)).iloc[0] for shift in (None, Shift(), Shift(mooring_stiffness=0.8))
     )
     assert plain.equals(same)
     assert plain["PtfmSurge_mean_[m]"] < soft["PtfmSurge_mean_[m]"]  # it drifts farther on softer lines
@@ -134,8 +143,7 @@ def test_a_delay_shows_what_was_measured_as_many_periods_ago(turbine):
 
 
 def test_noise_is_on_the_readings_and_not_in_the_metrics():
-    hold = {"hold": "constant"}
-    plain, noisy = (short(hold, windy(shift)).iloc[0] for shift in (None, Shift(noise=0.5)))
+    plain, noisy = (short({"deaf": Deaf()}, windy(shift)).iloc[0] for shift in (None, Shift(noise=0.5)))
     assert plain.equals(noisy)  # a controller that looks at nothing runs as without noise
     felt, truth = (short(["gspi_oc3"], windy(shift)).iloc[0] for shift in (Shift(noise=0.05), None))
     assert felt["blade_pitch_travel_[deg/s]"] > 1.05 * truth["blade_pitch_travel_[deg/s]"]
