@@ -95,7 +95,9 @@ CASES_EXAMPLES = """[bold]Examples[/bold]
 
 [cyan]fowt scores cases results/shifted --out results/shifted/scores[/cyan]  every shifted plant by itself
 
-[cyan]fowt scores cases results/gusts --figures "RotSpeed_max_[rpm],PtfmPitch_max_[deg]"[/cyan]  any metric"""
+[cyan]fowt scores cases results/gusts --figures "RotSpeed_max_[rpm],PtfmPitch_max_[deg]"[/cyan]  any metric
+
+[cyan]fowt scores cases results/sea_states --each[/cyan]  one row per sea state"""
 
 
 @scores.command(name="cases", epilog=CASES_EXAMPLES)
@@ -109,13 +111,14 @@ def by_cases(
     figures: Annotated[
         str, typer.Option(help="Figures or metrics whose tables are made, by commas.")
     ] = "rotor-speed std,platform-pitch std,blade-pitch travel,tower-base DEL",
+    each: Annotated[bool, typer.Option("--each", help="Every case by itself, winds too.")] = False,
     out_path: OutOption = None,
 ):
     """Compare agents with one rival on each kind of case (its winds together), and count what failed."""
     from training.agent_scores import by_kind, figures_named, kinds_markdown, read_results
 
     table, chosen = read_results(results, _names(cases)), figures_named(_names(figures))
-    found, counts = by_kind(table, against, _groups(group), _names(agents), chosen)
+    found, counts = by_kind(table, against, _groups(group), _names(agents), chosen, each)
     _shown(kinds_markdown(found, counts), {"": found, "counts": counts}, out_path)
 
 

@@ -34,7 +34,7 @@ def results(tmp_path):
 def test_rivals_prints_the_table_that_it_writes(results):
     done = call("rivals", results, "--against", "gspi_oc3", "--group", "g=a,b", "--out", results / "s")
     assert done.exit_code == 0, done.output
-    assert "| rotor-speed std | 0.725 [" in done.output and "| `g` | 12 | 0 |" in done.output
+    assert "| rotor-speed std | 0.725 [" in done.output and "| `g` |  | 12 | 0 |" in done.output
     assert (results / "s.md").read_text().strip() in done.output
     table = pd.read_csv(results / "s.csv")
     assert set(table["agent"]) == {"g"} and (table["ratio"] - 0.725).abs().max() < 1e-12

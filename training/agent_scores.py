@@ -10,11 +10,13 @@ seeds of one configuration make a group, whose interval resamples training and w
 
 import re
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
+from controllers import DESIGN, POLICY, information
 from fowt_env.errors import InputError, unknown
 from fowt_env.outputs import replacing, write_table
 from training.bootstrap import crossed_estimate
@@ -23,6 +25,11 @@ from training.metrics import METRICS
 __all__ = ["COUNTS", "FIGURES", "Figure", "agent_counts", "agent_scores", "by_kind", "read_results"]
 
 KEY = ["controller", "case", "seed"]
+PAST_ANY = "past a constraint"
+MEASURED = {  # what a turbine's own sensors show
+    "time", "rotor_speed", "generator_speed", "blade_pitch", "generator_torque", "platform_pitch",
+    "platform_pitch_rate", "platform_pitch_acceleration", "nacelle_acceleration", "nacelle_velocity",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -209,8 +216,8 @@ def _scores(table, rivals, chosen, figures):
 def agent_counts(table, rivals, groups=None, agents=None):
     """DataFrame: per agent, group and rival the runs, those that failed, and those that passed a constraint.
 
-    Columns: agent, runs, failed, the names of COUNTS (runs in which it was passed at least once),
-    "largest overspeed (%)", verdict ("met" where nothing failed or was passed).
+    Columns: agent, told (see told), runs, failed, the names of COUNTS (runs in which it was passed at least
+    once), past any of them, largest overspeed (%), verdict ("met" where nothing failed or was passed).
     """
     return _counts(table, grouped(table, rivals, groups, agents) | {name: (name,) for name in rivals})
 
@@ -220,12 +227,29 @@ def _counts(table, chosen):
     rows = []
     for name, labels in chosen.items():
         here = table[table["controller"].isin(labels)]
-        row = {"agent": name, "runs": len(here), "failed": int((here["status"] != "ok").sum())}
+        row = {"agent": name, "told": "; ".join(dict.fromkeys(map(told, labels))), "runs": len(here)}
+        row["failed"] = int((here["status"] != "ok").sum())
         row |= {text: int((here[metric] > 0).sum()) for text, metric in COUNTS.items()}
+        row[PAST_ANY] = int((here[list(COUNTS.values())] > 0).any(axis=1).sum())
         row["largest overspeed (%)"] = float(here["overspeed_[%]"].max())
-        row["verdict"] = "missed" if row["failed"] or any(row[text] for text in COUNTS) else "met"
+        row["verdict"] = "missed" if row["failed"] or row[PAST_ANY] else "met"
         rows.append(row)
     return pd.DataFrame(rows)
+
+
+@lru_cache(maxsize=256)
+def told(label):
+    """What a controller is told: "measured" for channels of MEASURED, and by name what else it uses.
+
+    "" for labels that name neither a controller of the package nor an agent or design that is still there.
+    """
+    if ":" in label and not label.startswith((POLICY, DESIGN)):
+        return ""  # code of the user's own, which a table is no reason to run
+    try:
+        used = information(label)
+    except InputError:
+        return ""
+    return ", ".join((["measured"] if set(used) & MEASURED else []) + [x for x in used if x not in MEASURED])
 
 
 def kind_of(case):
@@ -233,15 +257,17 @@ def kind_of(case):
     return re.sub(r"(_\d+){1,2}$", "", case)
 
 
-def by_kind(table, rival, groups=None, agents=None, figures=FIGURES):
+def by_kind(table, rival, groups=None, agents=None, figures=FIGURES, each=False):
     """(scores, counts) as agent_scores and agent_counts give, for each kind of case by itself.
+
+    each: every case is a kind of its own; else the winds of a kind (kind_of) are taken together.
 
     Both have a further first column, kind. A kind in which an agent has no run that went well has NaN
     ratios there.
     """
     chosen = grouped(table, [rival], groups, agents)
     scores, counts = [], []
-    for kind, here in table.groupby(table["case"].map(kind_of), sort=False):
+    for kind, here in table.groupby(table["case"] if each else table["case"].map(kind_of), sort=False):
         counts.append(_counts(here, chosen | {rival: (rival,)}).assign(kind=kind))
         for name, labels in chosen.items():
             try:
@@ -281,10 +307,10 @@ def scores_markdown(scores, counts):
         wide.index.name = f"over `{rival}`"
         wide.columns = [f"`{name}`" for name in names]
         parts.append(markdown_table(wide))
-    told = counts.copy()
-    told["largest overspeed (%)"] = told["largest overspeed (%)"].map("{:.1f}".format)
-    told["agent"] = told["agent"].map("`{}`".format)
-    parts.append(markdown_table(told))
+    shown = counts.copy()
+    shown["largest overspeed (%)"] = shown["largest overspeed (%)"].map("{:.1f}".format)
+    shown["agent"] = shown["agent"].map("`{}`".format)
+    parts.append(markdown_table(shown.drop(columns=PAST_ANY)))
     return "\n".join(parts)
 
 
@@ -300,12 +326,10 @@ def kinds_markdown(scores, counts, figures=None):
         wide.index.name = f"{name} over `{rows['rival'].iloc[0]}`"
         wide.columns = [f"`{agent}`" for agent in names]
         parts.append(markdown_table(wide))
-    told = counts.assign(
-        text=counts["failed"].map(str) + " / " + counts[list(COUNTS)].max(axis=1).map(str) + " of "
-        + counts["runs"].map(str)
-    )  # fmt: skip
+    columns = counts[["failed", PAST_ANY, "runs"]].to_numpy()
+    shown = counts.assign(text=[f"{failed} / {past} of {runs}" for failed, past, runs in columns])
     agents = list(dict.fromkeys(counts["agent"]))
-    wide = told.pivot(index="kind", columns="agent", values="text").loc[kinds, agents]
+    wide = shown.pivot(index="kind", columns="agent", values="text").loc[kinds, agents]
     wide.index.name = "failed / past a constraint"
     wide.columns = [f"`{agent}`" for agent in agents]
     parts.append(markdown_table(wide))

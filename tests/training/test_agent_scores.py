@@ -9,6 +9,7 @@ from fowt_env.outputs import write_table
 from training.agent_scores import (
     COUNTS,
     FIGURES,
+    PAST_ANY,
     Figure,
     agent_counts,
     agent_scores,
@@ -18,6 +19,7 @@ from training.agent_scores import (
     kinds_markdown,
     read_results,
     scores_markdown,
+    told,
 )
 from training.bootstrap import interquartile_mean
 from training.evaluate import COLUMNS
@@ -88,7 +90,16 @@ def test_a_passed_constraint_is_a_miss_even_once():
     runs.loc[(runs["controller"] == "agent") & (runs["seed"] == 1), "rotor_speed_violations_[-]"] = 3.0
     counts = agent_counts(runs, ["rival"]).set_index("agent")
     assert counts.loc["agent", "rotor past 130 %"] == 1 and counts.loc["agent", "verdict"] == "missed"
-    assert set(COUNTS.values()) <= set(METRICS)
+    assert counts.loc["agent", PAST_ANY] == 1 and set(COUNTS.values()) <= set(METRICS)
+
+
+def test_each_controller_stands_with_what_it_is_told():
+    assert told("gspi_oc3") == "measured"
+    assert told("lqr") == "measured, plant_model"
+    assert told("rosco_float") == "measured, wind_speed, plant_model"
+    assert told("policy:ppo_measured") == "measured"
+    assert told("policy:ppo_preview") == "measured, wind_speed, wind_preview"
+    assert told("my_module:Mine") == told("policy:gone.npz") == told("mine") == ""
 
 
 def test_a_rival_at_zero_gives_no_ratio_and_the_pairs_say_so():
@@ -120,6 +131,8 @@ def test_kinds_of_cases_are_scored_apart_and_a_kind_that_failed_has_no_ratio():
     assert scores.loc[scores["kind"] == "stiff", "ratio"].isna().all()
     text = kinds_markdown(scores, counts, ["rotor-speed std"])
     assert "| stiff | - |" in text and "| stiff | 2 / 0 of 2 | 0 / 0 of 2 |" in text
+    every, _ = by_kind(runs, "rival", each=True)
+    assert list(dict.fromkeys(every["kind"])) == ["soft_14", "soft_18", "stiff_14"]
     assert [kind_of(name) for name in ("ntm_18", "ntm_11_4", "eog_rated", "ss_5")] == [
         "ntm", "ntm", "eog_rated", "ss"
     ]  # fmt: skip
