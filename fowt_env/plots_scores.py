@@ -9,6 +9,8 @@ from fowt_env.plots_design import WIND, place_legend
 
 MARKS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*", "p", "h")
 FRONTS = (("full", "-", "the linear bound"), ("measured", "--", "the same, measured channels"))
+FRAME = 1.3  # ends of both axes of plot_shares
+HOLLOW = "hollow: more travel or power\ndeviation than gspi_oc3"
 GUST = (  # panels of plot_gust: label, channel
     ("wind\n(m/s)", "Wind1VelX_[m/s]"),
     ("rotor speed\n(rpm)", "RotSpeed_[rpm]"),
@@ -31,7 +33,7 @@ def plot_shares(fractions, bound, path=None, title=None):
 
     fractions: training.bound_scores.bound_fractions; bound: training.linear_bound.bound_table. Large marks:
     agents; small ones of the same kind: their training seeds. Hollow: more travel or power deviation than
-    gspi_oc3, so that the bound does not hold.
+    gspi_oc3, so that the bound does not hold. Agents beyond FRAME stand in the corner with their figures.
     """
     from training.linear_bound import efficient
 
@@ -43,8 +45,6 @@ def plot_shares(fractions, bound, path=None, title=None):
     figure = new_figure(3.1 * columns + 0.6, 3.1 * rows + 0.3)
     places = list(figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).flat)
     names = list(dict.fromkeys(fractions["agent"]))
-    limit = 1.05 * max(1.1, fractions["speed_ratio_[-]"].max(), fractions["pitch_ratio_[-]"].max())
-    cut = min(limit, 1.8)
     for axes, wind in zip(places, winds, strict=False):
         style_axes(axes)
         here = bound[bound[WIND] == wind]
@@ -56,11 +56,16 @@ def plot_shares(fractions, bound, path=None, title=None):
                 axes.plot(front[:, 0], front[:, 1], color=INK, ls=line_style, linewidth=1.2, label=text)
         axes.scatter(1.0, 1.0, marker="+", s=80, color=INK, label="gspi_oc3", zorder=4)
         at = fractions[fractions[WIND] == wind]
+        beyond = 0
         for number, name in enumerate(names):
-            _marks(axes, at[at["agent"] == name], name, *look(number), cut)
+            beyond += _marks(axes, at[at["agent"] == name], *look(number), beyond)
+            colour, mark = look(number)  # the same in the legend, whatever the first wind has
+            style = {"facecolor": colour, "edgecolor": INK, "linewidth": 0.5}
+            axes.scatter([], [], marker=mark, s=46, label=name, **style)
+        axes.scatter([], [], marker="o", s=46, facecolor="none", edgecolor=INK, label=HOLLOW)
         axes.set_title(f"{wind:g} m/s", fontsize=9, color=INK)
-        axes.set_xlim(0.0, cut)
-        axes.set_ylim(0.0, cut)
+        axes.set_xlim(0.0, FRAME)
+        axes.set_ylim(0.0, FRAME)
     place_legend(figure, places, len(winds))
     figure.supxlabel("rotor-speed deviation over that of gspi_oc3", fontsize=9, color=INK)
     figure.supylabel("platform-pitch deviation over that of gspi_oc3", fontsize=9, color=INK)
@@ -69,22 +74,28 @@ def plot_shares(fractions, bound, path=None, title=None):
     return save_figure(figure, path)
 
 
-def _marks(axes, rows, name, colour, mark, cut):
-    """One agent at one wind; beyond the frame, an arrow at its edge says where it is."""
+def _marks(axes, rows, colour, mark, beyond):
+    """Draw one agent at one wind; the number of agents (0 or 1) that lie beyond the frame.
+
+    Such a one stands as text in the corner, below `beyond` others.
+    """
+    outside = 0
     for row in rows.sort_values("seed_of").to_dict("records"):
         whole = row["seed_of"] == ""
         x, y = row["speed_ratio_[-]"], row["pitch_ratio_[-]"]
-        if max(x, y) > cut:
+        if max(x, y) > FRAME:
             if whole:
-                edge = min(x, 0.97 * cut), min(y, 0.97 * cut)
-                axes.annotate(f"{x:.2f}, {y:.2f}", edge, fontsize=6, color=colour, ha="right", va="top")
-                axes.scatter(*edge, marker=mark, s=14, color=colour, label=name)
+                place = 0.98 * FRAME, (0.96 - 0.06 * beyond) * FRAME
+                axes.annotate(f"{x:.2f}, {y:.2f}", place, fontsize=7, color=colour, ha="right", va="center")
+                axes.scatter(0.72 * FRAME, place[1], marker=mark, s=14, color=colour)
+                outside = 1
             continue
         style = {"facecolor": colour, "edgecolor": INK if whole else "white", "linewidth": 0.5}
         if not row["within"]:
             style = {"facecolor": "white" if whole else "none", "edgecolor": colour, "linewidth": 1.2}
         size, level = (46, 6) if whole else (14, 7)  # the seeds lie upon their mean
-        axes.scatter(x, y, marker=mark, s=size, label=name if whole else None, zorder=level, **style)
+        axes.scatter(x, y, marker=mark, s=size, zorder=level, **style)
+    return outside
 
 
 def plot_gust(runs, path=None, title=None, start=None, end=None):
