@@ -53,6 +53,7 @@ class CompiledController:
     A subclass sets `kernel = staticmethod(law)`, with law made by fowt_env.jit.control_kernel, and
     writes reset(). parameters and memory are float64 arrays; IntEnums beside the law name their
     entries. The compiled loop calls kernel on these arrays; act() calls the same law from Python.
+    A law is handed the command in force, which it overwrites with the next one.
     """
 
     kernel: Callable[..., None] | None = None
@@ -62,6 +63,7 @@ class CompiledController:
         self.name = str(name)
         self.parameters = np.ascontiguousarray(parameters, dtype=np.float64)
         self.memory = np.zeros(n_memory)
+        self.command = np.zeros(N_COMMANDS)  # in force, for act(); a first call must not rely on it
 
     def prepare(self, scene: Any) -> None:
         """Take what the law needs of the scene of the coming run; called once before reset()."""
@@ -75,9 +77,8 @@ class CompiledController:
         values = np.array(measurement, dtype=np.float64)
         if values.shape != (N_MEASUREMENTS,):
             raise InputError(f"measurement has shape {values.shape}: must be ({N_MEASUREMENTS},)")
-        command = np.zeros(N_COMMANDS)
-        call_law(self.kernel, self.parameters, self.memory, values, command)
-        return float(command[0]), float(command[1])
+        call_law(self.kernel, self.parameters, self.memory, values, self.command)
+        return float(self.command[0]), float(self.command[1])
 
 
 class CheckedController:

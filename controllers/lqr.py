@@ -4,6 +4,9 @@ A Kalman filter on measured channels estimates platform, rotor-averaged wind and
 the estimates moves both commands by their rates, so limits need no further care. The models, trims and
 gains of controllers/lqr_design.py are interpolated in a slow mean of the estimated wind. Where the pitch
 rests near its minimum the torque law of theory.md, section 3, takes over.
+
+Filter and feedback go on from the command in force, whoever gave it: what the residual mode of the
+environment adds to one command stays in the next, so that it is an addition to the rates.
 """
 
 from enum import IntEnum
@@ -66,7 +69,8 @@ PITCH_COMMAND = TORQUE_COMMAND + 1
 INNOVATION = PITCH_COMMAND + 1
 DEVIATION = INNOVATION + N_SENSORS
 FED_BACK = DEVIATION + N_STATE
-N_MEMORY = FED_BACK + N_FEEDBACK
+STARTED = FED_BACK + N_FEEDBACK  # whether a command is in force yet
+N_MEMORY = STARTED + 1
 
 
 @kernel
@@ -127,17 +131,39 @@ def feed_back(p, low, share, memory, row):
 
 
 @kernel
-def lqr_step(p, memory, measurement, command):
-    """One period of the sampled law."""
-    dt, rated = p[Head.CONTROL_DT], p[Head.RATED_SPEED]
+def block_of(p, memory):
+    """(start of the block of the wind below the operating wind, share of the way to the next block)."""
     last = p[Head.FIRST_WIND] + (p[Head.WINDS] - 1.0) * p[Head.WIND_STEP]
     place = (limited(memory[OPERATING_WIND], p[Head.FIRST_WIND], last) - p[Head.FIRST_WIND]) / p[
         Head.WIND_STEP
     ]
     node = min(int(place), int(p[Head.WINDS]) - 2)
-    share = place - node
-    low = BLOCKS + node * BLOCK
+    return BLOCKS + node * BLOCK, place - node
+
+
+@kernel
+def estimate(p, memory, measurement, command):
+    """Bring the estimate to the present: over the last period under its command, then what is measured.
+
+    At the first instant reset has left the estimate, and no command has acted.
+    """
+    if memory[STARTED] != 0.0:
+        low, share = block_of(p, memory)
+        predict(p, low, share, memory, command[0], command[1])
+        decay = p[Head.SCHEDULE_DECAY]
+        memory[OPERATING_WIND] = decay * memory[OPERATING_WIND] + (1.0 - decay) * memory[WIND + 1]
+        memory[TORQUE_COMMAND], memory[PITCH_COMMAND] = command[0], command[1]
+    memory[STARTED] = 1.0
+    low, share = block_of(p, memory)
     correct(p, low, share, memory, measurement)
+
+
+@kernel
+def lqr_step(p, memory, measurement, command):
+    """One period of the sampled law."""
+    dt, rated = p[Head.CONTROL_DT], p[Head.RATED_SPEED]
+    estimate(p, memory, measurement, command)
+    low, share = block_of(p, memory)
 
     speed_error = measurement[Measure.GENERATOR_SPEED] / p[Head.GEAR_RATIO] - rated
     pitch, torque = memory[PITCH_COMMAND], memory[TORQUE_COMMAND]
@@ -170,11 +196,6 @@ def lqr_step(p, memory, measurement, command):
     wanted = blend * wanted + (1.0 - blend) * by_curve
     step = dt * p[Head.TORQUE_RATE_LIMIT]
     torque += limited(wanted - torque, -step, step)
-
-    predict(p, low, share, memory, torque, pitch)
-    decay = p[Head.SCHEDULE_DECAY]
-    memory[OPERATING_WIND] = decay * memory[OPERATING_WIND] + (1.0 - decay) * memory[WIND + 1]
-    memory[PITCH_COMMAND], memory[TORQUE_COMMAND] = pitch, torque
     command[0], command[1] = torque, pitch
 
 
@@ -182,6 +203,12 @@ def lqr_step(p, memory, measurement, command):
 def lqr_law(parameters, memory, measurement, command):
     """Compiled form of lqr_step, one type for all control laws."""
     lqr_step(parameters, memory, measurement, command)
+
+
+@control_kernel
+def estimator_law(parameters, memory, measurement, command):
+    """The estimate alone; the command in force is read and stays."""
+    estimate(parameters, memory, measurement, command)
 
 
 def blocks(models, weights, rated_speed, dt):
@@ -194,6 +221,9 @@ def blocks(models, weights, rated_speed, dt):
         parts = (model.trim, model.torque, model.pitch, a, b, model.C, design.estimator_gain(model, dt), gain)
         rows.append(np.concatenate([np.ravel(part) for part in parts]))
     return np.array(rows)
+
+
+_BLOCKS = {}  # (id of models, weights, control period) -> (models, their blocks): environments make many
 
 
 class LQR(CompiledController):
@@ -215,6 +245,7 @@ class LQR(CompiledController):
         self.turbine, self.control_dt = turbine, check_control_dt(control_dt)
         self.weights = Weights() if weights is None else weights
         self.prepared = False
+        self._plant = None  # the models it was designed on last, in prepare
         self.designed = models is not None
         if self.designed:
             self.take(models)
@@ -227,13 +258,21 @@ class LQR(CompiledController):
         """
         if scene.model.wind is None:
             raise InputError(f"controller {self.name!r}: needs a scene with wind to linearise")
-        if not self.designed:
-            self.take(design.design_models(scene))
+        if self.designed:
+            return
+        models = design.design_models(scene)
+        if models is not self._plant:
+            self._plant = models
+            self.take(models)
 
     def take(self, models):
         """Take the gains for DesignModels of winds 1 m/s apart."""
-        rated = self.turbine.rated_rotor_speed
-        self.install(models[0].wind, blocks(models, self.weights, rated, self.control_dt))
+        known = (id(models), self.weights, self.control_dt)
+        if known not in _BLOCKS:
+            rated = self.turbine.rated_rotor_speed
+            # the models are kept with what was made of them, so that their id stays theirs
+            _BLOCKS[known] = models, blocks(models, self.weights, rated, self.control_dt)
+        self.install(models[0].wind, _BLOCKS[known][1])
 
     def install(self, first_wind, table):
         """Take the blocks of winds 1 m/s apart."""
@@ -290,6 +329,18 @@ class LQR(CompiledController):
         if not np.isfinite(torque):
             torque = np.interp(wind, winds, table[:, TORQUE])
         memory[TORQUE_COMMAND] = torque
+
+
+class WindEstimator(LQR):
+    """The Kalman filter of LQR without its feedback: told the commands in force, it only estimates.
+
+    memory begins with what it estimates, in the order of ESTIMATED of fowt_env/envs/observations.py.
+    """
+
+    kernel = staticmethod(estimator_law)
+
+    def __init__(self, turbine, control_dt, name="estimator"):
+        super().__init__(turbine, control_dt, name=name)
 
 
 def lqr(turbine, control_dt):

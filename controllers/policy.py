@@ -12,10 +12,14 @@ from pathlib import Path
 
 import numpy as np
 
-from controllers.base import CompiledController, check_control_dt
+from controllers.base import CompiledController, call_law, check_control_dt
+from controllers.lqr import WindEstimator
 from fowt_env.envs.actions import MODES, Mode, action_of, build_action_map, command_of, start_tracking
 from fowt_env.envs.decisions import Decisions, DecisionSettings
 from fowt_env.envs.observations import (
+    ESTIMATE_CHANNELS,
+    ESTIMATED,
+    ESTIMATES,
     FIRST_ACTION,
     N_ACTIONS,
     PREVIEW,
@@ -161,6 +165,8 @@ class PolicyController:
             residual_pitch=settings["residual_pitch"],
         )
         self._actions = build_action_map(self._mode, task, turbine, control_dt)
+        watching = bool(set(ESTIMATE_CHANNELS) & set(names))
+        self._estimator = WindEstimator(turbine, control_dt) if watching else None
         self._baseline = self._law = None
         self._parameters, self._memory = np.zeros(1), np.zeros(1)
         if self._mode == Mode.RESIDUAL:
@@ -180,7 +186,9 @@ class PolicyController:
 
     def _information(self, names):
         """Measurements and extras that the agent and its baseline use, each once."""
-        used = [] if self._baseline is None else list(self._baseline.information)
+        used = []
+        for part in (self._baseline, self._estimator):
+            used += [] if part is None else part.information
         used += [name for name in names if name in Measurement._fields or name == "wind_preview"]
         if self._mode == Mode.SETPOINT:
             used.append("rotor_speed")
@@ -190,6 +198,8 @@ class PolicyController:
         """Take the coming wind, where the agent sees it, and what the baseline needs of the scene."""
         if self._baseline is not None:
             self._baseline.prepare(scene)
+        if self._estimator is not None:
+            self._estimator.prepare(scene)
         if len(self._chosen.preview):
             from controllers.preview import rotor_wind
 
@@ -207,6 +217,8 @@ class PolicyController:
             self._parameters, self._memory = self._baseline.parameters, self._baseline.memory
         elif self._mode == Mode.SETPOINT:
             start_tracking(self._memory, measurement, self._actions)
+        if self._estimator is not None:
+            self._estimator.reset(measurement)
         action_of(self._u, float(measurement.rotor_speed), self._actions, self._accepted)
         self._calls = 0
 
@@ -214,6 +226,10 @@ class PolicyController:
         """(generator torque, blade pitch); every `hold` calls the network decides anew."""
         values = np.array(measurement, dtype=np.float64)
         decisions = self._decisions
+        if self._estimator is not None and self._calls > 0:  # the first instant is that of the reset
+            call_law(
+                self._estimator.kernel, self._estimator.parameters, self._estimator.memory, values, self._u
+            )
         if self._calls % decisions.settings.hold == 0:
             self._look(values)
             if self._calls == 0:
@@ -239,6 +255,8 @@ class PolicyController:
         """Fill the observation from measurements (N_MEASUREMENTS,)."""
         self._signals[:N_MEASUREMENTS] = values
         self._signals[FIRST_ACTION : FIRST_ACTION + N_ACTIONS] = self._accepted
+        if self._estimator is not None:
+            self._signals[ESTIMATES : ESTIMATES + len(ESTIMATED)] = self._estimator.memory[: len(ESTIMATED)]
         if len(self._chosen.preview):
             time, speed, period = self._wind
             ahead = values[Measure.TIME] + self._chosen.preview

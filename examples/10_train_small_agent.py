@@ -3,8 +3,8 @@
     python examples/10_train_small_agent.py            # some minutes on two cores
     python examples/10_train_small_agent.py --steps 20000   # a first look
 
-Needs pip install "fowt-env[train,plot]". The agent sees what a turbine measures, with four seconds of
-history, and adds to the gain-scheduled PI; it never learned from the validation episodes. Its policy ends up
+Needs pip install "fowt-env[train,plot]". The agent sees what a turbine measures and what the estimator of
+lqr makes of it, and adds to lqr; it never learned from the validation episodes. Its policy ends up
 as runs/small_agent/best.npz, ready for
 
     fowt evaluate --controllers policy:runs/small_agent/best.npz,pi_unscheduled

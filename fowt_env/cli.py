@@ -772,4 +772,5 @@ def stability(
         raise typer.Exit(1)
 
 
-from fowt_env import cli_design, cli_plot, cli_report, cli_train  # noqa: E402, F401 - add their commands to the app
+# these add their commands to the app
+from fowt_env import cli_design, cli_plot, cli_report, cli_scores, cli_train  # noqa: E402, F401

@@ -204,7 +204,7 @@ def plot_bound(table, names, points=None, path=None, title=None):
     if points is not None:
         bar = figure.colorbar(drawn, ax=places, pad=0.01)
         bar.set_label("blade-pitch travel over that of gspi_oc3", fontsize=8)
-    _place_legend(figure, places, len(winds))
+    place_legend(figure, places, len(winds))
     figure.supxlabel("rotor-speed deviation over that of gspi_oc3", fontsize=9, color=INK)
     figure.supylabel("platform-pitch deviation over that of gspi_oc3", fontsize=9, color=INK)
     if title:
@@ -212,7 +212,7 @@ def plot_bound(table, names, points=None, path=None, title=None):
     return save_figure(figure, path)
 
 
-def _place_legend(figure, places, used):
+def place_legend(figure, places, used):
     """The legend in the first spare place of a grid, or below it; the spare places emptied."""
     for axes in places[used:]:
         axes.set_axis_off()

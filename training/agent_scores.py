@@ -1,103 +1,349 @@
 """How agents compare with rivals on the same runs: interquartile mean of ratios, with 95 % intervals.
 
     fowt evaluate --controllers policy:ppo_measured,gspi_oc3,rosco_float --seeds 1:6:1 --out results/rl
-    python -m training.agent_scores results/rl/results.csv --rivals gspi_oc3,rosco_float
+    fowt scores rivals results/rl --against gspi_oc3,rosco_float
 
-Each ratio is of one metric of an agent over that of a rival in the same wind and waves. Intervals are
-percentile bootstraps over these runs; they say nothing about other training seeds.
+Each ratio is of one metric of an agent over that of a rival in the same wind and waves. Several training
+seeds of one configuration make a group, whose interval resamples training and weather seeds
+(training.bootstrap).
 """
 
-import argparse
+import re
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from scipy.stats import trim_mean
 
+from controllers import DESIGN, POLICY, information
 from fowt_env.errors import InputError, unknown
+from fowt_env.outputs import replacing, write_table
+from training.bootstrap import crossed_estimate
+from training.metrics import METRICS
+
+__all__ = ["COUNTS", "FIGURES", "Figure", "agent_counts", "agent_scores", "by_kind", "read_results"]
+
+KEY = ["controller", "case", "seed"]
+PAST_ANY = "past a constraint"
+MEASURED = {  # what a turbine's own sensors show
+    "time", "rotor_speed", "generator_speed", "blade_pitch", "generator_torque", "platform_pitch",
+    "platform_pitch_rate", "platform_pitch_acceleration", "nacelle_acceleration", "nacelle_velocity",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A metric that is scored as ratio to a rival's, and what is aimed at: first, then; None: nothing.
+
+    more: whether the ratio is to be at least the aim; else at most.
+    """
+
+    name: str
+    metric: str
+    first: float | None = None
+    then: float | None = None
+    more: bool = False
+
+    def reaches(self, ratio, aim):
+        """Whether a ratio reaches an aim."""
+        return ratio >= aim if self.more else ratio <= aim
+
+    def level(self, ratio):
+        """ "then", "first" or "missed"; where there is one aim only, "met" or "missed"."""
+        if self.then is not None and self.reaches(ratio, self.then):
+            return "then"
+        if self.reaches(ratio, self.first):
+            return "met" if self.then is None else "first"
+        return "missed"
+
+    def verdict(self, ratio, low, high):
+        """What the ratio reaches (level), with "*" where the whole interval does; "" without a ratio.
+
+        "then, first*": the ratio reaches the second aim, the whole interval the first.
+        """
+        if self.first is None or not np.isfinite(ratio):
+            return ""
+        found = self.level(ratio)
+        if not np.isfinite(high):
+            return found
+        best, worst = (self.level(end) for end in ((high, low) if self.more else (low, high)))
+        if found == "missed":
+            return "missed*" if best == "missed" else "missed"
+        if worst == found:
+            return f"{found}*"
+        return f"{found}, {worst}*" if worst != "missed" else found
+
 
 FIGURES = (
-    "RotSpeed_std_[rpm]",
-    "PtfmPitch_std_[deg]",
-    "blade_pitch_travel_[deg/s]",
-    "GenPwr_mean_[kW]",
-    "GenPwr_std_[kW]",
-    "TwrBsMyt_std_[kN-m]",
-    "FAIRTEN_std_[kN]",
+    Figure("rotor-speed std", "RotSpeed_std_[rpm]", 0.8, 0.6),
+    Figure("platform-pitch std", "PtfmPitch_std_[deg]", 0.8, 0.7),
+    Figure("blade-pitch travel", "blade_pitch_travel_[deg/s]", 1.0),
+    Figure("mean power", "GenPwr_mean_[kW]", 0.995, more=True),
+    Figure("power std", "GenPwr_std_[kW]", 1.0),
+    Figure("tower-base DEL", "TwrBsMyt_DEL_[kN-m]", 1.0),
+    Figure("fairlead DEL", "FAIRTEN_DEL_[kN]", 1.0),
 )
-RESAMPLES = 2000
+COUNTS = {  # constraint: metric that counts how often it was passed
+    "rotor past 130 %": "rotor_speed_violations_[-]",
+    "tower top past 3.3 m/s2": "tower_top_acceleration_violations_[-]",
+    "blade pitch past 10 deg/s": "blade_pitch_rate_violations_[-]",
+}
 
 
-def interquartile_mean(values):
-    """Mean of the middle half of values (..., n), along the last axis."""
-    return trim_mean(values, 0.25, axis=-1)
+def figures_named(names):
+    """List of the Figures of names: those of FIGURES, and metrics as figures without an aim.
+
+    Raises: InputError for other names.
+    """
+    known = {figure.name: figure for figure in FIGURES}
+    known |= {metric: Figure(metric, metric) for metric in METRICS}
+    for name in names:
+        if name not in known:
+            raise unknown("figure", name, known)
+    return [known[name] for name in names]
 
 
-def interval(values, rng):
-    """(low, high): 95 % percentile bootstrap of the interquartile mean of values (n,)."""
-    picks = rng.integers(len(values), size=(RESAMPLES, len(values)))
-    low, high = np.percentile(interquartile_mean(np.asarray(values)[picks]), (2.5, 97.5))
-    return float(low), float(high)
+def read_results(paths, cases=None):
+    """DataFrame of one or several results of fowt evaluate: folders, or CSV files. cases: names to keep.
+
+    Raises: InputError for what is no such file, and where two hold the same run with other figures.
+    """
+    tables = []
+    for path in map(Path, paths):
+        file = path / "results.csv" if path.is_dir() else path
+        if not file.is_file():
+            raise InputError(f"results {str(file)!r}: no such file; make it with fowt evaluate --out")
+        table = pd.read_csv(file)
+        missing = [name for name in (*KEY, "status", *METRICS) if name not in table]
+        if missing:
+            raise InputError(f"results {str(file)!r}: column {missing[0]!r} is missing")
+        tables.append(table[table["controller"] != "parked"])
+    table = pd.concat(tables, ignore_index=True)
+    one = table.drop_duplicates([*KEY, "status", *(figure.metric for figure in FIGURES)])
+    twice = one[one.duplicated(KEY)]
+    if len(twice):
+        name, case, seed = twice.iloc[0][KEY]
+        raise InputError(f"results: {name} on {case}, seed {seed}, is there twice with different figures")
+    if cases is not None:
+        known = list(dict.fromkeys(one["case"]))
+        for name in cases:
+            if name not in known:
+                raise unknown("case of the evaluation", name, known)
+        one = one[one["case"].isin(cases)]
+    return one.reset_index(drop=True)
 
 
-def agent_scores(table, rivals, agents=None):
-    """DataFrame: per agent, rival and figure the ratio's interquartile mean, its interval, runs, failures.
+def grouped(table, rivals, groups=None, agents=None):
+    """{name: labels of its training seeds} of what is scored: groups, then single agents.
 
-    table: what training.evaluate.evaluate returns. agents: labels; None: all that are no rivals.
-    Raises: InputError for labels that were not run, or where no run of both went well.
+    groups: {name: labels}. agents: labels; None: all that are neither rivals nor in a group.
+    Raises: InputError for labels that were not run, and names that are taken.
     """
     known = list(dict.fromkeys(table["controller"]))
-    agents = [name for name in known if name not in rivals] if agents is None else agents
-    for name in (*rivals, *agents):
+    groups = dict(groups or {})
+    inside = [label for labels in groups.values() for label in labels]
+    if agents is None:
+        agents = [name for name in known if name not in rivals and name not in inside]
+    for name in (*rivals, *inside, *agents):
         if name not in known:
             raise unknown("controller of the evaluation", name, known)
-    runs = table.set_index(["controller", "case", "seed"]).sort_index()
+    for name, labels in groups.items():
+        if name in known or len(set(labels)) < len(labels) or not labels:
+            raise InputError(
+                f"group {name!r} = {', '.join(labels)}: needs a name that no controller has, and controllers"
+                " that differ"
+            )
+    return groups | {name: (name,) for name in agents}
+
+
+def _values(runs, labels, cases, seeds, metric):
+    """(labels, cases, seeds) values of a metric; NaN where a run failed or was not made."""
+    index = pd.MultiIndex.from_product([labels, cases, seeds])
+    return runs[metric].reindex(index).to_numpy(dtype=float).reshape(len(labels), len(cases), len(seeds))
+
+
+def agent_scores(table, rivals, groups=None, agents=None, figures=FIGURES):
+    """DataFrame: per agent or group, rival and figure the ratio, its interval, and what that reaches.
+
+    table: what training.evaluate.evaluate returns; groups, agents: as grouped takes them. Columns: agent,
+    rival, figure, metric, ratio (interquartile mean over all runs), low, high, pairs (runs with a ratio),
+    runs, training_seeds, verdict (Figure.verdict). Where the rival's figure is 0 there is no ratio.
+    Raises: InputError for labels that were not run, or where no run of both went well.
+    """
+    return _scores(table, rivals, grouped(table, rivals, groups, agents), figures)
+
+
+def _scores(table, rivals, chosen, figures):
+    """agent_scores of {name: labels}."""
+    good = table.set_index(KEY).sort_index()
+    made = good.index
+    good = good[good["status"] == "ok"]
+    cases, seeds = list(dict.fromkeys(table["case"])), sorted(set(table["seed"]))
     rows = []
-    for agent in agents:
-        failed = int((runs.loc[agent]["status"] != "ok").sum())
+    for name, labels in chosen.items():
+        runs = int(made.get_level_values(0).isin(labels).sum())
         for rival in rivals:
-            ratio = (runs.loc[agent][list(FIGURES)] / runs.loc[rival][list(FIGURES)]).dropna()
-            if ratio.empty:
-                raise InputError(f"{agent} and {rival}: no run of both went well")
-            for figure in FIGURES:
-                low, high = interval(ratio[figure].to_numpy(), np.random.default_rng(0))
+            pairs_at_all = 0
+            for figure in figures:
+                own = _values(good, list(labels), cases, seeds, figure.metric)
+                other = _values(good, [rival], cases, seeds, figure.metric)
+                with np.errstate(divide="ignore", invalid="ignore"):
+                    ratio = np.where(other != 0.0, own / other, np.nan)
+                pairs = int(np.isfinite(ratio).sum())
+                pairs_at_all += pairs
+                estimate, low, high = crossed_estimate(ratio)
                 rows.append(
                     {
-                        "agent": agent,
+                        "agent": name,
                         "rival": rival,
-                        "figure": figure,
-                        "ratio": float(interquartile_mean(ratio[figure].to_numpy())),
+                        "figure": figure.name,
+                        "metric": figure.metric,
+                        "ratio": estimate,
                         "low": low,
                         "high": high,
-                        "runs": len(ratio),
-                        "failed": failed,
+                        "pairs": pairs,
+                        "runs": runs,
+                        "training_seeds": len(labels),
+                        "verdict": figure.verdict(estimate, low, high),
                     }
                 )
+            if not pairs_at_all:
+                raise InputError(f"{name} and {rival}: no run of both went well")
     return pd.DataFrame(rows)
 
 
-def main(arguments=None):
-    """Print the table of one or several results.csv."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("tables", nargs="+", help="results.csv of fowt evaluate; several are put together")
-    parser.add_argument("--rivals", default="gspi_oc3,rosco_float")
-    given = parser.parse_args(arguments)
-    table = pd.concat([pd.read_csv(path) for path in given.tables]).drop_duplicates(
-        ["controller", "case", "seed"]
-    )
-    scores = agent_scores(table, given.rivals.split(","))
-    shown = [
-        f"{r:.3f} [{low:.3f}, {high:.3f}]" for r, low, high in scores[["ratio", "low", "high"]].to_numpy()
-    ]
-    scores["shown"] = shown
-    wide = scores.pivot_table(
-        index=["agent", "rival", "runs", "failed"],
-        columns="figure",
-        values="shown",
-        aggfunc="first",
-        sort=False,
-    )
-    print(wide.T.to_string())
+def agent_counts(table, rivals, groups=None, agents=None):
+    """DataFrame: per agent, group and rival the runs, those that failed, and those that passed a constraint.
+
+    Columns: agent, told (see told), runs, failed, the names of COUNTS (runs in which it was passed at least
+    once), past any of them, largest overspeed (%), verdict ("met" where nothing failed or was passed).
+    """
+    return _counts(table, grouped(table, rivals, groups, agents) | {name: (name,) for name in rivals})
 
 
-if __name__ == "__main__":
-    main()
+def _counts(table, chosen):
+    """agent_counts of {name: labels}."""
+    rows = []
+    for name, labels in chosen.items():
+        here = table[table["controller"].isin(labels)]
+        row = {"agent": name, "told": "; ".join(dict.fromkeys(map(told, labels))), "runs": len(here)}
+        row["failed"] = int((here["status"] != "ok").sum())
+        row |= {text: int((here[metric] > 0).sum()) for text, metric in COUNTS.items()}
+        row[PAST_ANY] = int((here[list(COUNTS.values())] > 0).any(axis=1).sum())
+        row["largest overspeed (%)"] = float(here["overspeed_[%]"].max())
+        row["verdict"] = "missed" if row["failed"] or row[PAST_ANY] else "met"
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+@lru_cache(maxsize=256)
+def told(label):
+    """What a controller is told: "measured" for channels of MEASURED, and by name what else it uses.
+
+    "" for labels that name neither a controller of the package nor an agent or design that is still there.
+    """
+    if ":" in label and not label.startswith((POLICY, DESIGN)):
+        return ""  # code of the user's own, which a table is no reason to run
+    try:
+        used = information(label)
+    except InputError:
+        return ""
+    return ", ".join((["measured"] if set(used) & MEASURED else []) + [x for x in used if x not in MEASURED])
+
+
+def kind_of(case):
+    """Name of a case without the wind speed at its end: "ntm_18" and "ntm_11_4" are "ntm"."""
+    return re.sub(r"(_\d+){1,2}$", "", case)
+
+
+def by_kind(table, rival, groups=None, agents=None, figures=FIGURES, each=False):
+    """(scores, counts) as agent_scores and agent_counts give, for each kind of case by itself.
+
+    each: every case is a kind of its own; else the winds of a kind (kind_of) are taken together.
+
+    Both have a further first column, kind. A kind in which an agent has no run that went well has NaN
+    ratios there.
+    """
+    chosen = grouped(table, [rival], groups, agents)
+    scores, counts = [], []
+    for kind, here in table.groupby(table["case"] if each else table["case"].map(kind_of), sort=False):
+        counts.append(_counts(here, chosen | {rival: (rival,)}).assign(kind=kind))
+        for name, labels in chosen.items():
+            try:
+                scores.append(_scores(here, [rival], {name: labels}, figures).assign(kind=kind))
+            except InputError:  # all failed or none was made, which the counts say
+                blank = {"agent": name, "rival": rival, "kind": kind, "pairs": 0, "verdict": ""}
+                scores.append(pd.DataFrame([blank | {"figure": figure.name} for figure in figures]))
+    whole = pd.concat(scores, ignore_index=True), pd.concat(counts, ignore_index=True)
+    return tuple(frame[["kind", *frame.columns.drop("kind")]] for frame in whole)
+
+
+def ratio_text(row):
+    """Text of one row of agent_scores: ratio [low, high]."""
+    if not np.isfinite(row["ratio"]):
+        return "-"
+    text = f"{row['ratio']:.3f}"
+    return f"{text} [{row['low']:.3f}, {row['high']:.3f}]" if np.isfinite(row["low"]) else text
+
+
+def markdown_table(frame):
+    """Markdown text of a DataFrame of texts, its index (if it has a name) as first column."""
+    frame = frame.reset_index() if frame.index.name else frame
+    rows = [list(map(str, frame.columns)), ["---"] * frame.shape[1], *frame.astype(str).values.tolist()]
+    return "\n".join("| " + " | ".join(row) + " |" for row in rows) + "\n"
+
+
+def scores_markdown(scores, counts):
+    """Markdown text of agent_scores and agent_counts: a table for each rival, one of failures."""
+    parts = []
+    names = list(dict.fromkeys(scores["agent"]))
+    for rival, rows in scores.groupby("rival", sort=False):
+        shown = rows.assign(
+            text=[f"{ratio_text(row)} {row['verdict']}".rstrip() for _, row in rows.iterrows()]
+        )
+        wide = shown.pivot(index="figure", columns="agent", values="text")
+        wide = wide.loc[list(dict.fromkeys(scores["figure"])), names]
+        wide.index.name = f"over `{rival}`"
+        wide.columns = [f"`{name}`" for name in names]
+        parts.append(markdown_table(wide))
+    shown = counts.copy()
+    shown["largest overspeed (%)"] = shown["largest overspeed (%)"].map("{:.1f}".format)
+    shown["agent"] = shown["agent"].map("`{}`".format)
+    parts.append(markdown_table(shown.drop(columns=PAST_ANY)))
+    return "\n".join(parts)
+
+
+def kinds_markdown(scores, counts, figures=None):
+    """Markdown text of by_kind: a table for each of its figures (names; None: all), one of failures."""
+    parts = []
+    names = list(dict.fromkeys(scores["agent"]))
+    kinds = list(dict.fromkeys(scores["kind"]))
+    for name in figures or list(dict.fromkeys(scores["figure"])):
+        rows = scores[scores["figure"] == name]
+        shown = rows.assign(text=[ratio_text(row) for _, row in rows.iterrows()])
+        wide = shown.pivot(index="kind", columns="agent", values="text").loc[kinds, names]
+        wide.index.name = f"{name} over `{rows['rival'].iloc[0]}`"
+        wide.columns = [f"`{agent}`" for agent in names]
+        parts.append(markdown_table(wide))
+    columns = counts[["failed", PAST_ANY, "runs"]].to_numpy()
+    shown = counts.assign(text=[f"{failed} / {past} of {runs}" for failed, past, runs in columns])
+    agents = list(dict.fromkeys(counts["agent"]))
+    wide = shown.pivot(index="kind", columns="agent", values="text").loc[kinds, agents]
+    wide.index.name = "failed / past a constraint"
+    wide.columns = [f"`{agent}`" for agent in agents]
+    parts.append(markdown_table(wide))
+    return "\n".join(parts)
+
+
+def write_scores(tables, text, path):
+    """Paths written: PATH.md of the text, and PATH_suffix.csv of {suffix: DataFrame} ("": PATH.csv)."""
+    path = Path(path)
+    written = [path.with_name(path.name + ".md")]
+    with replacing(written[0]) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    for suffix, frame in tables.items():
+        name = f"{path.name}_{suffix}.csv" if suffix else f"{path.name}.csv"
+        written.append(path.with_name(name))
+        write_table(frame, written[-1])
+    return written

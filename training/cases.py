@@ -30,6 +30,7 @@ from fowt_env.weather.wind_field import REQUIRED, is_field
 from fowt_env.weather.wind_spec import read_wind
 from training.faults import Fault
 from training.metrics import METRICS
+from training.shifts import Shift
 
 FOLDER = Path(__file__).parent / "suites"
 WIND_KINDS = ("rotor-averaged", "full-field")
@@ -41,7 +42,8 @@ class Case:
 
     parked: the turbine idles with feathered blades (at rest without wind), so no controller is compared.
     initial: absolute values of channels at the start, as simulate takes them.
-    seeds, duration, skip: of this case where they differ from the suite's.
+    seeds, duration, skip: of this case where they differ from the suite's. shift: how the plant differs from
+    the one that controllers are told of (training.shifts).
     """
 
     name: str
@@ -56,6 +58,7 @@ class Case:
     seeds: tuple | None = None
     duration: float | None = None  # s
     skip: float | None = None  # s
+    shift: Shift | None = None  # what of the plant its controllers do not know
 
 
 def described(case):
@@ -70,6 +73,7 @@ def described(case):
         "fault": None if case.fault is None else case.fault.model_dump(exclude_none=True),
         "parked": case.parked,
         "initial": case.initial,
+        "shift": None if case.shift is None else case.shift.model_dump(exclude_defaults=True),
     }
     return _plain(values)
 
@@ -110,6 +114,7 @@ class CaseEntry(Record):
     seeds: Seeds | None = None
     duration: Positive | None = None
     skip: NonNegative | None = None
+    shift: Shift | None = None
 
 
 class Term(Record):
@@ -250,6 +255,8 @@ def _case(entry, speed, file, folder):
     for key in options:
         if key not in (*OPTIONS, "fidelity", "rotor"):
             raise unknown("option", key, (*OPTIONS, "fidelity", "rotor"))
+    if entry.shift is not None and options.get("turbine") is not None:
+        raise InputError("shift: a case with one takes the turbine of its platform, not that of an option")
     if entry.platform is not None or file.platform != "oc3_hywind":
         read_platform(entry.platform or file.platform)
     return Case(
@@ -264,6 +271,7 @@ def _case(entry, speed, file, folder):
         entry.seeds,
         entry.duration,
         entry.skip,
+        entry.shift,
     )
 
 

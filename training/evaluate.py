@@ -27,6 +27,7 @@ from training.engines import outcomes
 from training.faults import faulted, idling
 from training.metrics import METRICS, metrics
 from training.results import controller_code, open_results, parquet_of, run_file, write_run
+from training.shifts import Unaware, shifted_parts
 from training.wind_boxes import cached_box
 
 __all__ = ["COLUMNS", "Case", "evaluate", "metrics", "named_cases", "run_file", "summary"]
@@ -268,10 +269,13 @@ def _scored(run):
     wind = case.wind
     if is_field(wind):
         wind = cached_box(wind, case.platform, run.seed, options)
-    scene = fowt_env.build_scene(case.platform, wind=wind, sea=case.sea, seed=run.seed, **options)
+    known = scene = fowt_env.build_scene(case.platform, wind=wind, sea=case.sea, seed=run.seed, **options)
+    if case.shift is not None and case.shift.factors:
+        parts = shifted_parts(case.shift, case.platform)
+        scene = fowt_env.build_scene(wind=wind, sea=case.sea, seed=run.seed, **options | parts)
     turbine = scene.turbine
     try:
-        controller = _controller(run, scene)
+        controller = _controller(run, known)
         frame = fowt_env.simulate(
             scene, controller=controller, duration=run.duration, initial=case.initial, **run.options
         )
@@ -287,15 +291,21 @@ def _scored(run):
     return row, frame
 
 
-def _controller(run, scene):
-    """What simulate is given as controller: the run's own, with its fault, or a parked turbine's."""
-    if run.case.parked:
-        return idling(scene.turbine) if scene.wind_speed else None
-    if run.case.fault is None:
+def _controller(run, known):
+    """What simulate is given as controller: the run's own, with its fault, or a parked turbine's.
+
+    known: the scene that the controller is told of.
+    """
+    case = run.case
+    if case.parked:
+        return idling(known.turbine) if known.wind_speed else None
+    if case.fault is None and case.shift is None:
         return run.controller
     control_dt = run.options.get("control_dt", CONTROL_DT)
-    inner = make(run.controller, scene.turbine, control_dt)
-    return faulted(inner, run.case.fault, scene.turbine, control_dt)
+    controller = make(run.controller, known.turbine, control_dt)
+    if case.shift is not None:
+        controller = Unaware(controller, known, case.shift, run.seed)
+    return faulted(controller, case.fault, known.turbine, control_dt)
 
 
 def _reason(error):

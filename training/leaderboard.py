@@ -1,32 +1,21 @@
 """Controllers compared on equal seeds: means with intervals, paired differences, and a suite's score.
 
-The unit of chance is the seed: one seed draws the wind and waves of every case from the same random
-phases, so its cases are not independent of each other. Seeds are resampled, with all their cases
-(cluster bootstrap), and each case counts alike in a mean over cases.
+Seeds are resampled, with all their cases (training.bootstrap), and each case counts alike in a mean over
+cases.
 """
 
 import numpy as np
-from scipy.stats import norm as normal
-from scipy.stats import t as student
 
 from fowt_env.errors import unknown
+from training.bootstrap import LEVEL, RESAMPLES, interval, resample_weights
 from training.metrics import METRICS
 
-LEVEL = 0.95
-RESAMPLES = 10_000
-RANDOM_SEED = 20191
 BASELINES = ("gspi_oc3", "pi")  # the first of these that was evaluated, unless one is named
 METHOD = (
     "percentile bootstrap over seeds, each with all its cases, widened for n seeds by sqrt(n/(n-1)) and by"
     " Student's t with n-1 degrees of freedom over the normal; every case counts alike; differences are"
     " paired by case and seed"
 )
-
-
-def resample_weights(n, resamples=RESAMPLES, random_seed=RANDOM_SEED):
-    """(resamples, n) counts of how often each of n seeds is drawn, n draws with replacement."""
-    draws = np.random.default_rng(random_seed).integers(n, size=(resamples, n))
-    return np.stack([(draws == seed).sum(axis=1) for seed in range(n)], axis=1).astype(np.float64)
 
 
 def case_means(values, weights):
@@ -42,28 +31,6 @@ def case_means(values, weights):
     single = there.sum(axis=0) == 1
     means[:, single] = filled[:, single].sum(axis=0)
     return means
-
-
-def interval(estimate, resampled, n):
-    """(low, high) of the estimate (metrics,) from resampled ones (resamples, metrics); NaN for one seed.
-
-    Percentiles of n resampled values are too narrow for small n: of 6 normal ones they hold the truth in
-    84 % of trials. Widening them as Student's interval is wider than the normal one makes it 94 %, and
-    keeps their skewness. Hesterberg, The American Statistician 69(4), 2015, section 5.3, does the same
-    with the percentiles' levels.
-    """
-    if n < 2:
-        return np.full_like(estimate, np.nan), np.full_like(estimate, np.nan)
-    tails = [50.0 * (1.0 - LEVEL), 50.0 * (1.0 + LEVEL)]
-    upper = 0.5 * (1.0 + LEVEL)
-    widening = np.sqrt(n / (n - 1.0)) * student.ppf(upper, n - 1) / normal.ppf(upper)
-    spread = np.nanpercentile(_known(resampled) - estimate, tails, axis=0) * widening
-    return estimate + spread[0], estimate + spread[1]
-
-
-def _known(values):
-    """The array with zeros in columns that are NaN throughout: their estimate is NaN, so their result is."""
-    return np.where(np.isnan(values).all(axis=0), 0.0, values)
 
 
 def default_baseline(controllers, baseline=None):

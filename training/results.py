@@ -36,8 +36,9 @@ FORMAT = 1  # of the folder; raised when files or their meaning change
 ROW_KEY = b"fowt_env.row"
 TABLE_EVERY = 2.0  # s between rewritings of results.csv while runs go on
 PACKAGES = ("numpy", "numba", "scipy", "pandas", "rainflow", "rosco", "hipersim")
+SHAPING = ("metrics.py", "faults.py", "shifts.py", "randomisation.py")  # of this package, what shapes figures
 # sources that shape no figure of a run
-UNRELATED = ("cli.py", "cli_arguments.py", "plots.py", "warmup.py")
+UNRELATED = ("cli.py", "cli_arguments.py", "cli_scores.py", "plots.py", "plots_scores.py", "warmup.py")
 
 
 def run_file(folder, label, case, seed):
@@ -112,7 +113,7 @@ def plant_code():
         for path in package.rglob("*")
         if path.is_file() and "__pycache__" not in path.parts and path.name not in UNRELATED
     )
-    return _digest([*files, own / "metrics.py", own / "faults.py"])
+    return _digest([*files, *(own / name for name in SHAPING)])
 
 
 def controller_code(controller):

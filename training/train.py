@@ -51,6 +51,16 @@ OBSERVATIONS = {  # information sets that agents are compared with
         "nacelle_acceleration", "previous_action", "wind_speed", "wind_preview",
     ),
     "blade": ("rotor_speed", "blade_pitch", "previous_action"),
+    # as measured, and what the estimator of lqr makes of it: wind, surge and waves
+    "estimate": (
+        "rotor_speed", "blade_pitch", "generator_torque", "platform_pitch", "platform_pitch_rate",
+        "nacelle_acceleration", "previous_action", "estimated_wind", "estimated_platform", "estimated_waves",
+    ),
+    "estimate_preview": (
+        "rotor_speed", "blade_pitch", "generator_torque", "platform_pitch", "platform_pitch_rate",
+        "nacelle_acceleration", "previous_action", "estimated_wind", "estimated_platform", "estimated_waves",
+        "wind_speed", "wind_preview",
+    ),
 }  # fmt: skip
 SECTIONS = ("environment", "decisions", "algorithm", "normalise", "validation", "checkpoint_minutes", "task")
 TASK_FIELDS = ("residual_pitch", "residual_torque", "blade_pitch", "setpoint")
@@ -58,6 +68,8 @@ VERSIONS = ("fowt-env", "stable-baselines3", "sb3-contrib", "torch", "numpy", "n
 RATIOS = ("rotor_speed_std_[rpm]", "platform_pitch_std_[deg]", "blade_pitch_travel_[deg/s]")
 FAILURE_COST = 10.0  # of the validation score, per share of episodes that failed
 TRAVEL_COST = 2.0  # of the validation score, per unit of blade-pitch travel beyond the baseline's
+POWER_COST = 20.0  # of the validation score, per unit of mean power short of LEAST_POWER
+LEAST_POWER = 0.995  # of the reference's
 
 
 def resolve(algo, task, seed, steps, changes=None):
@@ -211,15 +223,16 @@ def judged(figures, reference):
     """{ratio or score: number}: means over episodes of figures over those of the reference; lower is better.
 
     score: mean of the ratios of rotor-speed and platform-pitch standard deviation, plus what travel beyond
-    the reference's and failures cost.
+    the reference's, a lack of mean power and failures cost.
     """
     ratios = {name: float(np.nanmean(figures[name] / reference[name])) for name in RATIOS}
     failed = float(figures["failed"].mean())
     speed, platform, travel = (ratios[name] for name in RATIOS)
-    score = 0.5 * (speed + platform) + TRAVEL_COST * max(0.0, travel - 1.0) + FAILURE_COST * failed
     row = {f"{name.split('_[')[0]}_ratio": ratio for name, ratio in ratios.items()}
     for name in ("shaft_power_mean_[kW]", "shaft_power_std_[kW]"):
         row[f"{name.split('_[')[0]}_ratio"] = float(np.nanmean(figures[name] / reference[name]))
+    score = 0.5 * (speed + platform) + TRAVEL_COST * max(0.0, travel - 1.0) + FAILURE_COST * failed
+    score += POWER_COST * max(0.0, LEAST_POWER - row["shaft_power_mean_ratio"])
     return row | {"failed": failed, "score": score if np.isfinite(score) else float("inf")}
 
 
@@ -291,6 +304,7 @@ class Training:
             listeners[0].n_calls = state["evaluation_calls"]
             judge_after.best = state["best"]
             keeper.before = state["seconds"]
+            keeper.torch_state = state["torch"]
         self.evaluation, self.judge, self.keeper = listeners[0], judge_after, keeper
         left = settings["steps"] - model.num_timesteps
         finished = True
@@ -376,7 +390,6 @@ class Training:
 
     def _load(self, kind, env):
         """(model, state) of the newest checkpoint, everything put back in its place."""
-        import torch
         from stable_baselines3.common.vec_env import VecNormalize
 
         folder = self.newest()
@@ -404,7 +417,6 @@ class Training:
         model.action_space.np_random.bit_generator.state = state["action_space"]
         random.setstate(state["random"])
         np.random.set_state(state["numpy"])
-        torch.set_rng_state(state["torch"])
         self.rows = state["rows"]
         return model, state
 

@@ -4,6 +4,7 @@ import time
 
 import numpy as np
 import pandas as pd
+import torch
 from stable_baselines3.common.callbacks import BaseCallback, EvalCallback
 
 from fowt_env.outputs import write_table
@@ -47,6 +48,7 @@ class Keeper(BaseCallback):
         self.training = training
         self.report = report
         self.before = 0.0  # s, of the sittings before this one
+        self.torch_state = None  # to go on from in the first rollout
         self._begin = self._saved = self._reported = time.monotonic()
         self._first = None
 
@@ -59,6 +61,10 @@ class Keeper(BaseCallback):
         self._first = self.num_timesteps
 
     def _on_rollout_start(self):
+        if self.torch_state is not None:
+            # lasting noise was drawn once more before this point than in the run that was stopped
+            torch.set_rng_state(self.torch_state)
+            self.torch_state = None
         now = time.monotonic()
         if self.training.stop or now - self._saved > 60.0 * self.training.settings["checkpoint_minutes"]:
             self.training.save()

@@ -25,9 +25,17 @@ from fowt_env.envs.kernels import (
     Setting,
     act,
     act_physical,
+    show_again,
     start,
 )
-from fowt_env.envs.observations import N_ACTIONS, PREVIEW, build_observation_map, check_channels, entries
+from fowt_env.envs.observations import (
+    ESTIMATE_CHANNELS,
+    N_ACTIONS,
+    PREVIEW,
+    build_observation_map,
+    check_channels,
+    entries,
+)
 from fowt_env.envs.rewards import (
     N_TERMS,
     TERMS,
@@ -60,7 +68,8 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     platform     built-in name, path or description.Platform
     rotor        "bem", "lookup" or "table"; None: the task's, or else that of the fidelity
     action_mode  "direct", "setpoint" or "residual", see the table of actions
-    baseline     compiled controller, by name, that the residual mode adds to
+    baseline     compiled controller, by name, that the residual mode adds to; lqr goes on from the sum, so
+                 that what is added in every period is an addition to its rates
     observation  channel names in place of the task's; "default" among them stands for the task's
     reward       {term: weight} in place of single weights of the task
     dt           physics step, s (None: that of the scene's integrator); control_dt: time between
@@ -175,11 +184,19 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             self._baseline = named_baseline(self.baseline, turbine, self.control_dt)
             law = self._baseline.kernel
             parameters, memory = self._baseline.parameters, self._baseline.memory
-        self._law = Box(None, law)
+        self._estimator = watch = None
+        if set(ESTIMATE_CHANNELS) & set(task.observation):
+            from controllers.lqr import WindEstimator  # fowt_env imports nothing from it otherwise
+
+            self._estimator = WindEstimator(turbine, self.control_dt)
+            watch = self._estimator.kernel
+        watching = self._estimator is not None
+        self._law, self._watch = Box(None, law), Box(None, watch)
         self._setting = Setting(
             model=scene.model,
             actions=build_action_map(mode, task, turbine, self.control_dt),
             parameters=parameters,
+            estimator=self._estimator.parameters if watching else None,
             chosen=build_observation_map(chosen, task.wind_preview),
             scales=build_scales(turbine, self.control_dt),
             weights=weight_array(task.weights),
@@ -193,6 +210,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             x=np.zeros(n),
             u=np.zeros(2),
             memory=memory,
+            estimate=self._estimator.memory if watching else None,
             action=np.zeros(N_ACTIONS),
             measurement=np.zeros(N_MEASUREMENTS),
             observation=np.zeros(len(chosen), dtype=np.float32),
@@ -230,9 +248,10 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         run.reference[:] = reference
         self._offset(episode.offsets)
         start(self._box)
-        if self._baseline is not None:
-            self._baseline.prepare(scene)
         self.restart_loops()
+        if self._estimator is not None:
+            self._estimator.reset(self.measurement())
+            show_again(self._box)
         self._running = True
         info = {
             "time": 0.0,
@@ -278,7 +297,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             raise InputError(f"action = {action!r}: must be {N_ACTIONS} numbers") from None
         if asked.shape != (N_ACTIONS,):
             raise InputError(f"action has shape {asked.shape}: must be ({N_ACTIONS},)")
-        status, reward = act(self._box, self._law, asked)
+        status, reward = act(self._box, self._law, self._watch, asked)
         if status == BAD_ACTION:
             raise InputError(f"action = {action!r}: must be finite")
         return self._result(status, reward)
@@ -293,7 +312,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         torque, blade_pitch = float(torque), float(blade_pitch)
         if not (isfinite(torque) and isfinite(blade_pitch)):
             raise InputError(f"torque = {torque!r}, blade_pitch = {blade_pitch!r}: must be finite")
-        return self._result(*act_physical(self._box, torque, blade_pitch))
+        return self._result(*act_physical(self._box, self._watch, torque, blade_pitch))
 
     def _result(self, status, reward):
         """What step returns, from the status and reward of a control period."""
@@ -326,8 +345,8 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         if self._box is None:
             raise ResetNeeded("call reset() first: there is no state yet")
         run = self._run
-        arrays = [getattr(run, name).copy() for name in CARRIED]
-        arrays += [getattr(run.work, name).copy() for name in WORK_CARRIED]
+        found = [getattr(run, name) for name in CARRIED] + [getattr(run.work, name) for name in WORK_CARRIED]
+        arrays = [None if array is None else array.copy() for array in found]
         generator = None if self._np_random is None else self._np_random.bit_generator.state
         return Snapshot(self._kind, self.scene, tuple(arrays), self._running, generator, self._np_random_seed)
 
@@ -345,7 +364,9 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         run, work = self._run, self._run.work
         arrays = iter(snapshot.arrays)
         for name in CARRIED:
-            getattr(run, name)[:] = next(arrays)
+            array, saved = getattr(run, name), next(arrays)
+            if array is not None:
+                array[:] = saved
         for name in WORK_CARRIED:
             getattr(work, name)[:] = next(arrays)
         self._running = snapshot.running
@@ -360,6 +381,12 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self.scene = scene
         self._run = self._run._replace(work=scene.work())
         self._setting = self._setting._replace(model=scene.model)
+        if self._baseline is not None:
+            self._baseline.prepare(scene)
+            self._setting = self._setting._replace(parameters=self._baseline.parameters)
+        if self._estimator is not None:
+            self._estimator.prepare(scene)
+            self._setting = self._setting._replace(estimator=self._estimator.parameters)
         self._box = Box(self._setting, self._run)
 
     def measurement(self) -> Measurement:
@@ -435,7 +462,10 @@ def _adapted(
 
 
 def named_baseline(name, turbine, control_dt):
-    """Compiled controller of that name. Raises: InputError for unknown ones and those written in Python."""
+    """Compiled controller of a name, as controllers.make takes it.
+
+    Raises: InputError for unknown ones and those written in Python.
+    """
     from controllers import make  # looked up only when used: fowt_env imports nothing from it
     from controllers.base import CompiledController
 

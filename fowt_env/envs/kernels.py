@@ -29,6 +29,7 @@ class Setting(NamedTuple):
     model: Model
     actions: ActionMap
     parameters: np.ndarray  # of the baseline law
+    estimator: np.ndarray | None  # parameters of the estimator's law
     chosen: ObservationMap
     scales: Scales
     weights: np.ndarray  # (N_TERMS,)
@@ -44,6 +45,7 @@ class Run(NamedTuple):
     x: np.ndarray  # (n_state,)
     u: np.ndarray  # (2,) generator torque and blade-pitch command in force
     memory: np.ndarray  # of the baseline law or the set-point loop
+    estimate: np.ndarray | None  # memory of the estimator; None: no channel asks for it
     action: np.ndarray  # (2,) last accepted action
     measurement: np.ndarray  # (N_MEASUREMENTS,) at the present instant
     observation: np.ndarray  # (n,) float32
@@ -81,7 +83,9 @@ def show(setting, run):
     """Fill the observation from the present measurement."""
     t = run.counts[STEP] * setting.dt
     chosen = setting.chosen
-    fill_signals(t, setting.model, run.x, run.measurement, run.action, chosen.preview, run.signals)
+    fill_signals(
+        t, setting.model, run.x, run.measurement, run.action, run.estimate, chosen.preview, run.signals
+    )
     fill_observation(run.signals, chosen, run.observation)
 
 
@@ -100,8 +104,22 @@ def start(box):
     return status
 
 
+@entry
+def show_again(box):
+    """Fill the observation anew, after an estimator was started."""
+    show(box.scene, box.work)
+
+
 @kernel
-def advance_period(setting, run):
+def update_estimate(law, setting, run):
+    """Take the period that is over, its command and what is measured now into the estimate."""
+    if law is None:
+        return
+    law(setting.estimator, run.estimate, run.measurement, run.u)
+
+
+@kernel
+def advance_period(setting, run, estimator):
     """Advance one control period under run.u, measure, observe and pay; returns (status, reward)."""
     copy_into(run.before, run.measurement)
     first = run.counts[STEP]
@@ -113,17 +131,18 @@ def advance_period(setting, run):
             status = seen
     if status == RUNNING and run.measurement[Measure.ROTOR_SPEED] > setting.overspeed:
         status = OVERSPEED
+    update_estimate(estimator, setting, run)
     show(setting, run)
     fill_terms(run.measurement, run.before, run.reference, status != RUNNING, setting.scales, run.terms)
     return status, weighted_sum(setting.weights, run.terms)
 
 
 @entry
-def act(box, law, action):
+def act(box, law, estimator, action):
     """One control period under an action (2,) in [-1, 1]; returns (status, reward).
 
-    law: Box whose work is the control kernel of the baseline, or None; Python takes ten times as long to
-    hand over the kernel itself. BAD_ACTION leaves everything as it was.
+    law, estimator: Boxes whose work is the control kernel of the baseline and of the estimator, or None;
+    Python takes ten times as long to hand over a kernel itself. BAD_ACTION leaves everything as it was.
     """
     setting, run = box.scene, box.work
     clipped = accept(action, run.action)
@@ -134,14 +153,17 @@ def act(box, law, action):
         run.action, setting.actions, law.work, setting.parameters, run.memory, run.measurement, run.u,
         run.wanted,
     )  # fmt: skip
-    return advance_period(setting, run)
+    return advance_period(setting, run, estimator.work)
 
 
 @entry
-def act_physical(box, torque, blade_pitch):
-    """One control period under a physical command, as simulate applies it; returns (status, reward)."""
+def act_physical(box, estimator, torque, blade_pitch):
+    """One control period under a physical command, as simulate applies it; returns (status, reward).
+
+    estimator: as act takes it.
+    """
     setting, run = box.scene, box.work
     run.u[0] = torque
     run.u[1] = blade_pitch
     action_of(run.u, run.x[State.ROTOR_SPEED], setting.actions, run.action)
-    return advance_period(setting, run)
+    return advance_period(setting, run, estimator.work)

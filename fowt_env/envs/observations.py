@@ -20,7 +20,12 @@ SIN_AZIMUTH = N_MEASUREMENTS  # signals that follow the measurements
 COS_AZIMUTH = N_MEASUREMENTS + 1
 FIRST_ACTION = N_MEASUREMENTS + 2
 SECOND_ACTION = N_MEASUREMENTS + 3
-PREVIEW = N_MEASUREMENTS + 4
+ESTIMATES = N_MEASUREMENTS + 4
+ESTIMATED = (  # what an estimator's memory begins with, see controllers/lqr.py
+    "surge", "platform_pitch", "surge_rate", "platform_pitch_rate", "rotor_speed", "blade_pitch",
+    "wind_tendency", "wind", "wave", "wave_quadrature", "moment", "mean_wind",
+)  # fmt: skip
+PREVIEW = ESTIMATES + len(ESTIMATED)
 N_ACTIONS = 2
 DEFAULT = "default"  # in a list of channels: the task's own
 
@@ -71,6 +76,34 @@ def _wind(name, signal, meaning):
     return Entry(name, "m/s", int(signal), 0.0, 15.0, -100.0, 150.0, meaning)
 
 
+def _estimated(name):
+    """Signal of something estimated."""
+    return ESTIMATES + ESTIMATED.index(name)
+
+
+ESTIMATE_CHANNELS = {  # made by the estimator of lqr from what a turbine measures
+    "estimated_wind": (
+        _wind("estimated_wind", _estimated("wind"), "rotor-averaged wind, estimated"),
+        _wind("estimated_wind_tendency", _estimated("wind_tendency"), "what the estimated wind follows"),
+        _wind("estimated_mean_wind", _estimated("mean_wind"), "estimated wind, low pass of some 80 s"),
+    ),
+    "estimated_platform": (
+        _symmetric("estimated_surge", "m", 20.0, 200.0, "surge, estimated", _estimated("surge")),
+        _symmetric(
+            "estimated_surge_rate", "m/s", 1.0, 50.0, "time derivative of surge, estimated",
+            _estimated("surge_rate"),
+        ),
+    ),
+    "estimated_waves": (
+        _symmetric("estimated_wave", "m", 3.0, 50.0, "wave elevation, estimated", _estimated("wave")),
+        _symmetric(
+            "estimated_wave_quadrature", "m", 3.0, 50.0, "the same a quarter of the peak period later",
+            _estimated("wave_quadrature"),
+        ),
+    ),
+}  # fmt: skip
+
+
 def channels(turbine, preview=()):
     """{channel: tuple of its Entries} for a description.Turbine; preview: look-ahead times (s)."""
     rated, law, drive = turbine.rated_rotor_speed, turbine.torque_law, turbine.pitch_drive
@@ -106,7 +139,7 @@ def channels(turbine, preview=()):
         _wind(f"wind_preview_{ahead:g}s", PREVIEW + i, f"wind along x at the hub {ahead:g} s ahead, exact")
         for i, ahead in enumerate(preview)
     )
-    return table
+    return table | ESTIMATE_CHANNELS
 
 
 def check_channels(where, names, default=None):
@@ -136,6 +169,7 @@ KNOWN = (
     "azimuth",
     "previous_action",
     "wind_preview",
+    *ESTIMATE_CHANNELS,
 )
 
 
@@ -175,14 +209,20 @@ def build_observation_map(chosen, preview):
 
 
 @kernel
-def fill_signals(t, scene, x, measurement, action, preview, signals):
-    """Fill signals (n,): the measurement, azimuth, last action, and the hub wind at t + preview."""
+def fill_signals(t, scene, x, measurement, action, estimate, preview, signals):
+    """Fill signals (n,): the measurement, azimuth, last action, estimates, and the hub wind at t + preview.
+
+    estimate: memory of an estimator, or None.
+    """
     for i in range(N_MEASUREMENTS):
         signals[i] = measurement[i]
     signals[SIN_AZIMUTH] = np.sin(x[State.AZIMUTH])
     signals[COS_AZIMUTH] = np.cos(x[State.AZIMUTH])
     signals[FIRST_ACTION] = action[0]
     signals[SECOND_ACTION] = action[1]
+    if estimate is not None:
+        for i in range(PREVIEW - ESTIMATES):
+            signals[ESTIMATES + i] = estimate[i]
     for i in range(preview.shape[0]):
         ahead = t + preview[i]
         now = wind_now(ahead, scene.wind)

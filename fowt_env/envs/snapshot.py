@@ -5,7 +5,9 @@ from typing import Any, NamedTuple
 
 # arrays of kernels.Run that outlive a control period, and of dynamics.Work: those that carry over, and
 # stages, whose first row holds the wake's rates as long as the kept loads are fresh
-CARRIED = ("x", "u", "memory", "action", "measurement", "observation", "counts", "reference", "terms")
+CARRIED = (
+    "x", "u", "memory", "estimate", "action", "measurement", "observation", "counts", "reference", "terms",
+)  # fmt: skip
 WORK_CARRIED = ("lines", "counters", "stages", "kept", "history")
 
 
@@ -14,7 +16,7 @@ class Snapshot(NamedTuple):
 
     kind: tuple  # settings that an environment must share to go on from here
     scene: Any  # scene.Scene with the weather of the episode
-    arrays: tuple  # copies, in the order of CARRIED and WORK_CARRIED
+    arrays: tuple  # copies, in the order of CARRIED and WORK_CARRIED; None for what the run lacks
     running: bool
     generator: Mapping[str, Any] | None  # state of the random generator; None before the first draw
     seed: int | None  # that the generator was made from

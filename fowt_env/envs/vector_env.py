@@ -93,7 +93,7 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         self.single_action_space = first.action_space
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
-        self._law = first._law
+        self._law, self._watch = first._law, first._watch
         self._share_rows()
         self._statuses = np.full(num_envs, RUNNING, dtype=np.int64)
         self._rewards = np.zeros(num_envs)
@@ -225,7 +225,7 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
             ) from None
         if asked.shape != (self.num_envs, N_ACTIONS):
             raise InputError(f"actions have shape {asked.shape}: must be ({self.num_envs}, {N_ACTIONS})")
-        given = (self._boxes, self._law, asked, active, self._statuses, self._rewards)
+        given = (self._boxes, self._law, self._watch, asked, active, self._statuses, self._rewards)
         if self.threads == 1:
             bad = act_all(*given)
         else:
@@ -252,7 +252,8 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         infos["saturated_actions"], infos["_saturated_actions"] = saturated, shown.copy()
         if terminations.any():
             for i in (shown & terminations).nonzero()[0]:
-                infos = self._add_info(infos, {"termination": self.envs[i]._reason(self._statuses[i])}, int(i))
+                reason = {"termination": self.envs[i]._reason(self._statuses[i])}
+                infos = self._add_info(infos, reason, int(i))
         return infos
 
     def _finals(self, ended):

@@ -179,7 +179,7 @@ def fill_place(pose, px, py, pz, body_axes, motion):
 
 @kernel
 def fill_water(t, pose, waves, current, depth, wanted, body_axes, motion):
-    """Fill the motion of the water at the point, above the still surface that at it; zero if not wanted."""
+    """Fill the motion of the water at the point (above the still surface: that at it); zero if not wanted."""
     u = v = w = du = dv = dw = 0.0
     if wanted:
         z = min(motion[Motion.Z], 0.0)

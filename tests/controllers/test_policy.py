@@ -12,6 +12,7 @@ from controllers import information, make
 from controllers.policy import read_policy, shipped_agents
 from fowt_env.description import read_turbine
 from fowt_env.envs import TASKS, FowtEnv
+from fowt_env.envs.observations import entries
 from fowt_env.errors import InputError
 
 QUICK = {"rotor": "table", "wave_components": 10, "wind": {"kind": "ntm", "speed": 18.0, "class": "B"}}
@@ -25,7 +26,7 @@ def write_random_policy(
     import json
 
     rng = np.random.default_rng(0)
-    n = (sum({"previous_action": 2, "wind_preview": len(preview)}.get(name, 1) for name in names)) * 3
+    n = 3 * len(entries(names, TURBINE, preview))
     settings = {
         "format": 1, "activation": "tanh", "squash": "clip", "layers": 2, "clip_observation": 10.0,
         "control_dt": 0.1, "decisions": {"hold": 3, "smoothing": 0.4, "history": 2}, "action_mode": mode,
@@ -58,17 +59,31 @@ def test_the_exported_network_answers_as_stable_baselines3_does(algo, tmp_path):
     assert np.abs(network(features) - expected).max() < 1e-5
 
 
-@pytest.mark.parametrize("mode", ["residual", "direct", "setpoint"])
-def test_the_controller_commands_what_the_environment_would_do_with_its_decisions(mode, tmp_path):
+ESTIMATED = ("estimated_wind", "estimated_platform", "estimated_waves")
+
+
+@pytest.mark.parametrize(
+    ("mode", "baseline", "estimated"),
+    [
+        ("residual", "gspi_oc3", ()),
+        ("residual", "lqr", ESTIMATED),
+        ("direct", "gspi_oc3", ESTIMATED),
+        ("setpoint", "gspi_oc3", ()),
+    ],
+)
+def test_the_controller_commands_what_the_environment_would_do_with_its_decisions(
+    mode, baseline, estimated, tmp_path
+):
     from fowt_env.envs.decisions import Decisions, DecisionSettings
 
-    names, preview = ("rotor_speed", "platform_pitch_rate", "previous_action", "wind_preview"), (1.0, 2.5)
-    path = write_random_policy(tmp_path / "a.npz", mode, names, preview)
+    names = ("rotor_speed", "platform_pitch_rate", "previous_action", *estimated, "wind_preview")
+    preview = (1.0, 2.5)
+    path = write_random_policy(tmp_path / "a.npz", mode, names, preview, baseline=baseline)
     task = replace(TASKS["above_rated"], residual_pitch=3.0, setpoint=(0.9, 1.1))
     env = FowtEnv(
         task,
         action_mode=mode,
-        baseline="gspi_oc3",
+        baseline=baseline,
         observation=names,
         wind_preview=preview,
         duration=20.0,
@@ -109,6 +124,10 @@ def test_information_is_what_agent_and_baseline_see(tmp_path):
     known = make(f"policy:{path}", TURBINE, 0.1).information
     assert known == ("generator_speed", "blade_pitch", "rotor_speed", "wind_preview")
     assert make(f"policy:{path}", TURBINE, 0.1).name == f"policy:{path}"
+    path = write_random_policy(tmp_path / "b.npz", names=("rotor_speed", "estimated_wind"))
+    known = set(make(f"policy:{path}", TURBINE, 0.1).information)
+    assert {"plant_model", "nacelle_acceleration", "platform_pitch_rate"} <= known
+    assert not {"wind_speed", "wind_preview", "surge"} & known
     for name in shipped_agents():
         knows_wind = {"wind_speed", "wind_preview"} & set(information(f"policy:{name}"))
         assert bool(knows_wind) == ("preview" in name)

@@ -14,10 +14,13 @@ SMALL = {
     "validation.every": 64,
     "validation.skip": 2.0,
 }
+OFF_POLICY = {
+    "buffer_size": 500, "learning_starts": 20, "batch_size": 16, "train_freq": 4, "gradient_steps": 1,
+}  # fmt: skip
 QUICK_ALGORITHM = {
     "ppo": {"n_steps": 16, "batch_size": 16, "n_epochs": 2},
-    "sac": {"buffer_size": 500, "learning_starts": 20, "batch_size": 16, "gradient_steps": 1},
-    "tqc": {"buffer_size": 500, "learning_starts": 20, "batch_size": 16, "gradient_steps": 1},
+    "sac": OFF_POLICY,
+    "tqc": OFF_POLICY,
 }
 
 

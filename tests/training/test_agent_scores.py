@@ -5,41 +5,173 @@ import pandas as pd
 import pytest
 
 from fowt_env.errors import InputError
-from training.agent_scores import FIGURES, agent_scores, interquartile_mean, interval
+from fowt_env.outputs import write_table
+from training.agent_scores import (
+    COUNTS,
+    FIGURES,
+    PAST_ANY,
+    Figure,
+    agent_counts,
+    agent_scores,
+    by_kind,
+    figures_named,
+    kind_of,
+    kinds_markdown,
+    read_results,
+    scores_markdown,
+    told,
+)
+from training.bootstrap import interquartile_mean
+from training.evaluate import COLUMNS
+from training.metrics import METRICS
 
 
-def table(ratios):
-    """An evaluation in which the agent's every figure is a ratio of the rival's, one per seed."""
+def table(agents, cases=("ntm_18",)):
+    """An evaluation of {agent: ratios, one per seed} beside a rival whose figures differ by case and seed."""
     rows = []
-    for seed, ratio in enumerate(ratios):
-        for name, factor in (("rival", 1.0), ("agent", ratio)):
-            figures = {figure: factor * (seed + 1.0) for figure in FIGURES}
-            rows.append({"controller": name, "case": "ntm_18", "seed": seed, "status": "ok"} | figures)
-    return pd.DataFrame(rows)
+    seeds = len(next(iter(agents.values())))
+    for c, case in enumerate(cases):
+        for seed in range(seeds):
+            for name, ratios in {"rival": [1.0] * seeds, **agents}.items():
+                row = dict.fromkeys(COLUMNS, 0.0)
+                row |= {"controller": name, "case": case, "seed": seed, "status": "ok", "reason": ""}
+                rows.append(row | {figure.metric: ratios[seed] * (c + seed + 1.0) for figure in FIGURES})
+    return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
-def test_the_interquartile_mean_leaves_out_a_quarter_at_each_end():
-    assert interquartile_mean(np.array([100.0, 1.0, 2.0, -50.0])) == 1.5
+def fail(runs, controller, seed):
+    at = (runs["controller"] == controller) & (runs["seed"] == seed)
+    runs.loc[at, ["status", *METRICS]] = ["failed"] + [np.nan] * len(METRICS)
+
+
+def test_identical_runs_have_ratio_one_with_an_interval_without_width():
+    scores = agent_scores(table({"agent": [1.0] * 4}, ("ntm_14", "ntm_18")), ["rival"])
+    assert (scores[["ratio", "low", "high"]] == 1.0).all(axis=None)
+    assert (scores["pairs"] == 8).all()
+    verdicts = dict(zip(scores["figure"], scores["verdict"], strict=True))
+    assert verdicts["blade-pitch travel"] == "met*" and verdicts["rotor-speed std"] == "missed*"
 
 
 def test_ratios_are_taken_run_by_run_and_the_interval_holds_the_mean():
     ratios = np.random.default_rng(1).normal(0.8, 0.05, 40)
-    scores = agent_scores(table(ratios), ["rival"])
-    assert list(scores["figure"]) == list(FIGURES)
+    scores = agent_scores(table({"agent": ratios}), ["rival"])
+    assert list(scores["figure"]) == [figure.name for figure in FIGURES]
     assert scores["ratio"].to_numpy() == pytest.approx(interquartile_mean(ratios))
     assert (scores["low"] < scores["ratio"]).all() and (scores["ratio"] < scores["high"]).all()
     assert (scores["high"] - scores["low"] < 0.06).all()
 
 
-def test_the_interval_of_equal_runs_is_a_point():
-    assert interval(np.full(9, 0.7), np.random.default_rng(0)) == pytest.approx((0.7, 0.7))
+def test_a_group_is_scored_over_all_its_training_seeds():
+    agents = {"a": [0.7, 0.71, 0.69], "b": [0.8, 0.81, 0.79], "c": [0.9, 0.91, 0.89], "d": [0.5, 0.5, 0.5]}
+    scores = agent_scores(table(agents), ["rival"], {"all": ["a", "b", "c"]})
+    assert set(scores["agent"]) == {"all", "d"}
+    whole = scores[scores["agent"] == "all"].iloc[0]
+    assert whole["ratio"] == pytest.approx(interquartile_mean(sum((agents[k] for k in "abc"), [])))
+    assert (whole["runs"], whole["pairs"], whole["training_seeds"]) == (9, 9, 3)
+    one = agent_scores(table(agents), ["rival"], agents=["b"]).iloc[0]
+    assert whole["high"] - whole["low"] > 3.0 * (one["high"] - one["low"])
 
 
 def test_failed_runs_are_counted_and_left_out():
-    runs = table([0.5, 0.5, 0.5])
-    last = (runs["controller"] == "agent") & (runs["seed"] == 2)
-    runs.loc[last, ["status", *FIGURES]] = ["failed"] + [np.nan] * len(FIGURES)
-    scores = agent_scores(runs, ["rival"])
-    assert (scores["runs"] == 2).all() and (scores["failed"] == 1).all()
+    runs = table({"agent": [0.5, 0.5, 0.5]})
+    fail(runs, "agent", 2)
+    scores, counts = agent_scores(runs, ["rival"]), agent_counts(runs, ["rival"])
+    assert (scores["pairs"] == 2).all() and (scores["runs"] == 3).all()
+    assert list(counts["agent"]) == ["agent", "rival"] and list(counts["failed"]) == [1, 0]
+    assert list(counts["verdict"]) == ["missed", "met"]
+    fail(runs, "rival", 0)
+    fail(runs, "rival", 1)
+    with pytest.raises(InputError, match="no run of both went well"):
+        agent_scores(runs, ["rival"])
+
+
+def test_a_passed_constraint_is_a_miss_even_once():
+    runs = table({"agent": [0.5, 0.5]})
+    runs.loc[(runs["controller"] == "agent") & (runs["seed"] == 1), "rotor_speed_violations_[-]"] = 3.0
+    counts = agent_counts(runs, ["rival"]).set_index("agent")
+    assert counts.loc["agent", "rotor past 130 %"] == 1 and counts.loc["agent", "verdict"] == "missed"
+    assert counts.loc["agent", PAST_ANY] == 1 and set(COUNTS.values()) <= set(METRICS)
+
+
+def test_each_controller_stands_with_what_it_is_told():
+    assert told("gspi_oc3") == "measured"
+    assert told("lqr") == "measured, plant_model"
+    assert told("rosco_float") == "measured, wind_speed, plant_model"
+    assert told("policy:ppo_measured") == "measured"
+    assert told("policy:ppo_preview") == "measured, wind_speed, wind_preview"
+    assert told("my_module:Mine") == told("policy:gone.npz") == told("mine") == ""
+
+
+def test_a_rival_at_zero_gives_no_ratio_and_the_pairs_say_so():
+    runs = table({"agent": [0.5, 0.5]})
+    runs.loc[(runs["controller"] == "rival") & (runs["seed"] == 1), "blade_pitch_travel_[deg/s]"] = 0.0
+    scores = agent_scores(runs, ["rival"]).set_index("figure")
+    assert scores.loc["blade-pitch travel", "pairs"] == 1 and scores.loc["power std", "pairs"] == 2
+    assert scores.loc["blade-pitch travel", "ratio"] == 0.5
+
+
+def test_verdicts_name_the_aim_that_is_reached_and_whether_all_of_the_interval_does():
+    down, up = Figure("x", "x", 0.8, 0.6), Figure("p", "p", 0.995, more=True)
+    assert down.verdict(0.55, 0.5, 0.6) == "then*"
+    assert down.verdict(0.55, 0.5, 0.7) == "then, first*"
+    assert down.verdict(0.55, 0.5, 0.9) == "then"
+    assert down.verdict(0.7, 0.5, 0.79) == "first*" and down.verdict(0.7, 0.5, 0.81) == "first"
+    assert down.verdict(0.9, 0.7, 1.0) == "missed" and down.verdict(0.9, 0.81, 1.0) == "missed*"
+    assert up.verdict(1.0, 0.996, 1.1) == "met*" and up.verdict(1.0, 0.99, 1.1) == "met"
+    assert up.verdict(0.9, 0.8, 0.99) == "missed*" and up.verdict(0.9, 0.8, 1.0) == "missed"
+    assert down.verdict(0.7, np.nan, np.nan) == "first" and down.verdict(np.nan, np.nan, np.nan) == ""
+
+
+def test_kinds_of_cases_are_scored_apart_and_a_kind_that_failed_has_no_ratio():
+    runs = table({"agent": [0.5, 0.6]}, ("soft_14", "soft_18", "stiff_14"))
+    runs.loc[(runs["controller"] == "agent") & (runs["case"] == "stiff_14"), "status"] = "failed"
+    scores, counts = by_kind(runs, "rival")
+    soft = scores[scores["kind"] == "soft"]
+    assert (soft["pairs"] == 4).all() and soft["ratio"].to_numpy() == pytest.approx(0.55)
+    assert scores.loc[scores["kind"] == "stiff", "ratio"].isna().all()
+    text = kinds_markdown(scores, counts, ["rotor-speed std"])
+    assert "| stiff | - |" in text and "| stiff | 2 / 0 of 2 | 0 / 0 of 2 |" in text
+    every, _ = by_kind(runs, "rival", each=True)
+    assert list(dict.fromkeys(every["kind"])) == ["soft_14", "soft_18", "stiff_14"]
+    assert [kind_of(name) for name in ("ntm_18", "ntm_11_4", "eog_rated", "ss_5")] == [
+        "ntm", "ntm", "eog_rated", "ss"
+    ]  # fmt: skip
+
+
+def test_wrong_names_and_groups_are_refused():
+    runs = table({"agent": [0.5, 0.5]})
     with pytest.raises(InputError, match="unknown controller of the evaluation 'rivla'"):
         agent_scores(runs, ["rivla"])
+    for groups in ({"agent": ["agent"]}, {"g": ["agent", "agent"]}, {"g": []}):
+        with pytest.raises(InputError, match="needs a name that no controller has"):
+            agent_scores(runs, ["rival"], groups)
+    with pytest.raises(InputError, match="unknown figure 'rotor'"):
+        figures_named(["rotor"])
+
+
+def test_any_metric_may_be_a_figure_without_an_aim():
+    runs = table({"agent": [0.5, 0.6]})
+    runs["PtfmPitch_max_[deg]"] = runs["PtfmPitch_std_[deg]"]
+    scores, _ = by_kind(runs, "rival", figures=figures_named(["PtfmPitch_max_[deg]", "power std"]))
+    assert list(scores["figure"]) == ["PtfmPitch_max_[deg]", "power std"]
+    assert scores["ratio"].to_numpy() == pytest.approx(0.55) and list(scores["verdict"]) == ["", "met"]
+
+
+def test_results_are_joined_and_a_run_with_two_answers_is_refused(tmp_path):
+    runs = table({"agent": [0.5, 0.5]})
+    one, two = (write_table(runs, tmp_path / f"{name}.csv") for name in ("one", "two"))
+    assert len(read_results([one, two])) == len(runs)
+    write_table(runs.assign(**{"RotSpeed_std_[rpm]": 9.0}), two)
+    with pytest.raises(InputError, match="is there twice with different figures"):
+        read_results([one, two])
+    with pytest.raises(InputError, match="unknown case of the evaluation"):
+        read_results([one], ["ntm_19"])
+    with pytest.raises(InputError, match="no such file"):
+        read_results([tmp_path / "none"])
+
+
+def test_the_text_has_a_table_per_rival_and_one_of_failures():
+    runs = table({"agent": [0.5, 0.6, 0.5]})
+    text = scores_markdown(agent_scores(runs, ["rival"]), agent_counts(runs, ["rival"]))
+    assert "| over `rival` | `agent` |" in text and text.count("\n| --- |") == 2
+    assert "| rotor-speed std | 0.5" in text and "then" in text

@@ -5,9 +5,10 @@ import pandas as pd
 import pytest
 
 from fowt_env.errors import InputError
+from training.bootstrap import interval, resample_weights
 from training.cases import Score, Term
 from training.evaluate import COLUMNS
-from training.leaderboard import case_means, interval, leaderboard, resample_weights
+from training.leaderboard import case_means, leaderboard
 from training.metrics import METRICS
 
 STD = "RotSpeed_std_[rpm]"

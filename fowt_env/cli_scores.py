@@ -1,0 +1,194 @@
+"""The commands that score agents: scores rivals, cases, bound, gust."""
+
+from typing import Annotated
+
+import typer
+
+from fowt_env.cli import app, note, out, progress_bar, reported
+from fowt_env.cli_arguments import parse_sea, parse_wind
+from fowt_env.errors import InputError
+
+scores = typer.Typer(
+    no_args_is_help=True,
+    rich_markup_mode="rich",
+    help="Score agents against rivals, case by case, against the linear bound, in a gust.",
+)
+app.add_typer(scores, name="scores")
+
+FoldersArgument = Annotated[
+    list[str], typer.Argument(metavar="RESULTS...", help="Folders or results.csv of fowt evaluate.")
+]
+GroupOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--group", metavar="NAME=LABEL,LABEL", help="Training seeds of one configuration; repeatable."
+    ),
+]
+AgentsOption = Annotated[
+    str | None, typer.Option(help="Controllers to score, by commas; default: all that are no rivals.")
+]
+CasesOption = Annotated[str | None, typer.Option(help="Cases that count, by commas; default: all.")]
+
+
+def _names(text):
+    """List of the names in a text with commas; None for None."""
+    return None if text is None else [name.strip() for name in text.split(",") if name.strip()]
+
+
+def _groups(texts):
+    """{name: labels} of the texts of --group. Raises: InputError."""
+    found = {}
+    for text in texts or ():
+        name, equals, labels = text.partition("=")
+        if not (name.strip() and equals and _names(labels)):
+            raise InputError(f"--group {text!r}: must be NAME=LABEL,LABEL")
+        if name.strip() in found:
+            raise InputError(f"--group {text!r}: the name is there twice")
+        found[name.strip()] = _names(labels)
+    return found
+
+
+def _shown(text, tables, out_path):
+    """Print the markdown text, and write it with its tables where a path is given."""
+    from training.agent_scores import write_scores
+
+    out.print(text, highlight=False, markup=False, soft_wrap=True)
+    if out_path is not None:
+        note("wrote " + ", ".join(str(path) for path in write_scores(tables, text, out_path)))
+
+
+OutOption = Annotated[
+    str | None, typer.Option("--out", metavar="STEM", help="Write STEM.md and the tables as STEM*.csv.")
+]
+RIVALS_EXAMPLES = """[bold]Examples[/bold]
+
+[cyan]fowt scores rivals results/rl --against gspi_oc3,rosco_float --out results/rl/scores[/cyan]
+
+[cyan]fowt scores rivals results/rl --group preview=policy:ppo_preview,policy:ppo_preview_seed0[/cyan]
+
+Each figure: interquartile mean of ratios on the same runs, its 95 % interval, and what that reaches:
+missed, first, then (or met), with * where the whole interval does."""
+
+
+@scores.command(epilog=RIVALS_EXAMPLES)
+@reported
+def rivals(
+    results: FoldersArgument,
+    against: Annotated[str, typer.Option(help="Rivals, by commas.")] = "gspi_oc3,rosco_float",
+    group: GroupOption = None,
+    agents: AgentsOption = None,
+    cases: CasesOption = None,
+    out_path: OutOption = None,
+):
+    """Compare agents with rivals over all cases, with a verdict on each aim."""
+    from training.agent_scores import agent_counts, agent_scores, read_results, scores_markdown
+
+    table = read_results(results, _names(cases))
+    chosen = _names(against), _groups(group), _names(agents)
+    found, counts = agent_scores(table, *chosen), agent_counts(table, *chosen)
+    _shown(scores_markdown(found, counts), {"": found, "counts": counts}, out_path)
+
+
+CASES_EXAMPLES = """[bold]Examples[/bold]
+
+[cyan]fowt evaluate --suite shifted --controllers policy:ppo_measured,gspi_oc3 --out results/shifted[/cyan]
+
+[cyan]fowt scores cases results/shifted --out results/shifted/scores[/cyan]  every shifted plant by itself
+
+[cyan]fowt scores cases results/gusts --figures "RotSpeed_max_[rpm],PtfmPitch_max_[deg]"[/cyan]  any metric
+
+[cyan]fowt scores cases results/sea_states --each[/cyan]  one row per sea state"""
+
+
+@scores.command(name="cases", epilog=CASES_EXAMPLES)
+@reported
+def by_cases(
+    results: FoldersArgument,
+    against: Annotated[str, typer.Option(help="The rival.")] = "gspi_oc3",
+    group: GroupOption = None,
+    agents: AgentsOption = None,
+    cases: CasesOption = None,
+    figures: Annotated[
+        str, typer.Option(help="Figures or metrics whose tables are made, by commas.")
+    ] = "rotor-speed std,platform-pitch std,blade-pitch travel,tower-base DEL",
+    each: Annotated[bool, typer.Option("--each", help="Every case by itself, winds too.")] = False,
+    out_path: OutOption = None,
+):
+    """Compare agents with one rival on each kind of case (its winds together), and count what failed."""
+    from training.agent_scores import by_kind, figures_named, kinds_markdown, read_results
+
+    table, chosen = read_results(results, _names(cases)), figures_named(_names(figures))
+    found, counts = by_kind(table, against, _groups(group), _names(agents), chosen, each)
+    _shown(kinds_markdown(found, counts), {"": found, "counts": counts}, out_path)
+
+
+BOUND_EXAMPLES = """[bold]Examples[/bold]
+
+[cyan]fowt scores bound results/rl --plot results/rl/bound.png --out results/rl/bound[/cyan]
+
+In brackets: more blade-pitch travel or power deviation than gspi_oc3, which the bound does not allow."""
+
+
+@scores.command(epilog=BOUND_EXAMPLES)
+@reported
+def bound(
+    results: FoldersArgument,
+    group: GroupOption = None,
+    agents: AgentsOption = None,
+    cases: CasesOption = None,
+    table_path: Annotated[
+        str | None, typer.Option("--bound", help="CSV of fowt design bound; default: the package's.")
+    ] = None,
+    plot: Annotated[str | None, typer.Option(help="Picture of the fronts with all controllers.")] = None,
+    out_path: OutOption = None,
+):
+    """Say which share of what the linear bound allows each controller reaches, per wind speed."""
+    from fowt_env.plots_scores import plot_shares
+    from training.agent_scores import read_results
+    from training.bound_scores import bound_fractions, bound_markdown, read_bound
+
+    fronts = read_bound(table_path)
+    found = bound_fractions(read_results(results, _names(cases)), fronts, _groups(group), _names(agents))
+    text = "\n".join(bound_markdown(found, column) for column in ("of_bound_[-]", "of_measured_[-]"))
+    _shown(text, {"": found}, out_path)
+    if plot is not None:
+        plot_shares(found, fronts, plot)
+        note(f"wrote {plot}")
+
+
+GUST_EXAMPLES = """[bold]Examples[/bold]
+
+[cyan]fowt scores gust gust.png --controllers pi,gspi_oc3,rosco_float,lqr,policy:ppo_measured[/cyan]"""
+
+
+@scores.command(epilog=GUST_EXAMPLES)
+@reported
+def gust(
+    plot: Annotated[str, typer.Argument(help="The picture.")],
+    controllers: Annotated[str, typer.Option(help="By commas; see fowt list.")] = "gspi_oc3,rosco_float,lqr",
+    wind: Annotated[
+        str, typer.Option(help="As for fowt simulate.")
+    ] = '{"kind": "eog", "speed": 18, "class": "B", "start": 200}',
+    sea: Annotated[str, typer.Option(help="As for fowt simulate.")] = "jonswap:4:10",
+    seed: Annotated[int, typer.Option(help="Seed of the waves.")] = 1,
+    start: Annotated[float, typer.Option(help="First second that is shown.")] = 190.0,
+    end: Annotated[float, typer.Option(help="Last second, where the runs end.")] = 280.0,
+    fidelity: Annotated[str, typer.Option(help="reference, standard or fast.")] = "standard",
+):
+    """Draw the time series of one gust under several controllers into one picture."""
+    import fowt_env
+    from fowt_env.plots_scores import plot_gust
+
+    names = list(dict.fromkeys(_names(controllers)))
+    if not 0.0 <= start < end:
+        raise InputError(f"start = {start:g} s: must be 0 or more and below end = {end:g} s")
+    scene = fowt_env.build_scene(
+        wind=parse_wind(wind), sea=parse_sea(sea), seed=seed, fidelity=fidelity, duration=max(700.0, end)
+    )
+    runs = {}
+    with progress_bar("simulating", len(names)) as update:
+        for number, name in enumerate(names, 1):
+            runs[name] = fowt_env.simulate(scene, controller=name, duration=end)
+            update(number, name)
+    plot_gust(runs, plot, start=start, end=end)
+    note(f"wrote {plot}")

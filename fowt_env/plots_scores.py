@@ -1,0 +1,134 @@
+"""Plots of agents beside rivals and the linear bound, and of one gust under many controllers.
+
+As in plots.py every function returns a matplotlib Figure and, if given a path, writes it there.
+"""
+
+from fowt_env.errors import InputError
+from fowt_env.plots import COLOURS, INK, TIME, named_runs, new_figure, save_figure, style_axes
+from fowt_env.plots_design import WIND, place_legend
+
+MARKS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*", "p", "h")
+FRONTS = (("full", "-", "the linear bound"), ("measured", "--", "the same, measured channels"))
+FRAME = 1.3  # ends of both axes of plot_shares
+HOLLOW = "hollow: more travel or power\ndeviation than gspi_oc3"
+GUST = (  # panels of plot_gust: label, channel
+    ("wind\n(m/s)", "Wind1VelX_[m/s]"),
+    ("rotor speed\n(rpm)", "RotSpeed_[rpm]"),
+    ("blade pitch\n(deg)", "BldPitch1_[deg]"),
+    ("torque\n(kN m)", "GenTq_[kN-m]"),
+    ("power\n(kW)", "GenPwr_[kW]"),
+    ("platform pitch\n(deg)", "PtfmPitch_[deg]"),
+    ("tower-base\nmoment (MN m)", "TwrBsMyt_[kN-m]"),
+    ("fairlead\ntension (kN)", "FAIRTEN1_[kN]"),
+)
+
+
+def look(number):
+    """(colour, mark) of the number-th of several controllers; no two of the first 84 have both."""
+    return COLOURS[number % len(COLOURS)], MARKS[number % len(MARKS)]
+
+
+def plot_shares(fractions, bound, path=None, title=None):
+    """Rotor-speed against platform-pitch deviation over gspi_oc3's, a panel per wind, with the fronts.
+
+    fractions: training.bound_scores.bound_fractions; bound: training.linear_bound.bound_table. Large marks:
+    agents; small ones of the same kind: their training seeds. Hollow: more travel or power deviation than
+    gspi_oc3, so that the bound does not hold. Agents beyond FRAME stand in the corner with their figures.
+    """
+    from training.linear_bound import efficient
+
+    winds = sorted(fractions[WIND].unique())
+    if not winds:
+        raise InputError("nothing to plot: no wind has both a front and runs")
+    columns = min(4, len(winds) + 1)
+    rows = -(-(len(winds) + 1) // columns)
+    figure = new_figure(3.1 * columns + 0.6, 3.1 * rows + 0.3)
+    places = list(figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).flat)
+    names = list(dict.fromkeys(fractions["agent"]))
+    for axes, wind in zip(places, winds, strict=False):
+        style_axes(axes)
+        here = bound[bound[WIND] == wind]
+        for information, line_style, text in FRONTS:
+            front = efficient(
+                here[here["information"] == information][["speed_ratio_[-]", "pitch_ratio_[-]"]]
+            )
+            if len(front):
+                axes.plot(front[:, 0], front[:, 1], color=INK, ls=line_style, linewidth=1.2, label=text)
+        axes.scatter(1.0, 1.0, marker="+", s=80, color=INK, label="gspi_oc3", zorder=4)
+        at = fractions[fractions[WIND] == wind]
+        beyond = 0
+        for number, name in enumerate(names):
+            beyond += _marks(axes, at[at["agent"] == name], *look(number), beyond)
+            colour, mark = look(number)  # the same in the legend, whatever the first wind has
+            style = {"facecolor": colour, "edgecolor": INK, "linewidth": 0.5}
+            axes.scatter([], [], marker=mark, s=46, label=name, **style)
+        axes.scatter([], [], marker="o", s=46, facecolor="none", edgecolor=INK, label=HOLLOW)
+        axes.set_title(f"{wind:g} m/s", fontsize=9, color=INK)
+        axes.set_xlim(0.0, FRAME)
+        axes.set_ylim(0.0, FRAME)
+    place_legend(figure, places, len(winds))
+    figure.supxlabel("rotor-speed deviation over that of gspi_oc3", fontsize=9, color=INK)
+    figure.supylabel("platform-pitch deviation over that of gspi_oc3", fontsize=9, color=INK)
+    if title:
+        figure.suptitle(title, fontsize=10, color=INK)
+    return save_figure(figure, path)
+
+
+def _marks(axes, rows, colour, mark, beyond):
+    """Draw one agent at one wind; the number of agents (0 or 1) that lie beyond the frame.
+
+    Such a one stands as text in the corner, below `beyond` others.
+    """
+    outside = 0
+    for row in rows.sort_values("seed_of").to_dict("records"):
+        whole = row["seed_of"] == ""
+        x, y = row["speed_ratio_[-]"], row["pitch_ratio_[-]"]
+        if max(x, y) > FRAME:
+            if whole:
+                place = 0.98 * FRAME, (0.96 - 0.06 * beyond) * FRAME
+                axes.annotate(f"{x:.2f}, {y:.2f}", place, fontsize=7, color=colour, ha="right", va="center")
+                axes.scatter(0.72 * FRAME, place[1], marker=mark, s=14, color=colour)
+                outside = 1
+            continue
+        style = {"facecolor": colour, "edgecolor": INK if whole else "white", "linewidth": 0.5}
+        if not row["within"]:
+            style = {"facecolor": "white" if whole else "none", "edgecolor": colour, "linewidth": 1.2}
+        size, level = (46, 6) if whole else (14, 7)  # the seeds lie upon their mean
+        axes.scatter(x, y, marker=mark, s=size, zorder=level, **style)
+    return outside
+
+
+def plot_gust(runs, path=None, title=None, start=None, end=None):
+    """Time series of {controller: frame} over each other between two times (s), one legend for all panels."""
+    runs = named_runs(runs)
+    low = -float("inf") if start is None else start
+    high = float("inf") if end is None else end
+    kept = {label: f[(f[TIME] >= low) & (f[TIME] <= high)] for label, f in runs.items()}
+    kept = named_runs(kept)
+    panels = [panel for panel in GUST if any(panel[1] in frame for frame in kept.values())]
+    if not panels:
+        raise InputError(f"nothing to plot: no run has {', '.join(channel for _, channel in GUST)}")
+    figure = new_figure(9.5, 0.9 + 1.25 * len(panels))
+    places = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, (label, channel) in zip(places, panels, strict=True):
+        style_axes(axes)
+        scale = 1e-3 if "MN m" in label else 1.0
+        shown = {name: frame for name, frame in kept.items() if channel in frame}
+        values = [frame[channel].to_numpy() for frame in shown.values()]
+        if channel.startswith("Wind"):  # the same for all
+            axes.plot(next(iter(shown.values()))[TIME], values[0], color=INK, linewidth=1.2)
+        else:
+            for number, (name, frame) in enumerate(kept.items()):
+                if name in shown:
+                    style = {"color": COLOURS[number % len(COLOURS)], "linewidth": 1.1}
+                    style["ls"] = ("-", "--", ":")[number // len(COLOURS) % 3]
+                    axes.plot(frame[TIME], scale * frame[channel], label=name, **style)
+        axes.set_ylabel(label, fontsize=8, color=INK)
+        axes.margins(x=0.0)
+    places[-1].set_xlabel("time (s)", fontsize=9, color=INK)
+    handles, names = places[-1].get_legend_handles_labels()
+    figure.legend(handles, names, loc="outside lower center", ncols=4, fontsize=8, frameon=False)
+    figure.align_ylabels(places)
+    if title:
+        figure.suptitle(title, fontsize=11, color=INK)
+    return save_figure(figure, path)

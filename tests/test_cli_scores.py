@@ -1,0 +1,67 @@
+"""The commands of scores: what they print and write, and clear refusals."""
+
+import pandas as pd
+import pytest
+from typer.testing import CliRunner
+
+pytest.importorskip("matplotlib", reason="matplotlib is not installed: the extra `plot` is missing")
+
+from fowt_env.cli import EXIT_INPUT, app  # noqa: E402
+from fowt_env.outputs import write_table  # noqa: E402
+from training.agent_scores import FIGURES  # noqa: E402
+from training.evaluate import COLUMNS  # noqa: E402
+
+
+def call(*arguments):
+    return CliRunner().invoke(app, ["scores", *map(str, arguments)])
+
+
+@pytest.fixture
+def results(tmp_path):
+    """A results folder of gspi_oc3 and two agents at 0.7 and 0.75 of its every figure."""
+    rows = []
+    for case in ("ntm_14", "ntm_18"):
+        for seed in (1, 2, 3):
+            for name, ratio in (("gspi_oc3", 1.0), ("a", 0.7), ("b", 0.75)):
+                row = dict.fromkeys(COLUMNS, 0.0) | {"controller": name, "case": case, "seed": seed}
+                rows.append(
+                    row | {"status": "ok"} | {figure.metric: ratio * (1.0 + seed) for figure in FIGURES}
+                )
+    write_table(pd.DataFrame(rows, columns=list(COLUMNS)), tmp_path / "results.csv")
+    return tmp_path
+
+
+def test_rivals_prints_the_table_that_it_writes(results):
+    done = call("rivals", results, "--against", "gspi_oc3", "--group", "g=a,b", "--out", results / "s")
+    assert done.exit_code == 0, done.output
+    assert "| rotor-speed std | 0.725 [" in done.output and "| `g` |  | 12 | 0 |" in done.output
+    assert (results / "s.md").read_text().strip() in done.output
+    table = pd.read_csv(results / "s.csv")
+    assert set(table["agent"]) == {"g"} and (table["ratio"] - 0.725).abs().max() < 1e-12
+    assert list(pd.read_csv(results / "s_counts.csv")["agent"]) == ["g", "gspi_oc3"]
+
+
+def test_cases_scores_each_kind_and_bound_draws_its_picture(results):
+    done = call("cases", results, "--figures", "power std")
+    assert done.exit_code == 0 and "| ntm | 0.700 [0.700, 0.700] | 0.750 [0.750, 0.750] |" in done.output
+    done = call("bound", results, "--plot", results / "bound.png")
+    assert done.exit_code == 0, done.output
+    assert "| share of the bound | 14 m/s | 18 m/s |" in done.output
+    assert (results / "bound.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("rivals", "{}", "--against", "gspi"), "unknown controller of the evaluation 'gspi'"),
+        (("rivals", "{}", "--group", "g"), "must be NAME=LABEL,LABEL"),
+        (("rivals", "{}", "--group", "g=a", "--group", "g=b"), "there twice"),
+        (("rivals", "nowhere"), "no such file"),
+        (("cases", "{}", "--figures", "power"), "unknown figure 'power'"),
+        (("bound", "{}", "--bound", "nowhere.csv"), "there is no such file"),
+        (("gust", "x.png", "--start", "300"), "start = 300 s"),
+    ],
+)
+def test_what_cannot_be_scored_is_refused_with_its_reason(results, arguments, message):
+    done = call(*(word.format(results) for word in arguments))
+    assert done.exit_code == EXIT_INPUT and message in done.output

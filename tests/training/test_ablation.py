@@ -1,0 +1,64 @@
+"""The ablation: its file names real settings, its runs go on, its report says what there is."""
+
+import pytest
+import yaml
+
+pytest.importorskip("stable_baselines3")
+pytest.importorskip("sb3_contrib")
+
+from fowt_env.errors import InputError
+from training import ablation
+from training.train import environment_settings, make_algorithm
+
+from .small_run import QUICK_ALGORITHM, SMALL
+
+
+@pytest.fixture
+def table(tmp_path):
+    """Two small variants, as read from a file."""
+    quick = {f"algorithm.{key}": value for key, value in QUICK_ALGORITHM["ppo"].items()}
+    both = {"a": {"label": "first"}, "b": {"label": "second", "set": {"environment.observation": "blade"}}}
+    path = tmp_path / "table.yml"
+    path.write_text(yaml.safe_dump({"steps": 64, "seeds": [0], "common": SMALL | quick, "variants": both}))
+    return ablation.read_table(path)
+
+
+def test_every_variant_of_the_file_differs_from_the_others_and_can_be_resolved():
+    table = ablation.read_table()
+    resolved = [ablation.settings_of(table, name, 0) for name in table["variants"]]
+    for settings in resolved:
+        assert environment_settings(settings)["observation"] and make_algorithm(settings["algo"])
+    assert all(one != other for i, one in enumerate(resolved) for other in resolved[:i])
+
+
+def test_a_finished_variant_is_left_alone_and_a_longer_one_goes_on(table, tmp_path):
+    out = tmp_path / "runs"
+    assert ablation.run_variant(table, "a", 0, out)
+    folder = ablation.folder_of(out, "a", 0)
+    before = (folder / "validation.csv").stat().st_mtime_ns
+    assert ablation.decisions_done(folder) == 64
+    assert ablation.run_variant(table, "a", 0, out)
+    assert (folder / "validation.csv").stat().st_mtime_ns == before
+    assert ablation.run_variant(table, "a", 0, out, steps=128)
+    assert ablation.decisions_done(folder) == 128
+
+
+def test_the_report_has_what_was_validated_and_a_picture(table, tmp_path):
+    with pytest.raises(InputError, match="no variant has been validated"):
+        ablation.ablation_rows(table, tmp_path)
+    (tmp_path / "b_0").mkdir()
+    (tmp_path / "b_0" / "settings.yml").write_text("steps: 64")  # killed before its first checkpoint
+    assert ablation.run_variant(table, "b", 0, tmp_path)
+    rows = ablation.ablation_rows(table, tmp_path)
+    assert list(rows["label"]) == ["second"] and rows["decisions_trained"][0] == 64
+    assert ablation.markdown(rows).splitlines()[2].startswith("| second | ")
+    assert ablation.plot_ablation(rows, tmp_path / "plot.png").stat().st_size > 5000
+
+
+def test_misspelt_names_are_refused(table, tmp_path):
+    with pytest.raises(InputError, match="unknown variant 'c'"):
+        ablation.settings_of(table, "c", 0)
+    path = tmp_path / "bad.yml"
+    path.write_text("steps: 1\nseeds: [0]\ncommon: {}\nvariants: {a: {lable: x}}\n")
+    with pytest.raises(InputError, match="lable"):
+        ablation.read_table(path)

@@ -1,0 +1,107 @@
+"""Shares of the linear bound on a front and runs of known place."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+pytest.importorskip("matplotlib", reason="matplotlib is not installed: the extra `plot` is missing")
+
+from fowt_env.errors import InputError  # noqa: E402
+from fowt_env.plots_scores import plot_gust, plot_shares  # noqa: E402
+from training.bound_scores import bound_fractions, bound_markdown, read_bound  # noqa: E402
+from training.evaluate import COLUMNS  # noqa: E402
+
+SPEED, LEAN, TRAVEL, POWER = (
+    "RotSpeed_std_[rpm]", "PtfmPitch_std_[deg]", "blade_pitch_travel_[deg/s]", "GenPwr_std_[kW]",
+)  # fmt: skip
+
+
+def bound():
+    """One wind, a front of one corner at half of both deviations (0.6 of the measured channels)."""
+    rows = [
+        {"wind_[m/s]": 18.0, "information": name, "speed_ratio_[-]": place, "pitch_ratio_[-]": place}
+        for name, place in (("full", 0.5), ("measured", 0.6))
+    ]
+    return pd.DataFrame(rows)
+
+
+def runs(controllers, cases=("ntm_18",), seeds=(1, 2)):
+    """Runs whose figures are {controller: (speed, pitch, travel, power)} times those of gspi_oc3."""
+    rows = []
+    for case in cases:
+        for seed in seeds:
+            for name, ratios in ({"gspi_oc3": (1.0,) * 4} | controllers).items():
+                row = dict.fromkeys(COLUMNS, 0.0) | {"controller": name, "case": case, "seed": seed}
+                row |= {"status": "ok"} | dict(
+                    zip((SPEED, LEAN, TRAVEL, POWER), (seed * ratio for ratio in ratios), strict=True)
+                )
+                rows.append(row)
+    return pd.DataFrame(rows, columns=list(COLUMNS))
+
+
+def test_a_controller_halfway_to_the_front_reaches_half_of_the_bound():
+    found = bound_fractions(runs({"x": (0.75, 0.75, 1.0, 1.0), "on": (0.5, 0.5, 0.9, 1.0)}), bound())
+    assert list(found["of_bound_[-]"]) == pytest.approx([0.5, 1.0])
+    assert found["of_measured_[-]"].iloc[0] == pytest.approx(0.25 / 0.4)
+    assert found["within"].all()
+
+
+def test_more_travel_than_the_baseline_is_marked():
+    table = bound_fractions(runs({"x": (0.75, 0.75, 1.3, 1.0), "y": (0.75, 0.75, 1.0, 1.1)}), bound())
+    assert not table["within"].any()
+    assert "| `x` | [0.50] |" in bound_markdown(table)
+    assert "| `x` | 0.50 |" in bound_markdown(table.assign(within=True))
+
+
+def test_a_group_has_its_mean_and_the_range_of_its_training_seeds():
+    agents = {"a": (0.7, 0.7, 1.0, 1.0), "b": (0.8, 0.8, 1.0, 1.0)}
+    found = bound_fractions(runs(agents), bound(), {"both": ["a", "b"]})
+    assert list(found["seed_of"]) == ["a", "b", ""]
+    assert list(found["of_bound_[-]"]) == pytest.approx([0.6, 0.4, 0.5])
+    assert "| `both` | 0.50 (0.40 to 0.60) |" in bound_markdown(found)
+
+
+def test_a_failed_run_takes_its_pair_along():
+    table = runs({"x": (0.75, 0.75, 1.0, 1.0)})
+    table.loc[(table["controller"] == "x") & (table["seed"] == 2), "status"] = "failed"
+    assert bound_fractions(table, bound())["speed_ratio_[-]"].iloc[0] == 0.75
+    table["status"] = "failed"
+    with pytest.raises(InputError, match="no run of gspi_oc3"):
+        bound_fractions(table, bound())
+
+
+def test_a_controller_worse_in_both_has_no_share():
+    found = bound_fractions(runs({"x": (1.1, 1.2, 1.0, 1.0)}), bound())
+    assert np.isnan(found["of_bound_[-]"].iloc[0]) and "worse" in bound_markdown(found)
+
+
+def test_cases_of_two_kinds_are_not_mixed():
+    with pytest.raises(InputError, match="several kinds"):
+        bound_fractions(runs({"x": (0.7, 0.7, 1.0, 1.0)}, ("ntm_18", "soft_18")), bound())
+
+
+def test_the_picture_has_a_panel_per_wind_and_a_mark_for_each_agent_and_training_seed(tmp_path):
+    agents = {"a": (0.7, 0.7, 1.0, 1.0), "b": (0.8, 0.8, 1.3, 1.0), "far": (0.5, 4.0, 1.0, 1.0)}
+    table = runs(agents, ("ntm_14", "ntm_18"))
+    found = bound_fractions(table, read_bound(), {"both": ["a", "b"]})
+    figure = plot_shares(found, read_bound(), tmp_path / "shares.png")
+    assert (tmp_path / "shares.png").stat().st_size > 10_000
+    drawn = [axes for axes in figure.axes if axes.get_title()]
+    assert [axes.get_title() for axes in drawn] == ["14 m/s", "18 m/s"]
+    # gspi_oc3, two seeds and their mean, and the one beyond the frame, which is written in the corner
+    shown = [[marks for marks in axes.collections if len(marks.get_offsets())] for axes in drawn]
+    assert [len(marks) for marks in shown] == [5, 5]
+    assert all([text.get_text() for text in axes.texts] == ["0.50, 4.00"] for axes in drawn)
+
+
+def test_a_gust_is_drawn_for_every_controller_within_its_seconds(tmp_path):
+    time = np.arange(0.0, 20.0, 0.1)
+    frames = {
+        name: pd.DataFrame({"Time_[s]": time, "Wind1VelX_[m/s]": 18.0, "RotSpeed_[rpm]": time + k})
+        for k, name in enumerate("abcdefghij")
+    }  # fmt: skip
+    figure = plot_gust(frames, tmp_path / "gust.png", start=5.0, end=10.0)
+    wind, speed = figure.axes
+    assert len(wind.lines) == 1 and len(speed.lines) == 10
+    assert len({(line.get_color(), line.get_linestyle()) for line in speed.lines}) == 10
+    assert speed.lines[0].get_xdata()[[0, -1]] == pytest.approx([5.0, 10.0])

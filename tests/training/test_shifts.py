@@ -1,0 +1,184 @@
+"""Shifted plants: the run is on them, the controller knows the nominal one, noise is on readings alone."""
+
+import json
+
+import numpy as np
+import pytest
+
+import fowt_env
+from controllers import make
+from fowt_env.errors import InputError
+from fowt_env.linear_model import linearize
+from fowt_env.measurement import Measurement
+from training.cases import Case, described, read_suite
+from training.evaluate import _controller, evaluate, planned
+from training.randomisation import PLANT, SENSORS
+from training.shifts import Shift, Unaware, reading_scales, shifted_parts
+
+WIND = {"kind": "ntm", "speed": 18.0, "class": "B"}
+
+
+def windy(shift=None, **more):
+    return Case("windy", WIND, {"kind": "jonswap", "Hs": 4.0, "Tp": 10.0}, shift=shift, **more)
+
+
+def short(controllers, *cases, **options):
+    return evaluate(controllers, list(cases), duration=40.0, skip=10.0, seeds=[1], **options)
+
+
+class Recorder:
+    """gspi_oc3 that keeps what it was given."""
+
+    name = "recorder"
+
+    def __init__(self, turbine, control_dt):
+        self.inner = make("gspi_oc3", turbine, control_dt)
+        self.turbine, self.seen, self.scene = turbine, [], None
+
+    def prepare(self, scene):
+        self.scene = scene
+
+    def reset(self, measurement):
+        self.seen = [measurement]
+        self.inner.reset(measurement)
+
+    def act(self, measurement):
+        self.seen.append(measurement)
+        return self.inner.act(measurement)
+
+
+class Deaf:
+    """Commands that no reading changes."""
+
+    def reset(self, measurement):
+        pass
+
+    def act(self, measurement):
+        return 43093.55, 0.26
+
+
+def measured(time, **values):
+    return Measurement(**(dict.fromkeys(Measurement._fields, 0.0) | values | {"time": time}))
+
+
+def unaware(shift, turbine, seed=1):
+    """(Unaware, its Recorder) that was told of nothing but a turbine."""
+    inner = Recorder(turbine, 0.1)
+    known = type("Known", (), {"turbine": turbine})()
+    return Unaware(inner, known, shift, seed), inner
+
+
+def test_a_shift_has_every_quantity_that_training_randomises():
+    assert set(Shift.model_fields) == {*PLANT, *SENSORS}
+    assert Shift(mooring_stiffness=1.2, noise=0.1).factors == {"mooring_stiffness": 1.2}
+
+
+def periods(shift):
+    """{mode: period} of the plant at rest in still water."""
+    scene = fowt_env.build_scene(fidelity="standard", **shifted_parts(shift))
+    return {mode.name: mode.period for mode in linearize(scene).modes()}
+
+
+def test_a_stiffer_mooring_shortens_the_surge_period_by_its_root():
+    nominal, stiff, soft = (periods(Shift(mooring_stiffness=k)) for k in (1.0, 1.2, 0.8))
+    assert stiff["surge"] / nominal["surge"] == pytest.approx(1.2**-0.5, rel=0.01)
+    assert soft["surge"] / nominal["surge"] == pytest.approx(0.8**-0.5, rel=0.01)
+    # the water plane and the ballast hold the platform's pitch, not the lines
+    assert stiff["platform_pitch"] / nominal["platform_pitch"] == pytest.approx(1.0, abs=0.02)
+
+
+def test_more_added_mass_lengthens_the_surge_period_as_its_share_of_the_mass_says():
+    nominal, heavy = periods(Shift()), periods(Shift(added_mass=1.2))
+    # the spar's added mass is about that of its displaced water, half of all that surges
+    assert 1.03 < heavy["surge"] / nominal["surge"] < 1.07
+
+
+def test_the_run_is_on_the_shifted_plant_and_the_controller_knows_the_nominal_one():
+    shift = Shift(mooring_stiffness=1.2, actuator_lag=2.0)
+    run = planned(["lqr"], [windy(shift)], seeds=[1])[0]
+    known = fowt_env.build_scene(wind=WIND, sea=run.case.sea, seed=1, fidelity="standard", duration=700.0)
+    controller = _controller(run, known)
+    told = make("lqr", known.turbine, 0.1)
+    told.prepare(known)
+    wrong = fowt_env.build_scene(
+        wind=WIND, sea=run.case.sea, seed=1, fidelity="standard", **shifted_parts(shift)
+    )
+    controller.prepare(wrong)
+    assert np.array_equal(controller.inner.parameters, told.parameters)
+    told.prepare(wrong)
+    assert not np.array_equal(controller.inner.parameters, told.parameters)
+    assert wrong.turbine.pitch_drive.time_constant == 2.0 * known.turbine.pitch_drive.time_constant
+
+
+def test_a_shifted_mooring_changes_the_motions_and_an_empty_shift_no_bit():
+    plain, same, soft = (
+        short(["gspi_oc3"], windy(shift)).iloc[0] for shift in (None, Shift(), Shift(mooring_stiffness=0.8))
+    )
+    assert plain.equals(same)
+    assert plain["PtfmSurge_mean_[m]"] < soft["PtfmSurge_mean_[m]"]  # it drifts farther on softer lines
+    assert plain["Wind1VelX_std_[m/s]"] == soft["Wind1VelX_std_[m/s]"]
+
+
+def test_noise_reaches_the_controller_with_its_size_and_no_delay(turbine):
+    controller, inner = unaware(Shift(noise=0.02), turbine)
+    controller.reset(measured(0.0))
+    for step in range(4000):
+        controller.act(measured(0.1 * step))
+    seen = np.array(inner.seen[1:])
+    scales = reading_scales(turbine)
+    assert np.array_equal(seen[:, 0], 0.1 * np.arange(4000))  # the clock is exact
+    np.testing.assert_allclose(seen[:, 1:].std(axis=0), 0.02 * scales[1:], rtol=0.06)
+    assert np.abs(seen[:, 1:].mean(axis=0) / (0.02 * scales[1:])).max() < 0.06
+    correlation = np.corrcoef(seen[:, 1:].T) - np.eye(seen.shape[1] - 1)
+    assert np.abs(correlation).max() < 0.08
+    assert inner.seen[0] == inner.seen[1]  # one reading per instant, also that of the start
+
+
+def test_a_delay_shows_what_was_measured_as_many_periods_ago(turbine):
+    controller, inner = unaware(Shift(delay=2), turbine)
+    controller.reset(measured(0.0, surge=0.0))
+    for step in range(6):
+        controller.act(measured(0.1 * step, surge=float(step)))
+    assert [reading.surge for reading in inner.seen[1:]] == [0.0, 0.0, 0.0, 1.0, 2.0, 3.0]
+
+
+def test_noise_is_on_the_readings_and_not_in_the_metrics():
+    plain, noisy = (short({"deaf": Deaf()}, windy(shift)).iloc[0] for shift in (None, Shift(noise=0.5)))
+    assert plain.equals(noisy)  # a controller that looks at nothing runs as without noise
+    felt, truth = (short(["gspi_oc3"], windy(shift)).iloc[0] for shift in (Shift(noise=0.05), None))
+    assert felt["blade_pitch_travel_[deg/s]"] > 1.05 * truth["blade_pitch_travel_[deg/s]"]
+    assert felt["RotSpeed_std_[rpm]"] == pytest.approx(truth["RotSpeed_std_[rpm]"], rel=0.1)
+
+
+def test_the_same_seed_gives_the_same_bits_and_another_other_noise(turbine):
+    rows = [short(["gspi_oc3"], windy(Shift(noise=0.02))).iloc[0] for _ in range(2)]
+    assert rows[0].equals(rows[1])
+    readings = []
+    for seed in (1, 1, 2):
+        controller, inner = unaware(Shift(noise=0.02), turbine, seed)
+        controller.reset(measured(0.0))
+        readings.append(inner.seen[0])
+    assert readings[0] == readings[1] != readings[2]
+
+
+def test_a_suite_may_carry_shifts_and_names_wrong_ones(tmp_path):
+    suite = read_suite("shifted")
+    shifts = {case.name.rpartition("_")[0]: case.shift for case in suite.cases}
+    assert shifts["nominal"] is None and shifts["mooring_soft"] == Shift(mooring_stiffness=0.8)
+    assert {tuple(shift.factors.values()) for shift in shifts.values() if shift} >= {(0.8,), (1.2,), (2.0,)}
+    assert shifts["noise"].noise > 0.0 and max(suite.seeds) < 1000
+    assert described(suite.cases[-1])["shift"] == {"noise": 0.02}
+    json.dumps([described(case) for case in suite.cases], allow_nan=False)
+    text = (
+        'version = 1\ndescription = "d"\nsource = "s"\nwind = "rotor-averaged"\nduration = 100.0\n'
+        '[[case]]\nname = "x"\nwind = 18.0\n'
+    )
+    for more, message in (
+        ("shift = {mooring = 1.2}", "mooring"),
+        ("shift = {added_mass = 0.0}", "added_mass"),
+        ('shift = {drag = 2.0}\noptions = {turbine = "nrel5mw"}', "takes the turbine of its platform"),
+    ):
+        path = tmp_path / "mine.toml"
+        path.write_text(text + more + "\n")
+        with pytest.raises(InputError, match=message):
+            read_suite(path)

@@ -1,0 +1,158 @@
+"""What information, action mode and algorithm are worth: equal runs that differ in one thing each.
+
+    python -m training.ablation --out runs/ablation                      # all of training/agents/ablation.yml
+    python -m training.ablation --out runs/ablation --only direct,estimate
+    python -m training.ablation --out runs/ablation --report docs/figures/rl_ablation.png
+
+Each variant and seed is a run of training/train.py in a folder of its own; one that was stopped goes on
+where it was when the command is given again, and one that has ended is left alone. The runs are far shorter
+than those of the shipped agents, so that they say which lever moves more, not where it ends.
+"""
+
+import argparse
+import shutil
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import yaml
+
+from fowt_env.errors import InputError, unknown
+from fowt_env.plots import COLOURS, new_figure, save_figure, style_axes
+from training.train import AGENTS, Training, resolve
+
+TABLE = AGENTS / "ablation.yml"
+KEYS = ("steps", "seeds", "common", "variants")
+OWN_KEYS = ("label", "algo", "steps", "set")
+FIGURES = {
+    "rotor_speed_std_ratio": "rotor-speed std",
+    "platform_pitch_std_ratio": "platform-pitch std",
+    "blade_pitch_travel_ratio": "blade-pitch travel",
+    "shaft_power_std_ratio": "power std",
+}
+
+
+def read_table(path=TABLE):
+    """{"steps", "seeds", "common", "variants"} of an ablation file. Raises: InputError for unknown keys."""
+    with Path(path).open(encoding="utf-8") as file:
+        table = yaml.safe_load(file)
+    for key in table:
+        if key not in KEYS:
+            raise unknown(f"key of {path}", key, KEYS)
+    for name, variant in table["variants"].items():
+        for key in variant:
+            if key not in OWN_KEYS:
+                raise unknown(f"key of variant {name!r} of {path}", key, OWN_KEYS)
+    return table
+
+
+def settings_of(table, name, seed, steps=None):
+    """Resolved settings of a variant and seed. Raises: InputError."""
+    if name not in table["variants"]:
+        raise unknown("variant", name, table["variants"])
+    variant = table["variants"][name]
+    changes = table["common"] | variant.get("set", {})
+    steps = steps or variant.get("steps", table["steps"])
+    return resolve(variant.get("algo", "ppo"), "above_rated", seed, steps, changes)
+
+
+def folder_of(out, name, seed):
+    """Folder of the run of a variant and seed."""
+    return Path(out) / f"{name}_{seed}"
+
+
+def decisions_done(folder):
+    """Decisions in the newest checkpoint of a run's folder; 0 without one."""
+    steps = [int(p.name.removeprefix("step_")) for p in Path(folder).glob("checkpoints/step_*")]
+    return max(steps, default=0)
+
+
+def run_variant(table, name, seed, out, steps=None, report=None):
+    """Whether the run of a variant and seed has reached its end, after training what is left of it."""
+    settings, folder = settings_of(table, name, seed, steps), folder_of(out, name, seed)
+    done = decisions_done(folder)
+    if done >= settings["steps"]:
+        return True
+    if done == 0 and (folder / "settings.yml").exists():
+        shutil.rmtree(folder)  # stopped in its first minutes, before there was anything to go on from
+    return Training(settings, folder, resume=done > 0).run(report)
+
+
+def ablation_rows(table, out):
+    """DataFrame: a row per variant and seed that has been validated, with the figures of its best policy."""
+    rows = []
+    for name, variant in table["variants"].items():
+        for seed in table["seeds"]:
+            path = folder_of(out, name, seed) / "validation.csv"
+            if not path.is_file():
+                continue
+            validated = pd.read_csv(path)
+            best = validated.loc[validated["score"].idxmin()]
+            about = {"variant": name, "label": variant["label"], "seed": seed}
+            trained = {"decisions_trained": int(validated["decisions"].iloc[-1])}
+            rows.append(about | best.to_dict() | trained)
+    if not rows:
+        raise InputError(f"{out}: no variant has been validated yet")
+    return pd.DataFrame(rows)
+
+
+def plot_ablation(rows, path):
+    """Path of a plot of the figures of ablation_rows: a line per variant, a dot per seed."""
+    labels = list(dict.fromkeys(rows["label"]))
+    figure = new_figure(10.0, 1.2 + 0.33 * len(labels))
+    axes = figure.subplots(1, len(FIGURES), sharey=True)
+    for axis, (name, title), colour in zip(axes, FIGURES.items(), COLOURS, strict=False):
+        place = np.array([labels.index(label) for label in rows["label"]])
+        axis.plot(rows[name], place, "o", color=colour)
+        axis.axvline(1.0, color="0.6", linewidth=0.8)
+        axis.set_title(title, fontsize=9)
+        style_axes(axis)
+    axes[0].set_yticks(range(len(labels)), labels, fontsize=8)
+    axes[0].invert_yaxis()
+    figure.supxlabel("ratio to gspi_oc3 on the validation episodes", fontsize=8)
+    save_figure(figure, path)
+    return path
+
+
+def markdown(rows):
+    """The figures of ablation_rows as a markdown table, means over the seeds."""
+    mean = rows.groupby("label", sort=False)[[*FIGURES, "failed", "score", "decisions_trained"]].mean()
+    lines = [
+        f"| | {' | '.join(FIGURES.values())} | failed | score | decisions |",
+        "|" + "---|" * (len(FIGURES) + 4),
+    ]
+    for label, row in mean.iterrows():
+        cells = " | ".join(f"{row[name]:.3f}" for name in FIGURES)
+        share, thousands = f"{row['failed']:.2f}", f"{row['decisions_trained'] / 1e3:.0f} k"
+        lines.append(f"| {label} | {cells} | {share} | {row['score']:.3f} | {thousands} |")
+    return "\n".join(lines)
+
+
+def main(arguments=None):
+    """Train what is left of the chosen variants, or report what there is."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--out", default="runs/ablation", help="folder of the runs")
+    parser.add_argument("--table", default=str(TABLE), help="file of variants")
+    parser.add_argument("--only", help="variants, separated by commas")
+    parser.add_argument("--steps", type=int, help="decisions of each run, in place of the file's")
+    parser.add_argument("--report", metavar="PICTURE", help="train nothing: plot and print what there is")
+    given = parser.parse_args(arguments)
+    table = read_table(given.table)
+    if given.report:
+        rows = ablation_rows(table, given.out)
+        print(plot_ablation(rows, given.report))
+        print(markdown(rows))
+        return
+    for name in given.only.split(",") if given.only else table["variants"]:
+        for seed in table["seeds"]:
+
+            def report(done, total, text, name=name, seed=seed):
+                print(f"\r{name} {seed}: {done}/{total}: {text}  ", end="", file=sys.stderr)
+
+            if not run_variant(table, name, seed, given.out, given.steps, report):
+                sys.exit(f"stopped; the same command goes on with {name}, seed {seed}")
+
+
+if __name__ == "__main__":
+    main()
