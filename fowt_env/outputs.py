@@ -1,6 +1,7 @@
 """Writing results: whole files or none, so that an interrupted run never leaves half a file."""
 
 import os
+import re
 import tempfile
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,6 +13,7 @@ if TYPE_CHECKING:
     from fowt_env.linear_model import LinearModel
 
 TABLE_SUFFIXES = (".csv", ".parquet")
+_LEFTOVER = re.compile(r"\..*-(\d+)-[a-z0-9_]{8}(?:\.[^.]*)?")  # file of `replacing`, its process
 SERIES_SUFFIXES = (*TABLE_SUFFIXES, ".outb")  # of a time series, which OpenFAST's format can hold too
 
 
@@ -24,7 +26,8 @@ def replacing(path):
     path = Path(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}-", suffix=path.suffix)
+        prefix = f".{path.stem}-{os.getpid()}-"
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=prefix, suffix=path.suffix)
     except OSError as error:  # which names the temporary file
         raise OSError(error.errno, f"cannot be written: {error.strerror}", str(path)) from error
     os.close(handle)
@@ -35,6 +38,30 @@ def replacing(path):
     except BaseException:
         Path(name).unlink(missing_ok=True)
         raise
+
+
+def is_leftover(path):
+    """Whether a file is a temporary one of `replacing`."""
+    return _LEFTOVER.fullmatch(Path(path).name) is not None
+
+
+def remove_leftovers(folder):
+    """Remove the temporary files of `replacing` in a folder whose process is gone: it was killed."""
+    for path in Path(folder).glob(".*"):
+        found = _LEFTOVER.fullmatch(path.name)
+        if found and not process_lives(int(found[1])):
+            path.unlink(missing_ok=True)
+
+
+def process_lives(number):
+    """Whether a process of this machine has the number."""
+    try:
+        os.kill(number, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:
+        return True
+    return True
 
 
 def _umask():
@@ -73,14 +100,17 @@ def write_table(frame, path):
 def read_table(path):
     """DataFrame of a CSV or Parquet file that write_table wrote.
 
-    Raises: InputError if there is no such file or its ending is another.
+    Raises: InputError if there is no such file, its ending is another, or it is broken.
     """
     import pandas as pd
 
     path = table_path(path)
     if not path.is_file():
         raise InputError(f"file {str(path)!r}: not found")
-    return pd.read_csv(path) if path.suffix.lower() == ".csv" else pd.read_parquet(path.absolute())
+    try:
+        return pd.read_csv(path) if path.suffix.lower() == ".csv" else pd.read_parquet(path.absolute())
+    except Exception as error:  # whatever a broken file makes pandas and pyarrow raise
+        raise InputError(f"file {str(path)!r} cannot be read: {error!s:.300}") from None
 
 
 def write_mat(model: "LinearModel", path: str | Path) -> Path:

@@ -14,7 +14,6 @@ from fowt_env.records import (
     FloatArray,
     NonNegative,
     NumberOrArray,
-    Positive,
     Record,
     bounded,
     is_number,
@@ -126,7 +125,7 @@ class JointTable(Record):
     name: str = ""
     wind: tuple[NonNegative, ...]  # m/s, increasing
     Hs: tuple[NonNegative, ...]
-    Tp: tuple[Positive, ...]
+    Tp: tuple[Period, ...]
     source: str = ""
     confidence: str = ""
 

@@ -1,8 +1,9 @@
-"""Checked reading of TOML and CSV files; whatever is wrong becomes an InputError that names the file."""
+"""Checked reading of TOML, JSON and CSV; whatever is wrong becomes an InputError that names the file."""
 
 import csv
 import difflib
 import io
+import json
 import math
 import tomllib
 from pathlib import Path
@@ -44,6 +45,21 @@ def read_toml(path, kind):
         return tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise InputError(f"{kind} file {str(path)!r} is not valid TOML: {error}") from None
+
+
+def parse_json(text):
+    """Value of a JSON text, every number of it finite. Raises: ValueError."""
+    try:
+        return json.loads(text, parse_constant=_finite, parse_float=_finite)
+    except RecursionError:
+        raise ValueError("it is nested too deeply") from None
+
+
+def _finite(text):
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(f"{text} is not a number of JSON")
+    return value
 
 
 def read_table(path, kind, columns):

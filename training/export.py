@@ -5,7 +5,7 @@ import pickle
 
 import numpy as np
 
-from controllers.policy import FORMAT
+from controllers.policy_file import FORMAT
 from fowt_env.errors import InputError
 from fowt_env.outputs import replacing
 
@@ -87,6 +87,8 @@ def export_run(folder, path):
 
     run = Training(None, folder, resume=True)
     settings, checkpoint = run.settings, run.newest()
+    if checkpoint is None:
+        raise InputError(f"{folder}: holds no checkpoint of a run yet")
     model = make_algorithm(settings["algo"]).load(checkpoint / "model.zip", device="cpu")
     with (checkpoint / "normalisation.pkl").open("rb") as file:
         normalisation = pickle.load(file)

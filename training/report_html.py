@@ -21,6 +21,7 @@ import pandas as pd
 from fowt_env.errors import InputError, unknown
 from fowt_env.outputs import read_table, replacing
 from fowt_env.plots import PANELS, SPECTRA, TIME, frequency_marks, spectrum
+from fowt_env.textfiles import parse_json
 from training.evaluate import run_file
 
 TABLES = ("results.csv", "metrics.csv")  # the first that is there
@@ -171,7 +172,7 @@ def _json_file(path):
     if not path.is_file():
         return {}
     try:
-        value = json.loads(path.read_text(encoding="utf-8"))
+        value = parse_json(path.read_text(encoding="utf-8"))
     except ValueError as error:
         raise InputError(f"file {str(path)!r} is not JSON: {error}") from None
     if not isinstance(value, dict):

@@ -34,8 +34,9 @@ import numpy as np
 from fowt_env.envs.decisions import DecisionSettings
 from fowt_env.envs.tasks import SITE, task_of
 from fowt_env.errors import InputError, unknown
-from fowt_env.outputs import replacing
+from fowt_env.outputs import process_lives, remove_leftovers, replacing
 from training.seeds import TRAINING, seeds_for
+from training.train_settings import check_settings, read_settings
 
 AGENTS = Path(__file__).parent / "agents"
 ALGORITHMS = ("ppo", "sac", "tqc")
@@ -81,7 +82,7 @@ def resolve(algo, task, seed, steps, changes=None):
     settings = deepcopy(table[task])
     for key, value in (changes or {}).items():
         _change(settings, key, value)
-    return {"algo": algo, "name": task, "seed": seed, "steps": steps} | settings
+    return check_settings({"algo": algo, "name": task, "seed": seed, "steps": steps} | settings)
 
 
 def _change(settings, key, value):
@@ -224,23 +225,20 @@ def judged(figures, reference):
 
 
 class Training:
-    """One run in one folder. resume: go on from its newest checkpoint.
+    """One run in one folder. resume: go on from its newest checkpoint, or start anew where it has none yet.
 
     Raises: InputError where the folder holds another run, or none to resume.
     """
 
     def __init__(self, settings, folder, resume=False):
-        import yaml
-
         self.folder = Path(folder)
         self.checkpoints = self.folder / "checkpoints"
         path = self.folder / "settings.yml"
         self.resume = resume
         if resume:
-            if not path.exists() or self.newest() is None:
-                raise InputError(f"--resume: {self.folder} holds no checkpoint of a run")
-            with path.open(encoding="utf-8") as file:
-                stored = yaml.safe_load(file)
+            if not path.exists():
+                raise InputError(f"--resume: {self.folder} holds no run")
+            stored = read_settings(path)
             if settings is not None:
                 stored["steps"] = settings["steps"]
             settings = stored
@@ -271,10 +269,11 @@ class Training:
         torch.set_num_threads(int(os.environ.get("FOWT_TORCH_THREADS", "1")))
         kind = make_algorithm(settings["algo"])
         env, judge = make_envs(settings)
+        self._remove_leftovers()
         self._write_settings()
         self.reference = baseline_figures(settings)
         set_random_seed(settings["seed"])
-        if self.resume:
+        if self.resume and self.newest() is not None:
             model, state = self._load(kind, env)
         else:
             env.seed(settings["seed"])
@@ -323,6 +322,14 @@ class Training:
         finally:
             for number, handler in before.items():
                 signal.signal(number, handler)
+
+    def _remove_leftovers(self):
+        """Remove what processes that were killed left half written."""
+        remove_leftovers(self.folder)
+        for path in self.checkpoints.glob(".writing_*"):
+            number = path.name.removeprefix(".writing_")
+            if not (number.isdigit() and process_lives(int(number))):
+                shutil.rmtree(path, ignore_errors=True)
 
     def _write_settings(self):
         import yaml

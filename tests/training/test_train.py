@@ -76,6 +76,20 @@ def test_a_run_leaves_settings_versions_checkpoint_policies_table_and_plot(tmp_p
     assert any((folder / "tensorboard").iterdir())
 
 
+def test_a_run_that_was_killed_before_its_first_checkpoint_starts_anew(tmp_path):
+    whole = Training(small("ppo"), tmp_path / "whole")
+    assert whole.run()
+    killed = Training(small("ppo"), tmp_path / "killed")
+    killed._write_settings()
+    half = killed.checkpoints / ".writing_999999999"
+    half.mkdir(parents=True)
+    resumed = Training(None, tmp_path / "killed", resume=True)
+    assert resumed.run()
+    assert not half.exists()
+    for name, value in parameters(whole).items():
+        assert torch.equal(value, parameters(resumed)[name]), name
+
+
 def test_validation_repeats_the_same_episodes_bit_for_bit():
     _, judge = make_envs(small("ppo"))
     rng = np.random.default_rng(0)
@@ -116,7 +130,7 @@ def test_wrong_settings_are_named(tmp_path):
         Training(small("ppo", **{"environment.observation": "mesured"}), tmp_path / "a").run()
     with pytest.raises(InputError, match="ppo does not take these settings.*n_stepps"):
         Training(small("ppo", **{"algorithm.n_stepps": 3}), tmp_path / "b").run()
-    with pytest.raises(InputError, match="holds no checkpoint"):
+    with pytest.raises(InputError, match="holds no run"):
         Training(None, tmp_path / "c", resume=True)
 
 
