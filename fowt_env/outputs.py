@@ -1,5 +1,6 @@
 """Writing results: whole files or none, so that an interrupted run never leaves half a file."""
 
+import errno
 import os
 import re
 import tempfile
@@ -12,6 +13,7 @@ from fowt_env.errors import InputError
 if TYPE_CHECKING:
     from fowt_env.linear_model import LinearModel
 
+NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
 TABLE_SUFFIXES = (".csv", ".parquet")
 _LEFTOVER = re.compile(r"\..*-(\d+)-[a-z0-9_]{8}(?:\.[^.]*)?")  # file of `replacing`, its process
 SERIES_SUFFIXES = (*TABLE_SUFFIXES, ".outb")  # of a time series, which OpenFAST's format can hold too
@@ -21,7 +23,7 @@ SERIES_SUFFIXES = (*TABLE_SUFFIXES, ".outb")  # of a time series, which OpenFAST
 def replacing(path):
     """Path of a temporary file beside `path` that takes its place when the block ends well.
 
-    Raises: OSError naming the path where there cannot be one.
+    Raises: OSError naming the path where there cannot be one, or the disk has no room for it.
     """
     path = Path(path)
     try:
@@ -35,9 +37,16 @@ def replacing(path):
         yield Path(name)
         os.chmod(name, 0o666 & ~_umask())
         os.replace(name, path)
-    except BaseException:
+    except BaseException as error:
         Path(name).unlink(missing_ok=True)
+        if isinstance(error, OSError) and error.errno in NO_ROOM:  # it names nothing, or the temporary file
+            raise no_room(error, path) from error
         raise
+
+
+def no_room(error, path):
+    """OSError that names the path which there was no room to write."""
+    return OSError(error.errno, f"cannot be written: {os.strerror(error.errno)}", str(path))
 
 
 def is_leftover(path):

@@ -85,7 +85,7 @@ def export_run(folder, path):
     from fowt_env.envs.decisions import DecisionSettings
     from training.train import Training, environment_settings, make_algorithm
 
-    run = Training(None, folder, resume=True)
+    run = Training(None, folder, resume=True, trusted=True)
     settings, checkpoint = run.settings, run.newest()
     if checkpoint is None:
         raise InputError(f"{folder}: holds no checkpoint of a run yet")

@@ -219,8 +219,8 @@ def _read_runs(folder, table, chosen, rate, say):
             missing += 1
             continue
         skip = _skipped(row, frame)
-        if row["status"] == "ok":
-            kept = frame[frame[TIME] >= frame[TIME].iloc[0] + skip - 1e-9]
+        kept = frame[frame[TIME] >= frame[TIME].iloc[0] + skip - 1e-9]
+        if row["status"] == "ok" and len(kept):
             for channel in (name for name in SAMPLED if name in frame.columns):
                 cell = samples.setdefault(channel, {}).setdefault((row["controller"], row["case"]), [])
                 cell.append(kept[channel].to_numpy())

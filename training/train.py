@@ -14,6 +14,7 @@ on the same machine with the same number of torch threads. SAC and TQC are saved
 update, with the replay buffer. What is not repeated: wall times, and with them the rates that are shown.
 """
 
+import errno
 import json
 import os
 import pickle
@@ -37,6 +38,7 @@ from fowt_env.errors import InputError, unknown
 from fowt_env.outputs import process_lives, remove_leftovers, replacing
 from training.seeds import TRAINING, seeds_for
 from training.train_settings import check_settings, read_settings
+from training.trust import is_own, seal
 
 AGENTS = Path(__file__).parent / "agents"
 ALGORITHMS = ("ppo", "sac", "tqc")
@@ -227,10 +229,12 @@ def judged(figures, reference):
 class Training:
     """One run in one folder. resume: go on from its newest checkpoint, or start anew where it has none yet.
 
-    Raises: InputError where the folder holds another run, or none to resume.
+    Loading a checkpoint executes code from it: one that no run of this user wrote (training.trust) is refused
+    unless trusted.
+    Raises: InputError where the folder holds another run, none to resume, or a stranger's.
     """
 
-    def __init__(self, settings, folder, resume=False):
+    def __init__(self, settings, folder, resume=False, trusted=False):
         self.folder = Path(folder)
         self.checkpoints = self.folder / "checkpoints"
         path = self.folder / "settings.yml"
@@ -238,6 +242,12 @@ class Training:
         if resume:
             if not path.exists():
                 raise InputError(f"--resume: {self.folder} holds no run")
+            newest = self.newest()
+            if newest is not None and not trusted and not is_own(newest):
+                raise InputError(
+                    f"--resume: loading {newest} executes code from it, and no run of yours wrote it so;"
+                    " if you trust whoever did, add --trust-zip"
+                )
             stored = read_settings(path)
             if settings is not None:
                 stored["steps"] = settings["steps"]
@@ -340,20 +350,36 @@ class Training:
             path.write_text(json.dumps(versions(), indent=1), encoding="utf-8")
 
     def save(self):
-        """Write a checkpoint of the present instant, whole or not at all; the one before it goes."""
-        import torch
+        """Write a checkpoint of the present instant, whole or not at all; the one before it goes.
 
-        model, env = self.model, self.env
-        target = self.checkpoints / f"step_{model.num_timesteps}"
+        Raises: OSError naming it where there is no room; the one before it stays.
+        """
+        target = self.checkpoints / f"step_{self.model.num_timesteps}"
         if target.exists():
             return
         temporary = self.checkpoints / f".writing_{os.getpid()}"
         shutil.rmtree(temporary, ignore_errors=True)
-        temporary.mkdir(parents=True)
-        model.save(temporary / "model.zip")
-        env.save(str(temporary / "normalisation.pkl"))
+        try:
+            temporary.mkdir(parents=True)
+            self._fill(temporary)
+        except (OSError, RuntimeError) as error:  # RuntimeError: what torch makes of a full disk
+            shutil.rmtree(temporary, ignore_errors=True)
+            number = getattr(error, "errno", None) or errno.EIO
+            raise OSError(number, f"the checkpoint cannot be written: {error}", str(target)) from error
+        os.replace(temporary, target)
+        for old in self.checkpoints.glob("step_*"):
+            if old != target:
+                shutil.rmtree(old, ignore_errors=True)
+
+    def _fill(self, folder):
+        """Write the files of a checkpoint of the present instant."""
+        import torch
+
+        model, env = self.model, self.env
+        model.save(folder / "model.zip")
+        env.save(str(folder / "normalisation.pkl"))
         if hasattr(model, "replay_buffer"):
-            model.save_replay_buffer(temporary / "replay_buffer.pkl")
+            model.save_replay_buffer(folder / "replay_buffer.pkl")
         monitor = env.venv
         state = {
             "environments": decision_env(env).get_state(),
@@ -374,12 +400,9 @@ class Training:
             "seconds": self.keeper.seconds(),
             "episodes": list(model.ep_info_buffer),
         }
-        with (temporary / "state.pkl").open("wb") as file:
+        with (folder / "state.pkl").open("wb") as file:
             pickle.dump(state, file)
-        os.replace(temporary, target)
-        for old in self.checkpoints.glob("step_*"):
-            if old != target:
-                shutil.rmtree(old, ignore_errors=True)
+        seal(folder)
 
     def _load(self, kind, env):
         """(model, state) of the newest checkpoint, everything put back in its place."""
