@@ -1,9 +1,9 @@
 """Numba's cache of compiled functions, made fit for several processes, broken files and full disks.
 
-Numba reads a function's index, adds an entry and writes it back without a lock, and numbers the files of machine
-code by what it read: of two processes that compile at once one loses its entry, or finds the other's code under
-it. A broken file, or no room for a new one, ends the program. Here entries are added under a lock, a broken
-file is as good as none, and what cannot be kept is compiled again the next time.
+Numba reads a function's index, adds an entry and writes it back without a lock, and numbers the files of
+machine code by what it read: of two processes that compile at once one loses its entry, or finds the other's
+code under it. A broken file, or no room for a new one, ends the program. Here entries are added under a lock,
+a broken file is as good as none, and what cannot be kept is compiled again the next time.
 """
 
 import fcntl
