@@ -114,7 +114,7 @@ def check_readable(folder, reference):
         elif path.suffix == ".md":
             assert path.read_text(encoding="utf-8") == reference[path.name], path
         else:
-            assert path.suffix in (".pkl", ".zip"), f"a file that was not expected: {path}"
+            assert path.suffix in (".pkl", ".zip", ".txt"), f"a file that was not expected: {path}"
 
 
 def check_rows(table, whole):
