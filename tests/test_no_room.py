@@ -127,14 +127,6 @@ def test_train_without_room_keeps_the_checkpoint_before_and_goes_on_later(tmp_pa
     assert result.exit_code == 0, result.output
 
 
-def test_a_benchmark_without_room_names_its_table_and_keeps_the_old_one(tmp_path):
-    path = tmp_path / "evaluation.csv"
-    path.write_text("old")
-    with files_of_at_most(100):
-        refused("benchmark", "evaluation", "--count", "1", "--out", path, named=path)
-    assert contents(tmp_path) == {path: b"old"}
-
-
 def test_validate_without_room_keeps_the_old_table(tmp_path):
     path = tmp_path / "validation.csv"
     path.write_text("old")
@@ -182,7 +174,7 @@ def small_disk(tmp_path):
 
 
 def test_a_full_disk_names_the_file_and_loses_nothing(small_disk):
-    frame = pd.DataFrame({"Time_[s]": np.arange(5000) * 0.1, "RotSpeed_[rpm]": np.random.rand(5000)})
+    frame = pd.DataFrame({"Time_[s]": np.arange(20_000) * 0.1, "RotSpeed_[rpm]": np.random.rand(20_000)})
     old = write_table(frame[:100], small_disk / "run.csv")
     before = contents(small_disk)
     for name in ("run.csv", "other.csv", "run.parquet", "run.outb"):
@@ -190,5 +182,8 @@ def test_a_full_disk_names_the_file_and_loses_nothing(small_disk):
             write_table(frame, small_disk / name)
     refused("simulate", *SHORT, "--out", old, named=old)
     assert contents(small_disk) == before
+    (small_disk / "rest").write_bytes(bytes(os.statvfs(small_disk).f_bavail * 4096))
+    refused("benchmark", "evaluation", "--count", "1", "--out", small_disk / "a.csv", named="a.csv")
+    refused("trim", "--winds", "18", "--out", old, named=old)
+    assert contents(small_disk) == before | {small_disk / "rest": (small_disk / "rest").read_bytes()}
     assert not [path for path in small_disk.iterdir() if is_leftover(path)]
-    assert os.statvfs(small_disk).f_bavail > 0

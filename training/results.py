@@ -330,7 +330,10 @@ def open_results(folder, settings, columns):
     results = ResultsFolder(folder, settings, columns)
     if results.folder.exists() and not results.folder.is_dir():
         raise InputError(f"results folder {str(folder)!r}: is a file")
-    results.folder.mkdir(parents=True, exist_ok=True)
+    try:
+        results.folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"results folder {str(folder)!r}: cannot be written: {error.strerror}") from None
     handle = os.open(results.folder, os.O_RDONLY)
     try:
         try:
