@@ -171,7 +171,7 @@ def test_the_study_itself_finds_a_crash_a_hang_and_a_wrong_error(tmp_path):
         "        if self.calls == 3: time.sleep(60)\n"
         "        if self.calls == 4: bytearray(10**11)\n"
         "        if self.calls == 5: os.kill(os.getpid(), 11)\n"
-        "mutation.Samples, mutation.SECONDS = Samples, 1\n"
+        "mutation.Samples, mutation.SECONDS, mutation.WAITS = Samples, 1, 1\n"
         "mutation.main()\n"
     )
     words = ["--folder", tmp_path / "worker", "--count", "9", "--work"]

@@ -153,7 +153,7 @@ def read_results(folder):
     table["reason"] = texts["reason"] if "reason" in texts.columns else ""
     try:
         table["seed"] = pd.to_numeric(texts["seed"]).astype(int)
-    except (ValueError, TypeError) as error:
+    except (ValueError, TypeError, OverflowError) as error:
         raise InputError(f"table {str(path)!r}: column seed must hold whole numbers ({error})") from None
     figures = {}
     for name in texts.columns.drop([n for n in (*KEYS, "reason") if n in texts.columns]):
