@@ -37,7 +37,7 @@ def cached_box(spec, platform, seed, options):
     path = cache_root() / "wind_boxes" / f"{name}.npz"
     if path.exists():
         try:
-            with np.load(path, allow_pickle=False) as file:
+            with path.open("rb") as content, np.load(content, allow_pickle=False) as file:
                 values = {key: file[key] for key in ARRAYS}
                 return WindBox(**values, **{key: file[key].item() for key in NUMBERS})
         except Exception:  # whatever a broken file makes numpy raise: it is made again
