@@ -5,12 +5,13 @@ BIN := $(VENV)/bin
 PROJECT := pyproject.toml setup.py constraints.txt
 INSTALL = $(BIN)/python -m pip install --quiet --constraint constraints.txt --editable
 
-.PHONY: help demo test test-quick lint format clean
+.PHONY: help demo test test-quick coverage lint format clean
 .DELETE_ON_ERROR:
 
 help:
 	@echo "make demo        score the PI controller of Eq. (8) above rated: table and plots under results/demo"
 	@echo "make test        all tests (make test-quick: without the slow ones)"
+	@echo "make coverage    what the quick tests reach of what users touch; pages in htmlcov"
 	@echo "make lint        ruff and mypy;  make format: let ruff mend what it can"
 	@echo "make clean       remove results and build leftovers (the environment stays; rm -r $(VENV) removes it)"
 
@@ -35,6 +36,9 @@ test: $(VENV)/.installed-dev
 test-quick: $(VENV)/.installed-dev
 	$(BIN)/python -m pytest --numprocesses auto --dist loadfile
 
+coverage: $(VENV)/.installed-dev
+	$(BIN)/python -m pytest --numprocesses auto --dist loadfile --cov --cov-report=term --cov-report=html
+
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .
 	$(BIN)/mypy
@@ -43,5 +47,5 @@ format: $(VENV)/.installed-dev
 	$(BIN)/ruff check --fix .
 
 clean:
-	rm -rf results build dist *.egg-info .pytest_cache .ruff_cache .mypy_cache .hypothesis
+	rm -rf results build dist *.egg-info .pytest_cache .ruff_cache .mypy_cache .hypothesis htmlcov .coverage .coverage.*
 	find . -name __pycache__ -not -path "./$(VENV)/*" -prune -exec rm -rf {} +

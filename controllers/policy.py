@@ -1,12 +1,10 @@
 """Exported policy network as a controller: plain arrays, evaluated with numpy alone.
 
-A policy file is a .npz of arrays and one JSON text (FORMAT below), read without pickle, so that loading one
-runs no code of its author. training/export.py writes it. `policy:NAME` is a file of training/agents,
-`policy:PATH` any other; a stable-baselines3 zip is refused here, since loading one executes code from it.
+A policy file (policy_file.py) is read without pickle, so that loading one runs no code of its author.
+`policy:NAME` is a file of training/agents, `policy:PATH` any other; a stable-baselines3 zip is refused here,
+since loading one executes code from it.
 """
 
-import json
-import zipfile
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +12,7 @@ import numpy as np
 
 from controllers.base import CompiledController, call_law, check_control_dt
 from controllers.lqr import WindEstimator
+from controllers.policy_file import read_policy
 from fowt_env.envs.actions import MODES, Mode, action_of, build_action_map, command_of, start_tracking
 from fowt_env.envs.decisions import Decisions, DecisionSettings
 from fowt_env.envs.observations import (
@@ -33,14 +32,6 @@ from fowt_env.measurement import N_MEASUREMENTS, Measure, Measurement
 
 PREFIX = "policy:"
 AGENTS = Path(__file__).resolve().parent.parent / "training" / "agents"
-FORMAT = 1
-ACTIVATIONS = {"tanh": np.tanh, "relu": lambda x: np.maximum(x, 0.0)}
-SQUASHES = {"clip": lambda x: np.clip(x, -1.0, 1.0), "tanh": np.tanh}
-KEYS = (
-    "format", "activation", "squash", "layers", "clip_observation", "control_dt", "decisions", "action_mode",
-    "baseline", "observation", "wind_preview", "blade_pitch", "setpoint", "residual_torque", "residual_pitch",
-    "about",
-)  # fmt: skip
 
 
 def shipped_agents():
@@ -63,72 +54,6 @@ def policy_path(name):
     if name not in shipped_agents():
         raise unknown("policy", name, shipped_agents() or ("a path that ends with .npz",))
     return AGENTS / f"{name}.npz"
-
-
-class Network:
-    """A multilayer perceptron on normalised features, float32.
-
-    weights, biases: lists of (out, in) and (out,) arrays; mean, scale: of the features; clip: of the
-    normalised features. Calling it with features (..., size) returns actions (..., 2) in [-1, 1].
-    """
-
-    def __init__(self, weights, biases, activation, squash, mean, scale, clip):
-        self.weights = [np.ascontiguousarray(w, dtype=np.float32) for w in weights]
-        self.biases = [np.ascontiguousarray(b, dtype=np.float32) for b in biases]
-        self.activation, self.squash = ACTIVATIONS[activation], SQUASHES[squash]
-        self.mean = np.asarray(mean, dtype=np.float64)
-        self.scale = np.asarray(scale, dtype=np.float64)
-        self.clip = float(clip)
-
-    def __call__(self, features):
-        normal = np.clip((features - self.mean) / self.scale, -self.clip, self.clip)
-        x = normal.astype(np.float32)
-        for weight, bias in zip(self.weights[:-1], self.biases[:-1], strict=True):
-            x = self.activation(x @ weight.T + bias)
-        return self.squash(x @ self.weights[-1].T + self.biases[-1])
-
-
-def read_policy(path):
-    """(settings dict, Network) of a policy file.
-
-    Raises: InputError naming the file and what is wrong with it.
-    """
-    path = Path(path)
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files}
-        settings = json.loads(str(arrays["settings"]))
-        layers = range(settings["layers"])
-        weights = [arrays[f"weight_{i}"] for i in layers]
-        biases = [arrays[f"bias_{i}"] for i in layers]
-        mean, scale = arrays["mean"], arrays["scale"]
-    except (OSError, KeyError, TypeError, ValueError, zipfile.BadZipFile) as error:
-        raise InputError(f"policy file {str(path)!r}: cannot be read: {error}") from error
-    for key in KEYS:
-        if key not in settings:
-            raise InputError(f"policy file {str(path)!r}: the setting {key!r} is missing")
-    if settings["format"] != FORMAT:
-        raise InputError(f"policy file {str(path)!r}: format {settings['format']!r}: must be {FORMAT}")
-    for key, known in (("activation", ACTIVATIONS), ("squash", SQUASHES), ("action_mode", MODES)):
-        if settings[key] not in known:
-            raise unknown(f"{key} of policy file {str(path)!r}", settings[key], known)
-    _check_shapes(path, weights, biases, mean, scale)
-    network = Network(
-        weights, biases, settings["activation"], settings["squash"], mean, scale, settings["clip_observation"]
-    )
-    return settings, network
-
-
-def _check_shapes(path, weights, biases, mean, scale):
-    """Raise InputError unless the arrays form one network of finite numbers with two outputs."""
-    size = mean.shape
-    good = len(weights) > 0 and len(size) == 1 and scale.shape == size and bool(np.all(scale > 0.0))
-    for weight, bias in zip(weights, biases, strict=True):
-        good = good and weight.ndim == 2 and (weight.shape[1],) == size and weight.shape[:1] == bias.shape
-        size = bias.shape
-    finite = all(bool(np.all(np.isfinite(array))) for array in (*weights, *biases, mean, scale))
-    if not (good and finite and size == (N_ACTIONS,)):
-        raise InputError(f"policy file {str(path)!r}: its arrays do not form a network with two outputs")
 
 
 class PolicyController:

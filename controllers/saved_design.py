@@ -17,7 +17,7 @@ from controllers.lqr_design import LOWEST_DESIGN_WIND, MODEL_SHAPES, DesignModel
 from controllers.pi import PI, PISettings
 from fowt_env.errors import InputError, unknown
 from fowt_env.outputs import replacing
-from fowt_env.textfiles import read_text
+from fowt_env.textfiles import parse_json, read_text
 
 PREFIX = "design:"
 FORMAT, VERSION = "fowt-design", 1
@@ -67,14 +67,10 @@ def load_design(path):
     where = f"design file {str(path)!r}"
     text = read_text(Path(path), "design")
     try:
-        content = json.loads(text, parse_constant=_not_a_number)
-    except (ValueError, RecursionError) as error:
+        content = parse_json(text)
+    except ValueError as error:
         raise InputError(f"{where} is not valid JSON: {error}") from None
     return _factory(content, where, Path(path).stem)
-
-
-def _not_a_number(text):
-    raise ValueError(f"{text} is not a number of JSON")
 
 
 def _factory(content, where, name="design"):

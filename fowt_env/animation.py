@@ -3,6 +3,8 @@
 Needs pygame and pillow (GIF), and imageio with ffmpeg for MP4: pip install "fowt-env[render]" or "[video]".
 """
 
+import errno
+from contextlib import suppress
 from itertools import chain
 from pathlib import Path
 
@@ -129,10 +131,18 @@ def _write_mp4(pictures, path, pause):
     writer = imageio_ffmpeg.write_frames(
         str(path), (width, height), fps=100.0 / pause, quality=7, macro_block_size=2, ffmpeg_log_level="error"
     )
+    sent = written = 0
     try:
         writer.send(None)
-        writer.send(first)
-        for picture in pictures:
-            writer.send(picture)
+        for picture in chain([first], pictures):
+            sent += 1
+            try:
+                writer.send(picture)
+            except OSError:  # ffmpeg has ended
+                break
     finally:
         writer.close()
+    with suppress(RuntimeError):  # no video
+        written, _ = imageio_ffmpeg.count_frames_and_secs(str(path))
+    if written < sent:  # ffmpeg does not say why; a full disk most of all
+        raise OSError(errno.EIO, f"ffmpeg wrote {written} of {sent} pictures", str(path))

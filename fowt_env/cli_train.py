@@ -31,6 +31,10 @@ def train(
     steps: Annotated[int | None, typer.Option(help="Decisions; default 2000000, or as before.")] = None,
     out_folder: Annotated[str | None, typer.Option("--out", help="Folder of the run.")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on from the newest checkpoint.")] = False,
+    trust_zip: Annotated[
+        bool,
+        typer.Option("--trust-zip", help="With --resume: load a checkpoint of others, executing its code."),
+    ] = False,
     change: Annotated[
         list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a setting; repeatable.")
     ] = None,
@@ -42,7 +46,9 @@ def train(
     if resume:
         if change:
             raise InputError("--set: a resumed run keeps its settings; only --steps may grow")
-        run = Training(None if steps is None else {"steps": steps}, folder, resume=True)
+        run = Training(None if steps is None else {"steps": steps}, folder, resume=True, trusted=trust_zip)
+        if trust_zip:
+            note(f"warning: executing code from the checkpoint in {folder}, as asked")
     else:
         settings = resolve(
             algo, task, seed, 2_000_000 if steps is None else steps, parse_pairs(change, "set")

@@ -17,6 +17,8 @@ from pathlib import Path
 import numba
 from numba import types
 
+from fowt_env import kernel_cache
+
 KEEP_CACHES = 4  # folders of older sources kept, so that switching branches does not recompile
 KERNEL_PACKAGES = ("fowt_env", "controllers")
 
@@ -71,6 +73,7 @@ def _use_cache_folder():
 
 
 CACHE_FOLDER = _use_cache_folder()
+kernel_cache.install()
 
 _HOUSE = {"cache": True, "error_model": "numpy", "nogil": True}
 

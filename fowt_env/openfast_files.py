@@ -1,8 +1,11 @@
-"""Files of OpenFAST: binary output (.outb) written, uniform wind (.wnd, .hh) read."""
+"""Files of OpenFAST: binary output (.outb) written and read, uniform wind (.wnd, .hh) read."""
 
+import os
 import re
 import struct
+from collections import Counter
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,8 +13,8 @@ from fowt_env.errors import InputError
 from fowt_env.textfiles import read_text
 
 TIME = "Time_[s]"
-# OpenFAST's format 3: double precision, time by its start and step; 2 and 4 would round to 16 bits
-UNCOMPRESSED = 3
+# OpenFAST's FileIDs. 3 is double precision, time by its start and step; the others round to 16 bits
+WITH_TIME, WITHOUT_TIME, UNCOMPRESSED, WITH_LENGTH = 1, 2, 3, 4
 NAME_LENGTH = 10  # characters of a channel name and of a unit, its brackets included
 EVEN = 1e-6  # largest deviation of a time from the even grid, as a share of its step
 WIND_COLUMNS = 8
@@ -51,6 +54,127 @@ def _name_and_unit(column):
             f" {NAME_LENGTH - 2} characters"
         )
     return found[1], f"({found[2]})"
+
+
+def read_outb(path):
+    """DataFrame of a binary output file of OpenFAST, its columns named as those of simulate: RotSpeed_[rpm].
+
+    All four FileIDs are read: 1 (packed times), 2 and 4 (packed values), 3 (double precision, what write_outb
+    writes). float64 values as the file holds them, NaN included; the first column is the time (s).
+    Memory: at most some ten times the size of the file, since every count in it is checked against that size.
+    Raises: InputError that names the file, the place in it and what is wrong; also for a channel named twice.
+    """
+    import pandas as pd
+
+    path = Path(path)
+    try:
+        if not path.is_file():
+            raise InputError(f".outb file {str(path)!r}: no such file")
+        with path.open("rb") as file:
+            names, values = _outb(_Reader(file, str(path), os.fstat(file.fileno()).st_size))
+    except (OSError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f".outb file {str(path)[:200]!r}: cannot be read: {error}") from None
+    return pd.DataFrame(values, columns=names)
+
+
+class _Reader(NamedTuple):
+    """A file that is read from its start on, each part only where the file is long enough for it."""
+
+    file: object
+    path: str
+    size: int  # bytes
+
+    def refuse(self, what):
+        """InputError at the present place."""
+        return InputError(f".outb file {self.path!r}: {what}, before byte {self.file.tell()} of {self.size}")
+
+    def take(self, count, kind, what):
+        """(count,) little-endian numbers of a numpy type; what: for the message."""
+        kind = np.dtype(kind).newbyteorder("<")
+        left = self.size - self.file.tell()
+        if count < 0 or count * kind.itemsize > left:
+            raise self.refuse(f"{what}: {count} x {kind.itemsize} bytes are needed, {left} are left")
+        content = self.file.read(count * kind.itemsize)
+        if len(content) < count * kind.itemsize:
+            raise self.refuse(f"{what}: the file ended while it was read")
+        return np.frombuffer(content, dtype=kind)
+
+    def whole(self, kind, what, low):
+        """One whole number of at least low."""
+        value = int(self.take(1, kind, what)[0])
+        if value < low:
+            raise self.refuse(f"{what} is {value}: must be at least {low}")
+        return value
+
+    def scales(self, count, kind, what):
+        """(slopes, offsets) (count,), finite and no slope zero."""
+        slope, offset = (self.take(count, kind, f"{word} of {what}") for word in ("slopes", "offsets"))
+        if not (np.isfinite(slope).all() and np.isfinite(offset).all() and slope.all()):
+            raise self.refuse(f"slopes and offsets of {what} must be finite, and no slope zero")
+        return slope.astype(np.float64), offset.astype(np.float64)
+
+    def words(self, count, length, what):
+        """List of count texts of length characters, stripped."""
+        content = self.take(count * length, "u1", what)
+        if not ((content >= 32) & (content < 127)).all():
+            raise self.refuse(f"{what} must be printable ASCII")
+        text = content.tobytes().decode("ascii")
+        return [text[i : i + length].strip() for i in range(0, len(text), length)]
+
+    def last(self, size, what):
+        """Raises: InputError unless `size` bytes are left."""
+        left = self.size - self.file.tell()
+        if size != left:
+            raise self.refuse(f"{what} take {size} bytes, {left} are left")
+
+
+def _outb(reader):
+    """(column names, values (n, columns)) of an open .outb file."""
+    kind = int(reader.take(1, "i2", "FileID")[0])
+    if kind not in (WITH_TIME, WITHOUT_TIME, UNCOMPRESSED, WITH_LENGTH):
+        raise reader.refuse(f"FileID is {kind}: must be 1, 2, 3 or 4")
+    length = reader.whole("i2", "length of names", 1) if kind == WITH_LENGTH else NAME_LENGTH
+    channels = reader.whole("i4", "number of channels", 1)
+    rows = reader.whole("i4", "number of time steps", 1)
+    if kind == WITH_TIME:
+        time_slope, time_offset = reader.scales(1, "f8", "the time")
+    else:
+        start, step = reader.take(2, "f8", "start and step of the time")
+        if not (np.isfinite(start) and np.isfinite(step) and step > 0.0):
+            raise reader.refuse(f"time starts at {start:g} s with step {step:g} s: must be finite, step > 0")
+    packed = kind != UNCOMPRESSED
+    if packed:
+        slope, offset = reader.scales(channels, "f4", "the channels")
+    reader.take(reader.whole("i4", "length of the description", 0), "u1", "description")
+    names = reader.words(channels + 1, length, "channel names")
+    units = reader.words(channels + 1, length, "units")
+    columns = [f"{name}_[{_bare(unit)}]" for name, unit in zip(names, units, strict=True)]
+    if len(set(columns)) < len(columns):
+        twice = Counter(columns).most_common(1)[0][0]
+        raise reader.refuse(f"channel {twice!r} is there twice")
+    size = (4 * rows if kind == WITH_TIME else 0) + rows * channels * (2 if packed else 8)
+    reader.last(size, f"{rows} rows of {channels} channels")
+    values = np.empty((rows, channels + 1))
+    with np.errstate(over="ignore"):
+        if kind == WITH_TIME:
+            values[:, 0] = (reader.take(rows, "i4", "times") - time_offset) / time_slope
+        else:
+            values[:, 0] = start + step * np.arange(rows)
+    if not (np.isfinite(values[:, 0]).all() and (np.diff(values[:, 0]) > 0.0).all()):
+        raise reader.refuse("the times must be finite and increase")
+    content = reader.take(rows * channels, "i2" if packed else "f8", "values").reshape(rows, channels)
+    values[:, 1:] = content
+    if packed:
+        values[:, 1:] -= offset
+        values[:, 1:] /= slope
+    return columns, values
+
+
+def _bare(unit):
+    """A unit without its brackets."""
+    return unit[1:-1] if unit[:1] + unit[-1:] in ("()", "[]") else unit
 
 
 def read_uniform_wind(path):

@@ -1,6 +1,8 @@
 """Writing results: whole files or none, so that an interrupted run never leaves half a file."""
 
+import errno
 import os
+import re
 import tempfile
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,7 +13,9 @@ from fowt_env.errors import InputError
 if TYPE_CHECKING:
     from fowt_env.linear_model import LinearModel
 
+NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
 TABLE_SUFFIXES = (".csv", ".parquet")
+_LEFTOVER = re.compile(r"\..*-(\d+)-[a-z0-9_]{8}(?:\.[^.]*)?")  # file of `replacing`, its process
 SERIES_SUFFIXES = (*TABLE_SUFFIXES, ".outb")  # of a time series, which OpenFAST's format can hold too
 
 
@@ -19,12 +23,13 @@ SERIES_SUFFIXES = (*TABLE_SUFFIXES, ".outb")  # of a time series, which OpenFAST
 def replacing(path):
     """Path of a temporary file beside `path` that takes its place when the block ends well.
 
-    Raises: OSError naming the path where there cannot be one.
+    Raises: OSError naming the path where there cannot be one, or the disk has no room for it.
     """
     path = Path(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}-", suffix=path.suffix)
+        prefix = f".{path.stem}-{os.getpid()}-"
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=prefix, suffix=path.suffix)
     except OSError as error:  # which names the temporary file
         raise OSError(error.errno, f"cannot be written: {error.strerror}", str(path)) from error
     os.close(handle)
@@ -32,9 +37,40 @@ def replacing(path):
         yield Path(name)
         os.chmod(name, 0o666 & ~_umask())
         os.replace(name, path)
-    except BaseException:
+    except BaseException as error:
         Path(name).unlink(missing_ok=True)
+        if isinstance(error, OSError) and error.errno in NO_ROOM:  # it names nothing, or the temporary file
+            raise no_room(error, path) from error
         raise
+
+
+def no_room(error, path):
+    """OSError that names the path which there was no room to write."""
+    return OSError(error.errno, f"cannot be written: {os.strerror(error.errno)}", str(path))
+
+
+def is_leftover(path):
+    """Whether a file is a temporary one of `replacing`."""
+    return _LEFTOVER.fullmatch(Path(path).name) is not None
+
+
+def remove_leftovers(folder):
+    """Remove the temporary files of `replacing` in a folder whose process is gone: it was killed."""
+    for path in Path(folder).glob(".*"):
+        found = _LEFTOVER.fullmatch(path.name)
+        if found and not process_lives(int(found[1])):
+            path.unlink(missing_ok=True)
+
+
+def process_lives(number):
+    """Whether a process of this machine has the number."""
+    try:
+        os.kill(number, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:
+        return True
+    return True
 
 
 def _umask():
@@ -73,14 +109,17 @@ def write_table(frame, path):
 def read_table(path):
     """DataFrame of a CSV or Parquet file that write_table wrote.
 
-    Raises: InputError if there is no such file or its ending is another.
+    Raises: InputError if there is no such file, its ending is another, or it is broken.
     """
     import pandas as pd
 
     path = table_path(path)
     if not path.is_file():
         raise InputError(f"file {str(path)!r}: not found")
-    return pd.read_csv(path) if path.suffix.lower() == ".csv" else pd.read_parquet(path.absolute())
+    try:
+        return pd.read_csv(path) if path.suffix.lower() == ".csv" else pd.read_parquet(path.absolute())
+    except Exception as error:  # whatever a broken file makes pandas and pyarrow raise
+        raise InputError(f"file {str(path)!r} cannot be read: {error!s:.300}") from None
 
 
 def write_mat(model: "LinearModel", path: str | Path) -> Path:

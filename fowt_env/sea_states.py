@@ -14,7 +14,6 @@ from fowt_env.records import (
     FloatArray,
     NonNegative,
     NumberOrArray,
-    Positive,
     Record,
     bounded,
     is_number,
@@ -25,6 +24,7 @@ from fowt_env.records import (
 from fowt_env.textfiles import DATA, locate, raise_problems, read_toml
 
 STANDARD_GRAVITY = 9.80665  # m/s2
+LOWEST_WAVE = 1e-6  # m; a spectrum of less, but not of nothing, would underflow
 
 SEA_KEYS = {  # kind -> (required keys, optional keys); the common keys may be given with every kind
     "still": ((), ()),
@@ -98,6 +98,8 @@ class SeaState(Record):
                 for name, value in (("heading", self.heading), ("phase", self.phase))
                 if isinstance(value, np.ndarray)
             ]
+            if self.Hs is not None and 0.0 < self.Hs < LOWEST_WAVE:
+                problems.append(f"Hs = {self.Hs:g}: must be 0, or at least {LOWEST_WAVE:g} m")
         else:
             problems = self._component_problems()
         if problems:
@@ -126,7 +128,7 @@ class JointTable(Record):
     name: str = ""
     wind: tuple[NonNegative, ...]  # m/s, increasing
     Hs: tuple[NonNegative, ...]
-    Tp: tuple[Positive, ...]
+    Tp: tuple[Period, ...]
     source: str = ""
     confidence: str = ""
 

@@ -1,9 +1,11 @@
-"""Checked reading of TOML and CSV files; whatever is wrong becomes an InputError that names the file."""
+"""Checked reading of TOML, JSON and CSV; whatever is wrong becomes an InputError that names the file."""
 
 import csv
 import difflib
 import io
+import json
 import math
+import re
 import tomllib
 from pathlib import Path
 
@@ -15,6 +17,9 @@ from fowt_env.records import interval, short
 DATA = Path(__file__).parent / "data"
 MAX_BYTES = 5_000_000  # a description is a few kB; anything far larger is a wrong file
 MAX_LISTED = 20  # problems listed in one message
+MAX_DEPTH = 32  # parts of a dotted key; tomllib's time goes with their square
+_KEY_PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""
+_DEEP_KEY = re.compile(rf"(?m)(?:^|[\[{{,])[ \t]*{_KEY_PART}(?:[ \t]*\.[ \t]*{_KEY_PART}){{{MAX_DEPTH}}}")
 
 
 def read_text(path, kind):
@@ -40,10 +45,29 @@ def read_text(path, kind):
 def read_toml(path, kind):
     """Contents of a TOML file as nested dicts."""
     text = read_text(path, kind)
+    deep = _DEEP_KEY.search(text)
+    if deep:
+        line = text.count("\n", 0, deep.start()) + 1
+        raise InputError(f"{kind} file {str(path)!r}: line {line}: a key of more than {MAX_DEPTH} parts")
     try:
         return tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise InputError(f"{kind} file {str(path)!r} is not valid TOML: {error}") from None
+
+
+def parse_json(text):
+    """Value of a JSON text, every number of it finite. Raises: ValueError."""
+    try:
+        return json.loads(text, parse_constant=_finite, parse_float=_finite)
+    except RecursionError:
+        raise ValueError("it is nested too deeply") from None
+
+
+def _finite(text):
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(f"{text} is not a number of JSON")
+    return value
 
 
 def read_table(path, kind, columns):

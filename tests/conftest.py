@@ -12,6 +12,12 @@ os.environ.setdefault("SDL_VIDEODRIVER", "dummy")  # windows of render mode "hum
 os.environ.pop("COLUMNS", None)
 
 
+@pytest.fixture(scope="session", autouse=True)
+def _own_configuration(tmp_path_factory):
+    """The key of checkpoints in a folder of the tests, not in the home of whoever runs them."""
+    os.environ["FOWT_CONFIG_DIR"] = str(tmp_path_factory.mktemp("config"))
+
+
 @pytest.fixture(scope="session")
 def platform():
     return read_platform("oc3_hywind")

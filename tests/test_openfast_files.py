@@ -1,3 +1,5 @@
+import struct
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -5,9 +7,10 @@ import pytest
 import fowt_env
 from fowt_env.cli_arguments import parse_wind
 from fowt_env.errors import InputError
-from fowt_env.openfast_files import read_uniform_wind, write_outb
+from fowt_env.openfast_files import read_outb, read_uniform_wind, write_outb
 from fowt_env.outputs import read_table, write_table
 from fowt_env.weather.wind import build_wind, wind_at, wind_now
+from training.metrics import damage_equivalent_load
 
 ROTOR = {
     "reference_height": 90.0,
@@ -110,6 +113,15 @@ def run():
     return fowt_env.simulate(fowt_env.build_scene(wind=18.0, rotor="table"), duration=5.0)
 
 
+@pytest.fixture(scope="module")
+def loaded_run():
+    """In turbulence and waves, with cycles to count."""
+    wind = {"kind": "ntm", "speed": 18.0, "class": "B"}
+    sea = {"kind": "jonswap", "Hs": 4.0, "Tp": 10.0}
+    scene = fowt_env.build_scene(wind=wind, sea=sea, seed=1, fidelity="standard")
+    return fowt_env.simulate(scene, controller="pi", duration=200.0)
+
+
 def test_openfast_s_own_reader_finds_every_channel_bit_for_bit(run, tmp_path):
     reader = pytest.importorskip("openfast_io.FAST_output_reader", reason="openfast_io is not installed")
     path = write_table(run, tmp_path / "run.outb")
@@ -136,6 +148,128 @@ def test_frames_that_the_format_has_no_room_for_are_refused_and_leave_no_file(ru
     with pytest.raises(InputError, match=message):
         write_table(change(run), tmp_path / "run.outb")
     assert list(tmp_path.iterdir()) == []
+
+
+def packed(frame, file_id, length=10):
+    """Content of a .outb file whose values are packed into 16 bits."""
+    values = frame.to_numpy()
+    time, data = values[:, 0], values[:, 1:]
+    low, high = data.min(axis=0), data.max(axis=0)
+    slope = np.where(high > low, 65535.0 / np.maximum(high - low, 1e-30), 1.0).astype("<f4")
+    offset = (-32768.0 - low * slope).astype("<f4")
+    head = struct.pack("<h", file_id) + (struct.pack("<h", length) if file_id == 4 else b"")
+    head += struct.pack("<ii", data.shape[1], len(time))
+    if file_id == 1:
+        times = np.round((time - time[0]) * 1000.0).astype("<i4")
+        head += struct.pack("<dd", 1000.0, -1000.0 * time[0])
+    else:
+        head += struct.pack("<dd", time[0], time[1] - time[0])
+    head += slope.tobytes() + offset.tobytes() + struct.pack("<i", 5) + b"a run"
+    names, units = zip(*(column[:-1].split("_[") for column in frame.columns), strict=True)
+    words = "".join(word.ljust(length) for word in (*names, *(f"({unit})" for unit in units)))
+    head += words.encode() + (times.tobytes() if file_id == 1 else b"")
+    return head + np.clip(np.round(data * slope + offset), -32768, 32767).astype("<i2").tobytes()
+
+
+def test_reading_gives_back_the_run_that_was_written(run, tmp_path):
+    frame = read_outb(write_table(run, tmp_path / "run.outb"))
+    assert list(frame.columns) == list(run.columns)
+    np.testing.assert_array_equal(frame.iloc[:, 1:], run.iloc[:, 1:])
+    np.testing.assert_allclose(frame["Time_[s]"], run["Time_[s]"], rtol=0.0, atol=1e-12)
+
+
+def test_what_is_not_a_number_is_written_and_read_as_such(run, tmp_path):
+    broken = run.copy()
+    broken.loc[3, "RotSpeed_[rpm]"] = np.nan
+    frame = read_outb(write_table(broken, tmp_path / "run.outb"))
+    np.testing.assert_array_equal(frame["RotSpeed_[rpm]"], broken["RotSpeed_[rpm]"])
+
+
+@pytest.mark.parametrize(("file_id", "length"), [(1, 10), (2, 10), (4, 10), (4, 16)])
+def test_packed_files_are_read_as_openfast_s_own_reader_reads_them(loaded_run, tmp_path, file_id, length):
+    run = loaded_run
+    reader = pytest.importorskip("openfast_io.FAST_output_reader", reason="openfast_io is not installed")
+    path = tmp_path / "run.outb"
+    path.write_bytes(packed(run, file_id, length))
+    frame = read_outb(path)
+    data, info, _ = reader.load_binary_output(str(path))
+    columns = [f"{a}_[{b}]" for a, b in zip(info["attribute_names"], info["attribute_units"], strict=True)]
+    assert list(frame.columns) == columns == list(run.columns)
+    np.testing.assert_array_equal(frame.to_numpy(), data)
+    span = run.max() - run.min()
+    slope = (65535.0 / span).where(span > 0.0, 1.0)
+    # half a step of 16 bits, and the single precision of the offset that values far from zero need
+    rounding = (0.51 + 2.0**-23 * (65536.0 + slope * run.abs().max())) / slope
+    assert ((frame - run).abs().max() <= rounding).all()
+
+
+HEAD = 2 + 4 + 4 + 16 + 4 + 8  # bytes of a file of write_outb before its names; 8: "fowt_env"
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda content: b"", "FileID: 1 x 2 bytes are needed, 0 are left, before byte 0 of 0"),
+        (lambda content: b"\x07" + content[1:], "FileID is 7: must be 1, 2, 3 or 4"),
+        (lambda content: content[:-1], "rows of .* channels take .* bytes, .* are left"),
+        (lambda content: content + b"\0", "rows of .* channels take .* bytes, .* are left"),
+        (lambda content: content[:2] + b"\xff\xff\xff\x7f" + content[6:], "channel names: .* are needed"),
+        (lambda content: content[:2] + b"\xff\xff\xff\xff" + content[6:], "number of channels is -1"),
+        (lambda content: content[:6] + b"\xff\xff\xff\x7f" + content[10:], "2147483647 rows"),
+        (lambda content: content[:6] + bytes(4) + content[10:], "number of time steps is 0"),
+        (lambda content: content[:18] + struct.pack("<d", np.nan) + content[26:], "step nan s"),
+        (lambda content: content[:10] + struct.pack("<d", 1e300) + content[18:], "finite and increase"),
+        (lambda content: content[:26] + b"\xff\xff\xff\x7f" + content[30:], "description: .* are needed"),
+        (lambda content: content[:HEAD] + b"\x80" + content[HEAD + 1 :], "names must be printable ASCII"),
+        (
+            lambda content: content[: HEAD + 10] + content[HEAD + 20 : HEAD + 30] + content[HEAD + 20 :],
+            "is there twice",
+        ),
+    ],
+)
+def test_broken_output_files_are_refused_with_the_place(run, tmp_path, change, message):
+    path = write_table(run, tmp_path / "run.outb")
+    path.write_bytes(change(path.read_bytes()))
+    with pytest.raises(InputError, match=rf"run\.outb.*{message}"):
+        read_outb(path)
+
+
+@pytest.mark.parametrize("change", [(10, 1000.0), (26, 1.0)])
+def test_a_packed_file_without_scale_is_refused(run, tmp_path, change):
+    content = packed(run, 1)
+    place, value = change
+    form = "<d" if place == 10 else "<f"
+    broken = content[:place] + struct.pack(form, 0.0) + content[place + struct.calcsize(form) :]
+    path = tmp_path / "run.outb"
+    path.write_bytes(broken)
+    with pytest.raises(InputError, match="no slope zero"):
+        read_outb(path)
+
+
+@pytest.mark.parametrize("path", ["none.outb", ".", "a" * 300, "a\0b"])
+def test_an_output_file_that_is_none_is_named(tmp_path, path):
+    with pytest.raises(InputError, match="outb file"):
+        read_outb(tmp_path / path)
+
+
+def test_pcrunch_finds_the_same_statistics_and_loads_in_our_file(loaded_run, tmp_path):
+    run = loaded_run
+    pcrunch = pytest.importorskip("pCrunch", reason="pCrunch is not installed")
+    from pCrunch.openfast_readers import OpenFASTBinary
+
+    channel, exponent = "TwrBsMyt_[kN-m]", 4
+    output = OpenFASTBinary(write_table(run, tmp_path / "run.outb"))
+    assert output.channels == [column.split("_[")[0] for column in run.columns]
+    found = pd.DataFrame(output.summary_stats())
+    for column in run.columns:
+        theirs, ours = found[column.split("_[")[0]], run[column]
+        expected = (ours.min(), ours.max(), ours.std(ddof=0), ours.mean(), ours.median())
+        got = theirs[["min", "max", "std", "mean", "median"]]
+        np.testing.assert_allclose(got, expected, rtol=1e-9, atol=1e-9 * (1.0 + ours.abs().max()))
+    fatigue = pcrunch.FatigueParams(slope=exponent, bins=10_000)
+    theirs = fatigue.compute_del(output["TwrBsMyt"], output.elapsed_time)
+    length = run["Time_[s]"].iloc[-1] - run["Time_[s]"].iloc[0]
+    assert theirs == pytest.approx(damage_equivalent_load(run[channel], length, exponent), rel=0.02)
 
 
 def test_outb_is_for_time_series_alone(tmp_path):

@@ -1,4 +1,6 @@
 import os
+import subprocess
+import sys
 
 import numpy as np
 import pandas as pd
@@ -7,7 +9,7 @@ from scipy.io import loadmat
 
 from fowt_env import build_scene, linearize
 from fowt_env.errors import InputError
-from fowt_env.outputs import read_table, replacing, write_mat, write_table
+from fowt_env.outputs import is_leftover, read_table, remove_leftovers, replacing, write_mat, write_table
 
 FRAME = pd.DataFrame({"Time_[s]": [0.0, 0.1], "PtfmPitch_[deg]": [1.0 / 3.0, -2e-7]})
 
@@ -25,6 +27,19 @@ def test_a_failed_write_keeps_the_old_file_and_leaves_nothing_else(tmp_path):
         temporary.write_text("half")
         raise RuntimeError
     assert path.read_text() == "old" and list(tmp_path.iterdir()) == [path]
+
+
+def test_what_a_killed_process_left_is_removed_and_what_a_living_one_writes_stays(tmp_path):
+    ended = subprocess.Popen([sys.executable, "-c", ""])
+    ended.wait()
+    dead = tmp_path / f".run-{ended.pid}-abcdefgh.csv"
+    others = [tmp_path / name for name in (".run-1-abcdefgh.csv", ".hidden", "run-999999999-abcdefgh.csv")]
+    for path in (dead, *others):
+        path.touch()
+    with replacing(tmp_path / "run.csv") as own:
+        remove_leftovers(tmp_path)
+        assert is_leftover(own) and own.exists() and is_leftover(dead)
+    assert sorted(tmp_path.iterdir()) == sorted([*others, tmp_path / "run.csv"])
 
 
 def test_files_get_the_mode_that_the_user_asked_for(tmp_path):

@@ -368,7 +368,6 @@ def _processor():
 def write_csv(table, path, remarks=()):
     """Write a table with the header and remarks as comment lines before it; returns the path."""
     path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
     with replacing(path) as temporary, Path(temporary).open("w", encoding="utf-8", newline="") as file:
         for line in (*header(), *remarks):
             file.write(f"# {line}\n")

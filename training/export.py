@@ -5,7 +5,7 @@ import pickle
 
 import numpy as np
 
-from controllers.policy import FORMAT
+from controllers.policy_file import FORMAT
 from fowt_env.errors import InputError
 from fowt_env.outputs import replacing
 
@@ -85,8 +85,10 @@ def export_run(folder, path):
     from fowt_env.envs.decisions import DecisionSettings
     from training.train import Training, environment_settings, make_algorithm
 
-    run = Training(None, folder, resume=True)
+    run = Training(None, folder, resume=True, trusted=True)
     settings, checkpoint = run.settings, run.newest()
+    if checkpoint is None:
+        raise InputError(f"{folder}: holds no checkpoint of a run yet")
     model = make_algorithm(settings["algo"]).load(checkpoint / "model.zip", device="cpu")
     with (checkpoint / "normalisation.pkl").open("rb") as file:
         normalisation = pickle.load(file)

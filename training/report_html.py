@@ -21,6 +21,7 @@ import pandas as pd
 from fowt_env.errors import InputError, unknown
 from fowt_env.outputs import read_table, replacing
 from fowt_env.plots import PANELS, SPECTRA, TIME, frequency_marks, spectrum
+from fowt_env.textfiles import parse_json
 from training.evaluate import run_file
 
 TABLES = ("results.csv", "metrics.csv")  # the first that is there
@@ -152,7 +153,7 @@ def read_results(folder):
     table["reason"] = texts["reason"] if "reason" in texts.columns else ""
     try:
         table["seed"] = pd.to_numeric(texts["seed"]).astype(int)
-    except (ValueError, TypeError) as error:
+    except (ValueError, TypeError, OverflowError) as error:
         raise InputError(f"table {str(path)!r}: column seed must hold whole numbers ({error})") from None
     figures = {}
     for name in texts.columns.drop([n for n in (*KEYS, "reason") if n in texts.columns]):
@@ -171,7 +172,7 @@ def _json_file(path):
     if not path.is_file():
         return {}
     try:
-        value = json.loads(path.read_text(encoding="utf-8"))
+        value = parse_json(path.read_text(encoding="utf-8"))
     except ValueError as error:
         raise InputError(f"file {str(path)!r} is not JSON: {error}") from None
     if not isinstance(value, dict):
@@ -218,8 +219,8 @@ def _read_runs(folder, table, chosen, rate, say):
             missing += 1
             continue
         skip = _skipped(row, frame)
-        if row["status"] == "ok":
-            kept = frame[frame[TIME] >= frame[TIME].iloc[0] + skip - 1e-9]
+        kept = frame[frame[TIME] >= frame[TIME].iloc[0] + skip - 1e-9]
+        if row["status"] == "ok" and len(kept):
             for channel in (name for name in SAMPLED if name in frame.columns):
                 cell = samples.setdefault(channel, {}).setdefault((row["controller"], row["case"]), [])
                 cell.append(kept[channel].to_numpy())

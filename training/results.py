@@ -30,9 +30,14 @@ import pyarrow.parquet as pq
 
 import fowt_env
 from fowt_env.errors import InputError
-from fowt_env.outputs import replacing, write_table
+from fowt_env.outputs import remove_leftovers, replacing, write_table
+from fowt_env.textfiles import parse_json
 
 FORMAT = 1  # of the folder; raised when files or their meaning change
+MANIFEST = {  # what each key of manifest.json holds, beside its format
+    "fowt_env": str, "plant": str, "versions": dict, "created": str, "suite": dict | None, "options": dict,
+    "cases": dict, "seeds": list, "controllers": dict,
+}  # fmt: skip
 ROW_KEY = b"fowt_env.row"
 TABLE_EVERY = 2.0  # s between rewritings of results.csv while runs go on
 PACKAGES = ("numpy", "numba", "scipy", "pandas", "rainflow", "rosco", "hipersim")
@@ -67,9 +72,11 @@ def read_row(path):
     try:
         metadata = pq.read_schema(path).metadata or {}
         row = json.loads(metadata[ROW_KEY])
-    except (KeyError, ValueError, OSError, pa.ArrowException) as error:
+        if not isinstance(row, dict) or {"controller", "case", "seed"} - set(row):
+            raise ValueError("its row lacks controller, case or seed")
+    except (KeyError, ValueError, RecursionError, OSError, MemoryError, pa.ArrowException) as error:
         raise InputError(
-            f"{str(path)!r} is no run of an evaluation ({error}); remove it to run it again"
+            f"{str(path)!r} is no run of an evaluation ({error!s:.300}); remove it to run it again"
         ) from None
     return {key: float("nan") if value is None else value for key, value in row.items()}
 
@@ -210,8 +217,8 @@ class ResultsFolder:
         }
         wanted = json.loads(_json(wanted))
         old = self._manifest()
-        for path in self.folder.glob("runs/*/.*.parquet"):  # left by a process that was killed
-            path.unlink(missing_ok=True)
+        for folder in (self.folder, *self.folder.glob("runs/*/")):
+            remove_leftovers(folder)
         for path in sorted(self.folder.glob("runs/*/*.parquet")):
             row = read_row(path)
             self.rows[row["controller"], row["case"], row["seed"]] = row
@@ -239,13 +246,19 @@ class ResultsFolder:
         if not path.exists():
             return None
         try:
-            old = json.loads(path.read_text(encoding="utf-8"))
+            old = parse_json(path.read_text(encoding="utf-8"))
         except ValueError:
             raise self._refused("has a manifest.json that is not valid JSON") from None
         if not isinstance(old, dict) or old.get("format") != FORMAT:
             raise self._refused(
                 f"has format {old.get('format') if isinstance(old, dict) else None}, not {FORMAT}"
             )
+        for key, kind in MANIFEST.items():
+            if not isinstance(old.get(key), kind):
+                raise self._refused(f"has a manifest.json without a sound {key!r}")
+        sound = all(type(seed) is int for seed in old["seeds"])
+        if not sound or not all(isinstance(case, dict) for case in old["cases"].values()):
+            raise self._refused("has a manifest.json whose seeds or cases are none")
         return old
 
     def _compare(self, old, wanted):
@@ -305,7 +318,7 @@ class ResultsFolder:
 def _short(value):
     """Text of a setting for a message."""
     if isinstance(value, dict) and "name" in value:
-        return f"{value['name']!r} version {value['version']}"
+        return f"{value['name']!r} version {value.get('version')}"
     return str(value)
 
 
@@ -318,7 +331,10 @@ def open_results(folder, settings, columns):
     results = ResultsFolder(folder, settings, columns)
     if results.folder.exists() and not results.folder.is_dir():
         raise InputError(f"results folder {str(folder)!r}: is a file")
-    results.folder.mkdir(parents=True, exist_ok=True)
+    try:
+        results.folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"results folder {str(folder)!r}: cannot be written: {error.strerror}") from None
     handle = os.open(results.folder, os.O_RDONLY)
     try:
         try:

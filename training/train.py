@@ -14,6 +14,7 @@ on the same machine with the same number of torch threads. SAC and TQC are saved
 update, with the replay buffer. What is not repeated: wall times, and with them the rates that are shown.
 """
 
+import errno
 import json
 import os
 import pickle
@@ -34,8 +35,10 @@ import numpy as np
 from fowt_env.envs.decisions import DecisionSettings
 from fowt_env.envs.tasks import SITE, task_of
 from fowt_env.errors import InputError, unknown
-from fowt_env.outputs import replacing
+from fowt_env.outputs import process_lives, remove_leftovers, replacing
 from training.seeds import TRAINING, seeds_for
+from training.train_settings import check_settings, read_settings
+from training.trust import is_own, seal
 
 AGENTS = Path(__file__).parent / "agents"
 ALGORITHMS = ("ppo", "sac", "tqc")
@@ -93,7 +96,7 @@ def resolve(algo, task, seed, steps, changes=None):
     settings = deepcopy(table[task])
     for key, value in (changes or {}).items():
         _change(settings, key, value)
-    return {"algo": algo, "name": task, "seed": seed, "steps": steps} | settings
+    return check_settings({"algo": algo, "name": task, "seed": seed, "steps": steps} | settings)
 
 
 def _change(settings, key, value):
@@ -237,23 +240,28 @@ def judged(figures, reference):
 
 
 class Training:
-    """One run in one folder. resume: go on from its newest checkpoint.
+    """One run in one folder. resume: go on from its newest checkpoint, or start anew where it has none yet.
 
-    Raises: InputError where the folder holds another run, or none to resume.
+    Loading a checkpoint executes code from it: one that no run of this user wrote (training.trust) is refused
+    unless trusted.
+    Raises: InputError where the folder holds another run, none to resume, or a stranger's.
     """
 
-    def __init__(self, settings, folder, resume=False):
-        import yaml
-
+    def __init__(self, settings, folder, resume=False, trusted=False):
         self.folder = Path(folder)
         self.checkpoints = self.folder / "checkpoints"
         path = self.folder / "settings.yml"
         self.resume = resume
         if resume:
-            if not path.exists() or self.newest() is None:
-                raise InputError(f"--resume: {self.folder} holds no checkpoint of a run")
-            with path.open(encoding="utf-8") as file:
-                stored = yaml.safe_load(file)
+            if not path.exists():
+                raise InputError(f"--resume: {self.folder} holds no run")
+            newest = self.newest()
+            if newest is not None and not trusted and not is_own(newest):
+                raise InputError(
+                    f"--resume: loading {newest} executes code from it, and no run of yours wrote it so;"
+                    " if you trust whoever did, add --trust-zip"
+                )
+            stored = read_settings(path)
             if settings is not None:
                 stored["steps"] = settings["steps"]
             settings = stored
@@ -284,10 +292,11 @@ class Training:
         torch.set_num_threads(int(os.environ.get("FOWT_TORCH_THREADS", "1")))
         kind = make_algorithm(settings["algo"])
         env, judge = make_envs(settings)
+        self._remove_leftovers()
         self._write_settings()
         self.reference = baseline_figures(settings)
         set_random_seed(settings["seed"])
-        if self.resume:
+        if self.resume and self.newest() is not None:
             model, state = self._load(kind, env)
         else:
             env.seed(settings["seed"])
@@ -338,6 +347,14 @@ class Training:
             for number, handler in before.items():
                 signal.signal(number, handler)
 
+    def _remove_leftovers(self):
+        """Remove what processes that were killed left half written."""
+        remove_leftovers(self.folder)
+        for path in self.checkpoints.glob(".writing_*"):
+            number = path.name.removeprefix(".writing_")
+            if not (number.isdigit() and process_lives(int(number))):
+                shutil.rmtree(path, ignore_errors=True)
+
     def _write_settings(self):
         import yaml
 
@@ -347,20 +364,36 @@ class Training:
             path.write_text(json.dumps(versions(), indent=1), encoding="utf-8")
 
     def save(self):
-        """Write a checkpoint of the present instant, whole or not at all; the one before it goes."""
-        import torch
+        """Write a checkpoint of the present instant, whole or not at all; the one before it goes.
 
-        model, env = self.model, self.env
-        target = self.checkpoints / f"step_{model.num_timesteps}"
+        Raises: OSError naming it where there is no room; the one before it stays.
+        """
+        target = self.checkpoints / f"step_{self.model.num_timesteps}"
         if target.exists():
             return
         temporary = self.checkpoints / f".writing_{os.getpid()}"
         shutil.rmtree(temporary, ignore_errors=True)
-        temporary.mkdir(parents=True)
-        model.save(temporary / "model.zip")
-        env.save(str(temporary / "normalisation.pkl"))
+        try:
+            temporary.mkdir(parents=True)
+            self._fill(temporary)
+        except (OSError, RuntimeError) as error:  # RuntimeError: what torch makes of a full disk
+            shutil.rmtree(temporary, ignore_errors=True)
+            number = getattr(error, "errno", None) or errno.EIO
+            raise OSError(number, f"the checkpoint cannot be written: {error}", str(target)) from error
+        os.replace(temporary, target)
+        for old in self.checkpoints.glob("step_*"):
+            if old != target:
+                shutil.rmtree(old, ignore_errors=True)
+
+    def _fill(self, folder):
+        """Write the files of a checkpoint of the present instant."""
+        import torch
+
+        model, env = self.model, self.env
+        model.save(folder / "model.zip")
+        env.save(str(folder / "normalisation.pkl"))
         if hasattr(model, "replay_buffer"):
-            model.save_replay_buffer(temporary / "replay_buffer.pkl")
+            model.save_replay_buffer(folder / "replay_buffer.pkl")
         monitor = env.venv
         state = {
             "environments": decision_env(env).get_state(),
@@ -381,12 +414,9 @@ class Training:
             "seconds": self.keeper.seconds(),
             "episodes": list(model.ep_info_buffer),
         }
-        with (temporary / "state.pkl").open("wb") as file:
+        with (folder / "state.pkl").open("wb") as file:
             pickle.dump(state, file)
-        os.replace(temporary, target)
-        for old in self.checkpoints.glob("step_*"):
-            if old != target:
-                shutil.rmtree(old, ignore_errors=True)
+        seal(folder)
 
     def _load(self, kind, env):
         """(model, state) of the newest checkpoint, everything put back in its place."""

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fowt_env.outputs import replacing, write_table
+from fowt_env.outputs import remove_leftovers, replacing, write_table
 from fowt_env.plots import COLOURS, INK, TIME, new_figure, save_figure, spectrum, style_axes
 from training.openfast import DECAYS
 
@@ -231,6 +231,7 @@ def write_report(study, folder, plots=True):
     """Paths written: validation.csv, validation.md and, with plots, one or two images per case."""
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
+    remove_leftovers(folder)
     paths = [write_table(study.table(), folder / "validation.csv"), folder / "validation.md"]
     with replacing(paths[1]) as temporary:
         temporary.write_text(markdown(study) + "\n", encoding="utf-8")

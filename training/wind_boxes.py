@@ -36,9 +36,12 @@ def cached_box(spec, platform, seed, options):
     name = hashlib.sha256(text.encode()).hexdigest()[:24]
     path = cache_root() / "wind_boxes" / f"{name}.npz"
     if path.exists():
-        with np.load(path) as file:
-            values = {key: file[key] for key in ARRAYS}
-            return WindBox(**values, **{key: file[key].item() for key in NUMBERS})
+        try:
+            with path.open("rb") as content, np.load(content, allow_pickle=False) as file:
+                values = {key: file[key] for key in ARRAYS}
+                return WindBox(**values, **{key: file[key].item() for key in NUMBERS})
+        except Exception:  # whatever a broken file makes numpy raise: it is made again
+            path.unlink(missing_ok=True)
     box = read_box(spec, **arguments)
     with replacing(path) as temporary:
         np.savez(temporary, **{key: getattr(box, key) for key in (*ARRAYS, *NUMBERS)})

@@ -6,7 +6,7 @@ wind upstream by half a width is known at the start. Outside the grid: below it 
 zero at the still-water level, as in InflowWind without tower points; beside and above it the edge's wind
 holds (and scene.py refuses grids that do not hold the rotor).
 
-Sources of boxes: TurbSim files (.bts, read by openfast_io), the user's arrays, Mann turbulence (hipersim).
+Sources of boxes: TurbSim files (turbsim.py), the user's arrays, Mann turbulence (hipersim).
 """
 
 from dataclasses import dataclass
@@ -19,11 +19,11 @@ import numpy as np
 from fowt_env.errors import InputError, unknown
 from fowt_env.jit import kernel
 from fowt_env.weather.iec import length_scale, ntm_sigma
+from fowt_env.weather.turbsim import read_bts
 from fowt_env.weather.wind_spec import MOVING, TURBULENCE_CLASS, Flag, Number, Seed
 
 MARGIN = 75.0  # m of platform drift against the wind that a box must still cover at the end of a run
 DISK_RADII, DISK_AZIMUTHS = 12, 36  # points of the rotor average
-PERIODIC = 8  # identifier of a TurbSim file whose box repeats; 7 of one that does not
 
 
 class WindField(NamedTuple):
@@ -255,30 +255,18 @@ def _from_arrays(values, hub_height, rotor_diameter, shear_exponent, seed, durat
 
 
 def _from_bts(values, *_):
-    path = values["path"]
-    if not path.is_file():
-        raise InputError(f"wind.path = {str(path)!r}: no such file")
-    try:
-        from openfast_io.turbsim_file import TurbSimFile
-    except ImportError:
-        raise InputError(
-            "TurbSim boxes are read by openfast_io, which is not installed: pip install 'fowt-env[openfast]'"
-        ) from None
-    try:
-        file = TurbSimFile(str(path))
-    except Exception as error:  # whatever a broken file makes the reader raise
-        raise InputError(f"wind.path = {str(path)!r}: not a TurbSim full-field file ({error})") from None
-    y, z = _even("y", np.asarray(file["y"])), _even("z", np.asarray(file["z"]))
-    speed = float(file["uRef"])
-    shift = values["shift"]
-    periodic = values["periodic"]
+    velocity, y, z, dt, speed, repeats = read_bts(values["path"])
+    y, z = _even("y", y), _even("z", z)
+    for key, value in (("dt", dt), ("speed", speed)):
+        KINDS["box"][key][0].read(f"wind.path = {str(values['path'])!r}: {key}", value)
+    shift, periodic = values["shift"], values["periodic"]
     return WindBox(
-        np.ascontiguousarray(np.transpose(file["u"], (1, 3, 2, 0)), dtype=np.float32),
+        velocity,
         y,
         z,
-        float(file["dt"]),
+        dt,
         speed,
-        int(file["ID"]) == PERIODIC if periodic is None else periodic,
+        repeats if periodic is None else periodic,
         0.5 * (y[-1] - y[0]) / speed if shift is None else float(shift),
     )
 

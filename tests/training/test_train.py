@@ -76,6 +76,58 @@ def test_a_run_leaves_settings_versions_checkpoint_policies_table_and_plot(tmp_p
     assert any((folder / "tensorboard").iterdir())
 
 
+def test_a_run_that_was_killed_before_its_first_checkpoint_starts_anew(tmp_path):
+    whole = Training(small("ppo"), tmp_path / "whole")
+    assert whole.run()
+    killed = Training(small("ppo"), tmp_path / "killed")
+    killed._write_settings()
+    half = killed.checkpoints / ".writing_999999999"
+    half.mkdir(parents=True)
+    resumed = Training(None, tmp_path / "killed", resume=True)
+    assert resumed.run()
+    assert not half.exists()
+    for name, value in parameters(whole).items():
+        assert torch.equal(value, parameters(resumed)[name]), name
+
+
+def test_a_checkpoint_of_others_or_a_changed_one_is_resumed_only_where_it_is_trusted(tmp_path, monkeypatch):
+    run = Training(small("ppo", steps=32), tmp_path / "run")
+    assert run.run()
+    Training(None, run.folder, resume=True)
+    (run.newest() / "state.pkl").touch()
+    Training(None, run.folder, resume=True)  # the contents count
+    monkeypatch.setenv("FOWT_CONFIG_DIR", str(tmp_path / "another user"))
+    with pytest.raises(InputError, match="executes code.*--trust-zip"):
+        Training(None, run.folder, resume=True)
+    assert Training({"steps": 64}, run.folder, resume=True, trusted=True).run()
+    Training(None, run.folder, resume=True)  # its newest checkpoint is this user's own
+    with (run.newest() / "state.pkl").open("ab") as file:
+        file.write(b".")
+    with pytest.raises(InputError, match="executes code"):
+        Training(None, run.folder, resume=True)
+
+
+def test_without_a_place_for_its_key_a_run_goes_on_but_its_checkpoint_has_no_seal(tmp_path, monkeypatch):
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("FOWT_CONFIG_DIR", str(tmp_path / "file" / "below"))
+    run = Training(small("ppo", steps=32), tmp_path / "run")
+    assert run.run() and not (run.newest() / "seal.txt").exists()
+    with pytest.raises(InputError, match="--trust-zip"):
+        Training(None, run.folder, resume=True)
+
+
+def test_wrong_values_of_settings_are_named(tmp_path):
+    with pytest.raises(InputError, match="validation.winds.*-3"):
+        small("ppo", **{"validation.winds": [-3]})
+    with pytest.raises(InputError, match="checkpoint_minutes = 'often'"):
+        small("ppo", checkpoint_minutes="often")
+    folder = tmp_path / "run"
+    folder.mkdir()
+    (folder / "settings.yml").write_text("algo: [ppo\n")
+    with pytest.raises(InputError, match="settings.yml.*not valid YAML"):
+        Training(None, folder, resume=True)
+
+
 def test_validation_repeats_the_same_episodes_bit_for_bit():
     _, judge = make_envs(small("ppo"))
     rng = np.random.default_rng(0)
@@ -116,7 +168,7 @@ def test_wrong_settings_are_named(tmp_path):
         Training(small("ppo", **{"environment.observation": "mesured"}), tmp_path / "a").run()
     with pytest.raises(InputError, match="ppo does not take these settings.*n_stepps"):
         Training(small("ppo", **{"algorithm.n_stepps": 3}), tmp_path / "b").run()
-    with pytest.raises(InputError, match="holds no checkpoint"):
+    with pytest.raises(InputError, match="holds no run"):
         Training(None, tmp_path / "c", resume=True)
 
 

@@ -1,0 +1,159 @@
+"""Files of policies: arrays and one JSON text in a .npz, read without pickle and checked to the last value.
+
+Loading one runs no code of its author. No count in it is believed: an array takes the memory that the file's
+table of contents gives it, and all of them at most MAX_BYTES. training/export.py writes such files.
+"""
+
+import math
+import zipfile
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from fowt_env.envs.actions import MODES
+from fowt_env.envs.decisions import DecisionSettings
+from fowt_env.envs.observations import KNOWN, N_ACTIONS
+from fowt_env.errors import InputError
+from fowt_env.records import Finite, NonNegative, Positive, Record, validate
+from fowt_env.textfiles import parse_json, raise_problems
+
+FORMAT = 1
+ACTIVATIONS = {"tanh": np.tanh, "relu": lambda x: np.maximum(x, 0.0)}
+SQUASHES = {"clip": lambda x: np.clip(x, -1.0, 1.0), "tanh": np.tanh}
+MAX_BYTES = 100_000_000  # of all arrays; the largest policy made so far has 200 kB
+MAX_LAYERS = 100
+HEADERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
+PAIR = Annotated[list[Finite], Field(min_length=2, max_length=2)]
+
+
+class PolicySettings(Record):
+    """The JSON text of a policy file."""
+
+    format: Literal[1]
+    activation: Literal[tuple(ACTIVATIONS)]
+    squash: Literal[tuple(SQUASHES)]
+    layers: Annotated[int, Field(ge=1, le=MAX_LAYERS, strict=True)]
+    clip_observation: Positive
+    control_dt: Positive
+    decisions: dict[str, Any]  # of DecisionSettings
+    action_mode: Literal[tuple(MODES)]
+    baseline: str
+    observation: Annotated[list[Literal[KNOWN]], Field(min_length=1, max_length=200)]
+    wind_preview: Annotated[list[NonNegative], Field(max_length=200)]  # s
+    blade_pitch: PAIR  # deg
+    setpoint: PAIR
+    residual_torque: Finite
+    residual_pitch: Finite  # deg
+    about: dict[str, Any]
+
+
+class Network:
+    """A multilayer perceptron on normalised features, float32.
+
+    weights, biases: lists of (out, in) and (out,) arrays; mean, scale: of the features; clip: of the
+    normalised features. Calling it with features (..., size) returns actions (..., 2) in [-1, 1].
+    """
+
+    def __init__(self, weights, biases, activation, squash, mean, scale, clip):
+        self.weights = [np.ascontiguousarray(w, dtype=np.float32) for w in weights]
+        self.biases = [np.ascontiguousarray(b, dtype=np.float32) for b in biases]
+        self.activation, self.squash = ACTIVATIONS[activation], SQUASHES[squash]
+        self.mean = np.asarray(mean, dtype=np.float64)
+        self.scale = np.asarray(scale, dtype=np.float64)
+        self.clip = float(clip)
+
+    def __call__(self, features):
+        normal = np.clip((features - self.mean) / self.scale, -self.clip, self.clip)
+        x = normal.astype(np.float32)
+        for weight, bias in zip(self.weights[:-1], self.biases[:-1], strict=True):
+            x = self.activation(x @ weight.T + bias)
+        return self.squash(x @ self.weights[-1].T + self.biases[-1])
+
+
+def read_policy(path):
+    """(settings dict, Network) of a policy file.
+
+    Raises: InputError naming the file and what is wrong with it.
+    """
+    path = Path(path)
+    where = f"policy file {str(path)!r}"
+    try:
+        arrays = _arrays(path)
+        settings = parse_json(str(arrays["settings"]))
+    except Exception as error:  # whatever a broken file makes zipfile, zlib, numpy and json raise
+        raise InputError(f"{where}: cannot be read: {error!s:.300}") from error
+    _check_settings(where, settings)
+    try:
+        weights = [_numbers(arrays[f"weight_{i}"]) for i in range(settings["layers"])]
+        biases = [_numbers(arrays[f"bias_{i}"]) for i in range(settings["layers"])]
+        mean, scale = _numbers(arrays["mean"]), _numbers(arrays["scale"])
+    except (KeyError, ValueError) as error:
+        raise InputError(f"{where}: array {error}") from None
+    _check_shapes(where, weights, biases, mean, scale)
+    network = Network(
+        weights, biases, settings["activation"], settings["squash"], mean, scale, settings["clip_observation"]
+    )
+    return settings, network
+
+
+def _arrays(path):
+    """{name: array} of a .npz file, each once its size is known to be that of its place in the file."""
+    arrays = {}
+    with zipfile.ZipFile(path) as archive:
+        members = archive.infolist()
+        total = sum(member.file_size for member in members)
+        if total > MAX_BYTES:
+            raise ValueError(f"it holds {total} bytes; allowed: at most {MAX_BYTES}")
+        for member in members:
+            with archive.open(member) as file:
+                version = np.lib.format.read_magic(file)
+                if version not in HEADERS:
+                    raise ValueError(f"array {member.filename!r} has the version {version}")
+                shape, by_columns, kind = HEADERS[version](file)
+                size = math.prod(shape) * kind.itemsize
+                if kind.hasobject:
+                    raise ValueError(f"array {member.filename!r} holds pickled objects, which are not loaded")
+                if size != member.file_size - file.tell():
+                    raise ValueError(f"array {member.filename!r}: {shape} of {kind} is not its size")
+                content = np.frombuffer(file.read(), dtype=kind)
+                arrays[member.filename.removesuffix(".npy")] = content.reshape(
+                    shape, order="F" if by_columns else "C"
+                )
+    return arrays
+
+
+def _numbers(array):
+    """An array of numbers. Raises: ValueError."""
+    if array.dtype.kind not in "fiu":
+        raise ValueError(f"of {array.dtype}: must hold numbers")
+    return array
+
+
+def _check_settings(where, settings):
+    """Raises: InputError unless settings are those of a policy of this format."""
+    if not isinstance(settings, dict):
+        raise InputError(f"{where}: its settings must be a JSON object")
+    if settings.get("format") != FORMAT:
+        raise InputError(f"{where}: format {settings.get('format')!r}: must be {FORMAT}")
+    found, problems = validate(PolicySettings, settings)
+    raise_problems(where, problems)
+    try:
+        DecisionSettings(**found.decisions)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+    except TypeError as error:
+        raise InputError(f"{where}: decisions = {settings['decisions']}: {error}") from None
+
+
+def _check_shapes(where, weights, biases, mean, scale):
+    """Raise InputError unless the arrays form one network of finite numbers with two outputs."""
+    size = mean.shape
+    good = len(size) == 1 and scale.shape == size and bool(np.all(scale > 0.0))
+    for weight, bias in zip(weights, biases, strict=True):
+        good = good and weight.ndim == 2 and (weight.shape[1],) == size and weight.shape[:1] == bias.shape
+        size = bias.shape
+    finite = all(bool(np.all(np.isfinite(array))) for array in (*weights, *biases, mean, scale))
+    if not (good and finite and size == (N_ACTIONS,)):
+        raise InputError(f"{where}: its arrays do not form a network with two outputs")

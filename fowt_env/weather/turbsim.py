@@ -1,0 +1,78 @@
+"""TurbSim's full-field wind files (.bts), read by openfast_io once their head is known to be sound."""
+
+import os
+import struct
+
+import numpy as np
+
+from fowt_env.errors import InputError
+
+NOT_PERIODIC, PERIODIC = 7, 8  # identifiers: whether the box repeats
+HEAD = struct.Struct("<h4i12fi")  # kind; counts; spacings, hub and scales; length of the description
+
+
+def read_bts(path):
+    """(velocity, y, z, dt, speed, periodic) of a TurbSim file.
+
+    velocity (n_time, n_z, n_y, 3) float32 m/s; y, z (m); dt (s); speed: mean wind at the hub (m/s); periodic:
+    whether the file says so. Memory: at most some ten times the size of the file.
+    Raises: InputError that names the file and what is wrong with it.
+    """
+    where = f"wind.path = {str(path)!r}"
+    try:
+        if not path.is_file():
+            raise InputError(f"{where}: no such file")
+        _check_head(path, where)
+    except (OSError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"wind.path = {str(path)[:200]!r}: cannot be read: {error}") from None
+    try:
+        from openfast_io.turbsim_file import TurbSimFile
+    except ImportError:
+        raise InputError(
+            "TurbSim boxes are read by openfast_io, which is not installed: pip install 'fowt-env[openfast]'"
+        ) from None
+    try:
+        with np.errstate(over="ignore"):
+            file = TurbSimFile(str(path))
+    except Exception as error:  # whatever a broken file makes the reader raise
+        raise InputError(f"{where}: not a TurbSim full-field file ({error})") from None
+    with np.errstate(over="ignore"):
+        velocity = np.ascontiguousarray(np.transpose(file["u"], (1, 3, 2, 0)), dtype=np.float32)
+    if not np.isfinite(velocity).all():
+        raise InputError(f"{where}: holds winds that are not finite")
+    y, z = np.asarray(file["y"]), np.asarray(file["z"])
+    return velocity, y, z, float(file["dt"]), float(file["uRef"]), int(file["ID"]) == PERIODIC
+
+
+def _check_head(path, where):
+    """Raises: InputError where the head of a TurbSim file is not that of a file of its size.
+
+    The reader believes the counts that it finds, and takes the memory and the time that they ask for.
+    """
+    with path.open("rb") as file:
+        head = file.read(HEAD.size)
+        size = os.fstat(file.fileno()).st_size
+    if len(head) < HEAD.size:
+        raise InputError(f"{where}: {size} bytes: a TurbSim full-field file has {HEAD.size} or more")
+    kind, n_z, n_y, n_tower, n_time, *numbers, length = HEAD.unpack(head)
+    if kind not in (NOT_PERIODIC, PERIODIC):
+        raise InputError(f"{where}: identifier {kind}: a TurbSim full-field file has 7 or 8")
+    if min(n_z, n_y) < 2 or n_time < 1 or min(n_tower, length) < 0:
+        raise InputError(
+            f"{where}: {n_z} x {n_y} points, {n_tower} on the tower, {n_time} times, {length} characters:"
+            " must be 2 x 2, 0, 1, 0 or more"
+        )
+    needed = HEAD.size + length + 6 * n_time * (n_z * n_y + n_tower)
+    if needed != size:
+        raise InputError(
+            f"{where}: {n_time} times of {n_z} x {n_y} + {n_tower} points take {needed} bytes; it has {size}"
+        )
+    dz, dy, dt, speed, *rest = numbers
+    scales = rest[2::2]
+    if not (np.isfinite(numbers).all() and min(dz, dy, dt, speed) > 0.0 and all(scales)):
+        raise InputError(
+            f"{where}: spacings {dz:g} m, {dy:g} m, {dt:g} s, wind {speed:g} m/s, scales {scales}:"
+            " all numbers of the head must be finite, these positive, and no scale zero"
+        )

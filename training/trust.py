@@ -1,0 +1,76 @@
+"""Whose checkpoint it is: loading one executes code from it, so one's own are told from those of strangers.
+
+A checkpoint that a run of this user wrote carries a seal, a keyed hash (HMAC-SHA256) of all its files. The
+key is in the user's configuration folder (FOWT_CONFIG_DIR, else XDG_CONFIG_HOME/fowt_env or
+~/.config/fowt_env), for nobody else to read. A checkpoint without a right seal is loaded only where the user
+says so.
+"""
+
+import hashlib
+import hmac
+import os
+import secrets
+from pathlib import Path
+
+SEAL = "seal.txt"
+KEY = "checkpoint_key"
+KEY_BYTES = 32
+
+
+def config_folder():
+    """Folder of what belongs to the user and not to a run."""
+    given = os.environ.get("FOWT_CONFIG_DIR")
+    if given:
+        return Path(given)
+    base = os.environ.get("XDG_CONFIG_HOME")
+    return (Path(base) if base else Path.home() / ".config") / "fowt_env"
+
+
+def _key():
+    """The user's key, made where there is none; None where that cannot be."""
+    path = config_folder() / KEY
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        temporary = path.with_name(f".{KEY}-{os.getpid()}-{secrets.token_hex(4)}")
+        if not path.exists():
+            handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+            with os.fdopen(handle, "wb") as file:
+                file.write(secrets.token_bytes(KEY_BYTES))
+            try:
+                os.link(temporary, path)  # whole, and of several processes only the first's
+            except FileExistsError:
+                pass
+            finally:
+                temporary.unlink()
+        key = path.read_bytes()
+    except OSError:
+        return None
+    return key if len(key) == KEY_BYTES else None
+
+
+def _hash(folder, key):
+    """Keyed hash of the names and contents of a folder's files."""
+    total = hmac.new(key, digestmod=hashlib.sha256)
+    for path in sorted(folder.iterdir()):
+        if path.name != SEAL:
+            with path.open("rb") as file:
+                content = hashlib.file_digest(file, "sha256").hexdigest()
+            total.update(f"{path.name}\n{content}\n".encode())
+    return total.hexdigest()
+
+
+def seal(folder):
+    """Put the seal to a checkpoint's folder; without a key, as in a home that is read-only, there is none."""
+    key = _key()
+    if key is not None:
+        (folder / SEAL).write_text(_hash(folder, key) + "\n", encoding="ascii")
+
+
+def is_own(folder):
+    """Whether a checkpoint is as a run of this user wrote it."""
+    key = _key()
+    try:
+        given = (folder / SEAL).read_text(encoding="ascii").strip()
+        return key is not None and hmac.compare_digest(given, _hash(folder, key))
+    except (OSError, ValueError, TypeError):
+        return False
