@@ -1,0 +1,58 @@
+"""Docstrings as markdown: their aligned lists of names become lists, everything else stays as it is.
+
+The docstrings are written to be read by help(), as
+
+    name      what it means,
+              over as many lines as it takes
+
+which markdown would run into one paragraph.
+"""
+
+import re
+
+from griffe import Extension
+
+ENTRY = re.compile(r"(?P<names>[A-Za-z_][\w.*]*(?:, [A-Za-z_][\w.*]*)*)(?P<gap> {2,}|: )(?P<text>\S.*)")
+INDENT = re.compile(r" *")
+WORDS = {"Raises", "Source", "Sources", "Returns", "Attributes", "Needs", "Equation"}
+
+
+def as_markdown(text):
+    """The docstring with every aligned list of names as a markdown list, and nothing else of markdown's."""
+    return "\n\n".join(_literal(_paragraph(block)) for block in re.split(r"\n\s*\n", text))
+
+
+def _literal(text):
+    """The text with the signs of links, emphasis and HTML taken as they are, but for lists and code."""
+    pieces = re.split(r"(`[^`]*`)", text)
+    return "".join(
+        piece if i % 2 else re.sub(r"([\[\]*])", r"\\\1", piece).replace("<", "&lt;")
+        for i, piece in enumerate(pieces)
+    )
+
+
+def _paragraph(block):
+    """One paragraph; a list where its first line and all others of that indentation name something."""
+    lines = block.splitlines()
+    depth = min(len(INDENT.match(line).group()) for line in lines)
+    found = [ENTRY.fullmatch(line[depth:]) for line in lines]
+    heads = [i for i, line in enumerate(lines) if len(INDENT.match(line).group()) == depth]
+    if not all(found[i] for i in heads) or found[0].group("names") in WORDS:
+        return block
+    items = []
+    for i, line in enumerate(lines):
+        if i in heads:
+            names = found[i].group("names").split(", ")
+            items.append(f"- {', '.join(f'`{name}`' for name in names)}: {found[i].group('text')}")
+        else:
+            items[-1] += " " + line.strip()
+    return "\n".join(items)
+
+
+class AlignedLists(Extension):
+    """Griffe's view of the docstrings, turned into markdown."""
+
+    def on_object(self, *, obj, **_):
+        """Rewrite the docstring of one module, class, function or attribute."""
+        if obj.docstring is not None:
+            obj.docstring.value = as_markdown(obj.docstring.value)
