@@ -32,11 +32,13 @@ MARK = re.compile(r"(<!-- from the code: (\w+) -->\n).*?(<!-- end -->)", re.S)
 RPM, DEG = 30.0 / pi, 180.0 / pi
 PREVIEW = (2.0, 4.0)  # s, look-ahead times of the example in the table of channels
 
-# Each reward term in terms of the names of the page's table of symbols; tests evaluate them beside the kernels.
+# Each reward term in the symbols of the page's table; tests evaluate them beside the kernels.
 FORMULAS = {
     "power": "clip(P / P_rated, 0, 1) * tolerance(P / P_rated, 0, 1, {POWER_MARGIN:g})",
     "rotor_speed": "tolerance(W / W_rated, min(W_0, W_rated) / W_rated, 1, {SPEED_MARGIN:g})",
-    "platform_motion": "tolerance(hypot(theta - theta_0, rate * {TILT_PERIOD:g} / (2 * pi)), 0, 0, radians({tilt:g}))",
+    "platform_motion": (
+        "tolerance(hypot(theta - theta_0, rate * {TILT_PERIOD:g} / (2 * pi)), 0, 0, radians({tilt:g}))"
+    ),
     "pitch_travel": "-clip(abs(beta - beta_before) / (beta_rate * control_dt), 0, 1)",
     "torque_travel": "-clip(abs(Q - Q_before) / (Q_rate * control_dt), 0, 1)",
     "failure": "-1 if failed else 0",
@@ -45,8 +47,8 @@ OPTIONS = {  # of reset: the value that is taken in place of the drawn one
     "wind": "wind of the episode, as `build_scene` takes it",
     "sea": "sea of the episode, as `build_scene` takes it; `None`: still water",
     "weather_seed": "seed of its turbulence and waves",
-    "offsets": "`{channel: offset}` from the operating point, in the channel's unit, in place of all drawn ones",
-    "exact_start": "whether the operating point is solved for this wind (so where `wind` is given) or interpolated",
+    "offsets": "`{channel: offset}` from the operating point, in the channel's unit, for all drawn ones",
+    "exact_start": "whether the operating point is exact (so where `wind` is given) or interpolated",
 }
 assert set(OPTIONS) == set(Episode._fields) and set(FORMULAS) == set(rewards.TERMS)
 
@@ -104,10 +106,11 @@ def tasks():
 
 def offsets():
     """What each task adds to the operating point at the start."""
-    names = list(dict.fromkeys(name for task in TASKS.values() for name in task.offsets))
+    chosen = list(TASKS.values())
+    names = list(dict.fromkeys(name for task in chosen for name in task.offsets))
     units = {"PtfmSurge": "m", "PtfmSway": "m", "PtfmHeave": "m", "RotSpeed": "rpm"}
     rows = [
-        (f"`{name}`", units.get(name, "deg"), *(_range(task.offsets.get(name, 0.0)) for task in TASKS.values()))
+        (f"`{name}`", units.get(name, "deg"), *(_range(task.offsets.get(name, 0.0)) for task in chosen))
         for name in names
     ]
     return markdown(("channel", "unit", *(f"`{name}`" for name in TASKS)), rows)
@@ -123,7 +126,11 @@ def actuators():
     machine = turbine()
     law, drive = machine.torque_law, machine.pitch_drive
     rows = [
-        ("generator torque", f"0 to {law.max_torque * 1e-3:.3f} kN m", f"{law.max_torque_rate * 1e-3:g} kN m/s"),
+        (
+            "generator torque",
+            f"0 to {law.max_torque * 1e-3:.3f} kN m",
+            f"{law.max_torque_rate * 1e-3:g} kN m/s",
+        ),
         (
             "blade pitch",
             f"{drive.minimum * DEG:g} to {drive.maximum * DEG:g} deg",
@@ -191,7 +198,7 @@ def terminations():
     limits = {
         NON_FINITE: "a number of the state is infinite or not a number",
         CAPSIZED: f"platform pitch beyond +-{CAPSIZE:g} rad ({CAPSIZE * DEG:.0f} deg)",
-        OVERSPEED: f"rotor speed above {turbine().overspeed * RPM:g} rpm (`overspeed_rpm` of the turbine file)",
+        OVERSPEED: f"rotor speed above {turbine().overspeed * RPM:g} rpm (the turbine's `overspeed_rpm`)",
     }
     return markdown(
         ('`info["termination"]`', "when"), [(f"`{REASONS[status]}`", text) for status, text in limits.items()]
@@ -222,8 +229,11 @@ def cli_page():
     """The reference of the command line as markdown."""
     root = typer.main.get_command(app)
     head = (
-        "# Command line\n\nWritten by `python docs/tools/reference_pages.py` from the commands themselves, whose `--help` says"
-        " the same.\n\nExit codes: 0 done; 1 a run stopped, or a check failed; 2 an argument cannot be used; 130 interrupted.\n"
+        "# Command line\n\n"
+        "Written by `python docs/tools/reference_pages.py` from the commands;"
+        " `--help` says the same.\n\n"
+        "Exit codes: 0 done; 1 a run stopped, or a check failed; 2 an argument cannot be used; 130"
+        " interrupted.\n"
     )
     return head + "".join(_commands(root, "fowt"))
 
@@ -259,10 +269,10 @@ def _parameter(parameter):
         names = f"`{parameter.name.upper()}`"
     else:
         names = " ".join(f"`{flag}`" for flag in (*parameter.opts, *parameter.secondary_opts))
-    default = parameter.default
-    shown = "" if default is None or default == [] else f"`{default}`"
+    default, pair = parameter.default, parameter.secondary_opts
+    shown = "" if default in (None, []) else f"`{default}`"
     if getattr(parameter, "is_flag", False):
-        shown = f"`{(parameter.opts if default else parameter.secondary_opts)[0]}`" if parameter.secondary_opts else ""
+        shown = f"`{(parameter.opts if default else pair)[0]}`" if pair else ""
     return names, shown, _plain(parameter.help or "").replace("|", "\\|")
 
 
