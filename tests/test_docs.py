@@ -143,10 +143,10 @@ def test_links_out_of_docs_lead_to_the_site_s_own_pages():
 def test_docstrings_keep_their_lists_of_names_and_their_signs():
     pytest.importorskip("griffe", reason="mkdocstrings is not installed: the extra `docs` is missing")
     as_markdown = tool("docstrings").as_markdown
-    listed = "wind       m/s, as\n           given\nsea, seed  still: `x[0]`"
+    listed = "wind      m/s, as\n          given\nsea, seed still: `x[0]`"
     assert as_markdown(listed) == "- `wind`: m/s, as given\n- `sea`, `seed`: still: `x[0]`"
-    prose = "A table\nof two lines.\n\nRaises: InputError for a number"
-    assert as_markdown(prose) == prose
+    for prose in ("A table\nof two lines.\n\nRaises: an error", "u  m/s\nand no list of names"):
+        assert as_markdown(prose) == prose
     assert as_markdown("a[i] < *b*") == r"a\[i\] &lt; \*b\*"
 
 

@@ -62,6 +62,13 @@ def test_every_block_of_extending_runs(folder):
     assert swing["damper:Damper"] < 0.95 * swing["pi"]  # it damps
 
 
+@pytest.mark.parametrize("page", ["index.md", "environment.md"])
+def test_every_block_of_a_page_runs(folder, page):
+    found = blocks(page)
+    assert found
+    run_blocks(found, folder)
+
+
 @pytest.mark.parametrize("page", ["getting-started.md", "faq.md", "index.md"])
 def test_extras_that_a_page_installs_exist(page):
     named = re.findall(r"pip install [^\n`]*?\[([\w,]+)\]", (DOCS / page).read_text())

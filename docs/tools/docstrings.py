@@ -12,7 +12,9 @@ import re
 
 from griffe import Extension
 
-ENTRY = re.compile(r"(?P<names>[A-Za-z_][\w.*]*(?:, [A-Za-z_][\w.*]*)*)(?P<gap> {2,}|: )(?P<text>\S.*)")
+NAMES = r"(?P<names>[A-Za-z_][\w.*]*(?:, [A-Za-z_][\w.*]*)*)"
+ENTRY = re.compile(NAMES + r"(?: {2,}|: )(?P<text>\S.*)")
+LONGEST = re.compile(NAMES + r" (?P<text>\S.*)")  # the longest name of a list has one blank after it
 INDENT = re.compile(r" *")
 WORDS = {"Raises", "Source", "Sources", "Returns", "Attributes", "Needs", "Equation"}
 
@@ -35,17 +37,21 @@ def _paragraph(block):
     """One paragraph; a list where its first line and all others of that indentation name something."""
     lines = block.splitlines()
     depth = min(len(INDENT.match(line).group()) for line in lines)
-    found = [ENTRY.fullmatch(line[depth:]) for line in lines]
-    heads = [i for i, line in enumerate(lines) if len(INDENT.match(line).group()) == depth]
-    if not all(found[i] for i in heads) or found[0].group("names") in WORDS:
+    lines = [line[depth:] for line in lines]
+    first = ENTRY.fullmatch(lines[0])
+    if first is None or first.group("names") in WORDS:
         return block
+    column = first.start("text")
     items = []
-    for i, line in enumerate(lines):
-        if i in heads:
-            names = found[i].group("names").split(", ")
-            items.append(f"- {', '.join(f'`{name}`' for name in names)}: {found[i].group('text')}")
-        else:
+    for line in lines:
+        if line.startswith(" "):
             items[-1] += " " + line.strip()
+            continue
+        entry = ENTRY.fullmatch(line) or LONGEST.fullmatch(line)
+        if entry is None or (entry.re is LONGEST and entry.start("text") != column):
+            return block
+        names = ", ".join(f"`{name}`" for name in entry.group("names").split(", "))
+        items.append(f"- {names}: {entry.group('text')}")
     return "\n".join(items)
 
 
