@@ -145,7 +145,9 @@ def test_docstrings_keep_their_lists_of_names_and_their_signs():
     as_markdown = tool("docstrings").as_markdown
     listed = "wind      m/s, as\n          given\nsea, seed still: `x[0]`"
     assert as_markdown(listed) == "- `wind`: m/s, as given\n- `sea`, `seed`: still: `x[0]`"
-    for prose in ("A table\nof two lines.\n\nRaises: an error", "u  m/s\nand no list of names"):
+    assert as_markdown("wind      m/s\nRises with height.") == "- `wind`: m/s\n\nRises with height."
+    assert as_markdown("As in\n\n    x[0]") == "As in\n\n    x[0]"
+    for prose in ("A table\nof two lines.\n\nRaises: an error", "u: m/s\nand no list of names"):
         assert as_markdown(prose) == prose
     assert as_markdown("a[i] < *b*") == r"a\[i\] &lt; \*b\*"
 

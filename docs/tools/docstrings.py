@@ -21,7 +21,13 @@ WORDS = {"Raises", "Source", "Sources", "Returns", "Attributes", "Needs", "Equat
 
 def as_markdown(text):
     """The docstring with every aligned list of names as a markdown list, and nothing else of markdown's."""
-    return "\n\n".join(_literal(_paragraph(block)) for block in re.split(r"\n\s*\n", text))
+    blocks = re.split(r"\n[ \t]*\n", text)
+    return "\n\n".join(block if _is_code(block) else _literal(_paragraph(block)) for block in blocks)
+
+
+def _is_code(block):
+    """Whether a paragraph is indented as a program is."""
+    return all(line.startswith("    ") for line in block.splitlines())
 
 
 def _literal(text):
@@ -34,7 +40,10 @@ def _literal(text):
 
 
 def _paragraph(block):
-    """One paragraph; a list where its first line and all others of that indentation name something."""
+    """One paragraph; a list where its first line and all others of that indentation name something.
+
+    What follows an aligned list without a blank line becomes a paragraph of its own.
+    """
     lines = block.splitlines()
     depth = min(len(INDENT.match(line).group()) for line in lines)
     lines = [line[depth:] for line in lines]
@@ -43,13 +52,15 @@ def _paragraph(block):
         return block
     column = first.start("text")
     items = []
-    for line in lines:
+    for number, line in enumerate(lines):
         if line.startswith(" "):
             items[-1] += " " + line.strip()
             continue
         entry = ENTRY.fullmatch(line) or LONGEST.fullmatch(line)
         if entry is None or (entry.re is LONGEST and entry.start("text") != column):
-            return block
+            if first.string[first.end("names")] == ":":
+                return block
+            return "\n".join(items) + "\n\n" + "\n".join(lines[number:])
         names = ", ".join(f"`{name}`" for name in entry.group("names").split(", "))
         items.append(f"- {names}: {entry.group('text')}")
     return "\n".join(items)
