@@ -136,6 +136,7 @@ def test_links_out_of_docs_lead_to_the_site_s_own_pages():
     text = "[a](../README.md#layout) `[b](../README.md)` [c](theory.md) [d](https://x.org)"
     assert hooks.linked(text, "page.md") == text.replace("../README.md#", "readme.md#")
     assert hooks.linked("[e](../examples/01_simulate.py)", "page.md") == "[e](examples/01_simulate.md)"
+    assert hooks.linked("[`e`](01_simulate.py)", "examples/index.md") == "[`e`](01_simulate.md)"
     assert hooks.linked("![f](docs/figures/gust.gif)", "readme.md") == "![f](figures/gust.gif)"
     assert hooks.linked("[g](../../CONTRIBUTING.md)", "api/envs.md") == "[g](../contributing.md)"
 

@@ -26,8 +26,10 @@ PAGES = {  # file of the repository: page of the site
     "examples/README.md": "examples/index.md",
 }
 EXAMPLES = {f"examples/{path.name}": f"examples/{path.stem}.md" for path in ROOT.glob("examples/*.py")}
-LINK = re.compile(r"(!?\[[^\]]*\]\()([^)\s]+)(\))")
-CODE = re.compile(r"(^ *```.*?^ *```|`[^`\n]+`)", re.S | re.M)
+CODE = r"^ *```.*?^ *```|`[^`\n]+`"
+LINK = r"(?P<start>!?\[(?:`[^`\n]*`|[^\]`])*\]\()(?P<target>[^)\s]+)\)"
+CODE_OR_LINK = re.compile(f"{CODE}|{LINK}", re.S | re.M)
+EXAMPLE = re.compile(r"`(\d\d_\w+\.py)`")
 FORMULA = re.compile(r'<(span|div) class="arithmatex">\\([(\[])(.*?)\\[)\]]</\1>', re.S)
 SYMBOL = re.compile(r'<symbol id="([^"]+)"(.*?</symbol>)', re.S)
 BOX = re.compile(r'<svg([^>]*?) width="([^"]+)" height="([^"]+)" viewBox="(\S+) (\S+) (\S+) (\S+)">')
@@ -45,7 +47,10 @@ def on_config(config):
 def on_files(files, config):
     """The site's files with the repository's own pages and the examples among them."""
     for source, page in PAGES.items():
-        files.append(File.generated(config, page, content=(ROOT / source).read_text()))
+        text = (ROOT / source).read_text()
+        if source == "examples/README.md":
+            text = EXAMPLE.sub(r"[`\1`](\1)", text)
+        files.append(File.generated(config, page, content=text))
     for source, page in EXAMPLES.items():
         text = (ROOT / source).read_text()
         content = f"# `{Path(source).name}`\n\n```python\n{text}```\n"
@@ -74,16 +79,14 @@ def linked(markdown, page):
     here = posixpath.dirname(page)
 
     def moved(match):
-        start, target, end = match.groups()
-        path, sign, anchor = target.partition("#")
+        path, sign, anchor = (match["target"] or "").partition("#")  # none: code
         if not path or ":" in path:
             return match.group()
         wanted = posixpath.normpath(posixpath.join(folder, path))
         at = (PAGES | EXAMPLES).get(wanted, wanted.removeprefix("docs/"))
-        return start + posixpath.relpath(at, here or ".") + sign + anchor + end
+        return f"{match['start']}{posixpath.relpath(at, here or '.')}{sign}{anchor})"
 
-    pieces = CODE.split(markdown)  # code stands at the odd places
-    return "".join(piece if i % 2 else LINK.sub(moved, piece) for i, piece in enumerate(pieces))
+    return CODE_OR_LINK.sub(moved, markdown)
 
 
 def _drawn(match, shapes):
