@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 PROJECT := pyproject.toml setup.py constraints.txt
 INSTALL = $(BIN)/python -m pip install --quiet --constraint constraints.txt --editable
 
-.PHONY: help demo test test-quick coverage lint format clean
+.PHONY: help demo test test-quick coverage lint docs format clean
 .DELETE_ON_ERROR:
 
 help:
@@ -13,6 +13,7 @@ help:
 	@echo "make test        all tests (make test-quick: without the slow ones)"
 	@echo "make coverage    what the quick tests reach of what users touch; pages in htmlcov"
 	@echo "make lint        ruff and mypy;  make format: let ruff mend what it can"
+	@echo "make docs        the documentation site, in site/"
 	@echo "make clean       remove results and build leftovers (the environment stays; rm -r $(VENV) removes it)"
 
 $(BIN)/python:
@@ -43,9 +44,13 @@ lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 
+# the variable silences an advertisement of the theme's
+docs: $(VENV)/.installed-dev
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --clean --config-file .mkdocs.yml
+
 format: $(VENV)/.installed-dev
 	$(BIN)/ruff check --fix .
 
 clean:
-	rm -rf results build dist *.egg-info .pytest_cache .ruff_cache .mypy_cache .hypothesis htmlcov .coverage .coverage.*
+	rm -rf results site build dist *.egg-info .pytest_cache .ruff_cache .mypy_cache .hypothesis htmlcov .coverage .coverage.*
 	find . -name __pycache__ -not -path "./$(VENV)/*" -prune -exec rm -rf {} +

@@ -74,8 +74,8 @@ def _processes(function, tasks, indices, jobs):
         except BrokenProcessPool:
             continue
     raise RuntimeError(
-        f"worker processes died {ATTEMPTS} times (out of memory, or killed); {len(left)} runs are left:"
-        " the same command goes on with them"
+        f"worker processes died {ATTEMPTS} times (out of memory, killed, or started by a program without"
+        f" `if __name__ == '__main__':`); {len(left)} runs are left: the same command goes on with them"
     )
 
 

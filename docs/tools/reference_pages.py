@@ -1,0 +1,308 @@
+"""Writes what the reference pages take from the code: `python docs/tools/reference_pages.py`.
+
+docs/cli.md is written whole. In docs/environment.md the text between a pair of marks
+
+    <!-- from the code: NAME -->
+    <!-- end -->
+
+is what the function of that name in TABLES returns. tests/test_docs.py fails while either is out of step.
+"""
+
+import re
+from math import pi
+from pathlib import Path
+
+import typer
+from rich.text import Text
+
+from fowt_env.cli import app
+from fowt_env.description import read_platform, read_turbine
+from fowt_env.envs import rewards
+from fowt_env.envs.actions import TRACKING_DAMPING, TRACKING_FREQUENCY
+from fowt_env.envs.kernels import OVERSPEED, REASONS
+from fowt_env.envs.observations import KNOWN, STANDARD, entries
+from fowt_env.envs.tables import action_table, markdown, observation_table
+from fowt_env.envs.tasks import TASKS, Episode
+from fowt_env.outputs import replacing
+from fowt_env.step import CAPSIZE, CAPSIZED, NON_FINITE
+from fowt_env_registration import ENVIRONMENTS
+
+DOCS = Path(__file__).resolve().parents[1]
+MARK = re.compile(r"(<!-- from the code: (\w+) -->\n).*?(<!-- end -->)", re.S)
+RPM, DEG = 30.0 / pi, 180.0 / pi
+PREVIEW = (2.0, 4.0)  # s, look-ahead times of the example in the table of channels
+
+# Each reward term in the symbols of the page's table; tests evaluate them beside the kernels.
+FORMULAS = {
+    "power": "clip(P / P_rated, 0, 1) * tolerance(P / P_rated, 0, 1, {POWER_MARGIN:g})",
+    "rotor_speed": "tolerance(W / W_rated, min(W_0, W_rated) / W_rated, 1, {SPEED_MARGIN:g})",
+    "platform_motion": (
+        "tolerance(hypot(theta - theta_0, rate * {TILT_PERIOD:g} / (2 * pi)), 0, 0, radians({tilt:g}))"
+    ),
+    "pitch_travel": "-clip(abs(beta - beta_before) / (beta_rate * control_dt), 0, 1)",
+    "torque_travel": "-clip(abs(Q - Q_before) / (Q_rate * control_dt), 0, 1)",
+    "failure": "-1 if failed else 0",
+}
+OPTIONS = {  # of reset: the value that is taken in place of the drawn one
+    "wind": "wind of the episode, as `build_scene` takes it",
+    "sea": "sea of the episode, as `build_scene` takes it; `None`: still water",
+    "weather_seed": "seed of its turbulence and waves",
+    "offsets": "`{channel: offset}` from the operating point, in the channel's unit, for all drawn ones",
+    "exact_start": "whether the operating point is exact (so where `wind` is given) or interpolated",
+}
+assert set(OPTIONS) == set(Episode._fields) and set(FORMULAS) == set(rewards.TERMS)
+
+
+def turbine():
+    """The turbine that the figures of the page belong to."""
+    return read_turbine(read_platform("oc3_hywind").turbine)
+
+
+def reward_formulas():
+    """{term: its formula as a Python expression}."""
+    values = {name: getattr(rewards, name) for name in ("POWER_MARGIN", "SPEED_MARGIN", "TILT_PERIOD")}
+    return {
+        name: text.format(**values, tilt=rewards.TILT_MARGIN * DEG) for name, text in FORMULAS.items()
+    }
+
+
+def _range(value, unit=""):
+    """A fixed value, or the range (low, high) that an episode draws from, as text."""
+    if not isinstance(value, tuple):
+        return f"{value:g}{unit}" if isinstance(value, int | float) else str(value)
+    return f"{value[0]:g} to {value[1]:g}{unit}"
+
+
+def _weather(spec):
+    """A wind or sea of a task as text."""
+    if spec is None:
+        return "none (still water)"
+    return ", ".join(f"{key} {_range(value)}" for key, value in spec.items())
+
+
+def environments():
+    """Registered names."""
+    return markdown(("name", "class"), [(f"`{name}`", f"`{at}`") for name, at in ENVIRONMENTS.items()])
+
+
+def tasks():
+    """What sets the tasks apart, and what each episode draws."""
+    chosen = list(TASKS.values())
+    rated = turbine().rated_rotor_speed * RPM
+    rows = [
+        ("wind", *(_weather(task.wind) for task in chosen)),
+        ("sea", *(_weather(task.sea) for task in chosen)),
+        ("episode", *(f"{task.duration:g} s" for task in chosen)),
+        ("rotor model", *(task.rotor or "the fidelity's" for task in chosen)),
+        ("reach of the blade pitch", *(_range(task.blade_pitch, " deg") for task in chosen)),
+        (
+            "reach of the set-point",
+            *(_range(tuple(share * rated for share in task.setpoint), " rpm") for task in chosen),
+        ),
+        ("weather seeds", *(f"{task.weather_seeds[0]} to {task.weather_seeds[1] - 1}" for task in chosen)),
+    ]
+    return markdown(("", *(f"`{task.name}`" for task in chosen)), rows)
+
+
+def offsets():
+    """What each task adds to the operating point at the start."""
+    chosen = list(TASKS.values())
+    names = list(dict.fromkeys(name for task in chosen for name in task.offsets))
+    units = {"PtfmSurge": "m", "PtfmSway": "m", "PtfmHeave": "m", "RotSpeed": "rpm"}
+    rows = [
+        (f"`{name}`", units.get(name, "deg"), *(_range(task.offsets.get(name, 0.0)) for task in chosen))
+        for name in names
+    ]
+    return markdown(("channel", "unit", *(f"`{name}`" for name in TASKS)), rows)
+
+
+def actions():
+    """Both actions in each mode."""
+    return action_table(TASKS["full_range"], turbine())
+
+
+def actuators():
+    """Limits between a command and the plant."""
+    machine = turbine()
+    law, drive = machine.torque_law, machine.pitch_drive
+    rows = [
+        (
+            "generator torque",
+            f"0 to {law.max_torque * 1e-3:.3f} kN m",
+            f"{law.max_torque_rate * 1e-3:g} kN m/s",
+        ),
+        (
+            "blade pitch",
+            f"{drive.minimum * DEG:g} to {drive.maximum * DEG:g} deg",
+            f"{drive.rate_limit * DEG:g} deg/s, first-order lag of {drive.time_constant:g} s",
+        ),
+        (
+            "loop of the mode `setpoint`",
+            "as the generator torque",
+            f"PI on rotor speed, {TRACKING_FREQUENCY:g} rad/s, damping ratio {TRACKING_DAMPING:g}",
+        ),
+    ]
+    return markdown(("", "range", "speed"), rows)
+
+
+def observation():
+    """Entries of the tasks' observation."""
+    same = {task.observation for task in TASKS.values()}
+    assert same == {STANDARD}, "tasks that differ in what is seen need a table each"
+    return observation_table(TASKS["above_rated"], turbine())
+
+
+def channels():
+    """Entries of the channels that the tasks leave out."""
+    others = [name for name in KNOWN if name not in STANDARD]
+    machine = turbine()
+    rows = [
+        (
+            f"`{name}`",
+            entry.name,
+            entry.unit,
+            *(f"{value:.4g}" for value in (entry.centre, entry.scale)),
+            *(f"{(end - entry.centre) / entry.scale:.4g}" for end in (entry.low, entry.high)),
+            entry.meaning,
+        )
+        for name in others
+        for entry in entries((name,), machine, PREVIEW)
+    ]
+    return markdown(("channel", "entry", "unit", "centre", "scale", "low", "high", "meaning"), rows)
+
+
+def reward():
+    """Formula, range and weights of each term."""
+    formulas = reward_formulas()
+    rows = [
+        (
+            f"`{name}`",
+            f"`{formulas[name]}`",
+            f"{term.low:g} to {term.high:g}",
+            *(f"{task.weights.get(name, 0.0):g}" for task in TASKS.values()),
+        )
+        for name, term in rewards.TERMS.items()
+    ]
+    return markdown(("term", "formula", "range", *(f"`{name}`" for name in TASKS)), rows)
+
+
+def meanings():
+    """What each term rewards, in words."""
+    return markdown(
+        ("term", "meaning"), [(f"`{name}`", term.meaning) for name, term in rewards.TERMS.items()]
+    )
+
+
+def terminations():
+    """Reasons that end an episode in failure."""
+    limits = {
+        NON_FINITE: "a number of the state is infinite or not a number",
+        CAPSIZED: f"platform pitch beyond +-{CAPSIZE:g} rad ({CAPSIZE * DEG:.0f} deg)",
+        OVERSPEED: f"rotor speed above {turbine().overspeed * RPM:g} rpm (the turbine's `overspeed_rpm`)",
+    }
+    return markdown(
+        ('`info["termination"]`', "when"), [(f"`{REASONS[status]}`", text) for status, text in limits.items()]
+    )
+
+
+def options():
+    """What reset takes as options."""
+    return markdown(("option", "meaning"), [(f"`{name}`", text) for name, text in OPTIONS.items()])
+
+
+TABLES = (
+    environments, tasks, offsets, actions, actuators, observation, channels, reward, meanings, terminations,
+    options,
+)  # fmt: skip
+
+
+def environment_page(text):
+    """The page's text with each marked table as the code gives it now."""
+    made = {table.__name__: table for table in TABLES}
+    found = [match.group(2) for match in MARK.finditer(text)]
+    if sorted(found) != sorted(made):
+        raise ValueError(f"marks {found} are not one for each of {list(made)}")
+    return MARK.sub(lambda match: f"{match.group(1)}\n{made[match.group(2)]()}\n\n{match.group(3)}", text)
+
+
+def cli_page():
+    """The reference of the command line as markdown."""
+    root = typer.main.get_command(app)
+    head = (
+        "# Command line\n\n"
+        "Written by `python docs/tools/reference_pages.py` from the commands;"
+        " `--help` says the same.\n\n"
+        "Exit codes: 0 done; 1 a run stopped, or a check failed; 2 an argument cannot be used; 130"
+        " interrupted.\n"
+    )
+    return head + "".join(_commands(root, "fowt"))
+
+
+def _commands(command, name):
+    """Sections of a command's subcommands, in the order in which they are listed."""
+    for key, inner in command.commands.items():
+        full = f"{name} {key}"
+        if hasattr(inner, "commands"):
+            yield f"\n## `{full}`\n\n{_plain(inner.help)}\n"
+            yield from _commands(inner, full)
+        else:
+            yield _section(inner, full)
+
+
+def _section(command, name):
+    """Heading, purpose, parameters and examples of one command."""
+    level = "##" if name.count(" ") == 1 else "###"
+    arguments = [p for p in command.params if p.param_type_name == "argument"]
+    wanted = "".join(f" {p.name.upper()}" if p.required else f" [{p.name.upper()}]" for p in arguments)
+    lines = [f"\n{level} `{name}`", _plain(command.help), f"```\n{name}{wanted} [OPTIONS]\n```"]
+    rows = [_parameter(p) for p in command.params if p.name != "help"]
+    if rows:
+        lines.append(markdown(("parameter", "default", "meaning"), rows))
+    if command.epilog:
+        lines.append(_examples(command.epilog))
+    return "\n\n".join(lines) + "\n"
+
+
+def _parameter(parameter):
+    """(names, default, meaning) of an option or argument."""
+    if parameter.param_type_name == "argument":
+        names = f"`{parameter.name.upper()}`"
+    else:
+        names = " ".join(f"`{flag}`" for flag in (*parameter.opts, *parameter.secondary_opts))
+    default, pair = parameter.default, parameter.secondary_opts
+    shown = "" if default in (None, []) else f"`{default}`"
+    if getattr(parameter, "is_flag", False):
+        shown = f"`{(parameter.opts if default else pair)[0]}`" if pair else ""
+    return names, shown, _plain(parameter.help or "").replace("|", "\\|")
+
+
+def _examples(epilog):
+    """The coloured examples of a help text as a block of code, and what stands beside them."""
+    lines, rest = [], []
+    for paragraph in epilog.split("\n\n"):
+        text = " ".join(paragraph.split())
+        example = re.fullmatch(r"\[cyan\](.*?)\[/cyan\]\s*(.*)", text)
+        if example:
+            remark = f"  # {_plain(example.group(2))}" if example.group(2) else ""
+            lines.append(_plain(example.group(1)) + remark)
+        elif text != "[bold]Examples[/bold]":
+            rest.append(_plain(text))
+    block = "```bash\n" + "\n".join(lines) + "\n```" if lines else ""
+    return "\n\n".join(part for part in (block, *rest) if part)
+
+
+def _plain(text):
+    """Text without rich's markup."""
+    return " ".join(Text.from_markup(text or "").plain.split())
+
+
+def main():
+    """Write both pages."""
+    page = DOCS / "environment.md"
+    for path, text in ((page, environment_page(page.read_text())), (DOCS / "cli.md", cli_page())):
+        with replacing(path) as target:
+            target.write_text(text)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,50 @@
+"""Fenced blocks of the documentation's pages, for the tests that run them."""
+
+import re
+import shlex
+from pathlib import Path
+from typing import NamedTuple
+
+from typer.testing import CliRunner
+
+from fowt_env import cli
+
+DOCS = Path(__file__).resolve().parent.parent / "docs"
+FENCE = re.compile(r"^```(\w*)(?: title=\"([^\"]+)\")?\n(.*?)^```$", re.S | re.M)
+NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
+
+
+class Block(NamedTuple):
+    """A fenced block: its language, the file it is to be saved as (or ""), its text, the heading above it."""
+
+    language: str
+    file: str
+    text: str
+    heading: str
+
+
+def blocks(page):
+    """Blocks of a page of docs/ in order."""
+    text = (DOCS / page).read_text(encoding="utf-8")
+    found = []
+    for match in FENCE.finditer(text):
+        headings = re.findall(r"^#+ (.*)$", FENCE.sub("", text[: match.start()]), re.M)
+        found.append(Block(match[1], match[2] or "", match[3], headings[-1]))
+    return found
+
+
+def fowt(line):
+    """Run one line of a shell that starts with fowt; it must end well. Returns what it printed."""
+    result = CliRunner().invoke(cli.app, shlex.split(line, comments=True)[1:], env={"COLUMNS": "200"})
+    assert result.exit_code == 0, f"{line}\n{result.stdout}\n{result.stderr}\n{result.exception!r}"
+    return result.stdout
+
+
+def assert_printed(printed, shown, rel=0.02, abs_=0.11):
+    """Raise unless both texts are the same words with nearly the same numbers.
+
+    The pages round to a digit, and another machine's last bits may turn one over.
+    """
+    assert NUMBER.sub("#", printed).split() == NUMBER.sub("#", shown).split(), printed
+    for a, b in zip(NUMBER.findall(printed), NUMBER.findall(shown), strict=True):
+        assert abs(float(a) - float(b)) <= max(abs_, rel * abs(float(b))), printed

@@ -1,0 +1,174 @@
+"""Pages of docs/ that say what the code says, and the site that is built of them."""
+
+import html
+import importlib.util
+import os
+import re
+import subprocess
+import sys
+from math import exp, hypot, log, pi, radians
+
+import gymnasium
+import numpy as np
+import pytest
+from doc_pages import DOCS, FENCE
+
+from fowt_env.description import read_turbine
+from fowt_env.envs.rewards import N_TERMS, TERMS, build_scales, fill_terms
+from fowt_env.envs.tasks import TASKS
+from fowt_env.measurement import N_MEASUREMENTS, Measure
+
+ROOT = DOCS.parent
+
+
+def tool(name):
+    """A module of docs/tools."""
+    spec = importlib.util.spec_from_file_location(name, DOCS / "tools" / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+PAGES = tool("reference_pages")
+AGAIN = "python docs/tools/reference_pages.py writes it anew"
+
+
+def test_the_tables_of_the_environment_page_are_those_of_the_code():
+    text = (DOCS / "environment.md").read_text()
+    assert PAGES.environment_page(text) == text, AGAIN
+
+
+def test_a_table_that_is_not_the_code_s_is_noticed():
+    text = (DOCS / "environment.md").read_text()
+    assert text.count("| -20    |") == 1
+    changed = text.replace("| -20    |", "| -21    |")
+    assert PAGES.environment_page(changed) == text
+    with pytest.raises(ValueError, match="rewards"):
+        PAGES.environment_page(text.replace("from the code: reward -->", "from the code: rewards -->"))
+
+
+def test_the_page_of_the_command_line_is_that_of_the_commands():
+    assert PAGES.cli_page() == (DOCS / "cli.md").read_text(), AGAIN
+
+
+def clip(x, low, high):
+    return min(max(x, low), high)
+
+
+def tolerance(x, low, high, margin):
+    if low <= x <= high:
+        return 1.0
+    distance = low - x if x < low else x - high
+    return exp(log(0.1) * (distance / margin) ** 2)
+
+
+def test_the_printed_reward_formulas_give_what_the_kernels_give():
+    turbine, control_dt = read_turbine("nrel5mw"), 0.1
+    rng = np.random.default_rng(5)
+    law, scales = turbine.torque_law, build_scales(turbine, control_dt)
+    formulas = PAGES.reward_formulas()
+    for _ in range(200):
+        before, now = np.zeros((2, N_MEASUREMENTS))
+        now[Measure.ROTOR_SPEED] = rng.uniform(0.2, 1.8)
+        now[Measure.GENERATOR_TORQUE] = rng.uniform(0.0, 47e3)
+        now[Measure.PLATFORM_PITCH], now[Measure.PLATFORM_PITCH_RATE] = rng.normal(scale=[0.08, 0.02])
+        now[Measure.BLADE_PITCH] = rng.uniform(0.0, 0.5)
+        before[Measure.BLADE_PITCH] = now[Measure.BLADE_PITCH] + rng.normal(scale=0.01)
+        before[Measure.GENERATOR_TORQUE] = now[Measure.GENERATOR_TORQUE] + rng.normal(scale=1e3)
+        reference = np.array([rng.normal(scale=0.05), rng.uniform(0.7, 1.4)])
+        failed = bool(rng.integers(2))
+        names = {
+            "clip": clip, "tolerance": tolerance, "hypot": hypot, "radians": radians, "pi": pi,
+            "min": min, "abs": abs,
+            "P": now[Measure.GENERATOR_TORQUE] * turbine.drivetrain.gear_ratio * now[Measure.ROTOR_SPEED],
+            "P_rated": law.rated_power,
+            "W": now[Measure.ROTOR_SPEED], "W_0": reference[1], "W_rated": turbine.rated_rotor_speed,
+            "theta": now[Measure.PLATFORM_PITCH], "theta_0": reference[0],
+            "rate": now[Measure.PLATFORM_PITCH_RATE],
+            "beta": now[Measure.BLADE_PITCH], "beta_before": before[Measure.BLADE_PITCH],
+            "beta_rate": turbine.pitch_drive.rate_limit,
+            "Q": now[Measure.GENERATOR_TORQUE], "Q_before": before[Measure.GENERATOR_TORQUE],
+            "Q_rate": law.max_torque_rate, "control_dt": control_dt, "failed": failed,
+        }  # fmt: skip
+        terms = np.full(N_TERMS, np.nan)
+        fill_terms(now, before, reference, failed, scales, terms)
+        printed = [eval(formulas[term], {"__builtins__": {}}, names) for term in TERMS]
+        np.testing.assert_allclose(terms, printed, rtol=1e-12, atol=1e-15)
+
+
+def test_the_info_table_has_every_key_and_no_other():
+    section = (DOCS / "environment.md").read_text().partition("\n## Info\n")[2].partition("\n## ")[0]
+    rows = [line.strip("| ").split(" | ") for line in section.splitlines() if line.startswith("| `")]
+    told = {"reset": set(), "step": set(), "step, at a failure": set()}
+    for key, where, _ in rows:
+        name = key.strip("`")
+        names = [f"reward/{term}" for term in TERMS] if name == "reward/<term>" else [name]
+        for place in where.split(", ") if "failure" not in where else [where]:
+            told[place].update(names)
+    env = gymnasium.make("fowt_env/OC3Hywind-v0", task="above_rated").unwrapped
+    assert set(env.reset(seed=1)[1]) == told["reset"]
+    assert set(env.step([0.0, 0.0])[4]) == told["step"]
+    env.reset(seed=1, options={"offsets": {"RotSpeed": 6.0}})
+    assert set(env.step([0.0, 0.0])[4]) == told["step"] | told["step, at a failure"]
+
+
+def test_every_task_is_in_the_reference():
+    text = (DOCS / "environment.md").read_text()
+    assert all(f"`{name}`" in text for name in TASKS)
+
+
+PROSE = ["README.md", "CHANGELOG.md", "CONTRIBUTING.md", "examples/README.md"]
+PROSE += [path.relative_to(ROOT).as_posix() for path in DOCS.rglob("*.md")]
+
+
+@pytest.mark.parametrize("page", PROSE)
+def test_links_between_files_hold(page):
+    text = FENCE.sub("", (ROOT / page).read_text())
+    for target in re.findall(r"\]\(([^)\s]+)\)", re.sub(r"`[^`\n]+`", "", text)):
+        if ":" not in target and not target.startswith("#"):
+            assert ((ROOT / page).parent / target.partition("#")[0]).exists(), f"{page}: {target}"
+
+
+def test_links_out_of_docs_lead_to_the_site_s_own_pages():
+    pytest.importorskip("mkdocs", reason="mkdocs is not installed: the extra `docs` is missing")
+    pytest.importorskip("ziamath")
+    hooks = tool("site_hooks")
+    text = "[a](../README.md#layout) `[b](../README.md)` [c](theory.md) [d](https://x.org)"
+    assert hooks.linked(text, "page.md") == text.replace("../README.md#", "readme.md#")
+    assert hooks.linked("[e](../examples/01_simulate.py)", "page.md") == "[e](examples/01_simulate.md)"
+    assert hooks.linked("[`e`](01_simulate.py)", "examples/index.md") == "[`e`](01_simulate.md)"
+    assert hooks.linked("![f](docs/figures/gust.gif)", "readme.md") == "![f](figures/gust.gif)"
+    assert hooks.linked("[g](../../CONTRIBUTING.md)", "api/envs.md") == "[g](../contributing.md)"
+
+
+def test_docstrings_keep_their_lists_of_names_and_their_signs():
+    pytest.importorskip("griffe", reason="mkdocstrings is not installed: the extra `docs` is missing")
+    as_markdown = tool("docstrings").as_markdown
+    listed = "wind      m/s, as\n          given\nsea, seed still: `x[0]`"
+    assert as_markdown(listed) == "- `wind`: m/s, as given\n- `sea`, `seed`: still: `x[0]`"
+    assert as_markdown("wind      m/s\nRises with height.") == "- `wind`: m/s\n\nRises with height."
+    assert as_markdown("As in\n\n    x[0]") == "As in\n\n    x[0]"
+    for prose in ("A table\nof two lines.\n\nRaises: an error", "u: m/s\nand no list of names"):
+        assert as_markdown(prose) == prose
+    assert as_markdown("a[i] < *b*") == r"a\[i\] &lt; \*b\*"
+
+
+@pytest.mark.slow
+def test_the_site_is_built_without_a_warning_and_needs_no_network(tmp_path):
+    pytest.importorskip("mkdocs", reason="mkdocs is not installed: the extra `docs` is missing")
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--config-file", ".mkdocs.yml"]
+    variables = os.environ | {"NO_MKDOCS_2_WARNING": "1"}
+    done = subprocess.run(
+        [*command, "--site-dir", str(tmp_path)], cwd=ROOT, env=variables, capture_output=True, text=True
+    )
+    assert done.returncode == 0 and "warning" not in done.stderr.lower(), done.stderr
+    pages = list(tmp_path.rglob("*.html"))
+    assert {"index.html", "theory.html", "readme.html", "contributing.html"} <= {page.name for page in pages}
+    for page in pages:
+        text = page.read_text(encoding="utf-8")
+        assert not re.search(r'<(script|img|iframe)[^>]+src="https?:', text), page
+        assert not re.search(r'<link[^>]+rel="(stylesheet|preconnect|icon)"[^>]+href="https?:', text), page
+        assert 'class="arithmatex"' not in text, page  # a formula that was not drawn
+    theory = (tmp_path / "theory.html").read_text(encoding="utf-8")
+    assert theory.count('class="number"') == len(re.findall(r"\\tag\{", (DOCS / "theory.md").read_text()))
+    assert 'aria-label="' + html.escape(r"v = R^T \dot r") + '"' in theory

@@ -1,0 +1,75 @@
+"""The programs and commands of docs/getting-started.md and docs/extending.md do what the pages say."""
+
+import contextlib
+import io
+import re
+import sys
+import tomllib
+
+import pandas as pd
+import pytest
+from doc_pages import DOCS, assert_printed, blocks, fowt
+
+EXTRAS = tomllib.loads((DOCS.parent / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+SETUP = re.compile(r"(python3\.11 -m venv|\. \.venv|pip install)\b")
+
+
+def run_blocks(page_blocks, folder):
+    """Run blocks in order in a folder; text is what the block before it must have printed.
+
+    Files are saved, programs share one namespace.
+    """
+    names, printed = {"__name__": "__main__"}, ""
+    for block in page_blocks:
+        if block.file:
+            (folder / block.file).write_text(block.text)
+        elif block.language == "python":
+            with contextlib.redirect_stdout(io.StringIO()) as out:
+                exec(compile(block.text, f"<{block.heading}>", "exec"), names)
+            printed = out.getvalue()
+        elif block.language == "bash":
+            printed = "".join(fowt(line) for line in block.text.splitlines() if not SETUP.match(line))
+        elif block.language == "text":
+            assert_printed(printed, block.text)
+        else:
+            raise AssertionError(f"a block of {block.language!r} that nobody runs")
+    return names
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """Working folder of the programs, forgotten with what they imported from it."""
+    monkeypatch.chdir(tmp_path)
+    known = set(sys.modules)
+    yield tmp_path
+    for name in set(sys.modules) - known:
+        if getattr(sys.modules[name], "__file__", None) and str(tmp_path) in sys.modules[name].__file__:
+            del sys.modules[name]
+
+
+def test_every_block_of_getting_started_runs(folder):
+    pytest.importorskip("matplotlib", reason="matplotlib is not installed: the extra `plot` is missing")
+    run_blocks(blocks("getting-started.md"), folder)
+    assert (folder / "run.csv").stat().st_size > 1e5 and (folder / "run.png").stat().st_size > 1e4
+    assert (folder / "results" / "first" / "leaderboard.json").exists()
+
+
+def test_every_block_of_extending_runs(folder):
+    run_blocks(blocks("extending.md"), folder)
+    table = pd.read_csv(folder / "results" / "damper" / "results.csv").set_index("controller")
+    assert (table["status"] == "ok").all()
+    swing = table["PtfmPitch_std_[deg]"]
+    assert swing["damper:Damper"] < 0.95 * swing["pi"]  # it damps
+
+
+@pytest.mark.parametrize("page", ["index.md", "environment.md"])
+def test_every_block_of_a_page_runs(folder, page):
+    found = blocks(page)
+    assert found
+    run_blocks(found, folder)
+
+
+@pytest.mark.parametrize("page", ["getting-started.md", "faq.md", "index.md"])
+def test_extras_that_a_page_installs_exist(page):
+    named = re.findall(r"pip install [^\n`]*?\[([\w,]+)\]", (DOCS / page).read_text())
+    assert {extra for group in named for extra in group.split(",")} <= set(EXTRAS)
