@@ -45,7 +45,7 @@ def test_a_run_ends_goes_on_and_its_checkpoint_becomes_a_policy_on_request_only(
         (("train", "--steps", "0"), "steps = 0"),
         (("train", "--set", "reward=1"), "unknown setting 'reward'"),
         (("train", "--resume", "--set", "task=x", "--out", "nowhere"), "keeps its settings"),
-        (("train", "--resume", "--out", "nowhere"), "no checkpoint"),
+        (("train", "--resume", "--out", "nowhere"), "holds no run"),
         (("export-policy", "nowhere", "--out", "p.zip"), "must end with .npz"),
     ],
 )

@@ -217,8 +217,9 @@ class ResultsFolder:
         }
         wanted = json.loads(_json(wanted))
         old = self._manifest()
-        for folder in (self.folder, *self.folder.glob("runs/*/")):
-            remove_leftovers(folder)
+        remove_leftovers(self.folder)
+        for path in self.folder.glob("runs/*/.*.parquet"):  # left by a process that was killed
+            path.unlink(missing_ok=True)
         for path in sorted(self.folder.glob("runs/*/*.parquet")):
             row = read_row(path)
             self.rows[row["controller"], row["case"], row["seed"]] = row

@@ -1,5 +1,7 @@
 """Full-field wind: sampling of a box, its travel, its edges, its averages, and runs in it."""
 
+import struct
+
 import numpy as np
 import pytest
 from scipy.interpolate import RegularGridInterpolator
@@ -173,3 +175,30 @@ def test_the_rotor_table_gets_the_rotor_average_of_a_box():
     scene = fowt_env.build_scene("oc3_hywind", wind=spec, rotor="table")
     assert scene.model.wind_field is None
     assert scene.model.wind.value[:, 0] == pytest.approx(12.0, abs=1e-5)
+
+
+BTS_HEAD = "<h4i12fi"
+SOUND = (8, 2, 2, 0, 1, 140.0, 140.0, 0.1, 12.0, 90.0, 20.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0)
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "message"),
+    [
+        (0, 9, "identifier 9"),
+        (1, 0, "0 x 2 points"),
+        (2, 2**31 - 1, "times of 2 x 2147483647 . 0 points take 25769803834 bytes; it has 94"),
+        (4, 2**31 - 1, "2147483647 times"),
+        (17, -1, "-1 characters"),
+        (7, float("nan"), "nan s"),
+        (11, 0.0, "no scale zero"),
+        (8, 1e30, "speed = 1.0*15.*must be in .1, 100. m"),
+    ],
+)
+def test_a_turbsim_file_whose_head_cannot_be_is_refused_before_it_is_read(tmp_path, place, value, message):
+    pytest.importorskip("openfast_io", reason="openfast_io is not installed")
+    head = list(SOUND)
+    head[place] = value
+    path = tmp_path / "box.bts"
+    path.write_bytes(struct.pack(BTS_HEAD, *head) + np.full(12, 12, "<i2").tobytes())
+    with pytest.raises(InputError, match=f"box.bts.*{message}"):
+        read_box({"kind": "bts", "path": path}, hub_height=90.0, rotor_diameter=126.0)
