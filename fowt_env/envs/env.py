@@ -68,8 +68,8 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     platform     built-in name, path or description.Platform
     rotor        "bem", "lookup" or "table"; None: the task's, or else that of the fidelity
     action_mode  "direct", "setpoint" or "residual", see the table of actions
-    baseline     compiled controller, by name, that the residual mode adds to; lqr goes on from the sum, so that
-                 what is added in every period is an addition to its rates
+    baseline     compiled controller, by name, that the residual mode adds to; lqr goes on from the sum, so
+                 that what is added in every period is an addition to its rates
     observation  channel names in place of the task's; "default" among them stands for the task's
     reward       {term: weight} in place of single weights of the task
     dt           physics step, s (None: that of the scene's integrator); control_dt: time between
