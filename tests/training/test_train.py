@@ -144,12 +144,14 @@ def test_validation_repeats_the_same_episodes_bit_for_bit():
     assert found[0]["rotor_speed_std_[rpm]"][0] != found[0]["rotor_speed_std_[rpm]"][1]
 
 
-def test_the_baseline_is_judged_one_against_itself_and_travel_beyond_it_costs():
+def test_the_baseline_is_judged_one_against_itself_and_more_travel_or_less_power_cost():
     reference = baseline_figures(small("ppo"))
     row = judged(reference, reference)
     assert row["score"] == pytest.approx(1.0) and row["failed"] == 0.0
     busy = reference | {"blade_pitch_travel_[deg/s]": 1.5 * reference["blade_pitch_travel_[deg/s]"]}
     assert judged(busy, reference)["score"] == pytest.approx(2.0)
+    weak = reference | {"shaft_power_mean_[kW]": 0.99 * reference["shaft_power_mean_[kW]"]}
+    assert judged(weak, reference)["score"] == pytest.approx(1.1)
     nothing = {name: np.full_like(values, np.nan) for name, values in reference.items()}
     with pytest.warns(RuntimeWarning):
         assert judged(nothing | {"failed": np.ones(2)}, reference)["score"] == np.inf
