@@ -37,7 +37,7 @@ def test_the_estimated_wind_follows_the_wind_under_actions_of_any_kind():
 def test_without_estimated_channels_there_is_no_estimator_and_with_them_the_plant_is_the_same():
     plain = FowtEnv(action_mode="residual", observation=("rotor_speed",), **QUICK)
     watched = FowtEnv(action_mode="residual", observation=("rotor_speed", *ESTIMATES), **QUICK)
-    assert plain._watch.work is None and plain._run.estimate is None and watched._watch.work is not None
+    assert plain._estimator is None and plain._run.estimate is None and watched._estimator is not None
     plain.reset(seed=2), watched.reset(seed=2)
     for action in actions(40):
         one, reward, *_ = plain.step(action)
