@@ -64,7 +64,7 @@ RIVALS_EXAMPLES = """[bold]Examples[/bold]
 
 [cyan]fowt scores rivals results/rl --against gspi_oc3,rosco_float --out results/rl/scores[/cyan]
 
-[cyan]fowt scores rivals results/rl --group preview=policy:ppo_preview,policy:ppo_preview_seed0[/cyan]
+[cyan]fowt scores rivals results/rl --group preview=policy:ppo_lqr_preview,policy:ppo_lqr_preview_seed1[/cyan]
 
 Each figure: interquartile mean of ratios on the same runs, its 95 % interval, and what that reaches:
 missed, first, then (or met), with * where the whole interval does."""
@@ -91,7 +91,7 @@ def rivals(
 
 CASES_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt evaluate --suite shifted --controllers policy:ppo_measured,gspi_oc3 --out results/shifted[/cyan]
+[cyan]fowt evaluate --suite shifted --controllers policy:ppo_lqr,gspi_oc3 --out results/shifted[/cyan]
 
 [cyan]fowt scores cases results/shifted --out results/shifted/scores[/cyan]  every shifted plant by itself
 
@@ -158,7 +158,7 @@ def bound(
 
 GUST_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt scores gust gust.png --controllers pi,gspi_oc3,rosco_float,lqr,policy:ppo_measured[/cyan]"""
+[cyan]fowt scores gust gust.png --controllers pi,gspi_oc3,rosco_float,lqr,policy:ppo_lqr[/cyan]"""
 
 
 @scores.command(epilog=GUST_EXAMPLES)

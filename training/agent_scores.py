@@ -1,6 +1,6 @@
 """How agents compare with rivals on the same runs: interquartile mean of ratios, with 95 % intervals.
 
-    fowt evaluate --controllers policy:ppo_measured,gspi_oc3,rosco_float --seeds 1:6:1 --out results/rl
+    fowt evaluate --controllers policy:ppo_lqr,gspi_oc3,rosco_float --seeds 1:6:1 --out results/rl
     fowt scores rivals results/rl --against gspi_oc3,rosco_float
 
 Each ratio is of one metric of an agent over that of a rival in the same wind and waves. Several training

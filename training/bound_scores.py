@@ -1,6 +1,6 @@
 """How much of what the linear bound allows a controller reaches, per wind speed.
 
-    fowt scores bound results/rl --group preview=policy:ppo_preview,policy:ppo_preview_seed0 --plot front.png
+    fowt scores bound results/rl --group agents=policy:ppo_lqr,policy:ppo_lqr_seed1 --plot front.png
 
 The bound (training/linear_bound.py) holds for linear feedback at the blade-pitch travel and power deviation
 of gspi_oc3: a controller that spends more of either is not bound by it, and is marked.

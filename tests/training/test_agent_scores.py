@@ -97,8 +97,8 @@ def test_each_controller_stands_with_what_it_is_told():
     assert told("gspi_oc3") == "measured"
     assert told("lqr") == "measured, plant_model"
     assert told("rosco_float") == "measured, wind_speed, plant_model"
-    assert told("policy:ppo_measured") == "measured"
-    assert told("policy:ppo_preview") == "measured, wind_speed, wind_preview"
+    assert told("policy:ppo_lqr") == "measured, plant_model"
+    assert told("policy:ppo_lqr_preview") == "measured, plant_model, wind_speed, wind_preview"
     assert told("my_module:Mine") == told("policy:gone.npz") == told("mine") == ""
 
 
