@@ -231,7 +231,7 @@ class Samples:
         from controllers.policy import AGENTS, PolicyController
 
         path = self.folder / "policy.npz"
-        shutil.copy(AGENTS / "ppo_preview.npz", path)
+        shutil.copy(AGENTS / "ppo_lqr_preview.npz", path)
 
         def load(path=path):
             return PolicyController(path, self.turbine, 0.1, "policy")

@@ -76,7 +76,7 @@ def mark(tmp_path):
 def test_a_pickled_array_in_a_policy_is_not_loaded(tmp_path, mark):
     path = tmp_path / "bomb.npz"
     bomb = np.array([Bomb(mark)], dtype=object)
-    with np.load(AGENTS / "ppo_measured.npz") as file:
+    with np.load(AGENTS / "ppo_lqr.npz") as file:
         np.savez(path, **{name: file[name] for name in file.files if name != "mean"}, mean=bomb)
     with pytest.raises(InputError, match="bomb.npz.*holds pickled objects, which are not loaded"):
         read_policy(path)
