@@ -216,6 +216,9 @@ def place_legend(figure, places, used):
     """The legend in the first spare place of a grid, or below it; the spare places emptied."""
     for axes in places[used:]:
         axes.set_axis_off()
+    columns = places[0].get_subplotspec().get_gridspec().ncols
+    for axes in places[max(0, used - columns) : used]:  # above a spare place, too
+        axes.tick_params(labelbottom=True)
     handles, labels = places[0].get_legend_handles_labels()
     if len(places) > used:
         places[used].legend(handles, labels, fontsize=8, frameon=False, loc="center")
