@@ -24,7 +24,7 @@ from fowt_env.records import (
 from fowt_env.textfiles import DATA, locate, raise_problems, read_toml
 
 STANDARD_GRAVITY = 9.80665  # m/s2
-LOWEST_WAVE = 1e-6  # m; a spectrum of less, but not of nothing, would underflow
+LOWEST_WAVE = 1e-9  # m; a spectrum of less, but not of nothing, would underflow
 
 SEA_KEYS = {  # kind -> (required keys, optional keys); the common keys may be given with every kind
     "still": ((), ()),
