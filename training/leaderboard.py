@@ -11,6 +11,7 @@ from training.bootstrap import LEVEL, RESAMPLES, interval, resample_weights
 from training.metrics import METRICS
 
 BASELINES = ("gspi_oc3", "pi")  # the first of these that was evaluated, unless one is named
+MOST_OF_REFERENCE = 1e6  # a difference of more than this many times the baseline's own value has no percentage
 METHOD = (
     "percentile bootstrap over seeds, each with all its cases, widened for n seeds by sqrt(n/(n-1)) and by"
     " Student's t with n-1 degrees of freedom over the normal; every case counts alike; differences are"
@@ -138,8 +139,9 @@ def _entry(values, base, runs, failed, weights):
     gap, gap_low, gap_high = _figures(values - base, weights)
     # the baseline over the same runs, so that a failed run does not shift it
     reference = _figures(np.where(pairs, base, np.nan), np.ones((1, weights.shape[1])))[0]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        percent = np.where(np.abs(reference) > 0.0, 100.0 * gap / np.abs(reference), np.nan)
+    # a share of nothing, or of what rounding left of nothing, says nothing
+    measured = np.abs(gap) < MOST_OF_REFERENCE * np.abs(reference)
+    percent = 100.0 * np.divide(gap, np.abs(reference), out=np.full_like(gap, np.nan), where=measured)
     return {
         "runs": int(runs.sum()),
         "failed": int(failed.sum()),

@@ -75,6 +75,12 @@ def test_a_failed_run_leaves_its_pair_out_and_is_counted():
     assert found["difference"][STD]["percent"] == pytest.approx(100.0)  # of the baseline's same run
 
 
+def test_a_share_of_what_rounding_left_of_nothing_is_not_given():
+    figures = {("pi", "a", 1): 1e-143, ("x", "a", 1): 0.01, ("pi", "a", 2): 3e-320, ("x", "a", 2): 0.01}
+    gap = entry(leaderboard(table(figures)), "x")["difference"][STD]
+    assert gap["mean"] == pytest.approx(0.01) and not np.isfinite(np.float64(gap["percent"] or np.nan))
+
+
 def test_a_controller_without_a_finished_run_has_no_figures_and_harms_no_other():
     figures = {("pi", "a", 1): 1.0, ("pi", "a", 2): 3.0, ("x", "a", 1): None, ("x", "a", 2): None}
     board = leaderboard(table(figures))
