@@ -11,7 +11,7 @@ from training.bootstrap import LEVEL, RESAMPLES, interval, resample_weights
 from training.metrics import METRICS
 
 BASELINES = ("gspi_oc3", "pi")  # the first of these that was evaluated, unless one is named
-MOST_OF_REFERENCE = 1e6  # a difference of more than this many times the baseline's own value has no percentage
+MOST_OF_REFERENCE = 1e6  # larger differences, as multiples of the baseline's own value, get no percentage
 METHOD = (
     "percentile bootstrap over seeds, each with all its cases, widened for n seeds by sqrt(n/(n-1)) and by"
     " Student's t with n-1 degrees of freedom over the normal; every case counts alike; differences are"
