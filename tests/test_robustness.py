@@ -1,5 +1,7 @@
 """What must not break whatever is asked of the plant; `fowt benchmark stability` has the full counts."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from naive import rigid_body
@@ -17,6 +19,8 @@ from training import (
     stability_map,
     stability_plain,
 )
+
+FOUND = Path(__file__).parent / "reference" / "stability"
 
 
 def keeps_the_margin(name, integrator, duration):
@@ -60,6 +64,11 @@ def test_many_random_scenes_and_states_of_every_fidelity_stay_finite_and_bounded
     plants = ("standard", "fast", "standard", "standard", "reference")
     # `fowt benchmark stability --cases N` runs more
     assert no_failure(stability_cases.random_cases(500, seed=12, plants=plants))
+
+
+@pytest.mark.parametrize("case", sorted(FOUND.glob("*.json")), ids=lambda path: path.stem)
+def test_cases_that_once_broke_the_bounds_keep_them(case):
+    assert stability_cases.replay(case).failure == ""
 
 
 @pytest.mark.slow
