@@ -34,13 +34,18 @@ def _source_hash():
     return digest.hexdigest()[:16]
 
 
-def cache_root():
-    """Folder that holds the compiled kernels (FOWT_CACHE_DIR, else the user's cache folder)."""
-    given = os.environ.get("FOWT_CACHE_DIR")
+def user_folder(own, base, usual):
+    """Folder that the environment variable own names; else fowt_env in that of base, or in usual at home."""
+    given = os.environ.get(own)
     if given:
         return Path(given)
-    base = os.environ.get("XDG_CACHE_HOME")
-    return (Path(base) if base else Path.home() / ".cache") / "fowt_env"
+    shared = os.environ.get(base)
+    return (Path(shared) if shared else Path.home() / usual) / "fowt_env"
+
+
+def cache_root():
+    """Folder that holds the compiled kernels (FOWT_CACHE_DIR, else the user's cache folder)."""
+    return user_folder("FOWT_CACHE_DIR", "XDG_CACHE_HOME", ".cache")
 
 
 def _use_cache_folder():

@@ -204,16 +204,18 @@ def plot_bound(table, names, points=None, path=None, title=None):
     if points is not None:
         bar = figure.colorbar(drawn, ax=places, pad=0.01)
         bar.set_label("blade-pitch travel over that of gspi_oc3", fontsize=8)
-    place_legend(figure, places, len(winds))
+    return finish_bound(figure, places, len(winds), path, title)
+
+
+def finish_bound(figure, places, used, path, title):
+    """The Figure of a grid of deviations over those of gspi_oc3, completed and written to path.
+
+    Labels, title and a legend in the first spare place, or above the grid; other spare places are emptied.
+    """
     figure.supxlabel("rotor-speed deviation over that of gspi_oc3", fontsize=9, color=INK)
     figure.supylabel("platform-pitch deviation over that of gspi_oc3", fontsize=9, color=INK)
     if title:
         figure.suptitle(title, fontsize=10, color=INK)
-    return save_figure(figure, path)
-
-
-def place_legend(figure, places, used):
-    """The legend in the first spare place of a grid, or below it; the spare places emptied."""
     for axes in places[used:]:
         axes.set_axis_off()
     columns = places[0].get_subplotspec().get_gridspec().ncols
@@ -225,3 +227,4 @@ def place_legend(figure, places, used):
     else:
         columns = 1 if used == 1 else 3
         figure.legend(handles, labels, loc="outside upper center", ncols=columns, fontsize=8, frameon=False)
+    return save_figure(figure, path)

@@ -5,7 +5,7 @@ As in plots.py every function returns a matplotlib Figure and, if given a path, 
 
 from fowt_env.errors import InputError
 from fowt_env.plots import COLOURS, INK, TIME, named_runs, new_figure, save_figure, style_axes
-from fowt_env.plots_design import WIND, place_legend
+from fowt_env.plots_design import WIND, finish_bound
 
 MARKS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*", "p", "h")
 FRONTS = (("full", "-", "the linear bound"), ("measured", "--", "the same, measured channels"))
@@ -66,12 +66,7 @@ def plot_shares(fractions, bound, path=None, title=None):
         axes.set_title(f"{wind:g} m/s", fontsize=9, color=INK)
         axes.set_xlim(0.0, FRAME)
         axes.set_ylim(0.0, FRAME)
-    place_legend(figure, places, len(winds))
-    figure.supxlabel("rotor-speed deviation over that of gspi_oc3", fontsize=9, color=INK)
-    figure.supylabel("platform-pitch deviation over that of gspi_oc3", fontsize=9, color=INK)
-    if title:
-        figure.suptitle(title, fontsize=10, color=INK)
-    return save_figure(figure, path)
+    return finish_bound(figure, places, len(winds), path, title)
 
 
 def _marks(axes, rows, colour, mark, beyond):

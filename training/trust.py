@@ -10,7 +10,8 @@ import hashlib
 import hmac
 import os
 import secrets
-from pathlib import Path
+
+from fowt_env.jit import user_folder
 
 SEAL = "seal.txt"
 KEY = "checkpoint_key"
@@ -19,11 +20,7 @@ KEY_BYTES = 32
 
 def config_folder():
     """Folder of what belongs to the user and not to a run."""
-    given = os.environ.get("FOWT_CONFIG_DIR")
-    if given:
-        return Path(given)
-    base = os.environ.get("XDG_CONFIG_HOME")
-    return (Path(base) if base else Path.home() / ".config") / "fowt_env"
+    return user_folder("FOWT_CONFIG_DIR", "XDG_CONFIG_HOME", ".config")
 
 
 def _key():
