@@ -255,7 +255,7 @@ class ResultsFolder:
                 f"has format {old.get('format') if isinstance(old, dict) else None}, not {FORMAT}"
             )
         for key, kind in MANIFEST.items():
-            if not isinstance(old.get(key), kind):
+            if key not in old or not isinstance(old[key], kind):  # a suite may be null, not absent
                 raise self._refused(f"has a manifest.json without a sound {key!r}")
         sound = all(type(seed) is int for seed in old["seeds"])
         if not sound or not all(isinstance(case, dict) for case in old["cases"].values()):

@@ -152,6 +152,20 @@ def test_a_manifest_of_another_format_is_refused(tmp_path, content):
     assert (tmp_path / "manifest.json").read_text() == content
 
 
+@pytest.mark.parametrize("key", results.MANIFEST)
+def test_a_manifest_that_lacks_a_key_is_refused_by_its_name(tmp_path, key):
+    settings = {"suite": None, "options": {}, "cases": {}, "seeds": [], "controllers": {}}
+    with results.open_results(tmp_path, settings, ["controller"]):
+        pass
+    path = tmp_path / "manifest.json"
+    manifest = json.loads(path.read_text())
+    del manifest[key]
+    path.write_text(json.dumps(manifest))
+    with pytest.raises(InputError, match=f"without a sound '{key}'"):
+        with results.open_results(tmp_path, settings, ["controller"]):
+            pass
+
+
 def test_a_folder_in_use_and_a_file_are_refused(tmp_path):
     settings = {"suite": None, "options": {}, "cases": {}, "seeds": [], "controllers": {}}
     with results.open_results(tmp_path / "a", settings, COLUMNS):
