@@ -37,6 +37,7 @@ from fowt_env.loads.rotor import (
     hub_flow,
     rotor_load,
 )
+from fowt_env.prefetch import prefetch
 from fowt_env.state import State, Wrench
 from fowt_env.weather.wind import LOWEST_HEIGHT, wind_at
 
@@ -250,6 +251,76 @@ def _sheared_force(pose, hub, blade, now, series, profile, low, high, share, rad
 
 
 @kernel
+def _across(velocity, slice_now, row, column, component, p, q, r, d):
+    """A component of the wind within a slice, from the corners of a cell with their weights."""
+    above, beside = row + np.uintp(1), column + np.uintp(1)
+    return (
+        p * velocity[slice_now, row, column, component]
+        + q * velocity[slice_now, row, beside, component]
+        + r * velocity[slice_now, above, column, component]
+        + d * velocity[slice_now, above, beside, component]
+    )
+
+
+@kernel
+def _field_force(t, pose, hub, blade, field, low, high, share, radii, arm):
+    """BladeForce in a box of wind, station by station without branches; not valid where the blade leaves the
+    box or the table.
+
+    Along a blade the place in the grid is linear in the radius, so that its ends tell whether all of it lies
+    inside.
+    """
+    velocity = field.velocity
+    s0 = (t + field.shift - hub.X * field.slowness) * field.rate
+    if field.periodic:
+        s0 = s0 % velocity.shape[0]
+    s1 = -blade.rx * field.slowness * field.rate
+    y0, y1 = (hub.Y - field.low_y) * field.inverse_dy, blade.ry * field.inverse_dy
+    z0, z1 = (hub.Z - field.low_z) * field.inverse_dz, blade.rz * field.inverse_dz
+    root, tip = radii[0], radii[radii.shape[0] - 1]
+    inside = (
+        min(s0 + s1 * root, s0 + s1 * tip) >= 0.0
+        and max(s0 + s1 * root, s0 + s1 * tip) < velocity.shape[0] - 1.0
+        and min(y0 + y1 * root, y0 + y1 * tip) >= 0.0
+        and max(y0 + y1 * root, y0 + y1 * tip) < velocity.shape[2] - 1.0
+        and min(z0 + z1 * root, z0 + z1 * tip) >= 0.0
+        and max(z0 + z1 * root, z0 + z1 * tip) < velocity.shape[1] - 1.0
+    )
+    force_n = force_t = moment_n = moment_t = 0.0
+    if not inside:
+        return BladeForce(force_n, force_t, moment_n, moment_t, False)
+    one = np.uintp(1)  # indices without sign are not tested for counting from the end
+    outside = 0
+    for j in range(radii.shape[0]):
+        radius = radii[j]
+        s, y, z = s0 + s1 * radius, y0 + y1 * radius, z0 + z1 * radius
+        slice_now, row, column = np.uintp(s), np.uintp(z), np.uintp(y)
+        late, up, left = s - float(slice_now), z - float(row), y - float(column)
+        slice_next = slice_now + one
+        # in a long box every new slice lies in memory that the processor does not expect to be read
+        prefetch(velocity, slice_next + one, row, column)
+        prefetch(velocity, slice_next + one, row + one, column)
+        p, q = (1.0 - up) * (1.0 - left), (1.0 - up) * left
+        r, d = up * (1.0 - left), up * left
+        rest = 1.0 - late
+        u = rest * _across(velocity, slice_now, row, column, 0, p, q, r, d)
+        v = rest * _across(velocity, slice_now, row, column, 1, p, q, r, d)
+        w = rest * _across(velocity, slice_now, row, column, 2, p, q, r, d)
+        u += late * _across(velocity, slice_next, row, column, 0, p, q, r, d)
+        v += late * _across(velocity, slice_next, row, column, 1, p, q, r, d)
+        w += late * _across(velocity, slice_next, row, column, 2, p, q, r, d)
+        v_normal = pose.r11 * u + pose.r21 * v + pose.r31 * w - hub.vx - radius * blade.normal_rate
+        v_tangential = blade.tangential + radius * blade.spin - (blade.tx * u + blade.ty * v + blade.tz * w)
+        outside += 0 if v_normal > 0.0 and v_normal + abs(v_tangential) < LARGEST_SPEED else 1
+        fn, ft = _station_force(v_normal, v_tangential, j, low, high, share)
+        force_n += fn
+        force_t += ft
+        moment_n += arm[j] * fn
+        moment_t += arm[j] * ft
+    return BladeForce(force_n, force_t, moment_n, moment_t, outside == 0)
+
+
+@kernel
 def _sampled_force(t, pose, hub, blade, now, series, field, blade_pitch, low, high, share, table, counters):
     """BladeForce with the wind sampled station by station, and the exact solution outside the table."""
     elements = table.elements
@@ -320,6 +391,8 @@ def rotor_lookup_load(t, pose, x, now, series, field, table, counters):
             force = _sheared_force(
                 pose, hub, blade, now, series, profile, low, high, share, table.radius, table.arm
             )
+        elif field is not None:
+            force = _field_force(t, pose, hub, blade, field, low, high, share, table.radius, table.arm)
         if not force.valid:
             force = _sampled_force(
                 t, pose, hub, blade, now, series, field, blade_pitch, low, high, share, table, counters

@@ -9,13 +9,17 @@ from numba import config, njit
 from fowt_env.counters import N_COUNTERS
 from fowt_env.description import read_turbine
 from fowt_env.loads.blade_elements import blade_section, build_blade_elements
-from fowt_env.loads.rotor import NO_ROTOR_LOAD, rotor_load
+from fowt_env.loads.rotor import NO_ROTOR_LOAD, hub_flow, rotor_load
 from fowt_env.loads.rotor_lookup import (
     AHEAD,
     BEHIND,
     COARSE_END,
     DENSE_START,
+    _blade,
+    _field_force,
+    _pitch_row,
     _profile,
+    _sampled_force,
     _shear,
     _station_force,
     build_section_table,
@@ -245,18 +249,60 @@ def test_near_the_sea_and_far_from_it_the_wind_is_sampled_station_by_station():
         assert quick[0, 6:] == pytest.approx(exact[0, 6:], rel=1e-3)
 
 
-def test_full_field_wind_is_sampled_at_every_station():
+def rough_field(periodic):
     """A rough box: 2 m/s of white noise at every grid point, so that each station has its own wind."""
-    rng = np.random.default_rng(4)
     mean = np.array([15.0, 0.0, 0.0], dtype=np.float32)
+    rng = np.random.default_rng(4)
     velocity = mean + rng.normal(0.0, 2.0, (60, 19, 19, 3)).astype(np.float32)
-    field = WindField(velocity, 2.0, 10.0, 1.0 / 15.0, -90.0, 10.0, 0.1, 0.1, True)
+    return WindField(velocity, 2.0, 10.0, 1.0 / 15.0, -90.0, 10.0, 0.1, 0.1, periodic)
+
+
+def test_full_field_wind_is_sampled_at_every_station():
+    field = rough_field(True)
     states, winds = operating(2000)
     exact, quick = both(states, winds, field=field)
     uniform, _ = both(states, winds)
     rms = np.sqrt(np.mean((quick - exact) ** 2, axis=0)) / exact.std(axis=0)
     assert rms[6] < 5e-4 and rms[7] < 5e-4
     assert np.abs(uniform - exact)[:, 6].mean() > 0.1 * exact[:, 6].std()  # the box does replace the series
+
+
+@njit
+def blades(states, times, series, field, table, counters, quick, plain):
+    """(n, 5) each: the sums over a blade without branches and one station at a time; the last: valid."""
+    elements = table.elements
+    for i in range(states.shape[0]):
+        x, t = states[i], times[i]
+        now, pose = wind_now(t, series), pose_of(x)
+        hub = hub_flow(t, pose, now, series, field, elements.overhang, elements.hub_height)
+        blade = _blade(x[State.AZIMUTH], x[State.ROTOR_SPEED], pose, hub)
+        row = _pitch_row(x[State.BLADE_PITCH])
+        k = int(row)
+        low, high, share = table.load[k], table.load[k + 1], row - k
+        a = _field_force(t, pose, hub, blade, field, low, high, share, table.radius, table.arm)
+        b = _sampled_force(
+            t, pose, hub, blade, now, series, field, x[State.BLADE_PITCH], low, high, share, table, counters
+        )
+        for out, force in ((quick, a), (plain, b)):
+            out[i, 0], out[i, 1] = force.force_n, force.force_t
+            out[i, 2], out[i, 3], out[i, 4] = force.moment_n, force.moment_t, 1.0 if force.valid else 0.0
+
+
+@pytest.mark.parametrize("periodic", [False, True])
+def test_a_blade_inside_its_box_gets_the_sums_of_its_stations_one_by_one(periodic):
+    """And one that reaches beyond the grid, the ends of the box or the table says so."""
+    field, rng = rough_field(periodic), np.random.default_rng(5)
+    states, _ = operating(3000)
+    series, times = series_of([15.0, 0.0, 0.0, 0.0, 0.0]), rng.uniform(-20.0, 70.0, 3000)
+    states[::10, State.SWAY] += 60.0
+    states[1::10, State.VX] += 40.0
+    quick, plain = np.zeros((3000, 5)), np.zeros((3000, 5))
+    blades(states, times, series, field, TABLE, np.zeros(N_COUNTERS), quick, plain)
+    valid = quick[:, 4] == 1.0
+    assert (0.75 if periodic else 0.2) < valid.mean() < (0.9 if periodic else 0.5)
+    assert not valid[1::10].any()
+    size = np.abs(plain[:, :4]).max(axis=0)
+    assert np.abs(quick - plain)[valid, :4].max(axis=0) == pytest.approx(0.0 * size, abs=1e-11 * size.min())
 
 
 @pytest.mark.parametrize("name", ["blade_pitch", "rotor_speed", "vx", "wy", "azimuth", "heave"])
@@ -303,25 +349,31 @@ from fowt_env.loads.blade_elements import build_blade_elements
 from fowt_env.loads.rotor_lookup import SectionTable, rotor_lookup_load
 from fowt_env.state import pose_of
 from fowt_env.weather.wind import make_series, wind_now
+from fowt_env.weather.wind_field import WindField
 
 given = np.load(sys.argv[1])
+field = WindField(given["velocity"], 2.0, 10.0, 1.0 / 15.0, -90.0, 10.0, 0.1, 0.1, True)
 rotor = build_blade_elements(read_turbine("nrel5mw"), 1.225)
 table = SectionTable(given["load"], rotor.radius, rotor.moment_weight / rotor.weight, rotor)
 for x, row in zip(given["states"], given["winds"]):
     series = make_series(
         [0.0], [row], reference_height=90.0, reference_length=126.0, shear_exponent=0.14
     )
-    load = rotor_lookup_load(
-        0.0, pose_of(x), x, wind_now(0.0, series), series, None, table, np.zeros(8)
-    )
-    print(*[repr(float(value)) for value in (*load.wrench, load.thrust, load.torque)])
+    for box in (None, field):
+        load = rotor_lookup_load(
+            0.0, pose_of(x), x, wind_now(0.0, series), series, box, table, np.zeros(8)
+        )
+        print(*[repr(float(value)) for value in (*load.wrench, load.thrust, load.torque)])
 """
 
 
 def test_plain_python_gives_the_same_loads(tmp_path):
     states, winds = operating(6)
     states[5, State.ROTOR_SPEED] = 0.2
-    np.savez(tmp_path / "given.npz", load=TABLE.load, states=states, winds=winds)
+    field = rough_field(True)
+    np.savez(
+        tmp_path / "given.npz", load=TABLE.load, states=states, winds=winds, velocity=field.velocity
+    )
     run = subprocess.run(
         [sys.executable, "-c", PLAIN, str(tmp_path / "given.npz")],
         env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
@@ -330,5 +382,5 @@ def test_plain_python_gives_the_same_loads(tmp_path):
         check=True,
     )
     plain = np.array([[float(value) for value in line.split()] for line in run.stdout.splitlines()])
-    compiled = both(states, winds)[1]
+    compiled = np.stack([both(states, winds, field=box)[1] for box in (None, field)], axis=1).reshape(12, -1)
     assert plain == pytest.approx(compiled, rel=1e-9, abs=1e-9 * np.abs(compiled).max())
