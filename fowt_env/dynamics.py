@@ -99,7 +99,7 @@ N_KEPT = 41
 
 
 class Work(NamedTuple):
-    """Scratch of one plant. lines, counters, kept and history carry over between calls."""
+    """Scratch of one plant. lines, counters, kept, history and samples carry over between calls."""
 
     lines: np.ndarray  # (n_lines, 6) mooring warm start and results
     counters: np.ndarray  # (N_COUNTERS,)
@@ -109,6 +109,7 @@ class Work(NamedTuple):
     stages: np.ndarray  # (5, n_state) Runge-Kutta stages and stage state
     kept: np.ndarray  # (N_KEPT + room,), room of the user's loads (loads.own.room_of)
     history: np.ndarray  # (4, n_state) derivatives of past steps, latest first
+    samples: np.ndarray  # (4 integrators.Gusts.samples, 7) rotor loads within past steps, latest first
 
 
 class Loads(NamedTuple):

@@ -1,23 +1,38 @@
 """Fixed-step integrators of one plant. A scene's `multistep` part chooses: None is classical Runge-Kutta.
 
 The blade pitch follows its own first-order law exactly within a step (constant command), so the
-stiffest part of the plant does not limit the multistep methods.
+stiffest part of the plant does not limit the multistep methods. Nor does the rotor in a box of wind, whose
+blades pass a cell of the grid in a tenth of a second: its load alone is evaluated several times a step
+(Gusts), everything else once.
 """
 
 from math import exp
 from typing import NamedTuple
 
-from fowt_env.dynamics import Kept, attitude_rate, derivative, evaluate, respond
+import numpy as np
+
+from fowt_env.dynamics import Kept, accelerate, attitude_rate, derivative, evaluate, respond, rotor_part
 from fowt_env.errors import unknown
 from fowt_env.jit import inlined_kernel, kernel
 from fowt_env.loads.drivetrain import followed_pitch, limited
-from fowt_env.state import State
+from fowt_env.loads.morison import StripLoad
+from fowt_env.state import NO_LOAD, State, Wrench, pose_in
+from fowt_env.weather.wind import wind_now
 
 INTEGRATORS = ("rk4", "heun", "abm4", "ab4")
 START_STEPS = 3  # steps before four past derivatives exist
 # rad of blade pitch (30.4 deg) beyond which the lift of a free rotor's blades works against its speed: up to
 # 4.5 1/s in 70 m/s, where Adams-Bashforth alone is stable to 0.3 over that and the corrected method to 1.3
 FEATHERING = 0.53
+BASHFORTH = (55.0 / 24.0, -59.0 / 24.0, 37.0 / 24.0, -9.0 / 24.0)  # Adams-Bashforth 4, latest first
+N_SAMPLE = 7  # of a sample of the rotor's load: its wrench and its torque
+
+
+class Gusts(NamedTuple):
+    """How the rotor's load is followed within a step of Adams-Bashforth 4, see follow_rotor."""
+
+    samples: int  # evaluations of the rotor's load per step, evenly spaced from the step's beginning
+    weight: np.ndarray  # (4 samples,) of the samples, latest first
 
 
 class Multistep(NamedTuple):
@@ -25,15 +40,40 @@ class Multistep(NamedTuple):
 
     heun: bool  # explicit trapezoid, two evaluations a step
     corrector: bool  # Adams-Bashforth-Moulton in PECE form, two evaluations; else predictor alone, one
+    gusts: object = None  # Gusts, or None: the rotor's load is evaluated once per step like all others
 
 
-def build_integrator(name):
-    """Multistep part of an integrator's name, None for "rk4". Raises: InputError for an unknown name."""
+def build_gusts(samples):
+    """Gusts of a number of samples per step, None for one.
+
+    The weights are those of Adams-Bashforth 4 in `samples` shorter steps, less those of one step of it, so
+    that a load that varies slowly is left alone.
+    """
+    if samples == 1:
+        return None
+    weight = np.zeros(4 * samples)
+    for latest in range(samples):  # of each short step, counted back from the last
+        weight[latest : latest + 4] += np.array(BASHFORTH) / samples
+    weight[samples - 1 :: samples] -= BASHFORTH
+    return Gusts(samples, weight)
+
+
+def rotor_samples(multistep):
+    """Rows per step that a Multistep (or None) keeps of the rotor's load: none where it is evaluated once."""
+    return 0 if multistep is None or multistep.gusts is None else multistep.gusts.samples
+
+
+def build_integrator(name, rotor_samples=1):
+    """Multistep part of an integrator's name, None for "rk4".
+
+    rotor_samples  evaluations of the rotor's load per step; more than one with "ab4" alone
+    Raises: InputError for an unknown name.
+    """
     if name not in INTEGRATORS:
         raise unknown("integrator", name, INTEGRATORS)
     if name == "rk4":
         return None
-    return Multistep(name == "heun", name == "abm4")
+    return Multistep(name == "heun", name == "abm4", build_gusts(rotor_samples) if name == "ab4" else None)
 
 
 @inlined_kernel
@@ -136,12 +176,80 @@ def feathering(x, scene):
     return x[State.BLADE_PITCH] > FEATHERING and not scene.body.rotor_held
 
 
+@kernel
+def sample_rotor(t, x, u, dt, scene, gusts, work):
+    """Put the rotor's loads within the step from t into work.samples, latest first, before those of the past.
+
+    Between the ends of the step the state is extrapolated from the last two derivatives: to second order,
+    while the platform hardly moves and the blades turn by 7 deg. Without gusts nothing is done.
+    """
+    if gusts is None:
+        return
+    samples, kept, history, between = work.samples, work.kept, work.history, work.stages[2]
+    n = gusts.samples
+    for k in range(samples.shape[0] - 1, n - 1, -1):
+        for i in range(N_SAMPLE):
+            samples[k, i] = samples[k - n, i]
+    for i in range(6):
+        samples[n - 1, i] = kept[Kept.ROTOR + i]
+    samples[n - 1, 6] = kept[Kept.TORQUE]
+    past = 0 if kept[Kept.STEPS] < 1.0 else 1
+    for part in range(1, n):
+        after = part * dt / n
+        bend = 0.5 * after * after / dt
+        for i in range(x.shape[0]):
+            between[i] = x[i] + after * history[0, i] + bend * (history[0, i] - history[past, i])
+        between[State.BLADE_PITCH] = pitch_after(x[State.BLADE_PITCH], u[1], after, scene.actuator)
+        aero = rotor_part(
+            t + after, pose_in(between, scene.body.plane), between, wind_now(t + after, scene.wind),
+            scene.wind, scene.wind_field, scene.rotor, scene.rotor_lookup, scene.rotor_table, scene.skew,
+            scene.wake, work.stages[3], work.counters,
+        )  # fmt: skip
+        row = samples[n - 1 - part]
+        row[0], row[1], row[2] = aero.wrench.fx, aero.wrench.fy, aero.wrench.fz
+        row[3], row[4], row[5] = aero.wrench.mx, aero.wrench.my, aero.wrench.mz
+        row[6] = aero.torque
+
+
+@kernel
+def follow_rotor(dt, scene, gusts, work, y):
+    """Add to the velocities y at the end of a step what sample_rotor found within it; without gusts nothing.
+
+    To the velocities of Adams-Bashforth 4 comes the difference that short steps of it make to the impulse of
+    the rotor's load: dt M^-1 (sum of weight times sample), with the mass matrix of the step's beginning.
+    """
+    if gusts is None:
+        return
+    samples, weight = work.samples, gusts.weight
+    fx = fy = fz = mx = my = mz = torque = 0.0
+    for k in range(samples.shape[0]):
+        share = weight[k]
+        fx += share * samples[k, 0]
+        fy += share * samples[k, 1]
+        fz += share * samples[k, 2]
+        mx += share * samples[k, 3]
+        my += share * samples[k, 4]
+        mz += share * samples[k, 5]
+        torque += share * samples[k, 6]
+    kept, extra, still = work.kept, work.stages[3], work.stages[2]
+    for i in range(still.shape[0]):
+        still[i] = 0.0  # without velocities the equation of motion has no terms but the load
+    strips = StripLoad(NO_LOAD, kept[Kept.S0], kept[Kept.S1], kept[Kept.S2], kept[Kept.A33])
+    accelerate(
+        pose_in(still, scene.body.plane), still, Wrench(fx, fy, fz, mx, my, mz), torque, strips, scene.body,
+        work.matrix, extra,
+    )  # fmt: skip
+    for i in range(State.VX, State.ROTOR_SPEED + 1):
+        y[i] += dt * extra[i]
+
+
 @inlined_kernel
 def adams(t, x, u, dt, scene, work):
     """One Adams step: velocities by Adams-Bashforth 4, positions by Adams-Moulton 4 with the new velocities.
 
     With the corrector, in the first three steps, and while the blades of a free rotor are feathered,
-    velocities are corrected by Adams-Moulton after an evaluation at the predicted state.
+    velocities are corrected by Adams-Moulton after an evaluation at the predicted state. Without it, the
+    rotor's load may be followed within the step (follow_rotor).
     """
     history, new, y = work.history, work.stages[1], work.stages[4]
     kept = work.kept
@@ -155,11 +263,14 @@ def adams(t, x, u, dt, scene, work):
     for i in range(x.shape[0]):
         y[i] = x[i] + dt * bashforth(order, i, history)
     y[State.BLADE_PITCH] = pitch
+    sample_rotor(t, x, u, dt, scene, scene.multistep.gusts, work)
     if scene.multistep.corrector or steps < START_STEPS or feathering(x, scene):
         derivative(t + dt, y, u, scene, work, new)
         for i in range(State.VX, x.shape[0]):
             y[i] = x[i] + dt * moulton(order, new[i], i, history)
         y[State.BLADE_PITCH] = pitch
+    else:
+        follow_rotor(dt, scene, scene.multistep.gusts, work, y)
     attitude_rate(y, new, scene.body.plane)
     new[State.AZIMUTH] = y[State.ROTOR_SPEED]
     for i in range(State.VX):

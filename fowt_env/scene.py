@@ -13,7 +13,7 @@ from fowt_env.counters import N_COUNTERS
 from fowt_env.description import Platform, Turbine, read_platform, read_turbine, sea_state_of
 from fowt_env.dynamics import N_KEPT, Body, Model, Work
 from fowt_env.errors import InputError, unknown
-from fowt_env.integrators import INTEGRATORS, build_integrator
+from fowt_env.integrators import INTEGRATORS, N_SAMPLE, build_integrator, rotor_samples
 from fowt_env.jit import Box
 from fowt_env.loads.blade_elements import build_blade_elements
 from fowt_env.loads.damping import build_damping
@@ -55,6 +55,7 @@ FIDELITIES = {
 }
 IN_PLANE = 1e-9  # share of a vector out of the plane of a planar scene that rounding may leave
 STEPS = {"rk4": 0.05, "heun": 0.05, "abm4": 0.1, "ab4": 0.1}  # s, default step of each integrator
+FIELD_SAMPLES = 3  # rotor loads per step of ab4 in a box of wind, whose cells the blades cross in 0.1 s
 REFERENCE_STEP = 0.0125  # s, of rk4 at fidelity "reference": errs 2e-6 in heave, 2e-7 elsewhere
 OPTIONS = {
     # name: (default, allowed values or a description of the allowed range)
@@ -70,6 +71,8 @@ OPTIONS = {
     "mooring": (True, (False, True, "catenary", "table")),
     "planar": (False, (False, True)),
     "integrator": (None, (None, *INTEGRATORS)),  # None: the fidelity's
+    # of the rotor's load per step of ab4; None: FIELD_SAMPLES in a box of wind, else 1
+    "rotor_samples": (None, "None or a number of samples, 1 to 10"),
     "wave_loads": (None, (None, "exact", "fast")),  # None: the fidelity's
     "current": (None, "None, a speed (m/s) or {'speed', 'heading' (deg), 'exponent'}"),
     "duration": (700.0, "seconds of random wind and sea, > 0"),
@@ -130,6 +133,7 @@ class Scene:
             np.zeros((5, self.n_state)),
             np.zeros(N_KEPT + room_of(len(self.loads))),
             np.zeros((4, self.n_state)),
+            np.zeros((4 * rotor_samples(self.model.multistep), N_SAMPLE)),
         )
 
     def box(self, work: Work | None = None) -> Box:
@@ -210,7 +214,8 @@ def build_scene(
     rotor     "bem": blade-element momentum solved at every blade and station; "lookup": the same sweep
               from a table per station; "table": the whole rotor as one table. None: the fidelity's
     fidelity  "reference": everything solved exactly, Runge-Kutta 4; "standard": every blade and station
-              by look-up, fast wave sums, Adams-Bashforth 4; "fast": the rotor as one table
+              by look-up, fast wave sums, Adams-Bashforth 4 (in a box of wind with three rotor loads per
+              step); "fast": the rotor as one table
     loads     further loads on platform and tower, of one's own (own_load.Load)
     options   see OPTIONS; a platform file may set other defaults. planar: surge, heave and platform pitch
               alone move; of ntm and etm turbulence the part in the plane is kept
@@ -263,7 +268,7 @@ def build_scene(
         tower=build_tower_drag(platform.tower, site.air_density) if aero and chosen["tower_drag"] else None,
         wind=series,
         wind_field=air.field,
-        multistep=build_integrator(chosen["integrator"]),
+        multistep=build_integrator(chosen["integrator"], _samples(chosen, air.field)),
         own=build_own_loads(own, platform.tower.base_height, site.water_depth),
     )
     return Scene(model, platform, turbine, air.spec, sea, seed, rotor, chosen, air.speed, own)
@@ -345,11 +350,29 @@ def _options(given, platform):
         chosen["shear_exponent"] = _number("shear_exponent", chosen["shear_exponent"], 0.0, 1.0)
     if chosen["strip_length"] is not None:
         chosen["strip_length"] = _number("strip_length", chosen["strip_length"], 0.01, 1e3)
-    if chosen["wave_components"] is not None:
-        count = chosen["wave_components"]
-        if isinstance(count, bool) or not isinstance(count, int | np.integer) or not 1 <= count <= 10000:
-            raise InputError(f"wave_components = {count!r}: must be a whole number from 1 to 10000")
+    for name, most in (("wave_components", 10000), ("rotor_samples", 10)):
+        count = chosen[name]
+        if count is not None and not (_whole(count) and 1 <= count <= most):
+            raise InputError(f"{name} = {count!r}: must be a whole number from 1 to {most}")
     return chosen
+
+
+def _whole(value):
+    """Whether a value is a whole number."""
+    return isinstance(value, int | np.integer) and not isinstance(value, bool)
+
+
+def _samples(chosen, field):
+    """Evaluations of the rotor's load per step."""
+    asked, integrator = chosen["rotor_samples"], chosen["integrator"]
+    if asked not in (None, 1) and integrator != "ab4":
+        raise InputError(
+            f"rotor_samples = {asked}: only integrator = 'ab4' evaluates the rotor more than once a step,"
+            f" not {integrator!r}"
+        )
+    if asked is None:
+        asked = FIELD_SAMPLES if field is not None and integrator == "ab4" else 1
+    return asked
 
 
 class _Air(NamedTuple):

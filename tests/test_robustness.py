@@ -29,7 +29,7 @@ def keeps_the_margin(name, integrator, duration):
     base = kind.scene()
     point = kind.point(base)
     fine, _ = stability_map.excursions(base, point, 0.025, duration)
-    scene = stability_long.with_integrator(base, integrator)
+    scene = stability_long.with_integrator(base, integrator, kind.rotor_samples)
     late = stability_map.excursions(scene, point, stability_map.MARGIN * STEPS[integrator], duration)[1]
     return bool(np.all(late <= stability_map.GROWTH * (fine + stability_map.FLOOR)))
 
@@ -40,6 +40,10 @@ def keeps_the_margin(name, integrator, duration):
 )
 def test_default_step_keeps_a_factor_of_two_from_blow_up(name, integrator):
     assert keeps_the_margin(name, integrator, 100.0)
+
+
+def test_default_step_keeps_a_factor_of_two_where_the_rotor_is_sampled_within_a_step():
+    assert keeps_the_margin("full, rotor sampled thrice a step", "ab4", 100.0)
 
 
 @pytest.mark.slow

@@ -30,7 +30,8 @@ CHANNELS = {
     "rotor_speed": "RotSpeed_[rpm]",
     "fairlead_tension": "FAIRTEN1_[kN]",
 }
-UNITS = {"strongest": "strongest components", "blade_stations": "stations", "strip_length": "m strips"}
+UNITS = {"strongest": "strongest components", "blade_stations": "stations", "strip_length": "m strips",
+         "rotor_samples": "rotor loads a step"}  # fmt: skip
 TIMED = 1.0  # s of CPU time: shorter runs are repeated until then, longer ones timed once
 COLUMNS = (
     "seed", "variant", "axis", "integrator", "dt_s", "rotor", "wave_loads", "components", "seconds",
@@ -97,6 +98,10 @@ def variants():
             ("strips", "strip_length", "exact", (1.5, 6.0, 12.0)),
         )
         for value in values
+    ]
+    found += [
+        Variant("rotor loads per step", "ab4", 0.1, "lookup", "fast", (("rotor_samples", n),))
+        for n in (1, 2, 3, 4)
     ]
     found += [
         Variant("all together", name, dt, rotor, "fast", options)

@@ -24,10 +24,11 @@ ORDERS = {"rk4": 4, "heun": 2, "abm4": 4, "ab4": 4}
 WEATHER_SEA = {"kind": "jonswap", "Hs": 6.0, "Tp": 10.0}
 
 
-def with_integrator(scene, name):
-    """The scene with another integrator."""
+def with_integrator(scene, name, rotor_samples=1):
+    """The scene with another integrator, ab4 with that many rotor loads per step."""
     return replace(
-        scene.with_model(multistep=build_integrator(name)), options=scene.options | {"integrator": name}
+        scene.with_model(multistep=build_integrator(name, rotor_samples)),
+        options=scene.options | {"integrator": name},
     )
 
 

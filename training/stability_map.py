@@ -5,18 +5,19 @@ model of the scene: Runge-Kutta 4 through every state; the others with the blade
 Adams methods, positions by Adams-Moulton from the new velocities.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from math import exp, log
 
 import numpy as np
 import pandas as pd
 
-from fowt_env.integrators import INTEGRATORS, build_integrator, feathering
+from fowt_env.integrators import INTEGRATORS, feathering
 from fowt_env.linear_model import MOTIONS, STATE_INDEX, STATES, linearize
 from fowt_env.scene import STEPS, build_scene
 from fowt_env.state import State
 from fowt_env.steady import OperatingPoint, trim
 from fowt_env.step import RUNNING, advance, forget
+from training.stability_long import with_integrator
 
 DURATION = 300.0  # s of each run: hundreds of steps even at the largest
 FINE_STEP = 0.0125  # s, of the run that others are judged by
@@ -47,6 +48,7 @@ class Kind:
     options: dict = field(default_factory=dict)
     platform_held: bool = False
     rotor_held: bool = False
+    rotor_samples: int = 1  # of ab4
 
     def scene(self, integrator="rk4"):
         """Scene of this kind with one of INTEGRATORS."""
@@ -72,6 +74,7 @@ class Kind:
 
 KINDS = {
     "full, look-up rotor": Kind(),
+    "full, rotor sampled thrice a step": Kind(rotor_samples=3),  # as in a box of wind
     "full, BEM rotor": Kind(fidelity="reference", options={"wave_components": 40}),
     "full, table rotor": Kind(fidelity="fast"),
     "full, rated wind": Kind(wind=11.4),
@@ -241,8 +244,9 @@ def stability_map(kinds=None, integrators=INTEGRATORS, duration=DURATION, progre
         others = [i for i in range(N) if i != PITCH]
         fastest = np.abs(np.linalg.eigvals(model.A[np.ix_(others, others)])).max()
         for integrator in integrators:
-            scene = base.with_model(multistep=build_integrator(integrator))
-            scene = _named(scene, integrator)
+            if kind.rotor_samples > 1 and integrator != "ab4":
+                continue
+            scene = with_integrator(base, integrator, kind.rotor_samples)
             default = STEPS[integrator]
             found = measured_limit(scene, point, fine, duration)
             scheme = "abm4" if integrator == "ab4" and feathering(point.state, base.model) else integrator
@@ -256,8 +260,3 @@ def stability_map(kinds=None, integrators=INTEGRATORS, duration=DURATION, progre
                 }
             )  # fmt: skip
     return pd.DataFrame(rows)
-
-
-def _named(scene, integrator):
-    """The scene with the integrator's name in its options, where its default step is looked up."""
-    return replace(scene, options=scene.options | {"integrator": integrator})

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 CARRIED = (
     "x", "u", "memory", "estimate", "action", "measurement", "observation", "counts", "reference", "terms",
 )  # fmt: skip
-WORK_CARRIED = ("lines", "counters", "stages", "kept", "history")
+WORK_CARRIED = ("lines", "counters", "stages", "kept", "history", "samples")
 
 
 class Snapshot(NamedTuple):
