@@ -27,7 +27,8 @@ def test_evaluation_prints_and_writes_what_a_run_takes(tmp_path):
 
 
 def test_stability_writes_its_part_and_a_report_and_says_what_holds(tmp_path):
-    stdout, stderr = fowt("benchmark", "stability", "--parts", "cases", "--cases", "5", "--out", str(tmp_path))
+    words = ("--parts", "cases", "--cases", "5", "--out", str(tmp_path))
+    stdout, stderr = fowt("benchmark", "stability", *words)
     assert "holds" in stdout and "MISSED" not in stdout and "robustness.md" in stderr
     assert json.loads((tmp_path / "cases.json").read_text())
     assert (tmp_path / "robustness.md").read_text().startswith("#")
