@@ -3,12 +3,16 @@
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
+import numba
 import pytest
 
 import fowt_env
+from fowt_env.jit import KEEP_CACHES
 from fowt_env.kernel_cache import SharedCacheFile
+from fowt_env.warmup import COMPILING_MESSAGE, compilation_announced
 
 ROOT = Path(fowt_env.__file__).resolve().parent.parent
 REGISTRATION = ROOT / "fowt_env_registration.py"
@@ -48,6 +52,35 @@ def test_a_missing_folder_is_made_and_used(tmp_path):
     assert factor == "0.25"
     assert used == given and Path(used).parent == folder
     assert list(Path(used).rglob("*.nbi"))
+
+
+def test_folders_of_older_sources_go_but_the_newest_and_those_in_use(tmp_path):
+    """Beneath the user's cache folder where no other is named. In use: touched within a day."""
+    place = tmp_path / "cache" / "fowt_env"
+    now = time.time()
+    for number in range(8):
+        (place / f"{number}").mkdir(parents=True)
+        days = 0.5 if number < 2 else 1.0 + number
+        os.utime(place / f"{number}", (now - 86400.0 * days,) * 2)
+    variables = {"FOWT_CACHE_DIR": "", "XDG_CACHE_HOME": str(place.parent)}
+    _, used, _ = output(start(SMALL + WHERE, tmp_path / "unused", **variables))
+    assert Path(used).parent == place
+    left = {path.name for path in place.iterdir()} - {Path(used).name}
+    assert left == {"0", "1", "2", "3"} and len(left) == KEEP_CACHES
+
+
+def test_the_first_kernel_that_is_compiled_is_announced_once():
+    def double(x):
+        return 2.0 * x
+
+    double.__module__ = "fowt_env.not_on_disk"
+    said, compiled = [], numba.njit(double)
+    with compilation_announced(said.append):
+        assert compiled(1.0) == 2.0 and compiled(1) == 2.0
+    assert said == [COMPILING_MESSAGE]
+    with compilation_announced(said.append):
+        assert compiled(2.0) == 4.0
+    assert len(said) == 1
 
 
 def test_a_folder_that_cannot_be_written_is_done_without(tmp_path):
