@@ -4,7 +4,6 @@ import json
 
 import numpy as np
 import pandas as pd
-import pytest
 from test_cli import fowt
 
 
@@ -76,7 +75,6 @@ def test_a_sweep_of_weights_refuses_seeds_for_scoring_and_weights_that_there_are
     assert "unknown weight 'pitch_rat'. Did you mean 'pitch_rate'" in " ".join(stderr.split())
 
 
-@pytest.mark.slow
 def test_a_sweep_of_weights_shows_and_writes_every_variant_beside_gspi(tmp_path):
     path = tmp_path / "sweep.csv"
     words = ("--vary", "pitch_rate=8,80", "--cases", "steady_16", "--seeds", "1001", "--out", str(path))
