@@ -6,6 +6,7 @@ table of contents gives it, and all of them at most MAX_BYTES. training/export.p
 
 import math
 import zipfile
+from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -16,7 +17,7 @@ from fowt_env.envs.actions import MODES
 from fowt_env.envs.decisions import DecisionSettings
 from fowt_env.envs.observations import KNOWN, N_ACTIONS
 from fowt_env.errors import InputError
-from fowt_env.records import Finite, NonNegative, Positive, Record, validate
+from fowt_env.records import Finite, NonNegative, Positive, Record, unknown_key, validate
 from fowt_env.textfiles import parse_json, raise_problems
 
 FORMAT = 1
@@ -139,12 +140,13 @@ def _check_settings(where, settings):
         raise InputError(f"{where}: format {settings.get('format')!r}: must be {FORMAT}")
     found, problems = validate(PolicySettings, settings)
     raise_problems(where, problems)
+    known = [field.name for field in fields(DecisionSettings)]
+    problems = [unknown_key(f"decisions.{key}", key, known) for key in found.decisions if key not in known]
+    raise_problems(where, problems)
     try:
         DecisionSettings(**found.decisions)
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
-    except TypeError as error:
-        raise InputError(f"{where}: decisions = {settings['decisions']}: {error}") from None
 
 
 def _check_shapes(where, weights, biases, mean, scale):

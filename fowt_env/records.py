@@ -228,6 +228,9 @@ def allowed(model, loc):
         return interval(low, high, low_open, high_open, "a number" if kind is float else "a whole number")
     if typing.get_origin(kind) is typing.Literal:
         return "one of " + ", ".join(repr(option) for option in typing.get_args(kind))
+    if typing.get_origin(kind) is list:
+        inner, _ = _unwrapped(typing.get_args(kind)[0], [])
+        return f"a list of {'numbers' if inner is float else 'entries'}"
     if typing.get_origin(kind) is tuple:
         arguments = typing.get_args(kind)
         count = "" if arguments[-1] is Ellipsis else f"{len(arguments)} "

@@ -82,6 +82,7 @@ OPTIONS = {
     "shear_exponent": (None, "None (the platform file's) or 0 to 1"),
     "turbine": (None, "None (the platform file's), a name, a path or a description.Turbine"),
 }
+ARGUMENTS = ("platform", "wind", "sea", "seed", "rotor", "fidelity", "loads")  # of build_scene beside OPTIONS
 
 
 @dataclass(frozen=True, eq=False)
@@ -340,7 +341,8 @@ def _options(given, platform):
     ):
         for name, value in values.items():
             if name not in OPTIONS:
-                raise unknown(f"option of {source}", name, OPTIONS)
+                own = () if values is platform.options else ARGUMENTS
+                raise unknown(f"option of {source}", name, (*OPTIONS, *own))
             allowed = OPTIONS[name][1]
             if isinstance(allowed, tuple) and not any(value is a or value == a for a in allowed):
                 raise InputError(f"{name} = {value!r}: allowed {', '.join(repr(a) for a in allowed)}")

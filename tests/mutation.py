@@ -3,7 +3,8 @@
     python tests/mutation.py --count 10000 --seed 1 --folder mutated
 
 A worker with bounded memory makes, loads and judges the files, each within a time limit; should it crash or
-hang, the file is blamed and the next worker goes on. A seed and a number always make the same file.
+hang, the file is blamed and the next worker goes on. A seed and a number always make the same file: the sound
+files hold no date, and neither versions nor a hash of the sources.
 """
 
 import argparse
@@ -195,6 +196,8 @@ class Samples:
         path = self.folder / "box.bts"
         with contextlib.redirect_stdout(None):
             box.write(str(path))
+        now = rb"on \d\d-\w{3}-\d{4} at [\d:]{8}"
+        path.write_bytes(re.sub(now, b"on 01-Jan-2026 at 00:00:00", path.read_bytes()))
         self.add("bts", path, BINARY, lambda: read_box(
             {"kind": "bts", "path": path}, hub_height=90.0, rotor_diameter=126.0
         ).field())  # fmt: skip
@@ -248,11 +251,14 @@ class Samples:
 
     def _results(self):
         from fowt_env.outputs import read_table
+        from training import results
         from training.evaluate import COLUMNS
         from training.report_html import write_report
-        from training.results import FORMAT, open_results, read_row, write_run
+        from training.results import FORMAT, open_results, read_row, write_json, write_run
         from training.train import Training, resolve
 
+        results.plant_code = lambda: "0123456789abcdef"  # the same manifest in every tree
+        results.versions = lambda: {"python": "3.11", "numpy": "2.0"}
         folder = self.folder / "results"
         row = dict.fromkeys(COLUMNS, 1.5) | {"controller": "pi", "case": "calm", "seed": 1, "status": "ok"}
         row |= {"reason": ""}
@@ -277,6 +283,8 @@ class Samples:
         (folder / "results.csv").unlink(missing_ok=True)
         run.unlink()
         reopen()
+        manifest = json.loads((folder / "manifest.json").read_text())
+        write_json(manifest | {"created": "2026-01-01T00:00:00+0000"}, folder / "manifest.json")
         write_run(frame, row, run)
         table = reopen()
         from training.report import write_leaderboard
@@ -328,7 +336,7 @@ def inside(member, way):
                     data = buffer.getvalue()
                 elif name == member and data:
                     data = way(data, rng)
-                made.writestr(name, data)
+                made.writestr(zipfile.ZipInfo(name), data, zipfile.ZIP_DEFLATED)  # without the time of day
         return target.getvalue()
 
     change.__name__ = f"{way.__name__} {member}"

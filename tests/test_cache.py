@@ -6,10 +6,13 @@ import sys
 import time
 from pathlib import Path
 
+import numba
 import pytest
 
 import fowt_env
+from fowt_env.jit import KEEP_CACHES
 from fowt_env.kernel_cache import SharedCacheFile
+from fowt_env.warmup import COMPILING_MESSAGE, compilation_announced
 
 ROOT = Path(fowt_env.__file__).resolve().parent.parent
 REGISTRATION = ROOT / "fowt_env_registration.py"
@@ -51,6 +54,35 @@ def test_a_missing_folder_is_made_and_used(tmp_path):
     assert list(Path(used).rglob("*.nbi"))
 
 
+def test_folders_of_older_sources_go_but_the_newest_and_those_in_use(tmp_path):
+    """Beneath the user's cache folder where no other is named. In use: touched within a day."""
+    place = tmp_path / "cache" / "fowt_env"
+    now = time.time()
+    for number in range(8):
+        (place / f"{number}").mkdir(parents=True)
+        days = 0.5 if number < 2 else 1.0 + number
+        os.utime(place / f"{number}", (now - 86400.0 * days,) * 2)
+    variables = {"FOWT_CACHE_DIR": "", "XDG_CACHE_HOME": str(place.parent)}
+    _, used, _ = output(start(SMALL + WHERE, tmp_path / "unused", **variables))
+    assert Path(used).parent == place
+    left = {path.name for path in place.iterdir()} - {Path(used).name}
+    assert left == {"0", "1", "2", "3"} and len(left) == KEEP_CACHES
+
+
+def test_the_first_kernel_that_is_compiled_is_announced_once():
+    def double(x):
+        return 2.0 * x
+
+    double.__module__ = "fowt_env.not_on_disk"
+    said, compiled = [], numba.njit(double)
+    with compilation_announced(said.append):
+        assert compiled(1.0) == 2.0 and compiled(1) == 2.0
+    assert said == [COMPILING_MESSAGE]
+    with compilation_announced(said.append):
+        assert compiled(2.0) == 4.0
+    assert len(said) == 1
+
+
 def test_a_folder_that_cannot_be_written_is_done_without(tmp_path):
     """It lies beneath a file, which stops even the superuser."""
     (tmp_path / "file").write_text("")
@@ -90,16 +122,17 @@ def test_kernels_of_other_sources_are_never_used(tmp_path):
     assert len(list((tmp_path / "cache").iterdir())) == 2
 
 
-@pytest.mark.parametrize("ending", ["nbi", "nbc"])
-@pytest.mark.parametrize("content", [b"", b"\x80\x04broken", bytes(3000)], ids=["empty", "half", "zeros"])
-def test_broken_files_are_compiled_anew(tmp_path, ending, content):
+def test_broken_files_are_compiled_anew(tmp_path):
     folder = tmp_path / "cache"
     assert output(start(SMALL, folder)) == ["0.25"]
-    files = list(folder.rglob(f"*.{ending}"))
-    for path in files:
-        path.write_bytes(content)
-    assert files and output(start(SMALL, folder)) == ["0.25"]
-    assert all(path.read_bytes() != content for path in files if path.stem.startswith("waves.ramp"))
+    for ending in ("nbi", "nbc"):
+        for content in (b"", b"\x80\x04broken", bytes(3000)):
+            files = list(folder.rglob(f"*.{ending}"))
+            for path in files:
+                path.write_bytes(content)
+            assert files and output(start(SMALL, folder)) == ["0.25"], (ending, content[:10])
+            written = [path.read_bytes() for path in files if path.stem.startswith("waves.ramp")]
+            assert written and content not in written, (ending, content[:10])
     assert output(start(SMALL, folder)) == ["0.25"]
 
 
@@ -110,10 +143,12 @@ def test_without_room_for_machine_code_kernels_work_all_the_same(tmp_path):
 
 
 KEEPER = """
-import sys, time
+import pathlib, sys
 from fowt_env.kernel_cache import SharedCacheFile
 file = SharedCacheFile(sys.argv[1], "function", "stamp")
-while time.time() < float(sys.argv[2]):
+ready = pathlib.Path(sys.argv[2])
+(ready / sys.argv[3]).touch()
+while len(list(ready.iterdir())) < 3:
     pass
 for number in range(100):
     file.save((sys.argv[3], number), f"code of {sys.argv[3]} {number}")
@@ -122,9 +157,10 @@ for number in range(100):
 
 def test_processes_that_keep_code_at_once_keep_all_of_it_under_the_right_keys(tmp_path):
     """Of these 300 entries numba's own file was seen to lose 27 and to have 6 under another's key."""
-    begin = str(time.time() + 8.0)
+    ready = tmp_path / "ready"  # where each says that it can begin
+    ready.mkdir()
     variables = os.environ | {"PYTHONPATH": str(ROOT)}
-    command = [sys.executable, "-c", KEEPER, tmp_path, begin]
+    command = [sys.executable, "-c", KEEPER, tmp_path, ready]
     keepers = [subprocess.Popen([*map(str, command), name], env=variables) for name in "abc"]
     assert [keeper.wait(timeout=300) for keeper in keepers] == [0, 0, 0]
     file = SharedCacheFile(str(tmp_path), "function", "stamp")

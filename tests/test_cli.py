@@ -204,6 +204,39 @@ def test_evaluate_writes_table_runs_and_plots(tmp_path):
     assert len(list((tmp_path / "runs").rglob("*.parquet"))) == 4
 
 
+BREAKS_DOWN = """
+class BreaksDown:
+    def reset(self, measurement):
+        self.command = measurement.generator_torque, measurement.blade_pitch
+    def act(self, measurement):
+        if measurement.time > 8.0:
+            raise ZeroDivisionError("it broke down")
+        return self.command
+"""
+
+
+def test_evaluate_says_which_runs_failed_and_why_and_scores_the_others(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "broken_law.py").write_text(BREAKS_DOWN)
+    stdout, stderr = fowt(
+        "evaluate", "--controllers", "pi,broken_law:BreaksDown", "--cases", "steady_16",
+        "--duration", "15", "--skip", "5", "--no-plot", "--out", "out",
+    )  # fmt: skip
+    assert "failed: broken_law:BreaksDown, steady_16, seed 1: " in stderr and "it broke down" in stderr
+    assert "0/1" in stdout and "1/1" in stdout
+    table = pd.read_csv(tmp_path / "out" / "results.csv").set_index("controller")
+    assert table["status"].to_dict() == {"pi": "ok", "broken_law:BreaksDown": "failed"}
+    assert table.loc["pi", "RotSpeed_mean_[rpm]"] > 5.0
+
+
+def test_evaluate_without_matplotlib_has_its_tables_and_names_the_extra(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    words = ("--controllers", "pi", "--cases", "steady_16", "--duration", "15", "--skip", "5")
+    _, stderr = fowt("evaluate", *words, "--out", str(tmp_path))
+    assert "no plots: " in stderr and 'pip install "fowt-env[plot]"' in stderr
+    assert len(pd.read_csv(tmp_path / "results.csv")) == 1
+
+
 def test_evaluate_takes_a_suite_of_the_users_own_compares_and_resumes(tmp_path):
     suite = tmp_path / "mine.toml"
     suite.write_text(

@@ -15,6 +15,15 @@ def test_linearize_writes_models_and_says_where_the_pitch_rests(tmp_path):
     assert np.load(out)["A"].shape == (2, 14, 14)
 
 
+def test_linearize_writes_the_table_of_modes_or_a_folder_of_everything(tmp_path):
+    table, folder = tmp_path / "modes.csv", tmp_path / "study"
+    fowt("linearize", "--winds", "18", "--out", str(table))
+    assert set(pd.read_csv(table)["mode"]) >= {"surge", "platform_pitch"}
+    _, stderr = fowt("linearize", "--winds", "18", "--out", str(folder))
+    assert {path.name for path in folder.iterdir()} >= {"modes.csv", "models.json"}
+    assert all(path.name in stderr for path in folder.iterdir())
+
+
 def test_linearize_refuses_other_endings_before_it_starts(tmp_path):
     _, stderr = fowt("linearize", "--winds", "18", "--out", str(tmp_path / "m.mat"), code=2)
     assert "must be a folder or end with .csv, .parquet, .json, .npz" in " ".join(stderr.split())
@@ -44,11 +53,32 @@ def test_a_designed_lqr_is_saved_with_its_weights(tmp_path):
 
 def test_bound_writes_and_front_reads_its_fronts(tmp_path):
     bound, runs = tmp_path / "bound.csv", tmp_path / "runs.csv"
-    stdout, _ = fowt("design", "bound", "--wind", "18", "--out", str(bound))
+    picture, share = tmp_path / "bound.png", tmp_path / "front.png"
+    stdout, _ = fowt("design", "bound", "--wind", "18", "--out", str(bound), "--plot", str(picture))
     assert "measured" in stdout
     metrics = "RotSpeed_std_[rpm],PtfmPitch_std_[deg],GenPwr_std_[kW],blade_pitch_travel_[deg/s]"
     runs.write_text(f"case,variant,seed,{metrics}\nntm_18,gspi_oc3,1,1,1,1,1\nntm_18,mine,1,0.8,0.8,1,1\n")
-    stdout, _ = fowt("design", "front", "--runs", str(runs), "--bound", str(bound))
+    ratios = tmp_path / "ratios.csv"
+    words = ("--runs", str(runs), "--bound", str(bound), "--out", str(ratios), "--plot", str(share))
+    stdout, _ = fowt("design", "front", *words)
     assert "mine" in stdout
+    assert pd.read_csv(ratios)["speed_ratio_[-]"].tolist() == [0.8]
+    assert picture.stat().st_size > 10_000 and share.stat().st_size > 10_000
     _, stderr = fowt("design", "bound", "--wind", "9", code=2)
     assert "wind = 9.0: must be above 11.4" in " ".join(stderr.split())
+
+
+def test_a_sweep_of_weights_refuses_seeds_for_scoring_and_weights_that_there_are_not():
+    _, stderr = fowt("design", "lqr", "--seeds", "1,2", code=2)
+    assert "seeds = [1, 2]: tune on seeds of 1000 and above" in " ".join(stderr.split())
+    _, stderr = fowt("design", "lqr", "--vary", "pitch_rat=1,2", code=2)
+    assert "unknown weight 'pitch_rat'. Did you mean 'pitch_rate'" in " ".join(stderr.split())
+
+
+def test_a_sweep_of_weights_shows_and_writes_every_variant_beside_gspi(tmp_path):
+    path = tmp_path / "sweep.csv"
+    words = ("--vary", "pitch_rate=8,80", "--cases", "steady_16", "--seeds", "1001", "--out", str(path))
+    stdout, _ = fowt("design", "lqr", *words)
+    table = pd.read_csv(path)
+    assert list(table["variant"]) == ["gspi_oc3", "{'pitch_rate': 8.0}", "{'pitch_rate': 80.0}"]
+    assert all(name in stdout for name in table["variant"])

@@ -50,6 +50,13 @@ def test_cases_scores_each_kind_and_bound_draws_its_picture(results):
     assert (results / "bound.png").stat().st_size > 10_000
 
 
+def test_gust_draws_its_picture_of_each_controller(tmp_path):
+    words = ("--controllers", "pi,gspi_oc3", "--wind", "18", "--sea", "none", "--start", "2", "--end", "10")
+    done = call("gust", tmp_path / "gust.png", *words)
+    assert done.exit_code == 0, done.output
+    assert (tmp_path / "gust.png").stat().st_size > 10_000
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

@@ -1,11 +1,15 @@
 """The commands of learning: clear refusals, and a run from the command line."""
 
+import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
 pytest.importorskip("stable_baselines3")
 
-from fowt_env.cli import EXIT_INPUT, app
+from fowt_env.cli import EXIT_INPUT, EXIT_INTERRUPTED, app
+from training import train_callbacks
+from training.benchmark_training import KINDS
+from training.train import Training
 
 SMALL = (
     "environment.num_envs=2", "environment.rotor=table", "environment.wave_components=10",
@@ -35,6 +39,36 @@ def test_a_run_ends_goes_on_and_its_checkpoint_becomes_a_policy_on_request_only(
     done = call("export-policy", folder, "--out", tmp_path / "p.npz", "--trust-zip")
     assert done.exit_code == 0 and "warning" in done.output
     assert (tmp_path / "p.npz").stat().st_size == pytest.approx((folder / "last.npz").stat().st_size, abs=50)
+
+
+def test_an_interrupted_run_ends_with_a_checkpoint_its_own_exit_code_and_goes_on(tmp_path, monkeypatch):
+    folder = tmp_path / "run"
+    whole = Training.save
+
+    def save_and_ask(run):
+        run.stop = True  # as an interrupt does
+        return whole(run)
+
+    monkeypatch.setattr(train_callbacks, "REPORT_EVERY", 0.0)
+    monkeypatch.setattr(Training, "save", save_and_ask)
+    stopped = train(folder, 96, "--set", "checkpoint_minutes=0")
+    assert stopped.exit_code == EXIT_INTERRUPTED, stopped.output
+    assert "stopped with a checkpoint" in stopped.output
+    (checkpoint,) = (folder / "checkpoints").iterdir()
+    assert checkpoint.name != "step_96"
+    monkeypatch.undo()
+    done = call("train", "--resume", "--trust-zip", "--out", folder)
+    assert done.exit_code == 0 and "finished" in done.output and "warning: executing code" in done.output
+    assert [p.name for p in (folder / "checkpoints").iterdir()] == ["step_96"]
+
+
+@pytest.mark.slow
+def test_benchmark_training_writes_a_row_per_kind_of_environment(tmp_path):
+    path = tmp_path / "training.csv"
+    done = call("benchmark", "training", "--envs", "8", "--steps", "1024", "--out", path)
+    assert done.exit_code == 0, done.output
+    table = pd.read_csv(path, comment="#")
+    assert list(table["kind"]) == list(KINDS) and (table["steps_per_s"] > 0.0).all()
 
 
 @pytest.mark.parametrize(

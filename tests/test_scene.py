@@ -1,10 +1,13 @@
 """Building scenes: what is refused, what a level of fidelity means, and what it costs in accuracy."""
 
+import inspect
+
 import numpy as np
 import pytest
 
 from fowt_env import build_scene, simulate
 from fowt_env.errors import InputError
+from fowt_env.scene import ARGUMENTS
 from fowt_env.step import run
 
 NTM = {"kind": "ntm", "speed": 18.0, "class": "B"}
@@ -22,6 +25,8 @@ MOTIONS = ["PtfmSurge", "PtfmSway", "PtfmHeave", "PtfmRoll", "PtfmPitch", "PtfmY
         ({"rotor": "ben"}, ["ben", "Did you mean 'bem'"]),
         ({"fidelity": "standart"}, ["standart", "Did you mean 'standard'"]),
         ({"surfaces": "swl"}, ["surfaces", "Did you mean 'surface'"]),
+        ({"fidelty": "standard"}, ["fidelty", "Did you mean 'fidelity'", "loads"]),
+        ({"winds": 18.0}, ["winds", "Did you mean 'wind'"]),
         ({"surface": "sea"}, ["surface = 'sea'", "instantaneous", "swl"]),
         ({"seed": -1}, ["seed = -1", ">= 0"]),
         ({"seed": 1.5}, ["seed = 1.5"]),
@@ -48,6 +53,11 @@ def test_what_cannot_be_built_is_refused_by_name_value_and_range(arguments, word
         build_scene(**arguments)
     for word in words:
         assert word in str(error.value)
+
+
+def test_every_argument_of_build_scene_is_among_those_that_a_refusal_names():
+    kinds = inspect.signature(build_scene).parameters.values()
+    assert {kind.name for kind in kinds if kind.kind != kind.VAR_KEYWORD} == set(ARGUMENTS)
 
 
 def test_a_level_falls_back_to_what_the_scene_needs():

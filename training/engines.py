@@ -19,6 +19,7 @@ from fowt_env.errors import InputError, unknown
 from fowt_env.warmup import kernels_compiled
 
 ENGINES = ("processes", "ray")
+NICENESS = "RAY_worker_niceness"  # environment variable by which Ray is told how nice its workers are
 WINDOW = 4  # Ray tasks handed out per processor
 ATTEMPTS = 3  # pools or Ray tries of one run before a worker that dies on it is taken as its own doing
 
@@ -122,7 +123,12 @@ def session(engine, jobs=1, address=None):
     if ray.is_initialized():
         yield
         return
-    options = {"address": address} if address else {"num_cpus": jobs, "include_dashboard": False}
+    if address:
+        options = {"address": address}
+    else:
+        options = {"num_cpus": jobs, "include_dashboard": False}
+        if NICENESS not in os.environ:  # Ray's own choice, 15, waits for whatever else the machine does
+            options["_system_config"] = {"worker_niceness": 0}
     ray.init(log_to_driver=False, logging_level="error", **options)
     try:
         yield

@@ -37,7 +37,13 @@ from fowt_env.envs.tasks import SITE, task_of
 from fowt_env.errors import InputError, unknown
 from fowt_env.outputs import process_lives, remove_leftovers, replacing
 from training.seeds import TRAINING, seeds_for
-from training.train_settings import check_settings, read_settings
+from training.train_settings import (
+    SCHEDULES,
+    TASK_FIELDS,
+    check_algorithm,
+    check_settings,
+    read_settings,
+)
 from training.trust import is_own, seal
 
 AGENTS = Path(__file__).parent / "agents"
@@ -66,7 +72,6 @@ OBSERVATIONS = {  # information sets that agents are compared with
     ),
 }  # fmt: skip
 SECTIONS = ("environment", "decisions", "algorithm", "normalise", "validation", "checkpoint_minutes", "task")
-TASK_FIELDS = ("residual_pitch", "residual_torque", "blade_pitch", "setpoint")
 VERSIONS = ("fowt-env", "stable-baselines3", "sb3-contrib", "torch", "numpy", "numba", "gymnasium")
 RATIOS = ("rotor_speed_std_[rpm]", "platform_pitch_std_[deg]", "blade_pitch_travel_[deg/s]")
 FAILURE_COST = 10.0  # of the validation score, per share of episodes that failed
@@ -193,9 +198,10 @@ def make_envs(settings):
     per_env, sensors = (None, None) if not plants else randomised(plants, n, settings["seed"])
     base = FowtSB3VecEnv(n, threads=1, per_env=per_env, **chosen)
     env = VecNormalize(VecMonitor(DecisionVecEnv(base, decisions, sensors)), **normalise)
-    fixed = ValidationVecEnv(
-        validation_episodes(settings), settings["validation"].get("skip", 60.0), threads=1, **chosen
-    )
+    skip, duration = settings["validation"].get("skip", 60.0), base.env.envs[0].task.duration
+    if skip >= duration:
+        raise InputError(f"validation.skip = {skip}: must be less than the {duration:g} s of an episode")
+    fixed = ValidationVecEnv(validation_episodes(settings), skip, threads=1, **chosen)
     judge = VecNormalize(VecMonitor(DecisionVecEnv(fixed, decisions)), training=False, **normalise)
     judge.norm_reward = False
     return env, judge
@@ -291,10 +297,9 @@ class Training:
         settings = self.settings
         torch.set_num_threads(int(os.environ.get("FOWT_TORCH_THREADS", "1")))
         kind = make_algorithm(settings["algo"])
+        check_algorithm(kind, settings["algo"], settings["algorithm"])
         env, judge = make_envs(settings)
         self._remove_leftovers()
-        self._write_settings()
-        self.reference = baseline_figures(settings)
         set_random_seed(settings["seed"])
         if self.resume and self.newest() is not None:
             model, state = self._load(kind, env)
@@ -302,6 +307,8 @@ class Training:
             env.seed(settings["seed"])
             model = _new_model(kind, settings, env)
             state = None
+        self._write_settings()  # not before they are known to work: a folder with settings holds a run
+        self.reference = baseline_figures(settings)
         self.model, self.env = model, env
         from stable_baselines3.common.logger import configure
 
@@ -474,11 +481,9 @@ def _schedules(settings):
     from stable_baselines3.common.utils import LinearSchedule
 
     chosen = {}
-    for key in ("learning_rate", "clip_range"):
+    for key in SCHEDULES:
         value = settings["algorithm"].get(key)
         if isinstance(value, list):
-            if len(value) != 2:
-                raise InputError(f"algorithm.{key} = {value!r}: must be a number or a pair [start, end]")
             chosen[key] = LinearSchedule(float(value[0]), float(value[1]), 1.0)
     return chosen
 
@@ -497,7 +502,7 @@ def _new_model(kind, settings, env):
         policy["activation_fn"] = known[name]
     try:
         return kind("MlpPolicy", env, policy_kwargs=policy, seed=settings["seed"], device="cpu", **given)
-    except (TypeError, ValueError) as error:
+    except (AssertionError, TypeError, ValueError) as error:
         raise InputError(f"algorithm: {settings['algo']} does not take these settings: {error}") from error
 
 

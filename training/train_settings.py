@@ -1,15 +1,44 @@
 """What the settings of a training run may be: files and changes are checked before anything is built."""
 
+import inspect
+from dataclasses import fields
 from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
+from fowt_env.envs.decisions import DecisionSettings
+from fowt_env.envs.env import FowtEnv
 from fowt_env.errors import InputError
-from fowt_env.records import NonNegative, Positive, Record, validate
+from fowt_env.records import Fraction, NonNegative, Positive, Record, is_number, short, unknown_key, validate
+from fowt_env.scene import OPTIONS
 from fowt_env.textfiles import raise_problems, read_text
 
 Count = Annotated[int, Field(ge=1, strict=True)]
 Whole = Annotated[int, Field(ge=0, strict=True)]
+Switch = Annotated[bool, Field(strict=True)]
+TASK_FIELDS = ("residual_pitch", "residual_torque", "blade_pitch", "setpoint")
+OF_TRAINING = ("num_envs", "randomise", *TASK_FIELDS)  # keys of environment beside those of FowtEnv
+FORMS = (  # of what the environment takes apart: key, types, in words
+    ("reward", dict, "a table of weights"),
+    ("randomise", dict, "a table"),
+    ("observation", (str, list), "the name of an observation set, or a list of channels"),
+)
+SCHEDULES = ("learning_rate", "clip_range")  # of an algorithm: numbers that may fall over a run
+GIVEN_BY_TRAINING = (  # arguments of stable-baselines3's algorithms
+    "self", "policy", "env", "seed", "device", "tensorboard_log", "verbose", "_init_setup_model",
+)  # fmt: skip
+NOT_SET_THERE = ("self", "task", "render_mode", "options")  # of FowtEnv: what training gives, or lacks
+
+
+class Normalise(Record):
+    """Arguments of stable-baselines3's VecNormalize; what is left out has its default."""
+
+    norm_obs: Switch = True
+    norm_reward: Switch = True
+    clip_obs: Positive = 10.0
+    clip_reward: Positive = 10.0
+    gamma: Fraction = 0.99
+    epsilon: Positive = 1e-8
 
 
 class Validation(Record):
@@ -32,7 +61,7 @@ class TrainingSettings(Record):
     task: str  # of the environment
     environment: dict[str, Any]
     decisions: dict[str, Any]
-    normalise: dict[str, Any]
+    normalise: Normalise
     algorithm: dict[str, Any]
     validation: Validation
     checkpoint_minutes: NonNegative
@@ -43,7 +72,56 @@ def check_settings(settings, where="settings"):
     if not isinstance(settings, dict):
         raise InputError(f"{where}: must be a table of settings")
     raise_problems(where, validate(TrainingSettings, settings)[1])
+    known = {"environment": environment_keys(), "decisions": [f.name for f in fields(DecisionSettings)]}
+    problems = [
+        unknown_key(f"{section}.{key}", key, keys)
+        for section, keys in known.items() for key in settings[section] if key not in keys
+    ]  # fmt: skip
+    for key, kinds, words in FORMS:
+        value = settings["environment"].get(key)
+        if value is not None and not isinstance(value, kinds):
+            problems.append(f"environment.{key} = {short(value)}: must be {words}")
+    raise_problems(where, problems)
+    DecisionSettings(**settings["decisions"])
     return settings
+
+
+def environment_keys():
+    """Names of all settings of the environment that a training run may change."""
+    own = [name for name in inspect.signature(FowtEnv.__init__).parameters if name not in NOT_SET_THERE]
+    return list(dict.fromkeys([*OF_TRAINING, *own, *OPTIONS]))
+
+
+def check_algorithm(kind, name, given):
+    """Raises: InputError for settings of algorithm that its class lacks, or declares with another type."""
+    arguments = inspect.signature(kind.__init__).parameters
+    known = {key: argument.annotation for key, argument in arguments.items() if key not in GIVEN_BY_TRAINING}
+    problems = []
+    for key, value in given.items():
+        if key not in known:
+            problems.append(unknown_key(f"algorithm.{key}", key, known))
+        elif (wanted := _not_allowed(key, value, known[key])) is not None:
+            problems.append(f"algorithm.{key} = {short(value)}: must be {wanted}")
+    raise_problems(name, problems)
+
+
+def _not_allowed(key, value, declared):
+    """What a setting of an algorithm must be, in words, where the value is not; else None."""
+    number = is_number(value)
+    if key == "policy_kwargs":
+        return None if isinstance(value, dict) else "a table"
+    if key == "gamma":
+        return None if number and 0.0 < value <= 1.0 else "a number > 0 and <= 1"
+    if key in SCHEDULES:
+        pair = isinstance(value, list) and len(value) == 2 and all(map(is_number, value))
+        return None if number or pair else "a number or a pair [start, end]"
+    if declared is bool:
+        return None if isinstance(value, bool) else "true or false"
+    if declared is int:
+        return None if type(value) is int else "a whole number"
+    if declared is float:
+        return None if number else "a number"
+    return None
 
 
 def read_settings(path):

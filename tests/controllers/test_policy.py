@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+import zipfile
 from dataclasses import replace
 
 import numpy as np
@@ -162,3 +163,54 @@ def test_files_that_are_no_policies_are_refused(tmp_path):
     path = write_random_policy(tmp_path / "good.npz")
     with pytest.raises(InputError, match="control_dt = 0.05: must be 0.1 s"):
         make(f"policy:{path}", TURBINE, 0.05)
+
+
+def rewritten(path, **arrays):
+    """The policy file with some arrays replaced, or left out where None."""
+    with np.load(path) as file:
+        kept = {name: file[name] for name in file.files} | arrays
+    np.savez(path, **{name: array for name, array in kept.items() if array is not None})
+    return path
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"decisions": {"envs": 8}}, "decisions.envs: unknown key. Allowed: hold, smoothing, history"),
+        ({"decisions": {"hold": 0}}, "decisions.hold = 0: must be a whole number from 1 to 100"),
+        ({"activation": "tan"}, "activation = 'tan': must be one of .*Did you mean 'tanh'"),
+        ({"layers": 3}, "array 'weight_2 is not a file|array 'weight_2'"),
+        ({"clip_observatio": 3.0}, "clip_observatio: unknown key. Did you mean 'clip_observation'"),
+    ],
+)
+def test_settings_that_no_policy_can_have_are_named(settings, message, tmp_path):
+    path = write_random_policy(tmp_path / "a.npz", **settings)
+    with pytest.raises(InputError, match=f"policy file .*a.npz.*{message}"):
+        read_policy(path)
+
+
+@pytest.mark.parametrize(
+    ("arrays", "message"),
+    [
+        ({"settings": np.array("[1]")}, "its settings must be a JSON object"),
+        ({"settings": np.array("{")}, "cannot be read"),
+        ({"settings": None}, "cannot be read: 'settings'"),
+        ({"weight_1": None}, "array 'weight_1'"),
+        ({"mean": np.array(["a", "b"])}, "array of <U1: must hold numbers"),
+        ({"bias_1": np.zeros(3)}, "do not form a network with two outputs"),
+        ({"scale": np.zeros(27)}, "do not form a network with two outputs"),
+        ({"bias_0": np.full(5, np.nan)}, "do not form a network with two outputs"),
+    ],
+)
+def test_arrays_that_form_no_network_are_refused(arrays, message, tmp_path):
+    path = rewritten(write_random_policy(tmp_path / "a.npz"), **arrays)
+    with pytest.raises(InputError, match=f"policy file .*a.npz.*{message}"):
+        read_policy(path)
+
+
+def test_an_array_of_a_later_version_of_its_format_is_refused(tmp_path):
+    path = write_random_policy(tmp_path / "a.npz")
+    with zipfile.ZipFile(path, "a") as file:
+        file.writestr("more.npy", b"\x93NUMPY\x09\x00")
+    with pytest.raises(InputError, match=r"array 'more.npy' has the version \(9, 0\)"):
+        read_policy(path)

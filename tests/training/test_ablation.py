@@ -62,3 +62,17 @@ def test_misspelt_names_are_refused(table, tmp_path):
     path.write_text("steps: 1\nseeds: [0]\ncommon: {}\nvariants: {a: {lable: x}}\n")
     with pytest.raises(InputError, match="lable"):
         ablation.read_table(path)
+
+
+def test_the_command_trains_what_is_left_and_reports_what_there_is(table, tmp_path, capsys):
+    path, out, picture = tmp_path / "table.yml", tmp_path / "runs", tmp_path / "plot.png"
+    words = ["--table", str(path), "--out", str(out)]
+    ablation.main([*words, "--only", "a"])
+    assert ablation.decisions_done(ablation.folder_of(out, "a", 0)) == 64
+    with pytest.raises(InputError, match="unknown variant 'c'"):
+        ablation.main([*words, "--only", "c"])
+    capsys.readouterr()
+    ablation.main([*words, "--report", str(picture)])
+    shown = capsys.readouterr().out
+    assert str(picture) in shown and "| first | " in shown and "| second | " not in shown
+    assert picture.stat().st_size > 5000

@@ -85,6 +85,23 @@ def test_rosco_in_worker_processes_gives_the_bits_of_one_process():
 # ------------------------------------------------------------------ Ray
 
 
+def niceness(task):
+    return os.nice(0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("asked", "more"), [(None, 0), ("3", 3)])
+def test_workers_of_a_ray_of_ours_are_as_nice_as_this_process_unless_ray_is_told_otherwise(
+    asked, more, monkeypatch
+):
+    pytest.importorskip("ray", reason="Ray is not installed: pip install 'fowt-env[ray]'")
+    monkeypatch.delenv("RAY_worker_niceness", raising=False)
+    if asked is not None:
+        monkeypatch.setenv("RAY_worker_niceness", asked)
+    found = dict(outcomes(niceness, [1], engine="ray"))
+    assert found == {0: min(19, os.nice(0) + more)}
+
+
 @pytest.fixture(scope="module")
 def cluster():
     """A local Ray cluster of two workers."""

@@ -1,8 +1,22 @@
+import copy
+import json
+
 import pandas as pd
 import pytest
 
+from fowt_env.errors import InputError
+from training.evaluate import COLUMNS
+from training.leaderboard import leaderboard
 from training.metrics import METRICS
-from training.report import DROPPED_FIRST, HEADLINE, summary_rows
+from training.report import (
+    DROPPED_FIRST,
+    HEADLINE,
+    LEADERBOARD_DROPS,
+    chosen_cases,
+    evaluation_plots,
+    leaderboard_rows,
+    summary_rows,
+)
 
 
 def means():
@@ -35,3 +49,48 @@ def test_printed_rows_fit_the_width_and_say_what_failed(width):
 
 def test_a_wide_terminal_gets_every_column():
     assert len(summary_rows(means(), 200)[0]) == 3 + len(HEADLINE)
+
+
+def board(seeds):
+    """Leaderboard of pi and of x, whose every run failed, over one case."""
+    rows = [
+        dict.fromkeys(COLUMNS, 1.0 + 0.1 * seed)
+        | {"controller": name, "case": "calm", "seed": seed, "status": status, "reason": ""}
+        for seed in seeds
+        for name, status in (("pi", "ok"), ("x", "failed"))
+    ]
+    return leaderboard(pd.DataFrame(rows))
+
+
+def test_the_leaderboard_says_how_many_runs_went_well_and_of_which_seeds():
+    title, headings, rows = leaderboard_rows(board([1, 2, 3, 6, 8, 9]))
+    assert "seeds 1-3, 6, 8-9" in title and "difference from pi" in title
+    (pi, x) = (dict(zip(headings, row, strict=True)) for row in rows)
+    assert (pi["runs"], x["runs"]) == ("6/6", "0/6")
+    assert set(list(x.values())[2:]) == {"-"}
+
+
+def test_a_narrow_terminal_loses_columns_of_the_leaderboard_in_order():
+    wide, narrow = (leaderboard_rows(board([1, 2]), width)[1] for width in (300, 60))
+    assert len(wide) - len(narrow) == len(LEADERBOARD_DROPS) and set(narrow) < set(wide)
+
+
+def test_a_score_beyond_a_limit_stands_in_brackets_and_none_is_a_dash():
+    scored = copy.deepcopy(board([1, 2]))
+    for entry, score in zip(scored["controllers"], ({"mean": 0.9, "valid": False}, None), strict=True):
+        entry["score"] = score
+    _, headings, rows = leaderboard_rows(scored)
+    place = headings.index("score")
+    assert [row[place] for row in rows] == ["(0.900)", "-"]
+
+
+def test_of_runs_that_all_failed_there_is_nothing_to_plot(tmp_path):
+    (tmp_path / "manifest.json").write_text(json.dumps({"cases": {"calm": {}}}))
+    table = pd.DataFrame([{"controller": "x", "case": "calm", "seed": 1, "status": "failed"}])
+    assert evaluation_plots(table, {}, tmp_path) == [] and len(list(tmp_path.iterdir())) == 1
+
+
+def test_a_case_that_the_suite_does_not_hold_is_named():
+    message = "unknown case of suite 'above_rated' 'ntm_81'. Did you mean 'ntm_18'"
+    with pytest.raises(InputError, match=message):
+        chosen_cases("above_rated", "ntm_81")

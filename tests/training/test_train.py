@@ -1,6 +1,7 @@
 """Training: what a run leaves behind, how it stops and goes on, and what it refuses."""
 
 import json
+import random
 import shlex
 import tomllib
 
@@ -168,10 +169,58 @@ def test_wrong_settings_are_named(tmp_path):
         resolve("ppo", "above_rated", 0, 10, {"algoritm.gamma": 1.0})
     with pytest.raises(InputError, match="unknown observation set 'mesured'. Did you mean 'measured'"):
         Training(small("ppo", **{"environment.observation": "mesured"}), tmp_path / "a").run()
-    with pytest.raises(InputError, match="ppo does not take these settings.*n_stepps"):
-        Training(small("ppo", **{"algorithm.n_stepps": 3}), tmp_path / "b").run()
     with pytest.raises(InputError, match="holds no run"):
         Training(None, tmp_path / "c", resume=True)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"decisions.envs": 8}, "decisions.envs: unknown key. Allowed: hold, smoothing, history"),
+        ({"decisions.hold": 0}, "decisions.hold = 0: must be a whole number from 1 to 100"),
+        ({"environment.num_env": 8}, "environment.num_env: unknown key. Did you mean 'num_envs'"),
+        ({"environment.windd": 8}, "environment.windd: unknown key. Did you mean 'wind'"),
+        ({"environment.threads": 8}, "environment.threads: unknown key"),  # training's own
+        ({"environment.reward": 3}, "environment.reward = 3: must be a table of weights"),
+        ({"environment.observation": 3}, "environment.observation = 3: must be the name"),
+        ({"environment.randomise": 3}, "environment.randomise = 3: must be a table"),
+        ({"normalise.training": True}, "normalise.training: unknown key"),
+        ({"normalise.clip_obs": "x"}, "normalise.clip_obs = 'x': must be a number > 0"),
+        ({"validation.winds": "[a]"}, r"validation.winds = '\[a\]': must be a list of numbers"),
+    ],
+)
+def test_a_setting_that_no_run_can_have_is_named_before_anything_is_built(change, message):
+    with pytest.raises(InputError, match=message):
+        small("ppo", **change)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"algorithm.n_stepps": 3}, "algorithm.n_stepps: unknown key. Did you mean 'n_steps'"),
+        ({"algorithm.seed": 3}, "algorithm.seed: unknown key"),  # training's own
+        ({"algorithm.gamma": 1.5}, "algorithm.gamma = 1.5: must be a number > 0 and <= 1"),
+        ({"algorithm.n_steps": 0.5}, "algorithm.n_steps = 0.5: must be a whole number"),
+        ({"algorithm.ent_coef": "x"}, "algorithm.ent_coef = 'x': must be a number"),
+        ({"algorithm.use_sde": 1}, "algorithm.use_sde = 1: must be true or false"),
+        ({"algorithm.learning_rate": [1.0, "b"]}, "algorithm.learning_rate = .*a pair"),
+        ({"algorithm.policy_kwargs": 3}, "algorithm.policy_kwargs = 3: must be a table"),
+        ({"algorithm.policy_kwargs.net": 3}, "ppo does not take these settings.*'net'"),
+        ({"algorithm.n_steps": -1}, "ppo does not take these settings.*n_steps=-1"),
+        ({"validation.skip": 12.0}, "validation.skip = 12.0: must be less than the 12 s of an episode"),
+    ],
+)
+def test_a_run_that_cannot_start_says_why_and_leaves_nothing_behind(change, message, tmp_path):
+    with pytest.raises(InputError, match=message):
+        Training(small("ppo", **change), tmp_path / "run").run()
+    assert not (tmp_path / "run").exists()
+
+
+def test_judging_the_baseline_draws_nothing_from_the_generators_of_training():
+    settings = small("ppo")
+    before = (random.getstate(), repr(np.random.get_state()), torch.get_rng_state().tolist())
+    baseline_figures(settings)
+    assert before == (random.getstate(), repr(np.random.get_state()), torch.get_rng_state().tolist())
 
 
 def test_a_published_agent_has_a_card_whose_command_makes_the_same_settings(tmp_path, monkeypatch):

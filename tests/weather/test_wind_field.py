@@ -1,6 +1,7 @@
 """Full-field wind: sampling of a box, its travel, its edges, its averages, and runs in it."""
 
 import struct
+import sys
 
 import numpy as np
 import pytest
@@ -95,12 +96,43 @@ def test_steady_field_is_the_mean_over_time_at_every_height():
         ({"colour": 1}, "colour"),
         ({"dt": -1.0}, "dt"),
         ({"u": np.full((4, 9, 11), np.nan)}, "finite"),
+        ({"u": "wind"}, "wind.u: must be an array of numbers with 3 axes"),
+        ({"v": np.zeros((4, 9, 10))}, r"wind.v has shape \(4, 9, 10\): must be that of u"),
+        ({"y": np.r_[Y[:-1], 90.0]}, "wind.y: must be at least 2 evenly increasing numbers"),
+        ({"periodic": 1}, "wind.periodic = 1"),
     ],
 )
 def test_bad_boxes_are_refused_by_name(change, words):
     spec = {"kind": "box", "u": np.full((4, 9, 11), 12.0), "y": Y, "z": Z, "dt": 0.5, "speed": 12.0}
     with pytest.raises(InputError, match=words):
         read_box(spec | change, hub_height=HUB, rotor_diameter=DIAMETER)
+
+
+def test_what_a_kind_of_box_needs_is_named_where_it_is_missing():
+    with pytest.raises(InputError, match="wind.path is missing: the bts wind needs it"):
+        read_box({"kind": "bts"}, hub_height=HUB, rotor_diameter=DIAMETER)
+    with pytest.raises(InputError, match="wind.path = 3: must be a path"):
+        read_box({"kind": "bts", "path": 3}, hub_height=HUB, rotor_diameter=DIAMETER)
+
+
+@pytest.mark.parametrize(
+    ("module", "spec", "extra"),
+    [
+        ("hipersim", {"kind": "mann", "speed": 18.0}, "mann"),
+        ("openfast_io.turbsim_file", {"kind": "bts", "path": "small.bts"}, "openfast"),
+    ],
+)
+def test_a_box_whose_library_is_missing_says_how_to_install_it(module, spec, extra, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, module, None)
+    monkeypatch.chdir(tmp_path)
+    head = struct.pack("<h4l12fl", 7, 9, 11, 0, 4, *[1.0] * 12, 0)
+    (tmp_path / "small.bts").write_bytes(head + bytes(2 * 3 * 4 * 9 * 11))
+    with pytest.raises(InputError, match=rf"not installed: pip install 'fowt-env\[{extra}\]'"):
+        read_box(spec, hub_height=HUB, rotor_diameter=DIAMETER, duration=60.0)
+
+
+def test_a_box_says_in_words_what_it_is():
+    assert repr(random_box()) == "WindBox(40 x 0.5 s, 11 x 9 points, 12 m/s)"
 
 
 def test_missing_turbsim_file_is_named():
