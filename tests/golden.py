@@ -35,20 +35,22 @@ def actions():
 
 
 def trajectory(name, task, **options):
-    """DataFrame of step, reward, its terms and the observation entries, every EVERY steps."""
+    """DataFrame of step, reward, the terms that are paid for and the observation, every EVERY steps."""
     env = gymnasium.make(name, task=task, **options)
     observation, info = env.reset(seed=SEED)
-    rows = [_row(0, 0.0, observation, info)]
+    weights = env.unwrapped.task.weights
+    paid = [key for key in REWARD_KEYS if weights.get(key.removeprefix("reward/"), 0.0) > 0.0]
+    rows = [_row(0, 0.0, observation, info, paid)]
     for step, action in enumerate(actions(), 1):
         observation, reward, terminated, truncated, info = env.step(action)
         assert not (terminated or truncated), f"{name} {task}: the episode ended at step {step}"
         if step % EVERY == 0:
-            rows.append(_row(step, reward, observation, info))
+            rows.append(_row(step, reward, observation, info, paid))
     return pd.DataFrame(rows)
 
 
-def _row(step, reward, observation, info):
-    terms = {key: float(info.get(key, 0.0)) for key in REWARD_KEYS}  # reset pays nothing
+def _row(step, reward, observation, info, paid):
+    terms = {key: float(info.get(key, 0.0)) for key in paid}  # reset pays nothing
     seen = {f"observation_{i}": float(value) for i, value in enumerate(observation)}
     return {"step": step, "reward": float(reward), **terms, **seen}
 

@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import yaml
+from scipy.stats import t
 
 from fowt_env.errors import InputError, unknown
 from fowt_env.plots import COLOURS, new_figure, save_figure, style_axes
@@ -24,13 +25,14 @@ from training.train import AGENTS, Training, resolve
 
 TABLE = AGENTS / "ablation.yml"
 KEYS = ("steps", "seeds", "common", "variants")
-OWN_KEYS = ("label", "algo", "steps", "set")
+OWN_KEYS = ("label", "algo", "steps", "seeds", "set")
 FIGURES = {
     "rotor_speed_std_ratio": "rotor-speed std",
     "platform_pitch_std_ratio": "platform-pitch std",
     "blade_pitch_travel_ratio": "blade-pitch travel",
     "shaft_power_std_ratio": "power std",
 }
+COLUMNS = FIGURES | {"shaft_power_mean_ratio": "mean power"}  # of the table; the picture has FIGURES
 
 
 def read_table(path=TABLE):
@@ -55,6 +57,11 @@ def settings_of(table, name, seed, steps=None):
     changes = table["common"] | variant.get("set", {})
     steps = steps or variant.get("steps", table["steps"])
     return resolve(variant.get("algo", "ppo"), "above_rated", seed, steps, changes)
+
+
+def seeds_of(table, name):
+    """Training seeds of a variant: its own, or those of all."""
+    return table["variants"][name].get("seeds", table["seeds"])
 
 
 def folder_of(out, name, seed):
@@ -83,14 +90,15 @@ def ablation_rows(table, out):
     """DataFrame: a row per variant and seed that has been validated, with the figures of its best policy."""
     rows = []
     for name, variant in table["variants"].items():
-        for seed in table["seeds"]:
+        for seed in seeds_of(table, name):
             path = folder_of(out, name, seed) / "validation.csv"
             if not path.is_file():
                 continue
             validated = pd.read_csv(path)
             best = validated.loc[validated["score"].idxmin()]
             about = {"variant": name, "label": variant["label"], "seed": seed}
-            trained = {"decisions_trained": int(validated["decisions"].iloc[-1])}
+            last = validated.iloc[-1]
+            trained = {"decisions_trained": int(last["decisions"]), "seconds_trained": float(last["seconds"])}
             rows.append(about | best.to_dict() | trained)
     if not rows:
         raise InputError(f"{out}: no variant has been validated yet")
@@ -116,16 +124,21 @@ def plot_ablation(rows, path):
 
 
 def markdown(rows):
-    """The figures of ablation_rows as a markdown table, means over the seeds."""
-    mean = rows.groupby("label", sort=False)[[*FIGURES, "failed", "score", "decisions_trained"]].mean()
+    """The figures of ablation_rows as a markdown table: means over seeds, 95 % interval of the score's."""
+    groups = rows.groupby("label", sort=False)
+    mean = groups[[*COLUMNS, "failed", "score", "decisions_trained", "seconds_trained"]].mean()
     lines = [
-        f"| | {' | '.join(FIGURES.values())} | failed | score | decisions |",
-        "|" + "---|" * (len(FIGURES) + 4),
+        f"| | {' | '.join(COLUMNS.values())} | failed | score | seeds | decisions | s |",
+        "|" + "---|" * (len(COLUMNS) + 6),
     ]
     for label, row in mean.iterrows():
-        cells = " | ".join(f"{row[name]:.3f}" for name in FIGURES)
-        share, thousands = f"{row['failed']:.2f}", f"{row['decisions_trained'] / 1e3:.0f} k"
-        lines.append(f"| {label} | {cells} | {share} | {row['score']:.3f} | {thousands} |")
+        cells = " | ".join(f"{row[name]:.3f}" for name in COLUMNS)
+        scores = groups.get_group(label)["score"].to_numpy()
+        score, n = f"{row['score']:.3f}", len(scores)
+        if n > 1:
+            score += f" ± {t.ppf(0.975, n - 1) * scores.std(ddof=1) / np.sqrt(n):.3f}"
+        trained = f"{row['decisions_trained'] / 1e3:.0f} k | {row['seconds_trained']:.0f}"
+        lines.append(f"| {label} | {cells} | {row['failed']:.2f} | {score} | {n} | {trained} |")
     return "\n".join(lines)
 
 
@@ -145,7 +158,7 @@ def main(arguments=None):
         print(markdown(rows))
         return
     for name in given.only.split(",") if given.only else table["variants"]:
-        for seed in table["seeds"]:
+        for seed in seeds_of(table, name):
 
             def report(done, total, text, name=name, seed=seed):
                 print(f"\r{name} {seed}: {done}/{total}: {text}  ", end="", file=sys.stderr)

@@ -5,7 +5,6 @@ from gymnasium.spaces import Box
 from stable_baselines3.common.vec_env import VecEnvWrapper
 
 from fowt_env.envs.decisions import Decisions
-from fowt_env.envs.observations import entries
 from fowt_env.measurement import Measure
 from training.sb3_env import FowtSB3VecEnv
 
@@ -19,19 +18,12 @@ class DecisionVecEnv(VecEnvWrapper):
     The reward is the mean over the control periods of the decision. An episode that ends before its
     decision does is followed by the next one under the action that asks for what is there already, until
     the others are through.
-
-    sensors: a randomisation.Sensors between the plants and the agent; None: what is measured is seen.
     """
 
-    def __init__(self, venv, settings, sensors=None):
+    def __init__(self, venv, settings):
         self.base = venv
         self.settings = settings
-        self.sensors = sensors
         self.channels = venv.observation_space.shape[0]
-        if sensors is not None:
-            task, turbine = venv.env.envs[0].task, venv.env.envs[0].scene.turbine
-            names = [entry.name for entry in entries(task.observation, turbine, task.wind_preview)]
-            sensors.sensed = np.array([not name.startswith("previous_action") for name in names])
         control_dt = venv.env.envs[0].control_dt
         self.decisions = Decisions(venv.num_envs, self.channels, settings, control_dt)
         repeats = settings.history
@@ -49,9 +41,6 @@ class DecisionVecEnv(VecEnvWrapper):
     def reset(self):
         """Features (n, size) at the start of new episodes."""
         observations = self.venv.reset()
-        if self.sensors is not None:
-            self.sensors.restart(slice(None), observations)
-            observations = self.sensors.read()
         self.decisions.restart(slice(None), observations, self._actions_in_force())
         return self.decisions.features()
 
@@ -69,8 +58,6 @@ class DecisionVecEnv(VecEnvWrapper):
             self.venv.step_async(decisions.smooth(self._decision))
             observations, rewards, dones, new = self.venv.step_wait()
             total += np.where(ended, 0.0, rewards)
-            if self.sensors is not None:
-                self.sensors.take(observations)
             infos = (
                 new if infos is None else [o if e else i for o, i, e in zip(infos, new, ended, strict=True)]
             )
@@ -79,12 +66,8 @@ class DecisionVecEnv(VecEnvWrapper):
                     last = infos[i]["terminal_observation"]
                     infos[i]["terminal_observation"] = decisions.last_features(i, last)
                 ended[i] = True
-                if self.sensors is not None:
-                    self.sensors.restart(i, observations[i])
                 decisions.action[i] = self.base.env.envs[i]._run.action
                 self._decision[i] = decisions.action[i]
-        if self.sensors is not None:
-            observations = self.sensors.read()
         decisions.see(observations)
         for i in np.flatnonzero(ended):
             decisions.restart(i, observations[i], decisions.action[i])
@@ -92,14 +75,11 @@ class DecisionVecEnv(VecEnvWrapper):
 
     def get_state(self):
         """Everything that decides how the episodes go on, to be pickled: plants, histories, actions."""
-        sensors = None if self.sensors is None else self.sensors.get_state()
-        return self.base.env.get_state(), self.decisions.seen.copy(), self.decisions.action.copy(), sensors
+        return self.base.env.get_state(), self.decisions.seen.copy(), self.decisions.action.copy()
 
     def set_state(self, state):
         """Go on from what get_state returned; returns the features there."""
-        plants, seen, action, sensors = state
-        if self.sensors is not None:
-            self.sensors.set_state(sensors)
+        plants, seen, action = state
         self.base.env.set_state(list(plants))
         self.decisions.seen[:] = seen
         self.decisions.action[:] = action

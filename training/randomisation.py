@@ -2,7 +2,8 @@
 
 Building a plant and its operating points takes seconds, so a batch draws a pool of plants once, by seed, and
 its environments share them in turn: environment i has plant i modulo the pool's size. Wind, sea and start are
-drawn anew in every episode as ever; sensor noise is drawn at every reading, the delay once per environment.
+drawn anew in every episode as ever; how much noise its sensors have, and how late they are, is drawn with the
+plant. Controllers in the environments (the baseline, the estimator) are designed on the plant of the files.
 """
 
 from math import isfinite
@@ -10,6 +11,7 @@ from math import isfinite
 import numpy as np
 
 from fowt_env.description import read_platform, read_turbine
+from fowt_env.envs.sensors import check_sensors
 from fowt_env.errors import InputError, unknown
 
 # name: (what is drawn, default distribution). Factors multiply the file's value.
@@ -26,9 +28,10 @@ PLANT = {
     "air_density": ("factor on the density of air", ("normal", 1.0, 0.02)),
 }
 SENSORS = {
-    "noise": "noise of each channel's readings, standard deviation as a share of its observation scale",
+    "noise": "white noise of every reading, standard deviation as a share of the channel's observation scale",
     "delay": "whole control periods from measurement to reading",
 }
+PLATFORM = "oc3_hywind"  # whose figures are multiplied, and which controllers know
 DEFAULT_SENSORS = {"noise": ("uniform", 0.0, 0.02), "delay": ("uniform", 0.0, 3.0)}
 KINDS = {
     "uniform": lambda rng, low, high: rng.uniform(low, high),
@@ -76,7 +79,7 @@ def draw(chosen, rng):
     return {name: float(KINDS[chosen[name][0]](rng, *chosen[name][1:])) for name in order}
 
 
-def plant_settings(factors, platform="oc3_hywind"):
+def plant_settings(factors, platform=PLATFORM):
     """{"platform", "turbine"} settings of FowtEnv for a plant with {name of PLANT: factor}."""
     base = read_platform(platform)
     turbine = read_turbine(base.turbine)
@@ -118,7 +121,7 @@ def plant_settings(factors, platform="oc3_hywind"):
 
 
 def randomised(spec, n, seed):
-    """(per_env settings of n environments, their Sensors) drawn with a seed.
+    """List of n dicts of FowtEnv settings drawn with a seed: plant, sensors, and the plant that is known.
 
     spec: {"plants": size of the pool, name: distribution or None, ...}. Raises: InputError.
     """
@@ -128,55 +131,9 @@ def randomised(spec, n, seed):
     chosen = distributions(spec)
     rng = np.random.default_rng([seed, 1])
     pool = [draw(chosen, rng) for _ in range(min(size, n))]
-    settings = [plant_settings({k: v for k, v in plant.items() if k in PLANT}) for plant in pool]
-    per_env = [settings[i % len(settings)] for i in range(n)]
-    sensors = Sensors(
-        noise=np.array([pool[i % len(pool)].get("noise", 0.0) for i in range(n)]),
-        delay=np.array([round(pool[i % len(pool)].get("delay", 0.0)) for i in range(n)]),
-        seed=seed,
-    )
-    return per_env, sensors
-
-
-class Sensors:
-    """Readings of n environments: late by whole control periods, with white noise; scaled observations.
-
-    noise (n,): standard deviations; delay (n,): control periods. sensed (channels,) bool: which channels are
-    sensors' (an agent knows its own last action exactly); all, until set. Raises: InputError below 0.
-    """
-
-    def __init__(self, noise, delay, seed):
-        self.noise = np.asarray(noise, dtype=np.float64)
-        self.delay = np.asarray(delay, dtype=np.int64)
-        if np.any(self.noise < 0.0) or np.any(self.delay < 0):
-            raise InputError("randomise: noise and delay must not be negative")
-        self.rng = np.random.default_rng([seed, 2])
-        self.sensed = True
-        self.past = None  # (delay + 1, n, channels), newest first
-
-    def restart(self, rows, observations):
-        """Forget the past of some rows."""
-        if self.past is None:
-            self.past = np.zeros((int(self.delay.max()) + 1, *np.shape(observations)), dtype=np.float32)
-        self.past[:, rows] = observations
-
-    def take(self, observations):
-        """Take the observations (n, channels) of one control period."""
-        self.past[1:] = self.past[:-1].copy()
-        self.past[0] = observations
-
-    def read(self):
-        """(n, channels) float32: what the sensors show now."""
-        late = self.past[self.delay, np.arange(len(self.delay))]
-        noisy = late + self.noise[:, None] * self.rng.normal(size=late.shape)
-        return np.where(self.sensed, noisy, self.past[0]).astype(np.float32)
-
-    def get_state(self):
-        """All that decides the coming readings."""
-        return self.past.copy(), self.rng.bit_generator.state
-
-    def set_state(self, state):
-        """Go on from what get_state returned."""
-        past, generator = state
-        self.past = past.copy()
-        self.rng.bit_generator.state = generator
+    settings = []
+    for drawn in pool:
+        sensors = {"noise": drawn.get("noise", 0.0), "delay": round(drawn.get("delay", 0.0))}
+        plant = plant_settings({name: value for name, value in drawn.items() if name in PLANT})
+        settings.append(plant | {"sensors": check_sensors(sensors), "designed_on": {"platform": PLATFORM}})
+    return [settings[i % len(settings)] for i in range(n)]

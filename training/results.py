@@ -127,9 +127,11 @@ def controller_code(controller):
     """{"name", "code"}: what a controller is called, and a hash of the sources that define it.
 
     A name of CONTROLLERS: its module, those of the package that this imports, and the package's data;
-    "design:FILE": the file and the package; "module:Name", a class or an object: the file that it comes from.
+    "design:FILE", "policy:NAME": the file and the package; "module:Name", a class or an object: the file that
+    it comes from.
     """
     from controllers import CONTROLLERS, saved_design
+    from controllers.policy import PREFIX, policy_path
 
     if not isinstance(controller, str):
         kind = (
@@ -141,6 +143,9 @@ def controller_code(controller):
         return {"name": controller, "code": _digest(_package_files(CONTROLLERS.get(controller)))}
     if controller.startswith(saved_design.PREFIX):
         files = [controller.removeprefix(saved_design.PREFIX), *_package_files(saved_design.load_design)]
+        return {"name": controller, "code": _digest(files)}
+    if controller.startswith(PREFIX):  # its baseline may be any controller
+        files = [policy_path(controller.removeprefix(PREFIX)), *_package_files(None)]
         return {"name": controller, "code": _digest(files)}
     module = controller.partition(":")[0]
     sys.path.insert(0, "")

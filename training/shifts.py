@@ -14,12 +14,10 @@ import numpy as np
 from pydantic import Field
 
 from controllers.base import CheckedController, CompiledController
-from fowt_env.envs.observations import channels
+from fowt_env.envs.sensors import NOISE_STREAM, reading_scales
 from fowt_env.measurement import Measurement
 from fowt_env.records import NonNegative, Positive, Record
 from training.randomisation import PLANT, plant_settings
-
-NOISE_STREAM = 3  # of a run's seed: apart from the weather's and from training.randomisation's
 
 
 class Shift(Record):
@@ -81,7 +79,8 @@ class Unaware:
         """What the controller inside answers to its reading."""
         if measurement.time != self.read_at:  # the first instant has been read by reset
             self.past.append(measurement)
-            self.reading, self.read_at = self._noisy(self.past[0]), measurement.time
+            late = self.past[0]._replace(time=measurement.time)  # a clock is not late
+            self.reading, self.read_at = self._noisy(late), measurement.time
         return self.inner.act(self.reading)
 
     def _noisy(self, measurement):
@@ -90,12 +89,3 @@ class Unaware:
             return measurement
         values = np.array(measurement) + self.spread * self.rng.normal(size=len(measurement))
         return Measurement(*values.tolist())
-
-
-def reading_scales(turbine):
-    """(N_MEASUREMENTS,) what noise of 1 is on each field of a Measurement, SI; 0 for the time."""
-    table = channels(turbine)
-    scales = {name: table[name][0].scale for name in Measurement._fields if name in table}
-    scales["generator_speed"] = turbine.drivetrain.gear_ratio * scales["rotor_speed"]
-    scales["time"] = 0.0  # a clock, not a sensor
-    return np.array([scales[name] for name in Measurement._fields])

@@ -183,10 +183,10 @@ def _sea_at(speed):
 
 
 def make_envs(settings):
-    """(training VecNormalize, validation VecNormalize) of resolved settings; only training is randomised."""
+    """(training VecNormalize, validation VecNormalize) of settings; plants are drawn for training alone."""
     from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
 
-    from training.decision_env import DecisionVecEnv, ValidationVecEnv
+    from training.decision_env import DecisionVecEnv
     from training.randomisation import randomised
     from training.sb3_env import FowtSB3VecEnv
 
@@ -195,16 +195,32 @@ def make_envs(settings):
     normalise = {"gamma": settings["algorithm"].get("gamma", 0.99)} | settings["normalise"]
     n = settings["environment"].get("num_envs", 1)
     plants = settings["environment"].get("randomise")
-    per_env, sensors = (None, None) if not plants else randomised(plants, n, settings["seed"])
+    per_env = None if not plants else randomised(plants, n, settings["seed"])
     base = FowtSB3VecEnv(n, threads=1, per_env=per_env, **chosen)
-    env = VecNormalize(VecMonitor(DecisionVecEnv(base, decisions, sensors)), **normalise)
+    env = VecNormalize(VecMonitor(DecisionVecEnv(base, decisions)), **normalise)
     skip, duration = settings["validation"].get("skip", 60.0), base.env.envs[0].task.duration
     if skip >= duration:
         raise InputError(f"validation.skip = {skip}: must be less than the {duration:g} s of an episode")
-    fixed = ValidationVecEnv(validation_episodes(settings), skip, threads=1, **chosen)
+    fixed = validation_env(settings, chosen)
     judge = VecNormalize(VecMonitor(DecisionVecEnv(fixed, decisions)), training=False, **normalise)
     judge.norm_reward = False
     return env, judge
+
+
+def validation_env(settings, chosen):
+    """ValidationVecEnv of resolved settings: FowtEnvs with the settings `chosen` on the nominal plant.
+
+    The sensors of the settings' validation go round the episodes of each wind.
+    """
+    from training.decision_env import ValidationVecEnv
+
+    given = settings["validation"]
+    episodes = validation_episodes(settings)
+    sensors = given.get("sensors")
+    per_env = None
+    if sensors:
+        per_env = [{"sensors": sensors[i % given["seeds"] % len(sensors)]} for i in range(len(episodes))]
+    return ValidationVecEnv(episodes, given.get("skip", 60.0), threads=1, per_env=per_env, **chosen)
 
 
 def decision_env(env):
@@ -216,11 +232,8 @@ def decision_env(env):
 
 def baseline_figures(settings, reference="gspi_oc3"):
     """{metric: (n,)} of a compiled controller on the validation episodes of resolved settings."""
-    from training.decision_env import ValidationVecEnv
-
     chosen = environment_settings(settings) | {"action_mode": "residual", "baseline": reference}
-    skip = settings["validation"].get("skip", 60.0)
-    env = ValidationVecEnv(validation_episodes(settings), skip, threads=1, **chosen)
+    env = validation_env(settings, chosen)
     env.reset()
     nothing = np.zeros((env.num_envs, 2))
     while not env._over.all():

@@ -49,6 +49,8 @@ class Validation(Record):
     seeds: Count
     every: Count  # decisions
     skip: NonNegative = 60.0  # s
+    # of FowtEnv, in turn over the seeds of each wind; none: exact readings
+    sensors: list[dict[str, Any]] = []
 
 
 class TrainingSettings(Record):

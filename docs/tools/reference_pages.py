@@ -42,6 +42,7 @@ FORMULAS = {
     "pitch_travel": "-clip(abs(beta - beta_before) / (beta_rate * control_dt), 0, 1)",
     "torque_travel": "-clip(abs(Q - Q_before) / (Q_rate * control_dt), 0, 1)",
     "failure": "-1 if failed else 0",
+    "power_shortfall": "clip(P / P_rated, 0, 1) - 1",
 }
 OPTIONS = {  # of reset: the value that is taken in place of the drawn one
     "wind": "wind of the episode, as `build_scene` takes it",

@@ -44,6 +44,7 @@ from fowt_env.envs.rewards import (
     check_weights,
     weight_array,
 )
+from fowt_env.envs.sensors import Sensors, check_sensors, draw_sensors, reading_scales
 from fowt_env.envs.snapshot import CARRIED, WORK_CARRIED, Snapshot
 from fowt_env.envs.tables import task_tables
 from fowt_env.envs.tasks import TASKS, Episode, Task, check_offset, task_of
@@ -51,7 +52,7 @@ from fowt_env.envs.trims import exact_trim, near_trim, plant_key
 from fowt_env.errors import InputError, unknown
 from fowt_env.jit import Box
 from fowt_env.measurement import N_MEASUREMENTS, Measurement
-from fowt_env.scene import build_scene
+from fowt_env.scene import Scene, build_scene
 from fowt_env.simulation import INITIAL, check_duration, steps_in
 from fowt_env.state import State
 from fowt_env.step import output
@@ -79,6 +80,14 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     wind_preview look-ahead times (s) of the channel wind_preview
     render_mode  None, "rgb_array" (render() returns a picture) or "human" (every step shows one in a window)
     fidelity     level of build_scene: "reference", "standard" or "fast"
+    sensors      {"noise": standard deviation of white noise on every reading, as a share of the channel's
+                 scale; "delay": control periods from measurement to reading}, either may be left out. One
+                 reading per control period is what observation, baseline and estimator are given, and
+                 measurement() returns; its noise follows from the weather's seed. Azimuth, last action and
+                 preview are exact; rewards and failures are of the true motions. None: readings are exact
+    designed_on  {"platform": ..., "turbine": ...} as build_scene takes them (the turbine may be left out:
+                 the platform's): the plant that baseline and estimator are designed on, where that is not
+                 the one that moves. None: it is
     options      further ones go to build_scene, loads of one's own (fowt_env.Load) among them
 
     An episode starts at the operating point of its mean wind, moved by the task's offsets, in wind and
@@ -122,6 +131,8 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         wind_preview: Sequence[float] | None = None,
         render_mode: str | None = None,
         fidelity: str = "standard",
+        sensors: Mapping[str, Any] | None = None,
+        designed_on: Mapping[str, Any] | None = None,
         **options: Any,
     ) -> None:
         if render_mode is not None:
@@ -150,6 +161,16 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             **options,
         )
         check_duration(self.scene, task.duration)
+        self._designed = None  # the scene of another plant that controllers in the environment know
+        if designed_on is not None:
+            parts = _design_parts(designed_on)
+            known = {**options, "turbine": parts["turbine"]}
+            length = max(task.duration, SHORTEST_WEATHER)
+            self._designed = build_scene(
+                parts["platform"], episode.wind, episode.sea, rotor=task.rotor, duration=length,
+                fidelity=fidelity, **known,
+            )  # fmt: skip
+        self._sensors = None if sensors is None else check_sensors(sensors)
         self.control_dt = float(control_dt)
         self.dt = min(self.scene.dt, self.control_dt) if dt is None else float(dt)
         per_control = steps_in("control_dt", control_dt, self.dt if dt is None else dt)
@@ -162,7 +183,8 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self._running = False
         # what a snapshot must agree with: the same numbers then mean the same
         seen = (task.observation, task.wind_preview)
-        self._kind = (self._key, action_mode, baseline, *seen, self.dt, self.control_dt, self._last)
+        told = (None if self._designed is None else plant_key(self._designed), self._sensors)
+        self._kind = (self._key, action_mode, baseline, *seen, self.dt, self.control_dt, self._last, told)
 
     def twin(self) -> "FowtEnv":
         """Another environment of the same settings, before its first reset; shares what is never written."""
@@ -181,16 +203,16 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         law = None
         parameters, memory = np.zeros(1), np.zeros(1)
         if mode == Mode.RESIDUAL:
-            self._baseline = named_baseline(self.baseline, turbine, self.control_dt)
+            self._baseline = named_baseline(self.baseline, self.design_scene.turbine, self.control_dt)
             law = self._baseline.kernel
             parameters, memory = self._baseline.parameters, self._baseline.memory
         self._estimator = watch = None
         if set(ESTIMATE_CHANNELS) & set(task.observation):
             from controllers.lqr import WindEstimator  # fowt_env imports nothing from it otherwise
 
-            self._estimator = WindEstimator(turbine, self.control_dt)
+            self._estimator = WindEstimator(self.design_scene.turbine, self.control_dt)
             watch = self._estimator.kernel
-        watching = self._estimator is not None
+        watching, sensed = self._estimator is not None, self._sensors is not None
         self._law, self._watch = Box(None, law), Box(None, watch)
         self._setting = Setting(
             model=scene.model,
@@ -203,8 +225,10 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             overspeed=float(turbine.overspeed),
             dt=self.dt,
             per_control=per_control,
+            sensors=Sensors(np.zeros((1, N_MEASUREMENTS)), self._sensors["delay"]) if sensed else None,
         )
         n = scene.n_state
+        measurement = np.zeros(N_MEASUREMENTS)
         self._run = Run(
             work=scene.work(),
             x=np.zeros(n),
@@ -212,7 +236,9 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             memory=memory,
             estimate=self._estimator.memory if watching else None,
             action=np.zeros(N_ACTIONS),
-            measurement=np.zeros(N_MEASUREMENTS),
+            measurement=measurement,
+            reading=np.zeros(N_MEASUREMENTS) if sensed else measurement,
+            past=np.zeros((self._sensors["delay"] + 1, N_MEASUREMENTS)) if sensed else None,
             observation=np.zeros(len(chosen), dtype=np.float32),
             counts=np.zeros(2, dtype=np.int64),
             reference=np.zeros(len(Reference._fields)),
@@ -381,19 +407,31 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self.scene = scene
         self._run = self._run._replace(work=scene.work())
         self._setting = self._setting._replace(model=scene.model)
+        if self._sensors is not None:
+            readings = self._last // self._setting.per_control + 1
+            scales = reading_scales(scene.turbine)
+            drawn = draw_sensors(self._sensors["noise"], self._sensors["delay"], scales, scene.seed, readings)
+            self._setting = self._setting._replace(sensors=drawn)
+        if self._designed is not None and (self._baseline is not None or self._estimator is not None):
+            self._designed = self._designed.with_weather(scene.wind, scene.sea, scene.seed)
         if self._baseline is not None:
-            self._baseline.prepare(scene)
+            self._baseline.prepare(self.design_scene)
             self._setting = self._setting._replace(parameters=self._baseline.parameters)
         if self._estimator is not None:
-            self._estimator.prepare(scene)
+            self._estimator.prepare(self.design_scene)
             self._setting = self._setting._replace(estimator=self._estimator.parameters)
         self._box = Box(self._setting, self._run)
 
     def measurement(self) -> Measurement:
-        """Measurement that a controller is given now (SI)."""
+        """Measurement that a controller is given now (SI), as the sensors read it."""
         if self._box is None:
             raise ResetNeeded("call reset() first: nothing has been measured yet")
-        return Measurement(*self._run.measurement.tolist())
+        return Measurement(*self._run.reading.tolist())
+
+    @property
+    def design_scene(self) -> Scene:
+        """Scene that controllers may be designed on: the plant of designed_on, or that which moves."""
+        return self.scene if self._designed is None else self._designed
 
     def channels(self) -> dict[str, float]:
         """{OpenFAST channel: value in its unit} of the present instant; leaves the run as it is."""
@@ -473,6 +511,16 @@ def named_baseline(name, turbine, control_dt):
     if not isinstance(baseline, CompiledController):
         raise InputError(f"baseline = {name!r}: must be a compiled controller, such as 'pi' or 'gspi_oc3'")
     return baseline
+
+
+def _design_parts(given):
+    """{"platform", "turbine"} of what an environment is given as designed_on. Raises: InputError."""
+    if not isinstance(given, Mapping) or "platform" not in given:
+        raise InputError(f"designed_on = {given!r}: must be a dict with a platform, and a turbine or not")
+    for key in given:
+        if key not in ("platform", "turbine"):
+            raise unknown("key of designed_on", key, ("platform", "turbine"))
+    return {"turbine": None} | dict(given)
 
 
 def _chosen(drawn, options):

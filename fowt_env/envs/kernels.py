@@ -13,6 +13,7 @@ from fowt_env.dynamics import Kept, Model, Work
 from fowt_env.envs.actions import ActionMap, accept, action_of, command_of
 from fowt_env.envs.observations import ObservationMap, fill_observation, fill_signals
 from fowt_env.envs.rewards import Scales, fill_terms, weighted_sum
+from fowt_env.envs.sensors import Sensors, take_reading
 from fowt_env.jit import entry, kernel
 from fowt_env.measurement import Measure
 from fowt_env.state import State
@@ -36,6 +37,7 @@ class Setting(NamedTuple):
     overspeed: float  # rad/s
     dt: float  # s
     per_control: int  # physics steps in a control period
+    sensors: Sensors | None  # between the plant and its readers; None: readings are the measurements
 
 
 class Run(NamedTuple):
@@ -48,6 +50,8 @@ class Run(NamedTuple):
     estimate: np.ndarray | None  # memory of the estimator; None: no channel asks for it
     action: np.ndarray  # (2,) last accepted action
     measurement: np.ndarray  # (N_MEASUREMENTS,) at the present instant
+    reading: np.ndarray  # the same as sensors show it; without any the measurement itself
+    past: np.ndarray | None  # last measurements, of the sensors' delay
     observation: np.ndarray  # (n,) float32
     counts: np.ndarray  # int64: physics steps done, control periods with a clipped action
     reference: np.ndarray  # rewards.Reference of the episode
@@ -67,7 +71,7 @@ def copy_into(target, source):
 
 @kernel
 def look(setting, run):
-    """Measure at the present instant; RUNNING, or NON_FINITE with the last measurement kept."""
+    """Measure and read at the present instant; RUNNING, or NON_FINITE with the last measurement kept."""
     model = setting.model
     t = run.counts[STEP] * setting.dt
     observe_scene(model, run.work, run.x, run.u, t, run.dx, run.measurement)
@@ -75,16 +79,18 @@ def look(setting, run):
         if not isfinite(value):
             copy_into(run.measurement, run.before)
             return NON_FINITE
+    period = run.counts[STEP] // setting.per_control
+    take_reading(setting.sensors, period, run.measurement, run.past, run.reading)
     return RUNNING
 
 
 @kernel
 def show(setting, run):
-    """Fill the observation from the present measurement."""
+    """Fill the observation from the present reading."""
     t = run.counts[STEP] * setting.dt
     chosen = setting.chosen
     fill_signals(
-        t, setting.model, run.x, run.measurement, run.action, run.estimate, chosen.preview, run.signals
+        t, setting.model, run.x, run.reading, run.action, run.estimate, chosen.preview, run.signals
     )
     fill_observation(run.signals, chosen, run.observation)
 
@@ -112,10 +118,10 @@ def show_again(box):
 
 @kernel
 def update_estimate(law, setting, run):
-    """Take the period that is over, its command and what is measured now into the estimate."""
+    """Take the period that is over, its command and what is read now into the estimate."""
     if law is None:
         return
-    law(setting.estimator, run.estimate, run.measurement, run.u)
+    law(setting.estimator, run.estimate, run.reading, run.u)
 
 
 @kernel
@@ -150,7 +156,7 @@ def act(box, law, estimator, action):
         return BAD_ACTION, 0.0
     run.counts[SATURATED] += clipped
     command_of(
-        run.action, setting.actions, law.work, setting.parameters, run.memory, run.measurement, run.u,
+        run.action, setting.actions, law.work, setting.parameters, run.memory, run.reading, run.u,
         run.wanted,
     )  # fmt: skip
     return advance_period(setting, run, estimator.work)

@@ -209,13 +209,13 @@ def build_observation_map(chosen, preview):
 
 
 @kernel
-def fill_signals(t, scene, x, measurement, action, estimate, preview, signals):
-    """Fill signals (n,): the measurement, azimuth, last action, estimates, and the hub wind at t + preview.
+def fill_signals(t, scene, x, reading, action, estimate, preview, signals):
+    """Fill signals (n,): what sensors read, azimuth, last action, estimates, and the hub wind at t + preview.
 
     estimate: memory of an estimator, or None.
     """
     for i in range(N_MEASUREMENTS):
-        signals[i] = measurement[i]
+        signals[i] = reading[i]
     signals[SIN_AZIMUTH] = np.sin(x[State.AZIMUTH])
     signals[COS_AZIMUTH] = np.cos(x[State.AZIMUTH])
     signals[FIRST_ACTION] = action[0]

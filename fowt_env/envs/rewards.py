@@ -65,6 +65,7 @@ TERMS = {
     "pitch_travel": Term(-1.0, 0.0, "blade-pitch travel over the most that the rate limit allows"),
     "torque_travel": Term(-1.0, 0.0, "change of generator torque over the most that the rate limit allows"),
     "failure": Term(-1.0, 0.0, "-1 in the step that ends in failure, else 0"),
+    "power_shortfall": Term(-1.0, 0.0, "minus the share of rated power that is lacking; more counts nothing"),
 }
 TermIndex = IntEnum("TermIndex", [name.upper() for name in TERMS], start=0)
 N_TERMS = len(TERMS)
@@ -96,6 +97,12 @@ def power_term(speed, torque, scales):
     """Share of rated power, and how well the rest stays below it."""
     share = scales.gear_ratio * speed * torque / scales.rated_power
     return clipped(share, 0.0, 1.0) * tolerance(share, (0.0, 1.0), POWER_MARGIN)
+
+
+@kernel
+def power_shortfall_term(speed, torque, scales):
+    """Minus the share of rated power that is lacking."""
+    return clipped(scales.gear_ratio * speed * torque / scales.rated_power, 0.0, 1.0) - 1.0
 
 
 @kernel
@@ -133,6 +140,7 @@ def fill_terms(m, before, reference, failed, scales, terms):
     )
     terms[TermIndex.TORQUE_TRAVEL] = travel_term(before[Measure.GENERATOR_TORQUE], torque, scales.torque_way)
     terms[TermIndex.FAILURE] = -1.0 if failed else 0.0
+    terms[TermIndex.POWER_SHORTFALL] = power_shortfall_term(speed, torque, scales)
 
 
 @kernel

@@ -44,7 +44,7 @@ class SafetyLayer(gymnasium.Wrapper):
         self._steepest = platform_rate * pi / 180.0
         self._gentle = release * self._steepest
         self._calm = round(calm / plant.control_dt)
-        self._baseline = named_baseline(baseline, plant.scene.turbine, plant.control_dt)
+        self._baseline = named_baseline(baseline, plant.design_scene.turbine, plant.control_dt)
         drive = plant.scene.turbine.pitch_drive
         # a command this far ahead of the blades keeps a first-order drive at its limit until the next one
         self._feather = drive.rate_limit * (drive.time_constant + plant.control_dt)
@@ -56,7 +56,7 @@ class SafetyLayer(gymnasium.Wrapper):
     def reset(self, **options):
         """As the environment's; the agent has the turbine."""
         observation, info = self.env.reset(**options)
-        self._baseline.prepare(self.env.unwrapped.scene)
+        self._baseline.prepare(self.env.unwrapped.design_scene)
         self._left = 0
         self._last_speed = None
         self.guarded_periods = 0

@@ -6,7 +6,8 @@ from typing import Any, NamedTuple
 # arrays of kernels.Run that outlive a control period, and of dynamics.Work: those that carry over, and
 # stages, whose first row holds the wake's rates as long as the kept loads are fresh
 CARRIED = (
-    "x", "u", "memory", "estimate", "action", "measurement", "observation", "counts", "reference", "terms",
+    "x", "u", "memory", "estimate", "action", "measurement", "reading", "past", "observation", "counts",
+    "reference", "terms",
 )  # fmt: skip
 WORK_CARRIED = ("lines", "counters", "stages", "kept", "history", "samples")
 

@@ -381,7 +381,7 @@ def _check_alike(i, env, first):
     kinds = [numba.typeof(Box(e._setting, e._run)) for e in (first, env)]
     if kinds[0] == kinds[1]:
         return
-    models = [e.scene.model._asdict() for e in (first, env)]
+    models = [e.scene.model._asdict() | {"sensors": e._setting.sensors} for e in (first, env)]
     parts = [n for n in models[0] if numba.typeof(models[0][n]) != numba.typeof(models[1][n])]
     raise InputError(
         f"per_env[{i}]: another compiled kind than the first, in {', '.join(parts)}; use the same"

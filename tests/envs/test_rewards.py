@@ -13,6 +13,7 @@ from fowt_env.envs.rewards import (
     check_weights,
     fill_terms,
     platform_motion_term,
+    power_shortfall_term,
     power_term,
     rotor_speed_term,
     tolerance,
@@ -68,7 +69,7 @@ def test_tolerance_falls_with_the_distance():
 def test_rated_operation_at_rest_earns_every_term():
     m = at_rated()
     terms = terms_of(m, m)
-    best = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+    best = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0])
     # rated torque times rated speed is rated power to the digits that the turbine file prints
     np.testing.assert_allclose(terms, best, atol=1e-5)
 
@@ -78,6 +79,12 @@ def test_power_term_is_the_share_below_rated_and_falls_above():
         assert power_term(RATED * share, RATED_TORQUE, SCALES) == pytest.approx(share, abs=1e-6)
     assert power_term(RATED, 1.2 * RATED_TORQUE, SCALES) == pytest.approx(AT_MARGIN, rel=1e-4)
     assert power_term(RATED, -RATED_TORQUE, SCALES) == 0.0
+
+
+def test_power_shortfall_is_what_is_lacking_and_more_than_rated_counts_nothing():
+    for share, expected in ((0.0, -1.0), (0.3, -0.7), (0.98, -0.02), (1.1, 0.0)):
+        assert power_shortfall_term(RATED * share, RATED_TORQUE, SCALES) == pytest.approx(expected, abs=1e-6)
+    assert power_shortfall_term(RATED, -RATED_TORQUE, SCALES) == -1.0
 
 
 def test_rotor_speed_term_is_flat_from_the_steady_speed_to_rated():
@@ -130,7 +137,7 @@ def test_every_term_has_a_weight_in_the_sum():
     weights = dict(zip(TERMS, rng.uniform(size=N_TERMS).tolist(), strict=True))
     expected = sum(weights[name] * terms[TermIndex[name.upper()]] for name in TERMS)
     assert weighted_sum(weight_array(weights), terms) == pytest.approx(expected, rel=1e-14)
-    assert np.array_equal(weight_array({"power": 2.0}), [2.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    assert np.array_equal(weight_array({"power": 2.0}), [2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
 
 
 @pytest.mark.parametrize(

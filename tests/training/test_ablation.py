@@ -55,6 +55,20 @@ def test_the_report_has_what_was_validated_and_a_picture(table, tmp_path):
     assert ablation.plot_ablation(rows, tmp_path / "plot.png").stat().st_size > 5000
 
 
+def test_a_variant_may_have_its_own_seeds_and_the_report_an_interval_over_them(table, tmp_path):
+    table["variants"]["a"]["seeds"] = [0, 1, 2]
+    assert ablation.seeds_of(table, "a") == [0, 1, 2] and ablation.seeds_of(table, "b") == [0]
+    header = "decisions,seconds,failed,score," + ",".join(ablation.COLUMNS)
+    for seed, score in enumerate((0.5, 0.7, 0.6)):
+        folder = ablation.folder_of(tmp_path, "a", seed)
+        folder.mkdir()
+        row = f"64,30.0,0.0,{score}" + ",1.0" * len(ablation.COLUMNS)
+        (folder / "validation.csv").write_text(f"{header}\n{row}\n")
+    line = ablation.markdown(ablation.ablation_rows(table, tmp_path)).splitlines()[2]
+    # by hand: standard deviation 0.1, 0.1/sqrt(3) * 4.303 (Student's t, two degrees of freedom)
+    assert line == "| first | " + "1.000 | " * 5 + "0.00 | 0.600 ± 0.248 | 3 | 0 k | 30 |"
+
+
 def test_misspelt_names_are_refused(table, tmp_path):
     with pytest.raises(InputError, match="unknown variant 'c'"):
         ablation.settings_of(table, "c", 0)

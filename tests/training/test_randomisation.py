@@ -7,7 +7,7 @@ pytest.importorskip("stable_baselines3")
 
 from fowt_env.description import read_platform
 from fowt_env.errors import InputError
-from training.randomisation import PLANT, SENSORS, Sensors, distributions, draw, plant_settings, randomised
+from training.randomisation import PLANT, SENSORS, distributions, draw, plant_settings, randomised
 from training.train import decision_env, make_envs, resolve
 
 from .small_run import small
@@ -44,38 +44,49 @@ def test_draws_stay_within_their_distributions_and_repeat_by_seed():
 
 
 def test_environments_share_a_pool_of_plants_and_differ_within_it():
-    per_env, sensors = randomised({"plants": 3}, 5, seed=1)
+    per_env = randomised({"plants": 3}, 5, seed=1)
     assert per_env[0] is per_env[3] and per_env[0] != per_env[1]
-    assert len(set(sensors.noise[:3])) == 3 and sensors.noise[4] == sensors.noise[1]
-
-
-def test_readings_are_late_by_the_delay_and_noisy_by_the_noise():
-    sensors = Sensors(noise=[0.0, 0.5], delay=[2, 0], seed=0)
-    sensors.sensed = np.array([True, False])
-    sensors.restart(slice(None), np.zeros((2, 2), dtype=np.float32))
-    seen = []
-    for value in range(1, 400):
-        sensors.take(np.full((2, 2), value, dtype=np.float32))
-        seen.append(sensors.read())
-    seen = np.array(seen)
-    assert seen[:4, 0, 0].tolist() == [0.0, 0.0, 1.0, 2.0]
-    assert seen[:4, 0, 1].tolist() == [1.0, 2.0, 3.0, 4.0]
-    noise = seen[:, 1, 0] - np.arange(1, 400)
-    assert 0.4 < noise.std() < 0.6 and abs(noise.mean()) < 0.1
-    assert np.array_equal(seen[:, 1, 1], np.arange(1, 400))
+    assert len({settings["sensors"]["noise"] for settings in per_env[:3]}) == 3
 
 
 def test_the_plain_task_is_not_randomised_and_the_robust_one_is():
     plain, judge = make_envs(small("ppo"))
-    assert decision_env(plain).sensors is None
+    assert {env._setting.sensors for env in environments(plain)} == {None}
     settings = small("ppo") | {"environment": small("ppo")["environment"] | {"randomise": {"plants": 2}}}
     robust, judge = make_envs(settings)
-    masses = [env.scene.platform.ballast.mass for env in decision_env(robust).base.env.envs]
-    assert len(set(masses)) == 2 and decision_env(robust).sensors is not None
-    assert len({env.scene.platform.ballast.mass for env in decision_env(judge).base.env.envs}) == 1
+    assert len({env.scene.platform.ballast.mass for env in environments(robust)}) == 2
+    assert len({env._sensors["noise"] for env in environments(robust)}) == 2
+    assert len({env.scene.platform.ballast.mass for env in environments(judge)}) == 1
+    assert {env._setting.sensors for env in environments(judge)} == {None}
     for algo in ("ppo", "sac", "tqc"):
         assert "randomise" in resolve(algo, "above_rated_robust", 0, 1)["environment"]
         assert "randomise" not in resolve(algo, "above_rated", 0, 1)["environment"]
+
+
+def environments(env):
+    return decision_env(env).base.env.envs
+
+
+def test_on_drawn_plants_baseline_and_estimator_are_those_of_the_plant_in_the_files():
+    """What the task randomises is not told to what is designed on models."""
+    chosen = small("ppo")
+    estimate = {"baseline": "lqr", "observation": "estimate", "action_mode": "residual"}
+    chosen = chosen | {"environment": chosen["environment"] | estimate}
+    drawn = chosen | {"environment": chosen["environment"] | {"randomise": {"plants": 2}}}
+    plain, robust = make_envs(chosen)[0], make_envs(drawn)[0]
+    plain.reset(), robust.reset()
+    reference = environments(plain)[0]._setting
+    for env in environments(robust):
+        assert env.scene.platform != environments(plain)[0].scene.platform
+        assert np.array_equal(env._setting.parameters, reference.parameters)
+        assert np.array_equal(env._setting.estimator, reference.estimator)
+
+
+def test_sensors_of_the_validation_go_round_the_seeds_of_each_wind():
+    settings = small("ppo")
+    validation = settings["validation"] | {"winds": [14, 18], "seeds": 2, "sensors": [{}, {"noise": 0.02}]}
+    _, judge = make_envs(settings | {"validation": validation})
+    assert [env._sensors["noise"] for env in environments(judge)] == [0.0, 0.02, 0.0, 0.02]
 
 
 @pytest.mark.parametrize(

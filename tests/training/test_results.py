@@ -144,6 +144,17 @@ def test_a_controllers_code_is_its_module_and_what_that_imports():
     assert own["name"].endswith(":Broken") and own["code"] != codes[0]
 
 
+def test_a_policys_code_changes_with_its_file(tmp_path):
+    path = tmp_path / "agent.npz"
+    codes = []
+    for content in (b"one", b"one", b"trained anew"):
+        path.write_bytes(content)
+        codes.append(results.controller_code(f"policy:{path}")["code"])
+    assert codes[0] == codes[1] != codes[2]
+    shipped = [results.controller_code(f"policy:{name}")["code"] for name in ("ppo_lqr", "ppo_lqr_preview")]
+    assert shipped[0] != shipped[1]
+
+
 @pytest.mark.parametrize("content", ["{", "[]", '{"format": 99}'])
 def test_a_manifest_of_another_format_is_refused(tmp_path, content):
     (tmp_path / "manifest.json").write_text(content)

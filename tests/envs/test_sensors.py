@@ -1,0 +1,224 @@
+"""Worn sensors and a plant that controllers do not know: one reading for all of them, and nothing else."""
+
+import numpy as np
+import pytest
+
+from controllers import make
+from controllers.base import call_law
+from controllers.lqr import WindEstimator
+from fowt_env import build_scene, simulate
+from fowt_env.envs import FowtEnv, FowtVectorEnv
+from fowt_env.envs.safety import SafetyLayer
+from fowt_env.envs.sensors import draw_sensors, reading_scales
+from fowt_env.errors import InputError
+from fowt_env.measurement import N_MEASUREMENTS, Measure, Measurement
+from training.randomisation import plant_settings
+from training.shifts import Shift, Unaware
+
+QUICK = {"rotor": "table", "wave_components": 20, "wind": {"kind": "ntm", "speed": 18.0, "class": "B"}}
+NAMES = ("rotor_speed", "platform_pitch_rate", "previous_action", "estimated_wind", "estimated_waves")
+ON_LQR = {"action_mode": "residual", "baseline": "lqr", "observation": NAMES}
+WORN = {"noise": 0.02, "delay": 2}
+SHIFTED = plant_settings({"added_mass": 1.2, "mooring_stiffness": 0.8, "upper_mass": 1.05})
+NOMINAL = {"platform": "oc3_hywind"}
+
+
+def run(env, steps=40, seed=3, reset_seed=4, reach=1.0):
+    """Observations of actions drawn with a seed, and all measurements and readings."""
+    rng = np.random.default_rng(seed)
+    rows = [(env.reset(seed=reset_seed)[0], env._run.measurement.copy(), env._run.reading.copy())]
+    for _ in range(steps):
+        observation = env.step(rng.uniform(-reach, reach, 2))[0]
+        rows.append((observation, env._run.measurement.copy(), env._run.reading.copy()))
+    return [np.array(column) for column in zip(*rows, strict=True)]
+
+
+@pytest.mark.parametrize("settings", [ON_LQR, {"action_mode": "setpoint"}, {"action_mode": "direct"}])
+def test_sensors_without_noise_and_delay_change_no_bit(settings):
+    plain, exact = FowtEnv(**settings, **QUICK), FowtEnv(**settings, sensors={}, **QUICK)
+    for one, other in zip(run(plain), run(exact), strict=True):
+        assert np.array_equal(one, other)
+    assert np.array_equal(plain._run.x, exact._run.x) and np.array_equal(plain._run.u, exact._run.u)
+
+
+def test_designing_on_the_very_plant_changes_no_bit():
+    plain, told = FowtEnv(**ON_LQR, **QUICK), FowtEnv(**ON_LQR, designed_on=NOMINAL, **QUICK)
+    for one, other in zip(run(plain), run(told), strict=True):
+        assert np.array_equal(one, other)
+
+
+def test_a_reading_is_what_was_measured_before_and_noise_of_the_stated_size():
+    env = FowtEnv(**(ON_LQR | {"observation": ("rotor_speed",)}), sensors=WORN, **QUICK)
+    _, measured, read = run(env, steps=1500, reach=0.0)
+    scales = reading_scales(env.scene.turbine)
+    late = np.concatenate([measured[:1], measured[:1], measured[:-2]])
+    noise = (read - late)[:, 1:] / (0.02 * scales[1:])
+    assert np.array_equal(read[:, Measure.TIME], measured[:, Measure.TIME])
+    assert np.abs(noise.std(axis=0) - 1.0).max() < 0.1 and np.abs(noise.mean(axis=0)).max() < 0.1
+    assert np.abs(np.corrcoef(noise.T) - np.eye(N_MEASUREMENTS - 1)).max() < 0.12
+    rated = env.scene.turbine.rated_rotor_speed
+    seen = env._run.observation[0] * 0.2 * rated + rated
+    assert seen == pytest.approx(read[-1, Measure.ROTOR_SPEED], rel=1e-6)
+    assert env.measurement() == Measurement(*read[-1].tolist())
+
+
+@pytest.mark.parametrize("sensors", [{"noise": 0.02}, {"delay": 3}, WORN])
+def test_observation_baseline_and_estimator_are_given_the_same_reading(sensors):
+    """lqr and estimator by hand, told what measurement() says: the same estimate, command and motion."""
+    env = FowtEnv(sensors=sensors, **ON_LQR, **QUICK)
+    env.reset(seed=5)
+    hand = FowtEnv(sensors=sensors, **(ON_LQR | {"action_mode": "direct"}), **QUICK)
+    hand.reset(seed=5)
+    law = make("lqr", hand.scene.turbine, 0.1)
+    law.prepare(hand.scene)
+    law.reset(hand.measurement())
+    watch = WindEstimator(hand.scene.turbine, 0.1)
+    watch.prepare(hand.scene)
+    watch.reset(hand.measurement())
+    for _ in range(60):
+        observation = env.step(np.zeros(2))[0]
+        other = hand.step_physical(*law.act(hand.measurement()))[0]
+        both = [np.delete(seen, [2, 3]) for seen in (observation, other)]  # the last action differs by mode
+        assert np.array_equal(*both)
+        assert np.array_equal(env._run.u, hand._run.u) and np.array_equal(env._run.x, hand._run.x)
+        call_law(watch.kernel, watch.parameters, watch.memory, np.array(hand.measurement()), hand._run.u)
+        assert np.array_equal(watch.memory, env._run.estimate)
+
+
+def test_noise_reaches_baseline_and_estimator_but_not_the_reward():
+    exact, worn = FowtEnv(**ON_LQR, **QUICK), FowtEnv(sensors={"noise": 0.05}, **ON_LQR, **QUICK)
+    exact.reset(seed=6), worn.reset(seed=6)
+    assert not np.array_equal(exact._run.estimate, worn._run.estimate)
+    exact.step(np.zeros(2)), worn.step(np.zeros(2))
+    assert exact._run.u[1] != worn._run.u[1]
+    deaf = {"action_mode": "direct", "observation": ("rotor_speed",)}
+    exact, worn = FowtEnv(**deaf, **QUICK), FowtEnv(sensors={"noise": 0.05}, **deaf, **QUICK)
+    exact.reset(seed=6), worn.reset(seed=6)
+    for _ in range(20):
+        (seen, paid, *_), (worn_seen, worn_paid, *_) = exact.step([0.1, 0.2]), worn.step([0.1, 0.2])
+        assert seen[0] != worn_seen[0] and paid == worn_paid
+
+
+def test_readings_repeat_with_the_weather_and_differ_in_another():
+    env = FowtEnv(observation=("rotor_speed",), sensors=WORN, **QUICK)
+    seen, _, _ = run(env, reset_seed=7)
+    again, _, _ = run(env, reset_seed=7)
+    _, info = env.reset(seed=8)
+    first = env.reset(options=info["episode"])[0]
+    assert np.array_equal(seen, again) and not np.array_equal(first, seen[0])
+    assert np.array_equal(first, env.reset(options=info["episode"])[0])
+
+
+@pytest.mark.parametrize("sensors", [WORN, {"noise": 0.01}])
+def test_the_batch_with_sensors_is_the_single_environment_bit_for_bit(sensors):
+    settings = ON_LQR | QUICK | SHIFTED | {"sensors": sensors, "designed_on": NOMINAL}
+    batch, single = FowtVectorEnv(2, threads=1, **settings), FowtEnv(**settings)
+    given = np.random.default_rng(1).uniform(-1.0, 1.0, (30, 2, 2))
+    first = batch.reset(seed=9)[0]
+    seen = [batch.step(row)[0] for row in given]
+    for i in range(2):
+        assert np.array_equal(first[i], single.reset(seed=9 + i)[0])
+        for k, row in enumerate(given):
+            assert np.array_equal(seen[k][i], single.step(row[i])[0])
+
+
+def test_environments_of_a_batch_may_differ_in_noise_and_delay_but_not_in_having_sensors():
+    per_env = [{"sensors": WORN}, {"sensors": {"noise": 0.0}}]
+    batch = FowtVectorEnv(2, threads=1, per_env=per_env, **ON_LQR, **QUICK)
+    seen = batch.reset(seed=1)[0]
+    assert np.array_equal(seen[1], FowtEnv(**ON_LQR, **QUICK).reset(seed=2)[0])
+    with pytest.raises(InputError, match="sensors"):
+        FowtVectorEnv(2, threads=1, per_env=[{"sensors": WORN}, {}], **ON_LQR, **QUICK)
+
+
+def test_a_snapshot_goes_on_with_the_same_readings():
+    env, other = (FowtEnv(sensors=WORN, **ON_LQR, **QUICK) for _ in range(2))
+    env.reset(seed=2)
+    for _ in range(7):
+        env.step([0.3, -0.2])
+    saved = env.get_state()
+    expected = [env.step([0.0, 0.5])[0] for _ in range(10)]
+    other.set_state(saved)
+    assert np.array_equal([other.step([0.0, 0.5])[0] for _ in range(10)], expected)
+    with pytest.raises(InputError, match="another plant"):
+        FowtEnv(sensors={"noise": 0.03}, **ON_LQR, **QUICK).set_state(saved)
+
+
+def test_the_drawn_plant_is_not_leaked_to_lqr_estimator_preview_and_safety_layer():
+    nominal = FowtEnv(**ON_LQR, **QUICK)
+    nominal.reset(seed=1)
+    told = FowtEnv(designed_on=NOMINAL, **ON_LQR, **SHIFTED, **QUICK)
+    leaked = FowtEnv(**ON_LQR, **SHIFTED, **QUICK)
+    for env, same in ((told, True), (leaked, False)):
+        env.reset(seed=1)
+        assert np.array_equal(env._setting.parameters, nominal._setting.parameters) is same
+        assert np.array_equal(env._setting.estimator, nominal._setting.estimator) is same
+    assert told.scene.platform.hydro != nominal.scene.platform.hydro  # it is another plant that moves
+    feedforward = {"action_mode": "residual", "baseline": "preview"}
+    heavy_air = plant_settings({"air_density": 1.04})
+    nominal = FowtEnv(**feedforward, **QUICK)
+    told = FowtEnv(designed_on=NOMINAL, **feedforward, **heavy_air, **QUICK)
+    leaked = FowtEnv(**feedforward, **heavy_air, **QUICK)
+    for seed in (1, 2):  # the wind foreseen is that of each episode
+        for env in (nominal, told, leaked):
+            env.reset(seed=seed)
+        assert np.array_equal(told._setting.parameters, nominal._setting.parameters)
+        assert not np.array_equal(leaked._setting.parameters, nominal._setting.parameters)
+    guarded = SafetyLayer(FowtEnv(designed_on=NOMINAL, **ON_LQR, **SHIFTED, **QUICK), baseline="lqr")
+    guarded.reset(seed=1)
+    law = make("lqr", guarded.unwrapped.design_scene.turbine, 0.1)
+    law.prepare(build_scene(fidelity="standard", **QUICK))
+    assert np.array_equal(guarded._baseline.parameters, law.parameters)
+
+
+def test_environment_and_load_case_give_a_controller_the_same_readings():
+    """sensors of FowtEnv and noise of a suite's case are the same numbers for the same weather."""
+    weather = {"wind": QUICK["wind"], "sea": None, "weather_seed": 5, "offsets": {}}
+    env = FowtEnv(sensors=WORN, designed_on=NOMINAL, action_mode="direct", **SHIFTED, **QUICK)
+    env.reset(options=weather)
+    scene = env.scene
+    known = build_scene(wind=QUICK["wind"], seed=5, fidelity="standard", rotor="table")
+    kept = []
+
+    class Watched:
+        def __init__(self):
+            self.law = make("gspi_oc3", known.turbine, 0.1)
+            self.reset = self.law.reset
+
+        def act(self, measurement):
+            kept.append(measurement)
+            return self.law.act(measurement)
+
+    simulate(scene, Unaware(Watched(), known, Shift(**WORN), 5), duration=3.0)
+    law = make("gspi_oc3", scene.turbine, 0.1)
+    law.reset(env.measurement())
+    for reading in kept[:30]:
+        seen = env.measurement()
+        np.testing.assert_allclose(seen, reading, rtol=1e-9, atol=1e-9)
+        env.step_physical(*law.act(seen))
+
+
+def test_noise_is_drawn_from_the_seed_alone(turbine):
+    scales = reading_scales(turbine)
+    rows = [draw_sensors(0.02, 0, scales, seed, 50).noise for seed in (1, 1, 2)]
+    assert np.array_equal(rows[0], rows[1]) and not np.array_equal(rows[0], rows[2])
+    assert draw_sensors(0.0, 4, scales, 1, 50).noise.shape == (1, N_MEASUREMENTS)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"sensors": 0.02}, "must be a dict with noise and delay"),
+        ({"sensors": {"nosie": 0.02}}, "Did you mean 'noise'"),
+        ({"sensors": {"noise": -0.1}}, r"sensors.noise = -0.1"),
+        ({"sensors": {"noise": float("nan")}}, r"sensors.noise = nan"),
+        ({"sensors": {"delay": 1.5}}, r"sensors.delay = 1.5"),
+        ({"sensors": {"delay": True}}, r"sensors.delay = True"),
+        ({"designed_on": "oc3_hywind"}, "must be a dict with a platform"),
+        ({"designed_on": {"turbine": None}}, "must be a dict with a platform"),
+        ({"designed_on": {"platform": "oc3_hywind", "sea": 1}}, "unknown key of designed_on 'sea'"),
+    ],
+)
+def test_what_cannot_be_used_is_named(settings, message):
+    with pytest.raises(InputError, match=message):
+        FowtEnv(**settings, **QUICK)
