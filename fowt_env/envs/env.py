@@ -1,5 +1,6 @@
 """The Gymnasium environment: a task, a scene and the compiled control period, glued together."""
 
+import inspect
 from collections.abc import Mapping, Sequence
 from copy import copy, deepcopy
 from dataclasses import replace
@@ -52,7 +53,7 @@ from fowt_env.envs.trims import exact_trim, near_trim, plant_key
 from fowt_env.errors import InputError, unknown
 from fowt_env.jit import Box
 from fowt_env.measurement import N_MEASUREMENTS, Measurement
-from fowt_env.scene import Scene, build_scene
+from fowt_env.scene import OPTIONS, Scene, build_scene
 from fowt_env.simulation import INITIAL, check_duration, steps_in
 from fowt_env.state import State
 from fowt_env.step import output
@@ -143,6 +144,9 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             load_pygame()
         if action_mode not in MODES:
             raise unknown("action_mode", action_mode, MODES)
+        for key in options:
+            if key not in OPTIONS and key != "loads":
+                raise unknown("setting of FowtEnv", key, {*OPTIONS, "loads", *SETTINGS})
         self.render_mode = render_mode
         self._view: Any = None
         task = _adapted(task_of(task), rotor, observation, reward, duration, wind, sea, wind_preview)
@@ -497,6 +501,10 @@ def _adapted(
     if reward is not None:
         changes["weights"] = task.weights | check_weights("reward", reward)
     return replace(task, **changes)
+
+
+# settings of FowtEnv by name, those of build_scene apart
+SETTINGS = tuple(name for name in inspect.signature(FowtEnv).parameters if name != "options")
 
 
 def named_baseline(name, turbine, control_dt):

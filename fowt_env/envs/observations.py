@@ -4,6 +4,7 @@ An entry of the observation is (value - centre)/scale, clipped to the bounds, fl
 far outside what happens before an episode fails; they are there so that the space is finite.
 """
 
+from collections.abc import Iterable
 from math import pi
 from typing import NamedTuple
 
@@ -149,6 +150,8 @@ def check_channels(where, names, default=None):
     """
     if isinstance(names, str):
         raise InputError(f"{where} = {names!r}: must be a list of channel names, such as ({names!r},)")
+    if not isinstance(names, Iterable):
+        raise InputError(f"{where} = {names!r}: must be a list of channel names, such as ('rotor_speed',)")
     known = KNOWN if default is None else (*KNOWN, DEFAULT)
     chosen = []
     for name in names:

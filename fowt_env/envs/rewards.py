@@ -3,6 +3,7 @@
 To add one: a kernel, a line in TERMS and one in fill_terms. reward = sum of weight * term.
 """
 
+from collections.abc import Mapping
 from enum import IntEnum
 from math import exp, hypot, isfinite, log, pi
 from typing import NamedTuple
@@ -166,8 +167,10 @@ def build_scales(turbine, control_dt):
 
 def check_weights(where, weights):
     """{term: float} of a mapping of weights. Raises: InputError for unknown terms and bad numbers."""
+    if not isinstance(weights, Mapping):
+        raise InputError(f"{where} = {weights!r}: must be a dict of reward terms and their weights")
     checked = {}
-    for name, weight in dict(weights).items():
+    for name, weight in weights.items():
         if name not in TERMS:
             raise unknown(f"reward term of {where}", name, TERMS)
         number = isinstance(weight, int | float | np.number) and not isinstance(weight, bool)
