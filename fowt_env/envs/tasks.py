@@ -204,6 +204,7 @@ WEIGHTS = {
     "pitch_travel": 0.2,
     "torque_travel": 0.1,
     "failure": 100.0,
+    "power_shortfall": 0.0,
 }
 START = {  # of the order of one standard deviation in operation
     "PtfmSurge": (-2.0, 2.0),
