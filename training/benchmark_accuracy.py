@@ -17,6 +17,7 @@ import pandas as pd
 from fowt_env.errors import InputError, unknown
 from fowt_env.scene import INTEGRATORS, REFERENCE_STEP, build_scene
 from fowt_env.simulation import initial_state, simulate
+from fowt_env.weather.wind_field import is_field
 from training.benchmark import SEA, TURBULENCE, Kind, calibration, header, loop_time
 from training.comparison import normalised_rms
 
@@ -175,6 +176,8 @@ def accuracy(
     wind, sea = wind or TURBULENCE, SEA if sea is None else sea
     check = Variant(REFERENCE, "rk4", 2.0 * finest, "bem", "exact")
     plan = [check, *(variants() if chosen is None else chosen)]
+    if not is_field(wind):
+        plan = [v for v in plan if ("rotor_samples", 1) not in v.options]  # what it is anyway
     rows = _finished(out)
     known = {(row["seed"], row["axis"], row["variant"], row["seconds"], row["finest_s"]) for row in rows}
     total, done = len(seeds) * len(plan), 0
