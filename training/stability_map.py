@@ -1,8 +1,8 @@
 """Largest stable step of each integrator and kind of scene: measured on the plant, and as theory has it.
 
 Theory is the amplification matrix of the very scheme of fowt_env/integrators.py applied to the linear
-model of the scene: Runge-Kutta 4 through every state; the others with the blade pitch exact and, for the
-Adams methods, positions by Adams-Moulton from the new velocities.
+model of the scene: blade pitch exact and, for the Adams methods, positions by Adams-Moulton from the new
+velocities.
 """
 
 from dataclasses import dataclass, field
@@ -90,26 +90,33 @@ KINDS = {
 }
 
 
-def runge_kutta(a, h):
-    """(N, N) matrix of one classical Runge-Kutta step of x' = a x."""
-    z = h * a
-    square = z @ z
-    return np.eye(N) + z + square / 2.0 + square @ z / 6.0 + square @ square / 24.0
-
-
 def exact_pitch(a, h):
     """Factor that the blade pitch's own law leaves of it after a step h."""
     return exp(a[PITCH, PITCH] * h)
 
 
+def with_pitch(matrix, factor):
+    """The matrix (N, N) with that factor of the present blade pitch as its row of the blade pitch."""
+    matrix[PITCH] = 0.0
+    matrix[PITCH, PITCH] = factor
+    return matrix
+
+
+def runge_kutta(a, h):
+    """(N, N) matrix of one classical Runge-Kutta step of x' = a x, blade pitch exact at every stage."""
+    half, whole = exact_pitch(a, 0.5 * h), exact_pitch(a, h)
+    k1 = a
+    k2 = a @ with_pitch(np.eye(N) + 0.5 * h * k1, half)
+    k3 = a @ with_pitch(np.eye(N) + 0.5 * h * k2, half)
+    k4 = a @ with_pitch(np.eye(N) + h * k3, whole)
+    return with_pitch(np.eye(N) + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4), whole)
+
+
 def trapezoid(a, h):
     """(N, N) matrix of one step of heun: explicit trapezoidal rule, blade pitch exact."""
-    predicted = np.eye(N) + h * a
-    predicted[PITCH] = 0.0
-    predicted[PITCH, PITCH] = exact_pitch(a, h)
-    matrix = np.eye(N) + 0.5 * h * (a + a @ predicted)
-    matrix[PITCH] = predicted[PITCH]
-    return matrix
+    pitch = exact_pitch(a, h)
+    predicted = with_pitch(np.eye(N) + h * a, pitch)
+    return with_pitch(np.eye(N) + 0.5 * h * (a + a @ predicted), pitch)
 
 
 def adams(a, h, corrector):
