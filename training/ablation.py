@@ -49,19 +49,24 @@ def read_table(path=TABLE):
     return table
 
 
-def settings_of(table, name, seed, steps=None):
-    """Resolved settings of a variant and seed. Raises: InputError."""
+def variant_of(table, name):
+    """What the table says of a variant. Raises: InputError for an unknown name."""
     if name not in table["variants"]:
         raise unknown("variant", name, table["variants"])
-    variant = table["variants"][name]
+    return table["variants"][name]
+
+
+def settings_of(table, name, seed, steps=None):
+    """Resolved settings of a variant and seed. Raises: InputError."""
+    variant = variant_of(table, name)
     changes = table["common"] | variant.get("set", {})
     steps = steps or variant.get("steps", table["steps"])
     return resolve(variant.get("algo", "ppo"), "above_rated", seed, steps, changes)
 
 
 def seeds_of(table, name):
-    """Training seeds of a variant: its own, or those of all."""
-    return table["variants"][name].get("seeds", table["seeds"])
+    """Training seeds of a variant: its own, or those of all. Raises: InputError for an unknown name."""
+    return variant_of(table, name).get("seeds", table["seeds"])
 
 
 def folder_of(out, name, seed):
