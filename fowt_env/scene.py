@@ -489,13 +489,13 @@ def _stations(count, turbine):
     if count is None:
         return None
     known = len(turbine.blade.radius)
-    if isinstance(count, bool) or not isinstance(count, int | np.integer) or not 3 <= count <= known:
+    if not (_whole(count) and 3 <= count <= known):
         raise InputError(f"blade_stations = {count!r}: must be a whole number from 3 to {known}")
     return np.round(np.linspace(0, known - 1, count)).astype(int)
 
 
 def _seed(seed):
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+    if not (_whole(seed) and seed >= 0):
         raise InputError(f"seed = {seed!r}: must be a whole number >= 0")
     return int(seed)
 
