@@ -5,6 +5,7 @@ from gymnasium.spaces import Box
 from stable_baselines3.common.vec_env import VecEnvWrapper
 
 from fowt_env.envs.decisions import Decisions
+from fowt_env.errors import InputError
 from fowt_env.measurement import Measure
 from training.sb3_env import FowtSB3VecEnv
 
@@ -91,14 +92,18 @@ class ValidationVecEnv(FowtSB3VecEnv):
 
     episodes: options of FowtEnv.reset, one dict each. After all episodes have ended once, figures() has the
     metrics of each, without its first `skip` seconds.
+    Raises: InputError where nothing of an episode is left.
     """
 
     def __init__(self, episodes, skip=60.0, **settings):
         super().__init__(len(episodes), **settings)
         self.episodes = [{"offsets": {}} | episode for episode in episodes]
         first = self.env.envs[0]
+        duration = first.task.duration
+        if skip >= duration:
+            raise InputError(f"validation.skip = {skip}: must be less than the {duration:g} s of an episode")
         self.skip = round(skip / first.control_dt)
-        self._record = np.full((round(first.task.duration / first.control_dt), len(episodes), 4), np.nan)
+        self._record = np.full((round(duration / first.control_dt), len(episodes), 4), np.nan)
         self._clock = 0
         self._over = np.zeros(len(episodes), dtype=bool)
         self._failed = np.zeros(len(episodes), dtype=bool)

@@ -198,9 +198,6 @@ def make_envs(settings):
     per_env = None if not plants else randomised(plants, n, settings["seed"])
     base = FowtSB3VecEnv(n, threads=1, per_env=per_env, **chosen)
     env = VecNormalize(VecMonitor(DecisionVecEnv(base, decisions)), **normalise)
-    skip, duration = settings["validation"].get("skip", 60.0), base.env.envs[0].task.duration
-    if skip >= duration:
-        raise InputError(f"validation.skip = {skip}: must be less than the {duration:g} s of an episode")
     fixed = validation_env(settings, chosen)
     judge = VecNormalize(VecMonitor(DecisionVecEnv(fixed, decisions)), training=False, **normalise)
     judge.norm_reward = False

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from fowt_env.envs.decisions import DecisionSettings
-from fowt_env.envs.env import FowtEnv
+from fowt_env.envs.env import SETTINGS
 from fowt_env.errors import InputError
 from fowt_env.records import Fraction, NonNegative, Positive, Record, is_number, short, unknown_key, validate
 from fowt_env.scene import OPTIONS
@@ -27,7 +27,7 @@ SCHEDULES = ("learning_rate", "clip_range")  # of an algorithm: numbers that may
 GIVEN_BY_TRAINING = (  # arguments of stable-baselines3's algorithms
     "self", "policy", "env", "seed", "device", "tensorboard_log", "verbose", "_init_setup_model",
 )  # fmt: skip
-NOT_SET_THERE = ("self", "task", "render_mode", "options")  # of FowtEnv: what training gives, or lacks
+NOT_SET_THERE = ("task", "render_mode")  # of FowtEnv: what training gives, or lacks
 
 
 class Normalise(Record):
@@ -90,7 +90,7 @@ def check_settings(settings, where="settings"):
 
 def environment_keys():
     """Names of all settings of the environment that a training run may change."""
-    own = [name for name in inspect.signature(FowtEnv.__init__).parameters if name not in NOT_SET_THERE]
+    own = [name for name in SETTINGS if name not in NOT_SET_THERE]
     return list(dict.fromkeys([*OF_TRAINING, *own, *OPTIONS]))
 
 
