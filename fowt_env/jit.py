@@ -12,6 +12,7 @@ import shutil
 import sys
 import tempfile
 import time
+from fnmatch import fnmatch
 from pathlib import Path
 
 import numba
@@ -21,16 +22,39 @@ from fowt_env import kernel_cache
 
 KEEP_CACHES = 4  # folders of older sources kept, so that switching branches does not recompile
 KERNEL_PACKAGES = ("fowt_env", "controllers")
+# Sources that no module with a kernel imports at its top, so that an edit of them compiles nothing anew. A
+# kernel freezes what its module's globals hold; tests/test_cache.py follows the imports and checks this list.
+NOT_COMPILED = (
+    "animation.py",
+    "cli*.py",
+    "openfast_files.py",
+    "outputs.py",
+    "plots*.py",
+    "policy*.py",
+    "rendering.py",
+    "rosco.py",
+    "saved_design.py",
+)
+
+
+def kernel_sources():
+    """Sorted paths of the kernel packages' sources that machine code may depend on."""
+    root = Path(__file__).resolve().parent.parent
+    return sorted(
+        path
+        for package in KERNEL_PACKAGES
+        for path in (root / package).rglob("*.py")
+        if not any(fnmatch(path.name, pattern) for pattern in NOT_COMPILED)
+    )
 
 
 def _source_hash():
-    """Hash of the kernel packages' sources and of the versions that shape machine code."""
+    """Hash of the kernels' sources and of the versions that shape machine code."""
     digest = hashlib.sha256(f"{numba.__version__} {sys.version}".encode())
     root = Path(__file__).resolve().parent.parent
-    for package in KERNEL_PACKAGES:
-        for path in sorted((root / package).rglob("*.py")):
-            digest.update(path.relative_to(root).as_posix().encode())
-            digest.update(path.read_bytes())
+    for path in kernel_sources():
+        digest.update(path.relative_to(root).as_posix().encode())
+        digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
 
 

@@ -1,6 +1,8 @@
 """The kernel cache: made where it is missing, done without where it cannot be, right where old or shared."""
 
+import ast
 import os
+import re
 import subprocess
 import sys
 import time
@@ -10,7 +12,7 @@ import numba
 import pytest
 
 import fowt_env
-from fowt_env.jit import KEEP_CACHES
+from fowt_env.jit import KEEP_CACHES, kernel_sources
 from fowt_env.kernel_cache import SharedCacheFile
 from fowt_env.warmup import COMPILING_MESSAGE, compilation_announced
 
@@ -120,6 +122,43 @@ def test_kernels_of_other_sources_are_never_used(tmp_path):
     state.write_text(text)
     assert output(start(program, tmp_path / "cache", code)) == ["2.0"]
     assert len(list((tmp_path / "cache").iterdir())) == 2
+
+
+def _module_files():
+    """{module name: path} of the kernel packages."""
+    files = {}
+    for path in (*ROOT.glob("fowt_env/**/*.py"), *ROOT.glob("controllers/**/*.py")):
+        parts = path.relative_to(ROOT).with_suffix("").parts
+        files[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return files
+
+
+def _imported_at_the_top(path, files):
+    """Names of files' modules that a source imports outside its functions."""
+    found = set()
+    for node in ast.parse(path.read_text()).body:
+        if isinstance(node, ast.ImportFrom):
+            names = (f"{node.module}.{alias.name}" for alias in node.names)
+            found |= {name if name in files else node.module for name in names}
+        elif isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+    return found & set(files)
+
+
+def test_every_source_that_a_kernel_can_see_is_in_the_key_of_the_cache():
+    files = _module_files()
+    compiled = re.compile(r"^ *@(\w*kernel|\w*entry|overload|intrinsic)\b|\b(njit|cfunc)\(", re.MULTILINE)
+    waiting = [name for name, path in files.items() if compiled.search(path.read_text())]
+    seen = set()
+    while waiting:
+        name = waiting.pop()
+        if name not in seen:
+            seen.add(name)
+            waiting += _imported_at_the_top(files[name], files)
+    assert len(seen) > 50
+    missing = {files[name] for name in seen} - set(kernel_sources())
+    assert not missing
+    assert {path.name for path in set(files.values()) - set(kernel_sources())} >= {"cli_plot.py", "plots.py"}
 
 
 def test_broken_files_are_compiled_anew(tmp_path):
