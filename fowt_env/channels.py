@@ -1,7 +1,7 @@
 """OpenFAST-named outputs and controller measurements from a state: the only place with deg, rpm and kN."""
 
 from enum import IntEnum
-from math import pi
+from math import cos, pi, sin
 from typing import NamedTuple
 
 import numpy as np
@@ -58,6 +58,7 @@ FIXED_CHANNELS = (
     Channel("BldPitch1", "deg", DEG),
     Channel("GenTq", "kN-m", 1e-3),
     Channel("GenPwr", "kW", 1e-3),
+    Channel("GenTqLim", "-", 1.0),
     Channel("RotThrust", "kN", 1e-3),
     Channel("RotTorq", "kN-m", 1e-3),
     Channel("RtFldFxh", "N", 1.0),
@@ -78,6 +79,7 @@ FIXED_CHANNELS = (
     Channel("Wind1VelX", "m/s", 1.0),
     Channel("Wind1VelY", "m/s", 1.0),
     Channel("Wind1VelZ", "m/s", 1.0),
+    Channel("RtVAvgxh", "m/s", 1.0),
 )
 Out = IntEnum("Out", [c.name.upper() for c in FIXED_CHANNELS], start=0)
 N_FIXED = len(FIXED_CHANNELS)
@@ -113,6 +115,37 @@ class Layout(NamedTuple):
     upper_matrix: np.ndarray  # (6, 6) mass matrix of everything above the tower base
     gear_ratio: float
     generator_efficiency: float
+    blades: int
+    span: np.ndarray  # (n,) radii along a blade at which the rotor's mean wind is read, m
+
+
+@kernel
+def rotor_wind(t, pose, azimuth, now, series, field, layout):
+    """Mean wind over the blades, relative to the hub and along the shaft, m/s: AeroDyn's RtVAvgxh.
+
+    As there every length of blade counts alike. Of a series it is the mean over the azimuth at rest, of a box
+    that over the blades where they are now.
+    """
+    if series is None:
+        return 0.0
+    hub = layout.hub
+    if field is None:
+        u, v, w = now.u * series.rotor_factor, now.v * series.rotor_factor, now.w
+    else:
+        u = v = w = 0.0
+        for blade in range(layout.blades):
+            psi = azimuth + 2.0 * pi * blade / layout.blades
+            ey, ez = -sin(psi), cos(psi)
+            for radius in layout.span:
+                X, Y, Z = to_inertial(pose, hub[0], hub[1] + radius * ey, hub[2] + radius * ez)
+                a, b, c = wind_at(t, pose.x + X, pose.y + Y, pose.z + Z, now, series, field)
+                u += a
+                v += b
+                w += c
+        n = layout.blades * layout.span.shape[0]
+        u, v, w = u / n, v / n, w / n
+    own = pose.vx + pose.wy * hub[2] - pose.wz * hub[1]
+    return pose.r11 * u + pose.r21 * v + pose.r31 * w - own
 
 
 @kernel
@@ -190,6 +223,7 @@ def record(scene, work, x, dx, u, t, loads, row):
     row[Out.BLDPITCH1] = x[State.BLADE_PITCH]
     row[Out.GENTQ] = u[0]
     row[Out.GENPWR] = layout.generator_efficiency * layout.gear_ratio * speed * u[0]
+    row[Out.GENTQLIM] = work.kept[Kept.TORQUE_LIMITED]
     # shaft loads: aerodynamics less the rotor's own inertia and weight
     hub = layout.hub
     hx, _, _ = point_acceleration(pose, dx, hub[0], hub[1], hub[2])
@@ -206,6 +240,7 @@ def record(scene, work, x, dx, u, t, loads, row):
     now = wind_now(t, scene.wind)
     wind = wind_at(t, 0.0, 0.0, hub[2], now, scene.wind, scene.wind_field)
     row[Out.WIND1VELX], row[Out.WIND1VELY], row[Out.WIND1VELZ] = wind
+    row[Out.RTVAVGXH] = rotor_wind(t, pose, x[State.AZIMUTH], now, scene.wind, scene.wind_field, layout)
     n = work.lines.shape[0]
     for i in range(n):
         row[N_FIXED + i] = work.lines[i, 2]

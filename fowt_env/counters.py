@@ -12,3 +12,8 @@ class Counter(IntEnum):
 
 
 N_COUNTERS = len(Counter)
+
+
+def counted(counters):
+    """{event: count} of a counter array, those that happened."""
+    return {event.name: int(counters[event]) for event in Counter if counters[event]}

@@ -48,6 +48,7 @@ class Model(NamedTuple):
     layout: object  # channels.Layout
     drivetrain: object  # loads.drivetrain.Drivetrain
     actuator: object  # loads.drivetrain.PitchActuator
+    generator: object  # loads.drivetrain.TorqueLimits
     hull: object  # loads.hydrostatics.Hull or None
     strips: object  # loads.morison.Strips or None
     waves: object  # weather.waves.Waves or None
@@ -93,9 +94,10 @@ class Kept(IntEnum):
     TIME = 38
     ELEVATED = 39  # 1 while ELEVATION, of the surface at the origin, is of TIME
     ELEVATION = 40
+    TORQUE_LIMITED = 41  # 1 in a control period whose torque command the generator could not follow
 
 
-N_KEPT = 41
+N_KEPT = 42
 
 
 class Work(NamedTuple):

@@ -2,13 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from math import cos, radians, sin
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from fowt_env.channels import Channel, Layout, channels
+from fowt_env.channels import Channel, Layout, Out, channels, to_units
 from fowt_env.counters import N_COUNTERS
 from fowt_env.description import Platform, Turbine, read_platform, read_turbine, sea_state_of
 from fowt_env.dynamics import N_KEPT, Body, Model, Work
@@ -18,7 +19,7 @@ from fowt_env.jit import Box
 from fowt_env.loads.blade_elements import build_blade_elements
 from fowt_env.loads.damping import build_damping
 from fowt_env.loads.diffraction import build_strip_diffraction
-from fowt_env.loads.drivetrain import build_drivetrain, build_pitch_actuator
+from fowt_env.loads.drivetrain import build_drivetrain, build_pitch_actuator, build_torque_limits
 from fowt_env.loads.fast_waves import (
     STILL_REFINEMENT,
     build_fast_waves,
@@ -39,8 +40,8 @@ from fowt_env.own_load import Load, blamed, build_own_loads, checked_loads
 from fowt_env.sea_states import SeaState
 from fowt_env.state import N_RIGID
 from fowt_env.weather.waves import build_waves
-from fowt_env.weather.wind import WindSeries, build_wind, make_series, nominal_speed
-from fowt_env.weather.wind_field import WindBox, hub_speed, is_field, read_box, rotor_average
+from fowt_env.weather.wind import WindSeries, build_wind, hub_series, make_series, nominal_speed
+from fowt_env.weather.wind_field import WindBox, hub_speed, hub_wind, is_field, read_box, rotor_average
 
 # what users may give as wind and sea, see build_scene
 Wind = float | dict[str, Any] | WindSeries | WindBox | None
@@ -56,6 +57,7 @@ FIDELITIES = {
 IN_PLANE = 1e-9  # share of a vector out of the plane of a planar scene that rounding may leave
 STEPS = {"rk4": 0.05, "heun": 0.05, "abm4": 0.1, "ab4": 0.1}  # s, default step of each integrator
 FIELD_SAMPLES = 3  # rotor loads per step of ab4 in a box of wind, whose cells the blades cross in 0.1 s
+SPAN_POINTS = 8  # along a blade, for the mean wind over the blades in the outputs
 REFERENCE_STEP = 0.0125  # s, of rk4 at fidelity "reference": errs 2e-6 in heave, 2e-7 elsewhere
 OPTIONS = {
     # name: (default, allowed values or a description of the allowed range)
@@ -121,6 +123,38 @@ class Scene:
     def channels(self) -> tuple[Channel, ...]:
         """Output channels of this scene, in row order."""
         return channels(self.n_lines, self.load_names)
+
+    def values(self, rows: np.ndarray) -> np.ndarray:
+        """A copy of output rows (k, n_channels), in SI as kernels write them, in the units of the channels.
+
+        Where the plant's wind is a rotor average, Wind1VelX to Z become those of a point at the hub.
+        """
+        if self._hub_wind is not None:
+            time, value = self._hub_wind
+            at = rows[:, Out.TIME]
+            if self.model.wind.period > 0.0:
+                at = at % self.model.wind.period
+            rows = rows.copy()
+            for column in range(3):
+                rows[:, Out.WIND1VELX + column] = np.interp(at, time, value[:, column])
+        return to_units(rows, self.n_lines, self.load_names)
+
+    @cached_property
+    def _hub_wind(self):
+        """(time, (n, 3)) of the wind at the hub where the model's wind is a rotor average, else None."""
+        rotor = self.turbine.rotor
+        if isinstance(self.wind, WindBox):
+            return hub_wind(self.wind, rotor.hub_height) if self.model.wind_field is None else None
+        found = hub_series(
+            self.wind,
+            reference_height=rotor.hub_height,
+            rotor_diameter=2.0 * rotor.tip_radius,
+            seed=self.seed,
+            duration=self.options["duration"],
+        )
+        if found is not None and self.options["planar"]:
+            found[1][:, 1] = 0.0
+        return found
 
     def work(self) -> Work:
         """Fresh scratch arrays for one plant of this scene."""
@@ -252,6 +286,7 @@ def build_scene(
         layout=build_layout(platform, turbine),
         drivetrain=build_drivetrain(turbine),
         actuator=build_pitch_actuator(turbine.pitch_drive),
+        generator=build_torque_limits(turbine.torque_law),
         hull=build_hull(platform.hull, site.water_density, site.gravity) if hydrodynamics else None,
         strips=strips,
         waves=waves,
@@ -610,4 +645,6 @@ def build_layout(platform, turbine):
         np.ascontiguousarray(assemble(_upper_bodies(platform, turbine))),
         float(turbine.drivetrain.gear_ratio),
         float(turbine.drivetrain.generator_efficiency),
+        int(rotor.blades),
+        np.linspace(rotor.hub_radius, rotor.tip_radius, 2 * SPAN_POINTS + 1)[1::2].copy(),
     )

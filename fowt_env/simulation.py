@@ -2,14 +2,15 @@
 
 from collections.abc import Callable
 from contextlib import contextmanager
-from math import pi
+from math import inf, pi
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from fowt_env.channels import DEG, RPM, to_units
+from fowt_env.channels import DEG, RPM
+from fowt_env.counters import counted
 from fowt_env.errors import ControllerInputError, InputError, SimulationStopped, unknown
 from fowt_env.jit import control_kernel
 from fowt_env.measurement import N_MEASUREMENTS, Measurement
@@ -17,7 +18,17 @@ from fowt_env.records import is_number
 from fowt_env.scene import Scene
 from fowt_env.state import OUT_OF_PLANE, State, pose_of
 from fowt_env.steady import trim
-from fowt_env.step import RUNNING, STOP_REASONS, advance, observe, output, output_row, run
+from fowt_env.step import (
+    OVERSPEED,
+    RUNNING,
+    STOP_REASONS,
+    advance,
+    command,
+    observe,
+    output,
+    output_row,
+    run,
+)
 from fowt_env.weather.wind_field import WindBox
 
 # Ctrl-C is heard and progress shown between compiled calls. A call by itself costs 1e-4 s, so they
@@ -155,6 +166,8 @@ def simulate(
     start: str = "trim",
     initial: dict[str, float] | None = None,
     progress: bool | Callable[[float], object] = False,
+    stop_overspeed: bool = False,
+    grid_loss: float | None = None,
 ) -> pd.DataFrame:
     """DataFrame of one run, columns named as OpenFAST writes them (`PtfmPitch_[deg]`).
 
@@ -167,10 +180,21 @@ def simulate(
                 None: scene.dt (0.0125 s at fidelity "reference", 0.1 s at the others)
     start       "trim" or "zero"; initial then sets absolute values of named channels
     progress    True shows a bar; a callable is called with the share done
+    stop_overspeed  end the run, as an environment does, at a control instant with a rotor speed beyond the
+                turbine file's overspeed
+    grid_loss   time (s) from which the generator is off the grid and has no torque; None: never
+
+    The generator torque stays within [0, max_torque] of the turbine file and moves in a control period at
+    most as far as its max_torque_rate allows, whatever is commanded: GenTq is the torque in force, and
+    GenTqLim is 1 while it differs from the command.
+
+    attrs["events"] of the DataFrame: {name: count} of what the plant met outside its usual range
+    (fowt_env.counters), of those that happened.
 
     Raises: InputError before anything runs (ControllerInputError where the controller raised it, whenever
-    that is); SimulationStopped (with the rows so far) on capsize or a
-    non-finite state; ControllerError if a controller returns anything but two finite numbers.
+    that is); SimulationStopped (with the rows so far) on capsize, a numerical blow-up, a
+    non-finite state or, where it is to stop there, overspeed; ControllerError if a controller returns
+    anything but two finite numbers.
     """
     if dt is None:
         dt = min(scene.dt, control_dt, output_dt)
@@ -191,7 +215,11 @@ def simulate(
         scene = scene.with_model(body=scene.model.body._replace(rotor_held=True))
         controller = _Hold()
         per_control = last  # nobody reads the measurements
-    loop = _Loop(scene, controller, x, u, dt, per_control, per_output, last)
+    overspeed = scene.turbine.overspeed if stop_overspeed else inf
+    if grid_loss is not None and not is_number(grid_loss):
+        raise InputError(f"grid_loss = {grid_loss!r}: must be a time in s, or None")
+    loss = inf if grid_loss is None else grid_loss - 1e-9  # an instant may miss it by rounding
+    loop = _Loop(scene, controller, x, u, dt, (per_control, per_output, last), overspeed, loss)
     with _bar(progress) as report, _controllers_own():
         loop.go(report)
     return loop.frame()
@@ -209,16 +237,17 @@ def _controllers_own():
 class _Loop:
     """A run in chunks, compiled where the controller is."""
 
-    def __init__(self, scene, controller, x, u, dt, per_control, per_output, last):
+    def __init__(self, scene, controller, x, u, dt, steps, overspeed, grid_loss):
         self.scene = scene
         self.controller = controller
         self.work = scene.work()
         self.box = scene.box(self.work)
         self.x, self.u, self.dt = x, u, float(dt)
-        self.per_control, self.per_output, self.last = per_control, per_output, last
+        self.per_control, self.per_output, self.last = steps
+        self.overspeed, self.grid_loss = float(overspeed), float(grid_loss)
         self.dx = np.zeros_like(x)
         self.measurement = np.zeros(N_MEASUREMENTS)
-        self.rows = np.empty((last // per_output + 1, len(scene.channels)))
+        self.rows = np.empty((self.last // self.per_output + 1, len(scene.channels)))
         self.filled = 0
 
     def go(self, report):
@@ -249,7 +278,8 @@ class _Loop:
         c = self.controller
         status, step, count = run(
             self.box, self.x, self.u, c.kernel, c.parameters, c.memory, self.measurement, self.dx,
-            self.dt, self.per_control, self.per_output, first, last, self.rows[self.filled :],
+            self.dt, self.per_control, self.per_output, self.overspeed, self.grid_loss, first, last,
+            self.rows[self.filled :],
         )  # fmt: skip
         self.filled += count
         self._check(status, step)
@@ -258,8 +288,12 @@ class _Loop:
     def _python(self, step):
         """One control period (or what is left of the run) with a controller in Python."""
         t = step * self.dt
+        if self.x[State.ROTOR_SPEED] > self.overspeed:
+            self._check(OVERSPEED, step)
         observe(self.box, self.x, self.u, t, self.dx, self.measurement)
-        self.u[:] = self.controller.act(Measurement(*self.measurement.tolist()))
+        torque, blade_pitch = self.controller.act(Measurement(*self.measurement.tolist()))
+        period = self.per_control * self.dt
+        command(self.box, self.u, t, torque, blade_pitch, period, self.grid_loss)
         end = min(step + self.per_control, self.last)
         while step < end:
             if step % self.per_output == 0:
@@ -280,8 +314,10 @@ class _Loop:
 
     def frame(self):
         """Rows so far in channel units."""
-        values = to_units(self.rows[: self.filled], self.scene.n_lines, self.scene.load_names)
-        return pd.DataFrame(values, columns=[c.column for c in self.scene.channels])
+        values = self.scene.values(self.rows[: self.filled])
+        frame = pd.DataFrame(values, columns=[c.column for c in self.scene.channels])
+        frame.attrs["events"] = counted(self.work.counters)
+        return frame
 
 
 class _bar:

@@ -8,19 +8,32 @@ from fowt_env.channels import measure, record
 from fowt_env.dynamics import Kept, loads_of
 from fowt_env.integrators import rates, take_step
 from fowt_env.jit import entry, inlined_kernel, kernel
+from fowt_env.loads.drivetrain import followed_torque, torque_was_limited
 from fowt_env.state import State
 
-RUNNING, NON_FINITE, CAPSIZED = 0, 1, 2
+RUNNING, NON_FINITE, CAPSIZED, OVERSPEED, BLOWN_UP = 0, 1, 2, 3, 4
 CAPSIZE = 1.4  # rad (80 deg) of platform pitch: the Euler angles are singular at 90 deg
-STOP_REASONS = {NON_FINITE: "non-finite state", CAPSIZED: "capsize (platform pitch beyond 80 deg)"}
+# No floating platform moves as fast: a state beyond is the time step's doing, not the sea's. A hull that
+# capsizes passes 80 deg at some 0.5 rad/s.
+FASTEST, FASTEST_TURN = 100.0, 10.0  # m/s, rad/s
+STOP_REASONS = {
+    NON_FINITE: "non-finite state",
+    CAPSIZED: "capsize (platform pitch beyond 80 deg)",
+    OVERSPEED: "overspeed (rotor speed beyond the turbine file's limit)",
+    BLOWN_UP: f"numerical blow-up (platform faster than {FASTEST:g} m/s or {FASTEST_TURN:g} rad/s): loads too"
+    " stiff for the time step",
+}
 
 
 @kernel
 def status_of(x):
-    """RUNNING, NON_FINITE or CAPSIZED for a state."""
+    """RUNNING, NON_FINITE, BLOWN_UP or CAPSIZED for a state."""
     for value in x:
         if not isfinite(value):
             return NON_FINITE
+    for i in range(3):
+        if abs(x[State.VX + i]) > FASTEST or abs(x[State.WX + i]) > FASTEST_TURN:
+            return BLOWN_UP
     if abs(x[State.PLATFORM_PITCH]) > CAPSIZE:
         return CAPSIZED
     return RUNNING
@@ -89,16 +102,46 @@ def output_row(box, x, u, t, size):
 
 
 @kernel
+def follow_torque(t, torque, u, period, generator, grid_loss, kept):
+    """Put the torque that the generator reaches into u[0], in place of the command there.
+
+    torque: what was in force before, N m; period: s until the next command. From the time grid_loss (s) on
+    the generator is off the grid and has no torque at once, whatever is commanded.
+    """
+    command = u[0]
+    if t >= grid_loss:
+        u[0] = 0.0
+        kept[Kept.TORQUE_LIMITED] = 0.0
+        return
+    u[0] = followed_torque(torque, command, period, generator)
+    kept[Kept.TORQUE_LIMITED] = 1.0 if torque_was_limited(u[0], command, generator) else 0.0
+
+
+@entry
+def command(box, u, t, torque, blade_pitch, period, grid_loss):
+    """Put a command (N m, rad) into u as the plant takes it for a control period; see follow_torque."""
+    before = u[0]
+    u[0] = torque
+    u[1] = blade_pitch
+    follow_torque(t, before, u, period, box.scene.generator, grid_loss, box.work.kept)
+
+
+@kernel
 def run_scene(
-    scene, work, x, u, act, parameters, memory, measurement, dx, dt, per_control, per_output, first, last, out
-):
+    scene, work, x, u, act, parameters, memory, measurement, dx, dt, per_control, per_output, overspeed,
+    grid_loss, first, last, out,
+):  # fmt: skip
     """Closed loop as in run."""
     rows = 0
     for step in range(first, last):
         t = step * dt
         if step % per_control == 0:
+            if x[State.ROTOR_SPEED] > overspeed:
+                return OVERSPEED, step, rows
             observe_scene(scene, work, x, u, t, dx, measurement)
+            torque = u[0]
             act(parameters, memory, measurement, u)
+            follow_torque(t, torque, u, per_control * dt, scene.generator, grid_loss, work.kept)
         if step % per_output == 0:
             output_scene(scene, work, x, u, t, dx, out[rows])
             rows += 1
@@ -110,12 +153,17 @@ def run_scene(
 
 
 @entry
-def run(box, x, u, act, parameters, memory, measurement, dx, dt, per_control, per_output, first, last, out):
+def run(
+    box, x, u, act, parameters, memory, measurement, dx, dt, per_control, per_output, overspeed, grid_loss,
+    first, last, out,
+):  # fmt: skip
     """Closed loop over the instants first <= step < last, writing rows of out (k, n_channels).
 
-    act: a control kernel (jit.control_kernel). Returns (status, step reached, rows written).
+    act: a control kernel (jit.control_kernel). overspeed: rotor speed (rad/s) beyond which the run ends at
+    the next control instant; grid_loss: time (s) from which the generator has no torque.
+    Returns (status, step reached, rows written).
     """
     return run_scene(
         box.scene, box.work, x, u, act, parameters, memory, measurement, dx, dt, per_control, per_output,
-        first, last, out,
+        overspeed, grid_loss, first, last, out,
     )  # fmt: skip

@@ -4,11 +4,13 @@ from naive import rigid_body
 from plant import random_state, rates
 
 import fowt_env
-from fowt_env.channels import FIXED_CHANNELS, channels, to_units
+from fowt_env.channels import FIXED_CHANNELS, channels, rotor_wind, to_units
 from fowt_env.dynamics import gravity_load
 from fowt_env.measurement import N_MEASUREMENTS, Measurement
 from fowt_env.state import State, pose_of
 from fowt_env.step import observe, output_row
+from fowt_env.weather.wind import wind_now
+from fowt_env.weather.wind_field import read_box
 
 COMMAND = np.array([3e4, 0.2])
 
@@ -126,6 +128,38 @@ def test_measurement_holds_rates_of_the_inertial_position(storm_scene):
     assert measured.wind_speed == pytest.approx(18.0, rel=1e-12)
     _, _, row = moving(storm_scene)
     assert row["Wind1VelX"] == pytest.approx(18.0, rel=1e-12)
+
+
+def test_the_rotor_s_wind_is_the_mean_over_its_blades_relative_to_the_moving_hub(storm_scene, turbine):
+    x, _, row = moving(storm_scene)
+    hub = np.array([-turbine.rotor.overhang, 0.0, turbine.rotor.hub_height])
+    radius = turbine.rotor.tip_radius * (np.arange(200) + 0.5) / 200
+    height = 1.0 + np.outer(radius, np.sin(np.linspace(0.0, 2.0 * np.pi, 360, endpoint=False))) / hub[2]
+    assert storm_scene.model.wind.shear_exponent > 0.0
+    mean = 18.0 * np.mean(height**storm_scene.model.wind.shear_exponent)
+    relative = rigid_body.rotation(*x[3:6])[0] * mean - x[7:10] - np.cross(x[10:13], hub)
+    assert row["RtVAvgxh"] == pytest.approx(relative[0], rel=1e-6)
+
+
+def test_the_rotor_s_wind_in_a_box_is_read_along_the_blades_where_they_are(storm_scene):
+    layout, series = storm_scene.model.layout, storm_scene.model.wind
+    x = random_state(np.random.default_rng(5), storm_scene.n_state, speed=2.0, turning=0.1)
+    R, pose = rigid_body.rotation(*x[3:6]), pose_of(x)
+    y, z = np.linspace(-100.0, 100.0, 21), np.linspace(5.0, 205.0, 21)
+    rng = np.random.default_rng(6)
+    u, v, w = rng.standard_normal((3, 40, z.size, y.size)) + np.array([12.0, 0.0, 0.0])[:, None, None, None]
+    spec = {"kind": "box", "u": u, "v": v, "w": w, "y": y, "z": z, "dt": 0.5, "speed": 12.0, "periodic": True}
+    box = read_box(spec, hub_height=90.0, rotor_diameter=126.0)
+    found = rotor_wind(3.0, pose, x[State.AZIMUTH], wind_now(3.0, series), series, box.field(), layout)
+    wind = np.zeros(3)
+    for blade in range(3):
+        psi = x[State.AZIMUTH] + 2.0 * np.pi * blade / 3
+        for radius in layout.span:
+            arm = layout.hub + radius * np.array([0.0, -np.sin(psi), np.cos(psi)])
+            wind += box.at(3.0, *(x[:3] + R @ arm))[0] / (3 * len(layout.span))
+    own = x[7:10] + np.cross(x[10:13], layout.hub)
+    assert found == pytest.approx((R.T @ wind - own)[0], rel=1e-5)
+    assert layout.span[0] > 1.5 and layout.span[-1] < 63.0 and np.ptp(np.diff(layout.span)) < 1e-9
 
 
 def test_lines_report_their_tensions(wave_scene):

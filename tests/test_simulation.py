@@ -10,7 +10,9 @@ from plant import random_state
 
 import fowt_env
 from controllers import make
+from controllers.constant import Constant
 from fowt_env import simulation
+from fowt_env.counters import Counter
 from fowt_env.errors import ControllerError, InputError, SimulationStopped
 from fowt_env.jit import control_kernel
 from fowt_env.simulation import initial_state
@@ -50,6 +52,95 @@ class Delegate:
 
     def act(self, measurement):
         return self.inner.act(measurement)
+
+
+# Limits of the generator and of the rotor
+
+
+class Commands:
+    """The same command in every period."""
+
+    def __init__(self, torque, blade_pitch):
+        self.command = torque, blade_pitch
+
+    def reset(self, measurement):
+        """Nothing to start."""
+
+    def act(self, measurement):
+        return self.command
+
+
+def followed(start, commands, maximum, step):
+    """Torque of each period in plain Python: the command in [0, maximum], a step from the last at most."""
+    torque, found = start, []
+    for wanted in commands:
+        wanted = min(max(wanted, 0.0), maximum)
+        torque = min(max(wanted, torque - step), torque + step)
+        found.append(torque)
+    return np.array(found)
+
+
+@pytest.mark.parametrize("torque", [90e3, -43e3, 20e3])
+@pytest.mark.parametrize("compiled", [True, False])
+def test_the_generator_keeps_its_range_and_rate_whatever_is_commanded(storm_scene, torque, compiled):
+    law = storm_scene.turbine.torque_law
+    controller = Constant(torque=torque, blade_pitch=0.26) if compiled else Commands(torque, 0.26)
+    frame = run(storm_scene, controller=controller, duration=5.0)
+    start = 1e3 * fowt_env.trim(storm_scene)["GenTq"]
+    expected = followed(start, [torque] * 50, law.max_torque, 0.1 * law.max_torque_rate)
+    got = 1e3 * frame["GenTq_[kN-m]"].to_numpy()
+    np.testing.assert_allclose(got[:50], expected, rtol=1e-12, atol=1e-6)
+    np.testing.assert_array_equal(frame["GenTqLim_[-]"][:50], 1.0 * (np.abs(expected - torque) > 1.0))
+    power = frame["GenPwr_[kW]"].to_numpy()
+    assert power.min() >= 0.0 and power.max() < 7000.0
+    np.testing.assert_allclose(
+        power, 0.944 * 97.0 * got * frame["RotSpeed_[rpm]"] * np.pi / 30e3, rtol=1e-9, atol=1e-9
+    )
+
+
+def test_a_command_within_the_limits_is_followed_to_the_bit(storm_scene):
+    start = 1e3 * fowt_env.trim(storm_scene)["GenTq"]
+    near = start - 0.1 * storm_scene.turbine.torque_law.max_torque_rate
+    frame = run(storm_scene, controller=Commands(near, 0.26), duration=1.0)
+    assert (frame["GenTq_[kN-m]"] == 1e-3 * near).all() and not frame["GenTqLim_[-]"].any()
+
+
+def test_the_generator_is_off_from_the_instant_of_the_grid_loss(storm_scene):
+    for controller in (Constant(), Commands(43e3, 0.26)):
+        frame = run(storm_scene, controller=controller, duration=2.0, grid_loss=0.7)
+        torque = frame["GenTq_[kN-m]"].to_numpy()
+        assert (torque[:7] > 40.0).all() and (torque[7:] == 0.0).all()
+    with pytest.raises(InputError, match="grid_loss = 'now': must be a time"):
+        run(storm_scene, controller="constant", grid_loss="now")
+
+
+@pytest.mark.parametrize("kind", [Constant, Commands])
+def test_a_run_goes_on_past_the_overspeed_unless_it_is_to_stop_there(storm_scene, kind):
+    limit = storm_scene.turbine.overspeed * 30.0 / np.pi
+    free = {"controller": kind(0.0, 0.0), "duration": 20.0}
+    frame = run(storm_scene, **free)
+    speed = frame["RotSpeed_[rpm]"].to_numpy()
+    assert speed.max() > 1.2 * limit
+    with pytest.raises(SimulationStopped, match="overspeed") as stopped:
+        run(storm_scene, **free, stop_overspeed=True)
+    first = int(np.argmax(speed > limit))
+    assert stopped.value.time == pytest.approx(frame["Time_[s]"][first])
+    np.testing.assert_array_equal(stopped.value.frame.to_numpy(), frame.to_numpy()[:first])
+
+
+def test_what_the_time_step_blows_up_is_not_called_a_capsize(platform):
+    hydro = platform.hydro.model_copy(update={"drag_coefficient": 1e5})
+    sea = {"kind": "regular", "H": 3.0, "T": 5.0}
+    scene = fowt_env.build_scene(platform.model_copy(update={"hydro": hydro}), sea=sea)
+    with pytest.raises(SimulationStopped, match="numerical blow-up"):
+        run(scene, dt=0.1, duration=20.0)
+
+
+def test_rare_events_of_a_run_are_handed_out(still_scene):
+    assert run(still_scene, duration=1.0).attrs["events"] == {}
+    loop = run(still_scene, duration=1.0, start="zero", initial={"PtfmHeave": -60.0})
+    assert set(loop.attrs["events"]) <= {event.name for event in Counter}
+    assert loop.attrs["events"]["HYDROSTATIC_FALLBACK"] > 0
 
 
 # Rows and time

@@ -12,6 +12,7 @@ import tempfile
 import time
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from math import inf
 from pathlib import Path
 
 import numba
@@ -241,7 +242,7 @@ def loop_time(scene, kind, x, u, dt, seconds, repeats=REPEATS):
         controller.reset(Measurement(*m.tolist()))
         run(
             box, y, v, controller.kernel, controller.parameters, controller.memory, m, dx, dt, per_control,
-            last + 1, 0, last, rows,
+            last + 1, inf, inf, 0, last, rows,
         )  # fmt: skip
 
     return median_time(go, repeats)

@@ -277,8 +277,9 @@ def _scored(run):
     try:
         controller = _controller(run, known)
         frame = fowt_env.simulate(
-            scene, controller=controller, duration=run.duration, initial=case.initial, **run.options
-        )
+            scene, controller=controller, duration=run.duration, initial=case.initial,
+            stop_overspeed=True, grid_loss=_grid_loss(case), **run.options,
+        )  # fmt: skip
         row |= metrics(
             frame, run.skip, degrees(turbine.rated_rotor_speed) / 6.0, degrees(turbine.pitch_drive.rate_limit)
         )
@@ -306,6 +307,13 @@ def _controller(run, known):
     if case.shift is not None:
         controller = Unaware(controller, known, case.shift, run.seed)
     return faulted(controller, case.fault, known.turbine, control_dt)
+
+
+def _grid_loss(case):
+    """Time (s) from which the case's generator is off the grid; None: never. A parked turbine's always is."""
+    if case.parked:
+        return 0.0
+    return None if case.fault is None else case.fault.grid_loss
 
 
 def _reason(error):

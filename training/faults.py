@@ -26,6 +26,11 @@ class Fault(Record):
     delay: NonNegative | None = None  # s
     rate: Positive = 8.0  # deg/s
 
+    @property
+    def grid_loss(self):
+        """Time (s) from which the generator is off the grid, as simulate takes it; None: it stays."""
+        return None if self.kind == "stuck_pitch" else self.time
+
 
 class FaultedController:
     """A controller with a Fault: the inner one's commands, from the fault on what it leaves of them."""

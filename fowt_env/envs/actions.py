@@ -9,7 +9,13 @@ from typing import NamedTuple
 
 from fowt_env.errors import InputError
 from fowt_env.jit import kernel
-from fowt_env.loads.drivetrain import build_drivetrain, limited
+from fowt_env.loads.drivetrain import (
+    TorqueLimits,
+    build_drivetrain,
+    build_torque_limits,
+    followed_torque,
+    limited,
+)
 from fowt_env.measurement import Measure
 
 # Set-point mode: PI on rotor speed through torque, this natural frequency and damping ratio of the
@@ -39,8 +45,7 @@ class ActionMap(NamedTuple):
     pitch_high: float
     residual_torque: float  # largest additions of the residual mode, N m
     residual_pitch: float  # rad
-    maximum_torque: float  # N m
-    torque_step: float  # most that the torque may change in one control period, N m
+    generator: TorqueLimits
     control_dt: float  # s
     tracking_gain: float  # set-point mode: N m per rad/s of rotor speed
     tracking_rate: float  # set-point mode: N m/s per rad/s
@@ -74,8 +79,7 @@ def build_action_map(mode, task, turbine, control_dt):
         pitch_high=float(reach[1]),
         residual_torque=float(task.residual_torque * law.rated_torque),
         residual_pitch=float(task.residual_pitch * pi / 180.0),
-        maximum_torque=float(law.max_torque),
-        torque_step=float(law.max_torque_rate * control_dt),
+        generator=build_torque_limits(law),
         control_dt=float(control_dt),
         tracking_gain=float(2.0 * TRACKING_DAMPING * TRACKING_FREQUENCY * inertia),
         tracking_rate=float(TRACKING_FREQUENCY**2 * inertia),
@@ -103,23 +107,12 @@ def spread(action, low, high):
 
 
 @kernel
-def towards(torque, wanted, step):
-    """The torque, moved towards the wanted one by at most a step, and exactly onto it within reach."""
-    change = wanted - torque
-    if change > step:
-        return torque + step
-    if change < -step:
-        return torque - step
-    return wanted
-
-
-@kernel
 def tracking_torque(speed, setpoint, memory, actions):
     """Torque that drives the rotor speed (rad/s) to its set-point; memory[0]: integral part, N m."""
     error = speed - setpoint
     integral = memory[0] + actions.tracking_rate * error * actions.control_dt
-    memory[0] = limited(integral, 0.0, actions.maximum_torque)
-    return limited(actions.tracking_gain * error + memory[0], 0.0, actions.maximum_torque)
+    memory[0] = limited(integral, 0.0, actions.generator.maximum)
+    return limited(actions.tracking_gain * error + memory[0], 0.0, actions.generator.maximum)
 
 
 @kernel
@@ -132,22 +125,22 @@ def baseline_command(law, parameters, memory, measurement, command):
 
 @kernel
 def command_of(action, actions, law, parameters, memory, measurement, u, wanted):
-    """Set u = (generator torque N m, blade pitch rad) from an accepted action; wanted is scratch (2,).
+    """Set u = (generator torque N m, blade pitch rad) from an accepted action; wanted (2,): what it commands.
 
-    The torque moves at most as fast as its rate limit; the pitch actuator limits itself.
+    The torque in u is what the generator reaches of the command; the pitch actuator limits itself.
     """
     wanted[0], wanted[1] = u[0], u[1]
     if actions.mode == Mode.RESIDUAL:
         baseline_command(law, parameters, memory, measurement, wanted)
-        torque = wanted[0] + action[0] * actions.residual_torque
-        pitch = wanted[1] + action[1] * actions.residual_pitch
+        wanted[0] += action[0] * actions.residual_torque
+        wanted[1] += action[1] * actions.residual_pitch
     else:
-        torque = spread(action[0], actions.low, actions.high)
-        pitch = spread(action[1], actions.pitch_low, actions.pitch_high)
+        wanted[0] = spread(action[0], actions.low, actions.high)
+        wanted[1] = spread(action[1], actions.pitch_low, actions.pitch_high)
         if actions.mode == Mode.SETPOINT:
-            torque = tracking_torque(measurement[Measure.ROTOR_SPEED], torque, memory, actions)
-    u[0] = towards(u[0], limited(torque, 0.0, actions.maximum_torque), actions.torque_step)
-    u[1] = pitch
+            wanted[0] = tracking_torque(measurement[Measure.ROTOR_SPEED], wanted[0], memory, actions)
+    u[0] = followed_torque(u[0], wanted[0], actions.control_dt, actions.generator)
+    u[1] = wanted[1]
 
 
 @kernel
@@ -168,4 +161,4 @@ def action_of(u, rotor_speed, actions, action):
 
 def start_tracking(memory, measurement, actions):
     """Set the integral so that the set-point of the present speed asks for the present torque."""
-    memory[0] = min(max(measurement.generator_torque, 0.0), actions.maximum_torque)
+    memory[0] = min(max(measurement.generator_torque, 0.0), actions.generator.maximum)

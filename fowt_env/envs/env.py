@@ -13,12 +13,13 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
-from fowt_env.channels import DEG, to_units
+from fowt_env.channels import DEG
 from fowt_env.description import Platform
 from fowt_env.envs.actions import MODES, Mode, build_action_map, start_tracking
 from fowt_env.envs.kernels import (
     BAD_ACTION,
-    REASONS,
+    LIMITED,
+    N_COUNTS,
     RUNNING,
     SATURATED,
     STEP,
@@ -56,7 +57,7 @@ from fowt_env.measurement import N_MEASUREMENTS, Measurement
 from fowt_env.scene import OPTIONS, Scene, build_scene
 from fowt_env.simulation import INITIAL, check_duration, steps_in
 from fowt_env.state import State
-from fowt_env.step import output
+from fowt_env.step import STOP_REASONS, output
 
 SHORTEST_WEATHER = 600.0  # s of random wind and sea: turbulence intensity is defined over 10 min
 StepResult = tuple[np.ndarray, float, bool, bool, dict[str, Any]]
@@ -99,8 +100,9 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     info of reset has them under "episode", and given as options they replay the episode.
 
     An action beyond [-1, 1] counts as the nearest end, and info["saturated_actions"] counts the periods
-    in which that happened. The torque moves at most as fast as its rate limit allows, the blade pitch
-    as its actuator does.
+    in which that happened. The torque stays within the generator's range and moves at most as fast as its
+    rate limit allows, the blade pitch as its actuator does; info["torque_limited"] counts the periods in
+    which the torque was not what was commanded.
 
     An episode is terminated by failure: rotor speed beyond the turbine file's overspeed, capsize
     (platform pitch beyond 80 deg) or a state that is not finite; info["termination"] has the reason. It
@@ -108,7 +110,8 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
     A picture shows one control period, so that 30 of them a second are three times real time.
 
-    info of each step: "time" (s), "saturated_actions", "reward/<term>" for each term before weighting.
+    info of each step: "time" (s), "saturated_actions", "torque_limited", "reward/<term>" for each term before
+    weighting.
 
     Raises: InputError for settings and actions that cannot be used.
     """
@@ -244,7 +247,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             reading=np.zeros(N_MEASUREMENTS) if sensed else measurement,
             past=np.zeros((self._sensors["delay"] + 1, N_MEASUREMENTS)) if sensed else None,
             observation=np.zeros(len(chosen), dtype=np.float32),
-            counts=np.zeros(2, dtype=np.int64),
+            counts=np.zeros(N_COUNTS, dtype=np.int64),
             reference=np.zeros(len(Reference._fields)),
             before=np.zeros(N_MEASUREMENTS),
             dx=np.zeros(n),
@@ -286,6 +289,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         info = {
             "time": 0.0,
             "saturated_actions": 0,
+            "torque_limited": 0,
             "wind_speed": self.scene.wind_speed,
             "episode": deepcopy(episode._asdict()),
         }
@@ -335,7 +339,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     def step_physical(self, torque: float, blade_pitch: float) -> StepResult:
         """As step, under a generator torque (N m) and blade pitch (rad), applied as simulate does.
 
-        No range and no torque rate limit are put on the command: that is up to whoever gives it.
+        The generator and the pitch actuator follow it as far as their limits allow.
         """
         if not self._running:
             raise ResetNeeded("call reset() first: no episode is running")
@@ -351,6 +355,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         info = dict(zip(REWARD_KEYS, run.terms.tolist(), strict=True))
         info["time"] = step * self.dt
         info["saturated_actions"] = int(run.counts[SATURATED])
+        info["torque_limited"] = int(run.counts[LIMITED])
         terminated = status != RUNNING
         truncated = not terminated and step >= self._last
         if terminated:
@@ -364,7 +369,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     def _reason(self, status):
         """Why an episode was terminated, with the load of the user's that is to blame, if one is."""
         fault = self.scene.blamed(self._run.work)
-        return f"{REASONS[status]}: {fault}" if fault else REASONS[status]
+        return f"{STOP_REASONS[status]}: {fault}" if fault else STOP_REASONS[status]
 
     def get_state(self) -> Snapshot:
         """Snapshot of all that decides how the run goes on: plant, controller, counters, weather, draws.
@@ -448,7 +453,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         row = np.empty(len(scene.channels))
         time = run.counts[STEP] * self.dt
         output(scene.box(work), run.x, run.u, time, np.zeros_like(run.x), row)
-        values = to_units(row[None, :], scene.n_lines, scene.load_names)[0].tolist()
+        values = scene.values(row[None, :])[0].tolist()
         return dict(zip((channel.name for channel in scene.channels), values, strict=True))
 
     def render(self) -> np.ndarray | None:

@@ -15,13 +15,14 @@ from fowt_env.envs.observations import ObservationMap, fill_observation, fill_si
 from fowt_env.envs.rewards import Scales, fill_terms, weighted_sum
 from fowt_env.envs.sensors import Sensors, take_reading
 from fowt_env.jit import entry, kernel
+from fowt_env.loads.drivetrain import followed_torque, torque_was_limited
 from fowt_env.measurement import Measure
 from fowt_env.state import State
-from fowt_env.step import NON_FINITE, RUNNING, STOP_REASONS, advance_scene, observe_scene
+from fowt_env.step import NON_FINITE, OVERSPEED, RUNNING, advance_scene, observe_scene
 
-BAD_ACTION, OVERSPEED = -1, 3  # beside the statuses of step.py
-REASONS = {**STOP_REASONS, OVERSPEED: "overspeed (rotor speed beyond the limit)"}
-STEP, SATURATED = 0, 1  # entries of Run.counts
+BAD_ACTION = -1  # beside the statuses of step.py
+STEP, SATURATED, LIMITED = 0, 1, 2  # entries of Run.counts
+N_COUNTS = 3
 
 
 class Setting(NamedTuple):
@@ -53,11 +54,12 @@ class Run(NamedTuple):
     reading: np.ndarray  # the same as sensors show it; without any the measurement itself
     past: np.ndarray | None  # last measurements, of the sensors' delay
     observation: np.ndarray  # (n,) float32
-    counts: np.ndarray  # int64: physics steps done, control periods with a clipped action
+    # int64: physics steps done, control periods with a clipped action, those with a torque at its limits
+    counts: np.ndarray
     reference: np.ndarray  # rewards.Reference of the episode
     before: np.ndarray  # (N_MEASUREMENTS,) scratch from here on: one control period ago
     dx: np.ndarray  # (n_state,)
-    wanted: np.ndarray  # (2,) command of the baseline
+    wanted: np.ndarray  # (2,) command of the last period, before the generator's limits
     signals: np.ndarray  # what observations are made of
     terms: np.ndarray  # (N_TERMS,) of the last period
 
@@ -99,8 +101,9 @@ def show(setting, run):
 def start(box):
     """Measure and show the first instant of an episode; returns the status."""
     setting, run = box.scene, box.work
-    run.counts[STEP] = 0
-    run.counts[SATURATED] = 0
+    for i in range(N_COUNTS):
+        run.counts[i] = 0
+    run.work.kept[Kept.TORQUE_LIMITED] = 0.0
     run.work.kept[Kept.FRESH] = 0.0
     run.work.kept[Kept.STEPS] = 0.0
     status = look(setting, run)
@@ -127,6 +130,9 @@ def update_estimate(law, setting, run):
 @kernel
 def advance_period(setting, run, estimator):
     """Advance one control period under run.u, measure, observe and pay; returns (status, reward)."""
+    was_limited = torque_was_limited(run.u[0], run.wanted[0], setting.model.generator)
+    run.counts[LIMITED] += was_limited
+    run.work.kept[Kept.TORQUE_LIMITED] = 1.0 if was_limited else 0.0
     copy_into(run.before, run.measurement)
     first = run.counts[STEP]
     status = advance_scene(setting.model, run.work, run.x, run.u, first, setting.per_control, setting.dt)
@@ -169,7 +175,9 @@ def act_physical(box, estimator, torque, blade_pitch):
     estimator: as act takes it.
     """
     setting, run = box.scene, box.work
-    run.u[0] = torque
+    run.wanted[0] = torque
+    run.wanted[1] = blade_pitch
+    run.u[0] = followed_torque(run.u[0], torque, setting.actions.control_dt, setting.model.generator)
     run.u[1] = blade_pitch
     action_of(run.u, run.x[State.ROTOR_SPEED], setting.actions, run.action)
     return advance_period(setting, run, estimator.work)

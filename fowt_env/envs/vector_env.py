@@ -15,7 +15,7 @@ from gymnasium.vector.utils import batch_space
 
 from fowt_env.envs.batch import act_all, act_all_parallel, thread_limit
 from fowt_env.envs.env import REWARD_KEYS, FowtEnv
-from fowt_env.envs.kernels import RUNNING, SATURATED, STEP
+from fowt_env.envs.kernels import LIMITED, N_COUNTS, RUNNING, SATURATED, STEP
 from fowt_env.envs.observations import N_ACTIONS
 from fowt_env.envs.rewards import N_TERMS
 from fowt_env.envs.snapshot import Snapshot
@@ -30,6 +30,7 @@ if "OMP_WAIT_POLICY" not in os.environ:
 
 MODES = {mode.value: mode for mode in AutoresetMode}
 INFO_KEYS = (*REWARD_KEYS, "time")  # those of every step that are float64
+INFO_COUNTS = {"saturated_actions": SATURATED, "torque_limited": LIMITED}  # those that are int64
 INFO_MASKS = tuple(f"_{key}" for key in INFO_KEYS)
 
 
@@ -107,7 +108,7 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         """Make the arrays that the outside reads rows of common ones."""
         n = self.num_envs
         self._observations = np.zeros((n, *self.single_observation_space.shape), dtype=np.float32)
-        self._counts = np.zeros((n, 2), dtype=np.int64)
+        self._counts = np.zeros((n, N_COUNTS), dtype=np.int64)
         self._terms = np.zeros((n, N_TERMS))
         for i, env in enumerate(self.envs):
             env._run = env._run._replace(
@@ -241,15 +242,17 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         columns = np.empty((len(INFO_KEYS), self.num_envs))
         columns[:N_TERMS] = self._terms.T
         np.multiply(self._counts[:, STEP], self._dt, out=columns[N_TERMS])
-        saturated = self._counts[:, SATURATED].copy()
+        counts = {key: self._counts[:, entry].copy() for key, entry in INFO_COUNTS.items()}
         if not shown.all():
             columns[:, ~shown] = 0.0
-            saturated[~shown] = 0
+            for values in counts.values():
+                values[~shown] = 0
         masks = np.empty((len(INFO_KEYS), self.num_envs), dtype=bool)
         masks[:] = shown  # a row each: a reset adds itself to some of them
         infos.update(zip(INFO_KEYS, columns, strict=True))
         infos.update(zip(INFO_MASKS, masks, strict=True))
-        infos["saturated_actions"], infos["_saturated_actions"] = saturated, shown.copy()
+        for key, values in counts.items():
+            infos[key], infos[f"_{key}"] = values, shown.copy()
         if terminations.any():
             for i in (shown & terminations).nonzero()[0]:
                 reason = {"termination": self.envs[i]._reason(self._statuses[i])}
@@ -268,7 +271,7 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         """Info of the last step of one environment, as its own step would give it."""
         info = dict(zip(REWARD_KEYS, self._terms[i].tolist(), strict=True))
         info["time"] = float(self._counts[i, STEP] * self._dt[i])
-        info["saturated_actions"] = int(self._counts[i, SATURATED])
+        info |= {key: int(self._counts[i, entry]) for key, entry in INFO_COUNTS.items()}
         if self._statuses[i] != RUNNING:
             info["termination"] = self.envs[i]._reason(self._statuses[i])
         return info

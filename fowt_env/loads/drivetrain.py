@@ -53,6 +53,16 @@ class PitchActuator(NamedTuple):
     maximum: float  # rad
 
 
+class TorqueLimits(NamedTuple):
+    """What generator and converter can do, on the high-speed shaft. They never drive the rotor."""
+
+    maximum: float  # N m
+    rate_limit: float  # N m/s, either way
+
+
+SLACK = 1e-9  # relative, by which a command may miss a limit in rounding
+
+
 def build_torque_curve(torque_law, region3="constant_torque"):
     """TorqueCurve of a description.TorqueLaw; region3 is "constant_torque" or "constant_power".
 
@@ -116,6 +126,11 @@ def build_pitch_actuator(pitch_drive):
     )
 
 
+def build_torque_limits(torque_law):
+    """TorqueLimits of a description.TorqueLaw."""
+    return TorqueLimits(maximum=float(torque_law.max_torque), rate_limit=float(torque_law.max_torque_rate))
+
+
 @kernel
 def limited(value, low, high):
     """The value, or the limit that it passes."""
@@ -143,6 +158,27 @@ def generator_torque(generator_speed, blade_pitch, curve):
     else:
         torque = curve.region25_slope * (generator_speed - curve.synchronous_speed)
     return min(torque, curve.maximum_torque)
+
+
+@kernel
+def followed_torque(torque, command, period, limits):
+    """Generator torque (N m) of a control period that begins at a torque, under a command.
+
+    The command within [0, maximum], and not further from the torque before than the rate limit allows in a
+    period (s). It acts from the period's beginning, as a torque that is set by a Bladed-style DLL does.
+    """
+    target = limited(command, 0.0, limits.maximum)
+    way = limits.rate_limit * period
+    change = target - torque
+    if abs(change) <= way * (1.0 + SLACK):
+        return target
+    return torque + way if change > 0.0 else torque - way
+
+
+@kernel
+def torque_was_limited(torque, command, limits):
+    """Whether a torque in force differs from its command by more than rounding."""
+    return abs(torque - command) > SLACK * limits.maximum
 
 
 @kernel

@@ -34,6 +34,7 @@ COHERENCE_DECAY = 12.0
 COHERENCE_OFFSET = 0.12
 SHORTEST_PERIOD = 600.0  # s; sigma_1 is defined over 10 min, a shorter record would squeeze it into gusts
 STEP = 0.1  # s
+OWN_PHASES = 5  # first random generator of what a point has beyond the disc average (0 to 4: turbulence)
 TABLE_RANGE = (1e-6, 1e4)  # of k R; beyond it the averages are 1 and 0 to 1e-6 and 1e-7
 TABLE_SIZE = 2000  # log-spaced; log-log interpolation is then within 1e-5
 PAIR_NODES = 200  # quadrature over pair distances, quadratically denser towards 0
@@ -78,6 +79,14 @@ def disk_gradient(kr):
     """
     log_kr, _, gradient = _pair_tables()
     return np.exp(np.interp(np.log(kr), log_kr, gradient))
+
+
+def centre_average(kr):
+    """Mean coherence of the disc's centre with its points, for k R = kr > 0 (any shape)."""
+    kr = np.asarray(kr, dtype=np.float64)
+    series = 1.0 - kr * (2.0 / 3.0 - 0.25 * kr)  # where the difference below loses its digits
+    exact = -2.0 * (np.expm1(-kr) + kr * np.exp(-kr)) / kr**2
+    return np.where(kr < 1e-3, series, exact)
 
 
 def coherence_wave_number(frequency, speed, height):
@@ -161,9 +170,37 @@ def turbulence(
     used = 5 if average == "rotor" and shear_turbulence else 3
     spectrum = np.empty((used, amplitude.shape[1]), dtype=np.complex128)
     for row in range(used):
-        phase = component_generator(seed, row).uniform(0.0, 2.0 * np.pi, amplitude.shape[1])
-        spectrum[row] = 0.5 * samples * amplitude[row] * np.exp(1j * phase)
-    value = np.zeros((samples + 1, 5))
-    value[:-1, :used] = np.fft.irfft(spectrum, samples, axis=1).T
+        spectrum[row] = 0.5 * samples * amplitude[row] * _phasor(seed, row, amplitude.shape[1])
+    return samples * step, _one_period(spectrum, samples, 5)
+
+
+def hub_turbulence(speed, sigma, *, height, diameter, period, seed, step=STEP):
+    """(period, value): turbulence at the hub, (n + 1, 3), in the wind whose disc average is turbulence(...).
+
+    Arguments as there. u, v and w of a point have the whole Kaimal spectrum. Each is the part that goes with
+    the disc average, by the mean coherence of the centre with the disc, and a rest that is independent of it.
+    """
+    samples = fft_length(int(np.ceil(period / step - 1e-9)))
+    point = amplitudes(speed, sigma, height, diameter, samples, step, "point")[:3]
+    frequency = np.arange(point.shape[1]) / (samples * step)
+    kr = coherence_wave_number(frequency, speed, height) * 0.5 * diameter
+    shared = centre_average(kr) / np.sqrt(disk_average(kr))
+    rest = np.sqrt(np.maximum(1.0 - shared**2, 0.0))
+    spectrum = np.empty(point.shape, dtype=np.complex128)
+    for row in range(3):
+        common, own = (_phasor(seed, component, point.shape[1]) for component in (row, OWN_PHASES + row))
+        spectrum[row] = 0.5 * samples * point[row] * (shared * common + rest * own)
+    return samples * step, _one_period(spectrum, samples, 3)
+
+
+def _phasor(seed, component, count):
+    """(count,) complex numbers of size 1 and random phase."""
+    return np.exp(1j * component_generator(seed, component).uniform(0.0, 2.0 * np.pi, count))
+
+
+def _one_period(spectrum, samples, columns):
+    """(samples + 1, columns) series of spectra (rows, m), zero in further columns, last row = first row."""
+    value = np.zeros((samples + 1, columns))
+    value[:-1, : len(spectrum)] = np.fft.irfft(spectrum, samples, axis=1).T
     value[-1] = value[0]
-    return samples * step, value
+    return value

@@ -15,7 +15,7 @@ from fowt_env.errors import InputError
 from fowt_env.jit import kernel
 from fowt_env.weather import gusts
 from fowt_env.weather.iec import EXTREME_SHEAR_EXPONENT, etm_sigma, extreme_speed, ntm_sigma
-from fowt_env.weather.turbulence import SHORTEST_PERIOD, turbulence
+from fowt_env.weather.turbulence import SHORTEST_PERIOD, hub_turbulence, turbulence
 from fowt_env.weather.wind_field import field_at
 from fowt_env.weather.wind_spec import SHARED, Number, Seed, read_wind
 
@@ -33,6 +33,7 @@ class WindSeries(NamedTuple):
     shear_exponent: float  # of the power law on u and v
     reference_height: float  # m
     reference_length: float  # m; the linear shears are m/s per this length
+    rotor_factor: float  # mean of the power law over the blades of a rotor of this diameter at that height
 
 
 class WindNow(NamedTuple):
@@ -120,6 +121,18 @@ def _series_at(Y, Z, now, series):
     return now.u * profile + linear, now.v * profile, now.w
 
 
+@lru_cache(maxsize=64)
+def rotor_factor(exponent, height, diameter):
+    """Mean over radius and azimuth of the power law (Z/height)**exponent, every length of blade alike."""
+    if exponent == 0.0:
+        return 1.0
+    node, weight = np.polynomial.legendre.leggauss(20)
+    radius = 0.25 * diameter * (node + 1.0)
+    angle = 2.0 * np.pi * np.arange(180) / 180
+    ratio = 1.0 + np.outer(np.sin(angle), radius) / height
+    return float(0.5 * weight @ (np.maximum(ratio, LOWEST_HEIGHT / height) ** exponent).mean(axis=0))
+
+
 def make_series(time, value, *, reference_height, reference_length, shear_exponent, period=0.0):
     """WindSeries of samples value (n, 5) at time (n,) s; finds out whether the time is uniform."""
     time = np.ascontiguousarray(time, dtype=np.float64)
@@ -138,6 +151,7 @@ def make_series(time, value, *, reference_height, reference_length, shear_expone
         float(shear_exponent),
         float(reference_height),
         float(reference_length),
+        rotor_factor(float(shear_exponent), float(reference_height), float(reference_length)),
     )
 
 
@@ -263,6 +277,22 @@ def _is_turbulent(spec):
 
 def _turbulent(spec, height, diameter, seed, duration):
     """(period, value) of one period of turbulence about its mean speed and direction."""
+    drawn = _drawn(spec, height, diameter, seed, duration)
+    period, value = turbulence(
+        **drawn, average=spec["average"], shear_turbulence=spec["shear_turbulence"]
+    )
+    value[:, 0] += drawn["speed"]
+    direction = radians(spec["direction"])
+    if direction != 0.0:
+        _turn(value, direction)
+        # of the gradients of the turned wind only the part that changes u along z and y can be carried
+        value[:, 3] *= cos(direction)
+        value[:, 4] *= cos(direction) ** 2
+    return period, value
+
+
+def _drawn(spec, height, diameter, seed, duration):
+    """Arguments of turbulence(): speed, sigma, height, diameter, period, seed. Raises: InputError."""
     speed = nominal_speed(spec)
     if spec.kind == "ntm":
         sigma = ntm_sigma(speed, spec["class"])
@@ -280,26 +310,33 @@ def _turbulent(spec, height, diameter, seed, duration):
         seed = spec["seed"]
     elif not isinstance(seed, np.random.SeedSequence):
         seed = Seed().read("seed", seed)
-    period, value = turbulence(
-        speed,
-        sigma,
-        height=height,
-        diameter=diameter,
-        period=period,
-        seed=seed,
-        average=spec["average"],
-        shear_turbulence=spec["shear_turbulence"],
-    )
-    value[:, 0] += speed
-    direction = radians(spec["direction"])
-    if direction != 0.0:
-        along, across = value[:, 0].copy(), value[:, 1].copy()
-        value[:, 0] = along * cos(direction) - across * sin(direction)
-        value[:, 1] = along * sin(direction) + across * cos(direction)
-        # of the gradients of the turned wind only the part that changes u along z and y can be carried
-        value[:, 3] *= cos(direction)
-        value[:, 4] *= cos(direction) ** 2
-    return period, value
+    place = {"height": height, "diameter": diameter}
+    return {"speed": speed, "sigma": sigma, **place, "period": period, "seed": seed}
+
+
+def _turn(value, direction):
+    """Turn u and v of the rows by a direction (rad, from +x towards +y)."""
+    along, across = value[:, 0].copy(), value[:, 1].copy()
+    value[:, 0] = along * cos(direction) - across * sin(direction)
+    value[:, 1] = along * sin(direction) + across * cos(direction)
+
+
+def hub_series(spec, *, reference_height, rotor_diameter, seed, duration):
+    """(time, value (n, 3)) of u, v, w at the hub over one period, where build_wind gives a rotor average.
+
+    Arguments as in build_wind. None for every other wind, which is a point's already.
+    """
+    if spec is None or isinstance(spec, WindSeries):
+        return None
+    spec = read_wind(spec)
+    if not _is_turbulent(spec) or spec["average"] != "rotor":
+        return None
+    drawn = _drawn(spec, float(reference_height), float(rotor_diameter), seed, duration)
+    period, value = hub_turbulence(**drawn)
+    value[:, 0] += drawn["speed"]
+    if spec["direction"] != 0.0:
+        _turn(value, radians(spec["direction"]))
+    return _even_times(period, len(value)), value
 
 
 GUSTS = {

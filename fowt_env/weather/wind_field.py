@@ -320,6 +320,13 @@ def hub_speed(box, hub_height):
     return float(np.hypot(u, v))
 
 
+def hub_wind(box, hub_height):
+    """(time, value (n, 3)): u, v, w of the box at the hub, X = Y = 0."""
+    field, count = box.field(), box.velocity.shape[0]
+    time = np.arange(count) * box.dt - box.shift
+    return time, np.array([field_at(t, 0.0, 0.0, float(hub_height), field) for t in time])
+
+
 @kernel
 def _average(field, hub_height, radius, weight, azimuths, value):
     """Fill value (n_time, 5) with the disk means of u, v, w and the two gradients of u times radius."""

@@ -7,6 +7,7 @@ import pytest
 
 import fowt_env
 from controllers import make
+from controllers.constant import Constant
 from fowt_env.errors import InputError
 from fowt_env.measurement import Measurement
 from training.evaluate import Case, evaluate
@@ -83,6 +84,16 @@ def test_the_inner_controller_is_handed_the_scene():
     FaultedController(Ramp(), Fault(kind="grid_loss", time=1.0), radians(90.0), DT).prepare("any")
 
 
+def test_a_generator_off_the_grid_has_no_torque_at_once_and_one_that_is_told_none_needs_its_time():
+    lost, told = run_with(Fault(kind="grid_loss", time=10.0), 20.0), run_with(None, 20.0, torque=0.0)
+    for frame in (lost, told):
+        assert frame["GenTq_[kN-m]"].iloc[-1] == 0.0
+    torque = lost["GenTq_[kN-m]"].to_numpy()
+    assert torque[99] > 40.0 and torque[100] == 0.0 and not lost["GenTqLim_[-]"].any()
+    assert np.diff(told["GenTq_[kN-m]"]).min() == pytest.approx(-1.5)
+    assert Fault(kind="stuck_pitch", time=10.0).grid_loss is None
+
+
 def test_wrong_faults_are_refused():
     for wrong in ({"kind": "fire", "time": 1.0}, {"kind": "grid_loss", "time": -1.0}, {"kind": "grid_loss"}):
         with pytest.raises(ValueError):
@@ -92,11 +103,12 @@ def test_wrong_faults_are_refused():
 STEADY = Case("steady", 16.0)
 
 
-def run_with(fault, duration=40.0):
+def run_with(fault, duration=40.0, torque=None):
     scene = fowt_env.build_scene("oc3_hywind", wind=16.0, fidelity="standard")
-    inner = make("pi", scene.turbine, DT)
+    inner = make("pi", scene.turbine, DT) if torque is None else Constant(torque=torque, blade_pitch=0.2)
     controller = faulted(inner, fault, scene.turbine, DT)
-    return fowt_env.simulate(scene, controller=controller, duration=duration)
+    lost = None if fault is None else fault.grid_loss
+    return fowt_env.simulate(scene, controller=controller, duration=duration, grid_loss=lost)
 
 
 def test_a_fault_that_never_comes_gives_the_bits_of_the_compiled_run():
