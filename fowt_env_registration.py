@@ -1,4 +1,4 @@
-"""Makes `gymnasium.make("fowt_env/OC3Hywind-v0")` work without importing fowt_env first.
+"""Makes `gymnasium.make("fowt_env/OC3Hywind-v1")` work without importing fowt_env first.
 
 Gymnasium 0.26 to 0.29 called the functions of the entry-point group "gymnasium.envs"; 1.0 dropped that
 and knows only what has been imported. So the installed file fowt_env_registration.pth calls
@@ -9,7 +9,7 @@ the id, as text. Neither gymnasium nor fowt_env is loaded before somebody asks f
 import sys
 from importlib.machinery import PathFinder
 
-ENVIRONMENTS = {"fowt_env/OC3Hywind-v0": "fowt_env.envs:FowtEnv"}
+ENVIRONMENTS = {"fowt_env/OC3Hywind-v1": "fowt_env.envs:FowtEnv"}
 VECTOR_ENTRY_POINT = "fowt_env.envs:FowtVectorEnv"  # of each of them
 
 

@@ -14,7 +14,7 @@ from fowt_env.envs.env import REWARD_KEYS
 from fowt_env.outputs import replacing
 
 FOLDER = Path(__file__).parent / "reference" / "golden"
-ENVIRONMENTS = ("fowt_env/OC3Hywind-v0",)
+ENVIRONMENTS = ("fowt_env/OC3Hywind-v1",)
 TASKS = ("above_rated", "full_range", "steady")  # every task that a name stands for
 SEED = 7
 STEPS = 100  # control periods; the first rows show the start, the last the physics added up

@@ -105,7 +105,7 @@ def test_the_info_table_has_every_key_and_no_other():
         names = [f"reward/{term}" for term in TERMS] if name == "reward/<term>" else [name]
         for place in where.split(", ") if "failure" not in where else [where]:
             told[place].update(names)
-    env = gymnasium.make("fowt_env/OC3Hywind-v0", task="above_rated").unwrapped
+    env = gymnasium.make("fowt_env/OC3Hywind-v1", task="above_rated").unwrapped
     assert set(env.reset(seed=1)[1]) == told["reset"]
     assert set(env.step([0.0, 0.0])[4]) == told["step"]
     env.reset(seed=1, options={"offsets": {"RotSpeed": 6.0}})

@@ -20,7 +20,7 @@ from fowt_env import cli, health, warmup
 from fowt_env.description import DATA, read_platform
 from fowt_env.envs import FowtEnv
 
-NAME = "fowt_env/OC3Hywind-v0"
+NAME = "fowt_env/OC3Hywind-v1"
 MESSAGES = [block for block in blocks("faq.md") if block.language == "text"]
 PROVOKED = {}  # heading of the page: functions of (folder, monkeypatch) that return what is printed there
 

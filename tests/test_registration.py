@@ -10,7 +10,7 @@ import pytest
 import fowt_env_registration
 
 ROOT = Path(fowt_env_registration.__file__).parent
-NAME = "fowt_env/OC3Hywind-v0"
+NAME = "fowt_env/OC3Hywind-v1"
 
 
 def python(code, *options):

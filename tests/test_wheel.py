@@ -85,9 +85,9 @@ def test_the_wheel_runs_the_readme_example_in_an_empty_environment_without_torch
         "import importlib.util, gymnasium\n"
         "assert importlib.util.find_spec('torch') is None\n"
         "assert len(df) == 51, len(df)\n"
-        "print(fowt_env.__file__, gymnasium.spec('fowt_env/OC3Hywind-v0').id)\n"
+        "print(fowt_env.__file__, gymnasium.spec('fowt_env/OC3Hywind-v1').id)\n"
     )
     text = run(python, "-c", program, **options)
-    assert "PtfmPitch_[deg]" in text and f"{tmp_path / 'venv'}" in text and "OC3Hywind-v0" in text
+    assert "PtfmPitch_[deg]" in text and f"{tmp_path / 'venv'}" in text and "OC3Hywind-v1" in text
     text = run(tmp_path / "venv" / "bin" / "fowt", "doctor", "--no-test", **options)
     assert "missing" in text and 'pip install "fowt-env[plot]"' in text

@@ -19,12 +19,20 @@ from fowt_env.cli import app
 from fowt_env.description import read_platform, read_turbine
 from fowt_env.envs import rewards
 from fowt_env.envs.actions import TRACKING_DAMPING, TRACKING_FREQUENCY
-from fowt_env.envs.kernels import OVERSPEED, REASONS
 from fowt_env.envs.observations import KNOWN, STANDARD, entries
 from fowt_env.envs.tables import action_table, markdown, observation_table
 from fowt_env.envs.tasks import TASKS, Episode
 from fowt_env.outputs import replacing
-from fowt_env.step import CAPSIZE, CAPSIZED, NON_FINITE
+from fowt_env.step import (
+    BLOWN_UP,
+    CAPSIZE,
+    CAPSIZED,
+    FASTEST,
+    FASTEST_TURN,
+    NON_FINITE,
+    OVERSPEED,
+    STOP_REASONS,
+)
 from fowt_env_registration import ENVIRONMENTS
 
 DOCS = Path(__file__).resolve().parents[1]
@@ -199,10 +207,12 @@ def terminations():
     limits = {
         NON_FINITE: "a number of the state is infinite or not a number",
         CAPSIZED: f"platform pitch beyond +-{CAPSIZE:g} rad ({CAPSIZE * DEG:.0f} deg)",
+        BLOWN_UP: f"the platform moves faster than {FASTEST:g} m/s or {FASTEST_TURN:g} rad/s",
         OVERSPEED: f"rotor speed above {turbine().overspeed * RPM:g} rpm (the turbine's `overspeed_rpm`)",
     }
     return markdown(
-        ('`info["termination"]`', "when"), [(f"`{REASONS[status]}`", text) for status, text in limits.items()]
+        ('`info["termination"]`', "when"),
+        [(f"`{STOP_REASONS[status]}`", text) for status, text in limits.items()],
     )
 
 

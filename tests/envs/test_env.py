@@ -64,7 +64,7 @@ def test_checkers_find_nothing_in_any_action_mode_with_every_channel(mode):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         env = gymnasium.make(
-            "fowt_env/OC3Hywind-v0", action_mode=mode, observation=KNOWN, wind_preview=(1.0, 5.0), **QUICK
+            "fowt_env/OC3Hywind-v1", action_mode=mode, observation=KNOWN, wind_preview=(1.0, 5.0), **QUICK
         )
         check_env(env.unwrapped)
         sb3_check_env(env)
@@ -355,9 +355,38 @@ def test_capsize_ends_the_episode():
 def test_a_state_that_is_not_finite_ends_the_episode_with_a_finite_observation():
     env = quick()
     env.reset(seed=1)
-    observation, reward, terminated, _, info = env.step_physical(1e300, 0.1)
+    env.unwrapped._run.x[State.VX] = np.inf
+    observation, reward, terminated, _, info = env.step_physical(4e4, 0.1)
     assert terminated and info["termination"] == "non-finite state"
     assert np.isfinite(reward) and observation in env.observation_space
+
+
+def test_a_physical_command_is_followed_within_the_generator_s_limits():
+    env = quick()
+    env.reset(options=FIXED | {"wind": 18.0, "sea": "still"})
+    law, hold = env.scene.turbine.torque_law, env.measurement().blade_pitch
+    way, start = 0.1 * law.max_torque_rate, env.measurement().generator_torque
+    assert env.step_physical(start - way, hold)[4]["torque_limited"] == 0
+    assert env.measurement().generator_torque == start - way
+    for torque, end in ((90e3, law.max_torque), (-43e3, 0.0)):
+        before = env.measurement().generator_torque
+        counted = env.step_physical(torque, hold)[4]["torque_limited"]
+        assert env.measurement().generator_torque == pytest.approx(before + np.copysign(way, end - before))
+        assert env.channels()["GenTqLim"] == 1.0
+        for _ in range(40):
+            info = env.step_physical(torque, hold)[4]
+        assert env.measurement().generator_torque == end and info["torque_limited"] == counted + 40
+    env.step_physical(0.0, hold)
+    assert env.channels()["GenTqLim"] == 0.0
+
+
+def test_the_commands_of_an_action_beyond_the_generator_are_counted():
+    env = quick()
+    info = env.reset(options=FIXED | {"wind": 18.0, "sea": "still"})[1]
+    assert info["torque_limited"] == 0
+    counts = [env.step((-1.0, 0.0))[4]["torque_limited"] for _ in range(32)]
+    # from 43.1 kN m to zero in steps of 1.5 takes 29 periods, the last of which gets there
+    assert counts == [*range(1, 29), 28, 28, 28, 28]
 
 
 def test_time_truncates_and_a_new_reset_is_needed():

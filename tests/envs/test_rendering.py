@@ -197,14 +197,14 @@ def test_gymnasium_finds_nothing_wrong_with_either_mode():
     from gymnasium.utils.env_checker import check_env
 
     for mode in ("rgb_array", "human"):
-        env = gymnasium.make("fowt_env/OC3Hywind-v0", render_mode=mode, **QUICK)
+        env = gymnasium.make("fowt_env/OC3Hywind-v1", render_mode=mode, **QUICK)
         check_env(env.unwrapped)
         env.close()
 
 
 def test_videos_can_be_recorded(tmp_path):
     pytest.importorskip("moviepy", reason="moviepy is not installed: the extra `video` is missing")
-    env = gymnasium.make("fowt_env/OC3Hywind-v0", render_mode="rgb_array", duration=1.0, **QUICK)
+    env = gymnasium.make("fowt_env/OC3Hywind-v1", render_mode="rgb_array", duration=1.0, **QUICK)
     env = gymnasium.wrappers.RecordVideo(env, str(tmp_path), episode_trigger=lambda episode: True)
     env.reset(seed=1)
     for _ in range(10):

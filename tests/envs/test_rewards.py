@@ -1,9 +1,14 @@
 """Reward terms: limits, ranges and signs."""
 
+import importlib.util
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+import fowt_env
 from fowt_env.description import read_turbine
+from fowt_env.envs import FowtEnv
 from fowt_env.envs.rewards import (
     AT_MARGIN,
     N_TERMS,
@@ -29,6 +34,15 @@ SCALES = build_scales(TURBINE, 0.1)
 RATED = TURBINE.rated_rotor_speed
 RATED_TORQUE = TURBINE.torque_law.rated_torque
 REST = np.array([0.05, RATED])
+
+
+def ranking_tool():
+    """docs/tools/reward_ranking.py as a module."""
+    path = Path(__file__).resolve().parents[2] / "docs" / "tools" / "reward_ranking.py"
+    spec = importlib.util.spec_from_file_location("reward_ranking", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
 def terms_of(now, before, reference=REST, failed=False):
@@ -153,3 +167,30 @@ def test_every_term_has_a_weight_in_the_sum():
 def test_bad_weights_name_the_term_and_the_range(weights, message):
     with pytest.raises(InputError, match=message):
         check_weights("reward", weights)
+
+
+def test_the_default_weights_rank_controllers_as_their_metrics_do():
+    """By the geometric mean of the metrics' ratios; with all weights 1 the same runs are ranked otherwise."""
+    tool = ranking_tool()
+    table = tool.ranking()
+    overall = np.log(table[list(tool.METRICS)]).mean(axis=1)
+    assert list(table.index) == list(overall.sort_values().index)
+    assert table.index[0] == "lqr"
+    gaps = -np.diff(table["reward"])
+    assert gaps.min() > 0.1  # of some 9 that perfection is paid
+    page = (Path(__file__).resolve().parents[2] / "docs" / "environment.md").read_text()
+    assert tool.markdown(table) in page, tool.markdown(table)
+    even = tool.ranking(("lqr", "pi_unscheduled", "gspi_oc3"), {name: 1.0 for name in TERMS})
+    assert even.index[0] == "pi_unscheduled"
+
+
+def test_the_ranking_pays_what_a_step_of_the_environment_pays():
+    tool = ranking_tool()
+    env = FowtEnv(action_mode="residual", baseline="lqr", duration=20.0)
+    wind, sea = {"kind": "ntm", "speed": 18.0, "class": "B"}, {"kind": "jonswap", "Hs": 3.5, "Tp": 8.6}
+    env.reset(options={"wind": wind, "sea": sea, "weather_seed": 5, "offsets": {}})
+    rewards = [env.step((0.0, 0.0))[1] for _ in range(200)]
+    frame = fowt_env.simulate(env.scene, controller="lqr", duration=20.0)
+    terms = tool.reward_terms(frame, env.scene)
+    # the rows have the angular velocity about y, where a measurement has the derivative of the Euler angle
+    np.testing.assert_allclose(terms @ weight_array(env.task.weights), rewards, rtol=5e-4)

@@ -126,7 +126,7 @@ def test_disabled_autoreset_leaves_the_resets_to_the_caller():
 
 def test_gymnasium_makes_it_through_the_registered_entry_point():
     env = gymnasium.make_vec(
-        "fowt_env/OC3Hywind-v0", num_envs=2, vectorization_mode="vector_entry_point", threads=1, **QUICK
+        "fowt_env/OC3Hywind-v1", num_envs=2, vectorization_mode="vector_entry_point", threads=1, **QUICK
     )
     assert isinstance(env, FowtVectorEnv) and env.num_envs == 2
     observations, _ = env.reset(seed=1)

@@ -1,0 +1,76 @@
+"""Controllers ranked by the default reward and by their metrics: `python docs/tools/reward_ranking.py`.
+
+Each runs in the same turbulence at 14, 18 and 22 m/s. The reward is that of the environment's step, from the
+rows of the run; docs/environment.md has the table.
+"""
+
+import numpy as np
+import pandas as pd
+
+import fowt_env
+from fowt_env.envs import tables
+from fowt_env.envs.rewards import TERMS, build_scales, fill_terms, weight_array
+from fowt_env.envs.tasks import TASKS
+from fowt_env.measurement import N_MEASUREMENTS, Measure
+from fowt_env.state import State
+
+CONTROLLERS = ("lqr", "floating_feedback", "gspi_oc3", "pi_unscheduled", "pi_land", "gspi_land")
+BASELINE = "gspi_oc3"
+WEATHER = ((14.0, 2.5, 8.0), (18.0, 3.5, 8.6), (22.0, 4.7, 9.3))  # mean wind (m/s), Hs (m), Tp (s)
+SEED = 100_001  # of the training range
+DURATION, SKIP = 600.0, 100.0  # s
+METRICS = ("rotor speed std", "platform pitch std", "blade-pitch travel")
+COLUMNS = {  # measurement: (channel, factor to SI)
+    Measure.ROTOR_SPEED: ("RotSpeed_[rpm]", np.pi / 30.0),
+    Measure.GENERATOR_TORQUE: ("GenTq_[kN-m]", 1e3),
+    Measure.PLATFORM_PITCH: ("PtfmPitch_[deg]", np.pi / 180.0),
+    Measure.PLATFORM_PITCH_RATE: ("PtfmRVyi_[deg/s]", np.pi / 180.0),
+    Measure.BLADE_PITCH: ("BldPitch1_[deg]", np.pi / 180.0),
+}
+
+
+def reward_terms(frame, scene, control_dt=0.1):
+    """(n - 1, N_TERMS) reward terms between the rows of a run that is written every control period."""
+    point = fowt_env.trim(scene)
+    reference = np.array([point.state[State.PLATFORM_PITCH], point.state[State.ROTOR_SPEED]])
+    scales = build_scales(scene.turbine, control_dt)
+    measured = np.zeros((len(frame), N_MEASUREMENTS))
+    for measure, (column, factor) in COLUMNS.items():
+        measured[:, measure] = factor * frame[column]
+    # a row has the torque that its controller has just set, a measurement the one until then
+    torque = measured[:, Measure.GENERATOR_TORQUE]
+    torque[1:], torque[0] = torque[:-1].copy(), point.command[0]
+    terms = np.zeros((len(frame) - 1, len(TERMS)))
+    for i in range(1, len(frame)):
+        fill_terms(measured[i], measured[i - 1], reference, False, scales, terms[i - 1])
+    return terms
+
+
+def ranking(names=CONTROLLERS, weights=None):
+    """DataFrame, a row per controller, best first: mean reward of a step, METRICS over those of BASELINE."""
+    weights = weight_array(TASKS["above_rated"].weights if weights is None else weights)
+    found = {name: [] for name in names}
+    for speed, height, period in WEATHER:
+        wind = {"kind": "ntm", "speed": speed, "class": "B"}
+        sea = {"kind": "jonswap", "Hs": height, "Tp": period}
+        scene = fowt_env.build_scene("oc3_hywind", wind, sea, seed=SEED, fidelity="standard")
+        for name in names:
+            frame = fowt_env.simulate(scene, controller=name, duration=DURATION)
+            reward = reward_terms(frame, scene).mean(axis=0) @ weights
+            kept = frame[frame["Time_[s]"] >= SKIP]
+            deviations = [kept[column].std() for column in ("RotSpeed_[rpm]", "PtfmPitch_[deg]")]
+            found[name].append([reward, *deviations, kept["BldPitch1_[deg]"].diff().abs().mean()])
+    table = pd.DataFrame({name: np.mean(rows, axis=0) for name, rows in found.items()}).T
+    table.columns = ["reward", *METRICS]
+    table[list(METRICS)] /= table.loc[BASELINE, list(METRICS)]
+    return table.sort_values("reward", ascending=False)
+
+
+def markdown(table):
+    """The ranking as the table of docs/environment.md."""
+    rows = [(f"`{name}`", *(f"{value:.2f}" for value in row)) for name, row in table.T.items()]
+    return tables.markdown(("baseline", "reward of a step", *METRICS), rows)
+
+
+if __name__ == "__main__":
+    print(markdown(ranking()))
