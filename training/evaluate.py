@@ -278,7 +278,7 @@ def _scored(run):
         controller = _controller(run, known)
         frame = fowt_env.simulate(
             scene, controller=controller, duration=run.duration, initial=case.initial,
-            stop_overspeed=True, grid_loss=_grid_loss(case), **run.options,
+            stop_overspeed=case.fault is None, grid_loss=_grid_loss(case), **run.options,
         )  # fmt: skip
         row |= metrics(
             frame, run.skip, degrees(turbine.rated_rotor_speed) / 6.0, degrees(turbine.pitch_drive.rate_limit)

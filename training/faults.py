@@ -14,6 +14,9 @@ from fowt_env.records import NonNegative, Positive, Record
 class Fault(Record):
     """A fault of a load case.
 
+    A run with a fault goes on past the turbine's overspeed, which ends any other as failed: how far a rotor
+    without torque or pitch runs away is what such a case shows.
+
     grid_loss       the generator torque is zero from `time` on; the controller goes on pitching. With a
                     delay (s) the protection feathers the blades that long after the loss
     stuck_pitch     the blades stay from `time` on where they are then; the torque is still the controller's

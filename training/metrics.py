@@ -63,6 +63,7 @@ METRICS = (
     "blade_pitch_travel_[deg/s]",
     "actuator_duty_[%]",
     "torque_travel_[kN-m/s]",
+    "torque_limited_[s]",
     "FAIRTEN_std_[kN]",
     "FAIRTEN_max_[kN]",
     "TwrBsMyt_DEL_[kN-m]",
@@ -114,9 +115,10 @@ def metrics(df, skip=0.0, rated_speed_rpm=12.1, pitch_rate_limit=8.0):
     pitch_rate_limit  of the blade-pitch drive, deg/s: the actuator duty is the mean rate in percent of it
     Standard deviations are about the run's own mean (N in the denominator). Travel is the sum of
     absolute steps per second. DEL: 1 Hz damage-equivalent load, exponent 4 (tower base fore-aft, shaft
-    torque) or 3 (fairlead). FAIRTEN: the line for which the figure is greatest. beyond: seconds past a
-    constraint (blade-pitch rate 10 deg/s, tower-top acceleration 3.3 m/s2, rotor speed 1.3 times rated),
-    violations: how often it was passed.
+    torque) or 3 (fairlead). torque_limited: seconds in which the generator could not follow its command,
+    being at the end of its range or its rate. FAIRTEN: the line for which the figure is greatest.
+    beyond: seconds past a constraint (blade-pitch rate 10 deg/s, tower-top acceleration 3.3 m/s2, rotor
+    speed 1.3 times rated), violations: how often it was passed.
     Raises: InputError for missing columns or if skip leaves fewer than two rows.
     """
     kept = _kept(df, skip)
@@ -136,6 +138,9 @@ def metrics(df, skip=0.0, rated_speed_rpm=12.1, pitch_rate_limit=8.0):
     result["blade_pitch_travel_[deg/s]"] = travel(time, blade_pitch)
     result["actuator_duty_[%]"] = 100.0 * result["blade_pitch_travel_[deg/s]"] / pitch_rate_limit
     result["torque_travel_[kN-m/s]"] = travel(time, kept["GenTq_[kN-m]"].to_numpy())
+    at_limit = kept.get("GenTqLim_[-]")
+    limited = np.nan if at_limit is None else float(np.mean(at_limit.to_numpy()[:-1]) * length)
+    result["torque_limited_[s]"] = limited
     lines = kept[[name for name in kept.columns if name.startswith("FAIRTEN")]].to_numpy()
     result["FAIRTEN_std_[kN]"] = float(lines.std(axis=0).max()) if lines.size else np.nan
     result["FAIRTEN_max_[kN]"] = float(lines.max()) if lines.size else np.nan

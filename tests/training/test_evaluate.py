@@ -2,9 +2,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from fowt_env.envs import FowtEnv
 from fowt_env.errors import InputError
 from training.cases import Case, all_cases, named_cases, read_suite
 from training.evaluate import COLUMNS, evaluate, summary
+from training.faults import Fault
 from training.metrics import METRICS
 
 GUSTY = Case(
@@ -24,6 +26,20 @@ class Frozen:
 
     def act(self, measurement):
         return self.command
+
+
+class Runaway(Frozen):
+    """No torque and no blade pitch: the rotor runs away."""
+
+    def act(self, measurement):
+        return 0.0, 0.0
+
+
+class HeldByTorque(Frozen):
+    """Holds the rotor speed by torque alone, as no generator of this size could."""
+
+    def act(self, measurement):
+        return 43093.0 + 3000.0 * (measurement.generator_speed - 122.9), self.command[1]
 
 
 class Broken(Frozen):
@@ -70,6 +86,28 @@ def test_every_controller_meets_the_same_wind_and_waves():
     weather = table[["case", "seed", "Wind1VelX_mean_[m/s]", "Wind1VelX_std_[m/s]", "Wave1Elev_std_[m]"]]
     assert len(weather.drop_duplicates()) == 2  # one realisation per seed
     assert table.groupby("seed")["BldPitch1_std_[deg]"].nunique().eq(2).all()  # and controllers that differ
+
+
+def test_a_rotor_beyond_the_turbine_s_overspeed_has_failed_when_an_environment_would_end():
+    options = {"duration": 40.0, "skip": 5.0}
+    row = evaluate({"runaway": Runaway()}, [CALM], **options).iloc[0]
+    assert row["status"] == "failed" and row["reason"].startswith("overspeed")
+    assert np.isnan(row["RotSpeed_std_[rpm]"])
+    env = FowtEnv(wind=16.0, duration=40.0)
+    env.reset(options={"wind": 16.0, "sea": None, "offsets": {}})
+    terminated = False
+    while not terminated:
+        *_, terminated, _, info = env.step_physical(0.0, 0.0)
+    assert info["termination"] == row["reason"] and info["time"] == pytest.approx(row["stopped_[s]"])
+    stuck = Case("stuck", 16.0, fault=Fault(kind="grid_loss", time=10.0))
+    gone_on = evaluate({"runaway": Runaway()}, [stuck], **options).iloc[0]
+    assert gone_on["status"] == "ok" and gone_on["overspeed_[%]"] > 100.0
+
+
+def test_a_controller_that_wants_more_than_the_generator_can_give_is_seen_to():
+    table = evaluate({"held": HeldByTorque(), "pi": "pi"}, [GUSTY], **SHORT).set_index("controller")
+    assert table.loc["held", "GenPwr_max_[kW]"] < 7000.0  # 47.4 kN m at 15.7 rpm
+    assert table.loc["held", "torque_limited_[s]"] > 1.0 and table.loc["pi", "torque_limited_[s]"] == 0.0
 
 
 def test_a_failing_run_is_a_row_with_its_reason_and_the_others_go_on():

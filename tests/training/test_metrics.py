@@ -56,6 +56,13 @@ def test_rms_keeps_the_mean_and_std_does_not():
     assert result["TwrBsMyt_std_[kN-m]"] == pytest.approx(0.0, abs=1e-6)
 
 
+def test_the_time_at_the_generator_s_limits_is_that_of_the_scored_rows():
+    at_limit = synthetic_run(**{"GenTqLim_[-]": lambda t: 1.0 * ((t > 19.95) & (t < 40.05))})
+    assert metrics(at_limit)["torque_limited_[s]"] == pytest.approx(20.1)
+    assert metrics(at_limit, skip=30.0)["torque_limited_[s]"] == pytest.approx(10.1)
+    assert np.isnan(metrics(synthetic_run())["torque_limited_[s]"])
+
+
 def test_overspeed_is_the_excess_over_rated_in_percent():
     fast = synthetic_run(**{"RotSpeed_[rpm]": lambda t: 12.1 + 1.21 * (t == 50.0)})
     assert metrics(fast)["overspeed_[%]"] == pytest.approx(10.0, rel=1e-9)
