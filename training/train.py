@@ -505,11 +505,7 @@ def _new_model(kind, settings, env):
     given = dict(settings["algorithm"]) | _schedules(settings)
     policy = dict(given.pop("policy_kwargs", {}))
     if "activation" in policy:
-        known = {"tanh": torch.nn.Tanh, "relu": torch.nn.ReLU}
-        name = policy.pop("activation")
-        if name not in known:
-            raise unknown("activation", name, known)
-        policy["activation_fn"] = known[name]
+        policy["activation_fn"] = {"tanh": torch.nn.Tanh, "relu": torch.nn.ReLU}[policy.pop("activation")]
     try:
         return kind("MlpPolicy", env, policy_kwargs=policy, seed=settings["seed"], device="cpu", **given)
     except (AssertionError, TypeError, ValueError) as error:
