@@ -5,42 +5,15 @@ import inspect
 import sys
 
 from controllers.base import CheckedController, CompiledController, Controller, check_control_dt
-from controllers.constant import constant
-from controllers.eq8 import eq8_literal
-from controllers.floating import floating_feedback
-from controllers.gspi import gspi_land, gspi_oc3
-from controllers.lqr import lqr
-from controllers.openfast import openfast_oc3
-from controllers.pi import pi, pi_land, pi_land_power, pi_unscheduled
-from controllers.pi_tuned import pi_tuned
 from controllers.policy import PREFIX as POLICY
-from controllers.policy import policy
-from controllers.preview import preview
-from controllers.rosco import rosco, rosco_float
+from controllers.policy import policy, shipped_agents
+from controllers.registry import CONTROLLERS
 from controllers.saved_design import PREFIX as DESIGN
 from controllers.saved_design import load_design
 from fowt_env.description import read_turbine
 from fowt_env.errors import InputError, unknown
 
 __all__ = ["CONTROLLERS", "CheckedController", "CompiledController", "Controller", "information", "make"]
-
-CONTROLLERS = {  # name -> factory(turbine: description.Turbine, control_dt: float) -> controller
-    "constant": constant,
-    "eq8_literal": eq8_literal,
-    "floating_feedback": floating_feedback,
-    "gspi_land": gspi_land,
-    "gspi_oc3": gspi_oc3,
-    "lqr": lqr,
-    "openfast_oc3": openfast_oc3,
-    "pi": pi,
-    "pi_land": pi_land,
-    "pi_land_power": pi_land_power,
-    "pi_tuned": pi_tuned,
-    "pi_unscheduled": pi_unscheduled,
-    "preview": preview,
-    "rosco": rosco,
-    "rosco_float": rosco_float,
-}
 
 
 def make(controller, turbine, control_dt):
@@ -66,7 +39,8 @@ def make(controller, turbine, control_dt):
         else:
             controller = _imported(name) if ":" in name else CONTROLLERS.get(name)
         if controller is None:
-            raise unknown("controller", name, CONTROLLERS)
+            agents = (f"{POLICY}{agent}" for agent in shipped_agents())
+            raise unknown("controller", name, (*CONTROLLERS, *agents))
     if isinstance(controller, type) or not isinstance(controller, Controller):
         controller = _called(controller, name, turbine, control_dt)
     for method in ("reset", "act"):

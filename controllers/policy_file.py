@@ -1,7 +1,8 @@
 """Files of policies: arrays and one JSON text in a .npz, read without pickle and checked to the last value.
 
-Loading one runs no code of its author. No count in it is believed: an array takes the memory that the file's
-table of contents gives it, and all of them at most MAX_BYTES. training/export.py writes such files.
+Loading one runs no code of its author: what it names is looked up among names that are known, its baseline
+among CONTROLLERS. No count in it is believed: an array takes the memory that the file's table of contents
+gives it, and all of them at most MAX_BYTES. training/export.py writes such files.
 """
 
 import math
@@ -13,6 +14,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field
 
+from controllers.registry import CONTROLLERS
 from fowt_env.envs.actions import MODES
 from fowt_env.envs.decisions import DecisionSettings
 from fowt_env.envs.observations import KNOWN, N_ACTIONS
@@ -40,7 +42,7 @@ class PolicySettings(Record):
     control_dt: Positive
     decisions: dict[str, Any]  # of DecisionSettings
     action_mode: Literal[tuple(MODES)]
-    baseline: str
+    baseline: Literal[tuple(CONTROLLERS)]  # an import path would run code
     observation: Annotated[list[Literal[KNOWN]], Field(min_length=1, max_length=200)]
     wind_preview: Annotated[list[NonNegative], Field(max_length=200)]  # s
     blade_pitch: PAIR  # deg

@@ -85,7 +85,7 @@ def _factory(content, where, name="design"):
     for key in KEYS:
         if key not in content:
             raise InputError(f"{where}: {key} is missing")
-    if content["kind"] not in KINDS:
+    if content["kind"] not in tuple(KINDS):  # a list cannot be looked up in a dict
         raise InputError(f"{where}: {unknown('kind', content['kind'], KINDS)}")
     _check_keys(content["settings"], KINDS[content["kind"]][0], "settings", where)
     make, turbine_name = KINDS[content["kind"]][1], content["turbine"]

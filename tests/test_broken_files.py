@@ -1,10 +1,13 @@
 """Files that are broken, or made by strangers: refused by name, without crash or hang, their code not run."""
 
+import json
 import os
 import pickle
 import subprocess
 import sys
 import zipfile
+from contextlib import suppress
+from copy import deepcopy
 from pathlib import Path
 
 import mutation
@@ -12,9 +15,11 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from controllers import make
 from controllers.policy import AGENTS
 from controllers.policy_file import read_policy
 from fowt_env import cli
+from fowt_env.description import read_turbine
 from fowt_env.errors import InputError
 from fowt_env.textfiles import parse_json, read_toml
 
@@ -152,6 +157,170 @@ def test_a_checkpoint_of_a_stranger_is_not_loaded_unless_it_is_trusted(tmp_path,
     assert result.exit_code == cli.EXIT_INPUT, result.output
     assert "--trust-zip" in result.stderr and "executes code" in result.stderr
     assert not mark.exists()
+
+
+HOSTILE = ("own_law:Law", "os:abort", "policy:self.npz", "design:/etc/passwd", "../../x")
+
+
+@pytest.fixture
+def trapped(tmp_path, mark, monkeypatch):
+    """Working folder whose module own_law leaves the mark when imported, as os.abort does when called."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(os, "abort", mark.touch)
+    Path("own_law.py").write_text(f"open({str(mark)!r}, 'w')\nLaw = print\n")
+    yield tmp_path
+    assert sys.modules.pop("own_law", None) is None and not mark.exists()
+
+
+def places(content, path=()):
+    """Paths of all values of nested tables and lists that are none themselves."""
+    items = content.items() if isinstance(content, dict) else enumerate(content)
+    for key, value in items:
+        if isinstance(value, dict | list) and value:
+            yield from places(value, (*path, key))
+        else:
+            yield (*path, key)
+
+
+def changed(content, path, value):
+    """A copy of nested tables and lists with another value at a path."""
+    content = deepcopy(content)
+    place = content
+    for key in path[:-1]:
+        place = place[key]
+    place[path[-1]] = value
+    return content
+
+
+def policy_of_a_stranger(settings, path):
+    """The path written: the shipped agent's arrays with other settings."""
+    with np.load(AGENTS / "ppo_lqr.npz") as file:
+        arrays = {name: file[name] for name in file.files}
+    np.savez(path, **arrays | {"settings": np.array(json.dumps(settings))})
+    return path
+
+
+@pytest.mark.parametrize("text", HOSTILE)
+def test_no_text_in_a_policy_file_is_looked_up_as_code_or_as_a_file(text, trapped):
+    sound = read_policy(AGENTS / "ppo_lqr.npz")[0]
+    found = list(places(sound))
+    assert ("baseline",) in found and ("observation", 0) in found
+    for path in found:
+        policy_of_a_stranger(changed(sound, path, text), "self.npz")
+        if path[0] == "about":  # told to people
+            assert make("policy:self.npz", read_turbine("nrel5mw"), 0.1).name == "policy:self.npz"
+            continue
+        with pytest.raises(InputError, match=f"policy file 'self.npz': {path[0]}.*{text}.*must be"):
+            read_policy("self.npz")
+        with pytest.raises(InputError):
+            make("policy:self.npz", read_turbine("nrel5mw"), 0.1)
+
+
+@pytest.mark.parametrize("text", HOSTILE)
+def test_a_policy_whose_baseline_is_no_built_in_controller_is_refused_by_the_commands(text, trapped):
+    settings = read_policy(AGENTS / "ppo_lqr.npz")[0] | {"baseline": text}
+    policy_of_a_stranger(settings, "self.npz")
+    result = invoke("simulate", "--controller", "policy:self.npz", "--duration", "1")
+    assert result.exit_code == cli.EXIT_INPUT, result.output
+    assert f"baseline = '{text}': must be one of 'constant'" in result.stderr
+    result = invoke("evaluate", "--controllers", "policy:self.npz", "--duration", "1", "--skip", "0")
+    assert result.exit_code == cli.EXIT_INPUT, result.output
+    from training.agent_scores import told
+
+    assert told("policy:self.npz" if text.startswith("policy:") else text) == ""
+
+
+def settings_of_a_stranger():
+    """Settings of a run with a value in every section of them, as many texts among them as there can be."""
+    from training.train import resolve
+
+    settings = resolve("ppo", "above_rated", 0, 100)
+    settings["environment"] |= {
+        "platform": "oc3_hywind", "turbine": "nrel5mw", "rotor": "table", "fidelity": "standard",
+        "wind": {"kind": "ntm", "speed": 18.0, "class": "B"}, "sea": "paper_wind_wave", "diffraction": "none",
+        "integrator": "ab4", "mooring": "table", "sensors": {"noise": 0.0}, "wave_loads": "fast",
+        "designed_on": {"platform": "oc3_hywind", "turbine": "nrel5mw"},
+    }  # fmt: skip
+    return settings
+
+
+@pytest.mark.parametrize("text", HOSTILE)
+def test_no_text_in_the_settings_of_a_stranger_is_looked_up_as_code(text, trapped):
+    pytest.importorskip("stable_baselines3", reason="stable_baselines3 is not installed")
+    import yaml
+
+    from training.train import Training
+
+    sound = settings_of_a_stranger()
+    found = list(places(sound))
+    assert ("environment", "baseline") in found and ("environment", "designed_on", "platform") in found
+    for path in found:
+        if path == ("name",):  # of the settings among ours: told to people
+            continue
+        folder = trapped / "run"
+        folder.mkdir(exist_ok=True)
+        (folder / "settings.yml").write_text(yaml.safe_dump(changed(sound, path, text)))
+        with pytest.raises(InputError, match=text):
+            Training(None, folder, resume=True).run()
+
+
+@pytest.mark.parametrize("text", HOSTILE)
+def test_a_folder_of_nothing_but_settings_is_refused_where_its_baseline_is_no_built_in_one(text, trapped):
+    import yaml
+
+    Path("run").mkdir()
+    settings = changed(settings_of_a_stranger(), ("environment", "baseline"), text)
+    Path("run", "settings.yml").write_text(yaml.safe_dump(settings))
+    result = invoke("train", "--resume", "--out", "run")
+    assert result.exit_code == cli.EXIT_INPUT
+    assert f"environment.baseline = '{text}': must be one of constant, " in result.stderr
+    assert [path.name for path in Path("run").iterdir()] == ["settings.yml"]
+
+
+@pytest.mark.parametrize("tag", ["object/apply:own_law.Law []", "name:own_law.Law", "module:own_law"])
+def test_settings_that_name_python_objects_are_not_loaded(tag, trapped):
+    from training.train import Training
+
+    Path("run").mkdir()
+    Path("run", "settings.yml").write_text(f"environment: !!python/{tag}\n")
+    with pytest.raises(InputError, match="settings.yml.*not valid YAML"):
+        Training(None, "run", resume=True)
+
+
+@pytest.mark.parametrize("text", HOSTILE)
+def test_no_text_in_a_design_is_looked_up_as_code_or_as_a_file(text, trapped):
+    turbine = read_turbine("nrel5mw")
+    sound = {
+        "format": "fowt-design", "version": 1, "kind": "pi", "platform": "", "turbine": turbine.name,
+        "command": "fowt", "settings": {"KP": 0.006, "KI": 0.0009, "gain_schedule_pitch": 0.11},
+    }  # fmt: skip
+    for path in places(sound):
+        Path("self.json").write_text(json.dumps(changed(sound, path, text)))
+        if path[0] in ("platform", "command"):  # told to people
+            assert make("design:self.json", turbine, 0.1).name == "self"
+            continue
+        with pytest.raises(InputError, match="design file 'self.json'"):
+            make("design:self.json", turbine, 0.1)
+    Path("self.json").write_text(json.dumps(sound | {"kind": [text]}))
+    with pytest.raises(InputError, match="unknown kind"):
+        make("design:self.json", turbine, 0.1)
+
+
+@pytest.mark.parametrize("text", HOSTILE)
+def test_no_text_in_a_suite_is_looked_up_as_code(text, trapped):
+    import tomllib
+
+    from training.cases import FOLDER, read_suite
+
+    words = (FOLDER / "atlas.toml").read_text(encoding="utf-8").split('"')
+    assert len(words) > 21
+    for number in range(1, len(words), 2):
+        content = '"'.join([*words[:number], text, *words[number + 1 :]])
+        tomllib.loads(content)
+        Path("suite.toml").write_text(content)
+        with suppress(InputError):
+            read_suite("suite.toml")
 
 
 def test_the_study_itself_finds_a_crash_a_hang_and_a_wrong_error(tmp_path):

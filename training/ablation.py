@@ -10,7 +10,6 @@ than those of the shipped agents, so that they say which lever moves more, not w
 """
 
 import argparse
-import shutil
 import sys
 from pathlib import Path
 
@@ -86,9 +85,7 @@ def run_variant(table, name, seed, out, steps=None, report=None):
     done = decisions_done(folder)
     if done >= settings["steps"]:
         return True
-    if done == 0 and (folder / "settings.yml").exists():
-        shutil.rmtree(folder)  # stopped in its first minutes, before there was anything to go on from
-    return Training(settings, folder, resume=done > 0).run(report)
+    return Training(settings, folder, resume=(folder / "settings.yml").exists()).run(report)
 
 
 def ablation_rows(table, out):

@@ -36,6 +36,7 @@ from fowt_env.envs.decisions import DecisionSettings
 from fowt_env.envs.tasks import SITE, task_of
 from fowt_env.errors import InputError, unknown
 from fowt_env.outputs import process_lives, remove_leftovers, replacing
+from training.locks import locked
 from training.seeds import TRAINING, seeds_for
 from training.train_settings import (
     SCHEDULES,
@@ -260,34 +261,41 @@ class Training:
 
     Loading a checkpoint executes code from it: one that no run of this user wrote (training.trust) is refused
     unless trusted.
-    Raises: InputError where the folder holds another run, none to resume, or a stranger's.
+    Raises: InputError where the folder holds another run, none to resume, or a stranger's; on run(), where
+    another training is in the folder.
     """
 
     def __init__(self, settings, folder, resume=False, trusted=False):
         self.folder = Path(folder)
         self.checkpoints = self.folder / "checkpoints"
-        path = self.folder / "settings.yml"
-        self.resume = resume
+        self.settings_path = self.folder / "settings.yml"
+        self.resume, self.trusted = resume, trusted
+        self._check_folder()
         if resume:
-            if not path.exists():
-                raise InputError(f"--resume: {self.folder} holds no run")
-            newest = self.newest()
-            if newest is not None and not trusted and not is_own(newest):
-                raise InputError(
-                    f"--resume: loading {newest} executes code from it, and no run of yours wrote it so;"
-                    " if you trust whoever did, add --trust-zip"
-                )
-            stored = read_settings(path)
+            stored = read_settings(self.settings_path)
             if settings is not None:
                 stored["steps"] = settings["steps"]
             settings = stored
-        elif path.exists():
-            raise InputError(
-                f"{self.folder} holds a run already: use --resume to go on with it, or another --out"
-            )
         self.settings = settings
         self.stop = False
         self.rows = []
+
+    def _check_folder(self):
+        """Raises: InputError unless the run can begin in its folder, or go on there."""
+        if not self.resume:
+            if self.settings_path.exists():
+                raise InputError(
+                    f"{self.folder} holds a run already: use --resume to go on with it, or another --out"
+                )
+            return
+        if not self.settings_path.exists():
+            raise InputError(f"--resume: {self.folder} holds no run")
+        newest = self.newest()
+        if newest is not None and not self.trusted and not is_own(newest):
+            raise InputError(
+                f"--resume: loading {newest} executes code from it, and no run of yours wrote it so;"
+                " if you trust whoever did, add --trust-zip"
+            )
 
     def newest(self):
         """Folder of the newest checkpoint, or None."""
@@ -298,30 +306,53 @@ class Training:
         """Train to the end, or to an interrupt; returns whether the end was reached.
 
         report(done, total, text): called about once a second.
+        Raises: InputError where another training is in the folder, or its settings cannot be used.
         """
+        name, busy = f"run folder {str(self.folder)!r}", "another training is writing to it"
+        with locked(self.folder, name, busy):  # before anything is built, which may take minutes
+            self._check_folder()  # again, now that no other changes it
+            if not self.resume:
+                self._write_settings()  # which say that the folder holds a run
+            try:
+                judge, state = self._build()
+            except BaseException:
+                if not self.resume:  # it never began: the folder is free for settings that work
+                    self.settings_path.unlink(missing_ok=True)
+                raise
+            if self.resume:
+                self._write_settings()  # they may have more steps now
+            with replacing(self.folder / "versions.json") as path:
+                path.write_text(json.dumps(versions(), indent=1), encoding="utf-8")
+            return self._learn(judge, state, report)
+
+    def _build(self):
+        """(validation environment, what a resumed run goes on from or None); sets model and env."""
         import torch
         from stable_baselines3.common.utils import set_random_seed
-
-        from training.train_callbacks import Judge, Keeper, Stopped, callbacks
 
         settings = self.settings
         torch.set_num_threads(int(os.environ.get("FOWT_TORCH_THREADS", "1")))
         kind = make_algorithm(settings["algo"])
         check_algorithm(kind, settings["algo"], settings["algorithm"])
-        env, judge = make_envs(settings)
+        self.env, judge = make_envs(settings)
         self._remove_leftovers()
         set_random_seed(settings["seed"])
+        state = None
         if self.resume and self.newest() is not None:
-            model, state = self._load(kind, env)
+            self.model, state = self._load(kind, self.env)
         else:
-            env.seed(settings["seed"])
-            model = _new_model(kind, settings, env)
-            state = None
-        self._write_settings()  # not before they are known to work: a folder with settings holds a run
-        self.reference = baseline_figures(settings)
-        self.model, self.env = model, env
+            self.env.seed(settings["seed"])
+            self.model = _new_model(kind, settings, self.env)
+        return judge, state
+
+    def _learn(self, judge, state, report):
+        """Whether the end was reached, once what is left of the run has been trained."""
         from stable_baselines3.common.logger import configure
 
+        from training.train_callbacks import Judge, Keeper, Stopped, callbacks
+
+        model = self.model
+        self.reference = baseline_figures(self.settings)
         model.set_logger(configure(str(self.folder / "tensorboard"), ["tensorboard"]))
         keeper = Keeper(self, report)
         judge_after = Judge(self)
@@ -332,7 +363,7 @@ class Training:
             keeper.before = state["seconds"]
             keeper.torch_state = state["torch"]
         self.evaluation, self.judge, self.keeper = listeners[0], judge_after, keeper
-        left = settings["steps"] - model.num_timesteps
+        left = self.settings["steps"] - model.num_timesteps
         finished = True
         with self._signals():
             if left > 0:
@@ -375,10 +406,8 @@ class Training:
     def _write_settings(self):
         import yaml
 
-        with replacing(self.folder / "settings.yml") as path:
+        with replacing(self.settings_path) as path:
             path.write_text(yaml.safe_dump(self.settings, sort_keys=False), encoding="utf-8")
-        with replacing(self.folder / "versions.json") as path:
-            path.write_text(json.dumps(versions(), indent=1), encoding="utf-8")
 
     def save(self):
         """Write a checkpoint of the present instant, whole or not at all; the one before it goes.
@@ -505,11 +534,7 @@ def _new_model(kind, settings, env):
     given = dict(settings["algorithm"]) | _schedules(settings)
     policy = dict(given.pop("policy_kwargs", {}))
     if "activation" in policy:
-        known = {"tanh": torch.nn.Tanh, "relu": torch.nn.ReLU}
-        name = policy.pop("activation")
-        if name not in known:
-            raise unknown("activation", name, known)
-        policy["activation_fn"] = known[name]
+        policy["activation_fn"] = {"tanh": torch.nn.Tanh, "relu": torch.nn.ReLU}[policy.pop("activation")]
     try:
         return kind("MlpPolicy", env, policy_kwargs=policy, seed=settings["seed"], device="cpu", **given)
     except (AssertionError, TypeError, ValueError) as error:

@@ -2,10 +2,12 @@
 
 import inspect
 from dataclasses import fields
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import Field
 
+from controllers.policy_file import ACTIVATIONS
+from controllers.registry import CONTROLLERS
 from fowt_env.envs.decisions import DecisionSettings
 from fowt_env.envs.env import SETTINGS
 from fowt_env.errors import InputError
@@ -27,6 +29,7 @@ SCHEDULES = ("learning_rate", "clip_range")  # of an algorithm: numbers that may
 GIVEN_BY_TRAINING = (  # arguments of stable-baselines3's algorithms
     "self", "policy", "env", "seed", "device", "tensorboard_log", "verbose", "_init_setup_model",
 )  # fmt: skip
+OBJECTS = ("action_noise", "rollout_buffer_class", "replay_buffer_class")  # arguments that no text stands for
 NOT_SET_THERE = ("task", "render_mode")  # of FowtEnv: what training gives, or lacks
 
 
@@ -83,6 +86,12 @@ def check_settings(settings, where="settings"):
         value = settings["environment"].get(key)
         if value is not None and not isinstance(value, kinds):
             problems.append(f"environment.{key} = {short(value)}: must be {words}")
+    n = settings["environment"].get("num_envs", 1)
+    if type(n) is not int or n < 1:
+        problems.append(f"environment.num_envs = {short(n)}: must be a whole number >= 1")
+    baseline = settings["environment"].get("baseline", "pi")
+    if baseline not in tuple(CONTROLLERS):  # an import path would run code of whoever wrote the file
+        problems.append(f"environment.baseline = {short(baseline)}: must be one of {', '.join(CONTROLLERS)}")
     raise_problems(where, problems)
     DecisionSettings(**settings["decisions"])
     return settings
@@ -97,14 +106,37 @@ def environment_keys():
 def check_algorithm(kind, name, given):
     """Raises: InputError for settings of algorithm that its class lacks, or declares with another type."""
     arguments = inspect.signature(kind.__init__).parameters
-    known = {key: argument.annotation for key, argument in arguments.items() if key not in GIVEN_BY_TRAINING}
+    left_out = (*GIVEN_BY_TRAINING, *OBJECTS)
+    known = {key: argument.annotation for key, argument in arguments.items() if key not in left_out}
     problems = []
     for key, value in given.items():
         if key not in known:
             problems.append(unknown_key(f"algorithm.{key}", key, known))
         elif (wanted := _not_allowed(key, value, known[key])) is not None:
             problems.append(f"algorithm.{key} = {short(value)}: must be {wanted}")
+        elif key == "policy_kwargs":
+            problems += _policy_problems(value)
     raise_problems(name, problems)
+
+
+def _policy_problems(given):
+    """One line per wrong value of policy_kwargs: its only text is the name of an activation."""
+    problems = []
+    for key, value in given.items():
+        if key == "activation" and value not in tuple(ACTIVATIONS):
+            wanted = f"one of {', '.join(ACTIVATIONS)}"
+        elif key != "activation" and _holds_text(value):
+            wanted = "numbers, or lists or tables of them"
+        else:
+            continue
+        problems.append(f"algorithm.policy_kwargs.{key} = {short(value)}: must be {wanted}")
+    return problems
+
+
+def _holds_text(value):
+    """Whether a value is a text, or has one within it."""
+    items = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
+    return isinstance(value, str) or any(map(_holds_text, items))
 
 
 def _not_allowed(key, value, declared):
@@ -123,6 +155,8 @@ def _not_allowed(key, value, declared):
         return None if type(value) is int else "a whole number"
     if declared is float:
         return None if number else "a number"
+    if isinstance(value, str) and str not in get_args(declared):
+        return "a number or a table"
     return None
 
 

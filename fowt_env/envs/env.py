@@ -517,9 +517,11 @@ def named_baseline(name, turbine, control_dt):
 
     Raises: InputError for unknown ones and those written in Python.
     """
-    from controllers import make  # looked up only when used: fowt_env imports nothing from it
+    from controllers import CONTROLLERS, make  # looked up only when used: fowt_env imports nothing from it
     from controllers.base import CompiledController
 
+    if isinstance(name, str) and ":" not in name and name not in CONTROLLERS:
+        raise unknown("baseline", name, CONTROLLERS)
     baseline = make(name, turbine, control_dt)
     if not isinstance(baseline, CompiledController):
         raise InputError(f"baseline = {name!r}: must be a compiled controller, such as 'pi' or 'gspi_oc3'")

@@ -13,6 +13,7 @@ import controllers
 from controllers import CONTROLLERS, CheckedController, information, make
 from controllers.base import EXTRA
 from controllers.constant import Constant
+from controllers.policy import shipped_agents
 from fowt_env import build_scene
 from fowt_env.errors import ControllerError, InputError
 from fowt_env.measurement import Measurement
@@ -143,6 +144,12 @@ def test_constant_holds_what_was_measured_or_given():
 def test_an_unknown_name_gets_a_suggestion():
     with pytest.raises(InputError, match="unknown controller 'pi_lnad'. Did you mean 'pi_land'"):
         make("pi_lnad", turbine(), 0.1)
+
+
+@pytest.mark.parametrize("name", shipped_agents())
+def test_the_bare_name_of_an_agent_gets_its_full_one_as_suggestion(name):
+    with pytest.raises(InputError, match=f"unknown controller '{name}'. Did you mean 'policy:{name}'"):
+        make(name, turbine(), 0.1)
 
 
 @pytest.mark.parametrize("control_dt", [0.0, -0.1, 1.5, float("nan"), float("inf")])

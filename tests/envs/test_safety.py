@@ -55,5 +55,5 @@ def test_a_steep_platform_rate_hands_over_and_calm_hands_back():
 )
 def test_limits_that_cannot_be_used_are_named(changes):
     name = next(iter(changes))
-    with pytest.raises(InputError, match=f"{name} = " if name != "baseline" else "unknown controller"):
+    with pytest.raises(InputError, match=f"{name} = " if name != "baseline" else "unknown baseline"):
         SafetyLayer(FowtEnv(**QUICK), **changes)

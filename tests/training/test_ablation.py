@@ -8,7 +8,7 @@ pytest.importorskip("sb3_contrib")
 
 from fowt_env.errors import InputError
 from training import ablation
-from training.train import environment_settings, make_algorithm
+from training.train import Training, environment_settings, make_algorithm
 
 from .small_run import QUICK_ALGORITHM, SMALL
 
@@ -43,11 +43,19 @@ def test_a_finished_variant_is_left_alone_and_a_longer_one_goes_on(table, tmp_pa
     assert ablation.decisions_done(folder) == 128
 
 
+def test_a_run_killed_before_its_first_checkpoint_starts_anew_and_its_folder_keeps_what_is_in_it(
+    table, tmp_path
+):
+    folder = ablation.folder_of(tmp_path, "b", 0)
+    Training(ablation.settings_of(table, "b", 0), folder)._write_settings()
+    (folder / "notes.txt").write_text("mine")
+    assert ablation.run_variant(table, "b", 0, tmp_path)
+    assert ablation.decisions_done(folder) == 64 and (folder / "notes.txt").read_text() == "mine"
+
+
 def test_the_report_has_what_was_validated_and_a_picture(table, tmp_path):
     with pytest.raises(InputError, match="no variant has been validated"):
         ablation.ablation_rows(table, tmp_path)
-    (tmp_path / "b_0").mkdir()
-    (tmp_path / "b_0" / "settings.yml").write_text("steps: 64")  # killed before its first checkpoint
     assert ablation.run_variant(table, "b", 0, tmp_path)
     rows = ablation.ablation_rows(table, tmp_path)
     assert list(rows["label"]) == ["second"] and rows["decisions_trained"][0] == 64

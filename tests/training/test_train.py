@@ -1,11 +1,17 @@
 """Training: what a run leaves behind, how it stops and goes on, and what it refuses."""
 
 import json
+import os
 import random
 import shlex
+import signal
+import subprocess
+import sys
 import tomllib
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 import yaml
 
@@ -16,10 +22,11 @@ import torch
 
 from controllers import information
 from controllers.policy import shipped_agents
+from controllers.policy_file import read_policy
 from fowt_env.cli_arguments import parse_pairs
 from fowt_env.errors import InputError
 from training import publish as publishing
-from training import train_callbacks
+from training import train, train_callbacks
 from training.train import AGENTS, Training, baseline_figures, decision_env, judged, make_envs, resolve
 
 from .small_run import small
@@ -91,6 +98,108 @@ def test_a_run_that_was_killed_before_its_first_checkpoint_starts_anew(tmp_path)
         assert torch.equal(value, parameters(resumed)[name]), name
 
 
+def test_a_second_training_in_a_folder_is_refused_before_anything_is_built(tmp_path, monkeypatch):
+    folder = tmp_path / "run"
+    first, second = Training(small("ppo"), folder), Training(small("ppo"), folder)
+
+    def building(settings):
+        third = Training(None, folder, resume=True)  # settings.yml is there from the start
+        for other in (second, third):
+            with pytest.raises(InputError, match=f"run folder '{folder}': another training is writing to it"):
+                other.run()
+        with pytest.raises(InputError, match="holds a run already"):
+            Training(small("ppo"), folder)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(train, "make_envs", building)
+    with pytest.raises(KeyboardInterrupt):
+        first.run()
+    assert not folder.exists()  # nothing was trained, so that settings that work may have it
+
+
+def test_a_run_that_came_into_the_folder_meanwhile_is_not_written_over(tmp_path):
+    late = Training(small("ppo", steps=32), tmp_path / "run")
+    first = Training(small("ppo", steps=64), late.folder)
+    first._write_settings()
+    with pytest.raises(InputError, match="holds a run already"):
+        late.run()
+    assert Training(None, late.folder, resume=True).settings == first.settings
+
+
+def test_a_run_cannot_be_gone_on_with_while_it_goes_on_and_can_once_it_was_killed(tmp_path, monkeypatch):
+    folder, root = tmp_path / "run", Path(__file__).resolve().parents[2]
+    code = (
+        "import sys, time\n"
+        "from training import train\n"
+        "train.make_envs = lambda settings: print('building', flush=True) or time.sleep(600)\n"
+        "train.Training(train.resolve('ppo', 'above_rated', 0, 100), sys.argv[1]).run()\n"
+    )
+    words = [sys.executable, "-c", code, folder]
+
+    def went_on(settings):
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(train, "make_envs", went_on)
+    with subprocess.Popen(words, stdout=subprocess.PIPE, env=os.environ | {"PYTHONPATH": str(root)}) as other:
+        try:
+            assert other.stdout.readline() == b"building\n"
+            with pytest.raises(InputError, match="another training is writing to it"):
+                Training(None, folder, resume=True).run()
+        finally:
+            other.send_signal(signal.SIGKILL)
+    with pytest.raises(ZeroDivisionError):
+        Training(None, folder, resume=True).run()
+    assert (folder / "settings.yml").exists()  # its own, which a run that cannot go on leaves alone
+
+
+def test_a_run_has_its_folder_to_itself_as_long_as_it_learns_and_no_longer(tmp_path):
+    run = Training(small("ppo", steps=32), tmp_path / "run")
+    refusals = []
+
+    def report(done, total, text):
+        with pytest.raises(InputError, match="another training is writing to it") as caught:
+            Training(None, run.folder, resume=True, trusted=True).run()
+        refusals.append(caught)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(train_callbacks, "REPORT_EVERY", 0.0)
+        assert run.run(report)
+    assert refusals
+    assert Training({"steps": 48}, run.folder, resume=True).run()
+
+
+def test_the_policy_that_is_kept_is_that_of_the_best_validation_also_in_a_resumed_run(tmp_path, monkeypatch):
+    scores, networks, runs = [2.0, 1.0, 3.0], [], []
+    real = train_callbacks.judged
+
+    def judged_otherwise(figures, reference):
+        networks.append(parameters(runs[-1]))
+        return real(figures, reference) | {"score": scores[len(networks) - 1]}
+
+    monkeypatch.setattr(train_callbacks, "judged", judged_otherwise)
+    monkeypatch.setattr(train_callbacks, "REPORT_EVERY", 0.0)
+    runs.append(Training(small("ppo", steps=192), tmp_path / "run"))
+
+    def report(done, total, text):
+        runs[0].stop = len(networks) == 2
+
+    assert not runs[0].run(report)
+    runs.append(Training(None, tmp_path / "run", resume=True))
+    assert runs[1].run()
+    table = pd.read_csv(tmp_path / "run" / "validation.csv")
+    assert list(table["score"]) == scores
+    settings, network = read_policy(tmp_path / "run" / "best.npz")
+    assert settings["about"]["steps"] == table["decisions"][table["score"].idxmin()]
+    kept = [torch.tensor(array) for array in (*network.weights, *network.biases)]
+
+    def same(stored):
+        layers = [f"mlp_extractor.policy_net.{i}" for i in (0, 2)] + ["action_net"]
+        there = [stored[f"{layer}.{kind}"] for kind in ("weight", "bias") for layer in layers]
+        return all(torch.equal(a, b) for a, b in zip(kept, there, strict=True))
+
+    assert [same(stored) for stored in networks] == [False, True, False]
+
+
 def test_a_checkpoint_of_others_or_a_changed_one_is_resumed_only_where_it_is_trusted(tmp_path, monkeypatch):
     run = Training(small("ppo", steps=32), tmp_path / "run")
     assert run.run()
@@ -101,11 +210,13 @@ def test_a_checkpoint_of_others_or_a_changed_one_is_resumed_only_where_it_is_tru
     with pytest.raises(InputError, match="executes code.*--trust-zip"):
         Training(None, run.folder, resume=True)
     assert Training({"steps": 64}, run.folder, resume=True, trusted=True).run()
-    Training(None, run.folder, resume=True)  # its newest checkpoint is this user's own
+    early = Training(None, run.folder, resume=True)  # its newest checkpoint is this user's own
     with (run.newest() / "state.pkl").open("ab") as file:
         file.write(b".")
     with pytest.raises(InputError, match="executes code"):
         Training(None, run.folder, resume=True)
+    with pytest.raises(InputError, match="executes code"):
+        early.run()
 
 
 def test_without_a_place_for_its_key_a_run_goes_on_but_its_checkpoint_has_no_seal(tmp_path, monkeypatch):
@@ -181,6 +292,9 @@ def test_wrong_settings_are_named(tmp_path):
         ({"environment.num_env": 8}, "environment.num_env: unknown key. Did you mean 'num_envs'"),
         ({"environment.windd": 8}, "environment.windd: unknown key. Did you mean 'wind'"),
         ({"environment.threads": 8}, "environment.threads: unknown key"),  # training's own
+        ({"environment.baseline": "mine:Law"}, "environment.baseline = 'mine:Law': must be one of const"),
+        ({"environment.num_envs": 0}, "environment.num_envs = 0: must be a whole number >= 1"),
+        ({"environment.baseline": None}, "environment.baseline = None: must be one of constant, "),
         ({"environment.reward": 3}, "environment.reward = 3: must be a table of weights"),
         ({"environment.observation": 3}, "environment.observation = 3: must be the name"),
         ({"environment.randomise": 3}, "environment.randomise = 3: must be a table"),
@@ -205,6 +319,11 @@ def test_a_setting_that_no_run_can_have_is_named_before_anything_is_built(change
         ({"algorithm.use_sde": 1}, "algorithm.use_sde = 1: must be true or false"),
         ({"algorithm.learning_rate": [1.0, "b"]}, "algorithm.learning_rate = .*a pair"),
         ({"algorithm.policy_kwargs": 3}, "algorithm.policy_kwargs = 3: must be a table"),
+        ({"algorithm.policy_kwargs.activation": "tan"}, "policy_kwargs.activation = 'tan': .* tanh, relu"),
+        ({"algorithm.policy_kwargs.optimizer_class": "x"}, "kwargs.optimizer_class = 'x': must be numbers"),
+        ({"algorithm.policy_kwargs.net_arch": {"pi": ["x"]}}, "policy_kwargs.net_arch = .*: must be numbers"),
+        ({"algorithm.rollout_buffer_class": "os:abort"}, "algorithm.rollout_buffer_class: unknown key"),
+        ({"algorithm.target_kl": "os:abort"}, "algorithm.target_kl = 'os:abort': must be a number"),
         ({"algorithm.policy_kwargs.net": 3}, "ppo does not take these settings.*'net'"),
         ({"algorithm.n_steps": -1}, "ppo does not take these settings.*n_steps=-1"),
         ({"validation.skip": 12.0}, "validation.skip = 12.0: must be less than the 12 s of an episode"),

@@ -1,0 +1,30 @@
+"""The built-in controllers by name. A file may name these and no others: any other name runs code."""
+
+from controllers.constant import constant
+from controllers.eq8 import eq8_literal
+from controllers.floating import floating_feedback
+from controllers.gspi import gspi_land, gspi_oc3
+from controllers.lqr import lqr
+from controllers.openfast import openfast_oc3
+from controllers.pi import pi, pi_land, pi_land_power, pi_unscheduled
+from controllers.pi_tuned import pi_tuned
+from controllers.preview import preview
+from controllers.rosco import rosco, rosco_float
+
+CONTROLLERS = {  # name -> factory(turbine: description.Turbine, control_dt: float) -> controller
+    "constant": constant,
+    "eq8_literal": eq8_literal,
+    "floating_feedback": floating_feedback,
+    "gspi_land": gspi_land,
+    "gspi_oc3": gspi_oc3,
+    "lqr": lqr,
+    "openfast_oc3": openfast_oc3,
+    "pi": pi,
+    "pi_land": pi_land,
+    "pi_land_power": pi_land_power,
+    "pi_tuned": pi_tuned,
+    "pi_unscheduled": pi_unscheduled,
+    "preview": preview,
+    "rosco": rosco,
+    "rosco_float": rosco_float,
+}
