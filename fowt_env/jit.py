@@ -19,11 +19,16 @@ from functools import cache
 from pathlib import Path
 
 import numba
-from numba import types
-from numba.core.ccallback import CFunc
 
-from fowt_env.folders import cache_root, distrust, make_private
-from fowt_env.kernel_cache import KernelCache
+from fowt_env.requirements import check_numba
+
+check_numba(numba.__version__)  # ahead of what other versions cannot import or compile
+
+from numba import types  # noqa: E402
+from numba.core.ccallback import CFunc  # noqa: E402
+
+from fowt_env.folders import cache_root, distrust, make_private  # noqa: E402
+from fowt_env.kernel_cache import KernelCache  # noqa: E402
 
 KEEP_CACHES = 4  # folders of older sources kept, so that switching branches does not recompile
 KERNEL_PACKAGES = ("fowt_env", "controllers")
