@@ -3,11 +3,11 @@
 Gymnasium 0.26 to 0.29 called the functions of the entry-point group "gymnasium.envs"; 1.0 dropped that
 and knows only what has been imported. So the installed file fowt_env_registration.pth calls
 register_with_gymnasium() when Python starts: it waits for gymnasium to be imported, and then adds
-the id, as text. Neither gymnasium nor fowt_env is loaded before somebody asks for it.
+the id, as text. Neither gymnasium nor fowt_env is loaded before somebody asks for it, nor anything else:
+every Python of the environment starts with it.
 """
 
 import sys
-from importlib.machinery import PathFinder
 
 ENVIRONMENTS = {"fowt_env/OC3Hywind-v1": "fowt_env.envs:FowtEnv"}
 VECTOR_ENTRY_POINT = "fowt_env.envs:FowtVectorEnv"  # of each of them
@@ -28,6 +28,8 @@ class _GymnasiumWatch:
     def find_spec(self, name, path=None, target=None):
         if name != "gymnasium.envs":
             return None
+        from importlib.machinery import PathFinder
+
         sys.meta_path.remove(self)
         spec = PathFinder.find_spec(name, path, target)
         if spec is None or spec.loader is None:
@@ -36,7 +38,12 @@ class _GymnasiumWatch:
 
         def execute_and_register(module):
             execute(module)
-            register_envs()
+            try:
+                register_envs()
+            except Exception as error:  # gymnasium is for others too, and does without these
+                import warnings
+
+                warnings.warn(f"fowt_env's environments are not registered: {error!r}", stacklevel=2)
 
         spec.loader.exec_module = execute_and_register
         return spec

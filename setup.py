@@ -5,14 +5,32 @@ import sys
 import sysconfig
 
 from setuptools import Distribution, setup
+from setuptools.command.build_py import build_py
 
+HOOK = "fowt_env_registration.pth"
 SITE_PACKAGES = os.path.relpath(sysconfig.get_path("purelib"), sys.prefix)
 
 
+class BuildWithHook(build_py):
+    """Puts it where the packages go, whatever that place is called on the machine that installs."""
+
+    def run(self):
+        super().run()
+        if not self.editable_mode:
+            self.copy_file(HOOK, os.path.join(self.build_lib, HOOK))
+
+
 class DistributionWithData(Distribution):
-    """Installs data files in editable mode too: setuptools asks for them there by this name."""
+    """Has it as a data file too where no packages are put anywhere: in editable mode, and in an sdist."""
 
-    has_data = Distribution.has_data_files
+    def has_data_files(self):
+        return "bdist_wheel" not in self.commands and super().has_data_files()
+
+    has_data = has_data_files  # by which name setuptools asks in editable mode
 
 
-setup(distclass=DistributionWithData, data_files=[(SITE_PACKAGES, ["fowt_env_registration.pth"])])
+setup(
+    cmdclass={"build_py": BuildWithHook},
+    distclass=DistributionWithData,
+    data_files=[(SITE_PACKAGES, [HOOK])],
+)

@@ -6,6 +6,7 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
+from fowt_env import requirements
 from fowt_env.errors import InputError
 
 DOCTOR_EXAMPLES = """[bold]Examples[/bold]
@@ -14,7 +15,7 @@ DOCTOR_EXAMPLES = """[bold]Examples[/bold]
 
 [cyan]fowt doctor --no-test[/cyan]  versions, optional parts and the cache alone
 
-[bold]Exit code[/bold]: 0 if the self-test gives its figures (or was left out), 1 if not."""
+[bold]Exit code[/bold]: 0 if versions and the self-test's figures (unless left out) are right, 1 if not."""
 
 out = Console()
 
@@ -23,10 +24,20 @@ def doctor(
     test: Annotated[bool, typer.Option("--test/--no-test", help="Run the self-test.")] = True,
 ):
     """Check this installation: versions, optional parts, kernel cache, a short run with known figures."""
-    from fowt_env import health  # numba and what it needs, which other commands' help can do without
-
-    _print_versions(health)
-    _print_extras(health)
+    _print_versions()
+    _print_extras()
+    faults = [package.advice for package in requirements.versions() if not package.fits]
+    if not faults:
+        try:
+            from fowt_env import health  # numba and what it needs, which other commands' help can do without
+        except ImportError as error:  # numba's own, where NumPy is too new for it
+            faults = [str(error)]
+    if faults:
+        for fault in faults:
+            out.print(f"[red]{escape(fault)}[/red]", soft_wrap=True, highlight=False)
+        raise typer.Exit(1)
+    _heading("machine")
+    out.print(f"  {escape(health.machine())}", highlight=False, soft_wrap=True)
     _print_cache(health.cache_state())
     if test and not _self_test(health).passed:
         raise typer.Exit(1)
@@ -36,33 +47,46 @@ def _heading(text):
     out.print(f"[bold]{text}[/bold]")
 
 
-def _print_versions(health):
+def _print_versions():
     _heading("versions")
-    for package in health.versions():
-        out.print(f"  {package.name:14} {package.version or '[red]missing[/red]'}", highlight=False)
-    out.print(f"  {escape(health.machine())}", highlight=False, soft_wrap=True)
+    for package in requirements.versions():
+        found = package.version or "missing"
+        state = found if package.fits else f"[red]{found}[/red], needed: {escape(package.needed)}"
+        out.print(f"  {package.name:14} {state}", highlight=False)
 
 
-def _print_extras(health):
+def _print_extras():
     _heading("optional parts")
     try:
-        extras = health.optional_parts()
+        extras = requirements.optional_parts()
     except InputError as error:
         out.print(f"  [yellow]{escape(str(error))}[/yellow]", soft_wrap=True, highlight=False)
         return
     for extra, packages in extras.items():
-        missing = [package.name for package in packages if package.version is None]
-        names = ", ".join(f"{package.name} {package.version or 'missing'}" for package in packages)
-        state = "[green]found[/green]" if not missing else "[yellow]missing[/yellow]"
-        advice = f': pip install "{health.DISTRIBUTION}[{extra}]"' if missing else ""
+        names = ", ".join(_named(package) for package in packages)
+        if any(package.version is None for package in packages):
+            state = "[yellow]missing[/yellow]"
+        elif all(package.fits for package in packages):
+            state = "[green]found[/green]"
+        else:
+            state = "[yellow]another version[/yellow]"
+        advice = "" if "green" in state else f': pip install "{requirements.DISTRIBUTION}[{extra}]"'
         out.print(f"  {extra:14} {state}  {escape(names + advice)}", highlight=False, soft_wrap=True)
+
+
+def _named(package):
+    """Name and version, with what is needed where that is another."""
+    if package.version is None or package.fits:
+        return f"{package.name} {package.version or 'missing'}"
+    return f"{package.name} {package.version} (needed: {package.needed})"
 
 
 def _print_cache(state):
     _heading("kernel cache")
     kernels = f"{state.megabytes:.1f} MB of compiled kernels" if state.compiled else "nothing compiled yet"
     others = f", {state.others} folders of other versions" if state.others else ""
-    out.print(f"  {escape(str(state.folder))}: {kernels}{others}", highlight=False, soft_wrap=True)
+    folder = state.folder or "no home folder, and no FOWT_CACHE_DIR"
+    out.print(f"  {escape(str(folder))}: {kernels}{others}", highlight=False, soft_wrap=True)
     if state.advice:
         out.print(f"  [yellow]{escape(state.advice)}[/yellow]", highlight=False, soft_wrap=True)
 

@@ -2,31 +2,45 @@
 
 Numba's own cache watches only the file of the function itself: after an edit of a callee in
 another file a cached caller would go on returning the old result. So the cache lives in a folder
-named by a hash of every source file of the packages that hold kernels.
+named by a hash of every source file of the packages that hold kernels, and holds functions of this
+project alone: a user's are compiled anew in each process.
 """
 
-import atexit
 import hashlib
 import os
+import re
 import shutil
 import sys
-import tempfile
 import time
+import warnings
+from contextlib import suppress
 from fnmatch import fnmatch
+from functools import cache
 from pathlib import Path
 
 import numba
-from numba import types
 
-from fowt_env import kernel_cache
+from fowt_env.requirements import check_numba
+
+check_numba(numba.__version__)  # ahead of what other versions cannot import or compile
+
+from numba import types  # noqa: E402
+from numba.core.ccallback import CFunc  # noqa: E402
+
+from fowt_env.folders import cache_root, distrust, make_private  # noqa: E402
+from fowt_env.kernel_cache import KernelCache  # noqa: E402
 
 KEEP_CACHES = 4  # folders of older sources kept, so that switching branches does not recompile
 KERNEL_PACKAGES = ("fowt_env", "controllers")
+PACKAGES = (*KERNEL_PACKAGES, "training")  # which compiles a few functions of its own
+MARKER = "made_by_fowt_env"  # a file in each folder that this module makes, and may therefore remove
+OWN_NAME = re.compile("[0-9a-f]{16}")
 # Sources that no module with a kernel imports at its top, so that an edit of them compiles nothing anew. A
 # kernel freezes what its module's globals hold; tests/test_cache.py follows the imports and checks this list.
 NOT_COMPILED = (
     "animation.py",
     "cli*.py",
+    "health.py",
     "openfast_files.py",
     "outputs.py",
     "plots*.py",
@@ -34,82 +48,139 @@ NOT_COMPILED = (
     "rendering.py",
     "rosco.py",
     "saved_design.py",
+    "warmup.py",
 )
+
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+def _sources(packages):
+    """Sorted paths of all sources of packages."""
+    return sorted(path for package in packages for path in (ROOT / package).rglob("*.py"))
 
 
 def kernel_sources():
     """Sorted paths of the kernel packages' sources that machine code may depend on."""
-    root = Path(__file__).resolve().parent.parent
-    return sorted(
+    return [
         path
-        for package in KERNEL_PACKAGES
-        for path in (root / package).rglob("*.py")
+        for path in _sources(KERNEL_PACKAGES)
         if not any(fnmatch(path.name, pattern) for pattern in NOT_COMPILED)
-    )
+    ]
 
 
-def _source_hash():
-    """Hash of the kernels' sources and of the versions that shape machine code."""
+def _hash(paths):
+    """Hash (16 hexadecimal digits) of sources and of the versions that shape machine code."""
     digest = hashlib.sha256(f"{numba.__version__} {sys.version}".encode())
-    root = Path(__file__).resolve().parent.parent
-    for path in kernel_sources():
-        digest.update(path.relative_to(root).as_posix().encode())
+    for path in paths:
+        digest.update(path.relative_to(ROOT).as_posix().encode())
         digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
 
 
-def user_folder(own, base, usual):
-    """Folder that the environment variable own names; else fowt_env in that of base, or in usual at home."""
-    given = os.environ.get(own)
-    if given:
-        return Path(given)
-    shared = os.environ.get(base)
-    return (Path(shared) if shared else Path.home() / usual) / "fowt_env"
+def own_folders(kernels):
+    """Folders of compiled kernels in a folder, those that this package made and no others."""
+    return [
+        path
+        for path in kernels.iterdir()
+        if OWN_NAME.fullmatch(path.name) and not path.is_symlink() and (path / MARKER).is_file()
+    ]
 
 
-def cache_root():
-    """Folder that holds the compiled kernels (FOWT_CACHE_DIR, else the user's cache folder)."""
-    return user_folder("FOWT_CACHE_DIR", "XDG_CACHE_HOME", ".cache")
+def _drop_oldest(folder):
+    """Remove what is older than KEEP_CACHES folders beside this one, unless a process may still use it."""
+    others = sorted(
+        (path for path in own_folders(folder.parent) if path != folder), key=lambda path: path.stat().st_mtime
+    )
+    day_ago = time.time() - 86400.0
+    for old in others[: max(0, len(others) - KEEP_CACHES)]:
+        if old.stat().st_mtime < day_ago:
+            shutil.rmtree(old, ignore_errors=True)
 
 
-def _use_cache_folder():
-    """Point numba at this source version's folder; drop the oldest others. Returns the folder.
+def _places(folder):
+    """The folders that must be ours, one by one, for an inner one can only be looked at if its outer is."""
+    yield folder.parent
+    yield folder
+    yield from (Path(entry) for entry in os.scandir(folder) if entry.is_dir())
 
-    None where it cannot be written: kernels then go to a folder of this process alone, gone with it, since
-    numba refuses to define a cached function that has nowhere to go.
+
+def _cache_folder(sources):
+    """Folder of this source version's kernels, made if need be; the oldest others are dropped.
+
+    One that cannot be written, but is there, is read all the same. None, and kernels are then compiled in
+    each process, where there is none or, after a warning, where somebody else may have put files into it.
     """
     root = cache_root()
-    folder = root / _source_hash()
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        os.utime(folder)
-        others = sorted(
-            (p for p in root.iterdir() if p.is_dir() and p != folder),
-            key=lambda p: p.stat().st_mtime,
-        )
-        day_ago = time.time() - 86400.0  # a process that is still running may use a younger one
-        for old in others[: max(0, len(others) - KEEP_CACHES)]:
-            if old.stat().st_mtime < day_ago:
-                shutil.rmtree(old, ignore_errors=True)
-        tempfile.TemporaryFile(dir=folder).close()
-    except OSError:
-        own = tempfile.mkdtemp(prefix="fowt_env_")  # private: caches are code
-        atexit.register(shutil.rmtree, own, ignore_errors=True)
-        numba.config.CACHE_DIR = own
+    if root is None:
         return None
-    numba.config.CACHE_DIR = str(folder)
+    folder = root / "kernels" / _hash(sources)
+    with suppress(OSError):
+        make_private(folder)
+    try:
+        for place in _places(folder):
+            if fault := distrust(place):
+                warnings.warn(
+                    f"{place} {fault}, and compiled kernels are code: it is not used, and kernels are"
+                    " compiled at each start. Set FOWT_CACHE_DIR to a folder of your own",
+                    RuntimeWarning,
+                    stacklevel=2,
+                )
+                return None
+    except OSError:  # it could not be made, or cannot be read
+        return None
+    with suppress(OSError):  # it is somebody else's to care for
+        (folder / MARKER).touch(mode=0o600)
+        os.utime(folder)
+        _drop_oldest(folder)
     return folder
 
 
-CACHE_FOLDER = _use_cache_folder()
-kernel_cache.install()
+_KERNEL_SOURCES = kernel_sources()
+_IN_FOLDER_NAME = frozenset(map(str, _KERNEL_SOURCES))
+CACHE_FOLDER = _cache_folder(_KERNEL_SOURCES)
+_real_path = cache(os.path.realpath)
 
-_HOUSE = {"cache": True, "error_model": "numpy", "nogil": True}
+
+@cache
+def _other_sources():
+    """{path of each source of this project that does not shape the folder's name: hash of all of these}."""
+    others = [path for path in _sources(PACKAGES) if str(path) not in _IN_FOLDER_NAME]
+    return dict.fromkeys(map(str, others), _hash(others))
+
+
+def _keep(compiled, function):
+    """Have what numba made of a function kept on disk, if all that it can depend on is in its key.
+
+    A user's function is not: it may use helpers and numbers of any file.
+    """
+    if CACHE_FOLDER is None:
+        return
+    path = _real_path(function.__code__.co_filename)
+    if path in _IN_FOLDER_NAME:
+        compiled._cache = KernelCache(function, CACHE_FOLDER)
+    elif path.startswith(f"{ROOT}{os.sep}") and path in _other_sources():
+        compiled._cache = KernelCache(function, CACHE_FOLDER, _other_sources()[path])
+
+
+def _decorator(**options):
+    """Decorator: numba.njit with these options, and kept on disk."""
+
+    def decorate(function):
+        compiled = numba.njit(**options)(function)
+        if compiled is not function:  # as it is under NUMBA_DISABLE_JIT
+            _keep(compiled, function)
+        return compiled
+
+    return decorate
+
+
+_HOUSE = {"error_model": "numpy", "nogil": True}
 
 # _nrt=False: numba counts references at every slice and call that takes arrays, each an atomic
 # instruction; without them a step takes a third less time. Such a kernel must not allocate, nor
 # return an array or a part that holds one.
-kernel = numba.njit(**_HOUSE, _nrt=False)
+kernel = _decorator(**_HOUSE, _nrt=False)
 
 # No fastmath anywhere: LLVM then orders a sum differently in each caller's copy of a function, and a
 # process that compiles gets other last bits than one that loads from disk (seen on the look-up rotor
@@ -117,13 +188,13 @@ kernel = numba.njit(**_HOUSE, _nrt=False)
 
 # A kernel put into its caller whatever its size. A call hands over a scene by value, some 400 words: that
 # takes longer than most loads, so what lies between a run and its loads is put into the run.
-inlined_kernel = numba.njit(**_HOUSE, _nrt=False, forceinline=True)
+inlined_kernel = _decorator(**_HOUSE, _nrt=False, forceinline=True)
 
 # Functions that take a Box, which is a counted reference, or that allocate.
-entry = numba.njit(**_HOUSE)
+entry = _decorator(**_HOUSE)
 
 # The same with its prange loops spread over threads.
-parallel_entry = numba.njit(**_HOUSE, parallel=True)
+parallel_entry = _decorator(**_HOUSE, parallel=True)
 
 FLOATS = types.float64[::1]
 CONTROL_SIGNATURE = types.void(FLOATS, FLOATS, FLOATS, FLOATS)
@@ -133,11 +204,16 @@ def control_kernel(function):
     """Compile a control law to a first-class function, so that one compiled loop serves them all.
 
     function(parameters, memory, measurement, command): four (n,) float64 arrays; it reads the
-    first and third and writes the second and fourth. Under NUMBA_DISABLE_JIT it stays Python.
+    first and third and writes the second and fourth. A user's law is compiled in each process, a fifth
+    of a second. Under NUMBA_DISABLE_JIT it stays Python.
     """
     if numba.config.DISABLE_JIT:
         return function
-    return numba.cfunc(CONTROL_SIGNATURE, cache=True, error_model="numpy")(function)
+    signature = CONTROL_SIGNATURE.args, CONTROL_SIGNATURE.return_type
+    compiled = CFunc(function, signature, locals={}, options={"error_model": "numpy"})
+    _keep(compiled, function)
+    compiled.compile()
+    return compiled
 
 
 if numba.config.DISABLE_JIT:

@@ -4,14 +4,23 @@ Numba reads a function's index, adds an entry and writes it back without a lock,
 machine code by what it read: of two processes that compile at once one loses its entry, or finds the other's
 code under it. A broken file, or no room for a new one, ends the program. Here entries are added under a lock,
 a broken file is as good as none, and what cannot be kept is compiled again the next time.
+
+The files are pickles, which run code as they are read: one that may be from somebody else is not.
 """
 
 import fcntl
+import inspect
 import itertools
 import os
-from contextlib import contextmanager
+import stat
+import tempfile
+from contextlib import contextmanager, suppress
+from functools import partial
 
+import numba
 from numba.core import caching
+
+from fowt_env.folders import distrust, make_private
 
 
 class SharedCacheFile(caching.IndexDataCacheFile):
@@ -35,7 +44,7 @@ class SharedCacheFile(caching.IndexDataCacheFile):
     @contextmanager
     def _lock(self):
         """Context that one process at a time is in."""
-        handle = os.open(self._index_path + ".lock", os.O_RDWR | os.O_CREAT, 0o666)
+        handle = os.open(self._index_path + ".lock", os.O_RDWR | os.O_CREAT, 0o600)
         try:
             fcntl.flock(handle, fcntl.LOCK_EX)
             yield
@@ -44,17 +53,88 @@ class SharedCacheFile(caching.IndexDataCacheFile):
 
     def _load_index(self):
         try:
+            _check(self._index_path)
             return super()._load_index()
         except Exception:  # whatever unpickling a broken file raises
             return {}
 
     def _load_data(self, name):
         try:
+            _check(self._data_path(name))
             return super()._load_data(name)
         except Exception as error:  # likewise; numba compiles anew where the file cannot be read
             raise OSError(f"{name}: {error}") from error
 
+    @contextmanager
+    def _open_for_write(self, path):
+        """Context with a file that takes the path's place at its end, private whatever the umask."""
+        handle, temporary = tempfile.mkstemp(dir=self._cache_path, prefix=os.path.basename(path) + ".tmp.")
+        try:
+            with os.fdopen(handle, "wb") as file:
+                yield file
+            os.replace(temporary, path)
+        except BaseException:
+            with suppress(OSError):
+                os.unlink(temporary)
+            raise
 
-def install():
-    """Have numba keep the compiled functions of this process in SharedCacheFiles."""
-    caching.IndexDataCacheFile = SharedCacheFile
+
+def _check(path):
+    """Raises: PermissionError for a file that somebody else may have written."""
+    fault = distrust(path, stat.S_ISREG)
+    if fault:
+        raise PermissionError(f"{path} {fault}")
+
+
+class _Locator(caching.UserProvidedCacheLocator):
+    """Where a kernel's files are: in the folder that it is told, and not where numba's settings say."""
+
+    def __init__(self, function, path, folder, stamp):
+        self._py_file = path
+        self._lineno = function.__code__.co_firstlineno
+        self._cache_path = os.path.join(folder, self.get_suitable_cache_subpath(path))
+        self._stamp = stamp
+
+    def get_source_stamp(self):
+        """What must not have changed: the function's file, and the stamp."""
+        return super().get_source_stamp(), self._stamp
+
+    def ensure_cache_path(self):
+        """Make the folder if it can be made; where it cannot, nothing is kept."""
+        with suppress(OSError):
+            make_private(self._cache_path)
+
+
+class _Files(caching.CompileResultCacheImpl):
+    """Numba's rules on what can be kept and what it is called, with our locator."""
+
+    def __init__(self, function, folder, stamp):
+        path = inspect.getfile(function)
+        self._lineno = function.__code__.co_firstlineno
+        self._locator = _Locator(function, path, folder, stamp)
+        module = os.path.splitext(os.path.basename(path))[0]
+        self._filename_base = self.get_filename_base(f"{module}.{function.__qualname__}", "")
+
+
+class KernelCache(caching.FunctionCache):
+    """Cache of one compiled function beneath a folder, for compiled functions' attribute _cache.
+
+    stamp: whatever it depends on beside its own file, its key and the name of the folder.
+    """
+
+    def __init__(self, function, folder, stamp=""):
+        self._impl_class = partial(_Files, folder=folder, stamp=stamp)
+        super().__init__(function)
+        file = getattr(self, "_cache_file", None)
+        if type(file) is not caching.IndexDataCacheFile:
+            raise ImportError(f"numba {numba.__version__} keeps compiled functions in a way that unknown")
+        locator = self._impl.locator
+        self._cache_file = SharedCacheFile(
+            locator.get_cache_path(), self._impl.filename_base, locator.get_source_stamp()
+        )
+
+    def save_overload(self, sig, data):
+        """Keep the machine code for a signature, unless a compiled function is among its arguments: that is
+        compiled into it, and as no other process knows it again, each would add its own."""
+        if "CPUDispatcher(" not in repr(sig):
+            super().save_overload(sig, data)

@@ -3,14 +3,15 @@
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from fowt_env.dynamics import derivative
-from fowt_env.jit import entry
+from fowt_env.measurement import N_MEASUREMENTS
 from fowt_env.state import Pose, State
+from fowt_env.step import forget, observe
 
 
-@entry
 def _rates(box, t, x, u, dx):
-    derivative(t, x, u, box.scene, box.work, dx)
+    """Fill dx by what is compiled for the runs themselves: a kernel of the tests would not be kept."""
+    forget(box)
+    observe(box, x, u, t, dx, np.zeros(N_MEASUREMENTS))
 
 
 def rates(scene, x, u=(0.0, 0.0), t=0.0, box=None):

@@ -3,12 +3,15 @@
 import os
 import subprocess
 import sys
+import tomllib
 from importlib import metadata
+from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
-from fowt_env import cli, health
+import fowt_env
+from fowt_env import cli, health, jit, requirements
 
 REQUIRES = [
     "numpy>=2.0",
@@ -40,15 +43,15 @@ def test_a_wrong_figure_fails_with_code_1(monkeypatch):
 
 
 def test_versions_are_those_installed(monkeypatch):
-    monkeypatch.setattr(health.metadata, "requires", lambda name: REQUIRES)
-    found = {package.name: package.version for package in health.versions()}
+    monkeypatch.setattr(metadata, "requires", lambda name: REQUIRES)
+    found = {package.name: package.version for package in requirements.versions()}
     assert found["numpy"] == metadata.version("numpy")
     assert found["Python"] == ".".join(map(str, sys.version_info[:3]))
 
 
 def test_a_missing_part_is_told_with_how_to_install_it(monkeypatch):
-    monkeypatch.setattr(health.metadata, "requires", lambda name: REQUIRES)
-    assert set(health.optional_parts()) == {"plot", "magic"}
+    monkeypatch.setattr(metadata, "requires", lambda name: REQUIRES)
+    assert set(requirements.optional_parts()) == {"plot", "magic"}
     stdout = doctor("--no-test")
     (line,) = (line for line in stdout.splitlines() if "magic" in line)
     assert "missing" in line and 'pip install "fowt-env[magic]"' in line
@@ -60,7 +63,7 @@ def test_a_folder_that_was_never_installed_is_no_failure(monkeypatch):
     def absent(name):
         raise metadata.PackageNotFoundError(name)
 
-    monkeypatch.setattr(health.metadata, "requires", absent)
+    monkeypatch.setattr(metadata, "requires", absent)
     assert "pip install -e ." in doctor("--no-test")
 
 
@@ -68,12 +71,14 @@ def test_the_cache_is_measured_and_other_versions_counted(tmp_path, monkeypatch)
     folder = tmp_path / "this"
     (folder / "loads").mkdir(parents=True)
     (folder / "loads" / "kernel.nbi").write_bytes(b"0" * 2_000_000)
-    (tmp_path / "older").mkdir()
-    monkeypatch.setenv("FOWT_CACHE_DIR", str(tmp_path))
+    for name in ("0123456789abcdef", "somebody's"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / jit.MARKER).touch()
     monkeypatch.setattr(health, "CACHE_FOLDER", folder)
     monkeypatch.setattr("fowt_env.warmup.CACHE_FOLDER", folder)
     state = health.cache_state()
-    assert (state.folder, state.usable, state.compiled, state.others) == (folder, True, True, 1)
+    assert (state.folder, state.others) == (folder, 1)
+    assert state.read and state.written and state.compiled
     assert state.megabytes == pytest.approx(2.0)
     assert "2.0 MB" in doctor("--no-test") and str(folder) in doctor("--no-test")
 
@@ -81,8 +86,72 @@ def test_the_cache_is_measured_and_other_versions_counted(tmp_path, monkeypatch)
 def test_a_cache_that_cannot_be_used_is_told_with_what_to_do(monkeypatch):
     monkeypatch.setattr(health, "CACHE_FOLDER", None)
     monkeypatch.setattr("fowt_env.warmup.CACHE_FOLDER", None)
-    assert not health.cache_state().usable
-    assert "FOWT_CACHE_DIR" in doctor("--no-test")
+    assert not health.cache_state().read
+    assert "FOWT_CACHE_DIR to a folder" in doctor("--no-test")
+
+
+def test_a_cache_that_is_read_only_is_told(monkeypatch, tmp_path):
+    monkeypatch.setattr(health, "CACHE_FOLDER", tmp_path)
+    monkeypatch.setattr(health.os, "access", lambda path, mode: False)
+    assert "read only" in doctor("--no-test")
+
+
+@pytest.mark.parametrize(
+    ("found", "word"), [("0.61.0", "old"), ("0.67.1rc1", "old"), ("0.69.0", "new"), ("1.0", "new")]
+)
+def test_a_numba_that_cannot_compile_the_kernels_is_told_before_it_is_tried(found, word, monkeypatch):
+    """Whatever the metadata says, which may be that of an older checkout."""
+    real = metadata.version
+    monkeypatch.setattr(metadata, "requires", lambda name: ["numba>=0.1"])
+    monkeypatch.setattr(metadata, "version", lambda name: found if name == "numba" else real(name))
+    monkeypatch.setitem(sys.modules, "fowt_env.health", None)  # whose import ends the program
+    monkeypatch.delattr(fowt_env, "health")
+    stdout = doctor(code=1)
+    assert f"numba {found} is too {word}: pip install 'numba{requirements.NUMBA}'" in stdout
+    with pytest.raises(ImportError, match=f"numba {found} is too {word}"):
+        requirements.check_numba(found)
+
+
+def test_the_kernels_of_another_numba_are_not_even_tried():
+    code = "import numba; numba.__version__ = '0.61.0'\nimport fowt_env.state"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=os.environ)
+    assert done.stderr.splitlines()[-1].startswith("ImportError: numba 0.61.0 is too old: pip install")
+
+
+def test_a_requirement_that_is_not_met_is_told_and_fails(monkeypatch):
+    asked = ["numpy<3,>=99.0", "scipy>=1", 'matplotlib<2; extra == "plot"']
+    monkeypatch.setattr(metadata, "requires", lambda name: asked)
+    stdout = doctor(code=1)
+    assert f"numpy {metadata.version('numpy')} is too old: pip install 'numpy<3,>=99.0'" in stdout
+    assert "scipy " in stdout and "scipy is" not in stdout
+    (line,) = (line for line in stdout.splitlines() if "matplotlib" in line)
+    assert "needed: <2" in line and 'pip install "fowt-env[plot]"' in line
+
+
+def test_what_numba_itself_refuses_is_told_in_a_line(monkeypatch):
+    monkeypatch.setitem(sys.modules, "fowt_env.health", None)
+    monkeypatch.delattr(fowt_env, "health")
+    stdout = doctor(code=1)
+    assert "Traceback" not in stdout and "fowt_env.health" in stdout.splitlines()[-1]
+
+
+@pytest.mark.parametrize(
+    ("version", "needed", "fits"),
+    [
+        ("2.0", ">=2.0", True), ("2", ">=2.0.0", True), ("1.26.4", ">=2.0", False), ("3.1", "==2.*", True),
+        ("2.13.0+cpu", "==2.13.0", True),
+        ("0.9", "<0.10", True), ("0.68.10", ">=0.68,<0.69", True), ("2.0.dev3", "<2,>=1.0", False),
+        ("3.1", "!=3.1", False), ("3.1", "", True), ("1.4", "~=1.3", True),
+    ],
+)  # fmt: skip
+def test_versions_are_compared_by_their_numbers(version, needed, fits):
+    assert requirements.satisfies(version, needed) is fits
+
+
+def test_the_bounds_of_numba_are_those_of_the_metadata():
+    with open(Path(fowt_env.__file__).parent.parent / "pyproject.toml", "rb") as file:
+        needed = tomllib.load(file)["project"]["dependencies"]
+    assert f"numba{requirements.NUMBA}" in needed
 
 
 def test_help_of_the_command_line_does_not_wait_for_numba():

@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 import fowt_env
 from controllers import make
-from fowt_env import cli, health, warmup
+from fowt_env import cli, health, jit, requirements, warmup
 from fowt_env.description import DATA, read_platform
 from fowt_env.envs import FowtEnv
 
@@ -96,6 +96,21 @@ def _(folder, monkeypatch):
 def _(folder, monkeypatch):
     monkeypatch.setattr(health, "CACHE_FOLDER", None)
     return health.cache_state().advice
+
+
+@under("Every run takes a minute")
+def _(folder, monkeypatch):
+    monkeypatch.setenv("FOWT_CACHE_DIR", str(folder))
+    (folder / "kernels").mkdir()
+    (folder / "kernels").chmod(0o777)
+    with pytest.warns(RuntimeWarning) as caught:
+        assert jit._cache_folder(jit.kernel_sources()) is None
+    return str(caught[0].message)
+
+
+@under("Numba is too old or too new")
+def _(folder, monkeypatch):
+    return message(ImportError, requirements.check_numba, "0.61.0")
 
 
 @under("Numba refuses NumPy")

@@ -61,7 +61,7 @@ def test_sdist_and_wheel_hold_every_data_file_and_the_licence(built):
     assert data_files() - in_sdist == set()
     assert data_files() - in_wheel == set()
     assert any(name.endswith("LICENSE") for name in in_wheel)
-    assert any(name.endswith("fowt_env_registration.pth") for name in in_wheel)
+    assert "fowt_env_registration.pth" in in_wheel and not any(".data/" in name for name in in_wheel)
     assert not any(name.startswith("tests/") for name in in_wheel)
 
 

@@ -10,8 +10,9 @@ import hashlib
 import hmac
 import os
 import secrets
+import stat
 
-from fowt_env.jit import user_folder
+from fowt_env.folders import distrust, make_private, user_folder
 
 SEAL = "seal.txt"
 KEY = "checkpoint_key"
@@ -19,15 +20,18 @@ KEY_BYTES = 32
 
 
 def config_folder():
-    """Folder of what belongs to the user and not to a run."""
+    """Folder of what belongs to the user and not to a run; None for a user without a home."""
     return user_folder("FOWT_CONFIG_DIR", "XDG_CONFIG_HOME", ".config")
 
 
 def _key():
-    """The user's key, made where there is none; None where that cannot be."""
-    path = config_folder() / KEY
+    """The user's key, made where there is none; None where that cannot be, or others may know the key."""
+    folder = config_folder()
+    if folder is None:
+        return None
+    path = folder / KEY
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+        make_private(folder)
         temporary = path.with_name(f".{KEY}-{os.getpid()}-{secrets.token_hex(4)}")
         if not path.exists():
             handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
@@ -39,6 +43,8 @@ def _key():
                 pass
             finally:
                 temporary.unlink()
+        if distrust(path, stat.S_ISREG) or path.stat().st_mode & (stat.S_IRWXG | stat.S_IRWXO):
+            return None
         key = path.read_bytes()
     except OSError:
         return None

@@ -2,11 +2,12 @@
 
 import hashlib
 import json
+from contextlib import suppress
 
 import numpy as np
 
 from fowt_env.description import Platform, Turbine, read_platform, read_turbine
-from fowt_env.jit import cache_root
+from fowt_env.folders import cache_root, distrust, make_private
 from fowt_env.outputs import replacing
 from fowt_env.weather.wind_field import WindBox, read_box
 
@@ -34,15 +35,31 @@ def cached_box(spec, platform, seed, options):
         return read_box(spec, **arguments)
     text = json.dumps([FORMAT, spec, arguments], sort_keys=True)
     name = hashlib.sha256(text.encode()).hexdigest()[:24]
-    path = cache_root() / "wind_boxes" / f"{name}.npz"
+    folder = _folder()
+    if folder is None:
+        return read_box(spec, **arguments)
+    path = folder / f"{name}.npz"
     if path.exists():
         try:
             with path.open("rb") as content, np.load(content, allow_pickle=False) as file:
                 values = {key: file[key] for key in ARRAYS}
                 return WindBox(**values, **{key: file[key].item() for key in NUMBERS})
         except Exception:  # whatever a broken file makes numpy raise: it is made again
-            path.unlink(missing_ok=True)
+            pass
     box = read_box(spec, **arguments)
-    with replacing(path) as temporary:
+    with suppress(OSError), replacing(path) as temporary:  # without room it is made again the next time
         np.savez(temporary, **{key: getattr(box, key) for key in (*ARRAYS, *NUMBERS)})
     return box
+
+
+def _folder():
+    """Folder for boxes, beside that of the kernels; None where there can be none of this user's own."""
+    root = cache_root()
+    if root is None:
+        return None
+    folder = root / "wind_boxes"
+    try:
+        make_private(folder)
+        return None if distrust(folder) else folder
+    except OSError:
+        return None

@@ -1,5 +1,7 @@
 """Boxes of wind that are kept: made once, and again where their file is broken."""
 
+import os
+
 import numpy as np
 import pytest
 
@@ -45,3 +47,37 @@ def test_a_broken_file_is_made_again(made, tmp_path, content):
     np.testing.assert_array_equal(box().velocity, made[0].velocity)
     box()
     assert len(made) == 2
+
+
+@pytest.mark.parametrize("given", ["a file", "open to all", "nowhere"])
+def test_without_a_folder_of_ones_own_boxes_are_made_each_time(given, made, tmp_path, monkeypatch):
+    if given == "a file":
+        (tmp_path / "file").write_text("")
+        monkeypatch.setenv("FOWT_CACHE_DIR", str(tmp_path / "file"))
+    elif given == "open to all":
+        (tmp_path / "wind_boxes").mkdir()
+        (tmp_path / "wind_boxes").chmod(0o777)
+    else:
+        monkeypatch.setattr(wind_boxes, "cache_root", lambda: None)
+    box(), box()
+    assert len(made) == 2
+    assert not list(tmp_path.rglob("*.npz"))
+
+
+def test_a_box_for_which_there_is_no_room_is_used_all_the_same(made, tmp_path, monkeypatch):
+    def full(file, **arrays):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(wind_boxes.np, "savez", full)
+    np.testing.assert_array_equal(box().velocity, made[0].velocity)
+    assert not list((tmp_path / "wind_boxes").iterdir())
+
+
+def test_the_folder_of_boxes_is_private_whatever_the_umask(made, tmp_path, monkeypatch):
+    monkeypatch.setenv("FOWT_CACHE_DIR", str(tmp_path / "new"))
+    before = os.umask(0)
+    try:
+        box()
+    finally:
+        os.umask(before)
+    assert (tmp_path / "new" / "wind_boxes").stat().st_mode & 0o777 == 0o700
