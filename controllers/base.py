@@ -8,6 +8,7 @@ Beside reset and act a controller may have
   that a comparison can say who knew what.
 """
 
+import reprlib
 import tomllib
 from collections.abc import Callable
 from math import isfinite
@@ -113,12 +114,23 @@ class CheckedController:
             return float(values[0]), float(values[1])
         time = float(measurement.time)
         raise ControllerError(
-            f"controller {self.name!r} returned {returned!r} at t = {time:.3f} s: act() must return two"
+            f"controller {self.name!r} returned {_shown(returned)} at t = {time:.3f} s: act() must return two"
             " finite numbers, (generator torque in N m on the high-speed shaft, blade pitch in rad)",
             controller=self.name,
             time=time,
             returned=returned,
         )
+
+
+def _shown(value: Any) -> str:
+    """repr of a controller's answer in some 200 characters, whatever it is."""
+    short = reprlib.Repr()
+    short.maxother = short.maxstring = short.maxlong = 200
+    try:
+        text = short.repr(value)
+    except Exception:  # of an element, which reprlib asks as it is
+        text = f"<{type(value).__name__}>"
+    return f"{text[:200]}..." if len(text) > 200 else text
 
 
 def tuned(name: str) -> dict[str, Any]:

@@ -74,6 +74,8 @@ def reported(command):
             fail(error, EXIT_INPUT)
         except KeyboardInterrupt:
             fail("interrupted", EXIT_INTERRUPTED)
+        except (SystemExit, GeneratorExit) as error:  # of a controller or a library, not the command's own
+            fail(f"ended early by {type(error).__name__}: {error}", EXIT_STOPPED)
 
     return run
 
@@ -277,6 +279,9 @@ def evaluate(
     jobs: Annotated[int, typer.Option(help="Worker processes.")] = 1,
     engine: Annotated[str, typer.Option(help="processes, or ray.")] = "processes",
     address: Annotated[str | None, typer.Option(help="Address of a running Ray cluster.")] = None,
+    time_limit: Annotated[
+        float, typer.Option(help="Seconds of the clock after which a run fails; 0: never.")
+    ] = 3600.0,
     out_folder: Annotated[
         str, typer.Option("--out", help="Folder for what is written.")
     ] = "results/evaluation",
@@ -314,6 +319,7 @@ def evaluate(
                 folder=folder,
                 engine=engine,
                 address=address,
+                time_limit=time_limit or None,
             )
         except KeyboardInterrupt:
             place = f"in {folder / 'results.csv'}; the same command goes on with the others"
@@ -336,6 +342,9 @@ def _print_evaluation(table, means, board):
         err.print(
             f"[red]failed: {escape(run)}: {escape(row['reason'])}[/red]", soft_wrap=True, highlight=False
         )
+    eventful = table[table["events"] != ""]
+    if len(eventful):
+        note(f"{len(eventful)} of {len(table)} runs had rare numerical events: column events of results.csv")
     for entry in board["controllers"]:
         if entry["score"] and not entry["score"]["valid"]:
             note(f"no valid score of {entry['controller']}: {entry['score']['why']}")

@@ -3,7 +3,8 @@
 import errno
 import os
 import re
-import tempfile
+import secrets
+import stat
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,22 +24,26 @@ SERIES_SUFFIXES = (*TABLE_SUFFIXES, ".outb")  # of a time series, which OpenFAST
 def replacing(path):
     """Path of a temporary file beside `path` that takes its place when the block ends well.
 
+    A file that is replaced leaves its rights to the new one; a link goes on pointing, to the new content.
     Raises: OSError naming the path where there cannot be one, or the disk has no room for it.
     """
     path = Path(path)
+    target = Path(os.path.realpath(path)) if path.is_symlink() else path
+    name = target.with_name(f".{target.stem}-{os.getpid()}-{secrets.token_hex(4)}{target.suffix}")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        prefix = f".{path.stem}-{os.getpid()}-"
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=prefix, suffix=path.suffix)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        mode = stat.S_IMODE(target.stat().st_mode) if target.exists() else None
+        # a new file's rights are those that the process's mask leaves; what is replaced may be private
+        os.close(os.open(name, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666 if mode is None else 0o600))
     except OSError as error:  # which names the temporary file
         raise OSError(error.errno, f"cannot be written: {error.strerror}", str(path)) from error
-    os.close(handle)
     try:
-        yield Path(name)
-        os.chmod(name, 0o666 & ~_umask())
-        os.replace(name, path)
+        yield name
+        if mode is not None:
+            name.chmod(mode)
+        os.replace(name, target)
     except BaseException as error:
-        Path(name).unlink(missing_ok=True)
+        name.unlink(missing_ok=True)
         if isinstance(error, OSError) and error.errno in NO_ROOM:  # it names nothing, or the temporary file
             raise no_room(error, path) from error
         raise
@@ -71,13 +76,6 @@ def process_lives(number):
     except PermissionError:
         return True
     return True
-
-
-def _umask():
-    """The process's file mode mask (reading it means setting it for an instant)."""
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
 
 
 def table_path(path, allowed=TABLE_SUFFIXES):

@@ -51,6 +51,38 @@ def test_files_get_the_mode_that_the_user_asked_for(tmp_path):
     assert path.stat().st_mode & 0o777 == 0o640
 
 
+@pytest.mark.parametrize("mode", [0o600, 0o444, 0o664])
+def test_a_file_that_is_written_anew_keeps_its_rights(tmp_path, mode):
+    path = tmp_path / "run.csv"
+    path.write_text("private")
+    path.chmod(mode)
+    with replacing(path) as temporary:
+        assert temporary.stat().st_mode & 0o077 == 0  # nobody reads it before it is in its place
+        temporary.write_text("anew")
+    assert path.stat().st_mode & 0o777 == mode and path.read_text() == "anew"
+
+
+def test_a_link_goes_on_pointing_to_the_new_content(tmp_path):
+    (tmp_path / "disk").mkdir()
+    target, link, dangling = tmp_path / "disk" / "run.csv", tmp_path / "run.csv", tmp_path / "new.csv"
+    target.write_text("old")
+    link.symlink_to("disk/run.csv")
+    dangling.symlink_to(tmp_path / "later" / "new.csv")
+    for path in (link, dangling):
+        write_table(FRAME, path)
+        assert path.is_symlink()
+        pd.testing.assert_frame_equal(read_table(path), FRAME)
+    assert target.read_text() == (tmp_path / "later" / "new.csv").read_text() != "old"
+    assert sorted(path.name for path in tmp_path.rglob("*")) == ["disk", "later", "new.csv", "new.csv"] + [
+        "run.csv", "run.csv",
+    ]  # fmt: skip
+
+
+def test_the_mask_of_the_process_is_never_changed(tmp_path, monkeypatch):
+    monkeypatch.delattr(os, "umask")
+    write_table(FRAME, tmp_path / "run.csv")
+
+
 def test_wrong_endings_and_missing_files_are_named(tmp_path):
     with pytest.raises(InputError, match="run.xlsx"):
         write_table(FRAME, tmp_path / "run.xlsx")

@@ -10,8 +10,9 @@ is a row with its reason, and the others go on. With jobs > 1 a script needs the
 
 import csv
 import io
-from dataclasses import dataclass
-from math import degrees
+import socket
+from contextlib import closing
+from functools import partial
 from pathlib import Path
 
 import pandas as pd
@@ -19,44 +20,32 @@ import pyarrow.parquet as pq
 
 import fowt_env
 from controllers import make
-from fowt_env.errors import ControllerError, ControllerInputError, InputError, SimulationStopped
+from fowt_env.errors import InputError
 from fowt_env.outputs import replacing, write_table
-from fowt_env.weather.wind_field import is_field
+from fowt_env.records import is_number, plain_number
 from training.cases import Case, Suite, described, named_cases
 from training.engines import outcomes
-from training.faults import faulted, idling
+from training.guard import attempt
 from training.metrics import METRICS, metrics
-from training.results import controller_code, open_results, parquet_of, run_file, write_run
-from training.shifts import Unaware, shifted_parts
-from training.wind_boxes import cached_box
+from training.results import (
+    check_name,
+    controller_code,
+    open_results,
+    parquet_of,
+    run_file,
+    version_gap,
+    versions,
+    write_run,
+)
+from training.scoring import COLUMNS, CONTROL_DT, SHORTEST_WEATHER, Run, lost_row, scored
 
-__all__ = ["COLUMNS", "Case", "evaluate", "metrics", "named_cases", "run_file", "summary"]
+__all__ = ["COLUMNS", "SHORTEST_WEATHER", "Case", "evaluate", "metrics", "named_cases", "run_file", "summary"]
 
 DURATION, SKIP, SEEDS = 660.0, 60.0, (1,)  # where neither the caller nor a suite says otherwise
 PARKED = "parked"  # what stands for the controller of a parked turbine
-CONTROL_DT = 0.1  # s, simulate's own
-
-SHORTEST_WEATHER = 700.0  # s of wind and waves: shorter runs see the start of the same realisation
-COLUMNS = ("controller", "case", "seed", "status", "reason", "stopped_[s]", "scored_[s]", *METRICS)
-
-
-@dataclass(frozen=True)
-class Run:
-    """One controller on one realisation of one case."""
-
-    label: str
-    controller: object  # name or object, as simulate takes it
-    case: Case
-    seed: int
-    duration: float
-    skip: float
-    options: dict  # further options of simulate
-    frame_path: Path | None  # where the time series goes
-
-    @property
-    def key(self):
-        """What tells runs of one evaluation apart."""
-        return self.label, self.case.name, self.seed
+LARGEST_SEED = 2**63 - 1  # of a column of whole numbers
+# s of wall clock: a run of eleven minutes takes 0.05 s with compiled laws and some minutes with slow Python
+TIME_LIMIT = 3600.0
 
 
 def evaluate(
@@ -72,6 +61,7 @@ def evaluate(
     folder=None,
     engine="processes",
     address=None,
+    time_limit=TIME_LIMIT,
     **options,
 ):
     """DataFrame with one row per controller, case and seed, and the columns COLUMNS.
@@ -88,10 +78,13 @@ def evaluate(
     folder        results folder (training.results) instead of out and runs_folder: what is done in it is not
                   done again, and the table is that of the whole folder
     engine        "processes" or "ray" (address: of a running cluster)
+    time_limit    seconds of wall clock after which a run fails; None: none. With jobs = 1 it is heard in the
+                  main thread alone, and not by C code that never returns; with more, the worker is ended
     options       further options of simulate: dt, control_dt, output_dt, start
     Failed runs have status "failed", the reason, and NaN metrics; so have those of a controller that cannot
-    be prepared, as where its library is missing. A parked turbine has no controller: such a
-    case is run once, under the name "parked".
+    be prepared, as where its library is missing, that calls sys.exit, or whose worker process dies three
+    times. Column events: rare numerical events of the run and how often each came. A parked turbine has no
+    controller: such a case is run once, under the name "parked".
     Raises: InputError for settings that no run could use.
     """
     if folder is not None:
@@ -100,7 +93,8 @@ def evaluate(
         runs_folder = Path(folder) / "runs"
     controllers = _labelled(controllers)
     suite = cases if isinstance(cases, Suite) else None
-    runs = _plan(controllers, _case_list(cases), suite, duration, skip, seeds, runs_folder, options)
+    given = (duration, skip, seeds, runs_folder, time_limit)
+    runs = _plan(controllers, _case_list(cases), suite, *given, options)
     _check_controllers(controllers, runs)
     if folder is not None:
         with open_results(folder, _settings(controllers, runs, suite, options), COLUMNS) as results:
@@ -118,9 +112,8 @@ def evaluate(
 def planned(controllers, cases, duration=None, skip=None, seeds=None, runs_folder=None, **options):
     """List of the Runs that evaluate would make of these arguments, for score."""
     suite = cases if isinstance(cases, Suite) else None
-    return _plan(
-        _labelled(controllers), _case_list(cases), suite, duration, skip, seeds, runs_folder, options
-    )
+    given = (duration, skip, seeds, runs_folder, TIME_LIMIT)
+    return _plan(_labelled(controllers), _case_list(cases), suite, *given, options)
 
 
 def _go(runs, total, jobs, progress, engine, address, keep):
@@ -130,17 +123,18 @@ def _go(runs, total, jobs, progress, engine, address, keep):
     report(before, total, None)
     rows = {}
     collect = engine == "ray"  # workers may be on machines that do not share this one's disk
-    for index, outcome in outcomes(score_and_send if collect else score, runs, jobs, engine, address):
-        if collect:
-            row, content = outcome
+    here = versions()
+    function, lost = (partial(score_and_send, here=here), _lost_and_sent) if collect else (score, _lost)
+    limit = runs[0].time_limit if runs else None
+    with closing(outcomes(function, runs, jobs, engine, address, limit, lost)) as ended:
+        for index, outcome in ended:
+            row, content = outcome if collect else (outcome, None)
             if content is not None:
                 with replacing(runs[index].frame_path) as temporary:
                     temporary.write_bytes(content)
-        else:
-            row = outcome
-        rows[runs[index].key] = row
-        keep(row)
-        report(before + len(rows), total, row)
+            rows[runs[index].key] = row
+            keep(row)
+            report(before + len(rows), total, row)
     return rows
 
 
@@ -149,7 +143,15 @@ def _labelled(controllers):
     if isinstance(controllers, str):
         controllers = [name.strip() for name in controllers.split(",") if name.strip()]
     if not isinstance(controllers, dict):
-        controllers = {name if isinstance(name, str) else type(name).__name__: name for name in controllers}
+        labelled = {}
+        for given in controllers:
+            name = given if isinstance(given, str) else getattr(given, "__name__", type(given).__name__)
+            if name in labelled and not isinstance(given, str):
+                raise InputError(f"controllers: two have the name {name!r}: give {{name: controller}}")
+            labelled[name] = given
+        controllers = labelled
+    for label in controllers:
+        check_name("controllers: the name", label)
     if PARKED in controllers:
         raise InputError(f"controllers: the name {PARKED!r} is that of turbines without one")
     return controllers
@@ -168,10 +170,14 @@ def _case_list(cases):
     return list(cases)
 
 
-def _plan(controllers, cases, suite, duration, skip, seeds, runs_folder, options):
+def _plan(controllers, cases, suite, duration, skip, seeds, runs_folder, time_limit, options):
     """The Runs of an evaluation, case by case, so that an interrupted one compares what it has."""
     if seeds is not None:
-        seeds = [int(seed) for seed in seeds]
+        seeds = [_seed(seed) for seed in seeds]
+    if time_limit is not None and not (is_number(time_limit) and time_limit > 0.0):
+        raise InputError(f"time_limit = {time_limit!r}: must be a positive number of seconds, or None")
+    if runs_folder is not None:
+        runs_folder = Path(runs_folder).absolute()  # of here, wherever a controller or a worker goes
     for what, given in (
         ("controllers", controllers),
         ("cases", cases),
@@ -181,8 +187,9 @@ def _plan(controllers, cases, suite, duration, skip, seeds, runs_folder, options
             raise InputError(f"{what}: at least one is needed")
     if len(set(seeds or ())) < len(seeds or ()) or len({case.name for case in cases}) < len(cases):
         raise InputError("seeds and names of cases must differ from each other")
-    runs = []
+    runs, places = [], {}
     for case in cases:
+        check_name("cases: the name", case.name)
         length = float(_first(duration, case.duration, suite and suite.duration, DURATION))
         start = float(_first(skip, case.skip, suite and suite.skip, SKIP))
         if not length > start >= 0.0:
@@ -196,8 +203,23 @@ def _plan(controllers, cases, suite, duration, skip, seeds, runs_folder, options
         for seed in _first(chosen, seeds, case.seeds, suite and suite.seeds, SEEDS):
             for label, controller in ({PARKED: None} if case.parked else controllers).items():
                 path = None if runs_folder is None else run_file(runs_folder, label, case.name, seed)
-                runs.append(Run(label, controller, case, seed, length, start, dict(options), path))
+                run = Run(label, controller, case, seed, length, start, dict(options), path, time_limit)
+                other = places.setdefault(str(path).casefold(), run)
+                if path is not None and other is not run:
+                    raise InputError(
+                        f"controller {other.label!r} in case {other.case.name!r} and controller {label!r} in"
+                        f" case {case.name!r} would have one file, {path.name!r}: give one another name"
+                    )
+                runs.append(run)
     return runs
+
+
+def _seed(value):
+    """A seed as an int. Raises: InputError."""
+    value = plain_number(value)
+    if not is_number(value) or value != int(value) or not 0 <= value <= LARGEST_SEED:
+        raise InputError(f"seeds: {value!r} is none: must be whole numbers in [0, {LARGEST_SEED}]")
+    return int(value)
 
 
 def _first(*values):
@@ -208,14 +230,12 @@ def _first(*values):
 def _check_controllers(controllers, runs):
     """Raises: InputError for a controller that cannot be made, before anything runs."""
     turbine = fowt_env.build_scene(runs[0].case.platform).turbine
+    control_dt = runs[0].options.get("control_dt", CONTROL_DT)
     for controller in controllers.values():
-        if isinstance(controller, str):
-            try:
-                make(controller, turbine, runs[0].options.get("control_dt", CONTROL_DT))
-            except InputError:
-                raise
-            except Exception:  # a bug of the user's: its runs fail with the reason, the others go on
-                continue
+        _, error = attempt(lambda given=controller: make(given, turbine, control_dt), runs[0].time_limit)
+        if isinstance(error, InputError):
+            raise error
+        # any other is a bug of the user's: its runs fail with the reason, the others go on
 
 
 def _settings(controllers, runs, suite, options):
@@ -243,86 +263,43 @@ def _settings(controllers, runs, suite, options):
 
 def score(run):
     """Row {column: value} of one run; a run that fails gives its reason instead of metrics."""
-    row, frame = _scored(run)
+    row, frame = scored(run)
     if run.frame_path is not None:
         write_run(frame, row, run.frame_path)
     return row
 
 
-def score_and_send(run):
-    """(row, content of the run's file or None): score for a worker on another machine."""
-    row, frame = _scored(run)
+def score_and_send(run, here=None):
+    """(row, content of the run's file or None): score for a worker on another machine.
+
+    here: versions of the machine that collects the runs, or None.
+    Raises: InputError where this machine has others, which would not give the same bits.
+    """
+    if here is not None and (gap := version_gap(here, versions())):
+        raise InputError(f"engine = 'ray': {gap[0]} here and {gap[1]} at the worker {socket.gethostname()}")
+    return _sent(run, *scored(run))
+
+
+def _lost(run, reason):
+    """Row of a run whose worker ended, with its file."""
+    row = lost_row(run, reason)
+    if run.frame_path is not None:
+        write_run(None, row, run.frame_path)
+    return row
+
+
+def _lost_and_sent(run, reason):
+    """What score_and_send would return of a run whose worker ended."""
+    return _sent(run, lost_row(run, reason), None)
+
+
+def _sent(run, row, frame):
+    """(row, content of the run's file or None)."""
     if run.frame_path is None:
         return row, None
     content = io.BytesIO()
     pq.write_table(parquet_of(frame, row), content)
     return row, content.getvalue()
-
-
-def _scored(run):
-    """(row, time series or None) of one run."""
-    row = dict.fromkeys(COLUMNS, float("nan"))
-    row |= {"controller": run.label, "case": run.case.name, "seed": run.seed, "status": "ok", "reason": ""}
-    row["scored_[s]"] = run.duration - run.skip
-    case = run.case
-    options = {"duration": max(SHORTEST_WEATHER, run.duration), **case.options}
-    wind = case.wind
-    if is_field(wind):
-        wind = cached_box(wind, case.platform, run.seed, options)
-    known = scene = fowt_env.build_scene(case.platform, wind=wind, sea=case.sea, seed=run.seed, **options)
-    if case.shift is not None and case.shift.factors:
-        parts = shifted_parts(case.shift, case.platform)
-        scene = fowt_env.build_scene(wind=wind, sea=case.sea, seed=run.seed, **options | parts)
-    turbine = scene.turbine
-    try:
-        controller = _controller(run, known)
-        frame = fowt_env.simulate(
-            scene, controller=controller, duration=run.duration, initial=case.initial,
-            stop_overspeed=case.fault is None, grid_loss=_grid_loss(case), **run.options,
-        )  # fmt: skip
-        row |= metrics(
-            frame, run.skip, degrees(turbine.rated_rotor_speed) / 6.0, degrees(turbine.pitch_drive.rate_limit)
-        )
-    except Exception as error:  # whatever a controller raises costs its run, not the evaluation
-        if isinstance(error, InputError) and not isinstance(error, ControllerInputError):
-            raise  # the run's settings, which no controller could use
-        frame = getattr(error, "frame", None)
-        stopped = getattr(error, "time", float("nan"))
-        row |= {"status": "failed", "reason": _reason(error), "stopped_[s]": stopped}
-    return row, frame
-
-
-def _controller(run, known):
-    """What simulate is given as controller: the run's own, with its fault, or a parked turbine's.
-
-    known: the scene that the controller is told of.
-    """
-    case = run.case
-    if case.parked:
-        return idling(known.turbine) if known.wind_speed else None
-    if case.fault is None and case.shift is None:
-        return run.controller
-    control_dt = run.options.get("control_dt", CONTROL_DT)
-    controller = make(run.controller, known.turbine, control_dt)
-    if case.shift is not None:
-        controller = Unaware(controller, known, case.shift, run.seed)
-    return faulted(controller, case.fault, known.turbine, control_dt)
-
-
-def _grid_loss(case):
-    """Time (s) from which the case's generator is off the grid; None: never. A parked turbine's always is."""
-    if case.parked:
-        return 0.0
-    return None if case.fault is None else case.fault.grid_loss
-
-
-def _reason(error):
-    """One line that says why a run failed."""
-    if isinstance(error, SimulationStopped):
-        return str(error.reason)
-    if isinstance(error, ControllerError | ControllerInputError):
-        return str(error)
-    return f"{type(error).__name__}: {error}"
 
 
 def _cell(value):

@@ -10,7 +10,7 @@ from fowt_env.plots import TIME, plot_evaluation, plot_pareto, plot_runs, plot_s
 from fowt_env.plots_response import BOXES, plot_boxes
 from training.cases import Score, named_cases, read_suite
 from training.leaderboard import leaderboard
-from training.results import run_file, write_json
+from training.results import file_name, run_file, write_json
 
 # printed columns: heading, metric, format
 HEADLINE = (
@@ -208,7 +208,8 @@ def evaluation_plots(table, board, folder):
         seed = rows["seed"].iloc[0]
         names = rows.loc[rows["seed"] == seed, "controller"]
         runs = {name: read_table(run_file(folder / "runs", name, case, seed)) for name in names}
-        paths += [folder / f"timeseries_{case}.png", folder / f"spectra_{case}.png"]
+        name = file_name(case)
+        paths += [folder / f"timeseries_{name}.png", folder / f"spectra_{name}.png"]
         title = f"{case}, seed {seed}"
         plot_runs(runs, paths[-2], title)
         period = _platform_pitch_period(about["platform"])

@@ -26,7 +26,8 @@ from training.evaluate import run_file
 
 TABLES = ("results.csv", "metrics.csv")  # the first that is there
 KEYS = ("controller", "case", "seed", "status")
-NO_METRIC = (*KEYS, "reason", "stopped_[s]", "scored_[s]")
+WORDS = ("reason", "events")
+NO_METRIC = (*KEYS, *WORDS, "stopped_[s]", "scored_[s]")
 # columns that the leaderboard shows at once, those of them that the table has
 HEADLINE = (
     "RotSpeed_std_[rpm]",
@@ -89,7 +90,8 @@ def write_report(
     seeds      whose time series go in; None: the first of each case
     rate       samples per second of the drawn series, means over their interval; None: DISPLAY_RATE, or
                what MAX_POINTS allow
-    platform   whose steady schedule is shown; None: that of the manifest's cases, else oc3_hywind
+    platform   whose steady schedule is shown; None: that of the manifest's cases, else oc3_hywind; where its
+               file cannot be read here, the page says so in place of the schedule
     schedule   whether there is one (it takes some seconds)
     progress   called as progress(done, total, text)
     Raises: InputError for a folder without results, a table or run that cannot be read, an unknown case
@@ -107,7 +109,7 @@ def write_report(
     say = progress or (lambda done, total, text: None)
     chosen = _chosen_runs(table, cases, seeds)
     runs = _read_runs(folder, table, chosen, rate, say)
-    point = _schedule(platform or _platform_of(manifest), say) if schedule else None
+    point = _schedule(platform, _platform_of(manifest), say) if schedule else None
     data = _page_data(table, board_file, runs, point)
     texts = _page_texts(folder, table, manifest, board_file, data, runs, point)
     page = Path(__file__).parent / "report_page"
@@ -156,7 +158,7 @@ def read_results(folder):
     except (ValueError, TypeError, OverflowError) as error:
         raise InputError(f"table {str(path)!r}: column seed must hold whole numbers ({error})") from None
     figures = {}
-    for name in texts.columns.drop([n for n in (*KEYS, "reason") if n in texts.columns]):
+    for name in texts.columns.drop([n for n in (*KEYS, *WORDS) if n in texts.columns]):
         numbers = pd.to_numeric(texts[name].replace("", "nan"), errors="coerce")
         given = ~texts[name].str.lower().isin(["", "nan"])
         if numbers.notna().sum() == given.sum():  # else a column of words
@@ -303,10 +305,21 @@ def _platform_of(manifest):
     return only if isinstance(only, str) else "oc3_hywind"
 
 
-def _schedule(platform, say):
-    """{"platform", "wind", "panels"} of the steady operating points over wind speed."""
+def _schedule(asked, own, say):
+    """{"platform", "wind", "panels"} of the steady operating points over wind speed.
+
+    Of the platform that was asked for, else of the evaluation's own: {"platform", "missing": why} where that
+    is a file of another place.
+    """
     import fowt_env
 
+    platform = asked or own
+    try:
+        fowt_env.build_scene(platform)
+    except InputError as error:
+        if asked:
+            raise
+        return {"platform": platform, "missing": str(error)}
     points = []
     for number, speed in enumerate(SCHEDULE_WINDS):
         say(number, len(SCHEDULE_WINDS), f"steady point at {speed:g} m/s")
@@ -461,7 +474,7 @@ def _page_data(table, board_file, runs, schedule):
             {"label": f"{label}<br>({unit}²/Hz)", "channel": channel} for label, channel, unit in SPECTRA
         ],
         "titles": {**{name: name.replace("_", " ") for name in names}, **labels},
-        "schedule": schedule,
+        "schedule": None if schedule is None or "missing" in schedule else schedule,
     }
 
 
@@ -486,7 +499,13 @@ def _page_texts(folder, table, manifest, board_file, data, runs, schedule):
     summary = f'<summary class="bad">{len(failed)} failed runs</summary>'
     failures = f"<details open>{summary}<ul>{items}</ul></details>"
     section = ""
-    if schedule:
+    if schedule and "missing" in schedule:
+        why = html.escape(schedule["missing"])
+        section = (
+            '<section id="schedule"><div class="heading"><h2>Steady schedule</h2></div><p class="remark">'
+            f"Not shown: {why}. Give another with --platform, or none with --no-schedule.</p></section>"
+        )
+    elif schedule:
         where = html.escape(schedule["platform"])
         section = (
             '<section id="schedule"><div class="heading"><h2>Steady schedule</h2></div><p class="remark">'

@@ -9,7 +9,6 @@ A run is done when its Parquet file is there, and that file appears whole or not
 leaderboard.json are made from those files, so an interrupted evaluation loses and repeats nothing.
 """
 
-import ast
 import fcntl
 import hashlib
 import importlib.util
@@ -31,9 +30,12 @@ import pyarrow.parquet as pq
 import fowt_env
 from fowt_env.errors import InputError
 from fowt_env.outputs import remove_leftovers, replacing, write_table
+from fowt_env.records import is_number
 from fowt_env.textfiles import parse_json
+from training.guard import printable
+from training.sources import imported_files
 
-FORMAT = 1  # of the folder; raised when files or their meaning change
+FORMAT = 2  # of the folder; raised when files or their meaning change
 MANIFEST = {  # what each key of manifest.json holds, beside its format
     "fowt_env": str, "plant": str, "versions": dict, "created": str, "suite": dict | None, "options": dict,
     "cases": dict, "seeds": list, "controllers": dict,
@@ -41,15 +43,36 @@ MANIFEST = {  # what each key of manifest.json holds, beside its format
 ROW_KEY = b"fowt_env.row"
 TABLE_EVERY = 2.0  # s between rewritings of results.csv while runs go on
 PACKAGES = ("numpy", "numba", "scipy", "pandas", "rainflow", "rosco", "hipersim")
-SHAPING = ("metrics.py", "faults.py", "shifts.py", "randomisation.py")  # of this package, what shapes figures
-# sources that shape no figure of a run
-UNRELATED = ("cli.py", "cli_arguments.py", "cli_scores.py", "plots.py", "plots_scores.py", "warmup.py")
+NO_FIGURES = ("fowt_env", "python", "pandas")  # of the versions: compared otherwise, or shaping no figure
+ROOT = Path(fowt_env.__file__).resolve().parent.parent  # folder of the packages
+RUN = Path(__file__).resolve().parent / "scoring.py"  # what it imports shapes a run
+# of the controllers, what a run without any of them needs
+ALWAYS_CONTROLLERS = ("controllers/base.py", "controllers/constant.py")
+INSTALLED = {"site-packages", "dist-packages"}
+PLAIN_NAME = re.compile(r"[a-z0-9_][a-z0-9_.-]{0,99}")  # of a file that no other name's can be taken for
+LONGEST_NAME = 500
+TEXTS = ("controller", "case", "status", "reason", "events")  # of a row; its other columns are numbers
+STATUSES = ("ok", "failed")
 
 
 def run_file(folder, label, case, seed):
-    """Path of a run's time series; characters that files cannot or should not bear become _."""
-    safe = [re.sub(r"[^\w.-]", "_", text) for text in (label, case)]
-    return Path(folder) / safe[0] / f"{safe[1]}_seed{seed}.parquet"
+    """Path of a run's time series. Names that files should not bear get a hash, so that each has its own."""
+    return Path(folder) / file_name(label) / f"{file_name(case)}_seed{seed}.parquet"
+
+
+def file_name(text):
+    """A name as it is where every file system keeps it apart, else what can be read of it and a hash."""
+    if PLAIN_NAME.fullmatch(text):
+        return text
+    readable = re.sub(r"[^A-Za-z0-9_.-]", "_", text).lstrip(".")[:80]
+    return f"{readable}-{hashlib.sha256(text.encode('utf-8')).hexdigest()[:6]}"
+
+
+def check_name(what, name):
+    """Raises: InputError for the name of a controller or case that a table cannot hold."""
+    if not isinstance(name, str) or not name.strip() or not name.isprintable() or len(name) > LONGEST_NAME:
+        shown = printable(name) if isinstance(name, str) else type(name).__name__
+        raise InputError(f"{what} {shown!r} must be a printable text of at most {LONGEST_NAME} characters")
 
 
 def parquet_of(frame, row):
@@ -71,14 +94,33 @@ def read_row(path):
     """Row {column: value} in a run's file. Raises: InputError for a file that write_run did not write."""
     try:
         metadata = pq.read_schema(path).metadata or {}
-        row = json.loads(metadata[ROW_KEY])
-        if not isinstance(row, dict) or {"controller", "case", "seed"} - set(row):
-            raise ValueError("its row lacks controller, case or seed")
+        row = parse_json(metadata[ROW_KEY].decode("utf-8"))
+        _check_row(row)
     except (KeyError, ValueError, RecursionError, OSError, MemoryError, pa.ArrowException) as error:
         raise InputError(
             f"{str(path)!r} is no run of an evaluation ({error!s:.300}); remove it to run it again"
         ) from None
+    row["reason"] = printable(row["reason"])
     return {key: float("nan") if value is None else value for key, value in row.items()}
+
+
+def _check_row(row):
+    """Raises: ValueError for what is no row of a run."""
+    if not isinstance(row, dict) or {*TEXTS, "seed"} - set(row):
+        raise ValueError(f"its row lacks one of {', '.join((*TEXTS, 'seed'))}")
+    for name, value in row.items():
+        if name in TEXTS:
+            sound = isinstance(value, str)
+        elif name == "seed":
+            sound = type(value) is int and 0 <= value < 2**63
+        else:
+            sound = value is None or is_number(value)
+        if not sound:
+            raise ValueError(f"its row has {name} = {printable(repr(value))}")
+    for name in ("controller", "case"):
+        check_name(f"its row's {name}", row[name])
+    if row["status"] not in STATUSES:
+        raise ValueError(f"its row has status = {printable(row['status'])!r}, none of {', '.join(STATUSES)}")
 
 
 def _json(value, **options):
@@ -111,24 +153,36 @@ def _digest(paths):
     return digest.hexdigest()[:16]
 
 
+def plant_files():
+    """Sorted files that shape a run: sources that it imports and data, but for the controllers'."""
+
+    def inside(path):
+        package = path.relative_to(ROOT).parts[0]
+        return package in ("fowt_env", "training") or path.relative_to(ROOT).as_posix() in ALWAYS_CONTROLLERS
+
+    return sorted([*imported_files([RUN], [ROOT], inside), *_data(ROOT / "fowt_env")])
+
+
 def plant_code():
     """Hash of all sources and data that shape a run, but for the controllers."""
-    package = Path(fowt_env.__file__).parent
-    own = Path(__file__).parent
-    files = sorted(
+    return _digest(plant_files())
+
+
+def _data(folder):
+    """Files beneath a folder that are no sources."""
+    return [
         path
-        for path in package.rglob("*")
-        if path.is_file() and "__pycache__" not in path.parts and path.name not in UNRELATED
-    )
-    return _digest([*files, *(own / name for name in SHAPING)])
+        for path in folder.rglob("*")
+        if path.is_file() and path.suffix != ".py" and "__pycache__" not in path.parts
+    ]
 
 
 def controller_code(controller):
-    """{"name", "code"}: what a controller is called, and a hash of the sources that define it.
+    """{"name", "code"}: what a controller is called, and a hash of the files that define it.
 
-    A name of CONTROLLERS: its module, those of the package that this imports, and the package's data;
-    "design:FILE", "policy:NAME": the file and the package; "module:Name", a class or an object: the file that
-    it comes from.
+    A name of CONTROLLERS: its module, what it imports of this project, and the data of the package
+    controllers; "design:FILE", "policy:NAME": the file and all controllers; "module:Name", a class or an
+    object: the file that it comes from, and what that imports from its own folder and this project.
     """
     from controllers import CONTROLLERS, saved_design
     from controllers.policy import PREFIX, policy_path
@@ -137,50 +191,83 @@ def controller_code(controller):
         kind = (
             controller if inspect.isroutine(controller) or inspect.isclass(controller) else type(controller)
         )
-        file = getattr(sys.modules.get(kind.__module__), "__file__", None)
-        return {"name": f"{kind.__module__}:{kind.__qualname__}", "code": _digest([file] if file else [])}
+        name = f"{kind.__module__}:{kind.__qualname__}"
+        return {"name": name, "code": _digest(_user_files(kind.__module__))}
     if ":" not in controller:
-        return {"name": controller, "code": _digest(_package_files(CONTROLLERS.get(controller)))}
-    if controller.startswith(saved_design.PREFIX):
+        files = _package_files(CONTROLLERS.get(controller))
+    elif controller.startswith(saved_design.PREFIX):
         files = [controller.removeprefix(saved_design.PREFIX), *_package_files(saved_design.load_design)]
-        return {"name": controller, "code": _digest(files)}
-    if controller.startswith(PREFIX):  # its baseline may be any controller
+    elif controller.startswith(PREFIX):  # its baseline may be any controller
         files = [policy_path(controller.removeprefix(PREFIX)), *_package_files(None)]
-        return {"name": controller, "code": _digest(files)}
-    module = controller.partition(":")[0]
+    else:
+        files = _user_files(controller.partition(":")[0])
+    return {"name": controller, "code": _digest(files)}
+
+
+def _package_files(factory):
+    """Files that a factory of the package controllers depends on; those of all controllers for any other."""
+    folder = ROOT / "controllers"
+    start = getattr(factory, "__module__", None) or ""
+    if start.startswith("controllers."):
+        starts = [ROOT.joinpath(*start.split(".")).with_suffix(".py")]
+    else:
+        starts = list(folder.rglob("*.py"))
+    return [*_with_own(starts, [ROOT]), *sorted(_data(folder))]
+
+
+def _user_files(module):
+    """Files that a user's module depends on: those of its own project, and of this one what they import."""
+    file = _module_file(module)
+    if file is None:
+        return []
+    depth = 0 if module == "__main__" else module.count(".") + (file.name == "__init__.py")
+    folder = file.parents[depth]
+    top = folder / module.partition(".")[0]
+
+    def inside(path):
+        own = path.is_relative_to(folder) and _package(path) is None
+        return path == file or own and (path.is_relative_to(top) or not INSTALLED & set(path.parts))
+
+    return _with_own(imported_files([file], [folder], inside), [folder, ROOT])
+
+
+def _module_file(name):
+    """File of a module, without running it where it is not imported yet; None where there is none."""
+    if name in sys.modules:
+        file = getattr(sys.modules[name], "__file__", None)
+        return None if file is None else Path(file).resolve()
+    top, *rest = name.split(".")
     sys.path.insert(0, "")
     try:
-        spec = importlib.util.find_spec(module)
+        spec = importlib.util.find_spec(top)
     except (ImportError, ValueError):
         spec = None
     finally:
         sys.path.remove("")
-    file = None if spec is None or not spec.has_location else spec.origin
-    return {"name": controller, "code": _digest([file] if file else [])}
+    if spec is None or not spec.has_location:
+        return None
+    place = Path(spec.origin).resolve()
+    place = place.parent if rest or place.name == "__init__.py" else place.with_suffix("")
+    found = (place.joinpath(*rest, "__init__.py"), place.joinpath(*rest).with_suffix(".py"))
+    return next((path for path in found if path.is_file()), None)
 
 
-def _package_files(factory):
-    """Sorted files of the package controllers that a factory of it depends on; all of them for any other."""
-    import controllers
+def _with_own(files, roots):
+    """Files, and what they import of this project's controllers, and with those of fowt_env."""
+    files, registry = set(files), ROOT / "controllers" / "__init__.py"  # which imports every controller
+    for package in ("controllers", "fowt_env"):
 
-    folder = Path(controllers.__file__).parent
-    files = [path for path in folder.rglob("*") if path.is_file() and "__pycache__" not in path.parts]
-    data = {path for path in files if path.suffix != ".py"}
-    start = getattr(factory, "__module__", None) or ""
-    if not start.startswith("controllers."):
-        return sorted(files)
-    found, names = set(), [start]
-    while names:
-        path = folder.joinpath(*names.pop().split(".")[1:]).with_suffix(".py")
-        if path in found or not path.exists():
-            continue
-        found.add(path)
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("controllers."):
-                names.append(node.module)
-            elif isinstance(node, ast.Import):
-                names += [alias.name for alias in node.names if alias.name.startswith("controllers.")]
-    return sorted(found | data)
+        def inside(path, known=frozenset(files), package=package):
+            return path in known or _package(path) == package and path != registry
+
+        files |= set(imported_files(files, roots, inside))
+    return sorted(files)
+
+
+def _package(path):
+    """Name of this project's package that a file is in, or None."""
+    part = path.relative_to(ROOT).parts[0] if path.is_relative_to(ROOT) else None
+    return part if part in ("fowt_env", "controllers", "training") else None
 
 
 def versions():
@@ -198,6 +285,15 @@ def versions():
     return found
 
 
+def version_gap(old, new):
+    """The first package that shapes figures and has different versions in two mappings, with both; or None.
+
+    One that is missing in a mapping shaped no figure there: its controllers failed.
+    """
+    differing = (name for name in sorted(set(old) & set(new) - set(NO_FIGURES)) if old[name] != new[name])
+    return next(((f"{name} {old[name]}", f"{name} {new[name]}") for name in differing), None)
+
+
 class ResultsFolder:
     """A locked folder of an evaluation: what is done in it, and what is added to it.
 
@@ -206,7 +302,8 @@ class ResultsFolder:
     """
 
     def __init__(self, folder, settings, columns):
-        self.folder = Path(folder)
+        self.given = Path(folder)  # for messages
+        self.folder = self.given.absolute()  # of here, wherever a controller goes
         self.columns = list(columns)
         self.settings = settings
         self.rows = {}  # (controller, case, seed) -> row
@@ -222,12 +319,14 @@ class ResultsFolder:
         }
         wanted = json.loads(_json(wanted))
         old = self._manifest()
-        remove_leftovers(self.folder)
-        for path in self.folder.glob("runs/*/.*.parquet"):  # left by a process that was killed
-            path.unlink(missing_ok=True)
-        for path in sorted(self.folder.glob("runs/*/*.parquet")):
+        for folder in (self.folder, *self.folder.glob("runs/*/")):
+            remove_leftovers(folder)
+        for path in sorted(self.folder.glob("runs/*/[!.]*.parquet")):
             row = read_row(path)
-            self.rows[row["controller"], row["case"], row["seed"]] = row
+            key = row["controller"], row["case"], row["seed"]
+            if run_file(self.folder / "runs", *key) != path:
+                raise InputError(f"{str(path)!r} holds the run {', '.join(map(str, key))}: remove it")
+            self.rows[key] = row
         parts = {key: dict(self.settings[key]) for key in ("cases", "controllers")}
         seeds = list(self.settings["seeds"])
         if old is not None:
@@ -240,7 +339,7 @@ class ResultsFolder:
         created = time.strftime("%Y-%m-%dT%H:%M:%S%z") if old is None else old["created"]
         self.manifest = {
             **wanted,
-            "versions": versions() if old is None else old["versions"],
+            "versions": versions() | ({} if old is None else old["versions"]),
             "created": created,
             "seeds": seeds,
             **parts,
@@ -273,6 +372,8 @@ class ResultsFolder:
             raise self._refused(f"was made by fowt_env {old['fowt_env']}, this is {wanted['fowt_env']}")
         if old["plant"] != wanted["plant"]:
             raise self._refused("was made by another state of this package's sources")
+        if gap := version_gap(old["versions"], versions()):
+            raise self._refused(f"was made with {gap[0]}, this is {gap[1]}")
         for key in ("suite", "options"):
             if old[key] != wanted[key]:
                 raise self._refused(f"was made with {key} {_short(old[key])}, not {_short(wanted[key])}")
@@ -287,15 +388,15 @@ class ResultsFolder:
         for label, code in self.settings["controllers"].items():
             before = old["controllers"].get(label, code)
             if before != code and any(key[0] == label for key in self.rows):
-                place = run_file(self.folder / "runs", label, "", 0).parent
+                place = run_file(self.given / "runs", label, "", 0).parent
                 raise InputError(
-                    f"results folder {str(self.folder)!r}: the code of controller {label!r} has changed since"
+                    f"results folder {str(self.given)!r}: the code of controller {label!r} has changed since"
                     f" its runs there; remove {str(place)!r} to run them again, or choose another folder"
                 )
 
     def _refused(self, why):
         return InputError(
-            f"results folder {str(self.folder)!r} {why}: choose another folder (--out), or remove this one"
+            f"results folder {str(self.given)!r} {why}: choose another folder (--out), or remove this one"
         )
 
     def add(self, row):

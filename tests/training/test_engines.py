@@ -39,8 +39,9 @@ def dies_once(task):
     return mark.name
 
 
-def always_dies(task):
-    os._exit(9)
+def dies_on_odd(task):
+    """The square of an even task; a worker that gets an odd one ends."""
+    return square(task) if task % 2 == 0 else os._exit(9)
 
 
 def test_every_engine_refuses_what_it_cannot_do():
@@ -68,9 +69,11 @@ def test_a_killed_worker_process_costs_its_task_a_retry(tmp_path):
 
 
 @pytest.mark.slow
-def test_workers_that_always_die_end_with_a_message():
-    with pytest.raises(RuntimeError, match="died 3 times.*2 runs are left"):
-        list(outcomes(always_dies, [1, 2], jobs=2))
+def test_a_task_on_which_workers_always_die_is_given_up_alone_and_with_its_exit_code():
+    with pytest.raises(RuntimeError, match="ended 3 times, the last time alone, with exit code 9"):
+        list(outcomes(dies_on_odd, [1, 2], jobs=2))
+    found = dict(outcomes(dies_on_odd, [1, 2, 3, 4], jobs=2, lost=lambda task, reason: (task, reason[-11:])))
+    assert found == {0: (1, "exit code 9"), 1: 4, 2: (3, "exit code 9"), 3: 16}
 
 
 @pytest.mark.slow

@@ -202,6 +202,18 @@ def test_the_schedule_is_the_steady_point_of_each_wind(folder, tmp_path):
     assert panels["thrust (kN)"][at] == pytest.approx(point["RotThrust"], rel=1e-5)
 
 
+def test_a_page_comes_out_where_the_platform_of_the_evaluation_is_a_file_of_another_place(folder, tmp_path):
+    copy = tmp_path / "copy"
+    shutil.copytree(folder, copy)
+    cases = {case: {"platform": "/home/alice/<b>.toml"} for case in CASES}
+    (copy / "manifest.json").write_text(json.dumps({"cases": cases}))
+    text = write_report(copy).read_text(encoding="utf-8")
+    assert "&#x27;/home/alice/&lt;b&gt;.toml&#x27; does not exist. Give another with --platform" in text
+    assert data_of(copy / "report.html")["schedule"] is None
+    with pytest.raises(InputError, match="mine.toml"):
+        write_report(copy, platform="mine.toml")
+
+
 def test_the_command_names_what_is_wrong(tmp_path):
     result = CliRunner().invoke(cli.app, ["report", str(tmp_path)])
     assert result.exit_code == cli.EXIT_INPUT and "holds no results.csv" in result.stderr

@@ -94,7 +94,9 @@ def test_what_is_done_is_not_done_again_and_more_can_be_added(tmp_path):
 def test_a_lost_run_is_made_again(tmp_path):
     first, _ = went(tmp_path, "pi", [CALM], seeds=(1, 2))
     (tmp_path / "runs" / "pi" / "calm_seed2.parquet").unlink()
-    (tmp_path / "runs" / "pi" / ".calm_seed2-x.parquet").write_bytes(b"half a file")
+    ended = subprocess.Popen([sys.executable, "-c", ""])
+    ended.wait()
+    (tmp_path / "runs" / "pi" / f".calm_seed2-{ended.pid}-abcdefgh.parquet").write_bytes(b"half a file")
     (tmp_path / "results.csv").unlink()
     second, made = went(tmp_path, "pi", [CALM], seeds=(1, 2))
     assert made == [("pi", "calm", 2)]
@@ -134,10 +136,13 @@ def test_other_settings_and_versions_are_refused_with_what_to_do(tmp_path, monke
 
 
 def test_a_controllers_code_is_its_module_and_what_that_imports():
-    names = {path.name for path in results._package_files(CONTROLLERS["eq8_literal"])}
-    assert {"eq8.py", "pi.py", "base.py"} <= names
-    assert "constant.py" not in names and "__init__.py" not in names
-    assert {"constant.py", "__init__.py"} <= {path.name for path in results._package_files(print)}
+    def names(factory):
+        paths = results._package_files(factory)
+        return {path.name for path in paths if path.parent == results.ROOT / "controllers"}
+
+    assert {"eq8.py", "pi.py", "base.py", "tuned.toml"} <= names(CONTROLLERS["eq8_literal"])
+    assert not {"constant.py", "__init__.py"} & names(CONTROLLERS["eq8_literal"])
+    assert {"constant.py", "__init__.py"} <= names(print)
     codes = [results.controller_code(name)["code"] for name in ("pi", "pi_land", "constant")]
     assert codes[0] == codes[1] != codes[2]
     own = results.controller_code(Broken())

@@ -11,8 +11,9 @@ from fowt_env.errors import InputError
 from fowt_env.linear_model import linearize
 from fowt_env.measurement import Measurement
 from training.cases import Case, described, read_suite
-from training.evaluate import _controller, evaluate, planned
+from training.evaluate import evaluate, planned
 from training.randomisation import PLANT, SENSORS
+from training.scoring import run_controller
 from training.shifts import Shift, Unaware, reading_scales, shifted_parts
 
 WIND = {"kind": "ntm", "speed": 18.0, "class": "B"}
@@ -97,7 +98,7 @@ def test_the_run_is_on_the_shifted_plant_and_the_controller_knows_the_nominal_on
     shift = Shift(mooring_stiffness=1.2, actuator_lag=2.0)
     run = planned(["lqr"], [windy(shift)], seeds=[1])[0]
     known = fowt_env.build_scene(wind=WIND, sea=run.case.sea, seed=1, fidelity="standard", duration=700.0)
-    controller = _controller(run, known)
+    controller = run_controller(run, known)
     told = make("lqr", known.turbine, 0.1)
     told.prepare(known)
     wrong = fowt_env.build_scene(

@@ -1,0 +1,141 @@
+"""One run of one controller on one case, to its row: what shapes a figure is imported from here."""
+
+from dataclasses import dataclass
+from math import degrees
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+import fowt_env
+from controllers import make
+from fowt_env.errors import ControllerError, ControllerInputError, InputError, SimulationStopped
+from fowt_env.records import is_number
+from fowt_env.weather.wind_field import is_field
+from training.faults import faulted, idling
+from training.guard import attempt, reason_of
+from training.metrics import METRICS, TIME, metrics
+from training.shifts import Unaware, shifted_parts
+from training.wind_boxes import cached_box
+
+CONTROL_DT = 0.1  # s, simulate's own
+SHORTEST_WEATHER = 700.0  # s of wind and waves: shorter runs see the start of the same realisation
+COLUMNS = (
+    *("controller", "case", "seed", "status", "reason", "events", "stopped_[s]", "scored_[s]"),
+    *METRICS,
+)
+
+
+@dataclass(frozen=True)
+class Run:
+    """One controller on one realisation of one case."""
+
+    label: str
+    controller: object  # name or object, as simulate takes it
+    case: Any  # training.cases.Case
+    seed: int
+    duration: float
+    skip: float
+    options: dict  # further options of simulate
+    frame_path: Path | None  # where the time series goes
+    time_limit: float | None = None  # s of wall clock
+
+    @property
+    def key(self):
+        """What tells runs of one evaluation apart."""
+        return self.label, self.case.name, self.seed
+
+
+def scored(run):
+    """(row, time series or None) of one run; one that fails has its reason instead of metrics.
+
+    Raises: InputError for settings that no controller could use.
+    """
+    case = run.case
+    options = {"duration": max(SHORTEST_WEATHER, run.duration), **case.options}
+    wind = case.wind
+    if is_field(wind):
+        wind = cached_box(wind, case.platform, run.seed, options)
+    known = scene = fowt_env.build_scene(case.platform, wind=wind, sea=case.sea, seed=run.seed, **options)
+    if case.shift is not None and case.shift.factors:
+        parts = shifted_parts(case.shift, case.platform)
+        scene = fowt_env.build_scene(wind=wind, sea=case.sea, seed=run.seed, **options | parts)
+    turbine = scene.turbine
+
+    def work():
+        frame = fowt_env.simulate(
+            scene,
+            controller=run_controller(run, known),
+            duration=run.duration,
+            initial=case.initial,
+            stop_overspeed=case.fault is None,
+            grid_loss=_grid_loss(case),
+            **run.options,
+        )
+        rated, rate = degrees(turbine.rated_rotor_speed) / 6.0, degrees(turbine.pitch_drive.rate_limit)
+        return frame, metrics(frame, run.skip, rated, rate)
+
+    # whatever a controller raises or does costs its run, not the evaluation
+    outcome, error = attempt(work, run.time_limit)
+    if error is None:
+        frame, figures = outcome
+        return _row(run, "ok", frame) | figures, frame
+    if isinstance(error, InputError) and not isinstance(error, ControllerInputError):
+        raise error  # the run's settings
+    frame, stopped = _end(error)
+    return _row(run, "failed", frame) | {"reason": reason_of(error), "stopped_[s]": stopped}, frame
+
+
+def lost_row(run, reason):
+    """Row of a run that failed without one of its own, as where its process ended."""
+    return _row(run, "failed", None) | {"reason": reason}
+
+
+def _row(run, status, frame):
+    """Row of a run without reason and figures."""
+    row = dict.fromkeys(COLUMNS, float("nan"))
+    row |= {"controller": run.label, "case": run.case.name, "seed": run.seed, "status": status, "reason": ""}
+    counts = {} if frame is None else frame.attrs.get("events", {})
+    row["events"] = "; ".join(f"{name} {count}" for name, count in counts.items() if count)
+    row["scored_[s]"] = run.duration - run.skip
+    return row
+
+
+def _end(error):
+    """(rows so far or None, time of the end or NaN, s) of what ended a run.
+
+    Only of what simulate raises, and read without calling anything: an exception may be a controller's own.
+    """
+    held = vars(error) if isinstance(error, SimulationStopped | ControllerError | KeyboardInterrupt) else {}
+    frame, stopped = held.get("frame"), held.get("time")
+    if not isinstance(frame, pd.DataFrame) or TIME not in frame or not (frame.dtypes == "float64").all():
+        frame = None
+    if not is_number(stopped):
+        stopped = float("nan") if frame is None or frame.empty else frame[TIME].iloc[-1]
+    return frame, float(stopped)
+
+
+def _grid_loss(case):
+    """Time (s) from which the case's generator is off the grid; None: never. A parked turbine's always is."""
+    if case.parked:
+        return 0.0
+    return None if case.fault is None else case.fault.grid_loss
+
+
+def run_controller(run, known):
+    """What simulate is given as controller: the run's own, with its fault, or a parked turbine's.
+
+    known: the scene that the controller is told of.
+    Raises: ControllerInputError where it cannot be made.
+    """
+    case = run.case
+    if case.parked:
+        return idling(known.turbine) if known.wind_speed else None
+    control_dt = run.options.get("control_dt", CONTROL_DT)
+    try:
+        controller = make(run.controller, known.turbine, control_dt)
+    except InputError as error:
+        raise ControllerInputError(str(error)) from error
+    if case.shift is not None:
+        controller = Unaware(controller, known, case.shift, run.seed)
+    return faulted(controller, case.fault, known.turbine, control_dt)
