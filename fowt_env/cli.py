@@ -20,7 +20,7 @@ from rich.progress import (
 
 from fowt_env.cli_arguments import parse_numbers, parse_pairs, parse_sea, parse_wind
 from fowt_env.cli_doctor import DOCTOR_EXAMPLES, doctor
-from fowt_env.cli_tables import number, print_table, table_width
+from fowt_env.cli_tables import figure, print_table, table_width
 from fowt_env.errors import ControllerError, InputError, SimulationStopped, unknown
 from fowt_env.outputs import SERIES_SUFFIXES, table_path, write_table
 
@@ -205,7 +205,7 @@ def simulate(
 
 def show(frame, title=None):
     """Print a DataFrame, its columns of texts to the left."""
-    rows = [list(map(number, row)) for row in frame.itertuples(index=False)]
+    rows = [list(map(figure, row)) for row in frame.itertuples(index=False)]
     texts = [i for i, name in enumerate(frame.columns) if frame[name].map(type).eq(str).any()]
     keys = max([i + 1 for i in texts if i < 2], default=1)
     print_table(out, list(frame.columns), rows, title, keys, left=texts)
@@ -234,7 +234,7 @@ def _print_channels(frame, title):
             if deviation < ROUNDING * abs(mean):
                 deviation = 0.0  # what the sums of a constant leave
             values = (mean, deviation, x.min(), x.max())
-            rows.append((channel.replace("_", " "), *map(number, values)))
+            rows.append((channel.replace("_", " "), *map(figure, values)))
     print_table(out, ("channel", "mean", "std", "min", "max"), rows, title)
 
 
@@ -424,7 +424,7 @@ def trim(
     title = f"{platform}, {'fixed' if fixed else 'floating'}, steady wind"
     shown = [name for name in TRIM_CHANNELS if name in rows[0]]
     headings = ["wind\nm/s", *(f"{name}\n{units.get(name, '')}" for name in shown)]
-    lines = [(f"{row['wind']:g}", *(number(row[name]) for name in shown)) for row in rows]
+    lines = [(f"{row['wind']:g}", *(figure(row[name]) for name in shown)) for row in rows]
     print_table(out, headings, lines, title, left=())
     names = {"wind": "Wind_[m/s]"} | {name: f"{name}_[{unit}]" for name, unit in units.items()}
     points = pd.DataFrame(rows).rename(columns=names)
@@ -563,7 +563,7 @@ def paper(
             (
                 row["case"],
                 row["channel"].replace("_", " "),
-                *(number(row[name]) for name in ("mean", "std", "min", "max")),
+                *(figure(row[name]) for name in ("mean", "std", "min", "max")),
             )
             for row in values[values["channel"].isin(("PtfmSurge_[m]", "PtfmPitch_[deg]"))].to_dict("records")
         ]
@@ -614,7 +614,7 @@ def speed(
             names, seconds, repeats, progress=lambda text, done, total: update(done, f"timing: {text}", total)
         )
         times = bench.start_times() if starts else {}
-    rows = [(column, *map(number, table[column])) for column in table.columns.drop(["kind", "absent"])]
+    rows = [(column, *map(figure, table[column])) for column in table.columns.drop(["kind", "absent"])]
     print_table(out, ("", *table["kind"]), rows, "CPU time of one thread")
     remarks = [f"{name}: {value:.2f}" for name, value in times.items()]
     for line in remarks:

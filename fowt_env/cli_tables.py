@@ -22,7 +22,7 @@ def table_width(console):
     return None
 
 
-def number(value):
+def figure(value):
     """Text of a value: whole numbers whole, others with four significant digits; a text as it is."""
     return str(value) if isinstance(value, str | Integral) else f"{value or 0.0:.4g}"
 
