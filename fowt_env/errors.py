@@ -26,7 +26,7 @@ class SimulationStopped(RuntimeError):
         self.frame = frame
 
 
-MOST_LISTED, NEAREST = 20, 5  # names that are all listed; how many are where there are more
+MOST_LISTED, NEAREST = 30, 5  # names that are all listed; how many are where there are more
 
 
 def unknown(kind: str, name: object, known: Iterable[object], command: str | None = None) -> InputError:

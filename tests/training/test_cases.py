@@ -4,8 +4,8 @@ import json
 
 import pytest
 
-from fowt_env.errors import InputError
-from training.cases import all_cases, described, read_suite, suite_names
+from fowt_env.errors import InputError, unknown
+from training.cases import all_cases, described, named_cases, read_suite, suite_names
 
 SUITES = ("above_rated", "above_rated_fullfield", "atlas", "dlc", "full_range", "gusts", "oc3", "paper")
 HEAD = """
@@ -121,6 +121,27 @@ def test_a_wrong_suite_is_refused_with_its_case_and_key(tmp_path, text, messages
     assert "mine.toml" in str(error.value)
     for message in messages:
         assert message in str(error.value)
+
+
+def test_an_unknown_case_has_the_five_nearest_and_the_command_that_lists_them():
+    known = [*suite_names(), *all_cases()]
+    with pytest.raises(InputError) as error:
+        named_cases("ntm_18,ntm_81")
+    head, _, rest = str(error.value).partition(f" Nearest of {len(known)}: ")
+    assert head == "unknown case 'ntm_81'. Did you mean 'ntm_8'?" and len(known) > 100
+    near, _, commands = rest.partition("; all: ")
+    assert near.split(", ")[:2] == ["ntm_8", "ntm_18"] and len(near.split(", ")) == 5
+    assert set(near.split(", ")) < set(known) and commands == "fowt list cases, fowt list suites"
+    with pytest.raises(InputError, match="unknown case 'zzz'. Nearest of"):  # near to none, and still helped
+        named_cases("zzz")
+
+
+def test_of_up_to_thirty_names_all_are_listed():
+    names = [f"name{number:02d}" for number in range(31)]
+    assert str(unknown("key", "nam", names[:30])).endswith("Known: " + ", ".join(names[:30]))
+    assert "Known" not in str(unknown("key", "nam", names)) and "31: name" in str(
+        unknown("key", "nam", names)
+    )
 
 
 def test_an_unknown_suite_suggests_and_a_broken_file_is_named(tmp_path):
