@@ -56,8 +56,8 @@ def target(row):
 
 
 def error_of(row, study):
-    """Error (%) of a row: rms errors anew from both series of the run, others from the two figures."""
-    if "rms error" not in row.quantity:
+    """Error (%) of a row: of rms and standard deviations anew from both series, else of the two figures."""
+    if "rms error" not in row.quantity and "standard deviation" not in row.quantity:
         return 0.0 if row.here == row.openfast == 0.0 else 100.0 * (row.here - row.openfast) / row.openfast
     ours, theirs = study.runs[row.case]
     time, begin, end = theirs[TIME].to_numpy(), 0.0, np.inf
@@ -69,6 +69,8 @@ def error_of(row, study):
     chosen = (time > begin - 0.05) & (time < end)
     (channel,) = [name for name in theirs if name.startswith(row.quantity.split(",")[0].split(" ")[0] + "_[")]
     mine, wanted = ours[channel].to_numpy()[chosen], theirs[channel].to_numpy()[chosen]
+    if "standard deviation" in row.quantity:
+        return 100.0 * (mine.std() / wanted.std() - 1.0)
     if "without mean" in row.quantity:
         mine, wanted = mine - mine.mean(), wanted - wanted.mean()
     return 100.0 * float(np.sqrt(((mine - wanted) ** 2).sum() / ((wanted - wanted.mean()) ** 2).sum()))

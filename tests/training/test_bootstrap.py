@@ -50,6 +50,8 @@ def test_a_seed_without_any_value_is_none_of_the_four():
     values = np.random.default_rng(0).normal(1.0, 0.1, (1, 2, 4))
     values[:, :, 3] = np.nan
     assert np.isnan(crossed_estimate(values, 200)[1])
+    values[0, 0, 2], values[0, 1, 3] = np.nan, 1.0  # with one in some case it is
+    assert np.isfinite(crossed_estimate(values, 200)).all()
 
 
 def test_the_interval_of_positive_values_stays_above_zero_and_that_of_counts_ends_there():
