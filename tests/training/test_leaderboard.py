@@ -47,6 +47,22 @@ def test_means_count_every_case_alike_however_many_seeds_it_has():
     assert figure["mean"] == pytest.approx(2.0) and figure["worst"] == 3.0
 
 
+def test_an_interval_is_that_of_the_mean_over_cases_whose_seeds_are_drawn_together():
+    values = dict(enumerate([10.0, 11.0, 9.5, 12.0, 10.5]))
+    shifts = {"a": 0.0, "b": 0.0, "c": 9.0}  # their mean is 3, their median 0, their greatest 9
+    one, three = (
+        entry(
+            leaderboard(table({("pi", case, s): values[s] + shifts[case] for case in cases for s in values})),
+            "pi",
+        )
+        for cases in ("a", "abc")
+    )
+    for key in ("mean", "low", "high", "seed_low", "seed_high"):
+        name = "RotSpeed_mean_[rpm]"
+        assert three["metrics"][name][key] == pytest.approx(one["metrics"][name][key] + 3.0)
+    assert three["cases"]["c"]["metrics"][STD]["worst"] == three["metrics"][STD]["worst"] == 21.0
+
+
 def test_paired_differences_are_sharper_than_the_means_they_come_from():
     board = leaderboard(table(noisy({"pi": 0.0, "x": 0.5}, 3, range(6))))
     assert board["baseline"] == "pi"
