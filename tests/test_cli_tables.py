@@ -250,7 +250,7 @@ def test_a_table_that_fits_has_its_headings_in_one_line(monkeypatch, capsys):
 
 def test_headings_are_wrapped_before_columns_are_parted_into_blocks(monkeypatch, capsys):
     headings, rows = ["name", "mean_speed_[rpm]", "n"], [["a", "1.5", "7"]]
-    lines = lines_of(monkeypatch, capsys, 16, headings, rows)
+    lines = lines_of(monkeypatch, capsys, 14, headings, rows)
     assert lines == ["       mean", "      speed", "name  [rpm]  n", "─" * 14, "a       1.5  7"]
     lines = lines_of(monkeypatch, capsys, 12, headings, rows)
     assert lines[3:] == ["─" * 11, "a       1.5", "", "name  n", "─" * 7, "a     7"]

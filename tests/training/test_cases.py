@@ -40,6 +40,13 @@ def test_a_name_that_several_suites_hold_is_the_same_case_in_each():
             assert described(case) == known[case.name]
 
 
+def test_a_case_that_is_named_by_itself_has_the_seeds_and_times_of_whoever_runs_it():
+    shipped = [case for suite in suite_names() for case in read_suite(suite).cases]
+    assert any(case.seeds for case in shipped) and any(case.duration for case in shipped)
+    for case in all_cases().values():
+        assert case.seeds is None and case.duration is None and case.skip is None
+
+
 def test_the_headline_is_what_the_brief_of_the_benchmark_says():
     suite = read_suite("above_rated")
     assert [case.wind["speed"] for case in suite.cases] == [12, 14, 16, 18, 20, 22, 24]
@@ -99,6 +106,7 @@ WIND = "wind = 16.0"
         (f'[[case]]\nname = "a"\n{WIND}\nsea = {{table = "north_sea"}}', ["sea.speed is missing"]),
         (f'[[case]]\nname = "a"\n{WIND}\noptions = {{surfac = "swl"}}', ["'surface'"]),
         (f'[[case]]\nname = "a"\n{WIND}\nskip = 200.0', ["skip = 200", "below duration = 100"]),
+        (f'[[case]]\nname = "a"\n{WIND}\nskip = 100.0', ["skip = 100", "below duration = 100"]),
         (f'[[case]]\nname = "a"\n{WIND}\nfault = {{kind = "grid_los", time = 50}}', ["'grid_loss'"]),
         (f'[[case]]\nname = "a"\n{WIND}\nfault = {{kind = "grid_loss", time = 500}}', ["fault.time = 500"]),
         ('[[case]]\nname = "a"\nwind = {kind = "mann", speed = 12}', ["does not fit"]),
@@ -142,6 +150,11 @@ def test_of_up_to_thirty_names_all_are_listed():
     assert "Known" not in str(unknown("key", "nam", names)) and "31: name" in str(
         unknown("key", "nam", names)
     )
+
+
+def test_a_suite_without_seeds_has_the_first_one_for_test(tmp_path):
+    head = HEAD.replace("seeds = [1, 2]\n", "")
+    assert read_suite(written(tmp_path, f'[[case]]\nname = "a"\n{WIND}', head)).seeds == (1,)
 
 
 def test_an_unknown_suite_suggests_and_a_broken_file_is_named(tmp_path):

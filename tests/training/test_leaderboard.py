@@ -114,6 +114,20 @@ def test_figures_that_cannot_be_negative_have_intervals_above_zero():
     assert all(found[name]["low"] < 0.0 for name in METRICS if name not in never)
 
 
+def test_a_score_of_deviations_has_an_interval_above_zero():
+    scattered = {("x", "a", seed): value for seed, value in enumerate([0.001, 0.5, 3.0, 0.01])}
+    figures = scattered | {("pi", "a", seed): 1.0 for seed in range(4)}
+    score = entry(leaderboard(table(figures), score=SPEED_SCORE), "x")["score"]
+    assert 0.0 < score["low"] < score["mean"] < score["high"]
+
+
+def test_whatever_is_not_ok_counts_as_failed():
+    frame = table({("pi", "a", 1): 1.0, ("pi", "a", 2): 2.0})
+    frame.loc[1, "status"] = "timeout"
+    found = entry(leaderboard(frame), "pi")
+    assert found["failed"] == 1 and found["metrics"][STD]["mean"] == 1.0
+
+
 def test_a_count_that_is_mostly_zero_has_an_interval_from_zero_on():
     figures = {("pi", "a", seed): value for seed, value in enumerate([0.0, 0.0, 0.0, 5.0])}
     found = entry(leaderboard(table(figures)), "pi")["metrics"]["rotor_speed_violations_[-]"]

@@ -77,6 +77,21 @@ def test_the_leaderboard_says_how_many_runs_went_well_and_of_which_seeds():
     assert len(remarks) == 1 and "x: 6 runs" in remarks[0]
 
 
+def test_a_row_has_means_with_intervals_the_worst_overspeed_and_differences_to_the_baseline():
+    both = board([1, 2, 3, 4, 5], x="ok", factor=0.5)
+    _, headings, (pi, x), _ = leaderboard_rows(both)
+    place = {heading.replace("\n", " "): number for number, heading in enumerate(headings)}
+    speed = both["controllers"][1]["metrics"]["RotSpeed_std_[rpm]"]
+    wanted = f"{speed['mean']:.3f} [{speed['low']:.3f}, {speed['high']:.3f}] -50.0%*"
+    assert x[place["rotor speed std rpm"]] == wanted and speed["mean"] == pytest.approx(0.65)
+    assert not any("%" in text or "*" in text for text in pi)  # the baseline has none to itself
+    assert (pi[place["overspeed max %"]], x[place["overspeed max %"]]) == ("1.5", "0.8")  # of the worst run
+    tower = both["controllers"][0]["metrics"]["TwrBsMyt_DEL_[kN-m]"]
+    tower["mean"] = 22_700.0
+    _, _, (pi, _), _ = leaderboard_rows(both)
+    assert pi[place["tower DEL MN m"]] == "22.7"
+
+
 def test_few_seeds_have_neither_interval_nor_star_and_the_remark_says_so_once():
     for seeds, words in (([1], "seed 1:"), ([1, 2, 4], "seeds 1-2, 4:")):
         title, _, rows, remarks = leaderboard_rows(board(seeds, x="ok"))
