@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich import box
 from rich.columns import Columns
 from rich.console import Console
 from rich.markup import escape
@@ -18,14 +17,15 @@ from rich.progress import (
     TextColumn,
     TimeElapsedColumn,
 )
-from rich.table import Table
 
 from fowt_env.cli_arguments import parse_numbers, parse_pairs, parse_sea, parse_wind
 from fowt_env.cli_doctor import DOCTOR_EXAMPLES, doctor
+from fowt_env.cli_tables import figure, print_table, table_width
 from fowt_env.errors import ControllerError, InputError, SimulationStopped, unknown
 from fowt_env.outputs import SERIES_SUFFIXES, table_path, write_table
 
 EXIT_STOPPED, EXIT_INPUT, EXIT_INTERRUPTED = 1, 2, 130
+ROUNDING = 1e-9  # a standard deviation below this share of the mean is none
 
 out = Console()
 err = Console(stderr=True)
@@ -201,8 +201,16 @@ def simulate(
             if rows is not None and len(rows):
                 _save_run(rows, out_path, None, title)
             raise
-    out.print(_channel_table(frame, title))
+    _print_channels(frame, title)
     _save_run(frame, out_path, plot, title)
+
+
+def show(frame, title=None):
+    """Print a DataFrame, its columns of texts to the left."""
+    rows = [list(map(figure, row)) for row in frame.itertuples(index=False)]
+    texts = [i for i, name in enumerate(frame.columns) if frame[name].map(type).eq(str).any()]
+    keys = max([i + 1 for i in texts if i < 2], default=1)
+    print_table(out, list(frame.columns), rows, title, keys, left=texts)
 
 
 def _save_run(frame, out_path, plot, title):
@@ -216,20 +224,20 @@ def _save_run(frame, out_path, plot, title):
         note(f"wrote {plot}")
 
 
-def _channel_table(frame, title):
-    """Mean, standard deviation and range of the main channels."""
+def _print_channels(frame, title):
+    """Print mean, standard deviation and range of the main channels."""
     from fowt_env.plots import PANELS
 
-    table = Table(title=escape(title), title_justify="left")
-    table.add_column("channel")
-    for name in ("mean", "std", "min", "max"):
-        table.add_column(name, justify="right")
+    rows = []
     for channel in dict.fromkeys([*(channel for _, channel in PANELS), "GenTq_[kN-m]", "RotThrust_[kN]"]):
         if channel in frame.columns:
             x = frame[channel]
-            values = (x.mean(), x.std(ddof=0), x.min(), x.max())
-            table.add_row(escape(channel.replace("_", " ")), *(f"{value:.4g}" for value in values))
-    return table
+            mean, deviation = x.mean(), x.std(ddof=0)
+            if deviation < ROUNDING * abs(mean):
+                deviation = 0.0  # what the sums of a constant leave
+            values = (mean, deviation, x.min(), x.max())
+            rows.append((channel.replace("_", " "), *map(figure, values)))
+    print_table(out, ("channel", "mean", "std", "min", "max"), rows, title)
 
 
 EVALUATE_EXAMPLES = """[bold]Examples[/bold]
@@ -334,9 +342,16 @@ def evaluate(
 
 def _print_evaluation(table, means, board):
     """Print metrics by case and the leaderboard, and on stderr what failed or passed a limit of the score."""
-    width = out.width if out.is_terminal else 200  # a file or a pipe has no width of its own
-    Console(width=width).print(_summary_table(means, width))
-    Console(width=width).print(_leaderboard_table(board, width))
+    from training.report import leaderboard_rows, summary_rows
+
+    width = table_width(out) or float("inf")
+    headings, rows, failures = summary_rows(means, width)
+    print_table(out, headings, rows, keys=2, left=(0, 1), red=_places(failures))
+    out.print()
+    title, headings, rows, remarks = leaderboard_rows(board, width)
+    print_table(out, headings, rows, title, red=_places(e["failed"] for e in board["controllers"]))
+    for remark in remarks:
+        out.print(remark, markup=False, highlight=False, soft_wrap=True)
     for row in table[table["status"] != "ok"].to_dict("records"):
         run = f"{row['controller']}, {row['case']}, seed {row['seed']}"
         err.print(
@@ -350,34 +365,9 @@ def _print_evaluation(table, means, board):
             note(f"no valid score of {entry['controller']}: {entry['score']['why']}")
 
 
-def _leaderboard_table(board, width):
-    """The printed leaderboard: one row per controller, intervals and paired differences in it."""
-    from training.report import leaderboard_rows
-
-    title, headings, rows = leaderboard_rows(board, width)
-    table = Table(
-        title=escape(title), title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False
-    )
-    for number, heading in enumerate(headings):
-        table.add_column(
-            escape(heading), justify="right" if number else "left", vertical="bottom", no_wrap=True
-        )
-    for row in rows:
-        table.add_row(*map(escape, row))
-    return table
-
-
-def _summary_table(means, width):
-    """The printed part of an evaluation: one row per controller and case."""
-    from training.report import summary_rows
-
-    headings, rows, failures = summary_rows(means, width)
-    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False)
-    for number, heading in enumerate(headings):
-        table.add_column(heading, justify="left" if number < 2 else "right", vertical="bottom", no_wrap=True)
-    for row, failed in zip(rows, failures, strict=True):
-        table.add_row(*map(escape, row), style="red" if failed else None)
-    return table
+def _places(flags):
+    """Numbers of the flags that are set."""
+    return [place for place, flag in enumerate(flags) if flag]
 
 
 def _evaluation_plots(table, board, folder):
@@ -441,14 +431,10 @@ def trim(
             update(number, f"wind {speed:g} m/s")
     units = {channel.name: channel.unit for channel in scene.channels}
     title = f"{platform}, {'fixed' if fixed else 'floating'}, steady wind"
-    table = Table(title=escape(title), title_justify="left")
     shown = [name for name in TRIM_CHANNELS if name in rows[0]]
-    table.add_column("wind\nm/s", justify="right")
-    for name in shown:
-        table.add_column(f"{name}\n{units.get(name, '')}", justify="right")
-    for row in rows:
-        table.add_row(f"{row['wind']:g}", *(f"{row[name]:.4g}" for name in shown))
-    out.print(table)
+    headings = ["wind\nm/s", *(f"{name}\n{units.get(name, '')}" for name in shown)]
+    lines = [(f"{row['wind']:g}", *(figure(row[name]) for name in shown)) for row in rows]
+    print_table(out, headings, lines, title, left=())
     names = {"wind": "Wind_[m/s]"} | {name: f"{name}_[{unit}]" for name, unit in units.items()}
     points = pd.DataFrame(rows).rename(columns=names)
     if out_path is not None:
@@ -487,22 +473,20 @@ def list_names(
     for heading in known if kind == "all" else (kind,):
         out.print(f"[bold]{heading}[/bold]")
         if heading == "controllers":
-            out.print(_controller_table(CONTROLLERS))
+            _print_controllers(CONTROLLERS)
             continue
         out.print(Columns(map(escape, known[heading]()), padding=(0, 3), expand=False), highlight=False)
 
 
-def _controller_table(factories):
-    """Table of controllers: name, what each is, and what it is told."""
+def _print_controllers(factories):
+    """Print the controllers: name, what each is, and what it uses."""
     from controllers import information
 
-    table = Table(box=None, padding=(0, 2, 0, 0))
-    for column in ("name", "what it is", "what it uses"):
-        table.add_column(column, header_style="dim")
-    for name, factory in factories.items():
-        first = factory.__doc__.splitlines()[0]
-        table.add_row(escape(name), escape(first), escape(", ".join(information(name))))
-    return table
+    rows = [
+        (name, factory.__doc__.splitlines()[0], ", ".join(information(name)))
+        for name, factory in factories.items()
+    ]
+    print_table(out, ("name", "what it is", "what it uses"), rows, prose=(1, 2))
 
 
 app.command(epilog=DOCTOR_EXAMPLES)(reported(doctor))
@@ -543,14 +527,13 @@ def validate(
             bts=bts,
             report=lambda text, done, total: update(done, f"validating: {text}", total),
         )
-    table = Table(title="against OpenFAST", title_justify="left")
-    for heading in ("case", "figures", "met", "missed", "reported"):
-        table.add_column(heading, justify="left" if heading == "case" else "right")
+    lines, missed = [], []
     for name, rows in study.table().groupby("case", sort=False):
         counts = [int((rows["verdict"] == verdict).sum()) for verdict in ("met", "MISSED", "reported")]
-        missed = f"[red]{counts[1]}[/red]" if counts[1] else "0"
-        table.add_row(escape(name), str(len(rows)), str(counts[0]), missed, str(counts[2]))
-    out.print(table)
+        lines.append((name, str(len(rows)), *map(str, counts)))
+        missed.append(counts[1])
+    headings = ("case", "figures", "met", "missed", "reported")
+    print_table(out, headings, lines, "against OpenFAST", red=_places(missed))
     for row in study.rows:
         if row.verdict == "MISSED":
             text = f"{row.case}: {row.quantity}: {row.error:.3g} %, allowed {row.allowed:g} %"
@@ -585,13 +568,16 @@ def paper(
         study = run_paper(names, lambda text, done, total: update(done, f"paper: {text}", total))
     if study.runs:
         values = statistics(study.runs)
-        table = Table(title="model scale", title_justify="left")
-        for heading in ("case", "channel", "mean", "std", "min", "max"):
-            table.add_column(heading, justify="left" if heading in ("case", "channel") else "right")
-        for row in values[values["channel"].isin(("PtfmSurge_[m]", "PtfmPitch_[deg]"))].to_dict("records"):
-            figures = (f"{row[name]:.4g}" for name in ("mean", "std", "min", "max"))
-            table.add_row(row["case"], escape(row["channel"].replace("_", " ")), *figures)
-        out.print(table)
+        rows = [
+            (
+                row["case"],
+                row["channel"].replace("_", " "),
+                *(figure(row[name]) for name in ("mean", "std", "min", "max")),
+            )
+            for row in values[values["channel"].isin(("PtfmSurge_[m]", "PtfmPitch_[deg]"))].to_dict("records")
+        ]
+        headings = ("case", "channel", "mean", "std", "min", "max")
+        print_table(out, headings, rows, "model scale", keys=2, left=(0, 1))
     for claim in study.claims:
         verdict = "[green]holds[/green]" if claim.holds else "[red]FAILS[/red]"
         text = f"Fig. {claim.figure}: {claim.text}: {claim.found}"
@@ -637,14 +623,8 @@ def speed(
             names, seconds, repeats, progress=lambda text, done, total: update(done, f"timing: {text}", total)
         )
         times = bench.start_times() if starts else {}
-    shown = Table(title="CPU time of one thread", title_justify="left")
-    shown.add_column("")
-    for name in table["kind"]:
-        shown.add_column(escape(name), justify="right")
-    for column in table.columns.drop(["kind", "absent"]):
-        values = (value if isinstance(value, str) else f"{value:.4g}" for value in table[column])
-        shown.add_row(escape(column), *values)
-    Console(width=out.width if out.is_terminal else 250).print(shown)
+    rows = [(column, *map(figure, table[column])) for column in table.columns.drop(["kind", "absent"])]
+    print_table(out, ("", *table["kind"]), rows, "CPU time of one thread")
     remarks = [f"{name}: {value:.2f}" for name, value in times.items()]
     for line in remarks:
         out.print(line, highlight=False)
@@ -698,14 +678,14 @@ def accuracy(
             repeats=repeats,
             progress=lambda text, done, total: update(done, text, total),
         )
-    shown = Table(title="rms difference over standard deviation, and speed of simulate", title_justify="left")
-    for heading in ("variant", "worst", "of", "x real time", "kernel alone", "front"):
-        shown.add_column(heading, justify="left" if heading in ("variant", "of") else "right")
+    rows = []
     for row in study.summary(table).to_dict("records"):
         speeds = (f"{row['real_time_factor']:.0f}", f"{row['kernel_factor']:.0f}")
         figures = (f"{row['worst']:.3g}", row["worst_of"], *speeds)
-        shown.add_row(escape(row["variant"]), *figures, "*" if row["front"] else "")
-    out.print(shown)
+        rows.append((row["variant"], *figures, "*" if row["front"] else ""))
+    headings = ("variant", "worst", "of", "x real time", "kernel alone", "front")
+    title = "rms difference over standard deviation, and speed of simulate"
+    print_table(out, headings, rows, title, left=(0, 2))
     files = [folder / "accuracy.csv"]
     if plot:
         study.plot_accuracy(table, folder / "accuracy.png")
@@ -732,12 +712,7 @@ def evaluation(
         table = study.evaluation_cost(count, suite, controller)
         tables = [table, study.ray_cost(controller=controller, suite=suite)] if with_ray else [table]
     for frame in tables:
-        shown = Table()
-        for name in frame.columns:
-            shown.add_column(escape(name), justify="left" if frame[name].dtype == object else "right")
-        for row in frame.itertuples(index=False):
-            shown.add_row(*(value if isinstance(value, str) else f"{value:.4g}" for value in row))
-        out.print(shown)
+        show(frame)
     remarks = [f"{row[0]}: {row[1]:.4g} ms" for frame in tables[1:] for row in frame.itertuples(index=False)]
     note(f"wrote {bench.write_csv(table, out_path, remarks)}")
 

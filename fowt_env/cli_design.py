@@ -5,10 +5,8 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.markup import escape
-from rich.table import Table
 
-from fowt_env.cli import app, note, out, progress_bar, reported
+from fowt_env.cli import app, note, out, progress_bar, reported, show
 from fowt_env.cli_arguments import parse_numbers, parse_pairs
 from fowt_env.errors import InputError
 
@@ -77,16 +75,6 @@ def _balanced(table):
     best = total.groupby([fronts["wind_[m/s]"], fronts["information"]], sort=False).idxmin()
     columns = ["wind_[m/s]", "information", "speed_ratio_[-]", "pitch_ratio_[-]", "torque_std_[%]"]
     return table.loc[best, columns]
-
-
-def show(frame, title):
-    """Print a DataFrame as a table."""
-    table = Table(title=escape(title), title_justify="left")
-    for name in frame.columns:
-        table.add_column(escape(name.replace("_", "\n")), justify="right")
-    for row in frame.itertuples(index=False):
-        table.add_row(*(escape(v) if isinstance(v, str) else f"{v:.4g}" for v in row))
-    out.print(table)
 
 
 @app.command(epilog=LINEARIZE_EXAMPLES)

@@ -26,12 +26,22 @@ class SimulationStopped(RuntimeError):
         self.frame = frame
 
 
-def unknown(kind: str, name: object, known: Iterable[object]) -> InputError:
-    """InputError for a name that is not known, with the nearest known one as a suggestion."""
+MOST_LISTED, NEAREST = 30, 5  # names that are all listed; how many are where there are more
+
+
+def unknown(kind: str, name: object, known: Iterable[object], command: str | None = None) -> InputError:
+    """InputError for a name that is not known, with the nearest known one as a suggestion.
+
+    Of more than MOST_LISTED names it lists the NEAREST, their number, and the command that prints them all.
+    """
     names = sorted(str(k) for k in known)
     close = difflib.get_close_matches(str(name), names, n=1)
     hint = f" Did you mean {close[0]!r}?" if close else ""
-    return InputError(f"unknown {kind} {name!r}.{hint} Known: {', '.join(names)}")
+    if len(names) <= MOST_LISTED:
+        return InputError(f"unknown {kind} {name!r}.{hint} Known: {', '.join(names)}")
+    near = ", ".join(difflib.get_close_matches(str(name), names, n=NEAREST, cutoff=0.0))
+    all_of_them = "" if command is None else f"; all: {command}"
+    return InputError(f"unknown {kind} {name!r}.{hint} Nearest of {len(names)}: {near}{all_of_them}")
 
 
 class ControllerError(RuntimeError):

@@ -272,8 +272,9 @@ LARGEST_MARK = 900.0  # points squared, of the controller that travels most
 def plot_pareto(board, path=None, title=None):
     """Rotor-speed against platform-pitch deviation of each controller; the mark's area is its pitch travel.
 
-    board: mapping of training.leaderboard.leaderboard. Bars are its intervals; the stepped line joins the
-    controllers that no other betters in both deviations. The legend gives travel and greatest overspeed.
+    board: mapping of training.leaderboard.leaderboard. Bars are its intervals, or, with too few seeds for
+    one, lines without ends the range over the seeds; the stepped line joins the controllers that no other
+    betters in both deviations. The legend gives travel and greatest overspeed.
     """
     entries = []
     for entry in board["controllers"]:
@@ -291,13 +292,18 @@ def plot_pareto(board, path=None, title=None):
     front = _undominated(points[:, :2])
     if len(front) > 1:
         axes.step(*front.T, where="post", color=INK, linewidth=0.8, linestyle=":", zorder=1)
-    marks = []
+    marks, drawn = [], set()
     for number, ((name, failed, figures), (x, y, travel)) in enumerate(zip(entries, points, strict=True)):
         colour = COLOURS[number % len(COLOURS)]
         square = number // len(COLOURS) % 2  # its area is the whole box of its size, a circle's pi/4 of it
-        bars = [[[max(0.0, f["mean"] - f["low"])], [max(0.0, f["high"] - f["mean"])]] for f in figures[:2]]
-        if np.isfinite(bars).all():
-            axes.errorbar(x, y, xerr=bars[0], yerr=bars[1], color=colour, linewidth=1.0, capsize=2, zorder=2)
+        for low, high, cap in (("low", "high", 2), ("seed_low", "seed_high", 0)):
+            bars = np.array([[[f["mean"] - f[low]], [f[high] - f["mean"]]] for f in figures[:2]])
+            if np.isfinite(bars).all():
+                bars = np.maximum(bars, 0.0)  # rounding
+                style = {"color": colour, "linewidth": 1.0, "capsize": cap, "zorder": 2}
+                axes.errorbar(x, y, xerr=bars[0], yerr=bars[1], **style)
+                drawn.add(low)
+                break
         lost = f", {failed} failed" if failed else ""
         marks.append(
             axes.scatter(
@@ -326,7 +332,10 @@ def plot_pareto(board, path=None, title=None):
     for handle in legend.legend_handles:
         handle.set_sizes([40.0])
     level = round(100 * board["interval"]["level"])
-    text = f"means over {len(board['cases'])} cases; area of a mark: pitch travel; bars: {level} % intervals"
+    cases = len(board["cases"])
+    text = f"means over {cases} case{'' if cases == 1 else 's'}; area of a mark: pitch travel"
+    text += f"; bars: {level} % intervals" if "low" in drawn else ""
+    text += "; lines: range over the seeds, too few for an interval" if "seed_low" in drawn else ""
     axes.set_title(text, fontsize=8, color=INK, loc="left")
     if title:
         figure.suptitle(title, fontsize=11, color=INK)

@@ -95,6 +95,7 @@ def test_a_wind_series_file_drives_the_run(tmp_path):
         (("simulate", "--rotor", "bemm"), "bem"),
         (("simulate", "--out", "run.xls"), "run.xls"),
         (("evaluate", "--cases", "above_ratted"), "above_rated"),
+        (("evaluate", "--cases", "ntm_81"), "'ntm_8'? Nearest of"),
         (("evaluate", "--suite", "above_ratted"), "above_rated"),
         (("evaluate", "--suite", "above_rated", "--cases", "ntm_13"), "ntm_12"),
         (("evaluate", "--controllers", "pie"), "'pi'"),
@@ -255,7 +256,8 @@ def test_evaluate_takes_a_suite_of_the_users_own_compares_and_resumes(tmp_path):
         str(out),
     )
     stdout, _ = fowt(*arguments)
-    assert "suite mine 2" in stdout and "difference from pi" in stdout and "[" in stdout
+    assert "suite mine 2" in stdout and "difference from pi" in stdout
+    assert stdout.count("3 seeds: no interval") == 1
     board = json.loads((out / "leaderboard.json").read_text())
     assert board["suite"]["version"] == 2 and board["seeds"] == [1, 2, 3] and board["baseline"] == "pi"
     assert [entry["controller"] for entry in board["controllers"]] == ["pi", "pi_land"]

@@ -131,7 +131,7 @@ def test_plotting_leaves_pyplot_alone():
 
 
 def pareto_board(controllers):
-    figure = {"low": np.nan, "high": np.nan}
+    figure = dict.fromkeys(("low", "high", "seed_low", "seed_high"), np.nan)
     entries = []
     for name, (speed, pitch, travel) in controllers.items():
         values = dict(zip(plots.PARETO, (speed, pitch, travel, 20.0), strict=True))
@@ -158,3 +158,27 @@ def test_pareto_marks_have_areas_in_the_ratio_of_pitch_travel_and_names_that_do_
 def test_a_pareto_plot_of_failures_alone_is_refused():
     with pytest.raises(InputError, match="nothing to plot"):
         plots.plot_pareto(pareto_board({"x": (np.nan, np.nan, np.nan)}))
+
+
+def test_a_pareto_plot_has_bars_for_intervals_and_the_range_of_the_seeds_where_there_are_none():
+    board = pareto_board({"x": (1.0, 0.9, 0.1)})
+    (entry,) = board["controllers"]
+    for figure in entry["metrics"].values():
+        figure.update(seed_low=0.8 * figure["mean"], seed_high=1.2 * figure["mean"])
+
+    def drawn():
+        axes = plots.plot_pareto(board).axes[0]
+        ends = np.concatenate(
+            [line.vertices for part in axes.containers for bar in part[2] for line in bar.get_paths()]
+        )
+        caps = sum(len(part[1]) for part in axes.containers)
+        return ends[:, 0].min(), ends[:, 0].max(), caps, axes.get_title(loc="left")
+
+    low, high, caps, title = drawn()
+    assert (low, high) == pytest.approx((0.8, 1.2)) and caps == 0
+    assert title.startswith("means over 1 case; ") and "range over the seeds" in title and "%" not in title
+    for figure in entry["metrics"].values():
+        figure.update(low=0.9 * figure["mean"], high=1.1 * figure["mean"])
+    low, high, caps, title = drawn()
+    assert (low, high) == pytest.approx((0.9, 1.1)) and caps == 4
+    assert "bars: 95 % intervals" in title and "range" not in title

@@ -19,8 +19,8 @@ import pandas as pd
 from controllers import DESIGN, POLICY, information
 from fowt_env.errors import InputError, unknown
 from fowt_env.outputs import replacing, write_table
-from training.bootstrap import crossed_estimate
-from training.metrics import METRICS
+from training.bootstrap import LEAST_SEEDS, crossed_estimate
+from training.metrics import METRICS, never_negative
 
 __all__ = ["COUNTS", "FIGURES", "Figure", "agent_counts", "agent_scores", "by_kind", "read_results"]
 
@@ -57,13 +57,16 @@ class Figure:
             return "met" if self.then is None else "first"
         return "missed"
 
-    def verdict(self, ratio, low, high):
+    def verdict(self, ratio, low, high, failed=0):
         """What the ratio reaches (level), with "*" where the whole interval does; "" without a ratio.
 
-        "then, first*": the ratio reaches the second aim, the whole interval the first.
+        "then, first*": the ratio reaches the second aim, the whole interval the first. "failed" where runs
+        failed: the ratio is that of the others, which may be the easy ones.
         """
         if self.first is None or not np.isfinite(ratio):
             return ""
+        if failed:
+            return "failed"
         found = self.level(ratio)
         if not np.isfinite(high):
             return found
@@ -167,8 +170,9 @@ def agent_scores(table, rivals, groups=None, agents=None, figures=FIGURES):
     """DataFrame: per agent or group, rival and figure the ratio, its interval, and what that reaches.
 
     table: what training.evaluate.evaluate returns; groups, agents: as grouped takes them. Columns: agent,
-    rival, figure, metric, ratio (interquartile mean over all runs), low, high, pairs (runs with a ratio),
-    runs, training_seeds, verdict (Figure.verdict). Where the rival's figure is 0 there is no ratio.
+    rival, figure, metric, ratio (interquartile mean over all runs), low, high (NaN for too few seeds:
+    training.bootstrap.crossed_estimate), pairs (runs with a ratio), runs, training_seeds, verdict
+    (Figure.verdict). Where the rival's figure is 0 there is no ratio.
     Raises: InputError for labels that were not run, or where no run of both went well.
     """
     return _scores(table, rivals, grouped(table, rivals, groups, agents), figures)
@@ -183,6 +187,7 @@ def _scores(table, rivals, chosen, figures):
     rows = []
     for name, labels in chosen.items():
         runs = int(made.get_level_values(0).isin(labels).sum())
+        failed = runs - int(good.index.get_level_values(0).isin(labels).sum())
         for rival in rivals:
             pairs_at_all = 0
             for figure in figures:
@@ -192,7 +197,7 @@ def _scores(table, rivals, chosen, figures):
                     ratio = np.where(other != 0.0, own / other, np.nan)
                 pairs = int(np.isfinite(ratio).sum())
                 pairs_at_all += pairs
-                estimate, low, high = crossed_estimate(ratio)
+                estimate, low, high = crossed_estimate(ratio, positive=never_negative(figure.metric))
                 rows.append(
                     {
                         "agent": name,
@@ -205,7 +210,7 @@ def _scores(table, rivals, chosen, figures):
                         "pairs": pairs,
                         "runs": runs,
                         "training_seeds": len(labels),
-                        "verdict": figure.verdict(estimate, low, high),
+                        "verdict": figure.verdict(estimate, low, high, failed),
                     }
                 )
             if not pairs_at_all:
@@ -294,6 +299,13 @@ def markdown_table(frame):
     return "\n".join("| " + " | ".join(row) + " |" for row in rows) + "\n"
 
 
+def _remark(scores):
+    """[line] that says why ratios have no interval; [] where each has one."""
+    bare = np.isfinite(scores["ratio"]) & ~np.isfinite(scores["low"])
+    text = f"No interval: fewer than {LEAST_SEEDS} weather seeds, or two or three training seeds.\n"
+    return [text] if bare.any() else []
+
+
 def scores_markdown(scores, counts):
     """Markdown text of agent_scores and agent_counts: a table for each rival, one of failures."""
     parts = []
@@ -307,6 +319,7 @@ def scores_markdown(scores, counts):
         wide.index.name = f"over `{rival}`"
         wide.columns = [f"`{name}`" for name in names]
         parts.append(markdown_table(wide))
+    parts += _remark(scores)
     shown = counts.copy()
     shown["largest overspeed (%)"] = shown["largest overspeed (%)"].map("{:.1f}".format)
     shown["agent"] = shown["agent"].map("`{}`".format)
@@ -326,6 +339,7 @@ def kinds_markdown(scores, counts, figures=None):
         wide.index.name = f"{name} over `{rows['rival'].iloc[0]}`"
         wide.columns = [f"`{agent}`" for agent in names]
         parts.append(markdown_table(wide))
+    parts += _remark(scores)
     columns = counts[["failed", PAST_ANY, "runs"]].to_numpy()
     shown = counts.assign(text=[f"{failed} / {past} of {runs}" for failed, past, runs in columns])
     agents = list(dict.fromkeys(counts["agent"]))

@@ -346,7 +346,7 @@ def named_cases(names):
         elif name in suite_names() or str(name).endswith(".toml"):
             found = read_suite(name).cases
         else:
-            raise unknown("case", name, (*suite_names(), *known))
+            raise unknown("case", name, (*suite_names(), *known), "fowt list cases, fowt list suites")
         for case in found:
             wanted.setdefault(case.name, case)
     if not wanted:

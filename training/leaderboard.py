@@ -7,15 +7,17 @@ cases.
 import numpy as np
 
 from fowt_env.errors import unknown
-from training.bootstrap import LEVEL, RESAMPLES, interval, resample_weights
-from training.metrics import METRICS
+from training.bootstrap import LEAST_SEEDS, LEVEL, RESAMPLES, interval, resample_weights
+from training.metrics import METRICS, never_negative
 
 BASELINES = ("gspi_oc3", "pi")  # the first of these that was evaluated, unless one is named
+POSITIVE = np.array([never_negative(name) for name in METRICS])
 MOST_OF_REFERENCE = 1e6  # larger differences, as multiples of the baseline's own value, get no percentage
 METHOD = (
     "percentile bootstrap over seeds, each with all its cases, widened for n seeds by sqrt(n/(n-1)) and by"
-    " Student's t with n-1 degrees of freedom over the normal; every case counts alike; differences are"
-    " paired by case and seed"
+    " Student's t with n-1 degrees of freedom over the normal; of the logarithm where a figure cannot be"
+    f" negative; none below {LEAST_SEEDS} seeds; every case counts alike; differences are paired by case and"
+    " seed, and there is none of a controller with failed runs"
 )
 
 
@@ -34,13 +36,19 @@ def case_means(values, weights):
     return means
 
 
-def default_baseline(controllers, baseline=None):
-    """Name of the controller that others are compared with. Raises: InputError if it was not evaluated."""
+def default_baseline(controllers, baseline=None, failed=()):
+    """Name of the controller that others are compared with; None: there is none.
+
+    It is the one that is named; else the first of BASELINES, or of all, that is not in `failed` (those with
+    failed runs).
+    Raises: InputError if it was not evaluated.
+    """
     if baseline is not None:
         if baseline not in controllers:
             raise unknown("baseline among the evaluated controllers", baseline, controllers)
         return baseline
-    return next((name for name in BASELINES if name in controllers), next(iter(controllers), None))
+    able = [name for name in controllers if name not in failed]
+    return next((name for name in BASELINES if name in able), next(iter(able), None))
 
 
 class _Grid:
@@ -66,8 +74,11 @@ class _Grid:
                 self.values[at] = figures[number]
 
 
-def _figures(values, weights):
-    """(estimate, low, high), each (metrics,), of the mean of values (cases, seeds, metrics)."""
+def _figures(values, weights, positive=False):
+    """(estimate, low, high), each (metrics,), of the mean of values (cases, seeds, metrics).
+
+    positive: which of them cannot be below zero (bootstrap.interval).
+    """
     used = np.isfinite(values).any(axis=(1, 2))
     if not used.any():
         empty = np.full(values.shape[-1], np.nan)
@@ -77,7 +88,16 @@ def _figures(values, weights):
         estimate = np.mean([case_means(case, one)[0] for case in values[used]], axis=0)
         resampled = np.mean([case_means(case, weights) for case in values[used]], axis=0)
     seeds = int(np.isfinite(values).any(axis=(0, 2)).sum())
-    return estimate, *interval(estimate, resampled, seeds)
+    return estimate, *interval(estimate, resampled, seeds, positive)
+
+
+def _seed_range(values):
+    """(least, greatest), each (metrics,), over the seeds of the mean over cases; of seeds with every case."""
+    used = np.isfinite(values).any(axis=(1, 2))
+    means = values[used].mean(axis=0) if used.any() else np.full(values.shape[1:], np.nan)
+    there = np.isfinite(means)
+    ends = np.where(there, means, np.inf).min(axis=0), np.where(there, means, -np.inf).max(axis=0)
+    return tuple(np.where(there.any(axis=0), end, np.nan) for end in ends)
 
 
 def _named(estimate, low, high, **more):
@@ -91,38 +111,51 @@ def _named(estimate, low, high, **more):
 def leaderboard(table, baseline=None, score=None, cases=None):
     """Mapping of plain values: how the controllers of an evaluation's table compare.
 
-    baseline   controller of the paired differences; None: gspi_oc3, else pi, else the first
+    baseline   controller of the paired differences; None: gspi_oc3, else pi, else the first, of those
+               without failed runs
     score      training.cases.Score of a suite, or None
     cases      names of the cases that count; None: all
-    Keys: baseline, interval (level, method, resamples), cases, seeds, controllers: a list of mappings with
-    controller, runs, failed, metrics {metric: mean, low, high, worst}, difference {metric: mean, low, high,
-    percent, pairs}, score (mean, low, high, valid, why; None without one), cases {case: runs, failed,
-    metrics, difference}. worst is the greatest over all runs; percent the mean difference over the
-    baseline's mean of the same runs.
+    Keys: baseline (None: every controller has failed runs), interval (level, method, resamples,
+    least_seeds), cases, seeds, controllers: a list of mappings with controller, runs, failed, metrics
+    {metric: mean, low, high, seed_low, seed_high, worst}, difference {metric: mean, low, high, percent,
+    pairs}, score (mean, low, high, valid, why; None without one), cases {case: runs, failed, metrics,
+    difference}. seed_low and seed_high are the range over the seeds of the mean over cases, worst the
+    greatest over all runs; percent the mean difference over the baseline's mean of the same runs.
+    Controllers with failed runs stand last and have no difference (NaN), whatever the cases: who fails in
+    bad weather has good means.
     Raises: InputError for a baseline that was not evaluated.
     """
     if cases is not None:
         table = table[table["case"].isin(cases)]
     grid = _Grid(table)
+    lost = [name for name, failed in zip(grid.controllers, grid.failed, strict=True) if failed.any()]
     baseline = default_baseline(
-        [name for name in grid.controllers if name != "parked"] or grid.controllers, baseline
+        [name for name in grid.controllers if name != "parked"] or grid.controllers, baseline, lost
     )
     weights = resample_weights(max(1, len(grid.seeds)))
-    base = grid.values[grid.controllers.index(baseline)] if grid.controllers else None
+    nothing = np.full(grid.values.shape[1:], np.nan)
+    base = nothing if baseline is None else grid.values[grid.controllers.index(baseline)]
     entries = []
     for number, name in enumerate(grid.controllers):
         values, runs, failed = grid.values[number], grid.runs[number], grid.failed[number]
-        entry = {"controller": name, **_entry(values, base, runs, failed, weights)}
+        other = nothing if failed.any() else base
+        entry = {"controller": name, **_entry(values, other, runs, failed, weights)}
         entry["score"] = None if score is None else _score(score, grid, number, weights)
         entry["cases"] = {
-            case: _entry(values[i : i + 1], base[i : i + 1], runs[i : i + 1], failed[i : i + 1], weights)
+            case: _entry(values[i : i + 1], other[i : i + 1], runs[i : i + 1], failed[i : i + 1], weights)
             for i, case in enumerate(grid.cases)
             if runs[i].any()
         }
         entries.append(entry)
+    entries.sort(key=lambda entry: entry["failed"] > 0)
     return {
         "baseline": baseline,
-        "interval": {"level": LEVEL, "method": METHOD, "resamples": RESAMPLES},
+        "interval": {
+            "level": LEVEL,
+            "method": METHOD,
+            "resamples": RESAMPLES,
+            "least_seeds": LEAST_SEEDS,
+        },
         "cases": grid.cases,
         "seeds": [int(seed) for seed in grid.seeds],
         "controllers": entries,
@@ -131,7 +164,8 @@ def leaderboard(table, baseline=None, score=None, cases=None):
 
 def _entry(values, base, runs, failed, weights):
     """Figures of one controller over some cases; arrays (cases, seeds[, metrics])."""
-    estimate, low, high = _figures(values, weights)
+    estimate, low, high = _figures(values, weights, POSITIVE)
+    least, greatest = _seed_range(values)
     with np.errstate(all="ignore"):
         filled = np.where(np.isfinite(values), values, -np.inf).max(axis=(0, 1))
     worst = np.where(np.isfinite(filled), filled, np.nan)
@@ -145,7 +179,7 @@ def _entry(values, base, runs, failed, weights):
     return {
         "runs": int(runs.sum()),
         "failed": int(failed.sum()),
-        "metrics": _named(estimate, low, high, worst=worst),
+        "metrics": _named(estimate, low, high, seed_low=least, seed_high=greatest, worst=worst),
         "difference": _named(
             gap, gap_low, gap_high, percent=percent, pairs=pairs.sum(axis=(0, 1)).astype(float)
         ),
@@ -157,11 +191,14 @@ def _score(score, grid, number, weights):
     nothing = {"mean": None, "low": None, "high": None, "valid": False}
     if score.baseline not in grid.controllers:
         return nothing | {"why": f"needs the controller {score.baseline!r} in the evaluation"}
-    if grid.failed[number].any():
-        return nothing | {"why": f"{int(grid.failed[number].sum())} failed runs"}
-    base = grid.values[grid.controllers.index(score.baseline)]
-    own = grid.values[number]
-    shared = np.isfinite(own).any(axis=(1, 2)) & np.isfinite(base).any(axis=(1, 2))
+    place = grid.controllers.index(score.baseline)
+    for failed, whose in ((grid.failed[number], ""), (grid.failed[place], f" of {score.baseline!r}")):
+        if failed.any():
+            count = int(failed.sum())
+            return nothing | {"why": f"{count} failed run{'' if count == 1 else 's'}{whose}"}
+    paired = np.isfinite(grid.values[number] - grid.values[place])
+    own, base = (np.where(paired, grid.values[i], np.nan) for i in (number, place))
+    shared = paired.any(axis=(1, 2))
     if not shared.any():
         return nothing | {"why": "no run in common with the baseline"}
 
@@ -176,11 +213,13 @@ def _score(score, grid, number, weights):
 
     with np.errstate(all="ignore"):
         estimate = value(np.ones((1, len(grid.seeds))))[0]
-        low, high = interval(estimate, value(weights), len(grid.seeds))
+        seeds = int(paired.any(axis=(0, 2)).sum())
+        positive = all(never_negative(term.metric) for term in score.term)
+        low, high = interval(estimate, value(weights), seeds, positive)
     why = []
     for name, limit in score.limits.items():
-        worst = np.nanmax(own[..., METRICS.index(name)])
-        if worst > limit:
+        worst = grid.values[number, ..., METRICS.index(name)][grid.runs[number]].max()
+        if not worst <= limit:  # a run without the figure is not within its limit
             why.append(f"{name} = {worst:g}, allowed {limit:g}")
     figures = {"mean": float(estimate[0]), "low": float(low[0]), "high": float(high[0])}
     return figures | {"valid": not why, "why": "; ".join(why)}

@@ -77,6 +77,14 @@ METRICS = (
     "rotor_speed_violations_[-]",
 )
 
+# what names of figures that cannot be below zero have in them
+_NEVER_NEGATIVE = ("_std_", "_rms_", "_DEL_", "_travel_", "_duty_", "_beyond_", "_violations_", "FAIRTEN_")
+
+
+def never_negative(metric):
+    """Whether a metric cannot be below zero: deviations, travel, fatigue, tensions, times and counts."""
+    return any(part in metric for part in _NEVER_NEGATIVE)
+
 
 def travel(time, value):
     """Mean absolute rate of a signal: the sum of its steps' sizes per second."""

@@ -114,22 +114,24 @@ LEADERBOARD_DROPS = ("FAIRTEN_DEL_[kN]", "TwrBsMyt_DEL_[kN-m]", "GenPwr_mean_[kW
 
 
 def leaderboard_rows(board, width=200):
-    """(title, headings, rows of texts) of a leaderboard mapping, at most `width` characters wide if possible.
+    """(title, headings, rows of texts, remarks) of a leaderboard, in `width` characters if possible.
 
-    A difference is in percent of the baseline, "*" where its interval leaves out zero.
+    A difference is in percent of the baseline, "*" where its interval leaves out zero. Remarks: lines on
+    what the table lacks, and why.
     """
-    level = round(100 * board["interval"]["level"])
     baseline = board["baseline"]
     name = "" if not board.get("suite") else f"suite {board['suite']['name']} {board['suite']['version']}, "
-    title = (
-        f"{name}{len(board['cases'])} cases, seeds {_ranges(board['seeds'])}: mean over cases"
-        f" [{level} % interval], paired difference from {baseline} (* interval without zero)"
-    )
+    intervals = has_intervals(board)
+    title = f"{name}{_counted(len(board['cases']), 'case')}, {_seeds(board['seeds'])}: means"
+    if intervals:
+        title += f" [{round(100 * board['interval']['level'])} % interval]"
+    if baseline is not None:
+        title += f", paired difference from {baseline}{' (* interval without zero)' if intervals else ''}"
     dropped = set()
     for drop in (None, *LEADERBOARD_DROPS):
         dropped.add(drop)
         columns = [("controller", [entry["controller"] for entry in board["controllers"]])]
-        columns.append(("runs", [f"{e['runs'] - e['failed']}/{e['runs']}" for e in board["controllers"]]))
+        columns.append(("runs", [_runs_text(entry) for entry in board["controllers"]]))
         if any(entry["score"] for entry in board["controllers"]):
             columns.append(("score", [_score_text(entry["score"]) for entry in board["controllers"]]))
         for heading, metric, form, with_interval, with_difference in LEADERBOARD:
@@ -148,7 +150,54 @@ def leaderboard_rows(board, width=200):
         if sum(2 + max(map(len, [*heading.split("\n"), *texts])) for heading, texts in columns) <= width:
             break
     headings, texts = zip(*columns, strict=True)
-    return title, headings, list(zip(*texts, strict=True))
+    return title, headings, list(zip(*texts, strict=True)), _remarks(board, intervals)
+
+
+def has_intervals(board):
+    """Whether any figure of a leaderboard has an interval: it had seeds enough."""
+    return any(
+        figure["low"] is not None and figure["low"] == figure["low"]
+        for entry in board["controllers"]
+        for figure in entry["metrics"].values()
+    )
+
+
+def no_interval(board):
+    """ "3 seeds: no interval", and from how many there is one."""
+    return f"{_counted(len(board['seeds']), 'seed')}: no interval (needs {board['interval']['least_seeds']})"
+
+
+def _remarks(board, intervals):
+    """Lines below the leaderboard: on intervals, failed runs and the baseline."""
+    lines = [] if intervals else [no_interval(board)]
+    failed = {e["controller"]: _counted(e["failed"], "run") for e in board["controllers"] if e["failed"]}
+    if failed:
+        counts = ", ".join(f"{name}: {count}" for name, count in failed.items())
+        lines.append(
+            f"failed ({counts}): no paired difference; means are of the other runs, perhaps the easy ones"
+        )
+    baseline = board["baseline"]
+    if baseline is None and board["controllers"]:
+        lines.append("no paired differences: every controller has failed runs")
+    if baseline in failed:
+        lines.append(f"baseline {baseline}: {failed[baseline]} failed; pairs are of the runs that went well")
+    return lines
+
+
+def _counted(count, noun):
+    """ "1 case", "2 cases"."""
+    return f"{count} {noun}{'' if count == 1 else 's'}"
+
+
+def _runs_text(entry):
+    """ "6/6" of a controller's runs, with the number of those that failed."""
+    failed = f", {entry['failed']} failed" if entry["failed"] else ""
+    return f"{entry['runs'] - entry['failed']}/{entry['runs']}{failed}"
+
+
+def _seeds(seeds):
+    """ "seed 1", "seeds 1-6, 9"."""
+    return f"seed{'' if len(seeds) == 1 else 's'} {_ranges(seeds)}"
 
 
 def _ranges(seeds):
@@ -174,7 +223,7 @@ def _cell(entry, metric, form, with_interval, with_difference):
     if with_interval and figure["low"] == figure["low"]:
         text += f" [{format(scale * figure['low'], form)}, {format(scale * figure['high'], form)}]"
     if with_difference and gap["percent"] == gap["percent"]:
-        sure = gap["low"] > 0.0 or gap["high"] < 0.0
+        sure = gap["low"] > 0.0 or gap["high"] < 0.0  # neither without an interval
         text += f" {gap['percent']:+.1f}%{'*' if sure else ' '}"
     return text
 

@@ -149,6 +149,25 @@ def test_load_stays_finite_in_any_attitude():
         assert np.abs(load[:2]).max() < 1e9
 
 
+@pytest.mark.parametrize("sea", [None, "rough"])
+def test_axial_drag_on_the_keel_is_that_of_the_plain_sum_and_of_morison_load(sea):
+    plain = strips_for()  # no built-in platform has any
+    strips, waves = plain._replace(axial_drag_coefficient=9.0), None if sea is None else waves_of(sea)
+    cases = list(random_states(40, 4.0, seed=15))
+    fast, naive = compare(waves, strips, cases)
+    without, naive_without = compare(waves, plain, cases)
+    drag, wanted = fast[:, 2] - without[:, 2], naive[:, 2] - naive_without[:, 2]
+    assert np.abs(wanted).max() > 0.1 * np.abs(naive[:, 2]).max() and wanted.min() < 0.0 < wanted.max()
+    np.testing.assert_allclose(drag, wanted, rtol=2e-3, atol=2e-3 * np.abs(wanted).max())
+    nodes = np.zeros((7, strips.nodes))
+    exact = [
+        np.subtract(*(as_array(morison_load(t, pose_of(x), s, waves, None, nodes)) for s in (strips, plain)))
+        for t, x in cases
+    ]
+    np.testing.assert_allclose(drag, np.array(exact)[:, 2], rtol=2e-3, atol=2e-3 * np.abs(wanted).max())
+    assert np.array_equal(np.delete(fast, 2, axis=1), np.delete(without, 2, axis=1))
+
+
 @pytest.mark.parametrize("drift", [0.0, 100.0])
 def test_error_does_not_grow_with_time_or_drift(drift):
     cases = [(t + 1e4, x) for t, x in random_states(40, 4.0, seed=4, drift=drift)]

@@ -62,14 +62,44 @@ def test_ratios_are_taken_run_by_run_and_the_interval_holds_the_mean():
 
 
 def test_a_group_is_scored_over_all_its_training_seeds():
-    agents = {"a": [0.7, 0.71, 0.69], "b": [0.8, 0.81, 0.79], "c": [0.9, 0.91, 0.89], "d": [0.5, 0.5, 0.5]}
-    scores = agent_scores(table(agents), ["rival"], {"all": ["a", "b", "c"]})
+    agents = {
+        name: [mean, mean + 0.01, mean - 0.01, mean]
+        for name, mean in (("a", 0.7), ("b", 0.8), ("c", 0.9), ("e", 0.75), ("d", 0.5))
+    }
+    scores = agent_scores(table(agents), ["rival"], {"all": ["a", "b", "c", "e"]})
     assert set(scores["agent"]) == {"all", "d"}
     whole = scores[scores["agent"] == "all"].iloc[0]
-    assert whole["ratio"] == pytest.approx(interquartile_mean(sum((agents[k] for k in "abc"), [])))
-    assert (whole["runs"], whole["pairs"], whole["training_seeds"]) == (9, 9, 3)
+    assert whole["ratio"] == pytest.approx(interquartile_mean(sum((agents[k] for k in "abce"), [])))
+    assert (whole["runs"], whole["pairs"], whole["training_seeds"]) == (16, 16, 4)
     one = agent_scores(table(agents), ["rival"], agents=["b"]).iloc[0]
     assert whole["high"] - whole["low"] > 3.0 * (one["high"] - one["low"])
+
+
+def test_ratios_over_fewer_than_four_seeds_have_no_interval_and_the_text_says_so_once():
+    agents = {name: [0.5, 0.6, 0.5, 0.6] for name in "abc"}
+    for runs, groups in ((table({"a": [0.5, 0.6, 0.5]}), {}), (table(agents), {"all": ["a", "b", "c"]})):
+        scores = agent_scores(runs, ["rival"], groups)
+        assert np.isfinite(scores["ratio"]).all() and scores[["low", "high"]].isna().all(axis=None)
+        assert not scores["verdict"].str.contains("*", regex=False).any()
+        text = scores_markdown(scores, agent_counts(runs, ["rival"], groups))
+        assert "[" not in text and text.count("No interval: ") == 1
+        assert kinds_markdown(*by_kind(runs, "rival", groups)).count("No interval: ") == 1
+    single = agent_scores(table(agents), ["rival"], agents=["a"])
+    assert np.isfinite(single[["low", "high"]]).all(axis=None)
+    assert "No interval" not in scores_markdown(single, agent_counts(table(agents), ["rival"], agents=["a"]))
+
+
+def test_ratios_of_deviations_have_intervals_above_zero_however_they_scatter():
+    scores = agent_scores(table({"agent": [0.001, 0.5, 3.0, 0.01]}), ["rival"]).set_index("figure")
+    assert (scores["low"].drop("mean power") > 0.0).all()
+    assert scores.loc["mean power", "low"] < 0.0  # power may be drawn from the grid
+
+
+def test_an_agent_with_a_failed_run_reaches_no_aim():
+    runs = table({"agent": [0.5] * 5, "other": [0.5] * 5})
+    fail(runs, "agent", 2)
+    scores = agent_scores(runs, ["rival"]).set_index(["agent", "figure"])["verdict"]
+    assert set(scores["agent"]) == {"failed"} and scores["other", "rotor-speed std"] == "then*"
 
 
 def test_failed_runs_are_counted_and_left_out():

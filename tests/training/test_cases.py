@@ -4,8 +4,8 @@ import json
 
 import pytest
 
-from fowt_env.errors import InputError
-from training.cases import all_cases, described, read_suite, suite_names
+from fowt_env.errors import InputError, unknown
+from training.cases import all_cases, described, named_cases, read_suite, suite_names
 
 SUITES = ("above_rated", "above_rated_fullfield", "atlas", "dlc", "full_range", "gusts", "oc3", "paper")
 HEAD = """
@@ -38,6 +38,13 @@ def test_a_name_that_several_suites_hold_is_the_same_case_in_each():
     for suite in map(read_suite, suite_names()):
         for case in suite.cases:
             assert described(case) == known[case.name]
+
+
+def test_a_case_that_is_named_by_itself_has_the_seeds_and_times_of_whoever_runs_it():
+    shipped = [case for suite in suite_names() for case in read_suite(suite).cases]
+    assert any(case.seeds for case in shipped) and any(case.duration for case in shipped)
+    for case in all_cases().values():
+        assert case.seeds is None and case.duration is None and case.skip is None
 
 
 def test_the_headline_is_what_the_brief_of_the_benchmark_says():
@@ -99,6 +106,7 @@ WIND = "wind = 16.0"
         (f'[[case]]\nname = "a"\n{WIND}\nsea = {{table = "north_sea"}}', ["sea.speed is missing"]),
         (f'[[case]]\nname = "a"\n{WIND}\noptions = {{surfac = "swl"}}', ["'surface'"]),
         (f'[[case]]\nname = "a"\n{WIND}\nskip = 200.0', ["skip = 200", "below duration = 100"]),
+        (f'[[case]]\nname = "a"\n{WIND}\nskip = 100.0', ["skip = 100", "below duration = 100"]),
         (f'[[case]]\nname = "a"\n{WIND}\nfault = {{kind = "grid_los", time = 50}}', ["'grid_loss'"]),
         (f'[[case]]\nname = "a"\n{WIND}\nfault = {{kind = "grid_loss", time = 500}}', ["fault.time = 500"]),
         ('[[case]]\nname = "a"\nwind = {kind = "mann", speed = 12}', ["does not fit"]),
@@ -121,6 +129,34 @@ def test_a_wrong_suite_is_refused_with_its_case_and_key(tmp_path, text, messages
     assert "mine.toml" in str(error.value)
     for message in messages:
         assert message in str(error.value)
+
+
+def test_an_unknown_case_has_the_five_nearest_and_the_command_that_lists_them():
+    known = [*suite_names(), *all_cases()]
+    with pytest.raises(InputError) as error:
+        named_cases("ntm_18,ntm_81")
+    head, _, rest = str(error.value).partition(f" Nearest of {len(known)}: ")
+    assert head == "unknown case 'ntm_81'. Did you mean 'ntm_8'?" and len(known) > 100
+    near, _, commands = rest.partition("; all: ")
+    assert near.split(", ")[:2] == ["ntm_8", "ntm_18"] and len(near.split(", ")) == 5
+    assert set(near.split(", ")) < set(known) and commands == "fowt list cases, fowt list suites"
+    with pytest.raises(
+        InputError, match=f"unknown case 'zzz'. Nearest of {len(known)}: .*,.*,.*,.*,.*;"
+    ):  # near to none, and still helped
+        named_cases("zzz")
+
+
+def test_of_up_to_thirty_names_all_are_listed():
+    names = [f"name{number:02d}" for number in range(31)]
+    assert str(unknown("key", "nam", names[:30])).endswith("Known: " + ", ".join(names[:30]))
+    assert "Known" not in str(unknown("key", "nam", names)) and "31: name" in str(
+        unknown("key", "nam", names)
+    )
+
+
+def test_a_suite_without_seeds_has_the_first_one_for_test(tmp_path):
+    head = HEAD.replace("seeds = [1, 2]\n", "")
+    assert read_suite(written(tmp_path, f'[[case]]\nname = "a"\n{WIND}', head)).seeds == (1,)
 
 
 def test_an_unknown_suite_suggests_and_a_broken_file_is_named(tmp_path):

@@ -44,6 +44,19 @@ def test_sine_has_the_known_standard_deviation_and_travel():
     assert result["blade_pitch_travel_[deg/s]"] == pytest.approx(1.2, rel=1e-12)
 
 
+def test_a_standard_deviation_is_about_the_runs_own_mean_with_n_in_the_denominator():
+    run = synthetic_run(duration=0.3, **{"RotSpeed_[rpm]": lambda t: 12.0 + np.array([1.0, -1.0, 1.0, -1.0])})
+    assert metrics(run)["RotSpeed_std_[rpm]"] == pytest.approx(1.0, rel=1e-12)
+
+
+def test_what_is_skipped_counts_from_the_first_row_whatever_its_time():
+    run = synthetic_run(**{"RotSpeed_[rpm]": lambda t: np.where(t < 19.95, 5.0, 12.0)})
+    for start in (0.0, 100.0):
+        moved = run.assign(**{"Time_[s]": run["Time_[s]"] + start})
+        assert metrics(moved, skip=20.0)["RotSpeed_min_[rpm]"] == 12.0
+        assert metrics(moved, skip=19.9)["RotSpeed_min_[rpm]"] == 5.0
+
+
 def test_ramp_travels_at_its_slope_whatever_the_output_step():
     for dt in (0.05, 0.5):
         result = metrics(synthetic_run(dt=dt, **{"GenTq_[kN-m]": lambda t: 40.0 - 0.02 * t}))

@@ -51,23 +51,73 @@ def test_a_wide_terminal_gets_every_column():
     assert len(summary_rows(means(), 200)[0]) == 3 + len(HEADLINE)
 
 
-def board(seeds):
-    """Leaderboard of pi and of x, whose every run failed, over one case."""
+def board(seeds, pi="ok", x="failed", factor=1.0, lost=None, baseline=None):
+    """Leaderboard of pi and of x (status of their runs) over one case.
+
+    x has `factor` times the figures of pi, and no run of the seed `lost`.
+    """
     rows = [
-        dict.fromkeys(COLUMNS, 1.0 + 0.1 * seed)
+        dict.fromkeys(COLUMNS, share * (1.0 + 0.1 * seed))
         | {"controller": name, "case": "calm", "seed": seed, "status": status, "reason": ""}
         for seed in seeds
-        for name, status in (("pi", "ok"), ("x", "failed"))
+        for name, status, share in (("pi", pi, 1.0), ("x", "failed" if seed == lost else x, factor))
     ]
-    return leaderboard(pd.DataFrame(rows))
+    return leaderboard(pd.DataFrame(rows), baseline)
 
 
 def test_the_leaderboard_says_how_many_runs_went_well_and_of_which_seeds():
-    title, headings, rows = leaderboard_rows(board([1, 2, 3, 6, 8, 9]))
-    assert "seeds 1-3, 6, 8-9" in title and "difference from pi" in title
+    title, headings, rows, remarks = leaderboard_rows(board([1, 2, 3, 6, 8, 9]))
+    assert title == (
+        "1 case, seeds 1-3, 6, 8-9: means [95 % interval],"
+        " paired difference from pi (* interval without zero)"
+    )
     (pi, x) = (dict(zip(headings, row, strict=True)) for row in rows)
-    assert (pi["runs"], x["runs"]) == ("6/6", "0/6")
+    assert (pi["runs"], x["runs"]) == ("6/6", "0/6, 6 failed")
     assert set(list(x.values())[2:]) == {"-"}
+    assert len(remarks) == 1 and "x: 6 runs" in remarks[0]
+
+
+def test_a_row_has_means_with_intervals_the_worst_overspeed_and_differences_to_the_baseline():
+    both = board([1, 2, 3, 4, 5], x="ok", factor=0.5)
+    _, headings, (pi, x), _ = leaderboard_rows(both)
+    place = {heading.replace("\n", " "): number for number, heading in enumerate(headings)}
+    speed = both["controllers"][1]["metrics"]["RotSpeed_std_[rpm]"]
+    wanted = f"{speed['mean']:.3f} [{speed['low']:.3f}, {speed['high']:.3f}] -50.0%*"
+    assert x[place["rotor speed std rpm"]] == wanted and speed["mean"] == pytest.approx(0.65)
+    assert not any("%" in text or "*" in text for text in pi)  # the baseline has none to itself
+    assert (pi[place["overspeed max %"]], x[place["overspeed max %"]]) == ("1.5", "0.8")  # of the worst run
+    tower = both["controllers"][0]["metrics"]["TwrBsMyt_DEL_[kN-m]"]
+    tower["mean"] = 22_700.0
+    _, _, (pi, _), _ = leaderboard_rows(both)
+    assert pi[place["tower DEL MN m"]] == "22.7"
+
+
+def test_few_seeds_have_neither_interval_nor_star_and_the_remark_says_so_once():
+    for seeds, words in (([1], "seed 1:"), ([1, 2, 4], "seeds 1-2, 4:")):
+        title, _, rows, remarks = leaderboard_rows(board(seeds, x="ok"))
+        assert words in title and "[" not in title and "*" not in title
+        assert not any("[" in text or "*" in text for row in rows for text in row)
+        count = "1 seed" if len(seeds) == 1 else "3 seeds"
+        assert remarks == [f"{count}: no interval (needs 4)"]
+    assert leaderboard_rows(board([1, 2, 3, 4], x="ok"))[3] == []
+
+
+def test_a_controller_that_failed_in_bad_weather_shows_no_gain_and_its_row_says_failed():
+    both = board([1, 2, 3, 4, 5], x="ok", factor=0.5)
+    _, headings, (_, row), _ = leaderboard_rows(both)
+    assert sum("-50.0%*" in text for text in row) == 6
+    lost = board([1, 2, 3, 4, 5], x="ok", factor=0.5, lost=5)
+    _, headings, (_, row), remarks = leaderboard_rows(lost)
+    assert row[headings.index("runs")] == "4/5, 1 failed"
+    assert not any("%" in text or "*" in text for text in row) and "x: 1 run)" in remarks[0]
+
+
+def test_a_baseline_that_failed_is_said_to_have():
+    _, _, _, remarks = leaderboard_rows(board([1, 2, 3, 4, 5], x="ok", lost=5, baseline="x"))
+    assert remarks[-1] == "baseline x: 1 run failed; pairs are of the runs that went well"
+    title, _, _, remarks = leaderboard_rows(board([1, 2], pi="failed"))
+    assert "difference" not in title
+    assert remarks[-1] == "no paired differences: every controller has failed runs"
 
 
 def test_a_narrow_terminal_loses_columns_of_the_leaderboard_in_order():
@@ -79,7 +129,7 @@ def test_a_score_beyond_a_limit_stands_in_brackets_and_none_is_a_dash():
     scored = copy.deepcopy(board([1, 2]))
     for entry, score in zip(scored["controllers"], ({"mean": 0.9, "valid": False}, None), strict=True):
         entry["score"] = score
-    _, headings, rows = leaderboard_rows(scored)
+    _, headings, rows, _ = leaderboard_rows(scored)
     place = headings.index("score")
     assert [row[place] for row in rows] == ["(0.900)", "-"]
 

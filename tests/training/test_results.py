@@ -74,7 +74,7 @@ def test_a_folder_holds_every_run_its_row_and_what_was_asked_for(tmp_path):
     board = write_leaderboard(table, tmp_path)
     assert json.loads((tmp_path / "leaderboard.json").read_text())["baseline"] == board["baseline"] == "pi"
     rows = leaderboard_rows(board)[2]
-    assert [row[1] for row in rows] == ["2/2", "0/2", "0/2"]
+    assert [row[1] for row in rows] == ["2/2", "0/2, 2 failed", "0/2, 2 failed"]
 
 
 def test_what_is_done_is_not_done_again_and_more_can_be_added(tmp_path):

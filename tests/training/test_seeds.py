@@ -1,7 +1,10 @@
 """Training, validation and test never share a realisation of wind and waves."""
 
+import shlex
+import tomllib
 from dataclasses import replace
 from itertools import combinations
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,11 +12,12 @@ import pytest
 from fowt_env.envs import FowtEnv
 from fowt_env.envs.tasks import LARGEST_SEED, TASKS
 from fowt_env.errors import InputError
-from training import tune_controllers
+from training import linear_design, tune_controllers, tune_pi
+from training.cases import FOLDER, read_suite, suite_names
 from training.seeds import PURPOSES, TEST, TRAINING, VALIDATION, seeds_for
-from training.train import ALGORITHMS, environment_settings, resolve, validation_episodes
+from training.train import AGENTS, ALGORITHMS, environment_settings, resolve, validation_episodes
 
-SUITE_SEEDS = range(1, 7)
+ROBUST = "above_rated_robust"
 
 
 def test_the_ranges_cover_every_seed_once():
@@ -22,18 +26,51 @@ def test_the_ranges_cover_every_seed_once():
     assert sum(len(seeds) for seeds in PURPOSES.values()) == LARGEST_SEED
 
 
-def test_the_suites_seeds_are_for_test_and_those_of_tuning_for_validation():
-    assert all(seed in TEST for seed in SUITE_SEEDS)
-    assert all(seed in VALIDATION for seed in tune_controllers.SEEDS)
+@pytest.mark.parametrize("name", suite_names())
+def test_every_seed_that_a_shipped_suite_names_is_for_test(name):
+    text = tomllib.loads((FOLDER / f"{name}.toml").read_text(encoding="utf-8"))
+    written = [seed for part in (text, *text["case"]) for seed in np.atleast_1d(part.get("seeds", []))]
+    suite = read_suite(name)
+    used = [seed for part in (suite, *suite.cases) for seed in part.seeds or ()]
+    assert written and set(written) == set(used) and set(used) <= set(TEST)
 
 
-@pytest.mark.parametrize("algo", ALGORITHMS)
-def test_agents_train_on_training_seeds_and_are_chosen_on_validation_seeds(algo):
-    settings = resolve(algo, "above_rated", 0, 1)
+def test_gains_are_tuned_on_validation_seeds_alone():
+    assert len(suite_names()) == len(list(FOLDER.glob("*.toml"))) > 5
+    assert tune_controllers.SEEDS and set(tune_controllers.SEEDS) <= set(VALIDATION)
+    assert linear_design.FIRST_TRAINING_SEED == tune_pi.FIRST_TRAINING_SEED == VALIDATION.start == TEST.stop
+    for search in (
+        lambda seed: linear_design.sweep([{}], "steady_16", [seed]),
+        lambda s: tune_pi.search([s]),
+    ):
+        with pytest.raises(InputError, match="seeds"):
+            search(TEST.stop - 1)
+
+
+def assert_apart(settings):
+    """Every episode of training is drawn from TRAINING, every one of validation from VALIDATION."""
     task = environment_settings(settings)["task"]
+    assert range(*task.weather_seeds) == TRAINING
     rng = np.random.default_rng(0)
     assert all(task.draw(rng).weather_seed in TRAINING for _ in range(200))
-    assert all(episode["weather_seed"] in VALIDATION for episode in validation_episodes(settings))
+    episodes = validation_episodes(settings)
+    assert episodes and all(episode["weather_seed"] in VALIDATION for episode in episodes)
+
+
+@pytest.mark.parametrize(("algo", "task"), [*((algo, "above_rated") for algo in ALGORITHMS), ("ppo", ROBUST)])
+def test_agents_train_on_training_seeds_and_are_chosen_on_validation_seeds(algo, task):
+    assert_apart(resolve(algo, task, 0, 1))
+
+
+@pytest.mark.parametrize("card", sorted(AGENTS.glob("*.toml")), ids=lambda path: path.stem)
+def test_the_command_of_each_shipped_agent_keeps_its_seeds_apart(card):
+    words = shlex.split(tomllib.loads(Path(card).read_text(encoding="utf-8"))["command"])
+    options = list(zip(words[2::2], words[3::2], strict=True))
+    named = dict(options)
+    changes = dict(value.split("=", 1) for option, value in options if option == "--set")
+    assert words[:2] == ["fowt", "train"] and not {key for key in changes if "seed" in key or "first" in key}
+    changes = {key: tomllib.loads(f"value = {value}")["value"] for key, value in changes.items()}
+    assert_apart(resolve(named["--algo"], named["--task"], int(named["--seed"]), 1, changes))
 
 
 def test_the_environment_draws_its_weather_from_the_range_of_its_task():

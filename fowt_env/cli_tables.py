@@ -1,0 +1,131 @@
+"""The one table of the command line: no frame, and no digit left out however narrow the terminal is.
+
+Where a table is wider than the terminal, its headings are wrapped over several lines; where it still is, it
+comes in blocks of columns, each with the first ones again. A file or a pipe gets it whole, unless COLUMNS
+says how wide it is.
+"""
+
+import os
+import re
+from numbers import Integral
+
+from rich.cells import cell_len
+from rich.text import Text
+
+GAP = "  "
+
+
+def table_width(console):
+    """Characters in a line of a console; None: as many as it takes (a file or a pipe)."""
+    if console.is_terminal or os.environ.get("COLUMNS", "").isdigit():
+        return console.width
+    return None
+
+
+def figure(value):
+    """Text of a value: whole numbers whole, others with four significant digits; a text as it is."""
+    return str(value) if isinstance(value, str | Integral) else f"{value or 0.0:.4g}"
+
+
+def print_table(console, headings, rows, title=None, keys=1, left=(0,), prose=(), red=()):
+    """Print rows (sequences of texts) below headings, numbers to the right.
+
+    keys   how many columns, from the first, every block of columns has
+    left   numbers of the columns that stand to the left; prose: of those whose texts may take several lines
+    red    numbers of the rows that are red
+    """
+    width = table_width(console)
+    columns = [[row[i].split("\n") for row in rows] for i in range(len(headings))]
+    heads = [heading.split("\n") for heading in headings]
+    if _total(map(_size, heads, columns)) > (width or float("inf")):
+        heads = [
+            head if len(head) > 1 else _filled(re.split(r"[\s_]+", head[0]), _size([""], column))
+            for head, column in zip(heads, columns, strict=True)
+        ]
+        columns = _folded(heads, columns, prose, width)
+    sizes = [_size(head, column) for head, column in zip(heads, columns, strict=True)]
+    if title:
+        console.print(Text(title, style="italic"), soft_wrap=True)
+    for block, chosen in enumerate(_blocks(sizes, keys, width)):
+        if block:
+            console.print()
+        ways = [(sizes[i], i in left or i in prose) for i in chosen]
+        tall = max(len(heads[i]) for i in chosen)
+        _print_lines(console, [[""] * (tall - len(heads[i])) + heads[i] for i in chosen], ways, "bold")
+        console.print(Text("─" * _total(size for size, _ in ways), style="dim"), soft_wrap=True)
+        for row in range(len(rows)):
+            _print_lines(console, [columns[i][row] for i in chosen], ways, "red" if row in red else "")
+
+
+def _print_lines(console, cells, ways, style):
+    """Print one row; cells: lines of each, ways: (size, whether to the left) of each."""
+    for line in range(max(map(len, cells))):
+        texts = []
+        for lines, (size, left) in zip(cells, ways, strict=True):
+            text = lines[line] if line < len(lines) else ""
+            room = " " * (size - cell_len(text))
+            texts.append(text + room if left else room + text)
+        console.print(Text(GAP.join(texts).rstrip(), style=style), soft_wrap=True)
+
+
+def _longest(lines):
+    """Width of the widest of some lines."""
+    return max(map(cell_len, lines))
+
+
+def _size(head, column):
+    """Width of a column with its heading."""
+    return max(map(_longest, [head, *column]))
+
+
+def _total(sizes):
+    """Width of columns side by side."""
+    sizes = list(sizes)
+    return sum(sizes) + len(GAP) * (len(sizes) - 1)
+
+
+def _filled(words, size):
+    """Lines of words, each as full as `size` or the longest word allows."""
+    size = max([size, *map(cell_len, words)])
+    lines = [words[0]]
+    for word in words[1:]:
+        if cell_len(lines[-1]) + 1 + cell_len(word) <= size:
+            lines[-1] += f" {word}"
+        else:
+            lines.append(word)
+    return lines
+
+
+def _folded(heads, columns, prose, width):
+    """The columns, those of prose with their texts over as many lines as it takes to fit the width."""
+    columns = list(columns)
+    while _total(map(_size, heads, columns)) > width:
+        able = [i for i in prose if _size([""], columns[i]) > max(_least(columns[i]), _longest(heads[i]))]
+        if not able:
+            break
+        widest = max(able, key=lambda i: _size([""], columns[i]))
+        size = _size([""], columns[widest]) - 1
+        columns[widest] = [
+            _filled(" ".join(lines).split(), size) if lines[0] else lines for lines in columns[widest]
+        ]
+    return columns
+
+
+def _least(column):
+    """Width of the longest word of a column."""
+    return max(cell_len(word) for lines in column for line in lines for word in (line.split() or [""]))
+
+
+def _blocks(sizes, keys, width):
+    """[numbers of columns] of each block: the first `keys` and as many more as fit, one at the least."""
+    first = list(range(keys))
+    blocks = [first[:]]
+    for i in range(keys, len(sizes)):
+        if (
+            len(blocks[-1]) > keys
+            and width is not None
+            and _total(sizes[j] for j in (*blocks[-1], i)) > width
+        ):
+            blocks.append(first[:])
+        blocks[-1].append(i)
+    return blocks
