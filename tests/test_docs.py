@@ -143,7 +143,7 @@ FIGURES = {  # what several pages say: {page: pattern with the figure as its gro
     },
     "calibration of the quiet machine": {
         README: r"on a machine that took (\S+) ms",
-        SPEED: r"and takes (\S+) ms\nwhen the machine is quiet",
+        SPEED: r"and takes (\S+) ms\swhen the machine is quiet",
     },
     "slowest OpenFAST": {
         README: r"same rigid model at (\S+) to \d+ times real time",
@@ -157,7 +157,7 @@ FIGURES = {  # what several pages say: {page: pattern with the figure as its gro
         README: r"\d+ of (\d+) figures within",
         VALIDATION: r"One figure of (\d+) is missed",
     },
-    "periods of decays": {README: r"differ by\n(\S+) % in period", VALIDATION: r"period 0\.2 % \| (\S+) %"},
+    "periods of decays": {README: r"differ by\s(\S+) % in period", VALIDATION: r"period 0\.2 % \| (\S+) %"},
     "motion of decays": {
         README: r"in period and (\S+) % of the motion",
         VALIDATION: r"\| free decays \| normalised rms 3 % \| (\S+) %",
@@ -175,7 +175,7 @@ FIGURES = {  # what several pages say: {page: pattern with the figure as its gro
         VALIDATION: r"the error is (\S+) deg",
     },
     "rotor speed of the preview agents": {
-        README: r"the preview agent is at\n(\S+) % in rotor speed",
+        README: r"the preview agent is at\s(\S+) % in rotor speed",
         "docs/rl.md": r"`ppo_lqr_preview` reaches every aim: (\S+) % in rotor speed",
     },
     "agent in the gust": {
