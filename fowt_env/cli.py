@@ -1,6 +1,7 @@
 """The `fowt` command: simulate, evaluate, trim, list, validate, paper. Thin: it parses, calls, prints."""
 
 import functools
+import warnings
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
@@ -65,7 +66,9 @@ def reported(command):
     @functools.wraps(command)
     def run(*args, **kwargs):
         try:
-            return command(*args, **kwargs)
+            with warnings.catch_warnings():
+                warnings.showwarning = _show_warning
+                return command(*args, **kwargs)
         except (SimulationStopped, ControllerError) as error:
             fail(error, EXIT_STOPPED)
         except InputError as error:
@@ -78,6 +81,11 @@ def reported(command):
             fail(f"ended early by {type(error).__name__}: {error}", EXIT_STOPPED)
 
     return run
+
+
+def _show_warning(message, *where):
+    """Print a warning in yellow on stderr, without the line of code that it came from."""
+    err.print(f"[yellow]Warning: {escape(str(message))}[/yellow]", soft_wrap=True, highlight=False)
 
 
 def fail(message, code):

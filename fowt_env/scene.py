@@ -105,6 +105,7 @@ class Scene:
     options: dict
     wind_speed: float | None  # mean hub wind that a trim uses; None without aerodynamics
     loads: tuple[Load, ...] = ()  # the user's own
+    label: str = ""  # the platform as it was asked for: name or path
     trims: dict = field(default_factory=dict, init=False, repr=False)  # {platform mode: OperatingPoint} found
 
     @property
@@ -257,6 +258,7 @@ def build_scene(
 
     Raises: InputError naming the key, the value and what is allowed.
     """
+    label = platform.name if isinstance(platform, Platform) else str(platform)
     if not isinstance(platform, Platform):
         platform = read_platform(platform)
     chosen = _options(options, platform)
@@ -307,7 +309,7 @@ def build_scene(
         multistep=build_integrator(chosen["integrator"], _samples(chosen, air.field)),
         own=build_own_loads(own, platform.tower.base_height, site.water_depth),
     )
-    return Scene(model, platform, turbine, air.spec, sea, seed, rotor, chosen, air.speed, own)
+    return Scene(model, platform, turbine, air.spec, sea, seed, rotor, chosen, air.speed, own, label)
 
 
 def _parts(fidelity, rotor, chosen):

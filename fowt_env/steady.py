@@ -9,6 +9,7 @@ from scipy.optimize import brentq
 
 from fowt_env.channels import to_units
 from fowt_env.dynamics import derivative
+from fowt_env.equilibrium import check_equilibrium, evaluated, label, unbalanced
 from fowt_env.errors import InputError, unknown
 from fowt_env.jit import entry
 from fowt_env.loads.drivetrain import build_torque_curve, generator_torque
@@ -142,6 +143,8 @@ class _Steady:
         self.dx = np.zeros_like(self.x)
         self.mean = np.zeros_like(self.x)
         self.curve = build_torque_curve(self.scene.turbine.torque_law)
+        self.start = None  # equilibrium.Evaluated of the undisplaced platform
+        self.slope = None  # last Jacobian of the motions
 
     def rates(self):
         """Azimuth-averaged derivative at the present state and command."""
@@ -149,7 +152,7 @@ class _Steady:
             settle_wake(self.box, self.x, self.dx)
         mean_derivative(self.box, self.x, self.u, AZIMUTHS, self.dx, self.mean)
         if fault := self.scene.blamed(self.work):
-            raise InputError(f"no steady state found for {self.scene!r}: {fault}")
+            raise InputError(f"no steady state found for {label(self.scene)}: {fault}")
         return self.mean
 
     def rotor_acceleration(self, rotor_speed, blade_pitch):
@@ -189,10 +192,7 @@ class _Steady:
     def _root(self, excess, low, high):
         """Zero of the rotor's acceleration. Raises: InputError where a falling platform leaves none."""
         if not excess(low) * excess(high) <= 0.0:
-            raise InputError(
-                f"no steady state found for {self.scene!r}: no rotor speed and blade pitch balance the torque"
-                " at the platform's place; has it buoyancy and moorings?"
-            )
+            raise self.refusal("where no rotor speed and blade pitch balance the torque")
         return brentq(excess, low, high, xtol=1e-14, rtol=1e-14)
 
     def motions(self):
@@ -242,6 +242,8 @@ class _Steady:
         lower the residual is halved: far from the solution lines go taut within metres.
         """
         residual = self.residual(free)
+        if self.start is None:  # at the first call the platform has not moved yet
+            self.start = evaluated(self.x, self.work)
         size = np.max(np.abs(residual))
         jacobian = None
         for _ in range(NEWTON_ROUNDS):
@@ -250,6 +252,9 @@ class _Steady:
             fresh = jacobian is None
             if fresh:
                 jacobian = self.jacobian(free)
+                if not np.isfinite(jacobian).all():
+                    break
+                self.slope = self._of_motions(jacobian)
             # least squares: without moorings nothing restores surge and sway, which then stay as they are
             change = np.linalg.lstsq(jacobian, -residual, rcond=1e-9)[0]
             before, start = size, self.x[free].copy()
@@ -269,6 +274,27 @@ class _Steady:
                 jacobian = None
         return size
 
+    def _of_motions(self, jacobian):
+        """The part of a Jacobian that has the motions alone."""
+        n = len(self.motions())
+        return jacobian[:n, :n]
+
+    def refusal(self, ending=None):
+        """InputError of a search that ends at this state without a steady one; ending as in unbalanced."""
+        self.rates()
+        end = evaluated(self.x, self.work)
+        return InputError(unbalanced(self.scene, self.start or end, end, ending))
+
+    def check(self):
+        """Refuse a state in which no platform can be, and warn of one that is odd."""
+        rest = self.x.copy()
+
+        def fresh_slope():
+            self.x[:] = rest
+            return self._of_motions(self.jacobian(self.motions()))
+
+        check_equilibrium(self.scene, rest, self.start, self.slope, fresh_slope)
+
 
 def trim(scene: Scene, platform: str = "floating") -> OperatingPoint:
     """OperatingPoint of a scene: steady state in its mean wind, waves flat.
@@ -277,7 +303,9 @@ def trim(scene: Scene, platform: str = "floating") -> OperatingPoint:
     blade pitch follow the torque curve below rated and rated speed above; beyond the cut-out wind
     the rotor is parked with feathered blades, and without wind it stands.
 
-    Raises: InputError for an unknown platform mode, or if no steady state is found.
+    Raises: InputError for an unknown platform mode, if no steady state is found, or if the platform cannot
+    be in it (keel in the sea bed, tower base under water). Warns once of a platform that rests where hardly
+    one is meant to.
     """
     if platform not in PLATFORM_MODES:
         raise unknown("platform mode of trim", platform, PLATFORM_MODES)
@@ -296,14 +324,12 @@ def _trim(scene, platform):
         for _ in range(OUTER_ROUNDS):
             # which of pitch and speed is free follows from the rotor's balance on the platform as it is
             free = steady.free_states()
-            remaining = steady.settle(free)
+            steady.settle(free)
             steady.settle_rotor()
             if steady.free_states() == free and np.max(np.abs(steady.residual(free))) < 1e3 * TOLERANCE:
                 break
         else:
-            raise InputError(
-                f"no steady state found for {scene!r}: remaining acceleration {remaining:.2e} m/s2 or rad/s2"
-            )
+            raise steady.refusal()
     return _point(scene, steady, platform)
 
 
@@ -311,7 +337,7 @@ def trim_held(scene, rotor_speed, blade_pitch, platform="floating"):
     """OperatingPoint with the rotor driven at a speed (rad/s) and a locked blade pitch (rad).
 
     For model tests, where a motor holds the rotor speed: theory.md Eq. (20). Mean wind, waves flat.
-    Raises: InputError for an unknown platform mode, or if no steady state is found.
+    Raises: InputError as trim does.
     """
     if platform not in PLATFORM_MODES:
         raise unknown("platform mode of trim_held", platform, PLATFORM_MODES)
@@ -322,9 +348,7 @@ def trim_held(scene, rotor_speed, blade_pitch, platform="floating"):
     if platform == "floating":
         remaining = steady.settle(steady.motions())
         if not remaining < 1e3 * TOLERANCE:
-            raise InputError(
-                f"no steady state found for {scene!r}: remaining acceleration {remaining:.2e} m/s2 or rad/s2"
-            )
+            raise steady.refusal()
     return _point(scene, steady, platform)
 
 
@@ -341,4 +365,6 @@ def _point(scene, steady, platform):
     values = {name: float(value) for name, value in zip(names, row, strict=True)}
     values["Azimuth"] = 0.0
     del values["Time"]
+    if platform == "floating":
+        steady.check()
     return OperatingPoint(values, state, command, scene.wind_speed, platform)

@@ -7,7 +7,7 @@ from numba.core import event
 
 from fowt_env.jit import CACHE_FOLDER, KERNEL_PACKAGES
 
-COMPILING_MESSAGE = "compiling kernels (first run of this kind of scene only, 10 to 60 s) ..."
+COMPILING_MESSAGE = "compiling kernels (first run of this kind of scene only, 10 s to 2 min) ..."
 
 
 class _Once(event.Listener):

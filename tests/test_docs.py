@@ -10,9 +10,11 @@ from math import exp, hypot, log, pi, radians
 
 import gymnasium
 import numpy as np
+import pandas as pd
 import pytest
 from doc_pages import DOCS, FENCE
 
+from controllers.policy import shipped_agents
 from fowt_env.description import read_turbine
 from fowt_env.envs.rewards import N_TERMS, TERMS, build_scales, fill_terms
 from fowt_env.envs.tasks import TASKS
@@ -115,6 +117,107 @@ def test_the_info_table_has_every_key_and_no_other():
 def test_every_task_is_in_the_reference():
     text = (DOCS / "environment.md").read_text()
     assert all(f"`{name}`" in text for name in TASKS)
+
+
+README, SPEED, VALIDATION = "README.md", "docs/performance.md", "docs/validation.md"
+FIGURES = {  # what several pages say: {page: pattern with the figure as its group}
+    "speed of standard": {
+        README: r"\| `standard` \| every .*\| ([\d,]+) \|",
+        SPEED: r"([\d,]+) and [\d,]+ when it is quiet",
+    },
+    "speed of fast": {
+        README: r"\| `fast` \| .*\| ([\d,]+) \|",
+        SPEED: r"[\d,]+ and ([\d,]+) when it is quiet",
+    },
+    "error of standard": {
+        README: r"\| `standard` \| every .*\| (\S+) \| [\d,]+ \|",
+        SPEED: r"errs by (\S+) of a standard deviation",
+    },
+    "error of fast": {
+        README: r"\| `fast` \| .*\| (\S+) \| [\d,]+ \|",
+        SPEED: r"errs by (\S+), which one would",
+    },
+    "speed of standard in a box": {
+        README: r"box of full-field wind `standard` errs by \S+ at ([\d,]+) times",
+        SPEED: r"`standard`, three rotor loads a step\) \| .* \| ([\d,]+) \| [\d,]+ \|",
+    },
+    "calibration of the quiet machine": {
+        README: r"on a machine that took (\S+) ms",
+        SPEED: r"and takes (\S+) ms\swhen the machine is quiet",
+    },
+    "slowest OpenFAST": {
+        README: r"same rigid model at (\S+) to \d+ times real time",
+        SPEED: r"quiet machine: (\S+) times real time",
+    },
+    "fastest OpenFAST": {
+        README: r"same rigid model at \S+ to (\d+) times real time",
+        SPEED: r"(\d+) at the coarsest sensible ones",
+    },
+    "figures of the validation": {
+        README: r"\d+ of (\d+) figures within",
+        VALIDATION: r"One figure of (\d+) is missed",
+    },
+    "periods of decays": {README: r"differ by\s(\S+) % in period", VALIDATION: r"period 0\.2 % \| (\S+) %"},
+    "motion of decays": {
+        README: r"in period and (\S+) % of the motion",
+        VALIDATION: r"\| free decays \| normalised rms 3 % \| (\S+) %",
+    },
+    "steady thrust": {
+        README: r"thrust and torque by (\S+) %",
+        VALIDATION: r"thrust, torque 0\.3 % \| (\S+) %",
+    },
+    "deviations in turbulence": {
+        README: r"and tensions by at most (\S+) %",
+        VALIDATION: r"uniform \| standard deviations 3 % \| (\S+) %",
+    },
+    "the missed figure, deg": {
+        README: r"is (\S+) deg of platform pitch",
+        VALIDATION: r"the error is (\S+) deg",
+    },
+    "rotor speed of the preview agents": {
+        README: r"the preview agent is at\s(\S+) % in rotor speed",
+        "docs/rl.md": r"`ppo_lqr_preview` reaches every aim: (\S+) % in rotor speed",
+    },
+    "agent in the gust": {
+        README: r"gust at 18 m/s under `pi` and `policy:(\w+)`",
+        "docs/index.md": r"under the agent (\w+)\]\(figures/gust.gif\)",
+    },
+}
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_pages_that_give_the_same_figure_agree(name):
+    found = {page: re.findall(pattern, (ROOT / page).read_text()) for page, pattern in FIGURES[name].items()}
+    assert {len(values) for values in found.values()} == {1}, found
+    assert len({values[0] for values in found.values()}) == 1, found
+
+
+def test_the_errors_of_the_levels_are_the_largest_of_the_stored_sweep():
+    sweep = pd.read_csv(DOCS / "figures" / "accuracy.csv", comment="#").groupby("variant")["worst"]
+    readme, page = (ROOT / README).read_text(), (ROOT / SPEED).read_text()
+    rows = dict(
+        re.findall(
+            r"^\| `(\w+)`(?: \(default\))? \| .*?\| (\d\S*)(?: in heave[^|]*)? \| [\d,]+ \|$", readme, re.M
+        )
+    )
+    assert set(rows) == {"reference", "standard", "fast"}
+    for level, error in rows.items():
+        row = rf"^\| [\w ]+ \| ([^|]*) \(`{level}`\) \| (\S+) \| (\S+) \|"
+        ((variant, mean, largest),) = re.findall(row, page, re.M)
+        seeds = sweep.get_group(variant)
+        assert (mean, largest) == (f"{seeds.mean():.1e}", f"{seeds.max():.1e}")
+        digits = len(error.partition("e")[0].replace(".", "")) - 1
+        assert float(error) == float(f"{seeds.max():.{digits}e}"), level
+
+
+NUMBERS = {"nine": 9, "sixteen": 16}
+
+
+def test_counts_in_words_are_those_of_the_files():
+    examples = re.search(r"\| `examples/` \| (\w+) programs", (ROOT / README).read_text())[1]
+    assert NUMBERS[examples] == len(list((ROOT / "examples").glob("[0-9]*.py")))
+    agents = re.search(r"^(\w+) agents are shipped", (DOCS / "rl.md").read_text(), re.M)[1]
+    assert NUMBERS[agents.lower()] == len(shipped_agents())
 
 
 PROSE = ["README.md", "CHANGELOG.md", "CONTRIBUTING.md", "examples/README.md"]

@@ -8,7 +8,7 @@ import tomllib
 
 import pandas as pd
 import pytest
-from doc_pages import DOCS, assert_printed, blocks, fowt
+from doc_pages import DOCS, NUMBER, assert_printed, blocks, fowt
 
 EXTRAS = tomllib.loads((DOCS.parent / "pyproject.toml").read_text())["project"]["optional-dependencies"]
 SETUP = re.compile(r"(python3\.11 -m venv|\. \.venv|pip install)\b")
@@ -60,6 +60,18 @@ def test_every_block_of_extending_runs(folder):
     assert (table["status"] == "ok").all()
     swing = table["PtfmPitch_std_[deg]"]
     assert swing["damper:Damper"] < 0.95 * swing["pi"]  # it damps
+
+
+def test_the_statistics_that_the_readme_shows_are_those_of_its_program():
+    program, shown = [block for block in blocks("../README.md") if block.heading == "Ten lines"][:2]
+    with contextlib.redirect_stdout(io.StringIO()) as out:
+        exec(compile(program.text, "<README.md>", "exec"), {})
+    printed = out.getvalue()
+    again = f"README.md must show\n{printed}"
+    assert NUMBER.sub("#", printed).split() == NUMBER.sub("#", shown.text).split(), again
+    for a, b in zip(NUMBER.findall(printed), NUMBER.findall(shown.text), strict=True):
+        # another machine's last bits may turn over the last digit that is shown
+        assert abs(float(a) - float(b)) < 1.5 * 10.0 ** -len(b.partition(".")[2]), again
 
 
 @pytest.mark.parametrize("page", ["index.md", "environment.md"])

@@ -197,6 +197,14 @@ def _(folder, monkeypatch):
     return refused(read_platform, "mine.toml")
 
 
+@under("A platform finds no place to rest")
+def _(folder, monkeypatch):
+    text = (DATA / "platforms" / "oc3_hywind.toml").read_text()
+    (folder / "mine.toml").write_text(text.replace("mass = 7466330.0", "mass = 8.47e6"))
+    monkeypatch.chdir(folder)
+    return refused(fowt_env.trim, fowt_env.build_scene("mine.toml", fidelity="standard"))
+
+
 @under("A controller's answer stops the run")
 def _(folder, monkeypatch):
     class Mine:

@@ -1,10 +1,17 @@
+import re
+import warnings
+
 import numpy as np
 import pytest
 from naive import rigid_body
 from plant import state
+from typer.testing import CliRunner
 
 import fowt_env
+from fowt_env import cli, equilibrium
+from fowt_env.description import DATA, names, read_platform, read_turbine
 from fowt_env.dynamics import gravity_load
+from fowt_env.envs import FowtEnv
 from fowt_env.errors import InputError
 from fowt_env.loads.hydrostatics import hydrostatic_load
 from fowt_env.loads.mooring import mooring_load
@@ -137,8 +144,142 @@ def test_spar_without_moorings_floats_higher_where_it_is(platform):
 
 
 def test_a_scene_that_cannot_rest_is_refused(bare_scene):
-    with pytest.raises(InputError, match="no steady state"):
+    with pytest.raises(InputError, match="no steady state") as caught:
         trim(bare_scene)
+    text = str(caught.value)
+    assert "platform 'oc3_hywind' without wind" in text
+    assert "Its weight of 79101 kN has no buoyancy: hydrodynamics = False" in text
+    assert "Nothing holds it in surge and sway: mooring = False" in text
+    assert "-79101 kN left in heave: weight -79101" in text
+
+
+@pytest.fixture
+def warned(monkeypatch):
+    """Warnings of platforms as in a process that has given none."""
+    monkeypatch.setattr(equilibrium, "_warned", set())
+
+
+def edited(folder, key, value):
+    """Path of a copy of the OC3-Hywind file in which the first line of that key has another value."""
+    text = (DATA / "platforms" / "oc3_hywind.toml").read_text()
+    path = folder / "mine.toml"
+    path.write_text(re.sub(rf"(?m)^{key} = .*$", f"{key} = {value}", text, count=1))
+    return path
+
+
+def complaint(path, wind=None):
+    """(what the trim of a platform file does: "refused" or "warned", its one message)."""
+    sea = None if wind is None else {"kind": "regular", "H": 0.1, "T": 2.0}
+    scene = fowt_env.build_scene(path, wind=wind, sea=sea)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        try:
+            trim(scene)
+        except InputError as error:
+            assert not caught
+            return "refused", str(error)
+    assert [warning.filename for warning in caught] == [__file__]
+    return "warned", str(caught[0].message)
+
+
+SHORT = "3 of 3 mooring lines are shorter than the way from anchor to fairlead"
+SLACK = "all mooring lines hang slack"
+NONSENSE = {  # key, value, wind, what becomes of it, words of its message
+    "too much ballast": (
+        "mass", "8.47e6", None, "refused",
+        ("no steady state", "weighs 88944 kN", "9843 kN (1004 t) too heavy", "ballast.mass = 7.46633e+06 kg"),
+    ),
+    "too little ballast": (
+        "mass", "4e6", None, "warned",
+        ("heave of 51.7 m, 43% of the draft", "(3466 t) too light", "ballast.mass = 7.46633e+06 kg"),
+    ),
+    "diameters in dm": (  # it floats on its side, or upside down
+        "diameter", "[94.0, 94.0, 65.0, 65.0]", None, "refused or warned",
+        ("from upright", "against a buoyancy of 8070814 kN (802921 m3)"),
+    ),
+    "centre of mass above the water": (
+        "cm_depth", "-89.9155", None, "warned",
+        ("unstable in", "platform pitch", "of mass is at z = 88.5 m", "cm_depth = -89.9155 m is positive"),
+    ),
+    "lines far too short": (
+        "length", "500.0", None, "refused",
+        ("keel 45.3 m below the sea bed", "tower base 235 m under water", SHORT),
+    ),
+    "lines too short": (
+        "length", "800.0", None, "refused",
+        ("keel 1.63 m below the sea bed", "tower base 192 m under water", SHORT, "800 m against 884.7 m"),
+    ),
+    "lines too long": ("length", "1300.0", None, "warned", (SLACK, "length 1300 m", "848.7 m")),
+    "lines too long, in wind": (
+        "length", "1300.0", 18.0, "refused", ("in wind of 18 m/s", SLACK, "kN left in surge: rotor"),
+    ),
+    "azimuths in radians": (
+        "azimuth_deg", "[0.0, 2.0944, 4.18879]", None, "warned",
+        ("all mooring lines pull to the same side", "(851.6, 62.37) m; azimuth_deg is in degrees"),
+    ),
+    "weight of the lines in kN": (
+        "wet_weight", "0.698094", None, "warned",
+        ("pull with 2.91 kN together", "it weighs 79101 kN", "wet_weight 0.698094 N/m"),
+    ),
+    "soft lines": ("EA", "1e3", None, "warned", (SLACK, "EA 1000 N")),
+    "no lines": (
+        "azimuth_deg", "[]", 18.0, "refused",
+        ("nothing holds it in surge and sway: it has no mooring lines", "kN left in surge: rotor"),
+    ),
+    "a mass beyond all numbers": ("mass", "1e300", None, "refused", ("too heavy", "9.81e+297 kN")),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", NONSENSE)
+def test_a_platform_that_cannot_be_meant_gets_a_message_that_says_why(name, tmp_path, warned):
+    key, value, wind, outcome, words = NONSENSE[name]
+    done, text = complaint(edited(tmp_path, key, value), wind)
+    assert done in outcome, text
+    assert "mine.toml' " in text and len(text) < 1000
+    for word in words:
+        assert word.lower() in text.lower(), text
+
+
+def test_runs_and_episodes_are_refused_as_their_trim_is(tmp_path):
+    path = edited(tmp_path, "length", "800.0")
+    with pytest.raises(InputError, match="keel 1.63 m below the sea bed"):
+        fowt_env.simulate(fowt_env.build_scene(path), duration=1.0)
+    env = FowtEnv(platform=path)
+    for wind in (None, {"kind": "steady", "speed": 18.0}):  # interpolated and exact trims
+        with pytest.raises(InputError, match="m below the sea bed and its tower base"):
+            env.reset(seed=1, options=None if wind is None else {"wind": wind})
+
+
+def test_a_platform_is_warned_of_once_whatever_the_wind(tmp_path, warned):
+    path = edited(tmp_path, "mass", "4e6")
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        env = FowtEnv(platform=path)
+        for seed in range(3):
+            env.reset(seed=seed)
+        trim(fowt_env.build_scene(path))
+    assert len(caught) == 1
+
+
+def test_the_command_prints_a_warning_as_one_line(tmp_path, warned):
+    path = edited(tmp_path, "mass", "4e6")
+    arguments = ["simulate", f"--platform={path}", "--wind=none", "--duration=1", "--fidelity=reference"]
+    result = CliRunner().invoke(cli.app, arguments, env={"COLUMNS": "80", "NO_COLOR": "1"})
+    assert result.exit_code == 0, result.stderr
+    shown = [line for line in result.stderr.splitlines() if "heave of 51.7 m" in line]
+    assert len(shown) == 1 and shown[0].startswith("Warning: platform ")
+    assert "UserWarning" not in result.stderr
+
+
+@pytest.mark.parametrize("name", names("platforms"))
+def test_built_in_platforms_rest_without_a_warning(name, warned):
+    rated = read_turbine(read_platform(name).turbine).rated_wind_speed
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        trim(fowt_env.build_scene(name))
+        for share in (0.5, 1.0, 1.6):
+            sea = {"kind": "regular", "H": 0.1, "T": 2.0}
+            trim(fowt_env.build_scene(name, wind=share * rated, sea=sea, skewed_wake=False))
 
 
 def test_operating_point_is_a_mapping_that_names_what_it_has(at_rest, still_scene):

@@ -1,0 +1,283 @@
+"""Whether a steady state is one that a platform can be in, and what pulls at it where there is none."""
+
+import sys
+import warnings
+from math import acos, cos, degrees, hypot, pi, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from fowt_env.dynamics import Kept
+from fowt_env.errors import InputError
+from fowt_env.loads.mooring import SLACK
+from fowt_env.state import State, pose_of
+from fowt_env.step import CAPSIZE
+
+MOTIONS = ("surge", "sway", "heave", "roll", "platform pitch", "yaw")
+LOADS = {  # name: where Work.kept has its wrench
+    "rotor": Kept.ROTOR,
+    "tower drag": Kept.TOWER,
+    "buoyancy and water": Kept.HYDRO,
+    "mooring": Kept.MOORING,
+}
+# What is odd in a steady state, but possible. The built-in platforms stay far from each.
+HEAVE = 0.1  # of the draft
+TILT = 20.0  # deg
+WEAK = 1e-3  # tensions of all lines together, of the weight
+ONE_SIDED = 0.9  # horizontal pull of all lines together, of the sum of each one's
+GROWTH = 1e-3  # square of a motion's rate of growth, of gravity over the draft
+MOORINGS = {"slack": "slack moorings", "weak": "loose moorings", "one-sided": "moorings to one side"}
+HEAVY = 0.02  # net vertical force on the undisplaced platform that is worth a word, of its weight
+OWN = ("fowt_env", "controllers", "training")  # packages; a warning is for the code that calls them
+_warned = set()  # hashes of platforms, each with what was odd about it
+
+
+class Evaluated(NamedTuple):
+    """A state and the loads there."""
+
+    x: np.ndarray  # (n_state,)
+    kept: np.ndarray  # Work.kept
+    lines: np.ndarray  # Work.lines
+
+
+def evaluated(x, work):
+    """Evaluated of the state that the last evaluation was of."""
+    return Evaluated(x.copy(), work.kept.copy(), work.lines.copy())
+
+
+def check_equilibrium(scene, rest, start, slope, fresh_slope):
+    """Refuse a steady state that no platform can be in; warn, once per platform, of one that is hardly meant.
+
+    rest: state vector; start: Evaluated of the undisplaced platform; slope: (n, n) derivatives of the
+    accelerations of the motions by the motions, at the state or near it (None: not known); fresh_slope()
+    returns them at it.
+
+    Raises: InputError.
+    """
+    if scene.model.hull is None:
+        return
+    heave, roll, platform_pitch = float(rest[State.HEAVE]), rest[State.ROLL], rest[State.PLATFORM_PITCH]
+    upright = cos(platform_pitch) * cos(roll)  # vertical component of the tower axis
+    tilt = degrees(acos(upright))
+    if impossible := _impossible(scene, heave, upright, tilt):
+        raise InputError(
+            f"{label(scene)}: its loads balance only with {' and '.join(impossible)} ({_place(rest)})."
+            f" {_sentences(_causes(scene, start))}".rstrip()
+        )
+    odd = {}
+    draft = -scene.platform.hull.z[0]
+    if abs(heave) > HEAVE * draft:
+        odd["heave"] = f"heave of {heave:.3g} m, {abs(heave) / draft:.0%} of the draft of {draft:g} m"
+    if tilt > TILT:
+        odd["tilt"] = f"{tilt:.3g} deg from upright"
+    # the slope at hand says enough unless it has something grow: another costs a third of a trim
+    if (slope is None or _growing(scene, slope)) and (growing := _growing(scene, fresh_slope())):
+        time = min(growing.values())
+        odd["unstable"] = f"unstable in {' and '.join(growing)}, which grows by a factor e in {time:.2g} s"
+    causes = _causes(scene, start)
+    odd |= {name: text for name, text in MOORINGS.items() if name in causes}
+    if not odd:
+        return
+    key = hash((repr(scene.platform), scene.turbine.name, *odd))
+    if key in _warned:
+        return
+    _warned.add(key)
+    if "tilt" in odd or "unstable" in odd:
+        causes["upright"] = _metacentre(scene)
+    text = f"{label(scene)}: {'; '.join(odd.values())} ({_place(rest)}). {_sentences(causes)}"
+    warnings.warn(text.rstrip(), stacklevel=_level_outside())
+
+
+def unbalanced(scene, start, end, ending=None):
+    """Text of why a search found no steady state: what is wrong with the undisplaced platform, and its end.
+
+    start, end: Evaluated; ending: what is wrong at the end in words, where it is not the platform's balance.
+    """
+    causes = _causes(scene, start)
+    if scene.model.mooring is None:
+        why = "mooring = False" if scene.platform.lines else "it has no mooring lines"
+        causes["unheld"] = (
+            f"nothing holds it in surge and sway: {why} (a run can begin upright instead, start = 'zero')"
+        )
+    text = f"no steady state found for {label(scene)}. {_sentences(causes)}".rstrip()
+    return f"{text} The search ended at {_place(end.x)}, {ending or _left(scene, end)}"
+
+
+def label(scene):
+    """Name of a scene's platform and its wind, for messages."""
+    wind = "without wind" if scene.wind_speed is None else f"in wind of {scene.wind_speed:g} m/s"
+    return f"platform {scene.label!r} {wind}"
+
+
+def _impossible(scene, heave, upright, tilt):
+    """List of what cannot be where the platform rests, in words."""
+    hull, depth = scene.platform.hull, scene.platform.environment.water_depth
+    across = sqrt(max(1.0 - upright * upright, 0.0))
+    keel = heave + upright * hull.z[0] - 0.5 * across * hull.diameter[0]
+    base_height = scene.platform.tower.base_height
+    base = heave + upright * base_height
+    found = []
+    if keel < -depth:
+        found.append(f"its keel {-depth - keel:.3g} m below the sea bed")
+    if keel > 0.0:
+        found.append(f"its keel {keel:.3g} m above the water")
+    if base < 0.0 < base_height:
+        found.append(f"its tower base {-base:.3g} m under water")
+    if tilt > degrees(CAPSIZE):
+        found.append(f"its tower {tilt:.3g} deg from upright")
+    return found
+
+
+def _causes(scene, start):
+    """{name: sentence} of what is wrong with the undisplaced platform."""
+    model, platform = scene.model, scene.platform
+    weight = model.body.mass * model.body.gravity
+    net = start.kept[Kept.TOTAL + 2]
+    found = {}
+    if model.mooring is not None:
+        found |= _mooring_causes(model.mooring, start, weight, net)
+    if abs(net) <= HEAVY * weight:
+        return found
+    if model.hull is None:
+        found["vertical"] = f"its weight of {_kilo(weight)} kN has no buoyancy: hydrodynamics = False"
+        return found
+    buoyancy, pull = start.kept[Kept.HYDRO + 2], -start.kept[Kept.MOORING + 2]
+    lines = f" and its lines pull down with {_kilo(pull)} kN" if model.mooring is not None else ""
+    found["vertical"] = (
+        f"undisplaced it weighs {_kilo(weight)} kN{lines}, against a buoyancy of {_kilo(buoyancy)} kN"
+        f" ({_number(buoyancy / model.hull.specific_weight)} m3): {_kilo(abs(net))} kN"
+        f" ({_number(abs(net) / model.body.gravity / 1e3)} t) too {'light' if net > 0.0 else 'heavy'}"
+    )
+    ballast = platform.ballast.mass
+    enough = ballast + net / model.body.gravity
+    if len(found) == 1 and enough > 0.0:  # with wrong moorings the ballast is not to blame
+        found["vertical"] += f"; ballast.mass = {enough:.6g} kg (now {ballast:.6g}) would float at this draft"
+    return found
+
+
+def _mooring_causes(mooring, start, weight, net):
+    """{name: sentence} of what is wrong with the mooring of the undisplaced platform; net: vertical force."""
+    span = mooring.anchor - mooring.fairlead
+    along, up = np.hypot(span[:, 0], span[:, 1]), -span[:, 2]
+    way = np.hypot(along, up)
+    pull, tension, regime = start.lines[:, 0], start.lines[:, 2], start.lines[:, 5]
+    found = {}
+    # taut lines are short on purpose, but not against more than the platform's buoyancy
+    if net < -HEAVY * weight and (short := np.flatnonzero(mooring.length < way)).size:
+        i = short[0]
+        found["short"] = (
+            f"{short.size} of {len(way)} mooring lines are shorter than the way from anchor to fairlead"
+            f" (line {i + 1}: length {mooring.length[i]:g} m against {way[i]:.4g} m, which takes"
+            f" {_kilo(tension[i])} kN)"
+        )
+    first = (
+        f"(line 1: length {mooring.length[0]:g} m, wet_weight {mooring.weight[0]:g} N/m, EA"
+        f" {mooring.EA[0]:g} N; {along[0]:.4g} m from anchor to fairlead and {up[0]:.4g} m up)"
+    )
+    if (regime == SLACK).all():
+        found["slack"] = f"all mooring lines hang slack and hold it nowhere {first}"
+    elif tension.sum() < WEAK * weight:
+        found["weak"] = (
+            f"its mooring lines pull with {_kilo(tension.sum())} kN together, and it weighs"
+            f" {_kilo(weight)} kN {first}"
+        )
+    together = hypot(start.kept[Kept.MOORING], start.kept[Kept.MOORING + 1])
+    if len(pull) > 1 and together > ONE_SIDED * pull.sum() > 0.0:
+        anchors = ", ".join(f"({x:.4g}, {y:.4g})" for x, y, _ in mooring.anchor[:4])
+        found["one-sided"] = (
+            f"all mooring lines pull to the same side, with {_kilo(together)} kN (anchors at (x, y) ="
+            f" {anchors} m; azimuth_deg is in degrees)"
+        )
+    return found
+
+
+def _metacentre(scene):
+    """Sentence on the stability of the undisplaced platform as a floating body."""
+    hull, body, depth = scene.model.hull, scene.model.body, scene.platform.ballast.cm_depth
+    area = pi * hull.radius**2
+    volume = hull.volume_below - area * hull.z_join
+    centre = (hull.moment_below - 0.5 * area * hull.z_join**2) / volume
+    mass_centre = body.s_z / body.mass
+    height = centre + 0.25 * area * hull.radius**2 / volume - mass_centre
+    return (
+        f"undisplaced its centre of mass is at z = {mass_centre:.3g} m, that of buoyancy at {centre:.3g} m"
+        f" and its metacentric height {height:.3g} m (ballast.cm_depth = {depth:g} m is positive downwards)"
+    )
+
+
+def _growing(scene, slope):
+    """{motion: s in which it grows by a factor e} of what leaves an equilibrium with this slope by itself."""
+    draft = -scene.platform.hull.z[0]
+    limit = GROWTH * scene.model.body.gravity / draft
+    if np.max(np.linalg.eigvals(slope).real) <= limit:
+        return {}
+    values, shapes = np.linalg.eig(slope)
+    names = MOTIONS if len(slope) == 6 else (MOTIONS[0], MOTIONS[2], MOTIONS[4])
+    arms = [0.5 * draft if name in MOTIONS[3:] else 1.0 for name in names]
+    found = {}
+    for value, shape in zip(values, shapes.T, strict=True):
+        if value.real > limit:
+            found[names[int(np.argmax(np.abs(shape) * arms))]] = 1.0 / sqrt(value.real)
+    return found
+
+
+def _left(scene, end):
+    """What is left of the balance at a state, in words: the largest force or moment, and of which loads."""
+    loads = _by_load(scene, end)
+    total = sum(loads.values())
+    arm = -0.5 * scene.platform.hull.z[0]
+    motion = int(np.argmax(np.abs(total) / [1.0, 1.0, 1.0, arm, arm, arm]))
+    parts = {name: load[motion] for name, load in loads.items()}
+    most = max(abs(part) for part in parts.values())
+    shown = ", ".join(f"{name} {_kilo(part)}" for name, part in parts.items() if abs(part) > 1e-3 * most)
+    unit = "kN" if motion < 3 else "kN m about the centre of mass"
+    return f"with {_kilo(total[motion])} {unit} left in {MOTIONS[motion]}: {shown}"
+
+
+def _by_load(scene, end):
+    """{load: (6,)} of all loads: force in inertial axes, moment about the centre of mass in body axes."""
+    pose, body = pose_of(end.x), scene.model.body
+    to_inertial = np.array(
+        [[pose.r11, pose.r12, pose.r13], [pose.r21, pose.r22, pose.r23], [pose.r31, pose.r32, pose.r33]]
+    )
+    centre = np.array([body.s_x, 0.0, body.s_z]) / body.mass
+    weight = -body.mass * body.gravity * to_inertial[2]
+    wrenches = {name: end.kept[first : first + 6] for name, first in LOADS.items()}
+    wrenches["weight"] = np.concatenate([weight, np.cross(centre, weight)])
+    if scene.loads:
+        wrenches["own loads"] = end.kept[Kept.TOTAL : Kept.TOTAL + 6] - sum(wrenches.values())
+    return {
+        name: np.concatenate([to_inertial @ wrench[:3], wrench[3:] - np.cross(centre, wrench[:3])])
+        for name, wrench in wrenches.items()
+    }
+
+
+def _place(x):
+    """Surge, heave and platform pitch of a state, in words."""
+    return (
+        f"surge {x[State.SURGE]:.4g} m, heave {x[State.HEAVE]:.4g} m, platform pitch"
+        f" {degrees(x[State.PLATFORM_PITCH]):.3g} deg"
+    )
+
+
+def _sentences(causes):
+    """The causes as sentences in a row."""
+    return " ".join(f"{text[0].upper()}{text[1:]}." for text in causes.values())
+
+
+def _number(value):
+    """A number with at least three digits, and without an exponent where it is of any real platform."""
+    return f"{value:.0f}" if 100.0 <= abs(value) < 1e9 else f"{value:.3g}"
+
+
+def _kilo(value):
+    """A number of N or N m in kN or kN m."""
+    return _number(value / 1e3)
+
+
+def _level_outside():
+    """stacklevel with which warnings.warn of the caller names the first line outside of these packages."""
+    level, frame = 1, sys._getframe(1)
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] in OWN:
+        level, frame = level + 1, frame.f_back
+    return level
