@@ -3,14 +3,18 @@ PYTHON ?= python3.11
 VENV ?= .venv
 BIN := $(VENV)/bin
 PROJECT := pyproject.toml setup.py constraints.txt
+# one worker per core, each with some 2 GB; tests/conftest.py says which files share a worker, and their order
+TESTS = $(BIN)/python -m pytest --numprocesses auto --maxprocesses 8 --dist loadfile --no-loadscope-reorder
 INSTALL = $(BIN)/python -m pip install --quiet --constraint constraints.txt --editable
 
-.PHONY: help demo test test-quick coverage lint docs format clean
+.PHONY: help demo test test-all test-rest test-quick coverage lint docs format clean
 .DELETE_ON_ERROR:
 
 help:
 	@echo "make demo        score the PI controller of Eq. (8) above rated: table and plots under results/demo"
-	@echo "make test        all tests (make test-quick: without the slow ones)"
+	@echo "make test        prove this installation: each layer against an independent reference"
+	@echo "make test-all    all tests (make test-rest: those that make test leaves out)"
+	@echo "make test-quick  all but the slow ones, as after an edit: minutes once their kernels are compiled"
 	@echo "make coverage    what the quick tests reach of what users touch; pages in htmlcov"
 	@echo "make lint        ruff and mypy;  make format: let ruff mend what it can"
 	@echo "make docs        the documentation site, in site/"
@@ -28,17 +32,25 @@ $(VENV)/.installed-dev: $(PROJECT) | $(BIN)/python
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --no-deps rosco
 	@touch $@ $(VENV)/.installed-plot
 
+# its cases share one kind of scene, which two processes would both compile
 demo: $(VENV)/.installed-plot
-	$(BIN)/fowt evaluate --controllers pi --cases above_rated --seeds 1 --jobs 2 --out results/demo
+	$(BIN)/fowt evaluate --controllers pi --cases above_rated --seeds 1 --out results/demo
 
 test: $(VENV)/.installed-dev
-	$(BIN)/python -m pytest -m "" --numprocesses auto --dist loadfile --durations=20
+	@echo "some five minutes on two cores, most of them for compiling kernels, which are kept"
+	$(TESTS) -m installation --durations=10
+
+test-all: $(VENV)/.installed-dev
+	$(TESTS) -m "" --durations=20
+
+test-rest: $(VENV)/.installed-dev
+	$(TESTS) -m "not installation" --durations=20
 
 test-quick: $(VENV)/.installed-dev
-	$(BIN)/python -m pytest --numprocesses auto --dist loadfile
+	$(TESTS)
 
 coverage: $(VENV)/.installed-dev
-	$(BIN)/python -m pytest --numprocesses auto --dist loadfile --cov --cov-report=term --cov-report=html
+	$(TESTS) --cov --cov-report=term --cov-report=html
 
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .

@@ -12,6 +12,54 @@ os.environ.setdefault("SDL_VIDEODRIVER", "dummy")  # windows of render mode "hum
 os.environ.pop("COLUMNS", None)
 
 
+# Test files that run the same kinds of scene, which one worker then compiles once; longest first.
+KINDS = {
+    "openfast": ["tests/test_validation.py"],
+    "environment": ["tests/envs/test_env.py", "tests/envs/test_golden.py"],
+    "steady wind": ["tests/test_cli.py", "tests/training/test_evaluate.py"],
+}
+KIND_OF = {file: kind for kind, files in KINDS.items() for file in files}
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    """With --dist loadfile: files of one kind go to one worker too, since two would both compile it."""
+    if config.getvalue("dist") != "loadfile":
+        return None
+    from xdist.scheduler import LoadFileScheduling
+
+    class LoadKindScheduling(LoadFileScheduling):
+        def _split_scope(self, nodeid):
+            return KIND_OF.get(file_of(nodeid), file_of(nodeid))
+
+    return LoadKindScheduling(config, log)
+
+
+def pytest_collection_modifyitems(items):
+    """Longest first, so that no worker is left with it at the end: kinds, files with slow tests, others."""
+    slow = {file_of(item.nodeid) for item in items if item.get_closest_marker("slow")}
+    order = list(KINDS)
+
+    def rank(item):
+        file = file_of(item.nodeid)
+        return order.index(KIND_OF[file]) if file in KIND_OF else len(order) + (file not in slow)
+
+    items.sort(key=rank)
+
+
+def file_of(nodeid):
+    """The file that a test is in."""
+    return nodeid.partition("::")[0]
+
+
+def pytest_terminal_summary(terminalreporter):
+    """Versions that a test has installed, also where it ran in a worker."""
+    for report in terminalreporter.getreports("passed"):
+        for name, value in report.user_properties:
+            if name == "installed":
+                terminalreporter.write_line(f"{report.nodeid} installed {value}")
+
+
 @pytest.fixture(scope="session", autouse=True)
 def _own_configuration(tmp_path_factory):
     """The key of checkpoints in a folder of the tests, not in the home of whoever runs them."""

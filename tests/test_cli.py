@@ -28,6 +28,7 @@ def fowt(*arguments, code=0):
     return result.stdout, result.stderr
 
 
+@pytest.mark.installation
 def test_simulate_prints_statistics_and_writes_what_simulate_returns(tmp_path):
     out, plot = tmp_path / "run.csv", tmp_path / "run.png"
     stdout, stderr = fowt("simulate", *SHORT, "--seed", "4", "--out", str(out), "--plot", str(plot))
@@ -184,6 +185,7 @@ def test_an_interrupted_evaluation_says_where_its_rows_are(tmp_path, monkeypatch
     assert len(pd.read_csv(tmp_path / "results.csv")) == 1
 
 
+@pytest.mark.installation
 def test_evaluate_writes_table_runs_and_plots(tmp_path):
     stdout, _ = fowt(
         "evaluate", "--controllers", "pi,pi_land", "--cases", "steady_16,ntm_18",
@@ -280,6 +282,7 @@ def test_trim_prints_the_operating_points_of_trim(tmp_path):
     assert table["RotThrust_[kN]"][1] == pytest.approx(point["RotThrust"], rel=1e-9)
 
 
+@pytest.mark.installation
 def test_list_names_everything_that_the_other_commands_take():
     stdout, _ = fowt("list")
     for name in ("oc3_hywind", "paper_wind_wave", "pi_land", "above_rated", "ntm_18"):
@@ -287,6 +290,7 @@ def test_list_names_everything_that_the_other_commands_take():
     assert "oc3_hywind" not in fowt("list", "controllers")[0]
 
 
+@pytest.mark.installation
 @pytest.mark.parametrize("command", ["simulate", "evaluate", "trim", "plot"])
 def test_help_shows_examples_whose_options_exist(command):
     stdout, _ = fowt(command, "--help")
@@ -296,6 +300,7 @@ def test_help_shows_examples_whose_options_exist(command):
     assert used and used <= options
 
 
+@pytest.mark.installation
 def test_version_is_that_of_the_package():
     assert fowt("--version")[0].strip() == fowt_env.__version__
 

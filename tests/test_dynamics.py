@@ -70,6 +70,7 @@ def naive_accelerations(row, platform, turbine, **options):
     )
 
 
+@pytest.mark.installation
 def test_accelerations_are_those_of_three_constrained_bodies(platform, turbine):
     body = build_body(platform, turbine)
     rows = reference_states()
@@ -79,6 +80,7 @@ def test_accelerations_are_those_of_three_constrained_bodies(platform, turbine):
         assert np.abs(project_accelerations(row, turbine, body) - expected).max() < 1e-11
 
 
+@pytest.mark.installation
 def test_accelerations_are_those_of_newton_and_euler_body_by_body(platform, turbine):
     body = build_body(platform, turbine)
     for row in reference_states()[:60]:
@@ -113,6 +115,7 @@ def test_held_platform_leaves_the_rotor_alone(platform, turbine):
     assert np.all(project_accelerations(row, turbine, both) == 0.0)
 
 
+@pytest.mark.installation
 def test_mass_matrix_has_the_published_entries(platform, turbine):
     m = build_body(platform, turbine).mass_matrix
     assert np.array_equal(m, m.T)
@@ -127,6 +130,7 @@ def test_mass_matrix_has_the_published_entries(platform, turbine):
     assert m[5, 5] == pytest.approx(1.9079e8, rel=2e-5)
 
 
+@pytest.mark.installation
 def test_the_solver_agrees_with_numpy_on_badly_scaled_systems():
     rng = np.random.default_rng(5)
     for _ in range(50):

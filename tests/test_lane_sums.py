@@ -5,6 +5,8 @@ import pytest
 
 from fowt_env.lane_sums import CROSSED, SUM_LANES, _sums_twin, crossed_sums, lane_dot
 
+pytestmark = pytest.mark.installation
+
 
 @pytest.mark.parametrize("n", [0, 8, 16, 120, 1024])
 def test_crossed_sums_have_the_bits_of_the_fixed_order(n):

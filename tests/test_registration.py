@@ -9,6 +9,8 @@ import pytest
 
 import fowt_env_registration
 
+pytestmark = pytest.mark.installation
+
 ROOT = Path(fowt_env_registration.__file__).parent
 NAME = "fowt_env/OC3Hywind-v1"
 

@@ -112,12 +112,14 @@ def anew(row, frame):
 # --------------------------------------------------------------------------- quick
 
 
+@pytest.mark.installation
 def test_total_mass_and_displacement_are_the_decks():
     platform, scene = read_platform(PLATFORM), build_scene(PLATFORM)
     assert scene.model.body.mass == pytest.approx(platform.published["total_mass"], abs=1.0)
     assert trim(scene)["FAIRTEN1"] == pytest.approx(911.4, rel=2e-3)
 
 
+@pytest.mark.installation
 def test_pitch_decay_is_openfasts_within_02_percent_of_period_and_3_percent_of_decrement_and_rms():
     channel, _, duration = DECAYS["decay_pitch"]
     ours, theirs = RUNS["decay_pitch"].frame(), reference("decay_pitch")
@@ -155,6 +157,7 @@ def test_a_study_has_errors_in_percent_of_the_reference():
     assert list(study.table()["verdict"]) == [row.verdict for row in study.rows]
 
 
+@pytest.mark.installation
 def test_steady_winds_with_locked_platform_are_within_02_and_03_percent():
     study = Study()
     GROUPS["steady"][0](study)
@@ -189,6 +192,7 @@ def test_the_tip_node_of_aerodyn_explains_its_thrust_and_torque_to_3e_5_at_every
     assert np.abs(explained).max() < 3e-5
 
 
+@pytest.mark.installation
 @pytest.mark.parametrize("case", ["regwave_H3T5", "regwave_H3T5_displaced"])
 def test_first_harmonics_in_a_regular_wave_are_within_1_percent(case):
     pair = [frame[frame[TIME] >= 400.0 - 1e-6] for frame in (RUNS[case].frame(), reference(case))]
@@ -210,6 +214,7 @@ def test_references_carry_their_settings_and_stay_small():
     assert size < 8e6
 
 
+@pytest.mark.installation
 def test_the_stored_region_of_the_box_holds_the_recorded_hub_wind():
     box = read_box(box_wind(), hub_height=90.0, rotor_diameter=126.0)
     theirs = reference("turb_18mps_Hs7.5_box")

@@ -8,6 +8,8 @@ import controllers
 from fowt_env.description import read_turbine
 from fowt_env.measurement import Measurement
 
+pytestmark = pytest.mark.installation
+
 TURBINE = read_turbine("nrel5mw_openfast")
 RATED = TURBINE.rated_rotor_speed * TURBINE.drivetrain.gear_ratio
 POWER = TURBINE.torque_law.rated_torque * RATED

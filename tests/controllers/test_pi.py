@@ -13,6 +13,8 @@ from fowt_env.errors import InputError
 from fowt_env.loads.drivetrain import generator_torque
 from fowt_env.measurement import Measurement
 
+pytestmark = pytest.mark.installation
+
 TURBINE = turbine()
 RATED_SPEED = TURBINE.rated_rotor_speed
 BETA_K = 0.1099965

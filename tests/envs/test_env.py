@@ -45,6 +45,7 @@ def rollout(env, seed, n=40):
     return hashlib.sha256(b"".join(parts)).hexdigest()
 
 
+@pytest.mark.installation
 @pytest.mark.parametrize("task", TASKS)
 @pytest.mark.parametrize("name", ENVIRONMENTS)
 def test_gymnasium_and_sb3_checkers_find_nothing(name, task):

@@ -7,6 +7,8 @@ from golden import ENVIRONMENTS, TASKS, path_of, trajectory
 
 import fowt_env_registration
 
+pytestmark = pytest.mark.installation
+
 # Observations are float32 (6e-8 in themselves), and libraries differ in the last bits of their sums, which
 # 100 steps carry on; below this, entries near zero count by their distance.
 RELATIVE, ABSOLUTE = 1e-6, 1e-7

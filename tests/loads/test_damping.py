@@ -1,9 +1,12 @@
 import numpy as np
+import pytest
 from plant import random_state
 
 from fowt_env.description import Hydro
 from fowt_env.loads.damping import LinearDamping, build_damping, damping_load
 from fowt_env.state import NO_LOAD, State, pose_of
+
+pytestmark = pytest.mark.installation
 
 NOTHING = Hydro(added_mass_coefficient=1.0, drag_coefficient=0.6, heave_added_mass=0.0)
 

@@ -32,6 +32,8 @@ from fowt_env.loads.fast_waves import (
 from fowt_env.loads.morison import GAUSS_OFFSET, axis_surface, build_strips, morison_load, wet_cell
 from fowt_env.weather.waves import build_waves, wave_number
 
+pytestmark = pytest.mark.installation
+
 VALIDITY = Path(__file__).resolve().parents[2] / "docs" / "validity.md"
 SWITCHES = [("instantaneous", "instantaneous", "wheeler"), ("fixed", "swl", "none")]
 STILL = (np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))

@@ -17,6 +17,8 @@ from fowt_env.loads.drivetrain import (
     shaft_torque,
 )
 
+pytestmark = pytest.mark.installation
+
 
 def test_the_parabola_meets_the_slip_line_at_the_published_speed():
     curve = build_torque_curve(torque_law())

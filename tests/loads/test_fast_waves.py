@@ -22,6 +22,8 @@ from fowt_env.loads.morison import Current, axis_surface, build_strips, current_
 from fowt_env.state import N_RIGID, State, pose_of
 from fowt_env.weather.waves import build_waves
 
+pytestmark = pytest.mark.installation
+
 PLATFORM = read_platform("oc3_hywind")
 SITE = PLATFORM.environment
 SEAS = {

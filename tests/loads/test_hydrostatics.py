@@ -8,6 +8,8 @@ from fowt_env.counters import N_COUNTERS, Counter
 from fowt_env.loads.hydrostatics import build_hull, hydrostatic_load, sliced, submerged
 from fowt_env.state import NO_LOAD
 
+pytestmark = pytest.mark.installation
+
 
 @pytest.fixture(scope="module")
 def hull(platform):

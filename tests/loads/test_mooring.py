@@ -23,6 +23,8 @@ from fowt_env.loads.mooring import (
 )
 from fowt_env.state import N_RIGID, NO_LOAD, State, pose_of
 
+pytestmark = pytest.mark.installation
+
 # OC3-Hywind line: Jonkman (2010), NREL/TP-500-47535, table 6-1; wet weight as MAP++ has it
 L, W, EA = 902.2, 698.094, 384.243e6
 Z_REST, X_REST = 250.0, 848.67

@@ -19,6 +19,8 @@ from fowt_env.loads.morison import (
 )
 from fowt_env.weather.waves import build_waves, wave_kinematics
 
+pytestmark = pytest.mark.installation
+
 SWITCHES = list(itertools.product(("instantaneous", "fixed"), ("instantaneous", "swl"), ("wheeler", "none")))
 # omega, amplitude, phase, heading: from kh = 0.5 (felt at the seabed) to 158 (spent above the keel)
 SEA = [

@@ -15,6 +15,8 @@ from fowt_env.loads.rotor import NO_ROTOR_LOAD, rotor_load
 from fowt_env.state import N_RIGID, State, pose_of
 from fowt_env.weather.wind import make_series, wind_at, wind_now
 
+pytestmark = pytest.mark.installation
+
 TURBINE = read_turbine("nrel5mw")
 ROTOR = build_blade_elements(TURBINE, 1.225)
 AREA = np.pi * ROTOR.tip_radius**2

@@ -29,6 +29,8 @@ from fowt_env.state import N_RIGID, State, pose_of
 from fowt_env.weather.wind import make_series, wind_now
 from fowt_env.weather.wind_field import WindField
 
+pytestmark = pytest.mark.installation
+
 if config.DISABLE_JIT:
     pytest.skip("the table takes minutes to build without the compiler", allow_module_level=True)
 

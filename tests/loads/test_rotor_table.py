@@ -9,6 +9,8 @@ from fowt_env.loads.rotor_table import build_rotor_table, rotor_table_load
 from fowt_env.state import N_RIGID, State, pose_of
 from fowt_env.weather.wind import make_series, wind_now
 
+pytestmark = pytest.mark.installation
+
 ROTOR = build_blade_elements(read_turbine("nrel5mw"), 1.225)
 TABLE = build_rotor_table(ROTOR)
 RATED_THRUST, RATED_TORQUE = 750e3, 4.18e6

@@ -7,6 +7,8 @@ from fowt_env.loads.tower import build_tower_drag, tower_load
 from fowt_env.state import N_RIGID, NO_LOAD, pose_of
 from fowt_env.weather.wind import make_series, wind_at, wind_now
 
+pytestmark = pytest.mark.installation
+
 TOWER = read_platform("oc3_hywind").tower
 PART = build_tower_drag(TOWER, 1.225)
 

@@ -17,6 +17,8 @@ from fowt_env.loads.wake import (
 from fowt_env.state import N_RIGID, State, pose_of
 from fowt_env.weather.wind import make_series, wind_now
 
+pytestmark = pytest.mark.installation
+
 ROTOR = build_blade_elements(read_turbine("nrel5mw"), 1.225)
 WAKE, SKEW = build_dynamic_inflow(), build_skewed_wake()
 N_WAKE = n_wake_states(ROTOR, WAKE)

@@ -79,6 +79,7 @@ class Unusable(Frozen):
             raise InputError(f"no library in {moment}")
 
 
+@pytest.mark.installation
 def test_every_controller_meets_the_same_wind_and_waves():
     table = evaluate(["pi", "pi_land"], [GUSTY], seeds=(1, 2), **SHORT)
     assert list(table.columns) == list(COLUMNS) and len(table) == 4
@@ -143,6 +144,7 @@ def test_without_the_rosco_library_its_runs_fail_and_say_what_to_install(monkeyp
     assert rows.loc["pi", "status"] == "ok"
 
 
+@pytest.mark.installation
 def test_table_and_runs_on_disk_are_those_returned(tmp_path):
     out = tmp_path / "deep" / "metrics.csv"
     table = evaluate("pi", [CALM], out=out, runs_folder=tmp_path / "runs", **SHORT)

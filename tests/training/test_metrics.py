@@ -5,6 +5,8 @@ import pytest
 from fowt_env.errors import InputError
 from training.metrics import METRICS, damage_equivalent_load, metrics
 
+pytestmark = pytest.mark.installation
+
 
 def synthetic_run(duration=100.0, dt=0.1, **columns):
     """A run with constant channels, except for those given."""

@@ -6,6 +6,8 @@ import pytest
 from fowt_env.weather import gusts
 from fowt_env.weather.iec import extreme_speed
 
+pytestmark = pytest.mark.installation
+
 SITE = {"turbulence_class": "B", "height": 90.0, "diameter": 126.0}
 # 1 + 0.1 * 126/42 = 1.3 divides the standard deviation in EOG and EDC
 

@@ -15,6 +15,8 @@ from fowt_env.weather.turbulence import (
     turbulence,
 )
 
+pytestmark = pytest.mark.installation
+
 NREL5MW = {"height": 90.0, "diameter": 126.0}
 SPEED = 18.0
 SIGMA = ntm_sigma(SPEED, "B")

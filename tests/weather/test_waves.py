@@ -14,6 +14,8 @@ from fowt_env.weather.waves import (
     wave_number,
 )
 
+pytestmark = pytest.mark.installation
+
 G, RHO, DEPTH = 9.80665, 1025.0, 320.0
 SITE = dict(depth=DEPTH, density=RHO, gravity=G, seed=0, duration=600.0)
 # omega, amplitude, phase, heading: kh from 0.5 to 158 at the depth of the site

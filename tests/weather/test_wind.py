@@ -16,6 +16,8 @@ from fowt_env.weather.wind import (
 )
 from fowt_env.weather.wind_spec import KINDS, read_wind
 
+pytestmark = pytest.mark.installation
+
 SITE = {
     "reference_height": 90.0,
     "rotor_diameter": 126.0,

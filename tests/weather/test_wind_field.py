@@ -27,6 +27,7 @@ def random_box(**changes):
     return box_of(u, v=v, w=w, **changes)
 
 
+@pytest.mark.installation
 def test_sampling_is_trilinear_like_a_plain_interpolator():
     box = random_box()
     grid = (np.arange(40) * 0.5, Z, Y)
@@ -66,6 +67,7 @@ def test_time_that_is_not_a_number_is_answered_without_a_crash():
     assert np.isfinite(field_at(np.nan, 0.0, 0.0, 90.0, random_box().field())).all()
 
 
+@pytest.mark.installation
 def test_rotor_average_finds_mean_and_gradients_of_a_plane():
     y, z = np.meshgrid(Y, Z)
     plane = 12.0 + 0.02 * (z - HUB) - 0.01 * y

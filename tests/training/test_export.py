@@ -1,0 +1,46 @@
+"""Exported networks that were never trained answer as stable-baselines3 does; no kernel is needed."""
+
+import gymnasium
+import numpy as np
+import pytest
+
+pytest.importorskip("sb3_contrib", reason="the extra `train` is not installed")
+
+import torch
+from stable_baselines3 import PPO, SAC
+from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
+
+from controllers.policy import read_policy
+from fowt_env.envs import FowtEnv
+from fowt_env.envs.decisions import Decisions, DecisionSettings
+from training.export import export_policy
+
+pytestmark = pytest.mark.installation
+
+
+class Shape(gymnasium.Env):
+    """The spaces of an environment that nobody steps."""
+
+    def __init__(self, width):
+        self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (width,), np.float32)
+        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (2,), np.float32)
+
+
+@pytest.mark.parametrize("algorithm", [PPO, SAC])
+def test_an_exported_network_answers_as_stable_baselines3_does_before_any_training(algorithm, tmp_path):
+    single, settings = FowtEnv("steady"), DecisionSettings(hold=2, history=2)
+    size = single.observation_space.shape[0]
+    width = Decisions(1, size, settings, single.control_dt).features().shape[1]
+    normalised = VecNormalize(DummyVecEnv([lambda: Shape(width)]))
+    rng = np.random.default_rng(3)
+    normalised.obs_rms.update(2.0 + 3.0 * rng.normal(size=(500, width)))
+    model = algorithm("MlpPolicy", normalised, seed=5, device="cpu")
+    with torch.no_grad():  # PPO starts with answers near zero
+        for parameter in model.policy.parameters():
+            parameter.add_(0.1 * torch.randn_like(parameter))
+    path = export_policy(model, normalised, single, settings, tmp_path / "policy.npz", {})
+    features = (2.0 + 6.0 * rng.normal(size=(300, width))).astype(np.float32)
+    expected, _ = model.predict(normalised.normalize_obs(features), deterministic=True)
+    answers = read_policy(path)[1](features)
+    assert expected.min() < -0.9 and expected.max() > 0.9
+    assert np.abs(answers - expected).max() < 1e-5
