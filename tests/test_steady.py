@@ -12,9 +12,10 @@ from fowt_env import cli, equilibrium
 from fowt_env.description import DATA, names, read_platform, read_turbine
 from fowt_env.dynamics import gravity_load
 from fowt_env.envs import FowtEnv
+from fowt_env.equilibrium import check_equilibrium, evaluated
 from fowt_env.errors import InputError
 from fowt_env.loads.hydrostatics import hydrostatic_load
-from fowt_env.loads.mooring import mooring_load
+from fowt_env.loads.mooring import SUSPENDED, mooring_load
 from fowt_env.state import State, pose_of
 from fowt_env.steady import AZIMUTHS, calm, mean_derivative, trim
 
@@ -238,6 +239,27 @@ def test_a_platform_that_cannot_be_meant_gets_a_message_that_says_why(name, tmp_
     assert "mine.toml' " in text and len(text) < 1000
     for word in words:
         assert word.lower() in text.lower(), text
+
+
+@pytest.mark.parametrize(
+    "offsets, kind, words",
+    [
+        ({"heave": 121.0}, InputError, "its keel 1 m above the water"),
+        ({"heave": -201.0}, InputError, "its keel 1 m below the sea bed"),
+        ({"platform_pitch": np.radians(85.0)}, InputError, "its tower 85 deg from upright"),
+        ({"platform_pitch": np.radians(-25.0)}, UserWarning, "25 deg from upright"),
+        ({"heave": -13.0}, InputError, "its tower base 3 m under water"),
+        ({"heave": 13.0}, UserWarning, "heave of 13 m, 11% of the draft"),
+    ],
+)
+def test_a_place_is_judged_by_keel_tower_base_tilt_and_heave(offsets, kind, words, still_scene, warned):
+    work = still_scene.work()
+    work.lines[:, [0, 2, 5]] = 1e6, 1e6, SUSPENDED  # moorings with nothing wrong
+    start = evaluated(state(), work)
+    stable = -np.eye(6)
+    expected = pytest.raises if kind is InputError else pytest.warns
+    with expected(kind, match=words):
+        check_equilibrium(still_scene, state(**offsets), start, stable, lambda: stable)
 
 
 def test_runs_and_episodes_are_refused_as_their_trim_is(tmp_path):
