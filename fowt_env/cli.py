@@ -3,6 +3,7 @@
 import functools
 import warnings
 from contextlib import contextmanager
+from math import pi
 from pathlib import Path
 from typing import Annotated
 
@@ -73,7 +74,7 @@ def reported(command):
             fail(error, EXIT_STOPPED)
         except InputError as error:
             fail(error, EXIT_INPUT)
-        except OSError as error:
+        except (OSError, ImportError) as error:
             fail(error, EXIT_INPUT)
         except KeyboardInterrupt:
             fail("interrupted", EXIT_INTERRUPTED)
@@ -210,7 +211,24 @@ def simulate(
                 _save_run(rows, out_path, None, title)
             raise
     _print_channels(frame, title)
+    _note_limits(frame, scene.turbine)
     _save_run(frame, out_path, plot, title)
+
+
+def _note_limits(frame, turbine):
+    """Say where a run was at the generator's limits, and that its rotor passed the turbine's overspeed."""
+    limited = frame["GenTqLim_[-]"].mean()
+    if limited > 0.0:
+        note(
+            f"generator torque at its range or rate limit for {100.0 * limited:.1f} % of the run: it was"
+            " commanded more than it can follow"
+        )
+    fastest, limit = frame["RotSpeed_[rpm]"].max(), turbine.overspeed * 30.0 / pi
+    if fastest > limit:
+        note(
+            f"rotor speed of up to {fastest:.2f} rpm is beyond the turbine's overspeed of {limit:g} rpm,"
+            " where an environment ends and an evaluation counts the run as failed"
+        )
 
 
 def show(frame, title=None):

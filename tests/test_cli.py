@@ -39,6 +39,19 @@ def test_simulate_prints_statistics_and_writes_what_simulate_returns(tmp_path):
     assert plot.read_bytes().startswith(b"\x89PNG")
 
 
+def test_a_run_at_the_generator_s_limits_or_past_the_overspeed_says_so(tmp_path, monkeypatch):
+    (tmp_path / "runaway.py").write_text(
+        "class Off:\n    def reset(self, m): pass\n    def act(self, m): return 0.0, 0.0\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    stderr = fowt("simulate", "--wind", "18", "--duration", "20", "--controller", "runaway:Off")[1]
+    assert "rate limit for 13.9 % of the run" in stderr  # 28 of 201 rows: from 43.1 kN m to zero
+    assert "beyond the turbine's overspeed of 15.73 rpm" in stderr
+    quiet = fowt("simulate", *SHORT)[1]
+    assert "overspeed" not in quiet and "rate limit" not in quiet
+
+
 def test_parquet_holds_the_same_bits(tmp_path):
     wind = json.dumps({"kind": "ntm", "speed": 16, "class": "A"})
     for name in ("a", "b"):
