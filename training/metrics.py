@@ -78,7 +78,10 @@ METRICS = (
 )
 
 # what names of figures that cannot be below zero have in them
-_NEVER_NEGATIVE = ("_std_", "_rms_", "_DEL_", "_travel_", "_duty_", "_beyond_", "_violations_", "FAIRTEN_")
+_NEVER_NEGATIVE = (
+    *("_std_", "_rms_", "_DEL_", "_travel_", "_duty_"),
+    *("_limited_", "_beyond_", "_violations_", "FAIRTEN_"),
+)
 
 
 def never_negative(metric):
