@@ -87,6 +87,7 @@ def failed(study, *exceptions):
         text = f"{row.case}: {row.quantity}: {error:.3g} % against {wanted} %"
         verdict = "reported" if wanted is None else "met" if abs(error) <= wanted else "MISSED"
         assert row.verdict == verdict, text
+        assert np.array_equal(row.allowed, np.nan if wanted is None else wanted, equal_nan=True), text
         if verdict == "MISSED" and not any(known in text for known in exceptions):
             texts.append(text)
     return texts
