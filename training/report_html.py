@@ -409,20 +409,26 @@ def _board(table, board_file, metrics):
             f"leaderboard.json is not of this version ({type(error).__name__}: {error}): run fowt evaluate on"
             " the folder again, or remove that file to have means of results.csv"
         ) from None
-    return views, {MEAN: "means", DIFFERENCE: f"differences to {board_file.get('baseline')}"}
+    baseline = board_file.get("baseline")
+    difference = "no differences: all have failed runs" if baseline is None else f"differences to {baseline}"
+    return views, {MEAN: "means", DIFFERENCE: difference}
 
 
 def _remark(table, board_file, case):
     """What the figures of the leaderboard are, in a sentence or two."""
     part = table if case == ALL_CASES else table[table["case"] == case]
     seeds, cases = sorted(set(part["seed"])), part["case"].nunique()
-    text = f"{len(part)} runs, {cases} {'case' if cases == 1 else 'cases'}, seeds {_numbers(seeds)}. "
+    text = f"{len(part)} runs, {cases} {'case' if cases == 1 else 'cases'}, "
+    text += f"{'seed' if len(seeds) == 1 else 'seeds'} {_numbers(seeds)}. "
     interval = board_file.get("interval")
-    if isinstance(interval, dict) and len(seeds) > 1:
+    if isinstance(interval, dict) and len(seeds) >= interval.get("least_seeds", 2):
         text += f"Small print: {100 * interval['level']:g} % intervals ({interval['method']}). "
     else:
         text += "Means over seeds, every case alike; failed runs have no figures. "
-        why = "a single seed" if len(seeds) == 1 else "there is no leaderboard.json"
+        why = "there is no leaderboard.json"
+        if isinstance(interval, dict):
+            count = "a single seed" if len(seeds) == 1 else f"{len(seeds)} seeds"
+            why = f"{count} of the {interval.get('least_seeds', 2)} that one needs"
         text += f"No intervals: {why}. "
     return text + "Click a heading to sort; the best figure of a column is in colour."
 
