@@ -32,8 +32,9 @@ $(VENV)/.installed-dev: $(PROJECT) | $(BIN)/python
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --no-deps rosco
 	@touch $@ $(VENV)/.installed-plot
 
+# its cases share one kind of scene, which two processes would both compile
 demo: $(VENV)/.installed-plot
-	$(BIN)/fowt evaluate --controllers pi --cases above_rated --seeds 1 --jobs 2 --out results/demo
+	$(BIN)/fowt evaluate --controllers pi --cases above_rated --seeds 1 --out results/demo
 
 test: $(VENV)/.installed-dev
 	@echo "some five minutes on two cores, most of them for compiling kernels, which are kept"
