@@ -14,9 +14,9 @@ os.environ.pop("COLUMNS", None)
 
 # Test files that run the same kinds of scene, which one worker then compiles once; longest first.
 KINDS = {
-    "openfast": ["tests/test_validation.py"],
     "environment": ["tests/envs/test_env.py", "tests/envs/test_golden.py"],
-    "steady wind": ["tests/test_cli.py", "tests/training/test_evaluate.py"],
+    "command line": ["tests/test_cli.py", "tests/training/test_evaluate.py"],
+    "openfast": ["tests/test_validation.py"],
 }
 KIND_OF = {file: kind for kind, files in KINDS.items() for file in files}
 
