@@ -127,7 +127,7 @@ class KernelCache(caching.FunctionCache):
         super().__init__(function)
         file = getattr(self, "_cache_file", None)
         if type(file) is not caching.IndexDataCacheFile:
-            raise ImportError(f"numba {numba.__version__} keeps compiled functions in a way that unknown")
+            raise ImportError(f"numba {numba.__version__} keeps compiled functions in an unknown way")
         locator = self._impl.locator
         self._cache_file = SharedCacheFile(
             locator.get_cache_path(), self._impl.filename_base, locator.get_source_stamp()
