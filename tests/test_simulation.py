@@ -345,7 +345,7 @@ def test_capsize_stops_the_run_and_keeps_the_rows(still_scene):
 
 def test_compiled_run_stops_on_a_state_that_is_not_a_number(storm_scene):
     x, u = initial_state(storm_scene)
-    closed = simulation._Loop(storm_scene, CompiledNan(), x, u, 0.05, 2, 2, 200)
+    closed = simulation._Loop(storm_scene, CompiledNan(), x, u, 0.05, (2, 2, 200), np.inf, np.inf)
     with pytest.raises(SimulationStopped, match="non-finite state") as caught:
         closed.go(lambda share: None)
     assert 1.0 < caught.value.time <= 1.1 + 1e-9  # the end of the control period that went wrong

@@ -1,6 +1,6 @@
 """Torque law, shaft balance and blade-pitch actuator of a geared turbine (theory.md, section 3)."""
 
-from math import sqrt
+from math import isfinite, sqrt
 from typing import NamedTuple
 
 from fowt_env.errors import InputError, unknown
@@ -167,6 +167,8 @@ def followed_torque(torque, command, period, limits):
     The command within [0, maximum], and not further from the torque before than the rate limit allows in a
     period (s). It acts from the period's beginning, as a torque that is set by a Bladed-style DLL does.
     """
+    if not isfinite(command):  # which a limit would turn into a torque; the run stops at it instead
+        return command
     target = limited(command, 0.0, limits.maximum)
     way = limits.rate_limit * period
     change = target - torque

@@ -171,7 +171,7 @@ def test_the_command_goes_through_to_its_leaderboard_and_says_what_failed_and_wh
     assert result.stderr.count("SystemExit: 0") == 2
     assert "1 of 4 runs had rare numerical events" in result.stderr
     board = json.loads((tmp_path / "leaderboard.json").read_text())
-    assert [entry["failed"] for entry in board["controllers"]] == [2, 0]
+    assert [entry["failed"] for entry in board["controllers"]] == [0, 2]
 
 
 # ------------------------------------------------------------------ names
