@@ -9,12 +9,10 @@ A run is done when its Parquet file is there, and that file appears whole or not
 leaderboard.json are made from those files, so an interrupted evaluation loses and repeats nothing.
 """
 
-import fcntl
 import hashlib
 import importlib.util
 import inspect
 import json
-import os
 import platform as machine
 import re
 import sys
@@ -33,6 +31,7 @@ from fowt_env.outputs import remove_leftovers, replacing, write_table
 from fowt_env.records import is_number
 from fowt_env.textfiles import parse_json
 from training.guard import printable
+from training.locks import locked
 from training.sources import imported_files
 
 FORMAT = 2  # of the folder; raised when files or their meaning change
@@ -436,23 +435,10 @@ def open_results(folder, settings, columns):
     Raises: InputError where the folder is in use, or holds runs of another version or other settings.
     """
     results = ResultsFolder(folder, settings, columns)
-    if results.folder.exists() and not results.folder.is_dir():
-        raise InputError(f"results folder {str(folder)!r}: is a file")
-    try:
-        results.folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"results folder {str(folder)!r}: cannot be written: {error.strerror}") from None
-    handle = os.open(results.folder, os.O_RDONLY)
-    try:
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            raise InputError(f"results folder {str(folder)!r}: another evaluation is writing to it") from None
+    with locked(results.folder, f"results folder {str(folder)!r}", "another evaluation is writing to it"):
         results._open()
         try:
             yield results
         finally:
             if results.rows:
                 results.write()
-    finally:
-        os.close(handle)  # and with it the lock, also where the process is killed
