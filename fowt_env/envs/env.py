@@ -18,10 +18,9 @@ from fowt_env.description import Platform
 from fowt_env.envs.actions import MODES, Mode, build_action_map, start_tracking
 from fowt_env.envs.kernels import (
     BAD_ACTION,
-    LIMITED,
     N_COUNTS,
     RUNNING,
-    SATURATED,
+    SHOWN_COUNTS,
     STEP,
     Run,
     Setting,
@@ -288,8 +287,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self._running = True
         info = {
             "time": 0.0,
-            "saturated_actions": 0,
-            "torque_limited": 0,
+            **dict.fromkeys(SHOWN_COUNTS, 0),
             "wind_speed": self.scene.wind_speed,
             "episode": deepcopy(episode._asdict()),
         }
@@ -354,8 +352,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         step = int(run.counts[STEP])
         info = dict(zip(REWARD_KEYS, run.terms.tolist(), strict=True))
         info["time"] = step * self.dt
-        info["saturated_actions"] = int(run.counts[SATURATED])
-        info["torque_limited"] = int(run.counts[LIMITED])
+        info |= {key: int(run.counts[entry]) for key, entry in SHOWN_COUNTS.items()}
         terminated = status != RUNNING
         truncated = not terminated and step >= self._last
         if terminated:

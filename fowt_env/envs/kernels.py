@@ -23,6 +23,7 @@ from fowt_env.step import NON_FINITE, OVERSPEED, RUNNING, advance_scene, observe
 BAD_ACTION = -1  # beside the statuses of step.py
 STEP, SATURATED, LIMITED = 0, 1, 2  # entries of Run.counts
 N_COUNTS = 3
+SHOWN_COUNTS = {"saturated_actions": SATURATED, "torque_limited": LIMITED}  # in the infos
 
 
 class Setting(NamedTuple):

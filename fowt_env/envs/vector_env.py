@@ -15,7 +15,7 @@ from gymnasium.vector.utils import batch_space
 
 from fowt_env.envs.batch import act_all, act_all_parallel, thread_limit
 from fowt_env.envs.env import REWARD_KEYS, FowtEnv
-from fowt_env.envs.kernels import LIMITED, N_COUNTS, RUNNING, SATURATED, STEP
+from fowt_env.envs.kernels import N_COUNTS, RUNNING, SHOWN_COUNTS, STEP
 from fowt_env.envs.observations import N_ACTIONS
 from fowt_env.envs.rewards import N_TERMS
 from fowt_env.envs.snapshot import Snapshot
@@ -30,7 +30,6 @@ if "OMP_WAIT_POLICY" not in os.environ:
 
 MODES = {mode.value: mode for mode in AutoresetMode}
 INFO_KEYS = (*REWARD_KEYS, "time")  # those of every step that are float64
-INFO_COUNTS = {"saturated_actions": SATURATED, "torque_limited": LIMITED}  # those that are int64
 INFO_MASKS = tuple(f"_{key}" for key in INFO_KEYS)
 
 
@@ -242,7 +241,7 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         columns = np.empty((len(INFO_KEYS), self.num_envs))
         columns[:N_TERMS] = self._terms.T
         np.multiply(self._counts[:, STEP], self._dt, out=columns[N_TERMS])
-        counts = {key: self._counts[:, entry].copy() for key, entry in INFO_COUNTS.items()}
+        counts = {key: self._counts[:, entry].copy() for key, entry in SHOWN_COUNTS.items()}
         if not shown.all():
             columns[:, ~shown] = 0.0
             for values in counts.values():
@@ -271,7 +270,7 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         """Info of the last step of one environment, as its own step would give it."""
         info = dict(zip(REWARD_KEYS, self._terms[i].tolist(), strict=True))
         info["time"] = float(self._counts[i, STEP] * self._dt[i])
-        info |= {key: int(self._counts[i, entry]) for key, entry in INFO_COUNTS.items()}
+        info |= {key: int(self._counts[i, entry]) for key, entry in SHOWN_COUNTS.items()}
         if self._statuses[i] != RUNNING:
             info["termination"] = self.envs[i]._reason(self._statuses[i])
         return info
