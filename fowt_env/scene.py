@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fowt_env.channels import FIXED_CHANNELS, Channel, Layout, channels, to_units
+from fowt_env.channels import Channel, Layout, channels, to_units, with_hub_wind
 from fowt_env.counters import N_COUNTERS
 from fowt_env.description import Platform, Turbine, read_platform, read_turbine, sea_state_of
 from fowt_env.dynamics import N_KEPT, Body, Model, Work
@@ -57,7 +57,6 @@ FIDELITIES = {
 IN_PLANE = 1e-9  # share of a vector out of the plane of a planar scene that rounding may leave
 STEPS = {"rk4": 0.05, "heun": 0.05, "abm4": 0.1, "ab4": 0.1}  # s, default step of each integrator
 FIELD_SAMPLES = 3  # rotor loads per step of ab4 in a box of wind, whose cells the blades cross in 0.1 s
-CHANNEL_AT = {channel.name: column for column, channel in enumerate(FIXED_CHANNELS)}
 SPAN_POINTS = 8  # along a blade, for the mean wind over the blades in the outputs
 REFERENCE_STEP = 0.0125  # s, of rk4 at fidelity "reference": errs 2e-6 in heave, 2e-7 elsewhere
 OPTIONS = {
@@ -132,13 +131,7 @@ class Scene:
         Where the plant's wind is a rotor average, Wind1VelX to Z become those of a point at the hub.
         """
         if self._hub_wind is not None:
-            time, value = self._hub_wind
-            at = rows[:, CHANNEL_AT["Time"]]
-            if self.model.wind.period > 0.0:
-                at = at % self.model.wind.period
-            rows = rows.copy()
-            for column in range(3):
-                rows[:, CHANNEL_AT["Wind1VelX"] + column] = np.interp(at, time, value[:, column])
+            rows = with_hub_wind(rows, self._hub_wind, self.model.wind.period)
         return to_units(rows, self.n_lines, self.load_names)
 
     @cached_property
