@@ -3,7 +3,6 @@
 import functools
 import warnings
 from contextlib import contextmanager
-from math import pi
 from pathlib import Path
 from typing import Annotated
 
@@ -217,13 +216,15 @@ def simulate(
 
 def _note_limits(frame, turbine):
     """Say where a run was at the generator's limits, and that its rotor passed the turbine's overspeed."""
+    from fowt_env.channels import RPM
+
     limited = frame["GenTqLim_[-]"].mean()
     if limited > 0.0:
         note(
             f"generator torque at its range or rate limit for {100.0 * limited:.1f} % of the run: it was"
             " commanded more than it can follow"
         )
-    fastest, limit = frame["RotSpeed_[rpm]"].max(), turbine.overspeed * 30.0 / pi
+    fastest, limit = frame["RotSpeed_[rpm]"].max(), turbine.overspeed * RPM
     if fastest > limit:
         note(
             f"rotor speed of up to {fastest:.2f} rpm is beyond the turbine's overspeed of {limit:g} rpm,"

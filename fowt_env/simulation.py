@@ -203,6 +203,8 @@ def simulate(
     last = steps_in("duration", duration, dt)
     steps_in("duration", duration, output_dt)
     check_duration(scene, duration)
+    if grid_loss is not None and not is_number(grid_loss):
+        raise InputError(f"grid_loss = {grid_loss!r}: must be a time in s, or None")
     held = controller is None
     if not held:
         from controllers import make  # looked up only when used: fowt_env imports nothing from it
@@ -216,8 +218,6 @@ def simulate(
         controller = _Hold()
         per_control = last  # nobody reads the measurements
     overspeed = scene.turbine.overspeed if stop_overspeed else inf
-    if grid_loss is not None and not is_number(grid_loss):
-        raise InputError(f"grid_loss = {grid_loss!r}: must be a time in s, or None")
     loss = inf if grid_loss is None else grid_loss - 1e-9  # an instant may miss it by rounding
     loop = _Loop(scene, controller, x, u, dt, (per_control, per_output, last), overspeed, loss)
     with _bar(progress) as report, _controllers_own():
@@ -270,6 +270,7 @@ class _Loop:
         except KeyboardInterrupt as interrupt:
             interrupt.frame = self.frame()  # what is done is not lost: the caller may keep it
             raise
+        self._check_speed(self.last)
         row = output_row(self.box, self.x, self.u, self.last * self.dt, self.rows.shape[1])
         self.rows[self.filled] = row
         self.filled += 1
@@ -288,8 +289,7 @@ class _Loop:
     def _python(self, step):
         """One control period (or what is left of the run) with a controller in Python."""
         t = step * self.dt
-        if self.x[State.ROTOR_SPEED] > self.overspeed:
-            self._check(OVERSPEED, step)
+        self._check_speed(step)
         observe(self.box, self.x, self.u, t, self.dx, self.measurement)
         torque, blade_pitch = self.controller.act(Measurement(*self.measurement.tolist()))
         period = self.per_control * self.dt
@@ -304,6 +304,10 @@ class _Loop:
             step += n
             self._check(status, step)
         return step
+
+    def _check_speed(self, step):
+        if self.x[State.ROTOR_SPEED] > self.overspeed:
+            self._check(OVERSPEED, step)
 
     def _check(self, status, step):
         if status != RUNNING:

@@ -126,6 +126,8 @@ def test_a_run_goes_on_past_the_overspeed_unless_it_is_to_stop_there(storm_scene
     first = int(np.argmax(speed > limit))
     assert stopped.value.time == pytest.approx(frame["Time_[s]"][first])
     np.testing.assert_array_equal(stopped.value.frame.to_numpy(), frame.to_numpy()[:first])
+    with pytest.raises(SimulationStopped, match="overspeed"):  # an environment ends at its last instant too
+        run(storm_scene, **free | {"duration": first * 0.1}, stop_overspeed=True)
 
 
 def test_what_the_time_step_blows_up_is_not_called_a_capsize(platform):
