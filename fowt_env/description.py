@@ -89,8 +89,9 @@ class Ballast(Record):
 class Hull(Record):
     """Outer shape: diameters linear between heights, keel first, ending above the water."""
 
-    z: tuple[Finite, ...]  # m, body frame, increasing
-    diameter: tuple[Positive, ...]  # m, the last two equal (the water-piercing cylinder)
+    # far beyond any structure, so that volumes and their moments are finite
+    z: tuple[bounded(ge=-1e4, le=1e4), ...]  # m, body frame, increasing
+    diameter: tuple[bounded(gt=0, le=1e4), ...]  # m, the last two equal (the water-piercing cylinder)
 
     @model_validator(mode="after")
     def _shape(self):

@@ -130,14 +130,13 @@ BINARY = (flipped, truncated, inserted, removed, recounted, recounted, recounted
 class Samples:
     """Sound files of every kind in a folder, and how each is loaded. kinds: {name: (file, ways, load)}."""
 
-    def __init__(self, folder):
+    GROUPS = ("descriptions", "winds", "outputs", "policies", "results")
+
+    def __init__(self, folder, groups=GROUPS):
         self.folder = folder
         self.kinds = {}
-        self._descriptions()
-        self._winds()
-        self._outputs()
-        self._policies()
-        self._results()
+        for group in groups:
+            getattr(self, f"_{group}")()
 
     def add(self, name, path, ways, load):
         """Another kind of file: load() reads it where it lies."""

@@ -22,6 +22,8 @@ from fowt_env import cli
 from fowt_env.description import read_turbine
 from fowt_env.errors import InputError
 from fowt_env.textfiles import parse_json, read_toml
+from training import report_html, results
+from training.metrics import METRICS
 
 FILES = int(os.environ.get("FOWT_MUTATIONS", "10000"))
 
@@ -352,3 +354,35 @@ def test_the_study_itself_finds_a_crash_a_hang_and_a_wrong_error(tmp_path):
     told = [line for line in done.stdout.splitlines() if "told" in line]
     assert ["KeyError" in told[0], "TimeoutError" in told[1], "MemoryError" in told[2]] == [True] * 3
     assert len(told) == 3
+
+
+ODD_VALUES = (None, -1, 10**400, "x", [{}], {"a": {}})
+
+
+@pytest.mark.parametrize("name", ["manifest.json", "leaderboard.json"])
+def test_every_value_of_a_results_folder_s_files_may_be_any_other(tmp_path, monkeypatch, name):
+    pytest.importorskip("openfast_io", reason="openfast_io is not installed")
+    pytest.importorskip("plotly", reason="plotly is not installed")
+    monkeypatch.setattr(report_html, "_plotly_script", lambda: "")
+    monkeypatch.setattr(results, "plant_code", results.plant_code)  # as Samples leaves it
+    monkeypatch.setattr(results, "versions", results.versions)
+    samples = mutation.Samples(tmp_path, ["results"])
+    path = tmp_path / "results" / name
+    loads = [load for file, _, load in samples.kinds.values() if file == path]
+    sound = json.loads(path.read_text())
+    others = set(METRICS) - {"RotSpeed_std_[rpm]"}  # one metric stands for all
+    tried = refused = 0
+    for place in [*((key,) for key in sound), *places(sound)]:
+        if others & set(place):
+            continue
+        for value in ODD_VALUES:
+            path.write_text(json.dumps(changed(sound, place, value)))
+            for load in loads:
+                tried += 1
+                try:
+                    load()
+                except InputError as error:
+                    assert str(tmp_path / "results") in str(error)
+                    refused += 1
+            path.write_text(json.dumps(sound))
+    assert loads and tried > 100 and 0.2 * tried < refused < tried

@@ -193,6 +193,7 @@ def test_nrel5mw_blade_has_the_19_evaluated_stations_and_whole_polars():
         (("shear_exponent = 0.14", "shear_exponent = 1.5"), ["environment.shear_exponent", ">= 0 and <= 1"]),
         (("[-120.0, -12.0", "[-12.0, -120.0"), ["hull", "-120.0", "must increase"]),
         (("[-120.0, -12.0", "[-420.0, -12.0"), ["hull.z.1", "-420.0", ">= -water_depth = -320.0"]),
+        (("6.5, 6.5]", "1e200, 1e200]"), ["hull.diameter.3", "1e+200", "> 0 and <= 10000"]),
         (("6.5, 6.5]", "6.5]"), ["hull", "same length", "4 and 3"]),
         (("anchor_z = -320.0", "anchor_z = -321.0"), ["lines.1.anchor", "-321.0", "between -water_depth"]),
         (

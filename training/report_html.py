@@ -23,6 +23,7 @@ from fowt_env.outputs import read_table, replacing
 from fowt_env.plots import PANELS, SPECTRA, TIME, frequency_marks, spectrum
 from fowt_env.textfiles import parse_json
 from training.evaluate import run_file
+from training.leaderboard_file import check_leaderboard
 
 TABLES = ("results.csv", "metrics.csv")  # the first that is there
 KEYS = ("controller", "case", "seed", "status")
@@ -105,7 +106,7 @@ def write_report(
     if rate is not None and not 0.0 < rate < float("inf"):
         raise InputError(f"rate = {rate}: must be a positive number of samples per second")
     table = read_results(folder)
-    board_file, manifest = _json_file(folder / "leaderboard.json"), _json_file(folder / "manifest.json")
+    board_file, manifest = _leaderboard(folder / "leaderboard.json"), _json_file(folder / "manifest.json")
     say = progress or (lambda done, total, text: None)
     chosen = _chosen_runs(table, cases, seeds)
     runs = _read_runs(folder, table, chosen, rate, say)
@@ -180,6 +181,11 @@ def _json_file(path):
     if not isinstance(value, dict):
         raise InputError(f"file {str(path)!r}: must hold a mapping")
     return value
+
+
+def _leaderboard(path):
+    """LeaderboardFile, or None without the file. Raises: InputError for a file that holds something else."""
+    return check_leaderboard(_json_file(path), path) if path.is_file() else None
 
 
 def _chosen_runs(table, cases, seeds):
@@ -371,46 +377,43 @@ def _means(table, metrics, case):
     return rows
 
 
-def _board_rows(entries, what, case):
-    """Leaderboard rows of leaderboard.json: means or paired differences, with their intervals."""
+def _board_rows(board, what, case):
+    """Leaderboard rows of a LeaderboardFile: means or paired differences, with their intervals."""
     rows = []
-    for entry in entries:
-        part = entry if case == ALL_CASES else entry.get("cases", {}).get(case)
+    for entry in board.controllers:
+        part = entry if case == ALL_CASES else entry.cases.get(case)
         if part is None:
             continue
-        figures = part["metrics" if what == MEAN else "difference"]
-        values, intervals = {}, {}
-        for name, figure in figures.items():
-            values[name], low, high = (figure.get(key) for key in ("mean", "low", "high"))
-            if low is not None and high is not None:
-                intervals[name] = [low, high]
-        row = {"controller": entry["controller"], "runs": part["runs"], "failed": part["failed"]}
-        score = entry.get("score") if case == ALL_CASES and what == MEAN else None
-        if score:
-            values["score"] = score["mean"]
-            if score.get("low") is not None:
-                intervals["score"] = [score["low"], score["high"]]
-        rows.append({**row, "values": values, "intervals": intervals})
+        figures = dict(part.metrics if what == MEAN else part.difference)
+        if entry.score and case == ALL_CASES and what == MEAN:
+            figures["score"] = entry.score
+        rows.append(
+            {
+                "controller": entry.controller,
+                "runs": part.runs,
+                "failed": part.failed,
+                "values": {name: figure.mean for name, figure in figures.items()},
+                "intervals": {
+                    name: [figure.low, figure.high]
+                    for name, figure in figures.items()
+                    if figure.low is not None and figure.high is not None
+                },
+            }
+        )
     return rows
 
 
 def _board(table, board_file, metrics):
     """({view: {case: rows}}, {view: title}) of the leaderboard, from leaderboard.json where it is there."""
     cases = [ALL_CASES, *dict.fromkeys(table["case"])]
-    if not board_file:
+    if board_file is None:
         return {MEAN: {case: _means(table, metrics, case) for case in cases}}, {MEAN: "means"}
-    try:
-        entries = board_file["controllers"]
-        views = {
-            what: {case: _board_rows(entries, what, case) for case in cases} for what in (MEAN, DIFFERENCE)
-        }
-    except (KeyError, TypeError, AttributeError) as error:
-        raise InputError(
-            f"leaderboard.json is not of this version ({type(error).__name__}: {error}): run fowt evaluate on"
-            " the folder again, or remove that file to have means of results.csv"
-        ) from None
-    baseline = board_file.get("baseline")
-    difference = "no differences: all have failed runs" if baseline is None else f"differences to {baseline}"
+    views = {
+        what: {case: _board_rows(board_file, what, case) for case in cases} for what in (MEAN, DIFFERENCE)
+    }
+    difference = "no differences: all have failed runs"
+    if board_file.baseline is not None:
+        difference = f"differences to {board_file.baseline}"
     return views, {MEAN: "means", DIFFERENCE: difference}
 
 
@@ -420,15 +423,15 @@ def _remark(table, board_file, case):
     seeds, cases = sorted(set(part["seed"])), part["case"].nunique()
     text = f"{len(part)} runs, {cases} {'case' if cases == 1 else 'cases'}, "
     text += f"{'seed' if len(seeds) == 1 else 'seeds'} {_numbers(seeds)}. "
-    interval = board_file.get("interval")
-    if isinstance(interval, dict) and len(seeds) >= interval.get("least_seeds", 2):
-        text += f"Small print: {100 * interval['level']:g} % intervals ({interval['method']}). "
+    interval = None if board_file is None else board_file.interval
+    if interval is not None and len(seeds) >= interval.least_seeds:
+        text += f"Small print: {100 * interval.level:g} % intervals ({interval.method}). "
     else:
         text += "Means over seeds, every case alike; failed runs have no figures. "
         why = "there is no leaderboard.json"
-        if isinstance(interval, dict):
+        if interval is not None:
             count = "a single seed" if len(seeds) == 1 else f"{len(seeds)} seeds"
-            why = f"{count} of the {interval.get('least_seeds', 2)} that one needs"
+            why = f"{count} of the {interval.least_seeds} that one needs"
         text += f"No intervals: {why}. "
     return text + "Click a heading to sort; the best figure of a column is in colour."
 
@@ -555,8 +558,8 @@ def _provenance(table, manifest, board_file):
                 )
     else:
         facts["evaluation"] = "the folder has no manifest.json: the versions that made its runs are not known"
-    if board_file.get("baseline") is not None:
-        facts["baseline"] = board_file["baseline"]
+    if board_file is not None and board_file.baseline is not None:
+        facts["baseline"] = board_file.baseline
     facts["seeds"] = _numbers(sorted(set(table["seed"])))
     facts["cases"] = ", ".join(dict.fromkeys(table["case"]))
     if "scored_[s]" in table.columns:

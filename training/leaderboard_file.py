@@ -1,0 +1,70 @@
+"""What leaderboard.json must hold for a page to be made of it; keys beyond these are let be.
+
+The file is checked whole before anything is read from it, since it may come from another version or hand.
+"""
+
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from fowt_env.errors import InputError
+from fowt_env.records import validate
+
+Count = Annotated[int, Field(ge=0, le=10**9)]
+Number = Annotated[float, Field(ge=-1e300, le=1e300)]
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(frozen=True, strict=True)
+
+
+class Figure(_Part):
+    """A mean or a difference with the ends of its interval; null where there is none."""
+
+    mean: Number | None
+    low: Number | None = None
+    high: Number | None = None
+
+
+class Figures(_Part):
+    """What a controller did, over all cases or in one."""
+
+    runs: Count
+    failed: Count
+    metrics: dict[str, Figure]
+    difference: dict[str, Figure]
+
+
+class Entry(Figures):
+    """A controller."""
+
+    controller: str
+    score: Figure | None = None
+    cases: dict[str, Figures] = {}
+
+
+class Interval(_Part):
+    """How the intervals were made."""
+
+    level: Annotated[float, Field(gt=0, lt=1)]
+    method: str
+    least_seeds: Annotated[int, Field(ge=1, le=10**9)] = 2
+
+
+class LeaderboardFile(_Part):
+    """The file."""
+
+    baseline: str | None
+    interval: Interval | None = None
+    controllers: list[Entry]
+
+
+def check_leaderboard(content, path):
+    """A LeaderboardFile of parsed JSON. Raises: InputError that names the first keys that are wrong."""
+    board, problems = validate(LeaderboardFile, content)
+    if problems:
+        raise InputError(
+            f"{str(path)!r} is not of this version ({'; '.join(problems[:3])}): run fowt evaluate on the"
+            " folder again, or remove that file to have means of results.csv"
+        )
+    return board
