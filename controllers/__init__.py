@@ -4,14 +4,17 @@ import importlib
 import inspect
 import sys
 
-from controllers.base import CheckedController, CompiledController, Controller, check_control_dt
-from controllers.policy import PREFIX as POLICY
-from controllers.policy import policy, shipped_agents
-from controllers.registry import CONTROLLERS
-from controllers.saved_design import PREFIX as DESIGN
-from controllers.saved_design import load_design
+from fowt_env.controllers.base import CheckedController, CompiledController, Controller, check_control_dt
+from fowt_env.controllers.policy import PREFIX as POLICY
+from fowt_env.controllers.policy import policy, shipped_agents
+from fowt_env.controllers.registry import CONTROLLERS
+from fowt_env.controllers.saved_design import PREFIX as DESIGN
+from fowt_env.controllers.saved_design import load_design
 from fowt_env.description import read_turbine
 from fowt_env.errors import InputError, unknown
+
+if __name__ != "fowt_env.controllers":  # a module that is imported under two names exists twice
+    raise ImportError("this package is fowt_env.controllers: import it by that name")
 
 __all__ = ["CONTROLLERS", "CheckedController", "CompiledController", "Controller", "information", "make"]
 

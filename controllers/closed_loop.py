@@ -4,7 +4,7 @@ from math import isinf
 
 import numpy as np
 
-from controllers.pi import PISettings, schedule_gain
+from fowt_env.controllers.pi import PISettings, schedule_gain
 from fowt_env.errors import InputError
 from fowt_env.linear_model import LinearModel, linearize, modes
 from fowt_env.loads.drivetrain import generator_torque

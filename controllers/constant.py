@@ -5,7 +5,7 @@ from math import isfinite
 
 import numpy as np
 
-from controllers.base import CompiledController, check_control_dt
+from fowt_env.controllers.base import CompiledController, check_control_dt
 from fowt_env.errors import InputError
 from fowt_env.jit import control_kernel
 

@@ -7,8 +7,8 @@ that fades only like 1/t, depends on the choice of t = 0, and ends unstable. Do 
 
 from enum import IntEnum
 
-from controllers.base import CompiledController, check_control_dt
-from controllers.pi import (
+from fowt_env.controllers.base import CompiledController, check_control_dt
+from fowt_env.controllers.pi import (
     Memory,
     Parameter,
     PISettings,

@@ -17,8 +17,8 @@ from math import exp, inf, isfinite
 
 import numpy as np
 
-from controllers.base import check_control_dt, tuned
-from controllers.pi import (
+from fowt_env.controllers.base import check_control_dt, tuned
+from fowt_env.controllers.pi import (
     PI,
     Memory,
     Parameter,

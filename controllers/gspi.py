@@ -16,8 +16,8 @@ from math import ceil, isnan, nan
 
 import numpy as np
 
-from controllers.base import check_control_dt
-from controllers.pi import PI, Memory, Parameter, PISettings, pi_step
+from fowt_env.controllers.base import check_control_dt
+from fowt_env.controllers.pi import PI, Memory, Parameter, PISettings, pi_step
 from fowt_env.jit import control_kernel
 from fowt_env.loads.drivetrain import TorqueCurve
 from fowt_env.measurement import Measure

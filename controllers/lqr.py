@@ -14,9 +14,18 @@ from math import exp
 
 import numpy as np
 
-from controllers import lqr_design as design
-from controllers.base import CompiledController, check_control_dt
-from controllers.lqr_design import MOMENT, N_FEEDBACK, N_PLANT, N_SENSORS, N_STATE, WAVE, WIND, Weights
+from fowt_env.controllers import lqr_design as design
+from fowt_env.controllers.base import CompiledController, check_control_dt
+from fowt_env.controllers.lqr_design import (
+    MOMENT,
+    N_FEEDBACK,
+    N_PLANT,
+    N_SENSORS,
+    N_STATE,
+    WAVE,
+    WIND,
+    Weights,
+)
 from fowt_env.errors import InputError
 from fowt_env.jit import control_kernel, kernel
 from fowt_env.loads.drivetrain import TorqueCurve, build_torque_curve, generator_torque, limited

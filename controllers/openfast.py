@@ -15,8 +15,8 @@ from enum import IntEnum
 
 import numpy as np
 
-from controllers.base import CompiledController, check_control_dt
-from controllers.pi import Parameter, PISettings, curve_of, schedule_gain
+from fowt_env.controllers.base import CompiledController, check_control_dt
+from fowt_env.controllers.pi import Parameter, PISettings, curve_of, schedule_gain
 from fowt_env.jit import control_kernel, kernel
 from fowt_env.loads.drivetrain import generator_torque, limited
 from fowt_env.measurement import Measure

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.base import CompiledController, check_control_dt
+from fowt_env.controllers.base import CompiledController, check_control_dt
 from fowt_env.errors import InputError, unknown
 from fowt_env.jit import control_kernel, kernel
 from fowt_env.loads.drivetrain import TorqueCurve, build_torque_curve, generator_torque, limited

@@ -3,7 +3,7 @@
 import tomllib
 from pathlib import Path
 
-from controllers.pi import PI, PISettings
+from fowt_env.controllers.pi import PI, PISettings
 
 FACTORS_FILE = Path(__file__).parent / "data" / "pi_tuned.toml"
 

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from controllers.base import CompiledController, call_law, check_control_dt
-from controllers.lqr import WindEstimator
-from controllers.policy_file import read_policy
+from fowt_env.controllers.base import CompiledController, call_law, check_control_dt
+from fowt_env.controllers.lqr import WindEstimator
+from fowt_env.controllers.policy_file import read_policy
 from fowt_env.envs.actions import MODES, Mode, action_of, build_action_map, command_of, start_tracking
 from fowt_env.envs.decisions import Decisions, DecisionSettings
 from fowt_env.envs.observations import (
@@ -95,7 +95,7 @@ class PolicyController:
         self._baseline = self._law = None
         self._parameters, self._memory = np.zeros(1), np.zeros(1)
         if self._mode == Mode.RESIDUAL:
-            from controllers import make
+            from fowt_env.controllers import make
 
             self._baseline = make(settings["baseline"], turbine, control_dt)
             if not isinstance(self._baseline, CompiledController):
@@ -126,7 +126,7 @@ class PolicyController:
         if self._estimator is not None:
             self._estimator.prepare(scene)
         if len(self._chosen.preview):
-            from controllers.preview import rotor_wind
+            from fowt_env.controllers.preview import rotor_wind
 
             if scene.model.wind is None:
                 raise InputError(f"controller {self.name!r}: needs a scene with wind to look ahead")

@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field
 
-from controllers.registry import CONTROLLERS
+from fowt_env.controllers.registry import CONTROLLERS
 from fowt_env.envs.actions import MODES
 from fowt_env.envs.decisions import DecisionSettings
 from fowt_env.envs.observations import KNOWN, N_ACTIONS

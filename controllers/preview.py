@@ -16,8 +16,8 @@ from math import exp, isfinite
 
 import numpy as np
 
-from controllers.base import check_control_dt
-from controllers.pi import (
+from fowt_env.controllers.base import check_control_dt
+from fowt_env.controllers.pi import (
     PI,
     Memory,
     Parameter,

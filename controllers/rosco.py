@@ -29,7 +29,7 @@ import numpy as np
 from scipy.interpolate import RectBivariateSpline
 from scipy.optimize import brentq
 
-from controllers.base import check_control_dt, tuned
+from fowt_env.controllers.base import check_control_dt, tuned
 from fowt_env.errors import ControllerError, InputError, unknown
 from fowt_env.loads.blade_elements import build_blade_elements
 from fowt_env.loads.rotor_table import performance

@@ -1,8 +1,8 @@
 """Operating point, linear model, its modes with and without the controller, and a file for MATLAB."""
 
 import fowt_env
-from controllers.closed_loop import closed_loop_matrix
-from controllers.pi import PISettings
+from fowt_env.controllers.closed_loop import closed_loop_matrix
+from fowt_env.controllers.pi import PISettings
 from fowt_env.linear_model import modes
 from fowt_env.outputs import write_mat
 

@@ -12,9 +12,9 @@ Needs pip install "fowt-env[report]".
 
 from pathlib import Path
 
-from training.evaluate import evaluate
-from training.report import write_leaderboard
-from training.report_html import write_report
+from fowt_env.training.evaluate import evaluate
+from fowt_env.training.report import write_leaderboard
+from fowt_env.training.report_html import write_report
 
 FOLDER = Path("results/examples/report")
 

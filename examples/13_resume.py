@@ -15,7 +15,7 @@ import signal
 from importlib.util import find_spec
 from pathlib import Path
 
-from training.evaluate import evaluate
+from fowt_env.training.evaluate import evaluate
 
 FOLDER = Path("results/examples/resume")
 STEPS = 4_000  # decisions: enough to be interrupted, far too few to learn
@@ -40,7 +40,7 @@ def interrupted_evaluation():
 
 def interrupted_training():
     """Send a training the signal of Ctrl-C, and resume it from its checkpoint."""
-    from training.train import Training, resolve
+    from fowt_env.training.train import Training, resolve
 
     changes = {"environment.num_envs": 8, "validation.winds": [18], "validation.every": STEPS}
     settings = resolve("ppo", "above_rated", 0, STEPS, changes)

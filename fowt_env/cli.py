@@ -323,9 +323,9 @@ def evaluate(
     plot: Annotated[bool, typer.Option("--plot/--no-plot", help="Make the plots.")] = True,
 ):
     """Score controllers on load cases: a leaderboard with intervals, metrics by case, the runs, and plots."""
-    from training.evaluate import evaluate as evaluate_controllers
-    from training.evaluate import summary
-    from training.report import chosen_cases, write_leaderboard
+    from fowt_env.training.evaluate import evaluate as evaluate_controllers
+    from fowt_env.training.evaluate import summary
+    from fowt_env.training.report import chosen_cases, write_leaderboard
 
     folder = Path(out_folder)
     chosen = chosen_cases(suite, cases)
@@ -369,7 +369,7 @@ def evaluate(
 
 def _print_evaluation(table, means, board):
     """Print metrics by case and the leaderboard, and on stderr what failed or passed a limit of the score."""
-    from training.report import leaderboard_rows, summary_rows
+    from fowt_env.training.report import leaderboard_rows, summary_rows
 
     width = table_width(out) or float("inf")
     headings, rows, failures = summary_rows(means, width)
@@ -399,7 +399,7 @@ def _places(flags):
 
 def _evaluation_plots(table, board, folder):
     """Paths of the plots made; none, with a note, where matplotlib is missing."""
-    from training.report import evaluation_plots
+    from fowt_env.training.report import evaluation_plots
 
     try:
         with progress_bar("plotting", None):
@@ -481,10 +481,10 @@ def list_names(
     ] = "all",
 ):
     """List the names that the other commands know."""
-    from controllers import CONTROLLERS
-    from controllers.policy import shipped_agents
+    from fowt_env.controllers import CONTROLLERS
+    from fowt_env.controllers.policy import shipped_agents
     from fowt_env.description import names
-    from training.cases import all_cases, read_suite, suite_names
+    from fowt_env.training.cases import all_cases, read_suite, suite_names
 
     known = {
         "platforms": lambda: names("platforms"),
@@ -507,7 +507,7 @@ def list_names(
 
 def _print_controllers(factories):
     """Print the controllers: name, what each is, and what it uses."""
-    from controllers import information
+    from fowt_env.controllers import information
 
     rows = [
         (name, factory.__doc__.splitlines()[0], ", ".join(information(name)))
@@ -543,8 +543,8 @@ def validate(
     plot: Annotated[bool, typer.Option("--plot/--no-plot", help="Make the plots.")] = True,
 ):
     """Compare this plant with OpenFAST on the same cases: every figure with its verdict, and plots."""
-    from training.validate import GROUPS, validate_cases
-    from training.validate_report import write_report
+    from fowt_env.training.validate import GROUPS, validate_cases
+    from fowt_env.training.validate_report import write_report
 
     names = list(GROUPS) if case == "all" else [name.strip() for name in case.split(",") if name.strip()]
     with progress_bar("validating", None) as update:
@@ -587,8 +587,8 @@ def paper(
     plot: Annotated[bool, typer.Option("--plot/--no-plot", help="Make the plots.")] = True,
 ):
     """Run the paper's load cases and check its claims."""
-    from training.paper import run_paper, statistics, wanted_cases
-    from training.paper_report import write_report
+    from fowt_env.training.paper import run_paper, statistics, wanted_cases
+    from fowt_env.training.paper_report import write_report
 
     names = wanted_cases(case)
     with progress_bar("paper", None) as update:
@@ -642,7 +642,7 @@ def speed(
     out_path: Annotated[str, typer.Option("--out", help="CSV to write.")] = "results/benchmark/speed.csv",
 ):
     """Time each kind of scene: a step, the closed loop, simulate end to end, and each load."""
-    from training import benchmark as bench
+    from fowt_env.training import benchmark as bench
 
     names = None if kinds is None else [name.strip() for name in kinds.split(";") if name.strip()]
     with progress_bar("benchmark", None) as update:
@@ -688,8 +688,8 @@ def accuracy(
     plot: Annotated[bool, typer.Option("--plot/--no-plot", help="Make the plot.")] = True,
 ):
     """Measure error against run time over integrators, steps, rotor models and wave sums."""
-    from training import benchmark_accuracy as study
-    from training.openfast import box_wind
+    from fowt_env.training import benchmark_accuracy as study
+    from fowt_env.training.openfast import box_wind
 
     chosen = None if axes is None else study.select([name.strip() for name in axes.split(",")])
     folder = Path(out_folder)
@@ -732,8 +732,8 @@ def evaluation(
     ] = "results/benchmark/evaluation.csv",
 ):
     """Time the runs of an evaluation on one core, and with --ray what handing them out costs."""
-    from training import benchmark as bench
-    from training import benchmark_evaluation as study
+    from fowt_env.training import benchmark as bench
+    from fowt_env.training import benchmark_evaluation as study
 
     with progress_bar("timing runs", None):
         table = study.evaluation_cost(count, suite, controller)
@@ -759,8 +759,8 @@ def stability(
     replay: Annotated[str | None, typer.Option(help="Run a stored case again, nothing else.")] = None,
 ):
     """Try to break the simulator: steps, random scenes, hostile actions, extremes, long runs."""
-    from training import stability as stress
-    from training.stability_cases import replay as run_again
+    from fowt_env.training import stability as stress
+    from fowt_env.training.stability_cases import replay as run_again
 
     if replay is not None:
         outcome = run_again(replay)

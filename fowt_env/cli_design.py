@@ -59,8 +59,8 @@ Raising pitch_rate saves travel, platform_pitch calms the platform, power holds 
 def save_lqr(weights, path):
     """The path written: lqr with these weights ({name: value}) on the models of OC3-Hywind."""
     import fowt_env
-    from controllers.lqr_design import Weights, design_models
-    from controllers.saved_design import lqr_settings, save_design
+    from fowt_env.controllers.lqr_design import Weights, design_models
+    from fowt_env.controllers.saved_design import lqr_settings, save_design
 
     chosen = Weights().changed(**weights)
     scene = fowt_env.build_scene("oc3_hywind", wind=18.0)
@@ -90,7 +90,7 @@ def linearize(
     """Print modes and right-half-plane zeros of the floating turbine over the wind."""
     import fowt_env
     from fowt_env.outputs import TABLE_SUFFIXES, write_table
-    from training.linear_design import (
+    from fowt_env.training.linear_design import (
         MODEL_SUFFIXES,
         mode_table,
         models_over,
@@ -147,9 +147,9 @@ def pi(
     import pandas as pd
 
     import fowt_env
-    from controllers.pi_design import design_pi
-    from controllers.saved_design import save_design
-    from training.linear_design import models_over
+    from fowt_env.controllers.pi_design import design_pi
+    from fowt_env.controllers.saved_design import save_design
+    from fowt_env.training.linear_design import models_over
 
     speeds = parse_numbers(winds, "winds")
     scene = fowt_env.build_scene(platform, wind=speeds[0])
@@ -185,7 +185,7 @@ def bound(
     """Least rotor-speed and platform-pitch deviations of any linear feedback, by what it knows."""
     import fowt_env
     from fowt_env.outputs import table_path, write_table
-    from training.linear_bound import INFORMATION, bound_table
+    from fowt_env.training.linear_bound import INFORMATION, bound_table
 
     if out_path is not None:
         table_path(out_path)
@@ -215,7 +215,7 @@ def front(
 ):
     """Simulated designs over gspi_oc3, beside the linear bound, and the share of it that they reach."""
     from fowt_env.outputs import read_table, write_table
-    from training.linear_bound import INFORMATION, ratio_table
+    from fowt_env.training.linear_bound import INFORMATION, ratio_table
 
     fronts = read_table(bound_path)
     table = ratio_table(read_table(runs), fronts)
@@ -245,7 +245,7 @@ def lqr(
     ] = None,
 ):
     """Sweep the weights of lqr on training seeds, beside gspi_oc3; or save one design (--out .json)."""
-    from training.linear_design import SHOWN, sweep
+    from fowt_env.training.linear_design import SHOWN, sweep
 
     fixed = parse_pairs(weight, "weight")
     if out_path is not None and out_path.lower().endswith(".json"):

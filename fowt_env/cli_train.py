@@ -40,7 +40,7 @@ def train(
     ] = None,
 ):
     """Train an agent with stable-baselines3, validate it as it learns, keep the best."""
-    from training.train import Training, resolve
+    from fowt_env.training.train import Training, resolve
 
     folder = Path(out_folder or f"runs/{task}_{algo}_{seed}")
     if resume:
@@ -75,7 +75,7 @@ def export_policy(
     ] = False,
 ):
     """Write the policy of a run's newest checkpoint as a plain array file."""
-    from training.export import export_run
+    from fowt_env.training.export import export_run
 
     if Path(out_path).suffix != ".npz":
         raise InputError(f"--out {out_path!r}: must end with .npz")
@@ -96,8 +96,8 @@ def training(
     out_path: Annotated[str, typer.Option("--out", help="CSV to write.")] = "results/benchmark/training.csv",
 ):
     """Time PPO on each kind of vector environment, and say what physics, torch and Python take."""
-    from training.benchmark import write_csv
-    from training.benchmark_training import benchmark_training
+    from fowt_env.training.benchmark import write_csv
+    from fowt_env.training.benchmark_training import benchmark_training
 
     with progress_bar("training speed", None) as update:
         table = benchmark_training(envs, steps, progress=lambda done, total, kind: update(done, kind, total))

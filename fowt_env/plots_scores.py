@@ -35,7 +35,7 @@ def plot_shares(fractions, bound, path=None, title=None):
     agents; small ones of the same kind: their training seeds. Hollow: more travel or power deviation than
     gspi_oc3, so that the bound does not hold. Agents beyond FRAME stand in the corner with their figures.
     """
-    from training.linear_bound import efficient
+    from fowt_env.training.linear_bound import efficient
 
     winds = sorted(fractions[WIND].unique())
     if not winds:

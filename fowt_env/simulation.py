@@ -207,7 +207,7 @@ def simulate(
         raise InputError(f"grid_loss = {grid_loss!r}: must be a time in s, or None")
     held = controller is None
     if not held:
-        from controllers import make  # looked up only when used: fowt_env imports nothing from it
+        from fowt_env.controllers import make  # looked up only when used: fowt_env imports nothing from it
 
         controller = make(controller, scene.turbine, control_dt)
         with _controllers_own():

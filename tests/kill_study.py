@@ -22,9 +22,9 @@ import pandas as pd
 import yaml
 
 import fowt_env.cli
-from controllers.policy import read_policy
+from fowt_env.controllers.policy import read_policy
 from fowt_env.outputs import is_leftover
-from training import results
+from fowt_env.training import results
 
 ROOT = Path(__file__).resolve().parent.parent
 EVALUATE = (

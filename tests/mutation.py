@@ -143,11 +143,11 @@ class Samples:
         self.kinds[name] = (path, ways, load)
 
     def _descriptions(self):
-        from controllers.saved_design import load_design
+        from fowt_env.controllers.saved_design import load_design
         from fowt_env.description import read_platform, read_turbine
         from fowt_env.scene import build_scene
         from fowt_env.sea_states import joint_sea_state, sea_state_of
-        from training.cases import read_suite
+        from fowt_env.training.cases import read_suite
 
         data, folder = ROOT / "fowt_env" / "data", self.folder
         turbine = folder / "turbine"
@@ -230,7 +230,7 @@ class Samples:
             self.add(f"outb {kind}", path, BINARY, lambda path=path: read_outb(path))
 
     def _policies(self):
-        from controllers.policy import AGENTS, PolicyController
+        from fowt_env.controllers.policy import AGENTS, PolicyController
 
         path = self.folder / "policy.npz"
         shutil.copy(AGENTS / "ppo_lqr_preview.npz", path)
@@ -250,11 +250,11 @@ class Samples:
 
     def _results(self):
         from fowt_env.outputs import read_table
-        from training import results
-        from training.evaluate import COLUMNS
-        from training.report_html import write_report
-        from training.results import FORMAT, open_results, read_row, write_json, write_run
-        from training.train import Training, resolve
+        from fowt_env.training import results
+        from fowt_env.training.evaluate import COLUMNS
+        from fowt_env.training.report_html import write_report
+        from fowt_env.training.results import FORMAT, open_results, read_row, write_json, write_run
+        from fowt_env.training.train import Training, resolve
 
         results.plant_code = lambda: "0123456789abcdef"  # the same manifest in every tree
         results.versions = lambda: {"python": "3.11", "numpy": "2.0"}
@@ -286,7 +286,7 @@ class Samples:
         write_json(manifest | {"created": "2026-01-01T00:00:00+0000"}, folder / "manifest.json")
         write_run(frame, row, run)
         table = reopen()
-        from training.report import write_leaderboard
+        from fowt_env.training.report import write_leaderboard
 
         write_leaderboard(table, folder)
         assert json.loads((folder / "manifest.json").read_text())["format"] == FORMAT

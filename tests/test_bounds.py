@@ -21,7 +21,7 @@ EXTRAS = [Requirement(text) for extra in PROJECT["optional-dependencies"].values
 SMOKE = """
 from gymnasium.utils.env_checker import check_env
 
-import controllers, fowt_env, training
+import fowt_env.controllers, fowt_env.training
 from fowt_env.envs import FowtEnv
 
 check_env(FowtEnv("steady"), skip_render_check=True)

@@ -15,15 +15,15 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from controllers import make
-from controllers.policy import AGENTS
-from controllers.policy_file import read_policy
 from fowt_env import cli
+from fowt_env.controllers import make
+from fowt_env.controllers.policy import AGENTS
+from fowt_env.controllers.policy_file import read_policy
 from fowt_env.description import read_turbine
 from fowt_env.errors import InputError
 from fowt_env.textfiles import parse_json, read_toml
-from training import report_html, results
-from training.metrics import METRICS
+from fowt_env.training import report_html, results
+from fowt_env.training.metrics import METRICS
 
 FILES = int(os.environ.get("FOWT_MUTATIONS", "10000"))
 
@@ -138,7 +138,7 @@ def test_a_stable_baselines3_zip_is_refused_where_a_policy_is_meant(tmp_path, ma
 
 def checkpoint_of_a_stranger(folder, mark):
     """A training run's folder whose every file would run code."""
-    from training.train import resolve
+    from fowt_env.training.train import resolve
 
     place = folder / "checkpoints" / "step_64"
     place.mkdir(parents=True)
@@ -228,14 +228,14 @@ def test_a_policy_whose_baseline_is_no_built_in_controller_is_refused_by_the_com
     assert f"baseline = '{text}': must be one of 'constant'" in result.stderr
     result = invoke("evaluate", "--controllers", "policy:self.npz", "--duration", "1", "--skip", "0")
     assert result.exit_code == cli.EXIT_INPUT, result.output
-    from training.agent_scores import told
+    from fowt_env.training.agent_scores import told
 
     assert told("policy:self.npz" if text.startswith("policy:") else text) == ""
 
 
 def settings_of_a_stranger():
     """Settings of a run with a value in every section of them, as many texts among them as there can be."""
-    from training.train import resolve
+    from fowt_env.training.train import resolve
 
     settings = resolve("ppo", "above_rated", 0, 100)
     settings["environment"] |= {
@@ -252,7 +252,7 @@ def test_no_text_in_the_settings_of_a_stranger_is_looked_up_as_code(text, trappe
     pytest.importorskip("stable_baselines3", reason="stable_baselines3 is not installed")
     import yaml
 
-    from training.train import Training
+    from fowt_env.training.train import Training
 
     sound = settings_of_a_stranger()
     found = list(places(sound))
@@ -282,7 +282,7 @@ def test_a_folder_of_nothing_but_settings_is_refused_where_its_baseline_is_no_bu
 
 @pytest.mark.parametrize("tag", ["object/apply:own_law.Law []", "name:own_law.Law", "module:own_law"])
 def test_settings_that_name_python_objects_are_not_loaded(tag, trapped):
-    from training.train import Training
+    from fowt_env.training.train import Training
 
     Path("run").mkdir()
     Path("run", "settings.yml").write_text(f"environment: !!python/{tag}\n")
@@ -313,7 +313,7 @@ def test_no_text_in_a_design_is_looked_up_as_code_or_as_a_file(text, trapped):
 def test_no_text_in_a_suite_is_looked_up_as_code(text, trapped):
     import tomllib
 
-    from training.cases import FOLDER, read_suite
+    from fowt_env.training.cases import FOLDER, read_suite
 
     words = (FOLDER / "atlas.toml").read_text(encoding="utf-8").split('"')
     assert len(words) > 21

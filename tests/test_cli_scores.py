@@ -8,8 +8,8 @@ pytest.importorskip("matplotlib", reason="matplotlib is not installed: the extra
 
 from fowt_env.cli import EXIT_INPUT, app  # noqa: E402
 from fowt_env.outputs import write_table  # noqa: E402
-from training.agent_scores import FIGURES  # noqa: E402
-from training.evaluate import COLUMNS  # noqa: E402
+from fowt_env.training.agent_scores import FIGURES  # noqa: E402
+from fowt_env.training.evaluate import COLUMNS  # noqa: E402
 
 
 def call(*arguments):

@@ -71,7 +71,7 @@ def trim_command(monkeypatch, tmp_path):
 
 
 def linearize_command(monkeypatch, tmp_path):
-    from training import linear_design
+    from fowt_env.training import linear_design
 
     modes = frame_of(["wind_[m/s]", "period_[s]", "damping_ratio_[-]", *"abcdefgh"], 3)
     modes.insert(1, "mode", ["surge", "platform_pitch", "heave"])
@@ -83,8 +83,8 @@ def linearize_command(monkeypatch, tmp_path):
 
 
 def design_pi_command(monkeypatch, tmp_path):
-    from controllers import pi_design
-    from training import linear_design
+    from fowt_env.controllers import pi_design
+    from fowt_env.training import linear_design
 
     names = ["wind_[m/s]", "blade_pitch_[deg]", "slope_[1/s2]", "KP_[s]", "KI_[-]", "omega_[rad/s]"]
     table = frame_of([*names, "zeta_[-]", "platform_zeta_[-]", "platform_omega_[rad/s]"], 3)
@@ -95,7 +95,7 @@ def design_pi_command(monkeypatch, tmp_path):
 
 
 def design_bound_command(monkeypatch, tmp_path):
-    from training import linear_bound
+    from fowt_env.training import linear_bound
 
     names = ["speed_ratio_[-]", "pitch_ratio_[-]", "travel_ratio_[-]", "power_ratio_[-]", "torque_std_[%]"]
     table = frame_of(["wind_[m/s]", "share_[-]", *names, "RotSpeed_std_[rpm]", "PtfmPitch_std_[deg]"], 5)
@@ -106,7 +106,7 @@ def design_bound_command(monkeypatch, tmp_path):
 
 def design_front_command(monkeypatch, tmp_path):
     from fowt_env import outputs
-    from training import linear_bound
+    from fowt_env.training import linear_bound
 
     table = frame_of(["wind_[m/s]", *linear_bound.RATIOS, "of_bound_[-]", "of_measured_[-]"], 3)
     table.insert(1, "variant", ["{'pitch_rate': 8.0}", "{'pitch_rate': 80.0}", "default"])
@@ -116,7 +116,7 @@ def design_front_command(monkeypatch, tmp_path):
 
 
 def design_lqr_command(monkeypatch, tmp_path):
-    from training import linear_design
+    from fowt_env.training import linear_design
 
     table = frame_of(linear_design.SHOWN, 2, case=["ntm_18"] * 2, variant=["gspi_oc3", "{'pitch_rate': 8.0}"])
     monkeypatch.setattr(linear_design, "sweep", lambda *a: table)
@@ -124,7 +124,7 @@ def design_lqr_command(monkeypatch, tmp_path):
 
 
 def validate_command(monkeypatch, tmp_path):
-    from training import validate, validate_report
+    from fowt_env.training import validate, validate_report
 
     study = validate.Study()
     for number in range(123):
@@ -137,7 +137,7 @@ def validate_command(monkeypatch, tmp_path):
 
 
 def paper_command(monkeypatch, tmp_path):
-    from training import paper, paper_report
+    from fowt_env.training import paper, paper_report
 
     table = frame_of(["mean", "std", "min", "max"], 2, case=["LC5"] * 2)
     table.insert(1, "channel", ["PtfmSurge_[m]", "PtfmPitch_[deg]"])
@@ -148,7 +148,7 @@ def paper_command(monkeypatch, tmp_path):
 
 
 def benchmark_speed_command(monkeypatch, tmp_path):
-    from training import benchmark
+    from fowt_env.training import benchmark
 
     kinds = list(benchmark.KINDS)[:8]
     table = frame_of(["step_us", "loop_us", "simulate_x", "seconds"], 8, kind=kinds, absent=[""] * 8)
@@ -157,7 +157,7 @@ def benchmark_speed_command(monkeypatch, tmp_path):
 
 
 def benchmark_accuracy_command(monkeypatch, tmp_path):
-    from training import benchmark_accuracy
+    from fowt_env.training import benchmark_accuracy
 
     name = "rotor as a table, midpoint, 0.05 s, waves by bands, one call in two, and more words of this kind"
     row = {"variant": name, "worst": 0.0123, "worst_of": "PtfmPitch_[deg]", "front": True}
@@ -168,7 +168,7 @@ def benchmark_accuracy_command(monkeypatch, tmp_path):
 
 
 def benchmark_evaluation_command(monkeypatch, tmp_path):
-    from training import benchmark_evaluation
+    from fowt_env.training import benchmark_evaluation
 
     table = frame_of([f"a_rather_long_name_{i}_ms" for i in range(9)], 2, case=["ntm_18", "ntm_20"])
     table["runs"] = [1234567, 3]
@@ -193,9 +193,9 @@ def test_a_command_prints_every_figure_in_full(command, width, monkeypatch, tmp_
 
 
 def test_evaluate_prints_every_figure_of_what_it_shows_in_full(width, capsys):
-    from training.evaluate import COLUMNS, summary
-    from training.leaderboard import leaderboard
-    from training.report import leaderboard_rows, summary_rows
+    from fowt_env.training.evaluate import COLUMNS, summary
+    from fowt_env.training.leaderboard import leaderboard
+    from fowt_env.training.report import leaderboard_rows, summary_rows
 
     rng = np.random.default_rng(0)
     rows = [
@@ -217,7 +217,7 @@ def test_evaluate_prints_every_figure_of_what_it_shows_in_full(width, capsys):
 
 
 def test_list_breaks_texts_between_words_and_nowhere_else(width):
-    from controllers import CONTROLLERS, information
+    from fowt_env.controllers import CONTROLLERS, information
 
     printed = printed_by("list", "controllers")
     wanted = [word for name in CONTROLLERS for word in (name, CONTROLLERS[name].__doc__.split()[0])]

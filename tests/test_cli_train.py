@@ -7,9 +7,9 @@ from typer.testing import CliRunner
 pytest.importorskip("stable_baselines3")
 
 from fowt_env.cli import EXIT_INPUT, EXIT_INTERRUPTED, app
-from training import train_callbacks
-from training.benchmark_training import KINDS
-from training.train import Training
+from fowt_env.training import train_callbacks
+from fowt_env.training.benchmark_training import KINDS
+from fowt_env.training.train import Training
 
 SMALL = (
     "environment.num_envs=2", "environment.rotor=table", "environment.wave_components=10",

@@ -15,8 +15,8 @@ from gymnasium.envs.registration import registry
 from typer.testing import CliRunner
 
 import fowt_env
-from controllers import make
 from fowt_env import cli, health, jit, requirements, warmup
+from fowt_env.controllers import make
 from fowt_env.description import DATA, read_platform
 from fowt_env.envs import FowtEnv
 
@@ -121,7 +121,7 @@ def _(folder, monkeypatch):
 
 @under("A part is not installed")
 def _(folder, monkeypatch):
-    from training.train import make_algorithm
+    from fowt_env.training.train import make_algorithm
 
     missing("stable_baselines3", monkeypatch)
     return refused(make_algorithm, "ppo")
@@ -247,8 +247,8 @@ def _(folder, monkeypatch):
 
 @under("The results folder is of another version")
 def _(folder, monkeypatch):
-    import training.results as results
-    from training.evaluate import evaluate
+    import fowt_env.training.results as results
+    from fowt_env.training.evaluate import evaluate
 
     asked = {"cases": "steady_16", "duration": 5.0, "skip": 1.0, "folder": "results/mine"}
     monkeypatch.chdir(folder)
@@ -259,7 +259,7 @@ def _(folder, monkeypatch):
 
 @under("The results folder is of another version")
 def _(folder, monkeypatch):
-    from training.evaluate import evaluate
+    from fowt_env.training.evaluate import evaluate
 
     asked = {"cases": "steady_16", "duration": 5.0, "skip": 1.0, "folder": "results/mine"}
     monkeypatch.chdir(folder)
@@ -281,7 +281,7 @@ def _(folder, monkeypatch):
 @under("Worker processes die")
 def _(folder, monkeypatch):
     errors = python(
-        "from training import engines\n"
+        "from fowt_env.training import engines\n"
         "engines.kernels_compiled = lambda: True\n"  # else the first run is done without a worker
         "list(engines.outcomes(abs, [1, 2], jobs=2))\n",
         folder,

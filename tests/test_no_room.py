@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 from fowt_env import cli
 from fowt_env.outputs import is_leftover, write_table
-from training import results
+from fowt_env.training import results
 
 SHORT = ("--wind", "18", "--duration", "20", "--option", "wave_components=10")
 EVALUATE = ("evaluate", "--controllers", "pi", "--cases", "ntm_18", "--duration", "20", "--skip", "5")

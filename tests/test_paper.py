@@ -11,7 +11,7 @@ from fowt_env.description import read_platform, read_turbine
 from fowt_env.errors import InputError
 from fowt_env.state import State
 from fowt_env.steady import trim_held
-from training import identify_model, paper, paper_report
+from fowt_env.training import identify_model, paper, paper_report
 
 TABLE_1 = {"surge": 10.24, "sway": 10.24, "heave": 3.66, "roll": 4.27, "platform_pitch": 4.27, "yaw": 3.15}
 

@@ -11,7 +11,7 @@ from fowt_env.integrators import INTEGRATORS
 from fowt_env.scene import STEPS
 from fowt_env.state import State
 from fowt_env.step import RUNNING, advance
-from training import (
+from fowt_env.training import (
     stability,
     stability_cases,
     stability_extremes,

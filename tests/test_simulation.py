@@ -9,9 +9,9 @@ import pytest
 from plant import random_state
 
 import fowt_env
-from controllers import make
-from controllers.constant import Constant
 from fowt_env import simulation
+from fowt_env.controllers import make
+from fowt_env.controllers.constant import Constant
 from fowt_env.counters import Counter
 from fowt_env.errors import ControllerError, InputError, SimulationStopped
 from fowt_env.jit import control_kernel

@@ -9,8 +9,8 @@ import gzip
 import numpy as np
 import pytest
 
-from controllers import CONTROLLERS
 from fowt_env.channels import Out
+from fowt_env.controllers import CONTROLLERS
 from fowt_env.description import read_platform, read_turbine
 from fowt_env.errors import InputError
 from fowt_env.loads.blade_elements import build_blade_elements, lift_drag
@@ -18,11 +18,20 @@ from fowt_env.scene import build_scene
 from fowt_env.state import State
 from fowt_env.steady import trim
 from fowt_env.step import output_row
+from fowt_env.training.comparison import decay_decrement, decay_period, harmonics, normalised_rms
+from fowt_env.training.openfast import (
+    DECAYS,
+    FOLDER,
+    PLATFORM,
+    RUNS,
+    box_wind,
+    hub_wind,
+    reference,
+    steady_reference,
+)
+from fowt_env.training.validate import GROUPS, Row, Study, validate_cases
+from fowt_env.training.validate_report import write_report
 from fowt_env.weather.wind_field import read_box
-from training.comparison import decay_decrement, decay_period, harmonics, normalised_rms
-from training.openfast import DECAYS, FOLDER, PLATFORM, RUNS, box_wind, hub_wind, reference, steady_reference
-from training.validate import GROUPS, Row, Study, validate_cases
-from training.validate_report import write_report
 
 TIME = "Time_[s]"
 

@@ -16,11 +16,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from controllers import DESIGN, POLICY, information
+from fowt_env.controllers import DESIGN, POLICY, information
 from fowt_env.errors import InputError, unknown
 from fowt_env.outputs import replacing, write_table
-from training.bootstrap import LEAST_SEEDS, crossed_estimate
-from training.metrics import METRICS, never_negative
+from fowt_env.training.bootstrap import LEAST_SEEDS, crossed_estimate
+from fowt_env.training.metrics import METRICS, never_negative
 
 __all__ = ["COUNTS", "FIGURES", "Figure", "agent_counts", "agent_scores", "by_kind", "read_results"]
 

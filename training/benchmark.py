@@ -19,8 +19,8 @@ import numba
 import numpy as np
 import pandas as pd
 
-from controllers import make
 from fowt_env.channels import measure, record
+from fowt_env.controllers import make
 from fowt_env.dynamics import Kept, loads_of, respond, rotor_part, strip_part
 from fowt_env.errors import InputError, unknown
 from fowt_env.jit import entry, kernel
@@ -87,7 +87,7 @@ class Kind:
 
 
 def _box():
-    from training.openfast import box_wind
+    from fowt_env.training.openfast import box_wind
 
     return box_wind()
 

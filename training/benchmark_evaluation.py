@@ -8,10 +8,10 @@ import numpy as np
 import pandas as pd
 
 from fowt_env.errors import InputError
-from training.cases import read_suite
-from training.engines import outcomes
-from training.evaluate import planned, score, score_and_send
-from training.results import read_row
+from fowt_env.training.cases import read_suite
+from fowt_env.training.engines import outcomes
+from fowt_env.training.evaluate import planned, score, score_and_send
+from fowt_env.training.results import read_row
 
 STAGES = ("whole run", "without its file", "reading its row")
 

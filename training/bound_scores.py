@@ -12,8 +12,8 @@ import numpy as np
 import pandas as pd
 
 from fowt_env.errors import InputError
-from training.agent_scores import KEY, grouped, markdown_table
-from training.linear_bound import RATIOS, fraction_of_bound, ratio_table
+from fowt_env.training.agent_scores import KEY, grouped, markdown_table
+from fowt_env.training.linear_bound import RATIOS, fraction_of_bound, ratio_table
 
 BOUND = Path(__file__).parent / "data" / "linear_bound.csv"
 BASELINE = "gspi_oc3"  # whose travel and power the bound keeps

@@ -25,12 +25,12 @@ from fowt_env.records import (
 from fowt_env.scene import OPTIONS
 from fowt_env.sea_states import SeaState, sea_state_of
 from fowt_env.textfiles import locate, raise_problems, read_toml
+from fowt_env.training.faults import Fault
+from fowt_env.training.metrics import METRICS
+from fowt_env.training.shifts import Shift
 from fowt_env.weather.wind_field import KINDS as FIELD_KINDS
 from fowt_env.weather.wind_field import REQUIRED, is_field
 from fowt_env.weather.wind_spec import read_wind
-from training.faults import Fault
-from training.metrics import METRICS
-from training.shifts import Shift
 
 FOLDER = Path(__file__).parent / "suites"
 WIND_KINDS = ("rotor-averaged", "full-field")

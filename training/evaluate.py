@@ -1,6 +1,6 @@
 """Any controllers on any cases, judged alike: one table of metrics.
 
-    from training.evaluate import evaluate
+    from fowt_env.training.evaluate import evaluate
     table = evaluate(["pi", "pi_land"], "above_rated", seeds=(1, 2), jobs=2)
 
 Every controller meets the same wind and waves: a (case, seed) is one realisation. A run that fails
@@ -19,15 +19,15 @@ import pandas as pd
 import pyarrow.parquet as pq
 
 import fowt_env
-from controllers import make
+from fowt_env.controllers import make
 from fowt_env.errors import InputError
 from fowt_env.outputs import replacing, write_table
 from fowt_env.records import is_number, plain_number
-from training.cases import Case, Suite, described, named_cases
-from training.engines import outcomes
-from training.guard import attempt
-from training.metrics import METRICS, metrics
-from training.results import (
+from fowt_env.training.cases import Case, Suite, described, named_cases
+from fowt_env.training.engines import outcomes
+from fowt_env.training.guard import attempt
+from fowt_env.training.metrics import METRICS, metrics
+from fowt_env.training.results import (
     check_name,
     controller_code,
     open_results,
@@ -37,7 +37,7 @@ from training.results import (
     versions,
     write_run,
 )
-from training.scoring import COLUMNS, CONTROL_DT, SHORTEST_WEATHER, Run, lost_row, scored
+from fowt_env.training.scoring import COLUMNS, CONTROL_DT, SHORTEST_WEATHER, Run, lost_row, scored
 
 __all__ = ["COLUMNS", "SHORTEST_WEATHER", "Case", "evaluate", "metrics", "named_cases", "run_file", "summary"]
 

@@ -5,7 +5,7 @@ import pickle
 
 import numpy as np
 
-from controllers.policy_file import FORMAT
+from fowt_env.controllers.policy_file import FORMAT
 from fowt_env.errors import InputError
 from fowt_env.outputs import replacing
 
@@ -83,7 +83,7 @@ def export_run(folder, path):
     """
     from fowt_env.envs import FowtEnv
     from fowt_env.envs.decisions import DecisionSettings
-    from training.train import Training, environment_settings, make_algorithm
+    from fowt_env.training.train import Training, environment_settings, make_algorithm
 
     run = Training(None, folder, resume=True, trusted=True)
     settings, checkpoint = run.settings, run.newest()

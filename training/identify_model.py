@@ -7,7 +7,7 @@ keeps the weight, the pull of the lines and the buoyancy in balance at the desig
 the polars gives the Froude-scaled rated thrust in the rated condition of the paper (LC2), whose wind is
 twice the Froude-scaled one: at the model's Reynolds number airfoils lift less.
 
-`python -m training.identify_model` writes the files anew.
+`python -m fowt_env.training.identify_model` writes the files anew.
 """
 
 from math import cos, hypot, pi, sin, sqrt

@@ -7,8 +7,8 @@ cases.
 import numpy as np
 
 from fowt_env.errors import unknown
-from training.bootstrap import LEAST_SEEDS, LEVEL, RESAMPLES, interval, resample_weights
-from training.metrics import METRICS, never_negative
+from fowt_env.training.bootstrap import LEAST_SEEDS, LEVEL, RESAMPLES, interval, resample_weights
+from fowt_env.training.metrics import METRICS, never_negative
 
 BASELINES = ("gspi_oc3", "pi")  # the first of these that was evaluated, unless one is named
 POSITIVE = np.array([never_negative(name) for name in METRICS])

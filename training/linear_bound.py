@@ -1,6 +1,6 @@
 """How well any linear controller can do: fronts of rotor-speed against platform-pitch deviation.
 
-    python -m training.linear_bound          (or fowt design bound --wind 12,14,16,18,20,22,24)
+    python -m fowt_env.training.linear_bound          (or fowt design bound --wind 12,14,16,18,20,22,24)
 
 Per wind speed, on the plant of controllers/lqr_design.py (surge, platform pitch, rotor, pitch actuator; the
 rotor-averaged Kaimal wind and the site's sea as shaped white noise): standard deviations from Lyapunov
@@ -21,7 +21,7 @@ import numpy as np
 import pandas as pd
 from scipy.linalg import solve_continuous_are, solve_continuous_lyapunov
 
-from controllers.lqr_design import (
+from fowt_env.controllers.lqr_design import (
     MOMENT,
     N_FEEDBACK,
     N_PLANT,
@@ -30,7 +30,7 @@ from controllers.lqr_design import (
     design_model,
     feedback_plant,
 )
-from controllers.pi import PISettings, schedule_gain
+from fowt_env.controllers.pi import PISettings, schedule_gain
 from fowt_env.errors import InputError
 
 WINDS = (12.0, 14.0, 16.0, 18.0, 20.0, 22.0, 24.0)  # m/s
@@ -267,7 +267,7 @@ def fraction_of_bound(table, wind, speed_ratio, pitch_ratio, information="full")
 
 
 def ratio_table(runs, bound=None):
-    """DataFrame of a sweep's means over seeds (training.linear_design.sweep) over those of its gspi_oc3.
+    """DataFrame of a sweep's means over seeds (fowt_env.training.linear_design.sweep) over those of its gspi_oc3.
 
     Columns: wind, variant, ratios of speed, platform pitch, power and travel; with a bound_table also the
     fractions of the bound and of the front for measured channels. Cases are named kind_WIND.

@@ -10,15 +10,15 @@ import numpy as np
 import pandas as pd
 from scipy.linalg import eigvals
 
-from controllers.lqr import LQR
-from controllers.lqr_design import Weights, scene_at
+from fowt_env.controllers.lqr import LQR
+from fowt_env.controllers.lqr_design import Weights, scene_at
 from fowt_env.errors import InputError
 from fowt_env.linear_model import FORCES, STATE_INDEX, linearize
 from fowt_env.outputs import replacing, write_table
 from fowt_env.simulation import simulate
-from training.cases import named_cases
-from training.evaluate import SHORTEST_WEATHER
-from training.metrics import metrics
+from fowt_env.training.cases import named_cases
+from fowt_env.training.evaluate import SHORTEST_WEATHER
+from fowt_env.training.metrics import metrics
 
 FIRST_TRAINING_SEED = 1000  # seeds below are for scoring
 INFINITE = 1e3  # rad/s: generalised eigenvalues beyond are zeros at infinity

@@ -18,8 +18,8 @@ from fowt_env.errors import InputError, unknown
 from fowt_env.loads.mooring import catenary
 from fowt_env.plots import spectrum
 from fowt_env.steady import trim_held
+from fowt_env.training.comparison import harmonics
 from fowt_env.weather.turbulence import turbulence
-from training.comparison import harmonics
 
 PLATFORM = "liu_1_50"
 TIME, SURGE, PITCH = "Time_[s]", "PtfmSurge_[m]", "PtfmPitch_[deg]"

@@ -8,7 +8,7 @@ import fowt_env
 from fowt_env.description import read_platform
 from fowt_env.outputs import replacing, write_table
 from fowt_env.plots import COLOURS, INK, TIME, new_figure, plot_run, save_figure, spectrum, style_axes
-from training import paper
+from fowt_env.training import paper
 
 LABELS = {
     paper.SURGE: "surge (m)",

@@ -1,6 +1,6 @@
 """Ship the best policy of a training run: its .npz in training/agents, and a card that says where it is from.
 
-    python -m training.publish runs/above_rated_ppo_1 ppo_lqr --machine "two shared cores of a Xeon"
+    python -m fowt_env.training.publish runs/above_rated_ppo_1 ppo_lqr --machine "two shared cores of a Xeon"
 
 The card has the command that makes the run again, its seed, wall time and machine, what the agent is told,
 its figures on the validation episodes, and the versions that the run was made with.
@@ -14,11 +14,11 @@ from pathlib import Path
 import pandas as pd
 import yaml
 
-from controllers import information
-from controllers.policy import read_policy
+from fowt_env.controllers import information
+from fowt_env.controllers.policy import read_policy
 from fowt_env.errors import InputError
 from fowt_env.outputs import replacing
-from training.train import AGENTS, resolve
+from fowt_env.training.train import AGENTS, resolve
 
 LARGEST_FILE = 200_000  # bytes of a policy that is kept in the repository
 

@@ -8,9 +8,9 @@ from fowt_env.errors import unknown
 from fowt_env.outputs import read_table
 from fowt_env.plots import TIME, plot_evaluation, plot_pareto, plot_runs, plot_spectra
 from fowt_env.plots_response import BOXES, plot_boxes
-from training.cases import Score, named_cases, read_suite
-from training.leaderboard import leaderboard
-from training.results import file_name, run_file, write_json
+from fowt_env.training.cases import Score, named_cases, read_suite
+from fowt_env.training.leaderboard import leaderboard
+from fowt_env.training.results import file_name, run_file, write_json
 
 # printed columns: heading, metric, format
 HEADLINE = (
@@ -42,7 +42,7 @@ DROPPED_FIRST = (
 
 
 def summary_rows(means, width):
-    """(headings, rows of texts, failures per row) of what training.evaluate.summary gives.
+    """(headings, rows of texts, failures per row) of what fowt_env.training.evaluate.summary gives.
 
     Columns are dropped until headings and values, two spaces between them, take at most `width` characters.
     """

@@ -1,6 +1,6 @@
 """One self-contained HTML page of an evaluation: table, plots, schedule, provenance.
 
-    from training.report_html import write_report
+    from fowt_env.training.report_html import write_report
     write_report("results/above_rated")
 
 The page holds its data and plotly.js, and asks nothing of a network. Needs plotly:
@@ -22,8 +22,8 @@ from fowt_env.errors import InputError, unknown
 from fowt_env.outputs import read_table, replacing
 from fowt_env.plots import PANELS, SPECTRA, TIME, frequency_marks, spectrum
 from fowt_env.textfiles import parse_json
-from training.evaluate import run_file
-from training.leaderboard_file import check_leaderboard
+from fowt_env.training.evaluate import run_file
+from fowt_env.training.leaderboard_file import check_leaderboard
 
 TABLES = ("results.csv", "metrics.csv")  # the first that is there
 KEYS = ("controller", "case", "seed", "status")

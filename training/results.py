@@ -30,9 +30,9 @@ from fowt_env.errors import InputError
 from fowt_env.outputs import remove_leftovers, replacing, write_table
 from fowt_env.records import is_number
 from fowt_env.textfiles import parse_json
-from training.guard import printable
-from training.locks import locked
-from training.sources import imported_files
+from fowt_env.training.guard import printable
+from fowt_env.training.locks import locked
+from fowt_env.training.sources import imported_files
 
 FORMAT = 2  # of the folder; raised when files or their meaning change
 MANIFEST = {  # what each key of manifest.json holds, beside its format
@@ -183,8 +183,8 @@ def controller_code(controller):
     controllers; "design:FILE", "policy:NAME": the file and all controllers; "module:Name", a class or an
     object: the file that it comes from, and what that imports from its own folder and this project.
     """
-    from controllers import CONTROLLERS, saved_design
-    from controllers.policy import PREFIX, policy_path
+    from fowt_env.controllers import CONTROLLERS, saved_design
+    from fowt_env.controllers.policy import PREFIX, policy_path
 
     if not isinstance(controller, str):
         kind = (

@@ -1,6 +1,6 @@
 """What makes ROSCO with the OC3 gains differ from the published law with the same gains, one thing at a time.
 
-    python -m training.rosco_differences --jobs 2
+    python -m fowt_env.training.rosco_differences --jobs 2
 
 From the published law towards ROSCO: its periods, the place of the gain schedule, the pitch that sets it.
 From ROSCO towards the published law: the set-point smoother, the torque law, and gains that undo the place of
@@ -13,8 +13,8 @@ from math import exp
 import numpy as np
 import pandas as pd
 
-from controllers.gspi import gspi_oc3
-from controllers.pi import (
+from fowt_env.controllers.gspi import gspi_oc3
+from fowt_env.controllers.pi import (
     PI,
     Memory,
     Parameter,
@@ -24,10 +24,10 @@ from controllers.pi import (
     speed_error,
     write_commands,
 )
-from controllers.rosco import SCHEDULE, Rosco, RoscoSettings, pitch_gains
+from fowt_env.controllers.rosco import SCHEDULE, Rosco, RoscoSettings, pitch_gains
 from fowt_env.description import read_turbine
-from training.evaluate import evaluate
-from training.tune_controllers import BASELINE, CONTROL_DT, SEEDS, WINDS, training_case
+from fowt_env.training.evaluate import evaluate
+from fowt_env.training.tune_controllers import BASELINE, CONTROL_DT, SEEDS, WINDS, training_case
 
 SHOWN = {
     "rotor speed std": "RotSpeed_std_[rpm]",

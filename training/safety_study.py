@@ -1,6 +1,6 @@
 """Agents with and without the safety layer on validation episodes.
 
-    python -m training.safety_study --agents ppo_lqr --out results/safety.csv
+    python -m fowt_env.training.safety_study --agents ppo_lqr --out results/safety.csv
 
 Beside the trained agents two careless ones with direct commands are run: one that asks for new random
 torque and blade pitch every 5 s, and one that asks for no torque and flat blades.
@@ -13,11 +13,11 @@ from math import degrees
 import numpy as np
 import pandas as pd
 
-from controllers.policy import policy_path, read_policy
+from fowt_env.controllers.policy import policy_path, read_policy
 from fowt_env.envs import TASKS, FowtEnv, SafetyLayer
 from fowt_env.envs.decisions import Decisions, DecisionSettings
 from fowt_env.outputs import write_table
-from training.train import TASK_FIELDS, resolve, validation_episodes
+from fowt_env.training.train import TASK_FIELDS, resolve, validation_episodes
 
 CARELESS = ("random direct", "no torque, flat blades")
 

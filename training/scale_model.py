@@ -7,7 +7,7 @@ The result is similar to its original, not a design: masses of real turbines gro
 speed does not grow with size, and nobody has built it. It shows that the description carries another size,
 and serves where a control law is to be tried on one.
 
-`python -m training.scale_model --help` has the settings; without any it writes the built-in oc3_froude_10mw.
+`python -m fowt_env.training.scale_model --help` has the settings; without any it writes the built-in oc3_froude_10mw.
 """
 
 from pathlib import Path
@@ -19,7 +19,7 @@ import typer
 from fowt_env.description import DATA, read_platform, read_turbine
 from fowt_env.errors import InputError
 from fowt_env.outputs import replacing
-from training.identify_model import toml_value
+from fowt_env.training.identify_model import toml_value
 
 PLATFORM, TURBINE = "oc3_hywind", "nrel5mw"
 POWER_EXPONENT = 3.5

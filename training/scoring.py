@@ -8,15 +8,15 @@ from typing import Any
 import pandas as pd
 
 import fowt_env
-from controllers import make
+from fowt_env.controllers import make
 from fowt_env.errors import ControllerError, ControllerInputError, InputError, SimulationStopped
 from fowt_env.records import is_number
+from fowt_env.training.faults import faulted, idling
+from fowt_env.training.guard import attempt, reason_of
+from fowt_env.training.metrics import METRICS, TIME, metrics
+from fowt_env.training.shifts import Unaware, shifted_parts
+from fowt_env.training.wind_boxes import cached_box
 from fowt_env.weather.wind_field import is_field
-from training.faults import faulted, idling
-from training.guard import attempt, reason_of
-from training.metrics import METRICS, TIME, metrics
-from training.shifts import Unaware, shifted_parts
-from training.wind_boxes import cached_box
 
 CONTROL_DT = 0.1  # s, simulate's own
 SHORTEST_WEATHER = 700.0  # s of wind and waves: shorter runs see the start of the same realisation

@@ -13,11 +13,11 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from controllers.base import CheckedController, CompiledController
+from fowt_env.controllers.base import CheckedController, CompiledController
 from fowt_env.envs.sensors import NOISE_STREAM, reading_scales
 from fowt_env.measurement import Measurement
 from fowt_env.records import NonNegative, Positive, Record
-from training.randomisation import PLANT, plant_settings
+from fowt_env.training.randomisation import PLANT, plant_settings
 
 
 class Shift(Record):

@@ -16,8 +16,14 @@ from fowt_env.integrators import INTEGRATORS
 from fowt_env.outputs import replacing
 from fowt_env.scene import STEPS
 from fowt_env.step import RUNNING
-from training import stability_cases, stability_extremes, stability_long, stability_map, stability_plain
-from training.benchmark import header
+from fowt_env.training import (
+    stability_cases,
+    stability_extremes,
+    stability_long,
+    stability_map,
+    stability_plain,
+)
+from fowt_env.training.benchmark import header
 
 MEMORY_MB = 5.0  # growth that counts as none: less than a byte per step of the documented run
 # relative changes of the free body over 10000000 default steps: kinetic energy, linear momentum, angular

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from controllers import make
 from fowt_env.channels import measure
+from fowt_env.controllers import make
 from fowt_env.counters import Counter
 from fowt_env.errors import InputError, unknown
 from fowt_env.integrators import build_integrator, rates, take_step

@@ -6,8 +6,8 @@ from math import degrees, isfinite, pi
 import numpy as np
 import pandas as pd
 
-from controllers import make
 from fowt_env.channels import DEG, RPM
+from fowt_env.controllers import make
 from fowt_env.envs import FowtEnv
 from fowt_env.errors import InputError
 from fowt_env.loads.mooring import Mooring

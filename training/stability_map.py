@@ -17,7 +17,7 @@ from fowt_env.scene import STEPS, build_scene
 from fowt_env.state import State
 from fowt_env.steady import OperatingPoint, trim
 from fowt_env.step import RUNNING, advance, forget
-from training.stability_long import with_integrator
+from fowt_env.training.stability_long import with_integrator
 
 DURATION = 300.0  # s of each run: hundreds of steps even at the largest
 FINE_STEP = 0.0125  # s, of the run that others are judged by

@@ -8,7 +8,7 @@ import torch
 from stable_baselines3.common.callbacks import BaseCallback, EvalCallback
 
 from fowt_env.outputs import write_table
-from training.train import decision_env, judged, seconds_text
+from fowt_env.training.train import decision_env, judged, seconds_text
 
 REPORT_EVERY = 1.0  # s
 
@@ -90,7 +90,7 @@ class Keeper(BaseCallback):
 
 
 def callbacks(training, judge_env, judge, keeper):
-    """[EvalCallback on the validation episodes, Keeper] of a training.train.Training."""
+    """[EvalCallback on the validation episodes, Keeper] of a fowt_env.training.train.Training."""
     every = max(1, training.settings["validation"]["every"] // training.env.num_envs)
     evaluation = EvalCallback(
         judge_env,

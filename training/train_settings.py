@@ -6,8 +6,8 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import Field
 
-from controllers.policy_file import ACTIVATIONS
-from controllers.registry import CONTROLLERS
+from fowt_env.controllers.policy_file import ACTIVATIONS
+from fowt_env.controllers.registry import CONTROLLERS
 from fowt_env.envs.decisions import DecisionSettings
 from fowt_env.envs.env import SETTINGS
 from fowt_env.errors import InputError

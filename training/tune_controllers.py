@@ -1,7 +1,7 @@
 """Tune the motion feedback of floating_feedback and rosco_float on training cases.
 
-    python -m training.tune_controllers --jobs 2
-    python -m training.tune_controllers --engine ray --address ray://head:10001
+    python -m fowt_env.training.tune_controllers --jobs 2
+    python -m fowt_env.training.tune_controllers --engine ray --address ray://head:10001
 
 Every setting of a grid runs in the training cases: 13, 17 and 21 m/s, NTM class B with the site's normal
 sea, seeds 1001 and 1002, which are apart from the winds and seeds that controllers are scored on. Its
@@ -20,16 +20,16 @@ from pathlib import Path
 
 import pandas as pd
 
-from controllers.base import TUNED
-from controllers.floating import FeedbackSettings, FloatingFeedback
-from controllers.pi import PISettings
-from controllers.rosco import Rosco, RoscoSettings
+from fowt_env.controllers.base import TUNED
+from fowt_env.controllers.floating import FeedbackSettings, FloatingFeedback
+from fowt_env.controllers.pi import PISettings
+from fowt_env.controllers.rosco import Rosco, RoscoSettings
 from fowt_env.description import joint_sea_state, read_turbine
 from fowt_env.errors import InputError, unknown
 from fowt_env.outputs import replacing, write_table
-from training.cases import Case
-from training.engines import session
-from training.evaluate import evaluate
+from fowt_env.training.cases import Case
+from fowt_env.training.engines import session
+from fowt_env.training.evaluate import evaluate
 
 WINDS = (13.0, 17.0, 21.0)
 SEEDS = (1001, 1002)
@@ -130,7 +130,7 @@ def tuned_text(tables):
     Raises: InputError where no setting of a table can be chosen.
     """
     lines = [
-        "# Settings chosen on training cases by `python -m training.tune_controllers`; that file says how.",
+        "# Settings chosen on training cases by `python -m fowt_env.training.tune_controllers`; that file says how.",
         "# Figures are means over the cases of the ratio to gspi_oc3; unfed_travel of that to the law unfed.",
     ]
     for name, table in tables.items():

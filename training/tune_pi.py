@@ -1,6 +1,6 @@
 """The PI baseline at its best: gains searched on training seeds, so that nobody beats a straw man.
 
-    python -m training.tune_pi --seeds 1001,1002,1003 --out controllers/data/pi_tuned.toml
+    python -m fowt_env.training.tune_pi --seeds 1001,1002,1003 --out controllers/data/pi_tuned.toml
 
 The cases are those of a suite, the seeds others than it is scored on (1000 and above). Searched are
 factors on the published OC3 gains: proportional, integral, and the blade pitch at which the schedule halves
@@ -15,14 +15,14 @@ import numpy as np
 import typer
 from scipy.optimize import minimize
 
-from controllers.pi import PI, PISettings
 from fowt_env.cli_arguments import parse_numbers
+from fowt_env.controllers.pi import PI, PISettings
 from fowt_env.errors import InputError
 from fowt_env.outputs import replacing
 from fowt_env.scene import build_scene
-from training.cases import read_suite
-from training.engines import session
-from training.evaluate import evaluate
+from fowt_env.training.cases import read_suite
+from fowt_env.training.engines import session
+from fowt_env.training.evaluate import evaluate
 
 FACTORS = ("KP", "KI", "gain_schedule_pitch")
 FIRST_TRAINING_SEED = 1000  # below it lie the seeds of the suites
@@ -87,7 +87,7 @@ def search(seeds, suite="above_rated", evaluations=60, report=None, **engine):
 
 
 TEXT = """# Factors on the published OC3 gains of `pi`, found by
-#   python -m training.tune_pi --suite {suite} --seeds {seeds} --evaluations {evaluations}
+#   python -m fowt_env.training.tune_pi --suite {suite} --seeds {seeds} --evaluations {evaluations}
 # on training seeds, which no suite is scored on. Relative to `pi` there: rotor-speed deviation {speed:.3f},
 # platform-pitch deviation {pitch:.3f}, blade-pitch travel {travel:.3f}.
 KP = {KP:.4f}

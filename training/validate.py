@@ -12,14 +12,14 @@ import numpy as np
 import pandas as pd
 
 from fowt_env.errors import InputError, unknown
-from training.comparison import (
+from fowt_env.training.comparison import (
     band_energy,
     decay_decrement,
     decay_period,
     harmonics,
     normalised_rms,
 )
-from training.openfast import DECAYS, PLATFORM, RUNS, reference, steady_reference
+from fowt_env.training.openfast import DECAYS, PLATFORM, RUNS, reference, steady_reference
 
 TIME = "Time_[s]"
 MOTIONS = (
@@ -237,7 +237,7 @@ def turbulence(study):
 
 def costs(study):
     """What the cheaper choices cost, each as an error against the dearer one on the same run."""
-    from training.validate_costs import cheaper_choices
+    from fowt_env.training.validate_costs import cheaper_choices
 
     cheaper_choices(study)
 

@@ -4,11 +4,11 @@ import numpy as np
 import pandas as pd
 
 from fowt_env.description import read_platform, read_turbine
+from fowt_env.training.comparison import normalised_rms
+from fowt_env.training.openfast import PLATFORM, RUNS, box_wind
 from fowt_env.weather.iec import ntm_sigma
 from fowt_env.weather.turbulence import turbulence
 from fowt_env.weather.wind_field import read_box, rotor_average
-from training.comparison import normalised_rms
-from training.openfast import PLATFORM, RUNS, box_wind
 
 STEP = 0.025  # s; half of it changes deviations by less than 0.1 % here
 GENERATOR_SEEDS = 8
@@ -22,7 +22,7 @@ INSTANTANEOUS = {
 
 def cheaper_choices(study):
     """Add the rows of every choice to the study, and their runs for the plots."""
-    from training.validate import PITCH, SETTLED, SPEED, SURGE, TENSIONS, THRUST, _name, _since
+    from fowt_env.training.validate import PITCH, SETTLED, SPEED, SURGE, TENSIONS, THRUST, _name, _since
 
     def frame(key, case, **changes):
         if key not in study.runs:

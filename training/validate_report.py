@@ -6,7 +6,7 @@ import numpy as np
 
 from fowt_env.outputs import remove_leftovers, replacing, write_table
 from fowt_env.plots import COLOURS, INK, TIME, new_figure, save_figure, spectrum, style_axes
-from training.openfast import DECAYS
+from fowt_env.training.openfast import DECAYS
 
 LABELS = {
     "PtfmSurge_[m]": "surge\n(m)",

@@ -214,7 +214,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             parameters, memory = self._baseline.parameters, self._baseline.memory
         self._estimator = watch = None
         if set(ESTIMATE_CHANNELS) & set(task.observation):
-            from controllers.lqr import WindEstimator  # fowt_env imports nothing from it otherwise
+            from fowt_env.controllers.lqr import WindEstimator  # fowt_env imports nothing from it otherwise
 
             self._estimator = WindEstimator(self.design_scene.turbine, self.control_dt)
             watch = self._estimator.kernel
@@ -514,8 +514,11 @@ def named_baseline(name, turbine, control_dt):
 
     Raises: InputError for unknown ones and those written in Python.
     """
-    from controllers import CONTROLLERS, make  # looked up only when used: fowt_env imports nothing from it
-    from controllers.base import CompiledController
+    from fowt_env.controllers import (  # looked up only when used: fowt_env imports nothing from it
+        CONTROLLERS,
+        make,
+    )
+    from fowt_env.controllers.base import CompiledController
 
     if isinstance(name, str) and ":" not in name and name not in CONTROLLERS:
         raise unknown("baseline", name, CONTROLLERS)

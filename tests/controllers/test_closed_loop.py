@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from controllers.closed_loop import closed_loop_matrix, platform_pitch_damping
-from controllers.pi import PISettings
 from fowt_env import build_scene, linearize, simulate, trim
+from fowt_env.controllers.closed_loop import closed_loop_matrix, platform_pitch_damping
+from fowt_env.controllers.pi import PISettings
 from fowt_env.errors import InputError
 from fowt_env.linear_model import STATE_INDEX, modes
 from fowt_env.loads.drivetrain import generator_torque

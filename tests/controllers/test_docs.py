@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from controllers import CONTROLLERS, make
-from controllers.base import tuned
 from fowt_env import build_scene, simulate
+from fowt_env.controllers import CONTROLLERS, make
+from fowt_env.controllers.base import tuned
 
 TEXT = (Path(__file__).resolve().parents[2] / "docs" / "controllers.md").read_text(encoding="utf-8")
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from naive.turbine import turbine
 
-from controllers import make
-from controllers.base import tuned
-from controllers.floating import FeedbackSettings, FloatingFeedback
-from controllers.pi import PISettings
-from controllers.pi import pi as make_pi
 from fowt_env import build_scene, simulate
+from fowt_env.controllers import make
+from fowt_env.controllers.base import tuned
+from fowt_env.controllers.floating import FeedbackSettings, FloatingFeedback
+from fowt_env.controllers.pi import PISettings
+from fowt_env.controllers.pi import pi as make_pi
 from fowt_env.errors import InputError
 from fowt_env.measurement import Measurement
 

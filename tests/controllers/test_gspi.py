@@ -8,8 +8,8 @@ from naive.pi import NaivePI
 from naive.turbine import turbine
 
 import fowt_env
-from controllers.gspi import GSPI, gspi_land, gspi_oc3
-from controllers.pi import Memory, PISettings
+from fowt_env.controllers.gspi import GSPI, gspi_land, gspi_oc3
+from fowt_env.controllers.pi import Memory, PISettings
 from fowt_env.measurement import Measurement
 
 TURBINE = turbine()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from naive.discon import Discon
 
-import controllers
+from fowt_env import controllers
 from fowt_env.description import read_turbine
 from fowt_env.measurement import Measurement
 

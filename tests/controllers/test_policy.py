@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import fowt_env
-from controllers import information, make
-from controllers.policy import read_policy, shipped_agents
+from fowt_env.controllers import information, make
+from fowt_env.controllers.policy import read_policy, shipped_agents
 from fowt_env.description import read_turbine
 from fowt_env.envs import TASKS, FowtEnv
 from fowt_env.envs.observations import entries
@@ -48,8 +48,8 @@ def write_random_policy(
 @pytest.mark.parametrize("algo", ["ppo", "sac", "tqc"])
 def test_the_exported_network_answers_as_stable_baselines3_does(algo, tmp_path):
     pytest.importorskip("sb3_contrib")
+    from fowt_env.training.train import Training
     from tests.training.small_run import small
-    from training.train import Training
 
     run = Training(small(algo, steps=40), tmp_path / "run")
     run.run()

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from controllers import make
-from controllers.pi import PISettings
-from controllers.preview import Preview, PreviewSettings, foreseen_pitch, rotor_wind, steady_pitch
 from fowt_env import build_scene, simulate
+from fowt_env.controllers import make
+from fowt_env.controllers.pi import PISettings
+from fowt_env.controllers.preview import Preview, PreviewSettings, foreseen_pitch, rotor_wind, steady_pitch
 from fowt_env.errors import InputError
 from fowt_env.measurement import Measurement
 

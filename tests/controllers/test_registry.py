@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 from naive.turbine import turbine
 
-import controllers
-from controllers import CONTROLLERS, CheckedController, information, make
-from controllers.base import EXTRA
-from controllers.constant import Constant
-from controllers.policy import shipped_agents
-from fowt_env import build_scene
+from fowt_env import build_scene, controllers
+from fowt_env.controllers import CONTROLLERS, CheckedController, information, make
+from fowt_env.controllers.base import EXTRA
+from fowt_env.controllers.constant import Constant
+from fowt_env.controllers.policy import shipped_agents
 from fowt_env.errors import ControllerError, InputError
 from fowt_env.measurement import Measurement
 
@@ -193,7 +192,7 @@ def test_an_import_path_is_looked_for_in_the_working_folder(tmp_path, monkeypatc
         make("my_own_law:Lau", turbine(), 0.1)
 
 
-@pytest.mark.parametrize("path", ["no_such_module_at_all:Law", "controllers.pi:", ":PI"])
+@pytest.mark.parametrize("path", ["no_such_module_at_all:Law", "fowt_env.controllers.pi:", ":PI"])
 def test_a_broken_import_path_is_named(path):
     with pytest.raises(InputError, match=path):
         make(path, turbine(), 0.1)

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from controllers import make
-from controllers.rosco import Rosco, RoscoSettings, find_library, pitch_gains
 from fowt_env import build_scene, simulate
+from fowt_env.controllers import make
+from fowt_env.controllers.rosco import Rosco, RoscoSettings, find_library, pitch_gains
 from fowt_env.errors import InputError
 from fowt_env.measurement import Measurement
 

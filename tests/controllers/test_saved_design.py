@@ -5,18 +5,18 @@ import json
 import numpy as np
 import pytest
 
-from controllers import make
-from controllers.closed_loop import closed_loop_matrix
-from controllers.lqr import LQR
-from controllers.lqr_design import Weights, design_model, design_models
-from controllers.pi import PI, PISettings
-from controllers.pi_design import design_pi
-from controllers.saved_design import load_design, lqr_settings, save_design
 from fowt_env import build_scene
+from fowt_env.controllers import make
+from fowt_env.controllers.closed_loop import closed_loop_matrix
+from fowt_env.controllers.lqr import LQR
+from fowt_env.controllers.lqr_design import Weights, design_model, design_models
+from fowt_env.controllers.pi import PI, PISettings
+from fowt_env.controllers.pi_design import design_pi
+from fowt_env.controllers.saved_design import load_design, lqr_settings, save_design
 from fowt_env.errors import InputError
-from training.evaluate import evaluate
-from training.linear_design import models_over
-from training.results import controller_code
+from fowt_env.training.evaluate import evaluate
+from fowt_env.training.linear_design import models_over
+from fowt_env.training.results import controller_code
 
 GOOD = {"KP": 0.006, "KI": 0.0009, "gain_schedule_pitch": 0.11}
 

@@ -13,7 +13,7 @@ from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
 import fowt_env
-from controllers import make
+from fowt_env.controllers import make
 from fowt_env.envs import TASKS, FowtEnv, Task
 from fowt_env.envs.observations import KNOWN
 from fowt_env.envs.rewards import TERMS

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from controllers import make
+from fowt_env.controllers import make
 from fowt_env.envs import FowtEnv, FowtVectorEnv
 from fowt_env.simulation import simulate
 

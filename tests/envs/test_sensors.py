@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
-from controllers import make
-from controllers.base import call_law
-from controllers.lqr import WindEstimator
 from fowt_env import build_scene, simulate
+from fowt_env.controllers import make
+from fowt_env.controllers.base import call_law
+from fowt_env.controllers.lqr import WindEstimator
 from fowt_env.envs import FowtEnv, FowtVectorEnv
 from fowt_env.envs.safety import SafetyLayer
 from fowt_env.envs.sensors import draw_sensors, reading_scales
 from fowt_env.errors import InputError
 from fowt_env.measurement import N_MEASUREMENTS, Measure, Measurement
-from training.randomisation import plant_settings
-from training.shifts import Shift, Unaware
+from fowt_env.training.randomisation import plant_settings
+from fowt_env.training.shifts import Shift, Unaware
 
 QUICK = {"rotor": "table", "wave_components": 20, "wind": {"kind": "ntm", "speed": 18.0, "class": "B"}}
 NAMES = ("rotor_speed", "platform_pitch_rate", "previous_action", "estimated_wind", "estimated_waves")

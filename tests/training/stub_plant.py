@@ -11,10 +11,10 @@ import numpy as np
 import pandas as pd
 
 import fowt_env
-from controllers import make
+from fowt_env.controllers import make
 from fowt_env.description import read_platform, read_turbine
 from fowt_env.measurement import Measurement
-from training import guard
+from fowt_env.training import guard
 
 CHANNELS = {  # channel: (mean, amplitude)
     "RotSpeed_[rpm]": (12.0, 1.0),

@@ -6,7 +6,7 @@ import pytest
 
 from fowt_env.errors import InputError
 from fowt_env.outputs import write_table
-from training.agent_scores import (
+from fowt_env.training.agent_scores import (
     COUNTS,
     FIGURES,
     PAST_ANY,
@@ -21,9 +21,9 @@ from training.agent_scores import (
     scores_markdown,
     told,
 )
-from training.bootstrap import interquartile_mean
-from training.evaluate import COLUMNS
-from training.metrics import METRICS
+from fowt_env.training.bootstrap import interquartile_mean
+from fowt_env.training.evaluate import COLUMNS
+from fowt_env.training.metrics import METRICS
 
 
 def table(agents, cases=("ntm_18",)):

@@ -11,11 +11,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from controllers import make
+from fowt_env.controllers import make
 from fowt_env.errors import InputError
-from training.cases import Case
-from training.engines import outcomes
-from training.evaluate import evaluate
+from fowt_env.training.cases import Case
+from fowt_env.training.engines import outcomes
+from fowt_env.training.evaluate import evaluate
 
 GUSTY = Case(
     "gusty",

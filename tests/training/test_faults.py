@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 import fowt_env
-from controllers import make
-from controllers.constant import Constant
+from fowt_env.controllers import make
+from fowt_env.controllers.constant import Constant
 from fowt_env.errors import InputError
 from fowt_env.measurement import Measurement
-from training.evaluate import Case, evaluate
-from training.faults import Fault, FaultedController, faulted, idling
+from fowt_env.training.evaluate import Case, evaluate
+from fowt_env.training.faults import Fault, FaultedController, faulted, idling
 
 DT = 0.1
 

@@ -16,13 +16,13 @@ import fowt_env
 from fowt_env import cli
 from fowt_env.description import read_platform, read_turbine
 from fowt_env.errors import InputError
+from fowt_env.training import engines, guard, results
+from fowt_env.training.cases import Case
+from fowt_env.training.evaluate import COLUMNS, evaluate
+from fowt_env.training.metrics import METRICS
+from fowt_env.training.report import evaluation_plots, write_leaderboard
+from fowt_env.training.results import LONGEST_NAME, check_name, read_row, run_file, write_run
 from tests.training import stub_plant
-from training import engines, guard, results
-from training.cases import Case
-from training.evaluate import COLUMNS, evaluate
-from training.metrics import METRICS
-from training.report import evaluation_plots, write_leaderboard
-from training.results import LONGEST_NAME, check_name, read_row, run_file, write_run
 
 CALM = Case("calm", 16.0)
 SHORT = {"duration": 4.0, "skip": 1.0}
@@ -295,7 +295,7 @@ def test_a_folder_of_other_versions_is_refused_with_both_of_them(tmp_path, packa
 
 
 def test_a_ray_worker_of_other_versions_does_nothing(monkeypatch):
-    from training.evaluate import score_and_send
+    from fowt_env.training.evaluate import score_and_send
 
     with pytest.raises(InputError, match="numpy 0.1 here and numpy .* at the worker"):
         score_and_send(None, here=results.versions() | {"numpy": "0.1"})
@@ -330,15 +330,15 @@ def test_a_row_is_that_of_the_scored_part_of_its_file_by_the_figures_of_its_own_
 
 USED = """
 import sys
-from training.cases import Case
-from training.scoring import Run, scored
-from training.shifts import Shift
+from fowt_env.training.cases import Case
+from fowt_env.training.scoring import Run, scored
+from fowt_env.training.shifts import Shift
 sea = {"kind": "jonswap", "Hs": 3.0, "Tp": 9.0}
 wind = {"kind": "ntm", "speed": 18.0, "class": "B"}
 case = Case("c", wind, sea, shift=Shift(noise=0.01))
 row, _ = scored(Run("constant", "constant", case, 1, 1.0, 0.1, {}, None))
 assert row["status"] == "ok", row["reason"]
-own = ("fowt_env.", "training.", "controllers.base", "controllers.constant")
+own = ("fowt_env.", "training.", "fowt_env.controllers.base", "fowt_env.controllers.constant")
 print(*{sys.modules[name].__file__ for name in [*sys.modules] if name.startswith(own)}, sep="\\n")
 """
 
@@ -402,7 +402,7 @@ def test_an_edit_of_what_a_controllers_module_imports_from_its_project_changes_i
 
 
 def test_a_users_controller_depends_on_those_of_the_package_that_it_builds_on(tmp_path, monkeypatch):
-    (tmp_path / "built.py").write_text("from controllers.lqr import lqr as Law\nimport controllers\n")
+    (tmp_path / "built.py").write_text("from fowt_env.controllers.lqr import lqr as Law\nimport fowt_env.controllers\n")
     monkeypatch.syspath_prepend(str(tmp_path))
     names = {path.relative_to(path.parents[1]).as_posix() for path in results._user_files("built")}
     assert {"controllers/lqr.py", "controllers/lqr_design.py", "fowt_env/linear_model.py"} <= names

@@ -8,18 +8,14 @@ import pandas as pd
 import pytest
 from scipy.linalg import solve_continuous_are, solve_continuous_lyapunov
 
-from controllers.lqr_design import MOMENT, N_FEEDBACK, N_PLANT, PLANT, design_model, wind_filter
 from fowt_env import build_scene
+from fowt_env.controllers.lqr_design import MOMENT, N_FEEDBACK, N_PLANT, PLANT, design_model, wind_filter
 from fowt_env.description import joint_sea_state, sea_state_of
 from fowt_env.errors import InputError
 from fowt_env.linear_model import linearize
 from fowt_env.plots_design import plot_bound
-from fowt_env.wave_force import wave_force
-from fowt_env.weather.iec import ntm_sigma
-from fowt_env.weather.turbulence import amplitudes
-from fowt_env.weather.waves import jonswap
-from training import linear_bound
-from training.linear_bound import (
+from fowt_env.training import linear_bound
+from fowt_env.training.linear_bound import (
     INFORMATION,
     LIMITED,
     RATIOS,
@@ -33,6 +29,10 @@ from training.linear_bound import (
     gspi_covariance,
     ratio_table,
 )
+from fowt_env.wave_force import wave_force
+from fowt_env.weather.iec import ntm_sigma
+from fowt_env.weather.turbulence import amplitudes
+from fowt_env.weather.waves import jonswap
 
 HEIGHT, DIAMETER = 90.0, 126.0
 
@@ -86,9 +86,9 @@ def test_the_covariance_under_gspi_is_the_integral_of_its_spectra(problem, base)
 
 def test_the_closed_loop_of_gspi_has_the_eigenvalues_of_the_whole_plant(windy, problem):
     """The planar states of the bound against controllers/closed_loop.py with all degrees of freedom."""
-    from controllers.closed_loop import closed_loop_matrix
-    from controllers.lqr_design import scene_at
-    from controllers.pi import PISettings
+    from fowt_env.controllers.closed_loop import closed_loop_matrix
+    from fowt_env.controllers.lqr_design import scene_at
+    from fowt_env.controllers.pi import PISettings
 
     whole, _ = closed_loop_matrix(linearize(scene_at(windy, 18.0)), PISettings.published(windy.turbine))
     _, a = gspi_covariance(problem)

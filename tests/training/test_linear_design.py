@@ -8,7 +8,7 @@ import pytest
 from fowt_env import build_scene
 from fowt_env.errors import InputError
 from fowt_env.plots_design import plot_bode, plot_damping, plot_poles
-from training.linear_design import (
+from fowt_env.training.linear_design import (
     mode_table,
     models_over,
     save_models,

@@ -5,10 +5,10 @@ import pandas as pd
 import pytest
 
 from fowt_env.errors import InputError
-from training.evaluate import COLUMNS
-from training.leaderboard import leaderboard
-from training.metrics import METRICS
-from training.report import (
+from fowt_env.training.evaluate import COLUMNS
+from fowt_env.training.leaderboard import leaderboard
+from fowt_env.training.metrics import METRICS
+from fowt_env.training.report import (
     DROPPED_FIRST,
     HEADLINE,
     LEADERBOARD_DROPS,

@@ -12,8 +12,8 @@ pytest.importorskip("plotly", reason="plotly is not installed: the extra `report
 import fowt_env  # noqa: E402
 from fowt_env import cli  # noqa: E402
 from fowt_env.errors import InputError  # noqa: E402
-from training.evaluate import run_file  # noqa: E402
-from training.report_html import SCHEDULE_WINDS, read_results, write_report  # noqa: E402
+from fowt_env.training.evaluate import run_file  # noqa: E402
+from fowt_env.training.report_html import SCHEDULE_WINDS, read_results, write_report  # noqa: E402
 
 EVIL = "<img src=x onerror=alert(1)></script>&"
 CONTROLLERS = ("calm", "busy", EVIL)

@@ -14,13 +14,13 @@ import pandas as pd
 import pytest
 
 import fowt_env
-from controllers import CONTROLLERS
+from fowt_env.controllers import CONTROLLERS
 from fowt_env.errors import InputError
-from training import results
-from training.cases import Case, Suite
-from training.evaluate import COLUMNS, evaluate
-from training.metrics import METRICS
-from training.report import leaderboard_rows, write_leaderboard
+from fowt_env.training import results
+from fowt_env.training.cases import Case, Suite
+from fowt_env.training.evaluate import COLUMNS, evaluate
+from fowt_env.training.metrics import METRICS
+from fowt_env.training.report import leaderboard_rows, write_leaderboard
 
 CALM = Case("calm", 16.0)
 WINDY = Case("windy", 18.0)
@@ -130,7 +130,7 @@ def test_other_settings_and_versions_are_refused_with_what_to_do(tmp_path, monke
         with pytest.raises(InputError, match="another state"):
             evaluate("pi", suite(), folder=tmp_path)
     with monkeypatch.context() as patch:
-        patch.setattr("training.evaluate.controller_code", lambda controller: {"name": "pi", "code": "new"})
+        patch.setattr("fowt_env.training.evaluate.controller_code", lambda controller: {"name": "pi", "code": "new"})
         with pytest.raises(InputError, match="code of controller 'pi' has changed"):
             evaluate("pi", suite(), folder=tmp_path)
 
@@ -206,8 +206,8 @@ def test_a_file_that_is_no_run_is_named(tmp_path):
 
 SCRIPT = """
 import sys
-from training.evaluate import evaluate
-from training.cases import Case
+from fowt_env.training.evaluate import evaluate
+from fowt_env.training.cases import Case
 if __name__ == "__main__":
     cases = [Case("calm", 16.0), Case("windy", 18.0)]
     settings = {"seeds": (1, 2, 3), "duration": 60.0, "skip": 5.0}

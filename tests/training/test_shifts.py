@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 import fowt_env
-from controllers import make
+from fowt_env.controllers import make
 from fowt_env.errors import InputError
 from fowt_env.linear_model import linearize
 from fowt_env.measurement import Measurement
-from training.cases import Case, described, read_suite
-from training.evaluate import evaluate, planned
-from training.randomisation import PLANT, SENSORS
-from training.scoring import run_controller
-from training.shifts import Shift, Unaware, reading_scales, shifted_parts
+from fowt_env.training.cases import Case, described, read_suite
+from fowt_env.training.evaluate import evaluate, planned
+from fowt_env.training.randomisation import PLANT, SENSORS
+from fowt_env.training.scoring import run_controller
+from fowt_env.training.shifts import Shift, Unaware, reading_scales, shifted_parts
 
 WIND = {"kind": "ntm", "speed": 18.0, "class": "B"}
 

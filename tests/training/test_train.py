@@ -20,14 +20,22 @@ pytest.importorskip("sb3_contrib")
 
 import torch
 
-from controllers import information
-from controllers.policy import shipped_agents
-from controllers.policy_file import read_policy
 from fowt_env.cli_arguments import parse_pairs
+from fowt_env.controllers import information
+from fowt_env.controllers.policy import shipped_agents
+from fowt_env.controllers.policy_file import read_policy
 from fowt_env.errors import InputError
-from training import publish as publishing
-from training import train, train_callbacks
-from training.train import AGENTS, Training, baseline_figures, decision_env, judged, make_envs, resolve
+from fowt_env.training import publish as publishing
+from fowt_env.training import train, train_callbacks
+from fowt_env.training.train import (
+    AGENTS,
+    Training,
+    baseline_figures,
+    decision_env,
+    judged,
+    make_envs,
+    resolve,
+)
 
 from .small_run import small
 
@@ -130,7 +138,7 @@ def test_a_run_cannot_be_gone_on_with_while_it_goes_on_and_can_once_it_was_kille
     folder, root = tmp_path / "run", Path(__file__).resolve().parents[2]
     code = (
         "import sys, time\n"
-        "from training import train\n"
+        "from fowt_env.training import train\n"
         "train.make_envs = lambda settings: print('building', flush=True) or time.sleep(600)\n"
         "train.Training(train.resolve('ppo', 'above_rated', 0, 100), sys.argv[1]).run()\n"
     )

@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-from training import trust
+from fowt_env.training import trust
 
 
 @pytest.fixture

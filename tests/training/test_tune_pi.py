@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from controllers.pi import pi
-from controllers.pi_tuned import FACTORS_FILE, pi_tuned
+from fowt_env.controllers.pi import pi
+from fowt_env.controllers.pi_tuned import FACTORS_FILE, pi_tuned
 from fowt_env.errors import InputError
-from training import tune_pi
-from training.engines import session
-from training.tune_pi import FAILED, PENALTY, TRAVEL, WEIGHED, candidate, cost, search
+from fowt_env.training import tune_pi
+from fowt_env.training.engines import session
+from fowt_env.training.tune_pi import FAILED, PENALTY, TRAVEL, WEIGHED, candidate, cost, search
 
 ONES = dict.fromkeys(tune_pi.FACTORS, 1.0)
 
@@ -37,7 +37,7 @@ def test_the_search_starts_from_the_published_gains_and_takes_the_cheapest(monke
         columns = {"status": ["ok"], **{key: [value] for key in WEIGHED}, TRAVEL: [1.0]}
         return pd.DataFrame(columns)
 
-    from controllers.pi import PISettings
+    from fowt_env.controllers.pi import PISettings
     from fowt_env.scene import build_scene
 
     published = PISettings.published(build_scene("oc3_hywind").turbine).KP
@@ -64,7 +64,7 @@ def test_seeds_that_the_suites_are_scored_on_are_refused():
 
 def test_pi_tuned_has_the_stored_factors_and_says_how_they_were_found(turbine):
     text = FACTORS_FILE.read_text()
-    assert "training.tune_pi" in text and "--seeds 10" in text
+    assert "fowt_env.training.tune_pi" in text and "--seeds 10" in text
     tuned, base = pi_tuned(turbine, 0.1), pi(turbine, 0.1)
     import tomllib
 

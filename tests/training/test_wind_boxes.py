@@ -5,8 +5,8 @@ import os
 import numpy as np
 import pytest
 
+from fowt_env.training import wind_boxes
 from fowt_env.weather.wind_field import WindBox
-from training import wind_boxes
 
 SPEC = {"kind": "mann", "speed": 18.0}
 
