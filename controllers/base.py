@@ -19,8 +19,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fowt_env.errors import ControllerError, InputError
-from fowt_env.jit import kernel
-from fowt_env.measurement import N_MEASUREMENTS, Measurement
+from fowt_env.plant.compile.decorators import kernel
+from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
 
 TUNED = Path(__file__).parent / "tuned.toml"  # written by training/tune_controllers.py
 N_COMMANDS = 2  # command[0]: generator torque, N m, high-speed shaft; command[1]: blade pitch, rad
@@ -51,7 +51,7 @@ def call_law(law, parameters, memory, measurement, command):
 class CompiledController:
     """Base of the controllers whose law runs inside the compiled loop.
 
-    A subclass sets `kernel = staticmethod(law)`, with law made by fowt_env.jit.control_kernel, and
+    A subclass sets `kernel = staticmethod(law)`, with law made by fowt_env.plant.compile.decorators.control_kernel, and
     writes reset(). parameters and memory are float64 arrays; IntEnums beside the law name their
     entries. The compiled loop calls kernel on these arrays; act() calls the same law from Python.
     A law is handed the command in force, which it overwrites with the next one.

@@ -7,9 +7,9 @@ import numpy as np
 from fowt_env.controllers.pi import PISettings, schedule_gain
 from fowt_env.errors import InputError
 from fowt_env.linear_model import LinearModel, linearize, modes
-from fowt_env.loads.drivetrain import generator_torque
+from fowt_env.plant.drivetrain import generator_torque
+from fowt_env.plant.state import State
 from fowt_env.scene import build_scene
-from fowt_env.state import State
 from fowt_env.steady import trim
 
 PLATFORM_PERIOD = 30.0  # s

@@ -7,7 +7,7 @@ import numpy as np
 
 from fowt_env.controllers.base import CompiledController, check_control_dt
 from fowt_env.errors import InputError
-from fowt_env.jit import control_kernel
+from fowt_env.plant.compile.decorators import control_kernel
 
 
 class Memory(IntEnum):

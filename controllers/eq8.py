@@ -18,8 +18,8 @@ from fowt_env.controllers.pi import (
     start_commands,
     write_commands,
 )
-from fowt_env.jit import control_kernel, kernel
-from fowt_env.measurement import Measure
+from fowt_env.plant.compile.decorators import control_kernel, kernel
+from fowt_env.plant.measurement import Measure
 
 
 class LiteralMemory(IntEnum):

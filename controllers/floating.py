@@ -31,9 +31,9 @@ from fowt_env.controllers.pi import (
     write_commands,
 )
 from fowt_env.errors import InputError, unknown
-from fowt_env.jit import control_kernel, kernel
-from fowt_env.loads.drivetrain import TorqueCurve, limited
-from fowt_env.measurement import Measure
+from fowt_env.plant.compile.decorators import control_kernel, kernel
+from fowt_env.plant.drivetrain import TorqueCurve, limited
+from fowt_env.plant.measurement import Measure
 
 SIGNALS = {"nacelle_velocity": Measure.NACELLE_VELOCITY, "platform_pitch_rate": Measure.PLATFORM_PITCH_RATE}
 

@@ -18,9 +18,9 @@ import numpy as np
 
 from fowt_env.controllers.base import check_control_dt
 from fowt_env.controllers.pi import PI, Memory, Parameter, PISettings, pi_step
-from fowt_env.jit import control_kernel
-from fowt_env.loads.drivetrain import TorqueCurve
-from fowt_env.measurement import Measure
+from fowt_env.plant.compile.decorators import control_kernel
+from fowt_env.plant.drivetrain import TorqueCurve
+from fowt_env.plant.measurement import Measure
 
 SAMPLING = 0.0125  # s, longest period of the law itself
 

@@ -27,9 +27,9 @@ from fowt_env.controllers.lqr_design import (
     Weights,
 )
 from fowt_env.errors import InputError
-from fowt_env.jit import control_kernel, kernel
-from fowt_env.loads.drivetrain import TorqueCurve, build_torque_curve, generator_torque, limited
-from fowt_env.measurement import Measure
+from fowt_env.plant.compile.decorators import control_kernel, kernel
+from fowt_env.plant.drivetrain import TorqueCurve, build_torque_curve, generator_torque, limited
+from fowt_env.plant.measurement import Measure
 
 HANDOVER = (0.01745, 0.05236)  # rad of pitch command: torque by the curve below, by feedback above
 TORQUE_RANGE = (0.5, 1.1)  # of rated, for the feedback's torque

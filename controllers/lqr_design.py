@@ -170,7 +170,7 @@ def design_model(scene, speed):
 
 def _state_rows():
     """Entries of PLANT in the state vector."""
-    from fowt_env.state import State
+    from fowt_env.plant.state import State
 
     return [State[name.upper()] for name in PLANT]
 

@@ -17,9 +17,9 @@ import numpy as np
 
 from fowt_env.controllers.base import CompiledController, check_control_dt
 from fowt_env.controllers.pi import Parameter, PISettings, curve_of, schedule_gain
-from fowt_env.jit import control_kernel, kernel
-from fowt_env.loads.drivetrain import generator_torque, limited
-from fowt_env.measurement import Measure
+from fowt_env.plant.compile.decorators import control_kernel, kernel
+from fowt_env.plant.drivetrain import generator_torque, limited
+from fowt_env.plant.measurement import Measure
 
 
 class Memory(IntEnum):

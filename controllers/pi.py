@@ -13,9 +13,9 @@ import numpy as np
 
 from fowt_env.controllers.base import CompiledController, check_control_dt
 from fowt_env.errors import InputError, unknown
-from fowt_env.jit import control_kernel, kernel
-from fowt_env.loads.drivetrain import TorqueCurve, build_torque_curve, generator_torque, limited
-from fowt_env.measurement import Measure
+from fowt_env.plant.compile.decorators import control_kernel, kernel
+from fowt_env.plant.drivetrain import TorqueCurve, build_torque_curve, generator_torque, limited
+from fowt_env.plant.measurement import Measure
 
 SCHEDULE_ON = ("commanded", "measured")
 BUMPLESS = 1e-9  # rad, largest step of the first command that still counts as none

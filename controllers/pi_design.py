@@ -14,7 +14,7 @@ from fowt_env.controllers.closed_loop import PLATFORM_PERIOD, closed_loop_matrix
 from fowt_env.controllers.pi import PISettings, schedule_gain
 from fowt_env.errors import InputError, unknown
 from fowt_env.linear_model import modes
-from fowt_env.state import State
+from fowt_env.plant.state import State
 
 SCHEDULES = ("loop", "published")
 

@@ -28,7 +28,7 @@ from fowt_env.envs.observations import (
 )
 from fowt_env.envs.tasks import Task
 from fowt_env.errors import InputError, unknown
-from fowt_env.measurement import N_MEASUREMENTS, Measure, Measurement
+from fowt_env.plant.measurement import N_MEASUREMENTS, Measure, Measurement
 
 PREFIX = "policy:"
 AGENTS = Path(__file__).resolve().parent.parent / "training" / "agents"

@@ -28,10 +28,10 @@ from fowt_env.controllers.pi import (
     write_commands,
 )
 from fowt_env.errors import InputError
-from fowt_env.jit import control_kernel, kernel
-from fowt_env.loads.drivetrain import TorqueCurve
-from fowt_env.measurement import Measure
-from fowt_env.state import State
+from fowt_env.plant.compile.decorators import control_kernel, kernel
+from fowt_env.plant.drivetrain import TorqueCurve
+from fowt_env.plant.measurement import Measure
+from fowt_env.plant.state import State
 from fowt_env.steady import calm, trim
 from fowt_env.weather.wind_field import WindBox, rotor_average
 

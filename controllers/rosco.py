@@ -31,8 +31,8 @@ from scipy.optimize import brentq
 
 from fowt_env.controllers.base import check_control_dt, tuned
 from fowt_env.errors import ControllerError, InputError, unknown
-from fowt_env.loads.blade_elements import build_blade_elements
-from fowt_env.loads.rotor_table import performance
+from fowt_env.plant.aero.blade_elements import build_blade_elements
+from fowt_env.plant.aero.coefficient_table import performance
 
 INSTALL = "pip install --no-deps rosco"
 PRELOADED = ("libquadmath", "libgfortran", "libmvec")  # bundled with it; a copy elsewhere cannot find them

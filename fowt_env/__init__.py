@@ -14,10 +14,10 @@ if TYPE_CHECKING:  # the names below, for editors and type checkers
     from fowt_env.errors import SimulationStopped as SimulationStopped
     from fowt_env.linear_model import linearize as linearize
     from fowt_env.linear_model import natural_periods as natural_periods
-    from fowt_env.measurement import Measurement as Measurement
     from fowt_env.own_load import Load as Load
     from fowt_env.own_load import Motion as Motion
     from fowt_env.own_load import load_kernel as load_kernel
+    from fowt_env.plant.measurement import Measurement as Measurement
     from fowt_env.scene import Scene as Scene
     from fowt_env.scene import build_scene as build_scene
     from fowt_env.simulation import simulate as simulate
@@ -34,7 +34,7 @@ _PUBLIC = {
     "simulate": "fowt_env.simulation",
     "linearize": "fowt_env.linear_model",
     "natural_periods": "fowt_env.linear_model",
-    "Measurement": "fowt_env.measurement",
+    "Measurement": "fowt_env.plant.measurement",
     "Load": "fowt_env.own_load",
     "Motion": "fowt_env.own_load",
     "load_kernel": "fowt_env.own_load",

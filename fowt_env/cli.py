@@ -105,7 +105,7 @@ def progress_bar(description, total):
 
     A compilation meanwhile is announced above the bar.
     """
-    from fowt_env.warmup import compilation_announced
+    from fowt_env.plant.compile.announcement import compilation_announced
 
     def say(text):
         err.print(f"[yellow]{text}[/yellow]", soft_wrap=True, highlight=False)
@@ -216,7 +216,7 @@ def simulate(
 
 def _note_limits(frame, turbine):
     """Say where a run was at the generator's limits, and that its rotor passed the turbine's overspeed."""
-    from fowt_env.channels import RPM
+    from fowt_env.plant.channels import RPM
 
     limited = frame["GenTqLim_[-]"].mean()
     if limited > 0.0:

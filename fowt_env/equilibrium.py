@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fowt_env.dynamics import Kept
 from fowt_env.errors import InputError
-from fowt_env.loads.mooring import SLACK
-from fowt_env.state import State, pose_of
-from fowt_env.step import CAPSIZE
+from fowt_env.plant.dynamics import Kept
+from fowt_env.plant.mooring import SLACK
+from fowt_env.plant.rollout import CAPSIZE
+from fowt_env.plant.state import State, pose_of
 
 MOTIONS = ("surge", "sway", "heave", "roll", "platform pitch", "yaw")
 LOADS = {  # name: where Work.kept has its wrench

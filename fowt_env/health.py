@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numba
 
 from fowt_env.folders import cache_root
-from fowt_env.jit import CACHE_FOLDER, own_folders
-from fowt_env.warmup import compilation_announced, kernels_compiled
+from fowt_env.plant.compile.announcement import compilation_announced, kernels_compiled
+from fowt_env.plant.compile.decorators import CACHE_FOLDER, own_folders
 
 TEST_DURATION = 60.0  # s
 # Last row of reference_run(). They guard an installation, not the physics (tests do that): a part that is

@@ -9,18 +9,24 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fowt_env.channels import Channel, Layout, channels, to_units, with_hub_wind
-from fowt_env.counters import N_COUNTERS
 from fowt_env.description import Platform, Turbine, read_platform, read_turbine, sea_state_of
-from fowt_env.dynamics import N_KEPT, Body, Model, Work
 from fowt_env.errors import InputError, unknown
-from fowt_env.integrators import INTEGRATORS, N_SAMPLE, build_integrator, rotor_samples
-from fowt_env.jit import Box
-from fowt_env.loads.blade_elements import build_blade_elements
-from fowt_env.loads.damping import build_damping
-from fowt_env.loads.diffraction import build_strip_diffraction
-from fowt_env.loads.drivetrain import build_drivetrain, build_pitch_actuator, build_torque_limits
-from fowt_env.loads.fast_waves import (
+from fowt_env.own_load import Load, blamed, build_own_loads, checked_loads
+from fowt_env.plant.aero.blade_elements import build_blade_elements
+from fowt_env.plant.aero.coefficient_table import build_rotor_table
+from fowt_env.plant.aero.section_table import build_section_table
+from fowt_env.plant.aero.tower_drag import build_tower_drag
+from fowt_env.plant.aero.wake import build_dynamic_inflow, build_skewed_wake, n_wake_states
+from fowt_env.plant.channels import Channel, Layout, channels, to_units, with_hub_wind
+from fowt_env.plant.compile.decorators import Box
+from fowt_env.plant.drivetrain import build_drivetrain, build_pitch_actuator, build_torque_limits
+from fowt_env.plant.dynamics import N_KEPT, Body, Model, Work
+from fowt_env.plant.events import N_COUNTERS
+from fowt_env.plant.hydro.diffraction import build_strip_diffraction
+from fowt_env.plant.hydro.hydrostatics import build_hull
+from fowt_env.plant.hydro.linear_damping import build_damping
+from fowt_env.plant.hydro.morison import Current, build_strips
+from fowt_env.plant.hydro.wave_bands import (
     STILL_REFINEMENT,
     build_fast_waves,
     build_lane_diffraction,
@@ -28,17 +34,11 @@ from fowt_env.loads.fast_waves import (
     can_be_fast,
     fast_scratch,
 )
-from fowt_env.loads.hydrostatics import build_hull
-from fowt_env.loads.mooring import build_mooring
-from fowt_env.loads.morison import Current, build_strips
-from fowt_env.loads.own import room_of
-from fowt_env.loads.rotor_lookup import build_section_table
-from fowt_env.loads.rotor_table import build_rotor_table
-from fowt_env.loads.tower import build_tower_drag
-from fowt_env.loads.wake import build_dynamic_inflow, build_skewed_wake, n_wake_states
-from fowt_env.own_load import Load, blamed, build_own_loads, checked_loads
+from fowt_env.plant.integrators import INTEGRATORS, N_SAMPLE, build_integrator, rotor_samples
+from fowt_env.plant.mooring import build_mooring
+from fowt_env.plant.state import N_RIGID
+from fowt_env.plant.user_loads import room_of
 from fowt_env.sea_states import SeaState
-from fowt_env.state import N_RIGID
 from fowt_env.weather.waves import build_waves
 from fowt_env.weather.wind import WindSeries, build_wind, hub_series, make_series, nominal_speed
 from fowt_env.weather.wind_field import WindBox, hub_speed, hub_wind, is_field, read_box, rotor_average

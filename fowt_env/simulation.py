@@ -9,16 +9,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from fowt_env.channels import DEG, RPM
-from fowt_env.counters import counted
 from fowt_env.errors import ControllerInputError, InputError, SimulationStopped, unknown
-from fowt_env.jit import control_kernel
-from fowt_env.measurement import N_MEASUREMENTS, Measurement
-from fowt_env.records import is_number
-from fowt_env.scene import Scene
-from fowt_env.state import OUT_OF_PLANE, State, pose_of
-from fowt_env.steady import trim
-from fowt_env.step import (
+from fowt_env.plant.channels import DEG, RPM
+from fowt_env.plant.compile.decorators import control_kernel
+from fowt_env.plant.events import counted
+from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
+from fowt_env.plant.rollout import (
     OVERSPEED,
     RUNNING,
     STOP_REASONS,
@@ -29,6 +25,10 @@ from fowt_env.step import (
     output_row,
     run,
 )
+from fowt_env.plant.state import OUT_OF_PLANE, State, pose_of
+from fowt_env.records import is_number
+from fowt_env.scene import Scene
+from fowt_env.steady import trim
 from fowt_env.weather.wind_field import WindBox
 
 # Ctrl-C is heard and progress shown between compiled calls. A call by itself costs 1e-4 s, so they
@@ -189,7 +189,7 @@ def simulate(
     GenTqLim is 1 while it differs from the command.
 
     attrs["events"] of the DataFrame: {name: count} of what the plant met outside its usual range
-    (fowt_env.counters), of those that happened.
+    (fowt_env.plant.events), of those that happened.
 
     Raises: InputError before anything runs (ControllerInputError where the controller raised it, whenever
     that is); SimulationStopped (with the rows so far) on capsize, a numerical blow-up, a

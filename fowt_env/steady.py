@@ -7,16 +7,16 @@ from math import pi
 import numpy as np
 from scipy.optimize import brentq
 
-from fowt_env.channels import to_units
-from fowt_env.dynamics import derivative
 from fowt_env.equilibrium import check_equilibrium, evaluated, label, unbalanced
 from fowt_env.errors import InputError, unknown
-from fowt_env.jit import entry
-from fowt_env.loads.drivetrain import build_torque_curve, generator_torque
-from fowt_env.loads.rotor import wake_equilibrium
+from fowt_env.plant.aero.bem_rotor import wake_equilibrium
+from fowt_env.plant.channels import to_units
+from fowt_env.plant.compile.decorators import entry
+from fowt_env.plant.drivetrain import build_torque_curve, generator_torque
+from fowt_env.plant.dynamics import derivative
+from fowt_env.plant.rollout import output_row
+from fowt_env.plant.state import State, pose_of
 from fowt_env.scene import Scene
-from fowt_env.state import State, pose_of
-from fowt_env.step import output_row
 from fowt_env.weather.wind import make_series, wind_now
 from fowt_env.weather.wind_field import steady_field
 

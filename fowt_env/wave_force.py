@@ -12,9 +12,9 @@ from math import pi
 import numpy as np
 
 from fowt_env.description import sea_state_of
-from fowt_env.jit import entry
-from fowt_env.loads.morison import morison_load
-from fowt_env.state import State, pose_of
+from fowt_env.plant.compile.decorators import entry
+from fowt_env.plant.hydro.morison import morison_load
+from fowt_env.plant.state import State, pose_of
 from fowt_env.weather.waves import build_waves
 
 BAND = (0.15, 2.0)  # rad/s, of the fit: periods of 3.1 to 42 s

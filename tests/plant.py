@@ -3,9 +3,9 @@
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from fowt_env.measurement import N_MEASUREMENTS
-from fowt_env.state import Pose, State
-from fowt_env.step import forget, observe
+from fowt_env.plant.measurement import N_MEASUREMENTS
+from fowt_env.plant.rollout import forget, observe
+from fowt_env.plant.state import Pose, State
 
 
 def _rates(box, t, x, u, dx):

@@ -13,21 +13,21 @@ import numba
 import pytest
 
 import fowt_env
-from fowt_env import kernel_cache
-from fowt_env.jit import KEEP_CACHES, MARKER, kernel_sources
-from fowt_env.kernel_cache import SharedCacheFile
-from fowt_env.warmup import COMPILING_MESSAGE, compilation_announced
+from fowt_env.plant.compile import disk_cache as kernel_cache
+from fowt_env.plant.compile.announcement import COMPILING_MESSAGE, compilation_announced
+from fowt_env.plant.compile.decorators import KEEP_CACHES, MARKER, kernel_sources
+from fowt_env.plant.compile.disk_cache import SharedCacheFile
 
 ROOT = Path(fowt_env.__file__).resolve().parent.parent
 REGISTRATION = ROOT / "fowt_env_registration.py"
 SMALL = "from fowt_env.weather.waves import ramp_factor; print(ramp_factor(1.0, 4.0))\n"
 HITS = "print(sum(ramp_factor.stats.cache_hits.values()))\n"
-WHERE = "from fowt_env.jit import CACHE_FOLDER; print(CACHE_FOLDER)\n"
+WHERE = "from fowt_env.plant.compile.decorators import CACHE_FOLDER; print(CACHE_FOLDER)\n"
 DAY = 86400.0
 DECAY = """
 import sys
 from fowt_env import build_scene, simulate
-from fowt_env.warmup import compilation_announced
+from fowt_env.plant.compile.announcement import compilation_announced
 said = []
 with compilation_announced(said.append):
     frame = simulate(build_scene(), None, duration=2.0, start="zero", initial={"PtfmPitch": 5.0})
@@ -253,7 +253,7 @@ def test_a_folder_that_is_read_only_is_read(tmp_path):
         "os.mkdir = os.utime = os.replace = os.unlink = os.rmdir = refuse\nos.open = reading\n"
     )
     use = (
-        "from fowt_env.weather.waves import ramp_factor as f\nfrom fowt_env.state import add, NO_LOAD\n"
+        "from fowt_env.weather.waves import ramp_factor as f\nfrom fowt_env.plant.state import add, NO_LOAD\n"
         "print(f(1.0, 4.0), sum(f.stats.cache_hits.values()), add(NO_LOAD, NO_LOAD).fx)\n"
     )
     assert output(start(locked + use, tmp_path / "cache")) == ["0.25", "1", "0.0"]
@@ -261,7 +261,7 @@ def test_a_folder_that_is_read_only_is_read(tmp_path):
 
 
 LAW = """
-from fowt_env.jit import control_kernel, entry, kernel
+from fowt_env.plant.compile.decorators import control_kernel, entry, kernel
 from gains import GAIN, wanted_pitch
 import gains
 
@@ -278,7 +278,7 @@ def law(parameters, memory, measurement, command):
     command[0] = gains.GAIN
     command[1] = own_helper(measurement[0])
 """
-GAINS = "from fowt_env.jit import kernel\nGAIN = {}\n@kernel\ndef wanted_pitch(speed):\n    return {}\n"
+GAINS = "from fowt_env.plant.compile.decorators import kernel\nGAIN = {}\n@kernel\ndef wanted_pitch(speed):\n    return {}\n"
 CALL_LAW = """
 import numpy as np
 from fowt_env.controllers.base import call_law
@@ -321,7 +321,7 @@ def test_what_is_compiled_into_one_of_ours_for_a_users_function_is_not_kept(tmp_
 
 def test_numba_code_of_other_packages_is_kept_where_it_would_be_without_ours(tmp_path):
     (tmp_path / "other.py").write_text("import numba\n@numba.njit(cache=True)\ndef f(x): return 2.0 * x\n")
-    code = "import fowt_env.jit, other; other.f(1.0)"
+    code = "import fowt_env.plant.compile.decorators, other; other.f(1.0)"
     output(start(code, tmp_path / "cache"))
     assert list((tmp_path / "__pycache__").glob("other.f*.nbi"))
     output(start(code, tmp_path / "cache", NUMBA_CACHE_DIR=str(tmp_path / "given")))
@@ -362,7 +362,7 @@ def test_kernels_of_the_studies_are_kept_until_one_of_their_sources_changes(tmp_
     training.mkdir()
     (training / "numbers.py").write_text("GAIN = 1.0\n")
     (training / "study.py").write_text(
-        "from fowt_env.jit import entry\nfrom training.numbers import GAIN\n"
+        "from fowt_env.plant.compile.decorators import entry\nfrom training.numbers import GAIN\n"
         "@entry\ndef amplified(x):\n    return GAIN * x\n"
     )
     program = "from training.study import amplified as f; print(f(2.0), sum(f.stats.cache_hits.values()))\n"
@@ -378,11 +378,11 @@ def test_kernels_of_other_sources_are_never_used(tmp_path):
     """Numba alone would: it watches the file of the function, and not those of what it calls."""
     code = copied_code(tmp_path)
     (code / "fowt_env" / "extra.py").write_text(
-        "from fowt_env.jit import kernel\nfrom fowt_env.state import add\n"
+        "from fowt_env.plant.compile.decorators import kernel\nfrom fowt_env.plant.state import add\n"
         "@kernel\ndef twice(load):\n    return add(load, load).fx\n"
     )
     program = (
-        "from fowt_env.extra import twice\nfrom fowt_env.state import NO_LOAD\n"
+        "from fowt_env.extra import twice\nfrom fowt_env.plant.state import NO_LOAD\n"
         "print(twice(NO_LOAD._replace(fx=1.0)))\n"
     )
     assert output(start(program, tmp_path / "cache", code)) == ["2.0"]
@@ -455,7 +455,7 @@ def test_without_room_for_machine_code_kernels_work_all_the_same(tmp_path):
 
 KEEPER = """
 import pathlib, sys
-from fowt_env.kernel_cache import SharedCacheFile
+from fowt_env.plant.compile.disk_cache import SharedCacheFile
 file = SharedCacheFile(sys.argv[1], "function", "stamp")
 ready = pathlib.Path(sys.argv[2])
 (ready / sys.argv[3]).touch()

@@ -4,11 +4,11 @@ from naive import rigid_body
 from plant import random_state, rates
 
 import fowt_env
-from fowt_env.channels import FIXED_CHANNELS, channels, rotor_wind, to_units
-from fowt_env.dynamics import gravity_load
-from fowt_env.measurement import N_MEASUREMENTS, Measurement
-from fowt_env.state import State, pose_of
-from fowt_env.step import observe, output_row
+from fowt_env.plant.channels import FIXED_CHANNELS, channels, rotor_wind, to_units
+from fowt_env.plant.dynamics import gravity_load
+from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
+from fowt_env.plant.rollout import observe, output_row
+from fowt_env.plant.state import State, pose_of
 from fowt_env.weather.wind import wind_now
 from fowt_env.weather.wind_field import read_box
 

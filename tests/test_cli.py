@@ -13,7 +13,7 @@ import fowt_env
 from fowt_env import cli
 from fowt_env.cli_arguments import parse_numbers, parse_pairs, parse_sea, parse_wind
 from fowt_env.errors import InputError, SimulationStopped
-from fowt_env.warmup import COMPILING_MESSAGE
+from fowt_env.plant.compile.announcement import COMPILING_MESSAGE
 
 SHORT = ("--duration", "10", "--wind", "18")
 

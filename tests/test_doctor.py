@@ -11,7 +11,8 @@ import pytest
 from typer.testing import CliRunner
 
 import fowt_env
-from fowt_env import cli, health, jit, requirements
+from fowt_env import cli, health, requirements
+from fowt_env.plant.compile import decorators as jit
 
 REQUIRES = [
     "numpy>=2.0",
@@ -75,7 +76,7 @@ def test_the_cache_is_measured_and_other_versions_counted(tmp_path, monkeypatch)
         (tmp_path / name).mkdir()
         (tmp_path / name / jit.MARKER).touch()
     monkeypatch.setattr(health, "CACHE_FOLDER", folder)
-    monkeypatch.setattr("fowt_env.warmup.CACHE_FOLDER", folder)
+    monkeypatch.setattr("fowt_env.plant.compile.announcement.CACHE_FOLDER", folder)
     state = health.cache_state()
     assert (state.folder, state.others) == (folder, 1)
     assert state.read and state.written and state.compiled
@@ -85,7 +86,7 @@ def test_the_cache_is_measured_and_other_versions_counted(tmp_path, monkeypatch)
 
 def test_a_cache_that_cannot_be_used_is_told_with_what_to_do(monkeypatch):
     monkeypatch.setattr(health, "CACHE_FOLDER", None)
-    monkeypatch.setattr("fowt_env.warmup.CACHE_FOLDER", None)
+    monkeypatch.setattr("fowt_env.plant.compile.announcement.CACHE_FOLDER", None)
     assert not health.cache_state().read
     assert "FOWT_CACHE_DIR to a folder" in doctor("--no-test")
 
@@ -113,7 +114,7 @@ def test_a_numba_that_cannot_compile_the_kernels_is_told_before_it_is_tried(foun
 
 
 def test_the_kernels_of_another_numba_are_not_even_tried():
-    code = "import numba; numba.__version__ = '0.61.0'\nimport fowt_env.state"
+    code = "import numba; numba.__version__ = '0.61.0'\nimport fowt_env.plant.state"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=os.environ)
     assert done.stderr.splitlines()[-1].startswith("ImportError: numba 0.61.0 is too old: pip install")
 

@@ -8,13 +8,13 @@ from naive import rigid_body
 from plant import integrate, make_pose, random_state, rates, state
 from scipy.integrate import solve_ivp
 
-from fowt_env.dynamics import accelerate, gravity_load, inertial_load, solve_spd
-from fowt_env.loads.drivetrain import build_drivetrain, shaft_torque
-from fowt_env.loads.hydrostatics import submerged
-from fowt_env.loads.mooring import mooring_load
-from fowt_env.loads.morison import StripLoad
+from fowt_env.plant.drivetrain import build_drivetrain, shaft_torque
+from fowt_env.plant.dynamics import accelerate, gravity_load, inertial_load, solve_spd
+from fowt_env.plant.hydro.hydrostatics import submerged
+from fowt_env.plant.hydro.morison import StripLoad
+from fowt_env.plant.mooring import mooring_load
+from fowt_env.plant.state import NO_LOAD, State, Wrench, add, pose_of
 from fowt_env.scene import assemble, build_body
-from fowt_env.state import NO_LOAD, State, Wrench, add, pose_of
 
 REFERENCE = Path(__file__).parent / "reference" / "accelerations.csv"
 DRY = StripLoad(NO_LOAD, 0.0, 0.0, 0.0, 0.0)

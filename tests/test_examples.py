@@ -8,7 +8,7 @@ from time import perf_counter
 
 import pytest
 
-from fowt_env.warmup import compilation_announced
+from fowt_env.plant.compile.announcement import compilation_announced
 
 FOLDER = Path(__file__).resolve().parent.parent / "examples"
 LIMIT = 60.0  # s

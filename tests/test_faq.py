@@ -15,10 +15,12 @@ from gymnasium.envs.registration import registry
 from typer.testing import CliRunner
 
 import fowt_env
-from fowt_env import cli, health, jit, requirements, warmup
+from fowt_env import cli, health, requirements
 from fowt_env.controllers import make
 from fowt_env.description import DATA, read_platform
 from fowt_env.envs import FowtEnv
+from fowt_env.plant.compile import announcement as warmup
+from fowt_env.plant.compile import decorators as jit
 
 NAME = "fowt_env/OC3Hywind-v1"
 MESSAGES = [block for block in blocks("faq.md") if block.language == "text"]

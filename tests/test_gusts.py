@@ -6,7 +6,7 @@ import pytest
 from fowt_env import build_scene, simulate
 from fowt_env.envs import FowtEnv, FowtVectorEnv
 from fowt_env.errors import InputError
-from fowt_env.integrators import BASHFORTH, build_gusts, build_integrator, rotor_samples
+from fowt_env.plant.integrators import BASHFORTH, build_gusts, build_integrator, rotor_samples
 from fowt_env.training.comparison import normalised_rms
 from fowt_env.training.openfast import box_wind
 

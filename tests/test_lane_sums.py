@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fowt_env.lane_sums import CROSSED, SUM_LANES, _sums_twin, crossed_sums, lane_dot
+from fowt_env.plant.compile.vector_sums import CROSSED, SUM_LANES, _sums_twin, crossed_sums, lane_dot
 
 pytestmark = pytest.mark.installation
 

@@ -15,12 +15,12 @@ from plant import rates
 import fowt_env
 from fowt_env import Load, Motion, build_scene, linearize, load_kernel, natural_periods, simulate, trim
 from fowt_env.description import read_platform
-from fowt_env.dynamics import Kept
 from fowt_env.envs import FowtEnv, FowtVectorEnv
 from fowt_env.errors import InputError, SimulationStopped
-from fowt_env.loads.morison import current_at
-from fowt_env.state import State, pose_of
-from fowt_env.step import output_row
+from fowt_env.plant.dynamics import Kept
+from fowt_env.plant.hydro.morison import current_at
+from fowt_env.plant.rollout import output_row
+from fowt_env.plant.state import State, pose_of
 from fowt_env.weather.waves import wave_kinematics
 
 ROOT = Path(fowt_env.__file__).resolve().parent.parent
@@ -305,7 +305,7 @@ def test_a_pickled_snapshot_of_a_loaded_environment_goes_on_bit_for_bit():
 PROCESS = """
 import sys
 from fowt_env import Load, Motion, build_scene, load_kernel, simulate
-from fowt_env.warmup import compilation_announced
+from fowt_env.plant.compile.announcement import compilation_announced
 @load_kernel
 def one(parameters, motion, force):
     force[0] = -parameters[0] * motion[Motion.VX]

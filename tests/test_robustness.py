@@ -7,10 +7,10 @@ import pytest
 from naive import rigid_body
 from scipy.integrate import solve_ivp
 
-from fowt_env.integrators import INTEGRATORS
+from fowt_env.plant.integrators import INTEGRATORS
+from fowt_env.plant.rollout import RUNNING, advance
+from fowt_env.plant.state import State
 from fowt_env.scene import STEPS
-from fowt_env.state import State
-from fowt_env.step import RUNNING, advance
 from fowt_env.training import (
     stability,
     stability_cases,

@@ -12,12 +12,12 @@ import fowt_env
 from fowt_env import simulation
 from fowt_env.controllers import make
 from fowt_env.controllers.constant import Constant
-from fowt_env.counters import Counter
 from fowt_env.errors import ControllerError, InputError, SimulationStopped
-from fowt_env.jit import control_kernel
+from fowt_env.plant.compile.decorators import control_kernel
+from fowt_env.plant.events import Counter
+from fowt_env.plant.rollout import advance
+from fowt_env.plant.state import State, pose_of
 from fowt_env.simulation import initial_state
-from fowt_env.state import State, pose_of
-from fowt_env.step import advance
 
 ROOT = Path(__file__).resolve().parent.parent
 COLUMNS = ["PtfmSurge_[m]", "PtfmHeave_[m]", "PtfmPitch_[deg]", "PtfmYaw_[deg]"]
@@ -392,7 +392,7 @@ def test_another_process_gives_the_same_bits():
 STEPS = """
 import numpy as np, fowt_env
 from plant import random_state
-from fowt_env.step import advance
+from fowt_env.plant.rollout import advance
 scene = fowt_env.build_scene("oc3_hywind", wind=18.0, seed=3, duration=60.0, wave_components=20,
     sea={"kind": "jonswap", "Hs": 6.0, "Tp": 10.0, "gamma": 3.3})
 x = random_state(np.random.default_rng(6))

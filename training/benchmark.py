@@ -19,20 +19,20 @@ import numba
 import numpy as np
 import pandas as pd
 
-from fowt_env.channels import measure, record
 from fowt_env.controllers import make
-from fowt_env.dynamics import Kept, loads_of, respond, rotor_part, strip_part
 from fowt_env.errors import InputError, unknown
-from fowt_env.jit import entry, kernel
-from fowt_env.loads.hydrostatics import hydrostatic_load
-from fowt_env.loads.mooring import mooring_load
-from fowt_env.loads.tower import tower_load
-from fowt_env.measurement import N_MEASUREMENTS, Measurement
 from fowt_env.outputs import replacing
+from fowt_env.plant.aero.tower_drag import tower_load
+from fowt_env.plant.channels import measure, record
+from fowt_env.plant.compile.decorators import entry, kernel
+from fowt_env.plant.dynamics import Kept, loads_of, respond, rotor_part, strip_part
+from fowt_env.plant.hydro.hydrostatics import hydrostatic_load
+from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
+from fowt_env.plant.mooring import mooring_load
+from fowt_env.plant.rollout import advance, forget, observe, output, run
+from fowt_env.plant.state import State, pose_of
 from fowt_env.scene import build_scene
 from fowt_env.simulation import _Hold, initial_state, simulate
-from fowt_env.state import State, pose_of
-from fowt_env.step import advance, forget, observe, output, run
 from fowt_env.weather.wind import wind_now
 
 CALIBRATION_STEPS = 10_000_000

@@ -11,7 +11,7 @@ from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
 
 from fowt_env.envs import FowtEnv, FowtVectorEnv
 from fowt_env.envs.batch import act_all, thread_limit
-from fowt_env.jit import parallel_entry
+from fowt_env.plant.compile.decorators import parallel_entry
 from fowt_env.training.benchmark import header, multiply_adds
 
 SIZES = (1, 16, 256, 4096)

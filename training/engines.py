@@ -17,8 +17,8 @@ from contextlib import contextmanager, suppress
 from multiprocessing import connection
 
 from fowt_env.errors import InputError, unknown
+from fowt_env.plant.compile.announcement import kernels_compiled
 from fowt_env.training.guard import GRACE, LIMIT_CODE, as_worker, attempt, reason_of, time_limit_reason
-from fowt_env.warmup import kernels_compiled
 
 ENGINES = ("processes", "ray")
 NICENESS = "RAY_worker_niceness"  # environment variable by which Ray is told how nice its workers are

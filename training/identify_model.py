@@ -17,8 +17,8 @@ from scipy.optimize import brentq, fsolve
 
 from fowt_env.description import DATA, Line, read_platform, read_turbine
 from fowt_env.linear_model import natural_periods
-from fowt_env.loads.mooring import catenary
 from fowt_env.outputs import replacing
+from fowt_env.plant.mooring import catenary
 from fowt_env.scene import build_scene
 from fowt_env.steady import trim_held
 

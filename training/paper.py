@@ -15,7 +15,7 @@ import pandas as pd
 import fowt_env
 from fowt_env.description import read_platform
 from fowt_env.errors import InputError, unknown
-from fowt_env.loads.mooring import catenary
+from fowt_env.plant.mooring import catenary
 from fowt_env.plots import spectrum
 from fowt_env.steady import trim_held
 from fowt_env.training.comparison import harmonics

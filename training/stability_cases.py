@@ -11,20 +11,20 @@ from pathlib import Path
 
 import numpy as np
 
-from fowt_env.channels import measure
 from fowt_env.controllers import make
-from fowt_env.counters import Counter
 from fowt_env.errors import InputError, unknown
-from fowt_env.integrators import build_integrator, rates, take_step
-from fowt_env.jit import entry, kernel
-from fowt_env.loads.hydrostatics import submerged
-from fowt_env.loads.mooring import mooring_load
-from fowt_env.measurement import N_MEASUREMENTS, Measurement
 from fowt_env.outputs import replacing
+from fowt_env.plant.channels import measure
+from fowt_env.plant.compile.decorators import entry, kernel
+from fowt_env.plant.events import Counter
+from fowt_env.plant.hydro.hydrostatics import submerged
+from fowt_env.plant.integrators import build_integrator, rates, take_step
+from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
+from fowt_env.plant.mooring import mooring_load
+from fowt_env.plant.rollout import NON_FINITE, RUNNING, STOP_REASONS, observe, status_of
+from fowt_env.plant.state import State, pose_of
 from fowt_env.scene import FIDELITIES, build_scene
 from fowt_env.simulation import hold
-from fowt_env.state import State, pose_of
-from fowt_env.step import NON_FINITE, RUNNING, STOP_REASONS, observe, status_of
 
 DURATION = 30.0  # s of each case: three wave periods, one of platform pitch
 WEATHER = 60.0  # s of random wind and sea

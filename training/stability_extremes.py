@@ -6,16 +6,16 @@ from math import degrees, isfinite, pi
 import numpy as np
 import pandas as pd
 
-from fowt_env.channels import DEG, RPM
 from fowt_env.controllers import make
 from fowt_env.envs import FowtEnv
 from fowt_env.errors import InputError
-from fowt_env.loads.mooring import Mooring
-from fowt_env.measurement import N_MEASUREMENTS, Measurement
+from fowt_env.plant.channels import DEG, RPM
+from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
+from fowt_env.plant.mooring import Mooring
+from fowt_env.plant.rollout import RUNNING, STOP_REASONS, advance, forget, observe
+from fowt_env.plant.state import State
 from fowt_env.scene import build_scene
 from fowt_env.simulation import initial_state
-from fowt_env.state import State
-from fowt_env.step import RUNNING, STOP_REASONS, advance, forget, observe
 
 CONTROL_DT = 0.1  # s
 EVENT = 60.0  # s at which gusts start and faults happen

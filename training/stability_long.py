@@ -9,14 +9,14 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from fowt_env.dynamics import Kept
 from fowt_env.envs import FowtEnv
-from fowt_env.integrators import INTEGRATORS, START_STEPS, build_integrator
-from fowt_env.measurement import N_MEASUREMENTS
+from fowt_env.plant.dynamics import Kept
+from fowt_env.plant.integrators import INTEGRATORS, START_STEPS, build_integrator
+from fowt_env.plant.measurement import N_MEASUREMENTS
+from fowt_env.plant.rollout import RUNNING, advance, forget, observe
+from fowt_env.plant.state import State
 from fowt_env.scene import STEPS, build_scene
 from fowt_env.simulation import initial_state
-from fowt_env.state import State
-from fowt_env.step import RUNNING, advance, forget, observe
 from fowt_env.training.stability_cases import Runner, platform_energy, potential_energy
 
 CHUNK = 100_000  # steps between looks at the invariants

@@ -1,6 +1,6 @@
 """Largest stable step of each integrator and kind of scene: measured on the plant, and as theory has it.
 
-Theory is the amplification matrix of the very scheme of fowt_env/integrators.py applied to the linear
+Theory is the amplification matrix of the very scheme of fowt_env/plant/integrators.py applied to the linear
 model of the scene: blade pitch exact and, for the Adams methods, positions by Adams-Moulton from the new
 velocities.
 """
@@ -11,12 +11,12 @@ from math import exp, log
 import numpy as np
 import pandas as pd
 
-from fowt_env.integrators import INTEGRATORS, feathering
 from fowt_env.linear_model import MOTIONS, STATE_INDEX, STATES, linearize
+from fowt_env.plant.integrators import INTEGRATORS, feathering
+from fowt_env.plant.rollout import RUNNING, advance, forget
+from fowt_env.plant.state import State
 from fowt_env.scene import STEPS, build_scene
-from fowt_env.state import State
 from fowt_env.steady import OperatingPoint, trim
-from fowt_env.step import RUNNING, advance, forget
 from fowt_env.training.stability_long import with_integrator
 
 DURATION = 300.0  # s of each run: hundreds of steps even at the largest

@@ -16,10 +16,10 @@ import numpy as np
 
 from fowt_env.envs import FowtEnv, FowtVectorEnv
 from fowt_env.errors import InputError
-from fowt_env.integrators import INTEGRATORS, build_integrator
+from fowt_env.plant.integrators import INTEGRATORS, build_integrator
+from fowt_env.plant.rollout import advance, output_row
+from fowt_env.plant.state import State
 from fowt_env.scene import build_scene
-from fowt_env.state import State
-from fowt_env.step import advance, output_row
 
 STEPS = 5
 ENV_STEPS = 3

@@ -11,8 +11,8 @@ import fowt_env
 from fowt_env.envs import tables
 from fowt_env.envs.rewards import TERMS, build_scales, fill_terms, weight_array
 from fowt_env.envs.tasks import TASKS
-from fowt_env.measurement import N_MEASUREMENTS, Measure
-from fowt_env.state import State
+from fowt_env.plant.measurement import N_MEASUREMENTS, Measure
+from fowt_env.plant.state import State
 
 CONTROLLERS = ("lqr", "floating_feedback", "gspi_oc3", "pi_unscheduled", "pi_land", "gspi_land")
 BASELINE = "gspi_oc3"

@@ -8,15 +8,15 @@ from math import isfinite, pi
 from typing import NamedTuple
 
 from fowt_env.errors import InputError
-from fowt_env.jit import kernel
-from fowt_env.loads.drivetrain import (
+from fowt_env.plant.compile.decorators import kernel
+from fowt_env.plant.drivetrain import (
     TorqueLimits,
     build_drivetrain,
     build_torque_limits,
     followed_torque,
     limited,
 )
-from fowt_env.measurement import Measure
+from fowt_env.plant.measurement import Measure
 
 # Set-point mode: PI on rotor speed through torque, this natural frequency and damping ratio of the
 # rigid rotor. Fast beside the platform's pitch (0.21 rad/s), slow beside the torque rate limit.

@@ -7,7 +7,7 @@ import numba
 import numpy as np
 
 from fowt_env.envs.kernels import act
-from fowt_env.jit import entry, kernel, parallel_entry
+from fowt_env.plant.compile.decorators import entry, kernel, parallel_entry
 
 
 @kernel

@@ -13,7 +13,6 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
-from fowt_env.channels import DEG
 from fowt_env.description import Platform
 from fowt_env.envs.actions import MODES, Mode, build_action_map, start_tracking
 from fowt_env.envs.kernels import (
@@ -51,12 +50,13 @@ from fowt_env.envs.tables import task_tables
 from fowt_env.envs.tasks import TASKS, Episode, Task, check_offset, task_of
 from fowt_env.envs.trims import exact_trim, near_trim, plant_key
 from fowt_env.errors import InputError, unknown
-from fowt_env.jit import Box
-from fowt_env.measurement import N_MEASUREMENTS, Measurement
+from fowt_env.plant.channels import DEG
+from fowt_env.plant.compile.decorators import Box
+from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
+from fowt_env.plant.rollout import STOP_REASONS, output
+from fowt_env.plant.state import State
 from fowt_env.scene import OPTIONS, Scene, build_scene
 from fowt_env.simulation import INITIAL, check_duration, steps_in
-from fowt_env.state import State
-from fowt_env.step import STOP_REASONS, output
 
 SHORTEST_WEATHER = 600.0  # s of random wind and sea: turbulence intensity is defined over 10 min
 StepResult = tuple[np.ndarray, float, bool, bool, dict[str, Any]]

@@ -9,16 +9,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fowt_env.dynamics import Kept, Model, Work
 from fowt_env.envs.actions import ActionMap, accept, action_of, command_of
 from fowt_env.envs.observations import ObservationMap, fill_observation, fill_signals
 from fowt_env.envs.rewards import Scales, fill_terms, weighted_sum
 from fowt_env.envs.sensors import Sensors, take_reading
-from fowt_env.jit import entry, kernel
-from fowt_env.loads.drivetrain import followed_torque, torque_was_limited
-from fowt_env.measurement import Measure
-from fowt_env.state import State
-from fowt_env.step import NON_FINITE, OVERSPEED, RUNNING, advance_scene, observe_scene
+from fowt_env.plant.compile.decorators import entry, kernel
+from fowt_env.plant.drivetrain import followed_torque, torque_was_limited
+from fowt_env.plant.dynamics import Kept, Model, Work
+from fowt_env.plant.measurement import Measure
+from fowt_env.plant.rollout import NON_FINITE, OVERSPEED, RUNNING, advance_scene, observe_scene
+from fowt_env.plant.state import State
 
 BAD_ACTION = -1  # beside the statuses of step.py
 STEP, SATURATED, LIMITED = 0, 1, 2  # entries of Run.counts

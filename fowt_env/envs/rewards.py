@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from fowt_env.errors import InputError, unknown
-from fowt_env.jit import kernel
-from fowt_env.measurement import Measure
+from fowt_env.plant.compile.decorators import kernel
+from fowt_env.plant.measurement import Measure
 
 AT_MARGIN = 0.1  # value of tolerance() one margin outside its bounds
 STEEPNESS = -log(AT_MARGIN)

@@ -12,8 +12,8 @@ import numpy as np
 
 from fowt_env.envs.observations import channels
 from fowt_env.errors import InputError, unknown
-from fowt_env.jit import kernel
-from fowt_env.measurement import N_MEASUREMENTS, Measure, Measurement
+from fowt_env.plant.compile.decorators import kernel
+from fowt_env.plant.measurement import N_MEASUREMENTS, Measure, Measurement
 
 NOISE_STREAM = 3  # of a run's seed: apart from that of its weather
 LONGEST_DELAY = 1000  # control periods

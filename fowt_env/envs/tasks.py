@@ -9,8 +9,8 @@ from fowt_env.description import joint_sea_state, joint_tables, sea_state_of
 from fowt_env.envs.observations import STANDARD, check_channels
 from fowt_env.envs.rewards import check_weights
 from fowt_env.errors import InputError, unknown
+from fowt_env.plant.state import State
 from fowt_env.simulation import INITIAL
-from fowt_env.state import State
 from fowt_env.weather.wind import WindSeries, nominal_speed
 from fowt_env.weather.wind_field import is_field
 from fowt_env.weather.wind_spec import read_wind

@@ -20,7 +20,7 @@ from fowt_env.envs.observations import N_ACTIONS
 from fowt_env.envs.rewards import N_TERMS
 from fowt_env.envs.snapshot import Snapshot
 from fowt_env.errors import InputError, unknown
-from fowt_env.jit import Box
+from fowt_env.plant.compile.decorators import Box
 
 # GNU's OpenMP, which runs numba's threads on Linux, lets an idle thread spin for milliseconds: best between
 # steps on a quiet machine, ruinous beside other programs (docs/performance.md). This many turns are some 50

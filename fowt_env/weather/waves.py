@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fowt_env.errors import InputError
-from fowt_env.jit import kernel
+from fowt_env.plant.compile.decorators import kernel
 
 # Beyond this k*depth-like product an exponential is below 1e-12 of its surface value.
 NEGLIGIBLE = 27.6

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fowt_env.errors import InputError
-from fowt_env.jit import kernel
+from fowt_env.plant.compile.decorators import kernel
 from fowt_env.weather import gusts
 from fowt_env.weather.iec import EXTREME_SHEAR_EXPONENT, etm_sigma, extreme_speed, ntm_sigma
 from fowt_env.weather.turbulence import SHORTEST_PERIOD, hub_turbulence, turbulence

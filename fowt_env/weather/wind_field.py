@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fowt_env.errors import InputError, unknown
-from fowt_env.jit import kernel
+from fowt_env.plant.compile.decorators import kernel
 from fowt_env.weather.iec import length_scale, ntm_sigma
 from fowt_env.weather.turbsim import read_bts
 from fowt_env.weather.wind_spec import MOVING, TURBULENCE_CLASS, Flag, Number, Seed

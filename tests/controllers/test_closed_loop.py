@@ -8,8 +8,8 @@ from fowt_env.controllers.closed_loop import closed_loop_matrix, platform_pitch_
 from fowt_env.controllers.pi import PISettings
 from fowt_env.errors import InputError
 from fowt_env.linear_model import STATE_INDEX, modes
-from fowt_env.loads.drivetrain import generator_torque
-from fowt_env.state import State
+from fowt_env.plant.drivetrain import generator_torque
+from fowt_env.plant.state import State
 from fowt_env.steady import AZIMUTHS, calm, mean_derivative
 
 

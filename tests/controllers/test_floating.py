@@ -13,7 +13,7 @@ from fowt_env.controllers.floating import FeedbackSettings, FloatingFeedback
 from fowt_env.controllers.pi import PISettings
 from fowt_env.controllers.pi import pi as make_pi
 from fowt_env.errors import InputError
-from fowt_env.measurement import Measurement
+from fowt_env.plant.measurement import Measurement
 
 TURBINE = turbine()
 DT = 0.1

@@ -10,7 +10,7 @@ from naive.turbine import turbine
 import fowt_env
 from fowt_env.controllers.gspi import GSPI, gspi_land, gspi_oc3
 from fowt_env.controllers.pi import Memory, PISettings
-from fowt_env.measurement import Measurement
+from fowt_env.plant.measurement import Measurement
 
 TURBINE = turbine()
 RATED = 122.9096

@@ -6,7 +6,7 @@ from naive.discon import Discon
 
 from fowt_env import controllers
 from fowt_env.description import read_turbine
-from fowt_env.measurement import Measurement
+from fowt_env.plant.measurement import Measurement
 
 pytestmark = pytest.mark.installation
 

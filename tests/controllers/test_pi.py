@@ -10,8 +10,8 @@ from naive.turbine import turbine
 from fowt_env.controllers.eq8 import Eq8Literal, literal_gain
 from fowt_env.controllers.pi import PI, Memory, PISettings, gains, schedule_gain
 from fowt_env.errors import InputError
-from fowt_env.loads.drivetrain import generator_torque
-from fowt_env.measurement import Measurement
+from fowt_env.plant.drivetrain import generator_torque
+from fowt_env.plant.measurement import Measurement
 
 pytestmark = pytest.mark.installation
 

@@ -8,7 +8,7 @@ from fowt_env.controllers import make
 from fowt_env.controllers.pi import PISettings
 from fowt_env.controllers.preview import Preview, PreviewSettings, foreseen_pitch, rotor_wind, steady_pitch
 from fowt_env.errors import InputError
-from fowt_env.measurement import Measurement
+from fowt_env.plant.measurement import Measurement
 
 DT = 0.1
 STILL = Measurement(*[0.0] * len(Measurement._fields))

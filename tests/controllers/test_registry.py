@@ -15,7 +15,7 @@ from fowt_env.controllers.base import EXTRA
 from fowt_env.controllers.constant import Constant
 from fowt_env.controllers.policy import shipped_agents
 from fowt_env.errors import ControllerError, InputError
-from fowt_env.measurement import Measurement
+from fowt_env.plant.measurement import Measurement
 
 ROOT = Path(__file__).resolve().parents[2]
 QUIET = Measurement(*[0.0] * len(Measurement._fields))
@@ -252,7 +252,7 @@ def test_a_measurement_of_another_length_is_refused():
 
 
 def test_the_plant_does_not_import_controllers():
-    code = "import sys, fowt_env, fowt_env.loads.drivetrain; sys.exit('controllers' in sys.modules)"
+    code = "import sys, fowt_env, fowt_env.plant.drivetrain; sys.exit('controllers' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], cwd=ROOT).returncode == 0
 
 

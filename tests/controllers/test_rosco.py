@@ -14,7 +14,7 @@ from fowt_env import build_scene, simulate
 from fowt_env.controllers import make
 from fowt_env.controllers.rosco import Rosco, RoscoSettings, find_library, pitch_gains
 from fowt_env.errors import InputError
-from fowt_env.measurement import Measurement
+from fowt_env.plant.measurement import Measurement
 
 needs_library = pytest.mark.skipif(
     find_spec("rosco") is None,

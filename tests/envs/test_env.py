@@ -19,7 +19,7 @@ from fowt_env.envs.observations import KNOWN
 from fowt_env.envs.rewards import TERMS
 from fowt_env.envs.trims import GRID, exact_trim, near_trim
 from fowt_env.errors import InputError
-from fowt_env.state import State
+from fowt_env.plant.state import State
 from fowt_env_registration import ENVIRONMENTS
 
 QUICK = {"rotor": "table", "wave_components": 20}

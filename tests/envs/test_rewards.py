@@ -27,7 +27,7 @@ from fowt_env.envs.rewards import (
     weighted_sum,
 )
 from fowt_env.errors import InputError
-from fowt_env.measurement import N_MEASUREMENTS, Measure
+from fowt_env.plant.measurement import N_MEASUREMENTS, Measure
 
 TURBINE = read_turbine("nrel5mw")
 SCALES = build_scales(TURBINE, 0.1)

@@ -11,7 +11,7 @@ from fowt_env.envs import FowtEnv, FowtVectorEnv
 from fowt_env.envs.safety import SafetyLayer
 from fowt_env.envs.sensors import draw_sensors, reading_scales
 from fowt_env.errors import InputError
-from fowt_env.measurement import N_MEASUREMENTS, Measure, Measurement
+from fowt_env.plant.measurement import N_MEASUREMENTS, Measure, Measurement
 from fowt_env.training.randomisation import plant_settings
 from fowt_env.training.shifts import Shift, Unaware
 

@@ -3,8 +3,8 @@ import pytest
 from plant import random_state
 
 from fowt_env.description import Hydro
-from fowt_env.loads.damping import LinearDamping, build_damping, damping_load
-from fowt_env.state import NO_LOAD, State, pose_of
+from fowt_env.plant.hydro.linear_damping import LinearDamping, build_damping, damping_load
+from fowt_env.plant.state import NO_LOAD, State, pose_of
 
 pytestmark = pytest.mark.installation
 

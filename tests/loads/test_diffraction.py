@@ -14,14 +14,15 @@ from plant import make_pose
 from fowt_env import build_scene, simulate
 from fowt_env.description import sea_state_of
 from fowt_env.errors import InputError
-from fowt_env.loads.diffraction import (
+from fowt_env.plant.hydro.diffraction import (
     TERMS,
     build_strip_diffraction,
     coefficient_series,
     factor_at,
     inertia_coefficient,
 )
-from fowt_env.loads.fast_waves import (
+from fowt_env.plant.hydro.morison import GAUSS_OFFSET, axis_surface, build_strips, morison_load, wet_cell
+from fowt_env.plant.hydro.wave_bands import (
     LANES,
     build_fast_waves,
     build_lane_diffraction,
@@ -29,7 +30,6 @@ from fowt_env.loads.fast_waves import (
     fast_morison_load,
     fast_scratch,
 )
-from fowt_env.loads.morison import GAUSS_OFFSET, axis_surface, build_strips, morison_load, wet_cell
 from fowt_env.weather.waves import build_waves, wave_number
 
 pytestmark = pytest.mark.installation

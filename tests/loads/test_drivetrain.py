@@ -6,7 +6,7 @@ from naive.pi import oc3_torque
 from naive.turbine import torque_law, turbine
 
 from fowt_env.errors import InputError
-from fowt_env.loads.drivetrain import (
+from fowt_env.plant.drivetrain import (
     PitchActuator,
     build_drivetrain,
     build_pitch_actuator,

@@ -9,8 +9,9 @@ import pytest
 from naive.strips import strip_load
 
 from fowt_env.description import read_platform, sea_state_of
-from fowt_env.loads import fast_waves
-from fowt_env.loads.fast_waves import (
+from fowt_env.plant.hydro import wave_bands as fast_waves
+from fowt_env.plant.hydro.morison import Current, axis_surface, build_strips, current_at, morison_load
+from fowt_env.plant.hydro.wave_bands import (
     build_fast_waves,
     build_lanes,
     can_be_fast,
@@ -18,8 +19,7 @@ from fowt_env.loads.fast_waves import (
     fast_scratch,
     phasors,
 )
-from fowt_env.loads.morison import Current, axis_surface, build_strips, current_at, morison_load
-from fowt_env.state import N_RIGID, State, pose_of
+from fowt_env.plant.state import N_RIGID, State, pose_of
 from fowt_env.weather.waves import build_waves
 
 pytestmark = pytest.mark.installation

@@ -4,9 +4,9 @@ from naive import hydrostatics as naive
 from naive.rigid_body import rotation
 from plant import make_pose
 
-from fowt_env.counters import N_COUNTERS, Counter
-from fowt_env.loads.hydrostatics import build_hull, hydrostatic_load, sliced, submerged
-from fowt_env.state import NO_LOAD
+from fowt_env.plant.events import N_COUNTERS, Counter
+from fowt_env.plant.hydro.hydrostatics import build_hull, hydrostatic_load, sliced, submerged
+from fowt_env.plant.state import NO_LOAD
 
 pytestmark = pytest.mark.installation
 

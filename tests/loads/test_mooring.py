@@ -7,9 +7,9 @@ import naive.mooring as naive
 import numpy as np
 import pytest
 
-from fowt_env.counters import N_COUNTERS, Counter
 from fowt_env.description import Line
-from fowt_env.loads.mooring import (
+from fowt_env.plant.events import N_COUNTERS, Counter
+from fowt_env.plant.mooring import (
     N_LINE,
     SLACK,
     SUSPENDED,
@@ -21,7 +21,7 @@ from fowt_env.loads.mooring import (
     suspended_residual,
     touchdown_residual,
 )
-from fowt_env.state import N_RIGID, NO_LOAD, State, pose_of
+from fowt_env.plant.state import N_RIGID, NO_LOAD, State, pose_of
 
 pytestmark = pytest.mark.installation
 

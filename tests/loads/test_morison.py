@@ -8,7 +8,7 @@ from naive.rigid_body import rotation
 from plant import make_pose
 
 from fowt_env.description import SeaState
-from fowt_env.loads.morison import (
+from fowt_env.plant.hydro.morison import (
     GAUSS_OFFSET,
     Current,
     axis_surface,

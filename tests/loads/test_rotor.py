@@ -7,12 +7,12 @@ import pytest
 from naive import rotor as naive
 from numba import njit
 
-from fowt_env.counters import N_COUNTERS, Counter
 from fowt_env.description import read_turbine
 from fowt_env.errors import InputError
-from fowt_env.loads.blade_elements import bem_residual, blade_section, build_blade_elements
-from fowt_env.loads.rotor import NO_ROTOR_LOAD, rotor_load
-from fowt_env.state import N_RIGID, State, pose_of
+from fowt_env.plant.aero.bem_rotor import NO_ROTOR_LOAD, rotor_load
+from fowt_env.plant.aero.blade_elements import bem_residual, blade_section, build_blade_elements
+from fowt_env.plant.events import N_COUNTERS, Counter
+from fowt_env.plant.state import N_RIGID, State, pose_of
 from fowt_env.weather.wind import make_series, wind_at, wind_now
 
 pytestmark = pytest.mark.installation
@@ -396,10 +396,10 @@ def test_infinite_or_missing_numbers_come_back_as_nan():
 
 PLAIN = """
 import numpy as np
-from fowt_env.loads.blade_elements import build_blade_elements
-from fowt_env.loads.rotor import rotor_load
+from fowt_env.plant.aero.blade_elements import build_blade_elements
+from fowt_env.plant.aero.bem_rotor import rotor_load
 from fowt_env.description import read_turbine
-from fowt_env.state import pose_of
+from fowt_env.plant.state import pose_of
 from fowt_env.weather.wind import make_series, wind_now
 rotor = build_blade_elements(read_turbine("nrel5mw"), 1.225)
 series = make_series([0.0], [[%r, 1.0, 0.5, 0.5, 0.2]], reference_height=90.0, reference_length=126.0,

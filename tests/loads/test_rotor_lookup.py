@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from numba import config, njit
 
-from fowt_env.counters import N_COUNTERS
 from fowt_env.description import read_turbine
-from fowt_env.loads.blade_elements import blade_section, build_blade_elements
-from fowt_env.loads.rotor import NO_ROTOR_LOAD, hub_flow, rotor_load
-from fowt_env.loads.rotor_lookup import (
+from fowt_env.plant.aero.bem_rotor import NO_ROTOR_LOAD, hub_flow, rotor_load
+from fowt_env.plant.aero.blade_elements import blade_section, build_blade_elements
+from fowt_env.plant.aero.section_table import (
     AHEAD,
     BEHIND,
     COARSE_END,
@@ -25,7 +24,8 @@ from fowt_env.loads.rotor_lookup import (
     build_section_table,
     rotor_lookup_load,
 )
-from fowt_env.state import N_RIGID, State, pose_of
+from fowt_env.plant.events import N_COUNTERS
+from fowt_env.plant.state import N_RIGID, State, pose_of
 from fowt_env.weather.wind import make_series, wind_now
 from fowt_env.weather.wind_field import WindField
 
@@ -347,9 +347,9 @@ PLAIN = """
 import sys
 import numpy as np
 from fowt_env.description import read_turbine
-from fowt_env.loads.blade_elements import build_blade_elements
-from fowt_env.loads.rotor_lookup import SectionTable, rotor_lookup_load
-from fowt_env.state import pose_of
+from fowt_env.plant.aero.blade_elements import build_blade_elements
+from fowt_env.plant.aero.section_table import SectionTable, rotor_lookup_load
+from fowt_env.plant.state import pose_of
 from fowt_env.weather.wind import make_series, wind_now
 from fowt_env.weather.wind_field import WindField
 

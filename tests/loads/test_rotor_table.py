@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
 
-from fowt_env.counters import N_COUNTERS
 from fowt_env.description import read_turbine
-from fowt_env.loads.blade_elements import build_blade_elements
-from fowt_env.loads.rotor import NO_ROTOR_LOAD, rotor_load
-from fowt_env.loads.rotor_table import build_rotor_table, rotor_table_load
-from fowt_env.state import N_RIGID, State, pose_of
+from fowt_env.plant.aero.bem_rotor import NO_ROTOR_LOAD, rotor_load
+from fowt_env.plant.aero.blade_elements import build_blade_elements
+from fowt_env.plant.aero.coefficient_table import build_rotor_table, rotor_table_load
+from fowt_env.plant.events import N_COUNTERS
+from fowt_env.plant.state import N_RIGID, State, pose_of
 from fowt_env.weather.wind import make_series, wind_now
 
 pytestmark = pytest.mark.installation

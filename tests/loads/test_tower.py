@@ -3,8 +3,8 @@ import pytest
 from naive import rotor as naive
 
 from fowt_env.description import read_platform
-from fowt_env.loads.tower import build_tower_drag, tower_load
-from fowt_env.state import N_RIGID, NO_LOAD, pose_of
+from fowt_env.plant.aero.tower_drag import build_tower_drag, tower_load
+from fowt_env.plant.state import N_RIGID, NO_LOAD, pose_of
 from fowt_env.weather.wind import make_series, wind_at, wind_now
 
 pytestmark = pytest.mark.installation

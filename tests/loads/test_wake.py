@@ -1,11 +1,10 @@
 import numpy as np
 import pytest
 
-from fowt_env.counters import N_COUNTERS
 from fowt_env.description import read_turbine
-from fowt_env.loads.blade_elements import blade_section, build_blade_elements
-from fowt_env.loads.rotor import hub_flow, rotor_load, wake_equilibrium
-from fowt_env.loads.wake import (
+from fowt_env.plant.aero.bem_rotor import hub_flow, rotor_load, wake_equilibrium
+from fowt_env.plant.aero.blade_elements import blade_section, build_blade_elements
+from fowt_env.plant.aero.wake import (
     PER_ELEMENT,
     build_dynamic_inflow,
     build_skewed_wake,
@@ -14,7 +13,8 @@ from fowt_env.loads.wake import (
     skew_of,
     time_constants,
 )
-from fowt_env.state import N_RIGID, State, pose_of
+from fowt_env.plant.events import N_COUNTERS
+from fowt_env.plant.state import N_RIGID, State, pose_of
 from fowt_env.weather.wind import make_series, wind_now
 
 pytestmark = pytest.mark.installation

@@ -1,4 +1,4 @@
-"""Slow, obvious twin of fowt_env/loads/hydrostatics.py: fibres along the hull, each integrated."""
+"""Slow, obvious twin of fowt_env/plant/hydro/hydrostatics.py: fibres along the hull, each integrated."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Slow, obvious twin of fowt_env/loads/mooring.py: the equations of theory.md 5.5 as printed, N and m."""
+"""Slow, obvious twin of fowt_env/plant/mooring.py: the equations of theory.md 5.5 as printed, N and m."""
 
 import numpy as np
 from scipy.optimize import brentq

@@ -9,7 +9,7 @@ import fowt_env
 from fowt_env.controllers import make
 from fowt_env.controllers.constant import Constant
 from fowt_env.errors import InputError
-from fowt_env.measurement import Measurement
+from fowt_env.plant.measurement import Measurement
 from fowt_env.training.evaluate import Case, evaluate
 from fowt_env.training.faults import Fault, FaultedController, faulted, idling
 

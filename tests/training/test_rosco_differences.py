@@ -7,7 +7,7 @@ import pytest
 
 from fowt_env.controllers.pi import PISettings
 from fowt_env.controllers.pi import pi as make_pi
-from fowt_env.measurement import Measurement
+from fowt_env.plant.measurement import Measurement
 from fowt_env.training.rosco_differences import InsideIntegral, differences, outside_factor
 
 RATED = Measurement(*[0.0] * len(Measurement._fields))._replace(

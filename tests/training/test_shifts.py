@@ -9,7 +9,7 @@ import fowt_env
 from fowt_env.controllers import make
 from fowt_env.errors import InputError
 from fowt_env.linear_model import linearize
-from fowt_env.measurement import Measurement
+from fowt_env.plant.measurement import Measurement
 from fowt_env.training.cases import Case, described, read_suite
 from fowt_env.training.evaluate import evaluate, planned
 from fowt_env.training.randomisation import PLANT, SENSORS

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from fowt_env.errors import InputError
-from fowt_env.jit import kernel
+from fowt_env.plant.compile.decorators import kernel
 from fowt_env.weather.iec import ntm_sigma
 from fowt_env.weather.wind import (
     LOWEST_HEIGHT,

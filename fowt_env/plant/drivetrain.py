@@ -4,7 +4,7 @@ from math import isfinite, sqrt
 from typing import NamedTuple
 
 from fowt_env.errors import InputError, unknown
-from fowt_env.jit import kernel
+from fowt_env.plant.compile.decorators import kernel
 
 REGION3 = ("constant_torque", "constant_power")
 

@@ -8,7 +8,7 @@ from enum import IntEnum
 from math import cos, sin
 from typing import NamedTuple
 
-from fowt_env.jit import kernel
+from fowt_env.plant.compile.decorators import kernel
 
 
 class State(IntEnum):

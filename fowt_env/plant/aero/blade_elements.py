@@ -31,7 +31,7 @@ import numba
 import numpy as np
 
 from fowt_env.errors import InputError
-from fowt_env.jit import kernel
+from fowt_env.plant.compile.decorators import kernel
 
 TOLERANCE = 1e-8  # of the residual before the last step of Newton's method; after it, about its square
 LAST_STEP = 1e-6  # largest last step, times Momentum.scale: the second-order error of loads is then 1e-12

@@ -13,7 +13,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from fowt_env.jit import kernel
+from fowt_env.plant.compile.decorators import kernel
 
 SUM_LANES = 8
 CROSSED = ((0, 2), (0, 3), (1, 2), (1, 3))  # of rows v, g, c, s

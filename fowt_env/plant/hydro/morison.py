@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fowt_env.jit import kernel
-from fowt_env.loads.diffraction import factor_at
-from fowt_env.state import Wrench
+from fowt_env.plant.compile.decorators import kernel
+from fowt_env.plant.hydro.diffraction import factor_at
+from fowt_env.plant.state import Wrench
 from fowt_env.weather.waves import NEGLIGIBLE, elevation, ramp_factor
 
 CELLS_PER_DRAFT = (

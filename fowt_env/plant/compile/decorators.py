@@ -28,7 +28,7 @@ from numba import types  # noqa: E402
 from numba.core.ccallback import CFunc  # noqa: E402
 
 from fowt_env.folders import cache_root, distrust, make_private  # noqa: E402
-from fowt_env.kernel_cache import KernelCache  # noqa: E402
+from fowt_env.plant.compile.disk_cache import KernelCache  # noqa: E402
 
 KEEP_CACHES = 4  # folders of older sources kept, so that switching branches does not recompile
 KERNEL_PACKAGES = ("fowt_env", "controllers")
@@ -52,7 +52,7 @@ NOT_COMPILED = (
 )
 
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[3]
 
 
 def _sources(packages):

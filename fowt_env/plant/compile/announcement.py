@@ -5,7 +5,7 @@ from contextlib import contextmanager
 import numba
 from numba.core import event
 
-from fowt_env.jit import CACHE_FOLDER, KERNEL_PACKAGES
+from fowt_env.plant.compile.decorators import CACHE_FOLDER, KERNEL_PACKAGES
 
 COMPILING_MESSAGE = "compiling kernels (first run of this kind of scene only, 10 s to 2 min) ..."
 

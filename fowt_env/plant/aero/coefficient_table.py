@@ -17,10 +17,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fowt_env.jit import kernel
-from fowt_env.loads.blade_elements import blade_section, elements_key, fade
-from fowt_env.loads.rotor import FAST_ROTOR, NO_ROTOR_LOAD, SLOW_ROTOR, RotorLoad, hub_flow
-from fowt_env.state import State, Wrench
+from fowt_env.plant.aero.bem_rotor import FAST_ROTOR, NO_ROTOR_LOAD, SLOW_ROTOR, RotorLoad, hub_flow
+from fowt_env.plant.aero.blade_elements import blade_section, elements_key, fade
+from fowt_env.plant.compile.decorators import kernel
+from fowt_env.plant.state import State, Wrench
 
 # Angle theta = atan2(speed * tip radius, axial wind): 0 parked, 90 deg no wind, 180 deg parked in reversed
 # wind, negative turning backwards. Steps are small where the loads bend: (start, step) in deg. Tip-speed

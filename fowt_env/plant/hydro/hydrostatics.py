@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fowt_env.counters import Counter
-from fowt_env.jit import kernel
-from fowt_env.state import NO_LOAD, Wrench
+from fowt_env.plant.compile.decorators import kernel
+from fowt_env.plant.events import Counter
+from fowt_env.plant.state import NO_LOAD, Wrench
 
 SLICE_NODES = 24  # Gauss points per section in the partly wet zone; 1e-4 of the volume at 60 deg
 

@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fowt_env.counters import Counter
-from fowt_env.jit import kernel
-from fowt_env.state import NO_LOAD, Wrench
+from fowt_env.plant.compile.decorators import kernel
+from fowt_env.plant.events import Counter
+from fowt_env.plant.state import NO_LOAD, Wrench
 
 SLACK, TOUCHDOWN, SUSPENDED = 0, 1, 2  # regimes, as written to the last column of `lines`
 

@@ -4,12 +4,12 @@ from math import isfinite
 
 import numpy as np
 
-from fowt_env.channels import measure, record
-from fowt_env.dynamics import Kept, loads_of
-from fowt_env.integrators import rates, take_step
-from fowt_env.jit import entry, inlined_kernel, kernel
-from fowt_env.loads.drivetrain import followed_torque, torque_was_limited
-from fowt_env.state import State
+from fowt_env.plant.channels import measure, record
+from fowt_env.plant.compile.decorators import entry, inlined_kernel, kernel
+from fowt_env.plant.drivetrain import followed_torque, torque_was_limited
+from fowt_env.plant.dynamics import Kept, loads_of
+from fowt_env.plant.integrators import rates, take_step
+from fowt_env.plant.state import State
 
 RUNNING, NON_FINITE, CAPSIZED, OVERSPEED, BLOWN_UP = 0, 1, 2, 3, 4
 CAPSIZE = 1.4  # rad (80 deg) of platform pitch: the Euler angles are singular at 90 deg

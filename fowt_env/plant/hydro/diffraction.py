@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import h1vp
 
-from fowt_env.jit import kernel
+from fowt_env.plant.compile.decorators import kernel
 
 TERMS = 6  # of the polynomial: within 3e-6 of the coefficient on the taper of OC3 down to 2.5 s
 

@@ -6,8 +6,8 @@ Both are off by default (None). Source: theory.md, 5.1.
 from math import atan2, pi, sqrt, tan
 from typing import NamedTuple
 
-from fowt_env.jit import kernel
-from fowt_env.state import State
+from fowt_env.plant.compile.decorators import kernel
+from fowt_env.plant.state import State
 
 PER_ELEMENT = 4  # wake states of a blade element: first stage and induced velocity, axial and tangential
 LOWEST_WIND = 1.0  # m/s; weaker wind gets the time constants of this one, which would else grow without bound

@@ -2,8 +2,8 @@
 
 from typing import NamedTuple
 
-from fowt_env.jit import kernel
-from fowt_env.state import NO_LOAD, State, Wrench
+from fowt_env.plant.compile.decorators import kernel
+from fowt_env.plant.state import NO_LOAD, State, Wrench
 
 
 class LinearDamping(NamedTuple):

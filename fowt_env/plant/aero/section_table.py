@@ -20,16 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fowt_env.counters import Counter
-from fowt_env.jit import kernel
-from fowt_env.loads.blade_elements import (
-    LARGEST_SPEED,
-    BladeElements,
-    blade_section,
-    elements_key,
-    fade,
-)
-from fowt_env.loads.rotor import (
+from fowt_env.plant.aero.bem_rotor import (
     FAST_ROTOR,
     NO_ROTOR_LOAD,
     SLOW_ROTOR,
@@ -37,8 +28,17 @@ from fowt_env.loads.rotor import (
     hub_flow,
     rotor_load,
 )
-from fowt_env.prefetch import prefetch
-from fowt_env.state import State, Wrench
+from fowt_env.plant.aero.blade_elements import (
+    LARGEST_SPEED,
+    BladeElements,
+    blade_section,
+    elements_key,
+    fade,
+)
+from fowt_env.plant.compile.decorators import kernel
+from fowt_env.plant.compile.prefetch import prefetch
+from fowt_env.plant.events import Counter
+from fowt_env.plant.state import State, Wrench
 from fowt_env.weather.wind import LOWEST_HEIGHT, wind_at
 
 # Directions: v_normal/(v_normal + |v_tangential|) in AHEAD cells, from the rotor plane to the shaft (where

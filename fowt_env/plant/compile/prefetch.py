@@ -6,7 +6,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from fowt_env.jit import kernel
+from fowt_env.plant.compile.decorators import kernel
 
 
 @intrinsic

@@ -11,12 +11,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fowt_env.dynamics import Kept, accelerate, attitude_rate, derivative, evaluate, respond, rotor_part
 from fowt_env.errors import unknown
-from fowt_env.jit import inlined_kernel, kernel
-from fowt_env.loads.drivetrain import followed_pitch, limited
-from fowt_env.loads.morison import StripLoad
-from fowt_env.state import NO_LOAD, State, Wrench, pose_in
+from fowt_env.plant.compile.decorators import inlined_kernel, kernel
+from fowt_env.plant.drivetrain import followed_pitch, limited
+from fowt_env.plant.dynamics import Kept, accelerate, attitude_rate, derivative, evaluate, respond, rotor_part
+from fowt_env.plant.hydro.morison import StripLoad
+from fowt_env.plant.state import NO_LOAD, State, Wrench, pose_in
 from fowt_env.weather.wind import wind_now
 
 INTEGRATORS = ("rk4", "heun", "abm4", "ab4")

@@ -10,19 +10,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fowt_env.jit import inlined_kernel, kernel
-from fowt_env.loads.damping import damping_load
-from fowt_env.loads.drivetrain import pitch_rate, shaft_torque
-from fowt_env.loads.fast_waves import FastScratch, fast_morison_load
-from fowt_env.loads.hydrostatics import hydrostatic_load
-from fowt_env.loads.mooring import mooring_load
-from fowt_env.loads.morison import StripLoad, morison_load
-from fowt_env.loads.own import evaluate_own, with_own
-from fowt_env.loads.rotor import RotorLoad, rotor_load
-from fowt_env.loads.rotor_lookup import rotor_lookup_load
-from fowt_env.loads.rotor_table import rotor_table_load
-from fowt_env.loads.tower import tower_load
-from fowt_env.state import NO_LOAD, State, Wrench, add, pose_in, pose_of
+from fowt_env.plant.aero.bem_rotor import RotorLoad, rotor_load
+from fowt_env.plant.aero.coefficient_table import rotor_table_load
+from fowt_env.plant.aero.section_table import rotor_lookup_load
+from fowt_env.plant.aero.tower_drag import tower_load
+from fowt_env.plant.compile.decorators import inlined_kernel, kernel
+from fowt_env.plant.drivetrain import pitch_rate, shaft_torque
+from fowt_env.plant.hydro.hydrostatics import hydrostatic_load
+from fowt_env.plant.hydro.linear_damping import damping_load
+from fowt_env.plant.hydro.morison import StripLoad, morison_load
+from fowt_env.plant.hydro.wave_bands import FastScratch, fast_morison_load
+from fowt_env.plant.mooring import mooring_load
+from fowt_env.plant.state import NO_LOAD, State, Wrench, add, pose_in, pose_of
+from fowt_env.plant.user_loads import evaluate_own, with_own
 from fowt_env.weather.wind import wind_now
 
 
