@@ -10,7 +10,7 @@ from fowt_env.controllers.policy import policy, shipped_agents
 from fowt_env.controllers.registry import CONTROLLERS
 from fowt_env.controllers.saved_design import PREFIX as DESIGN
 from fowt_env.controllers.saved_design import load_design
-from fowt_env.description import read_turbine
+from fowt_env.descriptions.platform import read_turbine
 from fowt_env.errors import InputError, unknown
 
 if __name__ != "fowt_env.controllers":  # a module that is imported under two names exists twice

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.linalg import expm, solve_continuous_are, solve_discrete_are
 from scipy.optimize import least_squares
 
-from fowt_env.description import joint_sea_state, sea_state_of
+from fowt_env.descriptions.platform import joint_sea_state, sea_state_of
 from fowt_env.errors import InputError, unknown
 from fowt_env.linear_model import linearize
 from fowt_env.steady import calm

@@ -15,12 +15,12 @@ import numpy as np
 from pydantic import Field
 
 from fowt_env.controllers.registry import CONTROLLERS
+from fowt_env.descriptions.files import parse_json, raise_problems
+from fowt_env.descriptions.records import Finite, NonNegative, Positive, Record, unknown_key, validate
 from fowt_env.envs.actions import MODES
 from fowt_env.envs.decisions import DecisionSettings
 from fowt_env.envs.observations import KNOWN, N_ACTIONS
 from fowt_env.errors import InputError
-from fowt_env.records import Finite, NonNegative, Positive, Record, unknown_key, validate
-from fowt_env.textfiles import parse_json, raise_problems
 
 FORMAT = 1
 ACTIVATIONS = {"tanh": np.tanh, "relu": lambda x: np.maximum(x, 0.0)}

@@ -15,9 +15,9 @@ import numpy as np
 from fowt_env.controllers.lqr import LQR
 from fowt_env.controllers.lqr_design import LOWEST_DESIGN_WIND, MODEL_SHAPES, DesignModel, Weights
 from fowt_env.controllers.pi import PI, PISettings
+from fowt_env.descriptions.files import parse_json, read_text
 from fowt_env.errors import InputError, unknown
 from fowt_env.outputs import replacing
-from fowt_env.textfiles import parse_json, read_text
 
 PREFIX = "design:"
 FORMAT, VERSION = "fowt-design", 1

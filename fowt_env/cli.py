@@ -483,7 +483,7 @@ def list_names(
     """List the names that the other commands know."""
     from fowt_env.controllers import CONTROLLERS
     from fowt_env.controllers.policy import shipped_agents
-    from fowt_env.description import names
+    from fowt_env.descriptions.platform import names
     from fowt_env.training.cases import all_cases, read_suite, suite_names
 
     known = {

@@ -85,6 +85,6 @@ def _draw(kind, frames, path, title, skip, platform):
 
 def _platform_pitch_period(platform):
     """Natural period (s) of platform pitch that a platform's file states, or None."""
-    from fowt_env.description import read_platform
+    from fowt_env.descriptions.platform import read_platform
 
     return read_platform(platform).published.get("natural_periods", {}).get("pitch")

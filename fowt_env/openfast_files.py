@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fowt_env.descriptions.files import read_text
 from fowt_env.errors import InputError
-from fowt_env.textfiles import read_text
 
 TIME = "Time_[s]"
 # OpenFAST's FileIDs. 3 is double precision, time by its start and step; the others round to 16 bits

@@ -13,11 +13,11 @@ import numpy as np
 from numba import types
 from numba.core.errors import NumbaError
 
+from fowt_env.descriptions.records import is_number
 from fowt_env.errors import InputError
 from fowt_env.plant.channels import channels
 from fowt_env.plant.compile.decorators import FLOATS
 from fowt_env.plant.user_loads import MOST_LOADS, N_MOTION, Motion, OwnLoads
-from fowt_env.records import is_number
 
 AXES = ("inertial", "body")
 SIGNATURE = types.void(FLOATS, FLOATS, FLOATS)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from fowt_env.descriptions.records import is_number
 from fowt_env.errors import ControllerInputError, InputError, SimulationStopped, unknown
 from fowt_env.plant.channels import DEG, RPM
 from fowt_env.plant.compile.decorators import control_kernel
@@ -26,7 +27,6 @@ from fowt_env.plant.rollout import (
     run,
 )
 from fowt_env.plant.state import OUT_OF_PLANE, State, pose_of
-from fowt_env.records import is_number
 from fowt_env.scene import Scene
 from fowt_env.steady import trim
 from fowt_env.weather.wind_field import WindBox

@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-from fowt_env.description import read_platform, read_turbine
+from fowt_env.descriptions.platform import read_platform, read_turbine
 from fowt_env.scene import build_scene
 
 os.environ.setdefault("SDL_VIDEODRIVER", "dummy")  # windows of render mode "human" without a display

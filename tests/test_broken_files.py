@@ -19,9 +19,9 @@ from fowt_env import cli
 from fowt_env.controllers import make
 from fowt_env.controllers.policy import AGENTS
 from fowt_env.controllers.policy_file import read_policy
-from fowt_env.description import read_turbine
+from fowt_env.descriptions.files import parse_json, read_toml
+from fowt_env.descriptions.platform import read_turbine
 from fowt_env.errors import InputError
-from fowt_env.textfiles import parse_json, read_toml
 from fowt_env.training import report_html, results
 from fowt_env.training.metrics import METRICS
 

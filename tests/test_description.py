@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fowt_env import description
-from fowt_env.description import (
+from fowt_env.descriptions import platform as description
+from fowt_env.descriptions.files import MAX_BYTES
+from fowt_env.descriptions.platform import (
     SeaState,
     iec_gamma,
     joint_sea_state,
@@ -22,7 +23,6 @@ from fowt_env.description import (
     sea_states,
 )
 from fowt_env.errors import InputError
-from fowt_env.textfiles import MAX_BYTES
 
 PLATFORM = description.DATA / "platforms" / "oc3_hywind.toml"
 TURBINE = description.DATA / "turbines" / "nrel5mw" / "turbine.toml"

@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 import fowt_env
 from fowt_env import cli, health, requirements
 from fowt_env.controllers import make
-from fowt_env.description import DATA, read_platform
+from fowt_env.descriptions.platform import DATA, read_platform
 from fowt_env.envs import FowtEnv
 from fowt_env.plant.compile import announcement as warmup
 from fowt_env.plant.compile import decorators as jit

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from fowt_env import build_scene, cli
+from fowt_env.descriptions.sea_state import SEA_KEYS
+from fowt_env.descriptions.wind import KINDS
 from fowt_env.errors import InputError
 from fowt_env.scene import OPTIONS
-from fowt_env.sea_states import SEA_KEYS
-from fowt_env.weather.wind_spec import KINDS
 
 
 def examples(count):

@@ -14,7 +14,7 @@ from plant import rates
 
 import fowt_env
 from fowt_env import Load, Motion, build_scene, linearize, load_kernel, natural_periods, simulate, trim
-from fowt_env.description import read_platform
+from fowt_env.descriptions.platform import read_platform
 from fowt_env.envs import FowtEnv, FowtVectorEnv
 from fowt_env.errors import InputError, SimulationStopped
 from fowt_env.plant.dynamics import Kept

@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 
 import fowt_env
 from fowt_env.cli import app
-from fowt_env.description import read_platform, read_turbine
+from fowt_env.descriptions.platform import read_platform, read_turbine
 from fowt_env.errors import InputError
 from fowt_env.plant.state import State
 from fowt_env.steady import trim_held

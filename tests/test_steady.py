@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 import fowt_env
 from fowt_env import cli, equilibrium
-from fowt_env.description import DATA, names, read_platform, read_turbine
+from fowt_env.descriptions.platform import DATA, names, read_platform, read_turbine
 from fowt_env.envs import FowtEnv
 from fowt_env.equilibrium import check_equilibrium, evaluated
 from fowt_env.errors import InputError

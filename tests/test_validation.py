@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from fowt_env.controllers import CONTROLLERS
-from fowt_env.description import read_platform, read_turbine
+from fowt_env.descriptions.platform import read_platform, read_turbine
 from fowt_env.errors import InputError
 from fowt_env.plant.aero.blade_elements import build_blade_elements, lift_drag
 from fowt_env.plant.channels import Out

@@ -12,9 +12,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
-from fowt_env.description import joint_sea_state, read_platform
-from fowt_env.errors import InputError, unknown
-from fowt_env.records import (
+from fowt_env.descriptions.files import locate, raise_problems, read_toml
+from fowt_env.descriptions.platform import joint_sea_state, read_platform
+from fowt_env.descriptions.records import (
     NonNegative,
     Positive,
     Record,
@@ -22,15 +22,15 @@ from fowt_env.records import (
     plain_number,
     validate,
 )
+from fowt_env.descriptions.sea_state import SeaState, sea_state_of
+from fowt_env.descriptions.wind import read_wind
+from fowt_env.errors import InputError, unknown
 from fowt_env.scene import OPTIONS
-from fowt_env.sea_states import SeaState, sea_state_of
-from fowt_env.textfiles import locate, raise_problems, read_toml
 from fowt_env.training.faults import Fault
 from fowt_env.training.metrics import METRICS
 from fowt_env.training.shifts import Shift
 from fowt_env.weather.wind_field import KINDS as FIELD_KINDS
 from fowt_env.weather.wind_field import REQUIRED, is_field
-from fowt_env.weather.wind_spec import read_wind
 
 FOLDER = Path(__file__).parent / "suites"
 WIND_KINDS = ("rotor-averaged", "full-field")

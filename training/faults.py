@@ -8,7 +8,7 @@ from typing import Literal
 
 from fowt_env.controllers.base import CheckedController, CompiledController, check_control_dt
 from fowt_env.controllers.constant import Constant
-from fowt_env.records import NonNegative, Positive, Record
+from fowt_env.descriptions.records import NonNegative, Positive, Record
 
 
 class Fault(Record):

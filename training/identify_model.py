@@ -15,7 +15,7 @@ from math import cos, hypot, pi, sin, sqrt
 import numpy as np
 from scipy.optimize import brentq, fsolve
 
-from fowt_env.description import DATA, Line, read_platform, read_turbine
+from fowt_env.descriptions.platform import DATA, Line, read_platform, read_turbine
 from fowt_env.linear_model import natural_periods
 from fowt_env.outputs import replacing
 from fowt_env.plant.mooring import catenary

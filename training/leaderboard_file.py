@@ -7,8 +7,8 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from fowt_env.descriptions.records import validate
 from fowt_env.errors import InputError
-from fowt_env.records import validate
 
 Count = Annotated[int, Field(ge=0, le=10**9)]
 Number = Annotated[float, Field(ge=-1e300, le=1e300)]

@@ -10,7 +10,7 @@ from math import isfinite
 
 import numpy as np
 
-from fowt_env.description import read_platform, read_turbine
+from fowt_env.descriptions.platform import read_platform, read_turbine
 from fowt_env.envs.sensors import check_sensors
 from fowt_env.errors import InputError, unknown
 

@@ -3,7 +3,7 @@
 import json
 from dataclasses import replace
 
-from fowt_env.description import Platform, read_platform
+from fowt_env.descriptions.platform import Platform, read_platform
 from fowt_env.errors import unknown
 from fowt_env.outputs import read_table
 from fowt_env.plots import TIME, plot_evaluation, plot_pareto, plot_runs, plot_spectra

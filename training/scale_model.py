@@ -16,7 +16,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from fowt_env.description import DATA, read_platform, read_turbine
+from fowt_env.descriptions.platform import DATA, read_platform, read_turbine
 from fowt_env.errors import InputError
 from fowt_env.outputs import replacing
 from fowt_env.training.identify_model import toml_value

@@ -9,8 +9,8 @@ import pandas as pd
 
 import fowt_env
 from fowt_env.controllers import make
+from fowt_env.descriptions.records import is_number
 from fowt_env.errors import ControllerError, ControllerInputError, InputError, SimulationStopped
-from fowt_env.records import is_number
 from fowt_env.training.faults import faulted, idling
 from fowt_env.training.guard import attempt, reason_of
 from fowt_env.training.metrics import METRICS, TIME, metrics

@@ -8,12 +8,21 @@ from pydantic import Field
 
 from fowt_env.controllers.policy_file import ACTIVATIONS
 from fowt_env.controllers.registry import CONTROLLERS
+from fowt_env.descriptions.files import raise_problems, read_text
+from fowt_env.descriptions.records import (
+    Fraction,
+    NonNegative,
+    Positive,
+    Record,
+    is_number,
+    short,
+    unknown_key,
+    validate,
+)
 from fowt_env.envs.decisions import DecisionSettings
 from fowt_env.envs.env import SETTINGS
 from fowt_env.errors import InputError
-from fowt_env.records import Fraction, NonNegative, Positive, Record, is_number, short, unknown_key, validate
 from fowt_env.scene import OPTIONS
-from fowt_env.textfiles import raise_problems, read_text
 
 Count = Annotated[int, Field(ge=1, strict=True)]
 Whole = Annotated[int, Field(ge=0, strict=True)]

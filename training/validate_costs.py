@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from fowt_env.description import read_platform, read_turbine
+from fowt_env.descriptions.platform import read_platform, read_turbine
 from fowt_env.training.comparison import normalised_rms
 from fowt_env.training.openfast import PLATFORM, RUNS, box_wind
 from fowt_env.weather.iec import ntm_sigma

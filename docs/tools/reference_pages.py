@@ -16,7 +16,7 @@ import typer
 from rich.text import Text
 
 from fowt_env.cli import app
-from fowt_env.description import read_platform, read_turbine
+from fowt_env.descriptions.platform import read_platform, read_turbine
 from fowt_env.envs import rewards
 from fowt_env.envs.actions import TRACKING_DAMPING, TRACKING_FREQUENCY
 from fowt_env.envs.observations import KNOWN, STANDARD, entries

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
-from fowt_env.description import Platform
+from fowt_env.descriptions.platform import Platform
 from fowt_env.envs.actions import MODES, Mode, build_action_map, start_tracking
 from fowt_env.envs.kernels import (
     BAD_ACTION,

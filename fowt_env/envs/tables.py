@@ -2,7 +2,7 @@
 
 from math import isinf
 
-from fowt_env.description import read_platform, read_turbine
+from fowt_env.descriptions.platform import read_platform, read_turbine
 from fowt_env.envs.observations import entries
 from fowt_env.envs.rewards import TERMS
 

@@ -5,7 +5,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fowt_env.description import joint_sea_state, joint_tables, sea_state_of
+from fowt_env.descriptions.platform import joint_sea_state, joint_tables, sea_state_of
+from fowt_env.descriptions.wind import read_wind
 from fowt_env.envs.observations import STANDARD, check_channels
 from fowt_env.envs.rewards import check_weights
 from fowt_env.errors import InputError, unknown
@@ -13,7 +14,6 @@ from fowt_env.plant.state import State
 from fowt_env.simulation import INITIAL
 from fowt_env.weather.wind import WindSeries, nominal_speed
 from fowt_env.weather.wind_field import is_field
-from fowt_env.weather.wind_spec import read_wind
 
 SITE = "gulf_of_maine_normal"
 LARGEST_SEED = 2**31  # of an episode's weather

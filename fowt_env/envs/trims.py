@@ -5,7 +5,7 @@ import pickle
 from dataclasses import replace
 from math import floor
 
-from fowt_env.records import Record
+from fowt_env.descriptions.records import Record
 from fowt_env.steady import trim
 
 GRID = 0.25  # m/s between exact trims; between them the state is linear in the wind speed

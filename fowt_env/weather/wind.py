@@ -11,13 +11,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fowt_env.descriptions.wind import SHARED, Number, Seed, read_wind
 from fowt_env.errors import InputError
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.weather import gusts
 from fowt_env.weather.iec import EXTREME_SHEAR_EXPONENT, etm_sigma, extreme_speed, ntm_sigma
 from fowt_env.weather.turbulence import SHORTEST_PERIOD, hub_turbulence, turbulence
 from fowt_env.weather.wind_field import field_at
-from fowt_env.weather.wind_spec import SHARED, Number, Seed, read_wind
 
 OPENING = 60.0  # s; the platform trims to the mean of this much of a user's series
 LOWEST_HEIGHT = 1.0  # m; points below it (waves, rotor at sea level) see the wind of this height

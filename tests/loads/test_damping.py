@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from plant import random_state
 
-from fowt_env.description import Hydro
+from fowt_env.descriptions.platform import Hydro
 from fowt_env.plant.hydro.linear_damping import LinearDamping, build_damping, damping_load
 from fowt_env.plant.state import NO_LOAD, State, pose_of
 

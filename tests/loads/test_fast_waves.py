@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from naive.strips import strip_load
 
-from fowt_env.description import read_platform, sea_state_of
+from fowt_env.descriptions.platform import read_platform, sea_state_of
 from fowt_env.plant.hydro import wave_bands as fast_waves
 from fowt_env.plant.hydro.morison import Current, axis_surface, build_strips, current_at, morison_load
 from fowt_env.plant.hydro.wave_bands import (

@@ -7,7 +7,7 @@ import naive.mooring as naive
 import numpy as np
 import pytest
 
-from fowt_env.description import Line
+from fowt_env.descriptions.platform import Line
 from fowt_env.plant.events import N_COUNTERS, Counter
 from fowt_env.plant.mooring import (
     N_LINE,

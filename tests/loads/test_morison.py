@@ -7,7 +7,7 @@ from naive.morison import spar_of
 from naive.rigid_body import rotation
 from plant import make_pose
 
-from fowt_env.description import SeaState
+from fowt_env.descriptions.platform import SeaState
 from fowt_env.plant.hydro.morison import (
     GAUSS_OFFSET,
     Current,

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from naive import rotor as naive
 
-from fowt_env.description import read_platform
+from fowt_env.descriptions.platform import read_platform
 from fowt_env.plant.aero.tower_drag import build_tower_drag, tower_load
 from fowt_env.plant.state import N_RIGID, NO_LOAD, pose_of
 from fowt_env.weather.wind import make_series, wind_at, wind_now

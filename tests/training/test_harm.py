@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 import fowt_env
 from fowt_env import cli
-from fowt_env.description import read_platform, read_turbine
+from fowt_env.descriptions.platform import read_platform, read_turbine
 from fowt_env.errors import InputError
 from fowt_env.training import engines, guard, results
 from fowt_env.training.cases import Case

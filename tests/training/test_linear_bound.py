@@ -10,7 +10,7 @@ from scipy.linalg import solve_continuous_are, solve_continuous_lyapunov
 
 from fowt_env import build_scene
 from fowt_env.controllers.lqr_design import MOMENT, N_FEEDBACK, N_PLANT, PLANT, design_model, wind_filter
-from fowt_env.description import joint_sea_state, sea_state_of
+from fowt_env.descriptions.platform import joint_sea_state, sea_state_of
 from fowt_env.errors import InputError
 from fowt_env.linear_model import linearize
 from fowt_env.plots_design import plot_bound

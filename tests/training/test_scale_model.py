@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fowt_env import build_scene, natural_periods, simulate, trim
-from fowt_env.description import DATA, Line, read_platform, read_turbine
+from fowt_env.descriptions.platform import DATA, Line, read_platform, read_turbine
 from fowt_env.errors import InputError
 from fowt_env.training.scale_model import EXPONENTS, platform_text, scale_of_power, turbine_text, write
 

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from fowt_env.descriptions.wind import KINDS, read_wind
 from fowt_env.errors import InputError
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.weather.iec import ntm_sigma
@@ -14,7 +15,6 @@ from fowt_env.weather.wind import (
     wind_at,
     wind_now,
 )
-from fowt_env.weather.wind_spec import KINDS, read_wind
 
 pytestmark = pytest.mark.installation
 

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
+from fowt_env.descriptions.records import interval, short
 from fowt_env.errors import InputError
-from fowt_env.records import interval, short
 
 DATA = Path(__file__).parent / "data"
 MAX_BYTES = 5_000_000  # a description is a few kB; anything far larger is a wrong file

@@ -11,8 +11,8 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from fowt_env.errors import InputError, unknown
-from fowt_env.records import (
+from fowt_env.descriptions.files import DATA, column, locate, raise_problems, read_table, read_toml
+from fowt_env.descriptions.records import (
     Finite,
     FloatArray,
     Fraction,
@@ -23,7 +23,7 @@ from fowt_env.records import (
     to_si,
     validate,
 )
-from fowt_env.sea_states import (
+from fowt_env.descriptions.sea_state import (
     SeaState,
     iec_gamma,
     joint_sea_state,
@@ -32,7 +32,7 @@ from fowt_env.sea_states import (
     sea_state_of,
     sea_states,
 )
-from fowt_env.textfiles import DATA, column, locate, raise_problems, read_table, read_toml
+from fowt_env.errors import InputError, unknown
 
 __all__ = [  # the one place to import descriptions from
     "Ballast",

@@ -9,8 +9,8 @@ from typing import Literal
 import numpy as np
 from pydantic import model_validator
 
-from fowt_env.errors import InputError
-from fowt_env.records import (
+from fowt_env.descriptions.files import DATA, locate, raise_problems, read_toml
+from fowt_env.descriptions.records import (
     FloatArray,
     NonNegative,
     NumberOrArray,
@@ -21,7 +21,7 @@ from fowt_env.records import (
     unknown_key,
     validate,
 )
-from fowt_env.textfiles import DATA, locate, raise_problems, read_toml
+from fowt_env.errors import InputError
 
 STANDARD_GRAVITY = 9.80665  # m/s2
 LOWEST_WAVE = 1e-9  # m; a spectrum of less, but not of nothing, would underflow
