@@ -14,11 +14,11 @@ import numpy as np
 from scipy.linalg import expm, solve_continuous_are, solve_discrete_are
 from scipy.optimize import least_squares
 
+from fowt_env.analysis.linear_model import linearize
+from fowt_env.analysis.trim import calm
+from fowt_env.analysis.wave_excitation import wave_force
 from fowt_env.descriptions.platform import joint_sea_state, sea_state_of
 from fowt_env.errors import InputError, unknown
-from fowt_env.linear_model import linearize
-from fowt_env.steady import calm
-from fowt_env.wave_force import wave_force
 from fowt_env.weather.iec import ntm_sigma
 from fowt_env.weather.turbulence import amplitudes
 

@@ -16,6 +16,7 @@ from math import exp, isfinite
 
 import numpy as np
 
+from fowt_env.analysis.trim import calm, trim
 from fowt_env.controllers.base import check_control_dt
 from fowt_env.controllers.pi import (
     PI,
@@ -32,7 +33,6 @@ from fowt_env.plant.compile.decorators import control_kernel, kernel
 from fowt_env.plant.drivetrain import TorqueCurve
 from fowt_env.plant.measurement import Measure
 from fowt_env.plant.state import State
-from fowt_env.steady import calm, trim
 from fowt_env.weather.wind_field import WindBox, rotor_average
 
 SCHEDULE_SPEEDS = 15  # trims from rated to cut-out wind, square-root spaced: the schedule is steep at rated

@@ -1,9 +1,9 @@
 """Operating point, linear model, its modes with and without the controller, and a file for MATLAB."""
 
 import fowt_env
+from fowt_env.analysis.linear_model import modes
 from fowt_env.controllers.closed_loop import closed_loop_matrix
 from fowt_env.controllers.pi import PISettings
-from fowt_env.linear_model import modes
 from fowt_env.outputs import write_mat
 
 scene = fowt_env.build_scene(wind=18.0, fidelity="standard")

@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Any
 from fowt_env_registration import register_with_gymnasium
 
 if TYPE_CHECKING:  # the names below, for editors and type checkers
+    from fowt_env.analysis.linear_model import linearize as linearize
+    from fowt_env.analysis.linear_model import natural_periods as natural_periods
+    from fowt_env.analysis.trim import OperatingPoint as OperatingPoint
+    from fowt_env.analysis.trim import trim as trim
     from fowt_env.errors import ControllerError as ControllerError
     from fowt_env.errors import InputError as InputError
     from fowt_env.errors import SimulationStopped as SimulationStopped
-    from fowt_env.linear_model import linearize as linearize
-    from fowt_env.linear_model import natural_periods as natural_periods
     from fowt_env.own_load import Load as Load
     from fowt_env.own_load import Motion as Motion
     from fowt_env.own_load import load_kernel as load_kernel
@@ -21,19 +23,17 @@ if TYPE_CHECKING:  # the names below, for editors and type checkers
     from fowt_env.scene import Scene as Scene
     from fowt_env.scene import build_scene as build_scene
     from fowt_env.simulation import simulate as simulate
-    from fowt_env.steady import OperatingPoint as OperatingPoint
-    from fowt_env.steady import trim as trim
 
 __version__ = "0.1.0"
 
 _PUBLIC = {
     "build_scene": "fowt_env.scene",
     "Scene": "fowt_env.scene",
-    "trim": "fowt_env.steady",
-    "OperatingPoint": "fowt_env.steady",
+    "trim": "fowt_env.analysis.trim",
+    "OperatingPoint": "fowt_env.analysis.trim",
     "simulate": "fowt_env.simulation",
-    "linearize": "fowt_env.linear_model",
-    "natural_periods": "fowt_env.linear_model",
+    "linearize": "fowt_env.analysis.linear_model",
+    "natural_periods": "fowt_env.analysis.linear_model",
     "Measurement": "fowt_env.plant.measurement",
     "Load": "fowt_env.own_load",
     "Motion": "fowt_env.own_load",

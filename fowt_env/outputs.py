@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from fowt_env.errors import InputError
 
 if TYPE_CHECKING:
-    from fowt_env.linear_model import LinearModel
+    from fowt_env.analysis.linear_model import LinearModel
 
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
 TABLE_SUFFIXES = (".csv", ".parquet")
@@ -132,7 +132,7 @@ def write_mat(model: "LinearModel", path: str | Path) -> Path:
     import numpy as np
     from scipy.io import savemat
 
-    from fowt_env.linear_model import STATE_INDEX
+    from fowt_env.analysis.linear_model import STATE_INDEX
 
     path = Path(path)
     if path.suffix.lower() != ".mat":

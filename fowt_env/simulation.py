@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from fowt_env.analysis.trim import trim
 from fowt_env.descriptions.records import is_number
 from fowt_env.errors import ControllerInputError, InputError, SimulationStopped, unknown
 from fowt_env.plant.channels import DEG, RPM
@@ -28,7 +29,6 @@ from fowt_env.plant.rollout import (
 )
 from fowt_env.plant.state import OUT_OF_PLANE, State, pose_of
 from fowt_env.scene import Scene
-from fowt_env.steady import trim
 from fowt_env.weather.wind_field import WindBox
 
 # Ctrl-C is heard and progress shown between compiled calls. A call by itself costs 1e-4 s, so they

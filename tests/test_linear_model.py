@@ -3,8 +3,8 @@ import pytest
 from plant import rates
 
 import fowt_env
+from fowt_env.analysis.linear_model import STATE_INDEX, linearize, natural_periods
 from fowt_env.errors import InputError
-from fowt_env.linear_model import STATE_INDEX, linearize, natural_periods
 from fowt_env.plant.state import State
 
 PERIODS = {"surge": 124.0, "sway": 124.0, "heave": 30.8, "roll": 29.9, "platform_pitch": 29.9, "yaw": 8.28}

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from fowt_env import build_scene, simulate
+from fowt_env.analysis.linear_model import linearize
 from fowt_env.descriptions.platform import read_platform
 from fowt_env.errors import InputError
-from fowt_env.linear_model import linearize
 from fowt_env.plant.state import OUT_OF_PLANE
 from fowt_env.simulation import initial_state
 

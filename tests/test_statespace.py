@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import fowt_env
-from fowt_env.linear_model import linearize
+from fowt_env.analysis.linear_model import linearize
 
 PERIODS = (6.0, 9.0, 14.0)  # s
 

@@ -8,16 +8,17 @@ from plant import state
 from typer.testing import CliRunner
 
 import fowt_env
-from fowt_env import cli, equilibrium
+from fowt_env import cli
+from fowt_env.analysis import equilibrium
+from fowt_env.analysis.equilibrium import check_equilibrium, evaluated
+from fowt_env.analysis.trim import AZIMUTHS, calm, mean_derivative, trim
 from fowt_env.descriptions.platform import DATA, names, read_platform, read_turbine
 from fowt_env.envs import FowtEnv
-from fowt_env.equilibrium import check_equilibrium, evaluated
 from fowt_env.errors import InputError
 from fowt_env.plant.dynamics import gravity_load
 from fowt_env.plant.hydro.hydrostatics import hydrostatic_load
 from fowt_env.plant.mooring import SUSPENDED, mooring_load
 from fowt_env.plant.state import State, pose_of
-from fowt_env.steady import AZIMUTHS, calm, mean_derivative, trim
 
 
 @pytest.fixture(scope="module")

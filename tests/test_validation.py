@@ -9,6 +9,7 @@ import gzip
 import numpy as np
 import pytest
 
+from fowt_env.analysis.trim import trim
 from fowt_env.controllers import CONTROLLERS
 from fowt_env.descriptions.platform import read_platform, read_turbine
 from fowt_env.errors import InputError
@@ -17,7 +18,6 @@ from fowt_env.plant.channels import Out
 from fowt_env.plant.rollout import output_row
 from fowt_env.plant.state import State
 from fowt_env.scene import build_scene
-from fowt_env.steady import trim
 from fowt_env.training.comparison import decay_decrement, decay_period, harmonics, normalised_rms
 from fowt_env.training.openfast import (
     DECAYS,

@@ -15,12 +15,12 @@ from math import cos, hypot, pi, sin, sqrt
 import numpy as np
 from scipy.optimize import brentq, fsolve
 
+from fowt_env.analysis.linear_model import natural_periods
+from fowt_env.analysis.trim import trim_held
 from fowt_env.descriptions.platform import DATA, Line, read_platform, read_turbine
-from fowt_env.linear_model import natural_periods
 from fowt_env.outputs import replacing
 from fowt_env.plant.mooring import catenary
 from fowt_env.scene import build_scene
-from fowt_env.steady import trim_held
 
 NAME = "liu_1_50"
 TURBINE = NAME

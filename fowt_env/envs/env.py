@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
+from fowt_env.analysis.trim_cache import exact_trim, near_trim, plant_key
 from fowt_env.descriptions.platform import Platform
 from fowt_env.envs.actions import MODES, Mode, build_action_map, start_tracking
 from fowt_env.envs.kernels import (
@@ -48,7 +49,6 @@ from fowt_env.envs.sensors import Sensors, check_sensors, draw_sensors, reading_
 from fowt_env.envs.snapshot import CARRIED, WORK_CARRIED, Snapshot
 from fowt_env.envs.tables import task_tables
 from fowt_env.envs.tasks import TASKS, Episode, Task, check_offset, task_of
-from fowt_env.envs.trims import exact_trim, near_trim, plant_key
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.channels import DEG
 from fowt_env.plant.compile.decorators import Box

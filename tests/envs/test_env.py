@@ -13,11 +13,11 @@ from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
 import fowt_env
+from fowt_env.analysis.trim_cache import GRID, exact_trim, near_trim
 from fowt_env.controllers import make
 from fowt_env.envs import TASKS, FowtEnv, Task
 from fowt_env.envs.observations import KNOWN
 from fowt_env.envs.rewards import TERMS
-from fowt_env.envs.trims import GRID, exact_trim, near_trim
 from fowt_env.errors import InputError
 from fowt_env.plant.state import State
 from fowt_env_registration import ENVIRONMENTS

@@ -405,7 +405,7 @@ def test_a_users_controller_depends_on_those_of_the_package_that_it_builds_on(tm
     (tmp_path / "built.py").write_text("from fowt_env.controllers.lqr import lqr as Law\nimport fowt_env.controllers\n")
     monkeypatch.syspath_prepend(str(tmp_path))
     names = {path.relative_to(path.parents[1]).as_posix() for path in results._user_files("built")}
-    assert {"controllers/lqr.py", "controllers/lqr_design.py", "fowt_env/linear_model.py"} <= names
+    assert {"controllers/lqr.py", "controllers/lqr_design.py", "fowt_env/analysis/linear_model.py"} <= names
     assert "controllers/rosco.py" not in names and "controllers/__init__.py" not in names
 
 

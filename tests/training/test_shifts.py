@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import fowt_env
+from fowt_env.analysis.linear_model import linearize
 from fowt_env.controllers import make
 from fowt_env.errors import InputError
-from fowt_env.linear_model import linearize
 from fowt_env.plant.measurement import Measurement
 from fowt_env.training.cases import Case, described, read_suite
 from fowt_env.training.evaluate import evaluate, planned

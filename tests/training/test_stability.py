@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from fowt_env.analysis.linear_model import STATES
 from fowt_env.cli import app
 from fowt_env.envs import FowtEnv
 from fowt_env.errors import InputError
-from fowt_env.linear_model import STATES
 from fowt_env.plant.hydro.linear_damping import LinearDamping
 from fowt_env.plant.state import State
 from fowt_env.scene import STEPS, build_scene

@@ -7,7 +7,7 @@ from math import pi
 import numpy as np
 from scipy.optimize import brentq
 
-from fowt_env.equilibrium import check_equilibrium, evaluated, label, unbalanced
+from fowt_env.analysis.equilibrium import check_equilibrium, evaluated, label, unbalanced
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.aero.bem_rotor import wake_equilibrium
 from fowt_env.plant.channels import to_units

@@ -7,14 +7,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fowt_env.analysis.trim import AZIMUTHS, calm, trim
+from fowt_env.analysis.wave_excitation import fit_wave_filter, wave_force
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.channels import N_FIXED, Out, measure, record
 from fowt_env.plant.compile.decorators import entry
 from fowt_env.plant.dynamics import Kept, evaluate, loads_of, respond
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measure
 from fowt_env.plant.state import State
-from fowt_env.steady import AZIMUTHS, calm, trim
-from fowt_env.wave_force import fit_wave_filter, wave_force
 
 STATES = (
     "surge", "sway", "heave", "roll", "platform_pitch", "yaw",

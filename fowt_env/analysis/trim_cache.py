@@ -5,8 +5,8 @@ import pickle
 from dataclasses import replace
 from math import floor
 
+from fowt_env.analysis.trim import trim
 from fowt_env.descriptions.records import Record
-from fowt_env.steady import trim
 
 GRID = 0.25  # m/s between exact trims; between them the state is linear in the wind speed
 _KNOWN = {}  # (plant, shear exponent, wind speed) -> (state, command)
