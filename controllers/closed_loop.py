@@ -10,7 +10,7 @@ from fowt_env.controllers.pi import PISettings, schedule_gain
 from fowt_env.errors import InputError
 from fowt_env.plant.drivetrain import generator_torque
 from fowt_env.plant.state import State
-from fowt_env.scene import build_scene
+from fowt_env.scene.build import build_scene
 
 PLATFORM_PERIOD = 30.0  # s
 TORQUE_STEP = 1e-4  # rad/s of rotor speed, for the slope of the torque curve

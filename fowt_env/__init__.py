@@ -16,28 +16,28 @@ if TYPE_CHECKING:  # the names below, for editors and type checkers
     from fowt_env.errors import ControllerError as ControllerError
     from fowt_env.errors import InputError as InputError
     from fowt_env.errors import SimulationStopped as SimulationStopped
-    from fowt_env.own_load import Load as Load
-    from fowt_env.own_load import Motion as Motion
-    from fowt_env.own_load import load_kernel as load_kernel
     from fowt_env.plant.measurement import Measurement as Measurement
-    from fowt_env.scene import Scene as Scene
-    from fowt_env.scene import build_scene as build_scene
+    from fowt_env.scene.build import Scene as Scene
+    from fowt_env.scene.build import build_scene as build_scene
+    from fowt_env.scene.user_loads import Load as Load
+    from fowt_env.scene.user_loads import Motion as Motion
+    from fowt_env.scene.user_loads import load_kernel as load_kernel
     from fowt_env.simulation import simulate as simulate
 
 __version__ = "0.1.0"
 
 _PUBLIC = {
-    "build_scene": "fowt_env.scene",
-    "Scene": "fowt_env.scene",
+    "build_scene": "fowt_env.scene.build",
+    "Scene": "fowt_env.scene.build",
     "trim": "fowt_env.analysis.trim",
     "OperatingPoint": "fowt_env.analysis.trim",
     "simulate": "fowt_env.simulation",
     "linearize": "fowt_env.analysis.linear_model",
     "natural_periods": "fowt_env.analysis.linear_model",
     "Measurement": "fowt_env.plant.measurement",
-    "Load": "fowt_env.own_load",
-    "Motion": "fowt_env.own_load",
-    "load_kernel": "fowt_env.own_load",
+    "Load": "fowt_env.scene.user_loads",
+    "Motion": "fowt_env.scene.user_loads",
+    "load_kernel": "fowt_env.scene.user_loads",
     "InputError": "fowt_env.errors",
     "SimulationStopped": "fowt_env.errors",
     "ControllerError": "fowt_env.errors",

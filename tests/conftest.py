@@ -5,7 +5,7 @@ import os
 import pytest
 
 from fowt_env.descriptions.platform import read_platform, read_turbine
-from fowt_env.scene import build_scene
+from fowt_env.scene.build import build_scene
 
 os.environ.setdefault("SDL_VIDEODRIVER", "dummy")  # windows of render mode "human" without a display
 # workers of pytest-xdist have the width of its terminal set, which the command's console would keep for good

@@ -146,7 +146,7 @@ class Samples:
         from fowt_env.controllers.saved_design import load_design
         from fowt_env.descriptions.platform import read_platform, read_turbine
         from fowt_env.descriptions.sea_state import joint_sea_state, sea_state_of
-        from fowt_env.scene import build_scene
+        from fowt_env.scene.build import build_scene
         from fowt_env.training.cases import read_suite
 
         data, folder = ROOT / "fowt_env" / "data", self.folder

@@ -14,7 +14,7 @@ from fowt_env.plant.hydro.hydrostatics import submerged
 from fowt_env.plant.hydro.morison import StripLoad
 from fowt_env.plant.mooring import mooring_load
 from fowt_env.plant.state import NO_LOAD, State, Wrench, add, pose_of
-from fowt_env.scene import assemble, build_body
+from fowt_env.scene.build import assemble, build_body
 
 REFERENCE = Path(__file__).parent / "reference" / "accelerations.csv"
 DRY = StripLoad(NO_LOAD, 0.0, 0.0, 0.0, 0.0)

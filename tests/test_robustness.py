@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from fowt_env.plant.integrators import INTEGRATORS
 from fowt_env.plant.rollout import RUNNING, advance
 from fowt_env.plant.state import State
-from fowt_env.scene import STEPS
+from fowt_env.scene.build import STEPS
 from fowt_env.training import (
     stability,
     stability_cases,

@@ -8,7 +8,7 @@ import pytest
 from fowt_env import build_scene, simulate
 from fowt_env.errors import InputError
 from fowt_env.plant.rollout import run
-from fowt_env.scene import ARGUMENTS
+from fowt_env.scene.build import ARGUMENTS
 
 NTM = {"kind": "ntm", "speed": 18.0, "class": "B"}
 SEA = {"kind": "jonswap", "Hs": 7.5, "Tp": 10.0, "gamma": 3.3}

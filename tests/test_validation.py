@@ -17,7 +17,7 @@ from fowt_env.plant.aero.blade_elements import build_blade_elements, lift_drag
 from fowt_env.plant.channels import Out
 from fowt_env.plant.rollout import output_row
 from fowt_env.plant.state import State
-from fowt_env.scene import build_scene
+from fowt_env.scene.build import build_scene
 from fowt_env.training.comparison import decay_decrement, decay_period, harmonics, normalised_rms
 from fowt_env.training.openfast import (
     DECAYS,

@@ -31,7 +31,7 @@ from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
 from fowt_env.plant.mooring import mooring_load
 from fowt_env.plant.rollout import advance, forget, observe, output, run
 from fowt_env.plant.state import State, pose_of
-from fowt_env.scene import build_scene
+from fowt_env.scene.build import build_scene
 from fowt_env.simulation import _Hold, initial_state, simulate
 from fowt_env.weather.wind import wind_now
 

@@ -25,7 +25,7 @@ from fowt_env.descriptions.records import (
 from fowt_env.descriptions.sea_state import SeaState, sea_state_of
 from fowt_env.descriptions.wind import read_wind
 from fowt_env.errors import InputError, unknown
-from fowt_env.scene import OPTIONS
+from fowt_env.scene.build import OPTIONS
 from fowt_env.training.faults import Fault
 from fowt_env.training.metrics import METRICS
 from fowt_env.training.shifts import Shift

@@ -20,7 +20,7 @@ from fowt_env.analysis.trim import trim_held
 from fowt_env.descriptions.platform import DATA, Line, read_platform, read_turbine
 from fowt_env.outputs import replacing
 from fowt_env.plant.mooring import catenary
-from fowt_env.scene import build_scene
+from fowt_env.scene.build import build_scene
 
 NAME = "liu_1_50"
 TURBINE = NAME

@@ -118,7 +118,7 @@ class Run:
 
     def frame(self, folder=None, bts=None, dt=None, wind=None, rotor="bem", progress=False, **options):
         """DataFrame of this project's run, every 0.1 s; wind None: the run's own, dt None: the deck's."""
-        from fowt_env.scene import build_scene
+        from fowt_env.scene.build import build_scene
         from fowt_env.simulation import simulate
 
         if wind is None:

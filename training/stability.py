@@ -15,7 +15,7 @@ from fowt_env.errors import unknown
 from fowt_env.outputs import replacing
 from fowt_env.plant.integrators import INTEGRATORS
 from fowt_env.plant.rollout import RUNNING
-from fowt_env.scene import STEPS
+from fowt_env.scene.build import STEPS
 from fowt_env.training import (
     stability_cases,
     stability_extremes,

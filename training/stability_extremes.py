@@ -14,7 +14,7 @@ from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
 from fowt_env.plant.mooring import Mooring
 from fowt_env.plant.rollout import RUNNING, STOP_REASONS, advance, forget, observe
 from fowt_env.plant.state import State
-from fowt_env.scene import build_scene
+from fowt_env.scene.build import build_scene
 from fowt_env.simulation import initial_state
 
 CONTROL_DT = 0.1  # s

@@ -15,7 +15,7 @@ from fowt_env.plant.integrators import INTEGRATORS, START_STEPS, build_integrato
 from fowt_env.plant.measurement import N_MEASUREMENTS
 from fowt_env.plant.rollout import RUNNING, advance, forget, observe
 from fowt_env.plant.state import State
-from fowt_env.scene import STEPS, build_scene
+from fowt_env.scene.build import STEPS, build_scene
 from fowt_env.simulation import initial_state
 from fowt_env.training.stability_cases import Runner, platform_energy, potential_energy
 

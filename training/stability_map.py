@@ -16,7 +16,7 @@ from fowt_env.analysis.trim import OperatingPoint, trim
 from fowt_env.plant.integrators import INTEGRATORS, feathering
 from fowt_env.plant.rollout import RUNNING, advance, forget
 from fowt_env.plant.state import State
-from fowt_env.scene import STEPS, build_scene
+from fowt_env.scene.build import STEPS, build_scene
 from fowt_env.training.stability_long import with_integrator
 
 DURATION = 300.0  # s of each run: hundreds of steps even at the largest

@@ -19,7 +19,7 @@ from fowt_env.errors import InputError
 from fowt_env.plant.integrators import INTEGRATORS, build_integrator
 from fowt_env.plant.rollout import advance, output_row
 from fowt_env.plant.state import State
-from fowt_env.scene import build_scene
+from fowt_env.scene.build import build_scene
 
 STEPS = 5
 ENV_STEPS = 3

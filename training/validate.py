@@ -138,7 +138,7 @@ def decays(study):
 def steady(study):
     """Steady winds, platform locked: rotor speed and blade pitch 0.2 %, thrust and torque 0.3 %."""
     from fowt_env.analysis.trim import trim
-    from fowt_env.scene import build_scene
+    from fowt_env.scene.build import build_scene
 
     for row in steady_reference(study.folder).to_dict("records"):
         wind = row["wind_mps"]

@@ -16,7 +16,7 @@ from fowt_env.plant.drivetrain import build_torque_curve, generator_torque
 from fowt_env.plant.dynamics import derivative
 from fowt_env.plant.rollout import output_row
 from fowt_env.plant.state import State, pose_of
-from fowt_env.scene import Scene
+from fowt_env.scene.build import Scene
 from fowt_env.weather.wind import make_series, wind_now
 from fowt_env.weather.wind_field import steady_field
 

@@ -55,7 +55,7 @@ from fowt_env.plant.compile.decorators import Box
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
 from fowt_env.plant.rollout import STOP_REASONS, output
 from fowt_env.plant.state import State
-from fowt_env.scene import OPTIONS, Scene, build_scene
+from fowt_env.scene.build import OPTIONS, Scene, build_scene
 from fowt_env.simulation import INITIAL, check_duration, steps_in
 
 SHORTEST_WEATHER = 600.0  # s of random wind and sea: turbulence intensity is defined over 10 min

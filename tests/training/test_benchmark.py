@@ -8,7 +8,7 @@ import pytest
 
 from fowt_env.envs import FowtEnv
 from fowt_env.errors import InputError
-from fowt_env.scene import build_scene
+from fowt_env.scene.build import build_scene
 from fowt_env.training import benchmark, benchmark_accuracy, benchmark_envs, benchmark_evaluation
 
 STILL = "still water, no wind"

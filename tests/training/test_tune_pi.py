@@ -38,7 +38,7 @@ def test_the_search_starts_from_the_published_gains_and_takes_the_cheapest(monke
         return pd.DataFrame(columns)
 
     from fowt_env.controllers.pi import PISettings
-    from fowt_env.scene import build_scene
+    from fowt_env.scene.build import build_scene
 
     published = PISettings.published(build_scene("oc3_hywind").turbine).KP
     monkeypatch.setattr(tune_pi, "evaluate", paraboloid)

@@ -12,7 +12,6 @@ import numpy as np
 from fowt_env.descriptions.platform import Platform, Turbine, read_platform, read_turbine, sea_state_of
 from fowt_env.descriptions.sea_state import SeaState
 from fowt_env.errors import InputError, unknown
-from fowt_env.own_load import Load, blamed, build_own_loads, checked_loads
 from fowt_env.plant.aero.blade_elements import build_blade_elements
 from fowt_env.plant.aero.coefficient_table import build_rotor_table
 from fowt_env.plant.aero.section_table import build_section_table
@@ -39,6 +38,7 @@ from fowt_env.plant.integrators import INTEGRATORS, N_SAMPLE, build_integrator, 
 from fowt_env.plant.mooring import build_mooring
 from fowt_env.plant.state import N_RIGID
 from fowt_env.plant.user_loads import room_of
+from fowt_env.scene.user_loads import Load, blamed, build_own_loads, checked_loads
 from fowt_env.weather.waves import build_waves
 from fowt_env.weather.wind import WindSeries, build_wind, hub_series, make_series, nominal_speed
 from fowt_env.weather.wind_field import WindBox, hub_speed, hub_wind, is_field, read_box, rotor_average
