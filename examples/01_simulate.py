@@ -1,7 +1,7 @@
 """One run: turbulent wind, an irregular sea, the built-in controller; statistics and a file."""
 
 import fowt_env
-from fowt_env.outputs import write_table
+from fowt_env.files.tables import write_table
 
 scene = fowt_env.build_scene(
     "oc3_hywind",

@@ -12,7 +12,7 @@ import numpy as np
 
 from fowt_env.envs.rendering import AT_REST, COLOURS, LOOSE, TIGHT, TRACES, YELLOW, View
 from fowt_env.errors import InputError
-from fowt_env.outputs import replacing
+from fowt_env.files.tables import replacing
 
 SUFFIXES = (".gif", ".mp4")
 MOST_RUNS = 4

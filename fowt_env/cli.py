@@ -23,7 +23,7 @@ from fowt_env.cli_arguments import parse_numbers, parse_pairs, parse_sea, parse_
 from fowt_env.cli_doctor import DOCTOR_EXAMPLES, doctor
 from fowt_env.cli_tables import figure, print_table, table_width
 from fowt_env.errors import ControllerError, InputError, SimulationStopped, unknown
-from fowt_env.outputs import SERIES_SUFFIXES, table_path, write_table
+from fowt_env.files.tables import SERIES_SUFFIXES, table_path, write_table
 
 EXIT_STOPPED, EXIT_INPUT, EXIT_INTERRUPTED = 1, 2, 130
 ROUNDING = 1e-9  # a standard deviation below this share of the mean is none

@@ -5,8 +5,8 @@ import math
 from pathlib import Path
 
 from fowt_env.errors import InputError
-from fowt_env.openfast_files import read_uniform_wind
-from fowt_env.outputs import read_table
+from fowt_env.files.openfast import read_uniform_wind
+from fowt_env.files.tables import read_table
 
 SEA_KEYS = {"jonswap": ("Hs", "Tp", "gamma"), "pierson_moskowitz": ("Hs", "Tp"), "regular": ("H", "T")}
 

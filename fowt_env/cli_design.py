@@ -89,7 +89,7 @@ def linearize(
 ):
     """Print modes and right-half-plane zeros of the floating turbine over the wind."""
     import fowt_env
-    from fowt_env.outputs import TABLE_SUFFIXES, write_table
+    from fowt_env.files.tables import TABLE_SUFFIXES, write_table
     from fowt_env.training.linear_design import (
         MODEL_SUFFIXES,
         mode_table,
@@ -184,7 +184,7 @@ def bound(
 ):
     """Least rotor-speed and platform-pitch deviations of any linear feedback, by what it knows."""
     import fowt_env
-    from fowt_env.outputs import table_path, write_table
+    from fowt_env.files.tables import table_path, write_table
     from fowt_env.training.linear_bound import INFORMATION, bound_table
 
     if out_path is not None:
@@ -214,7 +214,7 @@ def front(
     plot: Annotated[str | None, typer.Option(help="Pareto plot, e.g. front.png.")] = None,
 ):
     """Simulated designs over gspi_oc3, beside the linear bound, and the share of it that they reach."""
-    from fowt_env.outputs import read_table, write_table
+    from fowt_env.files.tables import read_table, write_table
     from fowt_env.training.linear_bound import INFORMATION, ratio_table
 
     fronts = read_table(bound_path)

@@ -39,7 +39,7 @@ def plot(
     ] = "oc3_hywind",
 ):
     """Plot saved runs: time series, spectra, box plots, response to waves; or the steady schedule."""
-    from fowt_env.outputs import read_table
+    from fowt_env.files.tables import read_table
 
     if kind not in KINDS:
         raise unknown("kind of plot", kind, KINDS)

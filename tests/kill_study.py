@@ -23,7 +23,7 @@ import yaml
 
 import fowt_env.cli
 from fowt_env.controllers.policy import read_policy
-from fowt_env.outputs import is_leftover
+from fowt_env.files.tables import is_leftover
 from fowt_env.training import results
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -214,7 +214,7 @@ class Samples:
             self.add(f"wind {name}", wind, ways, lambda wind=wind: build_wind(parse_wind(str(wind)), **rotor))
 
     def _outputs(self):
-        from fowt_env.openfast_files import read_outb, write_outb
+        from fowt_env.files.openfast import read_outb, write_outb
 
         rng = np.random.default_rng(0)
         values = rng.normal(size=(40, 6))
@@ -249,7 +249,7 @@ class Samples:
         self.add("policy arrays", arrays, within, lambda: load(arrays))
 
     def _results(self):
-        from fowt_env.outputs import read_table
+        from fowt_env.files.tables import read_table
         from fowt_env.training import results
         from fowt_env.training.evaluate import COLUMNS
         from fowt_env.training.report_html import write_report

@@ -105,7 +105,7 @@ def design_bound_command(monkeypatch, tmp_path):
 
 
 def design_front_command(monkeypatch, tmp_path):
-    from fowt_env import outputs
+    from fowt_env.files import tables as outputs
     from fowt_env.training import linear_bound
 
     table = frame_of(["wind_[m/s]", *linear_bound.RATIOS, "of_bound_[-]", "of_measured_[-]"], 3)

@@ -15,7 +15,7 @@ import pytest
 from typer.testing import CliRunner
 
 from fowt_env import cli
-from fowt_env.outputs import is_leftover, write_table
+from fowt_env.files.tables import is_leftover, write_table
 from fowt_env.training import results
 
 SHORT = ("--wind", "18", "--duration", "20", "--option", "wave_components=10")

@@ -21,7 +21,7 @@ import pandas as pd
 
 from fowt_env.controllers import make
 from fowt_env.errors import InputError, unknown
-from fowt_env.outputs import replacing
+from fowt_env.files.tables import replacing
 from fowt_env.plant.aero.tower_drag import tower_load
 from fowt_env.plant.channels import measure, record
 from fowt_env.plant.compile.decorators import entry, kernel

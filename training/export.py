@@ -7,7 +7,7 @@ import numpy as np
 
 from fowt_env.controllers.policy_file import FORMAT
 from fowt_env.errors import InputError
-from fowt_env.outputs import replacing
+from fowt_env.files.tables import replacing
 
 ACTIVATION_NAMES = {"Tanh": "tanh", "ReLU": "relu"}
 

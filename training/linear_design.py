@@ -14,7 +14,7 @@ from fowt_env.analysis.linear_model import FORCES, STATE_INDEX, linearize
 from fowt_env.controllers.lqr import LQR
 from fowt_env.controllers.lqr_design import Weights, scene_at
 from fowt_env.errors import InputError
-from fowt_env.outputs import replacing, write_table
+from fowt_env.files.tables import replacing, write_table
 from fowt_env.simulation import simulate
 from fowt_env.training.cases import named_cases
 from fowt_env.training.evaluate import SHORTEST_WEATHER

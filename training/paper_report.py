@@ -6,7 +6,7 @@ import numpy as np
 
 import fowt_env
 from fowt_env.descriptions.platform import read_platform
-from fowt_env.outputs import replacing, write_table
+from fowt_env.files.tables import replacing, write_table
 from fowt_env.plots import COLOURS, INK, TIME, new_figure, plot_run, save_figure, spectrum, style_axes
 from fowt_env.training import paper
 

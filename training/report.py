@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from fowt_env.descriptions.platform import Platform, read_platform
 from fowt_env.errors import unknown
-from fowt_env.outputs import read_table
+from fowt_env.files.tables import read_table
 from fowt_env.plots import TIME, plot_evaluation, plot_pareto, plot_runs, plot_spectra
 from fowt_env.plots_response import BOXES, plot_boxes
 from fowt_env.training.cases import Score, named_cases, read_suite

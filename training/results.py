@@ -29,7 +29,7 @@ import fowt_env
 from fowt_env.descriptions.files import parse_json
 from fowt_env.descriptions.records import is_number
 from fowt_env.errors import InputError
-from fowt_env.outputs import remove_leftovers, replacing, write_table
+from fowt_env.files.tables import remove_leftovers, replacing, write_table
 from fowt_env.training.guard import printable
 from fowt_env.training.locks import locked
 from fowt_env.training.sources import imported_files

@@ -18,7 +18,7 @@ import typer
 
 from fowt_env.descriptions.platform import DATA, read_platform, read_turbine
 from fowt_env.errors import InputError
-from fowt_env.outputs import replacing
+from fowt_env.files.tables import replacing
 from fowt_env.training.identify_model import toml_value
 
 PLATFORM, TURBINE = "oc3_hywind", "nrel5mw"

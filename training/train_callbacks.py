@@ -7,7 +7,7 @@ import pandas as pd
 import torch
 from stable_baselines3.common.callbacks import BaseCallback, EvalCallback
 
-from fowt_env.outputs import write_table
+from fowt_env.files.tables import write_table
 from fowt_env.training.train import decision_env, judged, seconds_text
 
 REPORT_EVERY = 1.0  # s

@@ -26,7 +26,7 @@ from fowt_env.controllers.pi import PISettings
 from fowt_env.controllers.rosco import Rosco, RoscoSettings
 from fowt_env.descriptions.platform import joint_sea_state, read_turbine
 from fowt_env.errors import InputError, unknown
-from fowt_env.outputs import replacing, write_table
+from fowt_env.files.tables import replacing, write_table
 from fowt_env.training.cases import Case
 from fowt_env.training.engines import session
 from fowt_env.training.evaluate import evaluate

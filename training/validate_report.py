@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fowt_env.outputs import remove_leftovers, replacing, write_table
+from fowt_env.files.tables import remove_leftovers, replacing, write_table
 from fowt_env.plots import COLOURS, INK, TIME, new_figure, save_figure, spectrum, style_axes
 from fowt_env.training.openfast import DECAYS
 

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from fowt_env.errors import InputError
-from fowt_env.outputs import write_table
+from fowt_env.files.tables import write_table
 from fowt_env.training.agent_scores import (
     COUNTS,
     FIGURES,

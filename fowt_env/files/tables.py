@@ -96,7 +96,7 @@ def write_table(frame, path):
         if path.suffix.lower() == ".csv":
             frame.to_csv(temporary, index=False, float_format="%.10g")
         elif path.suffix.lower() == ".outb":
-            from fowt_env.openfast_files import write_outb
+            from fowt_env.files.openfast import write_outb
 
             write_outb(frame, temporary)
         else:
