@@ -4,7 +4,7 @@ The land-based gains are too fast for a floating platform: its pitch motion lose
 """
 
 import fowt_env
-from fowt_env.plots import plot_run, plot_runs, plot_spectra
+from fowt_env.visual.time_series import plot_run, plot_runs, plot_spectra
 
 scene = fowt_env.build_scene(
     wind={"kind": "ntm", "speed": 16.0, "class": "B"},

@@ -245,7 +245,7 @@ def _save_run(frame, out_path, plot, title):
     if out_path is not None:
         note(f"wrote {write_table(frame, out_path)} ({len(frame)} rows)")
     if plot is not None:
-        from fowt_env.plots import plot_run
+        from fowt_env.visual.time_series import plot_run
 
         plot_run(frame, plot, title)
         note(f"wrote {plot}")
@@ -253,7 +253,7 @@ def _save_run(frame, out_path, plot, title):
 
 def _print_channels(frame, title):
     """Print mean, standard deviation and range of the main channels."""
-    from fowt_env.plots import PANELS
+    from fowt_env.visual.time_series import PANELS
 
     rows = []
     for channel in dict.fromkeys([*(channel for _, channel in PANELS), "GenTq_[kN-m]", "RotThrust_[kN]"]):
@@ -467,7 +467,7 @@ def trim(
     if out_path is not None:
         note(f"wrote {write_table(points, out_path)}")
     if plot is not None:
-        from fowt_env.plots_response import plot_schedule
+        from fowt_env.visual.response import plot_schedule
 
         plot_schedule(points, plot, title)
         note(f"wrote {plot}")

@@ -68,7 +68,8 @@ def _names(files):
 
 def _draw(kind, frames, path, title, skip, platform):
     """Write the picture of a kind."""
-    from fowt_env import plots, plots_response
+    from fowt_env.visual import response as plots_response
+    from fowt_env.visual import time_series as plots
 
     if kind == "series":
         plots.plot_runs(frames, path, title)

@@ -88,8 +88,8 @@ def animate(
 ):
     """Write an animation of one or several controllers in the same wind and waves, side by side."""
     import fowt_env
-    from fowt_env.animation import animate as animate_runs
-    from fowt_env.animation import animation_path
+    from fowt_env.visual.animation import animate as animate_runs
+    from fowt_env.visual.animation import animation_path
 
     path = animation_path(out_path)  # a wrong ending should not cost a run
     names = list(dict.fromkeys(name.strip() for name in controllers.split(",") if name.strip()))

@@ -7,7 +7,7 @@ Needs matplotlib: pip install "fowt-env[plot]".
 import numpy as np
 
 from fowt_env.errors import InputError
-from fowt_env.plots import COLOURS, INK, new_figure, save_figure, style_axes
+from fowt_env.visual.time_series import COLOURS, INK, new_figure, save_figure, style_axes
 
 MOTIONS = ("surge", "sway", "heave", "roll", "platform_pitch", "yaw", "rotor_speed")
 MARKS = ("o", "s", "^", "D", "v", "P", "X")

@@ -4,8 +4,8 @@ As in plots.py every function returns a matplotlib Figure and, if given a path, 
 """
 
 from fowt_env.errors import InputError
-from fowt_env.plots import COLOURS, INK, TIME, named_runs, new_figure, save_figure, style_axes
 from fowt_env.plots_design import WIND, finish_bound
+from fowt_env.visual.time_series import COLOURS, INK, TIME, named_runs, new_figure, save_figure, style_axes
 
 MARKS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*", "p", "h")
 FRONTS = (("full", "-", "the linear bound"), ("measured", "--", "the same, measured channels"))

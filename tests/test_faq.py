@@ -131,7 +131,7 @@ def _(folder, monkeypatch):
 
 @under("A part is not installed")
 def _(folder, monkeypatch):
-    from fowt_env.plots import new_figure
+    from fowt_env.visual.time_series import new_figure
 
     missing("matplotlib", monkeypatch)
     return refused(new_figure, 1.0, 1.0)
@@ -139,7 +139,7 @@ def _(folder, monkeypatch):
 
 @under("A part is not installed")
 def _(folder, monkeypatch):
-    from fowt_env.envs.rendering import load_pygame
+    from fowt_env.visual.rendering import load_pygame
 
     missing("pygame", monkeypatch)
     return refused(load_pygame)
@@ -310,7 +310,7 @@ def _(folder, monkeypatch):
 @under("Rendering without a display")
 def _(folder, monkeypatch):
     pytest.importorskip("pygame", reason="pygame is not installed: the extra `render` is missing")
-    code = "from fowt_env.envs.rendering import load_pygame\nload_pygame().display.init()\n"
+    code = "from fowt_env.visual.rendering import load_pygame\nload_pygame().display.init()\n"
     return python(code, folder)
 
 

@@ -7,8 +7,8 @@ import pytest
 
 pytest.importorskip("matplotlib", reason="matplotlib is not installed: the extra `plot` is missing")
 
-from fowt_env import plots  # noqa: E402
 from fowt_env.errors import InputError  # noqa: E402
+from fowt_env.visual import time_series as plots  # noqa: E402
 
 PNG = b"\x89PNG\r\n\x1a\n"
 

@@ -5,7 +5,7 @@ import pytest
 pytest.importorskip("matplotlib", reason="matplotlib is not installed: the extra `plot` is missing")
 
 from fowt_env.errors import InputError  # noqa: E402
-from fowt_env.plots_response import plot_boxes, plot_raos, plot_schedule, response_operator  # noqa: E402
+from fowt_env.visual.response import plot_boxes, plot_raos, plot_schedule, response_operator  # noqa: E402
 
 PNG = b"\x89PNG\r\n\x1a\n"
 

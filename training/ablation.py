@@ -19,8 +19,8 @@ import yaml
 from scipy.stats import t
 
 from fowt_env.errors import InputError, unknown
-from fowt_env.plots import COLOURS, new_figure, save_figure, style_axes
 from fowt_env.training.train import AGENTS, Training, resolve
+from fowt_env.visual.time_series import COLOURS, new_figure, save_figure, style_axes
 
 TABLE = AGENTS / "ablation.yml"
 KEYS = ("steps", "seeds", "common", "variants")

@@ -293,7 +293,7 @@ def openfast_points():
 
 def plot_accuracy(table, path=None):
     """Figure: error over real-time factor, both logarithmic, with the Pareto front and OpenFAST's points."""
-    from fowt_env.plots import COLOURS, INK, new_figure, save_figure, style_axes
+    from fowt_env.visual.time_series import COLOURS, INK, new_figure, save_figure, style_axes
 
     points = summary(table)
     points = points[np.isfinite(points["real_time_factor"]) & (points["worst"] > 0.0)]
@@ -320,7 +320,7 @@ def plot_accuracy(table, path=None):
 
 def _draw_openfast(axes):
     """OpenFAST's points; its reference, which differs by nothing from itself, on the lower edge."""
-    from fowt_env.plots import INK
+    from fowt_env.visual.time_series import INK
 
     theirs = openfast_points()
     style = {"color": "black", "markersize": 6, "markerfacecolor": "none", "linestyle": "none"}
@@ -341,7 +341,7 @@ def _draw_openfast(axes):
 
 def _name_front(axes, front):
     """Numbers at the points of the front, those of the levels with their names; all names beside it."""
-    from fowt_env.plots import INK
+    from fowt_env.visual.time_series import INK
 
     lines = []
     for number, row in enumerate(front.to_dict("records"), 1):

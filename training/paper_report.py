@@ -7,8 +7,17 @@ import numpy as np
 import fowt_env
 from fowt_env.descriptions.platform import read_platform
 from fowt_env.files.tables import replacing, write_table
-from fowt_env.plots import COLOURS, INK, TIME, new_figure, plot_run, save_figure, spectrum, style_axes
 from fowt_env.training import paper
+from fowt_env.visual.time_series import (
+    COLOURS,
+    INK,
+    TIME,
+    new_figure,
+    plot_run,
+    save_figure,
+    spectrum,
+    style_axes,
+)
 
 LABELS = {
     paper.SURGE: "surge (m)",

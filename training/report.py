@@ -6,11 +6,11 @@ from dataclasses import replace
 from fowt_env.descriptions.platform import Platform, read_platform
 from fowt_env.errors import unknown
 from fowt_env.files.tables import read_table
-from fowt_env.plots import TIME, plot_evaluation, plot_pareto, plot_runs, plot_spectra
-from fowt_env.plots_response import BOXES, plot_boxes
 from fowt_env.training.cases import Score, named_cases, read_suite
 from fowt_env.training.leaderboard import leaderboard
 from fowt_env.training.results import file_name, run_file, write_json
+from fowt_env.visual.response import BOXES, plot_boxes
+from fowt_env.visual.time_series import TIME, plot_evaluation, plot_pareto, plot_runs, plot_spectra
 
 # printed columns: heading, metric, format
 HEADLINE = (

@@ -141,7 +141,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         if render_mode is not None:
             if render_mode not in self.metadata["render_modes"]:
                 raise unknown("render_mode", render_mode, self.metadata["render_modes"])
-            from fowt_env.envs.rendering import load_pygame  # nobody else pays for it
+            from fowt_env.visual.rendering import load_pygame  # nobody else pays for it
 
             load_pygame()
         if action_mode not in MODES:
@@ -461,7 +461,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         if self.render_mode is None:
             gymnasium.logger.warn("render() needs a render_mode: FowtEnv(..., render_mode='rgb_array')")
             return None
-        from fowt_env.envs.rendering import View
+        from fowt_env.visual.rendering import View
 
         row = self.channels()
         if self._view is None:

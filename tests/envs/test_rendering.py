@@ -12,13 +12,10 @@ import pytest
 pytest.importorskip("pygame", reason="pygame is not installed: the extra `render` is missing")
 
 import fowt_env  # noqa: E402
-from fowt_env.animation import animate  # noqa: E402
-from fowt_env.envs import (  # noqa: E402
-    FowtEnv,
-    FowtVectorEnv,
-    rendering,  # noqa: E402
-)
-from fowt_env.envs.rendering import COLOURS, Pose, Surface, TurbinePanel, View, mooring_shapes  # noqa: E402
+from fowt_env.visual.animation import animate  # noqa: E402
+from fowt_env.envs import # noqa: E402     FowtEnv, FowtVectorEnv, # noqa: E402
+from fowt_env.visual import rendering
+from fowt_env.visual.rendering import COLOURS, Pose, Surface, TurbinePanel, View, mooring_shapes  # noqa: E402
 from fowt_env.errors import InputError  # noqa: E402
 from fowt_env.weather.waves import elevation  # noqa: E402
 
