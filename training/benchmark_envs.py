@@ -10,7 +10,7 @@ import pandas as pd
 from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
 
 from fowt_env.envs import FowtEnv, FowtVectorEnv
-from fowt_env.envs.batch import act_all, thread_limit
+from fowt_env.envs.episode_batch import act_all, thread_limit
 from fowt_env.plant.compile.decorators import parallel_entry
 from fowt_env.training.benchmark import header, multiply_adds
 

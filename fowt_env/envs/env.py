@@ -16,7 +16,7 @@ from gymnasium.error import ResetNeeded
 from fowt_env.analysis.trim_cache import exact_trim, near_trim, plant_key
 from fowt_env.descriptions.platform import Platform
 from fowt_env.envs.actions import MODES, Mode, build_action_map, start_tracking
-from fowt_env.envs.kernels import (
+from fowt_env.envs.episode import (
     BAD_ACTION,
     N_COUNTS,
     RUNNING,

@@ -13,9 +13,9 @@ from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
-from fowt_env.envs.batch import act_all, act_all_parallel, thread_limit
 from fowt_env.envs.env import REWARD_KEYS, FowtEnv
-from fowt_env.envs.kernels import N_COUNTS, RUNNING, SHOWN_COUNTS, STEP
+from fowt_env.envs.episode import N_COUNTS, RUNNING, SHOWN_COUNTS, STEP
+from fowt_env.envs.episode_batch import act_all, act_all_parallel, thread_limit
 from fowt_env.envs.observations import N_ACTIONS
 from fowt_env.envs.rewards import N_TERMS
 from fowt_env.envs.snapshot import Snapshot

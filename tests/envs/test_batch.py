@@ -3,7 +3,7 @@
 import numba
 import pytest
 
-from fowt_env.envs.batch import thread_limit
+from fowt_env.envs.episode_batch import thread_limit
 
 
 def test_the_number_of_threads_is_that_asked_for_within_the_block_alone():

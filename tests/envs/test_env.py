@@ -175,7 +175,7 @@ def test_actions_beyond_the_range_saturate_and_are_counted():
 
 
 def test_action_types_do_not_matter_and_compile_nothing_anew():
-    from fowt_env.envs.kernels import act
+    from fowt_env.envs.episode import act
 
     results = []
     env = quick()

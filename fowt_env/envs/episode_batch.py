@@ -6,7 +6,7 @@ from math import isfinite
 import numba
 import numpy as np
 
-from fowt_env.envs.kernels import act
+from fowt_env.envs.episode import act
 from fowt_env.plant.compile.decorators import entry, kernel, parallel_entry
 
 
