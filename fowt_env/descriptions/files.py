@@ -14,7 +14,7 @@ import numpy as np
 from fowt_env.descriptions.records import interval, short
 from fowt_env.errors import InputError
 
-DATA = Path(__file__).parent / "data"
+DATA = Path(__file__).parents[1] / "data"
 MAX_BYTES = 5_000_000  # a description is a few kB; anything far larger is a wrong file
 MAX_LISTED = 20  # problems listed in one message
 MAX_DEPTH = 32  # parts of a dotted key; tomllib's time goes with their square
