@@ -21,7 +21,7 @@ import numpy as np
 import pandas as pd
 import yaml
 
-import fowt_env.cli
+import fowt_env.training.cli.app
 from fowt_env.controllers.policy import read_policy
 from fowt_env.files.tables import is_leftover
 from fowt_env.training import results
@@ -63,7 +63,7 @@ def started(words, log):
         sys.argv = ["fowt", *words]
         code = 70
         try:
-            fowt_env.cli.main()
+            fowt_env.training.cli.app.main()
         except SystemExit as end:
             code = end.code or 0
         finally:

@@ -180,7 +180,7 @@ class Samples:
     def _winds(self):
         from openfast_io.turbsim_file import TurbSimFile
 
-        from fowt_env.cli_arguments import parse_wind
+        from fowt_env.training.cli.arguments import parse_wind
         from fowt_env.weather.wind import build_wind
         from fowt_env.weather.wind_field import read_box
 

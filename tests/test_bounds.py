@@ -88,7 +88,7 @@ def test_the_lowest_declared_versions_run_what_users_run_first(tmp_path, record_
     options = {"cwd": tmp_path, "env": environment}
     assert str(ROOT) in run(python, "-c", SMOKE, **options)
     for words in COMMANDS:
-        run(python, "-c", "from fowt_env.cli import main; main()", *words.split(), **options)
+        run(python, "-c", "from fowt_env.training.cli.app import main; main()", *words.split(), **options)
     assert (tmp_path / "run.parquet").stat().st_size > 0
     assert "gspi_oc3" in (tmp_path / "results" / "results.csv").read_text()
 

@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from fowt_env import cli
 from fowt_env.controllers import make
 from fowt_env.controllers.policy import AGENTS
 from fowt_env.controllers.policy_file import read_policy
@@ -23,6 +22,7 @@ from fowt_env.descriptions.files import parse_json, read_toml
 from fowt_env.descriptions.platform import read_turbine
 from fowt_env.errors import InputError
 from fowt_env.training import report_html, results
+from fowt_env.training.cli import app as cli
 from fowt_env.training.metrics import METRICS
 
 FILES = int(os.environ.get("FOWT_MUTATIONS", "10000"))

@@ -10,10 +10,10 @@ import pytest
 from typer.testing import CliRunner
 
 import fowt_env
-from fowt_env import cli
-from fowt_env.cli_arguments import parse_numbers, parse_pairs, parse_sea, parse_wind
 from fowt_env.errors import InputError, SimulationStopped
 from fowt_env.plant.compile.announcement import COMPILING_MESSAGE
+from fowt_env.training.cli import app as cli
+from fowt_env.training.cli.arguments import parse_numbers, parse_pairs, parse_sea, parse_wind
 
 SHORT = ("--duration", "10", "--wind", "18")
 
@@ -149,7 +149,7 @@ def test_a_stopped_run_gives_its_reason_and_its_rows(tmp_path, monkeypatch):
 
 @pytest.mark.slow
 def test_compiling_is_announced_once_and_only_when_it_happens(tmp_path):
-    code = "from fowt_env.cli import main; main()"
+    code = "from fowt_env.training.cli.app import main; main()"
     arguments = ["simulate", "--duration", "1", "--wind", "none", "--controller", "none"]
     environment = os.environ | {"FOWT_CACHE_DIR": str(tmp_path), "COLUMNS": "200"}
     options = {"env": environment, "capture_output": True}

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from test_cli import fowt
 
-from fowt_env.cli_plot import _names
+from fowt_env.training.cli.plot import _names
 
 pytest.importorskip("matplotlib", reason="matplotlib is not installed: the extra `plot` is missing")
 

@@ -10,7 +10,8 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 import fowt_env
-from fowt_env import cli, cli_tables
+from fowt_env.training.cli import app as cli
+from fowt_env.training.cli import tables as cli_tables
 
 WIDTHS = {"80 columns": {"COLUMNS": "80"}, "a pipe": {}}
 

@@ -6,9 +6,9 @@ from typer.testing import CliRunner
 
 pytest.importorskip("stable_baselines3")
 
-from fowt_env.cli import EXIT_INPUT, EXIT_INTERRUPTED, app
 from fowt_env.training import train_callbacks
 from fowt_env.training.benchmark_training import KINDS
+from fowt_env.training.cli.app import EXIT_INPUT, EXIT_INTERRUPTED, app
 from fowt_env.training.train import Training
 
 SMALL = (

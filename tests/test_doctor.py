@@ -11,8 +11,10 @@ import pytest
 from typer.testing import CliRunner
 
 import fowt_env
-from fowt_env import cli, health, requirements
+from fowt_env import requirements
 from fowt_env.plant.compile import decorators as jit
+from fowt_env.training.cli import app as cli
+from fowt_env.training.cli import health
 
 REQUIRES = [
     "numpy>=2.0",
@@ -105,7 +107,7 @@ def test_a_numba_that_cannot_compile_the_kernels_is_told_before_it_is_tried(foun
     real = metadata.version
     monkeypatch.setattr(metadata, "requires", lambda name: ["numba>=0.1"])
     monkeypatch.setattr(metadata, "version", lambda name: found if name == "numba" else real(name))
-    monkeypatch.setitem(sys.modules, "fowt_env.health", None)  # whose import ends the program
+    monkeypatch.setitem(sys.modules, "fowt_env.training.cli.health", None)  # whose import ends the program
     monkeypatch.delattr(fowt_env, "health")
     stdout = doctor(code=1)
     assert f"numba {found} is too {word}: pip install 'numba{requirements.NUMBA}'" in stdout
@@ -130,10 +132,10 @@ def test_a_requirement_that_is_not_met_is_told_and_fails(monkeypatch):
 
 
 def test_what_numba_itself_refuses_is_told_in_a_line(monkeypatch):
-    monkeypatch.setitem(sys.modules, "fowt_env.health", None)
+    monkeypatch.setitem(sys.modules, "fowt_env.training.cli.health", None)
     monkeypatch.delattr(fowt_env, "health")
     stdout = doctor(code=1)
-    assert "Traceback" not in stdout and "fowt_env.health" in stdout.splitlines()[-1]
+    assert "Traceback" not in stdout and "fowt_env.training.cli.health" in stdout.splitlines()[-1]
 
 
 @pytest.mark.parametrize(
@@ -156,6 +158,6 @@ def test_the_bounds_of_numba_are_those_of_the_metadata():
 
 
 def test_help_of_the_command_line_does_not_wait_for_numba():
-    code = "import sys, fowt_env.cli; print('numba' in sys.modules)"
+    code = "import sys, fowt_env.training.cli.app; print('numba' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=os.environ)
     assert done.stdout.strip() == "False", done.stderr

@@ -9,11 +9,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
-from fowt_env import build_scene, cli
+from fowt_env import build_scene
 from fowt_env.descriptions.sea_state import SEA_KEYS
 from fowt_env.descriptions.wind import KINDS
 from fowt_env.errors import InputError
 from fowt_env.scene.build import OPTIONS
+from fowt_env.training.cli import app as cli
 
 
 def examples(count):

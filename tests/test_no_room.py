@@ -14,9 +14,9 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
-from fowt_env import cli
 from fowt_env.files.tables import is_leftover, write_table
 from fowt_env.training import results
+from fowt_env.training.cli import app as cli
 
 SHORT = ("--wind", "18", "--duration", "20", "--option", "wave_components=10")
 EVALUATE = ("evaluate", "--controllers", "pi", "--cases", "ntm_18", "--duration", "20", "--skip", "5")

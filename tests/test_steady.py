@@ -8,7 +8,6 @@ from plant import state
 from typer.testing import CliRunner
 
 import fowt_env
-from fowt_env import cli
 from fowt_env.analysis import equilibrium
 from fowt_env.analysis.equilibrium import check_equilibrium, evaluated
 from fowt_env.analysis.trim import AZIMUTHS, calm, mean_derivative, trim
@@ -19,6 +18,7 @@ from fowt_env.plant.dynamics import gravity_load
 from fowt_env.plant.hydro.hydrostatics import hydrostatic_load
 from fowt_env.plant.mooring import SUSPENDED, mooring_load
 from fowt_env.plant.state import State, pose_of
+from fowt_env.training.cli import app as cli
 
 
 @pytest.fixture(scope="module")

@@ -15,12 +15,12 @@ import numpy as np
 import typer
 from scipy.optimize import minimize
 
-from fowt_env.cli_arguments import parse_numbers
 from fowt_env.controllers.pi import PI, PISettings
 from fowt_env.errors import InputError
 from fowt_env.files.tables import replacing
 from fowt_env.scene.build import build_scene
 from fowt_env.training.cases import read_suite
+from fowt_env.training.cli.arguments import parse_numbers
 from fowt_env.training.engines import session
 from fowt_env.training.evaluate import evaluate
 

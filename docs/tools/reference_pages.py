@@ -15,7 +15,6 @@ from pathlib import Path
 import typer
 from rich.text import Text
 
-from fowt_env.cli import app
 from fowt_env.descriptions.platform import read_platform, read_turbine
 from fowt_env.envs import rewards
 from fowt_env.envs.actions import TRACKING_DAMPING, TRACKING_FREQUENCY
@@ -33,6 +32,7 @@ from fowt_env.plant.rollout import (
     OVERSPEED,
     STOP_REASONS,
 )
+from fowt_env.training.cli.app import app
 from fowt_env_registration import ENVIRONMENTS
 
 DOCS = Path(__file__).resolve().parents[1]

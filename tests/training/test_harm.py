@@ -13,11 +13,11 @@ import pytest
 from typer.testing import CliRunner
 
 import fowt_env
-from fowt_env import cli
 from fowt_env.descriptions.platform import read_platform, read_turbine
 from fowt_env.errors import InputError
 from fowt_env.training import engines, guard, results
 from fowt_env.training.cases import Case
+from fowt_env.training.cli import app as cli
 from fowt_env.training.evaluate import COLUMNS, evaluate
 from fowt_env.training.metrics import METRICS
 from fowt_env.training.report import evaluation_plots, write_leaderboard

@@ -10,8 +10,8 @@ from typer.testing import CliRunner
 pytest.importorskip("plotly", reason="plotly is not installed: the extra `report` is missing")
 
 import fowt_env  # noqa: E402
-from fowt_env import cli  # noqa: E402
 from fowt_env.errors import InputError  # noqa: E402
+from fowt_env.training.cli import app as cli  # noqa: E402
 from fowt_env.training.evaluate import run_file  # noqa: E402
 from fowt_env.training.report_html import SCHEDULE_WINDS, read_results, write_report  # noqa: E402
 

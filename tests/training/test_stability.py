@@ -7,13 +7,13 @@ import pytest
 from typer.testing import CliRunner
 
 from fowt_env.analysis.linear_model import STATES
-from fowt_env.cli import app
 from fowt_env.envs import FowtEnv
 from fowt_env.errors import InputError
 from fowt_env.plant.hydro.linear_damping import LinearDamping
 from fowt_env.plant.state import State
 from fowt_env.scene.build import STEPS, build_scene
 from fowt_env.training import stability, stability_cases, stability_extremes, stability_long, stability_map
+from fowt_env.training.cli.app import app
 
 CALM = {"kind": "jonswap", "Hs": 3.0, "Tp": 9.0}
 

@@ -20,13 +20,13 @@ pytest.importorskip("sb3_contrib")
 
 import torch
 
-from fowt_env.cli_arguments import parse_pairs
 from fowt_env.controllers import information
 from fowt_env.controllers.policy import shipped_agents
 from fowt_env.controllers.policy_file import read_policy
 from fowt_env.errors import InputError
 from fowt_env.training import publish as publishing
 from fowt_env.training import train, train_callbacks
+from fowt_env.training.cli.arguments import parse_pairs
 from fowt_env.training.train import (
     AGENTS,
     Training,

@@ -29,7 +29,9 @@ def doctor(
     faults = [package.advice for package in requirements.versions() if not package.fits]
     if not faults:
         try:
-            from fowt_env import health  # numba and what it needs, which other commands' help can do without
+            from fowt_env.training.cli import (
+                health,  # numba and what it needs, which other commands' help can do without
+            )
         except ImportError as error:  # numba's own, where NumPy is too new for it
             faults = [str(error)]
     if faults:

@@ -19,11 +19,11 @@ from rich.progress import (
     TimeElapsedColumn,
 )
 
-from fowt_env.cli_arguments import parse_numbers, parse_pairs, parse_sea, parse_wind
-from fowt_env.cli_doctor import DOCTOR_EXAMPLES, doctor
-from fowt_env.cli_tables import figure, print_table, table_width
 from fowt_env.errors import ControllerError, InputError, SimulationStopped, unknown
 from fowt_env.files.tables import SERIES_SUFFIXES, table_path, write_table
+from fowt_env.training.cli.arguments import parse_numbers, parse_pairs, parse_sea, parse_wind
+from fowt_env.training.cli.doctor import DOCTOR_EXAMPLES, doctor
+from fowt_env.training.cli.tables import figure, print_table, table_width
 
 EXIT_STOPPED, EXIT_INPUT, EXIT_INTERRUPTED = 1, 2, 130
 ROUNDING = 1e-9  # a standard deviation below this share of the mean is none
@@ -784,4 +784,4 @@ def stability(
 
 
 # these add their commands to the app
-from fowt_env import cli_design, cli_plot, cli_report, cli_scores, cli_train  # noqa: E402, F401
+from fowt_env.training.cli import train as cli_train  # noqa: E402, F401

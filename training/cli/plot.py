@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
-from fowt_env.cli import app, note, reported
 from fowt_env.errors import InputError, unknown
+from fowt_env.training.cli.app import app, note, reported
 
 KINDS = ("series", "spectra", "boxes", "raos", "schedule")
 PLOT_EXAMPLES = """[bold]Examples[/bold]

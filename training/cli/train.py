@@ -5,9 +5,9 @@ from typing import Annotated
 
 import typer
 
-from fowt_env.cli import EXIT_INTERRUPTED, app, benchmarks, note, out, progress_bar, reported
-from fowt_env.cli_arguments import parse_pairs
 from fowt_env.errors import InputError
+from fowt_env.training.cli.app import EXIT_INTERRUPTED, app, benchmarks, note, out, progress_bar, reported
+from fowt_env.training.cli.arguments import parse_pairs
 
 TRAIN_EXAMPLES = """[bold]Examples[/bold]
 

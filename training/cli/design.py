@@ -6,9 +6,9 @@ from typing import Annotated
 
 import typer
 
-from fowt_env.cli import app, note, out, progress_bar, reported, show
-from fowt_env.cli_arguments import parse_numbers, parse_pairs
 from fowt_env.errors import InputError
+from fowt_env.training.cli.app import app, note, out, progress_bar, reported, show
+from fowt_env.training.cli.arguments import parse_numbers, parse_pairs
 
 design = typer.Typer(no_args_is_help=True, rich_markup_mode="rich", help="Tune controllers.")
 app.add_typer(design, name="design")
