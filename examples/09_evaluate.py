@@ -2,7 +2,7 @@
 
 from importlib import import_module
 
-from fowt_env.training.evaluate import evaluate, summary
+from fowt_env.training.evaluation.evaluate import evaluate, summary
 
 SlowPI = import_module("03_own_controller").SlowPI
 

@@ -12,7 +12,7 @@ Needs pip install "fowt-env[report]".
 
 from pathlib import Path
 
-from fowt_env.training.evaluate import evaluate
+from fowt_env.training.evaluation.evaluate import evaluate
 from fowt_env.training.report import write_leaderboard
 from fowt_env.training.report_html import write_report
 

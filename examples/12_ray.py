@@ -8,8 +8,8 @@ Needs pip install "fowt-env[ray]"; without Ray this example says so and ends.
 
 from importlib.util import find_spec
 
-from fowt_env.training.engines import session
-from fowt_env.training.evaluate import evaluate
+from fowt_env.training.evaluation.engines import session
+from fowt_env.training.evaluation.evaluate import evaluate
 
 
 def main():

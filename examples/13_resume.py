@@ -15,7 +15,7 @@ import signal
 from importlib.util import find_spec
 from pathlib import Path
 
-from fowt_env.training.evaluate import evaluate
+from fowt_env.training.evaluation.evaluate import evaluate
 
 FOLDER = Path("results/examples/resume")
 STEPS = 4_000  # decisions: enough to be interrupted, far too few to learn

@@ -147,7 +147,7 @@ class Samples:
         from fowt_env.descriptions.platform import read_platform, read_turbine
         from fowt_env.descriptions.sea_state import joint_sea_state, sea_state_of
         from fowt_env.scene.build import build_scene
-        from fowt_env.training.cases import read_suite
+        from fowt_env.training.evaluation.cases import read_suite
 
         data, folder = ROOT / "fowt_env" / "data", self.folder
         turbine = folder / "turbine"
@@ -250,10 +250,10 @@ class Samples:
 
     def _results(self):
         from fowt_env.files.tables import read_table
-        from fowt_env.training import results
-        from fowt_env.training.evaluate import COLUMNS
+        from fowt_env.training.evaluation import results
+        from fowt_env.training.evaluation.evaluate import COLUMNS
+        from fowt_env.training.evaluation.results import FORMAT, open_results, read_row, write_json, write_run
         from fowt_env.training.report_html import write_report
-        from fowt_env.training.results import FORMAT, open_results, read_row, write_json, write_run
         from fowt_env.training.train import Training, resolve
 
         results.plant_code = lambda: "0123456789abcdef"  # the same manifest in every tree

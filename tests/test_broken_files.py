@@ -21,9 +21,10 @@ from fowt_env.controllers.policy_file import read_policy
 from fowt_env.descriptions.files import parse_json, read_toml
 from fowt_env.descriptions.platform import read_turbine
 from fowt_env.errors import InputError
-from fowt_env.training import report_html, results
+from fowt_env.training import report_html
 from fowt_env.training.cli import app as cli
-from fowt_env.training.metrics import METRICS
+from fowt_env.training.evaluation import results
+from fowt_env.training.evaluation.metrics import METRICS
 
 FILES = int(os.environ.get("FOWT_MUTATIONS", "10000"))
 
@@ -313,7 +314,7 @@ def test_no_text_in_a_design_is_looked_up_as_code_or_as_a_file(text, trapped):
 def test_no_text_in_a_suite_is_looked_up_as_code(text, trapped):
     import tomllib
 
-    from fowt_env.training.cases import FOLDER, read_suite
+    from fowt_env.training.evaluation.cases import FOLDER, read_suite
 
     words = (FOLDER / "atlas.toml").read_text(encoding="utf-8").split('"')
     assert len(words) > 21

@@ -170,9 +170,9 @@ def test_ctrl_c_ends_with_130_and_without_a_half_file(tmp_path, monkeypatch):
 
 
 def test_an_interrupted_evaluation_says_where_its_rows_are(tmp_path, monkeypatch):
-    import fowt_env.training.evaluate
+    import fowt_env.training.evaluation.evaluate
 
-    real, calls = fowt_env.training.evaluate.score, []
+    real, calls = fowt_env.training.evaluation.evaluate.score, []
 
     def second_is_interrupted(run):
         calls.append(run)
@@ -180,7 +180,7 @@ def test_an_interrupted_evaluation_says_where_its_rows_are(tmp_path, monkeypatch
             raise KeyboardInterrupt
         return real(run)
 
-    monkeypatch.setattr(fowt_env.training.evaluate, "score", second_is_interrupted)
+    monkeypatch.setattr(fowt_env.training.evaluation.evaluate, "score", second_is_interrupted)
     arguments = (
         "--cases",
         "steady_16",

@@ -9,7 +9,7 @@ pytest.importorskip("matplotlib", reason="matplotlib is not installed: the extra
 from fowt_env.files.tables import write_table  # noqa: E402
 from fowt_env.training.agent_scores import FIGURES  # noqa: E402
 from fowt_env.training.cli.app import EXIT_INPUT, app  # noqa: E402
-from fowt_env.training.evaluate import COLUMNS  # noqa: E402
+from fowt_env.training.evaluation.evaluate import COLUMNS  # noqa: E402
 
 
 def call(*arguments):

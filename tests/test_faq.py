@@ -251,8 +251,8 @@ def _(folder, monkeypatch):
 
 @under("The results folder is of another version")
 def _(folder, monkeypatch):
-    import fowt_env.training.results as results
-    from fowt_env.training.evaluate import evaluate
+    import fowt_env.training.evaluation.results as results
+    from fowt_env.training.evaluation.evaluate import evaluate
 
     asked = {"cases": "steady_16", "duration": 5.0, "skip": 1.0, "folder": "results/mine"}
     monkeypatch.chdir(folder)
@@ -263,7 +263,7 @@ def _(folder, monkeypatch):
 
 @under("The results folder is of another version")
 def _(folder, monkeypatch):
-    from fowt_env.training.evaluate import evaluate
+    from fowt_env.training.evaluation.evaluate import evaluate
 
     asked = {"cases": "steady_16", "duration": 5.0, "skip": 1.0, "folder": "results/mine"}
     monkeypatch.chdir(folder)

@@ -15,8 +15,8 @@ import pytest
 from typer.testing import CliRunner
 
 from fowt_env.files.tables import is_leftover, write_table
-from fowt_env.training import results
 from fowt_env.training.cli import app as cli
+from fowt_env.training.evaluation import results
 
 SHORT = ("--wind", "18", "--duration", "20", "--option", "wave_components=10")
 EVALUATE = ("evaluate", "--controllers", "pi", "--cases", "ntm_18", "--duration", "20", "--skip", "5")

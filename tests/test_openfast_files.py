@@ -9,7 +9,7 @@ from fowt_env.errors import InputError
 from fowt_env.files.openfast import read_outb, read_uniform_wind, write_outb
 from fowt_env.files.tables import read_table, write_table
 from fowt_env.training.cli.arguments import parse_wind
-from fowt_env.training.metrics import damage_equivalent_load
+from fowt_env.training.evaluation.metrics import damage_equivalent_load
 from fowt_env.weather.wind import build_wind, wind_at, wind_now
 
 ROTOR = {

@@ -5,7 +5,7 @@
 
 Each ratio is of one metric of an agent over that of a rival in the same wind and waves. Several training
 seeds of one configuration make a group, whose interval resamples training and weather seeds
-(training.bootstrap).
+(training.evaluation.bootstrap).
 """
 
 import re
@@ -19,8 +19,8 @@ import pandas as pd
 from fowt_env.controllers import DESIGN, POLICY, information
 from fowt_env.errors import InputError, unknown
 from fowt_env.files.tables import replacing, write_table
-from fowt_env.training.bootstrap import LEAST_SEEDS, crossed_estimate
-from fowt_env.training.metrics import METRICS, never_negative
+from fowt_env.training.evaluation.bootstrap import LEAST_SEEDS, crossed_estimate
+from fowt_env.training.evaluation.metrics import METRICS, never_negative
 
 __all__ = ["COUNTS", "FIGURES", "Figure", "agent_counts", "agent_scores", "by_kind", "read_results"]
 
@@ -169,9 +169,9 @@ def _values(runs, labels, cases, seeds, metric):
 def agent_scores(table, rivals, groups=None, agents=None, figures=FIGURES):
     """DataFrame: per agent or group, rival and figure the ratio, its interval, and what that reaches.
 
-    table: what training.evaluate.evaluate returns; groups, agents: as grouped takes them. Columns: agent,
+    table: what training.evaluation.evaluate.evaluate returns; groups, agents: as grouped takes them. Columns: agent,
     rival, figure, metric, ratio (interquartile mean over all runs), low, high (NaN for too few seeds:
-    training.bootstrap.crossed_estimate), pairs (runs with a ratio), runs, training_seeds, verdict
+    training.evaluation.bootstrap.crossed_estimate), pairs (runs with a ratio), runs, training_seeds, verdict
     (Figure.verdict). Where the rival's figure is 0 there is no ratio.
     Raises: InputError for labels that were not run, or where no run of both went well.
     """

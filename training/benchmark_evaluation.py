@@ -8,10 +8,10 @@ import numpy as np
 import pandas as pd
 
 from fowt_env.errors import InputError
-from fowt_env.training.cases import read_suite
-from fowt_env.training.engines import outcomes
-from fowt_env.training.evaluate import planned, score, score_and_send
-from fowt_env.training.results import read_row
+from fowt_env.training.evaluation.cases import read_suite
+from fowt_env.training.evaluation.engines import outcomes
+from fowt_env.training.evaluation.evaluate import planned, score, score_and_send
+from fowt_env.training.evaluation.results import read_row
 
 STAGES = ("whole run", "without its file", "reading its row")
 

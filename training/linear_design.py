@@ -16,9 +16,9 @@ from fowt_env.controllers.lqr_design import Weights, scene_at
 from fowt_env.errors import InputError
 from fowt_env.files.tables import replacing, write_table
 from fowt_env.simulation import simulate
-from fowt_env.training.cases import named_cases
-from fowt_env.training.evaluate import SHORTEST_WEATHER
-from fowt_env.training.metrics import metrics
+from fowt_env.training.evaluation.cases import named_cases
+from fowt_env.training.evaluation.evaluate import SHORTEST_WEATHER
+from fowt_env.training.evaluation.metrics import metrics
 
 FIRST_TRAINING_SEED = 1000  # seeds below are for scoring
 INFINITE = 1e3  # rad/s: generalised eigenvalues beyond are zeros at infinity

@@ -6,9 +6,9 @@ from dataclasses import replace
 from fowt_env.descriptions.platform import Platform, read_platform
 from fowt_env.errors import unknown
 from fowt_env.files.tables import read_table
-from fowt_env.training.cases import Score, named_cases, read_suite
-from fowt_env.training.leaderboard import leaderboard
-from fowt_env.training.results import file_name, run_file, write_json
+from fowt_env.training.evaluation.cases import Score, named_cases, read_suite
+from fowt_env.training.evaluation.leaderboard import leaderboard
+from fowt_env.training.evaluation.results import file_name, run_file, write_json
 from fowt_env.visual.response import BOXES, plot_boxes
 from fowt_env.visual.time_series import TIME, plot_evaluation, plot_pareto, plot_runs, plot_spectra
 
@@ -42,7 +42,7 @@ DROPPED_FIRST = (
 
 
 def summary_rows(means, width):
-    """(headings, rows of texts, failures per row) of what fowt_env.training.evaluate.summary gives.
+    """(headings, rows of texts, failures per row) of what fowt_env.training.evaluation.evaluate.summary gives.
 
     Columns are dropped until headings and values, two spaces between them, take at most `width` characters.
     """

@@ -26,7 +26,7 @@ from fowt_env.controllers.pi import (
 )
 from fowt_env.controllers.rosco import SCHEDULE, Rosco, RoscoSettings, pitch_gains
 from fowt_env.descriptions.platform import read_turbine
-from fowt_env.training.evaluate import evaluate
+from fowt_env.training.evaluation.evaluate import evaluate
 from fowt_env.training.tune_controllers import BASELINE, CONTROL_DT, SEEDS, WINDS, training_case
 
 SHOWN = {

@@ -27,9 +27,9 @@ from fowt_env.controllers.rosco import Rosco, RoscoSettings
 from fowt_env.descriptions.platform import joint_sea_state, read_turbine
 from fowt_env.errors import InputError, unknown
 from fowt_env.files.tables import replacing, write_table
-from fowt_env.training.cases import Case
-from fowt_env.training.engines import session
-from fowt_env.training.evaluate import evaluate
+from fowt_env.training.evaluation.cases import Case
+from fowt_env.training.evaluation.engines import session
+from fowt_env.training.evaluation.evaluate import evaluate
 
 WINDS = (13.0, 17.0, 21.0)
 SEEDS = (1001, 1002)

@@ -19,10 +19,10 @@ from fowt_env.controllers.pi import PI, PISettings
 from fowt_env.errors import InputError
 from fowt_env.files.tables import replacing
 from fowt_env.scene.build import build_scene
-from fowt_env.training.cases import read_suite
 from fowt_env.training.cli.arguments import parse_numbers
-from fowt_env.training.engines import session
-from fowt_env.training.evaluate import evaluate
+from fowt_env.training.evaluation.cases import read_suite
+from fowt_env.training.evaluation.engines import session
+from fowt_env.training.evaluation.evaluate import evaluate
 
 FACTORS = ("KP", "KI", "gain_schedule_pitch")
 FIRST_TRAINING_SEED = 1000  # below it lie the seeds of the suites

@@ -215,7 +215,7 @@ def frequency_marks(frame, platform_pitch_period=None):
 def plot_evaluation(table, metrics, path=None, title=None):
     """One panel per metric: each case on the x axis, one line per controller, spread over seeds.
 
-    table      the DataFrame of training.evaluate.evaluate; failed runs are left out and counted
+    table      the DataFrame of training.evaluation.evaluate.evaluate; failed runs are left out and counted
     metrics    column names; marks are the mean over the seeds, bars reach from least to greatest
     """
     metrics = [name for name in metrics if name in table.columns]
@@ -272,7 +272,7 @@ LARGEST_MARK = 900.0  # points squared, of the controller that travels most
 def plot_pareto(board, path=None, title=None):
     """Rotor-speed against platform-pitch deviation of each controller; the mark's area is its pitch travel.
 
-    board: mapping of training.leaderboard.leaderboard. Bars are its intervals, or, with too few seeds for
+    board: mapping of training.evaluation.leaderboard.leaderboard. Bars are its intervals, or, with too few seeds for
     one, lines without ends the range over the seeds; the stepped line joins the controllers that no other
     betters in both deviations. The legend gives travel and greatest overspeed.
     """

@@ -6,8 +6,8 @@ from fowt_env import build_scene, simulate
 from fowt_env.controllers.lqr import LQR
 from fowt_env.controllers.lqr_design import Weights
 from fowt_env.errors import InputError
-from fowt_env.training.cases import named_cases
-from fowt_env.training.metrics import metrics
+from fowt_env.training.evaluation.cases import named_cases
+from fowt_env.training.evaluation.metrics import metrics
 
 
 def test_lqr_betters_the_baseline_at_no_more_pitch_travel_on_a_training_seed():

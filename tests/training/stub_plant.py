@@ -14,7 +14,7 @@ import fowt_env
 from fowt_env.controllers import make
 from fowt_env.descriptions.platform import read_platform, read_turbine
 from fowt_env.plant.measurement import Measurement
-from fowt_env.training import guard
+from fowt_env.training.evaluation import guard
 
 CHANNELS = {  # channel: (mean, amplitude)
     "RotSpeed_[rpm]": (12.0, 1.0),

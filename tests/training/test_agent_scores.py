@@ -21,9 +21,9 @@ from fowt_env.training.agent_scores import (
     scores_markdown,
     told,
 )
-from fowt_env.training.bootstrap import interquartile_mean
-from fowt_env.training.evaluate import COLUMNS
-from fowt_env.training.metrics import METRICS
+from fowt_env.training.evaluation.bootstrap import interquartile_mean
+from fowt_env.training.evaluation.evaluate import COLUMNS
+from fowt_env.training.evaluation.metrics import METRICS
 
 
 def table(agents, cases=("ntm_18",)):

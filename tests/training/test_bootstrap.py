@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fowt_env.training.bootstrap import crossed_estimate, interquartile_mean, interval
+from fowt_env.training.evaluation.bootstrap import crossed_estimate, interquartile_mean, interval
 
 
 def test_the_interquartile_mean_leaves_out_a_quarter_at_each_end():

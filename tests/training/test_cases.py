@@ -5,7 +5,7 @@ import json
 import pytest
 
 from fowt_env.errors import InputError, unknown
-from fowt_env.training.cases import all_cases, described, named_cases, read_suite, suite_names
+from fowt_env.training.evaluation.cases import all_cases, described, named_cases, read_suite, suite_names
 
 SUITES = ("above_rated", "above_rated_fullfield", "atlas", "dlc", "full_range", "gusts", "oc3", "paper")
 HEAD = """

@@ -13,9 +13,9 @@ import pytest
 
 from fowt_env.controllers import make
 from fowt_env.errors import InputError
-from fowt_env.training.cases import Case
-from fowt_env.training.engines import outcomes
-from fowt_env.training.evaluate import evaluate
+from fowt_env.training.evaluation.cases import Case
+from fowt_env.training.evaluation.engines import outcomes
+from fowt_env.training.evaluation.evaluate import evaluate
 
 GUSTY = Case(
     "gusty",

@@ -4,10 +4,10 @@ import pytest
 
 from fowt_env.envs import FowtEnv
 from fowt_env.errors import InputError
-from fowt_env.training.cases import Case, all_cases, named_cases, read_suite
-from fowt_env.training.evaluate import COLUMNS, evaluate, summary
-from fowt_env.training.faults import Fault
-from fowt_env.training.metrics import METRICS
+from fowt_env.training.evaluation.cases import Case, all_cases, named_cases, read_suite
+from fowt_env.training.evaluation.evaluate import COLUMNS, evaluate, summary
+from fowt_env.training.evaluation.faults import Fault
+from fowt_env.training.evaluation.metrics import METRICS
 
 GUSTY = Case(
     "gusty",

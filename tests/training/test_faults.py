@@ -10,8 +10,8 @@ from fowt_env.controllers import make
 from fowt_env.controllers.constant import Constant
 from fowt_env.errors import InputError
 from fowt_env.plant.measurement import Measurement
-from fowt_env.training.evaluate import Case, evaluate
-from fowt_env.training.faults import Fault, FaultedController, faulted, idling
+from fowt_env.training.evaluation.evaluate import Case, evaluate
+from fowt_env.training.evaluation.faults import Fault, FaultedController, faulted, idling
 
 DT = 0.1
 

@@ -15,13 +15,13 @@ from typer.testing import CliRunner
 import fowt_env
 from fowt_env.descriptions.platform import read_platform, read_turbine
 from fowt_env.errors import InputError
-from fowt_env.training import engines, guard, results
-from fowt_env.training.cases import Case
 from fowt_env.training.cli import app as cli
-from fowt_env.training.evaluate import COLUMNS, evaluate
-from fowt_env.training.metrics import METRICS
+from fowt_env.training.evaluation import engines, guard, results
+from fowt_env.training.evaluation.cases import Case
+from fowt_env.training.evaluation.evaluate import COLUMNS, evaluate
+from fowt_env.training.evaluation.metrics import METRICS
+from fowt_env.training.evaluation.results import LONGEST_NAME, check_name, read_row, run_file, write_run
 from fowt_env.training.report import evaluation_plots, write_leaderboard
-from fowt_env.training.results import LONGEST_NAME, check_name, read_row, run_file, write_run
 from tests.training import stub_plant
 
 CALM = Case("calm", 16.0)
@@ -295,7 +295,7 @@ def test_a_folder_of_other_versions_is_refused_with_both_of_them(tmp_path, packa
 
 
 def test_a_ray_worker_of_other_versions_does_nothing(monkeypatch):
-    from fowt_env.training.evaluate import score_and_send
+    from fowt_env.training.evaluation.evaluate import score_and_send
 
     with pytest.raises(InputError, match="numpy 0.1 here and numpy .* at the worker"):
         score_and_send(None, here=results.versions() | {"numpy": "0.1"})
@@ -330,9 +330,9 @@ def test_a_row_is_that_of_the_scored_part_of_its_file_by_the_figures_of_its_own_
 
 USED = """
 import sys
-from fowt_env.training.cases import Case
-from fowt_env.training.scoring import Run, scored
-from fowt_env.training.shifts import Shift
+from fowt_env.training.evaluation.cases import Case
+from fowt_env.training.evaluation.run_case import Run, scored
+from fowt_env.training.evaluation.model_mismatch import Shift
 sea = {"kind": "jonswap", "Hs": 3.0, "Tp": 9.0}
 wind = {"kind": "ntm", "speed": 18.0, "class": "B"}
 case = Case("c", wind, sea, shift=Shift(noise=0.01))
@@ -350,11 +350,11 @@ def test_what_a_run_imports_is_in_the_hash_of_the_plant_and_what_people_look_at_
     )
     assert done.returncode == 0, done.stderr
     files = {str(path) for path in results.plant_files()}
-    others = ("training/cases.py", "fowt_env/envs/decisions.py")  # of the program above, and of agents
+    others = ("training/evaluation/cases.py", "fowt_env/envs/decisions.py")  # of the program above, and of agents
     used = set(done.stdout.split()) - {str(results.ROOT / name) for name in others}
     assert used <= files and len(used) > 40
     names = {path.relative_to(results.ROOT).as_posix() for path in results.plant_files()}
-    assert {"fowt_env/data/platforms/oc3_hywind.toml", "training/metrics.py", "training/faults.py"} <= names
+    assert {"fowt_env/data/platforms/oc3_hywind.toml", "training/evaluation/metrics.py", "training/evaluation/faults.py"} <= names
     looks = ("fowt_env/cli", "fowt_env/plots", "fowt_env/animation", "training/report", "controllers/pi")
     assert not [name for name in names if name.startswith(looks)]
 

@@ -5,11 +5,11 @@ import pandas as pd
 import pytest
 
 from fowt_env.errors import InputError
-from fowt_env.training.bootstrap import interval, resample_weights
-from fowt_env.training.cases import Score, Term
-from fowt_env.training.evaluate import COLUMNS
-from fowt_env.training.leaderboard import case_means, leaderboard
-from fowt_env.training.metrics import METRICS, never_negative
+from fowt_env.training.evaluation.bootstrap import interval, resample_weights
+from fowt_env.training.evaluation.cases import Score, Term
+from fowt_env.training.evaluation.evaluate import COLUMNS
+from fowt_env.training.evaluation.leaderboard import case_means, leaderboard
+from fowt_env.training.evaluation.metrics import METRICS, never_negative
 
 STD = "RotSpeed_std_[rpm]"
 SPEED_SCORE = Score(baseline="pi", term=(Term(metric=STD, weight=1.0),))

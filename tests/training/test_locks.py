@@ -10,13 +10,13 @@ from pathlib import Path
 import pytest
 
 from fowt_env.errors import InputError
-from fowt_env.training.locks import locked
+from fowt_env.training.evaluation.locks import locked
 
 ROOT = Path(__file__).resolve().parents[2]
 WHAT, BUSY = "folder", "others are in it"
 HOLDER = """
 import sys, time
-from fowt_env.training.locks import locked
+from fowt_env.training.evaluation.locks import locked
 with locked(sys.argv[1], "folder", "others are in it"):
     print("locked", flush=True)
     time.sleep(600)

@@ -3,7 +3,7 @@ import pandas as pd
 import pytest
 
 from fowt_env.errors import InputError
-from fowt_env.training.metrics import METRICS, damage_equivalent_load, metrics
+from fowt_env.training.evaluation.metrics import METRICS, damage_equivalent_load, metrics
 
 pytestmark = pytest.mark.installation
 

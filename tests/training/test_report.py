@@ -5,9 +5,9 @@ import pandas as pd
 import pytest
 
 from fowt_env.errors import InputError
-from fowt_env.training.evaluate import COLUMNS
-from fowt_env.training.leaderboard import leaderboard
-from fowt_env.training.metrics import METRICS
+from fowt_env.training.evaluation.evaluate import COLUMNS
+from fowt_env.training.evaluation.leaderboard import leaderboard
+from fowt_env.training.evaluation.metrics import METRICS
 from fowt_env.training.report import (
     DROPPED_FIRST,
     HEADLINE,

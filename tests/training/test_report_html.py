@@ -12,7 +12,7 @@ pytest.importorskip("plotly", reason="plotly is not installed: the extra `report
 import fowt_env  # noqa: E402
 from fowt_env.errors import InputError  # noqa: E402
 from fowt_env.training.cli import app as cli  # noqa: E402
-from fowt_env.training.evaluate import run_file  # noqa: E402
+from fowt_env.training.evaluation.evaluate import run_file  # noqa: E402
 from fowt_env.training.report_html import SCHEDULE_WINDS, read_results, write_report  # noqa: E402
 
 EVIL = "<img src=x onerror=alert(1)></script>&"

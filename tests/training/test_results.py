@@ -16,10 +16,10 @@ import pytest
 import fowt_env
 from fowt_env.controllers import CONTROLLERS
 from fowt_env.errors import InputError
-from fowt_env.training import results
-from fowt_env.training.cases import Case, Suite
-from fowt_env.training.evaluate import COLUMNS, evaluate
-from fowt_env.training.metrics import METRICS
+from fowt_env.training.evaluation import results
+from fowt_env.training.evaluation.cases import Case, Suite
+from fowt_env.training.evaluation.evaluate import COLUMNS, evaluate
+from fowt_env.training.evaluation.metrics import METRICS
 from fowt_env.training.report import leaderboard_rows, write_leaderboard
 
 CALM = Case("calm", 16.0)
@@ -130,7 +130,7 @@ def test_other_settings_and_versions_are_refused_with_what_to_do(tmp_path, monke
         with pytest.raises(InputError, match="another state"):
             evaluate("pi", suite(), folder=tmp_path)
     with monkeypatch.context() as patch:
-        patch.setattr("fowt_env.training.evaluate.controller_code", lambda controller: {"name": "pi", "code": "new"})
+        patch.setattr("fowt_env.training.evaluation.evaluate.controller_code", lambda controller: {"name": "pi", "code": "new"})
         with pytest.raises(InputError, match="code of controller 'pi' has changed"):
             evaluate("pi", suite(), folder=tmp_path)
 
@@ -206,8 +206,8 @@ def test_a_file_that_is_no_run_is_named(tmp_path):
 
 SCRIPT = """
 import sys
-from fowt_env.training.evaluate import evaluate
-from fowt_env.training.cases import Case
+from fowt_env.training.evaluation.evaluate import evaluate
+from fowt_env.training.evaluation.cases import Case
 if __name__ == "__main__":
     cases = [Case("calm", 16.0), Case("windy", 18.0)]
     settings = {"seeds": (1, 2, 3), "duration": 60.0, "skip": 5.0}

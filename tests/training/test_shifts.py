@@ -10,11 +10,11 @@ from fowt_env.analysis.linear_model import linearize
 from fowt_env.controllers import make
 from fowt_env.errors import InputError
 from fowt_env.plant.measurement import Measurement
-from fowt_env.training.cases import Case, described, read_suite
-from fowt_env.training.evaluate import evaluate, planned
+from fowt_env.training.evaluation.cases import Case, described, read_suite
+from fowt_env.training.evaluation.evaluate import evaluate, planned
+from fowt_env.training.evaluation.model_mismatch import Shift, Unaware, reading_scales, shifted_parts
+from fowt_env.training.evaluation.run_case import run_controller
 from fowt_env.training.randomisation import PLANT, SENSORS
-from fowt_env.training.scoring import run_controller
-from fowt_env.training.shifts import Shift, Unaware, reading_scales, shifted_parts
 
 WIND = {"kind": "ntm", "speed": 18.0, "class": "B"}
 

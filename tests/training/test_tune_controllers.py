@@ -12,7 +12,7 @@ from fowt_env.controllers.floating import FeedbackSettings, FloatingFeedback
 from fowt_env.controllers.pi import PISettings
 from fowt_env.errors import InputError
 from fowt_env.training import tune_controllers
-from fowt_env.training.evaluate import evaluate
+from fowt_env.training.evaluation.evaluate import evaluate
 from fowt_env.training.tune_controllers import (
     FEEDBACK_GRID,
     FIGURES,
@@ -117,7 +117,7 @@ def test_the_command_writes_the_grids_and_the_choice(tmp_path, monkeypatch):
 @pytest.mark.slow
 def test_ray_tunes_to_the_same_table(small):
     pytest.importorskip("ray", reason="Ray is not installed: pip install 'fowt-env[ray]'")
-    from fowt_env.training.engines import session
+    from fowt_env.training.evaluation.engines import session
 
     with session("ray", jobs=2):
         spread = tune("floating_feedback", jobs=2, engine="ray", **SHORT)

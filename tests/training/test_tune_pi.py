@@ -9,7 +9,7 @@ from fowt_env.controllers.pi import pi
 from fowt_env.controllers.pi_tuned import FACTORS_FILE, pi_tuned
 from fowt_env.errors import InputError
 from fowt_env.training import tune_pi
-from fowt_env.training.engines import session
+from fowt_env.training.evaluation.engines import session
 from fowt_env.training.tune_pi import FAILED, PENALTY, TRAVEL, WEIGHED, candidate, cost, search
 
 ONES = dict.fromkeys(tune_pi.FACTORS, 1.0)

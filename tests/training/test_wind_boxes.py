@@ -5,7 +5,7 @@ import os
 import numpy as np
 import pytest
 
-from fowt_env.training import wind_boxes
+from fowt_env.training.evaluation import wind_boxes
 from fowt_env.weather.wind_field import WindBox
 
 SPEC = {"kind": "mann", "speed": 18.0}

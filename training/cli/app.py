@@ -323,8 +323,8 @@ def evaluate(
     plot: Annotated[bool, typer.Option("--plot/--no-plot", help="Make the plots.")] = True,
 ):
     """Score controllers on load cases: a leaderboard with intervals, metrics by case, the runs, and plots."""
-    from fowt_env.training.evaluate import evaluate as evaluate_controllers
-    from fowt_env.training.evaluate import summary
+    from fowt_env.training.evaluation.evaluate import evaluate as evaluate_controllers
+    from fowt_env.training.evaluation.evaluate import summary
     from fowt_env.training.report import chosen_cases, write_leaderboard
 
     folder = Path(out_folder)
@@ -484,7 +484,7 @@ def list_names(
     from fowt_env.controllers import CONTROLLERS
     from fowt_env.controllers.policy import shipped_agents
     from fowt_env.descriptions.platform import names
-    from fowt_env.training.cases import all_cases, read_suite, suite_names
+    from fowt_env.training.evaluation.cases import all_cases, read_suite, suite_names
 
     known = {
         "platforms": lambda: names("platforms"),

@@ -2,8 +2,8 @@
 
     manifest.json                              what was asked for: versions, suite, cases, controllers
     runs/<controller>/<case>_seed<n>.parquet   time series of one run, its row of the table in the metadata
-    results.csv                                one row per run, columns training.evaluate.COLUMNS
-    leaderboard.json                           means, intervals and paired differences (training.leaderboard)
+    results.csv                                one row per run, columns training.evaluation.evaluate.COLUMNS
+    leaderboard.json                           means, intervals and paired differences (training.evaluation.leaderboard)
 
 A run is done when its Parquet file is there, and that file appears whole or not at all. results.csv and
 leaderboard.json are made from those files, so an interrupted evaluation loses and repeats nothing.
@@ -30,9 +30,9 @@ from fowt_env.descriptions.files import parse_json
 from fowt_env.descriptions.records import is_number
 from fowt_env.errors import InputError
 from fowt_env.files.tables import remove_leftovers, replacing, write_table
-from fowt_env.training.guard import printable
-from fowt_env.training.locks import locked
-from fowt_env.training.sources import imported_files
+from fowt_env.training.evaluation.guard import printable
+from fowt_env.training.evaluation.locks import locked
+from fowt_env.training.evaluation.sources import imported_files
 
 FORMAT = 2  # of the folder; raised when files or their meaning change
 MANIFEST = {  # what each key of manifest.json holds, beside its format

@@ -11,11 +11,11 @@ import fowt_env
 from fowt_env.controllers import make
 from fowt_env.descriptions.records import is_number
 from fowt_env.errors import ControllerError, ControllerInputError, InputError, SimulationStopped
-from fowt_env.training.faults import faulted, idling
-from fowt_env.training.guard import attempt, reason_of
-from fowt_env.training.metrics import METRICS, TIME, metrics
-from fowt_env.training.shifts import Unaware, shifted_parts
-from fowt_env.training.wind_boxes import cached_box
+from fowt_env.training.evaluation.faults import faulted, idling
+from fowt_env.training.evaluation.guard import attempt, reason_of
+from fowt_env.training.evaluation.metrics import METRICS, TIME, metrics
+from fowt_env.training.evaluation.model_mismatch import Unaware, shifted_parts
+from fowt_env.training.evaluation.wind_boxes import cached_box
 from fowt_env.weather.wind_field import is_field
 
 CONTROL_DT = 0.1  # s, simulate's own
@@ -32,7 +32,7 @@ class Run:
 
     label: str
     controller: object  # name or object, as simulate takes it
-    case: Any  # training.cases.Case
+    case: Any  # training.evaluation.cases.Case
     seed: int
     duration: float
     skip: float

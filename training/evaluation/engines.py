@@ -18,7 +18,14 @@ from multiprocessing import connection
 
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.compile.announcement import kernels_compiled
-from fowt_env.training.guard import GRACE, LIMIT_CODE, as_worker, attempt, reason_of, time_limit_reason
+from fowt_env.training.evaluation.guard import (
+    GRACE,
+    LIMIT_CODE,
+    as_worker,
+    attempt,
+    reason_of,
+    time_limit_reason,
+)
 
 ENGINES = ("processes", "ray")
 NICENESS = "RAY_worker_niceness"  # environment variable by which Ray is told how nice its workers are

@@ -1,6 +1,6 @@
 """Load cases and suites of them, read from files: what controllers are compared on.
 
-A suite is a TOML file of training/suites, or the user's own. One `[[case]]` may stand for several: with
+A suite is a TOML file of training/evaluation/suites, or the user's own. One `[[case]]` may stand for several: with
 `speed = [12, 14]` and `name = "ntm_{speed}"` it is one case per mean wind speed, which then also stands
 in its wind and picks the row of its sea's table.
 """
@@ -26,9 +26,9 @@ from fowt_env.descriptions.sea_state import SeaState, sea_state_of
 from fowt_env.descriptions.wind import read_wind
 from fowt_env.errors import InputError, unknown
 from fowt_env.scene.build import OPTIONS
-from fowt_env.training.faults import Fault
-from fowt_env.training.metrics import METRICS
-from fowt_env.training.shifts import Shift
+from fowt_env.training.evaluation.faults import Fault
+from fowt_env.training.evaluation.metrics import METRICS
+from fowt_env.training.evaluation.model_mismatch import Shift
 from fowt_env.weather.wind_field import KINDS as FIELD_KINDS
 from fowt_env.weather.wind_field import REQUIRED, is_field
 
@@ -43,7 +43,7 @@ class Case:
     parked: the turbine idles with feathered blades (at rest without wind), so no controller is compared.
     initial: absolute values of channels at the start, as simulate takes them.
     seeds, duration, skip: of this case where they differ from the suite's. shift: how the plant differs from
-    the one that controllers are told of (training.shifts).
+    the one that controllers are told of (training.evaluation.model_mismatch).
     """
 
     name: str

@@ -1,6 +1,6 @@
 """Any controllers on any cases, judged alike: one table of metrics.
 
-    from fowt_env.training.evaluate import evaluate
+    from fowt_env.training.evaluation.evaluate import evaluate
     table = evaluate(["pi", "pi_land"], "above_rated", seeds=(1, 2), jobs=2)
 
 Every controller meets the same wind and waves: a (case, seed) is one realisation. A run that fails
@@ -23,11 +23,11 @@ from fowt_env.controllers import make
 from fowt_env.descriptions.records import is_number, plain_number
 from fowt_env.errors import InputError
 from fowt_env.files.tables import replacing, write_table
-from fowt_env.training.cases import Case, Suite, described, named_cases
-from fowt_env.training.engines import outcomes
-from fowt_env.training.guard import attempt
-from fowt_env.training.metrics import METRICS, metrics
-from fowt_env.training.results import (
+from fowt_env.training.evaluation.cases import Case, Suite, described, named_cases
+from fowt_env.training.evaluation.engines import outcomes
+from fowt_env.training.evaluation.guard import attempt
+from fowt_env.training.evaluation.metrics import METRICS, metrics
+from fowt_env.training.evaluation.results import (
     check_name,
     controller_code,
     open_results,
@@ -37,7 +37,7 @@ from fowt_env.training.results import (
     versions,
     write_run,
 )
-from fowt_env.training.scoring import COLUMNS, CONTROL_DT, SHORTEST_WEATHER, Run, lost_row, scored
+from fowt_env.training.evaluation.run_case import COLUMNS, CONTROL_DT, SHORTEST_WEATHER, Run, lost_row, scored
 
 __all__ = ["COLUMNS", "SHORTEST_WEATHER", "Case", "evaluate", "metrics", "named_cases", "run_file", "summary"]
 
@@ -67,7 +67,7 @@ def evaluate(
     """DataFrame with one row per controller, case and seed, and the columns COLUMNS.
 
     controllers   names (a sequence, or one string with commas), or {label: name or controller object}
-    cases         a Suite (training.cases.read_suite), Cases, or names of cases and suites
+    cases         a Suite (training.evaluation.cases.read_suite), Cases, or names of cases and suites
     duration      length of each run, s, of which the first `skip` seconds are not scored. None: those of the
                   case, else of the Suite, else 660 and 60
     seeds         one realisation of wind and waves each, the same for all controllers. None: as above, else 1
@@ -75,7 +75,7 @@ def evaluate(
     progress      called as progress(done, total, row) after each run (row None: before the first)
     out           CSV file: a row is appended as soon as its run ends; sorted at the end
     runs_folder   folder for the time series, <controller>/<case>_seed<n>.parquet
-    folder        results folder (training.results) instead of out and runs_folder: what is done in it is not
+    folder        results folder (training.evaluation.results) instead of out and runs_folder: what is done in it is not
                   done again, and the table is that of the whole folder
     engine        "processes" or "ray" (address: of a running cluster)
     time_limit    seconds of wall clock after which a run fails; None: none. With jobs = 1 it is heard in the

@@ -1,14 +1,14 @@
 """Controllers compared on equal seeds: means with intervals, paired differences, and a suite's score.
 
-Seeds are resampled, with all their cases (training.bootstrap), and each case counts alike in a mean over
+Seeds are resampled, with all their cases (training.evaluation.bootstrap), and each case counts alike in a mean over
 cases.
 """
 
 import numpy as np
 
 from fowt_env.errors import unknown
-from fowt_env.training.bootstrap import LEAST_SEEDS, LEVEL, RESAMPLES, interval, resample_weights
-from fowt_env.training.metrics import METRICS, never_negative
+from fowt_env.training.evaluation.bootstrap import LEAST_SEEDS, LEVEL, RESAMPLES, interval, resample_weights
+from fowt_env.training.evaluation.metrics import METRICS, never_negative
 
 BASELINES = ("gspi_oc3", "pi")  # the first of these that was evaluated, unless one is named
 POSITIVE = np.array([never_negative(name) for name in METRICS])
@@ -113,7 +113,7 @@ def leaderboard(table, baseline=None, score=None, cases=None):
 
     baseline   controller of the paired differences; None: gspi_oc3, else pi, else the first, of those
                without failed runs
-    score      training.cases.Score of a suite, or None
+    score      training.evaluation.cases.Score of a suite, or None
     cases      names of the cases that count; None: all
     Keys: baseline (None: every controller has failed runs), interval (level, method, resamples,
     least_seeds), cases, seeds, controllers: a list of mappings with controller, runs, failed, metrics
