@@ -253,7 +253,7 @@ class Samples:
         from fowt_env.training.evaluation import results
         from fowt_env.training.evaluation.evaluate import COLUMNS
         from fowt_env.training.evaluation.results import FORMAT, open_results, read_row, write_json, write_run
-        from fowt_env.training.report_html import write_report
+        from fowt_env.training.reports.html_page import write_report
         from fowt_env.training.train import Training, resolve
 
         results.plant_code = lambda: "0123456789abcdef"  # the same manifest in every tree
@@ -286,7 +286,7 @@ class Samples:
         write_json(manifest | {"created": "2026-01-01T00:00:00+0000"}, folder / "manifest.json")
         write_run(frame, row, run)
         table = reopen()
-        from fowt_env.training.report import write_leaderboard
+        from fowt_env.training.reports.terminal import write_leaderboard
 
         write_leaderboard(table, folder)
         assert json.loads((folder / "manifest.json").read_text())["format"] == FORMAT

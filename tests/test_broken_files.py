@@ -21,10 +21,10 @@ from fowt_env.controllers.policy_file import read_policy
 from fowt_env.descriptions.files import parse_json, read_toml
 from fowt_env.descriptions.platform import read_turbine
 from fowt_env.errors import InputError
-from fowt_env.training import report_html
 from fowt_env.training.cli import app as cli
 from fowt_env.training.evaluation import results
 from fowt_env.training.evaluation.metrics import METRICS
+from fowt_env.training.reports import html_page as report_html
 
 FILES = int(os.environ.get("FOWT_MUTATIONS", "10000"))
 
@@ -229,7 +229,7 @@ def test_a_policy_whose_baseline_is_no_built_in_controller_is_refused_by_the_com
     assert f"baseline = '{text}': must be one of 'constant'" in result.stderr
     result = invoke("evaluate", "--controllers", "policy:self.npz", "--duration", "1", "--skip", "0")
     assert result.exit_code == cli.EXIT_INPUT, result.output
-    from fowt_env.training.agent_scores import told
+    from fowt_env.training.reports.scores import told
 
     assert told("policy:self.npz" if text.startswith("policy:") else text) == ""
 

@@ -196,7 +196,7 @@ def test_a_command_prints_every_figure_in_full(command, width, monkeypatch, tmp_
 def test_evaluate_prints_every_figure_of_what_it_shows_in_full(width, capsys):
     from fowt_env.training.evaluation.evaluate import COLUMNS, summary
     from fowt_env.training.evaluation.leaderboard import leaderboard
-    from fowt_env.training.report import leaderboard_rows, summary_rows
+    from fowt_env.training.reports.terminal import leaderboard_rows, summary_rows
 
     rng = np.random.default_rng(0)
     rows = [

@@ -103,7 +103,7 @@ def save_models(models, path):
 
 def save_study(models, folder):
     """The paths written into a folder: modes.csv, zeros.csv, models.json, models.npz and three plots."""
-    from fowt_env.plots_design import plot_bode, plot_damping, plot_poles
+    from fowt_env.training.reports.design_plots import plot_bode, plot_damping, plot_poles
 
     folder = Path(folder)
     written = [write_table(mode_table(models), folder / "modes.csv")]

@@ -6,7 +6,10 @@ import pytest
 
 from fowt_env.errors import InputError
 from fowt_env.files.tables import write_table
-from fowt_env.training.agent_scores import (
+from fowt_env.training.evaluation.bootstrap import interquartile_mean
+from fowt_env.training.evaluation.evaluate import COLUMNS
+from fowt_env.training.evaluation.metrics import METRICS
+from fowt_env.training.reports.scores import (
     COUNTS,
     FIGURES,
     PAST_ANY,
@@ -21,9 +24,6 @@ from fowt_env.training.agent_scores import (
     scores_markdown,
     told,
 )
-from fowt_env.training.evaluation.bootstrap import interquartile_mean
-from fowt_env.training.evaluation.evaluate import COLUMNS
-from fowt_env.training.evaluation.metrics import METRICS
 
 
 def table(agents, cases=("ntm_18",)):

@@ -7,9 +7,9 @@ import pytest
 pytest.importorskip("matplotlib", reason="matplotlib is not installed: the extra `plot` is missing")
 
 from fowt_env.errors import InputError  # noqa: E402
-from fowt_env.plots_scores import plot_gust, plot_shares  # noqa: E402
-from fowt_env.training.bound_scores import bound_fractions, bound_markdown, read_bound  # noqa: E402
 from fowt_env.training.evaluation.evaluate import COLUMNS  # noqa: E402
+from fowt_env.training.reports.bound_scores import bound_fractions, bound_markdown, read_bound  # noqa: E402
+from fowt_env.training.reports.score_plots import plot_gust, plot_shares  # noqa: E402
 
 SPEED, LEAN, TRAVEL, POWER = (
     "RotSpeed_std_[rpm]", "PtfmPitch_std_[deg]", "blade_pitch_travel_[deg/s]", "GenPwr_std_[kW]",

@@ -21,7 +21,7 @@ from fowt_env.training.evaluation.cases import Case
 from fowt_env.training.evaluation.evaluate import COLUMNS, evaluate
 from fowt_env.training.evaluation.metrics import METRICS
 from fowt_env.training.evaluation.results import LONGEST_NAME, check_name, read_row, run_file, write_run
-from fowt_env.training.report import evaluation_plots, write_leaderboard
+from fowt_env.training.reports.terminal import evaluation_plots, write_leaderboard
 from tests.training import stub_plant
 
 CALM = Case("calm", 16.0)

@@ -14,7 +14,6 @@ from fowt_env.analysis.wave_excitation import wave_force
 from fowt_env.controllers.lqr_design import MOMENT, N_FEEDBACK, N_PLANT, PLANT, design_model, wind_filter
 from fowt_env.descriptions.platform import joint_sea_state, sea_state_of
 from fowt_env.errors import InputError
-from fowt_env.plots_design import plot_bound
 from fowt_env.training import linear_bound
 from fowt_env.training.linear_bound import (
     INFORMATION,
@@ -30,6 +29,7 @@ from fowt_env.training.linear_bound import (
     gspi_covariance,
     ratio_table,
 )
+from fowt_env.training.reports.design_plots import plot_bound
 from fowt_env.weather.iec import ntm_sigma
 from fowt_env.weather.turbulence import amplitudes
 from fowt_env.weather.waves import jonswap

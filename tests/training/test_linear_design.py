@@ -7,7 +7,6 @@ import pytest
 
 from fowt_env import build_scene
 from fowt_env.errors import InputError
-from fowt_env.plots_design import plot_bode, plot_damping, plot_poles
 from fowt_env.training.linear_design import (
     mode_table,
     models_over,
@@ -17,6 +16,7 @@ from fowt_env.training.linear_design import (
     transmission_zeros,
     zero_table,
 )
+from fowt_env.training.reports.design_plots import plot_bode, plot_damping, plot_poles
 
 
 @pytest.fixture(scope="module")

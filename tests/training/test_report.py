@@ -8,7 +8,7 @@ from fowt_env.errors import InputError
 from fowt_env.training.evaluation.evaluate import COLUMNS
 from fowt_env.training.evaluation.leaderboard import leaderboard
 from fowt_env.training.evaluation.metrics import METRICS
-from fowt_env.training.report import (
+from fowt_env.training.reports.terminal import (
     DROPPED_FIRST,
     HEADLINE,
     LEADERBOARD_DROPS,

@@ -13,7 +13,7 @@ import fowt_env  # noqa: E402
 from fowt_env.errors import InputError  # noqa: E402
 from fowt_env.training.cli import app as cli  # noqa: E402
 from fowt_env.training.evaluation.evaluate import run_file  # noqa: E402
-from fowt_env.training.report_html import SCHEDULE_WINDS, read_results, write_report  # noqa: E402
+from fowt_env.training.reports.html_page import SCHEDULE_WINDS, read_results, write_report  # noqa: E402
 
 EVIL = "<img src=x onerror=alert(1)></script>&"
 CONTROLLERS = ("calm", "busy", EVIL)

@@ -20,7 +20,7 @@ from fowt_env.training.evaluation import results
 from fowt_env.training.evaluation.cases import Case, Suite
 from fowt_env.training.evaluation.evaluate import COLUMNS, evaluate
 from fowt_env.training.evaluation.metrics import METRICS
-from fowt_env.training.report import leaderboard_rows, write_leaderboard
+from fowt_env.training.reports.terminal import leaderboard_rows, write_leaderboard
 
 CALM = Case("calm", 16.0)
 WINDY = Case("windy", 18.0)

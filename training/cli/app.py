@@ -325,7 +325,7 @@ def evaluate(
     """Score controllers on load cases: a leaderboard with intervals, metrics by case, the runs, and plots."""
     from fowt_env.training.evaluation.evaluate import evaluate as evaluate_controllers
     from fowt_env.training.evaluation.evaluate import summary
-    from fowt_env.training.report import chosen_cases, write_leaderboard
+    from fowt_env.training.reports.terminal import chosen_cases, write_leaderboard
 
     folder = Path(out_folder)
     chosen = chosen_cases(suite, cases)
@@ -369,7 +369,7 @@ def evaluate(
 
 def _print_evaluation(table, means, board):
     """Print metrics by case and the leaderboard, and on stderr what failed or passed a limit of the score."""
-    from fowt_env.training.report import leaderboard_rows, summary_rows
+    from fowt_env.training.reports.terminal import leaderboard_rows, summary_rows
 
     width = table_width(out) or float("inf")
     headings, rows, failures = summary_rows(means, width)
@@ -399,7 +399,7 @@ def _places(flags):
 
 def _evaluation_plots(table, board, folder):
     """Paths of the plots made; none, with a note, where matplotlib is missing."""
-    from fowt_env.training.report import evaluation_plots
+    from fowt_env.training.reports.terminal import evaluation_plots
 
     try:
         with progress_bar("plotting", None):

@@ -199,7 +199,7 @@ def bound(
     if out_path is not None:
         note(f"wrote {write_table(table, out_path)}")
     if plot is not None:
-        from fowt_env.plots_design import plot_bound
+        from fowt_env.training.reports.design_plots import plot_bound
 
         plot_bound(table, INFORMATION, path=plot)
         note(f"wrote {plot}")
@@ -223,7 +223,7 @@ def front(
     if out_path is not None:
         note(f"wrote {write_table(table, out_path)}")
     if plot is not None:
-        from fowt_env.plots_design import plot_bound
+        from fowt_env.training.reports.design_plots import plot_bound
 
         plot_bound(fronts, INFORMATION, table, path=plot)
         note(f"wrote {plot}")

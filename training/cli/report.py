@@ -40,7 +40,7 @@ def report(
     schedule: Annotated[bool, typer.Option("--schedule/--no-schedule", help="Show it.")] = True,
 ):
     """Make one HTML page of an evaluation: leaderboard, Pareto and box plots, time series, spectra."""
-    from fowt_env.training.report_html import write_report
+    from fowt_env.training.reports.html_page import write_report
 
     names = None if cases is None else [name.strip() for name in cases.split(",") if name.strip()]
     numbers = None if seeds is None else parse_numbers(seeds, "seeds")

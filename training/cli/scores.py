@@ -50,7 +50,7 @@ def _groups(texts):
 
 def _shown(text, tables, out_path):
     """Print the markdown text, and write it with its tables where a path is given."""
-    from fowt_env.training.agent_scores import write_scores
+    from fowt_env.training.reports.scores import write_scores
 
     out.print(text, highlight=False, markup=False, soft_wrap=True)
     if out_path is not None:
@@ -81,7 +81,7 @@ def rivals(
     out_path: OutOption = None,
 ):
     """Compare agents with rivals over all cases, with a verdict on each aim."""
-    from fowt_env.training.agent_scores import agent_counts, agent_scores, read_results, scores_markdown
+    from fowt_env.training.reports.scores import agent_counts, agent_scores, read_results, scores_markdown
 
     table = read_results(results, _names(cases))
     chosen = _names(against), _groups(group), _names(agents)
@@ -115,7 +115,7 @@ def by_cases(
     out_path: OutOption = None,
 ):
     """Compare agents with one rival on each kind of case (its winds together), and count what failed."""
-    from fowt_env.training.agent_scores import by_kind, figures_named, kinds_markdown, read_results
+    from fowt_env.training.reports.scores import by_kind, figures_named, kinds_markdown, read_results
 
     table, chosen = read_results(results, _names(cases)), figures_named(_names(figures))
     found, counts = by_kind(table, against, _groups(group), _names(agents), chosen, each)
@@ -143,9 +143,9 @@ def bound(
     out_path: OutOption = None,
 ):
     """Say which share of what the linear bound allows each controller reaches, per wind speed."""
-    from fowt_env.plots_scores import plot_shares
-    from fowt_env.training.agent_scores import read_results
-    from fowt_env.training.bound_scores import bound_fractions, bound_markdown, read_bound
+    from fowt_env.training.reports.bound_scores import bound_fractions, bound_markdown, read_bound
+    from fowt_env.training.reports.score_plots import plot_shares
+    from fowt_env.training.reports.scores import read_results
 
     fronts = read_bound(table_path)
     found = bound_fractions(read_results(results, _names(cases)), fronts, _groups(group), _names(agents))
@@ -177,7 +177,7 @@ def gust(
 ):
     """Draw the time series of one gust under several controllers into one picture."""
     import fowt_env
-    from fowt_env.plots_scores import plot_gust
+    from fowt_env.training.reports.score_plots import plot_gust
 
     names = list(dict.fromkeys(_names(controllers)))
     if not 0.0 <= start < end:

@@ -1,6 +1,6 @@
 """One self-contained HTML page of an evaluation: table, plots, schedule, provenance.
 
-    from fowt_env.training.report_html import write_report
+    from fowt_env.training.reports.html_page import write_report
     write_report("results/above_rated")
 
 The page holds its data and plotly.js, and asks nothing of a network. Needs plotly:

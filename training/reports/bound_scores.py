@@ -12,8 +12,8 @@ import numpy as np
 import pandas as pd
 
 from fowt_env.errors import InputError
-from fowt_env.training.agent_scores import KEY, grouped, markdown_table
 from fowt_env.training.linear_bound import RATIOS, fraction_of_bound, ratio_table
+from fowt_env.training.reports.scores import KEY, grouped, markdown_table
 
 BOUND = Path(__file__).parent / "data" / "linear_bound.csv"
 BASELINE = "gspi_oc3"  # whose travel and power the bound keeps
@@ -33,7 +33,7 @@ def bound_fractions(table, bound, groups=None, agents=None):
     """DataFrame: per agent or group, each of its training seeds and wind the share of the bound it reaches.
 
     table: of an evaluation with gspi_oc3, cases named kind_WIND; groups, agents as
-    training.agent_scores.grouped takes them. Columns: agent, seed_of (label of the training seed; "" for the
+    training.reports.scores.grouped takes them. Columns: agent, seed_of (label of the training seed; "" for the
     agent as a whole, whose ratios are the means over its seeds), wind, ratios of linear_bound.RATIOS (mean
     over the weather seeds on which both went well), of_bound_[-], of_measured_[-] (NaN: no better than
     gspi_oc3, or not above the bound's winds), within (no more travel and power deviation than gspi_oc3's).

@@ -4,7 +4,7 @@ As in plots.py every function returns a matplotlib Figure and, if given a path, 
 """
 
 from fowt_env.errors import InputError
-from fowt_env.plots_design import WIND, finish_bound
+from fowt_env.training.reports.design_plots import WIND, finish_bound
 from fowt_env.visual.time_series import COLOURS, INK, TIME, named_runs, new_figure, save_figure, style_axes
 
 MARKS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*", "p", "h")
@@ -31,7 +31,7 @@ def look(number):
 def plot_shares(fractions, bound, path=None, title=None):
     """Rotor-speed against platform-pitch deviation over gspi_oc3's, a panel per wind, with the fronts.
 
-    fractions: training.bound_scores.bound_fractions; bound: training.linear_bound.bound_table. Large marks:
+    fractions: training.reports.bound_scores.bound_fractions; bound: training.linear_bound.bound_table. Large marks:
     agents; small ones of the same kind: their training seeds. Hollow: more travel or power deviation than
     gspi_oc3, so that the bound does not hold. Agents beyond FRAME stand in the corner with their figures.
     """
