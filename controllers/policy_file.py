@@ -2,7 +2,7 @@
 
 Loading one runs no code of its author: what it names is looked up among names that are known, its baseline
 among CONTROLLERS. No count in it is believed: an array takes the memory that the file's table of contents
-gives it, and all of them at most MAX_BYTES. training/export.py writes such files.
+gives it, and all of them at most MAX_BYTES. training/rl/export.py writes such files.
 """
 
 import math

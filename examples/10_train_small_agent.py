@@ -13,7 +13,7 @@ as runs/small_agent/best.npz, ready for
 import argparse
 import sys
 
-from fowt_env.training.train import Training, baseline_figures, judged, resolve
+from fowt_env.training.rl.train import Training, baseline_figures, judged, resolve
 
 RATIOS = ("rotor_speed_std_ratio", "platform_pitch_std_ratio", "blade_pitch_travel_ratio", "failed")
 

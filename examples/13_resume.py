@@ -40,7 +40,7 @@ def interrupted_evaluation():
 
 def interrupted_training():
     """Send a training the signal of Ctrl-C, and resume it from its checkpoint."""
-    from fowt_env.training.train import Training, resolve
+    from fowt_env.training.rl.train import Training, resolve
 
     changes = {"environment.num_envs": 8, "validation.winds": [18], "validation.every": STEPS}
     settings = resolve("ppo", "above_rated", 0, STEPS, changes)

@@ -254,7 +254,7 @@ class Samples:
         from fowt_env.training.evaluation.evaluate import COLUMNS
         from fowt_env.training.evaluation.results import FORMAT, open_results, read_row, write_json, write_run
         from fowt_env.training.reports.html_page import write_report
-        from fowt_env.training.train import Training, resolve
+        from fowt_env.training.rl.train import Training, resolve
 
         results.plant_code = lambda: "0123456789abcdef"  # the same manifest in every tree
         results.versions = lambda: {"python": "3.11", "numpy": "2.0"}

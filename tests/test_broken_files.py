@@ -139,7 +139,7 @@ def test_a_stable_baselines3_zip_is_refused_where_a_policy_is_meant(tmp_path, ma
 
 def checkpoint_of_a_stranger(folder, mark):
     """A training run's folder whose every file would run code."""
-    from fowt_env.training.train import resolve
+    from fowt_env.training.rl.train import resolve
 
     place = folder / "checkpoints" / "step_64"
     place.mkdir(parents=True)
@@ -236,7 +236,7 @@ def test_a_policy_whose_baseline_is_no_built_in_controller_is_refused_by_the_com
 
 def settings_of_a_stranger():
     """Settings of a run with a value in every section of them, as many texts among them as there can be."""
-    from fowt_env.training.train import resolve
+    from fowt_env.training.rl.train import resolve
 
     settings = resolve("ppo", "above_rated", 0, 100)
     settings["environment"] |= {
@@ -253,7 +253,7 @@ def test_no_text_in_the_settings_of_a_stranger_is_looked_up_as_code(text, trappe
     pytest.importorskip("stable_baselines3", reason="stable_baselines3 is not installed")
     import yaml
 
-    from fowt_env.training.train import Training
+    from fowt_env.training.rl.train import Training
 
     sound = settings_of_a_stranger()
     found = list(places(sound))
@@ -283,7 +283,7 @@ def test_a_folder_of_nothing_but_settings_is_refused_where_its_baseline_is_no_bu
 
 @pytest.mark.parametrize("tag", ["object/apply:own_law.Law []", "name:own_law.Law", "module:own_law"])
 def test_settings_that_name_python_objects_are_not_loaded(tag, trapped):
-    from fowt_env.training.train import Training
+    from fowt_env.training.rl.train import Training
 
     Path("run").mkdir()
     Path("run", "settings.yml").write_text(f"environment: !!python/{tag}\n")

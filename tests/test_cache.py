@@ -135,7 +135,7 @@ def test_a_user_without_a_home_compiles_for_each_process(tmp_path):
     """As in a container under a number that no user has."""
     nobody = "import os, pwd\ndel os.environ['HOME']\ndel pwd.getpwuid\npwd.getpwuid = {}.__getitem__\n"
     variables = {"FOWT_CACHE_DIR": "", "XDG_CACHE_HOME": "", "FOWT_CONFIG_DIR": "", "XDG_CONFIG_HOME": ""}
-    code = nobody + SMALL + WHERE + "from fowt_env.training.trust import _key; print(_key())\n"
+    code = nobody + SMALL + WHERE + "from fowt_env.training.rl.checkpoint_signature import _key; print(_key())\n"
     assert output(start(code, tmp_path / "cache", **variables)) == ["0.25", "None", "None"]
     variables["FOWT_CACHE_DIR"] = str(tmp_path / "here")
     (used,) = output(start(nobody + WHERE, tmp_path / "cache", **variables))

@@ -6,10 +6,10 @@ from typer.testing import CliRunner
 
 pytest.importorskip("stable_baselines3")
 
-from fowt_env.training import train_callbacks
 from fowt_env.training.benchmark_training import KINDS
 from fowt_env.training.cli.app import EXIT_INPUT, EXIT_INTERRUPTED, app
-from fowt_env.training.train import Training
+from fowt_env.training.rl import callbacks as train_callbacks
+from fowt_env.training.rl.train import Training
 
 SMALL = (
     "environment.num_envs=2", "environment.rotor=table", "environment.wave_components=10",

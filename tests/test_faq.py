@@ -125,7 +125,7 @@ def _(folder, monkeypatch):
 
 @under("A part is not installed")
 def _(folder, monkeypatch):
-    from fowt_env.training.train import make_algorithm
+    from fowt_env.training.rl.train import make_algorithm
 
     missing("stable_baselines3", monkeypatch)
     return refused(make_algorithm, "ppo")

@@ -4,7 +4,7 @@
     python -m fowt_env.training.ablation --out runs/ablation --only direct,estimate
     python -m fowt_env.training.ablation --out runs/ablation --report docs/figures/rl_ablation.png
 
-Each variant and seed is a run of training/train.py in a folder of its own; one that was stopped goes on
+Each variant and seed is a run of training/rl/train.py in a folder of its own; one that was stopped goes on
 where it was when the command is given again, and one that has ended is left alone. The runs are far shorter
 than those of the shipped agents, so that they say which lever moves more, not where it ends.
 """
@@ -19,7 +19,7 @@ import yaml
 from scipy.stats import t
 
 from fowt_env.errors import InputError, unknown
-from fowt_env.training.train import AGENTS, Training, resolve
+from fowt_env.training.rl.train import AGENTS, Training, resolve
 from fowt_env.visual.time_series import COLOURS, new_figure, save_figure, style_axes
 
 TABLE = AGENTS / "ablation.yml"

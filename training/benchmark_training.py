@@ -8,7 +8,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 from fowt_env.envs import FowtEnv
 from fowt_env.envs.decisions import DecisionSettings
-from fowt_env.training.train import environment_settings, resolve
+from fowt_env.training.rl.train import environment_settings, resolve
 
 EPISODE = 600.0  # s
 
@@ -62,7 +62,7 @@ def nothing_env(env):
 
 def sync_env(n, settings):
     """FowtSB3VecEnv whose batch is Gymnasium's SyncVectorEnv of n single environments."""
-    from fowt_env.training.sb3_env import FowtSB3VecEnv
+    from fowt_env.training.rl.sb3_env import FowtSB3VecEnv
 
     class SyncSB3VecEnv(FowtSB3VecEnv):
         def reset(self):
@@ -86,8 +86,8 @@ def subject(kind, n, settings, decisions):
     """(VecEnv, control periods per step, its FowtVectorEnv or None) of a named kind."""
     from stable_baselines3.common.vec_env import SubprocVecEnv
 
-    from fowt_env.training.decision_env import DecisionVecEnv
-    from fowt_env.training.sb3_env import FowtSB3VecEnv
+    from fowt_env.training.rl.decision_env import DecisionVecEnv
+    from fowt_env.training.rl.sb3_env import FowtSB3VecEnv
 
     if kind == "SubprocVecEnv":
         return _plain(n, settings, lambda makers: SubprocVecEnv(makers, start_method="fork")), 1, None

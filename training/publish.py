@@ -18,7 +18,7 @@ from fowt_env.controllers import information
 from fowt_env.controllers.policy import read_policy
 from fowt_env.errors import InputError
 from fowt_env.files.tables import replacing
-from fowt_env.training.train import AGENTS, resolve
+from fowt_env.training.rl.train import AGENTS, resolve
 
 LARGEST_FILE = 200_000  # bytes of a policy that is kept in the repository
 

@@ -17,7 +17,7 @@ from fowt_env.controllers.policy import policy_path, read_policy
 from fowt_env.envs import TASKS, FowtEnv, SafetyLayer
 from fowt_env.envs.decisions import Decisions, DecisionSettings
 from fowt_env.files.tables import write_table
-from fowt_env.training.train import TASK_FIELDS, resolve, validation_episodes
+from fowt_env.training.rl.train import TASK_FIELDS, resolve, validation_episodes
 
 CARELESS = ("random direct", "no torque, flat blades")
 

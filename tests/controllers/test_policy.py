@@ -48,7 +48,7 @@ def write_random_policy(
 @pytest.mark.parametrize("algo", ["ppo", "sac", "tqc"])
 def test_the_exported_network_answers_as_stable_baselines3_does(algo, tmp_path):
     pytest.importorskip("sb3_contrib")
-    from fowt_env.training.train import Training
+    from fowt_env.training.rl.train import Training
     from tests.training.small_run import small
 
     run = Training(small(algo, steps=40), tmp_path / "run")

@@ -11,7 +11,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor, VecNormalize
 
 from fowt_env.envs import FowtEnv
-from fowt_env.training.sb3_env import FowtSB3VecEnv
+from fowt_env.training.rl.sb3_env import FowtSB3VecEnv
 
 QUICK = {"rotor": "table", "wave_components": 20}
 

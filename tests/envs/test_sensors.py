@@ -13,7 +13,7 @@ from fowt_env.envs.sensors import draw_sensors, reading_scales
 from fowt_env.errors import InputError
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measure, Measurement
 from fowt_env.training.evaluation.model_mismatch import Shift, Unaware
-from fowt_env.training.randomisation import plant_settings
+from fowt_env.training.rl.randomisation import plant_settings
 
 QUICK = {"rotor": "table", "wave_components": 20, "wind": {"kind": "ntm", "speed": 18.0, "class": "B"}}
 NAMES = ("rotor_speed", "platform_pitch_rate", "previous_action", "estimated_wind", "estimated_waves")

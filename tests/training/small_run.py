@@ -1,6 +1,6 @@
 """A training run of seconds, for the tests of training."""
 
-from fowt_env.training.train import resolve
+from fowt_env.training.rl.train import resolve
 
 SMALL = {
     "environment.num_envs": 2,

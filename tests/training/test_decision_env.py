@@ -8,8 +8,8 @@ pytest.importorskip("stable_baselines3")
 from fowt_env.envs import FowtEnv
 from fowt_env.envs.decisions import Decisions, DecisionSettings
 from fowt_env.errors import InputError
-from fowt_env.training.decision_env import DecisionVecEnv
-from fowt_env.training.sb3_env import FowtSB3VecEnv
+from fowt_env.training.rl.decision_env import DecisionVecEnv
+from fowt_env.training.rl.sb3_env import FowtSB3VecEnv
 
 QUICK = {"rotor": "table", "wave_components": 10, "wind": 18.0, "duration": 8.0}
 

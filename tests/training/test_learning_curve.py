@@ -5,7 +5,7 @@ import pytest
 
 pytest.importorskip("matplotlib", reason="matplotlib is not installed: the extra `plot` is missing")
 
-from fowt_env.training import learning_curve  # noqa: E402
+from fowt_env.training.rl import learning_curve  # noqa: E402
 
 RATIOS = ("rotor_speed_std_ratio", "platform_pitch_std_ratio", "blade_pitch_travel_ratio")
 

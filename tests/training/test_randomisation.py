@@ -7,8 +7,8 @@ pytest.importorskip("stable_baselines3")
 
 from fowt_env.descriptions.platform import read_platform
 from fowt_env.errors import InputError
-from fowt_env.training.randomisation import PLANT, SENSORS, distributions, draw, plant_settings, randomised
-from fowt_env.training.train import decision_env, make_envs, resolve
+from fowt_env.training.rl.randomisation import PLANT, SENSORS, distributions, draw, plant_settings, randomised
+from fowt_env.training.rl.train import decision_env, make_envs, resolve
 
 from .small_run import small
 

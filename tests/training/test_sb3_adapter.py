@@ -7,7 +7,7 @@ import pytest
 
 pytest.importorskip("stable_baselines3")
 
-from fowt_env.training import sb3_env
+from fowt_env.training.rl import sb3_env
 
 QUICK = {"rotor": "table", "wave_components": 20, "duration": 4.0}
 
@@ -23,6 +23,6 @@ def test_attributes_are_set_and_read_in_the_chosen_environments():
 
 def test_without_the_library_it_names_the_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "stable_baselines3.common.vec_env", None)
-    monkeypatch.delitem(sys.modules, "fowt_env.training.sb3_env")
+    monkeypatch.delitem(sys.modules, "fowt_env.training.rl.sb3_env")
     with pytest.raises(ImportError, match=r"pip install 'fowt-env\[train\]'"):
-        importlib.import_module("fowt_env.training.sb3_env")
+        importlib.import_module("fowt_env.training.rl.sb3_env")

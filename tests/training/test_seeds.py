@@ -15,7 +15,7 @@ from fowt_env.errors import InputError
 from fowt_env.training import linear_design, tune_controllers, tune_pi
 from fowt_env.training.evaluation.cases import FOLDER, read_suite, suite_names
 from fowt_env.training.evaluation.seeds import PURPOSES, TEST, TRAINING, VALIDATION, seeds_for
-from fowt_env.training.train import AGENTS, ALGORITHMS, environment_settings, resolve, validation_episodes
+from fowt_env.training.rl.train import AGENTS, ALGORITHMS, environment_settings, resolve, validation_episodes
 
 ROBUST = "above_rated_robust"
 

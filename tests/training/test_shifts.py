@@ -14,7 +14,7 @@ from fowt_env.training.evaluation.cases import Case, described, read_suite
 from fowt_env.training.evaluation.evaluate import evaluate, planned
 from fowt_env.training.evaluation.model_mismatch import Shift, Unaware, reading_scales, shifted_parts
 from fowt_env.training.evaluation.run_case import run_controller
-from fowt_env.training.randomisation import PLANT, SENSORS
+from fowt_env.training.rl.randomisation import PLANT, SENSORS
 
 WIND = {"kind": "ntm", "speed": 18.0, "class": "B"}
 

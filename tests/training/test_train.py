@@ -25,9 +25,10 @@ from fowt_env.controllers.policy import shipped_agents
 from fowt_env.controllers.policy_file import read_policy
 from fowt_env.errors import InputError
 from fowt_env.training import publish as publishing
-from fowt_env.training import train, train_callbacks
 from fowt_env.training.cli.arguments import parse_pairs
-from fowt_env.training.train import (
+from fowt_env.training.rl import callbacks as train_callbacks
+from fowt_env.training.rl import train
+from fowt_env.training.rl.train import (
     AGENTS,
     Training,
     baseline_figures,
@@ -280,7 +281,7 @@ def test_the_baseline_is_judged_one_against_itself_and_more_travel_or_less_power
 def test_wrong_settings_are_named(tmp_path):
     with pytest.raises(InputError, match="unknown algorithm 'pop'. Did you mean 'ppo'"):
         resolve("pop", "above_rated", 0, 10)
-    with pytest.raises(InputError, match="unknown task of training/agents/ppo.yml"):
+    with pytest.raises(InputError, match="unknown task of training/rl/ppo.yml"):
         resolve("ppo", "above_ratted", 0, 10)
     with pytest.raises(InputError, match="steps = 0"):
         resolve("ppo", "above_rated", 0, 0)

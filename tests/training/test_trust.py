@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-from fowt_env.training import trust
+from fowt_env.training.rl import checkpoint_signature as trust
 
 
 @pytest.fixture

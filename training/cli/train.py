@@ -40,7 +40,7 @@ def train(
     ] = None,
 ):
     """Train an agent with stable-baselines3, validate it as it learns, keep the best."""
-    from fowt_env.training.train import Training, resolve
+    from fowt_env.training.rl.train import Training, resolve
 
     folder = Path(out_folder or f"runs/{task}_{algo}_{seed}")
     if resume:
@@ -75,7 +75,7 @@ def export_policy(
     ] = False,
 ):
     """Write the policy of a run's newest checkpoint as a plain array file."""
-    from fowt_env.training.export import export_run
+    from fowt_env.training.rl.export import export_run
 
     if Path(out_path).suffix != ".npz":
         raise InputError(f"--out {out_path!r}: must end with .npz")

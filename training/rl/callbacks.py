@@ -8,7 +8,7 @@ import torch
 from stable_baselines3.common.callbacks import BaseCallback, EvalCallback
 
 from fowt_env.files.tables import write_table
-from fowt_env.training.train import decision_env, judged, seconds_text
+from fowt_env.training.rl.train import decision_env, judged, seconds_text
 
 REPORT_EVERY = 1.0  # s
 
@@ -36,7 +36,7 @@ class Judge(BaseCallback):
         write_table(pd.DataFrame(training.rows), training.folder / "validation.csv")
         if row["score"] < self.best:
             self.best = row["score"]
-            training.export("best.npz")
+            training.rl.export("best.npz")
         return True
 
 
@@ -90,7 +90,7 @@ class Keeper(BaseCallback):
 
 
 def callbacks(training, judge_env, judge, keeper):
-    """[EvalCallback on the validation episodes, Keeper] of a fowt_env.training.train.Training."""
+    """[EvalCallback on the validation episodes, Keeper] of a fowt_env.training.rl.train.Training."""
     every = max(1, training.settings["validation"]["every"] // training.env.num_envs)
     evaluation = EvalCallback(
         judge_env,

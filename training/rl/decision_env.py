@@ -7,7 +7,7 @@ from stable_baselines3.common.vec_env import VecEnvWrapper
 from fowt_env.envs.decisions import Decisions
 from fowt_env.errors import InputError
 from fowt_env.plant.measurement import Measure
-from fowt_env.training.sb3_env import FowtSB3VecEnv
+from fowt_env.training.rl.sb3_env import FowtSB3VecEnv
 
 RPM = 30.0 / np.pi
 RECORDED = (Measure.ROTOR_SPEED, Measure.PLATFORM_PITCH, Measure.BLADE_PITCH, Measure.GENERATOR_TORQUE)

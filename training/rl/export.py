@@ -83,7 +83,7 @@ def export_run(folder, path):
     """
     from fowt_env.envs import FowtEnv
     from fowt_env.envs.decisions import DecisionSettings
-    from fowt_env.training.train import Training, environment_settings, make_algorithm
+    from fowt_env.training.rl.train import Training, environment_settings, make_algorithm
 
     run = Training(None, folder, resume=True, trusted=True)
     settings, checkpoint = run.settings, run.newest()

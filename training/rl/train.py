@@ -1,6 +1,6 @@
 """Training of agents: settings from one YAML per algorithm, checkpoints that can be gone on from, validation.
 
-    from fowt_env.training.train import Training, resolve
+    from fowt_env.training.rl.train import Training, resolve
     Training(resolve("ppo", "above_rated", seed=0, steps=2_000_000), "runs/ppo_0").run()
 
 A run folder holds settings.yml and versions.json; checkpoints/step_N (model, normalisation, environments,
@@ -38,14 +38,14 @@ from fowt_env.errors import InputError, unknown
 from fowt_env.files.tables import process_lives, remove_leftovers, replacing
 from fowt_env.training.evaluation.locks import locked
 from fowt_env.training.evaluation.seeds import TRAINING, seeds_for
-from fowt_env.training.train_settings import (
+from fowt_env.training.rl.checkpoint_signature import is_own, seal
+from fowt_env.training.rl.settings import (
     SCHEDULES,
     TASK_FIELDS,
     check_algorithm,
     check_settings,
     read_settings,
 )
-from fowt_env.training.trust import is_own, seal
 
 AGENTS = Path(__file__).parent / "agents"
 ALGORITHMS = ("ppo", "sac", "tqc")
@@ -187,9 +187,9 @@ def make_envs(settings):
     """(training VecNormalize, validation VecNormalize) of settings; plants are drawn for training alone."""
     from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
 
-    from fowt_env.training.decision_env import DecisionVecEnv
-    from fowt_env.training.randomisation import randomised
-    from fowt_env.training.sb3_env import FowtSB3VecEnv
+    from fowt_env.training.rl.decision_env import DecisionVecEnv
+    from fowt_env.training.rl.randomisation import randomised
+    from fowt_env.training.rl.sb3_env import FowtSB3VecEnv
 
     chosen = environment_settings(settings)
     decisions = DecisionSettings(**settings["decisions"])
@@ -210,7 +210,7 @@ def validation_env(settings, chosen):
 
     The sensors of the settings' validation go round the episodes of each wind.
     """
-    from fowt_env.training.decision_env import ValidationVecEnv
+    from fowt_env.training.rl.decision_env import ValidationVecEnv
 
     given = settings["validation"]
     episodes = validation_episodes(settings)
@@ -259,7 +259,7 @@ def judged(figures, reference):
 class Training:
     """One run in one folder. resume: go on from its newest checkpoint, or start anew where it has none yet.
 
-    Loading a checkpoint executes code from it: one that no run of this user wrote (training.trust) is refused
+    Loading a checkpoint executes code from it: one that no run of this user wrote (training.rl.checkpoint_signature) is refused
     unless trusted.
     Raises: InputError where the folder holds another run, none to resume, or a stranger's; on run(), where
     another training is in the folder.
@@ -349,7 +349,7 @@ class Training:
         """Whether the end was reached, once what is left of the run has been trained."""
         from stable_baselines3.common.logger import configure
 
-        from fowt_env.training.train_callbacks import Judge, Keeper, Stopped, callbacks
+        from fowt_env.training.rl.callbacks import Judge, Keeper, Stopped, callbacks
 
         model = self.model
         self.reference = baseline_figures(self.settings)
@@ -498,7 +498,7 @@ class Training:
 
     def export(self, name):
         """Path of the present policy written as a plain array file in the run folder."""
-        from fowt_env.training.export import export_policy
+        from fowt_env.training.rl.export import export_policy
 
         about = {key: self.settings[key] for key in ("algo", "name", "seed")}
         about["steps"] = int(self.model.num_timesteps)
@@ -508,7 +508,7 @@ class Training:
 
     def plot(self):
         """Path of the plot of the learning curve, or None before the first validation."""
-        from fowt_env.training.learning_curve import plot_learning_curve
+        from fowt_env.training.rl.learning_curve import plot_learning_curve
 
         if not self.rows:
             return None

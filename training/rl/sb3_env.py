@@ -1,7 +1,7 @@
 """Many environments for stable-baselines3, stepped by one compiled call.
 
 from stable_baselines3 import PPO
-from fowt_env.training.sb3_env import FowtSB3VecEnv
+from fowt_env.training.rl.sb3_env import FowtSB3VecEnv
 model = PPO("MlpPolicy", FowtSB3VecEnv(16, task="above_rated", fidelity="standard")).learn(100_000)
 """
 
@@ -13,7 +13,7 @@ from fowt_env.envs.vector_env import of_one
 try:
     from stable_baselines3.common.vec_env import VecEnv
 except ImportError as error:
-    raise ImportError("fowt_env.training.sb3_env needs stable-baselines3: pip install 'fowt-env[train]'") from error
+    raise ImportError("fowt_env.training.rl.sb3_env needs stable-baselines3: pip install 'fowt-env[train]'") from error
 
 
 class FowtSB3VecEnv(VecEnv):

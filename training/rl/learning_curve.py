@@ -67,7 +67,7 @@ def plot_front(runs, path):
 def main(arguments=None):
     """Plot the learning curves and the front of several runs.
 
-    python -m fowt_env.training.learning_curve measured=runs/a preview=runs/b --out results/rl
+    python -m fowt_env.training.rl.learning_curve measured=runs/a preview=runs/b --out results/rl
     """
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("runs", nargs="+", metavar="LABEL=FOLDER")
