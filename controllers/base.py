@@ -22,7 +22,7 @@ from fowt_env.errors import ControllerError, InputError
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
 
-TUNED = Path(__file__).parent / "tuned.toml"  # written by training/tune_controllers.py
+TUNED = Path(__file__).parent / "tuned.toml"  # written by training/design/tune_feedback.py
 N_COMMANDS = 2  # command[0]: generator torque, N m, high-speed shaft; command[1]: blade pitch, rad
 EXTRA = {  # what a controller may be told beyond Measurement
     "wind_preview": "the rotor-averaged wind, some seconds before it arrives",
@@ -134,7 +134,7 @@ def _shown(value: Any) -> str:
 
 
 def tuned(name: str) -> dict[str, Any]:
-    """{setting: value} of a controller that training/tune_controllers.py has tuned."""
+    """{setting: value} of a controller that training/design/tune_feedback.py has tuned."""
     return tomllib.loads(TUNED.read_text())[name]["settings"]
 
 

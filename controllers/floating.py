@@ -42,7 +42,7 @@ SIGNALS = {"nacelle_velocity": Measure.NACELLE_VELOCITY, "platform_pitch_rate": 
 class FeedbackSettings:
     """What is fed back and how. Raises: InputError naming the key, value and allowed range.
 
-    The controller of that name takes the best of the grid of training/tune_controllers.py on its training
+    The controller of that name takes the best of the grid of training/design/tune_feedback.py on its training
     cases; controllers/tuned.toml has them with their figures.
     """
 

@@ -1,4 +1,4 @@
-"""The PI law with gains searched on training seeds (training/tune_pi.py): the baseline at its best."""
+"""The PI law with gains searched on training seeds (training/design/tune_pi.py): the baseline at its best."""
 
 import tomllib
 from pathlib import Path

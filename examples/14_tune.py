@@ -10,8 +10,8 @@ let simulations decide. The seeds for tuning are not those that controllers are 
 import fowt_env
 from fowt_env.controllers.pi import PI, PISettings
 from fowt_env.controllers.pi_design import design_pi
+from fowt_env.training.design.sweeps import models_over
 from fowt_env.training.evaluation.evaluate import evaluate
-from fowt_env.training.linear_design import models_over
 
 WINDS = (13.0, 15.0, 18.0, 21.0, 24.0)  # m/s, above rated
 OMEGAS = (0.12, 0.2, 0.35)  # rad/s

@@ -72,7 +72,7 @@ def trim_command(monkeypatch, tmp_path):
 
 
 def linearize_command(monkeypatch, tmp_path):
-    from fowt_env.training import linear_design
+    from fowt_env.training.design import sweeps as linear_design
 
     modes = frame_of(["wind_[m/s]", "period_[s]", "damping_ratio_[-]", *"abcdefgh"], 3)
     modes.insert(1, "mode", ["surge", "platform_pitch", "heave"])
@@ -85,7 +85,7 @@ def linearize_command(monkeypatch, tmp_path):
 
 def design_pi_command(monkeypatch, tmp_path):
     from fowt_env.controllers import pi_design
-    from fowt_env.training import linear_design
+    from fowt_env.training.design import sweeps as linear_design
 
     names = ["wind_[m/s]", "blade_pitch_[deg]", "slope_[1/s2]", "KP_[s]", "KI_[-]", "omega_[rad/s]"]
     table = frame_of([*names, "zeta_[-]", "platform_zeta_[-]", "platform_omega_[rad/s]"], 3)
@@ -96,7 +96,7 @@ def design_pi_command(monkeypatch, tmp_path):
 
 
 def design_bound_command(monkeypatch, tmp_path):
-    from fowt_env.training import linear_bound
+    from fowt_env.training.design import linear_bound
 
     names = ["speed_ratio_[-]", "pitch_ratio_[-]", "travel_ratio_[-]", "power_ratio_[-]", "torque_std_[%]"]
     table = frame_of(["wind_[m/s]", "share_[-]", *names, "RotSpeed_std_[rpm]", "PtfmPitch_std_[deg]"], 5)
@@ -107,7 +107,7 @@ def design_bound_command(monkeypatch, tmp_path):
 
 def design_front_command(monkeypatch, tmp_path):
     from fowt_env.files import tables as outputs
-    from fowt_env.training import linear_bound
+    from fowt_env.training.design import linear_bound
 
     table = frame_of(["wind_[m/s]", *linear_bound.RATIOS, "of_bound_[-]", "of_measured_[-]"], 3)
     table.insert(1, "variant", ["{'pitch_rate': 8.0}", "{'pitch_rate': 80.0}", "default"])
@@ -117,7 +117,7 @@ def design_front_command(monkeypatch, tmp_path):
 
 
 def design_lqr_command(monkeypatch, tmp_path):
-    from fowt_env.training import linear_design
+    from fowt_env.training.design import sweeps as linear_design
 
     table = frame_of(linear_design.SHOWN, 2, case=["ntm_18"] * 2, variant=["gspi_oc3", "{'pitch_rate': 8.0}"])
     monkeypatch.setattr(linear_design, "sweep", lambda *a: table)

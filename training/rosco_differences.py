@@ -4,7 +4,7 @@
 
 From the published law towards ROSCO: its periods, the place of the gain schedule, the pitch that sets it.
 From ROSCO towards the published law: the set-point smoother, the torque law, and gains that undo the place of
-the schedule. The training cases of training/tune_controllers.py; docs/controllers.md has the outcome.
+the schedule. The training cases of training/design/tune_feedback.py; docs/controllers.md has the outcome.
 """
 
 import argparse
@@ -26,8 +26,8 @@ from fowt_env.controllers.pi import (
 )
 from fowt_env.controllers.rosco import SCHEDULE, Rosco, RoscoSettings, pitch_gains
 from fowt_env.descriptions.platform import read_turbine
+from fowt_env.training.design.tune_feedback import BASELINE, CONTROL_DT, SEEDS, WINDS, training_case
 from fowt_env.training.evaluation.evaluate import evaluate
-from fowt_env.training.tune_controllers import BASELINE, CONTROL_DT, SEEDS, WINDS, training_case
 
 SHOWN = {
     "rotor speed std": "RotSpeed_std_[rpm]",

@@ -14,9 +14,9 @@ from fowt_env.controllers.pi import PI, PISettings
 from fowt_env.controllers.pi_design import design_pi
 from fowt_env.controllers.saved_design import load_design, lqr_settings, save_design
 from fowt_env.errors import InputError
+from fowt_env.training.design.sweeps import models_over
 from fowt_env.training.evaluation.evaluate import evaluate
 from fowt_env.training.evaluation.results import controller_code
-from fowt_env.training.linear_design import models_over
 
 GOOD = {"KP": 0.006, "KI": 0.0009, "gain_schedule_pitch": 0.11}
 

@@ -14,8 +14,8 @@ from fowt_env.analysis.wave_excitation import wave_force
 from fowt_env.controllers.lqr_design import MOMENT, N_FEEDBACK, N_PLANT, PLANT, design_model, wind_filter
 from fowt_env.descriptions.platform import joint_sea_state, sea_state_of
 from fowt_env.errors import InputError
-from fowt_env.training import linear_bound
-from fowt_env.training.linear_bound import (
+from fowt_env.training.design import linear_bound
+from fowt_env.training.design.linear_bound import (
     INFORMATION,
     LIMITED,
     RATIOS,
@@ -265,7 +265,7 @@ def test_the_plot_shows_fronts_and_points_of_the_winds_that_have_both(tmp_path):
 
 
 def test_the_published_fronts_are_those_of_today(windy):
-    """training/data/linear_bound.csv, as fowt design bound wrote it."""
+    """training/design/data/linear_bound.csv, as fowt design bound wrote it."""
     stored = pd.read_csv(Path(linear_bound.__file__).parent / "data" / "linear_bound.csv")
     stored = stored[(stored["wind_[m/s]"] == 18.0) & (stored["information"] != "state")]
     fresh = bound_table(windy, (18.0,), ("full", "wind", "measured"))

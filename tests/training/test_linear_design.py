@@ -7,7 +7,7 @@ import pytest
 
 from fowt_env import build_scene
 from fowt_env.errors import InputError
-from fowt_env.training.linear_design import (
+from fowt_env.training.design.sweeps import (
     mode_table,
     models_over,
     save_models,

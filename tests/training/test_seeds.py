@@ -12,7 +12,9 @@ import pytest
 from fowt_env.envs import FowtEnv
 from fowt_env.envs.tasks import LARGEST_SEED, TASKS
 from fowt_env.errors import InputError
-from fowt_env.training import linear_design, tune_controllers, tune_pi
+from fowt_env.training.design import sweeps as linear_design
+from fowt_env.training.design import tune_feedback as tune_controllers
+from fowt_env.training.design import tune_pi
 from fowt_env.training.evaluation.cases import FOLDER, read_suite, suite_names
 from fowt_env.training.evaluation.seeds import PURPOSES, TEST, TRAINING, VALIDATION, seeds_for
 from fowt_env.training.rl.train import AGENTS, ALGORITHMS, environment_settings, resolve, validation_episodes

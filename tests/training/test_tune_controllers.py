@@ -11,9 +11,8 @@ from fowt_env.controllers.base import TUNED
 from fowt_env.controllers.floating import FeedbackSettings, FloatingFeedback
 from fowt_env.controllers.pi import PISettings
 from fowt_env.errors import InputError
-from fowt_env.training import tune_controllers
-from fowt_env.training.evaluation.evaluate import evaluate
-from fowt_env.training.tune_controllers import (
+from fowt_env.training.design import tune_feedback as tune_controllers
+from fowt_env.training.design.tune_feedback import (
     FEEDBACK_GRID,
     FIGURES,
     GRIDS,
@@ -24,6 +23,7 @@ from fowt_env.training.tune_controllers import (
     tune,
     tuned_text,
 )
+from fowt_env.training.evaluation.evaluate import evaluate
 
 SHORT = {"duration": 90.0, "winds": (17.0,), "seeds": (1001,)}
 

@@ -8,9 +8,9 @@ import pytest
 from fowt_env.controllers.pi import pi
 from fowt_env.controllers.pi_tuned import FACTORS_FILE, pi_tuned
 from fowt_env.errors import InputError
-from fowt_env.training import tune_pi
+from fowt_env.training.design import tune_pi
+from fowt_env.training.design.tune_pi import FAILED, PENALTY, TRAVEL, WEIGHED, candidate, cost, search
 from fowt_env.training.evaluation.engines import session
-from fowt_env.training.tune_pi import FAILED, PENALTY, TRAVEL, WEIGHED, candidate, cost, search
 
 ONES = dict.fromkeys(tune_pi.FACTORS, 1.0)
 
@@ -64,7 +64,7 @@ def test_seeds_that_the_suites_are_scored_on_are_refused():
 
 def test_pi_tuned_has_the_stored_factors_and_says_how_they_were_found(turbine):
     text = FACTORS_FILE.read_text()
-    assert "fowt_env.training.tune_pi" in text and "--seeds 10" in text
+    assert "fowt_env.training.design.tune_pi" in text and "--seeds 10" in text
     tuned, base = pi_tuned(turbine, 0.1), pi(turbine, 0.1)
     import tomllib
 

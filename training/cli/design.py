@@ -90,7 +90,7 @@ def linearize(
     """Print modes and right-half-plane zeros of the floating turbine over the wind."""
     import fowt_env
     from fowt_env.files.tables import TABLE_SUFFIXES, write_table
-    from fowt_env.training.linear_design import (
+    from fowt_env.training.design.sweeps import (
         MODEL_SUFFIXES,
         mode_table,
         models_over,
@@ -149,7 +149,7 @@ def pi(
     import fowt_env
     from fowt_env.controllers.pi_design import design_pi
     from fowt_env.controllers.saved_design import save_design
-    from fowt_env.training.linear_design import models_over
+    from fowt_env.training.design.sweeps import models_over
 
     speeds = parse_numbers(winds, "winds")
     scene = fowt_env.build_scene(platform, wind=speeds[0])
@@ -185,7 +185,7 @@ def bound(
     """Least rotor-speed and platform-pitch deviations of any linear feedback, by what it knows."""
     import fowt_env
     from fowt_env.files.tables import table_path, write_table
-    from fowt_env.training.linear_bound import INFORMATION, bound_table
+    from fowt_env.training.design.linear_bound import INFORMATION, bound_table
 
     if out_path is not None:
         table_path(out_path)
@@ -215,7 +215,7 @@ def front(
 ):
     """Simulated designs over gspi_oc3, beside the linear bound, and the share of it that they reach."""
     from fowt_env.files.tables import read_table, write_table
-    from fowt_env.training.linear_bound import INFORMATION, ratio_table
+    from fowt_env.training.design.linear_bound import INFORMATION, ratio_table
 
     fronts = read_table(bound_path)
     table = ratio_table(read_table(runs), fronts)
@@ -245,7 +245,7 @@ def lqr(
     ] = None,
 ):
     """Sweep the weights of lqr on training seeds, beside gspi_oc3; or save one design (--out .json)."""
-    from fowt_env.training.linear_design import SHOWN, sweep
+    from fowt_env.training.design.sweeps import SHOWN, sweep
 
     fixed = parse_pairs(weight, "weight")
     if out_path is not None and out_path.lower().endswith(".json"):

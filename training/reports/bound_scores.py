@@ -2,7 +2,7 @@
 
     fowt scores bound results/rl --group agents=policy:ppo_lqr,policy:ppo_lqr_seed1 --plot front.png
 
-The bound (training/linear_bound.py) holds for linear feedback at the blade-pitch travel and power deviation
+The bound (training/design/linear_bound.py) holds for linear feedback at the blade-pitch travel and power deviation
 of gspi_oc3: a controller that spends more of either is not bound by it, and is marked.
 """
 
@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from fowt_env.errors import InputError
-from fowt_env.training.linear_bound import RATIOS, fraction_of_bound, ratio_table
+from fowt_env.training.design.linear_bound import RATIOS, fraction_of_bound, ratio_table
 from fowt_env.training.reports.scores import KEY, grouped, markdown_table
 
 BOUND = Path(__file__).parent / "data" / "linear_bound.csv"

@@ -1,6 +1,6 @@
 """How well any linear controller can do: fronts of rotor-speed against platform-pitch deviation.
 
-    python -m fowt_env.training.linear_bound          (or fowt design bound --wind 12,14,16,18,20,22,24)
+    python -m fowt_env.training.design.linear_bound          (or fowt design bound --wind 12,14,16,18,20,22,24)
 
 Per wind speed, on the plant of controllers/lqr_design.py (surge, platform pitch, rotor, pitch actuator; the
 rotor-averaged Kaimal wind and the site's sea as shaped white noise): standard deviations from Lyapunov
@@ -267,7 +267,7 @@ def fraction_of_bound(table, wind, speed_ratio, pitch_ratio, information="full")
 
 
 def ratio_table(runs, bound=None):
-    """DataFrame of a sweep's means over seeds (fowt_env.training.linear_design.sweep) over those of its gspi_oc3.
+    """DataFrame of a sweep's means over seeds (fowt_env.training.design.sweeps.sweep) over those of its gspi_oc3.
 
     Columns: wind, variant, ratios of speed, platform pitch, power and travel; with a bound_table also the
     fractions of the bound and of the front for measured channels. Cases are named kind_WIND.

@@ -1,6 +1,6 @@
 """The PI baseline at its best: gains searched on training seeds, so that nobody beats a straw man.
 
-    python -m fowt_env.training.tune_pi --seeds 1001,1002,1003 --out controllers/data/pi_tuned.toml
+    python -m fowt_env.training.design.tune_pi --seeds 1001,1002,1003 --out controllers/data/pi_tuned.toml
 
 The cases are those of a suite, the seeds others than it is scored on (1000 and above). Searched are
 factors on the published OC3 gains: proportional, integral, and the blade pitch at which the schedule halves
@@ -87,7 +87,7 @@ def search(seeds, suite="above_rated", evaluations=60, report=None, **engine):
 
 
 TEXT = """# Factors on the published OC3 gains of `pi`, found by
-#   python -m fowt_env.training.tune_pi --suite {suite} --seeds {seeds} --evaluations {evaluations}
+#   python -m fowt_env.training.design.tune_pi --suite {suite} --seeds {seeds} --evaluations {evaluations}
 # on training seeds, which no suite is scored on. Relative to `pi` there: rotor-speed deviation {speed:.3f},
 # platform-pitch deviation {pitch:.3f}, blade-pitch travel {travel:.3f}.
 KP = {KP:.4f}

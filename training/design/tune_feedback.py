@@ -1,7 +1,7 @@
 """Tune the motion feedback of floating_feedback and rosco_float on training cases.
 
-    python -m fowt_env.training.tune_controllers --jobs 2
-    python -m fowt_env.training.tune_controllers --engine ray --address ray://head:10001
+    python -m fowt_env.training.design.tune_feedback --jobs 2
+    python -m fowt_env.training.design.tune_feedback --engine ray --address ray://head:10001
 
 Every setting of a grid runs in the training cases: 13, 17 and 21 m/s, NTM class B with the site's normal
 sea, seeds 1001 and 1002, which are apart from the winds and seeds that controllers are scored on. Its
@@ -130,7 +130,7 @@ def tuned_text(tables):
     Raises: InputError where no setting of a table can be chosen.
     """
     lines = [
-        "# Settings chosen on training cases by `python -m fowt_env.training.tune_controllers`; that file says how.",
+        "# Settings chosen on training cases by `python -m fowt_env.training.design.tune_feedback`; that file says how.",
         "# Figures are means over the cases of the ratio to gspi_oc3; unfed_travel of that to the law unfed.",
     ]
     for name, table in tables.items():
