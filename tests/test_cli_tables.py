@@ -125,7 +125,8 @@ def design_lqr_command(monkeypatch, tmp_path):
 
 
 def validate_command(monkeypatch, tmp_path):
-    from fowt_env.training import validate, validate_report
+    from fowt_env.training.validation import report as validate_report
+    from fowt_env.training.validation import validate
 
     study = validate.Study()
     for number in range(123):

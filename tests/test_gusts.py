@@ -7,8 +7,8 @@ from fowt_env import build_scene, simulate
 from fowt_env.envs import FowtEnv, FowtVectorEnv
 from fowt_env.errors import InputError
 from fowt_env.plant.integrators import BASHFORTH, build_gusts, build_integrator, rotor_samples
-from fowt_env.training.comparison import normalised_rms
-from fowt_env.training.openfast import box_wind
+from fowt_env.training.validation.openfast_cases import box_wind
+from fowt_env.training.validation.signal_errors import normalised_rms
 
 SEA = {"kind": "jonswap", "Hs": 6.0, "Tp": 10.0}
 COLUMNS = (

@@ -18,8 +18,7 @@ from fowt_env.plant.channels import Out
 from fowt_env.plant.rollout import output_row
 from fowt_env.plant.state import State
 from fowt_env.scene.build import build_scene
-from fowt_env.training.comparison import decay_decrement, decay_period, harmonics, normalised_rms
-from fowt_env.training.openfast import (
+from fowt_env.training.validation.openfast_cases import (
     DECAYS,
     FOLDER,
     PLATFORM,
@@ -29,8 +28,14 @@ from fowt_env.training.openfast import (
     reference,
     steady_reference,
 )
-from fowt_env.training.validate import GROUPS, Row, Study, validate_cases
-from fowt_env.training.validate_report import write_report
+from fowt_env.training.validation.report import write_report
+from fowt_env.training.validation.signal_errors import (
+    decay_decrement,
+    decay_period,
+    harmonics,
+    normalised_rms,
+)
+from fowt_env.training.validation.validate import GROUPS, Row, Study, validate_cases
 from fowt_env.weather.wind_field import read_box
 
 TIME = "Time_[s]"

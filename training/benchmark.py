@@ -87,7 +87,7 @@ class Kind:
 
 
 def _box():
-    from fowt_env.training.openfast import box_wind
+    from fowt_env.training.validation.openfast_cases import box_wind
 
     return box_wind()
 

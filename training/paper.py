@@ -17,7 +17,7 @@ from fowt_env.analysis.trim import trim_held
 from fowt_env.descriptions.platform import read_platform
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.mooring import catenary
-from fowt_env.training.comparison import harmonics
+from fowt_env.training.validation.signal_errors import harmonics
 from fowt_env.visual.time_series import spectrum
 from fowt_env.weather.turbulence import turbulence
 

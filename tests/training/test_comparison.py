@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fowt_env.errors import InputError
-from fowt_env.training.comparison import (
+from fowt_env.training.validation.signal_errors import (
     band_energy,
     decay_decrement,
     decay_period,

@@ -543,8 +543,8 @@ def validate(
     plot: Annotated[bool, typer.Option("--plot/--no-plot", help="Make the plots.")] = True,
 ):
     """Compare this plant with OpenFAST on the same cases: every figure with its verdict, and plots."""
-    from fowt_env.training.validate import GROUPS, validate_cases
-    from fowt_env.training.validate_report import write_report
+    from fowt_env.training.validation.report import write_report
+    from fowt_env.training.validation.validate import GROUPS, validate_cases
 
     names = list(GROUPS) if case == "all" else [name.strip() for name in case.split(",") if name.strip()]
     with progress_bar("validating", None) as update:
@@ -689,7 +689,7 @@ def accuracy(
 ):
     """Measure error against run time over integrators, steps, rotor models and wave sums."""
     from fowt_env.training import benchmark_accuracy as study
-    from fowt_env.training.openfast import box_wind
+    from fowt_env.training.validation.openfast_cases import box_wind
 
     chosen = None if axes is None else study.select([name.strip() for name in axes.split(",")])
     folder = Path(out_folder)

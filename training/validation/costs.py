@@ -4,8 +4,8 @@ import numpy as np
 import pandas as pd
 
 from fowt_env.descriptions.platform import read_platform, read_turbine
-from fowt_env.training.comparison import normalised_rms
-from fowt_env.training.openfast import PLATFORM, RUNS, box_wind
+from fowt_env.training.validation.openfast_cases import PLATFORM, RUNS, box_wind
+from fowt_env.training.validation.signal_errors import normalised_rms
 from fowt_env.weather.iec import ntm_sigma
 from fowt_env.weather.turbulence import turbulence
 from fowt_env.weather.wind_field import read_box, rotor_average
@@ -22,7 +22,16 @@ INSTANTANEOUS = {
 
 def cheaper_choices(study):
     """Add the rows of every choice to the study, and their runs for the plots."""
-    from fowt_env.training.validate import PITCH, SETTLED, SPEED, SURGE, TENSIONS, THRUST, _name, _since
+    from fowt_env.training.validation.validate import (
+        PITCH,
+        SETTLED,
+        SPEED,
+        SURGE,
+        TENSIONS,
+        THRUST,
+        _name,
+        _since,
+    )
 
     def frame(key, case, **changes):
         if key not in study.runs:

@@ -48,7 +48,7 @@ def _path(folder, name):
     if not path.is_file():
         raise InputError(
             f"reference file {str(path)!r} not found: the OpenFAST runs come with the source tree,"
-            " in tests/reference/openfast; point --reference at that folder"
+            " in training/validation/reference; point --reference at that folder"
         )
     return path
 
@@ -88,7 +88,7 @@ def wave_components(folder=None):
 def box_wind(folder=None, bts=None):
     """Wind specification of the TurbSim box: the file itself if its path is given, else the stored region.
 
-    The region is rounded to 0.04 m/s (u) and 0.08 m/s (v, w); tests/reference/openfast/make.py wrote it.
+    The region is rounded to 0.04 m/s (u) and 0.08 m/s (v, w); training/validation/reference/make.py wrote it.
     """
     if bts is not None:
         return {"kind": "bts", "path": str(bts)}

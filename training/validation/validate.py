@@ -12,14 +12,14 @@ import numpy as np
 import pandas as pd
 
 from fowt_env.errors import InputError, unknown
-from fowt_env.training.comparison import (
+from fowt_env.training.validation.openfast_cases import DECAYS, PLATFORM, RUNS, reference, steady_reference
+from fowt_env.training.validation.signal_errors import (
     band_energy,
     decay_decrement,
     decay_period,
     harmonics,
     normalised_rms,
 )
-from fowt_env.training.openfast import DECAYS, PLATFORM, RUNS, reference, steady_reference
 
 TIME = "Time_[s]"
 MOTIONS = (
@@ -237,7 +237,7 @@ def turbulence(study):
 
 def costs(study):
     """What the cheaper choices cost, each as an error against the dearer one on the same run."""
-    from fowt_env.training.validate_costs import cheaper_choices
+    from fowt_env.training.validation.costs import cheaper_choices
 
     cheaper_choices(study)
 
@@ -256,7 +256,7 @@ GROUPS = {  # name -> (function, runs that it takes)
 def validate_cases(groups=None, folder=None, bts=None, report=None):
     """Study with every figure of the groups (names of GROUPS; None: all but costs).
 
-    folder: reference series (None: tests/reference/openfast); bts: the full TurbSim box instead of the
+    folder: reference series (None: training/validation/reference); bts: the full TurbSim box instead of the
     stored region; report: called with (text, runs done, runs in all) before each run.
     Raises: InputError for an unknown group or a missing reference.
     """
