@@ -150,7 +150,7 @@ def paper_command(monkeypatch, tmp_path):
 
 
 def benchmark_speed_command(monkeypatch, tmp_path):
-    from fowt_env.training import benchmark
+    from fowt_env.training.benchmarks import speed as benchmark
 
     kinds = list(benchmark.KINDS)[:8]
     table = frame_of(["step_us", "loop_us", "simulate_x", "seconds"], 8, kind=kinds, absent=[""] * 8)
@@ -159,7 +159,7 @@ def benchmark_speed_command(monkeypatch, tmp_path):
 
 
 def benchmark_accuracy_command(monkeypatch, tmp_path):
-    from fowt_env.training import benchmark_accuracy
+    from fowt_env.training.benchmarks import accuracy as benchmark_accuracy
 
     name = "rotor as a table, midpoint, 0.05 s, waves by bands, one call in two, and more words of this kind"
     row = {"variant": name, "worst": 0.0123, "worst_of": "PtfmPitch_[deg]", "front": True}
@@ -170,7 +170,7 @@ def benchmark_accuracy_command(monkeypatch, tmp_path):
 
 
 def benchmark_evaluation_command(monkeypatch, tmp_path):
-    from fowt_env.training import benchmark_evaluation
+    from fowt_env.training.benchmarks import evaluation as benchmark_evaluation
 
     table = frame_of([f"a_rather_long_name_{i}_ms" for i in range(9)], 2, case=["ntm_18", "ntm_20"])
     table["runs"] = [1234567, 3]

@@ -6,7 +6,7 @@ from typer.testing import CliRunner
 
 pytest.importorskip("stable_baselines3")
 
-from fowt_env.training.benchmark_training import KINDS
+from fowt_env.training.benchmarks.training import KINDS
 from fowt_env.training.cli.app import EXIT_INPUT, EXIT_INTERRUPTED, app
 from fowt_env.training.rl import callbacks as train_callbacks
 from fowt_env.training.rl.train import Training

@@ -23,7 +23,7 @@ from fowt_env.training import (
     stability_map,
     stability_plain,
 )
-from fowt_env.training.benchmark import header
+from fowt_env.training.benchmarks.speed import header
 
 MEMORY_MB = 5.0  # growth that counts as none: less than a byte per step of the documented run
 # relative changes of the free body over 10000000 default steps: kinetic energy, linear momentum, angular

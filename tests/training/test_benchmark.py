@@ -9,7 +9,10 @@ import pytest
 from fowt_env.envs import FowtEnv
 from fowt_env.errors import InputError
 from fowt_env.scene.build import build_scene
-from fowt_env.training import benchmark, benchmark_accuracy, benchmark_envs, benchmark_evaluation
+from fowt_env.training.benchmarks import accuracy as benchmark_accuracy
+from fowt_env.training.benchmarks import envs as benchmark_envs
+from fowt_env.training.benchmarks import evaluation as benchmark_evaluation
+from fowt_env.training.benchmarks import speed as benchmark
 
 STILL = "still water, no wind"
 TINY = {"seconds": 2.0, "repeats": 1, "calls": 20}

@@ -642,7 +642,7 @@ def speed(
     out_path: Annotated[str, typer.Option("--out", help="CSV to write.")] = "results/benchmark/speed.csv",
 ):
     """Time each kind of scene: a step, the closed loop, simulate end to end, and each load."""
-    from fowt_env.training import benchmark as bench
+    from fowt_env.training.benchmarks import speed as bench
 
     names = None if kinds is None else [name.strip() for name in kinds.split(";") if name.strip()]
     with progress_bar("benchmark", None) as update:
@@ -688,7 +688,7 @@ def accuracy(
     plot: Annotated[bool, typer.Option("--plot/--no-plot", help="Make the plot.")] = True,
 ):
     """Measure error against run time over integrators, steps, rotor models and wave sums."""
-    from fowt_env.training import benchmark_accuracy as study
+    from fowt_env.training.benchmarks import accuracy as study
     from fowt_env.training.validation.openfast_cases import box_wind
 
     chosen = None if axes is None else study.select([name.strip() for name in axes.split(",")])
@@ -732,8 +732,8 @@ def evaluation(
     ] = "results/benchmark/evaluation.csv",
 ):
     """Time the runs of an evaluation on one core, and with --ray what handing them out costs."""
-    from fowt_env.training import benchmark as bench
-    from fowt_env.training import benchmark_evaluation as study
+    from fowt_env.training.benchmarks import evaluation as study
+    from fowt_env.training.benchmarks import speed as bench
 
     with progress_bar("timing runs", None):
         table = study.evaluation_cost(count, suite, controller)

@@ -96,8 +96,8 @@ def training(
     out_path: Annotated[str, typer.Option("--out", help="CSV to write.")] = "results/benchmark/training.csv",
 ):
     """Time PPO on each kind of vector environment, and say what physics, torch and Python take."""
-    from fowt_env.training.benchmark import write_csv
-    from fowt_env.training.benchmark_training import benchmark_training
+    from fowt_env.training.benchmarks.speed import write_csv
+    from fowt_env.training.benchmarks.training import benchmark_training
 
     with progress_bar("training speed", None) as update:
         table = benchmark_training(envs, steps, progress=lambda done, total, kind: update(done, kind, total))

@@ -17,7 +17,7 @@ import pandas as pd
 from fowt_env.errors import InputError, unknown
 from fowt_env.scene.build import INTEGRATORS, REFERENCE_STEP, build_scene
 from fowt_env.simulation import initial_state, simulate
-from fowt_env.training.benchmark import SEA, TURBULENCE, Kind, calibration, header, loop_time
+from fowt_env.training.benchmarks.speed import SEA, TURBULENCE, Kind, calibration, header, loop_time
 from fowt_env.training.validation.signal_errors import normalised_rms
 from fowt_env.weather.wind_field import is_field
 

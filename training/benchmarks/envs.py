@@ -12,7 +12,7 @@ from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
 from fowt_env.envs import FowtEnv, FowtVectorEnv
 from fowt_env.envs.episode_batch import act_all, thread_limit
 from fowt_env.plant.compile.decorators import parallel_entry
-from fowt_env.training.benchmark import header, multiply_adds
+from fowt_env.training.benchmarks.speed import header, multiply_adds
 
 SIZES = (1, 16, 256, 4096)
 THREADS = (1, 2)
