@@ -139,7 +139,8 @@ def validate_command(monkeypatch, tmp_path):
 
 
 def paper_command(monkeypatch, tmp_path):
-    from fowt_env.training import paper, paper_report
+    from fowt_env.training.studies.paper import load_cases as paper
+    from fowt_env.training.studies.paper import report as paper_report
 
     table = frame_of(["mean", "std", "min", "max"], 2, case=["LC5"] * 2)
     table.insert(1, "channel", ["PtfmSurge_[m]", "PtfmPitch_[deg]"])

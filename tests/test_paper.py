@@ -10,8 +10,10 @@ from fowt_env.analysis.trim import trim_held
 from fowt_env.descriptions.platform import read_platform, read_turbine
 from fowt_env.errors import InputError
 from fowt_env.plant.state import State
-from fowt_env.training import identify_model, paper, paper_report
 from fowt_env.training.cli.app import app
+from fowt_env.training.studies.froude_model import identify as identify_model
+from fowt_env.training.studies.paper import load_cases as paper
+from fowt_env.training.studies.paper import report as paper_report
 
 TABLE_1 = {"surge": 10.24, "sway": 10.24, "heave": 3.66, "roll": 4.27, "platform_pitch": 4.27, "yaw": 3.15}
 

@@ -11,14 +11,12 @@ from fowt_env.plant.integrators import INTEGRATORS
 from fowt_env.plant.rollout import RUNNING, advance
 from fowt_env.plant.state import State
 from fowt_env.scene.build import STEPS
-from fowt_env.training import (
-    stability,
-    stability_cases,
-    stability_extremes,
-    stability_long,
-    stability_map,
-    stability_plain,
-)
+from fowt_env.training.studies.robustness import extremes as stability_extremes
+from fowt_env.training.studies.robustness import long_runs as stability_long
+from fowt_env.training.studies.robustness import random_cases as stability_cases
+from fowt_env.training.studies.robustness import step_limits as stability_map
+from fowt_env.training.studies.robustness import study as stability
+from fowt_env.training.studies.robustness import without_compiler as stability_plain
 
 FOUND = Path(__file__).parent / "reference" / "stability"
 

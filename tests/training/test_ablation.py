@@ -7,8 +7,8 @@ pytest.importorskip("stable_baselines3")
 pytest.importorskip("sb3_contrib")
 
 from fowt_env.errors import InputError
-from fowt_env.training import ablation
 from fowt_env.training.rl.train import Training, environment_settings, make_algorithm
+from fowt_env.training.studies import ablation
 
 from .small_run import QUICK_ALGORITHM, SMALL
 

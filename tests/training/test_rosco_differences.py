@@ -8,7 +8,7 @@ import pytest
 from fowt_env.controllers.pi import PISettings
 from fowt_env.controllers.pi import pi as make_pi
 from fowt_env.plant.measurement import Measurement
-from fowt_env.training.rosco_differences import InsideIntegral, differences, outside_factor
+from fowt_env.training.studies.rosco_differences import InsideIntegral, differences, outside_factor
 
 RATED = Measurement(*[0.0] * len(Measurement._fields))._replace(
     rotor_speed=1.267109, generator_speed=122.9096, generator_torque=43093.55, blade_pitch=0.25

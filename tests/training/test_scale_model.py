@@ -8,7 +8,13 @@ import pytest
 from fowt_env import build_scene, natural_periods, simulate, trim
 from fowt_env.descriptions.platform import DATA, Line, read_platform, read_turbine
 from fowt_env.errors import InputError
-from fowt_env.training.scale_model import EXPONENTS, platform_text, scale_of_power, turbine_text, write
+from fowt_env.training.studies.froude_model.scale import (
+    EXPONENTS,
+    platform_text,
+    scale_of_power,
+    turbine_text,
+    write,
+)
 
 NAME = "oc3_froude_10mw"
 SCALE = 2.0 ** (1.0 / 3.5)

@@ -12,8 +12,12 @@ from fowt_env.errors import InputError
 from fowt_env.plant.hydro.linear_damping import LinearDamping
 from fowt_env.plant.state import State
 from fowt_env.scene.build import STEPS, build_scene
-from fowt_env.training import stability, stability_cases, stability_extremes, stability_long, stability_map
 from fowt_env.training.cli.app import app
+from fowt_env.training.studies.robustness import extremes as stability_extremes
+from fowt_env.training.studies.robustness import long_runs as stability_long
+from fowt_env.training.studies.robustness import random_cases as stability_cases
+from fowt_env.training.studies.robustness import step_limits as stability_map
+from fowt_env.training.studies.robustness import study as stability
 
 CALM = {"kind": "jonswap", "Hs": 3.0, "Tp": 9.0}
 

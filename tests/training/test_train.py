@@ -24,7 +24,6 @@ from fowt_env.controllers import information
 from fowt_env.controllers.policy import shipped_agents
 from fowt_env.controllers.policy_file import read_policy
 from fowt_env.errors import InputError
-from fowt_env.training import publish as publishing
 from fowt_env.training.cli.arguments import parse_pairs
 from fowt_env.training.rl import callbacks as train_callbacks
 from fowt_env.training.rl import train
@@ -37,6 +36,7 @@ from fowt_env.training.rl.train import (
     make_envs,
     resolve,
 )
+from fowt_env.training.studies import publish_agent as publishing
 
 from .small_run import small
 

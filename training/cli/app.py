@@ -587,8 +587,8 @@ def paper(
     plot: Annotated[bool, typer.Option("--plot/--no-plot", help="Make the plots.")] = True,
 ):
     """Run the paper's load cases and check its claims."""
-    from fowt_env.training.paper import run_paper, statistics, wanted_cases
-    from fowt_env.training.paper_report import write_report
+    from fowt_env.training.studies.paper.load_cases import run_paper, statistics, wanted_cases
+    from fowt_env.training.studies.paper.report import write_report
 
     names = wanted_cases(case)
     with progress_bar("paper", None) as update:
@@ -759,8 +759,8 @@ def stability(
     replay: Annotated[str | None, typer.Option(help="Run a stored case again, nothing else.")] = None,
 ):
     """Try to break the simulator: steps, random scenes, hostile actions, extremes, long runs."""
-    from fowt_env.training import stability as stress
-    from fowt_env.training.stability_cases import replay as run_again
+    from fowt_env.training.studies.robustness import study as stress
+    from fowt_env.training.studies.robustness.random_cases import replay as run_again
 
     if replay is not None:
         outcome = run_again(replay)

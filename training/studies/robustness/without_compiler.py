@@ -1,6 +1,6 @@
 """The same small runs with and without the compiler: numbers must agree to rounding.
 
-As a program (`python -m fowt_env.training.stability_plain IN OUT`) it runs what IN, a pickle of jobs, asks for; with
+As a program (`python -m fowt_env.training.studies.robustness.without_compiler IN OUT`) it runs what IN, a pickle of jobs, asks for; with
 NUMBA_DISABLE_JIT=1 in its environment every kernel is then plain Python.
 """
 
@@ -114,7 +114,7 @@ def differences(given=None):
         root = Path(__file__).resolve().parent.parent
         path = os.pathsep.join(filter(None, (str(root), os.environ.get("PYTHONPATH"))))
         done = subprocess.run(
-            [sys.executable, "-m", "fowt_env.training.stability_plain", str(ask), str(answer)],
+            [sys.executable, "-m", "fowt_env.training.studies.robustness.without_compiler", str(ask), str(answer)],
             env={**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": path}, cwd=root,
             capture_output=True, text=True, check=False,
         )  # fmt: skip

@@ -1,6 +1,6 @@
 """Ship the best policy of a training run: its .npz in training/agents, and a card that says where it is from.
 
-    python -m fowt_env.training.publish runs/above_rated_ppo_1 ppo_lqr --machine "two shared cores of a Xeon"
+    python -m fowt_env.training.studies.publish_agent runs/above_rated_ppo_1 ppo_lqr --machine "two shared cores of a Xeon"
 
 The card has the command that makes the run again, its seed, wall time and machine, what the agent is told,
 its figures on the validation episodes, and the versions that the run was made with.

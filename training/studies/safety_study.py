@@ -1,6 +1,6 @@
 """Agents with and without the safety layer on validation episodes.
 
-    python -m fowt_env.training.safety_study --agents ppo_lqr --out results/safety.csv
+    python -m fowt_env.training.studies.safety_study --agents ppo_lqr --out results/safety.csv
 
 Beside the trained agents two careless ones with direct commands are run: one that asks for new random
 torque and blade pitch every 5 s, and one that asks for no torque and flat blades.

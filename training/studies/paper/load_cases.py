@@ -3,7 +3,7 @@
 Rotor speed and blade pitch are prescribed at model scale, theory.md Eq. (20). A run starts at its steady
 state in the mean wind; waves start at once, as a wave maker's do, so that a record holds the transient of
 its start. The wind is the printed one, with a turbulence intensity of 3 %, a choice: the paper says "low" and
-prints no value. What is identified and what is not: training/identify_model.py.
+prints no value. What is identified and what is not: training/studies/froude_model/identify.py.
 """
 
 from dataclasses import dataclass, field

@@ -17,7 +17,7 @@ from fowt_env.plant.integrators import INTEGRATORS, feathering
 from fowt_env.plant.rollout import RUNNING, advance, forget
 from fowt_env.plant.state import State
 from fowt_env.scene.build import STEPS, build_scene
-from fowt_env.training.stability_long import with_integrator
+from fowt_env.training.studies.robustness.long_runs import with_integrator
 
 DURATION = 300.0  # s of each run: hundreds of steps even at the largest
 FINE_STEP = 0.0125  # s, of the run that others are judged by

@@ -1,8 +1,8 @@
 """What information, action mode and algorithm are worth: equal runs that differ in one thing each.
 
-    python -m fowt_env.training.ablation --out runs/ablation                      # all of training/agents/ablation.yml
-    python -m fowt_env.training.ablation --out runs/ablation --only direct,estimate
-    python -m fowt_env.training.ablation --out runs/ablation --report docs/figures/rl_ablation.png
+    python -m fowt_env.training.studies.ablation --out runs/ablation                      # all of training/studies/ablation.yml
+    python -m fowt_env.training.studies.ablation --out runs/ablation --only direct,estimate
+    python -m fowt_env.training.studies.ablation --out runs/ablation --report docs/figures/rl_ablation.png
 
 Each variant and seed is a run of training/rl/train.py in a folder of its own; one that was stopped goes on
 where it was when the command is given again, and one that has ended is left alone. The runs are far shorter

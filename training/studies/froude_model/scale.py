@@ -7,7 +7,7 @@ The result is similar to its original, not a design: masses of real turbines gro
 speed does not grow with size, and nobody has built it. It shows that the description carries another size,
 and serves where a control law is to be tried on one.
 
-`python -m fowt_env.training.scale_model --help` has the settings; without any it writes the built-in oc3_froude_10mw.
+`python -m fowt_env.training.studies.froude_model.scale --help` has the settings; without any it writes the built-in oc3_froude_10mw.
 """
 
 from pathlib import Path
@@ -19,7 +19,7 @@ import typer
 from fowt_env.descriptions.platform import DATA, read_platform, read_turbine
 from fowt_env.errors import InputError
 from fowt_env.files.tables import replacing
-from fowt_env.training.identify_model import toml_value
+from fowt_env.training.studies.froude_model.identify import toml_value
 
 PLATFORM, TURBINE = "oc3_hywind", "nrel5mw"
 POWER_EXPONENT = 3.5
@@ -75,7 +75,7 @@ LABEL = """\
 # FROUDE-SCALED FROM {origin}, NOT A REAL {what}: every figure is that of {origin} times a power of
 # the scale {scale:.6g}, lengths by the first, times and speeds by its root, masses and forces by the third.
 # Nobody designed or built it; a turbine of this power would be lighter and reach its rated power at
-# less wind. SI units (kg, m, s, N, rad). Written by training/scale_model.py."""
+# less wind. SI units (kg, m, s, N, rad). Written by training/studies/froude_model/scale.py."""
 
 
 def scaled(record, name, scale):
@@ -137,7 +137,7 @@ def stations_text(turbine, scale):
     """Text of the blade file of a description.Turbine, lengths times the scale."""
     blade = turbine.blade
     rows = [
-        f"# Blade of {turbine.name}, lengths times {scale:.6g}, twist as it is (training/scale_model.py).",
+        f"# Blade of {turbine.name}, lengths times {scale:.6g}, twist as it is (training/studies/froude_model/scale.py).",
         "radius_m,chord_m,twist_deg,airfoil",
     ]
     for radius, chord, twist, airfoil in zip(
@@ -151,7 +151,7 @@ def _polar_files(turbine):
     """{file name: text} of its polars."""
     files = {}
     for name, polar in turbine.blade.polars.items():
-        rows = [f"# {name} of {turbine.name}, unchanged (training/scale_model.py).", "alpha_deg,cl,cd,cm"]
+        rows = [f"# {name} of {turbine.name}, unchanged (training/studies/froude_model/scale.py).", "alpha_deg,cl,cd,cm"]
         for alpha, *values in polar:
             rows.append(",".join(f"{value:.10g}" for value in (np.degrees(alpha), *values)))
         files[f"{name}.csv"] = "\n".join(rows) + "\n"

@@ -17,7 +17,7 @@ from fowt_env.plant.rollout import RUNNING, advance, forget, observe
 from fowt_env.plant.state import State
 from fowt_env.scene.build import STEPS, build_scene
 from fowt_env.simulation import initial_state
-from fowt_env.training.stability_cases import Runner, platform_energy, potential_energy
+from fowt_env.training.studies.robustness.random_cases import Runner, platform_energy, potential_energy
 
 CHUNK = 100_000  # steps between looks at the invariants
 ORDERS = {"rk4": 4, "heun": 2, "abm4": 4, "ab4": 4}

@@ -16,14 +16,12 @@ from fowt_env.files.tables import replacing
 from fowt_env.plant.integrators import INTEGRATORS
 from fowt_env.plant.rollout import RUNNING
 from fowt_env.scene.build import STEPS
-from fowt_env.training import (
-    stability_cases,
-    stability_extremes,
-    stability_long,
-    stability_map,
-    stability_plain,
-)
 from fowt_env.training.benchmarks.speed import header
+from fowt_env.training.studies.robustness import extremes as stability_extremes
+from fowt_env.training.studies.robustness import long_runs as stability_long
+from fowt_env.training.studies.robustness import random_cases as stability_cases
+from fowt_env.training.studies.robustness import step_limits as stability_map
+from fowt_env.training.studies.robustness import without_compiler as stability_plain
 
 MEMORY_MB = 5.0  # growth that counts as none: less than a byte per step of the documented run
 # relative changes of the free body over 10000000 default steps: kinetic energy, linear momentum, angular

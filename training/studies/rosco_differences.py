@@ -1,6 +1,6 @@
 """What makes ROSCO with the OC3 gains differ from the published law with the same gains, one thing at a time.
 
-    python -m fowt_env.training.rosco_differences --jobs 2
+    python -m fowt_env.training.studies.rosco_differences --jobs 2
 
 From the published law towards ROSCO: its periods, the place of the gain schedule, the pitch that sets it.
 From ROSCO towards the published law: the set-point smoother, the torque law, and gains that undo the place of

@@ -7,7 +7,7 @@ keeps the weight, the pull of the lines and the buoyancy in balance at the desig
 the polars gives the Froude-scaled rated thrust in the rated condition of the paper (LC2), whose wind is
 twice the Froude-scaled one: at the model's Reynolds number airfoils lift less.
 
-`python -m fowt_env.training.identify_model` writes the files anew.
+`python -m fowt_env.training.studies.froude_model.identify` writes the files anew.
 """
 
 from math import cos, hypot, pi, sin, sqrt
@@ -277,12 +277,12 @@ TURBINE_HEADER = """\
 # 1000/1025, the ratio of water densities). The as-built rotor is not published. Direct drive by a
 # motor: no gearbox, generator inertia, pitch actuator. Torque law and gains are scaled with the rest but
 # unused in the paper's tests, where rotor speed and blade pitch are prescribed. Polars: full scale,
-# coefficients times one identified factor, see polars/. Written by training/identify_model.py.
+# coefficients times one identified factor, see polars/. Written by training/studies/froude_model/identify.py.
 # SI units (kg, m, s, N, rad) unless the key says otherwise (_deg).
 """
 PLATFORM_HEADER = """\
 # The 1:50 model of Liu et al. (2023), J. Vib. Eng. 36(4) 892-902, SI units (kg, m, s, N, rad) at
-# model scale. Written by training/identify_model.py. Marks, by table:
+# model scale. Written by training/studies/froude_model/identify.py. Marks, by table:
 #   given       printed in the paper: scale 1:50, taut lines without touchdown, the periods of Table 1
 #   Froude      OC3-Hywind by Froude's law; the built model is not published
 #   identified  here, so that natural_periods() gives the computed periods of Table 1
@@ -302,7 +302,7 @@ def write_polars(folder, factor):
     """Write the full-scale polars times a factor."""
     for name, polar in read_turbine("nrel5mw").blade.polars.items():
         lines_of_text = [
-            f"# {name} of nrel5mw, all coefficients times {factor:.8g} (training/identify_model.py).",
+            f"# {name} of nrel5mw, all coefficients times {factor:.8g} (training/studies/froude_model/identify.py).",
             "alpha_deg,cl,cd,cm",
         ]
         for alpha, *coefficients in polar:
