@@ -5,11 +5,11 @@ import inspect
 import sys
 
 from fowt_env.controllers.base import CheckedController, CompiledController, Controller, check_control_dt
-from fowt_env.controllers.policy import PREFIX as POLICY
-from fowt_env.controllers.policy import policy, shipped_agents
+from fowt_env.controllers.design.saved_files import PREFIX as DESIGN
+from fowt_env.controllers.design.saved_files import load_design
+from fowt_env.controllers.policy.controller import PREFIX as POLICY
+from fowt_env.controllers.policy.controller import policy, shipped_agents
 from fowt_env.controllers.registry import CONTROLLERS
-from fowt_env.controllers.saved_design import PREFIX as DESIGN
-from fowt_env.controllers.saved_design import load_design
 from fowt_env.descriptions.platform import read_turbine
 from fowt_env.errors import InputError, unknown
 

@@ -8,7 +8,7 @@ published sampling; only the command waits for the next control instant.
 
 It departs from the published code in one way: the rate limit of the blade pitch counts from the last
 command. The code counts from the measured pitch, which with an actuator lag of 0.2 s would hold the blades
-to 0.5 deg/s. controllers/openfast.py keeps that too, for the deck without an actuator.
+to 0.5 deg/s. controllers/openfast_baseline.py keeps that too, for the deck without an actuator.
 """
 
 from enum import IntEnum

@@ -2,7 +2,7 @@
 
 import fowt_env
 from fowt_env.analysis.linear_model import modes
-from fowt_env.controllers.closed_loop import closed_loop_matrix
+from fowt_env.controllers.design.closed_loop import closed_loop_matrix
 from fowt_env.controllers.pi import PISettings
 from fowt_env.files.tables import write_mat
 

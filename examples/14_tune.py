@@ -8,8 +8,8 @@ let simulations decide. The seeds for tuning are not those that controllers are 
 """
 
 import fowt_env
+from fowt_env.controllers.design.pi import design_pi
 from fowt_env.controllers.pi import PI, PISettings
-from fowt_env.controllers.pi_design import design_pi
 from fowt_env.training.design.sweeps import models_over
 from fowt_env.training.evaluation.evaluate import evaluate
 

@@ -22,7 +22,7 @@ import pandas as pd
 import yaml
 
 import fowt_env.training.cli.app
-from fowt_env.controllers.policy import read_policy
+from fowt_env.controllers.policy.controller import read_policy
 from fowt_env.files.tables import is_leftover
 from fowt_env.training.evaluation import results
 

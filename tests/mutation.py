@@ -143,7 +143,7 @@ class Samples:
         self.kinds[name] = (path, ways, load)
 
     def _descriptions(self):
-        from fowt_env.controllers.saved_design import load_design
+        from fowt_env.controllers.design.saved_files import load_design
         from fowt_env.descriptions.platform import read_platform, read_turbine
         from fowt_env.descriptions.sea_state import joint_sea_state, sea_state_of
         from fowt_env.scene.build import build_scene
@@ -230,7 +230,7 @@ class Samples:
             self.add(f"outb {kind}", path, BINARY, lambda path=path: read_outb(path))
 
     def _policies(self):
-        from fowt_env.controllers.policy import AGENTS, PolicyController
+        from fowt_env.controllers.policy.controller import AGENTS, PolicyController
 
         path = self.folder / "policy.npz"
         shutil.copy(AGENTS / "ppo_lqr_preview.npz", path)

@@ -16,8 +16,8 @@ import pytest
 from typer.testing import CliRunner
 
 from fowt_env.controllers import make
-from fowt_env.controllers.policy import AGENTS
-from fowt_env.controllers.policy_file import read_policy
+from fowt_env.controllers.policy.controller import AGENTS
+from fowt_env.controllers.policy.network_file import read_policy
 from fowt_env.descriptions.files import parse_json, read_toml
 from fowt_env.descriptions.platform import read_turbine
 from fowt_env.errors import InputError

@@ -84,7 +84,7 @@ def linearize_command(monkeypatch, tmp_path):
 
 
 def design_pi_command(monkeypatch, tmp_path):
-    from fowt_env.controllers import pi_design
+    from fowt_env.controllers.design import pi as pi_design
     from fowt_env.training.design import sweeps as linear_design
 
     names = ["wind_[m/s]", "blade_pitch_[deg]", "slope_[1/s2]", "KP_[s]", "KI_[-]", "omega_[rad/s]"]

@@ -14,7 +14,7 @@ import pandas as pd
 import pytest
 from doc_pages import DOCS, FENCE
 
-from fowt_env.controllers.policy import shipped_agents
+from fowt_env.controllers.policy.controller import shipped_agents
 from fowt_env.descriptions.platform import read_turbine
 from fowt_env.envs.rewards import N_TERMS, TERMS, build_scales, fill_terms
 from fowt_env.envs.tasks import TASKS

@@ -214,7 +214,9 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             parameters, memory = self._baseline.parameters, self._baseline.memory
         self._estimator = watch = None
         if set(ESTIMATE_CHANNELS) & set(task.observation):
-            from fowt_env.controllers.lqr import WindEstimator  # fowt_env imports nothing from it otherwise
+            from fowt_env.controllers.lqr.law import (
+                WindEstimator,  # fowt_env imports nothing from it otherwise
+            )
 
             self._estimator = WindEstimator(self.design_scene.turbine, self.control_dt)
             watch = self._estimator.kernel

@@ -22,7 +22,7 @@ COS_AZIMUTH = N_MEASUREMENTS + 1
 FIRST_ACTION = N_MEASUREMENTS + 2
 SECOND_ACTION = N_MEASUREMENTS + 3
 ESTIMATES = N_MEASUREMENTS + 4
-ESTIMATED = (  # what an estimator's memory begins with, see controllers/lqr.py
+ESTIMATED = (  # what an estimator's memory begins with, see controllers/lqr/law.py
     "surge", "platform_pitch", "surge_rate", "platform_pitch_rate", "rotor_speed", "blade_pitch",
     "wind_tendency", "wind", "wave", "wave_quadrature", "moment", "mean_wind",
 )  # fmt: skip

@@ -6,7 +6,7 @@ import pytest
 from fowt_env import build_scene, linearize, simulate, trim
 from fowt_env.analysis.linear_model import STATE_INDEX, modes
 from fowt_env.analysis.trim import AZIMUTHS, calm, mean_derivative
-from fowt_env.controllers.closed_loop import closed_loop_matrix, platform_pitch_damping
+from fowt_env.controllers.design.closed_loop import closed_loop_matrix, platform_pitch_damping
 from fowt_env.controllers.pi import PISettings
 from fowt_env.errors import InputError
 from fowt_env.plant.drivetrain import generator_torque

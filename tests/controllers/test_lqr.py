@@ -3,8 +3,8 @@
 import pytest
 
 from fowt_env import build_scene, simulate
-from fowt_env.controllers.lqr import LQR
-from fowt_env.controllers.lqr_design import Weights
+from fowt_env.controllers.lqr.design import Weights
+from fowt_env.controllers.lqr.law import LQR
 from fowt_env.errors import InputError
 from fowt_env.training.evaluation.cases import named_cases
 from fowt_env.training.evaluation.metrics import metrics

@@ -7,12 +7,12 @@ import pytest
 
 from fowt_env import build_scene
 from fowt_env.controllers import make
-from fowt_env.controllers.closed_loop import closed_loop_matrix
-from fowt_env.controllers.lqr import LQR
-from fowt_env.controllers.lqr_design import Weights, design_model, design_models
+from fowt_env.controllers.design.closed_loop import closed_loop_matrix
+from fowt_env.controllers.design.pi import design_pi
+from fowt_env.controllers.design.saved_files import load_design, lqr_settings, save_design
+from fowt_env.controllers.lqr.design import Weights, design_model, design_models
+from fowt_env.controllers.lqr.law import LQR
 from fowt_env.controllers.pi import PI, PISettings
-from fowt_env.controllers.pi_design import design_pi
-from fowt_env.controllers.saved_design import load_design, lqr_settings, save_design
 from fowt_env.errors import InputError
 from fowt_env.training.design.sweeps import models_over
 from fowt_env.training.evaluation.evaluate import evaluate

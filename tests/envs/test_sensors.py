@@ -6,7 +6,7 @@ import pytest
 from fowt_env import build_scene, simulate
 from fowt_env.controllers import make
 from fowt_env.controllers.base import call_law
-from fowt_env.controllers.lqr import WindEstimator
+from fowt_env.controllers.lqr.law import WindEstimator
 from fowt_env.envs import FowtEnv, FowtVectorEnv
 from fowt_env.envs.safety import SafetyLayer
 from fowt_env.envs.sensors import draw_sensors, reading_scales

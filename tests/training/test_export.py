@@ -10,7 +10,7 @@ import torch
 from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
-from fowt_env.controllers.policy import read_policy
+from fowt_env.controllers.policy.controller import read_policy
 from fowt_env.envs import FowtEnv
 from fowt_env.envs.decisions import Decisions, DecisionSettings
 from fowt_env.training.rl.export import export_policy

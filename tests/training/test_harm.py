@@ -402,10 +402,10 @@ def test_an_edit_of_what_a_controllers_module_imports_from_its_project_changes_i
 
 
 def test_a_users_controller_depends_on_those_of_the_package_that_it_builds_on(tmp_path, monkeypatch):
-    (tmp_path / "built.py").write_text("from fowt_env.controllers.lqr import lqr as Law\nimport fowt_env.controllers\n")
+    (tmp_path / "built.py").write_text("from fowt_env.controllers.lqr.law import lqr as Law\nimport fowt_env.controllers\n")
     monkeypatch.syspath_prepend(str(tmp_path))
     names = {path.relative_to(path.parents[1]).as_posix() for path in results._user_files("built")}
-    assert {"controllers/lqr.py", "controllers/lqr_design.py", "fowt_env/analysis/linear_model.py"} <= names
+    assert {"controllers/lqr/law.py", "controllers/lqr/design.py", "fowt_env/analysis/linear_model.py"} <= names
     assert "controllers/rosco.py" not in names and "controllers/__init__.py" not in names
 
 

@@ -11,7 +11,7 @@ from scipy.linalg import solve_continuous_are, solve_continuous_lyapunov
 from fowt_env import build_scene
 from fowt_env.analysis.linear_model import linearize
 from fowt_env.analysis.wave_excitation import wave_force
-from fowt_env.controllers.lqr_design import MOMENT, N_FEEDBACK, N_PLANT, PLANT, design_model, wind_filter
+from fowt_env.controllers.lqr.design import MOMENT, N_FEEDBACK, N_PLANT, PLANT, design_model, wind_filter
 from fowt_env.descriptions.platform import joint_sea_state, sea_state_of
 from fowt_env.errors import InputError
 from fowt_env.training.design import linear_bound
@@ -85,9 +85,9 @@ def test_the_covariance_under_gspi_is_the_integral_of_its_spectra(problem, base)
 
 
 def test_the_closed_loop_of_gspi_has_the_eigenvalues_of_the_whole_plant(windy, problem):
-    """The planar states of the bound against controllers/closed_loop.py with all degrees of freedom."""
-    from fowt_env.controllers.closed_loop import closed_loop_matrix
-    from fowt_env.controllers.lqr_design import scene_at
+    """The planar states of the bound against controllers/design/closed_loop.py with all degrees of freedom."""
+    from fowt_env.controllers.design.closed_loop import closed_loop_matrix
+    from fowt_env.controllers.lqr.design import scene_at
     from fowt_env.controllers.pi import PISettings
 
     whole, _ = closed_loop_matrix(linearize(scene_at(windy, 18.0)), PISettings.published(windy.turbine))

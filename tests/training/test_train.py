@@ -21,8 +21,8 @@ pytest.importorskip("sb3_contrib")
 import torch
 
 from fowt_env.controllers import information
-from fowt_env.controllers.policy import shipped_agents
-from fowt_env.controllers.policy_file import read_policy
+from fowt_env.controllers.policy.controller import shipped_agents
+from fowt_env.controllers.policy.network_file import read_policy
 from fowt_env.errors import InputError
 from fowt_env.training.cli.arguments import parse_pairs
 from fowt_env.training.rl import callbacks as train_callbacks

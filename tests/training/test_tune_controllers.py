@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from fowt_env.controllers.base import TUNED
-from fowt_env.controllers.floating import FeedbackSettings, FloatingFeedback
+from fowt_env.controllers.floating_feedback import FeedbackSettings, FloatingFeedback
 from fowt_env.controllers.pi import PISettings
 from fowt_env.errors import InputError
 from fowt_env.training.design import tune_feedback as tune_controllers

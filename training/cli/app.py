@@ -482,7 +482,7 @@ def list_names(
 ):
     """List the names that the other commands know."""
     from fowt_env.controllers import CONTROLLERS
-    from fowt_env.controllers.policy import shipped_agents
+    from fowt_env.controllers.policy.controller import shipped_agents
     from fowt_env.descriptions.platform import names
     from fowt_env.training.evaluation.cases import all_cases, read_suite, suite_names
 

@@ -59,8 +59,8 @@ Raising pitch_rate saves travel, platform_pitch calms the platform, power holds 
 def save_lqr(weights, path):
     """The path written: lqr with these weights ({name: value}) on the models of OC3-Hywind."""
     import fowt_env
-    from fowt_env.controllers.lqr_design import Weights, design_models
-    from fowt_env.controllers.saved_design import lqr_settings, save_design
+    from fowt_env.controllers.design.saved_files import lqr_settings, save_design
+    from fowt_env.controllers.lqr.design import Weights, design_models
 
     chosen = Weights().changed(**weights)
     scene = fowt_env.build_scene("oc3_hywind", wind=18.0)
@@ -147,8 +147,8 @@ def pi(
     import pandas as pd
 
     import fowt_env
-    from fowt_env.controllers.pi_design import design_pi
-    from fowt_env.controllers.saved_design import save_design
+    from fowt_env.controllers.design.pi import design_pi
+    from fowt_env.controllers.design.saved_files import save_design
     from fowt_env.training.design.sweeps import models_over
 
     speeds = parse_numbers(winds, "winds")

@@ -2,7 +2,7 @@
 
     python -m fowt_env.training.design.linear_bound          (or fowt design bound --wind 12,14,16,18,20,22,24)
 
-Per wind speed, on the plant of controllers/lqr_design.py (surge, platform pitch, rotor, pitch actuator; the
+Per wind speed, on the plant of controllers/lqr/design.py (surge, platform pitch, rotor, pitch actuator; the
 rotor-averaged Kaimal wind and the site's sea as shaped white noise): standard deviations from Lyapunov
 equations, for the least weighted sum of both variances at no more blade-pitch travel and no more power
 deviation than gspi_oc3 has on the same model, and a torque deviation that the drivetrain can give (the
@@ -21,7 +21,7 @@ import numpy as np
 import pandas as pd
 from scipy.linalg import solve_continuous_are, solve_continuous_lyapunov
 
-from fowt_env.controllers.lqr_design import (
+from fowt_env.controllers.lqr.design import (
     MOMENT,
     N_FEEDBACK,
     N_PLANT,

@@ -11,8 +11,8 @@ import pandas as pd
 from scipy.linalg import eigvals
 
 from fowt_env.analysis.linear_model import FORCES, STATE_INDEX, linearize
-from fowt_env.controllers.lqr import LQR
-from fowt_env.controllers.lqr_design import Weights, scene_at
+from fowt_env.controllers.lqr.design import Weights, scene_at
+from fowt_env.controllers.lqr.law import LQR
 from fowt_env.errors import InputError
 from fowt_env.files.tables import replacing, write_table
 from fowt_env.simulation import simulate

@@ -21,7 +21,7 @@ from pathlib import Path
 import pandas as pd
 
 from fowt_env.controllers.base import TUNED
-from fowt_env.controllers.floating import FeedbackSettings, FloatingFeedback
+from fowt_env.controllers.floating_feedback import FeedbackSettings, FloatingFeedback
 from fowt_env.controllers.pi import PISettings
 from fowt_env.controllers.rosco import Rosco, RoscoSettings
 from fowt_env.descriptions.platform import joint_sea_state, read_turbine

@@ -183,8 +183,9 @@ def controller_code(controller):
     controllers; "design:FILE", "policy:NAME": the file and all controllers; "module:Name", a class or an
     object: the file that it comes from, and what that imports from its own folder and this project.
     """
-    from fowt_env.controllers import CONTROLLERS, saved_design
-    from fowt_env.controllers.policy import PREFIX, policy_path
+    from fowt_env.controllers import CONTROLLERS
+    from fowt_env.controllers.design import saved_files as saved_design
+    from fowt_env.controllers.policy.controller import PREFIX, policy_path
 
     if not isinstance(controller, str):
         kind = (

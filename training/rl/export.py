@@ -1,11 +1,11 @@
-"""Trained policies as plain array files, which controllers/policy.py reads with numpy alone."""
+"""Trained policies as plain array files, which controllers/policy/controller.py reads with numpy alone."""
 
 import json
 import pickle
 
 import numpy as np
 
-from fowt_env.controllers.policy_file import FORMAT
+from fowt_env.controllers.policy.network_file import FORMAT
 from fowt_env.errors import InputError
 from fowt_env.files.tables import replacing
 

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import Field
 
-from fowt_env.controllers.policy_file import ACTIVATIONS
+from fowt_env.controllers.policy.network_file import ACTIVATIONS
 from fowt_env.controllers.registry import CONTROLLERS
 from fowt_env.descriptions.files import raise_problems, read_text
 from fowt_env.descriptions.records import (
@@ -69,7 +69,7 @@ class TrainingSettings(Record):
     """Settings of a run. The environment's, the decisions' and the algorithm's are checked by these."""
 
     algo: Literal["ppo", "sac", "tqc"]
-    name: str  # of the settings in training/agents/ALGO.yml
+    name: str  # of the settings in controllers/policy/agents/ALGO.yml
     seed: Whole
     steps: Count
     task: str  # of the environment

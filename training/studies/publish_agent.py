@@ -1,4 +1,4 @@
-"""Ship the best policy of a training run: its .npz in training/agents, and a card that says where it is from.
+"""Ship the best policy of a training run: its .npz in controllers/policy/agents, and a card that says where it is from.
 
     python -m fowt_env.training.studies.publish_agent runs/above_rated_ppo_1 ppo_lqr --machine "two shared cores of a Xeon"
 
@@ -15,7 +15,7 @@ import pandas as pd
 import yaml
 
 from fowt_env.controllers import information
-from fowt_env.controllers.policy import read_policy
+from fowt_env.controllers.policy.controller import read_policy
 from fowt_env.errors import InputError
 from fowt_env.files.tables import replacing
 from fowt_env.training.rl.train import AGENTS, resolve

@@ -13,7 +13,7 @@ from math import degrees
 import numpy as np
 import pandas as pd
 
-from fowt_env.controllers.policy import policy_path, read_policy
+from fowt_env.controllers.policy.controller import policy_path, read_policy
 from fowt_env.envs import TASKS, FowtEnv, SafetyLayer
 from fowt_env.envs.decisions import Decisions, DecisionSettings
 from fowt_env.files.tables import write_table

@@ -11,7 +11,7 @@ from math import isfinite
 import numpy as np
 
 from fowt_env.analysis.linear_model import modes
-from fowt_env.controllers.closed_loop import PLATFORM_PERIOD, closed_loop_matrix
+from fowt_env.controllers.design.closed_loop import PLATFORM_PERIOD, closed_loop_matrix
 from fowt_env.controllers.pi import PISettings, schedule_gain
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.state import State

@@ -2,7 +2,7 @@
 
 A Kalman filter on measured channels estimates platform, rotor-averaged wind and waves; state feedback on
 the estimates moves both commands by their rates, so limits need no further care. The models, trims and
-gains of controllers/lqr_design.py are interpolated in a slow mean of the estimated wind. Where the pitch
+gains of controllers/lqr/design.py are interpolated in a slow mean of the estimated wind. Where the pitch
 rests near its minimum the torque law of theory.md, section 3, takes over.
 
 Filter and feedback go on from the command in force, whoever gave it: what the residual mode of the
@@ -14,9 +14,8 @@ from math import exp
 
 import numpy as np
 
-from fowt_env.controllers import lqr_design as design
 from fowt_env.controllers.base import CompiledController, check_control_dt
-from fowt_env.controllers.lqr_design import (
+from fowt_env.controllers.lqr.design import (
     MOMENT,
     N_FEEDBACK,
     N_PLANT,
@@ -26,6 +25,7 @@ from fowt_env.controllers.lqr_design import (
     WIND,
     Weights,
 )
+from fowt_env.controllers.lqr.law import design
 from fowt_env.errors import InputError
 from fowt_env.plant.compile.decorators import control_kernel, kernel
 from fowt_env.plant.drivetrain import TorqueCurve, build_torque_curve, generator_torque, limited

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from fowt_env.controllers.lqr import LQR
-from fowt_env.controllers.lqr_design import LOWEST_DESIGN_WIND, MODEL_SHAPES, DesignModel, Weights
+from fowt_env.controllers.lqr.design import LOWEST_DESIGN_WIND, MODEL_SHAPES, DesignModel, Weights
+from fowt_env.controllers.lqr.law import LQR
 from fowt_env.controllers.pi import PI, PISettings
 from fowt_env.descriptions.files import parse_json, read_text
 from fowt_env.errors import InputError, unknown

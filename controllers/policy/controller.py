@@ -1,7 +1,7 @@
 """Exported policy network as a controller: plain arrays, evaluated with numpy alone.
 
 A policy file (policy_file.py) is read without pickle, so that loading one runs no code of its author.
-`policy:NAME` is a file of training/agents, `policy:PATH` any other; a stable-baselines3 zip is refused here,
+`policy:NAME` is a file of controllers/policy/agents, `policy:PATH` any other; a stable-baselines3 zip is refused here,
 since loading one executes code from it.
 """
 
@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from fowt_env.controllers.base import CompiledController, call_law, check_control_dt
-from fowt_env.controllers.lqr import WindEstimator
-from fowt_env.controllers.policy_file import read_policy
+from fowt_env.controllers.lqr.law import WindEstimator
+from fowt_env.controllers.policy.network_file import read_policy
 from fowt_env.envs.actions import MODES, Mode, action_of, build_action_map, command_of, start_tracking
 from fowt_env.envs.decisions import Decisions, DecisionSettings
 from fowt_env.envs.observations import (
@@ -35,7 +35,7 @@ AGENTS = Path(__file__).resolve().parent.parent / "training" / "agents"
 
 
 def shipped_agents():
-    """Sorted names of the agents in training/agents."""
+    """Sorted names of the agents in controllers/policy/agents."""
     return sorted(path.stem for path in AGENTS.glob("*.npz"))
 
 
