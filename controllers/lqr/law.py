@@ -25,7 +25,7 @@ from fowt_env.controllers.lqr.design import (
     WIND,
     Weights,
 )
-from fowt_env.controllers.lqr.law import design
+from fowt_env.controllers.lqr import design
 from fowt_env.errors import InputError
 from fowt_env.plant.compile.decorators import control_kernel, kernel
 from fowt_env.plant.drivetrain import TorqueCurve, build_torque_curve, generator_torque, limited
