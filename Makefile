@@ -2,7 +2,7 @@
 PYTHON ?= python3.11
 VENV ?= .venv
 BIN := $(VENV)/bin
-PROJECT := pyproject.toml setup.py constraints.txt
+PROJECT := pyproject.toml constraints.txt
 # one worker per core, each with some 2 GB; tests/conftest.py says which files share a worker, and their order
 TESTS = $(BIN)/python -m pytest --numprocesses auto --maxprocesses 8 --dist loadfile --no-loadscope-reorder
 INSTALL = $(BIN)/python -m pip install --quiet --constraint constraints.txt --editable

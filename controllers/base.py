@@ -51,7 +51,7 @@ def call_law(law, parameters, memory, measurement, command):
 class CompiledController:
     """Base of the controllers whose law runs inside the compiled loop.
 
-    A subclass sets `kernel = staticmethod(law)`, with law made by fowt_env.plant.compile.decorators.control_kernel, and
+    A subclass sets `kernel = staticmethod(law)`, with law made by control_kernel, and
     writes reset(). parameters and memory are float64 arrays; IntEnums beside the law name their
     entries. The compiled loop calls kernel on these arrays; act() calls the same law from Python.
     A law is handed the command in force, which it overwrites with the next one.

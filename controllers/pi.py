@@ -4,9 +4,11 @@ theory.md, sections 3 and 4. Above rated the torque is constant (or the power, b
 blade pitch holds the rotor speed; below rated the pitch rests on its minimum and the torque curve rules.
 """
 
+import tomllib
 from dataclasses import dataclass, fields
 from enum import IntEnum
 from math import exp, inf, isfinite, isinf
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +20,7 @@ from fowt_env.plant.drivetrain import TorqueCurve, build_torque_curve, generator
 from fowt_env.plant.measurement import Measure
 
 SCHEDULE_ON = ("commanded", "measured")
+TUNED_FACTORS = Path(__file__).parent / "pi_tuned.toml"  # of KP, KI and beta_K; training/design/tune_pi.py
 BUMPLESS = 1e-9  # rad, largest step of the first command that still counts as none
 
 
@@ -344,3 +347,11 @@ def pi_land(turbine, control_dt):
 def pi_land_power(turbine, control_dt):
     """Land-based gains with their schedule, constant power above rated, as published for land."""
     return PI(PISettings.published(turbine, "land", "constant_power"), control_dt, "pi_land_power")
+
+
+def pi_tuned(turbine, control_dt):
+    """OC3 gains times stored factors: least deviations at no more pitch travel than `pi`, on other seeds."""
+    factors = tomllib.loads(TUNED_FACTORS.read_text(encoding="utf-8"))
+    published = PISettings.published(turbine)
+    changes = {name: getattr(published, name) * factor for name, factor in factors.items()}
+    return PI(PISettings.published(turbine, **changes), control_dt, "pi_tuned")

@@ -5,8 +5,7 @@ from fowt_env.controllers.floating_feedback import floating_feedback
 from fowt_env.controllers.gspi import gspi_land, gspi_oc3
 from fowt_env.controllers.lqr.law import lqr
 from fowt_env.controllers.openfast_baseline import openfast_oc3
-from fowt_env.controllers.pi import pi, pi_land, pi_land_power, pi_unscheduled
-from fowt_env.controllers.pi_tuned import pi_tuned
+from fowt_env.controllers.pi import pi, pi_land, pi_land_power, pi_tuned, pi_unscheduled
 from fowt_env.controllers.preview import preview
 from fowt_env.controllers.printed_eq8 import eq8_literal
 from fowt_env.controllers.rosco import rosco, rosco_float

@@ -1,12 +1,12 @@
 """fowt_env: control-design environment for floating offshore wind turbines.
 
-Public names are loaded on first use, so that importing the package costs nothing.
+Its import registers the environments at Gymnasium. Public names are loaded on first use.
 """
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from fowt_env_registration import register_with_gymnasium
+from fowt_env.registration import register_environments
 
 if TYPE_CHECKING:  # the names below, for editors and type checkers
     from fowt_env.analysis.linear_model import linearize as linearize
@@ -57,4 +57,4 @@ def __dir__() -> list[str]:
     return sorted({*globals(), *__all__})
 
 
-register_with_gymnasium()  # for those who did not install the package; costs nothing, see there
+register_environments()

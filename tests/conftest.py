@@ -15,8 +15,8 @@ os.environ.pop("COLUMNS", None)
 # Test files that run the same kinds of scene, which one worker then compiles once; longest first.
 KINDS = {
     "environment": ["tests/envs/test_env.py", "tests/envs/test_golden.py"],
-    "command line": ["tests/test_cli.py", "tests/training/test_evaluate.py"],
-    "openfast": ["tests/test_validation.py"],
+    "command line": ["tests/training/cli/test_app.py", "tests/training/evaluation/test_evaluate.py"],
+    "openfast": ["tests/training/validation/test_validate.py"],
 }
 KIND_OF = {file: kind for kind, files in KINDS.items() for file in files}
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from plant import random_state
+from plant_helpers import random_state
 
 import fowt_env
 from fowt_env import simulation
@@ -391,7 +391,7 @@ def test_another_process_gives_the_same_bits():
 
 STEPS = """
 import numpy as np, fowt_env
-from plant import random_state
+from plant_helpers import random_state
 from fowt_env.plant.rollout import advance
 scene = fowt_env.build_scene("oc3_hywind", wind=18.0, seed=3, duration=60.0, wave_components=20,
     sea={"kind": "jonswap", "Hs": 6.0, "Tp": 10.0, "gamma": 3.3})

@@ -15,6 +15,7 @@ from math import exp
 import numpy as np
 
 from fowt_env.controllers.base import CompiledController, check_control_dt
+from fowt_env.controllers.lqr import design
 from fowt_env.controllers.lqr.design import (
     MOMENT,
     N_FEEDBACK,
@@ -25,7 +26,6 @@ from fowt_env.controllers.lqr.design import (
     WIND,
     Weights,
 )
-from fowt_env.controllers.lqr import design
 from fowt_env.errors import InputError
 from fowt_env.plant.compile.decorators import control_kernel, kernel
 from fowt_env.plant.drivetrain import TorqueCurve, build_torque_curve, generator_torque, limited

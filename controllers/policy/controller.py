@@ -1,8 +1,8 @@
 """Exported policy network as a controller: plain arrays, evaluated with numpy alone.
 
-A policy file (policy_file.py) is read without pickle, so that loading one runs no code of its author.
-`policy:NAME` is a file of controllers/policy/agents, `policy:PATH` any other; a stable-baselines3 zip is refused here,
-since loading one executes code from it.
+A policy file (network_file.py) is read without pickle, so that loading one runs no code of its author.
+`policy:NAME` is a file of the folder agents, `policy:PATH` any other; a stable-baselines3 zip is
+refused here, since loading one executes code from it.
 """
 
 from dataclasses import replace
@@ -31,7 +31,7 @@ from fowt_env.errors import InputError, unknown
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measure, Measurement
 
 PREFIX = "policy:"
-AGENTS = Path(__file__).resolve().parent.parent / "training" / "agents"
+AGENTS = Path(__file__).parent / "agents"
 
 
 def shipped_agents():

@@ -5,7 +5,7 @@ docs/cli.md is written whole. In docs/environment.md the text between a pair of 
     <!-- from the code: NAME -->
     <!-- end -->
 
-is what the function of that name in TABLES returns. tests/test_docs.py fails while either is out of step.
+is what the function of that name in TABLES returns. A test fails while either is out of step.
 """
 
 import re
@@ -32,8 +32,8 @@ from fowt_env.plant.rollout import (
     OVERSPEED,
     STOP_REASONS,
 )
+from fowt_env.registration import ENVIRONMENTS
 from fowt_env.training.cli.app import app
-from fowt_env_registration import ENVIRONMENTS
 
 DOCS = Path(__file__).resolve().parents[1]
 MARK = re.compile(r"(<!-- from the code: (\w+) -->\n).*?(<!-- end -->)", re.S)

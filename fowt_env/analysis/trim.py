@@ -10,6 +10,7 @@ from scipy.optimize import brentq
 from fowt_env.analysis.equilibrium import check_equilibrium, evaluated, label, unbalanced
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.aero.bem_rotor import wake_equilibrium
+from fowt_env.plant.aero.wind import wind_now
 from fowt_env.plant.channels import to_units
 from fowt_env.plant.compile.decorators import entry
 from fowt_env.plant.drivetrain import build_torque_curve, generator_torque
@@ -17,7 +18,7 @@ from fowt_env.plant.dynamics import derivative
 from fowt_env.plant.rollout import output_row
 from fowt_env.plant.state import State, pose_of
 from fowt_env.scene.build import Scene
-from fowt_env.weather.wind import make_series, wind_now
+from fowt_env.weather.wind import make_series
 from fowt_env.weather.wind_field import steady_field
 
 AZIMUTHS = 12  # samples over the 120 degrees after which three blades repeat

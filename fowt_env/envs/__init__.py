@@ -6,8 +6,5 @@ from fowt_env.envs.snapshot import Snapshot
 from fowt_env.envs.tables import task_tables
 from fowt_env.envs.tasks import TASKS, Task
 from fowt_env.envs.vector_env import FowtVectorEnv
-from fowt_env_registration import register_envs
 
 __all__ = ["TASKS", "FowtEnv", "FowtVectorEnv", "SafetyLayer", "Snapshot", "Task", "task_tables"]
-
-register_envs()

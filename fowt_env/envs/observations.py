@@ -11,10 +11,10 @@ from typing import NamedTuple
 import numpy as np
 
 from fowt_env.errors import InputError, unknown
+from fowt_env.plant.aero.wind import wind_at, wind_now
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measure
 from fowt_env.plant.state import State
-from fowt_env.weather.wind import wind_at, wind_now
 
 DEG = pi / 180.0
 SIN_AZIMUTH = N_MEASUREMENTS  # signals that follow the measurements

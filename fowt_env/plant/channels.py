@@ -6,13 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fowt_env.plant.aero.wind import wind_at, wind_now
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.dynamics import N_KEPT, Kept, inertial_load
 from fowt_env.plant.hydro.wave_bands import surface_elevation
 from fowt_env.plant.measurement import Measure
 from fowt_env.plant.state import State, pose_of
 from fowt_env.plant.user_loads import record_own, to_inertial
-from fowt_env.weather.wind import wind_at, wind_now
 
 DEG = 180.0 / pi
 RPM = 30.0 / pi

@@ -14,6 +14,7 @@ from fowt_env.plant.aero.bem_rotor import RotorLoad, rotor_load
 from fowt_env.plant.aero.coefficient_table import rotor_table_load
 from fowt_env.plant.aero.section_table import rotor_lookup_load
 from fowt_env.plant.aero.tower_drag import tower_load
+from fowt_env.plant.aero.wind import wind_now
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.drivetrain import pitch_rate, shaft_torque
 from fowt_env.plant.hydro.hydrostatics import hydrostatic_load
@@ -23,7 +24,6 @@ from fowt_env.plant.hydro.wave_bands import FastScratch, fast_morison_load
 from fowt_env.plant.mooring import mooring_load
 from fowt_env.plant.state import NO_LOAD, State, Wrench, add, pose_in, pose_of
 from fowt_env.plant.user_loads import evaluate_own, with_own
-from fowt_env.weather.wind import wind_now
 
 
 class Body(NamedTuple):

@@ -12,12 +12,12 @@ from typing import NamedTuple
 import numpy as np
 
 from fowt_env.errors import unknown
+from fowt_env.plant.aero.wind import wind_now
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.drivetrain import followed_pitch, limited
 from fowt_env.plant.dynamics import Kept, accelerate, attitude_rate, derivative, evaluate, respond, rotor_part
 from fowt_env.plant.hydro.morison import StripLoad
 from fowt_env.plant.state import NO_LOAD, State, Wrench, pose_in
-from fowt_env.weather.wind import wind_now
 
 INTEGRATORS = ("rk4", "heun", "abm4", "ab4")
 START_STEPS = 3  # steps before four past derivatives exist

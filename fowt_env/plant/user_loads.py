@@ -10,12 +10,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fowt_env.plant.aero.wind import wind_at
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.hydro.morison import current_at
 from fowt_env.plant.hydro.wave_bands import surface_elevation
+from fowt_env.plant.hydro.waves import wave_kinematics
 from fowt_env.plant.state import State, Wrench, add
-from fowt_env.weather.waves import wave_kinematics
-from fowt_env.weather.wind import wind_at
 
 MOST_LOADS = 8
 

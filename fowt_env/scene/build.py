@@ -17,6 +17,7 @@ from fowt_env.plant.aero.coefficient_table import build_rotor_table
 from fowt_env.plant.aero.section_table import build_section_table
 from fowt_env.plant.aero.tower_drag import build_tower_drag
 from fowt_env.plant.aero.wake import build_dynamic_inflow, build_skewed_wake, n_wake_states
+from fowt_env.plant.aero.wind import WindSeries
 from fowt_env.plant.channels import Channel, Layout, channels, to_units, with_hub_wind
 from fowt_env.plant.compile.decorators import Box
 from fowt_env.plant.drivetrain import build_drivetrain, build_pitch_actuator, build_torque_limits
@@ -40,7 +41,7 @@ from fowt_env.plant.state import N_RIGID
 from fowt_env.plant.user_loads import room_of
 from fowt_env.scene.user_loads import Load, blamed, build_own_loads, checked_loads
 from fowt_env.weather.waves import build_waves
-from fowt_env.weather.wind import WindSeries, build_wind, hub_series, make_series, nominal_speed
+from fowt_env.weather.wind import build_wind, hub_series, make_series, nominal_speed
 from fowt_env.weather.wind_field import WindBox, hub_speed, hub_wind, is_field, read_box, rotor_average
 
 # what users may give as wind and sea, see build_scene

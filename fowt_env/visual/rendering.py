@@ -11,8 +11,8 @@ from math import cos, pi, radians, sin
 import numpy as np
 
 from fowt_env.errors import InputError
+from fowt_env.plant.hydro.waves import ramp_factor
 from fowt_env.plant.mooring import catenary, line_shape
-from fowt_env.weather.waves import ramp_factor
 
 SIZE = (960, 640)  # pixels of a view
 FPS = 30

@@ -272,7 +272,7 @@ LARGEST_MARK = 900.0  # points squared, of the controller that travels most
 def plot_pareto(board, path=None, title=None):
     """Rotor-speed against platform-pitch deviation of each controller; the mark's area is its pitch travel.
 
-    board: mapping of training.evaluation.leaderboard.leaderboard. Bars are its intervals, or, with too few seeds for
+    board: mapping of a leaderboard. Bars are its intervals, or, with too few seeds for
     one, lines without ends the range over the seeds; the stepped line joins the controllers that no other
     betters in both deviations. The legend gives travel and greatest overspeed.
     """

@@ -18,67 +18,13 @@ import numpy as np
 
 from fowt_env.descriptions.wind import MOVING, TURBULENCE_CLASS, Flag, Number, Seed
 from fowt_env.errors import InputError, unknown
+from fowt_env.plant.aero.wind_field import WindField, field_at
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.weather.iec import length_scale, ntm_sigma
 from fowt_env.weather.turbsim import read_bts
 
 MARGIN = 75.0  # m of platform drift against the wind that a box must still cover at the end of a run
 DISK_RADII, DISK_AZIMUTHS = 12, 36  # points of the rotor average
-
-
-class WindField(NamedTuple):
-    """A box of wind: slices normal to the mean wind, evenly spaced in time, height and across."""
-
-    velocity: np.ndarray  # (n_time, n_z, n_y, 3) float32 u, v, w, m/s
-    rate: float  # slices per second
-    shift: float  # s, added to the time
-    slowness: float  # s/m, 1 over the speed at which the box travels
-    low_y: float  # m, lowest grid line
-    low_z: float
-    inverse_dy: float  # 1/m
-    inverse_dz: float
-    periodic: bool  # False: the first and last slices hold
-
-
-@kernel
-def field_at(t, X, Y, Z, field):
-    """(u, v, w) m/s, inertial components, at the inertial point X, Y, Z (m) and time t (s)."""
-    velocity = field.velocity
-    slices, n_z, n_y = velocity.shape[0], velocity.shape[1], velocity.shape[2]
-    s = (t + field.shift - X * field.slowness) * field.rate
-    if field.periodic:
-        s = s % slices
-    if not s > 0.0:  # also where s is not a number
-        s = 0.0
-    if field.periodic:
-        i = min(int(s), slices - 1)
-        after = (i + 1) % slices
-    else:
-        s = min(s, slices - 1.0)
-        i = max(0, min(int(s), slices - 2))
-        after = min(i + 1, slices - 1)
-    late = s - i
-    y = min(max((Y - field.low_y) * field.inverse_dy, 0.0), n_y - 1.0)
-    z = min(max((Z - field.low_z) * field.inverse_dz, 0.0), n_z - 1.0)
-    if not (y >= 0.0 and z >= 0.0):
-        y = z = 0.0
-    j, k = min(int(y), n_y - 2), min(int(z), n_z - 2)
-    left, up = y - j, z - k
-    ground = 1.0
-    if Z < field.low_z:
-        ground = max(Z, 0.0) / field.low_z
-    a = (1.0 - up) * (1.0 - left) * ground
-    b = (1.0 - up) * left * ground
-    c = up * (1.0 - left) * ground
-    d = up * left * ground
-    u = v = w = 0.0
-    for number in range(2):
-        cut, share = (velocity[i], 1.0 - late) if number == 0 else (velocity[after], late)
-        p, q, r, s = share * a, share * b, share * c, share * d
-        u += p * cut[k, j, 0] + q * cut[k, j + 1, 0] + r * cut[k + 1, j, 0] + s * cut[k + 1, j + 1, 0]
-        v += p * cut[k, j, 1] + q * cut[k, j + 1, 1] + r * cut[k + 1, j, 1] + s * cut[k + 1, j + 1, 1]
-        w += p * cut[k, j, 2] + q * cut[k, j + 1, 2] + r * cut[k + 1, j, 2] + s * cut[k + 1, j + 1, 2]
-    return u, v, w
 
 
 # --------------------------------------------------------------------------- what a user may ask for

@@ -20,7 +20,7 @@ from fowt_env.envs.observations import KNOWN
 from fowt_env.envs.rewards import TERMS
 from fowt_env.errors import InputError
 from fowt_env.plant.state import State
-from fowt_env_registration import ENVIRONMENTS
+from fowt_env.registration import ENVIRONMENTS
 
 QUICK = {"rotor": "table", "wave_components": 20}
 NTM = {"kind": "ntm", "speed": 18.0, "class": "B"}

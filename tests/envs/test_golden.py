@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from golden import ENVIRONMENTS, TASKS, path_of, trajectory
 
-import fowt_env_registration
+from fowt_env import registration
 
 pytestmark = pytest.mark.installation
 
@@ -16,7 +16,7 @@ RELATIVE, ABSOLUTE = 1e-6, 1e-7
 MESSAGE = """{name}, task {task}: {column} moved by {excess:.2g} times the tolerance, at step {step}:
 stored {stored!r}, now {now!r}. Published results name this environment, so what it does must not change.
 If physics or reward changed on purpose, register the environment under the next version (-vN) in
-fowt_env_registration.py and run `python tests/golden.py`; CONTRIBUTING.md says how."""
+fowt_env/registration.py and run `python tests/golden.py`; CONTRIBUTING.md says how."""
 
 
 def compare(name, task, stored, now):
@@ -47,7 +47,7 @@ def test_a_thousandth_more_drag_does_not_pass(platform):
 
 
 def test_every_registered_environment_has_a_stored_trajectory():
-    assert set(ENVIRONMENTS) == set(fowt_env_registration.ENVIRONMENTS)
+    assert set(ENVIRONMENTS) == set(registration.ENVIRONMENTS)
 
 
 @pytest.mark.parametrize("column", ["reward", "observation_4"])

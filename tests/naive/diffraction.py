@@ -1,4 +1,4 @@
-"""Slow, obvious twins of fowt_env/plant/hydro/diffraction.py: the wave around a cylinder, and the force on strips.
+"""Slow, obvious twins of plant/hydro/diffraction.py: the wave around a cylinder, and the force on strips.
 
 A complex number stands for the real part of itself times exp(-i omega t).
 """

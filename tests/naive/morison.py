@@ -1,4 +1,4 @@
-"""Slow, obvious twin of fowt_env/plant/hydro/morison.py: the strip integrals of theory.md 5.4, point by point.
+"""Slow, obvious twin of plant/hydro/morison.py: the strip integrals of theory.md 5.4, point by point.
 
 sea: components as in naive/waves.py, or None. current: function of inertial height to (u, v), or None.
 """

@@ -5,14 +5,8 @@ import pytest
 from naive import waves as naive
 
 from fowt_env.descriptions.platform import SeaState
-from fowt_env.weather.waves import (
-    build_waves,
-    elevation,
-    jonswap,
-    ramp_factor,
-    wave_kinematics,
-    wave_number,
-)
+from fowt_env.plant.hydro.waves import elevation, ramp_factor, wave_kinematics
+from fowt_env.weather.waves import build_waves, jonswap, wave_number
 
 pytestmark = pytest.mark.installation
 

@@ -9,7 +9,8 @@ from scipy.interpolate import RegularGridInterpolator
 
 import fowt_env
 from fowt_env.errors import InputError
-from fowt_env.weather.wind_field import WindBox, field_at, hub_speed, read_box, rotor_average, steady_field
+from fowt_env.plant.aero.wind_field import field_at
+from fowt_env.weather.wind_field import WindBox, hub_speed, read_box, rotor_average, steady_field
 
 HUB, DIAMETER = 90.0, 126.0
 Y = np.linspace(-75.0, 75.0, 11)

@@ -19,10 +19,12 @@ import numba
 import numpy as np
 import pandas as pd
 
+import fowt_env
 from fowt_env.controllers import make
 from fowt_env.errors import InputError, unknown
 from fowt_env.files.tables import replacing
 from fowt_env.plant.aero.tower_drag import tower_load
+from fowt_env.plant.aero.wind import wind_now
 from fowt_env.plant.channels import measure, record
 from fowt_env.plant.compile.decorators import entry, kernel
 from fowt_env.plant.dynamics import Kept, loads_of, respond, rotor_part, strip_part
@@ -33,7 +35,6 @@ from fowt_env.plant.rollout import advance, forget, observe, output, run
 from fowt_env.plant.state import State, pose_of
 from fowt_env.scene.build import build_scene
 from fowt_env.simulation import _Hold, initial_state, simulate
-from fowt_env.weather.wind import wind_now
 
 CALIBRATION_STEPS = 10_000_000
 REPEATS = 5
@@ -318,7 +319,7 @@ print(imported - start, time.perf_counter() - start, time.process_time() - cpu)
 
 def start_times(fidelity="standard"):
     """{what: seconds}: a first run with an empty cache of kernels and a later one, each in a new process."""
-    root = Path(__file__).resolve().parent.parent
+    root = Path(fowt_env.__file__).resolve().parents[1]
     times = {}
     with tempfile.TemporaryDirectory() as folder:
         for name in ("first", "later"):
@@ -338,7 +339,7 @@ def start_times(fidelity="standard"):
 
 def header():
     """Lines (list of str) that say where and with what figures were taken."""
-    root = Path(__file__).resolve().parent.parent
+    root = Path(fowt_env.__file__).resolve().parents[1]
     git = ["git", "-C", str(root)]
     try:
         commit = subprocess.run([*git, "rev-parse", "HEAD"], capture_output=True, text=True, check=False)

@@ -1,6 +1,6 @@
 """How well any linear controller can do: fronts of rotor-speed against platform-pitch deviation.
 
-    python -m fowt_env.training.design.linear_bound          (or fowt design bound --wind 12,14,16,18,20,22,24)
+    python -m fowt_env.training.design.linear_bound      (or fowt design bound --wind 12,14,16,18,20,22,24)
 
 Per wind speed, on the plant of controllers/lqr/design.py (surge, platform pitch, rotor, pitch actuator; the
 rotor-averaged Kaimal wind and the site's sea as shaped white noise): standard deviations from Lyapunov
@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from math import isfinite, pi, sqrt
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -33,6 +34,7 @@ from fowt_env.controllers.lqr.design import (
 from fowt_env.controllers.pi import PISettings, schedule_gain
 from fowt_env.errors import InputError
 
+BOUND = Path(__file__).parent / "data" / "linear_bound.csv"  # what fowt design bound wrote
 WINDS = (12.0, 14.0, 16.0, 18.0, 20.0, 22.0, 24.0)  # m/s
 INFORMATION = {  # what the feedback knows: what it is called in plots
     "full": "state, wind and waves: the bound",
@@ -267,7 +269,7 @@ def fraction_of_bound(table, wind, speed_ratio, pitch_ratio, information="full")
 
 
 def ratio_table(runs, bound=None):
-    """DataFrame of a sweep's means over seeds (fowt_env.training.design.sweeps.sweep) over those of its gspi_oc3.
+    """DataFrame of a sweep's means over seeds (sweeps.sweep) over those of its gspi_oc3.
 
     Columns: wind, variant, ratios of speed, platform pitch, power and travel; with a bound_table also the
     fractions of the bound and of the front for measured channels. Cases are named kind_WIND.

@@ -130,7 +130,7 @@ def tuned_text(tables):
     Raises: InputError where no setting of a table can be chosen.
     """
     lines = [
-        "# Settings chosen on training cases by `python -m fowt_env.training.design.tune_feedback`; that file says how.",
+        "# Settings chosen on training cases by `python -m fowt_env.training.design.tune_feedback`.",
         "# Figures are means over the cases of the ratio to gspi_oc3; unfed_travel of that to the law unfed.",
     ]
     for name, table in tables.items():

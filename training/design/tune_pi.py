@@ -1,6 +1,6 @@
 """The PI baseline at its best: gains searched on training seeds, so that nobody beats a straw man.
 
-    python -m fowt_env.training.design.tune_pi --seeds 1001,1002,1003 --out controllers/data/pi_tuned.toml
+    python -m fowt_env.training.design.tune_pi --seeds 1001,1002,1003 --out controllers/pi_tuned.toml
 
 The cases are those of a suite, the seeds others than it is scored on (1000 and above). Searched are
 factors on the published OC3 gains: proportional, integral, and the blade pitch at which the schedule halves
@@ -103,7 +103,7 @@ def main(
     jobs: Annotated[int, typer.Option(help="Worker processes.")] = 1,
     engine: Annotated[str, typer.Option(help="Where the runs go: processes or ray.")] = "processes",
     address: Annotated[str | None, typer.Option(help="Of a Ray cluster that is running.")] = None,
-    out: Annotated[str, typer.Option(help="File to write.")] = "controllers/data/pi_tuned.toml",
+    out: Annotated[str, typer.Option(help="File to write.")] = "controllers/pi_tuned.toml",
 ):
     """Search the gains of pi_tuned and write them."""
     numbers = [int(number) for number in parse_numbers(seeds, "seeds")]

@@ -1,6 +1,6 @@
 """Load cases and suites of them, read from files: what controllers are compared on.
 
-A suite is a TOML file of training/evaluation/suites, or the user's own. One `[[case]]` may stand for several: with
+A suite is a TOML file of the folder suites, or the user's own. One `[[case]]` may stand for several: with
 `speed = [12, 14]` and `name = "ntm_{speed}"` it is one case per mean wind speed, which then also stands
 in its wind and picks the row of its sea's table.
 """

@@ -75,7 +75,7 @@ def evaluate(
     progress      called as progress(done, total, row) after each run (row None: before the first)
     out           CSV file: a row is appended as soon as its run ends; sorted at the end
     runs_folder   folder for the time series, <controller>/<case>_seed<n>.parquet
-    folder        results folder (training.evaluation.results) instead of out and runs_folder: what is done in it is not
+    folder        results folder (results.py) instead of out and runs_folder: what is done in it is not
                   done again, and the table is that of the whole folder
     engine        "processes" or "ray" (address: of a running cluster)
     time_limit    seconds of wall clock after which a run fails; None: none. With jobs = 1 it is heard in the

@@ -1,6 +1,6 @@
 """Controllers compared on equal seeds: means with intervals, paired differences, and a suite's score.
 
-Seeds are resampled, with all their cases (training.evaluation.bootstrap), and each case counts alike in a mean over
+Seeds are resampled, with all their cases (bootstrap.py), and each case counts alike in a mean over
 cases.
 """
 

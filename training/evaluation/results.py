@@ -2,8 +2,8 @@
 
     manifest.json                              what was asked for: versions, suite, cases, controllers
     runs/<controller>/<case>_seed<n>.parquet   time series of one run, its row of the table in the metadata
-    results.csv                                one row per run, columns training.evaluation.evaluate.COLUMNS
-    leaderboard.json                           means, intervals and paired differences (training.evaluation.leaderboard)
+    results.csv                                one row per run, columns evaluate.COLUMNS
+    leaderboard.json                           means, intervals and paired differences (leaderboard.py)
 
 A run is done when its Parquet file is there, and that file appears whole or not at all. results.csv and
 leaderboard.json are made from those files, so an interrupted evaluation loses and repeats nothing.
@@ -44,7 +44,7 @@ TABLE_EVERY = 2.0  # s between rewritings of results.csv while runs go on
 PACKAGES = ("numpy", "numba", "scipy", "pandas", "rainflow", "rosco", "hipersim")
 NO_FIGURES = ("fowt_env", "python", "pandas")  # of the versions: compared otherwise, or shaping no figure
 ROOT = Path(fowt_env.__file__).resolve().parent.parent  # folder of the packages
-RUN = Path(__file__).resolve().parent / "scoring.py"  # what it imports shapes a run
+RUN = Path(__file__).resolve().parent / "run_case.py"  # what it imports shapes a run
 # of the controllers, what a run without any of them needs
 ALWAYS_CONTROLLERS = ("controllers/base.py", "controllers/constant.py")
 INSTALLED = {"site-packages", "dist-packages"}

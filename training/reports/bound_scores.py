@@ -2,7 +2,7 @@
 
     fowt scores bound results/rl --group agents=policy:ppo_lqr,policy:ppo_lqr_seed1 --plot front.png
 
-The bound (training/design/linear_bound.py) holds for linear feedback at the blade-pitch travel and power deviation
+The bound (design/linear_bound.py) holds for linear feedback at the blade-pitch travel and power deviation
 of gspi_oc3: a controller that spends more of either is not bound by it, and is marked.
 """
 
@@ -12,10 +12,9 @@ import numpy as np
 import pandas as pd
 
 from fowt_env.errors import InputError
-from fowt_env.training.design.linear_bound import RATIOS, fraction_of_bound, ratio_table
+from fowt_env.training.design.linear_bound import BOUND, RATIOS, fraction_of_bound, ratio_table
 from fowt_env.training.reports.scores import KEY, grouped, markdown_table
 
-BOUND = Path(__file__).parent / "data" / "linear_bound.csv"
 BASELINE = "gspi_oc3"  # whose travel and power the bound keeps
 WIND = "wind_[m/s]"
 MORE = 1.02  # ratios of travel and power deviation above this are more than those of gspi_oc3
@@ -33,7 +32,7 @@ def bound_fractions(table, bound, groups=None, agents=None):
     """DataFrame: per agent or group, each of its training seeds and wind the share of the bound it reaches.
 
     table: of an evaluation with gspi_oc3, cases named kind_WIND; groups, agents as
-    training.reports.scores.grouped takes them. Columns: agent, seed_of (label of the training seed; "" for the
+    scores.grouped takes them. Columns: agent, seed_of (label of the training seed; "" for the
     agent as a whole, whose ratios are the means over its seeds), wind, ratios of linear_bound.RATIOS (mean
     over the weather seeds on which both went well), of_bound_[-], of_measured_[-] (NaN: no better than
     gspi_oc3, or not above the bound's winds), within (no more travel and power deviation than gspi_oc3's).

@@ -158,7 +158,7 @@ def _right_angles():
 
 
 def plot_bound(table, names, points=None, path=None, title=None):
-    """Fronts of fowt_env.training.design.linear_bound.bound_table over gspi_oc3's, a panel per wind, and simulated points.
+    """Fronts of linear_bound.bound_table over gspi_oc3's, a panel per wind, and simulated points.
 
     names: {information: legend text}, in order. points: training.design.linear_bound.ratio_table of simulated
     controllers, coloured by their blade-pitch travel over that of gspi_oc3. Winds without points are left

@@ -113,7 +113,7 @@ def write_report(
     point = _schedule(platform, _platform_of(manifest), say) if schedule else None
     data = _page_data(table, board_file, runs, point)
     texts = _page_texts(folder, table, manifest, board_file, data, runs, point)
-    page = Path(__file__).parent / "report_page"
+    page = Path(__file__).parent / "page"
     scripts = {"plotly": plotly_script, "script": (page / "page.js").read_text(encoding="utf-8")}
     style = (page / "page.css").read_text(encoding="utf-8")
     template = Template((page / "page.html").read_text(encoding="utf-8"))

@@ -31,7 +31,7 @@ def look(number):
 def plot_shares(fractions, bound, path=None, title=None):
     """Rotor-speed against platform-pitch deviation over gspi_oc3's, a panel per wind, with the fronts.
 
-    fractions: training.reports.bound_scores.bound_fractions; bound: training.design.linear_bound.bound_table. Large marks:
+    fractions: bound_scores.bound_fractions; bound: linear_bound.bound_table. Large marks:
     agents; small ones of the same kind: their training seeds. Hollow: more travel or power deviation than
     gspi_oc3, so that the bound does not hold. Agents beyond FRAME stand in the corner with their figures.
     """

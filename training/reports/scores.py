@@ -169,7 +169,7 @@ def _values(runs, labels, cases, seeds, metric):
 def agent_scores(table, rivals, groups=None, agents=None, figures=FIGURES):
     """DataFrame: per agent or group, rival and figure the ratio, its interval, and what that reaches.
 
-    table: what training.evaluation.evaluate.evaluate returns; groups, agents: as grouped takes them. Columns: agent,
+    table: what evaluate.evaluate returns; groups, agents: as grouped takes them. Columns: agent,
     rival, figure, metric, ratio (interquartile mean over all runs), low, high (NaN for too few seeds:
     training.evaluation.bootstrap.crossed_estimate), pairs (runs with a ratio), runs, training_seeds, verdict
     (Figure.verdict). Where the rival's figure is 0 there is no ratio.

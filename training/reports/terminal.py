@@ -42,7 +42,7 @@ DROPPED_FIRST = (
 
 
 def summary_rows(means, width):
-    """(headings, rows of texts, failures per row) of what fowt_env.training.evaluation.evaluate.summary gives.
+    """(headings, rows of texts, failures per row) of what evaluate.summary gives.
 
     Columns are dropped until headings and values, two spaces between them, take at most `width` characters.
     """

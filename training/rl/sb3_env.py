@@ -13,7 +13,7 @@ from fowt_env.envs.vector_env import of_one
 try:
     from stable_baselines3.common.vec_env import VecEnv
 except ImportError as error:
-    raise ImportError("fowt_env.training.rl.sb3_env needs stable-baselines3: pip install 'fowt-env[train]'") from error
+    raise ImportError("training with stable-baselines3 needs it: pip install 'fowt-env[train]'") from error
 
 
 class FowtSB3VecEnv(VecEnv):

@@ -47,7 +47,7 @@ from fowt_env.training.rl.settings import (
     read_settings,
 )
 
-AGENTS = Path(__file__).parent / "agents"
+SETTINGS_FOLDER = Path(__file__).parent  # of the YAML file of each algorithm
 ALGORITHMS = ("ppo", "sac", "tqc")
 OBSERVATIONS = {  # information sets that agents are compared with
     # what a turbine of today measures: drive train, blade pitch, motion of nacelle and hull
@@ -91,7 +91,7 @@ def resolve(algo, task, seed, steps, changes=None):
 
     if algo not in ALGORITHMS:
         raise unknown("algorithm", algo, ALGORITHMS)
-    with (AGENTS / f"{algo}.yml").open(encoding="utf-8") as file:
+    with (SETTINGS_FOLDER / f"{algo}.yml").open(encoding="utf-8") as file:
         table = yaml.safe_load(file)
     tasks = [name for name in table if not name.startswith("_")]
     if task not in tasks:
@@ -259,8 +259,8 @@ def judged(figures, reference):
 class Training:
     """One run in one folder. resume: go on from its newest checkpoint, or start anew where it has none yet.
 
-    Loading a checkpoint executes code from it: one that no run of this user wrote (training.rl.checkpoint_signature) is refused
-    unless trusted.
+    Loading a checkpoint executes code from it: one that no run of this user wrote (checkpoint_signature.py)
+    is refused unless trusted.
     Raises: InputError where the folder holds another run, none to resume, or a stranger's; on run(), where
     another training is in the folder.
     """

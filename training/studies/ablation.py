@@ -1,6 +1,6 @@
 """What information, action mode and algorithm are worth: equal runs that differ in one thing each.
 
-    python -m fowt_env.training.studies.ablation --out runs/ablation                      # all of training/studies/ablation.yml
+    python -m fowt_env.training.studies.ablation --out runs/ablation         # all of ablation.yml
     python -m fowt_env.training.studies.ablation --out runs/ablation --only direct,estimate
     python -m fowt_env.training.studies.ablation --out runs/ablation --report docs/figures/rl_ablation.png
 
@@ -19,10 +19,10 @@ import yaml
 from scipy.stats import t
 
 from fowt_env.errors import InputError, unknown
-from fowt_env.training.rl.train import AGENTS, Training, resolve
+from fowt_env.training.rl.train import Training, resolve
 from fowt_env.visual.time_series import COLOURS, new_figure, save_figure, style_axes
 
-TABLE = AGENTS / "ablation.yml"
+TABLE = Path(__file__).with_suffix(".yml")
 KEYS = ("steps", "seeds", "common", "variants")
 OWN_KEYS = ("label", "algo", "steps", "seeds", "set")
 FIGURES = {

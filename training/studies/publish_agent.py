@@ -1,6 +1,7 @@
-"""Ship the best policy of a training run: its .npz in controllers/policy/agents, and a card that says where it is from.
+"""Ship the best policy of a training run: its .npz and a card that says where it is from, in
+controllers/policy/agents.
 
-    python -m fowt_env.training.studies.publish_agent runs/above_rated_ppo_1 ppo_lqr --machine "two shared cores of a Xeon"
+    python -m fowt_env.training.studies.publish_agent runs/above_rated_ppo_1 ppo_lqr --machine "two cores"
 
 The card has the command that makes the run again, its seed, wall time and machine, what the agent is told,
 its figures on the validation episodes, and the versions that the run was made with.
@@ -15,10 +16,10 @@ import pandas as pd
 import yaml
 
 from fowt_env.controllers import information
-from fowt_env.controllers.policy.controller import read_policy
+from fowt_env.controllers.policy.controller import AGENTS, read_policy
 from fowt_env.errors import InputError
 from fowt_env.files.tables import replacing
-from fowt_env.training.rl.train import AGENTS, resolve
+from fowt_env.training.rl.train import resolve
 
 LARGEST_FILE = 200_000  # bytes of a policy that is kept in the repository
 

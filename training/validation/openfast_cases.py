@@ -10,7 +10,7 @@ import pandas as pd
 from fowt_env.errors import InputError
 
 PLATFORM = "oc3_hywind_openfast"
-FOLDER = Path(__file__).resolve().parent.parent / "tests" / "reference" / "openfast"
+FOLDER = Path(__file__).parent / "reference"
 COLUMNS = {  # column of a reference file: (OpenFAST channel as simulate names it, factor)
     "time_s": ("Time_[s]", 1.0),
     "wave_elev_m": ("Wave1Elev_[m]", 1.0),

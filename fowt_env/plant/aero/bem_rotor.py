@@ -10,10 +10,10 @@ from typing import NamedTuple
 
 from fowt_env.plant.aero.blade_elements import airload, element_of, fade, first_guess, solve_section
 from fowt_env.plant.aero.wake import PER_ELEMENT, filtered_induction, skew_factor, skew_of
+from fowt_env.plant.aero.wind import wind_at
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.events import Counter
 from fowt_env.plant.state import NO_LOAD, State, Wrench
-from fowt_env.weather.wind import wind_at
 
 SLOW_ROTOR, FAST_ROTOR = 1.0, 2.0  # tip-speed ratios between which the induction fades in
 

@@ -35,11 +35,11 @@ from fowt_env.plant.aero.blade_elements import (
     elements_key,
     fade,
 )
+from fowt_env.plant.aero.wind import LOWEST_HEIGHT, wind_at
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.compile.prefetch import prefetch
 from fowt_env.plant.events import Counter
 from fowt_env.plant.state import State, Wrench
-from fowt_env.weather.wind import LOWEST_HEIGHT, wind_at
 
 # Directions: v_normal/(v_normal + |v_tangential|) in AHEAD cells, from the rotor plane to the shaft (where
 # this has a kink), then on in BEHIND cells to an inflow in the plane from behind (roots in cross wind).
@@ -361,7 +361,7 @@ def rotor_lookup_load(t, pose, x, now, series, field, table, counters):
     now, series, field  wind (weather/wind.py); every station has the wind of where it is at this instant
     counters            as in rotor_load, for the exact solutions outside the table
     Against rotor_load: rms 1e-4 of the load's standard deviation over all operating states, for thrust and
-    torque; tests/loads/test_rotor_lookup.py has the figures.
+    torque; tests/plant/aero/test_section_table.py has the figures.
     """
     if table is None:
         return NO_ROTOR_LOAD

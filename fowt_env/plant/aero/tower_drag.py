@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fowt_env.plant.aero.wind import wind_at
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.state import NO_LOAD, Wrench
-from fowt_env.weather.wind import wind_at
 
 POINTS = 6  # Gauss points: force and moment to 4e-6 against 60 points, sheared wind on a pitching tower
 

@@ -2,8 +2,8 @@
 
 Numba's own cache watches only the file of the function itself: after an edit of a callee in
 another file a cached caller would go on returning the old result. So the cache lives in a folder
-named by a hash of every source file of the packages that hold kernels, and holds functions of this
-project alone: a user's are compiled anew in each process.
+named by a hash of every source of the plant. A kernel of another room (an environment's, a controller's)
+carries the hash of what its module imports besides. A user's function is compiled anew in each process.
 """
 
 import hashlib
@@ -14,7 +14,6 @@ import sys
 import time
 import warnings
 from contextlib import suppress
-from fnmatch import fnmatch
 from functools import cache
 from pathlib import Path
 
@@ -29,51 +28,20 @@ from numba.core.ccallback import CFunc  # noqa: E402
 
 from fowt_env.folders import cache_root, distrust, make_private  # noqa: E402
 from fowt_env.plant.compile.disk_cache import KernelCache  # noqa: E402
+from fowt_env.plant.compile.sources import imported_at_top  # noqa: E402
 
 KEEP_CACHES = 4  # folders of older sources kept, so that switching branches does not recompile
-KERNEL_PACKAGES = ("fowt_env", "controllers")
-PACKAGES = (*KERNEL_PACKAGES, "training")  # which compiles a few functions of its own
 MARKER = "made_by_fowt_env"  # a file in each folder that this module makes, and may therefore remove
 OWN_NAME = re.compile("[0-9a-f]{16}")
-# Sources that no module with a kernel imports at its top, so that an edit of them compiles nothing anew. A
-# kernel freezes what its module's globals hold; tests/test_cache.py follows the imports and checks this list.
-NOT_COMPILED = (
-    "animation.py",
-    "cli*.py",
-    "health.py",
-    "openfast_files.py",
-    "outputs.py",
-    "plots*.py",
-    "policy*.py",
-    "rendering.py",
-    "rosco.py",
-    "saved_design.py",
-    "warmup.py",
-)
-
-
-ROOT = Path(__file__).resolve().parents[3]
-
-
-def _sources(packages):
-    """Sorted paths of all sources of packages."""
-    return sorted(path for package in packages for path in (ROOT / package).rglob("*.py"))
-
-
-def kernel_sources():
-    """Sorted paths of the kernel packages' sources that machine code may depend on."""
-    return [
-        path
-        for path in _sources(KERNEL_PACKAGES)
-        if not any(fnmatch(path.name, pattern) for pattern in NOT_COMPILED)
-    ]
+PLANT = Path(__file__).absolute().parents[1]
+PACKAGE = PLANT.parent
 
 
 def _hash(paths):
     """Hash (16 hexadecimal digits) of sources and of the versions that shape machine code."""
     digest = hashlib.sha256(f"{numba.__version__} {sys.version}".encode())
     for path in paths:
-        digest.update(path.relative_to(ROOT).as_posix().encode())
+        digest.update(path.relative_to(PACKAGE).as_posix().encode())
         digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
 
@@ -136,17 +104,13 @@ def _cache_folder(sources):
     return folder
 
 
-_KERNEL_SOURCES = kernel_sources()
-_IN_FOLDER_NAME = frozenset(map(str, _KERNEL_SOURCES))
-CACHE_FOLDER = _cache_folder(_KERNEL_SOURCES)
-_real_path = cache(os.path.realpath)
+CACHE_FOLDER = _cache_folder(sorted(PLANT.rglob("*.py")))
 
 
 @cache
-def _other_sources():
-    """{path of each source of this project that does not shape the folder's name: hash of all of these}."""
-    others = [path for path in _sources(PACKAGES) if str(path) not in _IN_FOLDER_NAME]
-    return dict.fromkeys(map(str, others), _hash(others))
+def _outside_hash(path):
+    """Hash of a source of this package outside the plant, with all that it imports outside the plant."""
+    return _hash(path for path in imported_at_top(Path(path), PACKAGE.parent) if PLANT not in path.parents)
 
 
 def _keep(compiled, function):
@@ -154,13 +118,11 @@ def _keep(compiled, function):
 
     A user's function is not: it may use helpers and numbers of any file.
     """
-    if CACHE_FOLDER is None:
+    path = os.path.abspath(function.__code__.co_filename)
+    if CACHE_FOLDER is None or not path.startswith(f"{PACKAGE}{os.sep}"):
         return
-    path = _real_path(function.__code__.co_filename)
-    if path in _IN_FOLDER_NAME:
-        compiled._cache = KernelCache(function, CACHE_FOLDER)
-    elif path.startswith(f"{ROOT}{os.sep}") and path in _other_sources():
-        compiled._cache = KernelCache(function, CACHE_FOLDER, _other_sources()[path])
+    stamp = "" if path.startswith(f"{PLANT}{os.sep}") else _outside_hash(path)
+    compiled._cache = KernelCache(function, CACHE_FOLDER, stamp)
 
 
 def _decorator(**options):

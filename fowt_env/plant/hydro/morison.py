@@ -12,8 +12,8 @@ import numpy as np
 
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.hydro.diffraction import factor_at
+from fowt_env.plant.hydro.waves import NEGLIGIBLE, elevation, ramp_factor
 from fowt_env.plant.state import Wrench
-from fowt_env.weather.waves import NEGLIGIBLE, elevation, ramp_factor
 
 CELLS_PER_DRAFT = (
     60  # at least, below the surface section (2 m of OC3): 1e-5 of the first harmonic at T = 5 s

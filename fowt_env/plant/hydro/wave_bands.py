@@ -29,8 +29,8 @@ from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.compile.vector_sums import SUM_LANES, crossed_sums, lane_dot
 from fowt_env.plant.hydro.diffraction import TERMS, coefficient_series
 from fowt_env.plant.hydro.morison import StripLoad, current_at
+from fowt_env.plant.hydro.waves import elevation, ramp_factor
 from fowt_env.plant.state import NO_LOAD, Wrench, add
-from fowt_env.weather.waves import elevation, ramp_factor
 
 BAND = 6  # wave numbers K that share one component; 4: 1e-3, 6: 1e-4, 8: 4e-5 of one component
 RATIO = sqrt(2.0)  # of neighbouring K; the squaring chains need a square root of 2

@@ -302,7 +302,7 @@ def write_polars(folder, factor):
     """Write the full-scale polars times a factor."""
     for name, polar in read_turbine("nrel5mw").blade.polars.items():
         lines_of_text = [
-            f"# {name} of nrel5mw, all coefficients times {factor:.8g} (training/studies/froude_model/identify.py).",
+            f"# {name} of nrel5mw, all coefficients times {factor:.8g} (froude_model/identify.py).",
             "alpha_deg,cl,cd,cm",
         ]
         for alpha, *coefficients in polar:

@@ -7,7 +7,8 @@ The result is similar to its original, not a design: masses of real turbines gro
 speed does not grow with size, and nobody has built it. It shows that the description carries another size,
 and serves where a control law is to be tried on one.
 
-`python -m fowt_env.training.studies.froude_model.scale --help` has the settings; without any it writes the built-in oc3_froude_10mw.
+`python -m fowt_env.training.studies.froude_model.scale --help` has the settings; without any it writes the
+built-in oc3_froude_10mw.
 """
 
 from pathlib import Path
@@ -137,7 +138,7 @@ def stations_text(turbine, scale):
     """Text of the blade file of a description.Turbine, lengths times the scale."""
     blade = turbine.blade
     rows = [
-        f"# Blade of {turbine.name}, lengths times {scale:.6g}, twist as it is (training/studies/froude_model/scale.py).",
+        f"# Blade of {turbine.name}, lengths times {scale:.6g}, twist as it is (froude_model/scale.py).",
         "radius_m,chord_m,twist_deg,airfoil",
     ]
     for radius, chord, twist, airfoil in zip(
@@ -151,7 +152,7 @@ def _polar_files(turbine):
     """{file name: text} of its polars."""
     files = {}
     for name, polar in turbine.blade.polars.items():
-        rows = [f"# {name} of {turbine.name}, unchanged (training/studies/froude_model/scale.py).", "alpha_deg,cl,cd,cm"]
+        rows = [f"# {name} of {turbine.name}, unchanged (froude_model/scale.py).", "alpha_deg,cl,cd,cm"]
         for alpha, *values in polar:
             rows.append(",".join(f"{value:.10g}" for value in (np.degrees(alpha), *values)))
         files[f"{name}.csv"] = "\n".join(rows) + "\n"

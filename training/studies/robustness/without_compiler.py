@@ -1,7 +1,7 @@
 """The same small runs with and without the compiler: numbers must agree to rounding.
 
-As a program (`python -m fowt_env.training.studies.robustness.without_compiler IN OUT`) it runs what IN, a pickle of jobs, asks for; with
-NUMBA_DISABLE_JIT=1 in its environment every kernel is then plain Python.
+As a program (`python -m fowt_env.training.studies.robustness.without_compiler IN OUT`) it runs what IN, a
+pickle of jobs, asks for; with NUMBA_DISABLE_JIT=1 in its environment every kernel is then plain Python.
 """
 
 import os
@@ -14,6 +14,7 @@ from pathlib import Path
 import numba
 import numpy as np
 
+import fowt_env
 from fowt_env.envs import FowtEnv, FowtVectorEnv
 from fowt_env.errors import InputError
 from fowt_env.plant.integrators import INTEGRATORS, build_integrator
@@ -111,10 +112,10 @@ def differences(given=None):
     with tempfile.TemporaryDirectory() as folder:
         ask, answer = Path(folder) / "ask.pickle", Path(folder) / "answer.npz"
         ask.write_bytes(pickle.dumps(given))
-        root = Path(__file__).resolve().parent.parent
+        root = Path(fowt_env.__file__).resolve().parents[1]
         path = os.pathsep.join(filter(None, (str(root), os.environ.get("PYTHONPATH"))))
         done = subprocess.run(
-            [sys.executable, "-m", "fowt_env.training.studies.robustness.without_compiler", str(ask), str(answer)],
+            [sys.executable, "-m", __name__, str(ask), str(answer)],
             env={**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": path}, cwd=root,
             capture_output=True, text=True, check=False,
         )  # fmt: skip

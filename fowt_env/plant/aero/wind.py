@@ -1,0 +1,108 @@
+"""Wind at any instant and point: a time series at the reference height, sheared over the height, or a box."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from fowt_env.plant.aero.wind_field import field_at
+from fowt_env.plant.compile.decorators import kernel
+
+LOWEST_HEIGHT = 1.0  # m; points below it (waves, rotor at sea level) see the wind of this height
+
+
+class WindSeries(NamedTuple):
+    """Wind varying in time, with its shear over the height."""
+
+    time: np.ndarray  # (n,) s, increasing, n >= 1; with a period it runs from 0 to the period
+    value: np.ndarray  # (n, 5) u, v, w at the reference height, vertical_shear, horizontal_shear; m/s
+    inverse_step: float  # 1/dt of a uniform time, 1/s; 0: not uniform (then bisection)
+    period: float  # s; > 0: the series repeats, its last row equals the first; 0: ends are held
+    shear_exponent: float  # of the power law on u and v
+    reference_height: float  # m
+    reference_length: float  # m; the linear shears are m/s per this length
+    rotor_factor: float  # mean of the power law over the blades of a rotor of this diameter at that height
+
+
+class WindNow(NamedTuple):
+    """One instant of a WindSeries, m/s."""
+
+    u: float
+    v: float
+    w: float
+    vertical_shear: float
+    horizontal_shear: float
+
+
+NO_WIND = WindNow(0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@kernel
+def _row(series, i, weight):
+    """WindNow at the fraction `weight` from row i to row i + 1."""
+    value = series.value
+    rest = 1.0 - weight
+    return WindNow(
+        rest * value[i, 0] + weight * value[i + 1, 0],
+        rest * value[i, 1] + weight * value[i + 1, 1],
+        rest * value[i, 2] + weight * value[i + 1, 2],
+        rest * value[i, 3] + weight * value[i + 1, 3],
+        rest * value[i, 4] + weight * value[i + 1, 4],
+    )
+
+
+@kernel
+def wind_now(t, series):
+    """WindNow at time t (s): linear between samples, repeated with the period or held at the ends."""
+    if series is None:
+        return NO_WIND
+    time = series.time
+    last = time.shape[0] - 1
+    if series.period > 0.0:
+        t = t % series.period
+    # written so that a NaN time gives the first row instead of an index out of range
+    if last == 0 or not t > time[0]:
+        first = series.value[0]
+        return WindNow(first[0], first[1], first[2], first[3], first[4])
+    if t >= time[last]:
+        final = series.value[last]
+        return WindNow(final[0], final[1], final[2], final[3], final[4])
+    if series.inverse_step > 0.0:
+        i = min(int((t - time[0]) * series.inverse_step), last - 1)
+    else:
+        i, above = 0, last
+        while above - i > 1:
+            middle = (i + above) // 2
+            if time[middle] <= t:
+                i = middle
+            else:
+                above = middle
+    return _row(series, i, (t - time[i]) / (time[i + 1] - time[i]))
+
+
+@kernel
+def wind_at(t, X, Y, Z, now, series, field):
+    """(u, v, w) m/s, inertial components, at the inertial point X, Y, Z (m) and time t (s).
+
+    The horizontal wind follows the power law (Z/reference_height)**shear_exponent; the linear shears
+    add to u, m/s per reference_length above and to the left (+y) of the reference point. Points below
+    LOWEST_HEIGHT take its wind. now: wind_now(t, series). field: None, or a box of full-field wind
+    (wind_field.WindField) that replaces the series.
+    """
+    if series is None:
+        return 0.0, 0.0, 0.0
+    if field is None:
+        return _series_at(Y, Z, now, series)
+    return field_at(t, X, Y, Z, field)
+
+
+@kernel
+def _series_at(Y, Z, now, series):
+    """(u, v, w) of a series at a height and a distance to the left."""
+    height = max(Z, LOWEST_HEIGHT)
+    profile = 1.0
+    if series.shear_exponent != 0.0:
+        profile = (height / series.reference_height) ** series.shear_exponent
+    linear = (
+        now.vertical_shear * (height - series.reference_height) + now.horizontal_shear * Y
+    ) / series.reference_length
+    return now.u * profile + linear, now.v * profile, now.w

@@ -1,0 +1,13 @@
+"""The environments' names at Gymnasium: text alone, so that none is loaded before somebody makes one."""
+
+from gymnasium.envs.registration import register, registry
+
+ENVIRONMENTS = {"fowt_env/OC3Hywind-v1": "fowt_env.envs:FowtEnv"}
+VECTOR_ENTRY_POINT = "fowt_env.envs:FowtVectorEnv"  # of each of them
+
+
+def register_environments():
+    """Add the names to Gymnasium's registry, each once however often this is called."""
+    for name, entry_point in ENVIRONMENTS.items():
+        if name not in registry:
+            register(id=name, entry_point=entry_point, vector_entry_point=VECTOR_ENTRY_POINT)

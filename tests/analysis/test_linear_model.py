@@ -1,0 +1,117 @@
+import numpy as np
+import pytest
+from plant_helpers import rates
+
+import fowt_env
+from fowt_env.analysis.linear_model import STATE_INDEX, linearize, natural_periods
+from fowt_env.errors import InputError
+from fowt_env.plant.state import State
+
+PERIODS = {"surge": 124.0, "sway": 124.0, "heave": 30.8, "roll": 29.9, "platform_pitch": 29.9, "yaw": 8.28}
+CHANNELS = {  # motion: (channel, unit, initial offset)
+    "surge": ("PtfmSurge", "m", 1.0),
+    "sway": ("PtfmSway", "m", 1.0),
+    "heave": ("PtfmHeave", "m", 0.3),
+    "roll": ("PtfmRoll", "deg", 0.5),
+    "platform_pitch": ("PtfmPitch", "deg", 0.5),
+    "yaw": ("PtfmYaw", "deg", 1.0),
+}
+
+
+@pytest.fixture(scope="module")
+def periods(still_scene):
+    return natural_periods(still_scene)
+
+
+def test_natural_periods_are_those_of_theory(periods, platform):
+    assert list(periods) == list(PERIODS)
+    for motion, expected in PERIODS.items():
+        assert periods[motion] == pytest.approx(expected, rel=5e-3)
+    published = platform.published["natural_periods"]
+    for motion, key in zip(PERIODS, ("surge", "sway", "heave", "roll", "pitch", "yaw"), strict=True):
+        assert periods[motion] == pytest.approx(published[key], rel=5e-3)
+
+
+@pytest.mark.parametrize("motion", PERIODS)
+def test_free_decay_has_the_natural_period(motion, periods, still_scene):
+    channel, unit, offset = CHANNELS[motion]
+    rest = fowt_env.trim(still_scene)[channel]
+    frame = fowt_env.simulate(
+        still_scene, controller=None, duration=5.0 * round(periods[motion]), initial={channel: rest + offset}
+    )
+    t, y = frame["Time_[s]"].to_numpy(), frame[f"{channel}_[{unit}]"].to_numpy() - rest
+    falling = np.flatnonzero((y[:-1] > 0.0) & (y[1:] <= 0.0))
+    crossings = t[falling] + y[falling] / (y[falling] - y[falling + 1]) * (t[1] - t[0])
+    assert crossings.size >= 4
+    measured = (crossings[-1] - crossings[0]) / (crossings.size - 1)
+    assert measured == pytest.approx(periods[motion], rel=5e-3)
+    peaks = [np.abs(y[a:b]).max() for a, b in zip(falling[:-1], falling[1:], strict=True)]
+    assert np.all(np.diff(peaks) < 0.0)
+
+
+def test_motions_without_restoring_have_no_period(platform):
+    periods = natural_periods(fowt_env.build_scene("oc3_hywind", mooring=False))
+    assert periods["surge"] == periods["sway"] == np.inf
+    assert 20.0 < periods["heave"] < 40.0
+    assert periods["yaw"] == pytest.approx(PERIODS["yaw"], rel=0.1)  # the delta lines' spring
+
+
+def test_linear_model_predicts_small_motions(still_scene):
+    # |u| u has no slope at rest, but a difference quotient gives it one of the size of its step
+    scene = still_scene.with_model(strips=still_scene.model.strips._replace(drag_coefficient=0.0))
+    model = linearize(scene)
+    point, rows = model.point, list(STATE_INDEX)
+    rng = np.random.default_rng(0)
+    for _ in range(10):
+        change = rng.normal(size=len(rows)) * 1e-5
+        up, down = point.state.copy(), point.state.copy()
+        up[rows] += change
+        down[rows] -= change
+        half = 0.5 * (rates(scene, up, point.command) - rates(scene, down, point.command))[rows]
+        predicted = model.A @ change
+        for block in (slice(0, 6), slice(6, 12)):
+            size = np.abs(predicted[block]).max()
+            assert np.abs(half - predicted)[block].max() < 1e-5 * size
+
+
+def test_positions_follow_velocities_and_nothing_follows_the_blades_without_air(still_scene):
+    model = linearize(still_scene)
+    A = model.A
+    lean = model.point.state[State.PLATFORM_PITCH]
+    assert A[model.index("surge"), model.index("vx")] == pytest.approx(np.cos(lean), rel=1e-9)
+    assert np.all(A[:6, :3] == 0.0)
+    assert np.abs(A[:12, model.index("blade_pitch")]).max() < 1e-9
+
+
+def test_modes_are_the_damped_platform_motions(still_scene, periods):
+    modes = linearize(still_scene).modes()
+    assert {mode.name for mode in modes} == set(PERIODS)
+    assert [mode.period for mode in modes] == sorted((mode.period for mode in modes), reverse=True)
+    for mode in modes:
+        assert 0.0 < mode.damping_ratio < 0.1
+        assert 2.0 * np.pi / mode.frequency == pytest.approx(periods[mode.name], rel=2e-3)
+
+
+def test_inputs_act_where_they_should(storm_scene, turbine):
+    model = linearize(storm_scene)
+    row, ratio = storm_scene.model.body.rotor_row, turbine.drivetrain.gear_ratio
+    i = model.index("rotor_speed")
+    # the roll inertia takes a share H^2/(I_rx M44) of 1e-3
+    assert model.B[i, 0] == pytest.approx(-ratio / row, rel=2e-3)
+    assert model.B[model.index("blade_pitch"), 1] == pytest.approx(1.0 / turbine.pitch_drive.time_constant)
+    # slopes of the public rotor table at 18 m/s and 12.1 rpm (with tilt and cone)
+    assert model.B[i, 2] == pytest.approx(1.1957e6 / row, rel=0.1)
+    assert model.A[i, model.index("blade_pitch")] == pytest.approx(-5.1768e7 / row, rel=0.15)
+    assert model.A[i, i] == pytest.approx(-1.0552e7 / row, rel=0.25)
+    assert model.B[model.index("vx"), 2] > 0.0
+
+
+def test_linear_model_of_a_held_platform_has_no_platform_motion(storm_scene):
+    model = linearize(storm_scene, fowt_env.trim(storm_scene, platform="fixed"))
+    assert np.all(model.A[6:12] == 0.0) and np.all(model.B[6:12] == 0.0)
+    assert model.A[model.index("rotor_speed"), model.index("rotor_speed")] < 0.0
+
+
+def test_unknown_state_name_is_refused(still_scene):
+    with pytest.raises(InputError, match="Did you mean 'surge'"):
+        linearize(still_scene).index("surg")

@@ -1,0 +1,100 @@
+"""Every example runs, says what it claims, and takes less than a minute once compiled."""
+
+import re
+import runpy
+from math import exp, pi
+from pathlib import Path
+from time import perf_counter
+
+import pytest
+
+from fowt_env.plant.compile.announcement import compilation_announced
+
+FOLDER = Path(__file__).resolve().parents[2] / "examples"
+LIMIT = 60.0  # s
+CLAIMS = {  # example: what its output must match, and the files it must write
+    "01_simulate": (r"6001 rows", ["run.csv"]),
+    "02_plot": (r"pi_land +platform pitch std [3-9]\.", ["run.png", "runs.png", "spectra.png"]),
+    "03_own_controller": (r"slow_pi +rotor speed std 0\.", []),
+    "04_own_reward": (r"with the tower moment [0-9.]+", []),
+    "05_own_sea_state": (r"components +4 x std of elevation  4\.", ["my_sea.toml"]),
+    "06_own_load": (r"with plate .* in swell std 0\.[0-9]+ m", []),
+    "07_linearise": (r"with the PI controller, land gains", ["plant_18mps.mat"]),
+    "08_vector_env": (r"[0-9]+ environment steps a second", []),
+    "09_evaluate": (r"8 of 8 runs reached their end", []),
+    "11_report": (r"pi_land +platform pitch std [1-3]\.(.|\n)*it needs no network", ["report"]),
+    "12_ray": (r"the table of Ray is that of this process", []),
+    "13_resume": (r"called again: 2 runs made, 4 in the table(.|\n)*resumed: finished", ["resume"]),
+    "14_tune": (r"least mean of both deviations: omega 0\.(12|2) rad/s", []),
+    "15_record_video": (r"200 pictures of 960 x 640\nwrote ", ["video"]),
+    "16_what_if": (r"same bits\nreward of an episode", []),
+}
+NEEDS = {  # example: modules without which its claims are not met
+    "02_plot": ("matplotlib",),
+    "11_report": ("plotly",),
+    "12_ray": ("ray",),
+    "13_resume": ("stable_baselines3", "matplotlib"),
+    "15_record_video": ("pygame", "moviepy"),
+}
+SLOW = ("12_ray", "13_resume")  # they start Ray, and torch
+TRAINED = "10_train_small_agent"  # takes minutes: tests/examples has its test
+
+
+def test_every_example_is_tested_and_listed():
+    names = {path.stem for path in FOLDER.glob("*.py")}
+    assert names == {*CLAIMS, TRAINED}
+    listed = set(re.findall(r"`(\d\d_\w+)\.py`", (FOLDER / "README.md").read_text()))
+    assert listed == names
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow if name in SLOW else ()) for name in CLAIMS]
+)
+def test_an_example_runs_within_a_minute(name, tmp_path, monkeypatch, capsys):
+    for module in NEEDS.get(name, ()):
+        pytest.importorskip(module, reason=f"{module} is not installed: its extra is missing")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(FOLDER))
+    compiled = []
+    start = perf_counter()
+    with compilation_announced(compiled.append):
+        runpy.run_path(str(FOLDER / f"{name}.py"), run_name="__main__")
+    seconds = perf_counter() - start
+    pattern, files = CLAIMS[name]
+    output = capsys.readouterr().out
+    assert re.search(pattern, output), output
+    written = {path.name for path in (tmp_path / "results" / "examples").glob("*")}
+    assert written == set(files)
+    assert compiled or seconds < LIMIT  # compiling is the first run's alone
+
+
+def test_the_plate_brakes_the_heave_as_quadratic_drag_does(tmp_path, monkeypatch, capsys):
+    """Averaged over a cycle the amplitude follows dA/dt = -s A - c A^2 with c = 4 k w/(3 pi M)."""
+    monkeypatch.chdir(tmp_path)
+    found = runpy.run_path(str(FOLDER / "06_own_load.py"), run_name="__main__")
+    shown = capsys.readouterr().out
+    mass, frequency = 8066048.0 + 250319.0, 2.0 * pi / 30.8
+    slow, start, end = 1.3e5 / (2.0 * mass), 4.0, 3.0 * 30.8
+    quick = 4.0 * found["plate"].parameters[0] * frequency / (3.0 * pi * mass)
+    bare = start * exp(-slow * end)
+    braked = slow * bare / (slow + quick * (start - bare))
+    left = [float(value) for value in re.findall(r"up to ([0-9.]+) m", shown)]
+    assert left == pytest.approx([bare, braked], rel=0.05)  # the lines couple heave to surge a little
+    swell = [float(value) for value in re.findall(r"swell std ([0-9.]+) m", shown)]
+    assert swell[1] < swell[0]
+
+
+def test_a_look_ahead_pays(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    runpy.run_path(str(FOLDER / "16_what_if.py"), run_name="__main__")
+    alone, planned = re.search(
+        r"PI alone (-?[0-9.]+), with a look ahead (-?[0-9.]+)", capsys.readouterr().out
+    ).groups()
+    assert float(planned) > float(alone)
+
+
+def test_without_its_library_an_example_says_what_to_install(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    runpy.run_path(str(FOLDER / "12_ray.py"), run_name="__main__")
+    assert "fowt-env[ray]" in capsys.readouterr().out

@@ -1,0 +1,93 @@
+"""What users install: the built files hold everything, and a bare environment runs the README's example.
+
+Needs a package index for the dependencies of the empty environment, as `pip install fowt-env` does.
+"""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tarfile
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PACKAGES = ("fowt_env", "controllers", "training")
+CODE = {".py", ".pyc"}
+pytestmark = pytest.mark.slow
+
+
+def run(*command, **options):
+    done = subprocess.run([str(part) for part in command], capture_output=True, text=True, **options)
+    assert done.returncode == 0, f"{command}\n{done.stdout[-3000:]}\n{done.stderr[-3000:]}"
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    """(sdist, wheel) built from a copy of the sources, the wheel out of the sdist."""
+    folder = tmp_path_factory.mktemp("build")
+    source = folder / "source"
+    leave = shutil.ignore_patterns("__pycache__", "*.egg-info")
+    for package in PACKAGES:
+        shutil.copytree(ROOT / package, source / package, ignore=leave)
+    for path in ROOT.iterdir():
+        if path.is_file() and not path.name.startswith("."):
+            shutil.copy(path, source)
+    run(sys.executable, "-m", "build", "--no-isolation", "--outdir", folder / "dist", source)
+    (sdist,) = (folder / "dist").glob("*.tar.gz")
+    (wheel,) = (folder / "dist").glob("*.whl")
+    return sdist, wheel
+
+
+def data_files():
+    """Paths of the packages' files that are not code."""
+    return {
+        path.relative_to(ROOT).as_posix()
+        for package in PACKAGES
+        for path in (ROOT / package).rglob("*")
+        if path.is_file() and path.suffix not in CODE
+    }
+
+
+def test_sdist_and_wheel_hold_every_data_file_and_the_licence(built):
+    sdist, wheel = built
+    with tarfile.open(sdist) as archive:
+        in_sdist = {name.partition("/")[2] for name in archive.getnames()}
+    in_wheel = set(zipfile.ZipFile(wheel).namelist())
+    assert data_files() - in_sdist == set()
+    assert data_files() - in_wheel == set()
+    assert any(name.endswith("LICENSE") for name in in_wheel)
+    assert not any(name.endswith(".pth") or ".data/" in name for name in in_wheel)
+    assert not any(name.startswith("tests/") for name in in_wheel)
+
+
+def readme_example(duration):
+    """The program under "Ten lines" with another duration."""
+    section = (ROOT / "README.md").read_text().partition("## Ten lines")[2]
+    code = re.search(r"```python\n(.*?)```", section, re.S).group(1)
+    assert code.count("duration=600.0") == 1
+    return code.replace("duration=600.0", f"duration={duration}")
+
+
+def test_the_wheel_runs_the_readme_example_in_an_empty_environment_without_torch(built, tmp_path):
+    _, wheel = built
+    run(sys.executable, "-m", "venv", tmp_path / "venv")
+    python = tmp_path / "venv" / "bin" / "python"
+    run(python, "-m", "pip", "install", "--quiet", "--constraint", ROOT / "constraints.txt", wheel)
+    environment = {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}
+    environment["FOWT_CACHE_DIR"] = str(tmp_path / "cache")
+    options = {"cwd": tmp_path, "env": environment}
+    program = readme_example(5.0) + (
+        "import importlib.util, gymnasium\n"
+        "assert importlib.util.find_spec('torch') is None\n"
+        "assert len(df) == 51, len(df)\n"
+        "print(fowt_env.__file__, gymnasium.spec('fowt_env/OC3Hywind-v1').id)\n"
+    )
+    text = run(python, "-c", program, **options)
+    assert "PtfmPitch_[deg]" in text and f"{tmp_path / 'venv'}" in text and "OC3Hywind-v1" in text
+    text = run(tmp_path / "venv" / "bin" / "fowt", "doctor", "--no-test", **options)
+    assert "missing" in text and 'pip install "fowt-env[plot]"' in text

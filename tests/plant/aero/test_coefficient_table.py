@@ -1,0 +1,221 @@
+import numpy as np
+import pytest
+
+from fowt_env.descriptions.platform import read_turbine
+from fowt_env.plant.aero.bem_rotor import NO_ROTOR_LOAD, rotor_load
+from fowt_env.plant.aero.blade_elements import build_blade_elements
+from fowt_env.plant.aero.coefficient_table import build_rotor_table, rotor_table_load
+from fowt_env.plant.aero.wind import wind_now
+from fowt_env.plant.events import N_COUNTERS
+from fowt_env.plant.state import N_RIGID, State, pose_of
+from fowt_env.weather.wind import make_series
+
+pytestmark = pytest.mark.installation
+
+ROTOR = build_blade_elements(read_turbine("nrel5mw"), 1.225)
+TABLE = build_rotor_table(ROTOR)
+RATED_THRUST, RATED_TORQUE = 750e3, 4.18e6
+OPERATION = [  # wind m/s, rotor speed rad/s, blade pitch rad: operating points from cut-in to cut-out
+    (4.0, 0.752, 0.0),
+    (8.0, 0.964, 0.0),
+    (11.0, 1.248, 0.0),
+    (12.0, 1.267, 0.0692),
+    (15.0, 1.267, 0.1826),
+    (18.0, 1.267, 0.2609),
+    (24.0, 1.267, 0.3864),
+]
+
+
+def wind_series(u, v=0.0, vertical=0.0, shear=0.0):
+    return make_series(
+        [0.0], [[u, v, 0.0, vertical, 0.0]],
+        reference_height=90.0, reference_length=126.0, shear_exponent=shear,
+    )  # fmt: skip
+
+
+def state(speed, blade_pitch, azimuth=0.0, velocity=(0,) * 6):
+    x = np.zeros(N_RIGID)
+    x[7:13] = velocity
+    x[State.AZIMUTH], x[State.ROTOR_SPEED], x[State.BLADE_PITCH] = azimuth, speed, blade_pitch
+    return x
+
+
+def from_table(x, series, table=TABLE):
+    return rotor_table_load(pose_of(x), x, wind_now(0.0, series), series, table)
+
+
+def from_sections(x, series):
+    now, counters = wind_now(0.0, series), np.zeros(N_COUNTERS)
+    return rotor_load(0.0, pose_of(x), x, now, series, None, ROTOR, None, None, np.zeros_like(x), counters)
+
+
+def over_azimuth(x, series, points=8):
+    """Mean wrench and torque of the sections over a third of a turn."""
+    loads = []
+    for azimuth in np.linspace(0, 2 * np.pi / 3, points, endpoint=False):
+        x[State.AZIMUTH] = azimuth
+        result = from_sections(x, series)
+        loads.append([*result.wrench, result.thrust, result.torque])
+    return np.mean(loads, axis=0)
+
+
+def test_absent_table_or_wind_gives_exactly_zero():
+    x = state(1.2, 0.0)
+    assert from_table(x, wind_series(10.0), None) == NO_ROTOR_LOAD
+    assert from_table(x, None) == NO_ROTOR_LOAD
+    empty = build_rotor_table(ROTOR._replace(air_density=0.0))
+    assert np.all(np.array(from_table(x, wind_series(10.0), empty).wrench) == 0.0)
+
+
+def test_same_rotor_is_tabulated_once():
+    again = build_blade_elements(read_turbine("nrel5mw"), 1.225)
+    assert build_rotor_table(again) is TABLE
+
+
+def test_every_coefficient_is_finite_and_bounded():
+    assert np.all(np.isfinite(TABLE.load))
+    assert np.abs(TABLE.load[:, :, :2]).max() < np.pi  # twice the area and the dynamic pressure
+    assert np.abs(TABLE.load[:, :, 2:]).max() < 10.0
+
+
+def test_table_is_the_blade_element_momentum_solution_at_its_points():
+    rng = np.random.default_rng(0)
+    for _ in range(200):
+        theta, beta = rng.choice(TABLE.theta.point), rng.choice(TABLE.blade_pitch.point)
+        if abs(theta) == np.pi or np.cos(theta) == 0.0:
+            continue
+        wind, speed = 20 * np.cos(theta), 20 * np.sin(theta) / ROTOR.tip_radius
+        a, b = (
+            from_table(state(speed, beta), wind_series(wind)),
+            from_sections(state(speed, beta), wind_series(wind)),
+        )
+        q = 0.5 * 1.225 * np.pi * 63.0**2 * 400.0
+        assert a.thrust == pytest.approx(b.thrust, abs=1e-9 * q)
+        assert a.torque == pytest.approx(b.torque, abs=1e-9 * q * 63.0)
+
+
+def test_table_is_within_a_tenth_of_a_percent_around_operation():
+    """Interpolation error near the operating points, relative to rated thrust and torque."""
+    rng = np.random.default_rng(1)
+    thrust, torque = [], []
+    for _ in range(500):
+        U, speed, beta = OPERATION[rng.integers(len(OPERATION))]
+        U, speed, beta = (
+            U * rng.uniform(0.85, 1.15),
+            speed * rng.uniform(0.9, 1.1),
+            beta + rng.uniform(-0.03, 0.05),
+        )
+        a, b = (
+            from_table(state(speed, beta), wind_series(U)),
+            from_sections(state(speed, beta), wind_series(U)),
+        )
+        thrust.append(abs(a.thrust - b.thrust) / RATED_THRUST)
+        torque.append(abs(a.torque - b.torque) / RATED_TORQUE)
+    assert max(thrust) < 1e-3
+    assert max(torque) < 1e-3
+
+
+def test_table_covers_standstill_overspeed_feather_and_reversed_wind():
+    """Relative to the dynamic pressure of wind and tip speed together, which bounds every load."""
+    rng = np.random.default_rng(2)
+    worst = 0.0
+    for _ in range(2000):
+        U, speed, beta = rng.uniform(-25, 40), rng.uniform(-0.5, 2.2), rng.uniform(-0.1, 1.65)
+        a, b = (
+            from_table(state(speed, beta), wind_series(U)),
+            from_sections(state(speed, beta), wind_series(U)),
+        )
+        q = 0.5 * 1.225 * np.pi * 63.0**2 * (U**2 + (63.0 * speed) ** 2)
+        worst = max(worst, abs(a.thrust - b.thrust) / q, abs(a.torque - b.torque) / (63.0 * q))
+    assert worst < 2e-3
+    assert np.all(np.array(from_table(state(0.0, 0.3), wind_series(0.0)).wrench) == 0.0)
+
+
+@pytest.mark.parametrize("U, speed, beta", OPERATION)
+def test_shear_is_seen_in_the_mean_and_in_the_tilting_moment(U, speed, beta):
+    series, x = wind_series(U, shear=0.14), state(speed, beta)
+    mean, table = over_azimuth(x.copy(), series), from_table(x, series)
+    assert table.thrust == pytest.approx(mean[6], rel=0.002)
+    assert table.torque == pytest.approx(mean[7], rel=0.002, abs=0.002 * RATED_TORQUE)
+    tilt_mean = mean[4] - ROTOR.hub_height * mean[6]
+    tilt_table = table.wrench.my - ROTOR.hub_height * table.thrust
+    assert tilt_table == pytest.approx(tilt_mean, rel=0.04)
+    assert table.wrench.fy == pytest.approx(mean[1], rel=0.04, abs=50.0)
+
+
+def hub_loads(wrench):
+    """Three forces and three moments about the hub."""
+    fx, fy, fz, mx, my, mz = wrench[:6]
+    height, overhang = ROTOR.hub_height, ROTOR.overhang
+    return np.array([fx, fy, fz, mx + height * fy, my - height * fx - overhang * fz, mz + overhang * fy])
+
+
+def test_random_gusts_and_motions_give_the_loads_of_the_sections_over_a_turn():
+    """Error over standard deviation, with wind, shear and motion as in 18 m/s turbulence and Hs 7.5 m."""
+    rng = np.random.default_rng(3)
+    table, sections = [], []
+    for _ in range(200):
+        gust = rng.normal(size=5) * [1.8, 1.2, 0.5, 2.8, 2.8]
+        series = make_series(
+            [0.0], [gust + [18.0, 0.0, 0.0, 0.0, 0.0]],
+            reference_height=90.0, reference_length=126.0, shear_exponent=0.14,
+        )  # fmt: skip
+        x = state(1.267 + 0.1 * rng.normal(), 0.26 + 0.012 * gust[0] + 0.01 * rng.normal())
+        attitude = rng.normal(size=3) * [0.004, 0.015, 0.015] + [0.0, 0.05, 0.0]
+        x[[State.ROLL, State.PLATFORM_PITCH, State.YAW]] = attitude
+        x[State.VX : State.WZ + 1] = rng.normal(size=6) * [0.5, 0.1, 0.3, 0.002, 0.008, 0.003]
+        table.append(hub_loads(from_table(x, series).wrench))
+        sections.append(hub_loads(over_azimuth(x.copy(), series, 16)))
+    error = np.std(np.subtract(table, sections), axis=0) / np.std(sections, axis=0)
+    assert np.all(error < [0.01, 0.02, 0.02, 0.01, 0.015, 0.01])
+
+
+@pytest.mark.parametrize("U, speed, beta", OPERATION)
+def test_cross_wind_pushes_and_tilts_as_by_the_sections(U, speed, beta):
+    series, x = wind_series(U, v=0.03 * U), state(speed, beta)
+    table, mean = hub_loads(from_table(x, series).wrench), hub_loads(over_azimuth(x.copy(), series))
+    scale = np.array([RATED_THRUST] * 3 + [RATED_TORQUE] * 3)
+    assert np.all(np.abs(table - mean) < 1e-3 * scale)
+    assert table[4] == pytest.approx(mean[4], rel=0.1)
+
+
+def test_turning_the_disturbance_about_the_shaft_turns_the_loads():
+    """Horizontal shear and vertical wind are vertical shear and cross wind a quarter of a turn on."""
+
+    def series(v, w, vertical, horizontal):
+        return make_series(
+            [0.0], [[15.0, v, w, vertical, horizontal]],
+            reference_height=90.0, reference_length=126.0, shear_exponent=0.0,
+        )  # fmt: skip
+
+    x = state(1.267, 0.18)
+    a = hub_loads(from_table(x, series(1.0, 0.0, 0.0, 3.0)).wrench)
+    b = hub_loads(from_table(x, series(0.0, 1.0, 3.0, 0.0)).wrench)
+    c = hub_loads(from_table(x, series(0.0, 1.0, -3.0, 0.0)).wrench)
+    d = hub_loads(from_table(x, series(-1.0, 0.0, 0.0, -3.0)).wrench)
+    # y of the disk goes to z, z to -y
+    turned = hub_loads(from_table(x, series(-1.0, 0.0, 0.0, 3.0)).wrench)
+    assert np.allclose(a[[0, 3]], d[[0, 3]], rtol=1e-12)
+    assert np.allclose(a[[1, 2, 4, 5]], -d[[1, 2, 4, 5]], atol=1e-6)
+    assert np.allclose(b, [a[0], -a[2], a[1], a[3], -a[5], a[4]], atol=1e-6)
+    assert not np.allclose(b[1:3], c[1:3]) and not np.allclose(a[1:3], turned[1:3])
+
+
+@pytest.mark.parametrize("U, speed, beta", OPERATION)
+def test_platform_motion_is_damped_as_by_the_sections(U, speed, beta):
+    """Derivatives with surge velocity, pitch and yaw rate, within 2 %."""
+    series = wind_series(U)
+    for axis, row, step in ((0, 0, 0.2), (4, 4, 0.004), (5, 5, 0.004)):
+        velocity = np.zeros(6)
+        velocity[axis] = step
+        slopes = []
+        for evaluate in (
+            lambda x: np.array(from_table(x, series).wrench),
+            lambda x: over_azimuth(x, series)[:6],
+        ):
+            up = evaluate(state(speed, beta, velocity=velocity))
+            down = evaluate(state(speed, beta, velocity=-velocity))
+            slopes.append((up[row] - down[row]) / (2 * step))
+        assert slopes[1] < 0.0
+        # the moment's own derivative is taken over the width of gusts, that of the thrust is exact
+        assert slopes[0] == pytest.approx(slopes[1], rel=0.02 if axis != 5 else 0.05)

@@ -1,0 +1,493 @@
+"""The kernel cache: made where it is missing, done without where it cannot be, right where old or shared."""
+
+import ast
+import os
+import pickle
+import re
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numba
+import pytest
+
+import fowt_env
+from fowt_env.plant.compile import disk_cache as kernel_cache
+from fowt_env.plant.compile.announcement import COMPILING_MESSAGE, compilation_announced
+from fowt_env.plant.compile.decorators import KEEP_CACHES, MARKER, kernel_sources
+from fowt_env.plant.compile.disk_cache import SharedCacheFile
+
+ROOT = Path(fowt_env.__file__).resolve().parent.parent
+REGISTRATION = ROOT / "fowt_env_registration.py"
+SMALL = "from fowt_env.weather.waves import ramp_factor; print(ramp_factor(1.0, 4.0))\n"
+HITS = "print(sum(ramp_factor.stats.cache_hits.values()))\n"
+WHERE = "from fowt_env.plant.compile.decorators import CACHE_FOLDER; print(CACHE_FOLDER)\n"
+DAY = 86400.0
+DECAY = """
+import sys
+from fowt_env import build_scene, simulate
+from fowt_env.plant.compile.announcement import compilation_announced
+said = []
+with compilation_announced(said.append):
+    frame = simulate(build_scene(), None, duration=2.0, start="zero", initial={"PtfmPitch": 5.0})
+print(frame.to_numpy().tobytes().hex()[-4000:], len(said))
+"""
+
+
+def start(code, folder, root=ROOT, **environment):
+    """A fresh Python at work on the code, with its kernel cache in the folder."""
+    variables = os.environ | {"FOWT_CACHE_DIR": str(folder), "PYTHONPATH": str(root)} | environment
+    pipe = subprocess.PIPE
+    return subprocess.Popen(
+        [sys.executable, "-c", code], env=variables, cwd=folder.parent, stdout=pipe, stderr=pipe, text=True
+    )
+
+
+def output(process):
+    """Lines that it printed, once it has ended well."""
+    stdout, stderr = process.communicate(timeout=900)
+    assert process.returncode == 0, stderr
+    return stdout.split()
+
+
+def kernel_folder(place, number, days, mark=True):
+    """A folder that looks like one of older sources, untouched for some days."""
+    folder = place / f"{number:016x}"
+    folder.mkdir(parents=True)
+    (folder / "content").write_text("")
+    if mark:
+        (folder / MARKER).write_text("")
+    os.utime(folder, (time.time() - days * DAY,) * 2)
+    return folder
+
+
+def test_a_missing_folder_is_made_and_used(tmp_path):
+    folder = tmp_path / "a" / "cache"
+    folder.parent.mkdir()
+    factor, used = output(start(SMALL + WHERE, folder))
+    assert factor == "0.25"
+    assert Path(used).parent == folder / "kernels"
+    assert list(Path(used).rglob("*.nbi"))
+
+
+def test_folders_of_older_sources_go_but_those_in_use(tmp_path):
+    """Beneath the user's cache folder where no other is named. In use: touched within a day."""
+    place = tmp_path / "cache" / "fowt_env" / "kernels"
+    for number in range(9):
+        kernel_folder(place, number, 0.5 if number < 6 else 1.0 + number)
+    variables = {"FOWT_CACHE_DIR": "", "XDG_CACHE_HOME": str(tmp_path / "cache")}
+    _, used = output(start(SMALL + WHERE, tmp_path / "unused", **variables))
+    assert Path(used).parent == place
+    left = {path.name for path in place.iterdir()} - {Path(used).name}
+    assert left == {f"{number:016x}" for number in range(6)} and len(left) > KEEP_CACHES
+
+
+def test_nothing_goes_that_this_package_did_not_make(tmp_path):
+    """A disk for projects is given as the cache's folder, and one of the projects is called "kernels"."""
+    disk, place = tmp_path / "disk", tmp_path / "disk" / "kernels"
+    elsewhere = tmp_path / "elsewhere"
+    kept = [kernel_folder(elsewhere, 0, 2.0)]
+    for number in range(8):
+        (disk / f"project{number}").mkdir(parents=True)
+        kept += [disk / f"project{number}", kernel_folder(disk, number, 90.0)]
+        kept.append(kernel_folder(place, number, 100.0 + number, mark=False))
+        kernel_folder(place, 100 + number, 10.0 + number)
+        kept.append(kernel_folder(place / "of mine", number, 100.0))
+    (place / f"{500:016x}").symlink_to(kept[0])
+    named = kernel_folder(place, 501, 300.0)
+    kept.append(named.rename(place / "a name of mine"))
+    boxes = disk / "wind_boxes"
+    boxes.mkdir()
+    kept.append(boxes / "box.npz")
+    kept[-1].write_text("")
+    for path in disk.iterdir():
+        os.utime(path, (time.time() - 100.0 * DAY,) * 2)
+    output(start(WHERE, disk))
+    assert all(path.exists() for path in kept)
+    assert (place / f"{500:016x}").is_symlink() and (kept[0] / "content").exists()
+    own = [number for number in range(100, 108) if (place / f"{number:016x}").exists()]
+    assert own == list(range(100, 100 + KEEP_CACHES))  # while those that it made do go, but the newest
+
+
+def test_the_first_kernel_that_is_compiled_is_announced_once():
+    def double(x):
+        return 2.0 * x
+
+    double.__module__ = "fowt_env.not_on_disk"
+    said, compiled = [], numba.njit(double)
+    with compilation_announced(said.append):
+        assert compiled(1.0) == 2.0 and compiled(1) == 2.0
+    assert said == [COMPILING_MESSAGE]
+    with compilation_announced(said.append):
+        assert compiled(2.0) == 4.0
+    assert len(said) == 1
+
+
+def test_a_folder_that_cannot_be_made_is_done_without(tmp_path):
+    """It lies beneath a file, which stops even the superuser."""
+    (tmp_path / "file").write_text("")
+    variables = {"FOWT_CACHE_DIR": str(tmp_path / "file" / "cache")}
+    assert output(start(SMALL + WHERE, tmp_path / "cache", **variables)) == ["0.25", "None"]
+
+
+def test_a_user_without_a_home_compiles_for_each_process(tmp_path):
+    """As in a container under a number that no user has."""
+    nobody = "import os, pwd\ndel os.environ['HOME']\ndel pwd.getpwuid\npwd.getpwuid = {}.__getitem__\n"
+    variables = {"FOWT_CACHE_DIR": "", "XDG_CACHE_HOME": "", "FOWT_CONFIG_DIR": "", "XDG_CONFIG_HOME": ""}
+    key = "from fowt_env.training.rl.checkpoint_signature import _key; print(_key())\n"
+    code = nobody + SMALL + WHERE + key
+    assert output(start(code, tmp_path / "cache", **variables)) == ["0.25", "None", "None"]
+    variables["FOWT_CACHE_DIR"] = str(tmp_path / "here")
+    (used,) = output(start(nobody + WHERE, tmp_path / "cache", **variables))
+    assert Path(used).parent == tmp_path / "here" / "kernels"
+
+
+@pytest.mark.parametrize(
+    ("given", "meant"),
+    [("~/fowt cache", "home/fowt cache"), ("fowt cache", "fowt cache"), ("", "home/.cache/fowt_env")],
+)
+def test_the_home_folder_is_found_where_no_shell_has_put_it(given, meant, tmp_path):
+    variables = {"FOWT_CACHE_DIR": given, "XDG_CACHE_HOME": "relative", "HOME": str(tmp_path / "home")}
+    code = "from fowt_env.folders import cache_root; print(cache_root())"
+    assert " ".join(output(start(code, tmp_path / "cache", **variables))) == str(tmp_path / meant)
+    assert not list(tmp_path.iterdir())
+
+
+class Mark:
+    """Makes a folder when it is unpickled."""
+
+    def __init__(self, path):
+        self.path = path
+
+    def __reduce__(self):
+        return os.mkdir, (str(self.path),)
+
+
+# These run as another user than the one whose folder it is: the superuser gives the files away, and who is
+# not believes to be the next. Nothing of this depends on who runs the tests.
+OTHER = 54321
+
+
+def run_as_another(code, place, **variables):
+    """(lines, stderr) of a program that finds the files of a place to be somebody else's."""
+    if os.geteuid() == 0:
+        for path in (place, *place.rglob("*")):
+            os.chown(path, OTHER, -1)
+    else:
+        code = f"import os; os.geteuid = lambda: {os.geteuid() + 1}\n" + code
+    process = start(code, place.parent / "unused", **variables)
+    stdout, stderr = process.communicate(timeout=300)
+    assert process.returncode == 0, stderr
+    return stdout.split(), stderr
+
+
+@pytest.mark.parametrize("whose", ["kernels", "hash", "sources", "files"])
+def test_no_code_of_another_user_is_read(whose, tmp_path):
+    folder, mark = tmp_path / "cache", tmp_path / "mark"
+    _, used = output(start(SMALL + WHERE, folder))
+    for path in Path(used).rglob("*.nb[ic]"):
+        path.write_bytes(pickle.dumps(Mark(mark)))
+    (index,) = Path(used).rglob("waves.ramp*.nbi")
+    pickle.loads(index.read_bytes())
+    mark.rmdir()  # it works
+    places = {"kernels": folder / "kernels", "hash": Path(used), "sources": index.parent, "files": index}
+    lines, stderr = run_as_another(SMALL + WHERE, places[whose], FOWT_CACHE_DIR=str(folder))
+    assert not mark.exists()
+    if whose == "files" and os.geteuid() == 0:  # their folder is ours: they are replaced
+        assert lines == ["0.25", used] and stderr == ""
+    else:
+        assert lines == ["0.25", "None"]
+        assert stderr.count("belongs to user") == 1 and "Set FOWT_CACHE_DIR" in stderr
+
+
+@pytest.mark.parametrize(("inner", "mode"), [(False, 0o1777), (False, 0o770), (True, 0o702)])
+def test_a_folder_that_others_can_write_is_not_read(inner, mode, tmp_path):
+    (used,) = output(start(WHERE, tmp_path / "cache"))
+    place = Path(used) if inner else Path(used).parent
+    place.chmod(mode)
+    process = start(WHERE, tmp_path / "cache")
+    stdout, stderr = process.communicate(timeout=300)
+    assert stdout.split() == ["None"]
+    assert f"{place} can be written by others (mode {mode:04o})" in stderr and stderr.count("Warning") == 1
+
+
+def test_a_link_in_the_place_of_the_kernels_is_not_followed(tmp_path):
+    output(start(WHERE, tmp_path / "cache"))
+    (tmp_path / "cache" / "kernels").rename(tmp_path / "elsewhere")
+    (tmp_path / "cache" / "kernels").symlink_to(tmp_path / "elsewhere")
+    process = start(WHERE, tmp_path / "cache")
+    stdout, stderr = process.communicate(timeout=300)
+    assert stdout.split() == ["None"] and "is a symbolic link" in stderr
+
+
+def test_folders_and_files_are_private_and_read_again_whatever_the_umask(tmp_path):
+    folder, code = tmp_path / "new" / "cache", "import os; os.umask(0)\n" + SMALL + HITS
+    assert output(start(code, tmp_path / "unused", FOWT_CACHE_DIR=str(folder))) == ["0.25", "0"]
+    paths = [folder.parent, *folder.parent.rglob("*")]
+    assert any(path.suffix == ".nbc" for path in paths)
+    assert not any(path.stat().st_mode & 0o077 for path in paths)
+    assert output(start(code, tmp_path / "unused", FOWT_CACHE_DIR=str(folder))) == ["0.25", "1"]
+
+
+@pytest.mark.parametrize("ending", ["nbi", "nbc"])
+def test_a_file_that_others_can_write_is_not_read(ending, tmp_path):
+    output(start(SMALL, tmp_path / "cache"))
+    (path,) = (tmp_path / "cache").rglob(f"waves.ramp*.{ending}")
+    path.chmod(0o666)
+    assert output(start(SMALL + HITS, tmp_path / "cache")) == ["0.25", "0"]
+    assert path.stat().st_mode & 0o777 == 0o600
+    assert output(start(SMALL + HITS, tmp_path / "cache")) == ["0.25", "1"]
+
+
+def test_a_folder_that_is_read_only_is_read(tmp_path):
+    """As one that root has filled for all: what is there is used, and what is not is compiled."""
+    output(start(SMALL, tmp_path / "cache"))
+    folders = [path for path in (tmp_path / "cache").rglob("*") if path.is_dir()]
+    before = {path: path.stat().st_mtime_ns for path in folders}
+    locked = (
+        "import os\nreal = os.mkdir, os.open\n"
+        "def refuse(path, *rest, **more): raise PermissionError(13, 'read only', str(path))\n"
+        "def reading(path, flags, *rest, **more):\n"
+        "    if flags & (os.O_WRONLY | os.O_RDWR | os.O_CREAT): refuse(path)\n"
+        "    return real[1](path, flags, *rest, **more)\n"
+        "os.mkdir = os.utime = os.replace = os.unlink = os.rmdir = refuse\nos.open = reading\n"
+    )
+    use = (
+        "from fowt_env.weather.waves import ramp_factor as f\nfrom fowt_env.plant.state import add, NO_LOAD\n"
+        "print(f(1.0, 4.0), sum(f.stats.cache_hits.values()), add(NO_LOAD, NO_LOAD).fx)\n"
+    )
+    assert output(start(locked + use, tmp_path / "cache")) == ["0.25", "1", "0.0"]
+    assert before == {path: path.stat().st_mtime_ns for path in folders}
+
+
+LAW = """
+from fowt_env.plant.compile.decorators import control_kernel, entry, kernel
+from gains import GAIN, wanted_pitch
+import gains
+
+@kernel
+def own_helper(speed):
+    return wanted_pitch(speed) + 100.0 * GAIN
+
+@entry
+def total(values):
+    return values[0] + own_helper(0.0)
+
+@control_kernel
+def law(parameters, memory, measurement, command):
+    command[0] = gains.GAIN
+    command[1] = own_helper(measurement[0])
+"""
+GAINS = (
+    "from fowt_env.plant.compile.decorators import kernel\nGAIN = {}\n"
+    "@kernel\ndef wanted_pitch(speed):\n    return {}\n"
+)
+CALL_LAW = """
+import numpy as np
+from fowt_env.controllers.base import call_law
+from law import law, total
+four = [np.zeros(2) for _ in range(4)]
+call_law(law, *four)
+print(*four[3], total(four[0]))
+"""
+
+
+def test_code_of_a_user_is_what_it_says_after_an_edit_of_another_file(tmp_path):
+    """Helpers, entries and laws, and numbers of other modules."""
+    (tmp_path / "law.py").write_text(LAW)
+    for gain, pitch in ((1.0, 0.25), (2.0, 0.25), (2.0, 0.75)):
+        (tmp_path / "gains.py").write_text(GAINS.format(gain, pitch))
+        expected = [f"{gain}", f"{100.0 * gain + pitch}", f"{100.0 * gain + pitch}"]
+        variables = {
+            "PYTHONDONTWRITEBYTECODE": "1",  # whose .pyc has a time of whole seconds
+            "FOWT_CACHE_DIR": os.environ.get("FOWT_CACHE_DIR", ""),  # where our own laws are compiled already
+        }
+        assert output(start(CALL_LAW, tmp_path / "unused", **variables)) == expected
+
+
+def apply(function, value):
+    """function(value), for the test below."""
+    return function(value)
+
+
+def test_what_is_compiled_into_one_of_ours_for_a_users_function_is_not_kept(tmp_path):
+    """But for a law it is, which is an address to it."""
+    compiled = numba.njit(apply)
+    compiled._cache = kernel_cache.KernelCache(apply, tmp_path)
+    helper = numba.njit(lambda x: x + 1.0)
+    assert compiled(helper, 1.0) == 2.0 and compiled((helper, helper)[0], 2.0) == 3.0
+    assert not list(tmp_path.rglob("*.nb?"))
+    law = numba.cfunc("float64(float64)")(lambda x: x + 2.0)
+    assert compiled(law, 1.0) == 3.0
+    assert len(list(tmp_path.rglob("*.nbc"))) == 1
+
+
+def test_numba_code_of_other_packages_is_kept_where_it_would_be_without_ours(tmp_path):
+    (tmp_path / "other.py").write_text("import numba\n@numba.njit(cache=True)\ndef f(x): return 2.0 * x\n")
+    code = "import fowt_env.plant.compile.decorators, other; other.f(1.0)"
+    output(start(code, tmp_path / "cache"))
+    assert list((tmp_path / "__pycache__").glob("other.f*.nbi"))
+    output(start(code, tmp_path / "cache", NUMBA_CACHE_DIR=str(tmp_path / "given")))
+    assert list((tmp_path / "given").rglob("other.f*.nbi"))
+    assert not list((tmp_path / "cache").rglob("other.f*.nbi"))
+
+
+def test_ours_are_kept_in_files_made_for_several_processes_whatever_numba_is_told(tmp_path):
+    code = (
+        "from fowt_env.weather.waves import ramp_factor as f\nfrom fowt_env.simulation import hold\n"
+        "print(*(type(g._cache._cache_file).__name__ for g in (f, hold)), f._cache.cache_path)\n"
+    )
+    variables = {"NUMBA_CACHE_DIR": str(tmp_path), "NUMBA_CACHE_LOCATOR_CLASSES": "InTreeCacheLocator"}
+    *kinds, used = output(start(code, tmp_path / "cache", **variables))
+    assert set(kinds) == {SharedCacheFile.__name__} and Path(used).is_relative_to(tmp_path / "cache")
+
+
+def test_another_way_of_numba_to_keep_code_is_noticed(monkeypatch, tmp_path):
+    monkeypatch.setattr(kernel_cache.caching, "IndexDataCacheFile", lambda **given: object())
+    monkeypatch.setattr(kernel_cache.numba, "__version__", "9.9.9")
+    with pytest.raises(ImportError, match="numba 9.9.9"):
+        kernel_cache.KernelCache(kernel_folder, tmp_path)
+
+
+def copied_code(tmp_path):
+    """Folder with a copy of the packages that hold kernels."""
+    code = tmp_path / "code"
+    for path in (*ROOT.glob("fowt_env/**/*.py"), *ROOT.glob("controllers/**/*.py"), REGISTRATION):
+        copy = code / path.relative_to(ROOT)
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        copy.write_bytes(path.read_bytes())
+    return code
+
+
+def test_kernels_of_the_studies_are_kept_until_one_of_their_sources_changes(tmp_path):
+    """Those of training, whose sources do not shape the name of the folder."""
+    training = copied_code(tmp_path) / "training"
+    training.mkdir()
+    (training / "numbers.py").write_text("GAIN = 1.0\n")
+    (training / "study.py").write_text(
+        "from fowt_env.plant.compile.decorators import entry\nfrom training.numbers import GAIN\n"
+        "@entry\ndef amplified(x):\n    return GAIN * x\n"
+    )
+    program = "from training.study import amplified as f; print(f(2.0), sum(f.stats.cache_hits.values()))\n"
+    for expected in (["2.0", "0"], ["2.0", "1"]):
+        assert output(start(program, tmp_path / "cache", training.parent)) == expected
+    (training / "numbers.py").write_text("GAIN = 10.0\n")
+    for expected in (["20.0", "0"], ["20.0", "1"]):
+        assert output(start(program, tmp_path / "cache", training.parent)) == expected
+    assert len(list((tmp_path / "cache" / "kernels").iterdir())) == 1
+
+
+def test_kernels_of_other_sources_are_never_used(tmp_path):
+    """Numba alone would: it watches the file of the function, and not those of what it calls."""
+    code = copied_code(tmp_path)
+    (code / "fowt_env" / "extra.py").write_text(
+        "from fowt_env.plant.compile.decorators import kernel\nfrom fowt_env.plant.state import add\n"
+        "@kernel\ndef twice(load):\n    return add(load, load).fx\n"
+    )
+    program = (
+        "from fowt_env.extra import twice\nfrom fowt_env.plant.state import NO_LOAD\n"
+        "print(twice(NO_LOAD._replace(fx=1.0)))\n"
+    )
+    assert output(start(program, tmp_path / "cache", code)) == ["2.0"]
+    state = code / "fowt_env" / "state.py"
+    text = state.read_text()
+    assert "a.fx + b.fx" in text
+    state.write_text(text.replace("a.fx + b.fx", "a.fx - b.fx"))
+    assert output(start(program, tmp_path / "cache", code)) == ["0.0"]
+    state.write_text(text)
+    assert output(start(program, tmp_path / "cache", code)) == ["2.0"]
+    assert len(list((tmp_path / "cache" / "kernels").iterdir())) == 2
+
+
+def _module_files():
+    """{module name: path} of the kernel packages."""
+    files = {}
+    for path in (*ROOT.glob("fowt_env/**/*.py"), *ROOT.glob("controllers/**/*.py")):
+        parts = path.relative_to(ROOT).with_suffix("").parts
+        files[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return files
+
+
+def _imported_at_the_top(path, files):
+    """Names of files' modules that a source imports outside its functions."""
+    found = set()
+    for node in ast.parse(path.read_text()).body:
+        if isinstance(node, ast.ImportFrom):
+            names = (f"{node.module}.{alias.name}" for alias in node.names)
+            found |= {name if name in files else node.module for name in names}
+        elif isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+    return found & set(files)
+
+
+def test_every_source_that_a_kernel_can_see_is_in_the_key_of_the_cache():
+    files = _module_files()
+    compiled = re.compile(r"^ *@(\w*kernel|\w*entry|overload|intrinsic)\b|\b(njit|cfunc)\(", re.MULTILINE)
+    waiting = [name for name, path in files.items() if compiled.search(path.read_text())]
+    seen = set()
+    while waiting:
+        name = waiting.pop()
+        if name not in seen:
+            seen.add(name)
+            waiting += _imported_at_the_top(files[name], files)
+    assert len(seen) > 50
+    missing = {files[name] for name in seen} - set(kernel_sources())
+    assert not missing
+    assert {path.name for path in set(files.values()) - set(kernel_sources())} >= {"cli_plot.py", "plots.py"}
+
+
+def test_broken_files_are_compiled_anew(tmp_path):
+    folder = tmp_path / "cache"
+    assert output(start(SMALL, folder)) == ["0.25"]
+    for ending in ("nbi", "nbc"):
+        for content in (b"", b"\x80\x04broken", bytes(3000)):
+            files = list(folder.rglob(f"*.{ending}"))
+            for path in files:
+                path.write_bytes(content)
+            assert files and output(start(SMALL, folder)) == ["0.25"], (ending, content[:10])
+            written = [path.read_bytes() for path in files if path.stem.startswith("waves.ramp")]
+            assert written and content not in written, (ending, content[:10])
+    assert output(start(SMALL, folder)) == ["0.25"]
+
+
+def test_without_room_for_machine_code_kernels_work_all_the_same(tmp_path):
+    limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))\n"
+    assert output(start(limit + SMALL, tmp_path / "cache")) == ["0.25"]
+    assert not list((tmp_path / "cache").rglob("*.nbc"))
+
+
+KEEPER = """
+import pathlib, sys
+from fowt_env.plant.compile.disk_cache import SharedCacheFile
+file = SharedCacheFile(sys.argv[1], "function", "stamp")
+ready = pathlib.Path(sys.argv[2])
+(ready / sys.argv[3]).touch()
+while len(list(ready.iterdir())) < 3:
+    pass
+for number in range(100):
+    file.save((sys.argv[3], number), f"code of {sys.argv[3]} {number}")
+"""
+
+
+def test_processes_that_keep_code_at_once_keep_all_of_it_under_the_right_keys(tmp_path):
+    """Of these 300 entries numba's own file was seen to lose 27 and to have 6 under another's key."""
+    ready = tmp_path / "ready"  # where each says that it can begin
+    ready.mkdir()
+    variables = os.environ | {"PYTHONPATH": str(ROOT)}
+    command = [sys.executable, "-c", KEEPER, tmp_path, ready]
+    keepers = [subprocess.Popen([*map(str, command), name], env=variables) for name in "abc"]
+    assert [keeper.wait(timeout=300) for keeper in keepers] == [0, 0, 0]
+    file = SharedCacheFile(str(tmp_path), "function", "stamp")
+    for name in "abc":
+        assert all(file.load((name, number)) == f"code of {name} {number}" for number in range(100))
+
+
+@pytest.mark.slow
+def test_two_processes_that_compile_at_once_give_the_same_bits_as_one_that_loads(tmp_path):
+    folder = tmp_path / "cache"
+    together = [start(DECAY, folder) for _ in range(2)]
+    (one, said_one), (other, said_other) = (output(process) for process in together)
+    loaded, said = output(start(DECAY, folder))
+    assert one == other == loaded
+    assert (said_one, said_other, said) == ("1", "1", "0")

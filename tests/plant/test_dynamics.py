@@ -1,0 +1,413 @@
+import csv
+from math import pi
+from pathlib import Path
+
+import numpy as np
+import pytest
+from naive import rigid_body
+from plant_helpers import integrate, make_pose, random_state, rates, state
+from scipy.integrate import solve_ivp
+
+from fowt_env.plant.drivetrain import build_drivetrain, shaft_torque
+from fowt_env.plant.dynamics import accelerate, gravity_load, inertial_load, solve_spd
+from fowt_env.plant.hydro.hydrostatics import submerged
+from fowt_env.plant.hydro.morison import StripLoad
+from fowt_env.plant.mooring import mooring_load
+from fowt_env.plant.state import NO_LOAD, State, Wrench, add, pose_of
+from fowt_env.scene.build import assemble, build_body
+
+REFERENCE = Path(__file__).parents[1] / "reference" / "accelerations.csv"
+DRY = StripLoad(NO_LOAD, 0.0, 0.0, 0.0, 0.0)
+SPEEDS = [*range(State.VX, State.WZ + 1), State.ROTOR_SPEED]
+TUMBLING = dict(
+    surge=1.0, sway=-2.0, heave=3.0, roll=0.2, platform_pitch=-0.15, yaw=0.4,
+    vx=1.5, vy=0.4, vz=-0.3, wx=0.05, wy=0.03, wz=-0.04, rotor_speed=1.2671,
+)  # fmt: skip
+
+
+def reference_states():
+    with REFERENCE.open() as lines:
+        rows = csv.DictReader(line for line in lines if not line.startswith("#"))
+        return [{name: float(value) for name, value in row.items()} for row in rows]
+
+
+def columns(row, *names):
+    return np.array([row[name] for name in names])
+
+
+def motion(row):
+    return (
+        columns(row, "vx", "vy", "vz"),
+        columns(row, "wx", "wy", "wz"),
+        columns(row, "hub_fx", "hub_fy", "hub_fz"),
+        columns(row, "hub_mx", "hub_my", "hub_mz"),
+    )
+
+
+def project_accelerations(row, turbine, body):
+    """(7,) of the package for one row of the reference file."""
+    v, w, force, moment = motion(row)
+    names = ("roll", "platform_pitch", "yaw", "rotor_speed")
+    x = state(**{name: row[name] for name in names})
+    x[State.VX : State.VX + 3], x[State.WX : State.WX + 3] = v, w
+    pose = pose_of(x)
+    about_origin = moment + np.cross(rigid_body.hub(turbine), force)
+    load = add(gravity_load(pose, body), Wrench(*force, *about_origin))
+    drivetrain = build_drivetrain(turbine)
+    torque = shaft_torque(moment[0], row["generator_torque"], row["rotor_speed"], drivetrain)
+    dx = np.zeros(15)
+    accelerate(pose, x, load, torque, DRY, body, np.zeros((6, 6)), dx)
+    return dx[SPEEDS]
+
+
+def naive_accelerations(row, platform, turbine, **options):
+    v, w, force, moment = motion(row)
+    R = rigid_body.rotation(row["roll"], row["platform_pitch"], row["yaw"])
+    torque = row["generator_torque"]
+    gravity = platform.environment.gravity
+    return rigid_body.accelerations(
+        platform, turbine, R, v, w, row["rotor_speed"], force, moment, torque, gravity, **options
+    )
+
+
+@pytest.mark.installation
+def test_accelerations_are_those_of_three_constrained_bodies(platform, turbine):
+    body = build_body(platform, turbine)
+    rows = reference_states()
+    assert len(rows) == 200
+    for row in rows:
+        expected = columns(row, "dvx", "dvy", "dvz", "dwx", "dwy", "dwz", "drotor_speed")
+        assert np.abs(project_accelerations(row, turbine, body) - expected).max() < 1e-11
+
+
+@pytest.mark.installation
+def test_accelerations_are_those_of_newton_and_euler_body_by_body(platform, turbine):
+    body = build_body(platform, turbine)
+    for row in reference_states()[:60]:
+        difference = project_accelerations(row, turbine, body) - naive_accelerations(row, platform, turbine)
+        assert np.abs(difference).max() < 1e-11
+
+
+def test_where_the_generator_sits_and_what_it_weighs_does_not_matter(platform, turbine):
+    row = reference_states()[0]
+    moved = naive_accelerations(
+        row, platform, turbine, generator_mass=9000.0, generator_centre=np.array([-1.0, 0.7, 90.0])
+    )
+    assert np.abs(moved - naive_accelerations(row, platform, turbine)).max() < 1e-11
+
+
+def test_held_rotor_moves_the_platform_as_a_prescribed_speed_does(platform, turbine):
+    body = build_body(platform, turbine, rotor_held=True)
+    for row in reference_states()[:60]:
+        expected = naive_accelerations(row, platform, turbine, held=True)
+        assert np.abs(project_accelerations(row, turbine, body) - expected).max() < 1e-11
+
+
+def test_held_platform_leaves_the_rotor_alone(platform, turbine):
+    body = build_body(platform, turbine, platform_held=True)
+    drivetrain = build_drivetrain(turbine)
+    row = reference_states()[0]
+    accelerations = project_accelerations(row, turbine, body)
+    torque = row["hub_mx"] - drivetrain.gear_ratio * row["generator_torque"]
+    assert np.all(accelerations[:6] == 0.0)
+    assert accelerations[6] == pytest.approx(torque / drivetrain.inertia_row, rel=1e-14)
+    both = build_body(platform, turbine, platform_held=True, rotor_held=True)
+    assert np.all(project_accelerations(row, turbine, both) == 0.0)
+
+
+@pytest.mark.installation
+def test_mass_matrix_has_the_published_entries(platform, turbine):
+    m = build_body(platform, turbine).mass_matrix
+    assert np.array_equal(m, m.T)
+    assert m[0, 0] == 8066048.0
+    assert m[1, 5] == pytest.approx(-9.6101e4, rel=1e-5)
+    # the hub stands at 90 m here and at 89.56256 m in the published list
+    shift = turbine.rotor.mass * (90.0 - 89.56256)
+    assert m[0, 4] - shift == pytest.approx(-6.29205e8, rel=1e-5)
+    steiner = turbine.rotor.mass * (90.0**2 - 89.56256**2)
+    assert m[3, 3] - steiner == pytest.approx(6.8022e10, rel=2e-5)
+    assert m[4, 4] - steiner == pytest.approx(6.8007e10, rel=2e-5)
+    assert m[5, 5] == pytest.approx(1.9079e8, rel=2e-5)
+
+
+@pytest.mark.installation
+def test_the_solver_agrees_with_numpy_on_badly_scaled_systems():
+    rng = np.random.default_rng(5)
+    for _ in range(50):
+        root = rng.normal(size=(6, 6))
+        scale = np.array([1e4, 1e4, 1e4, 1e6, 1e6, 1e5])
+        a = (root @ root.T + 0.1 * np.eye(6)) * np.outer(scale, scale)
+        right = rng.normal(size=6) * scale
+        b = right.copy()
+        solve_spd(a.copy(), b)
+        np.testing.assert_allclose(b * scale, np.linalg.solve(a, right) * scale, rtol=1e-10)
+
+
+def test_gyroscopic_terms_do_no_work(platform, turbine):
+    body = build_body(platform, turbine)
+    rng = np.random.default_rng(5)
+    for _ in range(100):
+        x = random_state(rng, speed=3.0, turning=0.3)
+        c = np.array(inertial_load(pose_of(x), x[State.ROTOR_SPEED], body.mass_matrix, body.coupling))
+        nu = x[State.VX : State.WZ + 1]
+        assert abs(c @ nu) < 1e-12 * np.abs(c * nu).max()
+
+
+def test_downwind_pitching_turns_the_nacelle_left(platform, turbine):
+    body = build_body(platform, turbine)
+    x = state(wy=0.01, rotor_speed=1.2671)
+    c = inertial_load(pose_of(x), 1.2671, body.mass_matrix, body.coupling)
+    assert -c.mz == pytest.approx(body.coupling * 1.2671 * 0.01, rel=1e-12)
+
+
+# Conservation laws of theory.md, section 10
+
+
+def invariants(scene, platform, turbine, states, gravity):
+    """(kinetic + potential energy, linear momentum, angular momentum) along a path, body by body."""
+    parts = rigid_body.bodies(platform, turbine)
+    energy, linear, angular = [], [], []
+    for x in states:
+        r, R = x[:3], rigid_body.rotation(*x[3:6])
+        v, w, speed = x[7:10], x[10:13], x[State.ROTOR_SPEED]
+        kinetic = rigid_body.kinetic_energy(parts, v, w, speed)
+        energy.append([kinetic, rigid_body.potential_energy(parts, r, R, gravity)])
+        p, h = rigid_body.momenta(parts, r, R, v, w, speed)
+        linear.append(p)
+        angular.append(h)
+    return np.array(energy), np.array(linear), np.array(angular)
+
+
+def drift(history):
+    """Largest change of a vector over its first length."""
+    return np.abs(history - history[0]).max() / np.linalg.norm(history[0])
+
+
+def weightless(scene):
+    return scene.with_model(body=scene.model.body._replace(gravity=0.0))
+
+
+def test_free_fall_with_a_spinning_rotor_keeps_its_energy(bare_scene, platform, turbine):
+    times, states = integrate(bare_scene, state(**TUMBLING), 100.0)
+    gravity = platform.environment.gravity
+    energy, linear, _ = invariants(bare_scene, platform, turbine, states, gravity)
+    total = energy.sum(axis=1)
+    assert np.abs(total - total[0]).max() < 1e-9 * energy[0, 0]
+    weight = bare_scene.model.body.mass * gravity
+    assert np.abs(linear[:, 2] - linear[0, 2] + weight * times).max() < 1e-12 * weight * 100.0
+
+
+@pytest.mark.parametrize("torque", [0.0, 2e4])
+def test_momenta_are_kept_without_gravity_whatever_the_generator_does(bare_scene, platform, turbine, torque):
+    # the generator's torque, the gearbox's and the friction act inside the turbine
+    times, states = integrate(weightless(bare_scene), state(**TUMBLING), 100.0, u=(torque, 0.0))
+    energy, linear, angular = invariants(bare_scene, platform, turbine, states, 0.0)
+    assert drift(linear) < 1e-11
+    assert drift(angular) < 1e-11
+    if torque == 0.0:
+        assert drift(energy[:, :1]) < 1e-11
+    else:
+        assert np.ptp(states[:, State.ROTOR_SPEED]) > 1.0
+
+
+def with_coupling_sign(bare_scene, sign):
+    """Path of the weightless turbine whose gyroscopic moment C2 w_b has this sign."""
+    body = weightless(bare_scene).model.body
+
+    def rate(t, x):
+        dx = rates(weightless_scene, x, box=box)
+        extra = (1.0 - sign) * body.coupling * x[State.ROTOR_SPEED]
+        load = Wrench(0.0, 0.0, 0.0, 0.0, extra * x[State.WZ], -extra * x[State.WY])
+        accelerate(pose_of(x), x, load, 0.0, DRY, body, np.zeros((6, 6)), dx)
+        return dx
+
+    weightless_scene = weightless(bare_scene)
+    box = weightless_scene.box()
+    x0 = state(**TUMBLING)
+    solution = solve_ivp(rate, (0.0, 50.0), x0, method="DOP853", rtol=1e-10, atol=1e-12, max_step=1.0)
+    return solution.y.T
+
+
+def test_a_wrong_sign_of_the_gyroscopic_moment_would_be_noticed(bare_scene, platform, turbine):
+    for sign, noticed in ((1.0, False), (-1.0, True)):
+        states = with_coupling_sign(bare_scene, sign)
+        energy, _, angular = invariants(bare_scene, platform, turbine, states, 0.0)
+        assert drift(energy[:, :1]) < 1e-7  # energy cannot tell: the term does no work either way
+        assert (drift(angular) > 1e-3) == noticed
+        assert noticed or drift(angular) < 1e-8
+
+
+def test_euler_angles_and_a_quaternion_lead_to_the_same_place(bare_scene):
+    x0 = state(**TUMBLING)
+    times, states = integrate(bare_scene, x0, 100.0)
+    body = bare_scene.model.body
+
+    def rate(t, y):
+        R = rigid_body.quaternion_rotation(y[3:7])
+        pose = make_pose(y[:3], R, y[7:10], y[10:13])
+        x, dx = np.zeros(15), np.zeros(15)
+        x[State.VX : State.WZ + 1], x[State.ROTOR_SPEED] = y[7:13], y[13]
+        accelerate(pose, x, gravity_load(pose, body), 0.0, DRY, body, np.zeros((6, 6)), dx)
+        return np.r_[R @ y[7:10], rigid_body.quaternion_rate(y[3:7], y[10:13]), dx[SPEEDS]]
+
+    y0 = np.r_[x0[:3], rigid_body.quaternion(*x0[3:6]), x0[SPEEDS]]
+    scale = np.r_[np.full(3, 100.0), np.ones(4), np.full(3, 10.0), np.ones(4)]
+    solution = solve_ivp(
+        rate, (0.0, 100.0), y0, method="DOP853", rtol=1e-13, atol=1e-14 * scale, t_eval=times, max_step=0.5
+    )
+    fallen = np.abs(states[-1, State.HEAVE])
+    assert fallen > 4e4
+    assert np.abs(solution.y[:3].T - states[:, :3]).max() < 1e-8  # m, over 49 km
+    for x, q in zip(states, solution.y[3:7].T, strict=True):
+        assert np.abs(rigid_body.rotation(*x[3:6]) - rigid_body.quaternion_rotation(q)).max() < 1e-9
+
+
+def test_pinned_heavy_gyrostat_keeps_energy_and_vertical_angular_momentum(platform, turbine):
+    body = build_body(platform, turbine)
+    parts = rigid_body.bodies(platform, turbine)
+    gravity = platform.environment.gravity
+
+    def solve(q, w, speed, force):
+        pose = make_pose(np.zeros(3), rigid_body.quaternion_rotation(q), np.zeros(3), w)
+        x, dx = np.zeros(15), np.zeros(15)
+        x[State.WX : State.WZ + 1], x[State.ROTOR_SPEED] = w, speed
+        load = add(gravity_load(pose, body), Wrench(*force, 0.0, 0.0, 0.0))
+        accelerate(pose, x, load, 0.0, DRY, body, np.zeros((6, 6)), dx)
+        return dx[SPEEDS]
+
+    # the force at the pin is the one under which it stays: v' is linear in it
+    upright = np.array([1.0, 0.0, 0.0, 0.0])
+    at_rest = solve(upright, np.zeros(3), 0.0, np.zeros(3))[:3]
+    effect = [solve(upright, np.zeros(3), 0.0, 1e8 * unit)[:3] - at_rest for unit in np.eye(3)]
+    influence = np.array(effect).T / 1e8
+
+    def rate(t, y):
+        q, w, speed = y[:4], y[4:7], y[7]
+        force = np.linalg.solve(influence, -solve(q, w, speed, np.zeros(3))[:3])
+        return np.r_[rigid_body.quaternion_rate(q, w), solve(q, w, speed, force)[3:]]
+
+    y0 = np.r_[rigid_body.quaternion(0.2, -0.15, 0.4), [0.02, 0.03, -0.04], 1.2671]
+    times = np.linspace(0.0, 100.0, 41)
+    solution = solve_ivp(
+        rate, (0.0, 100.0), y0, method="DOP853", rtol=1e-12, atol=1e-14, t_eval=times, max_step=1.0
+    )
+    energy, vertical = [], []
+    for y in solution.y.T:
+        R = rigid_body.quaternion_rotation(y[:4])
+        kinetic = rigid_body.kinetic_energy(parts, np.zeros(3), y[4:7], y[7])
+        energy.append(kinetic + rigid_body.potential_energy(parts, np.zeros(3), R, gravity))
+        _, angular = rigid_body.momenta(parts, np.zeros(3), R, np.zeros(3), y[4:7], y[7])
+        vertical.append(angular[2])
+    swing = 0.03 * gravity * abs(body.s_z)
+    assert np.ptp(energy) < 1e-10 * swing
+    assert np.ptp(vertical) < 1e-10 * 0.05 * body.mass_matrix[4, 4]
+
+
+def test_nutation_has_the_rate_of_a_symmetric_gyrostat(bare_scene):
+    matrix = assemble([(1e6, (0.0, 0.0, 0.0), (2e8, 3e8, 3e8))])
+    body = bare_scene.model.body._replace(mass_matrix=matrix, mass=1e6, s_x=0.0, s_z=0.0, gravity=0.0)
+    speed = 1.2671
+    x0 = state(wy=0.001, rotor_speed=speed)
+    times, states = integrate(bare_scene.with_model(body=body), x0, 60.0, samples=1201)
+    turned = np.unwrap(np.arctan2(states[:, State.WZ], states[:, State.WY]))
+    assert np.polyfit(times, turned, 1)[0] == pytest.approx(body.coupling * speed / 3e8, rel=1e-8)
+
+
+def line_energy(H, V, length, weight, EA):
+    """Elastic and gravity energy of one frictionless line on the seabed or clear of it, by quadrature."""
+    lying = max(0.0, length - V / weight)
+    x, w = np.polynomial.legendre.leggauss(60)
+    s = lying + (length - lying) * (x + 1.0) / 2.0
+    vertical = V - weight * (length - s)
+    start = V - weight * (length - lying)
+    tension = np.hypot(H, vertical)
+    height = (tension - np.hypot(H, start)) / weight + (vertical**2 - start**2) / (2.0 * EA * weight)
+    hanging = np.sum(w * (length - lying) / 2.0 * (tension**2 / (2.0 * EA) + weight * height))
+    return hanging + lying * H * H / (2.0 * EA)
+
+
+def test_floating_body_on_its_lines_keeps_its_energy_without_fluid_inertia(still_scene, platform, turbine):
+    model = still_scene.model
+    strips = model.strips._replace(
+        added_mass_coefficient=0.0, drag_coefficient=0.0, heave_added_mass=0.0,
+    )  # fmt: skip
+    damping = type(model.damping)(*(0.0,) * 7)
+    scene = still_scene.with_model(strips=strips, damping=damping)
+    x0 = state(
+        surge=5.0, sway=2.0, heave=0.5, roll=0.02, platform_pitch=0.06, yaw=0.03,
+        vx=0.3, vy=-0.1, vz=0.05, wx=0.002, wy=0.004, wz=-0.001, rotor_speed=1.2671,
+    )  # fmt: skip
+    times, states = integrate(scene, x0, 100.0, samples=26, rtol=1e-12, atol=1e-13)
+    gravity = platform.environment.gravity
+    energy, _, _ = invariants(scene, platform, turbine, states, gravity)
+    work = scene.work()
+    outside = []
+    for x in states:
+        pose = pose_of(x)
+        mooring_load(pose, model.mooring, work.lines, work.counters)
+        lines = zip(work.lines, model.mooring.length, model.mooring.weight, model.mooring.EA, strict=True)
+        total = sum(line_energy(row[0], row[1], *line) for row, *line in lines)
+        volume, qx, qy, qz = submerged(pose, model.hull, work.counters)
+        height = volume * pose.z + qx * pose.r31 + qy * pose.r32 + qz * pose.r33
+        outside.append(total - model.hull.specific_weight * height)
+    total = energy.sum(axis=1) + outside
+    spin = 0.5 * model.body.rotor_row * x0[State.ROTOR_SPEED] ** 2
+    moving = np.abs(energy[:, 0] - spin).max()
+    assert np.abs(states[:, State.SURGE]).max() > 4.0
+    assert np.abs(total - total[0]).max() < 1e-8 * moving
+
+
+# Symmetries
+
+MIRROR = np.ones(15)
+MIRROR[[State.SWAY, State.ROLL, State.YAW, State.VY, State.WX, State.WZ, State.ROTOR_SPEED]] = -1.0
+
+
+def test_left_and_right_are_mirror_images(wave_scene):
+    rng = np.random.default_rng(8)
+    for _ in range(30):
+        x, t = random_state(rng), rng.uniform(0.0, 20.0)
+        here = rates(wave_scene, x, t=t)
+        there = rates(wave_scene, MIRROR * x, t=t)
+        assert np.abs(there - MIRROR * here)[SPEEDS].max() < 1e-12
+
+
+def turned_scene(scene, angle):
+    """The scene with anchors, waves and wind turned about the vertical; the yaw spring is left out."""
+    model = scene.model
+    c, s = np.cos(angle), np.sin(angle)
+    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    parts = {
+        "damping": model.damping._replace(yaw_stiffness=0.0),
+        "mooring": model.mooring._replace(anchor=np.ascontiguousarray(model.mooring.anchor @ turn.T)),
+    }
+    waves, wind = model.waves, model.wind
+    if waves is not None:
+        cosine, sine = waves.cos_heading, waves.sin_heading
+        parts["waves"] = waves._replace(cos_heading=c * cosine - s * sine, sin_heading=s * cosine + c * sine)
+    if wind is not None:
+        value = wind.value.copy()
+        value[:, :2] = wind.value[:, :2] @ turn[:2, :2].T
+        parts["wind"] = wind._replace(value=value)
+    return scene.with_model(**parts), turn
+
+
+@pytest.mark.parametrize("name", ["wave_scene", "storm_scene"])
+def test_nothing_depends_on_the_compass(name, request):
+    scene = request.getfixturevalue(name)
+    rng = np.random.default_rng(9)
+    plain, _ = turned_scene(scene, 0.0)
+    for _ in range(20):
+        x, t, angle = random_state(rng, scene.n_state), rng.uniform(0.0, 20.0), rng.uniform(-pi, pi)
+        other, turn = turned_scene(scene, angle)
+        turned = x.copy()
+        turned[:3] = turn @ x[:3]
+        turned[State.YAW] += angle
+        command = (4e4, 0.1)
+        difference = rates(other, turned, command, t) - rates(plain, x, command, t)
+        assert np.abs(difference[SPEEDS]).max() < 1e-10
+
+
+def test_still_water_has_no_preferred_time(still_scene):
+    x = random_state(np.random.default_rng(4))
+    assert np.array_equal(rates(still_scene, x, t=0.0), rates(still_scene, x, t=123.4))

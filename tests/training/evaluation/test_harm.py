@@ -1,0 +1,418 @@
+"""What a controller or a run does to others of its evaluation, and to the results folder: nothing."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+
+import numpy as np
+import pandas as pd
+import pytest
+import stub_plant
+from typer.testing import CliRunner
+
+import fowt_env
+from fowt_env.descriptions.platform import read_platform, read_turbine
+from fowt_env.errors import InputError
+from fowt_env.training.cli import app as cli
+from fowt_env.training.evaluation import engines, guard, results
+from fowt_env.training.evaluation.cases import Case
+from fowt_env.training.evaluation.evaluate import COLUMNS, evaluate
+from fowt_env.training.evaluation.metrics import METRICS
+from fowt_env.training.evaluation.results import LONGEST_NAME, check_name, read_row, run_file, write_run
+from fowt_env.training.reports.terminal import evaluation_plots, write_leaderboard
+
+CALM = Case("calm", 16.0)
+SHORT = {"duration": 4.0, "skip": 1.0}
+
+
+@pytest.fixture
+def plant(monkeypatch):
+    stub_plant.install(monkeypatch)
+    monkeypatch.setattr(engines, "GRACE", 0.5)
+    monkeypatch.setattr(engines, "kernels_compiled", lambda: True)  # else the first run is done here
+
+
+def rows_of(controllers, cases=(CALM,), **options):
+    """{controller: row} of an evaluation of kinds of stub_plant."""
+    table = evaluate(controllers, list(cases), **SHORT | options)
+    assert list(table.columns) == list(COLUMNS)
+    return table.set_index("controller", drop=False).to_dict("index")
+
+
+FAILURES = {
+    stub_plant.Exits: "SystemExit: 0",
+    stub_plant.Closes: "GeneratorExit",
+    stub_plant.Interrupts: "KeyboardInterrupt",
+    stub_plant.Unborn: "SystemExit: 3",
+    stub_plant.Mute: "Odd, whose message cannot be read (SystemExit)",
+    stub_plant.Smuggles: r"FileNotFoundError: none\udcff\x1b[31m \u202efound",
+    stub_plant.Floods: "controller 'Floods' returned [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, ...] at t = 0.000 s:"
+    " act()"
+    " must return two finite numbers, (generator torque in N m on the high-speed shaft, blade pitch in rad)",
+    stub_plant.Nameless: None,
+    stub_plant.Forges: "y" * 496 + " ...",
+    stub_plant.ForgesMore: "y" * 496 + " ...",
+}
+
+
+def test_whatever_a_controller_raises_costs_its_own_run_and_the_folder_stays_sound(
+    plant, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    kinds = {kind.__name__: kind if kind is stub_plant.Unborn else kind() for kind in FAILURES}
+    kinds = {"before": stub_plant.Still(), **kinds, "after": stub_plant.Still()}
+    rows = rows_of(kinds, folder="out")
+    for kind, reason in FAILURES.items():
+        row = rows[kind.__name__]
+        assert row["status"] == "failed" and np.isnan([row[name] for name in METRICS]).all()
+        assert row["reason"].isprintable() and 0 < len(row["reason"]) <= 500
+        assert reason is None or row["reason"] == reason
+    assert rows["before"]["status"] == rows["after"]["status"] == "ok"
+    assert rows["Interrupts"]["stopped_[s]"] == pytest.approx(1.0)  # its last row
+    again = rows_of({"before": stub_plant.Still()}, folder="out")  # what is there is read, and sound
+    assert again.keys() == rows.keys() and again["Smuggles"]["reason"] == rows["Smuggles"]["reason"]
+
+
+def test_a_controller_that_ends_its_worker_process_costs_its_own_run(plant, tmp_path, monkeypatch):
+    monkeypatch.setattr(engines, "ATTEMPTS", 2)
+    kinds = {"dies": stub_plant.Dies(), "exits": stub_plant.Exits(), "still": stub_plant.Still()}
+    rows = rows_of(kinds, folder=tmp_path, jobs=2)
+    assert rows["dies"]["reason"] == "its worker process ended 2 times, the last time alone, with exit code 0"
+    assert rows["exits"]["reason"] == "SystemExit: 0" and rows["still"]["status"] == "ok"
+    assert read_row(run_file(tmp_path / "runs", "dies", "calm", 1))["status"] == "failed"
+
+
+@pytest.mark.parametrize("kind", [stub_plant.Signalled, stub_plant.Deaf])
+def test_ctrl_c_ends_an_evaluation_whatever_a_controller_makes_of_it(plant, kind):
+    handler = signal.getsignal(signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt):
+        evaluate({"one": stub_plant.Still(), "hit": kind()}, [CALM], **SHORT)
+    assert signal.getsignal(signal.SIGINT) is handler
+
+
+def test_a_programs_own_handler_of_sigterm_ends_an_evaluation(plant):
+    before = signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(143))
+    try:
+        with pytest.raises(SystemExit, match="143"):
+            evaluate({"hit": stub_plant.Terminated()}, [CALM], **SHORT)
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+@pytest.mark.parametrize("kind", [stub_plant.Sleeps, stub_plant.Swallows])
+def test_a_run_over_the_time_limit_fails_with_its_rows_and_the_others_go_on(
+    plant, tmp_path, kind, monkeypatch
+):
+    monkeypatch.setattr(guard, "AGAIN", 0.1)
+    kinds = {"late": kind(), "still": stub_plant.Still()}
+    rows = rows_of(kinds, folder=tmp_path, time_limit=0.2)
+    assert rows["late"]["reason"] == "time limit: more than 0.2 s of wall clock"
+    assert rows["late"]["stopped_[s]"] == pytest.approx(1.0) and rows["still"]["status"] == "ok"
+    assert len(pd.read_parquet(run_file(tmp_path / "runs", "late", "calm", 1))) == 11
+    assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
+
+
+def test_a_time_limit_leaves_the_alarm_of_the_program_as_it_was():
+    rang = []
+    before = signal.signal(signal.SIGALRM, lambda number, frame: rang.append(number))
+    signal.setitimer(signal.ITIMER_REAL, 1000.0, 7.0)
+    try:
+        assert guard.attempt(lambda: 5, 100.0) == (5, None)
+        rest, period = signal.getitimer(signal.ITIMER_REAL)
+        assert 900.0 < rest <= 1000.0 and period == 7.0 and not rang
+        signal.raise_signal(signal.SIGALRM)
+        assert rang == [signal.SIGALRM]
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def test_a_run_that_never_comes_back_to_python_is_ended_with_its_worker(plant):
+    kinds = {"endless": stub_plant.Compiled(), "still": stub_plant.Still()}
+    rows = rows_of(kinds, jobs=2, time_limit=0.5)
+    assert rows["endless"]["reason"] == "time limit: more than 0.5 s of wall clock"
+    assert rows["still"]["status"] == "ok"
+
+
+def test_without_a_time_limit_and_outside_the_main_thread_runs_go_on_as_ever(plant):
+    found = []
+    thread = threading.Thread(target=lambda: found.append(rows_of({"a": stub_plant.Still()}, time_limit=9.0)))
+    thread.start()
+    thread.join()
+    unlimited = rows_of({"a": stub_plant.Still()}, time_limit=None)
+    assert found[0]["a"] == pytest.approx(unlimited["a"], nan_ok=True)
+    for wrong in (0.0, -1.0, float("nan"), "5"):
+        with pytest.raises(InputError, match="time_limit"):
+            rows_of({"a": stub_plant.Still()}, time_limit=wrong)
+
+
+def test_a_controller_that_leaves_the_working_folder_takes_nothing_with_it(plant, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    rows = rows_of({"wanders": stub_plant.Wanders(), "still": stub_plant.Still()}, folder="out")
+    assert os.getcwd() == str(tmp_path) and rows["wanders"]["status"] == rows["still"]["status"] == "ok"
+    assert len(list(tmp_path.glob("out/runs/*/calm_seed1.parquet"))) == 2
+
+
+def test_a_command_that_is_ended_from_inside_says_so_and_does_not_return_0(monkeypatch):
+    monkeypatch.setattr(fowt_env, "simulate", lambda *arguments, **options: sys.exit(0))
+    result = CliRunner().invoke(cli.app, ["simulate", "--duration", "5", "--wind", "none"])
+    assert result.exit_code == cli.EXIT_STOPPED and "SystemExit: 0" in result.stderr
+
+
+def test_the_command_goes_through_to_its_leaderboard_and_says_what_failed_and_what_was_rare(plant, tmp_path):
+    kinds = ",".join(f"{stub_plant.__name__}:{name}" for name in ("Exits", "Still"))
+    words = f"--controllers {kinds} --cases steady_16 --seeds 1,2 --duration 4 --skip 1 --no-plot --out"
+    result = CliRunner().invoke(cli.app, ["evaluate", *words.split(), str(tmp_path)])
+    assert result.exit_code == 0, result.output
+    assert result.stderr.count("stub_plant:Exits, steady_16, seed") == 2
+    assert result.stderr.count("SystemExit: 0") == 2
+    assert "1 of 4 runs had rare numerical events" in result.stderr
+    board = json.loads((tmp_path / "leaderboard.json").read_text())
+    assert [entry["failed"] for entry in board["controllers"]] == [0, 2]
+
+
+# ------------------------------------------------------------------ names
+
+
+def test_no_two_names_have_one_file():
+    names = ["c2:A", "c2_A", "C2_A", "c2_a", "c2 A", "c2/A", "..", ".", ".hidden", "hidden", "pi", "PI"]
+    names += ["policy:runs/ppo/0/best.npz", "policy:runs/ppo_0/best.npz", "größe", "gr__e"]
+    names += ["x" * 300, "x" * 301, "ß" * 300]
+    for place in (
+        lambda name: run_file("runs", name, "calm", 1),
+        lambda name: run_file("runs", "pi", name, 1),
+    ):
+        paths = [place(name) for name in names]
+        assert len({str(path).casefold() for path in paths}) == len(names)
+        for path in paths:
+            assert len(path.parts) == 3 and not {"..", "."} & set(path.parts)
+            assert all(len(os.fsencode(part)) < 150 and not part.startswith(".") for part in path.parts)
+    assert str(run_file("runs", "gspi_oc3", "ntm_18", 2)) == "runs/gspi_oc3/ntm_18_seed2.parquet"
+    assert run_file("runs", "policy:ppo_lqr", "a", 1).parent.name.startswith("policy_ppo_lqr-")
+
+
+def test_names_whose_files_would_meet_all_the_same_are_refused_with_both_of_them(plant, tmp_path):
+    meets = run_file("runs", "c2:A", "calm", 1).parent.name.lower()
+    with pytest.raises(InputError, match=f"'c2:A' in case 'calm' and controller '{meets}'"):
+        evaluate({"c2:A": stub_plant.Still(), meets: stub_plant.Still()}, [CALM], folder=tmp_path, **SHORT)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    "name", ["", " ", "a\nb", "a\x1b[31m", "a\udcff", "\u202ea", "x" * (LONGEST_NAME + 1), 7]
+)
+def test_names_that_no_table_can_hold_are_refused_before_anything_runs(plant, tmp_path, name):
+    for label, case in ((name, "calm"), ("a", name)):
+        with pytest.raises(InputError, match="must be a printable text of at most 500 characters"):
+            evaluate({label: stub_plant.Still()}, [Case(case, 16.0)], folder=tmp_path, **SHORT)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_hidden_case_and_a_long_label_are_run_once_and_no_file_but_a_leftover_is_deleted(plant, tmp_path):
+    asked = {"x" * 300: stub_plant.Still(), "a:b": stub_plant.Still(), "a_b": stub_plant.Wanders()}
+    cases = (Case(".hidden", 16.0), Case("Hidden", 17.0), Case("..", 18.0))
+    first = evaluate(asked, cases, folder=tmp_path, **SHORT)
+    own = tmp_path / "runs" / "a_b" / ".mine.parquet"
+    own.write_bytes(b"not yours")
+    made = []
+    say = {"progress": lambda done, total, row: row and made.append(row)}
+    pd.testing.assert_frame_equal(evaluate(asked, cases, folder=tmp_path, **say, **SHORT), first)
+    assert not made and own.read_bytes() == b"not yours"
+    assert len(list(tmp_path.glob("runs/*/[!.]*.parquet"))) == 9
+
+
+def test_plots_of_a_case_lie_in_the_folder_whatever_its_name(plant, tmp_path):
+    folder = tmp_path / "out"
+    table = evaluate({"a": stub_plant.Still()}, [Case("../up", 16.0)], folder=folder, **SHORT)
+    paths = evaluation_plots(table, write_leaderboard(table, folder), folder)
+    assert len(paths) == 5 and all(path.parent == folder and path.is_file() for path in paths)
+    assert list(tmp_path.iterdir()) == [folder]
+
+
+def test_two_objects_of_one_class_need_names(plant):
+    with pytest.raises(InputError, match="two have the name 'Still'"):
+        evaluate([stub_plant.Still(), stub_plant.Still()], [CALM], **SHORT)
+
+
+# ------------------------------------------------------------------ rows and folders
+
+
+def written_row(tmp_path, **changes):
+    """Path of a run file whose row has been changed."""
+    row = dict.fromkeys(COLUMNS, 1.5) | {"controller": "pi", "case": "calm", "seed": 1, "status": "ok"}
+    row = row | {"reason": "", "events": ""} | changes
+    row = {name: value for name, value in row.items() if value is not Ellipsis}
+    return write_run(None, row, tmp_path / "runs" / "pi" / "calm_seed1.parquet")
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"controller": ["x"]}, {"controller": None}, {"controller": "a\x1bb"}, {"case": 5}, {"case": ...},
+        {"seed": "1"}, {"seed": 1.0}, {"seed": True}, {"seed": -1}, {"seed": 2**63}, {"seed": None},
+        {"status": "fine"}, {"status": ...}, {"reason": 5}, {"reason": None}, {"events": {}},
+        {"scored_[s]": "long"}, {METRICS[0]: [1.0]}, {METRICS[0]: True}, {METRICS[0]: 10**400},
+    ],
+)  # fmt: skip
+def test_a_row_with_a_wrong_type_is_refused_by_its_files_name(tmp_path, changes):
+    path = written_row(tmp_path, **changes)
+    with pytest.raises(InputError, match=r"calm_seed1.parquet' is no run of an evaluation \(.*remove it"):
+        read_row(path)
+
+
+def test_a_row_of_a_file_elsewhere_is_refused_and_a_strangers_reason_made_printable(plant, tmp_path):
+    path = written_row(tmp_path, status="failed", reason="a\x1b[31m\nb" + "c" * 900)
+    assert read_row(path)["reason"] == "a\\x1b[31m b" + "c" * 485 + " ..."
+    path.rename(path.with_name("calm_seed2.parquet"))
+    with pytest.raises(InputError, match="calm_seed2.parquet' holds the run pi, calm, 1: remove it"):
+        with results.open_results(tmp_path, SETTINGS, COLUMNS):
+            pass
+
+
+SETTINGS = {"suite": None, "options": {}, "cases": {}, "seeds": [], "controllers": {}}
+
+
+@pytest.mark.parametrize("package", ["numpy", "numba", "machine", "rainflow"])
+def test_a_folder_of_other_versions_is_refused_with_both_of_them(tmp_path, package):
+    with results.open_results(tmp_path, SETTINGS, COLUMNS):
+        pass
+    path = tmp_path / "manifest.json"
+    manifest = json.loads(path.read_text())
+    assert manifest["versions"] == results.versions()
+    here = manifest["versions"][package]
+    path.write_text(json.dumps(manifest | {"versions": manifest["versions"] | {package: "0.1"}}))
+    with pytest.raises(InputError, match=f"made with {package} 0.1, this is {package} {here}: choose"):
+        with results.open_results(tmp_path, SETTINGS, COLUMNS):
+            pass
+    less = {name: version for name, version in manifest["versions"].items() if name != package}
+    path.write_text(json.dumps(manifest | {"versions": less | {"pandas": "0.1"}}))  # shapes nothing
+    with results.open_results(tmp_path, SETTINGS, COLUMNS):
+        pass
+    assert json.loads(path.read_text())["versions"] == results.versions() | {"pandas": "0.1"}
+
+
+def test_a_ray_worker_of_other_versions_does_nothing(monkeypatch):
+    from fowt_env.training.evaluation.evaluate import score_and_send
+
+    with pytest.raises(InputError, match="numpy 0.1 here and numpy .* at the worker"):
+        score_and_send(None, here=results.versions() | {"numpy": "0.1"})
+
+
+def test_rare_events_of_a_run_are_in_its_row(plant, tmp_path):
+    table = evaluate({"a": stub_plant.Still()}, [CALM], seeds=(1, 2), folder=tmp_path, **SHORT)
+    assert table["events"].tolist() == ["", "MOORING_UNCONVERGED 3"]
+    assert read_row(run_file(tmp_path / "runs", "a", "calm", 2))["events"] == "MOORING_UNCONVERGED 3"
+
+
+def test_a_row_is_that_of_the_scored_part_of_its_file_by_the_figures_of_its_own_turbine(plant, tmp_path):
+    small = Case("small", 5.0, platform="oc3_froude_10mw")
+    table = evaluate({"a": stub_plant.Still()}, [small], duration=30.0, skip=7.0, folder=tmp_path)
+    row, run = table.iloc[0], pd.read_parquet(run_file(tmp_path / "runs", "a", "small", 1))
+    turbine = read_turbine(read_platform("oc3_froude_10mw").turbine)
+    rated_rpm = turbine.rated_rotor_speed * 30.0 / np.pi
+    limit = np.degrees(turbine.pitch_drive.rate_limit)
+    assert abs(rated_rpm - 12.1) > 1.0 and abs(limit - 8.0) > 0.5  # not what metrics takes by itself
+    time = run["Time_[s]"].to_numpy()
+    kept = run[time > 7.0 - 0.05]
+    assert len(kept) == 231 and row["scored_[s]"] == 23.0
+    assert row["PtfmPitch_mean_[deg]"] == pytest.approx(np.average(kept["PtfmPitch_[deg]"]), rel=1e-12)
+    over = 100.0 * (kept["RotSpeed_[rpm]"].max() - rated_rpm) / rated_rpm
+    assert over > 0.0 and row["overspeed_[%]"] == pytest.approx(over, rel=1e-9)
+    rates = np.abs(np.diff(kept["BldPitch1_[deg]"])) / 0.1
+    assert row["actuator_duty_[%]"] == pytest.approx(100.0 * rates.mean() / limit, rel=1e-9)
+
+
+# ------------------------------------------------------------------ what shapes a run
+
+
+USED = """
+import sys
+from fowt_env.training.evaluation.cases import Case
+from fowt_env.training.evaluation.run_case import Run, scored
+from fowt_env.training.evaluation.model_mismatch import Shift
+sea = {"kind": "jonswap", "Hs": 3.0, "Tp": 9.0}
+wind = {"kind": "ntm", "speed": 18.0, "class": "B"}
+case = Case("c", wind, sea, shift=Shift(noise=0.01))
+row, _ = scored(Run("constant", "constant", case, 1, 1.0, 0.1, {}, None))
+assert row["status"] == "ok", row["reason"]
+own = ("fowt_env.", "training.", "fowt_env.controllers.base", "fowt_env.controllers.constant")
+print(*{sys.modules[name].__file__ for name in [*sys.modules] if name.startswith(own)}, sep="\\n")
+"""
+
+
+def test_what_a_run_imports_is_in_the_hash_of_the_plant_and_what_people_look_at_is_not(tmp_path):
+    environment = os.environ | {"PYTHONPATH": str(results.ROOT)}
+    done = subprocess.run(
+        [sys.executable, "-c", USED], env=environment, cwd=tmp_path, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    files = {str(path) for path in results.plant_files()}
+    # of the program above, and of agents
+    others = ("training/evaluation/cases.py", "fowt_env/envs/decisions.py")
+    used = set(done.stdout.split()) - {str(results.ROOT / name) for name in others}
+    assert used <= files and len(used) > 40
+    names = {path.relative_to(results.ROOT).as_posix() for path in results.plant_files()}
+    data = "fowt_env/data/platforms/oc3_hywind.toml"
+    assert {data, "training/evaluation/metrics.py", "training/evaluation/faults.py"} <= names
+    looks = ("fowt_env/cli", "fowt_env/plots", "fowt_env/animation", "training/report", "controllers/pi")
+    assert not [name for name in names if name.startswith(looks)]
+
+
+PROJECT = {
+    "mine.py": "from gains import K\nimport shared.filters as f\nclass Law:\n"
+    "    def reset(self, m):\n        from late import x\n    def act(self, m):\n        return 1.0, K\n",
+    "gains.py": "K = 0.1\n",
+    "late.py": "import numpy\nx = 1\n",
+    "shared/__init__.py": "",
+    "shared/filters.py": "from . import corner\nfrom .deep.far import y\n",
+    "shared/corner.py": "",
+    "shared/deep/far.py": "y = 2\n",
+    "other.py": "",
+}
+
+
+@pytest.mark.parametrize("how", ["name", "object", "class"])
+def test_an_edit_of_what_a_controllers_module_imports_from_its_project_changes_its_code(
+    tmp_path, monkeypatch, how
+):
+    for name, text in PROJECT.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.delitem(sys.modules, "mine", raising=False)
+    if how == "name":
+        controller = "mine:Law"
+    else:
+        import mine
+
+        controller = mine.Law if how == "class" else mine.Law()
+    known = results.controller_code(controller)["code"]
+    assert results.controller_code(controller)["code"] == known
+    for name in PROJECT:
+        path = tmp_path / name
+        before = path.read_text()
+        path.write_text(before + "# edited\n")
+        assert (results.controller_code(controller)["code"] != known) == (name != "other.py"), name
+        path.write_text(before)
+    assert results.controller_code(controller)["code"] == known
+    for name in ("mine", "gains", "late", "shared", "shared.filters", "shared.corner"):
+        sys.modules.pop(name, None)
+
+
+def test_a_users_controller_depends_on_those_of_the_package_that_it_builds_on(tmp_path, monkeypatch):
+    text = "from fowt_env.controllers.lqr.law import lqr as Law\nimport fowt_env.controllers\n"
+    (tmp_path / "built.py").write_text(text)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    names = {path.relative_to(path.parents[1]).as_posix() for path in results._user_files("built")}
+    law = {"controllers/lqr/law.py", "controllers/lqr/design.py"}
+    assert law | {"fowt_env/analysis/linear_model.py"} <= names
+    assert "controllers/rosco.py" not in names and "controllers/__init__.py" not in names
+
+
+def test_check_name_takes_what_the_package_ships():
+    for name in ("pi", "policy:ppo_lqr", "mine:Mine", "größe", "a b"):
+        check_name("name", name)

@@ -1,0 +1,277 @@
+"""The results folder: what it holds and refuses; a killed evaluation loses and repeats nothing."""
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import fowt_env
+from fowt_env.controllers import CONTROLLERS
+from fowt_env.errors import InputError
+from fowt_env.training.evaluation import results
+from fowt_env.training.evaluation.cases import Case, Suite
+from fowt_env.training.evaluation.evaluate import COLUMNS, evaluate
+from fowt_env.training.evaluation.metrics import METRICS
+from fowt_env.training.reports.terminal import leaderboard_rows, write_leaderboard
+
+CALM = Case("calm", 16.0)
+WINDY = Case("windy", 18.0)
+SHORT = {"duration": 20.0, "skip": 5.0}
+
+
+class Broken:
+    """Returns NaN."""
+
+    def reset(self, measurement):
+        pass
+
+    def act(self, measurement):
+        return float("nan"), 0.0
+
+
+class Misshapen(Broken):
+    """Returns three numbers."""
+
+    def act(self, measurement):
+        return 1.0, 2.0, 3.0
+
+
+def went(folder, *arguments, **options):
+    """(table, runs that were made) of an evaluation into a folder."""
+    made = []
+    table = evaluate(
+        *arguments,
+        folder=folder,
+        progress=lambda done, total, row: row and made.append(row),
+        **SHORT | options,
+    )
+    return table, [(row["controller"], row["case"], row["seed"]) for row in made]
+
+
+def test_a_folder_holds_every_run_its_row_and_what_was_asked_for(tmp_path):
+    table, made = went(tmp_path, {"pi": "pi", "broken": Broken(), "odd": Misshapen()}, [CALM], seeds=(1, 2))
+    assert len(made) == 6 and (table["status"] == "ok").tolist() == [True, False, False] * 2
+    for row in table.to_dict("records"):
+        path = results.run_file(tmp_path / "runs", row["controller"], "calm", row["seed"])
+        stored = results.read_row(path)
+        assert stored == pytest.approx(row, nan_ok=True) and list(stored) == list(COLUMNS)
+        frame = pd.read_parquet(path)
+        assert "Time_[s]" in frame.columns
+    assert len(pd.read_parquet(tmp_path / "runs" / "pi" / "calm_seed2.parquet")) == 201
+    written = pd.read_csv(tmp_path / "results.csv")
+    np.testing.assert_allclose(written[list(METRICS)], table[list(METRICS)].astype(float), rtol=1e-9)
+    manifest = json.loads((tmp_path / "manifest.json").read_text())
+    assert manifest["fowt_env"] == fowt_env.__version__ and manifest["seeds"] == [1, 2]
+    assert manifest["cases"]["calm"]["duration"] == 20.0 and list(manifest["controllers"])[0] == "pi"
+    board = write_leaderboard(table, tmp_path)
+    assert json.loads((tmp_path / "leaderboard.json").read_text())["baseline"] == board["baseline"] == "pi"
+    rows = leaderboard_rows(board)[2]
+    assert [row[1] for row in rows] == ["2/2", "0/2, 2 failed", "0/2, 2 failed"]
+
+
+def test_what_is_done_is_not_done_again_and_more_can_be_added(tmp_path):
+    _, made = went(tmp_path, "pi", [CALM])
+    assert made == [("pi", "calm", 1)]
+    path = tmp_path / "runs" / "pi" / "calm_seed1.parquet"
+    before = path.stat().st_mtime_ns
+    table, made = went(tmp_path, "pi,pi_land", [CALM, WINDY], seeds=(1, 2))
+    assert ("pi", "calm", 1) not in made and len(made) == 7 and path.stat().st_mtime_ns == before
+    assert len(table) == 8
+    again, made = went(tmp_path, "pi", [CALM])
+    assert made == [] and len(again) == 8  # the whole folder's table
+    fresh = evaluate("pi,pi_land", [CALM, WINDY], seeds=(1, 2), **SHORT)
+    pd.testing.assert_frame_equal(table, fresh, check_exact=True)
+
+
+def test_a_lost_run_is_made_again(tmp_path):
+    first, _ = went(tmp_path, "pi", [CALM], seeds=(1, 2))
+    (tmp_path / "runs" / "pi" / "calm_seed2.parquet").unlink()
+    ended = subprocess.Popen([sys.executable, "-c", ""])
+    ended.wait()
+    (tmp_path / "runs" / "pi" / f".calm_seed2-{ended.pid}-abcdefgh.parquet").write_bytes(b"half a file")
+    (tmp_path / "results.csv").unlink()
+    second, made = went(tmp_path, "pi", [CALM], seeds=(1, 2))
+    assert made == [("pi", "calm", 2)]
+    pd.testing.assert_frame_equal(first, second, check_exact=True)
+    assert not list(tmp_path.rglob(".*")) and (tmp_path / "results.csv").exists()
+
+
+def suite(version=1, wind=16.0):
+    return Suite("mine", version, "d", "s", "rotor-averaged", (1,), 20.0, 5.0, (Case("calm", wind),))
+
+
+def test_other_settings_and_versions_are_refused_with_what_to_do(tmp_path, monkeypatch):
+    evaluate("pi", suite(), folder=tmp_path)
+    evaluate("pi", suite(), folder=tmp_path)
+    for arguments, message in (
+        ({"cases": suite(version=2)}, "'mine' version 1"),
+        ({"cases": [CALM], **SHORT}, "suite"),
+        ({"cases": suite(wind=17.0)}, "wind = 16.0, now 17.0"),
+        ({"cases": suite(), "duration": 30.0}, "duration = 20.0, now 30.0"),
+        ({"cases": suite(), "control_dt": 0.2}, "options"),
+    ):
+        with pytest.raises(InputError, match=message) as error:
+            evaluate("pi", folder=tmp_path, **arguments)
+        assert "--out" in str(error.value) and str(tmp_path) in str(error.value)
+    with monkeypatch.context() as patch:
+        patch.setattr(fowt_env, "__version__", "9.9")
+        with pytest.raises(InputError, match="was made by fowt_env .* this is 9.9"):
+            evaluate("pi", suite(), folder=tmp_path)
+    with monkeypatch.context() as patch:
+        patch.setattr(results, "plant_code", lambda: "other")
+        with pytest.raises(InputError, match="another state"):
+            evaluate("pi", suite(), folder=tmp_path)
+    with monkeypatch.context() as patch:
+        new = {"name": "pi", "code": "new"}
+        patch.setattr("fowt_env.training.evaluation.evaluate.controller_code", lambda controller: new)
+        with pytest.raises(InputError, match="code of controller 'pi' has changed"):
+            evaluate("pi", suite(), folder=tmp_path)
+
+
+def test_a_controllers_code_is_its_module_and_what_that_imports():
+    def names(factory):
+        paths = results._package_files(factory)
+        return {path.name for path in paths if path.parent == results.ROOT / "controllers"}
+
+    assert {"eq8.py", "pi.py", "base.py", "tuned.toml"} <= names(CONTROLLERS["eq8_literal"])
+    assert not {"constant.py", "__init__.py"} & names(CONTROLLERS["eq8_literal"])
+    assert {"constant.py", "__init__.py"} <= names(print)
+    codes = [results.controller_code(name)["code"] for name in ("pi", "pi_land", "constant")]
+    assert codes[0] == codes[1] != codes[2]
+    own = results.controller_code(Broken())
+    assert own["name"].endswith(":Broken") and own["code"] != codes[0]
+
+
+def test_a_policys_code_changes_with_its_file(tmp_path):
+    path = tmp_path / "agent.npz"
+    codes = []
+    for content in (b"one", b"one", b"trained anew"):
+        path.write_bytes(content)
+        codes.append(results.controller_code(f"policy:{path}")["code"])
+    assert codes[0] == codes[1] != codes[2]
+    shipped = [results.controller_code(f"policy:{name}")["code"] for name in ("ppo_lqr", "ppo_lqr_preview")]
+    assert shipped[0] != shipped[1]
+
+
+@pytest.mark.parametrize("content", ["{", "[]", '{"format": 99}'])
+def test_a_manifest_of_another_format_is_refused(tmp_path, content):
+    (tmp_path / "manifest.json").write_text(content)
+    with pytest.raises(InputError, match="--out"):
+        evaluate("pi", suite(), folder=tmp_path)
+    assert (tmp_path / "manifest.json").read_text() == content
+
+
+@pytest.mark.parametrize("key", results.MANIFEST)
+def test_a_manifest_that_lacks_a_key_is_refused_by_its_name(tmp_path, key):
+    settings = {"suite": None, "options": {}, "cases": {}, "seeds": [], "controllers": {}}
+    with results.open_results(tmp_path, settings, ["controller"]):
+        pass
+    path = tmp_path / "manifest.json"
+    manifest = json.loads(path.read_text())
+    del manifest[key]
+    path.write_text(json.dumps(manifest))
+    with pytest.raises(InputError, match=f"without a sound '{key}'"):
+        with results.open_results(tmp_path, settings, ["controller"]):
+            pass
+
+
+def test_a_folder_in_use_and_a_file_are_refused(tmp_path):
+    settings = {"suite": None, "options": {}, "cases": {}, "seeds": [], "controllers": {}}
+    with results.open_results(tmp_path / "a", settings, COLUMNS):
+        with pytest.raises(InputError, match="another evaluation"):
+            evaluate("pi", suite(), folder=tmp_path / "a")
+    (tmp_path / "b").write_text("")
+    with pytest.raises(InputError, match="is a file"):
+        evaluate("pi", suite(), folder=tmp_path / "b")
+    with pytest.raises(InputError, match="out and runs_folder"):
+        evaluate("pi", suite(), folder=tmp_path / "c", out=tmp_path / "x.csv")
+
+
+def test_a_file_that_is_no_run_is_named(tmp_path):
+    evaluate("pi", suite(), folder=tmp_path)
+    path = tmp_path / "runs" / "pi" / "calm_seed1.parquet"
+    pd.DataFrame({"a": [1]}).to_parquet(path)
+    with pytest.raises(InputError, match="calm_seed1.parquet.*remove it"):
+        evaluate("pi", suite(), folder=tmp_path)
+
+
+# ------------------------------------------------------------------ kill -9
+
+SCRIPT = """
+import sys
+from fowt_env.training.evaluation.evaluate import evaluate
+from fowt_env.training.evaluation.cases import Case
+if __name__ == "__main__":
+    cases = [Case("calm", 16.0), Case("windy", 18.0)]
+    settings = {"seeds": (1, 2, 3), "duration": 60.0, "skip": 5.0}
+    evaluate("pi,pi_land", cases, folder=sys.argv[1], jobs=int(sys.argv[2]), **settings)
+"""
+
+
+def killed_evaluation(tmp_path, jobs, delays):
+    """Table of a folder whose evaluation was killed after each delay (s) and then finished."""
+    script = tmp_path / "script.py"
+    script.write_text(SCRIPT)
+    folder = tmp_path / "out"
+    command = [sys.executable, str(script), str(folder), str(jobs)]
+    root = Path(fowt_env.__file__).parent.parent
+    environment = os.environ | {"PYTHONPATH": f"{root}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"}
+    seen = {}
+    for delay in (*delays, None):
+        process = subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, start_new_session=True)
+        if delay is None:
+            assert process.wait(timeout=500) == 0, process.stderr.read()
+        else:
+            wait_for_runs(process, folder, len(seen) + 1, delay)
+            process.send_signal(signal.SIGKILL)  # the parent alone: its workers must see to themselves
+            process.wait()
+        process.stderr.close()
+        time.sleep(1.5)
+        found = {path: path.stat().st_mtime_ns for path in folder.glob("runs/*/[!.]*.parquet")}
+        assert all(found.get(path) == when for path, when in seen.items())  # nothing lost, nothing repeated
+        for path in found:
+            results.read_row(path)
+        seen = found
+    assert len(seen) == 12
+    return pd.read_csv(folder / "results.csv")
+
+
+def wait_for_runs(process, folder, count, delay):
+    """Return a little after `count` runs are there, or when the process has ended."""
+    deadline = time.monotonic() + 300.0
+    while time.monotonic() < deadline and process.poll() is None:
+        if len(list(folder.glob("runs/*/[!.]*.parquet"))) >= count:
+            break
+        time.sleep(0.02)
+    time.sleep(delay)
+
+
+def uninterrupted(tmp_path):
+    cases = [Case("calm", 16.0), Case("windy", 18.0)]
+    folder = tmp_path / "whole"
+    evaluate("pi,pi_land", cases, folder=folder, seeds=(1, 2, 3), duration=60.0, skip=5.0)
+    return pd.read_csv(folder / "results.csv")
+
+
+def test_an_evaluation_that_was_killed_goes_on_where_it_was(tmp_path):
+    pd.testing.assert_frame_equal(
+        killed_evaluation(tmp_path, 1, [0.05]), uninterrupted(tmp_path), check_exact=True
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_kills_at_random_moments_lose_and_repeat_nothing(tmp_path, jobs):
+    rng = random.Random(jobs)
+    delays = [rng.uniform(0.0, 0.4) for _ in range(5)]
+    pd.testing.assert_frame_equal(
+        killed_evaluation(tmp_path, jobs, delays), uninterrupted(tmp_path), check_exact=True
+    )

@@ -1,0 +1,282 @@
+"""Pictures: they show what is computed, at a rate that is fit for watching, and cost nothing unasked."""
+
+import subprocess
+import sys
+import time
+from math import pi, radians, tan
+
+import gymnasium
+import numpy as np
+import pytest
+
+pytest.importorskip("pygame", reason="pygame is not installed: the extra `render` is missing")
+
+import fowt_env  # noqa: E402
+from fowt_env.envs import FowtEnv, FowtVectorEnv  # noqa: E402
+from fowt_env.errors import InputError  # noqa: E402
+from fowt_env.plant.hydro.waves import elevation  # noqa: E402
+from fowt_env.visual import rendering  # noqa: E402
+from fowt_env.visual.animation import animate  # noqa: E402
+from fowt_env.visual.rendering import COLOURS, Pose, Surface, TurbinePanel, View, mooring_shapes  # noqa: E402
+
+QUICK = {"rotor": "table", "wave_components": 20}
+WEATHER = {"wind": 18.0, "sea": {"kind": "jonswap", "Hs": 5.0, "Tp": 10.0}}
+REST = dict.fromkeys(
+    ("PtfmSurge", "PtfmSway", "PtfmHeave", "PtfmRoll", "PtfmPitch", "PtfmYaw", "Azimuth", "BldPitch1"), 0.0
+)
+ROW = REST | {"Time": 0.0, "Wind1VelX": 18.0, "RotSpeed": 12.1, "GenPwr": 5000.0}
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return fowt_env.build_scene("oc3_hywind", seed=3, **QUICK, **WEATHER)
+
+
+@pytest.fixture(scope="module")
+def still():
+    return fowt_env.build_scene("oc3_hywind", wind=18.0, rotor="table")
+
+
+@pytest.fixture
+def env():
+    env = FowtEnv(render_mode="rgb_array", **QUICK, **WEATHER)
+    env.reset(seed=1)
+    yield env
+    env.close()
+
+
+def test_lines_end_at_anchor_and_fairlead_wherever_the_platform_is(scene):
+    mooring = scene.model.mooring
+    for row in (
+        REST,
+        REST | {"PtfmSurge": 25.0, "PtfmSway": -9.0, "PtfmHeave": -2.0, "PtfmPitch": 7.0, "PtfmYaw": 12.0},
+    ):
+        pose = Pose(row)
+        shapes = mooring_shapes(scene, pose)
+        assert len(shapes) == 3
+        for i, (points, tension) in enumerate(shapes):
+            np.testing.assert_allclose(points[0], mooring.anchor[i], atol=1e-6)
+            np.testing.assert_allclose(points[-1], pose.inertial(mooring.fairlead[i]), atol=1e-6)
+            assert np.diff(points[:, 2]).min() > -1e-9 and tension > 1e5
+
+
+def test_drawn_tension_and_pose_are_those_of_the_plant(env):
+    for _ in range(20):
+        env.step(np.array([0.3, -0.2]))
+    row = env.channels()
+    for i, (_, tension) in enumerate(mooring_shapes(env.scene, Pose(row))):
+        assert 1e-3 * tension == pytest.approx(row[f"FAIRTEN{i + 1}"], rel=1e-9)
+
+
+def test_the_drawn_sea_is_the_sum_of_the_scene_s_components(scene):
+    x = np.array([-90.0, 0.0, 41.5])
+    surface = Surface(scene.model.waves, x)
+    for t in (0.0, 17.3, 401.0):
+        expected = [elevation(t, at, 0.0, scene.model.waves) for at in x]
+        np.testing.assert_allclose(surface.at(t), expected, atol=1e-12)
+    assert np.ptp(surface.at(17.3)) > 0.1
+
+
+def test_the_first_blade_points_up_at_azimuth_zero_and_feathers_with_blade_pitch(scene):
+    panel = TurbinePanel(rendering.load_pygame(), scene, (300, 300))
+    radius, overhang = scene.turbine.rotor.tip_radius, len(scene.turbine.blade.radius)
+    assert panel._blade(0.0, 0.0)[overhang] == pytest.approx([0.0, 0.0, radius])
+    assert panel._blade(0.5 * pi, 0.0)[overhang] == pytest.approx([0.0, -radius, 0.0], abs=1e-9)
+    flat, feathered = (np.ptp(panel._blade(0.0, angle)[:, 0]) for angle in (0.0, 0.5 * pi))
+    assert feathered > 3.0 * flat
+
+
+def yellow_lean(picture):
+    """Slope dx/dz of the middle of the yellow part above the water."""
+    red, green, blue = (picture[..., k].astype(int) for k in range(3))
+    rows, columns = np.nonzero((red > 110) & (blue < 0.45 * red) & (red > green) & (green > 0.65 * red))
+    height = np.unique(rows)[7:-7]  # the ends are cut at right angles to the axis, not level
+    middle = [columns[rows == row].mean() for row in height]
+    assert len(height) > 10
+    return -np.polyfit(height, middle, 1)[0]
+
+
+@pytest.mark.parametrize("lean", [-15.0, 0.0, 20.0])
+def test_the_spar_leans_by_the_platform_pitch(still, lean):
+    view = View([still])
+    view.draw([ROW | {"PtfmPitch": lean, "PtfmHeave": 14.0}])
+    assert yellow_lean(view.array()[:, : view.right]) == pytest.approx(tan(radians(lean)), abs=0.04)
+
+
+def test_lines_are_drawn_where_they_were_computed_in_their_tension_s_colour(still):
+    view = View([still])
+    view.draw([ROW])
+    picture, panel = view.array().astype(int), view.panels[0]
+    seen = 0
+    for number, (points, tension) in enumerate(mooring_shapes(still, Pose(ROW))):
+        colour = np.array(rendering.tension_colour(tension, panel.tension_at_rest[number]))
+        for x, y in panel.pixels(points)[:-1] / rendering.SAMPLING:
+            if 2 < x < panel.size[0] - 3 and 2 < y < panel.size[1] - 3:
+                near = picture[round(y) - 1 : round(y) + 2, round(x) - 1 : round(x) + 2].reshape(-1, 3)
+                seen += np.abs(near - colour).max(axis=1).min() < 40
+    assert seen >= 10
+
+
+def test_the_mooring_inset_reaches_every_anchor(still):
+    view = View([still])
+    panel = view.mooring
+    ends = panel.pixels(still.model.mooring.anchor)
+    assert (ends >= 0).all() and (ends[:, 0] <= panel.size[0]).all() and (ends[:, 1] <= panel.size[1]).all()
+
+
+def test_pictures_are_not_blank_and_move_with_the_run(env):
+    first = env.render()
+    assert first.shape == (640, 960, 3) and first.dtype == np.uint8
+    assert len(np.unique(first.reshape(-1, 3), axis=0)) > 200
+    assert np.array_equal(first, env.render())  # looking changes nothing
+    for _ in range(10):
+        env.step(np.zeros(2))
+    assert (env.render() != first).mean() > 0.005
+
+
+def test_rendering_leaves_the_run_as_it_is():
+    rows = []
+    for mode in (None, "rgb_array"):
+        env = FowtEnv(render_mode=mode, **QUICK, **WEATHER)
+        env.reset(seed=5)
+        for _ in range(15):
+            observation = env.step(np.array([0.1, 0.4]))[0]
+            if mode:
+                env.render()
+        rows.append(observation.tobytes())
+    assert rows[0] == rows[1]
+
+
+def test_a_new_episode_starts_new_traces_in_its_own_weather(env):
+    env.step(np.zeros(2))
+    env.render()
+    env.reset(seed=9)
+    env.render()
+    assert len(env._view.traces.histories[0]) == 1
+    assert env._view.panels[0].surface.waves is env.scene.model.waves
+
+
+def test_traces_hold_the_last_minute(still):
+    view = View([still])
+    for t in np.arange(0.0, 100.0, 1.0):
+        view.traces.add([ROW | {"Time": t}])
+    times = [entry[0] for entry in view.traces.histories[0]]
+    assert times[0] == pytest.approx(99.0 - rendering.WINDOW) and times[-1] == 99.0
+
+
+def test_a_picture_takes_less_than_a_thirtieth_of_a_second(scene):
+    view = View([scene])
+    times = []
+    for k in range(40):
+        begin = time.process_time()
+        view.draw([ROW | {"Time": 0.1 * k}])
+        view.array()
+        times.append(time.process_time() - begin)
+    assert np.median(times) < 1.0 / 30.0
+
+
+def test_the_human_mode_draws_in_a_window_at_reset_and_every_step():
+    env = FowtEnv(render_mode="human", **QUICK, **WEATHER)
+    env.reset(seed=1)
+    begin = time.perf_counter()
+    for _ in range(6):
+        env.step(np.zeros(2))
+    assert time.perf_counter() - begin > 5 / 30.0 * 0.8  # no faster than can be watched
+    assert env.render() is None
+    window = env._view._window
+    assert np.array_equal(env._view.pygame.surfarray.array3d(window).swapaxes(0, 1), env._view.array())
+    env.close()
+    env.close()
+    assert env._view is None
+
+
+def test_gymnasium_finds_nothing_wrong_with_either_mode():
+    from gymnasium.utils.env_checker import check_env
+
+    for mode in ("rgb_array", "human"):
+        env = gymnasium.make("fowt_env/OC3Hywind-v1", render_mode=mode, **QUICK)
+        check_env(env.unwrapped)
+        env.close()
+
+
+def test_videos_can_be_recorded(tmp_path):
+    pytest.importorskip("moviepy", reason="moviepy is not installed: the extra `video` is missing")
+    env = gymnasium.make("fowt_env/OC3Hywind-v1", render_mode="rgb_array", duration=1.0, **QUICK)
+    env = gymnasium.wrappers.RecordVideo(env, str(tmp_path), episode_trigger=lambda episode: True)
+    env.reset(seed=1)
+    for _ in range(10):
+        env.step(np.zeros(2))
+    env.close()
+    (video,) = tmp_path.glob("*.mp4")
+    assert video.stat().st_size > 5000
+
+
+def test_an_unrendered_run_never_loads_pygame():
+    code = (
+        "import sys, numpy as np, fowt_env.envs as e;"
+        f"env = e.FowtEnv(**{ {**QUICK, 'wind': 18.0, 'sea': None}!r}); env.reset(seed=1);"
+        " env.step(np.zeros(2)); sys.exit('pygame' in sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", code]).returncode == 0
+
+
+def test_render_without_a_mode_warns():
+    env = FowtEnv(**QUICK, **WEATHER)
+    env.reset(seed=1)
+    with pytest.warns(UserWarning, match="render_mode"):
+        assert env.render() is None
+
+
+def test_a_missing_pygame_and_a_vector_environment_are_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pygame", None)
+    with pytest.raises(InputError, match=r"fowt-env\[render\]"):
+        FowtEnv(render_mode="rgb_array", **QUICK)
+    with pytest.raises(InputError, match="vector environment has no pictures"):
+        FowtVectorEnv(2, render_mode="rgb_array", **QUICK)
+
+
+@pytest.fixture(scope="module")
+def runs(scene):
+    return {name: fowt_env.simulate(scene, controller=name, duration=4.0) for name in ("pi", "pi_land")}
+
+
+def test_a_gif_shows_the_runs_beside_each_other(scene, runs, tmp_path):
+    from PIL import Image
+
+    path = animate(scene, runs, tmp_path / "two.gif", speed=4.0, fps=10, size=(480, 320))
+    with Image.open(path) as image:
+        assert image.size == (480, 320) and image.n_frames == 10 and image.info["duration"] == 100
+        first = np.asarray(image.convert("RGB")).astype(int)
+        image.seek(9)
+        last = np.asarray(image.convert("RGB")).astype(int)
+    assert np.abs(last - first).max(axis=2).mean() > 1.0
+    for colour in COLOURS[:2]:  # both traces keep their colours in the palette
+        assert (np.abs(last - colour).max(axis=2) < 12).sum() > 20
+
+
+def test_an_mp4_has_a_picture_per_step(scene, runs, tmp_path):
+    imageio_ffmpeg = pytest.importorskip("imageio_ffmpeg", reason="imageio-ffmpeg is not installed")
+    path = animate(scene, {"": runs["pi"]}, tmp_path / "one.mp4", speed=2.0, fps=10, size=(480, 320))
+    count, seconds = imageio_ffmpeg.count_frames_and_secs(str(path))
+    assert count == 20 and seconds == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"path": "a.avi"}, "must end with .gif or .mp4"),
+        ({"runs": {}}, "0 runs"),
+        ({"speed": 0.0}, "speed = 0"),
+        ({"fps": 61}, "fps = 61"),
+        ({"size": (481, 320)}, "even"),
+        ({"start": 99.0}, "start = 99"),
+    ],
+)
+def test_animations_that_cannot_be_made_are_named(scene, runs, tmp_path, arguments, message):
+    settings = {"runs": runs, "path": "a.gif"} | arguments
+    settings["path"] = tmp_path / settings["path"]
+    with pytest.raises(InputError, match=message):
+        animate(scene, **settings)
+    with pytest.raises(InputError, match="needs at least two rows"):
+        animate(scene, {"cut": runs["pi"][["Time_[s]"]]}, tmp_path / "a.gif")
+    assert list(tmp_path.iterdir()) == []
