@@ -250,14 +250,14 @@ class Samples:
 
     def _results(self):
         from fowt_env.files.tables import read_table
-        from fowt_env.training.evaluation import results
+        from fowt_env.training.evaluation import provenance
         from fowt_env.training.evaluation.evaluate import COLUMNS
         from fowt_env.training.evaluation.results import FORMAT, open_results, read_row, write_json, write_run
         from fowt_env.training.reports.html_page import write_report
         from fowt_env.training.rl.train import Training, resolve
 
-        results.plant_code = lambda: "0123456789abcdef"  # the same manifest in every tree
-        results.versions = lambda: {"python": "3.11", "numpy": "2.0"}
+        provenance.plant_code = lambda: "0123456789abcdef"  # the same manifest in every tree
+        provenance.versions = lambda: {"python": "3.11", "numpy": "2.0"}
         folder = self.folder / "results"
         row = dict.fromkeys(COLUMNS, 1.5) | {"controller": "pi", "case": "calm", "seed": 1, "status": "ok"}
         row |= {"reason": "", "events": ""}

@@ -26,7 +26,8 @@ def python(code, *options):
 
 @pytest.mark.parametrize("imports", ["fowt_env, gymnasium", "gymnasium, fowt_env"])
 def test_import_registers_and_loads_no_environment(imports):
-    code = f"import sys, {imports}\nprint(gymnasium.spec({NAME!r}).entry_point, 'fowt_env.envs' in sys.modules)"
+    code = f"import sys, {imports}; spec = gymnasium.spec({NAME!r})\n"
+    code += "print(spec.entry_point, 'fowt_env.envs' in sys.modules)"
     assert python(code) == "fowt_env.envs:FowtEnv False"
 
 

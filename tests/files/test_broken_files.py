@@ -22,7 +22,7 @@ from fowt_env.descriptions.files import parse_json, read_toml
 from fowt_env.descriptions.platform import read_turbine
 from fowt_env.errors import InputError
 from fowt_env.training.cli import app as cli
-from fowt_env.training.evaluation import results
+from fowt_env.training.evaluation import provenance
 from fowt_env.training.evaluation.metrics import METRICS
 from fowt_env.training.reports import html_page as report_html
 
@@ -365,8 +365,8 @@ def test_every_value_of_a_results_folder_s_files_may_be_any_other(tmp_path, monk
     pytest.importorskip("openfast_io", reason="openfast_io is not installed")
     pytest.importorskip("plotly", reason="plotly is not installed")
     monkeypatch.setattr(report_html, "_plotly_script", lambda: "")
-    monkeypatch.setattr(results, "plant_code", results.plant_code)  # as Samples leaves it
-    monkeypatch.setattr(results, "versions", results.versions)
+    monkeypatch.setattr(provenance, "plant_code", provenance.plant_code)  # as Samples leaves it
+    monkeypatch.setattr(provenance, "versions", provenance.versions)
     samples = mutation.Samples(tmp_path, ["results"])
     path = tmp_path / "results" / name
     loads = [load for file, _, load in samples.kinds.values() if file == path]

@@ -27,16 +27,8 @@ from fowt_env.training.evaluation.cases import Case, Suite, described, named_cas
 from fowt_env.training.evaluation.engines import outcomes
 from fowt_env.training.evaluation.guard import attempt
 from fowt_env.training.evaluation.metrics import METRICS, metrics
-from fowt_env.training.evaluation.results import (
-    check_name,
-    controller_code,
-    open_results,
-    parquet_of,
-    run_file,
-    version_gap,
-    versions,
-    write_run,
-)
+from fowt_env.training.evaluation.provenance import controller_code, version_gap, versions
+from fowt_env.training.evaluation.results import check_name, open_results, parquet_of, run_file, write_run
 from fowt_env.training.evaluation.run_case import COLUMNS, CONTROL_DT, SHORTEST_WEATHER, Run, lost_row, scored
 
 __all__ = ["COLUMNS", "SHORTEST_WEATHER", "Case", "evaluate", "metrics", "named_cases", "run_file", "summary"]

@@ -10,15 +10,10 @@ leaderboard.json are made from those files, so an interrupted evaluation loses a
 """
 
 import hashlib
-import importlib.util
-import inspect
 import json
-import platform as machine
 import re
-import sys
 import time
 from contextlib import contextmanager
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import pandas as pd
@@ -30,9 +25,9 @@ from fowt_env.descriptions.files import parse_json
 from fowt_env.descriptions.records import is_number
 from fowt_env.errors import InputError
 from fowt_env.files.tables import remove_leftovers, replacing, write_table
+from fowt_env.training.evaluation import provenance
 from fowt_env.training.evaluation.guard import printable
 from fowt_env.training.evaluation.locks import locked
-from fowt_env.training.evaluation.sources import imported_files
 
 FORMAT = 2  # of the folder; raised when files or their meaning change
 MANIFEST = {  # what each key of manifest.json holds, beside its format
@@ -41,13 +36,6 @@ MANIFEST = {  # what each key of manifest.json holds, beside its format
 }  # fmt: skip
 ROW_KEY = b"fowt_env.row"
 TABLE_EVERY = 2.0  # s between rewritings of results.csv while runs go on
-PACKAGES = ("numpy", "numba", "scipy", "pandas", "rainflow", "rosco", "hipersim")
-NO_FIGURES = ("fowt_env", "python", "pandas")  # of the versions: compared otherwise, or shaping no figure
-ROOT = Path(fowt_env.__file__).resolve().parent.parent  # folder of the packages
-RUN = Path(__file__).resolve().parent / "run_case.py"  # what it imports shapes a run
-# of the controllers, what a run without any of them needs
-ALWAYS_CONTROLLERS = ("controllers/base.py", "controllers/constant.py")
-INSTALLED = {"site-packages", "dist-packages"}
 PLAIN_NAME = re.compile(r"[a-z0-9_][a-z0-9_.-]{0,99}")  # of a file that no other name's can be taken for
 LONGEST_NAME = 500
 TEXTS = ("controller", "case", "status", "reason", "events")  # of a row; its other columns are numbers
@@ -144,156 +132,6 @@ def write_json(value, path):
     return path
 
 
-def _digest(paths):
-    """Hash of files, by their order and contents."""
-    digest = hashlib.sha256()
-    for path in paths:
-        digest.update(Path(path).read_bytes())
-    return digest.hexdigest()[:16]
-
-
-def plant_files():
-    """Sorted files that shape a run: sources that it imports and data, but for the controllers'."""
-
-    def inside(path):
-        package = path.relative_to(ROOT).parts[0]
-        return package in ("fowt_env", "training") or path.relative_to(ROOT).as_posix() in ALWAYS_CONTROLLERS
-
-    return sorted([*imported_files([RUN], [ROOT], inside), *_data(ROOT / "fowt_env")])
-
-
-def plant_code():
-    """Hash of all sources and data that shape a run, but for the controllers."""
-    return _digest(plant_files())
-
-
-def _data(folder):
-    """Files beneath a folder that are no sources."""
-    return [
-        path
-        for path in folder.rglob("*")
-        if path.is_file() and path.suffix != ".py" and "__pycache__" not in path.parts
-    ]
-
-
-def controller_code(controller):
-    """{"name", "code"}: what a controller is called, and a hash of the files that define it.
-
-    A name of CONTROLLERS: its module, what it imports of this project, and the data of the package
-    controllers; "design:FILE", "policy:NAME": the file and all controllers; "module:Name", a class or an
-    object: the file that it comes from, and what that imports from its own folder and this project.
-    """
-    from fowt_env.controllers import CONTROLLERS
-    from fowt_env.controllers.design import saved_files as saved_design
-    from fowt_env.controllers.policy.controller import PREFIX, policy_path
-
-    if not isinstance(controller, str):
-        kind = (
-            controller if inspect.isroutine(controller) or inspect.isclass(controller) else type(controller)
-        )
-        name = f"{kind.__module__}:{kind.__qualname__}"
-        return {"name": name, "code": _digest(_user_files(kind.__module__))}
-    if ":" not in controller:
-        files = _package_files(CONTROLLERS.get(controller))
-    elif controller.startswith(saved_design.PREFIX):
-        files = [controller.removeprefix(saved_design.PREFIX), *_package_files(saved_design.load_design)]
-    elif controller.startswith(PREFIX):  # its baseline may be any controller
-        files = [policy_path(controller.removeprefix(PREFIX)), *_package_files(None)]
-    else:
-        files = _user_files(controller.partition(":")[0])
-    return {"name": controller, "code": _digest(files)}
-
-
-def _package_files(factory):
-    """Files that a factory of the package controllers depends on; those of all controllers for any other."""
-    folder = ROOT / "controllers"
-    start = getattr(factory, "__module__", None) or ""
-    if start.startswith("controllers."):
-        starts = [ROOT.joinpath(*start.split(".")).with_suffix(".py")]
-    else:
-        starts = list(folder.rglob("*.py"))
-    return [*_with_own(starts, [ROOT]), *sorted(_data(folder))]
-
-
-def _user_files(module):
-    """Files that a user's module depends on: those of its own project, and of this one what they import."""
-    file = _module_file(module)
-    if file is None:
-        return []
-    depth = 0 if module == "__main__" else module.count(".") + (file.name == "__init__.py")
-    folder = file.parents[depth]
-    top = folder / module.partition(".")[0]
-
-    def inside(path):
-        own = path.is_relative_to(folder) and _package(path) is None
-        return path == file or own and (path.is_relative_to(top) or not INSTALLED & set(path.parts))
-
-    return _with_own(imported_files([file], [folder], inside), [folder, ROOT])
-
-
-def _module_file(name):
-    """File of a module, without running it where it is not imported yet; None where there is none."""
-    if name in sys.modules:
-        file = getattr(sys.modules[name], "__file__", None)
-        return None if file is None else Path(file).resolve()
-    top, *rest = name.split(".")
-    sys.path.insert(0, "")
-    try:
-        spec = importlib.util.find_spec(top)
-    except (ImportError, ValueError):
-        spec = None
-    finally:
-        sys.path.remove("")
-    if spec is None or not spec.has_location:
-        return None
-    place = Path(spec.origin).resolve()
-    place = place.parent if rest or place.name == "__init__.py" else place.with_suffix("")
-    found = (place.joinpath(*rest, "__init__.py"), place.joinpath(*rest).with_suffix(".py"))
-    return next((path for path in found if path.is_file()), None)
-
-
-def _with_own(files, roots):
-    """Files, and what they import of this project's controllers, and with those of fowt_env."""
-    files, registry = set(files), ROOT / "controllers" / "__init__.py"  # which imports every controller
-    for package in ("controllers", "fowt_env"):
-
-        def inside(path, known=frozenset(files), package=package):
-            return path in known or _package(path) == package and path != registry
-
-        files |= set(imported_files(files, roots, inside))
-    return sorted(files)
-
-
-def _package(path):
-    """Name of this project's package that a file is in, or None."""
-    part = path.relative_to(ROOT).parts[0] if path.is_relative_to(ROOT) else None
-    return part if part in ("fowt_env", "controllers", "training") else None
-
-
-def versions():
-    """{package: version} of what shapes the figures, Python and processor included."""
-    found = {
-        "fowt_env": fowt_env.__version__,
-        "python": machine.python_version(),
-        "machine": machine.machine(),
-    }
-    for name in PACKAGES:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            continue
-    return found
-
-
-def version_gap(old, new):
-    """The first package that shapes figures and has different versions in two mappings, with both; or None.
-
-    One that is missing in a mapping shaped no figure there: its controllers failed.
-    """
-    differing = (name for name in sorted(set(old) & set(new) - set(NO_FIGURES)) if old[name] != new[name])
-    return next(((f"{name} {old[name]}", f"{name} {new[name]}") for name in differing), None)
-
-
 class ResultsFolder:
     """A locked folder of an evaluation: what is done in it, and what is added to it.
 
@@ -314,7 +152,7 @@ class ResultsFolder:
         wanted = {
             "format": FORMAT,
             "fowt_env": fowt_env.__version__,
-            "plant": plant_code(),
+            "plant": provenance.plant_code(),
             **{key: self.settings[key] for key in ("suite", "options")},
         }
         wanted = json.loads(_json(wanted))
@@ -339,7 +177,7 @@ class ResultsFolder:
         created = time.strftime("%Y-%m-%dT%H:%M:%S%z") if old is None else old["created"]
         self.manifest = {
             **wanted,
-            "versions": versions() | ({} if old is None else old["versions"]),
+            "versions": provenance.versions() | ({} if old is None else old["versions"]),
             "created": created,
             "seeds": seeds,
             **parts,
@@ -372,7 +210,7 @@ class ResultsFolder:
             raise self._refused(f"was made by fowt_env {old['fowt_env']}, this is {wanted['fowt_env']}")
         if old["plant"] != wanted["plant"]:
             raise self._refused("was made by another state of this package's sources")
-        if gap := version_gap(old["versions"], versions()):
+        if gap := provenance.version_gap(old["versions"], provenance.versions()):
             raise self._refused(f"was made with {gap[0]}, this is {gap[1]}")
         for key in ("suite", "options"):
             if old[key] != wanted[key]:

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 import numba
 from numba.core import event
 
-from fowt_env.plant.compile.decorators import CACHE_FOLDER, KERNEL_PACKAGES
+from fowt_env.plant.compile.decorators import CACHE_FOLDER
 
 COMPILING_MESSAGE = "compiling kernels (first run of this kind of scene only, 10 s to 2 min) ..."
 
@@ -21,7 +21,7 @@ class _Once(event.Listener):
 
     def on_start(self, event):
         module = event.data["dispatcher"].py_func.__module__ or ""
-        if self.say is not None and module.split(".")[0] in KERNEL_PACKAGES:
+        if self.say is not None and module.startswith("fowt_env."):
             say, self.say = self.say, None
             say(COMPILING_MESSAGE)
 

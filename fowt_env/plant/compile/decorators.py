@@ -110,7 +110,7 @@ CACHE_FOLDER = _cache_folder(sorted(PLANT.rglob("*.py")))
 @cache
 def _outside_hash(path):
     """Hash of a source of this package outside the plant, with all that it imports outside the plant."""
-    return _hash(path for path in imported_at_top(Path(path), PACKAGE.parent) if PLANT not in path.parents)
+    return _hash(imported_at_top(Path(path), PACKAGE.parent, PLANT))
 
 
 def _keep(compiled, function):

@@ -13,12 +13,15 @@ COMMENT = re.compile("#.*")
 NAME = re.compile(r"(\w+)(?: as \w+)?")
 
 
-def imported_at_top(path, root):
-    """Sorted paths of a source of the package fowt_env below a folder and of all that it imports, in turn."""
+def imported_at_top(path, root, but):
+    """Sorted paths of a source of fowt_env, which lies in a folder `root`, and of all that it imports.
+
+    but: a folder whose sources are neither followed nor among them.
+    """
     found, left = set(), [path]
     while left:
         path = left.pop()
-        if path in found:
+        if path in found or but in path.parents:
             continue
         found.add(path)
         for source, names, module in STATEMENT.findall(path.read_text(encoding="utf-8")):

@@ -16,7 +16,7 @@ from fowt_env.controllers.pi import PI, PISettings
 from fowt_env.errors import InputError
 from fowt_env.training.design.sweeps import models_over
 from fowt_env.training.evaluation.evaluate import evaluate
-from fowt_env.training.evaluation.results import controller_code
+from fowt_env.training.evaluation.provenance import controller_code
 
 GOOD = {"KP": 0.006, "KI": 0.0009, "gain_schedule_pitch": 0.11}
 

@@ -3,7 +3,6 @@
 import ast
 import os
 import pickle
-import re
 import subprocess
 import sys
 import time
@@ -15,12 +14,12 @@ import pytest
 import fowt_env
 from fowt_env.plant.compile import disk_cache as kernel_cache
 from fowt_env.plant.compile.announcement import COMPILING_MESSAGE, compilation_announced
-from fowt_env.plant.compile.decorators import KEEP_CACHES, MARKER, kernel_sources
+from fowt_env.plant.compile.decorators import KEEP_CACHES, MARKER, PLANT
 from fowt_env.plant.compile.disk_cache import SharedCacheFile
+from fowt_env.plant.compile.sources import imported_at_top
 
 ROOT = Path(fowt_env.__file__).resolve().parent.parent
-REGISTRATION = ROOT / "fowt_env_registration.py"
-SMALL = "from fowt_env.weather.waves import ramp_factor; print(ramp_factor(1.0, 4.0))\n"
+SMALL = "from fowt_env.plant.hydro.waves import ramp_factor; print(ramp_factor(1.0, 4.0))\n"
 HITS = "print(sum(ramp_factor.stats.cache_hits.values()))\n"
 WHERE = "from fowt_env.plant.compile.decorators import CACHE_FOLDER; print(CACHE_FOLDER)\n"
 DAY = 86400.0
@@ -254,7 +253,7 @@ def test_a_folder_that_is_read_only_is_read(tmp_path):
         "os.mkdir = os.utime = os.replace = os.unlink = os.rmdir = refuse\nos.open = reading\n"
     )
     use = (
-        "from fowt_env.weather.waves import ramp_factor as f\nfrom fowt_env.plant.state import add, NO_LOAD\n"
+        "from fowt_env.plant.hydro.waves import ramp_factor as f\nfrom fowt_env.plant.state import add, NO_LOAD\n"
         "print(f(1.0, 4.0), sum(f.stats.cache_hits.values()), add(NO_LOAD, NO_LOAD).fx)\n"
     )
     assert output(start(locked + use, tmp_path / "cache")) == ["0.25", "1", "0.0"]
@@ -335,7 +334,7 @@ def test_numba_code_of_other_packages_is_kept_where_it_would_be_without_ours(tmp
 
 def test_ours_are_kept_in_files_made_for_several_processes_whatever_numba_is_told(tmp_path):
     code = (
-        "from fowt_env.weather.waves import ramp_factor as f\nfrom fowt_env.simulation import hold\n"
+        "from fowt_env.plant.hydro.waves import ramp_factor as f\nfrom fowt_env.simulation import hold\n"
         "print(*(type(g._cache._cache_file).__name__ for g in (f, hold)), f._cache.cache_path)\n"
     )
     variables = {"NUMBA_CACHE_DIR": str(tmp_path), "NUMBA_CACHE_LOCATOR_CLASSES": "InTreeCacheLocator"}
@@ -350,35 +349,46 @@ def test_another_way_of_numba_to_keep_code_is_noticed(monkeypatch, tmp_path):
         kernel_cache.KernelCache(kernel_folder, tmp_path)
 
 
+ROOMS = ("fowt_env", "controllers", "training")
+
+
 def copied_code(tmp_path):
-    """Folder with a copy of the packages that hold kernels."""
+    """Folder with a copy of the sources."""
     code = tmp_path / "code"
-    for path in (*ROOT.glob("fowt_env/**/*.py"), *ROOT.glob("controllers/**/*.py"), REGISTRATION):
+    for path in (path for room in ROOMS for path in (ROOT / room).rglob("*.py")):
         copy = code / path.relative_to(ROOT)
         copy.parent.mkdir(parents=True, exist_ok=True)
         copy.write_bytes(path.read_bytes())
+    for room in ROOMS[1:]:
+        if not (code / "fowt_env" / room).exists():
+            (code / "fowt_env" / room).symlink_to(code / room, target_is_directory=True)
     return code
 
 
-def test_kernels_of_the_studies_are_kept_until_one_of_their_sources_changes(tmp_path):
-    """Those of training, whose sources do not shape the name of the folder."""
-    training = copied_code(tmp_path) / "training"
-    training.mkdir()
-    (training / "numbers.py").write_text("GAIN = 1.0\n")
-    (training / "study.py").write_text(
-        "from fowt_env.plant.compile.decorators import entry\nfrom training.numbers import GAIN\n"
+def test_kernels_outside_the_plant_are_kept_until_what_they_import_changes(tmp_path):
+    """Their sources do not shape the name of the folder."""
+    code = copied_code(tmp_path)
+    (code / "training" / "numbers.py").write_text("GAIN = 1.0\n")
+    (code / "training" / "study.py").write_text(
+        "from fowt_env.plant.compile.decorators import entry\nfrom fowt_env.training.numbers import GAIN\n"
         "@entry\ndef amplified(x):\n    return GAIN * x\n"
     )
-    program = "from training.study import amplified as f; print(f(2.0), sum(f.stats.cache_hits.values()))\n"
+    program = (
+        "from fowt_env.training.study import amplified as f\n"
+        "print(f(2.0), sum(f.stats.cache_hits.values()))\n"
+    )
     for expected in (["2.0", "0"], ["2.0", "1"]):
-        assert output(start(program, tmp_path / "cache", training.parent)) == expected
-    (training / "numbers.py").write_text("GAIN = 10.0\n")
+        assert output(start(program, tmp_path / "cache", code)) == expected
+    with (code / "training" / "cli" / "app.py").open("a") as text:
+        text.write("\n# an edit of what is not compiled\n")
+    assert output(start(program, tmp_path / "cache", code)) == ["2.0", "1"]
+    (code / "training" / "numbers.py").write_text("GAIN = 10.0\n")
     for expected in (["20.0", "0"], ["20.0", "1"]):
-        assert output(start(program, tmp_path / "cache", training.parent)) == expected
+        assert output(start(program, tmp_path / "cache", code)) == expected
     assert len(list((tmp_path / "cache" / "kernels").iterdir())) == 1
 
 
-def test_kernels_of_other_sources_are_never_used(tmp_path):
+def test_kernels_of_other_sources_of_the_plant_are_never_used(tmp_path):
     """Numba alone would: it watches the file of the function, and not those of what it calls."""
     code = copied_code(tmp_path)
     (code / "fowt_env" / "extra.py").write_text(
@@ -390,7 +400,7 @@ def test_kernels_of_other_sources_are_never_used(tmp_path):
         "print(twice(NO_LOAD._replace(fx=1.0)))\n"
     )
     assert output(start(program, tmp_path / "cache", code)) == ["2.0"]
-    state = code / "fowt_env" / "state.py"
+    state = code / "fowt_env" / "plant" / "state.py"
     text = state.read_text()
     assert "a.fx + b.fx" in text
     state.write_text(text.replace("a.fx + b.fx", "a.fx - b.fx"))
@@ -401,17 +411,21 @@ def test_kernels_of_other_sources_are_never_used(tmp_path):
 
 
 def _module_files():
-    """{module name: path} of the kernel packages."""
+    """{module name: path} of the package."""
     files = {}
-    for path in (*ROOT.glob("fowt_env/**/*.py"), *ROOT.glob("controllers/**/*.py")):
+    for path in (path for room in ROOMS for path in (ROOT / room).rglob("*.py")):
         parts = path.relative_to(ROOT).with_suffix("").parts
+        parts = parts if parts[0] == "fowt_env" else ("fowt_env", *parts)
         files[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
     return files
 
 
 def _imported_at_the_top(path, files):
-    """Names of files' modules that a source imports outside its functions."""
+    """Names of files' modules that a source imports outside its functions, as a parser finds them."""
     found = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom | ast.Import):
+            assert not getattr(node, "level", 0), f"{path}: relative imports are not followed"
     for node in ast.parse(path.read_text()).body:
         if isinstance(node, ast.ImportFrom):
             names = (f"{node.module}.{alias.name}" for alias in node.names)
@@ -421,20 +435,26 @@ def _imported_at_the_top(path, files):
     return found & set(files)
 
 
-def test_every_source_that_a_kernel_can_see_is_in_the_key_of_the_cache():
+@pytest.mark.parametrize("name", ["controllers.pi", "envs.episode_batch", "training.benchmarks.speed"])
+def test_imports_are_found_as_a_parser_finds_them(name):
     files = _module_files()
-    compiled = re.compile(r"^ *@(\w*kernel|\w*entry|overload|intrinsic)\b|\b(njit|cfunc)\(", re.MULTILINE)
-    waiting = [name for name, path in files.items() if compiled.search(path.read_text())]
-    seen = set()
+    waiting, seen = [f"fowt_env.{name}"], set()
     while waiting:
-        name = waiting.pop()
-        if name not in seen:
-            seen.add(name)
-            waiting += _imported_at_the_top(files[name], files)
-    assert len(seen) > 50
-    missing = {files[name] for name in seen} - set(kernel_sources())
-    assert not missing
-    assert {path.name for path in set(files.values()) - set(kernel_sources())} >= {"cli_plot.py", "plots.py"}
+        module = waiting.pop()
+        if module not in seen:
+            seen.add(module)
+            waiting += _imported_at_the_top(files[module], files)
+    start = PLANT.parent.joinpath(*name.split(".")).with_suffix(".py")
+    found = imported_at_top(start, PLANT.parent.parent, but=Path("nothing"))
+    found, expected = {path.resolve() for path in found}, {files[module] for module in seen}
+    assert expected <= found and all(path.name == "__init__.py" for path in found - expected)
+
+
+def test_the_plant_imports_nothing_of_this_project_that_could_be_compiled_into_it():
+    files = _module_files()
+    plant = {name for name in files if name.startswith("fowt_env.plant")}
+    outside = set().union(*(_imported_at_the_top(files[name], files) for name in plant)) - plant
+    assert outside == {"fowt_env.errors", "fowt_env.folders", "fowt_env.requirements"}
 
 
 def test_broken_files_are_compiled_anew(tmp_path):
@@ -460,6 +480,7 @@ def test_without_room_for_machine_code_kernels_work_all_the_same(tmp_path):
 KEEPER = """
 import pathlib, sys
 from fowt_env.plant.compile.disk_cache import SharedCacheFile
+from fowt_env.plant.compile.sources import imported_at_top
 file = SharedCacheFile(sys.argv[1], "function", "stamp")
 ready = pathlib.Path(sys.argv[2])
 (ready / sys.argv[3]).touch()

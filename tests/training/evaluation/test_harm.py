@@ -17,7 +17,7 @@ import fowt_env
 from fowt_env.descriptions.platform import read_platform, read_turbine
 from fowt_env.errors import InputError
 from fowt_env.training.cli import app as cli
-from fowt_env.training.evaluation import engines, guard, results
+from fowt_env.training.evaluation import engines, guard, provenance, results
 from fowt_env.training.evaluation.cases import Case
 from fowt_env.training.evaluation.evaluate import COLUMNS, evaluate
 from fowt_env.training.evaluation.metrics import METRICS
@@ -281,7 +281,7 @@ def test_a_folder_of_other_versions_is_refused_with_both_of_them(tmp_path, packa
         pass
     path = tmp_path / "manifest.json"
     manifest = json.loads(path.read_text())
-    assert manifest["versions"] == results.versions()
+    assert manifest["versions"] == provenance.versions()
     here = manifest["versions"][package]
     path.write_text(json.dumps(manifest | {"versions": manifest["versions"] | {package: "0.1"}}))
     with pytest.raises(InputError, match=f"made with {package} 0.1, this is {package} {here}: choose"):
@@ -291,14 +291,14 @@ def test_a_folder_of_other_versions_is_refused_with_both_of_them(tmp_path, packa
     path.write_text(json.dumps(manifest | {"versions": less | {"pandas": "0.1"}}))  # shapes nothing
     with results.open_results(tmp_path, SETTINGS, COLUMNS):
         pass
-    assert json.loads(path.read_text())["versions"] == results.versions() | {"pandas": "0.1"}
+    assert json.loads(path.read_text())["versions"] == provenance.versions() | {"pandas": "0.1"}
 
 
 def test_a_ray_worker_of_other_versions_does_nothing(monkeypatch):
     from fowt_env.training.evaluation.evaluate import score_and_send
 
     with pytest.raises(InputError, match="numpy 0.1 here and numpy .* at the worker"):
-        score_and_send(None, here=results.versions() | {"numpy": "0.1"})
+        score_and_send(None, here=provenance.versions() | {"numpy": "0.1"})
 
 
 def test_rare_events_of_a_run_are_in_its_row(plant, tmp_path):
@@ -390,15 +390,15 @@ def test_an_edit_of_what_a_controllers_module_imports_from_its_project_changes_i
         import mine
 
         controller = mine.Law if how == "class" else mine.Law()
-    known = results.controller_code(controller)["code"]
-    assert results.controller_code(controller)["code"] == known
+    known = provenance.controller_code(controller)["code"]
+    assert provenance.controller_code(controller)["code"] == known
     for name in PROJECT:
         path = tmp_path / name
         before = path.read_text()
         path.write_text(before + "# edited\n")
-        assert (results.controller_code(controller)["code"] != known) == (name != "other.py"), name
+        assert (provenance.controller_code(controller)["code"] != known) == (name != "other.py"), name
         path.write_text(before)
-    assert results.controller_code(controller)["code"] == known
+    assert provenance.controller_code(controller)["code"] == known
     for name in ("mine", "gains", "late", "shared", "shared.filters", "shared.corner"):
         sys.modules.pop(name, None)
 
@@ -407,7 +407,7 @@ def test_a_users_controller_depends_on_those_of_the_package_that_it_builds_on(tm
     text = "from fowt_env.controllers.lqr.law import lqr as Law\nimport fowt_env.controllers\n"
     (tmp_path / "built.py").write_text(text)
     monkeypatch.syspath_prepend(str(tmp_path))
-    names = {path.relative_to(path.parents[1]).as_posix() for path in results._user_files("built")}
+    names = {path.relative_to(path.parents[1]).as_posix() for path in provenance._user_files("built")}
     law = {"controllers/lqr/law.py", "controllers/lqr/design.py"}
     assert law | {"fowt_env/analysis/linear_model.py"} <= names
     assert "controllers/rosco.py" not in names and "controllers/__init__.py" not in names

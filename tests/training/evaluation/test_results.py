@@ -16,7 +16,7 @@ import pytest
 import fowt_env
 from fowt_env.controllers import CONTROLLERS
 from fowt_env.errors import InputError
-from fowt_env.training.evaluation import results
+from fowt_env.training.evaluation import provenance, results
 from fowt_env.training.evaluation.cases import Case, Suite
 from fowt_env.training.evaluation.evaluate import COLUMNS, evaluate
 from fowt_env.training.evaluation.metrics import METRICS
@@ -144,9 +144,9 @@ def test_a_controllers_code_is_its_module_and_what_that_imports():
     assert {"eq8.py", "pi.py", "base.py", "tuned.toml"} <= names(CONTROLLERS["eq8_literal"])
     assert not {"constant.py", "__init__.py"} & names(CONTROLLERS["eq8_literal"])
     assert {"constant.py", "__init__.py"} <= names(print)
-    codes = [results.controller_code(name)["code"] for name in ("pi", "pi_land", "constant")]
+    codes = [provenance.controller_code(name)["code"] for name in ("pi", "pi_land", "constant")]
     assert codes[0] == codes[1] != codes[2]
-    own = results.controller_code(Broken())
+    own = provenance.controller_code(Broken())
     assert own["name"].endswith(":Broken") and own["code"] != codes[0]
 
 
@@ -155,9 +155,10 @@ def test_a_policys_code_changes_with_its_file(tmp_path):
     codes = []
     for content in (b"one", b"one", b"trained anew"):
         path.write_bytes(content)
-        codes.append(results.controller_code(f"policy:{path}")["code"])
+        codes.append(provenance.controller_code(f"policy:{path}")["code"])
     assert codes[0] == codes[1] != codes[2]
-    shipped = [results.controller_code(f"policy:{name}")["code"] for name in ("ppo_lqr", "ppo_lqr_preview")]
+    agents = ("policy:ppo_lqr", "policy:ppo_lqr_preview")
+    shipped = [provenance.controller_code(name)["code"] for name in agents]
     assert shipped[0] != shipped[1]
 
 

@@ -137,7 +137,7 @@ def test_a_run_cannot_be_gone_on_with_while_it_goes_on_and_can_once_it_was_kille
     folder, root = tmp_path / "run", Path(__file__).resolve().parents[3]
     code = (
         "import sys, time\n"
-        "from fowt_env.training import train\n"
+        "from fowt_env.training.rl import train\n"
         "train.make_envs = lambda settings: print('building', flush=True) or time.sleep(600)\n"
         "train.Training(train.resolve('ppo', 'above_rated', 0, 100), sys.argv[1]).run()\n"
     )

@@ -1,0 +1,176 @@
+"""What shaped a run: hashes of the sources it imports and of its controller's, versions of packages."""
+
+import hashlib
+import importlib.util
+import inspect
+import platform as machine
+import sys
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+import fowt_env
+from fowt_env.training.evaluation.sources import imported_files
+
+PACKAGES = ("numpy", "numba", "scipy", "pandas", "rainflow", "rosco", "hipersim")
+NO_FIGURES = ("fowt_env", "python", "pandas")  # of the versions: compared otherwise, or shaping no figure
+PACKAGE = Path(fowt_env.__file__).absolute().parent
+CONTROLLERS = PACKAGE / "controllers"
+RUN = PACKAGE / "training" / "evaluation" / "run_case.py"  # what it imports shapes a run
+# of the controllers, what a run without any of them needs
+ALWAYS = (CONTROLLERS / "base.py", CONTROLLERS / "constant.py")
+INSTALLED = {"site-packages", "dist-packages"}
+
+
+def _digest(paths):
+    """Hash of files, by their order and contents."""
+    digest = hashlib.sha256()
+    for path in paths:
+        digest.update(Path(path).read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def plant_files():
+    """Sorted files that shape a run: sources that it imports and data, but for the controllers'."""
+
+    def inside(path):
+        return _room(path) in ("simulator", "training") or path in ALWAYS
+
+    return sorted([*imported_files([RUN], [PACKAGE.parent], inside), *_data(PACKAGE / "data")])
+
+
+def plant_code():
+    """Hash of all sources and data that shape a run, but for the controllers."""
+    return _digest(plant_files())
+
+
+def _data(folder):
+    """Files beneath a folder that are no sources."""
+    return [
+        path
+        for path in folder.rglob("*")
+        if path.is_file() and path.suffix != ".py" and "__pycache__" not in path.parts
+    ]
+
+
+def controller_code(controller):
+    """{"name", "code"}: what a controller is called, and a hash of the files that define it.
+
+    A name of CONTROLLERS: its module, what it imports of this project, and the data of the package
+    controllers; "design:FILE", "policy:NAME": the file and all controllers; "module:Name", a class or an
+    object: the file that it comes from, and what that imports from its own folder and this project.
+    """
+    from fowt_env.controllers import CONTROLLERS
+    from fowt_env.controllers.design import saved_files as saved_design
+    from fowt_env.controllers.policy.controller import PREFIX, policy_path
+
+    if not isinstance(controller, str):
+        kind = (
+            controller if inspect.isroutine(controller) or inspect.isclass(controller) else type(controller)
+        )
+        name = f"{kind.__module__}:{kind.__qualname__}"
+        return {"name": name, "code": _digest(_user_files(kind.__module__))}
+    if ":" not in controller:
+        files = _package_files(CONTROLLERS.get(controller))
+    elif controller.startswith(saved_design.PREFIX):
+        files = [controller.removeprefix(saved_design.PREFIX), *_package_files(saved_design.load_design)]
+    elif controller.startswith(PREFIX):  # its baseline may be any controller
+        files = [policy_path(controller.removeprefix(PREFIX)), *_package_files(None)]
+    else:
+        files = _user_files(controller.partition(":")[0])
+    return {"name": controller, "code": _digest(files)}
+
+
+def _package_files(factory):
+    """Files that a factory of the package controllers depends on; those of all controllers for any other."""
+    start = getattr(factory, "__module__", None) or ""
+    if start.startswith("fowt_env.controllers."):
+        starts = [PACKAGE.parent.joinpath(*start.split(".")).with_suffix(".py")]
+    else:
+        starts = list(CONTROLLERS.rglob("*.py"))
+    return [*_with_own(starts, [PACKAGE.parent]), *sorted(_data(CONTROLLERS))]
+
+
+def _user_files(module):
+    """Files that a user's module depends on: those of its own project, and of this one what they import."""
+    file = _module_file(module)
+    if file is None:
+        return []
+    depth = 0 if module == "__main__" else module.count(".") + (file.name == "__init__.py")
+    folder = file.parents[depth]
+    top = folder / module.partition(".")[0]
+
+    def inside(path):
+        own = path.is_relative_to(folder) and _room(path) is None
+        return path == file or own and (path.is_relative_to(top) or not INSTALLED & set(path.parts))
+
+    return _with_own(imported_files([file], [folder], inside), [folder, PACKAGE.parent])
+
+
+def _module_file(name):
+    """File of a module, without running it where it is not imported yet; None where there is none."""
+    if name in sys.modules:
+        file = getattr(sys.modules[name], "__file__", None)
+        return None if file is None else _located(Path(file))
+    top, *rest = name.split(".")
+    sys.path.insert(0, "")
+    try:
+        spec = importlib.util.find_spec(top)
+    except (ImportError, ValueError):
+        spec = None
+    finally:
+        sys.path.remove("")
+    if spec is None or not spec.has_location:
+        return None
+    place = _located(Path(spec.origin))
+    place = place.parent if rest or place.name == "__init__.py" else place.with_suffix("")
+    found = (place.joinpath(*rest, "__init__.py"), place.joinpath(*rest).with_suffix(".py"))
+    return next((path for path in found if path.is_file()), None)
+
+
+def _with_own(files, roots):
+    """Files, and what they import of this project's controllers, and with those of fowt_env."""
+    files, registry = set(files), CONTROLLERS / "__init__.py"  # which imports every controller
+    for room in ("controllers", "simulator"):
+
+        def inside(path, known=frozenset(files), room=room):
+            return path in known or _room(path) == room and path != registry
+
+        files |= set(imported_files(files, roots, inside))
+    return sorted(files)
+
+
+def _located(path):
+    """A file's one path: within this package as it is imported, whose folders may be links; else resolved."""
+    return path if path.is_relative_to(PACKAGE) else path.resolve()
+
+
+def _room(path):
+    """What of this project a file belongs to: "controllers", "training", "simulator", or None."""
+    if not path.is_relative_to(PACKAGE):
+        return None
+    part = path.relative_to(PACKAGE).parts[0]
+    return part if part in ("controllers", "training") else "simulator"
+
+
+def versions():
+    """{package: version} of what shapes the figures, Python and processor included."""
+    found = {
+        "fowt_env": fowt_env.__version__,
+        "python": machine.python_version(),
+        "machine": machine.machine(),
+    }
+    for name in PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def version_gap(old, new):
+    """The first package that shapes figures and has different versions in two mappings, with both; or None.
+
+    One that is missing in a mapping shaped no figure there: its controllers failed.
+    """
+    differing = (name for name in sorted(set(old) & set(new) - set(NO_FIGURES)) if old[name] != new[name])
+    return next(((f"{name} {old[name]}", f"{name} {new[name]}") for name in differing), None)
