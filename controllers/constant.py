@@ -5,7 +5,7 @@ from math import isfinite
 
 import numpy as np
 
-from fowt_env.controllers.base import CompiledController, check_control_dt
+from fowt_env.control import CompiledController, check_control_dt
 from fowt_env.errors import InputError
 from fowt_env.plant.compile.decorators import control_kernel
 

@@ -17,7 +17,7 @@ from math import exp, inf, isfinite
 
 import numpy as np
 
-from fowt_env.controllers.base import check_control_dt, tuned
+from fowt_env.control import check_control_dt
 from fowt_env.controllers.pi import (
     PI,
     Memory,
@@ -30,6 +30,7 @@ from fowt_env.controllers.pi import (
     speed_error,
     write_commands,
 )
+from fowt_env.controllers.tuned import tuned
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.compile.decorators import control_kernel, kernel
 from fowt_env.plant.drivetrain import TorqueCurve, limited

@@ -16,7 +16,7 @@ from math import ceil, isnan, nan
 
 import numpy as np
 
-from fowt_env.controllers.base import check_control_dt
+from fowt_env.control import check_control_dt
 from fowt_env.controllers.pi import PI, Memory, Parameter, PISettings, pi_step
 from fowt_env.plant.compile.decorators import control_kernel
 from fowt_env.plant.drivetrain import TorqueCurve

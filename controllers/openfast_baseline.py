@@ -15,7 +15,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from fowt_env.controllers.base import CompiledController, check_control_dt
+from fowt_env.control import CompiledController, check_control_dt
 from fowt_env.controllers.pi import Parameter, PISettings, curve_of, schedule_gain
 from fowt_env.plant.compile.decorators import control_kernel, kernel
 from fowt_env.plant.drivetrain import generator_torque, limited

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fowt_env.controllers.base import CompiledController, check_control_dt
+from fowt_env.control import CompiledController, check_control_dt
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.compile.decorators import control_kernel, kernel
 from fowt_env.plant.drivetrain import TorqueCurve, build_torque_curve, generator_torque, limited

@@ -17,7 +17,7 @@ from math import exp, isfinite
 import numpy as np
 
 from fowt_env.analysis.trim import calm, trim
-from fowt_env.controllers.base import check_control_dt
+from fowt_env.control import check_control_dt
 from fowt_env.controllers.pi import (
     PI,
     Memory,

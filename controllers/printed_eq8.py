@@ -7,7 +7,7 @@ that fades only like 1/t, depends on the choice of t = 0, and ends unstable. Do 
 
 from enum import IntEnum
 
-from fowt_env.controllers.base import CompiledController, check_control_dt
+from fowt_env.control import CompiledController, check_control_dt
 from fowt_env.controllers.pi import (
     Memory,
     Parameter,

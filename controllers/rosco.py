@@ -29,7 +29,8 @@ import numpy as np
 from scipy.interpolate import RectBivariateSpline
 from scipy.optimize import brentq
 
-from fowt_env.controllers.base import check_control_dt, tuned
+from fowt_env.control import check_control_dt
+from fowt_env.controllers.tuned import tuned
 from fowt_env.errors import ControllerError, InputError, unknown
 from fowt_env.plant.aero.blade_elements import build_blade_elements
 from fowt_env.plant.aero.coefficient_table import performance

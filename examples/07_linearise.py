@@ -4,7 +4,7 @@ import fowt_env
 from fowt_env.analysis.linear_model import modes
 from fowt_env.controllers.design.closed_loop import closed_loop_matrix
 from fowt_env.controllers.pi import PISettings
-from fowt_env.files.tables import write_mat
+from fowt_env.files.matlab import write_mat
 
 scene = fowt_env.build_scene(wind=18.0, fidelity="standard")
 point = fowt_env.trim(scene)

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from fowt_env.analysis.trim import trim
+from fowt_env.control import make
 from fowt_env.descriptions.records import is_number
 from fowt_env.errors import ControllerInputError, InputError, SimulationStopped, unknown
 from fowt_env.plant.channels import DEG, RPM
@@ -172,9 +173,9 @@ def simulate(
     """DataFrame of one run, columns named as OpenFAST writes them (`PtfmPitch_[deg]`).
 
     controller  None: the rotor is held at the trim's speed and blade pitch (at rest without wind); a
-                name of controllers.CONTROLLERS or "module:Class"; or an object with
+                name of a built-in one or "module:Class"; or an object with
                 reset(measurement) and act(measurement) -> (generator torque N m, blade pitch rad), and
-                prepare(scene) where it needs more than measurements (controllers/base.py)
+                prepare(scene) where it needs more than measurements (control.py)
     duration    s; rows run from 0 to duration inclusive, every output_dt
     dt          physics step, s; must divide control_dt and output_dt, and output_dt the duration.
                 None: scene.dt (0.0125 s at fidelity "reference", 0.1 s at the others)
@@ -207,8 +208,6 @@ def simulate(
         raise InputError(f"grid_loss = {grid_loss!r}: must be a time in s, or None")
     held = controller is None
     if not held:
-        from fowt_env.controllers import make  # looked up only when used: fowt_env imports nothing from it
-
         controller = make(controller, scene.turbine, control_dt)
         with _controllers_own():
             controller.prepare(scene)

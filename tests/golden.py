@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from fowt_env.envs.env import REWARD_KEYS
-from fowt_env.files.tables import replacing
+from fowt_env.files.atomic import replacing
 
 FOLDER = Path(__file__).parent / "reference" / "golden"
 ENVIRONMENTS = ("fowt_env/OC3Hywind-v1",)

@@ -23,7 +23,7 @@ import yaml
 
 import fowt_env.training.cli.app
 from fowt_env.controllers.policy.controller import read_policy
-from fowt_env.files.tables import is_leftover
+from fowt_env.files.atomic import is_leftover
 from fowt_env.training.evaluation import results
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -17,7 +17,7 @@ from fowt_env.controllers.lqr.law import LQR
 from fowt_env.controllers.pi import PI, PISettings
 from fowt_env.descriptions.files import parse_json, read_text
 from fowt_env.errors import InputError, unknown
-from fowt_env.files.tables import replacing
+from fowt_env.files.atomic import replacing
 
 PREFIX = "design:"
 FORMAT, VERSION = "fowt-design", 1

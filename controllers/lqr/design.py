@@ -17,9 +17,9 @@ from scipy.optimize import least_squares
 from fowt_env.analysis.linear_model import linearize
 from fowt_env.analysis.trim import calm
 from fowt_env.analysis.wave_excitation import wave_force
+from fowt_env.descriptions.iec import ntm_sigma
 from fowt_env.descriptions.platform import joint_sea_state, sea_state_of
 from fowt_env.errors import InputError, unknown
-from fowt_env.weather.iec import ntm_sigma
 from fowt_env.weather.turbulence import amplitudes
 
 SITE = "gulf_of_maine_normal"  # joint sea states, as in the named suites

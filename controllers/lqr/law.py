@@ -14,7 +14,7 @@ from math import exp
 
 import numpy as np
 
-from fowt_env.controllers.base import CompiledController, check_control_dt
+from fowt_env.control import CompiledController, check_control_dt
 from fowt_env.controllers.lqr import design
 from fowt_env.controllers.lqr.design import (
     MOMENT,

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fowt_env.controllers.base import CompiledController, call_law, check_control_dt
+from fowt_env.control import CompiledController, call_law, check_control_dt
 from fowt_env.controllers.lqr.law import WindEstimator
 from fowt_env.controllers.policy.network_file import read_policy
 from fowt_env.envs.actions import MODES, Mode, action_of, build_action_map, command_of, start_tracking

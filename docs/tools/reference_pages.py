@@ -21,7 +21,7 @@ from fowt_env.envs.actions import TRACKING_DAMPING, TRACKING_FREQUENCY
 from fowt_env.envs.observations import KNOWN, STANDARD, entries
 from fowt_env.envs.tables import action_table, markdown, observation_table
 from fowt_env.envs.tasks import TASKS, Episode
-from fowt_env.files.tables import replacing
+from fowt_env.files.atomic import replacing
 from fowt_env.plant.rollout import (
     BLOWN_UP,
     CAPSIZE,

@@ -14,13 +14,8 @@ from fowt_env.plant.channels import N_FIXED, Out, measure, record
 from fowt_env.plant.compile.decorators import entry
 from fowt_env.plant.dynamics import Kept, evaluate, loads_of, respond
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measure
-from fowt_env.plant.state import State
+from fowt_env.plant.state import STATE_INDEX, STATES, State
 
-STATES = (
-    "surge", "sway", "heave", "roll", "platform_pitch", "yaw",
-    "vx", "vy", "vz", "wx", "wy", "wz", "rotor_speed", "blade_pitch",
-)  # fmt: skip
-STATE_INDEX = tuple(State[name.upper()] for name in STATES)
 # velocity steps are small because quadratic drag leaves a false damping proportional to them
 STEPS = np.array([1e-3, 1e-3, 1e-3, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-7, 1e-7, 1e-7, 1e-4, 1e-5])
 INPUTS = ("generator_torque", "blade_pitch_command", "wind_speed")

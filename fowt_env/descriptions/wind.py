@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fowt_env.descriptions.iec import REFERENCE_SPEED, TURBULENCE_INTENSITY
 from fowt_env.errors import InputError, unknown
-from fowt_env.weather.iec import REFERENCE_SPEED, TURBULENCE_INTENSITY
 
 
 class Required:

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
 from fowt_env.analysis.trim_cache import exact_trim, near_trim, plant_key
+from fowt_env.control import CompiledController, catalogue, make
 from fowt_env.descriptions.platform import Platform
 from fowt_env.envs.actions import MODES, Mode, build_action_map, start_tracking
 from fowt_env.envs.episode import (
@@ -214,11 +215,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             parameters, memory = self._baseline.parameters, self._baseline.memory
         self._estimator = watch = None
         if set(ESTIMATE_CHANNELS) & set(task.observation):
-            from fowt_env.controllers.lqr.law import (
-                WindEstimator,  # fowt_env imports nothing from it otherwise
-            )
-
-            self._estimator = WindEstimator(self.design_scene.turbine, self.control_dt)
+            self._estimator = catalogue().WindEstimator(self.design_scene.turbine, self.control_dt)
             watch = self._estimator.kernel
         watching, sensed = self._estimator is not None, self._sensors is not None
         self._law, self._watch = Box(None, law), Box(None, watch)
@@ -516,14 +513,9 @@ def named_baseline(name, turbine, control_dt):
 
     Raises: InputError for unknown ones and those written in Python.
     """
-    from fowt_env.controllers import (  # looked up only when used: fowt_env imports nothing from it
-        CONTROLLERS,
-        make,
-    )
-    from fowt_env.controllers.base import CompiledController
-
-    if isinstance(name, str) and ":" not in name and name not in CONTROLLERS:
-        raise unknown("baseline", name, CONTROLLERS)
+    known = catalogue().CONTROLLERS
+    if isinstance(name, str) and ":" not in name and name not in known:
+        raise unknown("baseline", name, known)
     baseline = make(name, turbine, control_dt)
     if not isinstance(baseline, CompiledController):
         raise InputError(f"baseline = {name!r}: must be a compiled controller, such as 'pi' or 'gspi_oc3'")

@@ -123,3 +123,10 @@ def pose_of(x):
         x[State.WY],
         x[State.WZ],
     )
+
+
+STATES = (
+    "surge", "sway", "heave", "roll", "platform_pitch", "yaw",
+    "vx", "vy", "vz", "wx", "wy", "wz", "rotor_speed", "blade_pitch",
+)  # fmt: skip
+STATE_INDEX = tuple(State[name.upper()] for name in STATES)

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from fowt_env.errors import InputError
-from fowt_env.files.tables import replacing
+from fowt_env.files.atomic import replacing
 from fowt_env.visual.rendering import AT_REST, COLOURS, LOOSE, TIGHT, TRACES, YELLOW, View
 
 SUFFIXES = (".gif", ".mp4")

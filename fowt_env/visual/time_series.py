@@ -10,7 +10,7 @@ import numpy as np
 from scipy.signal import welch
 
 from fowt_env.errors import InputError
-from fowt_env.files.tables import replacing
+from fowt_env.files.atomic import replacing
 
 TIME = "Time_[s]"
 # Okabe and Ito's palette: told apart with any colour vision

@@ -9,7 +9,7 @@ from math import atan, ceil, pi, radians
 
 import numpy as np
 
-from fowt_env.weather.iec import extreme_speed, length_scale, ntm_sigma
+from fowt_env.descriptions.iec import extreme_speed, length_scale, ntm_sigma
 
 STEP = 0.01  # s; linear interpolation is then within 1e-4 of the gust's amplitude
 

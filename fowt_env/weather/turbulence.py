@@ -26,7 +26,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from fowt_env.weather.iec import length_scale
+from fowt_env.descriptions.iec import length_scale
 
 LENGTH_RATIO = np.array([8.1, 2.7, 0.66])  # L_u, L_v, L_w over Lambda_1 (IEC Annex B)
 SIGMA_RATIO = np.array([1.0, 0.8, 0.5])  # sigma of u, v, w over sigma_1 (IEC Annex B)

@@ -10,11 +10,11 @@ from math import cos, hypot, radians, sin
 
 import numpy as np
 
+from fowt_env.descriptions.iec import EXTREME_SHEAR_EXPONENT, etm_sigma, extreme_speed, ntm_sigma
 from fowt_env.descriptions.wind import SHARED, Number, Seed, read_wind
 from fowt_env.errors import InputError
 from fowt_env.plant.aero.wind import LOWEST_HEIGHT, WindSeries
 from fowt_env.weather import gusts
-from fowt_env.weather.iec import EXTREME_SHEAR_EXPONENT, etm_sigma, extreme_speed, ntm_sigma
 from fowt_env.weather.turbulence import SHORTEST_PERIOD, hub_turbulence, turbulence
 
 OPENING = 60.0  # s; the platform trims to the mean of this much of a user's series

@@ -16,11 +16,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fowt_env.descriptions.iec import length_scale, ntm_sigma
 from fowt_env.descriptions.wind import MOVING, TURBULENCE_CLASS, Flag, Number, Seed
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.aero.wind_field import WindField, field_at
 from fowt_env.plant.compile.decorators import kernel
-from fowt_env.weather.iec import length_scale, ntm_sigma
 from fowt_env.weather.turbsim import read_bts
 
 MARGIN = 75.0  # m of platform drift against the wind that a box must still cover at the end of a run

@@ -3,9 +3,9 @@ import pytest
 from plant_helpers import rates
 
 import fowt_env
-from fowt_env.analysis.linear_model import STATE_INDEX, linearize, natural_periods
+from fowt_env.analysis.linear_model import linearize, natural_periods
 from fowt_env.errors import InputError
-from fowt_env.plant.state import State
+from fowt_env.plant.state import STATE_INDEX, State
 
 PERIODS = {"surge": 124.0, "sway": 124.0, "heave": 30.8, "roll": 29.9, "platform_pitch": 29.9, "yaw": 8.28}
 CHANNELS = {  # motion: (channel, unit, initial offset)

@@ -7,7 +7,7 @@ import pytest
 
 from fowt_env import build_scene, simulate
 from fowt_env.controllers import CONTROLLERS, make
-from fowt_env.controllers.base import tuned
+from fowt_env.controllers.tuned import tuned
 
 TEXT = (Path(__file__).resolve().parents[2] / "docs" / "controllers.md").read_text(encoding="utf-8")
 

@@ -8,10 +8,10 @@ from naive.turbine import turbine
 
 from fowt_env import build_scene, simulate
 from fowt_env.controllers import make
-from fowt_env.controllers.base import tuned
 from fowt_env.controllers.floating_feedback import FeedbackSettings, FloatingFeedback
 from fowt_env.controllers.pi import PISettings
 from fowt_env.controllers.pi import pi as make_pi
+from fowt_env.controllers.tuned import tuned
 from fowt_env.errors import InputError
 from fowt_env.plant.measurement import Measurement
 

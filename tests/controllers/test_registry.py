@@ -10,8 +10,8 @@ import pytest
 from naive.turbine import turbine
 
 from fowt_env import build_scene, controllers
+from fowt_env.control import EXTRA
 from fowt_env.controllers import CONTROLLERS, CheckedController, information, make
-from fowt_env.controllers.base import EXTRA
 from fowt_env.controllers.constant import Constant
 from fowt_env.controllers.policy.controller import shipped_agents
 from fowt_env.errors import ControllerError, InputError

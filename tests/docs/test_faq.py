@@ -15,14 +15,13 @@ from gymnasium.envs.registration import registry
 from typer.testing import CliRunner
 
 import fowt_env
-from fowt_env import requirements
 from fowt_env.controllers import make
 from fowt_env.descriptions.platform import DATA, read_platform
 from fowt_env.envs import FowtEnv
 from fowt_env.plant.compile import announcement as warmup
 from fowt_env.plant.compile import decorators as jit
 from fowt_env.training.cli import app as cli
-from fowt_env.training.cli import health
+from fowt_env.training.cli import health, requirements
 
 NAME = "fowt_env/OC3Hywind-v1"
 MESSAGES = [block for block in blocks("faq.md") if block.language == "text"]

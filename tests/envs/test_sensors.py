@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from fowt_env import build_scene, simulate
+from fowt_env.control import call_law
 from fowt_env.controllers import make
-from fowt_env.controllers.base import call_law
 from fowt_env.controllers.lqr.law import WindEstimator
 from fowt_env.envs import FowtEnv, FowtVectorEnv
 from fowt_env.envs.safety import SafetyLayer
@@ -13,7 +13,7 @@ from fowt_env.envs.sensors import draw_sensors, reading_scales
 from fowt_env.errors import InputError
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measure, Measurement
 from fowt_env.training.evaluation.model_mismatch import Shift, Unaware
-from fowt_env.training.rl.randomisation import plant_settings
+from fowt_env.training.evaluation.plant_perturbation import plant_settings
 
 QUICK = {"rotor": "table", "wave_components": 20, "wind": {"kind": "ntm", "speed": 18.0, "class": "B"}}
 NAMES = ("rotor_speed", "platform_pitch_rate", "previous_action", "estimated_wind", "estimated_waves")

@@ -14,7 +14,8 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
-from fowt_env.files.tables import is_leftover, write_table
+from fowt_env.files.atomic import is_leftover
+from fowt_env.files.tables import write_table
 from fowt_env.training.cli import app as cli
 from fowt_env.training.evaluation import results
 

@@ -9,7 +9,9 @@ from scipy.io import loadmat
 
 from fowt_env import build_scene, linearize
 from fowt_env.errors import InputError
-from fowt_env.files.tables import is_leftover, read_table, remove_leftovers, replacing, write_mat, write_table
+from fowt_env.files.atomic import is_leftover, remove_leftovers, replacing
+from fowt_env.files.matlab import write_mat
+from fowt_env.files.tables import read_table, write_table
 
 FRAME = pd.DataFrame({"Time_[s]": [0.0, 0.1], "PtfmPitch_[deg]": [1.0 / 3.0, -2e-7]})
 

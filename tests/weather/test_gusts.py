@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from fowt_env.descriptions.iec import extreme_speed
 from fowt_env.weather import gusts
-from fowt_env.weather.iec import extreme_speed
 
 pytestmark = pytest.mark.installation
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from naive.turbulence import disk_grid, pair_averages, veers
 
-from fowt_env.weather.iec import etm_sigma, length_scale, ntm_sigma
+from fowt_env.descriptions.iec import etm_sigma, length_scale, ntm_sigma
 from fowt_env.weather.turbulence import (
     amplitudes,
     centre_average,

@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
+from fowt_env.descriptions.iec import ntm_sigma
 from fowt_env.descriptions.wind import KINDS, read_wind
 from fowt_env.errors import InputError
 from fowt_env.plant.aero.wind import LOWEST_HEIGHT, NO_WIND, wind_at, wind_now
 from fowt_env.plant.compile.decorators import kernel
-from fowt_env.weather.iec import ntm_sigma
 from fowt_env.weather.wind import build_wind, make_series, mean_wind, nominal_speed
 
 pytestmark = pytest.mark.installation

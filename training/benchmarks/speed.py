@@ -22,7 +22,7 @@ import pandas as pd
 import fowt_env
 from fowt_env.controllers import make
 from fowt_env.errors import InputError, unknown
-from fowt_env.files.tables import replacing
+from fowt_env.files.atomic import replacing
 from fowt_env.plant.aero.tower_drag import tower_load
 from fowt_env.plant.aero.wind import wind_now
 from fowt_env.plant.channels import measure, record

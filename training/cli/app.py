@@ -19,9 +19,10 @@ from rich.progress import (
     TimeElapsedColumn,
 )
 
+from fowt_env.descriptions.checks import parse_numbers
 from fowt_env.errors import ControllerError, InputError, SimulationStopped, unknown
 from fowt_env.files.tables import SERIES_SUFFIXES, table_path, write_table
-from fowt_env.training.cli.arguments import parse_numbers, parse_pairs, parse_sea, parse_wind
+from fowt_env.training.cli.arguments import parse_pairs, parse_sea, parse_wind
 from fowt_env.training.cli.doctor import DOCTOR_EXAMPLES, doctor
 from fowt_env.training.cli.tables import figure, print_table, table_width
 

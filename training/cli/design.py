@@ -6,9 +6,10 @@ from typing import Annotated
 
 import typer
 
+from fowt_env.descriptions.checks import parse_numbers
 from fowt_env.errors import InputError
 from fowt_env.training.cli.app import app, note, out, progress_bar, reported, show
-from fowt_env.training.cli.arguments import parse_numbers, parse_pairs
+from fowt_env.training.cli.arguments import parse_pairs
 
 design = typer.Typer(no_args_is_help=True, rich_markup_mode="rich", help="Tune controllers.")
 app.add_typer(design, name="design")
@@ -199,7 +200,7 @@ def bound(
     if out_path is not None:
         note(f"wrote {write_table(table, out_path)}")
     if plot is not None:
-        from fowt_env.training.reports.design_plots import plot_bound
+        from fowt_env.training.design.plots import plot_bound
 
         plot_bound(table, INFORMATION, path=plot)
         note(f"wrote {plot}")
@@ -223,7 +224,7 @@ def front(
     if out_path is not None:
         note(f"wrote {write_table(table, out_path)}")
     if plot is not None:
-        from fowt_env.training.reports.design_plots import plot_bound
+        from fowt_env.training.design.plots import plot_bound
 
         plot_bound(fronts, INFORMATION, table, path=plot)
         note(f"wrote {plot}")

@@ -6,8 +6,8 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
-from fowt_env import requirements
 from fowt_env.errors import InputError
+from fowt_env.training.cli import requirements
 
 DOCTOR_EXAMPLES = """[bold]Examples[/bold]
 

@@ -5,9 +5,10 @@ from typing import Annotated
 
 import typer
 
+from fowt_env.descriptions.checks import parse_numbers
 from fowt_env.errors import InputError
 from fowt_env.training.cli.app import OptionOption, app, note, progress_bar, reported
-from fowt_env.training.cli.arguments import parse_numbers, parse_pairs, parse_sea, parse_wind
+from fowt_env.training.cli.arguments import parse_pairs, parse_sea, parse_wind
 
 REPORT_EXAMPLES = """[bold]Examples[/bold]
 

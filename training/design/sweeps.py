@@ -10,11 +10,13 @@ import numpy as np
 import pandas as pd
 from scipy.linalg import eigvals
 
-from fowt_env.analysis.linear_model import FORCES, STATE_INDEX, linearize
+from fowt_env.analysis.linear_model import FORCES, linearize
 from fowt_env.controllers.lqr.design import Weights, scene_at
 from fowt_env.controllers.lqr.law import LQR
 from fowt_env.errors import InputError
-from fowt_env.files.tables import replacing, write_table
+from fowt_env.files.atomic import replacing
+from fowt_env.files.tables import write_table
+from fowt_env.plant.state import STATE_INDEX
 from fowt_env.simulation import simulate
 from fowt_env.training.evaluation.cases import named_cases
 from fowt_env.training.evaluation.evaluate import SHORTEST_WEATHER
@@ -103,7 +105,7 @@ def save_models(models, path):
 
 def save_study(models, folder):
     """The paths written into a folder: modes.csv, zeros.csv, models.json, models.npz and three plots."""
-    from fowt_env.training.reports.design_plots import plot_bode, plot_damping, plot_poles
+    from fowt_env.training.design.plots import plot_bode, plot_damping, plot_poles
 
     folder = Path(folder)
     written = [write_table(mode_table(models), folder / "modes.csv")]

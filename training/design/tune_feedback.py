@@ -20,13 +20,14 @@ from pathlib import Path
 
 import pandas as pd
 
-from fowt_env.controllers.base import TUNED
 from fowt_env.controllers.floating_feedback import FeedbackSettings, FloatingFeedback
 from fowt_env.controllers.pi import PISettings
 from fowt_env.controllers.rosco import Rosco, RoscoSettings
+from fowt_env.controllers.tuned import TUNED
 from fowt_env.descriptions.platform import joint_sea_state, read_turbine
 from fowt_env.errors import InputError, unknown
-from fowt_env.files.tables import replacing, write_table
+from fowt_env.files.atomic import replacing
+from fowt_env.files.tables import write_table
 from fowt_env.training.evaluation.cases import Case
 from fowt_env.training.evaluation.engines import session
 from fowt_env.training.evaluation.evaluate import evaluate

@@ -16,10 +16,10 @@ import typer
 from scipy.optimize import minimize
 
 from fowt_env.controllers.pi import PI, PISettings
+from fowt_env.descriptions.checks import parse_numbers
 from fowt_env.errors import InputError
-from fowt_env.files.tables import replacing
+from fowt_env.files.atomic import replacing
 from fowt_env.scene.build import build_scene
-from fowt_env.training.cli.arguments import parse_numbers
 from fowt_env.training.evaluation.cases import read_suite
 from fowt_env.training.evaluation.engines import session
 from fowt_env.training.evaluation.evaluate import evaluate

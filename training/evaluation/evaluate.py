@@ -22,7 +22,8 @@ import fowt_env
 from fowt_env.controllers import make
 from fowt_env.descriptions.records import is_number, plain_number
 from fowt_env.errors import InputError
-from fowt_env.files.tables import replacing, write_table
+from fowt_env.files.atomic import replacing
+from fowt_env.files.tables import write_table
 from fowt_env.training.evaluation.cases import Case, Suite, described, named_cases
 from fowt_env.training.evaluation.engines import outcomes
 from fowt_env.training.evaluation.guard import attempt

@@ -6,7 +6,7 @@ The model has one collective blade pitch, so every fault acts on all three blade
 from math import radians
 from typing import Literal
 
-from fowt_env.controllers.base import CheckedController, CompiledController, check_control_dt
+from fowt_env.control import CheckedController, CompiledController, check_control_dt
 from fowt_env.controllers.constant import Constant
 from fowt_env.descriptions.records import NonNegative, Positive, Record
 

@@ -13,11 +13,11 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from fowt_env.controllers.base import CheckedController, CompiledController
+from fowt_env.control import CheckedController, CompiledController
 from fowt_env.descriptions.records import NonNegative, Positive, Record
 from fowt_env.envs.sensors import NOISE_STREAM, reading_scales
 from fowt_env.plant.measurement import Measurement
-from fowt_env.training.rl.randomisation import PLANT, plant_settings
+from fowt_env.training.evaluation.plant_perturbation import PLANT, plant_settings
 
 
 class Shift(Record):

@@ -16,8 +16,7 @@ NO_FIGURES = ("fowt_env", "python", "pandas")  # of the versions: compared other
 PACKAGE = Path(fowt_env.__file__).absolute().parent
 CONTROLLERS = PACKAGE / "controllers"
 RUN = PACKAGE / "training" / "evaluation" / "run_case.py"  # what it imports shapes a run
-# of the controllers, what a run without any of them needs
-ALWAYS = (CONTROLLERS / "base.py", CONTROLLERS / "constant.py")
+ALWAYS = (CONTROLLERS / "constant.py",)  # of the controllers, what a run without any of them needs
 INSTALLED = {"site-packages", "dist-packages"}
 
 

@@ -24,7 +24,8 @@ import fowt_env
 from fowt_env.descriptions.files import parse_json
 from fowt_env.descriptions.records import is_number
 from fowt_env.errors import InputError
-from fowt_env.files.tables import remove_leftovers, replacing, write_table
+from fowt_env.files.atomic import remove_leftovers, replacing
+from fowt_env.files.tables import write_table
 from fowt_env.training.evaluation import provenance
 from fowt_env.training.evaluation.guard import printable
 from fowt_env.training.evaluation.locks import locked

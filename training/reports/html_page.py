@@ -20,7 +20,8 @@ import pandas as pd
 
 from fowt_env.descriptions.files import parse_json
 from fowt_env.errors import InputError, unknown
-from fowt_env.files.tables import read_table, replacing
+from fowt_env.files.atomic import replacing
+from fowt_env.files.tables import read_table
 from fowt_env.training.evaluation.evaluate import run_file
 from fowt_env.training.evaluation.leaderboard_file import check_leaderboard
 from fowt_env.visual.time_series import PANELS, SPECTRA, TIME, frequency_marks, spectrum

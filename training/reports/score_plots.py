@@ -4,7 +4,7 @@ As in plots.py every function returns a matplotlib Figure and, if given a path, 
 """
 
 from fowt_env.errors import InputError
-from fowt_env.training.reports.design_plots import WIND, finish_bound
+from fowt_env.training.design.plots import WIND, finish_bound
 from fowt_env.visual.time_series import COLOURS, INK, TIME, named_runs, new_figure, save_figure, style_axes
 
 MARKS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*", "p", "h")

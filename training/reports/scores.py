@@ -18,7 +18,8 @@ import pandas as pd
 
 from fowt_env.controllers import DESIGN, POLICY, information
 from fowt_env.errors import InputError, unknown
-from fowt_env.files.tables import replacing, write_table
+from fowt_env.files.atomic import replacing
+from fowt_env.files.tables import write_table
 from fowt_env.training.evaluation.bootstrap import LEAST_SEEDS, crossed_estimate
 from fowt_env.training.evaluation.metrics import METRICS, never_negative
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from fowt_env.controllers.policy.network_file import FORMAT
 from fowt_env.errors import InputError
-from fowt_env.files.tables import replacing
+from fowt_env.files.atomic import replacing
 
 ACTIVATION_NAMES = {"Tanh": "tanh", "ReLU": "relu"}
 

@@ -10,28 +10,14 @@ from math import isfinite
 
 import numpy as np
 
-from fowt_env.descriptions.platform import read_platform, read_turbine
 from fowt_env.envs.sensors import check_sensors
 from fowt_env.errors import InputError, unknown
+from fowt_env.training.evaluation.plant_perturbation import PLANT, PLATFORM, plant_settings
 
-# name: (what is drawn, default distribution). Factors multiply the file's value.
-PLANT = {
-    "ballast_mass": (
-        "factor on the ballast's mass; the plant floats deeper or higher",
-        ("uniform", 0.99, 1.01),
-    ),
-    "upper_mass": ("factor on the masses and inertias of tower and nacelle", ("uniform", 0.95, 1.05)),
-    "added_mass": ("factor on the transverse and heave added mass", ("uniform", 0.8, 1.2)),
-    "drag": ("factor on the transverse drag coefficient and linear damping", ("uniform", 0.7, 1.3)),
-    "mooring_stiffness": ("factor on the lines' wet weight and EA", ("uniform", 0.8, 1.2)),
-    "actuator_lag": ("factor on the time constant of the blade-pitch drive", ("loguniform", 0.5, 2.0)),
-    "air_density": ("factor on the density of air", ("normal", 1.0, 0.02)),
-}
 SENSORS = {
     "noise": "white noise of every reading, standard deviation as a share of the channel's observation scale",
     "delay": "whole control periods from measurement to reading",
 }
-PLATFORM = "oc3_hywind"  # whose figures are multiplied, and which controllers know
 DEFAULT_SENSORS = {"noise": ("uniform", 0.0, 0.02), "delay": ("uniform", 0.0, 3.0)}
 KINDS = {
     "uniform": lambda rng, low, high: rng.uniform(low, high),
@@ -77,47 +63,6 @@ def draw(chosen, rng):
     """{name: value} of one draw of distributions, in a fixed order."""
     order = [name for name in (*PLANT, *SENSORS) if name in chosen]
     return {name: float(KINDS[chosen[name][0]](rng, *chosen[name][1:])) for name in order}
-
-
-def plant_settings(factors, platform=PLATFORM):
-    """{"platform", "turbine"} settings of FowtEnv for a plant with {name of PLANT: factor}."""
-    base = read_platform(platform)
-    turbine = read_turbine(base.turbine)
-
-    def factor(name):
-        value = factors.get(name, 1.0)
-        if not value > 0.0:
-            raise InputError(f"randomise.{name}: drew {value:g}: factors must be positive")
-        return value
-
-    def scaled(part, by, *names):
-        values = {name: getattr(part, name) for name in names}
-        return part.model_copy(
-            update={
-                n: tuple(by * x for x in v) if isinstance(v, tuple) else by * v for n, v in values.items()
-            }
-        )
-
-    hydro = scaled(base.hydro, factor("added_mass"), "added_mass_coefficient", "heave_added_mass")
-    upper, tau = factor("upper_mass"), factor("actuator_lag")
-    base = base.model_copy(
-        update={
-            "environment": scaled(base.environment, factor("air_density"), "air_density"),
-            "ballast": scaled(base.ballast, factor("ballast_mass"), "mass", "inertia"),
-            "hydro": scaled(hydro, factor("drag"), "drag_coefficient", "linear_damping"),
-            "tower": scaled(base.tower, upper, "mass", "inertia"),
-            "lines": tuple(
-                scaled(line, factor("mooring_stiffness"), "wet_weight", "EA") for line in base.lines
-            ),
-        }
-    )
-    turbine = turbine.model_copy(
-        update={
-            "nacelle": scaled(turbine.nacelle, upper, "mass", "inertia"),
-            "pitch_drive": scaled(turbine.pitch_drive, tau, "time_constant"),
-        }
-    )
-    return {"platform": base, "turbine": turbine}
 
 
 def randomised(spec, n, seed):

@@ -18,7 +18,7 @@ import yaml
 from fowt_env.controllers import information
 from fowt_env.controllers.policy.controller import AGENTS, read_policy
 from fowt_env.errors import InputError
-from fowt_env.files.tables import replacing
+from fowt_env.files.atomic import replacing
 from fowt_env.training.rl.train import resolve
 
 LARGEST_FILE = 200_000  # bytes of a policy that is kept in the repository

@@ -3,10 +3,10 @@
 import numpy as np
 import pandas as pd
 
+from fowt_env.descriptions.iec import ntm_sigma
 from fowt_env.descriptions.platform import read_platform, read_turbine
 from fowt_env.training.validation.openfast_cases import PLATFORM, RUNS, box_wind
 from fowt_env.training.validation.signal_errors import normalised_rms
-from fowt_env.weather.iec import ntm_sigma
 from fowt_env.weather.turbulence import turbulence
 from fowt_env.weather.wind_field import read_box, rotor_average
 

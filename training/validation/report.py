@@ -4,7 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from fowt_env.files.tables import remove_leftovers, replacing, write_table
+from fowt_env.files.atomic import remove_leftovers, replacing
+from fowt_env.files.tables import write_table
 from fowt_env.training.validation.openfast_cases import DECAYS
 from fowt_env.visual.time_series import COLOURS, INK, TIME, new_figure, save_figure, spectrum, style_axes
 

@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numba
 
-from fowt_env.requirements import check_numba
+from fowt_env.plant.compile.versions import check_numba
 
 check_numba(numba.__version__)  # ahead of what other versions cannot import or compile
 

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from fowt_env import build_scene, linearize, simulate, trim
-from fowt_env.analysis.linear_model import STATE_INDEX, modes
+from fowt_env.analysis.linear_model import modes
 from fowt_env.analysis.trim import AZIMUTHS, calm, mean_derivative
 from fowt_env.controllers.design.closed_loop import closed_loop_matrix, platform_pitch_damping
 from fowt_env.controllers.pi import PISettings
 from fowt_env.errors import InputError
 from fowt_env.plant.drivetrain import generator_torque
-from fowt_env.plant.state import State
+from fowt_env.plant.state import STATE_INDEX, State
 
 
 @pytest.fixture(scope="module")

@@ -10,10 +10,11 @@ import pytest
 from typer.testing import CliRunner
 
 import fowt_env
+from fowt_env.descriptions.checks import parse_numbers
 from fowt_env.errors import InputError, SimulationStopped
 from fowt_env.plant.compile.announcement import COMPILING_MESSAGE
 from fowt_env.training.cli import app as cli
-from fowt_env.training.cli.arguments import parse_numbers, parse_pairs, parse_sea, parse_wind
+from fowt_env.training.cli.arguments import parse_pairs, parse_sea, parse_wind
 
 SHORT = ("--duration", "10", "--wind", "18")
 

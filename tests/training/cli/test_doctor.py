@@ -11,10 +11,9 @@ import pytest
 from typer.testing import CliRunner
 
 import fowt_env
-from fowt_env import requirements
 from fowt_env.plant.compile import decorators as jit
 from fowt_env.training.cli import app as cli
-from fowt_env.training.cli import health
+from fowt_env.training.cli import health, requirements
 
 REQUIRES = [
     "numpy>=2.0",

@@ -12,6 +12,7 @@ from fowt_env import build_scene
 from fowt_env.analysis.linear_model import linearize
 from fowt_env.analysis.wave_excitation import wave_force
 from fowt_env.controllers.lqr.design import MOMENT, N_FEEDBACK, N_PLANT, PLANT, design_model, wind_filter
+from fowt_env.descriptions.iec import ntm_sigma
 from fowt_env.descriptions.platform import joint_sea_state, sea_state_of
 from fowt_env.errors import InputError
 from fowt_env.training.design import linear_bound
@@ -29,8 +30,7 @@ from fowt_env.training.design.linear_bound import (
     gspi_covariance,
     ratio_table,
 )
-from fowt_env.training.reports.design_plots import plot_bound
-from fowt_env.weather.iec import ntm_sigma
+from fowt_env.training.design.plots import plot_bound
 from fowt_env.weather.turbulence import amplitudes
 from fowt_env.weather.waves import jonswap
 

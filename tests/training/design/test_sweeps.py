@@ -7,6 +7,7 @@ import pytest
 
 from fowt_env import build_scene
 from fowt_env.errors import InputError
+from fowt_env.training.design.plots import plot_bode, plot_damping, plot_poles
 from fowt_env.training.design.sweeps import (
     mode_table,
     models_over,
@@ -16,7 +17,6 @@ from fowt_env.training.design.sweeps import (
     transmission_zeros,
     zero_table,
 )
-from fowt_env.training.reports.design_plots import plot_bode, plot_damping, plot_poles
 
 
 @pytest.fixture(scope="module")

@@ -7,9 +7,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from fowt_env.controllers.base import TUNED
 from fowt_env.controllers.floating_feedback import FeedbackSettings, FloatingFeedback
 from fowt_env.controllers.pi import PISettings
+from fowt_env.controllers.tuned import TUNED
 from fowt_env.errors import InputError
 from fowt_env.training.design import tune_feedback as tune_controllers
 from fowt_env.training.design.tune_feedback import (

@@ -338,26 +338,27 @@ wind = {"kind": "ntm", "speed": 18.0, "class": "B"}
 case = Case("c", wind, sea, shift=Shift(noise=0.01))
 row, _ = scored(Run("constant", "constant", case, 1, 1.0, 0.1, {}, None))
 assert row["status"] == "ok", row["reason"]
-own = ("fowt_env.", "training.", "fowt_env.controllers.base", "fowt_env.controllers.constant")
-print(*{sys.modules[name].__file__ for name in [*sys.modules] if name.startswith(own)}, sep="\\n")
+others = [name for name in sys.modules if name.startswith("fowt_env.controllers")]
+names = {name for name in sys.modules if name.startswith("fowt_env.")} - set(others)
+print(*{sys.modules[name].__file__ for name in {*names, "fowt_env.controllers.constant"}}, sep="\\n")
 """
 
 
 def test_what_a_run_imports_is_in_the_hash_of_the_plant_and_what_people_look_at_is_not(tmp_path):
-    environment = os.environ | {"PYTHONPATH": str(results.ROOT)}
+    environment = os.environ | {"PYTHONPATH": str(provenance.PACKAGE.parent)}
     done = subprocess.run(
         [sys.executable, "-c", USED], env=environment, cwd=tmp_path, capture_output=True, text=True
     )
     assert done.returncode == 0, done.stderr
-    files = {str(path) for path in results.plant_files()}
+    files = {str(path) for path in provenance.plant_files()}
     # of the program above, and of agents
-    others = ("training/evaluation/cases.py", "fowt_env/envs/decisions.py")
-    used = set(done.stdout.split()) - {str(results.ROOT / name) for name in others}
+    others = ("training/evaluation/cases.py", "envs/decisions.py")
+    used = set(done.stdout.split()) - {str(provenance.PACKAGE / name) for name in others}
     assert used <= files and len(used) > 40
-    names = {path.relative_to(results.ROOT).as_posix() for path in results.plant_files()}
-    data = "fowt_env/data/platforms/oc3_hywind.toml"
+    names = {path.relative_to(provenance.PACKAGE).as_posix() for path in provenance.plant_files()}
+    data = "data/platforms/oc3_hywind.toml"
     assert {data, "training/evaluation/metrics.py", "training/evaluation/faults.py"} <= names
-    looks = ("fowt_env/cli", "fowt_env/plots", "fowt_env/animation", "training/report", "controllers/pi")
+    looks = ("visual", "training/cli", "training/reports", "controllers/pi")
     assert not [name for name in names if name.startswith(looks)]
 
 
@@ -409,7 +410,7 @@ def test_a_users_controller_depends_on_those_of_the_package_that_it_builds_on(tm
     monkeypatch.syspath_prepend(str(tmp_path))
     names = {path.relative_to(path.parents[1]).as_posix() for path in provenance._user_files("built")}
     law = {"controllers/lqr/law.py", "controllers/lqr/design.py"}
-    assert law | {"fowt_env/analysis/linear_model.py"} <= names
+    assert law | {"analysis/linear_model.py"} <= names
     assert "controllers/rosco.py" not in names and "controllers/__init__.py" not in names
 
 

@@ -13,8 +13,9 @@ from fowt_env.plant.measurement import Measurement
 from fowt_env.training.evaluation.cases import Case, described, read_suite
 from fowt_env.training.evaluation.evaluate import evaluate, planned
 from fowt_env.training.evaluation.model_mismatch import Shift, Unaware, reading_scales, shifted_parts
+from fowt_env.training.evaluation.plant_perturbation import PLANT
 from fowt_env.training.evaluation.run_case import run_controller
-from fowt_env.training.rl.randomisation import PLANT, SENSORS
+from fowt_env.training.rl.randomisation import SENSORS
 
 WIND = {"kind": "ntm", "speed": 18.0, "class": "B"}
 

@@ -9,7 +9,8 @@ from small_run import small
 
 from fowt_env.descriptions.platform import read_platform
 from fowt_env.errors import InputError
-from fowt_env.training.rl.randomisation import PLANT, SENSORS, distributions, draw, plant_settings, randomised
+from fowt_env.training.evaluation.plant_perturbation import PLANT, plant_settings
+from fowt_env.training.rl.randomisation import SENSORS, distributions, draw, randomised
 from fowt_env.training.rl.train import decision_env, make_envs, resolve
 
 

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from fowt_env.analysis.linear_model import STATES
 from fowt_env.envs import FowtEnv
 from fowt_env.errors import InputError
 from fowt_env.plant.hydro.linear_damping import LinearDamping
-from fowt_env.plant.state import State
+from fowt_env.plant.state import STATES, State
 from fowt_env.scene.build import STEPS, build_scene
 from fowt_env.training.cli.app import app
 from fowt_env.training.studies.robustness import extremes as stability_extremes

@@ -18,7 +18,7 @@ from scipy.optimize import brentq, fsolve
 from fowt_env.analysis.linear_model import natural_periods
 from fowt_env.analysis.trim import trim_held
 from fowt_env.descriptions.platform import DATA, Line, read_platform, read_turbine
-from fowt_env.files.tables import replacing
+from fowt_env.files.atomic import replacing
 from fowt_env.plant.mooring import catenary
 from fowt_env.scene.build import build_scene
 

@@ -19,7 +19,7 @@ import typer
 
 from fowt_env.descriptions.platform import DATA, read_platform, read_turbine
 from fowt_env.errors import InputError
-from fowt_env.files.tables import replacing
+from fowt_env.files.atomic import replacing
 from fowt_env.training.studies.froude_model.identify import toml_value
 
 PLATFORM, TURBINE = "oc3_hywind", "nrel5mw"

@@ -6,7 +6,8 @@ import numpy as np
 
 import fowt_env
 from fowt_env.descriptions.platform import read_platform
-from fowt_env.files.tables import replacing, write_table
+from fowt_env.files.atomic import replacing
+from fowt_env.files.tables import write_table
 from fowt_env.training.studies.paper import load_cases as paper
 from fowt_env.visual.time_series import (
     COLOURS,

@@ -13,7 +13,7 @@ import numpy as np
 
 from fowt_env.controllers import make
 from fowt_env.errors import InputError, unknown
-from fowt_env.files.tables import replacing
+from fowt_env.files.atomic import replacing
 from fowt_env.plant.channels import measure
 from fowt_env.plant.compile.decorators import entry, kernel
 from fowt_env.plant.events import Counter

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from fowt_env.errors import unknown
-from fowt_env.files.tables import replacing
+from fowt_env.files.atomic import replacing
 from fowt_env.plant.integrators import INTEGRATORS
 from fowt_env.plant.rollout import RUNNING
 from fowt_env.scene.build import STEPS

@@ -1,28 +1,32 @@
-"""What a controller is: the protocol, its compiled form, and the check of a Python one's answers.
+"""What a controller is, and the one place that turns a name into one.
 
-Beside reset and act a controller may have
+A controller has reset(measurement) and act(measurement). Beside these it may have
 
 - prepare(scene), called once per run before reset: for what a measurement does not carry, such as steady
   operating points, a preview of the wind or the rotor's performance table;
 - information, a tuple of the Measurement fields that it uses and of whatever else it is told (EXTRA), so
   that a comparison can say who knew what.
+
+The built-in controllers are built on the simulator, and so it imports none of them: it knows the name of the
+package that has them (CATALOGUE), and imports that when a run or an environment asks for a name.
 """
 
+import importlib
+import inspect
 import reprlib
-import tomllib
+import sys
 from collections.abc import Callable
 from math import isfinite
-from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
 
-from fowt_env.errors import ControllerError, InputError
+from fowt_env.errors import ControllerError, InputError, unknown
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
 
-TUNED = Path(__file__).parent / "tuned.toml"  # written by training/design/tune_feedback.py
+CATALOGUE = "fowt_env.controllers"
 N_COMMANDS = 2  # command[0]: generator torque, N m, high-speed shaft; command[1]: blade pitch, rad
 EXTRA = {  # what a controller may be told beyond Measurement
     "wind_preview": "the rotor-averaged wind, some seconds before it arrives",
@@ -133,13 +137,81 @@ def _shown(value: Any) -> str:
     return f"{text[:200]}..." if len(text) > 200 else text
 
 
-def tuned(name: str) -> dict[str, Any]:
-    """{setting: value} of a controller that training/design/tune_feedback.py has tuned."""
-    return tomllib.loads(TUNED.read_text())[name]["settings"]
-
-
 def check_control_dt(control_dt: float) -> float:
     """The control period as a float. Raises: InputError outside (0, 1] s."""
     if not 0.0 < control_dt <= LONGEST_CONTROL_DT:
         raise InputError(f"control_dt = {control_dt}: must be in (0, {LONGEST_CONTROL_DT:g}] s")
     return float(control_dt)
+
+
+def catalogue() -> Any:
+    """The package of the built-in controllers: CONTROLLERS, PREFIXES, named(name), WindEstimator."""
+    return importlib.import_module(CATALOGUE)
+
+
+def make(controller: Any, turbine: Any, control_dt: float) -> Any:
+    """Controller ready for a run, from a name, an import path or an object.
+
+    controller: a built-in name ("pi"); "policy:NAME" or "policy:PATH" of a trained agent; "design:FILE" with
+    a file of `fowt design`; "module:Name" with Name a class, a factory or a controller (looked for in
+    the working folder too); such a class or factory itself; or an object with reset(measurement) and
+    act(measurement). Classes and factories are called with (turbine, control_dt) where they take two
+    arguments, else with none. Compiled controllers come back as they are, others inside a
+    CheckedController.
+    Raises: InputError for unknown names (with a suggestion), paths that cannot be imported, agents and
+    designs that cannot be used, and objects without reset and act.
+    """
+    control_dt = check_control_dt(control_dt)
+    name = None
+    if isinstance(controller, str):
+        name = controller
+        own = ":" in name and not name.startswith(tuple(catalogue().PREFIXES))
+        controller = _imported(name) if own else catalogue().named(name)
+    if isinstance(controller, type) or not isinstance(controller, Controller):
+        controller = _called(controller, name, turbine, control_dt)
+    for method in ("reset", "act"):
+        if not callable(getattr(controller, method, None)):
+            raise InputError(
+                f"controller {name or controller!r} has no method {method}(measurement): a controller has"
+                " reset(measurement) and act(measurement) -> (generator_torque, blade_pitch)"
+            )
+    if isinstance(controller, CompiledController | CheckedController):
+        return controller
+    return CheckedController(controller, name)
+
+
+def _imported(path):
+    """What "module:Name" points at."""
+    module_name, _, attribute = path.partition(":")
+    if not module_name or not attribute:
+        raise InputError(f"controller {path!r}: an import path is 'module:Name'")
+    sys.path.insert(0, "")  # a console script has its own folder on the path, not the user's
+    try:
+        module = importlib.import_module(module_name)
+    except ImportError as error:
+        raise InputError(f"controller {path!r}: cannot import {module_name!r}: {error}") from error
+    finally:
+        sys.path.remove("")
+    if not hasattr(module, attribute):
+        public = [key for key in vars(module) if not key.startswith("_")]
+        raise unknown(f"name in module {module_name!r}:", attribute, public)
+    return getattr(module, attribute)
+
+
+def _called(factory, name, turbine, control_dt):
+    """What a class or factory makes; anything that cannot be called comes back as it is."""
+    if not callable(factory):
+        return factory
+    try:
+        signature = inspect.signature(factory)
+    except ValueError:  # some built-in callables have none
+        return factory
+    for arguments in ((turbine, control_dt), ()):
+        try:
+            signature.bind(*arguments)
+        except TypeError:
+            continue
+        return factory(*arguments)
+    raise InputError(
+        f"controller {name or factory!r}: must take (turbine, control_dt) or no arguments, not {signature}"
+    )

@@ -1,0 +1,58 @@
+"""What this package needs of others, as its metadata has it, and whether what is installed will do."""
+
+import platform
+import re
+
+from fowt_env.errors import InputError
+from fowt_env.plant.compile.versions import NUMBA, Package
+
+DISTRIBUTION = "fowt-env"
+
+
+def _found(name, needed=""):
+    from importlib import metadata
+
+    try:
+        return Package(name, metadata.version(name), needed)
+    except metadata.PackageNotFoundError:
+        return Package(name, None, needed)
+
+
+def requirements() -> dict[str, list[Package]]:
+    """{extra or "": [Package]} of the installed package; those of [dev] are for its developers.
+
+    Raises: InputError where the package runs from a folder and was never installed.
+    """
+    from importlib import metadata
+
+    try:
+        lines = metadata.requires(DISTRIBUTION) or []
+    except metadata.PackageNotFoundError:
+        raise InputError(f"{DISTRIBUTION} is not installed here: pip install -e . in its folder") from None
+    found: dict[str, list[Package]] = {}
+    for line in lines:
+        wanted, _, marker = line.partition(";")
+        name, needed = re.fullmatch(r"\s*([A-Za-z0-9._-]+)(?:\[.*\])?\s*\(?([^()]*?)\)?\s*", wanted).groups()
+        extra = re.search(r"extra == ['\"]([^'\"]+)['\"]", marker)
+        key = extra.group(1) if extra else ""
+        if key != "dev" and name != DISTRIBUTION:
+            found.setdefault(key, []).append(_found(name, needed))
+    return found
+
+
+def versions() -> list[Package]:
+    """Python, this package and what it cannot do without."""
+    from fowt_env import __version__
+
+    try:
+        needed = requirements().get("", [])
+    except InputError:
+        needed = [_found(name) for name in ("numpy", "scipy", "numba", "gymnasium", "pandas")]
+    needed = [_found("numba", NUMBA) if package.name == "numba" else package for package in needed]
+    head = [Package(DISTRIBUTION, __version__), Package("Python", platform.python_version())]
+    return [*head, *needed, _found("llvmlite")]
+
+
+def optional_parts() -> dict[str, list[Package]]:
+    """{extra: [Package]}: what each extra of the package would bring, installed or not."""
+    return {extra: packages for extra, packages in sorted(requirements().items()) if extra}
