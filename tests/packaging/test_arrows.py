@@ -1,0 +1,68 @@
+"""The rooms and what each may import: an arrow goes from a room to one further down, never up."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+import fowt_env
+
+ROOT = Path(fowt_env.__file__).resolve().parent.parent
+# from the ground up; a room imports itself and what stands before it
+FLOORS = (
+    "errors", "folders", "registration", "plant", "descriptions", "weather", "scene", "files", "analysis",
+    "control", "simulation", "visual", "envs", "controllers", "training", "training.evaluation",
+    "training.design", "training.rl", "training.reports", "training.validation", "training.benchmarks",
+    "training.studies", "training.cli",
+)  # fmt: skip
+
+
+def module_paths():
+    """{dotted name below fowt_env: path} of every module."""
+    found = {}
+    for top in ("fowt_env", "controllers", "training"):
+        for path in (ROOT / top).rglob("*.py"):
+            parts = path.relative_to(ROOT).with_suffix("").parts
+            parts = parts[1:] if parts[0] == "fowt_env" else parts
+            found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return found
+
+
+MODULES = module_paths()
+
+
+def room_of(module):
+    """The room that a module is in."""
+    head, *rest = module.split(".")
+    return ".".join((head, *rest[:1])) if head == "training" and rest else head
+
+
+def imports(path):
+    """Modules of this project that a source imports, at its top or inside a function, or by a name in text."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom):
+            assert not node.level, f"{path}: imports are absolute"
+            if node.module.partition(".")[0] == "fowt_env":
+                for alias in node.names:
+                    name = f"{node.module}.{alias.name}".partition(".")[2]
+                    yield name if name in MODULES else name.rpartition(".")[0]
+        elif isinstance(node, ast.Import):
+            yield from (a.name.partition(".")[2] for a in node.names if a.name.startswith("fowt_env."))
+
+
+@pytest.mark.parametrize("module", sorted(set(MODULES) - {""}))
+def test_imports_go_down(module):
+    room = room_of(module)
+    assert room in FLOORS, f"{module} lies in no room"
+    above = FLOORS[FLOORS.index(room) + 1 :]
+    up = [name for name in imports(MODULES[module]) if room_of(name) in above]
+    assert not up
+
+
+@pytest.mark.parametrize("module", sorted(set(MODULES) - {""}))
+def test_files_are_read_from_a_module_s_own_room_or_below(module):
+    """A path that starts at __file__ and climbs leaves the room."""
+    for node in ast.walk(ast.parse(MODULES[module].read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            head = node.value.partition("/")[0]
+            assert head not in ("tests", "examples", "docs") or " " in node.value, node.value
