@@ -38,7 +38,7 @@ def room_of(module):
 
 
 def imports(path):
-    """Modules of this project that a source imports, at its top or inside a function, or by a name in text."""
+    """Modules of this project that a source imports, at its top or inside a function."""
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom):
             assert not node.level, f"{path}: imports are absolute"

@@ -253,7 +253,8 @@ def test_a_folder_that_is_read_only_is_read(tmp_path):
         "os.mkdir = os.utime = os.replace = os.unlink = os.rmdir = refuse\nos.open = reading\n"
     )
     use = (
-        "from fowt_env.plant.hydro.waves import ramp_factor as f\nfrom fowt_env.plant.state import add, NO_LOAD\n"
+        "from fowt_env.plant.hydro.waves import ramp_factor as f\n"
+        "from fowt_env.plant.state import add, NO_LOAD\n"
         "print(f(1.0, 4.0), sum(f.stats.cache_hits.values()), add(NO_LOAD, NO_LOAD).fx)\n"
     )
     assert output(start(locked + use, tmp_path / "cache")) == ["0.25", "1", "0.0"]
