@@ -12,6 +12,7 @@ from fowt_env.analysis.wave_excitation import fit_wave_filter, wave_force
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.channels import N_FIXED, Out, measure, record
 from fowt_env.plant.compile.decorators import entry
+from fowt_env.plant.compile.handle import data_of, model_of
 from fowt_env.plant.dynamics import Kept, evaluate, loads_of, respond
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measure
 from fowt_env.plant.state import STATE_INDEX, STATES, State
@@ -177,7 +178,7 @@ def modes(a, names, cm_height, arm):
 @entry
 def _mean_response(box, x, u, force, azimuths, dx, measurement, row, rates, measured, recorded):
     """Azimuth means of state rates, measurement and output row under u and further hull forces (6,)."""
-    scene, work = box.scene, box.work
+    scene, work = model_of(box), data_of(box)
     start = x[State.AZIMUTH]
     rates[:] = 0.0
     measured[:] = 0.0

@@ -13,6 +13,7 @@ from fowt_env.plant.aero.bem_rotor import wake_equilibrium
 from fowt_env.plant.aero.wind import wind_now
 from fowt_env.plant.channels import to_units
 from fowt_env.plant.compile.decorators import entry
+from fowt_env.plant.compile.handle import data_of, model_of
 from fowt_env.plant.drivetrain import build_torque_curve, generator_torque
 from fowt_env.plant.dynamics import derivative
 from fowt_env.plant.rollout import output_row
@@ -114,7 +115,7 @@ def mean_derivative(box, x, u, azimuths, dx, mean):
     mean[:] = 0.0
     for i in range(azimuths):
         x[State.AZIMUTH] = start + i * (2.0 * pi / 3.0) / azimuths
-        derivative(0.0, x, u, box.scene, box.work, dx)
+        derivative(0.0, x, u, model_of(box), data_of(box), dx)
         for j in range(x.shape[0]):
             mean[j] += dx[j] / azimuths
     x[State.AZIMUTH] = start
@@ -123,10 +124,10 @@ def mean_derivative(box, x, u, azimuths, dx, mean):
 @entry
 def settle_wake(box, x, dx):
     """Set the wake states of x to their steady values for the rest of it."""
-    scene = box.scene
+    scene = model_of(box)
     wake_equilibrium(
         0.0, pose_of(x), x, wind_now(0.0, scene.wind), scene.wind, scene.wind_field,
-        scene.rotor, scene.skew, scene.wake, dx, box.work.counters,
+        scene.rotor, scene.skew, scene.wake, dx, data_of(box).counters,
     )  # fmt: skip
 
 

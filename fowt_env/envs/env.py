@@ -52,7 +52,7 @@ from fowt_env.envs.tables import task_tables
 from fowt_env.envs.tasks import TASKS, Episode, Task, check_offset, task_of
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.channels import DEG
-from fowt_env.plant.compile.decorators import Box
+from fowt_env.plant.compile.handle import Handle
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
 from fowt_env.plant.rollout import STOP_REASONS, output
 from fowt_env.plant.state import State
@@ -218,7 +218,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             self._estimator = catalogue().WindEstimator(self.design_scene.turbine, self.control_dt)
             watch = self._estimator.kernel
         watching, sensed = self._estimator is not None, self._sensors is not None
-        self._law, self._watch = Box(None, law), Box(None, watch)
+        self._law, self._watch = Handle(None, law), Handle(None, watch)
         self._setting = Setting(
             model=scene.model,
             actions=build_action_map(mode, task, turbine, self.control_dt),
@@ -425,7 +425,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         if self._estimator is not None:
             self._estimator.prepare(self.design_scene)
             self._setting = self._setting._replace(estimator=self._estimator.parameters)
-        self._box = Box(self._setting, self._run)
+        self._box = Handle(self._setting, self._run)
 
     def measurement(self) -> Measurement:
         """Measurement that a controller is given now (SI), as the sensors read it."""

@@ -14,6 +14,7 @@ from fowt_env.envs.observations import ObservationMap, fill_observation, fill_si
 from fowt_env.envs.rewards import Scales, fill_terms, weighted_sum
 from fowt_env.envs.sensors import Sensors, take_reading
 from fowt_env.plant.compile.decorators import entry, kernel
+from fowt_env.plant.compile.handle import data_of, model_of
 from fowt_env.plant.drivetrain import followed_torque, torque_was_limited
 from fowt_env.plant.dynamics import Kept, Model, Work
 from fowt_env.plant.measurement import Measure
@@ -28,6 +29,8 @@ SHOWN_COUNTS = {"saturated_actions": SATURATED, "torque_limited": LIMITED}  # in
 
 class Setting(NamedTuple):
     """What stays fixed during an episode."""
+
+    by_reference = True
 
     model: Model
     actions: ActionMap
@@ -44,6 +47,8 @@ class Setting(NamedTuple):
 
 class Run(NamedTuple):
     """What moves during an episode; the arrays down to reference are its whole state."""
+
+    by_reference = True
 
     work: Work
     x: np.ndarray  # (n_state,)
@@ -101,7 +106,7 @@ def show(setting, run):
 @entry
 def start(box):
     """Measure and show the first instant of an episode; returns the status."""
-    setting, run = box.scene, box.work
+    setting, run = model_of(box), data_of(box)
     for i in range(N_COUNTS):
         run.counts[i] = 0
     run.work.kept[Kept.TORQUE_LIMITED] = 0.0
@@ -117,7 +122,7 @@ def start(box):
 @entry
 def show_again(box):
     """Fill the observation anew, after an estimator was started."""
-    show(box.scene, box.work)
+    show(model_of(box), data_of(box))
 
 
 @kernel
@@ -157,16 +162,16 @@ def act(box, law, estimator, action):
     law, estimator: Boxes whose work is the control kernel of the baseline and of the estimator, or None;
     Python takes ten times as long to hand over a kernel itself. BAD_ACTION leaves everything as it was.
     """
-    setting, run = box.scene, box.work
+    setting, run = model_of(box), data_of(box)
     clipped = accept(action, run.action)
     if clipped < 0:
         return BAD_ACTION, 0.0
     run.counts[SATURATED] += clipped
     command_of(
-        run.action, setting.actions, law.work, setting.parameters, run.memory, run.reading, run.u,
+        run.action, setting.actions, law.data, setting.parameters, run.memory, run.reading, run.u,
         run.wanted,
     )  # fmt: skip
-    return advance_period(setting, run, estimator.work)
+    return advance_period(setting, run, estimator.data)
 
 
 @entry
@@ -175,10 +180,10 @@ def act_physical(box, estimator, torque, blade_pitch):
 
     estimator: as act takes it.
     """
-    setting, run = box.scene, box.work
+    setting, run = model_of(box), data_of(box)
     run.wanted[0] = torque
     run.wanted[1] = blade_pitch
     run.u[0] = followed_torque(run.u[0], torque, setting.actions.control_dt, setting.model.generator)
     run.u[1] = blade_pitch
     action_of(run.u, run.x[State.ROTOR_SPEED], setting.actions, run.action)
-    return advance_period(setting, run, estimator.work)
+    return advance_period(setting, run, estimator.data)

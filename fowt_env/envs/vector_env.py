@@ -20,7 +20,7 @@ from fowt_env.envs.observations import N_ACTIONS
 from fowt_env.envs.rewards import N_TERMS
 from fowt_env.envs.snapshot import Snapshot
 from fowt_env.errors import InputError, unknown
-from fowt_env.plant.compile.decorators import Box
+from fowt_env.plant.compile.handle import Handle
 
 # GNU's OpenMP, which runs numba's threads on Linux, lets an idle thread spin for milliseconds: best between
 # steps on a quiet machine, ruinous beside other programs (docs/performance.md). This many turns are some 50
@@ -380,7 +380,7 @@ def _check_alike(i, env, first):
         raise InputError(f"per_env[{i}]: action_mode = {env.action_mode!r}: must be {first.action_mode!r}")
     if numba.config.DISABLE_JIT:
         return
-    kinds = [numba.typeof(Box(e._setting, e._run)) for e in (first, env)]
+    kinds = [numba.typeof(Handle(e._setting, e._run)) for e in (first, env)]
     if kinds[0] == kinds[1]:
         return
     models = [e.scene.model._asdict() | {"sensors": e._setting.sensors} for e in (first, env)]

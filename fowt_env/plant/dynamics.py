@@ -44,6 +44,8 @@ class Body(NamedTuple):
 class Model(NamedTuple):
     """Everything that does not change while stepping. A part that a scene lacks is None."""
 
+    by_reference = True
+
     body: Body
     layout: object  # channels.Layout
     drivetrain: object  # loads.drivetrain.Drivetrain
@@ -102,6 +104,8 @@ N_KEPT = 42
 
 class Work(NamedTuple):
     """Scratch of one plant. lines, counters, kept, history and samples carry over between calls."""
+
+    by_reference = True
 
     lines: np.ndarray  # (n_lines, 6) mooring warm start and results
     counters: np.ndarray  # (N_COUNTERS,)

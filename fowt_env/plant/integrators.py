@@ -14,6 +14,7 @@ import numpy as np
 from fowt_env.errors import unknown
 from fowt_env.plant.aero.wind import wind_now
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
+from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.drivetrain import followed_pitch, limited
 from fowt_env.plant.dynamics import Kept, accelerate, attitude_rate, derivative, evaluate, respond, rotor_part
 from fowt_env.plant.hydro.morison import StripLoad
@@ -35,10 +36,21 @@ class Gusts(NamedTuple):
     weight: np.ndarray  # (4 samples,) of the samples, latest first
 
 
-class Multistep(NamedTuple):
-    """Choice of a method other than Runge-Kutta 4."""
+class RungeKutta(NamedTuple):
+    """Classical Runge-Kutta 4."""
 
-    heun: bool  # explicit trapezoid, two evaluations a step
+    evaluations: int = 4
+
+
+class Heun(NamedTuple):
+    """Explicit trapezoidal rule."""
+
+    evaluations: int = 2
+
+
+class Multistep(NamedTuple):
+    """Adams-Bashforth 4, with or without correction by Adams-Moulton 4."""
+
     corrector: bool  # Adams-Bashforth-Moulton in PECE form, two evaluations; else predictor alone, one
     gusts: object = None  # Gusts, or None: the rotor's load is evaluated once per step like all others
 
@@ -60,7 +72,8 @@ def build_gusts(samples):
 
 def rotor_samples(multistep):
     """Rows per step that a Multistep (or None) keeps of the rotor's load: none where it is evaluated once."""
-    return 0 if multistep is None or multistep.gusts is None else multistep.gusts.samples
+    gusts = getattr(multistep, "gusts", None)
+    return 0 if gusts is None else gusts.samples
 
 
 def build_integrator(name, rotor_samples=1):
@@ -72,8 +85,10 @@ def build_integrator(name, rotor_samples=1):
     if name not in INTEGRATORS:
         raise unknown("integrator", name, INTEGRATORS)
     if name == "rk4":
-        return None
-    return Multistep(name == "heun", name == "abm4", build_gusts(rotor_samples) if name == "ab4" else None)
+        return RungeKutta()
+    if name == "heun":
+        return Heun()
+    return Multistep(name == "abm4", build_gusts(rotor_samples) if name == "ab4" else None)
 
 
 @inlined_kernel
@@ -110,7 +125,7 @@ def pitch_after(blade_pitch, command, dt, actuator):
 
 
 @inlined_kernel
-def rk4(t, x, u, dt, scene, work):
+def rk4(t, x, u, dt, scene, multistep, work):
     """One classical Runge-Kutta step of x in place, blade pitch exact at every stage."""
     k1, k2, k3, k4, y = work.stages[0], work.stages[1], work.stages[2], work.stages[3], work.stages[4]
     half = pitch_after(x[State.BLADE_PITCH], u[1], 0.5 * dt, scene.actuator)
@@ -134,7 +149,7 @@ def rk4(t, x, u, dt, scene, work):
 
 
 @inlined_kernel
-def heun(t, x, u, dt, scene, work):
+def heun(t, x, u, dt, scene, multistep, work):
     """One step of the explicit trapezoidal rule, blade pitch exact."""
     k1, k2, y = work.stages[0], work.stages[1], work.stages[4]
     rates(t, x, u, scene, work, k1)
@@ -244,7 +259,7 @@ def follow_rotor(dt, scene, gusts, work, y):
 
 
 @inlined_kernel
-def adams(t, x, u, dt, scene, work):
+def adams(t, x, u, dt, scene, multistep, work):
     """One Adams step: velocities by Adams-Bashforth 4, positions by Adams-Moulton 4 with the new velocities.
 
     With the corrector, in the first three steps, and while the blades of a free rotor are feathered,
@@ -263,14 +278,14 @@ def adams(t, x, u, dt, scene, work):
     for i in range(x.shape[0]):
         y[i] = x[i] + dt * bashforth(order, i, history)
     y[State.BLADE_PITCH] = pitch
-    sample_rotor(t, x, u, dt, scene, scene.multistep.gusts, work)
-    if scene.multistep.corrector or steps < START_STEPS or feathering(x, scene):
+    sample_rotor(t, x, u, dt, scene, multistep.gusts, work)
+    if multistep.corrector or steps < START_STEPS or feathering(x, scene):
         derivative(t + dt, y, u, scene, work, new)
         for i in range(State.VX, x.shape[0]):
             y[i] = x[i] + dt * moulton(order, new[i], i, history)
         y[State.BLADE_PITCH] = pitch
     else:
-        follow_rotor(dt, scene, scene.multistep.gusts, work, y)
+        follow_rotor(dt, scene, multistep.gusts, work, y)
     attitude_rate(y, new, scene.body.plane)
     new[State.AZIMUTH] = y[State.ROTOR_SPEED]
     for i in range(State.VX):
@@ -280,6 +295,9 @@ def adams(t, x, u, dt, scene, work):
     kept[Kept.STEPS] = steps + 1.0
 
 
+method_step = chosen_by_class("multistep", {RungeKutta: rk4, Heun: heun, Multistep: adams}, inlined=True)
+
+
 @inlined_kernel
 def take_step(t, x, u, dt, scene, multistep, work):
     """One step of the scene's integrator, x in place."""
@@ -287,10 +305,5 @@ def take_step(t, x, u, dt, scene, multistep, work):
     if pitch != x[State.BLADE_PITCH]:  # an actuator without lag jumps: the kept loads are not of this pitch
         x[State.BLADE_PITCH] = pitch
         work.kept[Kept.FRESH] = 0.0
-    if multistep is None:
-        rk4(t, x, u, dt, scene, work)
-    elif multistep.heun:
-        heun(t, x, u, dt, scene, work)
-    else:
-        adams(t, x, u, dt, scene, work)
+    method_step(t, x, u, dt, scene, multistep, work)
     work.kept[Kept.FRESH] = 0.0

@@ -6,6 +6,7 @@ import numpy as np
 
 from fowt_env.plant.channels import measure, record
 from fowt_env.plant.compile.decorators import entry, inlined_kernel, kernel
+from fowt_env.plant.compile.handle import data_of, model_of
 from fowt_env.plant.drivetrain import followed_torque, torque_was_limited
 from fowt_env.plant.dynamics import Kept, loads_of
 from fowt_env.plant.integrators import rates, take_step
@@ -53,7 +54,7 @@ def advance_scene(scene, work, x, u, first, n, dt):
 @entry
 def advance(box, x, u, first, n, dt):
     """Advance x (n_state,) in place by n steps of dt under constant u (2,); returns the status."""
-    return advance_scene(box.scene, box.work, x, u, first, n, dt)
+    return advance_scene(model_of(box), data_of(box), x, u, first, n, dt)
 
 
 @inlined_kernel
@@ -77,20 +78,20 @@ def observe(box, x, u, t, dx, measurement):
     The loads kept by the work arrays are used where they are fresh: after changing x from outside,
     call forget first.
     """
-    observe_scene(box.scene, box.work, x, u, t, dx, measurement)
+    observe_scene(model_of(box), data_of(box), x, u, t, dx, measurement)
 
 
 @entry
 def output(box, x, u, t, dx, row):
     """Fill one output row (n_channels,) in SI at time t under u; kept loads as in observe."""
-    output_scene(box.scene, box.work, x, u, t, dx, row)
+    output_scene(model_of(box), data_of(box), x, u, t, dx, row)
 
 
 @entry
 def forget(box):
     """Drop kept loads and past derivatives: the state was changed from outside."""
-    box.work.kept[Kept.FRESH] = 0.0
-    box.work.kept[Kept.STEPS] = 0.0
+    data_of(box).kept[Kept.FRESH] = 0.0
+    data_of(box).kept[Kept.STEPS] = 0.0
 
 
 def output_row(box, x, u, t, size):
@@ -123,7 +124,7 @@ def command(box, u, t, torque, blade_pitch, period, grid_loss):
     before = u[0]
     u[0] = torque
     u[1] = blade_pitch
-    follow_torque(t, before, u, period, box.scene.generator, grid_loss, box.work.kept)
+    follow_torque(t, before, u, period, model_of(box).generator, grid_loss, data_of(box).kept)
 
 
 @kernel
@@ -164,6 +165,6 @@ def run(
     Returns (status, step reached, rows written).
     """
     return run_scene(
-        box.scene, box.work, x, u, act, parameters, memory, measurement, dx, dt, per_control, per_output,
+        model_of(box), data_of(box), x, u, act, parameters, memory, measurement, dx, dt, per_control, per_output,
         overspeed, grid_loss, first, last, out,
     )  # fmt: skip

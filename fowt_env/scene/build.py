@@ -19,7 +19,7 @@ from fowt_env.plant.aero.tower_drag import build_tower_drag
 from fowt_env.plant.aero.wake import build_dynamic_inflow, build_skewed_wake, n_wake_states
 from fowt_env.plant.aero.wind import WindSeries
 from fowt_env.plant.channels import Channel, Layout, channels, to_units, with_hub_wind
-from fowt_env.plant.compile.decorators import Box
+from fowt_env.plant.compile.handle import Handle
 from fowt_env.plant.drivetrain import build_drivetrain, build_pitch_actuator, build_torque_limits
 from fowt_env.plant.dynamics import N_KEPT, Body, Model, Work
 from fowt_env.plant.events import N_COUNTERS
@@ -167,9 +167,9 @@ class Scene:
             np.zeros((4 * rotor_samples(self.model.multistep), N_SAMPLE)),
         )
 
-    def box(self, work: Work | None = None) -> Box:
+    def box(self, work: Work | None = None) -> Handle:
         """The scene and scratch in the form that kernels take from Python."""
-        return Box(self.model, self.work() if work is None else work)
+        return Handle(self.model, self.work() if work is None else work)
 
     def blamed(self, work: Work) -> str | None:
         """Words for the load of the user's that spoilt a run with this scratch; None where none did."""

@@ -27,6 +27,7 @@ from fowt_env.plant.aero.tower_drag import tower_load
 from fowt_env.plant.aero.wind import wind_now
 from fowt_env.plant.channels import measure, record
 from fowt_env.plant.compile.decorators import entry, kernel
+from fowt_env.plant.compile.handle import data_of, model_of
 from fowt_env.plant.dynamics import Kept, loads_of, respond, rotor_part, strip_part
 from fowt_env.plant.hydro.hydrostatics import hydrostatic_load
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
@@ -194,7 +195,7 @@ def _repeat(part, scene, work, x, u, dx, m, row, n, dt):
 
 @entry
 def _repeat_in(box, part, x, u, dx, m, row, n, dt):
-    return _repeat(part, box.scene, box.work, x, u, dx, m, row, n, dt)
+    return _repeat(part, model_of(box), data_of(box), x, u, dx, m, row, n, dt)
 
 
 def load_times(scene, x, u, calls=CHUNK, repeats=REPEATS):

@@ -176,37 +176,3 @@ def control_kernel(function):
     _keep(compiled, function)
     compiled.compile()
     return compiled
-
-
-if numba.config.DISABLE_JIT:
-
-    class Box:
-        """Plain twin of the compiled box, for runs with the JIT off."""
-
-        def __init__(self, scene, work):
-            self.scene = scene
-            self.work = work
-
-else:
-    from numba.experimental import structref
-
-    @structref.register
-    class _BoxType(types.StructRef):
-        def preprocess_fields(self, fields):
-            return tuple((name, types.unliteral(kind)) for name, kind in fields)
-
-    class Box(structref.StructRefProxy):
-        """What Python holds and hands to kernels: a scene and its scratch arrays.
-
-        A structref crosses from Python, and into prange, far cheaper than nested NamedTuples.
-        """
-
-        def __new__(cls, scene, work):
-            return _filled_box(scene, work)
-
-    structref.define_proxy(Box, _BoxType, ["scene", "work"])
-
-    @entry
-    def _filled_box(scene, work):
-        """A Box; numba's own constructor would be compiled anew, for a second, in every process."""
-        return Box(scene, work)

@@ -16,6 +16,7 @@ from fowt_env.errors import InputError, unknown
 from fowt_env.files.atomic import replacing
 from fowt_env.plant.channels import measure
 from fowt_env.plant.compile.decorators import entry, kernel
+from fowt_env.plant.compile.handle import data_of, model_of
 from fowt_env.plant.events import Counter
 from fowt_env.plant.hydro.hydrostatics import submerged
 from fowt_env.plant.integrators import build_integrator, rates, take_step
@@ -93,7 +94,7 @@ def run_case(
     from the origin (m) and rotor speed (rad/s).
     """
     return _run_case(
-        box.scene, box.work, x, u, act, parameters, memory, measurement, dx, commands, per_control,
+        model_of(box), data_of(box), x, u, act, parameters, memory, measurement, dx, commands, per_control,
         per_segment, last, dt, peak,
     )  # fmt: skip
 
@@ -145,7 +146,7 @@ def line_energy(H, V, length, weight, EA, node, share):
 
 @entry
 def _potential_energy(box, x, node, share):
-    model, work, pose = box.scene, box.work, pose_of(x)
+    model, work, pose = model_of(box), data_of(box), pose_of(x)
     body = model.body
     total = body.gravity * (body.mass * pose.z + body.s_x * pose.r31 + body.s_z * pose.r33)
     if model.hull is not None:

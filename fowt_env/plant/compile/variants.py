@@ -1,0 +1,42 @@
+"""One kernel out of several, chosen by the class of a part when its caller is compiled.
+
+Numba leaves out the branch `else` of `if part is None` where the part is None, but keeps the other one where it
+is not: both are then compiled, though the second can never run. Neither does it prune on a field, `model.part is
+None`, but on a function's own argument alone. So absence is tested first thing in a function that takes the part
+as an argument, and what has several forms is several classes, one of which chosen_by_class compiles.
+"""
+
+import inspect
+
+import numba
+from numba import types
+from numba.core.extending import overload
+
+
+def chosen_by_class(argument, cases, inlined=False):
+    """A function that is the kernel of cases {class: kernel} that its argument of this name has the class for.
+
+    The kernels take arguments of the same names. inlined: put into the caller whatever the size.
+    """
+    plain = {kind: getattr(kernel, "py_func", kernel) for kind, kernel in cases.items()}
+    names = list(inspect.signature(next(iter(plain.values()))).parameters)
+    place = names.index(argument)
+
+    def called(*arguments):
+        return cases[type(arguments[place])](*arguments)
+
+    if numba.config.DISABLE_JIT:
+        return called
+    text = ", ".join(names)
+    scope = {"called": called, "chosen": lambda kind: plain.get(_class_of(kind))}
+    exec(f"def function({text}): return called({text})\ndef choose({text}): return chosen({argument})", scope)
+    options = {"error_model": "numpy", "nogil": True, "_nrt": False, "forceinline": inlined}
+    overload(scope["function"], jit_options=options)(scope["choose"])
+    return scope["function"]
+
+
+def _class_of(kind):
+    """Class of the values of a numba type."""
+    if isinstance(kind, types.NoneType):
+        return type(None)
+    return getattr(kind, "instance_class", None)
