@@ -47,9 +47,13 @@ class Controller(Protocol):
 
 
 @kernel
-def call_law(law, parameters, memory, measurement, command):
-    """Run a compiled law once; the way to it from Python."""
+def _call(law, parameters, memory, measurement, command):
     law(parameters, memory, measurement, command)
+
+
+def call_law(law, parameters, memory, measurement, command):
+    """Run a law once, a ControlKernel or compiled; the way to it from Python."""
+    _call(getattr(law, "compiled", law), parameters, memory, measurement, command)
 
 
 class CompiledController:
@@ -70,6 +74,11 @@ class CompiledController:
         self.memory = np.zeros(n_memory)
         self.command = np.zeros(N_COMMANDS)  # in force, for act(); a first call must not rely on it
 
+    @property
+    def law(self) -> Any:
+        """The kernel, compiled."""
+        return getattr(self.kernel, "compiled", self.kernel)
+
     def prepare(self, scene: Any) -> None:
         """Take what the law needs of the scene of the coming run; called once before reset()."""
 
@@ -82,7 +91,7 @@ class CompiledController:
         values = np.array(measurement, dtype=np.float64)
         if values.shape != (N_MEASUREMENTS,):
             raise InputError(f"measurement has shape {values.shape}: must be ({N_MEASUREMENTS},)")
-        call_law(self.kernel, self.parameters, self.memory, values, self.command)
+        call_law(self.law, self.parameters, self.memory, values, self.command)
         return float(self.command[0]), float(self.command[1])
 
 

@@ -10,24 +10,14 @@ import numpy as np
 import pandas as pd
 
 from fowt_env.analysis.trim import trim
-from fowt_env.control import make
+from fowt_env.control import CompiledController, make
 from fowt_env.descriptions.records import is_number
 from fowt_env.errors import ControllerInputError, InputError, SimulationStopped, unknown
 from fowt_env.plant.channels import DEG, RPM
 from fowt_env.plant.compile.decorators import control_kernel
 from fowt_env.plant.events import counted
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
-from fowt_env.plant.rollout import (
-    OVERSPEED,
-    RUNNING,
-    STOP_REASONS,
-    advance,
-    command,
-    observe,
-    output,
-    output_row,
-    run,
-)
+from fowt_env.plant.rollout import OVERSPEED, RUNNING, STOP_REASONS, Schedule, rollout
 from fowt_env.plant.state import OUT_OF_PLANE, State, pose_of
 from fowt_env.scene.build import Scene
 from fowt_env.weather.wind_field import WindBox
@@ -61,14 +51,22 @@ def hold(parameters, memory, measurement, command):
     """Leave the command as it is."""
 
 
-class _Hold:
-    """Stand-in controller for controller=None."""
+@control_kernel
+def given(parameters, memory, measurement, command):
+    """The command that stands in parameters: torque, blade pitch."""
+    command[0] = parameters[0]
+    command[1] = parameters[1]
+
+
+class HeldCommand(CompiledController):
+    """The law of controller=None: the command stays as it is."""
 
     kernel = staticmethod(hold)
-    parameters = np.zeros(1)
-    memory = np.zeros(1)
 
-    def reset(self, measurement):
+    def __init__(self) -> None:
+        super().__init__("none", np.zeros(1), 1)
+
+    def reset(self, measurement: Measurement) -> None:
         """Nothing to start."""
 
 
@@ -214,11 +212,12 @@ def simulate(
     x, u = initial_state(scene, start, initial)
     if held:
         scene = scene.with_model(body=scene.model.body._replace(rotor_held=True))
-        controller = _Hold()
+        controller = HeldCommand()
         per_control = last  # nobody reads the measurements
     overspeed = scene.turbine.overspeed if stop_overspeed else inf
     loss = inf if grid_loss is None else grid_loss - 1e-9  # an instant may miss it by rounding
-    loop = _Loop(scene, controller, x, u, dt, (per_control, per_output, last), overspeed, loss)
+    schedule = Schedule(float(dt), per_control, per_output, last, float(overspeed), float(loss))
+    loop = _Loop(scene, controller, x, u, schedule)
     with _bar(progress) as report, _controllers_own():
         loop.go(report)
     return loop.frame()
@@ -236,81 +235,64 @@ def _controllers_own():
 class _Loop:
     """A run in chunks, compiled where the controller is."""
 
-    def __init__(self, scene, controller, x, u, dt, steps, overspeed, grid_loss):
+    def __init__(self, scene, controller, x, u, schedule):
         self.scene = scene
         self.controller = controller
         self.work = scene.work()
-        self.box = scene.box(self.work)
-        self.x, self.u, self.dt = x, u, float(dt)
-        self.per_control, self.per_output, self.last = steps
-        self.overspeed, self.grid_loss = float(overspeed), float(grid_loss)
+        self.handle = scene.box(self.work)
+        self.x, self.u, self.schedule = x, u, schedule
         self.dx = np.zeros_like(x)
         self.measurement = np.zeros(N_MEASUREMENTS)
-        self.rows = np.empty((self.last // self.per_output + 1, len(scene.channels)))
+        self.rows = np.empty((schedule.last // schedule.per_output + 1, len(scene.channels)))
         self.filled = 0
+        self.compiled = isinstance(controller, CompiledController)
+        if self.compiled:
+            self.law = controller.law, controller.parameters, controller.memory
+        else:
+            self.law = given.compiled, np.zeros(2), np.zeros(1)
 
     def go(self, report):
-        observe(self.box, self.x, self.u, 0.0, self.dx, self.measurement)
-        self.controller.reset(Measurement(*self.measurement.tolist()))
-        compiled = hasattr(self.controller, "kernel")
-        if compiled:
-            size = max(1, round(FIRST_CHUNK / self.dt))
+        """Run to the end. Raises: SimulationStopped; KeyboardInterrupt with the frame so far."""
+        self.controller.reset(self._measured(0))
+        last = self.schedule.last
+        size = max(1, round(FIRST_CHUNK / self.schedule.dt)) if self.compiled else self.schedule.per_control
         step = 0
         try:
-            while step < self.last:
-                if compiled:
-                    began = perf_counter()
-                    step = self._compiled(step, min(step + size, self.last))
-                    if perf_counter() - began < 0.25 * CHUNK_TIME:
-                        size *= 4
-                else:
-                    step = self._python(step)
-                report(step / self.last)
+            while step < last:
+                began = perf_counter()
+                if not self.compiled:
+                    self._ask(step)
+                step = self._roll(step, min(step + size, last))
+                if self.compiled and perf_counter() - began < 0.25 * CHUNK_TIME:
+                    size *= 4
+                report(step / last)
         except KeyboardInterrupt as interrupt:
             interrupt.frame = self.frame()  # what is done is not lost: the caller may keep it
             raise
-        self._check_speed(self.last)
-        row = output_row(self.box, self.x, self.u, self.last * self.dt, self.rows.shape[1])
-        self.rows[self.filled] = row
-        self.filled += 1
 
-    def _compiled(self, first, last):
-        c = self.controller
-        status, step, count = run(
-            self.box, self.x, self.u, c.kernel, c.parameters, c.memory, self.measurement, self.dx,
-            self.dt, self.per_control, self.per_output, self.overspeed, self.grid_loss, first, last,
+    def _roll(self, first, end):
+        status, step, count = rollout(
+            self.handle, self.x, self.u, *self.law, self.measurement, self.dx, self.schedule, first, end,
             self.rows[self.filled :],
         )  # fmt: skip
         self.filled += count
         self._check(status, step)
         return step
 
-    def _python(self, step):
-        """One control period (or what is left of the run) with a controller in Python."""
-        t = step * self.dt
-        self._check_speed(step)
-        observe(self.box, self.x, self.u, t, self.dx, self.measurement)
-        torque, blade_pitch = self.controller.act(Measurement(*self.measurement.tolist()))
-        period = self.per_control * self.dt
-        command(self.box, self.u, t, torque, blade_pitch, period, self.grid_loss)
-        end = min(step + self.per_control, self.last)
-        while step < end:
-            if step % self.per_output == 0:
-                output(self.box, self.x, self.u, step * self.dt, self.dx, self.rows[self.filled])
-                self.filled += 1
-            n = min(self.per_output - step % self.per_output, end - step)
-            status = advance(self.box, self.x, self.u, step, n, self.dt)
-            step += n
-            self._check(status, step)
-        return step
+    def _measured(self, step):
+        """Measurement at a step that is at hand."""
+        self._roll(step, step)
+        return Measurement(*self.measurement.tolist())
 
-    def _check_speed(self, step):
-        if self.x[State.ROTOR_SPEED] > self.overspeed:
+    def _ask(self, step):
+        """Have a controller in Python say what to do from a step on."""
+        if self.x[State.ROTOR_SPEED] > self.schedule.overspeed:
             self._check(OVERSPEED, step)
+        self.law[1][:] = self.controller.act(self._measured(step))
 
     def _check(self, status, step):
         if status != RUNNING:
-            reason, time = STOP_REASONS[status], step * self.dt
+            reason, time = STOP_REASONS[status], step * self.schedule.dt
             if fault := self.scene.blamed(self.work):
                 reason = f"{reason}: {fault}"
             raise SimulationStopped(f"stopped at t = {time:.3f} s: {reason}", reason, time, self.frame())

@@ -15,7 +15,7 @@ from fowt_env.controllers.constant import Constant
 from fowt_env.errors import ControllerError, InputError, SimulationStopped
 from fowt_env.plant.compile.decorators import control_kernel
 from fowt_env.plant.events import Counter
-from fowt_env.plant.rollout import advance
+from fowt_env.plant.rollout import Schedule, advance
 from fowt_env.plant.state import State, pose_of
 from fowt_env.simulation import initial_state
 
@@ -347,7 +347,7 @@ def test_capsize_stops_the_run_and_keeps_the_rows(still_scene):
 
 def test_compiled_run_stops_on_a_state_that_is_not_a_number(storm_scene):
     x, u = initial_state(storm_scene)
-    closed = simulation._Loop(storm_scene, CompiledNan(), x, u, 0.05, (2, 2, 200), np.inf, np.inf)
+    closed = simulation._Loop(storm_scene, CompiledNan(), x, u, Schedule(0.05, 2, 2, 200, np.inf, np.inf))
     with pytest.raises(SimulationStopped, match="non-finite state") as caught:
         closed.go(lambda share: None)
     assert 1.0 < caught.value.time <= 1.1 + 1e-9  # the end of the control period that went wrong
@@ -392,7 +392,7 @@ def test_another_process_gives_the_same_bits():
 STEPS = """
 import numpy as np, fowt_env
 from plant_helpers import random_state
-from fowt_env.plant.rollout import advance
+from fowt_env.plant.rollout import Schedule, advance
 scene = fowt_env.build_scene("oc3_hywind", wind=18.0, seed=3, duration=60.0, wave_components=20,
     sea={"kind": "jonswap", "Hs": 6.0, "Tp": 10.0, "gamma": 3.3})
 x = random_state(np.random.default_rng(6))

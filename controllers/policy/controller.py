@@ -100,7 +100,7 @@ class PolicyController:
             self._baseline = make(settings["baseline"], turbine, control_dt)
             if not isinstance(self._baseline, CompiledController):
                 raise InputError(f"{where}: baseline {settings['baseline']!r} is not a compiled controller")
-            self._law = self._baseline.kernel
+            self._law = self._baseline.law
         self._signals = np.zeros(PREVIEW + len(preview))
         self._seen = np.zeros(len(chosen), dtype=np.float32)
         self._u, self._wanted = np.zeros(2), np.zeros(2)
@@ -153,7 +153,7 @@ class PolicyController:
         decisions = self._decisions
         if self._estimator is not None and self._calls > 0:  # the first instant is that of the reset
             call_law(
-                self._estimator.kernel, self._estimator.parameters, self._estimator.memory, values, self._u
+                self._estimator.law, self._estimator.parameters, self._estimator.memory, values, self._u
             )
         if self._calls % decisions.settings.hold == 0:
             self._look(values)

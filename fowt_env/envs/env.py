@@ -211,12 +211,12 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         parameters, memory = np.zeros(1), np.zeros(1)
         if mode == Mode.RESIDUAL:
             self._baseline = named_baseline(self.baseline, self.design_scene.turbine, self.control_dt)
-            law = self._baseline.kernel
+            law = self._baseline.law
             parameters, memory = self._baseline.parameters, self._baseline.memory
         self._estimator = watch = None
         if set(ESTIMATE_CHANNELS) & set(task.observation):
             self._estimator = catalogue().WindEstimator(self.design_scene.turbine, self.control_dt)
-            watch = self._estimator.kernel
+            watch = self._estimator.law
         watching, sensed = self._estimator is not None, self._sensors is not None
         self._law, self._watch = Handle(None, law), Handle(None, watch)
         self._setting = Setting(

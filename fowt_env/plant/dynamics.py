@@ -16,11 +16,12 @@ from fowt_env.plant.aero.section_table import rotor_lookup_load
 from fowt_env.plant.aero.tower_drag import tower_load
 from fowt_env.plant.aero.wind import wind_now
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
+from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.drivetrain import pitch_rate, shaft_torque
 from fowt_env.plant.hydro.hydrostatics import hydrostatic_load
 from fowt_env.plant.hydro.linear_damping import damping_load
 from fowt_env.plant.hydro.morison import StripLoad, morison_load
-from fowt_env.plant.hydro.wave_bands import FastScratch, fast_morison_load
+from fowt_env.plant.hydro.wave_bands import FastScratch, Lanes, fast_morison_load
 from fowt_env.plant.mooring import mooring_load
 from fowt_env.plant.state import NO_LOAD, State, Wrench, add, pose_in, pose_of
 from fowt_env.plant.user_loads import evaluate_own, with_own
@@ -232,13 +233,20 @@ def rotor_part(t, pose, x, now, wind, field, rotor, lookup, table, skew, wake, d
 
 
 @kernel
-def strip_part(
+def _exact_strips(
     t, pose, strips, waves, current, kinematics, lanes, sea, scratch, diffraction, lane_diffraction
 ):
-    """Strip load of whichever method the scene has."""
-    if lanes is None:
-        return morison_load(t, pose, strips, waves, current, kinematics, diffraction)
+    return morison_load(t, pose, strips, waves, current, kinematics, diffraction)
+
+
+@kernel
+def _fast_strips(
+    t, pose, strips, waves, current, kinematics, lanes, sea, scratch, diffraction, lane_diffraction
+):
     return fast_morison_load(t, pose, lanes, sea, current, scratch, lane_diffraction)
+
+
+strip_part = chosen_by_class("lanes", {type(None): _exact_strips, Lanes: _fast_strips})
 
 
 @kernel

@@ -1,6 +1,7 @@
 """Fixed-step advance of one plant, and the compiled loop of a whole run with its controller."""
 
 from math import isfinite
+from typing import NamedTuple
 
 import numpy as np
 
@@ -118,53 +119,51 @@ def follow_torque(t, torque, u, period, generator, grid_loss, kept):
     kept[Kept.TORQUE_LIMITED] = 1.0 if torque_was_limited(u[0], command, generator) else 0.0
 
 
+class Schedule(NamedTuple):
+    """When a rollout steps, controls and records, in steps of dt from the run's beginning."""
+
+    dt: float  # s
+    per_control: int  # steps in a control period
+    per_output: int  # steps from one output row to the next
+    last: int  # step at which the run ends, with a row
+    overspeed: float  # rotor speed (rad/s) beyond which the run ends at the next control instant
+    grid_loss: float  # s, time from which the generator has no torque
+
+
 @entry
-def command(box, u, t, torque, blade_pitch, period, grid_loss):
-    """Put a command (N m, rad) into u as the plant takes it for a control period; see follow_torque."""
-    before = u[0]
-    u[0] = torque
-    u[1] = blade_pitch
-    follow_torque(t, before, u, period, model_of(box).generator, grid_loss, data_of(box).kept)
+def rollout(handle, x, u, law, parameters, memory, measurement, dx, schedule, first, end, out):
+    """Closed loop over the instants first <= step < end, and at the run's last one; rows go to out.
 
-
-@kernel
-def run_scene(
-    scene, work, x, u, act, parameters, memory, measurement, dx, dt, per_control, per_output, overspeed,
-    grid_loss, first, last, out,
-):  # fmt: skip
-    """Closed loop as in run."""
-    rows = 0
-    for step in range(first, last):
+    law      compiled control law (CompiledController.law), called at every control instant
+    first    = end: nothing moves, and measurement is filled as at that instant
+    out      (k, n_channels) of the rows to come, SI
+    Returns (status, step reached, rows written). x (n_state,), u, memory and measurement are written.
+    """
+    model, data = model_of(handle), data_of(handle)
+    dt, rows = schedule.dt, 0
+    if first == end:
+        observe_scene(model, data, x, u, first * dt, dx, measurement)
+        return RUNNING, first, rows
+    for step in range(first, end + 1):
         t = step * dt
-        if step % per_control == 0:
-            if x[State.ROTOR_SPEED] > overspeed:
-                return OVERSPEED, step, rows
-            observe_scene(scene, work, x, u, t, dx, measurement)
+        ending = step == schedule.last
+        if step == end and not ending:
+            break
+        if (ending or step % schedule.per_control == 0) and x[State.ROTOR_SPEED] > schedule.overspeed:
+            return OVERSPEED, step, rows
+        if not ending and step % schedule.per_control == 0:
+            observe_scene(model, data, x, u, t, dx, measurement)
             torque = u[0]
-            act(parameters, memory, measurement, u)
-            follow_torque(t, torque, u, per_control * dt, scene.generator, grid_loss, work.kept)
-        if step % per_output == 0:
-            output_scene(scene, work, x, u, t, dx, out[rows])
+            law(parameters, memory, measurement, u)
+            period = schedule.per_control * dt
+            follow_torque(t, torque, u, period, model.generator, schedule.grid_loss, data.kept)
+        if ending or step % schedule.per_output == 0:
+            output_scene(model, data, x, u, t, dx, out[rows])
             rows += 1
-        take_step(t, x, u, dt, scene, scene.multistep, work)
+        if ending:
+            break
+        take_step(t, x, u, dt, model, model.multistep, data)
         status = status_of(x)
         if status != RUNNING:
             return status, step + 1, rows
-    return RUNNING, last, rows
-
-
-@entry
-def run(
-    box, x, u, act, parameters, memory, measurement, dx, dt, per_control, per_output, overspeed, grid_loss,
-    first, last, out,
-):  # fmt: skip
-    """Closed loop over the instants first <= step < last, writing rows of out (k, n_channels).
-
-    act: a control kernel (jit.control_kernel). overspeed: rotor speed (rad/s) beyond which the run ends at
-    the next control instant; grid_loss: time (s) from which the generator has no torque.
-    Returns (status, step reached, rows written).
-    """
-    return run_scene(
-        model_of(box), data_of(box), x, u, act, parameters, memory, measurement, dx, dt, per_control, per_output,
-        overspeed, grid_loss, first, last, out,
-    )  # fmt: skip
+    return RUNNING, end, rows

@@ -7,7 +7,7 @@ import pytest
 
 from fowt_env import build_scene, simulate
 from fowt_env.errors import InputError
-from fowt_env.plant.rollout import run
+from fowt_env.plant.rollout import rollout
 from fowt_env.scene.build import ARGUMENTS
 
 NTM = {"kind": "ntm", "speed": 18.0, "class": "B"}
@@ -114,12 +114,12 @@ def test_fast_stays_within_two_hundredths_of_standard():
 
 
 def test_scenes_of_one_kind_share_one_compiled_run():
-    kinds = len(run.signatures)
+    kinds = len(rollout.signatures)
     for seed, components in ((1, 30), (2, 40)):
         scene = build_scene(wind=NTM, sea=SEA, seed=seed, wave_components=components, fidelity="standard")
         simulate(scene, "pi", duration=1.0)
         simulate(scene, "pi_land", duration=1.0)
-    assert len(run.signatures) <= kinds + 1
+    assert len(rollout.signatures) <= kinds + 1
 
 
 @pytest.mark.parametrize("count", [2, 1000, 5.0, True])

@@ -32,10 +32,10 @@ from fowt_env.plant.dynamics import Kept, loads_of, respond, rotor_part, strip_p
 from fowt_env.plant.hydro.hydrostatics import hydrostatic_load
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
 from fowt_env.plant.mooring import mooring_load
-from fowt_env.plant.rollout import advance, forget, observe, output, run
+from fowt_env.plant.rollout import Schedule, advance, forget, observe, output, rollout
 from fowt_env.plant.state import State, pose_of
 from fowt_env.scene.build import build_scene
-from fowt_env.simulation import _Hold, initial_state, simulate
+from fowt_env.simulation import HeldCommand, initial_state, simulate
 
 CALIBRATION_STEPS = 10_000_000
 REPEATS = 5
@@ -232,19 +232,20 @@ def step_time(scene, x, u, dt, steps=CHUNK, repeats=REPEATS):
 
 def loop_time(scene, kind, x, u, dt, seconds, repeats=REPEATS):
     """CPU seconds of the compiled closed loop, controller at 10 Hz, with one row of output."""
-    controller = make("pi", scene.turbine, 0.1) if kind.controlled else _Hold()
+    controller = make("pi", scene.turbine, 0.1) if kind.controlled else HeldCommand()
     box, dx, m = scene.box(), np.zeros_like(x), np.zeros(N_MEASUREMENTS)
     rows = np.zeros((1, len(scene.channels)))
-    per_control, last = round(0.1 / dt), round(seconds / dt)
+    last = round(seconds / dt)
+    schedule = Schedule(float(dt), round(0.1 / dt), last + 1, last, inf, inf)
 
     def go():
         y, v = x.copy(), u.copy()
         forget(box)
         observe(box, y, v, 0.0, dx, m)
         controller.reset(Measurement(*m.tolist()))
-        run(
-            box, y, v, controller.kernel, controller.parameters, controller.memory, m, dx, dt, per_control,
-            last + 1, inf, inf, 0, last, rows,
+        rollout(
+            box, y, v, controller.law, controller.parameters, controller.memory, m, dx, schedule, 0, last,
+            rows,
         )  # fmt: skip
 
     return median_time(go, repeats)

@@ -14,7 +14,7 @@ import sys
 import time
 import warnings
 from contextlib import suppress
-from functools import cache
+from functools import cache, cached_property, update_wrapper
 from pathlib import Path
 
 import numba
@@ -162,17 +162,30 @@ FLOATS = types.float64[::1]
 CONTROL_SIGNATURE = types.void(FLOATS, FLOATS, FLOATS, FLOATS)
 
 
+class ControlKernel:
+    """A control law that is compiled when a run first needs it: a scene has one of a dozen."""
+
+    def __init__(self, function):
+        self.function = function
+        update_wrapper(self, function)
+
+    @cached_property
+    def compiled(self):
+        """First-class function, or the Python function itself under NUMBA_DISABLE_JIT."""
+        if numba.config.DISABLE_JIT:
+            return self.function
+        signature = CONTROL_SIGNATURE.args, CONTROL_SIGNATURE.return_type
+        compiled = CFunc(self.function, signature, locals={}, options={"error_model": "numpy"})
+        _keep(compiled, self.function)
+        compiled.compile()
+        return compiled
+
+
 def control_kernel(function):
-    """Compile a control law to a first-class function, so that one compiled loop serves them all.
+    """A ControlKernel: a control law as a first-class function, so that one compiled loop serves them all.
 
     function(parameters, memory, measurement, command): four (n,) float64 arrays; it reads the
     first and third and writes the second and fourth. A user's law is compiled in each process, a fifth
-    of a second. Under NUMBA_DISABLE_JIT it stays Python.
+    of a second.
     """
-    if numba.config.DISABLE_JIT:
-        return function
-    signature = CONTROL_SIGNATURE.args, CONTROL_SIGNATURE.return_type
-    compiled = CFunc(function, signature, locals={}, options={"error_model": "numpy"})
-    _keep(compiled, function)
-    compiled.compile()
-    return compiled
+    return ControlKernel(function)

@@ -221,12 +221,12 @@ class Runner:
         energy, speed = self.bounds(x)
         for carried in (work.lines, work.counters, work.kept, work.history):
             carried[:] = 0.0  # as in a scene of its own: a case runs alike alone and among others
-        law, parameters, memory = hold, np.zeros(1), np.zeros(1)
+        law, parameters, memory = hold.compiled, np.zeros(1), np.zeros(1)
         if len(commands) == 0:
             observe(box, x, u, 0.0, self.dx, self.measurement)
             self.controller.reset(Measurement(*self.measurement.tolist()))
             law, parameters, memory = (
-                self.controller.kernel,
+                self.controller.law,
                 self.controller.parameters,
                 self.controller.memory,
             )
