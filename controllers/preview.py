@@ -16,7 +16,7 @@ from math import exp, isfinite
 
 import numpy as np
 
-from fowt_env.analysis.trim import calm, trim
+from fowt_env.analysis.trim import trim, without_fluctuations
 from fowt_env.control import check_control_dt
 from fowt_env.controllers.pi import (
     PI,
@@ -111,7 +111,7 @@ class Preview(PI):
 
         Raises: InputError for a scene without wind.
         """
-        if scene.model.wind is None:
+        if scene.model.aero is None:
             raise InputError(f"controller {self.name!r}: needs a scene with wind to look ahead")
         time, speed, period = rotor_wind(scene)
         step = self.control_dt
@@ -143,7 +143,7 @@ def rotor_wind(scene):
         rotor, box = scene.turbine.rotor, scene.wind
         time, value = rotor_average(box, rotor.hub_height, 2.0 * rotor.tip_radius)
         return time, value[:, 0], len(value) * box.dt if box.periodic else None
-    series = scene.model.wind
+    series = scene.model.aero.wind
     return series.time, series.value[:, 0], series.period if series.period > 0.0 else None
 
 
@@ -152,7 +152,7 @@ def steady_pitch(scene):
     turbine = scene.turbine
     low, high = turbine.rated_wind_speed - BELOW_RATED, turbine.cut_out_wind_speed
     speeds = low + (high - low) * np.linspace(0.0, 1.0, SCHEDULE_SPEEDS) ** 2
-    steady = (trim(replace(calm(scene, speed), wind_speed=speed), platform="fixed") for speed in speeds)
+    steady = (trim(replace(without_fluctuations(scene, speed), wind_speed=speed), platform="fixed") for speed in speeds)
     return speeds, np.array([point.state[State.BLADE_PITCH] for point in steady])
 
 

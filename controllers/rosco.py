@@ -148,7 +148,7 @@ class Rosco:
 
         Raises: InputError without wind or library, and for a change of what DISCON.IN does not have.
         """
-        if scene.model.wind is None:
+        if scene.model.aero is None:
             raise InputError(f"controller {self.name!r}: needs a scene with wind, for the rotor's table")
         self._source, needed = find_library()
         _preload(needed)

@@ -101,7 +101,7 @@ def initial_state(
         if not is_number(value):
             raise InputError(f"initial[{name!r}] = {value!r}: must be a finite number")
         index, factor = INITIAL[key]
-        if scene.model.body.plane is not None and index in OUT_OF_PLANE and value != 0.0:
+        if scene.model.rigid_body.plane is not None and index in OUT_OF_PLANE and value != 0.0:
             raise InputError(f"initial[{name!r}] = {value:g}: must be 0 in a planar scene")
         if State.VX <= index <= State.WZ:
             rates[index] = value * factor
@@ -132,8 +132,10 @@ def initial_state(
 def check_duration(scene: Scene, duration: float) -> None:
     """Refuse a run that is longer than the scene's random or recorded weather."""
     limit = scene.options["duration"]
-    random_sea = scene.model.waves is not None and scene.model.waves.omega.shape[0] > 1
-    wind = scene.model.wind
+    aero, hydro = scene.model.aero, scene.model.hydro
+    waves = None if hydro is None else hydro.waves
+    random_sea = waves is not None and waves.omega.shape[0] > 1
+    wind = None if aero is None else aero.wind
     if isinstance(scene.wind, WindBox) and duration > scene.wind.usable:
         raise InputError(
             f"duration = {duration:g} s: the box of wind covers {scene.wind.usable:.1f} s and does not repeat"
@@ -144,7 +146,7 @@ def check_duration(scene: Scene, duration: float) -> None:
             f"duration = {duration:g} s: this scene's random wind was drawn for {wind.period:g} s and would"
             f" repeat; build_scene(..., duration={duration:g})"
         )
-    if random_sea and scene.model.waves.random and duration > limit + 1e-9:
+    if random_sea and waves.random and duration > limit + 1e-9:
         raise InputError(
             f"duration = {duration:g} s: this scene's random sea was drawn for {limit:g} s and would repeat;"
             f" build_scene(..., duration={duration:g})"
@@ -211,7 +213,7 @@ def simulate(
             controller.prepare(scene)
     x, u = initial_state(scene, start, initial)
     if held:
-        scene = scene.with_model(body=scene.model.body._replace(rotor_held=True))
+        scene = scene.with_model({"rigid_body.rotor_held": True})
         controller = HeldCommand()
         per_control = last  # nobody reads the measurements
     overspeed = scene.turbine.overspeed if stop_overspeed else inf
@@ -238,8 +240,8 @@ class _Loop:
     def __init__(self, scene, controller, x, u, schedule):
         self.scene = scene
         self.controller = controller
-        self.work = scene.work()
-        self.handle = scene.box(self.work)
+        self.data = scene.data()
+        self.handle = scene.handle(self.data)
         self.x, self.u, self.schedule = x, u, schedule
         self.dx = np.zeros_like(x)
         self.measurement = np.zeros(N_MEASUREMENTS)
@@ -293,7 +295,7 @@ class _Loop:
     def _check(self, status, step):
         if status != RUNNING:
             reason, time = STOP_REASONS[status], step * self.schedule.dt
-            if fault := self.scene.blamed(self.work):
+            if fault := self.scene.first_nonfinite_load(self.data):
                 reason = f"{reason}: {fault}"
             raise SimulationStopped(f"stopped at t = {time:.3f} s: {reason}", reason, time, self.frame())
 
@@ -301,7 +303,7 @@ class _Loop:
         """Rows so far in channel units."""
         values = self.scene.values(self.rows[: self.filled])
         frame = pd.DataFrame(values, columns=[c.column for c in self.scene.channels])
-        frame.attrs["events"] = counted(self.work.counters)
+        frame.attrs["events"] = counted(self.data.counters)
         return frame
 
 

@@ -15,7 +15,7 @@ from scipy.linalg import expm, solve_continuous_are, solve_discrete_are
 from scipy.optimize import least_squares
 
 from fowt_env.analysis.linear_model import linearize
-from fowt_env.analysis.trim import calm
+from fowt_env.analysis.trim import without_fluctuations
 from fowt_env.analysis.wave_excitation import wave_force
 from fowt_env.descriptions.iec import ntm_sigma
 from fowt_env.descriptions.platform import joint_sea_state, sea_state_of
@@ -129,7 +129,7 @@ def wind_filter(speed, height, diameter):
 
 def scene_at(scene, speed):
     """The scene in a steady wind (m/s) and flat water."""
-    return replace(calm(scene, float(speed)), wind=float(speed), sea=None, wind_speed=float(speed))
+    return replace(without_fluctuations(scene, float(speed)), wind=float(speed), sea=None, wind_speed=float(speed))
 
 
 def design_model(scene, speed):

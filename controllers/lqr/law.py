@@ -265,7 +265,7 @@ class LQR(CompiledController):
         Models given on making stay as they are: such a controller does not know the scene's plant.
         Raises: InputError for a scene without wind.
         """
-        if scene.model.wind is None:
+        if scene.model.aero is None:
             raise InputError(f"controller {self.name!r}: needs a scene with wind to linearise")
         if self.designed:
             return

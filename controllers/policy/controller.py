@@ -128,7 +128,7 @@ class PolicyController:
         if len(self._chosen.preview):
             from fowt_env.controllers.preview import rotor_wind
 
-            if scene.model.wind is None:
+            if scene.model.aero is None:
                 raise InputError(f"controller {self.name!r}: needs a scene with wind to look ahead")
             self._wind = rotor_wind(scene)
 

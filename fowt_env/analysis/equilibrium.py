@@ -8,17 +8,17 @@ from typing import NamedTuple
 import numpy as np
 
 from fowt_env.errors import InputError
-from fowt_env.plant.dynamics import Kept
+from fowt_env.plant.model import LoadCache
 from fowt_env.plant.mooring import SLACK
 from fowt_env.plant.rollout import CAPSIZE
 from fowt_env.plant.state import State, pose_of
 
 MOTIONS = ("surge", "sway", "heave", "roll", "platform pitch", "yaw")
-LOADS = {  # name: where Work.kept has its wrench
-    "rotor": Kept.ROTOR,
-    "tower drag": Kept.TOWER,
-    "buoyancy and water": Kept.HYDRO,
-    "mooring": Kept.MOORING,
+LOADS = {  # name: where Data.cache has its wrench
+    "rotor": LoadCache.ROTOR,
+    "tower drag": LoadCache.TOWER,
+    "buoyancy and water": LoadCache.HYDRO,
+    "mooring": LoadCache.MOORING,
 }
 # What is odd in a steady state, but possible. The built-in platforms stay far from each.
 HEAVE = 0.1  # of the draft
@@ -36,13 +36,13 @@ class Evaluated(NamedTuple):
     """A state and the loads there."""
 
     x: np.ndarray  # (n_state,)
-    kept: np.ndarray  # Work.kept
+    cache: np.ndarray  # Data.cache
     lines: np.ndarray  # Work.lines
 
 
-def evaluated(x, work):
+def evaluated(x, data):
     """Evaluated of the state that the last evaluation was of."""
-    return Evaluated(x.copy(), work.kept.copy(), work.lines.copy())
+    return Evaluated(x.copy(), data.cache.copy(), data.lines.copy())
 
 
 def check_equilibrium(scene, rest, start, slope, fresh_slope):
@@ -54,7 +54,7 @@ def check_equilibrium(scene, rest, start, slope, fresh_slope):
 
     Raises: InputError.
     """
-    if scene.model.hull is None:
+    if scene.model.hydro is None:
         return
     heave, roll, platform_pitch = float(rest[State.HEAVE]), rest[State.ROLL], rest[State.PLATFORM_PITCH]
     upright = cos(platform_pitch) * cos(roll)  # vertical component of the tower axis
@@ -131,25 +131,25 @@ def _impossible(scene, heave, upright, tilt):
 def _causes(scene, start):
     """{name: sentence} of what is wrong with the undisplaced platform."""
     model, platform = scene.model, scene.platform
-    weight = model.body.mass * model.body.gravity
-    net = start.kept[Kept.TOTAL + 2]
+    weight = model.rigid_body.mass * model.rigid_body.gravity
+    net = start.cache[LoadCache.TOTAL + 2]
     found = {}
     if model.mooring is not None:
         found |= _mooring_causes(model.mooring, start, weight, net)
     if abs(net) <= HEAVY * weight:
         return found
-    if model.hull is None:
+    if model.hydro is None:
         found["vertical"] = f"its weight of {_kilo(weight)} kN has no buoyancy: hydrodynamics = False"
         return found
-    buoyancy, pull = start.kept[Kept.HYDRO + 2], -start.kept[Kept.MOORING + 2]
+    buoyancy, pull = start.cache[LoadCache.HYDRO + 2], -start.cache[LoadCache.MOORING + 2]
     lines = f" and its lines pull down with {_kilo(pull)} kN" if model.mooring is not None else ""
     found["vertical"] = (
         f"undisplaced it weighs {_kilo(weight)} kN{lines}, against a buoyancy of {_kilo(buoyancy)} kN"
-        f" ({_number(buoyancy / model.hull.specific_weight)} m3): {_kilo(abs(net))} kN"
-        f" ({_number(abs(net) / model.body.gravity / 1e3)} t) too {'light' if net > 0.0 else 'heavy'}"
+        f" ({_number(buoyancy / model.hydro.hull.specific_weight)} m3): {_kilo(abs(net))} kN"
+        f" ({_number(abs(net) / model.rigid_body.gravity / 1e3)} t) too {'light' if net > 0.0 else 'heavy'}"
     )
     ballast = platform.ballast.mass
-    enough = ballast + net / model.body.gravity
+    enough = ballast + net / model.rigid_body.gravity
     if len(found) == 1 and enough > 0.0:  # with wrong moorings the ballast is not to blame
         found["vertical"] += f"; ballast.mass = {enough:.6g} kg (now {ballast:.6g}) would float at this draft"
     return found
@@ -181,7 +181,7 @@ def _mooring_causes(mooring, start, weight, net):
             f"its mooring lines pull with {_kilo(tension.sum())} kN together, and it weighs"
             f" {_kilo(weight)} kN {first}"
         )
-    together = hypot(start.kept[Kept.MOORING], start.kept[Kept.MOORING + 1])
+    together = hypot(start.cache[LoadCache.MOORING], start.cache[LoadCache.MOORING + 1])
     if len(pull) > 1 and together > ONE_SIDED * pull.sum() > 0.0:
         anchors = ", ".join(f"({x:.4g}, {y:.4g})" for x, y, _ in mooring.anchor[:4])
         found["one-sided"] = (
@@ -193,7 +193,7 @@ def _mooring_causes(mooring, start, weight, net):
 
 def _metacentre(scene):
     """Sentence on the stability of the undisplaced platform as a floating body."""
-    hull, body, depth = scene.model.hull, scene.model.body, scene.platform.ballast.cm_depth
+    hull, body, depth = scene.model.hydro.hull, scene.model.rigid_body, scene.platform.ballast.cm_depth
     area = pi * hull.radius**2
     volume = hull.volume_below - area * hull.z_join
     centre = (hull.moment_below - 0.5 * area * hull.z_join**2) / volume
@@ -208,7 +208,7 @@ def _metacentre(scene):
 def _growing(scene, slope):
     """{motion: s in which it grows by a factor e} of what leaves an equilibrium with this slope by itself."""
     draft = -scene.platform.hull.z[0]
-    limit = GROWTH * scene.model.body.gravity / draft
+    limit = GROWTH * scene.model.rigid_body.gravity / draft
     if np.max(np.linalg.eigvals(slope).real) <= limit:
         return {}
     values, shapes = np.linalg.eig(slope)
@@ -236,16 +236,16 @@ def _left(scene, end):
 
 def _by_load(scene, end):
     """{load: (6,)} of all loads: force in inertial axes, moment about the centre of mass in body axes."""
-    pose, body = pose_of(end.x), scene.model.body
+    pose, body = pose_of(end.x), scene.model.rigid_body
     to_inertial = np.array(
         [[pose.r11, pose.r12, pose.r13], [pose.r21, pose.r22, pose.r23], [pose.r31, pose.r32, pose.r33]]
     )
     centre = np.array([body.s_x, 0.0, body.s_z]) / body.mass
     weight = -body.mass * body.gravity * to_inertial[2]
-    wrenches = {name: end.kept[first : first + 6] for name, first in LOADS.items()}
+    wrenches = {name: end.cache[first : first + 6] for name, first in LOADS.items()}
     wrenches["weight"] = np.concatenate([weight, np.cross(centre, weight)])
     if scene.loads:
-        wrenches["own loads"] = end.kept[Kept.TOTAL : Kept.TOTAL + 6] - sum(wrenches.values())
+        wrenches["own loads"] = end.cache[LoadCache.TOTAL : LoadCache.TOTAL + 6] - sum(wrenches.values())
     return {
         name: np.concatenate([to_inertial @ wrench[:3], wrench[3:] - np.cross(centre, wrench[:3])])
         for name, wrench in wrenches.items()

@@ -7,15 +7,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fowt_env.analysis.trim import AZIMUTHS, calm, trim
+from fowt_env.analysis.trim import AZIMUTHS, trim, without_fluctuations
 from fowt_env.analysis.wave_excitation import fit_wave_filter, wave_force
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.channels import N_FIXED, Out, measure, record
 from fowt_env.plant.compile.decorators import entry
 from fowt_env.plant.compile.handle import data_of, model_of
-from fowt_env.plant.dynamics import Kept, evaluate, loads_of, respond
+from fowt_env.plant.dynamics import evaluate, loads_of, respond
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measure
-from fowt_env.plant.state import STATE_INDEX, STATES, State
+from fowt_env.plant.model import LoadCache
+from fowt_env.plant.state import N_RIGID, STATE_INDEX, STATES, State
 
 # velocity steps are small because quadratic drag leaves a false damping proportional to them
 STEPS = np.array([1e-3, 1e-3, 1e-3, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-7, 1e-7, 1e-7, 1e-4, 1e-5])
@@ -176,34 +177,34 @@ def modes(a, names, cm_height, arm):
 
 
 @entry
-def _mean_response(box, x, u, force, azimuths, dx, measurement, row, rates, measured, recorded):
+def _mean_response(handle, x, u, force, azimuths, dx, measurement, row, rates, measured, recorded):
     """Azimuth means of state rates, measurement and output row under u and further hull forces (6,)."""
-    scene, work = model_of(box), data_of(box)
+    model, data = model_of(handle), data_of(handle)
     start = x[State.AZIMUTH]
     rates[:] = 0.0
     measured[:] = 0.0
     recorded[:] = 0.0
     for i in range(azimuths):
         x[State.AZIMUTH] = start + i * (2.0 * pi / 3.0) / azimuths
-        evaluate(0.0, x, scene, work, dx)
+        evaluate(0.0, x, model, data, dx)
         for j in range(6):
-            work.kept[Kept.TOTAL + j] += force[j]
-            work.kept[Kept.HYDRO + j] += force[j]
-        respond(x, u, scene, work, dx)
-        measure(scene, work, x, dx, u, 0.0, measurement)
-        record(scene, work, x, dx, u, 0.0, loads_of(work, dx), row)
+            data.cache[LoadCache.TOTAL + j] += force[j]
+            data.cache[LoadCache.HYDRO + j] += force[j]
+        respond(x, u, model, data, dx)
+        measure(model, data, x, dx, u, 0.0, measurement)
+        record(model, data, x, dx, u, 0.0, loads_of(data, dx), row)
         rates += dx / azimuths
         measured += measurement / azimuths
         recorded += row / azimuths
     x[State.AZIMUTH] = start
-    work.kept[Kept.FRESH] = 0.0
+    data.cache[LoadCache.VALID] = 0.0
 
 
 class _Plant:
     """State rates and outputs of a calm scene at any state, command and further force."""
 
     def __init__(self, scene, n_lines):
-        self.box = scene.box()
+        self.handle = scene.handle()
         self.columns = [*RECORDED.values(), *range(N_FIXED, N_FIXED + n_lines)]
         self.measures = [Measure[name.upper()] for name in MEASURED]
         rows = len(scene.channels)
@@ -212,7 +213,7 @@ class _Plant:
 
     def __call__(self, x, u, force):
         """(14 + n_outputs,) rates of STATES and the outputs."""
-        _mean_response(self.box, x, u, force, AZIMUTHS, *self.scratch, *self.means)
+        _mean_response(self.handle, x, u, force, AZIMUTHS, *self.scratch, *self.means)
         rates, measured, recorded = self.means
         return np.r_[rates[list(STATE_INDEX)], measured[self.measures], recorded[self.columns]]
 
@@ -226,11 +227,11 @@ def linearize(scene, operating_point=None):
 
     Raises: InputError if the scene has dynamic inflow.
     """
-    if scene.model.wake is not None:
+    if scene.n_state > N_RIGID:
         raise InputError("linearize: build the scene with dynamic_inflow=False")
     point = trim(scene) if operating_point is None else operating_point
-    body = scene.model.body._replace(platform_held=point.platform == "fixed")
-    plant = _Plant(calm(scene, point.wind_speed).with_model(body=body), scene.n_lines)
+    body = scene.model.rigid_body._replace(platform_held=point.platform == "fixed")
+    plant = _Plant(without_fluctuations(scene, point.wind_speed).with_model(rigid_body=body), scene.n_lines)
     x, u, force = point.state.copy(), point.command.copy(), np.zeros(6)
 
     def slopes(vector, indices, steps):
@@ -253,7 +254,7 @@ def linearize(scene, operating_point=None):
         step = INPUT_STEPS[2]
         sides = []
         for sign in (1.0, -1.0):
-            air = calm(scene, point.wind_speed + sign * step).with_model(body=body)
+            air = without_fluctuations(scene, point.wind_speed + sign * step).with_model(rigid_body=body)
             sides.append(_Plant(air, scene.n_lines)(x, u, force))
         of_inputs[:, 2] = (sides[0] - sides[1]) / (2.0 * step)
     n = len(STATES)

@@ -16,8 +16,9 @@ from fowt_env.plant.compile.decorators import entry
 from fowt_env.plant.compile.handle import data_of, model_of
 from fowt_env.plant.drivetrain import build_torque_curve, generator_torque
 from fowt_env.plant.dynamics import derivative
+from fowt_env.plant.hydro.load import BandedStrips
 from fowt_env.plant.rollout import output_row
-from fowt_env.plant.state import State, pose_of
+from fowt_env.plant.state import N_RIGID, State, pose_of
 from fowt_env.scene.build import Scene
 from fowt_env.weather.wind import make_series
 from fowt_env.weather.wind_field import steady_field
@@ -80,54 +81,56 @@ class OperatingPoint(Mapping):
         return f"OperatingPoint({text}, platform={self.platform!r})"
 
 
-def calm(scene, wind_speed=None):
+def without_fluctuations(scene, wind_speed=None):
     """The scene in steady mean wind and flat water: same types, so nothing is compiled anew."""
     parts = {}
-    model = scene.model
-    if model.waves is not None:
+    aero, hydro = scene.model.aero, scene.model.hydro
+    if hydro is not None and hydro.waves is not None:
         # one component of no height stands for flat water: summing them all would only take longer
-        waves = model.waves
+        waves = hydro.waves
         one = {
             name: getattr(waves, name)[:1].copy() for name in waves._fields if np.ndim(getattr(waves, name))
         }
-        parts["waves"] = waves._replace(**one | {"amplitude": np.zeros(1), "velocity": np.zeros(1)})
-    if model.sea is not None:
-        parts["sea"] = model.sea._replace(weight=np.zeros_like(model.sea.weight))
-    if model.wind is not None:
+        parts["hydro.waves"] = waves._replace(**one | {"amplitude": np.zeros(1), "velocity": np.zeros(1)})
+        if isinstance(hydro.strips, BandedStrips):
+            sea = hydro.strips.sea
+            parts["hydro.strips.sea"] = sea._replace(weight=np.zeros_like(sea.weight))
+    if aero is not None:
         speed = scene.wind_speed if wind_speed is None else wind_speed
-        if model.wind_field is not None:
+        if aero.field is not None:
             factor = 1.0 if wind_speed is None else wind_speed / scene.wind_speed
-            parts["wind_field"] = steady_field(model.wind_field, factor)
-        parts["wind"] = make_series(
+            parts["aero.field"] = steady_field(aero.field, factor)
+        parts["aero.wind"] = make_series(
             np.zeros(1),
             np.array([[speed, 0.0, 0.0, 0.0, 0.0]]),
-            reference_height=model.wind.reference_height,
-            reference_length=model.wind.reference_length,
-            shear_exponent=model.wind.shear_exponent,
+            reference_height=aero.wind.reference_height,
+            reference_length=aero.wind.reference_length,
+            shear_exponent=aero.wind.shear_exponent,
         )
-    return scene.with_model(**parts)
+    return scene.with_model(parts)
 
 
 @entry
-def mean_derivative(box, x, u, azimuths, dx, mean):
+def mean_derivative(handle, x, u, azimuths, dx, mean):
     """Mean of dx over the azimuths, into mean (n_state,)."""
     start = x[State.AZIMUTH]
     mean[:] = 0.0
     for i in range(azimuths):
         x[State.AZIMUTH] = start + i * (2.0 * pi / 3.0) / azimuths
-        derivative(0.0, x, u, model_of(box), data_of(box), dx)
+        derivative(0.0, x, u, model_of(handle), data_of(handle), dx)
         for j in range(x.shape[0]):
             mean[j] += dx[j] / azimuths
     x[State.AZIMUTH] = start
 
 
 @entry
-def settle_wake(box, x, dx):
-    """Set the wake states of x to their steady values for the rest of it."""
-    scene = model_of(box)
+def settle_wake(handle, x, dx):
+    """Set the wake states of x to their steady values for the rest of it; the rotor must be a BemRotor."""
+    aero = model_of(handle).aero
+    rotor = aero.rotor
     wake_equilibrium(
-        0.0, pose_of(x), x, wind_now(0.0, scene.wind), scene.wind, scene.wind_field,
-        scene.rotor, scene.skew, scene.wake, dx, data_of(box).counters,
+        0.0, pose_of(x), x, wind_now(0.0, aero.wind), aero.wind, aero.field, rotor.elements, rotor.skew,
+        rotor.wake, dx, data_of(handle).counters,
     )  # fmt: skip
 
 
@@ -138,8 +141,8 @@ class _Steady:
     scene: object
 
     def __post_init__(self):
-        self.work = self.scene.work()
-        self.box = self.scene.box(self.work)
+        self.data = self.scene.data()
+        self.handle = self.scene.handle(self.data)
         self.x = np.zeros(self.scene.n_state)
         self.u = np.zeros(2)
         self.dx = np.zeros_like(self.x)
@@ -150,10 +153,10 @@ class _Steady:
 
     def rates(self):
         """Azimuth-averaged derivative at the present state and command."""
-        if self.scene.model.wake is not None:
-            settle_wake(self.box, self.x, self.dx)
-        mean_derivative(self.box, self.x, self.u, AZIMUTHS, self.dx, self.mean)
-        if fault := self.scene.blamed(self.work):
+        if self.scene.n_state > N_RIGID:
+            settle_wake(self.handle, self.x, self.dx)
+        mean_derivative(self.handle, self.x, self.u, AZIMUTHS, self.dx, self.mean)
+        if fault := self.scene.first_nonfinite_load(self.data):
             raise InputError(f"no steady state found for {label(self.scene)}: {fault}")
         return self.mean
 
@@ -199,7 +202,7 @@ class _Steady:
 
     def motions(self):
         """Indices of the positions that the scene's platform can change."""
-        return [0, 1, 2, 3, 4, 5] if self.scene.model.body.plane is None else [0, 2, 4]
+        return [0, 1, 2, 3, 4, 5] if self.scene.model.rigid_body.plane is None else [0, 2, 4]
 
     def free_states(self):
         """Indices of the states that a floating trim finds: motions, pitch or speed of a turning rotor."""
@@ -245,7 +248,7 @@ class _Steady:
         """
         residual = self.residual(free)
         if self.start is None:  # at the first call the platform has not moved yet
-            self.start = evaluated(self.x, self.work)
+            self.start = evaluated(self.x, self.data)
         size = np.max(np.abs(residual))
         jacobian = None
         for _ in range(NEWTON_ROUNDS):
@@ -284,7 +287,7 @@ class _Steady:
     def refusal(self, ending=None):
         """InputError of a search that ends at this state without a steady one; ending as in unbalanced."""
         self.rates()
-        end = evaluated(self.x, self.work)
+        end = evaluated(self.x, self.data)
         return InputError(unbalanced(self.scene, self.start or end, end, ending))
 
     def check(self):
@@ -319,8 +322,8 @@ def trim(scene: Scene, platform: str = "floating") -> OperatingPoint:
 def _trim(scene, platform):
     """What trim gives, found anew."""
     held = platform == "fixed"
-    body = scene.model.body._replace(platform_held=held, rotor_held=False)
-    steady = _Steady(calm(scene).with_model(body=body))
+    body = scene.model.rigid_body._replace(platform_held=held, rotor_held=False)
+    steady = _Steady(without_fluctuations(scene).with_model(rigid_body=body))
     steady.settle_rotor()
     if not held:
         for _ in range(OUTER_ROUNDS):
@@ -343,8 +346,8 @@ def trim_held(scene, rotor_speed, blade_pitch, platform="floating"):
     """
     if platform not in PLATFORM_MODES:
         raise unknown("platform mode of trim_held", platform, PLATFORM_MODES)
-    body = scene.model.body._replace(platform_held=platform == "fixed", rotor_held=True)
-    steady = _Steady(calm(scene).with_model(body=body))
+    body = scene.model.rigid_body._replace(platform_held=platform == "fixed", rotor_held=True)
+    steady = _Steady(without_fluctuations(scene).with_model(rigid_body=body))
     steady.x[State.ROTOR_SPEED] = rotor_speed
     steady.x[State.BLADE_PITCH] = steady.u[1] = blade_pitch
     if platform == "floating":
@@ -361,7 +364,7 @@ def _point(scene, steady, platform):
     for i in range(AZIMUTHS):
         x = state.copy()
         x[State.AZIMUTH] += i * (2.0 * pi / 3.0) / AZIMUTHS
-        rows.append(output_row(steady.box, x, command, 0.0, len(scene.channels)))
+        rows.append(output_row(steady.handle, x, command, 0.0, len(scene.channels)))
     row = to_units(np.mean(rows, axis=0), scene.n_lines, scene.load_names)
     names = [channel.name for channel in scene.channels]
     values = {name: float(value) for name, value in zip(names, row, strict=True)}

@@ -32,10 +32,10 @@ def exact_trim(scene, key, speed):
     The arrays are shared: copy before writing. A box of wind has a profile of its own, so that its
     trim is not remembered.
     """
-    if scene.model.wind_field is not None:
+    if scene.model.aero.field is not None:
         point = trim(scene)
         return point.state, point.command
-    entry = (key, scene.model.wind.shear_exponent, float(speed))
+    entry = (key, scene.model.aero.wind.shear_exponent, float(speed))
     if entry not in _KNOWN:
         point = trim(replace(scene, wind_speed=float(speed)))
         _KNOWN[entry] = (point.state, point.command)

@@ -44,7 +44,7 @@ def wave_force(scene, state, omega):
     """
     omega = np.atleast_1d(np.asarray(omega, dtype=float))
     result = np.zeros((omega.size, 6), dtype=complex)
-    strips = scene.model.strips
+    strips = scene.model.hydro.strips.shape
     if strips is None:
         return result
     strips = strips._replace(drag_coefficient=0.0, axial_drag_coefficient=0.0)

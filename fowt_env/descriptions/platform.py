@@ -65,6 +65,8 @@ __all__ = [  # the one place to import descriptions from
 
 Vector3 = tuple[Finite, Finite, Finite]
 Inertia = tuple[NonNegative, NonNegative, NonNegative]
+Row = tuple[Finite, Finite, Finite, Finite, Finite, Finite]
+SixBySix = tuple[Row, Row, Row, Row, Row, Row]
 SixDamping = tuple[NonNegative, NonNegative, NonNegative, NonNegative, NonNegative, NonNegative]
 
 
@@ -119,6 +121,18 @@ class Hydro(Record):
     axial_drag_coefficient: NonNegative = 0.0  # C_Dz on the keel plate
     linear_damping: SixDamping = (0.0,) * 6  # surge, sway, heave N/(m/s); roll, pitch, yaw N m/(rad/s)
     yaw_stiffness: NonNegative = 0.0  # delta lines, N m/rad
+    added_mass: SixBySix | None = None  # further constant one about the body origin, kg, kg m, kg m2
+
+    @model_validator(mode="after")
+    def _added_mass(self):
+        if self.added_mass is not None:
+            matrix = np.array(self.added_mass)
+            scale = np.abs(matrix).max()
+            if np.abs(matrix - matrix.T).max() > 1e-6 * scale:
+                raise ValueError("added_mass: must be symmetric, 6 rows of 6 numbers")
+            if np.linalg.eigvalsh(matrix)[0] < -1e-9 * scale:
+                raise ValueError("added_mass: must be positive semidefinite: it has a negative eigenvalue")
+        return self
 
 
 class Tower(Record):

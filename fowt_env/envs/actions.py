@@ -17,6 +17,7 @@ from fowt_env.plant.drivetrain import (
     limited,
 )
 from fowt_env.plant.measurement import Measure
+from fowt_env.plant.state import Command
 
 # Set-point mode: PI on rotor speed through torque, this natural frequency and damping ratio of the
 # rigid rotor. Fast beside the platform's pitch (0.21 rad/s), slow beside the torque rate limit.
@@ -129,7 +130,8 @@ def command_of(action, actions, law, parameters, memory, measurement, u, wanted)
 
     The torque in u is what the generator reaches of the command; the pitch actuator limits itself.
     """
-    wanted[0], wanted[1] = u[0], u[1]
+    wanted[Command.GENERATOR_TORQUE] = u[Command.GENERATOR_TORQUE]
+    wanted[Command.BLADE_PITCH] = u[Command.BLADE_PITCH]
     if actions.mode == Mode.RESIDUAL:
         baseline_command(law, parameters, memory, measurement, wanted)
         wanted[0] += action[0] * actions.residual_torque
@@ -139,8 +141,11 @@ def command_of(action, actions, law, parameters, memory, measurement, u, wanted)
         wanted[1] = spread(action[1], actions.pitch_low, actions.pitch_high)
         if actions.mode == Mode.SETPOINT:
             wanted[0] = tracking_torque(measurement[Measure.ROTOR_SPEED], wanted[0], memory, actions)
-    u[0] = followed_torque(u[0], wanted[0], actions.control_dt, actions.generator)
-    u[1] = wanted[1]
+    torque = u[Command.GENERATOR_TORQUE]
+    u[Command.GENERATOR_TORQUE] = followed_torque(
+        torque, wanted[Command.GENERATOR_TORQUE], actions.control_dt, actions.generator
+    )
+    u[Command.BLADE_PITCH] = wanted[Command.BLADE_PITCH]
 
 
 @kernel
@@ -153,9 +158,9 @@ def action_of(u, rotor_speed, actions, action):
         action[0] = 0.0
         action[1] = 0.0
         return
-    first = rotor_speed if actions.mode == Mode.SETPOINT else u[0]
+    first = rotor_speed if actions.mode == Mode.SETPOINT else u[Command.GENERATOR_TORQUE]
     action[0] = limited(2.0 * (first - actions.low) / (actions.high - actions.low) - 1.0, -1.0, 1.0)
-    pitch = 2.0 * (u[1] - actions.pitch_low) / (actions.pitch_high - actions.pitch_low) - 1.0
+    pitch = 2.0 * (u[Command.BLADE_PITCH] - actions.pitch_low) / (actions.pitch_high - actions.pitch_low) - 1.0
     action[1] = limited(pitch, -1.0, 1.0)
 
 

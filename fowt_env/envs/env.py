@@ -47,7 +47,7 @@ from fowt_env.envs.rewards import (
     weight_array,
 )
 from fowt_env.envs.sensors import Sensors, check_sensors, draw_sensors, reading_scales
-from fowt_env.envs.snapshot import CARRIED, WORK_CARRIED, Snapshot
+from fowt_env.envs.snapshot import CARRIED, DATA_CARRIED, Snapshot
 from fowt_env.envs.tables import task_tables
 from fowt_env.envs.tasks import TASKS, Episode, Task, check_offset, task_of
 from fowt_env.errors import InputError, unknown
@@ -55,7 +55,7 @@ from fowt_env.plant.channels import DEG
 from fowt_env.plant.compile.handle import Handle
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
 from fowt_env.plant.rollout import STOP_REASONS, output
-from fowt_env.plant.state import State
+from fowt_env.plant.state import Command, State
 from fowt_env.scene.build import OPTIONS, Scene, build_scene
 from fowt_env.simulation import INITIAL, check_duration, steps_in
 
@@ -235,7 +235,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         n = scene.n_state
         measurement = np.zeros(N_MEASUREMENTS)
         self._run = Run(
-            work=scene.work(),
+            data=scene.data(),
             x=np.zeros(n),
             u=np.zeros(2),
             memory=memory,
@@ -253,7 +253,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             signals=np.zeros(PREVIEW + len(task.wind_preview)),
             terms=np.zeros(N_TERMS),
         )
-        self._box = None
+        self._handle = None
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -278,11 +278,11 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         reference = Reference(float(state[State.PLATFORM_PITCH]), float(state[State.ROTOR_SPEED]))
         run.reference[:] = reference
         self._offset(episode.offsets)
-        start(self._box)
+        start(self._handle)
         self.restart_loops()
         if self._estimator is not None:
             self._estimator.reset(self.measurement())
-            show_again(self._box)
+            show_again(self._handle)
         self._running = True
         info = {
             "time": 0.0,
@@ -316,7 +316,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
                 f" {x[State.PLATFORM_PITCH] * DEG:g} deg, must stay inside (-90, 90) deg"
             )
         x[State.BLADE_PITCH] = min(max(x[State.BLADE_PITCH], drive.minimum), drive.maximum)
-        self._run.u[1] = x[State.BLADE_PITCH]
+        self._run.u[Command.BLADE_PITCH] = x[State.BLADE_PITCH]
 
     def step(self, action: npt.ArrayLike) -> StepResult:
         """(observation, reward, terminated, truncated, info) after one control period."""
@@ -328,7 +328,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             raise InputError(f"action = {action!r}: must be {N_ACTIONS} numbers") from None
         if asked.shape != (N_ACTIONS,):
             raise InputError(f"action has shape {asked.shape}: must be ({N_ACTIONS},)")
-        status, reward = act(self._box, self._law, self._watch, asked)
+        status, reward = act(self._handle, self._law, self._watch, asked)
         if status == BAD_ACTION:
             raise InputError(f"action = {action!r}: must be finite")
         return self._result(status, reward)
@@ -343,7 +343,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         torque, blade_pitch = float(torque), float(blade_pitch)
         if not (isfinite(torque) and isfinite(blade_pitch)):
             raise InputError(f"torque = {torque!r}, blade_pitch = {blade_pitch!r}: must be finite")
-        return self._result(*act_physical(self._box, self._watch, torque, blade_pitch))
+        return self._result(*act_physical(self._handle, self._watch, torque, blade_pitch))
 
     def _result(self, status, reward):
         """What step returns, from the status and reward of a control period."""
@@ -364,7 +364,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
     def _reason(self, status):
         """Why an episode was terminated, with the load of the user's that is to blame, if one is."""
-        fault = self.scene.blamed(self._run.work)
+        fault = self.scene.first_nonfinite_load(self._run.data)
         return f"{STOP_REASONS[status]}: {fault}" if fault else STOP_REASONS[status]
 
     def get_state(self) -> Snapshot:
@@ -373,10 +373,10 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         For what-if: set_state(get_state()) and the same actions give the same bits, in this environment
         or in another of the same settings. The weather is shared, not copied; a snapshot can be pickled.
         """
-        if self._box is None:
+        if self._handle is None:
             raise ResetNeeded("call reset() first: there is no state yet")
         run = self._run
-        found = [getattr(run, name) for name in CARRIED] + [getattr(run.work, name) for name in WORK_CARRIED]
+        found = [getattr(run, name) for name in CARRIED] + [getattr(run.data, name) for name in DATA_CARRIED]
         arrays = [None if array is None else array.copy() for array in found]
         generator = None if self._np_random is None else self._np_random.bit_generator.state
         return Snapshot(self._kind, self.scene, tuple(arrays), self._running, generator, self._np_random_seed)
@@ -390,16 +390,16 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
                 "state: is of an environment with another plant, action mode, observation, duration or time"
                 " step; must be of one with these settings"
             )
-        if snapshot.scene is not self.scene or self._box is None:
+        if snapshot.scene is not self.scene or self._handle is None:
             self._enter(snapshot.scene)
-        run, work = self._run, self._run.work
+        run, data = self._run, self._run.data
         arrays = iter(snapshot.arrays)
         for name in CARRIED:
             array, saved = getattr(run, name), next(arrays)
             if array is not None:
                 array[:] = saved
-        for name in WORK_CARRIED:
-            getattr(work, name)[:] = next(arrays)
+        for name in DATA_CARRIED:
+            getattr(data, name)[:] = next(arrays)
         self._running = snapshot.running
         if snapshot.generator is None:
             self._np_random = None
@@ -410,7 +410,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     def _enter(self, scene):
         """Run in the scene's weather from now on, with new scratch: its size follows the wave components."""
         self.scene = scene
-        self._run = self._run._replace(work=scene.work())
+        self._run = self._run._replace(data=scene.data())
         self._setting = self._setting._replace(model=scene.model)
         if self._sensors is not None:
             readings = self._last // self._setting.per_control + 1
@@ -425,11 +425,11 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         if self._estimator is not None:
             self._estimator.prepare(self.design_scene)
             self._setting = self._setting._replace(estimator=self._estimator.parameters)
-        self._box = Handle(self._setting, self._run)
+        self._handle = Handle(self._setting, self._run)
 
     def measurement(self) -> Measurement:
         """Measurement that a controller is given now (SI), as the sensors read it."""
-        if self._box is None:
+        if self._handle is None:
             raise ResetNeeded("call reset() first: nothing has been measured yet")
         return Measurement(*self._run.reading.tolist())
 
@@ -440,15 +440,15 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
     def channels(self) -> dict[str, float]:
         """{OpenFAST channel: value in its unit} of the present instant; leaves the run as it is."""
-        if self._box is None:
+        if self._handle is None:
             raise ResetNeeded("call reset() first: there is no state yet")
         run, scene = self._run, self.scene
-        work = scene.work()
-        for name in ("lines", "stages", "kept"):  # what an evaluation at this instant has left
-            getattr(work, name)[:] = getattr(run.work, name)
+        data = scene.data()
+        for name in ("lines", "stages", "cache", "added_mass", "user"):  # what an evaluation at this instant has left
+            getattr(data, name)[:] = getattr(run.data, name)
         row = np.empty(len(scene.channels))
         time = run.counts[STEP] * self.dt
-        output(scene.box(work), run.x, run.u, time, np.zeros_like(run.x), row)
+        output(scene.handle(data), run.x, run.u, time, np.zeros_like(run.x), row)
         values = scene.values(row[None, :])[0].tolist()
         return dict(zip((channel.name for channel in scene.channels), values, strict=True))
 

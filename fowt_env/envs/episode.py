@@ -16,10 +16,10 @@ from fowt_env.envs.sensors import Sensors, take_reading
 from fowt_env.plant.compile.decorators import entry, kernel
 from fowt_env.plant.compile.handle import data_of, model_of
 from fowt_env.plant.drivetrain import followed_torque, torque_was_limited
-from fowt_env.plant.dynamics import Kept, Model, Work
 from fowt_env.plant.measurement import Measure
-from fowt_env.plant.rollout import NON_FINITE, OVERSPEED, RUNNING, advance_scene, observe_scene
-from fowt_env.plant.state import State
+from fowt_env.plant.model import Data, LoadCache, Model
+from fowt_env.plant.rollout import NON_FINITE, OVERSPEED, RUNNING, advance_plant, observe_plant
+from fowt_env.plant.state import Command, State
 
 BAD_ACTION = -1  # beside the statuses of step.py
 STEP, SATURATED, LIMITED = 0, 1, 2  # entries of Run.counts
@@ -50,7 +50,7 @@ class Run(NamedTuple):
 
     by_reference = True
 
-    work: Work
+    data: Data
     x: np.ndarray  # (n_state,)
     u: np.ndarray  # (2,) generator torque and blade-pitch command in force
     memory: np.ndarray  # of the baseline law or the set-point loop
@@ -82,7 +82,7 @@ def look(setting, run):
     """Measure and read at the present instant; RUNNING, or NON_FINITE with the last measurement kept."""
     model = setting.model
     t = run.counts[STEP] * setting.dt
-    observe_scene(model, run.work, run.x, run.u, t, run.dx, run.measurement)
+    observe_plant(model, run.data, run.x, run.u, t, run.dx, run.measurement)
     for value in run.measurement:
         if not isfinite(value):
             copy_into(run.measurement, run.before)
@@ -104,14 +104,14 @@ def show(setting, run):
 
 
 @entry
-def start(box):
+def start(handle):
     """Measure and show the first instant of an episode; returns the status."""
-    setting, run = model_of(box), data_of(box)
+    setting, run = model_of(handle), data_of(handle)
     for i in range(N_COUNTS):
         run.counts[i] = 0
-    run.work.kept[Kept.TORQUE_LIMITED] = 0.0
-    run.work.kept[Kept.FRESH] = 0.0
-    run.work.kept[Kept.STEPS] = 0.0
+    run.data.cache[LoadCache.TORQUE_LIMITED] = 0.0
+    run.data.cache[LoadCache.VALID] = 0.0
+    run.data.cache[LoadCache.STEPS] = 0.0
     status = look(setting, run)
     copy_into(run.before, run.measurement)
     action_of(run.u, run.x[State.ROTOR_SPEED], setting.actions, run.action)
@@ -120,9 +120,9 @@ def start(box):
 
 
 @entry
-def show_again(box):
+def show_again(handle):
     """Fill the observation anew, after an estimator was started."""
-    show(model_of(box), data_of(box))
+    show(model_of(handle), data_of(handle))
 
 
 @kernel
@@ -136,12 +136,12 @@ def update_estimate(law, setting, run):
 @kernel
 def advance_period(setting, run, estimator):
     """Advance one control period under run.u, measure, observe and pay; returns (status, reward)."""
-    was_limited = torque_was_limited(run.u[0], run.wanted[0], setting.model.generator)
+    was_limited = torque_was_limited(run.u[Command.GENERATOR_TORQUE], run.wanted[Command.GENERATOR_TORQUE], setting.model.generator)
     run.counts[LIMITED] += was_limited
-    run.work.kept[Kept.TORQUE_LIMITED] = 1.0 if was_limited else 0.0
+    run.data.cache[LoadCache.TORQUE_LIMITED] = 1.0 if was_limited else 0.0
     copy_into(run.before, run.measurement)
     first = run.counts[STEP]
-    status = advance_scene(setting.model, run.work, run.x, run.u, first, setting.per_control, setting.dt)
+    status = advance_plant(setting.model, run.data, run.x, run.u, first, setting.per_control, setting.dt)
     run.counts[STEP] = first + setting.per_control
     if status != NON_FINITE:
         seen = look(setting, run)
@@ -156,13 +156,13 @@ def advance_period(setting, run, estimator):
 
 
 @entry
-def act(box, law, estimator, action):
+def act(handle, law, estimator, action):
     """One control period under an action (2,) in [-1, 1]; returns (status, reward).
 
-    law, estimator: Boxes whose work is the control kernel of the baseline and of the estimator, or None;
+    law, estimator: Handles whose data is the control kernel of the baseline and of the estimator, or None;
     Python takes ten times as long to hand over a kernel itself. BAD_ACTION leaves everything as it was.
     """
-    setting, run = model_of(box), data_of(box)
+    setting, run = model_of(handle), data_of(handle)
     clipped = accept(action, run.action)
     if clipped < 0:
         return BAD_ACTION, 0.0
@@ -175,15 +175,15 @@ def act(box, law, estimator, action):
 
 
 @entry
-def act_physical(box, estimator, torque, blade_pitch):
+def act_physical(handle, estimator, torque, blade_pitch):
     """One control period under a physical command, as simulate applies it; returns (status, reward).
 
     estimator: as act takes it.
     """
-    setting, run = model_of(box), data_of(box)
-    run.wanted[0] = torque
-    run.wanted[1] = blade_pitch
-    run.u[0] = followed_torque(run.u[0], torque, setting.actions.control_dt, setting.model.generator)
-    run.u[1] = blade_pitch
+    setting, run = model_of(handle), data_of(handle)
+    run.wanted[Command.GENERATOR_TORQUE] = torque
+    run.wanted[Command.BLADE_PITCH] = blade_pitch
+    run.u[Command.GENERATOR_TORQUE] = followed_torque(run.u[Command.GENERATOR_TORQUE], torque, setting.actions.control_dt, setting.model.generator)
+    run.u[Command.BLADE_PITCH] = blade_pitch
     action_of(run.u, run.x[State.ROTOR_SPEED], setting.actions, run.action)
     return advance_period(setting, run, estimator.data)

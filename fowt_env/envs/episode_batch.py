@@ -21,36 +21,36 @@ def first_unusable(actions, active):
 
 
 @entry
-def act_some(boxes, law, estimator, actions, active, statuses, rewards, first, last):
+def act_some(handles, law, estimator, actions, active, statuses, rewards, first, last):
     """One control period of the active environments first <= i < last, see act_all."""
     for i in range(first, last):
         if active[i]:
-            statuses[i], rewards[i] = act(boxes[i], law, estimator, actions[i])
+            statuses[i], rewards[i] = act(handles[i], law, estimator, actions[i])
 
 
 @entry
-def act_all(boxes, law, estimator, actions, active, statuses, rewards):
+def act_all(handles, law, estimator, actions, active, statuses, rewards):
     """One control period of each active environment under its row of actions (n, 2), on this thread.
 
-    boxes: list of n Boxes of one type. Fills statuses (n,) and rewards (n,). Returns -1, or the index of the
+    handles: list of n Handles of one type. Fills statuses (n,) and rewards (n,). Returns -1, or the index of the
     first active environment whose action is not finite; then nothing was moved.
     """
     bad = first_unusable(actions, active)
     if bad < 0:
-        act_some(boxes, law, estimator, actions, active, statuses, rewards, 0, len(boxes))
+        act_some(handles, law, estimator, actions, active, statuses, rewards, 0, len(handles))
     return bad
 
 
 @parallel_entry
-def act_all_parallel(boxes, law, estimator, actions, active, statuses, rewards, parts):
+def act_all_parallel(handles, law, estimator, actions, active, statuses, rewards, parts):
     """As act_all, in as many parts, side by side, as there are threads to run them."""
     bad = first_unusable(actions, active)
     if bad < 0:
-        n = len(boxes)
+        n = len(handles)
         for part in numba.prange(parts):
             k = np.int64(part)  # prange counts unsigned
             act_some(
-                boxes,
+                handles,
                 law,
                 estimator,
                 actions,

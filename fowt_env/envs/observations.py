@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fowt_env.errors import InputError, unknown
-from fowt_env.plant.aero.wind import wind_at, wind_now
+from fowt_env.plant.aero.load import wind_of
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measure
 from fowt_env.plant.state import State
@@ -212,7 +212,7 @@ def build_observation_map(chosen, preview):
 
 
 @kernel
-def fill_signals(t, scene, x, reading, action, estimate, preview, signals):
+def fill_signals(t, model, x, reading, action, estimate, preview, signals):
     """Fill signals (n,): what sensors read, azimuth, last action, estimates, and the hub wind at t + preview.
 
     estimate: memory of an estimator, or None.
@@ -228,8 +228,7 @@ def fill_signals(t, scene, x, reading, action, estimate, preview, signals):
             signals[ESTIMATES + i] = estimate[i]
     for i in range(preview.shape[0]):
         ahead = t + preview[i]
-        now = wind_now(ahead, scene.wind)
-        wind = wind_at(ahead, 0.0, 0.0, scene.layout.hub[2], now, scene.wind, scene.wind_field)
+        wind = wind_of(ahead, 0.0, 0.0, model.layout.hub[2], model.aero)
         signals[PREVIEW + i] = wind[0]
 
 

@@ -9,7 +9,7 @@ CARRIED = (
     "x", "u", "memory", "estimate", "action", "measurement", "reading", "past", "observation", "counts",
     "reference", "terms",
 )  # fmt: skip
-WORK_CARRIED = ("lines", "counters", "stages", "kept", "history", "samples")
+DATA_CARRIED = ("lines", "counters", "stages", "cache", "added_mass", "user", "history", "samples")
 
 
 class Snapshot(NamedTuple):

@@ -100,7 +100,7 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         self._last = np.array([env._last for env in self.envs])
         self._dt = np.array([env.dt for env in self.envs])
         self._ended = np.zeros(num_envs, dtype=bool)  # waiting for the reset of the next step
-        self._boxes = None
+        self._handlees = None
         self._held = [None] * num_envs  # what the compiled list holds, for comparison
 
     def _share_rows(self):
@@ -151,7 +151,7 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
             raise InputError(f"options['reset_mask']: must be a bool array of shape ({self.num_envs},)")
         if not mask.any():
             raise InputError("options['reset_mask']: must name at least one environment")
-        if self._boxes is None and not mask.all():
+        if self._handlees is None and not mask.all():
             raise ResetNeeded("call reset() of all environments first")
         return mask
 
@@ -169,22 +169,22 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
 
     def _renew(self, i):
         """Put the environment's present box, if it is another than before, into the compiled list."""
-        box = self.envs[i]._box
+        box = self.envs[i]._handle
         if box is self._held[i]:
             return
         self._held[i] = box
-        if self._boxes is None:
+        if self._handlees is None:
             if any(held is None for held in self._held):
                 return
-            self._boxes = numba.typed.List(self._held)
+            self._handlees = numba.typed.List(self._held)
         else:
-            self._boxes[i] = box
+            self._handlees[i] = box
 
     def step(
         self, actions: npt.ArrayLike
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """(observations, rewards, terminations, truncations, infos) after one control period of each."""
-        if self._boxes is None:
+        if self._handlees is None:
             raise ResetNeeded("call reset() first: no episode is running")
         resets = self._ended.nonzero()[0]
         if len(resets) and self.autoreset_mode == AutoresetMode.DISABLED:
@@ -225,7 +225,7 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
             ) from None
         if asked.shape != (self.num_envs, N_ACTIONS):
             raise InputError(f"actions have shape {asked.shape}: must be ({self.num_envs}, {N_ACTIONS})")
-        given = (self._boxes, self._law, self._watch, asked, active, self._statuses, self._rewards)
+        given = (self._handlees, self._law, self._watch, asked, active, self._statuses, self._rewards)
         if self.threads == 1:
             bad = act_all(*given)
         else:

@@ -6,13 +6,15 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fowt_env.plant.aero.load import wind_of
 from fowt_env.plant.aero.wind import wind_at, wind_now
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
-from fowt_env.plant.dynamics import N_KEPT, Kept, inertial_load
-from fowt_env.plant.hydro.wave_bands import surface_elevation
+from fowt_env.plant.hydro.load import surface_at_origin
 from fowt_env.plant.measurement import Measure
-from fowt_env.plant.state import State, pose_of
-from fowt_env.plant.user_loads import record_own, to_inertial
+from fowt_env.plant.model import LoadCache
+from fowt_env.plant.rigid_body import momentum_rate
+from fowt_env.plant.state import Command, State, pose_of
+from fowt_env.plant.user_loads import record_user_loads, to_inertial
 
 DEG = 180.0 / pi
 RPM = 30.0 / pi
@@ -94,7 +96,7 @@ LOAD_CHANNELS = (  # of each of the user's loads: about the body origin, inertia
 
 
 def channels(n_lines, loads=()):
-    """Every output channel of a scene with n_lines mooring lines and loads of these names, in row order."""
+    """Every output channel of a model with n_lines mooring lines and loads of these names, in row order."""
     lines = range(1, n_lines + 1)
     return (
         *FIXED_CHANNELS,
@@ -120,14 +122,19 @@ class Layout(NamedTuple):
 
 
 @kernel
-def rotor_wind(t, pose, azimuth, now, series, field, layout):
+def rotor_wind(t, pose, azimuth, aero, layout):
     """Mean wind over the blades, relative to the hub and along the shaft, m/s: AeroDyn's RtVAvgxh.
 
     As there every length of blade counts alike. Of a series it is the mean over the azimuth at rest, of a box
     that over the blades where they are now.
     """
-    if series is None:
+    if aero is None:
         return 0.0
+    return _rotor_wind(t, pose, azimuth, wind_now(t, aero.wind), aero.wind, aero.field, layout)
+
+
+@kernel
+def _rotor_wind(t, pose, azimuth, now, series, field, layout):
     hub = layout.hub
     if field is None:
         u, v, w = now.u * series.rotor_factor, now.v * series.rotor_factor, now.w
@@ -162,28 +169,28 @@ def point_acceleration(pose, dx, px, py, pz):
 
 
 @kernel
-def kept_elevation(t, waves, sea, scratch, kept):
-    """surface_elevation, computed once for all outputs of an instant."""
-    if kept[Kept.ELEVATED] < 0.5:
-        kept[Kept.ELEVATION] = surface_elevation(t, waves, sea, scratch)
-        kept[Kept.ELEVATED] = 1.0
-    return kept[Kept.ELEVATION]
+def elevation_now(t, hydro, data):
+    """surface_at_origin, computed once for all outputs of an instant."""
+    cache = data.cache
+    if cache[LoadCache.ELEVATED] < 0.5:
+        cache[LoadCache.ELEVATION] = surface_at_origin(t, hydro, data)
+        cache[LoadCache.ELEVATED] = 1.0
+    return cache[LoadCache.ELEVATION]
 
 
 @inlined_kernel
-def measure(scene, work, x, dx, u, t, m):
+def measure(model, data, x, dx, u, t, m):
     """Fill the measurement array m (N_MEASUREMENTS,) from a state and its derivative."""
-    layout = scene.layout
+    layout = model.layout
     pose = pose_of(x)
-    now = wind_now(t, scene.wind)
-    wind = wind_at(t, 0.0, 0.0, layout.hub[2], now, scene.wind, scene.wind_field)
+    wind = wind_of(t, 0.0, 0.0, layout.hub[2], model.aero)
     top = layout.tower_top
     ax, _, _ = point_acceleration(pose, dx, top[0], top[1], top[2])
     m[Measure.TIME] = t
     m[Measure.ROTOR_SPEED] = x[State.ROTOR_SPEED]
     m[Measure.GENERATOR_SPEED] = layout.gear_ratio * x[State.ROTOR_SPEED]
     m[Measure.BLADE_PITCH] = x[State.BLADE_PITCH]
-    m[Measure.GENERATOR_TORQUE] = u[0]
+    m[Measure.GENERATOR_TORQUE] = u[Command.GENERATOR_TORQUE]
     for i in range(6):
         m[Measure.SURGE + i] = x[State.SURGE + i]
         m[Measure.SURGE_RATE + i] = dx[State.SURGE + i]
@@ -191,14 +198,14 @@ def measure(scene, work, x, dx, u, t, m):
     m[Measure.NACELLE_VELOCITY] = pose.vx + pose.wy * top[2] - pose.wz * top[1]
     m[Measure.PLATFORM_PITCH_ACCELERATION] = dx[State.WY]
     m[Measure.WIND_SPEED] = wind[0]
-    m[Measure.WAVE_ELEVATION] = kept_elevation(t, scene.waves, scene.sea, work.fast, work.kept)
+    m[Measure.WAVE_ELEVATION] = elevation_now(t, model.hydro, data)
 
 
 @inlined_kernel
-def record(scene, work, x, dx, u, t, loads, row):
+def record(model, data, x, dx, u, t, loads, row):
     """Fill one output row (n_channels,), SI, in the order of channels()."""
-    layout = scene.layout
-    body = scene.body
+    layout = model.layout
+    body = model.rigid_body
     pose = pose_of(x)
     row[Out.TIME] = t
     for i in range(6):
@@ -221,9 +228,9 @@ def record(scene, work, x, dx, u, t, loads, row):
     row[Out.ROTSPEED] = speed
     row[Out.GENSPEED] = layout.gear_ratio * speed
     row[Out.BLDPITCH1] = x[State.BLADE_PITCH]
-    row[Out.GENTQ] = u[0]
-    row[Out.GENPWR] = layout.generator_efficiency * layout.gear_ratio * speed * u[0]
-    row[Out.GENTQLIM] = work.kept[Kept.TORQUE_LIMITED]
+    row[Out.GENTQ] = u[Command.GENERATOR_TORQUE]
+    row[Out.GENPWR] = layout.generator_efficiency * layout.gear_ratio * speed * u[Command.GENERATOR_TORQUE]
+    row[Out.GENTQLIM] = data.cache[LoadCache.TORQUE_LIMITED]
     # shaft loads: aerodynamics less the rotor's own inertia and weight
     hub = layout.hub
     hx, _, _ = point_acceleration(pose, dx, hub[0], hub[1], hub[2])
@@ -236,24 +243,15 @@ def record(scene, work, x, dx, u, t, loads, row):
     h = loads.hydro
     row[Out.HYDROFXI], row[Out.HYDROFYI], row[Out.HYDROFZI] = to_inertial(pose, h.fx, h.fy, h.fz)
     row[Out.HYDROMXI], row[Out.HYDROMYI], row[Out.HYDROMZI] = to_inertial(pose, h.mx, h.my, h.mz)
-    row[Out.WAVE1ELEV] = kept_elevation(t, scene.waves, scene.sea, work.fast, work.kept)
-    now = wind_now(t, scene.wind)
-    wind = wind_at(t, 0.0, 0.0, hub[2], now, scene.wind, scene.wind_field)
+    row[Out.WAVE1ELEV] = elevation_now(t, model.hydro, data)
+    wind = wind_of(t, 0.0, 0.0, hub[2], model.aero)
     row[Out.WIND1VELX], row[Out.WIND1VELY], row[Out.WIND1VELZ] = wind
-    row[Out.RTVAVGXH] = rotor_wind(t, pose, x[State.AZIMUTH], now, scene.wind, scene.wind_field, layout)
-    n = work.lines.shape[0]
+    row[Out.RTVAVGXH] = rotor_wind(t, pose, x[State.AZIMUTH], model.aero, layout)
+    n = data.lines.shape[0]
     for i in range(n):
-        row[N_FIXED + i] = work.lines[i, 2]
-        row[N_FIXED + n + i] = work.lines[i, 3]
-    _record_own(pose, scene.own, work.kept, row, N_FIXED + 2 * n)
-
-
-@kernel
-def _record_own(pose, own, kept, row, start):
-    """Fill the channels of the user's loads from start on; nothing without any."""
-    if own is None:
-        return
-    record_own(pose, own, kept[N_KEPT:], row[start:])
+        row[N_FIXED + i] = data.lines[i, 2]
+        row[N_FIXED + n + i] = data.lines[i, 3]
+    record_user_loads(pose, model.user, data, row[N_FIXED + 2 * n :])
 
 
 @inlined_kernel
@@ -264,7 +262,7 @@ def tower_base(pose, x, dx, loads, body, layout, row):
     on the lower one).
     """
     m = layout.upper_matrix
-    c = inertial_load(pose, x[State.ROTOR_SPEED], m, body.coupling)
+    c = momentum_rate(pose, x[State.ROTOR_SPEED], m, body.coupling)
     mass, sx, sz = m[0, 0], m[1, 5], m[0, 4]
     nx, ny, nz = pose.r31, pose.r32, pose.r33
     g = body.gravity

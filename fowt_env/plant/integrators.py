@@ -1,4 +1,4 @@
-"""Fixed-step integrators of one plant. A scene's `multistep` part chooses: None is classical Runge-Kutta.
+"""Fixed-step integrators of one plant. A model's `multistep` part chooses: None is classical Runge-Kutta.
 
 The blade pitch follows its own first-order law exactly within a step (constant command), so the
 stiffest part of the plant does not limit the multistep methods. Nor does the rotor in a box of wind, whose
@@ -12,13 +12,15 @@ from typing import NamedTuple
 import numpy as np
 
 from fowt_env.errors import unknown
+from fowt_env.plant.aero.load import rotor_part
 from fowt_env.plant.aero.wind import wind_now
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.drivetrain import followed_pitch, limited
-from fowt_env.plant.dynamics import Kept, accelerate, attitude_rate, derivative, evaluate, respond, rotor_part
-from fowt_env.plant.hydro.morison import StripLoad
-from fowt_env.plant.state import NO_LOAD, State, Wrench, pose_in
+from fowt_env.plant.dynamics import derivative, evaluate, respond
+from fowt_env.plant.model import LoadCache
+from fowt_env.plant.rigid_body import accelerate, attitude_rate
+from fowt_env.plant.state import Command, State, Wrench, pose_in
 
 INTEGRATORS = ("rk4", "heun", "abm4", "ab4")
 START_STEPS = 3  # steps before four past derivatives exist
@@ -92,17 +94,17 @@ def build_integrator(name, rotor_samples=1):
 
 
 @inlined_kernel
-def rates(t, x, u, scene, work, dx):
+def rates(t, x, u, model, data, dx):
     """dx at an instant under u, from the kept loads where they are fresh."""
-    kept = work.kept
-    if kept[Kept.FRESH] < 0.5 or kept[Kept.TIME] != t:
-        evaluate(t, x, scene, work, work.stages[0])
-        kept[Kept.FRESH] = 1.0
-        kept[Kept.TIME] = t
-        kept[Kept.ELEVATED] = 0.0
+    cache = data.cache
+    if cache[LoadCache.VALID] < 0.5 or cache[LoadCache.TIME] != t:
+        evaluate(t, x, model, data, data.stages[0])
+        cache[LoadCache.VALID] = 1.0
+        cache[LoadCache.TIME] = t
+        cache[LoadCache.ELEVATED] = 0.0
     for i in range(State.WAKE, x.shape[0]):
-        dx[i] = work.stages[0, i]
-    respond(x, u, scene, work, dx)
+        dx[i] = data.stages[0, i]
+    respond(x, u, model, data, dx)
 
 
 @kernel
@@ -125,39 +127,39 @@ def pitch_after(blade_pitch, command, dt, actuator):
 
 
 @inlined_kernel
-def rk4(t, x, u, dt, scene, multistep, work):
+def rk4(t, x, u, dt, model, multistep, data):
     """One classical Runge-Kutta step of x in place, blade pitch exact at every stage."""
-    k1, k2, k3, k4, y = work.stages[0], work.stages[1], work.stages[2], work.stages[3], work.stages[4]
-    half = pitch_after(x[State.BLADE_PITCH], u[1], 0.5 * dt, scene.actuator)
-    whole = pitch_after(x[State.BLADE_PITCH], u[1], dt, scene.actuator)
-    rates(t, x, u, scene, work, k1)
+    k1, k2, k3, k4, y = data.stages[0], data.stages[1], data.stages[2], data.stages[3], data.stages[4]
+    half = pitch_after(x[State.BLADE_PITCH], u[Command.BLADE_PITCH], 0.5 * dt, model.actuator)
+    whole = pitch_after(x[State.BLADE_PITCH], u[Command.BLADE_PITCH], dt, model.actuator)
+    rates(t, x, u, model, data, k1)
     for i in range(x.shape[0]):
         y[i] = x[i] + 0.5 * dt * k1[i]
     y[State.BLADE_PITCH] = half
-    derivative(t + 0.5 * dt, y, u, scene, work, k2)
+    derivative(t + 0.5 * dt, y, u, model, data, k2)
     for i in range(x.shape[0]):
         y[i] = x[i] + 0.5 * dt * k2[i]
     y[State.BLADE_PITCH] = half
-    derivative(t + 0.5 * dt, y, u, scene, work, k3)
+    derivative(t + 0.5 * dt, y, u, model, data, k3)
     for i in range(x.shape[0]):
         y[i] = x[i] + dt * k3[i]
     y[State.BLADE_PITCH] = whole
-    derivative(t + dt, y, u, scene, work, k4)
+    derivative(t + dt, y, u, model, data, k4)
     for i in range(x.shape[0]):
         x[i] += dt / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i])
     x[State.BLADE_PITCH] = whole
 
 
 @inlined_kernel
-def heun(t, x, u, dt, scene, multistep, work):
+def heun(t, x, u, dt, model, multistep, data):
     """One step of the explicit trapezoidal rule, blade pitch exact."""
-    k1, k2, y = work.stages[0], work.stages[1], work.stages[4]
-    rates(t, x, u, scene, work, k1)
-    pitch = pitch_after(x[State.BLADE_PITCH], u[1], dt, scene.actuator)
+    k1, k2, y = data.stages[0], data.stages[1], data.stages[4]
+    rates(t, x, u, model, data, k1)
+    pitch = pitch_after(x[State.BLADE_PITCH], u[Command.BLADE_PITCH], dt, model.actuator)
     for i in range(x.shape[0]):
         y[i] = x[i] + dt * k1[i]
     y[State.BLADE_PITCH] = pitch
-    derivative(t + dt, y, u, scene, work, k2)
+    derivative(t + dt, y, u, model, data, k2)
     for i in range(x.shape[0]):
         x[i] += 0.5 * dt * (k1[i] + k2[i])
     x[State.BLADE_PITCH] = pitch
@@ -186,40 +188,40 @@ def moulton(order, new, i, history):
 
 
 @kernel
-def feathering(x, scene):
+def feathering(x, model):
     """Whether a free rotor's blades are pitched beyond FEATHERING, where its speed is heavily damped."""
-    return x[State.BLADE_PITCH] > FEATHERING and not scene.body.rotor_held
+    return x[State.BLADE_PITCH] > FEATHERING and not model.rigid_body.rotor_held
 
 
 @kernel
-def sample_rotor(t, x, u, dt, scene, gusts, work):
-    """Put the rotor's loads within the step from t into work.samples, latest first, before those of the past.
+def sample_rotor(t, x, u, dt, model, gusts, data):
+    """Put the rotor's loads within the step from t into data.samples, latest first, before those of the past.
 
     Between the ends of the step the state is extrapolated from the last two derivatives: to second order,
     while the platform hardly moves and the blades turn by 7 deg. Without gusts nothing is done.
     """
     if gusts is None:
         return
-    samples, kept, history, between = work.samples, work.kept, work.history, work.stages[2]
+    samples, cache, history, between = data.samples, data.cache, data.history, data.stages[2]
     n = gusts.samples
     for k in range(samples.shape[0] - 1, n - 1, -1):
         for i in range(N_SAMPLE):
             samples[k, i] = samples[k - n, i]
     for i in range(6):
-        samples[n - 1, i] = kept[Kept.ROTOR + i]
-    samples[n - 1, 6] = kept[Kept.TORQUE]
-    past = 0 if kept[Kept.STEPS] < 1.0 else 1
+        samples[n - 1, i] = cache[LoadCache.ROTOR + i]
+    samples[n - 1, 6] = cache[LoadCache.TORQUE]
+    past = 0 if cache[LoadCache.STEPS] < 1.0 else 1
     for part in range(1, n):
         after = part * dt / n
         bend = 0.5 * after * after / dt
         for i in range(x.shape[0]):
             between[i] = x[i] + after * history[0, i] + bend * (history[0, i] - history[past, i])
-        between[State.BLADE_PITCH] = pitch_after(x[State.BLADE_PITCH], u[1], after, scene.actuator)
+        between[State.BLADE_PITCH] = pitch_after(x[State.BLADE_PITCH], u[Command.BLADE_PITCH], after, model.actuator)
+        now = wind_now(t + after, model.aero.wind)
+        pose = pose_in(between, model.rigid_body.plane)
         aero = rotor_part(
-            t + after, pose_in(between, scene.body.plane), between, wind_now(t + after, scene.wind),
-            scene.wind, scene.wind_field, scene.rotor, scene.rotor_lookup, scene.rotor_table, scene.skew,
-            scene.wake, work.stages[3], work.counters,
-        )  # fmt: skip
+            t + after, pose, between, now, model.aero, model.aero.rotor, data.stages[3], data.counters
+        )
         row = samples[n - 1 - part]
         row[0], row[1], row[2] = aero.wrench.fx, aero.wrench.fy, aero.wrench.fz
         row[3], row[4], row[5] = aero.wrench.mx, aero.wrench.my, aero.wrench.mz
@@ -227,7 +229,7 @@ def sample_rotor(t, x, u, dt, scene, gusts, work):
 
 
 @kernel
-def follow_rotor(dt, scene, gusts, work, y):
+def follow_rotor(dt, model, gusts, data, y):
     """Add to the velocities y at the end of a step what sample_rotor found within it; without gusts nothing.
 
     To the velocities of Adams-Bashforth 4 comes the difference that short steps of it make to the impulse of
@@ -235,7 +237,7 @@ def follow_rotor(dt, scene, gusts, work, y):
     """
     if gusts is None:
         return
-    samples, weight = work.samples, gusts.weight
+    samples, weight = data.samples, gusts.weight
     fx = fy = fz = mx = my = mz = torque = 0.0
     for k in range(samples.shape[0]):
         share = weight[k]
@@ -246,64 +248,64 @@ def follow_rotor(dt, scene, gusts, work, y):
         my += share * samples[k, 4]
         mz += share * samples[k, 5]
         torque += share * samples[k, 6]
-    kept, extra, still = work.kept, work.stages[3], work.stages[2]
+    extra, still = data.stages[3], data.stages[2]
     for i in range(still.shape[0]):
         still[i] = 0.0  # without velocities the equation of motion has no terms but the load
-    strips = StripLoad(NO_LOAD, kept[Kept.S0], kept[Kept.S1], kept[Kept.S2], kept[Kept.A33])
+    body = model.rigid_body
     accelerate(
-        pose_in(still, scene.body.plane), still, Wrench(fx, fy, fz, mx, my, mz), torque, strips, scene.body,
-        work.matrix, extra,
+        pose_in(still, body.plane), still, Wrench(fx, fy, fz, mx, my, mz), torque, data.added_mass, body,
+        data.matrix, extra,
     )  # fmt: skip
     for i in range(State.VX, State.ROTOR_SPEED + 1):
         y[i] += dt * extra[i]
 
 
 @inlined_kernel
-def adams(t, x, u, dt, scene, multistep, work):
+def adams(t, x, u, dt, model, multistep, data):
     """One Adams step: velocities by Adams-Bashforth 4, positions by Adams-Moulton 4 with the new velocities.
 
     With the corrector, in the first three steps, and while the blades of a free rotor are feathered,
     velocities are corrected by Adams-Moulton after an evaluation at the predicted state. Without it, the
     rotor's load may be followed within the step (follow_rotor).
     """
-    history, new, y = work.history, work.stages[1], work.stages[4]
-    kept = work.kept
-    steps = int(kept[Kept.STEPS])
+    history, new, y = data.history, data.stages[1], data.stages[4]
+    cache = data.cache
+    steps = int(cache[LoadCache.STEPS])
     order = min(steps + 1, START_STEPS + 1)
     for k in range(START_STEPS, 0, -1):
         for i in range(x.shape[0]):
             history[k, i] = history[k - 1, i]
-    rates(t, x, u, scene, work, history[0])
-    pitch = pitch_after(x[State.BLADE_PITCH], u[1], dt, scene.actuator)
+    rates(t, x, u, model, data, history[0])
+    pitch = pitch_after(x[State.BLADE_PITCH], u[Command.BLADE_PITCH], dt, model.actuator)
     for i in range(x.shape[0]):
         y[i] = x[i] + dt * bashforth(order, i, history)
     y[State.BLADE_PITCH] = pitch
-    sample_rotor(t, x, u, dt, scene, multistep.gusts, work)
-    if multistep.corrector or steps < START_STEPS or feathering(x, scene):
-        derivative(t + dt, y, u, scene, work, new)
+    sample_rotor(t, x, u, dt, model, multistep.gusts, data)
+    if multistep.corrector or steps < START_STEPS or feathering(x, model):
+        derivative(t + dt, y, u, model, data, new)
         for i in range(State.VX, x.shape[0]):
             y[i] = x[i] + dt * moulton(order, new[i], i, history)
         y[State.BLADE_PITCH] = pitch
     else:
-        follow_rotor(dt, scene, multistep.gusts, work, y)
-    attitude_rate(y, new, scene.body.plane)
+        follow_rotor(dt, model, multistep.gusts, data, y)
+    attitude_rate(y, new, model.rigid_body.plane)
     new[State.AZIMUTH] = y[State.ROTOR_SPEED]
     for i in range(State.VX):
         x[i] += dt * moulton(order, new[i], i, history)
     for i in range(State.VX, x.shape[0]):
         x[i] = y[i]
-    kept[Kept.STEPS] = steps + 1.0
+    cache[LoadCache.STEPS] = steps + 1.0
 
 
 method_step = chosen_by_class("multistep", {RungeKutta: rk4, Heun: heun, Multistep: adams}, inlined=True)
 
 
 @inlined_kernel
-def take_step(t, x, u, dt, scene, multistep, work):
-    """One step of the scene's integrator, x in place."""
-    pitch = followed_pitch(x[State.BLADE_PITCH], u[1], dt, scene.actuator)
+def take_step(t, x, u, dt, model, multistep, data):
+    """One step of the model's integrator, x in place."""
+    pitch = followed_pitch(x[State.BLADE_PITCH], u[Command.BLADE_PITCH], dt, model.actuator)
     if pitch != x[State.BLADE_PITCH]:  # an actuator without lag jumps: the kept loads are not of this pitch
         x[State.BLADE_PITCH] = pitch
-        work.kept[Kept.FRESH] = 0.0
-    method_step(t, x, u, dt, scene, multistep, work)
-    work.kept[Kept.FRESH] = 0.0
+        data.cache[LoadCache.VALID] = 0.0
+    method_step(t, x, u, dt, model, multistep, data)
+    data.cache[LoadCache.VALID] = 0.0

@@ -9,9 +9,10 @@ from fowt_env.plant.channels import measure, record
 from fowt_env.plant.compile.decorators import entry, inlined_kernel, kernel
 from fowt_env.plant.compile.handle import data_of, model_of
 from fowt_env.plant.drivetrain import followed_torque, torque_was_limited
-from fowt_env.plant.dynamics import Kept, loads_of
+from fowt_env.plant.dynamics import loads_of
 from fowt_env.plant.integrators import rates, take_step
-from fowt_env.plant.state import State
+from fowt_env.plant.model import LoadCache
+from fowt_env.plant.state import Command, State
 
 RUNNING, NON_FINITE, CAPSIZED, OVERSPEED, BLOWN_UP = 0, 1, 2, 3, 4
 CAPSIZE = 1.4  # rad (80 deg) of platform pitch: the Euler angles are singular at 90 deg
@@ -42,10 +43,10 @@ def status_of(x):
 
 
 @kernel
-def advance_scene(scene, work, x, u, first, n, dt):
+def advance_plant(model, data, x, u, first, n, dt):
     """Advance x by n steps from time first*dt under constant u; returns the status."""
     for i in range(n):
-        take_step((first + i) * dt, x, u, dt, scene, scene.multistep, work)
+        take_step((first + i) * dt, x, u, dt, model, model.integrator, data)
         status = status_of(x)
         if status != RUNNING:
             return status
@@ -53,70 +54,72 @@ def advance_scene(scene, work, x, u, first, n, dt):
 
 
 @entry
-def advance(box, x, u, first, n, dt):
+def advance(handle, x, u, first, n, dt):
     """Advance x (n_state,) in place by n steps of dt under constant u (2,); returns the status."""
-    return advance_scene(model_of(box), data_of(box), x, u, first, n, dt)
+    return advance_plant(model_of(handle), data_of(handle), x, u, first, n, dt)
 
 
 @inlined_kernel
-def observe_scene(scene, work, x, u, t, dx, measurement):
+def observe_plant(model, data, x, u, t, dx, measurement):
     """Fill dx and measurement as observe does."""
-    rates(t, x, u, scene, work, dx)
-    measure(scene, work, x, dx, u, t, measurement)
+    rates(t, x, u, model, data, dx)
+    measure(model, data, x, dx, u, t, measurement)
 
 
 @inlined_kernel
-def output_scene(scene, work, x, u, t, dx, row):
+def output_plant(model, data, x, u, t, dx, row):
     """Fill dx and one output row as output does."""
-    rates(t, x, u, scene, work, dx)
-    record(scene, work, x, dx, u, t, loads_of(work, dx), row)
+    rates(t, x, u, model, data, dx)
+    record(model, data, x, dx, u, t, loads_of(data, dx), row)
 
 
 @entry
-def observe(box, x, u, t, dx, measurement):
+def observe(handle, x, u, t, dx, measurement):
     """Fill dx (n_state,) and measurement (N_MEASUREMENTS,) at time t under u.
 
-    The loads kept by the work arrays are used where they are fresh: after changing x from outside,
+    The loads kept by the data arrays are used where they are fresh: after changing x from outside,
     call forget first.
     """
-    observe_scene(model_of(box), data_of(box), x, u, t, dx, measurement)
+    observe_plant(model_of(handle), data_of(handle), x, u, t, dx, measurement)
 
 
 @entry
-def output(box, x, u, t, dx, row):
+def output(handle, x, u, t, dx, row):
     """Fill one output row (n_channels,) in SI at time t under u; kept loads as in observe."""
-    output_scene(model_of(box), data_of(box), x, u, t, dx, row)
+    output_plant(model_of(handle), data_of(handle), x, u, t, dx, row)
 
 
 @entry
-def forget(box):
+def forget(handle):
     """Drop kept loads and past derivatives: the state was changed from outside."""
-    data_of(box).kept[Kept.FRESH] = 0.0
-    data_of(box).kept[Kept.STEPS] = 0.0
+    data_of(handle).cache[LoadCache.VALID] = 0.0
+    data_of(handle).cache[LoadCache.STEPS] = 0.0
 
 
-def output_row(box, x, u, t, size):
+def output_row(handle, x, u, t, size):
     """One output row (size,) in SI of any state at time t under u."""
     row = np.empty(size)
-    forget(box)
-    output(box, x, u, float(t), np.zeros_like(x), row)
+    forget(handle)
+    output(handle, x, u, float(t), np.zeros_like(x), row)
     return row
 
 
 @kernel
-def follow_torque(t, torque, u, period, generator, grid_loss, kept):
-    """Put the torque that the generator reaches into u[0], in place of the command there.
+def follow_torque(t, torque, u, period, generator, grid_loss, cache):
+    """Put the torque that the generator reaches into u, in place of the command there.
 
     torque: what was in force before, N m; period: s until the next command. From the time grid_loss (s) on
     the generator is off the grid and has no torque at once, whatever is commanded.
     """
-    command = u[0]
+    command = u[Command.GENERATOR_TORQUE]
+    limited = 0.0
     if t >= grid_loss:
-        u[0] = 0.0
-        kept[Kept.TORQUE_LIMITED] = 0.0
-        return
-    u[0] = followed_torque(torque, command, period, generator)
-    kept[Kept.TORQUE_LIMITED] = 1.0 if torque_was_limited(u[0], command, generator) else 0.0
+        reached = 0.0
+    else:
+        reached = followed_torque(torque, command, period, generator)
+        limited = 1.0 if torque_was_limited(reached, command, generator) else 0.0
+    u[Command.GENERATOR_TORQUE] = reached
+    cache[LoadCache.TORQUE_LIMITED] = limited
 
 
 class Schedule(NamedTuple):
@@ -142,7 +145,7 @@ def rollout(handle, x, u, law, parameters, memory, measurement, dx, schedule, fi
     model, data = model_of(handle), data_of(handle)
     dt, rows = schedule.dt, 0
     if first == end:
-        observe_scene(model, data, x, u, first * dt, dx, measurement)
+        observe_plant(model, data, x, u, first * dt, dx, measurement)
         return RUNNING, first, rows
     for step in range(first, end + 1):
         t = step * dt
@@ -152,17 +155,17 @@ def rollout(handle, x, u, law, parameters, memory, measurement, dx, schedule, fi
         if (ending or step % schedule.per_control == 0) and x[State.ROTOR_SPEED] > schedule.overspeed:
             return OVERSPEED, step, rows
         if not ending and step % schedule.per_control == 0:
-            observe_scene(model, data, x, u, t, dx, measurement)
-            torque = u[0]
+            observe_plant(model, data, x, u, t, dx, measurement)
+            torque = u[Command.GENERATOR_TORQUE]
             law(parameters, memory, measurement, u)
             period = schedule.per_control * dt
-            follow_torque(t, torque, u, period, model.generator, schedule.grid_loss, data.kept)
+            follow_torque(t, torque, u, period, model.generator, schedule.grid_loss, data.cache)
         if ending or step % schedule.per_output == 0:
-            output_scene(model, data, x, u, t, dx, out[rows])
+            output_plant(model, data, x, u, t, dx, out[rows])
             rows += 1
         if ending:
             break
-        take_step(t, x, u, dt, model, model.multistep, data)
+        take_step(t, x, u, dt, model, model.integrator, data)
         status = status_of(x)
         if status != RUNNING:
             return status, step + 1, rows

@@ -35,6 +35,16 @@ class State(IntEnum):
 N_RIGID = 15  # states of a plant without wake states
 
 
+class Command(IntEnum):
+    """Index of each command in the flat (N_COMMANDS,) float64 vector."""
+
+    GENERATOR_TORQUE = 0  # N m, high-speed shaft
+    BLADE_PITCH = 1  # rad
+
+
+N_COMMANDS = len(Command)
+
+
 class Wrench(NamedTuple):
     """Force (N) and moment about the body origin (N m), body components."""
 

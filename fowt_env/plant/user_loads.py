@@ -10,11 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fowt_env.plant.aero.wind import wind_at
+from fowt_env.plant.aero.load import wind_of
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
-from fowt_env.plant.hydro.morison import current_at
-from fowt_env.plant.hydro.wave_bands import surface_elevation
-from fowt_env.plant.hydro.waves import wave_kinematics
+from fowt_env.plant.hydro.load import surface_at_origin, water_at
 from fowt_env.plant.state import State, Wrench, add
 
 MOST_LOADS = 8
@@ -70,7 +68,7 @@ class Motion(IntEnum):
 N_MOTION = len(Motion)
 
 
-class OwnLoads(NamedTuple):
+class UserLoads(NamedTuple):
     """Up to MOST_LOADS loads, n of them in use."""
 
     parameters: np.ndarray  # of all loads, one after the other
@@ -79,7 +77,6 @@ class OwnLoads(NamedTuple):
     body_axes: np.ndarray  # (n,) bool: axes of velocities and of the force
     above: np.ndarray  # (n,) bool: above the tower base, which then carries it
     water: np.ndarray  # (n,) bool: wants the motion of the water
-    depth: float  # m
     kernel0: object  # first-class functions; a tuple of them makes numba warn at every use
     kernel1: object
     kernel2: object
@@ -91,29 +88,29 @@ class OwnLoads(NamedTuple):
 
 
 def room_of(count):
-    """Entries of Work.kept that this many loads need: six of each, the first to fail, and Motion."""
+    """Entries of Data.user that this many loads need: six of each, the first to fail, and Motion."""
     return 6 * count + 1 + N_MOTION if count else 0
 
 
 @inlined_kernel
-def call_kernel(i, own, parameters, motion, force):
+def call_kernel(i, user, parameters, motion, force):
     """Have load i write its force and moment (6,)."""
     if i == 0:
-        own.kernel0(parameters, motion, force)
+        user.kernel0(parameters, motion, force)
     elif i == 1:
-        own.kernel1(parameters, motion, force)
+        user.kernel1(parameters, motion, force)
     elif i == 2:
-        own.kernel2(parameters, motion, force)
+        user.kernel2(parameters, motion, force)
     elif i == 3:
-        own.kernel3(parameters, motion, force)
+        user.kernel3(parameters, motion, force)
     elif i == 4:
-        own.kernel4(parameters, motion, force)
+        user.kernel4(parameters, motion, force)
     elif i == 5:
-        own.kernel5(parameters, motion, force)
+        user.kernel5(parameters, motion, force)
     elif i == 6:
-        own.kernel6(parameters, motion, force)
+        user.kernel6(parameters, motion, force)
     else:
-        own.kernel7(parameters, motion, force)
+        user.kernel7(parameters, motion, force)
 
 
 @kernel
@@ -178,16 +175,12 @@ def fill_place(pose, px, py, pz, body_axes, motion):
 
 
 @kernel
-def fill_water(t, pose, waves, current, depth, wanted, body_axes, motion):
+def fill_water(t, pose, hydro, wanted, body_axes, motion):
     """Fill the motion of the water at the point (above the still surface: that at it); zero if not wanted."""
     u = v = w = du = dv = dw = 0.0
     if wanted:
         z = min(motion[Motion.Z], 0.0)
-        u, v = current_at(z, depth, current)
-        if waves is not None:
-            moved = wave_kinematics(t, motion[Motion.X], motion[Motion.Y], z, waves)
-            u, v, w = u + moved.u, v + moved.v, moved.w
-            du, dv, dw = moved.du, moved.dv, moved.dw
+        u, v, w, du, dv, dw = water_at(t, motion[Motion.X], motion[Motion.Y], z, hydro)
     put(motion, Motion.WATER_X, pose, body_axes, u, v, w)
     put(motion, Motion.WATER_AX, pose, body_axes, du, dv, dw)
 
@@ -203,26 +196,28 @@ def body_wrench(pose, px, py, pz, body_axes, force):
 
 
 @kernel
-def evaluate_own(t, pose, x, now, wind, field, waves, sea, current, scratch, own, room):
-    """Fill room (room_of(n),): the wrench of each load, body axes about the body origin.
+def evaluate_user_loads(t, pose, x, aero, hydro, user, data):
+    """Fill data.user (room_of(n),): the wrench of each load, body axes about the body origin.
 
-    room[6 n] becomes the number, from 1, of the first load that gave a number that is not finite while
+    Entry 6 n becomes the number, from 1, of the first load that gave a number that is not finite while
     what it was given was finite.
     """
-    n = own.point.shape[0]
+    if user is None:
+        return
+    n, room = user.point.shape[0], data.user
     motion = room[6 * n + 1 :]
-    fill_common(t, pose, x, surface_elevation(t, waves, sea, scratch), motion)
+    fill_common(t, pose, x, surface_at_origin(t, hydro, data), motion)
     for i in range(n):
-        px, py, pz = own.point[i, 0], own.point[i, 1], own.point[i, 2]
-        axes = own.body_axes[i]
+        px, py, pz = user.point[i, 0], user.point[i, 1], user.point[i, 2]
+        axes = user.body_axes[i]
         fill_place(pose, px, py, pz, axes, motion)
-        u, v, w = wind_at(t, motion[Motion.X], motion[Motion.Y], motion[Motion.Z], now, wind, field)
+        u, v, w = wind_of(t, motion[Motion.X], motion[Motion.Y], motion[Motion.Z], aero)
         put(motion, Motion.WIND_X, pose, axes, u, v, w)
-        fill_water(t, pose, waves, current, own.depth, own.water[i], axes, motion)
+        fill_water(t, pose, hydro, user.water[i], axes, motion)
         force = room[6 * i : 6 * i + 6]
         for j in range(6):
             force[j] = 0.0
-        call_kernel(i, own, own.parameters[own.first[i] : own.first[i + 1]], motion, force)
+        call_kernel(i, user, user.parameters[user.first[i] : user.first[i + 1]], motion, force)
         total = given = 0.0
         for j in range(6):
             total += force[j]
@@ -236,25 +231,29 @@ def evaluate_own(t, pose, x, now, wind, field, waves, sea, current, scratch, own
 
 
 @kernel
-def own_wrench(i, room):
-    """Wrench of load i, as evaluate_own left it."""
+def user_wrench(i, room):
+    """Wrench of load i, as evaluate_user_loads left it in data.user."""
     k = 6 * i
     return Wrench(room[k], room[k + 1], room[k + 2], room[k + 3], room[k + 4], room[k + 5])
 
 
 @kernel
-def with_own(load, above, own, room):
-    """The load with those own loads added that act above the tower base, or those that do not."""
-    for i in range(own.point.shape[0]):
-        if own.above[i] == above:
-            load = add(load, own_wrench(i, room))
+def add_user_loads(load, above, user, data):
+    """The load with those of the user's added that act above the tower base, or those that do not."""
+    if user is None:
+        return load
+    for i in range(user.point.shape[0]):
+        if user.above[i] == above:
+            load = add(load, user_wrench(i, data.user))
     return load
 
 
 @kernel
-def record_own(pose, own, room, row):
+def record_user_loads(pose, user, data, row):
     """Fill six channels of each load into row: force and moment about the body origin, inertial axes."""
-    for i in range(own.point.shape[0]):
-        load = own_wrench(i, room)
+    if user is None:
+        return
+    for i in range(user.point.shape[0]):
+        load = user_wrench(i, data.user)
         row[6 * i], row[6 * i + 1], row[6 * i + 2] = to_inertial(pose, load.fx, load.fy, load.fz)
         row[6 * i + 3], row[6 * i + 4], row[6 * i + 5] = to_inertial(pose, load.mx, load.my, load.mz)

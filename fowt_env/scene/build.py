@@ -14,6 +14,7 @@ from fowt_env.descriptions.sea_state import SeaState
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.aero.blade_elements import build_blade_elements
 from fowt_env.plant.aero.coefficient_table import build_rotor_table
+from fowt_env.plant.aero.load import Aero, BemRotor
 from fowt_env.plant.aero.section_table import build_section_table
 from fowt_env.plant.aero.tower_drag import build_tower_drag
 from fowt_env.plant.aero.wake import build_dynamic_inflow, build_skewed_wake, n_wake_states
@@ -21,11 +22,12 @@ from fowt_env.plant.aero.wind import WindSeries
 from fowt_env.plant.channels import Channel, Layout, channels, to_units, with_hub_wind
 from fowt_env.plant.compile.handle import Handle
 from fowt_env.plant.drivetrain import build_drivetrain, build_pitch_actuator, build_torque_limits
-from fowt_env.plant.dynamics import N_KEPT, Body, Model, Work
 from fowt_env.plant.events import N_COUNTERS
+from fowt_env.plant.hydro.added_inertia import build_added_inertia
 from fowt_env.plant.hydro.diffraction import build_strip_diffraction
 from fowt_env.plant.hydro.hydrostatics import build_hull
 from fowt_env.plant.hydro.linear_damping import build_damping
+from fowt_env.plant.hydro.load import BandedStrips, ExactStrips, Hydro
 from fowt_env.plant.hydro.morison import Current, build_strips
 from fowt_env.plant.hydro.wave_bands import (
     STILL_REFINEMENT,
@@ -36,10 +38,11 @@ from fowt_env.plant.hydro.wave_bands import (
     fast_scratch,
 )
 from fowt_env.plant.integrators import INTEGRATORS, N_SAMPLE, build_integrator, rotor_samples
+from fowt_env.plant.model import N_CACHE, Data, Model, RigidBody
 from fowt_env.plant.mooring import build_mooring
 from fowt_env.plant.state import N_RIGID
 from fowt_env.plant.user_loads import room_of
-from fowt_env.scene.user_loads import Load, blamed, build_own_loads, checked_loads
+from fowt_env.scene.user_loads import Load, build_user_loads, checked_loads, first_nonfinite_load
 from fowt_env.weather.waves import build_waves
 from fowt_env.weather.wind import build_wind, hub_series, make_series, nominal_speed
 from fowt_env.weather.wind_field import WindBox, hub_speed, hub_wind, is_field, read_box, rotor_average
@@ -119,7 +122,7 @@ class Scene:
 
     @property
     def n_state(self) -> int:
-        return N_RIGID + n_wake_states(self.model.rotor, self.model.wake)
+        return N_RIGID + (0 if self.model.aero is None else n_wake_states(self.model.aero.rotor))
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -132,7 +135,7 @@ class Scene:
         Where the plant's wind is a rotor average, Wind1VelX to Z become those of a point at the hub.
         """
         if self._hub_wind is not None:
-            rows = with_hub_wind(rows, self._hub_wind, self.model.wind.period)
+            rows = with_hub_wind(rows, self._hub_wind, self.model.aero.wind.period)
         return to_units(rows, self.n_lines, self.load_names)
 
     @cached_property
@@ -140,7 +143,7 @@ class Scene:
         """(time, (n, 3)) of the wind at the hub where the model's wind is a rotor average, else None."""
         rotor = self.turbine.rotor
         if isinstance(self.wind, WindBox):
-            return hub_wind(self.wind, rotor.hub_height) if self.model.wind_field is None else None
+            return hub_wind(self.wind, rotor.hub_height) if self.model.aero.field is None else None
         found = hub_series(
             self.wind,
             reference_height=rotor.hub_height,
@@ -152,28 +155,31 @@ class Scene:
             found[1][:, 1] = 0.0
         return found
 
-    def work(self) -> Work:
+    def data(self) -> Data:
         """Fresh scratch arrays for one plant of this scene."""
-        nodes = 0 if self.model.strips is None else self.model.strips.nodes
-        return Work(
-            np.zeros((self.n_lines, 6)),
-            np.zeros(N_COUNTERS),
-            np.zeros((7, nodes)),
-            fast_scratch(self.model.sea, self.model.lanes),
-            np.zeros((6, 6)),
-            np.zeros((5, self.n_state)),
-            np.zeros(N_KEPT + room_of(len(self.loads))),
-            np.zeros((4, self.n_state)),
-            np.zeros((4 * rotor_samples(self.model.multistep), N_SAMPLE)),
+        hydro = self.model.hydro
+        strips = None if hydro is None else hydro.strips
+        return Data(
+            lines=np.zeros((self.n_lines, 6)),
+            counters=np.zeros(N_COUNTERS),
+            kinematics=np.zeros((7, 0 if strips is None else strips.shape.nodes)),
+            fast=fast_scratch(getattr(strips, "sea", None), getattr(strips, "lanes", None)),
+            added_mass=np.zeros((6, 6)),
+            matrix=np.zeros((6, 6)),
+            stages=np.zeros((5, self.n_state)),
+            cache=np.zeros(N_CACHE),
+            user=np.zeros(room_of(len(self.loads))),
+            history=np.zeros((4, self.n_state)),
+            samples=np.zeros((4 * rotor_samples(self.model.integrator), N_SAMPLE)),
         )
 
-    def box(self, work: Work | None = None) -> Handle:
-        """The scene and scratch in the form that kernels take from Python."""
-        return Handle(self.model, self.work() if work is None else work)
+    def handle(self, data: Data | None = None) -> Handle:
+        """The model and data in the form that kernels take from Python."""
+        return Handle(self.model, self.data() if data is None else data)
 
-    def blamed(self, work: Work) -> str | None:
-        """Words for the load of the user's that spoilt a run with this scratch; None where none did."""
-        return blamed(self.loads, work.kept[N_KEPT:])
+    def first_nonfinite_load(self, data: Data) -> str | None:
+        """Words for the load of the user's that made a run not finite with this data; None where none did."""
+        return first_nonfinite_load(self.loads, data.user)
 
     def with_weather(self, wind: Wind, sea: Sea, seed: int) -> "Scene":
         """A copy in other weather of the same kind: only wind and sea are drawn anew.
@@ -182,27 +188,20 @@ class Scene:
         """
         seed = _seed(seed)
         air, waves = _weather(wind, sea, seed, self.platform, self.turbine, self.rotor, self.options)
-        fast = _fast_sea(waves, self.model.strips) if self.model.lanes is not None else None
-        if (air.series is None) != (self.model.wind is None):
+        aero, hydro = self.model.aero, self.model.hydro
+        if (air.series is None) != (aero is None):
             raise InputError(
                 f"wind = {wind!r}: a scene cannot gain or lose its aerodynamics; use build_scene"
             )
-        if (air.field is None) != (self.model.wind_field is None):
+        if aero is not None and (air.field is None) != (aero.field is None):
             raise InputError("wind: a scene cannot gain or lose its box of full-field wind; use build_scene")
-        return replace(
-            self,
-            model=self.model._replace(
-                wind=air.series,
-                wind_field=air.field,
-                waves=waves,
-                sea=fast,
-                **_diffraction(self.options, waves, self.model.strips, fast, self.model.lanes),
-            ),
-            wind=air.spec,
-            sea=sea,
-            seed=seed,
-            wind_speed=air.speed,
-        )
+        if hydro is not None:
+            strips = _with_sea(hydro.strips, waves, self.options)
+            hydro = hydro._replace(waves=waves, strips=strips)
+        if aero is not None:
+            aero = aero._replace(wind=air.series, field=air.field)
+        model = self.model._replace(aero=aero, hydro=hydro)
+        return replace(self, model=model, wind=air.spec, sea=sea, seed=seed, wind_speed=air.speed)
 
     @property
     def dt(self) -> float:
@@ -211,15 +210,27 @@ class Scene:
             return REFERENCE_STEP
         return STEPS[self.options["integrator"]]
 
-    def with_model(self, **parts: Any) -> "Scene":
-        """A copy with some parts of the model replaced (same types: no recompilation)."""
-        return replace(self, model=self.model._replace(**parts))
+    def with_model(self, parts: Mapping[str, Any] | None = None, **slots: Any) -> "Scene":
+        """A copy with some parts of the model replaced (same types: no recompilation).
+
+        parts: {path: part}, as {"hydro.damping": ...}; slots: those at the top, as rigid_body=...
+        """
+        model = self.model
+        for path, part in {**(parts or {}), **slots}.items():
+            model = _replaced(model, path.split("."), part)
+        return replace(self, model=model)
 
     def __repr__(self):
         return (
             f"Scene({self.platform.name!r}, wind={self.wind!r}, sea={self.sea!r}, seed={self.seed},"
             f" rotor={self.rotor!r})"
         )
+
+
+def _replaced(part, path, value):
+    """A part of a model with that at a path of field names replaced."""
+    name, *rest = path
+    return part._replace(**{name: _replaced(getattr(part, name), rest, value) if rest else value})
 
 
 def build_scene(
@@ -247,7 +258,7 @@ def build_scene(
     fidelity  "reference": everything solved exactly, Runge-Kutta 4; "standard": every blade and station
               by look-up, fast wave sums, Adams-Bashforth 4 (in a box of wind with three rotor loads per
               step); "fast": the rotor as one table
-    loads     further loads on platform and tower, of one's own (own_load.Load)
+    loads     further loads on platform and tower, of one's own (scene.user_loads.Load)
     options   see OPTIONS; a platform file may set other defaults. planar: surge, heave and platform pitch
               alone move; of ntm and etm turbulence the part in the plane is kept
 
@@ -262,49 +273,70 @@ def build_scene(
         turbine = read_turbine(turbine)
     rotor = _parts(fidelity, rotor, chosen)
     seed = _seed(seed)
-    site = platform.environment
     air, waves = _weather(wind, sea, seed, platform, turbine, rotor, chosen)
-    series = air.series
-    hydrodynamics = chosen["hydrodynamics"]
-    aero = series is not None
-    stations = _stations(chosen["blade_stations"], turbine)
-    elements = build_blade_elements(turbine, site.air_density, stations) if aero else None
-    strips = _strips(platform, chosen) if hydrodynamics else None
-    quick = strips is not None and _quick(chosen, waves, strips)
-    lanes = build_lanes(platform.hull, strips, 1 if waves else STILL_REFINEMENT) if quick else None
-    fast = _fast_sea(waves, strips) if quick else None
-    current = _current(chosen["current"]) if hydrodynamics else None
+    current = _current(chosen["current"]) if chosen["hydrodynamics"] else None
     if chosen["planar"]:
         _check_symmetry(platform.lines if chosen["mooring"] else (), current)
     mooring = _mooring(platform.lines, chosen["mooring"])
-    own = checked_loads(loads, 0 if mooring is None else mooring.length.shape[0], chosen["planar"])
+    user = checked_loads(loads, 0 if mooring is None else mooring.length.shape[0], chosen["planar"])
     model = Model(
-        body=build_body(platform, turbine, plane=True if chosen["planar"] else None),
+        rigid_body=build_rigid_body(platform, turbine, plane=True if chosen["planar"] else None),
         layout=build_layout(platform, turbine),
         drivetrain=build_drivetrain(turbine),
         actuator=build_pitch_actuator(turbine.pitch_drive),
         generator=build_torque_limits(turbine.torque_law),
-        hull=build_hull(platform.hull, site.water_density, site.gravity) if hydrodynamics else None,
-        strips=strips,
-        waves=waves,
-        lanes=lanes,
-        sea=fast,
-        **_diffraction(chosen, waves, strips, fast, lanes),
-        current=current,
+        hydro=_hydro(platform, waves, current, chosen) if chosen["hydrodynamics"] else None,
         mooring=mooring,
-        damping=build_damping(platform.hydro) if hydrodynamics else None,
-        rotor=elements if rotor == "bem" else None,
-        rotor_lookup=build_section_table(elements) if aero and rotor == "lookup" else None,
-        rotor_table=build_rotor_table(elements) if aero and rotor == "table" else None,
-        skew=build_skewed_wake() if aero and chosen["skewed_wake"] else None,
-        wake=build_dynamic_inflow() if aero and chosen["dynamic_inflow"] else None,
-        tower=build_tower_drag(platform.tower, site.air_density) if aero and chosen["tower_drag"] else None,
-        wind=series,
-        wind_field=air.field,
-        multistep=build_integrator(chosen["integrator"], _samples(chosen, air.field)),
-        own=build_own_loads(own, platform.tower.base_height, site.water_depth),
+        aero=None if air.series is None else _aero(platform, turbine, air, rotor, chosen),
+        integrator=build_integrator(chosen["integrator"], _samples(chosen, air.field)),
+        user=build_user_loads(user, platform.tower.base_height),
     )
-    return Scene(model, platform, turbine, air.spec, sea, seed, rotor, chosen, air.speed, own, label)
+    return Scene(model, platform, turbine, air.spec, sea, seed, rotor, chosen, air.speed, user, label)
+
+
+def _aero(platform, turbine, air, rotor, chosen):
+    """Aero part of a scene with wind."""
+    density = platform.environment.air_density
+    elements = build_blade_elements(turbine, density, _stations(chosen["blade_stations"], turbine))
+    if rotor == "bem":
+        skew = build_skewed_wake() if chosen["skewed_wake"] else None
+        wake = build_dynamic_inflow() if chosen["dynamic_inflow"] else None
+        model = BemRotor(elements, skew, wake)
+    else:
+        model = build_section_table(elements) if rotor == "lookup" else build_rotor_table(elements)
+    tower = build_tower_drag(platform.tower, density) if chosen["tower_drag"] else None
+    return Aero(air.series, air.field, model, tower)
+
+
+def _hydro(platform, waves, current, chosen):
+    """Hydro part of a scene in water."""
+    site = platform.environment
+    shape = _strips(platform, chosen)
+    strips = ExactStrips(shape, None)
+    if _quick(chosen, waves, shape):
+        lanes = build_lanes(platform.hull, shape, 1 if waves else STILL_REFINEMENT)
+        strips = BandedStrips(shape, lanes, None, None)
+    return Hydro(
+        hull=build_hull(platform.hull, site.water_density, site.gravity),
+        strips=_with_sea(strips, waves, chosen),
+        waves=waves,
+        current=current,
+        damping=build_damping(platform.hydro),
+        added_inertia=build_added_inertia(platform.hydro.added_mass),
+    )
+
+
+def _with_sea(strips, waves, chosen):
+    """Strips in waves (None: still water). Raises: InputError for a sea beyond the fast path."""
+    diffracting = chosen["diffraction"] == "maccamy_fuchs" and waves is not None
+    if isinstance(strips, ExactStrips):
+        return strips._replace(
+            diffraction=build_strip_diffraction(waves, strips.shape) if diffracting else None
+        )
+    sea = _fast_sea(waves, strips.shape)
+    return strips._replace(
+        sea=sea, diffraction=build_lane_diffraction(sea, strips.lanes) if diffracting else None
+    )
 
 
 def _parts(fidelity, rotor, chosen):
@@ -351,17 +383,6 @@ def _fast_sea(waves, strips):
     if not can_be_fast(waves, strips):
         raise InputError("sea: several headings cannot be summed fast; build_scene(..., wave_loads='exact')")
     return build_fast_waves(waves, strips)
-
-
-def _diffraction(chosen, waves, strips, sea, lanes):
-    """{part of Model: diffraction}, one for either strip load, None where it is off or in still water."""
-    parts = {"diffraction": None, "lane_diffraction": None}
-    if chosen["diffraction"] == "maccamy_fuchs" and waves is not None:
-        if lanes is None:
-            parts["diffraction"] = build_strip_diffraction(waves, strips)
-        else:
-            parts["lane_diffraction"] = build_lane_diffraction(sea, lanes)
-    return parts
 
 
 def _options(given, platform):
@@ -609,14 +630,14 @@ def _upper_bodies(platform, turbine):
     ]
 
 
-def build_body(platform, turbine, platform_held=False, rotor_held=False, plane=None):
-    """Body part: Eq. (10) from the four rigid bodies. plane: True holds sway, roll and yaw at zero."""
+def build_rigid_body(platform, turbine, platform_held=False, rotor_held=False, plane=None):
+    """RigidBody part: Eq. (10) from the four rigid bodies. plane: True holds sway, roll and yaw at zero."""
     ballast = platform.ballast
     matrix = assemble(
         [(ballast.mass, (0.0, 0.0, -ballast.cm_depth), ballast.inertia), *_upper_bodies(platform, turbine)]
     )
     drivetrain = build_drivetrain(turbine)
-    return Body(
+    return RigidBody(
         np.ascontiguousarray(matrix),
         float(matrix[0, 0]),
         float(matrix[1, 5]),

@@ -17,7 +17,7 @@ from fowt_env.descriptions.records import is_number
 from fowt_env.errors import InputError
 from fowt_env.plant.channels import channels
 from fowt_env.plant.compile.decorators import FLOATS
-from fowt_env.plant.user_loads import MOST_LOADS, N_MOTION, Motion, OwnLoads
+from fowt_env.plant.user_loads import MOST_LOADS, N_MOTION, Motion, UserLoads
 
 AXES = ("inertial", "body")
 SIGNATURE = types.void(FLOATS, FLOATS, FLOATS)
@@ -265,29 +265,28 @@ def _try(load, position, rate, planar):
             )
 
 
-def build_own_loads(loads: Sequence[Load], base_height: float, depth: float) -> OwnLoads | None:
-    """OwnLoads part of checked loads, None without any."""
+def build_user_loads(loads: Sequence[Load], base_height: float) -> UserLoads | None:
+    """UserLoads part of checked loads, None without any."""
     if not loads:
         return None
     sizes = [len(load.parameters) for load in loads]
     spare = [loads[0].kernel] * (MOST_LOADS - len(loads))  # never called
-    return OwnLoads(
+    return UserLoads(
         np.array([value for load in loads for value in load.parameters], dtype=np.float64),
         np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64),
         np.array([load.point for load in loads], dtype=np.float64).reshape(-1, 3),
         np.array([load.axes == "body" for load in loads]),
         np.array([load.point[2] >= base_height for load in loads]),
         np.array([load.water for load in loads]),
-        float(depth),
         *(load.kernel for load in loads),
         *spare,
     )
 
 
-def blamed(loads: Sequence[Load], room: np.ndarray) -> str | None:
+def first_nonfinite_load(loads: Sequence[Load], room: np.ndarray) -> str | None:
     """Words for the load that first gave a number that is not finite; None where none did.
 
-    room: what loads.own.evaluate_own filled.
+    room: what plant.user_loads.evaluate_user_loads filled.
     """
     if not loads or not room[6 * len(loads)]:
         return None

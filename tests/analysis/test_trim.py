@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 import fowt_env
 from fowt_env.analysis import equilibrium
 from fowt_env.analysis.equilibrium import check_equilibrium, evaluated
-from fowt_env.analysis.trim import AZIMUTHS, calm, mean_derivative, trim
+from fowt_env.analysis.trim import AZIMUTHS, mean_derivative, trim, without_fluctuations
 from fowt_env.descriptions.platform import DATA, names, read_platform, read_turbine
 from fowt_env.envs import FowtEnv
 from fowt_env.errors import InputError
@@ -61,7 +61,7 @@ def test_platform_stays_at_trim_in_still_water(still_scene):
 
 def remaining(scene, point):
     """Azimuth-averaged derivative at an operating point."""
-    box = calm(scene).box()
+    box = without_fluctuations(scene).box()
     dx, mean = np.zeros(scene.n_state), np.zeros(scene.n_state)
     mean_derivative(box, point.state.copy(), point.command.copy(), AZIMUTHS, dx, mean)
     return mean
@@ -129,7 +129,7 @@ def test_rotor_stands_in_still_air_and_is_feathered_in_a_gale(storm_scene):
 
 
 def test_calm_scene_keeps_its_types(storm_scene):
-    quiet = calm(storm_scene).model
+    quiet = without_fluctuations(storm_scene).model
     for part, other in zip(quiet, storm_scene.model, strict=True):
         assert type(part) is type(other)
     assert np.all(quiet.waves.amplitude == 0.0) and np.all(quiet.waves.velocity == 0.0)

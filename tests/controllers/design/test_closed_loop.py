@@ -5,7 +5,7 @@ import pytest
 
 from fowt_env import build_scene, linearize, simulate, trim
 from fowt_env.analysis.linear_model import modes
-from fowt_env.analysis.trim import AZIMUTHS, calm, mean_derivative
+from fowt_env.analysis.trim import AZIMUTHS, mean_derivative, without_fluctuations
 from fowt_env.controllers.design.closed_loop import closed_loop_matrix, platform_pitch_damping
 from fowt_env.controllers.pi import PISettings
 from fowt_env.errors import InputError
@@ -22,7 +22,7 @@ def above_rated():
 def nonlinear_closed_loop(scene, settings):
     """z -> dz/dt of plant, filtered speed and integral, continuous in time; and z at the trim."""
     point = trim(scene)
-    box = calm(scene).box()
+    box = without_fluctuations(scene).box()
     rows = list(STATE_INDEX)
     ratio, gk = settings.gear_ratio, settings.gain_schedule_pitch
 

@@ -1,0 +1,80 @@
+"""Wind loads: of the rotor by whichever model the scene has, and of the tower."""
+
+from typing import NamedTuple
+
+from fowt_env.plant.aero.bem_rotor import RotorLoad, rotor_load
+from fowt_env.plant.aero.coefficient_table import RotorTable, rotor_table_load
+from fowt_env.plant.aero.section_table import SectionTable, rotor_lookup_load
+from fowt_env.plant.aero.tower_drag import tower_load
+from fowt_env.plant.aero.wind import WindSeries, wind_at, wind_now
+from fowt_env.plant.compile.decorators import kernel
+from fowt_env.plant.compile.variants import chosen_by_class
+from fowt_env.plant.state import NO_LOAD, Wrench
+
+
+class BemRotor(NamedTuple):
+    """Blade-element momentum solved at every station, with its optional wake models."""
+
+    elements: object  # blade_elements.BladeElements
+    skew: object  # wake.SkewedWake or None
+    wake: object  # wake.DynamicInflow or None
+
+
+class Aero(NamedTuple):
+    """Wind, and what it acts on."""
+
+    wind: WindSeries
+    field: object  # wind_field.WindField, which replaces the series, or None
+    rotor: object  # BemRotor, SectionTable or RotorTable
+    tower: object  # tower_drag.TowerDrag or None
+
+
+class AeroLoad(NamedTuple):
+    """Loads of the wind, body components about the body origin."""
+
+    rotor: RotorLoad
+    tower: Wrench
+
+
+NO_AERO_LOAD = AeroLoad(RotorLoad(NO_LOAD, 0.0, 0.0), NO_LOAD)
+
+
+@kernel
+def _solved(t, pose, x, now, aero, rotor, dx, counters):
+    return rotor_load(
+        t, pose, x, now, aero.wind, aero.field, rotor.elements, rotor.skew, rotor.wake, dx, counters
+    )
+
+
+@kernel
+def _by_sections(t, pose, x, now, aero, rotor, dx, counters):
+    return rotor_lookup_load(t, pose, x, now, aero.wind, aero.field, rotor, counters)
+
+
+@kernel
+def _by_coefficients(t, pose, x, now, aero, rotor, dx, counters):
+    return rotor_table_load(pose, x, now, aero.wind, rotor)
+
+
+# (t, pose, x, now, aero, rotor, dx, counters) -> RotorLoad; of dx the wake's rates alone are written
+rotor_part = chosen_by_class(
+    "rotor", {BemRotor: _solved, SectionTable: _by_sections, RotorTable: _by_coefficients}
+)
+
+
+@kernel
+def aero_load(t, pose, x, aero, data, dx):
+    """AeroLoad at a state; writes the wake's rates into dx."""
+    if aero is None:
+        return NO_AERO_LOAD
+    now = wind_now(t, aero.wind)
+    rotor = rotor_part(t, pose, x, now, aero, aero.rotor, dx, data.counters)
+    return AeroLoad(rotor, tower_load(t, pose, now, aero.wind, aero.field, aero.tower))
+
+
+@kernel
+def wind_of(t, X, Y, Z, aero):
+    """(u, v, w) m/s, inertial components, at an inertial point (m); zero without aerodynamics."""
+    if aero is None:
+        return 0.0, 0.0, 0.0
+    return wind_at(t, X, Y, Z, wind_now(t, aero.wind), aero.wind, aero.field)

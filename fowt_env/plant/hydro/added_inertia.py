@@ -1,0 +1,28 @@
+"""A constant added mass, as a potential-flow code gives it at infinite frequency (theory.md, 5.6)."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from fowt_env.plant.compile.decorators import kernel
+from fowt_env.plant.rigid_body import momentum_rate
+from fowt_env.plant.state import Wrench
+
+
+class AddedInertia(NamedTuple):
+    """Added mass in body axes about the body origin."""
+
+    matrix: np.ndarray  # (6, 6) symmetric: kg, kg m, kg m2
+
+
+def build_added_inertia(matrix):
+    """AddedInertia of a platform file's (6, 6) rows, or None where there are none or all are zero."""
+    matrix = np.zeros((6, 6)) if matrix is None else np.ascontiguousarray(matrix, dtype=np.float64)
+    return AddedInertia(matrix) if matrix.any() else None
+
+
+@kernel
+def added_inertia_load(pose, inertia):
+    """Velocity-dependent part of its load, Kirchhoff's equations: -(w x p, v x p + w x k), (p, k) = A nu."""
+    rate = momentum_rate(pose, 0.0, inertia.matrix, 0.0)
+    return Wrench(-rate.fx, -rate.fy, -rate.fz, -rate.mx, -rate.my, -rate.mz)

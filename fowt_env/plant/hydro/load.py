@@ -1,0 +1,143 @@
+"""Water loads: buoyancy, waves, current and own motion on the hull, and the added mass of all of these."""
+
+from typing import NamedTuple
+
+from fowt_env.plant.compile.decorators import kernel
+from fowt_env.plant.compile.variants import chosen_by_class
+from fowt_env.plant.hydro.added_inertia import added_inertia_load
+from fowt_env.plant.hydro.hydrostatics import hydrostatic_load
+from fowt_env.plant.hydro.linear_damping import damping_load
+from fowt_env.plant.hydro.morison import Strips, current_at, morison_load
+from fowt_env.plant.hydro.wave_bands import fast_morison_load, surface_elevation
+from fowt_env.plant.hydro.waves import elevation, wave_kinematics
+from fowt_env.plant.state import NO_LOAD, Wrench, add
+
+
+class ExactStrips(NamedTuple):
+    """Strip loads by the plain sum over all wave components."""
+
+    shape: Strips
+    diffraction: object  # diffraction.StripDiffraction or None: 1 + C_A in every wave
+
+
+class BandedStrips(NamedTuple):
+    """The same by a few wave numbers at the nodes of a fixed quadrature."""
+
+    shape: Strips
+    lanes: object  # wave_bands.Lanes
+    sea: object  # wave_bands.FastWaves, or None in still water
+    diffraction: object  # wave_bands.LaneDiffraction or None
+
+
+class Hydro(NamedTuple):
+    """The floater in the water."""
+
+    hull: object  # hydrostatics.Hull
+    strips: object  # ExactStrips or BandedStrips
+    waves: object  # waves.Waves or None
+    current: object  # morison.Current or None
+    damping: object  # linear_damping.LinearDamping or None
+    added_inertia: object  # added_inertia.AddedInertia or None
+
+
+class HydroLoad(NamedTuple):
+    """Loads of the water but for the added mass times acceleration, body components about the body origin."""
+
+    buoyancy: Wrench
+    strips: Wrench  # with the velocity-dependent terms of a constant added mass
+    damping: Wrench
+
+
+NO_HYDRO_LOAD = HydroLoad(NO_LOAD, NO_LOAD, NO_LOAD)
+
+
+@kernel
+def _exact(t, pose, hydro, strips, data):
+    return morison_load(
+        t, pose, strips.shape, hydro.waves, hydro.current, data.kinematics, strips.diffraction
+    )
+
+
+@kernel
+def _banded(t, pose, hydro, strips, data):
+    return fast_morison_load(
+        t, pose, strips.lanes, strips.sea, hydro.current, data.fast, strips.diffraction
+    )
+
+
+# (t, pose, hydro, strips, data) -> morison.StripLoad
+strip_load = chosen_by_class("strips", {ExactStrips: _exact, BandedStrips: _banded})
+
+
+@kernel
+def _plain_elevation(t, waves, strips, data):
+    return elevation(t, 0.0, 0.0, waves)
+
+
+@kernel
+def _banded_elevation(t, waves, strips, data):
+    return surface_elevation(t, waves, strips.sea, data.fast)
+
+
+_elevation = chosen_by_class("strips", {ExactStrips: _plain_elevation, BandedStrips: _banded_elevation})
+
+
+@kernel
+def surface_at_origin(t, hydro, data):
+    """Surface elevation at the inertial origin, m."""
+    if hydro is None:
+        return 0.0
+    return _elevation(t, hydro.waves, hydro.strips, data)
+
+
+@kernel
+def water_at(t, X, Y, Z, hydro):
+    """(u, v, w, du, dv, dw), m/s and m/s2, of waves and current at an inertial point (m)."""
+    if hydro is None:
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    return _water(t, X, Y, Z, hydro.waves, hydro.current, hydro.strips.shape.depth)
+
+
+@kernel
+def _water(t, X, Y, Z, waves, current, depth):
+    u, v = current_at(Z, depth, current)
+    if waves is None:
+        return u, v, 0.0, 0.0, 0.0, 0.0
+    moved = wave_kinematics(t, X, Y, Z, waves)
+    return u + moved.u, v + moved.v, moved.w, moved.du, moved.dv, moved.dw
+
+
+@kernel
+def hydro_load(t, pose, x, hydro, data):
+    """HydroLoad at a state; fills data.added_mass."""
+    if hydro is None:
+        return NO_HYDRO_LOAD
+    buoyancy = hydrostatic_load(pose, hydro.hull, data.counters)
+    strips = strip_load(t, pose, hydro, hydro.strips, data)
+    fill_added_mass(strips, data.added_mass)
+    wrench = add_inertia(pose, strips.wrench, hydro.added_inertia, data.added_mass)
+    return HydroLoad(buoyancy, wrench, damping_load(pose, x, hydro.damping))
+
+
+@kernel
+def fill_added_mass(strips, matrix):
+    """The symmetric (6, 6) added mass of a StripLoad, whose axis is the body's z."""
+    for i in range(6):
+        for j in range(6):
+            matrix[i, j] = 0.0
+    matrix[0, 0] = matrix[1, 1] = strips.s0
+    matrix[2, 2] = strips.a33
+    matrix[0, 4] = matrix[4, 0] = strips.s1
+    matrix[1, 3] = matrix[3, 1] = -strips.s1
+    matrix[3, 3] = matrix[4, 4] = strips.s2
+
+
+@kernel
+def add_inertia(pose, load, inertia, matrix):
+    """The load with that of a constant added mass, which is added to the matrix; as it is without one."""
+    if inertia is None:
+        return load
+    for i in range(6):
+        for j in range(6):
+            matrix[i, j] += inertia.matrix[i, j]
+    return add(load, added_inertia_load(pose, inertia))

@@ -1,0 +1,85 @@
+"""What a scene is made of, as kernels see it: Model never changes while stepping, Data does.
+
+A part that a scene lacks is None, and a part that has several forms is one of several classes: both are
+settled when a kernel is compiled (compile/variants.py says how), so that what a scene lacks costs nothing.
+"""
+
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+
+
+class RigidBody(NamedTuple):
+    """Mass properties of the whole turbine about the body origin, theory.md Eq. (10)."""
+
+    mass_matrix: np.ndarray  # (6, 6) M1
+    mass: float
+    s_x: float  # first moments: S = (s_x, 0, s_z), kg m
+    s_z: float
+    gravity: float
+    coupling: float  # H = I_rotor + N_g I_g
+    rotor_row: float  # I_rx = I_rotor + N_g^2 I_g
+    platform_held: bool
+    rotor_held: bool
+    plane: object = None  # True: surge, heave and platform pitch alone move; None: all six motions
+
+
+class Model(NamedTuple):
+    """Everything that does not change while stepping: one slot per physical question."""
+
+    rigid_body: RigidBody
+    layout: object  # channels.Layout
+    drivetrain: object  # drivetrain.Drivetrain
+    actuator: object  # drivetrain.PitchActuator
+    generator: object  # drivetrain.TorqueLimits
+    hydro: object  # hydro.load.Hydro or None
+    mooring: object  # mooring.Mooring or None
+    aero: object  # aero.load.Aero or None: no aerodynamics at all
+    integrator: object  # a class of integrators.INTEGRATORS
+    user: object = None  # user_loads.UserLoads or None
+
+    by_reference = True
+
+
+class LoadCache(IntEnum):
+    """Entries of Data.cache: the last evaluation of the loads, which the state alone decides.
+
+    VALID is 1 while they belong to the present state (at TIME), so that an observation and the step after it
+    share one evaluation. STEPS counts the steps since the start, for the multistep integrators.
+    """
+
+    VALID = 0
+    STEPS = 1
+    TORQUE = 2  # aerodynamic, about the shaft
+    THRUST = 3
+    TOTAL = 4  # six entries each: sum of all loads, ...
+    ROTOR = 10
+    TOWER = 16
+    HYDRO = 22  # buoyancy, strips and linear damping
+    MOORING = 28
+    TIME = 34
+    ELEVATED = 35  # 1 while ELEVATION, of the surface at the origin, is of TIME
+    ELEVATION = 36
+    TORQUE_LIMITED = 37  # 1 in a control period whose torque command the generator could not follow
+
+
+N_CACHE = 38
+
+
+class Data(NamedTuple):
+    """What changes: scratch of one plant. lines, counters, cache, history and samples last between calls."""
+
+    lines: np.ndarray  # (n_lines, 6) mooring warm start and results
+    counters: np.ndarray  # (N_COUNTERS,)
+    kinematics: np.ndarray  # (7, n_nodes) water kinematics at the strip nodes
+    fast: object  # hydro.wave_bands.FastScratch, the same for strips with wave bands
+    added_mass: np.ndarray  # (6, 6) of the last evaluation, symmetric, about the body origin
+    matrix: np.ndarray  # (6, 6) mass with added mass, solved in place
+    stages: np.ndarray  # (5, n_state) derivatives and states within a step
+    cache: np.ndarray  # (N_CACHE,), see LoadCache
+    user: np.ndarray  # (user_loads.room_of(n),) wrench of each of the user's loads, and what they are given
+    history: np.ndarray  # (4, n_state) derivatives of past steps, latest first
+    samples: np.ndarray  # (4 samples, 7) rotor loads within past steps, latest first
+
+    by_reference = True
