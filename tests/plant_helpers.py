@@ -17,13 +17,13 @@ def _rates(box, t, x, u, dx):
 def rates(scene, x, u=(0.0, 0.0), t=0.0, box=None):
     """dx/dt of a scene as a new array."""
     dx = np.zeros_like(x)
-    _rates(scene.box() if box is None else box, float(t), x, np.array(u, dtype=float), dx)
+    _rates(scene.handle() if box is None else box, float(t), x, np.array(u, dtype=float), dx)
     return dx
 
 
 def integrate(scene, x0, duration, u=(0.0, 0.0), samples=51, rtol=1e-13, atol=1e-14):
     """(times, states (samples, n_state)) by an eighth-order method far finer than the plant's own."""
-    box, u = scene.box(), np.array(u, dtype=float)
+    box, u = scene.handle(), np.array(u, dtype=float)
 
     def rate(t, x):
         dx = np.zeros_like(x)

@@ -396,7 +396,7 @@ from fowt_env.plant.rollout import Schedule, advance
 scene = fowt_env.build_scene("oc3_hywind", wind=18.0, seed=3, duration=60.0, wave_components=20,
     sea={"kind": "jonswap", "Hs": 6.0, "Tp": 10.0, "gamma": 3.3})
 x = random_state(np.random.default_rng(6))
-status = advance(scene.box(), x, np.array([4e4, 0.2]), 100, 3, 0.05)
+status = advance(scene.handle(), x, np.array([4e4, 0.2]), 100, 3, 0.05)
 """
 
 
@@ -416,8 +416,8 @@ def test_kernels_are_plain_python_with_the_jit_off():
 def test_many_steps_are_one_step_many_times(wave_scene):
     x0, u = random_state(np.random.default_rng(1)), np.zeros(2)
     together, alone = x0.copy(), x0.copy()
-    assert advance(wave_scene.box(), together, u, 7, 40, 0.05) == 0
-    box = wave_scene.box()
+    assert advance(wave_scene.handle(), together, u, 7, 40, 0.05) == 0
+    box = wave_scene.handle()
     for i in range(40):
         assert advance(box, alone, u, 7 + i, 1, 0.05) == 0
     assert np.array_equal(together, alone)
@@ -425,13 +425,13 @@ def test_many_steps_are_one_step_many_times(wave_scene):
 
 def test_steps_are_fourth_order(wave_scene):
     # without drag, whose |u| u is not smooth where the flow turns
-    smooth = wave_scene.with_model(strips=wave_scene.model.strips._replace(drag_coefficient=0.0))
+    smooth = wave_scene.with_model({"hydro.strips.shape.drag_coefficient": 0.0})
     x0, _ = initial_state(smooth, initial={"PtfmSurge": 1.0, "PtfmPitch": 1.0, "PtfmYaw": 1.0})
     duration = 8.0
 
     def end(dt):
         x = x0.copy()
-        assert advance(smooth.box(), x, np.zeros(2), 0, round(duration / dt), dt) == 0
+        assert advance(smooth.handle(), x, np.zeros(2), 0, round(duration / dt), dt) == 0
         return x
 
     exact = end(0.0125)
@@ -447,13 +447,13 @@ def test_steps_are_fourth_order(wave_scene):
 def test_other_integrators_converge_at_their_order(integrator, lowest, highest, wave_scene):
     # the Adams methods start with steps of lower order, which shows in the corrected one
     scene = fowt_env.build_scene("oc3_hywind", sea=wave_scene.sea, integrator=integrator)
-    scene = scene.with_model(strips=scene.model.strips._replace(drag_coefficient=0.0))
-    exact_scene = wave_scene.with_model(strips=scene.model.strips)
+    scene = scene.with_model({"hydro.strips.shape.drag_coefficient": 0.0})
+    exact_scene = wave_scene.with_model({"hydro.strips.shape": scene.model.hydro.strips.shape})
     x0, _ = initial_state(exact_scene, initial={"PtfmSurge": 1.0, "PtfmPitch": 1.0, "PtfmYaw": 1.0})
 
     def end(of, dt):
         x = x0.copy()
-        assert advance(of.box(), x, np.zeros(2), 0, round(8.0 / dt), dt) == 0
+        assert advance(of.handle(), x, np.zeros(2), 0, round(8.0 / dt), dt) == 0
         return x
 
     exact = end(exact_scene, 0.00625)
@@ -472,10 +472,9 @@ def test_default_step_is_accurate_in_waves(wave_scene):
 
 
 def test_no_sea_is_a_sea_of_no_height(still_scene, wave_scene):
-    waves = wave_scene.model.waves
-    flat = wave_scene.with_model(
-        waves=waves._replace(amplitude=0.0 * waves.amplitude, velocity=0.0 * waves.velocity)
-    )
+    waves = wave_scene.model.hydro.waves
+    flat = waves._replace(amplitude=0.0 * waves.amplitude, velocity=0.0 * waves.velocity)
+    flat = wave_scene.with_model({"hydro.waves": flat})
     options = dict(duration=20.0, initial={"PtfmSurge": 4.0, "PtfmPitch": 3.0, "PtfmRoll": 1.0})
     without, zero = run(still_scene, **options), run(flat, **options)
     assert np.allclose(without[COLUMNS], zero[COLUMNS], rtol=0.0, atol=1e-11)

@@ -58,7 +58,7 @@ def test_motions_without_restoring_have_no_period(platform):
 
 def test_linear_model_predicts_small_motions(still_scene):
     # |u| u has no slope at rest, but a difference quotient gives it one of the size of its step
-    scene = still_scene.with_model(strips=still_scene.model.strips._replace(drag_coefficient=0.0))
+    scene = still_scene.with_model({"hydro.strips.shape.drag_coefficient": 0.0})
     model = linearize(scene)
     point, rows = model.point, list(STATE_INDEX)
     rng = np.random.default_rng(0)
@@ -94,7 +94,7 @@ def test_modes_are_the_damped_platform_motions(still_scene, periods):
 
 def test_inputs_act_where_they_should(storm_scene, turbine):
     model = linearize(storm_scene)
-    row, ratio = storm_scene.model.body.rotor_row, turbine.drivetrain.gear_ratio
+    row, ratio = storm_scene.model.rigid_body.rotor_row, turbine.drivetrain.gear_ratio
     i = model.index("rotor_speed")
     # the roll inertia takes a share H^2/(I_rx M44) of 1e-3
     assert model.B[i, 0] == pytest.approx(-ratio / row, rel=2e-3)

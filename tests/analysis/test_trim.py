@@ -14,9 +14,9 @@ from fowt_env.analysis.trim import AZIMUTHS, mean_derivative, trim, without_fluc
 from fowt_env.descriptions.platform import DATA, names, read_platform, read_turbine
 from fowt_env.envs import FowtEnv
 from fowt_env.errors import InputError
-from fowt_env.plant.dynamics import gravity_load
 from fowt_env.plant.hydro.hydrostatics import hydrostatic_load
 from fowt_env.plant.mooring import SUSPENDED, mooring_load
+from fowt_env.plant.rigid_body import gravity_load
 from fowt_env.plant.state import State, pose_of
 from fowt_env.training.cli import app as cli
 
@@ -41,10 +41,10 @@ def test_trim_in_still_water_has_the_known_offsets(at_rest):
 
 
 def test_vertical_loads_at_zero_offset_leave_44_newtons(still_scene):
-    model, work = still_scene.model, still_scene.work()
+    model, data = still_scene.model, still_scene.data()
     pose = pose_of(state())
-    up = gravity_load(pose, model.body).fz + hydrostatic_load(pose, model.hull, work.counters).fz
-    up += mooring_load(pose, model.mooring, work.lines, work.counters).fz
+    up = gravity_load(pose, model.rigid_body).fz + hydrostatic_load(pose, model.hydro.hull, data.counters).fz
+    up += mooring_load(pose, model.mooring, data.lines, data.counters).fz
     assert up == pytest.approx(44.0, abs=5.0)
 
 
@@ -61,7 +61,7 @@ def test_platform_stays_at_trim_in_still_water(still_scene):
 
 def remaining(scene, point):
     """Azimuth-averaged derivative at an operating point."""
-    box = without_fluctuations(scene).box()
+    box = without_fluctuations(scene).handle()
     dx, mean = np.zeros(scene.n_state), np.zeros(scene.n_state)
     mean_derivative(box, point.state.copy(), point.command.copy(), AZIMUTHS, dx, mean)
     return mean
@@ -254,9 +254,9 @@ def test_a_platform_that_cannot_be_meant_gets_a_message_that_says_why(name, tmp_
     ],
 )
 def test_a_place_is_judged_by_keel_tower_base_tilt_and_heave(offsets, kind, words, still_scene, warned):
-    work = still_scene.work()
-    work.lines[:, [0, 2, 5]] = 1e6, 1e6, SUSPENDED  # moorings with nothing wrong
-    start = evaluated(state(), work)
+    data = still_scene.data()
+    data.lines[:, [0, 2, 5]] = 1e6, 1e6, SUSPENDED  # moorings with nothing wrong
+    start = evaluated(state(), data)
     stable = -np.eye(6)
     expected = pytest.raises if kind is InputError else pytest.warns
     with expected(kind, match=words):

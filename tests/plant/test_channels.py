@@ -6,8 +6,8 @@ from plant_helpers import random_state, rates
 import fowt_env
 from fowt_env.plant.aero.wind import wind_now
 from fowt_env.plant.channels import FIXED_CHANNELS, channels, rotor_wind, to_units
-from fowt_env.plant.dynamics import gravity_load
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
+from fowt_env.plant.rigid_body import gravity_load
 from fowt_env.plant.rollout import observe, output_row
 from fowt_env.plant.state import State, pose_of
 from fowt_env.weather.wind_field import read_box
@@ -18,7 +18,7 @@ COMMAND = np.array([3e4, 0.2])
 def moving(scene, seed=0):
     """(state, derivative, {channel: value in SI}) of a scene in rough motion."""
     x = random_state(np.random.default_rng(seed), scene.n_state, speed=2.0, turning=0.1)
-    row = output_row(scene.box(), x, COMMAND, 5.0, len(scene.channels))
+    row = output_row(scene.handle(), x, COMMAND, 5.0, len(scene.channels))
     return x, rates(scene, x, COMMAND, 5.0), dict(zip((c.name for c in scene.channels), row, strict=True))
 
 
@@ -96,14 +96,14 @@ def test_platform_and_nacelle_accelerations_are_those_of_their_points(wave_scene
 def test_hydrodynamic_load_closes_the_momentum_balance(wave_scene, platform, turbine):
     # weight and water accelerate the five bodies; nothing else does
     scene = fowt_env.build_scene("oc3_hywind", sea=wave_scene.sea, mooring=False)
-    scene = scene.with_model(damping=type(scene.model.damping)(*(0.0,) * 7))
+    scene = scene.with_model({"hydro.damping": type(scene.model.hydro.damping)(*(0.0,) * 7)})
     x, dx, row = moving(scene)
     R = rigid_body.rotation(*x[3:6])
     parts = rigid_body.bodies(platform, turbine)
     rate = rigid_body.inertia_forces(
         parts, x[7:10], x[10:13], x[State.ROTOR_SPEED], dx[7:10], dx[10:13], dx[State.ROTOR_SPEED]
     )
-    weight = np.array(gravity_load(pose_of(x), scene.model.body))
+    weight = np.array(gravity_load(pose_of(x), scene.model.rigid_body))
     expected = rate[:6] - weight
     got = np.r_[
         R.T @ vector(row, "HydroFxi", "HydroFyi", "HydroFzi"),
@@ -116,7 +116,7 @@ def test_hydrodynamic_load_closes_the_momentum_balance(wave_scene, platform, tur
 def test_measurement_holds_rates_of_the_inertial_position(storm_scene):
     x = random_state(np.random.default_rng(3), storm_scene.n_state)
     dx, values = np.zeros(storm_scene.n_state), np.zeros(N_MEASUREMENTS)
-    observe(storm_scene.box(), x, COMMAND, 2.5, dx, values)
+    observe(storm_scene.handle(), x, COMMAND, 2.5, dx, values)
     measured = Measurement(*values)
     assert measured.time == 2.5 and measured.generator_torque == COMMAND[0]
     assert measured.generator_speed == 97.0 * measured.rotor_speed
@@ -135,14 +135,14 @@ def test_the_rotor_s_wind_is_the_mean_over_its_blades_relative_to_the_moving_hub
     hub = np.array([-turbine.rotor.overhang, 0.0, turbine.rotor.hub_height])
     radius = turbine.rotor.tip_radius * (np.arange(200) + 0.5) / 200
     height = 1.0 + np.outer(radius, np.sin(np.linspace(0.0, 2.0 * np.pi, 360, endpoint=False))) / hub[2]
-    assert storm_scene.model.wind.shear_exponent > 0.0
-    mean = 18.0 * np.mean(height**storm_scene.model.wind.shear_exponent)
+    assert storm_scene.model.aero.wind.shear_exponent > 0.0
+    mean = 18.0 * np.mean(height**storm_scene.model.aero.wind.shear_exponent)
     relative = rigid_body.rotation(*x[3:6])[0] * mean - x[7:10] - np.cross(x[10:13], hub)
     assert row["RtVAvgxh"] == pytest.approx(relative[0], rel=1e-6)
 
 
 def test_the_rotor_s_wind_in_a_box_is_read_along_the_blades_where_they_are(storm_scene):
-    layout, series = storm_scene.model.layout, storm_scene.model.wind
+    layout, series = storm_scene.model.layout, storm_scene.model.aero.wind
     x = random_state(np.random.default_rng(5), storm_scene.n_state, speed=2.0, turning=0.1)
     R, pose = rigid_body.rotation(*x[3:6]), pose_of(x)
     y, z = np.linspace(-100.0, 100.0, 21), np.linspace(5.0, 205.0, 21)

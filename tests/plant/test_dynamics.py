@@ -9,15 +9,14 @@ from plant_helpers import integrate, make_pose, random_state, rates, state
 from scipy.integrate import solve_ivp
 
 from fowt_env.plant.drivetrain import build_drivetrain, shaft_torque
-from fowt_env.plant.dynamics import accelerate, gravity_load, inertial_load, solve_spd
 from fowt_env.plant.hydro.hydrostatics import submerged
-from fowt_env.plant.hydro.morison import StripLoad
 from fowt_env.plant.mooring import mooring_load
-from fowt_env.plant.state import NO_LOAD, State, Wrench, add, pose_of
-from fowt_env.scene.build import assemble, build_body
+from fowt_env.plant.rigid_body import accelerate, gravity_load, momentum_rate, solve_spd
+from fowt_env.plant.state import State, Wrench, add, pose_of
+from fowt_env.scene.build import assemble, build_rigid_body
 
 REFERENCE = Path(__file__).parents[1] / "reference" / "accelerations.csv"
-DRY = StripLoad(NO_LOAD, 0.0, 0.0, 0.0, 0.0)
+DRY = np.zeros((6, 6))  # added mass
 SPEEDS = [*range(State.VX, State.WZ + 1), State.ROTOR_SPEED]
 TUMBLING = dict(
     surge=1.0, sway=-2.0, heave=3.0, roll=0.2, platform_pitch=-0.15, yaw=0.4,
@@ -72,7 +71,7 @@ def naive_accelerations(row, platform, turbine, **options):
 
 @pytest.mark.installation
 def test_accelerations_are_those_of_three_constrained_bodies(platform, turbine):
-    body = build_body(platform, turbine)
+    body = build_rigid_body(platform, turbine)
     rows = reference_states()
     assert len(rows) == 200
     for row in rows:
@@ -82,7 +81,7 @@ def test_accelerations_are_those_of_three_constrained_bodies(platform, turbine):
 
 @pytest.mark.installation
 def test_accelerations_are_those_of_newton_and_euler_body_by_body(platform, turbine):
-    body = build_body(platform, turbine)
+    body = build_rigid_body(platform, turbine)
     for row in reference_states()[:60]:
         difference = project_accelerations(row, turbine, body) - naive_accelerations(row, platform, turbine)
         assert np.abs(difference).max() < 1e-11
@@ -97,27 +96,27 @@ def test_where_the_generator_sits_and_what_it_weighs_does_not_matter(platform, t
 
 
 def test_held_rotor_moves_the_platform_as_a_prescribed_speed_does(platform, turbine):
-    body = build_body(platform, turbine, rotor_held=True)
+    body = build_rigid_body(platform, turbine, rotor_held=True)
     for row in reference_states()[:60]:
         expected = naive_accelerations(row, platform, turbine, held=True)
         assert np.abs(project_accelerations(row, turbine, body) - expected).max() < 1e-11
 
 
 def test_held_platform_leaves_the_rotor_alone(platform, turbine):
-    body = build_body(platform, turbine, platform_held=True)
+    body = build_rigid_body(platform, turbine, platform_held=True)
     drivetrain = build_drivetrain(turbine)
     row = reference_states()[0]
     accelerations = project_accelerations(row, turbine, body)
     torque = row["hub_mx"] - drivetrain.gear_ratio * row["generator_torque"]
     assert np.all(accelerations[:6] == 0.0)
     assert accelerations[6] == pytest.approx(torque / drivetrain.inertia_row, rel=1e-14)
-    both = build_body(platform, turbine, platform_held=True, rotor_held=True)
+    both = build_rigid_body(platform, turbine, platform_held=True, rotor_held=True)
     assert np.all(project_accelerations(row, turbine, both) == 0.0)
 
 
 @pytest.mark.installation
 def test_mass_matrix_has_the_published_entries(platform, turbine):
-    m = build_body(platform, turbine).mass_matrix
+    m = build_rigid_body(platform, turbine).mass_matrix
     assert np.array_equal(m, m.T)
     assert m[0, 0] == 8066048.0
     assert m[1, 5] == pytest.approx(-9.6101e4, rel=1e-5)
@@ -144,19 +143,19 @@ def test_the_solver_agrees_with_numpy_on_badly_scaled_systems():
 
 
 def test_gyroscopic_terms_do_no_work(platform, turbine):
-    body = build_body(platform, turbine)
+    body = build_rigid_body(platform, turbine)
     rng = np.random.default_rng(5)
     for _ in range(100):
         x = random_state(rng, speed=3.0, turning=0.3)
-        c = np.array(inertial_load(pose_of(x), x[State.ROTOR_SPEED], body.mass_matrix, body.coupling))
+        c = np.array(momentum_rate(pose_of(x), x[State.ROTOR_SPEED], body.mass_matrix, body.coupling))
         nu = x[State.VX : State.WZ + 1]
         assert abs(c @ nu) < 1e-12 * np.abs(c * nu).max()
 
 
 def test_downwind_pitching_turns_the_nacelle_left(platform, turbine):
-    body = build_body(platform, turbine)
+    body = build_rigid_body(platform, turbine)
     x = state(wy=0.01, rotor_speed=1.2671)
-    c = inertial_load(pose_of(x), 1.2671, body.mass_matrix, body.coupling)
+    c = momentum_rate(pose_of(x), 1.2671, body.mass_matrix, body.coupling)
     assert -c.mz == pytest.approx(body.coupling * 1.2671 * 0.01, rel=1e-12)
 
 
@@ -184,7 +183,7 @@ def drift(history):
 
 
 def weightless(scene):
-    return scene.with_model(body=scene.model.body._replace(gravity=0.0))
+    return scene.with_model(rigid_body=scene.model.rigid_body._replace(gravity=0.0))
 
 
 def test_free_fall_with_a_spinning_rotor_keeps_its_energy(bare_scene, platform, turbine):
@@ -193,7 +192,7 @@ def test_free_fall_with_a_spinning_rotor_keeps_its_energy(bare_scene, platform, 
     energy, linear, _ = invariants(bare_scene, platform, turbine, states, gravity)
     total = energy.sum(axis=1)
     assert np.abs(total - total[0]).max() < 1e-9 * energy[0, 0]
-    weight = bare_scene.model.body.mass * gravity
+    weight = bare_scene.model.rigid_body.mass * gravity
     assert np.abs(linear[:, 2] - linear[0, 2] + weight * times).max() < 1e-12 * weight * 100.0
 
 
@@ -212,7 +211,7 @@ def test_momenta_are_kept_without_gravity_whatever_the_generator_does(bare_scene
 
 def with_coupling_sign(bare_scene, sign):
     """Path of the weightless turbine whose gyroscopic moment C2 w_b has this sign."""
-    body = weightless(bare_scene).model.body
+    body = weightless(bare_scene).model.rigid_body
 
     def rate(t, x):
         dx = rates(weightless_scene, x, box=box)
@@ -222,7 +221,7 @@ def with_coupling_sign(bare_scene, sign):
         return dx
 
     weightless_scene = weightless(bare_scene)
-    box = weightless_scene.box()
+    box = weightless_scene.handle()
     x0 = state(**TUMBLING)
     solution = solve_ivp(rate, (0.0, 50.0), x0, method="DOP853", rtol=1e-10, atol=1e-12, max_step=1.0)
     return solution.y.T
@@ -240,7 +239,7 @@ def test_a_wrong_sign_of_the_gyroscopic_moment_would_be_noticed(bare_scene, plat
 def test_euler_angles_and_a_quaternion_lead_to_the_same_place(bare_scene):
     x0 = state(**TUMBLING)
     times, states = integrate(bare_scene, x0, 100.0)
-    body = bare_scene.model.body
+    body = bare_scene.model.rigid_body
 
     def rate(t, y):
         R = rigid_body.quaternion_rotation(y[3:7])
@@ -263,7 +262,7 @@ def test_euler_angles_and_a_quaternion_lead_to_the_same_place(bare_scene):
 
 
 def test_pinned_heavy_gyrostat_keeps_energy_and_vertical_angular_momentum(platform, turbine):
-    body = build_body(platform, turbine)
+    body = build_rigid_body(platform, turbine)
     parts = rigid_body.bodies(platform, turbine)
     gravity = platform.environment.gravity
 
@@ -305,10 +304,10 @@ def test_pinned_heavy_gyrostat_keeps_energy_and_vertical_angular_momentum(platfo
 
 def test_nutation_has_the_rate_of_a_symmetric_gyrostat(bare_scene):
     matrix = assemble([(1e6, (0.0, 0.0, 0.0), (2e8, 3e8, 3e8))])
-    body = bare_scene.model.body._replace(mass_matrix=matrix, mass=1e6, s_x=0.0, s_z=0.0, gravity=0.0)
+    body = bare_scene.model.rigid_body._replace(mass_matrix=matrix, mass=1e6, s_x=0.0, s_z=0.0, gravity=0.0)
     speed = 1.2671
     x0 = state(wy=0.001, rotor_speed=speed)
-    times, states = integrate(bare_scene.with_model(body=body), x0, 60.0, samples=1201)
+    times, states = integrate(bare_scene.with_model(rigid_body=body), x0, 60.0, samples=1201)
     turned = np.unwrap(np.arctan2(states[:, State.WZ], states[:, State.WY]))
     assert np.polyfit(times, turned, 1)[0] == pytest.approx(body.coupling * speed / 3e8, rel=1e-8)
 
@@ -328,11 +327,11 @@ def line_energy(H, V, length, weight, EA):
 
 def test_floating_body_on_its_lines_keeps_its_energy_without_fluid_inertia(still_scene, platform, turbine):
     model = still_scene.model
-    strips = model.strips._replace(
+    strips = model.hydro.strips.shape._replace(
         added_mass_coefficient=0.0, drag_coefficient=0.0, heave_added_mass=0.0,
     )  # fmt: skip
-    damping = type(model.damping)(*(0.0,) * 7)
-    scene = still_scene.with_model(strips=strips, damping=damping)
+    damping = type(model.hydro.damping)(*(0.0,) * 7)
+    scene = still_scene.with_model({"hydro.strips.shape": strips, "hydro.damping": damping})
     x0 = state(
         surge=5.0, sway=2.0, heave=0.5, roll=0.02, platform_pitch=0.06, yaw=0.03,
         vx=0.3, vy=-0.1, vz=0.05, wx=0.002, wy=0.004, wz=-0.001, rotor_speed=1.2671,
@@ -340,18 +339,18 @@ def test_floating_body_on_its_lines_keeps_its_energy_without_fluid_inertia(still
     times, states = integrate(scene, x0, 100.0, samples=26, rtol=1e-12, atol=1e-13)
     gravity = platform.environment.gravity
     energy, _, _ = invariants(scene, platform, turbine, states, gravity)
-    work = scene.work()
+    data = scene.data()
     outside = []
     for x in states:
         pose = pose_of(x)
-        mooring_load(pose, model.mooring, work.lines, work.counters)
-        lines = zip(work.lines, model.mooring.length, model.mooring.weight, model.mooring.EA, strict=True)
+        mooring_load(pose, model.mooring, data.lines, data.counters)
+        lines = zip(data.lines, model.mooring.length, model.mooring.weight, model.mooring.EA, strict=True)
         total = sum(line_energy(row[0], row[1], *line) for row, *line in lines)
-        volume, qx, qy, qz = submerged(pose, model.hull, work.counters)
+        volume, qx, qy, qz = submerged(pose, model.hydro.hull, data.counters)
         height = volume * pose.z + qx * pose.r31 + qy * pose.r32 + qz * pose.r33
-        outside.append(total - model.hull.specific_weight * height)
+        outside.append(total - model.hydro.hull.specific_weight * height)
     total = energy.sum(axis=1) + outside
-    spin = 0.5 * model.body.rotor_row * x0[State.ROTOR_SPEED] ** 2
+    spin = 0.5 * model.rigid_body.rotor_row * x0[State.ROTOR_SPEED] ** 2
     moving = np.abs(energy[:, 0] - spin).max()
     assert np.abs(states[:, State.SURGE]).max() > 4.0
     assert np.abs(total - total[0]).max() < 1e-8 * moving
@@ -378,18 +377,18 @@ def turned_scene(scene, angle):
     c, s = np.cos(angle), np.sin(angle)
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     parts = {
-        "damping": model.damping._replace(yaw_stiffness=0.0),
+        "hydro.damping": model.hydro.damping._replace(yaw_stiffness=0.0),
         "mooring": model.mooring._replace(anchor=np.ascontiguousarray(model.mooring.anchor @ turn.T)),
     }
-    waves, wind = model.waves, model.wind
+    waves, aero = model.hydro.waves, model.aero
     if waves is not None:
         cosine, sine = waves.cos_heading, waves.sin_heading
-        parts["waves"] = waves._replace(cos_heading=c * cosine - s * sine, sin_heading=s * cosine + c * sine)
-    if wind is not None:
-        value = wind.value.copy()
-        value[:, :2] = wind.value[:, :2] @ turn[:2, :2].T
-        parts["wind"] = wind._replace(value=value)
-    return scene.with_model(**parts), turn
+        parts["hydro.waves"] = waves._replace(cos_heading=c * cosine - s * sine, sin_heading=s * cosine + c * sine)
+    if aero is not None:
+        value = aero.wind.value.copy()
+        value[:, :2] = aero.wind.value[:, :2] @ turn[:2, :2].T
+        parts["aero.wind"] = aero.wind._replace(value=value)
+    return scene.with_model(parts), turn
 
 
 @pytest.mark.parametrize("name", ["wave_scene", "storm_scene"])

@@ -54,10 +54,10 @@ def test_in_operation_the_torque_of_the_rotor_is_what_differs():
 def test_of_turbulence_the_part_in_the_plane_is_kept():
     wind = {"kind": "ntm", "speed": 18.0, "class": "B"}
     planar, full = (build_scene(wind=wind, seed=3, planar=p, fidelity="fast") for p in (True, False))
-    assert np.array_equal(planar.model.wind.value[:, [0, 2, 3]], full.model.wind.value[:, [0, 2, 3]])
-    assert np.all(planar.model.wind.value[:, [1, 4]] == 0.0)
+    assert np.array_equal(planar.model.aero.wind.value[:, [0, 2, 3]], full.model.aero.wind.value[:, [0, 2, 3]])
+    assert np.all(planar.model.aero.wind.value[:, [1, 4]] == 0.0)
     again = planar.with_weather(wind, None, 4)
-    assert np.all(again.model.wind.value[:, [1, 4]] == 0.0)
+    assert np.all(again.model.aero.wind.value[:, [1, 4]] == 0.0)
     with pytest.raises(InputError, match="planar"):
         planar.with_weather({"kind": "steady", "speed": 12.0, "direction": 10.0}, None, 4)
 

@@ -58,8 +58,8 @@ def test_only_adams_bashforth_in_a_box_samples_the_rotor_more_than_once():
         (18.0, {"fidelity": "standard", "rotor_samples": 4}, 4),
     ):
         scene = build_scene(wind=wind, duration=100.0, **options)
-        assert rotor_samples(scene.model.multistep) == samples
-        assert scene.work().samples.shape == (4 * samples, 7)
+        assert rotor_samples(scene.model.integrator) == samples
+        assert scene.data().samples.shape == (4 * samples, 7)
     assert build_integrator("abm4", 1).gusts is None and rotor_samples(None) == 0
 
 

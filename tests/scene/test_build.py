@@ -7,6 +7,9 @@ import pytest
 
 from fowt_env import build_scene, simulate
 from fowt_env.errors import InputError
+from fowt_env.plant.aero.load import BemRotor
+from fowt_env.plant.hydro.load import BandedStrips, ExactStrips
+from fowt_env.plant.integrators import RungeKutta
 from fowt_env.plant.rollout import rollout
 from fowt_env.scene.build import ARGUMENTS
 
@@ -62,15 +65,15 @@ def test_every_argument_of_build_scene_is_among_those_that_a_refusal_names():
 
 def test_a_level_falls_back_to_what_the_scene_needs():
     spread = build_scene(sea=SPREAD | {"heading": [0.0, 30.0]}, fidelity="standard")
-    assert spread.model.sea is None and spread.model.lanes is None
+    assert isinstance(spread.model.hydro.strips, ExactStrips)
     skewed = build_scene(wind=8.0, fidelity="standard", skewed_wake=True)
-    assert skewed.rotor == "bem" and skewed.model.rotor_lookup is None
+    assert skewed.rotor == "bem" and isinstance(skewed.model.aero.rotor, BemRotor)
 
 
 def test_an_explicit_part_overrides_its_level():
     scene = build_scene(wind=8.0, sea=SEA, fidelity="standard", rotor="bem", integrator="rk4")
-    assert scene.model.rotor is not None and scene.model.multistep is None
-    assert scene.model.sea is not None
+    assert isinstance(scene.model.aero.rotor, BemRotor) and isinstance(scene.model.integrator, RungeKutta)
+    assert isinstance(scene.model.hydro.strips, BandedStrips)
     assert scene.dt == 0.05
 
 
@@ -83,8 +86,8 @@ def test_new_weather_cannot_add_or_remove_aerodynamics():
 def test_new_weather_is_that_of_a_scene_built_with_it():
     moved = build_scene(wind=NTM, sea=SEA, seed=1).with_weather(NTM | {"speed": 14.0}, SEA, 5)
     built = build_scene(wind=NTM | {"speed": 14.0}, sea=SEA, seed=5)
-    assert np.array_equal(moved.model.wind.value, built.model.wind.value)
-    assert np.array_equal(moved.model.waves.phase, built.model.waves.phase)
+    assert np.array_equal(moved.model.aero.wind.value, built.model.aero.wind.value)
+    assert np.array_equal(moved.model.hydro.waves.phase, built.model.hydro.waves.phase)
     assert moved.wind_speed == built.wind_speed == 14.0
 
 
@@ -129,14 +132,14 @@ def test_a_number_of_stations_that_the_blade_lacks_is_refused(count):
 
 
 def test_stations_are_left_out_between_root_and_tip():
-    every = build_scene(wind=18.0).model.rotor.radius
-    some = build_scene(wind=18.0, blade_stations=5).model.rotor.radius
+    every = build_scene(wind=18.0).model.aero.rotor.elements.radius
+    some = build_scene(wind=18.0, blade_stations=5).model.aero.rotor.elements.radius
     assert some.size == 5 and some[0] == every[0] and some[-1] == every[-1]
     assert set(some) <= set(every)
 
 
 def test_strips_are_no_longer_than_asked_for():
-    fine, coarse = (build_scene(strip_length=length).model.strips for length in (3.0, 12.0))
+    fine, coarse = (build_scene(strip_length=length).model.hydro.strips.shape for length in (3.0, 12.0))
     assert fine.nodes > coarse.nodes
     with pytest.raises(InputError, match="strip_length = 0.0: must be a number in"):
         build_scene(strip_length=0.0)

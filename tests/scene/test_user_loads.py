@@ -17,9 +17,9 @@ from fowt_env import Load, Motion, build_scene, linearize, load_kernel, natural_
 from fowt_env.descriptions.platform import read_platform
 from fowt_env.envs import FowtEnv, FowtVectorEnv
 from fowt_env.errors import InputError, SimulationStopped
-from fowt_env.plant.dynamics import Kept
 from fowt_env.plant.hydro.morison import current_at
 from fowt_env.plant.hydro.waves import wave_kinematics
+from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rollout import output_row
 from fowt_env.plant.state import State, pose_of
 
@@ -94,9 +94,9 @@ def with_hydro(**changes):
 
 def test_without_loads_there_is_no_part_and_no_channel():
     scene = still()
-    assert scene.model.own is None and scene.loads == ()
+    assert scene.model.user is None and scene.loads == ()
     assert len(scene.channels) == len(build_scene("oc3_hywind").channels)
-    assert scene.work().kept.size == len(build_scene("oc3_hywind").work().kept)
+    assert scene.data().user.size == 0
 
 
 def test_a_force_at_the_fairleads_is_held_by_the_lines_alone():
@@ -116,7 +116,7 @@ def test_a_moment_leans_the_spar_by_the_metacentric_formula():
     platform = read_platform("oc3_hywind")
     points = [trim(still(Load("Couple", push, Push(my=m)))) for m in (moment, -moment)]
     lean = radians(points[0]["PtfmPitch"] - points[1]["PtfmPitch"]) / 2.0  # the nacelle leans it by itself
-    body = still().model.body
+    body = still().model.rigid_body
     buoyancy, preload, diameter = 80708144.0, 1607182.0, 6.5
     z = np.linspace(-120.0, 0.0, 120001)
     area = 0.25 * pi * np.interp(z, platform.hull.z, platform.hull.diameter) ** 2
@@ -129,13 +129,13 @@ def test_a_moment_leans_the_spar_by_the_metacentric_formula():
 def test_at_a_loaded_trim_the_rest_of_the_plant_balances_the_load_exactly():
     load = Load("Push", push, Push(2e5, 3e4, -1e5, 1e6, 2e6, 3e6), point=(2.0, -1.0, -50.0))
     point, scene = trim(still(load)), still()
-    work = scene.work()
-    rates(scene, point.state, box=scene.box(work))
+    data = scene.data()
+    rates(scene, point.state, box=scene.handle(data))
     pose = pose_of(point.state)
     turn = np.array([getattr(pose, f"r{i}{j}") for i in (1, 2, 3) for j in (1, 2, 3)]).reshape(3, 3)
     force, moment = turn.T @ load.parameters[:3], turn.T @ load.parameters[3:]
     expected = np.r_[force, moment + np.cross(load.point, force)]
-    left = work.kept[Kept.TOTAL : Kept.TOTAL + 6]
+    left = data.cache[LoadCache.TOTAL : LoadCache.TOTAL + 6]
     assert np.abs(left + expected).max() < 1e-8 * np.abs(expected).max()
 
 
@@ -193,7 +193,7 @@ def test_motion_holds_what_its_names_say():
     x[: State.YAW + 1] += [1.0, 2.0, -0.5, 0.03, 0.05, -0.04]
     x[State.VX : State.WZ + 1] = [0.5, -0.3, 0.2, 0.01, -0.02, 0.005]
     t = 7.3
-    row = output_row(scene.box(), x, np.array([4e4, 0.2]), t, len(scene.channels))
+    row = output_row(scene.handle(), x, np.array([4e4, 0.2]), t, len(scene.channels))
     values = dict(zip((channel.name for channel in scene.channels), row, strict=True))
     shown = {name: np.array([values[f"P{name}F{axis}i"] for axis in "xyz"]) for name in names}
     pose = pose_of(x)
@@ -201,8 +201,8 @@ def test_motion_holds_what_its_names_say():
     place = x[:3] + turn @ point
     spin = turn @ x[State.WX : State.WZ + 1]
     velocity = turn @ x[State.VX : State.VZ + 1] + np.cross(spin, turn @ point)
-    water = wave_kinematics(t, *place, scene.model.waves)
-    u, v = current_at(place[2], 320.0, scene.model.current)
+    water = wave_kinematics(t, *place, scene.model.hydro.waves)
+    u, v = current_at(place[2], 320.0, scene.model.hydro.current)
     expected = {
         "X": place,
         "VX": velocity,
@@ -239,8 +239,8 @@ def test_a_load_on_the_nacelle_is_carried_by_the_tower_base_and_one_on_the_hull_
         rows = []
         for strength in (force, Push()):
             scene = stormy(Load("Push", push, strength, point=(0.0, 0.0, z)))
-            held = scene.with_model(body=scene.model.body._replace(platform_held=True))
-            row = output_row(held.box(), np.zeros(held.n_state), np.zeros(2), 0.0, len(held.channels))
+            held = scene.with_model({"rigid_body.platform_held": True})
+            row = output_row(held.handle(), np.zeros(held.n_state), np.zeros(2), 0.0, len(held.channels))
             rows.append(dict(zip((c.name for c in held.channels), row, strict=True)))
         changes.append({name: rows[0][name] - rows[1][name] for name in rows[0]})
     upper, lower = changes
@@ -251,7 +251,7 @@ def test_a_load_on_the_nacelle_is_carried_by_the_tower_base_and_one_on_the_hull_
 
 def test_weather_drawn_anew_keeps_the_loads():
     scene = stormy(Load("Push", push, Push(fx=1e5))).with_weather(16.0, WEATHER["sea"], 5)
-    assert scene.model.own is not None
+    assert scene.model.user is not None
     assert simulate(scene, "pi", 5.0)["PushFxi_[N]"].to_numpy() == pytest.approx(1e5)
 
 

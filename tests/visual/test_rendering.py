@@ -70,9 +70,9 @@ def test_drawn_tension_and_pose_are_those_of_the_plant(env):
 
 def test_the_drawn_sea_is_the_sum_of_the_scene_s_components(scene):
     x = np.array([-90.0, 0.0, 41.5])
-    surface = Surface(scene.model.waves, x)
+    surface = Surface(scene.model.hydro.waves, x)
     for t in (0.0, 17.3, 401.0):
-        expected = [elevation(t, at, 0.0, scene.model.waves) for at in x]
+        expected = [elevation(t, at, 0.0, scene.model.hydro.waves) for at in x]
         np.testing.assert_allclose(surface.at(t), expected, atol=1e-12)
     assert np.ptp(surface.at(17.3)) > 0.1
 
@@ -153,7 +153,7 @@ def test_a_new_episode_starts_new_traces_in_its_own_weather(env):
     env.reset(seed=9)
     env.render()
     assert len(env._view.traces.histories[0]) == 1
-    assert env._view.panels[0].surface.waves is env.scene.model.waves
+    assert env._view.panels[0].surface.waves is env.scene.model.hydro.waves
 
 
 def test_traces_hold_the_last_minute(still):

@@ -208,8 +208,8 @@ def test_a_scene_with_a_box_takes_another_box_but_no_series():
 def test_the_rotor_table_gets_the_rotor_average_of_a_box():
     spec = {"kind": "box", "u": np.full((120, 9, 11), 12.0), "y": Y, "z": Z, "dt": 0.5, "speed": 12.0}
     scene = fowt_env.build_scene("oc3_hywind", wind=spec, rotor="table")
-    assert scene.model.wind_field is None
-    assert scene.model.wind.value[:, 0] == pytest.approx(12.0, abs=1e-5)
+    assert scene.model.aero.field is None
+    assert scene.model.aero.wind.value[:, 0] == pytest.approx(12.0, abs=1e-5)
 
 
 BTS_HEAD = "<h4i12fi"

@@ -131,7 +131,7 @@ def _scene(variant, seed, duration, wind, sea):
             wave_loads=variant.wave_loads, integrator=variant.integrator, **options,
         )  # fmt: skip
 
-    return build(sea if strongest is None else _thinned(build(sea).model.waves, strongest))
+    return build(sea if strongest is None else _thinned(build(sea).model.hydro.waves, strongest))
 
 
 def _thinned(waves, count):
@@ -208,7 +208,7 @@ def _row(variant, seed, duration, finest, reference, wind, sea, repeats):
     )  # fmt: skip
     found = errors(frame, reference)
     worst = max(found, key=found.get)
-    waves = scene.model.waves
+    waves = scene.model.hydro.waves
     return {
         "seed": seed, "variant": variant.name, "axis": variant.axis, "integrator": variant.integrator,
         "dt_s": variant.dt, "rotor": variant.rotor, "wave_loads": variant.wave_loads,

@@ -23,14 +23,17 @@ import fowt_env
 from fowt_env.controllers import make
 from fowt_env.errors import InputError, unknown
 from fowt_env.files.atomic import replacing
+from fowt_env.plant.aero.load import rotor_part
 from fowt_env.plant.aero.tower_drag import tower_load
 from fowt_env.plant.aero.wind import wind_now
 from fowt_env.plant.channels import measure, record
 from fowt_env.plant.compile.decorators import entry, kernel
 from fowt_env.plant.compile.handle import data_of, model_of
-from fowt_env.plant.dynamics import Kept, loads_of, respond, rotor_part, strip_part
+from fowt_env.plant.dynamics import loads_of, respond
 from fowt_env.plant.hydro.hydrostatics import hydrostatic_load
+from fowt_env.plant.hydro.load import strip_load
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
+from fowt_env.plant.model import LoadCache
 from fowt_env.plant.mooring import mooring_load
 from fowt_env.plant.rollout import Schedule, advance, forget, observe, output, rollout
 from fowt_env.plant.state import State, pose_of
@@ -77,7 +80,7 @@ class Kind:
         )
         if not self.platform_held:
             return scene
-        return scene.with_model(body=scene.model.body._replace(platform_held=True))
+        return scene.with_model({"rigid_body.platform_held": True})
 
     def start(self, scene):
         """(state, command) that runs of this kind begin with."""
@@ -98,7 +101,7 @@ KINDS = {
     "full, reference": Kind(TURBULENCE, SEA, "reference"),
     "full, standard": Kind(TURBULENCE, SEA, "standard"),
     "full, fast": Kind(TURBULENCE, SEA, "fast"),
-    "full-field box, standard": Kind(_box, SEA, "standard"),
+    "full-field handle, standard": Kind(_box, SEA, "standard"),
     "exact waves, look-up rotor": Kind(TURBULENCE, SEA, "standard", {"wave_loads": "exact"}),
     "BEM rotor, fast waves": Kind(TURBULENCE, SEA, "standard", {"rotor": "bem"}),
     "still water, wind": Kind(TURBULENCE, None, absent="waves"),
@@ -149,67 +152,79 @@ def median_time(call, repeats=REPEATS):
 
 
 @kernel
-def _repeat(part, scene, work, x, u, dx, m, row, n, dt):
+def _repeat(part, model, data, x, u, dx, m, row, n, dt):
     """n calls of one of LOADS at changing times and places; returns a sum that keeps them from vanishing."""
     total = 0.0
     for i in range(n):
         t = i * dt
         x[State.SURGE] += 1e-7  # nothing is the same as before: no call can be left out
         if part == 7:
-            respond(x, u, scene, work, dx)
+            respond(x, u, model, data, dx)
             total += dx[State.VX]
             continue
         if part == 8:
-            work.kept[Kept.ELEVATED] = 0.0
-            measure(scene, work, x, dx, u, t, m)
+            data.cache[LoadCache.ELEVATED] = 0.0
+            measure(model, data, x, dx, u, t, m)
             total += m[0]
             continue
         if part == 9:
-            work.kept[Kept.ELEVATED] = 0.0
-            record(scene, work, x, dx, u, t, loads_of(work, dx), row)
+            data.cache[LoadCache.ELEVATED] = 0.0
+            record(model, data, x, dx, u, t, loads_of(data, dx), row)
             total += row[0]
             continue
         pose = pose_of(x)
-        now = wind_now(t, scene.wind) if part == 1 else wind_now(0.0, scene.wind)
-        total += pose.r11 + pose.r23 + now.u
-        if part == 2:
-            aero = rotor_part(
-                t, pose, x, now, scene.wind, scene.wind_field, scene.rotor, scene.rotor_lookup,
-                scene.rotor_table, scene.skew, scene.wake, dx, work.counters,
-            )  # fmt: skip
-            total += aero.thrust + aero.wrench.mz
-        elif part == 3:
-            total += tower_load(t, pose, now, scene.wind, scene.wind_field, scene.tower).my
-        elif part == 4:
-            strips = strip_part(
-                t, pose, scene.strips, scene.waves, scene.current, work.kinematics, scene.lanes, scene.sea,
-                work.fast, scene.diffraction, scene.lane_diffraction,
-            )  # fmt: skip
-            total += strips.wrench.my
-        elif part == 5:
-            total += mooring_load(pose, scene.mooring, work.lines, work.counters).my
-        elif part == 6:
-            total += hydrostatic_load(pose, scene.hull, work.counters).my
+        total += pose.r11 + pose.r23
+        if part == 5:
+            total += mooring_load(pose, model.mooring, data.lines, data.counters).my
+        else:
+            total += _of_wind(part, t, pose, x, model.aero, data, dx)
+            total += _of_water(part, t, pose, model.hydro, data)
     return total
 
 
+@kernel
+def _of_wind(part, t, pose, x, aero, data, dx):
+    """Something of one of the loads of the wind, if part is one."""
+    if aero is None:
+        return 0.0
+    now = wind_now(t, aero.wind) if part == 1 else wind_now(0.0, aero.wind)
+    if part == 2:
+        load = rotor_part(t, pose, x, now, aero, aero.rotor, dx, data.counters)
+        return load.thrust + load.wrench.mz
+    if part == 3:
+        return tower_load(t, pose, now, aero.wind, aero.field, aero.tower).my
+    return now.u
+
+
+@kernel
+def _of_water(part, t, pose, hydro, data):
+    """Something of one of the loads of the water, if part is one."""
+    if hydro is None:
+        return 0.0
+    if part == 4:
+        return strip_load(t, pose, hydro, hydro.strips, data).wrench.my
+    if part == 6:
+        return hydrostatic_load(pose, hydro.hull, data.counters).my
+    return 0.0
+
+
 @entry
-def _repeat_in(box, part, x, u, dx, m, row, n, dt):
-    return _repeat(part, model_of(box), data_of(box), x, u, dx, m, row, n, dt)
+def _repeat_in(handle, part, x, u, dx, m, row, n, dt):
+    return _repeat(part, model_of(handle), data_of(handle), x, u, dx, m, row, n, dt)
 
 
 def load_times(scene, x, u, calls=CHUNK, repeats=REPEATS):
     """{load: microseconds of one call} near a state; the loop and the pose are taken off the others."""
-    box = scene.box()
+    handle = scene.handle()
     dx, m = np.zeros_like(x), np.zeros(N_MEASUREMENTS)
     row = np.zeros(len(scene.channels))
-    forget(box)
-    output(box, x, u, 0.0, dx, row)  # fills the kept loads that measure and record read
+    forget(handle)
+    output(handle, x, u, 0.0, dx, row)  # fills the kept loads that measure and record read
     micro = {}
     for part, name in enumerate(LOADS):
         micro[name] = (
             1e6
-            * median_time(lambda p=part: _repeat_in(box, p, x.copy(), u, dx, m, row, calls, 0.1), repeats)
+            * median_time(lambda p=part: _repeat_in(handle, p, x.copy(), u, dx, m, row, calls, 0.1), repeats)
             / calls
         )
     base = micro[LOADS[0]]
@@ -220,12 +235,12 @@ def load_times(scene, x, u, calls=CHUNK, repeats=REPEATS):
 
 def step_time(scene, x, u, dt, steps=CHUNK, repeats=REPEATS):
     """Microseconds of one physics step under a constant command."""
-    box = scene.box()
+    handle = scene.handle()
 
     def go():
         y = x.copy()
-        forget(box)
-        advance(box, y, u, 0, steps, dt)
+        forget(handle)
+        advance(handle, y, u, 0, steps, dt)
 
     return 1e6 * median_time(go, repeats) / steps
 
@@ -233,18 +248,18 @@ def step_time(scene, x, u, dt, steps=CHUNK, repeats=REPEATS):
 def loop_time(scene, kind, x, u, dt, seconds, repeats=REPEATS):
     """CPU seconds of the compiled closed loop, controller at 10 Hz, with one row of output."""
     controller = make("pi", scene.turbine, 0.1) if kind.controlled else HeldCommand()
-    box, dx, m = scene.box(), np.zeros_like(x), np.zeros(N_MEASUREMENTS)
+    handle, dx, m = scene.handle(), np.zeros_like(x), np.zeros(N_MEASUREMENTS)
     rows = np.zeros((1, len(scene.channels)))
     last = round(seconds / dt)
     schedule = Schedule(float(dt), round(0.1 / dt), last + 1, last, inf, inf)
 
     def go():
         y, v = x.copy(), u.copy()
-        forget(box)
-        observe(box, y, v, 0.0, dx, m)
+        forget(handle)
+        observe(handle, y, v, 0.0, dx, m)
         controller.reset(Measurement(*m.tolist()))
         rollout(
-            box, y, v, controller.law, controller.parameters, controller.memory, m, dx, schedule, 0, last,
+            handle, y, v, controller.law, controller.parameters, controller.memory, m, dx, schedule, 0, last,
             rows,
         )  # fmt: skip
 
@@ -257,14 +272,14 @@ def measure_kind(name, seconds=600.0, repeats=REPEATS, calls=CHUNK):
         raise unknown("kind of scene", name, KINDS)
     kind = KINDS[name]
     scene = kind.scene()
-    if hasattr(scene.wind, "usable"):  # a box of wind has an end
+    if hasattr(scene.wind, "usable"):  # a handle of wind has an end
         seconds = min(seconds, 10.0 * int(scene.wind.usable // 10.0))
     x, u = kind.start(scene)
     dt = scene.dt
     held = scene
     if not kind.controlled:
-        held = scene.with_model(body=scene.model.body._replace(rotor_held=True))
-    waves = scene.model.waves
+        held = scene.with_model({"rigid_body.rotor_held": True})
+    waves = None if scene.model.hydro is None else scene.model.hydro.waves
     row = {
         "kind": name,
         "integrator": scene.options["integrator"],

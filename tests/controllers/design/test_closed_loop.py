@@ -22,7 +22,7 @@ def above_rated():
 def nonlinear_closed_loop(scene, settings):
     """z -> dz/dt of plant, filtered speed and integral, continuous in time; and z at the trim."""
     point = trim(scene)
-    box = without_fluctuations(scene).box()
+    box = without_fluctuations(scene).handle()
     rows = list(STATE_INDEX)
     ratio, gk = settings.gear_ratio, settings.gain_schedule_pitch
 

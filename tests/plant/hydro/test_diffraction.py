@@ -21,6 +21,7 @@ from fowt_env.plant.hydro.diffraction import (
     factor_at,
     inertia_coefficient,
 )
+from fowt_env.plant.hydro.load import BandedStrips, ExactStrips
 from fowt_env.plant.hydro.morison import GAUSS_OFFSET, axis_surface, build_strips, morison_load, wet_cell
 from fowt_env.plant.hydro.wave_bands import (
     LANES,
@@ -303,8 +304,8 @@ def test_absent_option_adds_no_part():
     sea = {"kind": "regular", "H": 3.0, "T": 5.0}
     for given in ({}, {"diffraction": None}, {"diffraction": "none"}):
         model = build_scene(sea=sea, **given).model
-        assert model.diffraction is None and model.lane_diffraction is None
-    assert build_scene(sea=None, diffraction="maccamy_fuchs").model.diffraction is None
+        assert model.hydro.strips.diffraction is None
+    assert build_scene(sea=None, diffraction="maccamy_fuchs").model.hydro.strips.diffraction is None
     with pytest.raises(InputError, match="diffraction = 'mcf': allowed None, 'none', 'maccamy_fuchs'"):
         build_scene(sea=sea, diffraction="mcf")
 
@@ -315,15 +316,16 @@ def test_new_weather_has_the_diffraction_of_a_scene_built_with_it(fidelity):
     options = dict(fidelity=fidelity, diffraction="maccamy_fuchs", wave_components=30)
     moved = build_scene(sea={"kind": "jonswap", "Hs": 3.0, "Tp": 6.0}, **options).with_weather(None, sea, 3)
     built = build_scene(sea=sea, seed=3, **options)
-    name = "diffraction" if fidelity == "reference" else "lane_diffraction"
-    assert np.array_equal(getattr(moved.model, name).series, getattr(built.model, name).series)
-    assert (moved.model.diffraction is None) != (moved.model.lane_diffraction is None)
+    strips = moved.model.hydro.strips
+    assert np.array_equal(strips.diffraction.series, built.model.hydro.strips.diffraction.series)
+    assert isinstance(strips, ExactStrips if fidelity == "reference" else BandedStrips)
 
 
 def test_crossing_seas_fall_back_to_the_exact_path_with_diffraction():
     sea = {"kind": "components", "omega": [0.6, 0.9], "amplitude": [1.0, 0.5], "heading": [0.0, 30.0]}
     scene = build_scene(sea=sea, fidelity="standard", diffraction="maccamy_fuchs")
-    assert scene.model.sea is None and scene.model.diffraction.series.shape[0] == 2
+    strips = scene.model.hydro.strips
+    assert isinstance(strips, ExactStrips) and strips.diffraction.series.shape[0] == 2
 
 
 def first_harmonic(frame, column, period):

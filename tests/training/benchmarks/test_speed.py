@@ -27,7 +27,7 @@ def test_a_kind_of_scene_has_a_time_for_every_load_and_none_for_absent_ones():
     for figure in ("step_us", "step_x", "loop_x", "simulate_x", "calibration_ms"):
         assert row[figure] > 0.0
     scene = benchmark.KINDS[STILL].scene()
-    assert scene.model.wind is None and scene.model.waves is None
+    assert scene.model.aero.wind is None and scene.model.hydro.waves is None
 
 
 def test_an_unknown_kind_is_refused_by_name():
@@ -106,8 +106,8 @@ def test_every_axis_of_the_sweep_has_a_mark_of_its_own_in_the_plot(tmp_path):
 
 def test_a_thinned_sea_keeps_the_strongest_components_with_their_phases():
     sea = {"kind": "jonswap", "Hs": 6.0, "Tp": 11.0, "heading": 30.0}
-    waves = build_scene(sea=sea, seed=4).model.waves
-    few = build_scene(sea=benchmark_accuracy._thinned(waves, 7)).model.waves
+    waves = build_scene(sea=sea, seed=4).model.hydro.waves
+    few = build_scene(sea=benchmark_accuracy._thinned(waves, 7)).model.hydro.waves
     kept = np.isin(waves.omega, few.omega)
     assert kept.sum() == 7
     assert waves.amplitude[kept].min() > waves.amplitude[~kept].max()

@@ -173,7 +173,7 @@ def check_scene(arguments):
             keys = [str(key).replace("_", " ") for key in (*arguments, *inner)]
             assert any(key in text.replace("_", " ") for key in keys), text
         else:
-            assert scene.model.body.mass > 0.0
+            assert scene.model.rigid_body.mass > 0.0
 
 
 @examples(200)

@@ -63,10 +63,10 @@ def test_the_model_floats_at_its_design_draft():
 
 def test_the_model_is_oc3_hywind_by_froude_but_for_what_was_identified(model):
     full = read_platform("oc3_hywind")
-    assert np.allclose(np.array(model.hull.z) * 50.0, full.hull.z)
-    assert np.allclose(np.array(model.hull.diameter) * 50.0, full.hull.diameter)
+    assert np.allclose(np.array(model.hydro.hull.z) * 50.0, full.hull.z)
+    assert np.allclose(np.array(model.hydro.hull.diameter) * 50.0, full.hull.diameter)
     factor = 50.0**3 * full.environment.water_density / model.environment.water_density
-    assert model.tower.mass * factor == pytest.approx(full.tower.mass)
+    assert model.aero.tower.mass * factor == pytest.approx(full.tower.mass)
     assert model.ballast.mass * factor == pytest.approx(full.ballast.mass, rel=0.03)  # identified: 2.5 % less
     assert model.ballast.inertia[0] * factor * 2500.0 == pytest.approx(full.ballast.inertia[0], rel=0.04)
     turbine, original = read_turbine(model.turbine), read_turbine(full.turbine)
@@ -96,8 +96,8 @@ def test_the_committed_model_is_what_the_identification_gives(model):
 def test_a_driven_rotor_turns_the_platform_as_equation_20_says(model):
     # difference to a standing rotor: M1 nu' = -H (0, 0, 0, w_b', w_b w_z, -w_b w_y) with w_b' = 0
     scene = fowt_env.build_scene(model, hydrodynamics=False, mooring=False)
-    body = scene.model.body._replace(rotor_held=True)
-    scene = scene.with_model(body=body)
+    body = scene.model.rigid_body._replace(rotor_held=True)
+    scene = scene.with_model(rigid_body=body)
     spinning = state(vx=0.1, wy=0.2, wz=-0.3, rotor_speed=8.96)
     standing = spinning.copy()
     standing[State.ROTOR_SPEED] = 0.0

@@ -146,7 +146,7 @@ def test_euler_angles_of_a_tumbling_body_follow_a_quaternion_and_bodies_one_by_o
     duration, dt = 20.0, STEPS["rk4"]
     y0 = np.r_[rigid_body.quaternion(*x[3:6]), x[7:14]]
     twin = solve_ivp(rate, (0.0, duration), y0, method="DOP853", rtol=1e-9, atol=1e-10)
-    assert advance(scene.box(), x, np.zeros(2), 0, round(duration / dt), dt) == RUNNING
+    assert advance(scene.handle(), x, np.zeros(2), 0, round(duration / dt), dt) == RUNNING
     assert np.abs(x[3:6]).max() > 2.0 * np.pi
     R = rigid_body.quaternion_rotation(twin.y[:4, -1])
     assert np.abs(rigid_body.rotation(*x[3:6]) - R).max() < 1e-6

@@ -130,7 +130,7 @@ def test_a_case_runs_alike_alone_and_among_others(scene, runner, tmp_path):
 
 def test_a_plant_that_gains_energy_is_a_failure(scene):
     driven = LinearDamping(-2e7, -2e7, -2e7, -1e10, -1e10, -1e9, 0.0)
-    outcome = stability_cases.Runner(scene.with_model(damping=driven), 0.1).run(
+    outcome = stability_cases.Runner(scene.with_model({"hydro.damping": driven}), 0.1).run(
         np.r_[5.0, np.zeros(6), 0.5, np.zeros(5), 1.2, 0.2], [[4e4, 0.2]], 30.0
     )
     assert outcome.failure
@@ -164,12 +164,12 @@ def test_a_file_that_is_no_case_is_refused(text, message, tmp_path):
 
 def test_potential_energy_is_the_work_against_the_plants_own_loads(still_scene):
     scene = still_scene
-    box = scene.box()
-    quiet = scene.model.strips._replace(
+    box = scene.handle()
+    quiet = scene.model.hydro.strips.shape._replace(
         added_mass_coefficient=0.0, drag_coefficient=0.0, heave_added_mass=0.0
     )
-    damping = scene.model.damping._replace(yaw_stiffness=0.0)
-    plant = scene.with_model(strips=quiet, damping=damping)
+    damping = scene.model.hydro.damping._replace(yaw_stiffness=0.0)
+    plant = scene.with_model({"hydro.strips.shape": quiet, "hydro.damping": damping})
     x = np.zeros(15)
     x[:3] = 4.0, -2.0, 0.7
     step = 1e-3
@@ -182,7 +182,7 @@ def test_potential_energy_is_the_work_against_the_plants_own_loads(still_scene):
         slope.append((high - low) / (2.0 * step))
     from plant_helpers import rates  # in tests/
 
-    force = plant.model.body.mass_matrix @ rates(plant, x)[7:13]
+    force = plant.model.rigid_body.mass_matrix @ rates(plant, x)[7:13]
     assert np.allclose(-np.array(slope), force[:3], rtol=1e-5, atol=20.0)
 
 

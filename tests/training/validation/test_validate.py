@@ -130,7 +130,7 @@ def anew(row, frame):
 @pytest.mark.installation
 def test_total_mass_and_displacement_are_the_decks():
     platform, scene = read_platform(PLATFORM), build_scene(PLATFORM)
-    assert scene.model.body.mass == pytest.approx(platform.published["total_mass"], abs=1.0)
+    assert scene.model.rigid_body.mass == pytest.approx(platform.published["total_mass"], abs=1.0)
     assert trim(scene)["FAIRTEN1"] == pytest.approx(911.4, rel=2e-3)
 
 
@@ -194,7 +194,7 @@ def test_the_tip_node_of_aerodyn_explains_its_thrust_and_torque_to_3e_5_at_every
         x = np.zeros(scene.n_state)
         x[State.ROTOR_SPEED] = np.radians(6.0 * row["rotor_speed_rpm"])
         x[State.BLADE_PITCH] = np.radians(row["blade_pitch_deg"])
-        loads = output_row(scene.box(), x, np.zeros(2), 0.0, len(scene.channels))[
+        loads = output_row(scene.handle(), x, np.zeros(2), 0.0, len(scene.channels))[
             [Out.RTFLDFXH, Out.RTFLDMXH]
         ]
         lift, drag, _, _ = lift_drag(-(rotor.twist[-1] + x[State.BLADE_PITCH]), rotor.foil[-1], rotor.polars)

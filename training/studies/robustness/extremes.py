@@ -153,7 +153,7 @@ class _Run:
         if case.parked:
             self.x[State.ROTOR_SPEED] = self.u[0] = 0.0
             self.x[State.BLADE_PITCH] = self.u[1] = scene.turbine.pitch_drive.maximum
-            self.scene = scene.with_model(body=scene.model.body._replace(rotor_held=True))
+            self.scene = scene.with_model({"rigid_body.rotor_held": True})
         elif self.x[State.ROTOR_SPEED] > 0.0:  # beyond cut-out the trim idles feathered without control
             self.controller = make("pi", scene.turbine, CONTROL_DT)
         self.dx, self.measurement = np.zeros_like(self.x), np.zeros(N_MEASUREMENTS)
@@ -162,12 +162,12 @@ class _Run:
 
     def go(self):
         """(status, time reached) of the whole run."""
-        dt, work = self.dt, self.scene.work()
-        box = self.scene.box(work)
+        dt, data = self.dt, self.scene.data()
+        handle = self.scene.handle(data)
         per_control = round(CONTROL_DT / dt)
         fault = FAULTS.get(self.case.fault)
-        forget(box)
-        observe(box, self.x, self.u, 0.0, self.dx, self.measurement)
+        forget(handle)
+        observe(handle, self.x, self.u, 0.0, self.dx, self.measurement)
         if self.controller is not None:
             self.controller.reset(Measurement(*self.measurement.tolist()))
         for period in range(round(self.case.duration / CONTROL_DT)):
@@ -176,17 +176,17 @@ class _Run:
             if happened and self.case.fault == "line loss" and self.held is None:
                 self.held = 0.0
                 self.scene = without_line(self.scene, self.case.line)
-                work = self.scene.work()
-                box = self.scene.box(work)
-            observe(box, self.x, self.u, step * dt, self.dx, self.measurement)
-            self.note(work.lines)
+                data = self.scene.data()
+                handle = self.scene.handle(data)
+            observe(handle, self.x, self.u, step * dt, self.dx, self.measurement)
+            self.note(data.lines)
             if self.controller is not None:
                 self.u[:] = self.controller.act(Measurement(*self.measurement.tolist()))
             if happened and fault is not None:
                 if self.held is None:
                     self.held = float(self.x[State.BLADE_PITCH])
                 self.u[:] = fault(self.u, self.scene.turbine, self.held)
-            status = advance(box, self.x, self.u, step, per_control, dt)
+            status = advance(handle, self.x, self.u, step, per_control, dt)
             if status != RUNNING:
                 return status, (step + per_control) * dt
         return RUNNING, self.case.duration

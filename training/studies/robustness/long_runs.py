@@ -10,11 +10,11 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from fowt_env.envs import FowtEnv
-from fowt_env.plant.dynamics import Kept
-from fowt_env.plant.integrators import INTEGRATORS, START_STEPS, build_integrator
+from fowt_env.plant.integrators import INTEGRATORS, START_STEPS, Multistep, build_integrator
 from fowt_env.plant.measurement import N_MEASUREMENTS
+from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rollout import RUNNING, advance, forget, observe
-from fowt_env.plant.state import State
+from fowt_env.plant.state import N_COMMANDS, N_RIGID, State
 from fowt_env.scene.build import STEPS, build_scene
 from fowt_env.simulation import initial_state
 from fowt_env.training.studies.robustness.random_cases import Runner, platform_energy, potential_energy
@@ -27,7 +27,7 @@ WEATHER_SEA = {"kind": "jonswap", "Hs": 6.0, "Tp": 10.0}
 def with_integrator(scene, name, rotor_samples=1):
     """The scene with another integrator, ab4 with that many rotor loads per step."""
     return replace(
-        scene.with_model(multistep=build_integrator(name, rotor_samples)),
+        scene.with_model(integrator=build_integrator(name, rotor_samples)),
         options=scene.options | {"integrator": name},
     )
 
@@ -37,22 +37,24 @@ def free_scene():
     scene = build_scene(hydrodynamics=False, mooring=False)
     model = scene.model
     shaft = model.drivetrain._replace(bearing_loss_coefficient=0.0, mesh_loss=0.0)
-    return scene.with_model(body=model.body._replace(gravity=0.0), drivetrain=shaft)
+    return scene.with_model(rigid_body=model.rigid_body._replace(gravity=0.0), drivetrain=shaft)
 
 
 def floating_scene():
     """The turbine afloat on its lines in still water without drag, damping and fluid inertia."""
     scene = build_scene()
     model = scene.model
-    strips = model.strips._replace(added_mass_coefficient=0.0, drag_coefficient=0.0, heave_added_mass=0.0)
-    damping = type(model.damping)(*(0.0,) * len(model.damping))
+    shape = model.hydro.strips.shape._replace(
+        added_mass_coefficient=0.0, drag_coefficient=0.0, heave_added_mass=0.0
+    )
+    damping = type(model.hydro.damping)(*(0.0,) * len(model.hydro.damping))
     shaft = model.drivetrain._replace(bearing_loss_coefficient=0.0, mesh_loss=0.0)
-    return scene.with_model(strips=strips, damping=damping, drivetrain=shaft)
+    return scene.with_model({"hydro.strips.shape": shape, "hydro.damping": damping, "drivetrain": shaft})
 
 
 def free_start():
-    """State (15,) of a body that drifts, nutates and keeps its platform pitch off the singular 90 deg."""
-    x = np.zeros(15)
+    """State (N_RIGID,) of a body that drifts, nutates and keeps its platform pitch off the singular 90 deg."""
+    x = np.zeros(N_RIGID)
     x[3:6] = 0.2, -0.15, 0.4
     x[7:10] = 0.1, 0.05, -0.08
     x[10:13] = 0.01, 0.004, 0.006
@@ -61,8 +63,8 @@ def free_start():
 
 
 def floating_start():
-    """State (15,) of a platform set free at an offset, with its rotor turning."""
-    x = np.zeros(15)
+    """State (N_RIGID,) of a platform set free at an offset, with its rotor turning."""
+    x = np.zeros(N_RIGID)
     x[:6] = 5.0, 2.0, 0.5, 0.02, 0.06, 0.03
     x[State.ROTOR_SPEED] = 1.2671
     return x
@@ -70,7 +72,7 @@ def floating_start():
 
 def kinetic_energy(scene, x):
     """Kinetic energy of platform and rotor, J."""
-    body, speed = scene.model.body, x[State.ROTOR_SPEED]
+    body, speed = scene.model.rigid_body, x[State.ROTOR_SPEED]
     spin = 0.5 * body.rotor_row * speed**2 + body.coupling * speed * x[State.WX]
     return platform_energy(x, body.mass_matrix) + spin
 
@@ -82,7 +84,7 @@ def rotation(x):
 
 def momenta(scene, x):
     """(linear, angular about the inertial origin) momentum of the whole turbine, inertial axes, (3,) each."""
-    body, turn = scene.model.body, rotation(x)
+    body, turn = scene.model.rigid_body, rotation(x)
     body_momentum = body.mass_matrix @ x[7:13]
     body_momentum[3] += body.coupling * x[State.ROTOR_SPEED]
     linear = turn.apply(body_momentum[:3])
@@ -92,7 +94,7 @@ def momenta(scene, x):
 def own_momenta(scene, x):
     """(linear, angular about the centre of mass) momentum, inertial axes: both constant in free flight."""
     linear, angular = momenta(scene, x)
-    body = scene.model.body
+    body = scene.model.rigid_body
     centre = x[:3] + rotation(x).apply([body.s_x / body.mass, 0.0, body.s_z / body.mass])
     return linear, angular - np.cross(centre, linear)
 
@@ -101,14 +103,14 @@ def free_drift(integrator, steps, dt=None, progress=None):
     """{energy, linear, angular: largest relative change; status} of the free body over so many steps."""
     scene = with_integrator(free_scene(), integrator)
     dt = STEPS[integrator] if dt is None else dt
-    x, u, box = free_start(), np.zeros(2), scene.box()
+    x, u, handle = free_start(), np.zeros(N_COMMANDS), scene.handle()
     energy0, (linear0, angular0) = kinetic_energy(scene, x), own_momenta(scene, x)
     drift = {"energy": 0.0, "linear": 0.0, "angular": 0.0}
-    forget(box)
+    forget(handle)
     status, done = RUNNING, 0
     while done < steps and status == RUNNING:
         n = min(CHUNK, steps - done)
-        status = advance(box, x, u, done, n, dt)
+        status = advance(handle, x, u, done, n, dt)
         done += n
         linear, angular = own_momenta(scene, x)
         drift["energy"] = max(drift["energy"], abs(kinetic_energy(scene, x) / energy0 - 1.0))
@@ -130,16 +132,16 @@ def floating_drift(integrator, steps, dt=None, progress=None):
     """
     scene = with_integrator(floating_scene(), integrator)
     dt = STEPS[integrator] if dt is None else dt
-    x, u, box = floating_start(), np.zeros(2), scene.box()
-    start = kinetic_energy(scene, x) + potential_energy(box, x)
-    moving = potential_energy(box, x) - potential_energy(box, np.zeros(15))
-    forget(box)
+    x, u, handle = floating_start(), np.zeros(N_COMMANDS), scene.handle()
+    start = kinetic_energy(scene, x) + potential_energy(handle, x)
+    moving = potential_energy(handle, x) - potential_energy(handle, np.zeros(N_RIGID))
+    forget(handle)
     worst, status, done = 0.0, RUNNING, 0
     while done < steps and status == RUNNING:
         n = min(CHUNK, steps - done)
-        status = advance(box, x, u, done, n, dt)
+        status = advance(handle, x, u, done, n, dt)
         done += n
-        now = kinetic_energy(scene, x) + potential_energy(box, x)
+        now = kinetic_energy(scene, x) + potential_energy(handle, x)
         worst = max(worst, abs(now - start) / moving)
         if progress is not None:
             progress(f"floating body, {integrator}", done, steps)
@@ -181,7 +183,7 @@ def environment_memory(steps, progress=None):
     env.reset(seed=0)
     first, resets = None, 0
     for step in range(steps):
-        _, _, terminated, truncated, _ = env.step(np.zeros(2))
+        _, _, terminated, truncated, _ = env.step(np.zeros(N_COMMANDS))
         if terminated or truncated:
             env.reset()
             resets += 1
@@ -200,35 +202,35 @@ def measured_orders(duration=20.0, steps=(0.1, 0.05, 0.025), finest=0.003125):
     an error of third order that would hide the method's.
     """
     base = build_scene(sea={"kind": "regular", "H": 6.0, "T": 8.0})
-    base = base.with_model(strips=base.model.strips._replace(drag_coefficient=0.0))
+    base = base.with_model({"hydro.strips.shape.drag_coefficient": 0.0})
     x0, u = initial_state(base)
     rows = np.r_[0:6, 7:13]
     exact_scene = with_integrator(base, "rk4")
 
     def exact(time):
-        x, box = x0.copy(), exact_scene.box()
-        forget(box)
-        advance(box, x, u, 0, round(time / finest), finest)
+        x, handle = x0.copy(), exact_scene.handle()
+        forget(handle)
+        advance(handle, x, u, 0, round(time / finest), finest)
         return x
 
     def end(name, dt):
         scene = with_integrator(base, name)
-        if scene.model.multistep is None or scene.model.multistep.heun:
-            x, box = x0.copy(), scene.box()
-            forget(box)
-            advance(box, x, u, 0, round(duration / dt), dt)
+        if not isinstance(scene.model.integrator, Multistep):
+            x, handle = x0.copy(), scene.handle()
+            forget(handle)
+            advance(handle, x, u, 0, round(duration / dt), dt)
             return x[rows]
-        work = scene.work()
-        box = scene.box(work)
+        data = scene.data()
+        handle = scene.handle(data)
         for k in range(START_STEPS):
-            forget(box)
+            forget(handle)
             observe(
-                box, exact(k * dt), u, k * dt, work.history[START_STEPS - 1 - k], np.zeros(N_MEASUREMENTS)
+                handle, exact(k * dt), u, k * dt, data.history[START_STEPS - 1 - k], np.zeros(N_MEASUREMENTS)
             )
-        forget(box)
-        work.kept[Kept.STEPS] = START_STEPS
+        forget(handle)
+        data.cache[LoadCache.STEPS] = START_STEPS
         x = exact(START_STEPS * dt)
-        advance(box, x, u, START_STEPS, round(duration / dt) - START_STEPS, dt)
+        advance(handle, x, u, START_STEPS, round(duration / dt) - START_STEPS, dt)
         return x[rows]
 
     last = exact(duration)[rows]
@@ -247,19 +249,19 @@ def quaternion_difference(duration=60.0, integrator="rk4", dt=None):
     """
     scene = with_integrator(free_scene(), integrator)
     dt = STEPS[integrator] if dt is None else dt
-    x = np.zeros(15)
+    x = np.zeros(N_RIGID)
     x[3:6], x[10:13] = (0.5, 0.3, -1.0), (0.6, 0.02, 0.25)
     x[State.ROTOR_SPEED] = 1.2671
-    box, u = scene.box(), np.zeros(2)
-    dx, measurement = np.zeros(15), np.zeros(N_MEASUREMENTS)
+    handle, u = scene.handle(), np.zeros(N_COMMANDS)
+    dx, measurement = np.zeros(N_RIGID), np.zeros(N_MEASUREMENTS)
 
     def rate(t, y):
-        state = np.zeros(15)
+        state = np.zeros(N_RIGID)
         turn = Rotation.from_quat(y[:4])
         state[5], state[4], state[3] = turn.as_euler("ZYX")
         state[7:13], state[State.ROTOR_SPEED] = y[4:10], y[10]
-        forget(box)
-        observe(box, state, u, 0.0, dx, measurement)
+        forget(handle)
+        observe(handle, state, u, 0.0, dx, measurement)
         a, w = y[:4], y[7:10]
         spin = np.r_[a[3] * w + np.cross(a[:3], w), -a[:3] @ w]  # q (0, w), scalar last
         return np.r_[0.5 * spin, dx[7:13], dx[State.ROTOR_SPEED]]
@@ -267,7 +269,7 @@ def quaternion_difference(duration=60.0, integrator="rk4", dt=None):
     times = np.linspace(0.0, duration, 61)
     y0 = np.r_[rotation(x).as_quat(), x[7:13], x[State.ROTOR_SPEED]]
     twin = solve_ivp(rate, (0.0, duration), y0, method="DOP853", rtol=1e-12, atol=1e-13, t_eval=times)
-    own = scene.box()
+    own = scene.handle()
     forget(own)
     worst, turned, step = 0.0, 0.0, 0
     for i, time in enumerate(times):

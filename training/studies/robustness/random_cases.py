@@ -23,7 +23,7 @@ from fowt_env.plant.integrators import build_integrator, rates, take_step
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
 from fowt_env.plant.mooring import mooring_load
 from fowt_env.plant.rollout import NON_FINITE, RUNNING, STOP_REASONS, observe, status_of
-from fowt_env.plant.state import State, pose_of
+from fowt_env.plant.state import Command, State, pose_of
 from fowt_env.scene.build import FIDELITIES, build_scene
 from fowt_env.simulation import hold
 
@@ -57,7 +57,7 @@ def platform_energy(x, mass_matrix):
 
 @kernel
 def _run_case(
-    scene, work, x, u, act, parameters, memory, measurement, dx, commands, per_control, per_segment, last, dt,
+    model, data, x, u, act, parameters, memory, measurement, dx, commands, per_control, per_segment, last, dt,
     peak,
 ):  # fmt: skip
     for i in range(peak.shape[0]):
@@ -66,17 +66,17 @@ def _run_case(
         if commands.shape[0] > 0:
             if step % per_segment == 0:
                 row = min(step // per_segment, commands.shape[0] - 1)
-                u[0] = commands[row, 0]
-                u[1] = commands[row, 1]
+                u[Command.GENERATOR_TORQUE] = commands[row, 0]
+                u[Command.BLADE_PITCH] = commands[row, 1]
         elif step % per_control == 0:
-            rates(step * dt, x, u, scene, work, dx)
-            measure(scene, work, x, dx, u, step * dt, measurement)
+            rates(step * dt, x, u, model, data, dx)
+            measure(model, data, x, dx, u, step * dt, measurement)
             act(parameters, memory, measurement, u)
-        take_step(step * dt, x, u, dt, scene, scene.multistep, work)
+        take_step(step * dt, x, u, dt, model, model.integrator, data)
         status = status_of(x)
         if status != RUNNING:
             return status, step + 1
-        peak[0] = max(peak[0], platform_energy(x, scene.body.mass_matrix))
+        peak[0] = max(peak[0], platform_energy(x, model.rigid_body.mass_matrix))
         peak[1] = max(peak[1], max(abs(x[State.ROLL]), abs(x[State.PLATFORM_PITCH])))
         peak[2] = max(peak[2], sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]))
         peak[3] = max(peak[3], abs(x[State.ROTOR_SPEED]))
@@ -85,7 +85,7 @@ def _run_case(
 
 @entry
 def run_case(
-    box, x, u, act, parameters, memory, measurement, dx, commands, per_control, per_segment, last, dt, peak
+    handle, x, u, act, parameters, memory, measurement, dx, commands, per_control, per_segment, last, dt, peak
 ):
     """Advance x by last steps of dt; returns (status, steps done).
 
@@ -94,7 +94,7 @@ def run_case(
     from the origin (m) and rotor speed (rad/s).
     """
     return _run_case(
-        model_of(box), data_of(box), x, u, act, parameters, memory, measurement, dx, commands, per_control,
+        model_of(handle), data_of(handle), x, u, act, parameters, memory, measurement, dx, commands, per_control,
         per_segment, last, dt, peak,
     )  # fmt: skip
 
@@ -145,37 +145,44 @@ def line_energy(H, V, length, weight, EA, node, share):
 
 
 @entry
-def _potential_energy(box, x, node, share):
-    model, work, pose = model_of(box), data_of(box), pose_of(x)
-    body = model.body
+def _potential_energy(handle, x, node, share):
+    model, data, pose = model_of(handle), data_of(handle), pose_of(x)
+    body = model.rigid_body
     total = body.gravity * (body.mass * pose.z + body.s_x * pose.r31 + body.s_z * pose.r33)
-    if model.hull is not None:
-        volume, qx, qy, qz = submerged(pose, model.hull, work.counters)
-        depth = volume * pose.z + qx * pose.r31 + qy * pose.r32 + qz * pose.r33
-        total -= model.hull.specific_weight * depth
+    total -= buoyant_energy(pose, model.hydro, data)
     if model.mooring is not None:
         lines = model.mooring
-        mooring_load(pose, lines, work.lines, work.counters)
+        mooring_load(pose, lines, data.lines, data.counters)
         for i in range(lines.length.shape[0]):
-            H, V = work.lines[i, 0], work.lines[i, 1]
+            H, V = data.lines[i, 0], data.lines[i, 1]
             total += line_energy(H, V, lines.length[i], lines.weight[i], lines.EA[i], node, share)
     return total
 
 
-def potential_energy(box, x):
+@kernel
+def buoyant_energy(pose, hydro, data):
+    """Work (J) that the still water has done on the hull, up to a constant."""
+    if hydro is None:
+        return 0.0
+    volume, qx, qy, qz = submerged(pose, hydro.hull, data.counters)
+    depth = volume * pose.z + qx * pose.r31 + qy * pose.r32 + qz * pose.r33
+    return hydro.hull.specific_weight * depth
+
+
+def potential_energy(handle, x):
     """Energy (J) of gravity, still-water buoyancy and moorings of a state, up to a constant."""
-    return _potential_energy(box, x, *QUADRATURE)
+    return _potential_energy(handle, x, *QUADRATURE)
 
 
 def weather_speeds(scene):
     """(fastest wind at the rotor, fastest water at the surface) of a scene, m/s, generous."""
     wind = water = 0.0
-    series = scene.model.wind
-    if series is not None:
-        value = np.abs(series.value)
+    aero, hydro = scene.model.aero, scene.model.hydro
+    if aero is not None:
+        value = np.abs(aero.wind.value)
         level = np.sqrt((value[:, :3] ** 2).sum(axis=1)) + 0.5 * value[:, 3:].sum(axis=1)
         wind = 1.1 * float(level.max()) + 10.0  # shear over the rotor's height; the hub's own motion
-    waves = scene.model.waves
+    waves = None if hydro is None else hydro.waves
     if waves is not None:
         rms = sqrt(0.5 * float(np.sum((waves.amplitude * waves.omega) ** 2)))
         largest = float(np.sum(waves.amplitude * waves.omega))
@@ -188,11 +195,11 @@ class Runner:
 
     def __init__(self, scene, dt):
         self.scene, self.dt = scene, float(dt)
-        self.work = scene.work()
-        self.box = scene.box(self.work)
-        self.rest = potential_energy(self.box, np.zeros(scene.n_state))
+        self.data = scene.data()
+        self.handle = scene.handle(self.data)
+        self.rest = potential_energy(self.handle, np.zeros(scene.n_state))
         self.speeds = weather_speeds(scene)
-        self.controller = make("pi", scene.turbine, CONTROL_DT) if scene.model.wind is not None else None
+        self.controller = make("pi", scene.turbine, CONTROL_DT) if scene.model.aero is not None else None
         self.dx = np.zeros(scene.n_state)
         self.measurement = np.zeros(N_MEASUREMENTS)
 
@@ -204,26 +211,26 @@ class Runner:
         wind's thrust over HUB_TRAVEL. Rotor: its start, or FASTEST_TIP times the wind over the radius.
         """
         wind, water = self.speeds
-        body, rotor = self.scene.model.body, self.scene.turbine.rotor
+        body, rotor = self.scene.model.rigid_body, self.scene.turbine.rotor
         density = self.scene.platform.environment.air_density
         thrust = WIND_LOAD * 0.5 * density * pi * rotor.tip_radius**2 * wind**2
         energy = platform_energy(x, body.mass_matrix)
-        energy += max(0.0, potential_energy(self.box, x) - self.rest)
+        energy += max(0.0, potential_energy(self.handle, x) - self.rest)
         energy += body.mass * water**2 + thrust * HUB_TRAVEL
         return FACTOR * energy, max(1.05 * abs(x[State.ROTOR_SPEED]), FASTEST_TIP * wind / rotor.tip_radius)
 
     def run(self, state, commands, duration):
         """Outcome of a state (n,) under commands (k, 2), or under the PI where commands is empty."""
-        dt, box, work = self.dt, self.box, self.work
+        dt, handle, data = self.dt, self.handle, self.data
         x = np.array(state, dtype=float)
         commands = np.array(commands, dtype=float).reshape(-1, 2)
         u = np.array([0.0, x[State.BLADE_PITCH]])
         energy, speed = self.bounds(x)
-        for carried in (work.lines, work.counters, work.kept, work.history):
+        for carried in (data.lines, data.counters, data.cache, data.history):
             carried[:] = 0.0  # as in a scene of its own: a case runs alike alone and among others
         law, parameters, memory = hold.compiled, np.zeros(1), np.zeros(1)
         if len(commands) == 0:
-            observe(box, x, u, 0.0, self.dx, self.measurement)
+            observe(handle, x, u, 0.0, self.dx, self.measurement)
             self.controller.reset(Measurement(*self.measurement.tolist()))
             law, parameters, memory = (
                 self.controller.law,
@@ -232,10 +239,10 @@ class Runner:
             )
         peak = np.zeros(4)
         status, steps = run_case(
-            box, x, u, law, parameters, memory, self.measurement, self.dx, commands,
+            handle, x, u, law, parameters, memory, self.measurement, self.dx, commands,
             round(CONTROL_DT / dt), round(SEGMENT / dt), round(duration / dt), dt, peak,
         )  # fmt: skip
-        unconverged = int(work.counters[Counter.MOORING_UNCONVERGED])
+        unconverged = int(data.counters[Counter.MOORING_UNCONVERGED])
         outcome = Outcome(int(status), steps * dt, peak, energy, speed, unconverged)
         outcome.failure = judged(outcome)
         return outcome
@@ -365,7 +372,7 @@ def replay(case):
 def finer(scene, case):
     """Outcome of a case by Runge-Kutta 4 at a FINER-th of its step, in its own scene."""
     other = replace(
-        scene.with_model(multistep=build_integrator("rk4")), options=scene.options | {"integrator": "rk4"}
+        scene.with_model(integrator=build_integrator("rk4")), options=scene.options | {"integrator": "rk4"}
     )
     return Runner(other, case["dt"] / FINER).run(case["state"], case["commands"], case["duration"])
 

@@ -56,8 +56,8 @@ class Kind:
             wind=self.wind, sea=self.sea, seed=1, fidelity=self.fidelity, integrator=integrator,
             **self.options,
         )  # fmt: skip
-        body = scene.model.body._replace(platform_held=self.platform_held, rotor_held=self.rotor_held)
-        return scene.with_model(body=body)
+        body = scene.model.rigid_body._replace(platform_held=self.platform_held, rotor_held=self.rotor_held)
+        return scene.with_model(rigid_body=body)
 
     def point(self, scene):
         """OperatingPoint about which runs start and theory is linear.
@@ -74,7 +74,7 @@ class Kind:
 
 KINDS = {
     "full, look-up rotor": Kind(),
-    "full, rotor sampled thrice a step": Kind(rotor_samples=3),  # as in a box of wind
+    "full, rotor sampled thrice a step": Kind(rotor_samples=3),  # as in a handle of wind
     "full, BEM rotor": Kind(fidelity="reference", options={"wave_components": 40}),
     "full, table rotor": Kind(fidelity="fast"),
     "full, rated wind": Kind(wind=11.4),
@@ -199,20 +199,20 @@ def excursions(scene, point, dt, duration=DURATION):
     x, u = point.state.copy(), point.command.copy()
     rows = np.array(STATE_INDEX)
     moved = EXCITATION.copy()
-    if scene.model.body.platform_held:
+    if scene.model.rigid_body.platform_held:
         moved[: 2 * len(MOTIONS)] = 0.0
-    if scene.model.body.rotor_held:
+    if scene.model.rigid_body.rotor_held:
         moved[STATES.index("rotor_speed")] = 0.0
     centre = x[rows].copy()
     x[rows] += moved
     if x[State.BLADE_PITCH] > scene.turbine.pitch_drive.maximum:
         x[State.BLADE_PITCH] -= 2.0 * EXCITATION[PITCH]
-    box = scene.box()
-    forget(box)
+    handle = scene.handle()
+    forget(handle)
     peaks, late = np.zeros(N), np.zeros(N)
     steps = round(duration / dt)
     for i in range(steps):
-        if advance(box, x, u, i, 1, dt) != RUNNING:
+        if advance(handle, x, u, i, 1, dt) != RUNNING:
             return np.full(N, np.inf), np.full(N, np.inf)
         np.maximum(peaks, np.abs(x[rows] - centre), out=peaks)
         if i == steps // 2:

@@ -60,7 +60,7 @@ def jobs(scenes=SCENES, environments=True):
     for name, options in scenes.items():
         scene = build_scene(**options)
         for integrator in INTEGRATORS:
-            made = scene.with_model(multistep=build_integrator(integrator))
+            made = scene.with_model(integrator=build_integrator(integrator))
             found[f"{name}, {integrator}"] = ("scene", made)
     if environments:
         for mode in ("direct", "residual"):
@@ -78,10 +78,10 @@ def result(job):
     kind, *given = job
     if kind == "scene":
         scene = given[0]
-        x, box = start(scene), scene.box()
+        x, handle = start(scene), scene.handle()
         u = np.array([4.0e4, 0.25])
-        status = advance(box, x, u, 100, STEPS, 0.05)
-        row = output_row(scene.box(), x, u, 5.0 + STEPS * 0.05, len(scene.channels))
+        status = advance(handle, x, u, 100, STEPS, 0.05)
+        row = output_row(scene.handle(), x, u, 5.0 + STEPS * 0.05, len(scene.channels))
         return np.r_[status, x, row]
     mode, snapshot = given
     rng = np.random.default_rng(3)
