@@ -10,6 +10,7 @@ from plant_helpers import random_state
 
 import fowt_env
 from fowt_env import simulation
+from fowt_env.control import CompiledController
 from fowt_env.controllers import make
 from fowt_env.controllers.constant import Constant
 from fowt_env.errors import ControllerError, InputError, SimulationStopped
@@ -323,9 +324,11 @@ def nan_after_one_second(parameters, memory, measurement, command):
         command[1] = np.nan
 
 
-class CompiledNan:
+class CompiledNan(CompiledController):
     kernel = staticmethod(nan_after_one_second)
-    parameters, memory = np.zeros(1), np.zeros(1)
+
+    def __init__(self):
+        super().__init__("nan", np.zeros(1), 1)
 
     def reset(self, measurement):
         pass

@@ -122,7 +122,8 @@ class Scene:
 
     @property
     def n_state(self) -> int:
-        return N_RIGID + (0 if self.model.aero is None else n_wake_states(self.model.aero.rotor))
+        rotor = None if self.model.aero is None else self.model.aero.rotor
+        return N_RIGID + (n_wake_states(rotor.elements, rotor.wake) if isinstance(rotor, BemRotor) else 0)
 
     @property
     def channels(self) -> tuple[Channel, ...]:

@@ -4,7 +4,6 @@ from naive import rigid_body
 from plant_helpers import random_state, rates
 
 import fowt_env
-from fowt_env.plant.aero.wind import wind_now
 from fowt_env.plant.channels import FIXED_CHANNELS, channels, rotor_wind, to_units
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
 from fowt_env.plant.rigid_body import gravity_load
@@ -142,7 +141,7 @@ def test_the_rotor_s_wind_is_the_mean_over_its_blades_relative_to_the_moving_hub
 
 
 def test_the_rotor_s_wind_in_a_box_is_read_along_the_blades_where_they_are(storm_scene):
-    layout, series = storm_scene.model.layout, storm_scene.model.aero.wind
+    layout = storm_scene.model.layout
     x = random_state(np.random.default_rng(5), storm_scene.n_state, speed=2.0, turning=0.1)
     R, pose = rigid_body.rotation(*x[3:6]), pose_of(x)
     y, z = np.linspace(-100.0, 100.0, 21), np.linspace(5.0, 205.0, 21)
@@ -150,7 +149,8 @@ def test_the_rotor_s_wind_in_a_box_is_read_along_the_blades_where_they_are(storm
     u, v, w = rng.standard_normal((3, 40, z.size, y.size)) + np.array([12.0, 0.0, 0.0])[:, None, None, None]
     spec = {"kind": "box", "u": u, "v": v, "w": w, "y": y, "z": z, "dt": 0.5, "speed": 12.0, "periodic": True}
     box = read_box(spec, hub_height=90.0, rotor_diameter=126.0)
-    found = rotor_wind(3.0, pose, x[State.AZIMUTH], wind_now(3.0, series), series, box.field(), layout)
+    aero = storm_scene.model.aero._replace(field=box.field())
+    found = rotor_wind(3.0, pose, x[State.AZIMUTH], aero, layout)
     wind = np.zeros(3)
     for blade in range(3):
         psi = x[State.AZIMUTH] + 2.0 * np.pi * blade / 3

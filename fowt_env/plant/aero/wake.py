@@ -53,11 +53,11 @@ def build_dynamic_inflow(scale=1.0):
     return DynamicInflow(float(scale))
 
 
-def n_wake_states(rotor):
-    """Number of wake states that follow State.WAKE; 0 without dynamic inflow. rotor: the part of a scene."""
-    if getattr(rotor, "wake", None) is None:
+def n_wake_states(elements, wake):
+    """Number of wake states that follow State.WAKE; 0 without rotor or dynamic inflow."""
+    if elements is None or wake is None:
         return 0
-    return PER_ELEMENT * rotor.elements.blades * len(rotor.elements.radius)
+    return PER_ELEMENT * elements.blades * len(elements.radius)
 
 
 @kernel
