@@ -1,6 +1,6 @@
 """Torque law, shaft balance and blade-pitch actuator of a geared turbine (theory.md, section 3)."""
 
-from math import isfinite, sqrt
+from math import exp, isfinite, sqrt
 from typing import NamedTuple
 
 from fowt_env.errors import InputError, unknown
@@ -221,3 +221,22 @@ def followed_pitch(blade_pitch, command, dt, actuator):
     target = limited(command, actuator.minimum, actuator.maximum)
     way = actuator.rate_limit * dt
     return blade_pitch + limited(target - blade_pitch, -way, way)
+
+
+@kernel
+def pitch_after(blade_pitch, command, dt, actuator):
+    """Blade pitch after dt under a constant command: exact solution of lag and rate limit."""
+    if actuator.time_constant <= 0.0:
+        return blade_pitch
+    lag, fastest = actuator.time_constant, actuator.rate_limit
+    target = limited(command, actuator.minimum, actuator.maximum)
+    error = target - blade_pitch
+    sign = 1.0 if error > 0.0 else -1.0
+    size = abs(error)
+    band = fastest * lag  # inside it the lag alone limits the rate
+    if size > band:
+        slewing = (size - band) / fastest
+        if slewing >= dt:
+            return blade_pitch + sign * fastest * dt
+        return target - sign * band * exp(-(dt - slewing) / lag)
+    return target - error * exp(-dt / lag)

@@ -37,9 +37,10 @@ from fowt_env.plant.hydro.wave_bands import (
     can_be_fast,
     fast_scratch,
 )
-from fowt_env.plant.integrators import INTEGRATORS, N_SAMPLE, build_integrator, rotor_samples
+from fowt_env.plant.integrators import INTEGRATORS, build_integrator, rotor_samples
 from fowt_env.plant.model import N_CACHE, Data, Model, RigidBody
 from fowt_env.plant.mooring import build_mooring
+from fowt_env.plant.rotor_substeps import N_SAMPLE
 from fowt_env.plant.state import N_RIGID
 from fowt_env.plant.user_loads import room_of
 from fowt_env.scene.user_loads import Load, build_user_loads, checked_loads, first_nonfinite_load
@@ -59,7 +60,6 @@ FIDELITIES = {
     "fast": {"rotor": "table", "wave_loads": "fast", "integrator": "ab4", "mooring": "table"},
 }
 IN_PLANE = 1e-9  # share of a vector out of the plane of a planar scene that rounding may leave
-STEPS = {"rk4": 0.05, "heun": 0.05, "abm4": 0.1, "ab4": 0.1}  # s, default step of each integrator
 FIELD_SAMPLES = 3  # rotor loads per step of ab4 in a box of wind, whose cells the blades cross in 0.1 s
 SPAN_POINTS = 8  # along a blade, for the mean wind over the blades in the outputs
 REFERENCE_STEP = 0.0125  # s, of rk4 at fidelity "reference": errs 2e-6 in heave, 2e-7 elsewhere
@@ -209,7 +209,7 @@ class Scene:
         """Default physics step, s: that of the scene's integrator, finer at fidelity "reference"."""
         if self.options["fidelity"] == "reference" and self.options["integrator"] == "rk4":
             return REFERENCE_STEP
-        return STEPS[self.options["integrator"]]
+        return INTEGRATORS[self.options["integrator"]].dt
 
     def with_model(self, parts: Mapping[str, Any] | None = None, **slots: Any) -> "Scene":
         """A copy with some parts of the model replaced (same types: no recompilation).
@@ -421,13 +421,15 @@ def _whole(value):
 def _samples(chosen, field):
     """Evaluations of the rotor's load per step."""
     asked, integrator = chosen["rotor_samples"], chosen["integrator"]
-    if asked not in (None, 1) and integrator != "ab4":
+    able = INTEGRATORS[integrator].samples_rotor
+    if asked not in (None, 1) and not able:
+        some = " or ".join(repr(name) for name, method in INTEGRATORS.items() if method.samples_rotor)
         raise InputError(
-            f"rotor_samples = {asked}: only integrator = 'ab4' evaluates the rotor more than once a step,"
+            f"rotor_samples = {asked}: only integrator = {some} evaluates the rotor more than once a step,"
             f" not {integrator!r}"
         )
     if asked is None:
-        asked = FIELD_SAMPLES if field is not None and integrator == "ab4" else 1
+        asked = FIELD_SAMPLES if field is not None and able else 1
     return asked
 
 

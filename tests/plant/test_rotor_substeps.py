@@ -6,7 +6,8 @@ import pytest
 from fowt_env import build_scene, simulate
 from fowt_env.envs import FowtEnv, FowtVectorEnv
 from fowt_env.errors import InputError
-from fowt_env.plant.integrators import BASHFORTH, build_gusts, build_integrator, rotor_samples
+from fowt_env.plant.integrators import build_integrator, rotor_samples
+from fowt_env.plant.rotor_substeps import BASHFORTH, build_substeps
 from fowt_env.training.validation.openfast_cases import box_wind
 from fowt_env.training.validation.signal_errors import normalised_rms
 
@@ -19,7 +20,7 @@ COLUMNS = (
 
 def impulse(load, samples):
     """What the weights add to the impulse of a load(time) over the step from 0 to 1."""
-    gusts = build_gusts(samples)
+    gusts = build_substeps(samples)
     latest = (samples - 1) / samples
     return sum(w * load(latest - k / samples) for k, w in enumerate(gusts.weight))
 
@@ -60,7 +61,7 @@ def test_only_adams_bashforth_in_a_box_samples_the_rotor_more_than_once():
         scene = build_scene(wind=wind, duration=100.0, **options)
         assert rotor_samples(scene.model.integrator) == samples
         assert scene.data().samples.shape == (4 * samples, 7)
-    assert build_integrator("abm4", 1).gusts is None and rotor_samples(None) == 0
+    assert build_integrator("abm4", 1).substeps is None and rotor_samples(None) == 0
 
 
 def test_samples_of_another_integrator_are_refused():

@@ -10,7 +10,6 @@ from scipy.integrate import solve_ivp
 from fowt_env.plant.integrators import INTEGRATORS
 from fowt_env.plant.rollout import RUNNING, advance
 from fowt_env.plant.state import State
-from fowt_env.scene.build import STEPS
 from fowt_env.training.studies.robustness import extremes as stability_extremes
 from fowt_env.training.studies.robustness import long_runs as stability_long
 from fowt_env.training.studies.robustness import random_cases as stability_cases
@@ -28,7 +27,7 @@ def keeps_the_margin(name, integrator, duration):
     point = kind.point(base)
     fine, _ = stability_map.excursions(base, point, 0.025, duration)
     scene = stability_long.with_integrator(base, integrator, kind.rotor_samples)
-    late = stability_map.excursions(scene, point, stability_map.MARGIN * STEPS[integrator], duration)[1]
+    late = stability_map.excursions(scene, point, stability_map.MARGIN * INTEGRATORS[integrator].dt, duration)[1]
     return bool(np.all(late <= stability_map.GROWTH * (fine + stability_map.FLOOR)))
 
 
@@ -143,7 +142,7 @@ def test_euler_angles_of_a_tumbling_body_follow_a_quaternion_and_bodies_one_by_o
         dv = rigid_body.accelerations(platform, turbine, R, y[4:7], y[7:10], y[10], zero, zero, 0.0, 0.0)
         return np.r_[rigid_body.quaternion_rate(y[:4], y[7:10]), dv]
 
-    duration, dt = 20.0, STEPS["rk4"]
+    duration, dt = 20.0, INTEGRATORS["rk4"].dt
     y0 = np.r_[rigid_body.quaternion(*x[3:6]), x[7:14]]
     twin = solve_ivp(rate, (0.0, duration), y0, method="DOP853", rtol=1e-9, atol=1e-10)
     assert advance(scene.handle(), x, np.zeros(2), 0, round(duration / dt), dt) == RUNNING

@@ -10,7 +10,7 @@ from fowt_env.envs import FowtEnv
 from fowt_env.errors import InputError
 from fowt_env.plant.hydro.linear_damping import LinearDamping
 from fowt_env.plant.state import STATES, State
-from fowt_env.scene.build import STEPS, build_scene
+from fowt_env.scene.build import build_scene
 from fowt_env.training.cli.app import app
 from fowt_env.training.studies.robustness import extremes as stability_extremes
 from fowt_env.training.studies.robustness import long_runs as stability_long

@@ -10,12 +10,12 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from fowt_env.envs import FowtEnv
-from fowt_env.plant.integrators import INTEGRATORS, START_STEPS, Multistep, build_integrator
+from fowt_env.plant.integrators import INTEGRATORS, START_STEPS, Adams, build_integrator
 from fowt_env.plant.measurement import N_MEASUREMENTS
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rollout import RUNNING, advance, forget, observe
 from fowt_env.plant.state import N_COMMANDS, N_RIGID, State
-from fowt_env.scene.build import STEPS, build_scene
+from fowt_env.scene.build import build_scene
 from fowt_env.simulation import initial_state
 from fowt_env.training.studies.robustness.random_cases import Runner, platform_energy, potential_energy
 
@@ -102,7 +102,7 @@ def own_momenta(scene, x):
 def free_drift(integrator, steps, dt=None, progress=None):
     """{energy, linear, angular: largest relative change; status} of the free body over so many steps."""
     scene = with_integrator(free_scene(), integrator)
-    dt = STEPS[integrator] if dt is None else dt
+    dt = INTEGRATORS[integrator].dt if dt is None else dt
     x, u, handle = free_start(), np.zeros(N_COMMANDS), scene.handle()
     energy0, (linear0, angular0) = kinetic_energy(scene, x), own_momenta(scene, x)
     drift = {"energy": 0.0, "linear": 0.0, "angular": 0.0}
@@ -131,7 +131,7 @@ def floating_drift(integrator, steps, dt=None, progress=None):
     The energy of the motion is kinetic (without the rotor's spin) and potential energy above rest.
     """
     scene = with_integrator(floating_scene(), integrator)
-    dt = STEPS[integrator] if dt is None else dt
+    dt = INTEGRATORS[integrator].dt if dt is None else dt
     x, u, handle = floating_start(), np.zeros(N_COMMANDS), scene.handle()
     start = kinetic_energy(scene, x) + potential_energy(handle, x)
     moving = potential_energy(handle, x) - potential_energy(handle, np.zeros(N_RIGID))
@@ -215,7 +215,7 @@ def measured_orders(duration=20.0, steps=(0.1, 0.05, 0.025), finest=0.003125):
 
     def end(name, dt):
         scene = with_integrator(base, name)
-        if not isinstance(scene.model.integrator, Multistep):
+        if not isinstance(scene.model.integrator, Adams):
             x, handle = x0.copy(), scene.handle()
             forget(handle)
             advance(handle, x, u, 0, round(duration / dt), dt)
@@ -248,7 +248,7 @@ def quaternion_difference(duration=60.0, integrator="rk4", dt=None):
     integrated by an eighth-order method; body rates come from the plant's equation of motion in both.
     """
     scene = with_integrator(free_scene(), integrator)
-    dt = STEPS[integrator] if dt is None else dt
+    dt = INTEGRATORS[integrator].dt if dt is None else dt
     x = np.zeros(N_RIGID)
     x[3:6], x[10:13] = (0.5, 0.3, -1.0), (0.6, 0.02, 0.25)
     x[State.ROTOR_SPEED] = 1.2671

@@ -16,7 +16,7 @@ from fowt_env.analysis.trim import OperatingPoint, trim
 from fowt_env.plant.integrators import INTEGRATORS, feathering
 from fowt_env.plant.rollout import RUNNING, advance, forget
 from fowt_env.plant.state import STATE_INDEX, STATES, State
-from fowt_env.scene.build import STEPS, build_scene
+from fowt_env.scene.build import build_scene
 from fowt_env.training.studies.robustness.long_runs import with_integrator
 
 DURATION = 300.0  # s of each run: hundreds of steps even at the largest
@@ -228,7 +228,7 @@ def measured_limit(scene, point, fine, duration=DURATION):
     def holds(dt):
         return bool(np.all(excursions(scene, point, dt, duration)[1] <= GROWTH * (fine + FLOOR)))
 
-    return first_unstable(holds, STEPS[scene.options["integrator"]])
+    return first_unstable(holds, INTEGRATORS[scene.options["integrator"].dt])
 
 
 def stability_map(kinds=None, integrators=INTEGRATORS, duration=DURATION, progress=None):
@@ -254,7 +254,7 @@ def stability_map(kinds=None, integrators=INTEGRATORS, duration=DURATION, progre
             if kind.rotor_samples > 1 and integrator != "ab4":
                 continue
             scene = with_integrator(base, integrator, kind.rotor_samples)
-            default = STEPS[integrator]
+            default = INTEGRATORS[integrator].dt
             found = measured_limit(scene, point, fine, duration)
             scheme = "abm4" if integrator == "ab4" and feathering(point.state, base.model) else integrator
             theory = first_unstable(lambda h, m=model, i=scheme: stable(m.A, h, i, duration), default)

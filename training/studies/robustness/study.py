@@ -15,7 +15,6 @@ from fowt_env.errors import unknown
 from fowt_env.files.atomic import replacing
 from fowt_env.plant.integrators import INTEGRATORS
 from fowt_env.plant.rollout import RUNNING
-from fowt_env.scene.build import STEPS
 from fowt_env.training.benchmarks.speed import header
 from fowt_env.training.studies.robustness import extremes as stability_extremes
 from fowt_env.training.studies.robustness import long_runs as stability_long
@@ -86,7 +85,7 @@ def map_part(sizes, folder, progress):
         rows = table[table["integrator"] == integrator]
         least = rows.loc[rows["margin"].idxmin()]
         found.claim(
-            f"{integrator}: default step of {STEPS[integrator]:g} s",
+            f"{integrator}: default step of {INTEGRATORS[integrator].dt:g} s",
             f"{len(rows)} kinds of scene",
             f"least margin {least['margin']:.1f} ({least['kind']})",
             f"factor {stability_map.MARGIN:g} below the first blow-up",
@@ -234,13 +233,13 @@ def long_part(sizes, folder, progress):
             target = ", ".join(f"{key} {most:.0e}" for key, most in limits.items())
             found.claim(
                 f"free body, {integrator}, {when}: relative change of energy and momenta",
-                f"{steps} steps of {STEPS[integrator]:g} s", told, target, good,
+                f"{steps} steps of {INTEGRATORS[integrator].dt:g} s", told, target, good,
             )  # fmt: skip
     for integrator, most in FLOATING_DRIFT.items():
         drift = long.floating_drift(integrator, sizes.steps, progress=progress)
         found.claim(
             f"undamped floating body on its lines, {integrator}: change of energy over that of motion",
-            f"{sizes.steps} steps of {STEPS[integrator]:g} s", f"{drift['energy']:.1e}",
+            f"{sizes.steps} steps of {INTEGRATORS[integrator].dt:g} s", f"{drift['energy']:.1e}",
             f"{most:.0e}", drift["status"] == RUNNING and drift["energy"] <= most,
         )  # fmt: skip
     memory = long.plant_memory(sizes.steps, progress)

@@ -1,0 +1,107 @@
+"""The rotor's load within a step of Adams-Bashforth 4, for a box of wind that it crosses fast."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from fowt_env.plant.aero.load import rotor_part
+from fowt_env.plant.aero.wind import wind_now
+from fowt_env.plant.compile.decorators import kernel
+from fowt_env.plant.drivetrain import pitch_after
+from fowt_env.plant.model import LoadCache
+from fowt_env.plant.rigid_body import accelerate
+from fowt_env.plant.state import Command, State, Wrench, pose_in
+
+BASHFORTH = (55.0 / 24.0, -59.0 / 24.0, 37.0 / 24.0, -9.0 / 24.0)  # Adams-Bashforth 4, latest first
+N_SAMPLE = 7  # of a sample of the rotor's load: its wrench and its torque
+
+
+class RotorSubsteps(NamedTuple):
+    """How the rotor's load is followed within a step of Adams-Bashforth 4, see follow_rotor."""
+
+    samples: int  # evaluations of the rotor's load per step, evenly spaced from the step's beginning
+    weight: np.ndarray  # (4 samples,) of the samples, latest first
+
+
+def build_substeps(samples):
+    """RotorSubsteps of a number of samples per step, None for one.
+
+    The weights are those of Adams-Bashforth 4 in `samples` shorter steps, less those of one step of it, so
+    that a load that varies slowly is left alone.
+    """
+    if samples == 1:
+        return None
+    weight = np.zeros(4 * samples)
+    for latest in range(samples):  # of each short step, counted back from the last
+        weight[latest : latest + 4] += np.array(BASHFORTH) / samples
+    weight[samples - 1 :: samples] -= BASHFORTH
+    return RotorSubsteps(samples, weight)
+
+
+@kernel
+def sample_rotor(t, x, u, dt, model, substeps, data):
+    """Put the rotor's loads within the step from t into data.samples, latest first, before those of the past.
+
+    Between the ends of the step the state is extrapolated from the last two derivatives: to second order,
+    while the platform hardly moves and the blades turn by 7 deg. Without substeps nothing is done.
+    """
+    if substeps is None:
+        return
+    samples, cache, history, between = data.samples, data.cache, data.history, data.stages[2]
+    n = substeps.samples
+    for k in range(samples.shape[0] - 1, n - 1, -1):
+        for i in range(N_SAMPLE):
+            samples[k, i] = samples[k - n, i]
+    for i in range(6):
+        samples[n - 1, i] = cache[LoadCache.ROTOR + i]
+    samples[n - 1, 6] = cache[LoadCache.TORQUE]
+    past = 0 if cache[LoadCache.STEPS] < 1.0 else 1
+    for part in range(1, n):
+        after = part * dt / n
+        bend = 0.5 * after * after / dt
+        for i in range(x.shape[0]):
+            between[i] = x[i] + after * history[0, i] + bend * (history[0, i] - history[past, i])
+        between[State.BLADE_PITCH] = pitch_after(
+            x[State.BLADE_PITCH], u[Command.BLADE_PITCH], after, model.actuator
+        )
+        now = wind_now(t + after, model.aero.wind)
+        pose = pose_in(between, model.rigid_body.plane)
+        aero = rotor_part(
+            t + after, pose, between, now, model.aero, model.aero.rotor, data.stages[3], data.counters
+        )
+        row = samples[n - 1 - part]
+        row[0], row[1], row[2] = aero.wrench.fx, aero.wrench.fy, aero.wrench.fz
+        row[3], row[4], row[5] = aero.wrench.mx, aero.wrench.my, aero.wrench.mz
+        row[6] = aero.torque
+
+
+@kernel
+def follow_rotor(dt, model, substeps, data, y):
+    """Add to the velocities y at the end of a step what sample_rotor found within it; without substeps nothing.
+
+    To the velocities of Adams-Bashforth 4 comes the difference that short steps of it make to the impulse of
+    the rotor's load: dt M^-1 (sum of weight times sample), with the mass matrix of the step's beginning.
+    """
+    if substeps is None:
+        return
+    samples, weight = data.samples, substeps.weight
+    fx = fy = fz = mx = my = mz = torque = 0.0
+    for k in range(samples.shape[0]):
+        share = weight[k]
+        fx += share * samples[k, 0]
+        fy += share * samples[k, 1]
+        fz += share * samples[k, 2]
+        mx += share * samples[k, 3]
+        my += share * samples[k, 4]
+        mz += share * samples[k, 5]
+        torque += share * samples[k, 6]
+    extra, still = data.stages[3], data.stages[2]
+    for i in range(still.shape[0]):
+        still[i] = 0.0  # without velocities the equation of motion has no terms but the load
+    body = model.rigid_body
+    accelerate(
+        pose_in(still, body.plane), still, Wrench(fx, fy, fz, mx, my, mz), torque, data.added_mass, body,
+        data.matrix, extra,
+    )  # fmt: skip
+    for i in range(State.VX, State.ROTOR_SPEED + 1):
+        y[i] += dt * extra[i]
