@@ -17,10 +17,11 @@ if TYPE_CHECKING:  # the names below, for editors and type checkers
     from fowt_env.errors import InputError as InputError
     from fowt_env.errors import SimulationStopped as SimulationStopped
     from fowt_env.plant.measurement import Measurement as Measurement
+    from fowt_env.plant.user_loads import Force as Force
+    from fowt_env.plant.user_loads import Motion as Motion
     from fowt_env.scene.build import Scene as Scene
     from fowt_env.scene.build import build_scene as build_scene
     from fowt_env.scene.user_loads import Load as Load
-    from fowt_env.scene.user_loads import Motion as Motion
     from fowt_env.scene.user_loads import load_kernel as load_kernel
     from fowt_env.simulation import simulate as simulate
 
@@ -36,7 +37,8 @@ _PUBLIC = {
     "natural_periods": "fowt_env.analysis.linear_model",
     "Measurement": "fowt_env.plant.measurement",
     "Load": "fowt_env.scene.user_loads",
-    "Motion": "fowt_env.scene.user_loads",
+    "Force": "fowt_env.plant.user_loads",
+    "Motion": "fowt_env.plant.user_loads",
     "load_kernel": "fowt_env.scene.user_loads",
     "InputError": "fowt_env.errors",
     "SimulationStopped": "fowt_env.errors",

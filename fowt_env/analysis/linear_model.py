@@ -16,7 +16,7 @@ from fowt_env.plant.compile.handle import data_of, model_of
 from fowt_env.plant.dynamics import evaluate, loads_of, respond
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measure
 from fowt_env.plant.model import LoadCache
-from fowt_env.plant.state import N_RIGID, STATE_INDEX, STATES, State
+from fowt_env.plant.state import STATE_INDEX, STATES, State
 
 # velocity steps are small because quadratic drag leaves a false damping proportional to them
 STEPS = np.array([1e-3, 1e-3, 1e-3, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-7, 1e-7, 1e-7, 1e-4, 1e-5])
@@ -223,12 +223,16 @@ def linearize(scene, operating_point=None):
 
     The wind input moves the hub wind with its shear; waves are flat, and their small force comes in by
     wave_force. Drag has no linear part at rest in still water, so viscous damping is absent there.
-    Dynamic inflow is not linearised.
+    Internal states (dynamic inflow, those of loads) are not linearised.
 
-    Raises: InputError if the scene has dynamic inflow.
+    Raises: InputError if the scene has any.
     """
-    if scene.n_state > N_RIGID:
-        raise InputError("linearize: build the scene with dynamic_inflow=False")
+    internal = [block.name for block in scene.blocks if block.steady == "settled"]
+    if internal:
+        raise InputError(
+            f"linearize: the states of {', '.join(internal)} are not linearised: build the scene without them"
+            " (dynamic_inflow=False)"
+        )
     point = trim(scene) if operating_point is None else operating_point
     body = scene.model.rigid_body._replace(platform_held=point.platform == "fixed")
     plant = _Plant(without_fluctuations(scene, point.wind_speed).with_model(rigid_body=body), scene.n_lines)

@@ -18,7 +18,7 @@ from fowt_env.plant.drivetrain import build_torque_curve, generator_torque
 from fowt_env.plant.dynamics import derivative
 from fowt_env.plant.hydro.load import BandedStrips
 from fowt_env.plant.rollout import output_row
-from fowt_env.plant.state import N_RIGID, State, pose_of
+from fowt_env.plant.state import N_COMMANDS, Command, State, pose_of
 from fowt_env.scene.build import Scene
 from fowt_env.weather.wind import make_series
 from fowt_env.weather.wind_field import steady_field
@@ -134,6 +134,9 @@ def settle_wake(handle, x, dx):
     )  # fmt: skip
 
 
+SETTLING = 8  # Newton steps for a block of internal states; one is enough where they are linear
+
+
 @dataclass
 class _Steady:
     """Residual evaluations of a calm scene about one state vector."""
@@ -144,7 +147,7 @@ class _Steady:
         self.data = self.scene.data()
         self.handle = self.scene.handle(self.data)
         self.x = np.zeros(self.scene.n_state)
-        self.u = np.zeros(2)
+        self.u = np.zeros(N_COMMANDS)
         self.dx = np.zeros_like(self.x)
         self.mean = np.zeros_like(self.x)
         self.curve = build_torque_curve(self.scene.turbine.torque_law)
@@ -153,20 +156,54 @@ class _Steady:
 
     def rates(self):
         """Azimuth-averaged derivative at the present state and command."""
-        if self.scene.n_state > N_RIGID:
-            settle_wake(self.handle, self.x, self.dx)
+        for block in self.scene.blocks:
+            if block.steady == "settled":
+                self.settle_internal(block)
         mean_derivative(self.handle, self.x, self.u, AZIMUTHS, self.dx, self.mean)
         if fault := self.scene.first_nonfinite_load(self.data):
             raise InputError(f"no steady state found for {label(self.scene)}: {fault}")
         return self.mean
+
+    def settle_internal(self, block):
+        """Set a block of internal states to where its rates are zero, for the rest held as it is.
+
+        Raises: InputError where there is no such place, as of an integral.
+        """
+        if block.name == "wake":
+            settle_wake(self.handle, self.x, self.dx)
+            return
+        rows = slice(block.offset, block.offset + block.size)
+
+        def rates_at(values):
+            self.x[rows] = values
+            mean_derivative(self.handle, self.x, self.u, AZIMUTHS, self.dx, self.mean)
+            return self.mean[rows].copy()
+
+        values = self.x[rows].copy()
+        for _ in range(SETTLING):
+            rates = rates_at(values)
+            steps = 1e-6 * np.maximum(1.0, np.abs(values))
+            slopes = np.array([(rates_at(values + step) - rates) / step.sum() for step in np.diag(steps)]).T
+            try:
+                change = np.linalg.solve(slopes, rates)
+            except np.linalg.LinAlgError:
+                change = np.full(block.size, np.nan)
+            if not np.isfinite(change).all():
+                raise InputError(
+                    f"{block.name}: its states have no steady value: their rates must depend on them"
+                )
+            values = values - change
+            if np.abs(change).max() <= 1e-12 * np.maximum(1.0, np.abs(values)).max():
+                break
+        self.x[rows] = values
 
     def rotor_acceleration(self, rotor_speed, blade_pitch):
         """w_b' with the torque of the static curve, platform as it is."""
         ratio = self.scene.turbine.drivetrain.gear_ratio
         self.x[State.ROTOR_SPEED] = rotor_speed
         self.x[State.BLADE_PITCH] = blade_pitch
-        self.u[0] = generator_torque(ratio * rotor_speed, blade_pitch, self.curve)
-        self.u[1] = blade_pitch
+        self.u[Command.GENERATOR_TORQUE] = generator_torque(ratio * rotor_speed, blade_pitch, self.curve)
+        self.u[Command.BLADE_PITCH] = blade_pitch
         return self.rates()[State.ROTOR_SPEED]
 
     def settle_rotor(self):

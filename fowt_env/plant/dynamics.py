@@ -38,7 +38,7 @@ def evaluate(t, x, model, data, dx):
     aero = aero_load(t, pose, x, model.aero, data, dx)
     hydro = hydro_load(t, pose, x, model.hydro, data)
     mooring = mooring_load(pose, model.mooring, data.lines, data.counters)
-    evaluate_user_loads(t, pose, x, model.aero, model.hydro, model.user, data)
+    evaluate_user_loads(t, pose, x, model.aero, model.hydro, model.user, data, dx)
 
     tower = add_user_loads(aero.tower, True, model.user, data)
     load = add(aero.rotor.wrench, tower)

@@ -51,7 +51,7 @@ def rates(t, x, u, model, data, dx):
         cache[LoadCache.VALID] = 1.0
         cache[LoadCache.TIME] = t
         cache[LoadCache.ELEVATED] = 0.0
-    for i in range(State.WAKE, x.shape[0]):
+    for i in range(State.INTERNAL, x.shape[0]):
         dx[i] = data.stages[0, i]
     respond(x, u, model, data, dx)
 

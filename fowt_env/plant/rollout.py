@@ -161,6 +161,8 @@ def rollout(handle, x, u, law, parameters, memory, measurement, dx, schedule, fi
             period = schedule.per_control * dt
             follow_torque(t, torque, u, period, model.generator, schedule.grid_loss, data.cache)
         if ending or step % schedule.per_output == 0:
+            if rows == out.shape[0]:
+                raise IndexError("rollout: out has too few rows")
             output_plant(model, data, x, u, t, dx, out[rows])
             rows += 1
         if ending:

@@ -12,7 +12,7 @@ from fowt_env.plant.compile.decorators import kernel
 
 
 class State(IntEnum):
-    """Index of each state in the flat (n_state,) float64 vector. Wake states follow from WAKE on."""
+    """Index of each state in the flat (n_state,) float64 vector; a scene's further blocks begin at INTERNAL."""
 
     SURGE = 0  # position of the body origin in O, m
     SWAY = 1
@@ -29,10 +29,39 @@ class State(IntEnum):
     WZ = 12
     ROTOR_SPEED = 13  # relative to the nacelle, rad/s
     BLADE_PITCH = 14  # collective, positive to feather, rad
-    WAKE = 15  # first wake state; none unless dynamic inflow is on
+    INTERNAL = 15  # first of the internal states, which most scenes have none of: see Block
 
 
-N_RIGID = 15  # states of a plant without wake states
+N_RIGID = int(State.INTERNAL)
+
+
+class Block(NamedTuple):
+    """States that belong together: a row of the table that a scene has of its state vector."""
+
+    name: str
+    offset: int  # of the first
+    size: int
+    kind: str  # "position", "velocity", or "internal": a state of a load or an actuator
+    steady: str  # in a steady state: "solved" for balance, "zero", "averaged" over, or "settled": own rate zero
+
+
+RIGID_BLOCKS = (
+    Block("platform_position", State.SURGE, 6, "position", "solved"),
+    Block("azimuth", State.AZIMUTH, 1, "position", "averaged"),
+    Block("platform_velocity", State.VX, 6, "velocity", "zero"),
+    Block("rotor_speed", State.ROTOR_SPEED, 1, "velocity", "solved"),
+    Block("blade_pitch", State.BLADE_PITCH, 1, "internal", "solved"),
+)
+
+
+def state_blocks(internal):
+    """Tuple of all Blocks of a scene with internal ones of these {name: size}, in order; none of size 0."""
+    blocks, offset = list(RIGID_BLOCKS), N_RIGID
+    for name, size in internal.items():
+        if size:
+            blocks.append(Block(name, offset, size, "internal", "settled"))
+            offset += size
+    return tuple(blocks)
 
 
 class Command(IntEnum):

@@ -63,9 +63,23 @@ class Motion(IntEnum):
     WATER_AX = 35  # acceleration of the waves there, m/s2
     WATER_AY = 36
     WATER_AZ = 37
+    STATE = 38  # first of the load's own states, where it has some
 
 
-N_MOTION = len(Motion)
+class Force(IntEnum):
+    """Entries of the array `force` that a load kernel fills, in the axes of the load."""
+
+    FX = 0  # N, at the load's point
+    FY = 1
+    FZ = 2
+    MX = 3  # N m, about it
+    MY = 4
+    MZ = 5
+    RATE = 6  # first of the rates of the load's own states, 1/s
+
+
+N_MOTION = int(Motion.STATE)
+N_FORCE = int(Force.RATE)
 
 
 class UserLoads(NamedTuple):
@@ -77,6 +91,8 @@ class UserLoads(NamedTuple):
     body_axes: np.ndarray  # (n,) bool: axes of velocities and of the force
     above: np.ndarray  # (n,) bool: above the tower base, which then carries it
     water: np.ndarray  # (n,) bool: wants the motion of the water
+    first_state: np.ndarray  # (n + 1,) index in the state vector where the states of each begin, int64
+    most_states: int  # of one load
     kernel0: object  # first-class functions; a tuple of them makes numba warn at every use
     kernel1: object
     kernel2: object
@@ -87,14 +103,14 @@ class UserLoads(NamedTuple):
     kernel7: object
 
 
-def room_of(count):
-    """Entries of Data.user that this many loads need: six of each, the first to fail, and Motion."""
-    return 6 * count + 1 + N_MOTION if count else 0
+def room_of(count, most_states=0):
+    """Entries of Data.user that this many loads need: six of each, the first to fail, Motion and Force."""
+    return 6 * count + 1 + N_MOTION + N_FORCE + 2 * most_states if count else 0
 
 
 @inlined_kernel
 def call_kernel(i, user, parameters, motion, force):
-    """Have load i write its force and moment (6,)."""
+    """Have load i write its force and moment, and the rates of its states."""
     if i == 0:
         user.kernel0(parameters, motion, force)
     elif i == 1:
@@ -196,16 +212,17 @@ def body_wrench(pose, px, py, pz, body_axes, force):
 
 
 @kernel
-def evaluate_user_loads(t, pose, x, aero, hydro, user, data):
-    """Fill data.user (room_of(n),): the wrench of each load, body axes about the body origin.
+def evaluate_user_loads(t, pose, x, aero, hydro, user, data, dx):
+    """Fill data.user (room_of(n, most),): the wrench of each load, body axes about the body origin.
 
     Entry 6 n becomes the number, from 1, of the first load that gave a number that is not finite while
-    what it was given was finite.
+    what it was given was finite. Rates of the loads' own states go into dx.
     """
     if user is None:
         return
     n, room = user.point.shape[0], data.user
-    motion = room[6 * n + 1 :]
+    after = 6 * n + 1 + N_MOTION + user.most_states
+    motion, force = room[6 * n + 1 : after], room[after:]
     fill_common(t, pose, x, surface_at_origin(t, hydro, data), motion)
     for i in range(n):
         px, py, pz = user.point[i, 0], user.point[i, 1], user.point[i, 2]
@@ -214,20 +231,25 @@ def evaluate_user_loads(t, pose, x, aero, hydro, user, data):
         u, v, w = wind_of(t, motion[Motion.X], motion[Motion.Y], motion[Motion.Z], aero)
         put(motion, Motion.WIND_X, pose, axes, u, v, w)
         fill_water(t, pose, hydro, user.water[i], axes, motion)
-        force = room[6 * i : 6 * i + 6]
-        for j in range(6):
+        first, states = user.first_state[i], user.first_state[i + 1] - user.first_state[i]
+        for j in range(states):
+            motion[Motion.STATE + j] = x[first + j]
+        for j in range(force.shape[0]):
             force[j] = 0.0
         call_kernel(i, user, user.parameters[user.first[i] : user.first[i + 1]], motion, force)
         total = given = 0.0
-        for j in range(6):
+        for j in range(N_FORCE + states):
             total += force[j]
-        for j in range(N_MOTION):
+        for j in range(N_MOTION + states):
             given += motion[j]
         if room[6 * n] == 0.0 and not isfinite(total) and isfinite(given):
             room[6 * n] = i + 1.0
+        for j in range(states):
+            dx[first + j] = force[Force.RATE + j]
         load = body_wrench(pose, px, py, pz, axes, force)
-        force[0], force[1], force[2] = load.fx, load.fy, load.fz
-        force[3], force[4], force[5] = load.mx, load.my, load.mz
+        k = 6 * i
+        room[k], room[k + 1], room[k + 2] = load.fx, load.fy, load.fz
+        room[k + 3], room[k + 4], room[k + 5] = load.mx, load.my, load.mz
 
 
 @kernel

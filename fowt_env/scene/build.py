@@ -41,7 +41,7 @@ from fowt_env.plant.integrators import INTEGRATORS, build_integrator, rotor_samp
 from fowt_env.plant.model import N_CACHE, Data, Model, RigidBody
 from fowt_env.plant.mooring import build_mooring
 from fowt_env.plant.rotor_substeps import N_SAMPLE
-from fowt_env.plant.state import N_RIGID
+from fowt_env.plant.state import N_RIGID, Block, state_blocks
 from fowt_env.plant.user_loads import room_of
 from fowt_env.scene.user_loads import Load, build_user_loads, checked_loads, first_nonfinite_load
 from fowt_env.weather.waves import build_waves
@@ -120,10 +120,15 @@ class Scene:
     def load_names(self) -> tuple[str, ...]:
         return tuple(load.name for load in self.loads)
 
+    @cached_property
+    def blocks(self) -> tuple[Block, ...]:
+        """What the entries of this scene's state vector are, in order."""
+        internal = {"wake": _wake_states(self.model.aero)}
+        return state_blocks(internal | {f"load {load.name}": load.states for load in self.loads})
+
     @property
     def n_state(self) -> int:
-        rotor = None if self.model.aero is None else self.model.aero.rotor
-        return N_RIGID + (n_wake_states(rotor.elements, rotor.wake) if isinstance(rotor, BemRotor) else 0)
+        return self.blocks[-1].offset + self.blocks[-1].size
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -169,7 +174,7 @@ class Scene:
             matrix=np.zeros((6, 6)),
             stages=np.zeros((5, self.n_state)),
             cache=np.zeros(N_CACHE),
-            user=np.zeros(room_of(len(self.loads))),
+            user=np.zeros(room_of(len(self.loads), max((load.states for load in self.loads), default=0))),
             history=np.zeros((4, self.n_state)),
             samples=np.zeros((4 * rotor_samples(self.model.integrator), N_SAMPLE)),
         )
@@ -280,6 +285,7 @@ def build_scene(
         _check_symmetry(platform.lines if chosen["mooring"] else (), current)
     mooring = _mooring(platform.lines, chosen["mooring"])
     user = checked_loads(loads, 0 if mooring is None else mooring.length.shape[0], chosen["planar"])
+    aero = None if air.series is None else _aero(platform, turbine, air, rotor, chosen)
     model = Model(
         rigid_body=build_rigid_body(platform, turbine, plane=True if chosen["planar"] else None),
         layout=build_layout(platform, turbine),
@@ -288,11 +294,17 @@ def build_scene(
         generator=build_torque_limits(turbine.torque_law),
         hydro=_hydro(platform, waves, current, chosen) if chosen["hydrodynamics"] else None,
         mooring=mooring,
-        aero=None if air.series is None else _aero(platform, turbine, air, rotor, chosen),
+        aero=aero,
         integrator=build_integrator(chosen["integrator"], _samples(chosen, air.field)),
-        user=build_user_loads(user, platform.tower.base_height),
+        user=build_user_loads(user, platform.tower.base_height, N_RIGID + _wake_states(aero)),
     )
     return Scene(model, platform, turbine, air.spec, sea, seed, rotor, chosen, air.speed, user, label)
+
+
+def _wake_states(aero):
+    """Number of states of the wake of an Aero part or None."""
+    rotor = None if aero is None else aero.rotor
+    return n_wake_states(rotor.elements, rotor.wake) if isinstance(rotor, BemRotor) else 0
 
 
 def _aero(platform, turbine, air, rotor, chosen):

@@ -17,11 +17,12 @@ from fowt_env.descriptions.records import is_number
 from fowt_env.errors import InputError
 from fowt_env.plant.channels import channels
 from fowt_env.plant.compile.decorators import FLOATS
-from fowt_env.plant.user_loads import MOST_LOADS, N_MOTION, Motion, UserLoads
+from fowt_env.plant.user_loads import MOST_LOADS, N_FORCE, N_MOTION, Motion, UserLoads
 
 AXES = ("inertial", "body")
 SIGNATURE = types.void(FLOATS, FLOATS, FLOATS)
 ARGUMENTS = 3
+MOST_STATES = 100  # of one load
 IN_PLANE = 1e-9  # share of a force out of the plane of a planar scene that rounding may leave
 TRIALS = (  # states that a load is tried in: surge, sway, heave, roll, pitch, yaw, and their rates
     (np.zeros(6), np.zeros(6)),
@@ -96,9 +97,9 @@ def load_kernel(function: Callable[..., None]) -> LoadKernel:
     """LoadKernel of a function (parameters, motion, force) that numba can compile; a decorator.
 
     parameters  (n,) numbers of the Load; read only
-    motion      (N_MOTION,) what the load may depend on, indexed by Motion; read only
-    force       (6,) zeros, to be filled: force (N) at the load's point and moment (N m) about it, in the
-                axes of the load
+    motion      (N_MOTION + states,) what the load may depend on, indexed by Motion; read only
+    force       (N_FORCE + states,) zeros, to be filled, indexed by Force: force (N) at the load's point and
+                moment (N m) about it, in the axes of the load, and the rates of its states
 
     It must be a function of a module (for worker processes find it by its name), depend on nothing else
     than its arguments, and keep nothing from call to call: several calls make one step.
@@ -130,6 +131,9 @@ class Load:
     water       whether the kernel reads the motion of the water at its point (Motion.WATER_X ...), whose
                 sum over 225 wave components takes 6 microseconds, as three steps at fidelity "standard"
                 without wind (a load without it: 0.4, eight of them: 0.6 a step)
+    states      number of states of its own, integrated with the plant: motion[Motion.STATE + i] is one, and
+                force[Force.RATE + i] its rate. A run that starts from "zero" has them zero; in a trim their
+                rates are zero
 
     It may depend on the wind, the waves, the rotor and the time, and not on accelerations: give mass and
     added mass to the platform file. The rotor shaft feels it through the platform alone. A trim and a
@@ -144,6 +148,7 @@ class Load:
     point: Sequence[float] = (0.0, 0.0, 0.0)
     axes: str = "inertial"
     water: bool = False
+    states: int = 0
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name.isidentifier():
@@ -161,10 +166,16 @@ class Load:
             raise InputError(f"{where}: axes = {self.axes!r}: allowed 'inertial', 'body'")
         if not isinstance(self.water, bool):
             raise InputError(f"{where}: water = {self.water!r}: allowed False, True")
+        whole = isinstance(self.states, int) and not isinstance(self.states, bool)
+        if not (whole and 0 <= self.states <= MOST_STATES):
+            raise InputError(
+                f"{where}: states = {self.states!r}: must be a whole number from 0 to {MOST_STATES}"
+            )
 
     def key(self) -> tuple:
         """All that it does, as plain values that are the same in every process."""
-        return self.name, self.kernel.fingerprint(), self.parameters, self.point, self.axes, self.water
+        own = self.name, self.kernel.fingerprint(), self.parameters, self.point, self.axes, self.water
+        return (*own, self.states)
 
 
 def _numbers(where, key, values):
@@ -224,7 +235,7 @@ def _motion(load, position, rate):
     turn = _rotation(*position[3:])
     arm = turn @ load.point
     axes = turn.T if load.axes == "body" else np.eye(3)
-    motion = np.zeros(N_MOTION)
+    motion = np.zeros(N_MOTION + load.states)
     motion[Motion.X : Motion.Z + 1] = position[:3] + arm
     motion[Motion.VX : Motion.VZ + 1] = axes @ (rate[:3] + np.cross(rate[3:], arm))
     motion[Motion.WX : Motion.WZ + 1] = axes @ rate[3:]
@@ -240,7 +251,7 @@ def _try(load, position, rate, planar):
         position, rate = position.copy(), rate.copy()
         position[[1, 3, 5]] = rate[[1, 3, 5]] = 0.0
     where = f"load {load.name!r}"
-    motion, force = _motion(load, position, rate), np.zeros(6)
+    motion, force = _motion(load, position, rate), np.zeros(N_FORCE + load.states)
     parameters = np.array(load.parameters)
     motion.flags.writeable = parameters.flags.writeable = False
     try:
@@ -253,10 +264,10 @@ def _try(load, position, rate, planar):
             f"{where}: its kernel returned {returned!r}: must write to its third argument instead"
         )
     if not all(isfinite(value) for value in force):
-        raise InputError(f"{where}: its kernel gave force = {force.tolist()}: must be six finite numbers")
+        raise InputError(f"{where}: its kernel gave force = {force.tolist()}: must be {force.size} finite numbers")
     if planar:
         arm = _rotation(*position[3:]) @ load.point if load.axes == "inertial" else np.array(load.point)
-        moment = force[3:] + np.cross(arm, force[:3])
+        moment = force[3:6] + np.cross(arm, force[:3])
         out = max(abs(force[1]), abs(moment[0]) / 100.0, abs(moment[2]) / 100.0)  # over an arm of 100 m
         if out > IN_PLANE * np.abs(force[[0, 2]]).max():
             raise InputError(
@@ -265,8 +276,8 @@ def _try(load, position, rate, planar):
             )
 
 
-def build_user_loads(loads: Sequence[Load], base_height: float) -> UserLoads | None:
-    """UserLoads part of checked loads, None without any."""
+def build_user_loads(loads: Sequence[Load], base_height: float, first_state: int) -> UserLoads | None:
+    """UserLoads part of checked loads, None without any. first_state: index of the first of their states."""
     if not loads:
         return None
     sizes = [len(load.parameters) for load in loads]
@@ -278,6 +289,8 @@ def build_user_loads(loads: Sequence[Load], base_height: float) -> UserLoads | N
         np.array([load.axes == "body" for load in loads]),
         np.array([load.point[2] >= base_height for load in loads]),
         np.array([load.water for load in loads]),
+        first_state + np.concatenate([[0], np.cumsum([load.states for load in loads])]).astype(np.int64),
+        max(load.states for load in loads),
         *(load.kernel for load in loads),
         *spare,
     )

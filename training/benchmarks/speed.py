@@ -249,7 +249,7 @@ def loop_time(scene, kind, x, u, dt, seconds, repeats=REPEATS):
     """CPU seconds of the compiled closed loop, controller at 10 Hz, with one row of output."""
     controller = make("pi", scene.turbine, 0.1) if kind.controlled else HeldCommand()
     handle, dx, m = scene.handle(), np.zeros_like(x), np.zeros(N_MEASUREMENTS)
-    rows = np.zeros((1, len(scene.channels)))
+    rows = np.zeros((2, len(scene.channels)))  # of the first and the last instant
     last = round(seconds / dt)
     schedule = Schedule(float(dt), round(0.1 / dt), last + 1, last, inf, inf)
 

@@ -155,14 +155,14 @@ def wake_equilibrium(t, pose, x, now, series, field, rotor, skew, wake, dx, coun
     if rotor is None or series is None:
         return 0
     count = PER_ELEMENT * rotor.blades * rotor.radius.shape[0]
-    for i in range(State.WAKE, State.WAKE + count):
+    for i in range(State.INTERNAL, State.INTERNAL + count):
         x[i] = 0.0
     rotor_load(t, pose, x, now, series, field, rotor, skew, wake, dx, counters)
-    for i in range(State.WAKE, State.WAKE + count, 2):
+    for i in range(State.INTERNAL, State.INTERNAL + count, 2):
         x[i + 1] = dx[i]
         x[i] = 1.0
     rotor_load(t, pose, x, now, series, field, rotor, skew, wake, dx, counters)
-    for i in range(State.WAKE, State.WAKE + count, 2):
+    for i in range(State.INTERNAL, State.INTERNAL + count, 2):
         x[i] = x[i + 1] / (x[i + 1] - dx[i])
         x[i + 1] = x[i] / 0.4
         dx[i] = dx[i + 1] = 0.0

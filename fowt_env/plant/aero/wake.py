@@ -54,7 +54,7 @@ def build_dynamic_inflow(scale=1.0):
 
 
 def n_wake_states(elements, wake):
-    """Number of wake states that follow State.WAKE; 0 without rotor or dynamic inflow."""
+    """Number of wake states of dynamic inflow, the first block of internal ones; 0 without rotor or dynamic inflow."""
     if elements is None or wake is None:
         return 0
     return PER_ELEMENT * elements.blades * len(elements.radius)
@@ -100,7 +100,7 @@ def filtered_induction(section, v_normal, blade, j, wind_speed, wake, x, dx, rad
         return section.induced_normal, section.induced_tangential
     a = -section.induced_normal / v_normal if v_normal != 0.0 else 0.0
     slow, fast = time_constants(a, wind_speed, radius[j], tip_radius, wake)
-    i = State.WAKE + PER_ELEMENT * (blade * radius.shape[0] + j)
+    i = State.INTERNAL + PER_ELEMENT * (blade * radius.shape[0] + j)
     dx[i] = (0.4 * section.induced_normal - x[i]) / slow
     dx[i + 1] = (x[i] + 0.6 * section.induced_normal - x[i + 1]) / fast
     dx[i + 2] = (0.4 * section.induced_tangential - x[i + 2]) / slow

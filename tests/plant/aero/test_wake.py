@@ -152,7 +152,7 @@ def test_time_constants_are_those_of_oeye():
 def test_pitch_step_decays_with_two_time_constants(direction):
     """Analytic solution of the two filters after a step of the quasi-steady value from W0 to W1."""
     x, series, j, section, tau1, tau2 = element_after_a_step()
-    i = State.WAKE + PER_ELEMENT * j + 2 * direction
+    i = State.INTERNAL + PER_ELEMENT * j + 2 * direction
     W0, W1 = x[i + 1], (section.induced_normal, section.induced_tangential)[direction]
     assert abs(W1 - W0) > 1e-3
     dt, steps = 0.05, 600

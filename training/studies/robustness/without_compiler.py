@@ -47,7 +47,7 @@ def start(scene):
     x[:6] = 4.0, -3.0, 0.5, 0.05, 0.08, -0.1
     x[7:13] = 0.5, -0.3, 0.2, 0.01, 0.02, -0.02
     x[State.AZIMUTH], x[State.ROTOR_SPEED], x[State.BLADE_PITCH] = 0.7, 1.2, 0.2
-    x[State.WAKE :] = 1.0
+    x[State.INTERNAL :] = 1.0
     return x
 
 
