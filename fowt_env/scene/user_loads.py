@@ -132,8 +132,8 @@ class Load:
                 sum over 225 wave components takes 6 microseconds, as three steps at fidelity "standard"
                 without wind (a load without it: 0.4, eight of them: 0.6 a step)
     states      number of states of its own, integrated with the plant: motion[Motion.STATE + i] is one, and
-                force[Force.RATE + i] its rate. A run that starts from "zero" has them zero; in a trim their
-                rates are zero
+                force[Force.RATE + i] its rate. A run starts where their rates are zero, as a
+                trim has them
 
     It may depend on the wind, the waves, the rotor and the time, and not on accelerations: give mass and
     added mass to the platform file. The rotor shaft feels it through the platform alone. A trim and a

@@ -4,7 +4,7 @@ import os
 import pickle
 import subprocess
 import sys
-from math import exp, isfinite, nan, pi, radians, sqrt
+from math import exp, isfinite, nan, pi, radians, sin, sqrt
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,7 +13,7 @@ import pytest
 from plant_helpers import rates
 
 import fowt_env
-from fowt_env import Load, Motion, build_scene, linearize, load_kernel, natural_periods, simulate, trim
+from fowt_env import Force, Load, Motion, build_scene, linearize, load_kernel, natural_periods, simulate, trim
 from fowt_env.descriptions.platform import read_platform
 from fowt_env.envs import FowtEnv, FowtVectorEnv
 from fowt_env.errors import InputError, SimulationStopped
@@ -304,7 +304,7 @@ def test_a_pickled_snapshot_of_a_loaded_environment_goes_on_bit_for_bit():
 
 PROCESS = """
 import sys
-from fowt_env import Load, Motion, build_scene, load_kernel, simulate
+from fowt_env import Force, Load, Motion, build_scene, load_kernel, simulate
 from fowt_env.plant.compile.announcement import compilation_announced
 @load_kernel
 def one(parameters, motion, force):
@@ -448,3 +448,65 @@ def test_an_episode_that_a_load_spoils_says_so():
         == infos["termination"][0]
         == ("non-finite state: load 'Late' gave a force that is not finite")
     )
+
+
+# ------------------------------------------------------------------ states of a load's own
+
+
+@load_kernel
+def lagged_push(parameters, motion, force):
+    """A force that follows mean + amplitude sin(omega t) with a lag: tau, mean, amplitude, omega."""
+    tau, mean, amplitude, omega = parameters
+    force[Force.FX] = motion[Motion.STATE]
+    force[Force.RATE] = (mean + amplitude * sin(omega * motion[Motion.TIME]) - motion[Motion.STATE]) / tau
+
+
+def lagged(time, tau, mean, amplitude, omega):
+    """What lagged_push does from its steady value at time 0 on."""
+    swing = np.sin(omega * time) - omega * tau * (np.cos(omega * time) - np.exp(-time / tau))
+    return mean + amplitude * swing / (1.0 + (omega * tau) ** 2)
+
+
+@load_kernel
+def integral(parameters, motion, force):
+    force[Force.RATE] = parameters[0]
+
+
+@pytest.mark.parametrize("fidelity", ["standard", "reference"])
+def test_loads_with_states_follow_the_solution_of_their_equations(fidelity):
+    cases = {"Winch": (4.0, 2e5, 1e5, 0.4), "Jet": (1.0, -1e5, 5e4, 0.9)}
+    loads = [Load(name, lagged_push, values, states=1) for name, values in cases.items()]
+    scene = build_scene(fidelity=fidelity, loads=[loads[0], Load("Still", push, Push(fy=1e3)), loads[1]])
+    assert [block[:3] for block in scene.blocks[-2:]] == [("load Winch", 15, 1), ("load Jet", 16, 1)]
+    frame = simulate(scene, duration=20.0)
+    for name, values in cases.items():
+        expected = lagged(frame["Time_[s]"].to_numpy(), *values)
+        assert np.abs(frame[f"{name}Fxi_[N]"] - expected).max() < 2e-4 * values[2]
+    assert frame["StillFyi_[N]"].to_numpy() == pytest.approx(1e3)
+
+
+def test_a_trim_settles_the_states_and_refuses_what_never_settles():
+    lagged = trim(still(Load("Winch", lagged_push, (4.0, 2e5, 0.0, 1.0), states=1)))
+    assert lagged.state[State.INTERNAL] == pytest.approx(2e5, rel=1e-9)
+    steady = trim(still(Load("Winch", push, Push(fx=2e5))))
+    assert lagged.state[: State.INTERNAL] == pytest.approx(steady.state, rel=1e-7, abs=1e-9)
+    with pytest.raises(InputError, match="load Sum: its states have no steady value"):
+        trim(still(Load("Sum", integral, (1.0,), states=1)))
+
+
+def test_an_environment_carries_the_states_in_its_snapshots():
+    env = FowtEnv(task="above_rated", loads=[Load("Winch", lagged_push, (4.0, 2e5, 0.0, 1.0), states=1)], **QUICK)
+    env.reset(seed=1)
+    action = np.zeros(2)
+    for _ in range(3):
+        env.step(action)
+    kept = env.get_state()
+    first = [env.step(action)[0] for _ in range(4)]
+    env.set_state(kept)
+    assert np.array_equal(first, [env.step(action)[0] for _ in range(4)])
+
+
+@pytest.mark.parametrize("states", [-1, 1.5, True, 101])
+def test_a_number_of_states_that_cannot_be_is_named(states):
+    with pytest.raises(InputError, match="states = .*: must be a whole number from 0 to 100"):
+        Load("Winch", lagged_push, (4.0, 2e5, 0.0, 1.0), states=states)
