@@ -152,7 +152,8 @@ def steady_pitch(scene):
     turbine = scene.turbine
     low, high = turbine.rated_wind_speed - BELOW_RATED, turbine.cut_out_wind_speed
     speeds = low + (high - low) * np.linspace(0.0, 1.0, SCHEDULE_SPEEDS) ** 2
-    steady = (trim(replace(without_fluctuations(scene, speed), wind_speed=speed), platform="fixed") for speed in speeds)
+    scenes = (replace(without_fluctuations(scene, speed), wind_speed=speed) for speed in speeds)
+    steady = (trim(scene, platform="fixed") for scene in scenes)
     return speeds, np.array([point.state[State.BLADE_PITCH] for point in steady])
 
 

@@ -129,7 +129,8 @@ def wind_filter(speed, height, diameter):
 
 def scene_at(scene, speed):
     """The scene in a steady wind (m/s) and flat water."""
-    return replace(without_fluctuations(scene, float(speed)), wind=float(speed), sea=None, wind_speed=float(speed))
+    speed = float(speed)
+    return replace(without_fluctuations(scene, speed), wind=speed, sea=None, wind_speed=speed)
 
 
 def design_model(scene, speed):

@@ -160,7 +160,8 @@ def action_of(u, rotor_speed, actions, action):
         return
     first = rotor_speed if actions.mode == Mode.SETPOINT else u[Command.GENERATOR_TORQUE]
     action[0] = limited(2.0 * (first - actions.low) / (actions.high - actions.low) - 1.0, -1.0, 1.0)
-    pitch = 2.0 * (u[Command.BLADE_PITCH] - actions.pitch_low) / (actions.pitch_high - actions.pitch_low) - 1.0
+    span = actions.pitch_high - actions.pitch_low
+    pitch = 2.0 * (u[Command.BLADE_PITCH] - actions.pitch_low) / span - 1.0
     action[1] = limited(pitch, -1.0, 1.0)
 
 

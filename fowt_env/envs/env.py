@@ -444,7 +444,8 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             raise ResetNeeded("call reset() first: there is no state yet")
         run, scene = self._run, self.scene
         data = scene.data()
-        for name in ("lines", "stages", "cache", "added_mass", "user"):  # what an evaluation at this instant has left
+        # what an evaluation at this instant has left
+        for name in ("lines", "stages", "cache", "added_mass", "user"):
             getattr(data, name)[:] = getattr(run.data, name)
         row = np.empty(len(scene.channels))
         time = run.counts[STEP] * self.dt

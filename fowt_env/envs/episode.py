@@ -136,7 +136,8 @@ def update_estimate(law, setting, run):
 @kernel
 def advance_period(setting, run, estimator):
     """Advance one control period under run.u, measure, observe and pay; returns (status, reward)."""
-    was_limited = torque_was_limited(run.u[Command.GENERATOR_TORQUE], run.wanted[Command.GENERATOR_TORQUE], setting.model.generator)
+    torque, wanted = run.u[Command.GENERATOR_TORQUE], run.wanted[Command.GENERATOR_TORQUE]
+    was_limited = torque_was_limited(torque, wanted, setting.model.generator)
     run.counts[LIMITED] += was_limited
     run.data.cache[LoadCache.TORQUE_LIMITED] = 1.0 if was_limited else 0.0
     copy_into(run.before, run.measurement)
@@ -183,7 +184,10 @@ def act_physical(handle, estimator, torque, blade_pitch):
     setting, run = model_of(handle), data_of(handle)
     run.wanted[Command.GENERATOR_TORQUE] = torque
     run.wanted[Command.BLADE_PITCH] = blade_pitch
-    run.u[Command.GENERATOR_TORQUE] = followed_torque(run.u[Command.GENERATOR_TORQUE], torque, setting.actions.control_dt, setting.model.generator)
+    before = run.u[Command.GENERATOR_TORQUE]
+    run.u[Command.GENERATOR_TORQUE] = followed_torque(
+        before, torque, setting.actions.control_dt, setting.model.generator
+    )
     run.u[Command.BLADE_PITCH] = blade_pitch
     action_of(run.u, run.x[State.ROTOR_SPEED], setting.actions, run.action)
     return advance_period(setting, run, estimator.data)

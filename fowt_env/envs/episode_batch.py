@@ -32,8 +32,8 @@ def act_some(handles, law, estimator, actions, active, statuses, rewards, first,
 def act_all(handles, law, estimator, actions, active, statuses, rewards):
     """One control period of each active environment under its row of actions (n, 2), on this thread.
 
-    handles: list of n Handles of one type. Fills statuses (n,) and rewards (n,). Returns -1, or the index of the
-    first active environment whose action is not finite; then nothing was moved.
+    handles: list of n Handles of one type. Fills statuses (n,) and rewards (n,). Returns -1, or the index of
+    the first active environment whose action is not finite; then nothing was moved.
     """
     bad = first_unusable(actions, active)
     if bad < 0:

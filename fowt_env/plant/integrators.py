@@ -1,8 +1,9 @@
 """Fixed-step integrators of one plant: a class, a step and a row of INTEGRATORS each.
 
-The blade pitch follows its own first-order law exactly within a step (constant command), so the stiffest part of
-the plant does not limit the multistep methods. Nor does the rotor in a box of wind, whose blades pass a cell of
-the grid in a tenth of a second: its load alone is evaluated several times a step (rotor_substeps.py).
+The blade pitch follows its own first-order law exactly within a step (constant command), so the stiffest
+part of the plant does not limit the multistep methods. Nor does the rotor in a box of wind, whose blades pass
+a cell of the grid in a tenth of a second: its load alone is evaluated several times a step
+(rotor_substeps.py).
 """
 
 from typing import NamedTuple
@@ -188,7 +189,9 @@ def build_integrator(name, rotor_samples=1):
     if name not in INTEGRATORS:
         raise unknown("integrator", name, INTEGRATORS)
     method = INTEGRATORS[name]
-    return method.part._replace(substeps=build_substeps(rotor_samples)) if method.samples_rotor else method.part
+    if method.samples_rotor:
+        return method.part._replace(substeps=build_substeps(rotor_samples))
+    return method.part
 
 
 def rotor_samples(method):

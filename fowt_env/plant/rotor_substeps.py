@@ -77,7 +77,7 @@ def sample_rotor(t, x, u, dt, model, substeps, data):
 
 @kernel
 def follow_rotor(dt, model, substeps, data, y):
-    """Add to the velocities y at the end of a step what sample_rotor found within it; without substeps nothing.
+    """Add to the velocities y at the end of a step what sample_rotor found within it; nothing without any.
 
     To the velocities of Adams-Bashforth 4 comes the difference that short steps of it make to the impulse of
     the rotor's load: dt M^-1 (sum of weight times sample), with the mass matrix of the step's beginning.

@@ -12,7 +12,7 @@ from fowt_env.plant.compile.decorators import kernel
 
 
 class State(IntEnum):
-    """Index of each state in the flat (n_state,) float64 vector; a scene's further blocks begin at INTERNAL."""
+    """Index of each state in the flat (n_state,) float64 vector; further blocks begin at INTERNAL."""
 
     SURGE = 0  # position of the body origin in O, m
     SWAY = 1
@@ -42,7 +42,7 @@ class Block(NamedTuple):
     offset: int  # of the first
     size: int
     kind: str  # "position", "velocity", or "internal": a state of a load or an actuator
-    steady: str  # in a steady state: "solved" for balance, "zero", "averaged" over, or "settled": own rate zero
+    steady: str  # how a trim has it: "solved" for, "zero", "averaged" over, or "settled": its own rate is zero
 
 
 RIGID_BLOCKS = (

@@ -264,7 +264,9 @@ def _try(load, position, rate, planar):
             f"{where}: its kernel returned {returned!r}: must write to its third argument instead"
         )
     if not all(isfinite(value) for value in force):
-        raise InputError(f"{where}: its kernel gave force = {force.tolist()}: must be {force.size} finite numbers")
+        raise InputError(
+            f"{where}: its kernel gave force = {force.tolist()}: must be {force.size} finite numbers"
+        )
     if planar:
         arm = _rotation(*position[3:]) @ load.point if load.axes == "inertial" else np.array(load.point)
         moment = force[3:6] + np.cross(arm, force[:3])

@@ -153,7 +153,8 @@ class TurbinePanel:
     def enter(self, scene):
         """Show this scene from now on: the same turbine, other weather."""
         self.scene = scene
-        self.surface = Surface(None if scene.model.hydro is None else scene.model.hydro.waves, self._pixels / self.scale + self.left)
+        waves = None if scene.model.hydro is None else scene.model.hydro.waves
+        self.surface = Surface(waves, self._pixels / self.scale + self.left)
         rest = Pose(
             dict.fromkeys(("PtfmSurge", "PtfmSway", "PtfmHeave", "PtfmRoll", "PtfmPitch", "PtfmYaw"), 0.0)
         )

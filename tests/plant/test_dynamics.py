@@ -383,7 +383,8 @@ def turned_scene(scene, angle):
     waves, aero = model.hydro.waves, model.aero
     if waves is not None:
         cosine, sine = waves.cos_heading, waves.sin_heading
-        parts["hydro.waves"] = waves._replace(cos_heading=c * cosine - s * sine, sin_heading=s * cosine + c * sine)
+        headings = {"cos_heading": c * cosine - s * sine, "sin_heading": s * cosine + c * sine}
+        parts["hydro.waves"] = waves._replace(**headings)
     if aero is not None:
         value = aero.wind.value.copy()
         value[:, :2] = aero.wind.value[:, :2] @ turn[:2, :2].T

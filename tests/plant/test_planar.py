@@ -54,7 +54,8 @@ def test_in_operation_the_torque_of_the_rotor_is_what_differs():
 def test_of_turbulence_the_part_in_the_plane_is_kept():
     wind = {"kind": "ntm", "speed": 18.0, "class": "B"}
     planar, full = (build_scene(wind=wind, seed=3, planar=p, fidelity="fast") for p in (True, False))
-    assert np.array_equal(planar.model.aero.wind.value[:, [0, 2, 3]], full.model.aero.wind.value[:, [0, 2, 3]])
+    values = [scene.model.aero.wind.value[:, [0, 2, 3]] for scene in (planar, full)]
+    assert np.array_equal(*values)
     assert np.all(planar.model.aero.wind.value[:, [1, 4]] == 0.0)
     again = planar.with_weather(wind, None, 4)
     assert np.all(again.model.aero.wind.value[:, [1, 4]] == 0.0)

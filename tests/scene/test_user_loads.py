@@ -495,7 +495,8 @@ def test_a_trim_settles_the_states_and_refuses_what_never_settles():
 
 
 def test_an_environment_carries_the_states_in_its_snapshots():
-    env = FowtEnv(task="above_rated", loads=[Load("Winch", lagged_push, (4.0, 2e5, 0.0, 1.0), states=1)], **QUICK)
+    load = Load("Winch", lagged_push, (4.0, 2e5, 0.0, 1.0), states=1)
+    env = FowtEnv(task="above_rated", loads=[load], **QUICK)
     env.reset(seed=1)
     action = np.zeros(2)
     for _ in range(3):

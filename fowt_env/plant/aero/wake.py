@@ -54,7 +54,7 @@ def build_dynamic_inflow(scale=1.0):
 
 
 def n_wake_states(elements, wake):
-    """Number of wake states of dynamic inflow, the first block of internal ones; 0 without rotor or dynamic inflow."""
+    """Number of states of dynamic inflow, the first block of internal ones; 0 without rotor or wake."""
     if elements is None or wake is None:
         return 0
     return PER_ELEMENT * elements.blades * len(elements.radius)

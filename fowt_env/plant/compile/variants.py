@@ -1,9 +1,10 @@
 """One kernel out of several, chosen by the class of a part when its caller is compiled.
 
-Numba leaves out the branch `else` of `if part is None` where the part is None, but keeps the other one where it
-is not: both are then compiled, though the second can never run. Neither does it prune on a field, `model.part is
-None`, but on a function's own argument alone. So absence is tested first thing in a function that takes the part
-as an argument, and what has several forms is several classes, one of which chosen_by_class compiles.
+Numba leaves out the branch `else` of `if part is None` where the part is None, but keeps the other one where
+it is not: both are then compiled, though the second can never run. Neither does it prune on a field
+(`model.part is None`), but on a function's own argument alone. So absence is tested first thing in a function
+that takes the part as an argument, and what has several forms is several classes: chosen_by_class compiles
+the kernel of one.
 """
 
 import inspect
@@ -14,7 +15,7 @@ from numba.core.extending import overload
 
 
 def chosen_by_class(argument, cases, inlined=False):
-    """A function that is the kernel of cases {class: kernel} that its argument of this name has the class for.
+    """A function that is one of cases {class: kernel}, by the class of its argument of this name.
 
     The kernels take arguments of the same names. inlined: put into the caller whatever the size.
     """

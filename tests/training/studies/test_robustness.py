@@ -27,7 +27,8 @@ def keeps_the_margin(name, integrator, duration):
     point = kind.point(base)
     fine, _ = stability_map.excursions(base, point, 0.025, duration)
     scene = stability_long.with_integrator(base, integrator, kind.rotor_samples)
-    late = stability_map.excursions(scene, point, stability_map.MARGIN * INTEGRATORS[integrator].dt, duration)[1]
+    step = stability_map.MARGIN * INTEGRATORS[integrator].dt
+    late = stability_map.excursions(scene, point, step, duration)[1]
     return bool(np.all(late <= stability_map.GROWTH * (fine + stability_map.FLOOR)))
 
 

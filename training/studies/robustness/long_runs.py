@@ -53,7 +53,7 @@ def floating_scene():
 
 
 def free_start():
-    """State (N_RIGID,) of a body that drifts, nutates and keeps its platform pitch off the singular 90 deg."""
+    """State (N_RIGID,) of a body that drifts, nutates and keeps its pitch off the singular 90 deg."""
     x = np.zeros(N_RIGID)
     x[3:6] = 0.2, -0.15, 0.4
     x[7:10] = 0.1, 0.05, -0.08

@@ -94,8 +94,8 @@ def run_case(
     from the origin (m) and rotor speed (rad/s).
     """
     return _run_case(
-        model_of(handle), data_of(handle), x, u, act, parameters, memory, measurement, dx, commands, per_control,
-        per_segment, last, dt, peak,
+        model_of(handle), data_of(handle), x, u, act, parameters, memory, measurement, dx, commands,
+        per_control, per_segment, last, dt, peak,
     )  # fmt: skip
 
 
