@@ -133,9 +133,9 @@ def check_duration(scene: Scene, duration: float) -> None:
     """Refuse a run that is longer than the scene's random or recorded weather."""
     limit = scene.options["duration"]
     aero, hydro = scene.model.aero, scene.model.hydro
-    waves = None if hydro is None else hydro.waves
+    waves: Any = None if hydro is None else hydro.waves
     random_sea = waves is not None and waves.omega.shape[0] > 1
-    wind = None if aero is None else aero.wind
+    wind: Any = None if aero is None else aero.wind
     if isinstance(scene.wind, WindBox) and duration > scene.wind.usable:
         raise InputError(
             f"duration = {duration:g} s: the box of wind covers {scene.wind.usable:.1f} s and does not repeat"

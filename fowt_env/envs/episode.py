@@ -14,7 +14,7 @@ from fowt_env.envs.observations import ObservationMap, fill_observation, fill_si
 from fowt_env.envs.rewards import Scales, fill_terms, weighted_sum
 from fowt_env.envs.sensors import Sensors, take_reading
 from fowt_env.plant.compile.decorators import entry, kernel
-from fowt_env.plant.compile.handle import data_of, model_of
+from fowt_env.plant.compile.handle import by_reference, data_of, model_of
 from fowt_env.plant.drivetrain import followed_torque, torque_was_limited
 from fowt_env.plant.measurement import Measure
 from fowt_env.plant.model import Data, LoadCache, Model
@@ -27,10 +27,9 @@ N_COUNTS = 3
 SHOWN_COUNTS = {"saturated_actions": SATURATED, "torque_limited": LIMITED}  # in the infos
 
 
+@by_reference
 class Setting(NamedTuple):
     """What stays fixed during an episode."""
-
-    by_reference = True
 
     model: Model
     actions: ActionMap
@@ -45,10 +44,9 @@ class Setting(NamedTuple):
     sensors: Sensors | None  # between the plant and its readers; None: readings are the measurements
 
 
+@by_reference
 class Run(NamedTuple):
     """What moves during an episode; the arrays down to reference are its whole state."""
-
-    by_reference = True
 
     data: Data
     x: np.ndarray  # (n_state,)

@@ -9,6 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fowt_env.plant.compile.handle import by_reference
+
 
 class RigidBody(NamedTuple):
     """Mass properties of the whole turbine about the body origin, theory.md Eq. (10)."""
@@ -25,6 +27,7 @@ class RigidBody(NamedTuple):
     plane: object = None  # True: surge, heave and platform pitch alone move; None: all six motions
 
 
+@by_reference
 class Model(NamedTuple):
     """Everything that does not change while stepping: one slot per physical question."""
 
@@ -38,8 +41,6 @@ class Model(NamedTuple):
     aero: object  # aero.load.Aero or None: no aerodynamics at all
     integrator: object  # a class of integrators.INTEGRATORS
     user: object = None  # user_loads.UserLoads or None
-
-    by_reference = True
 
 
 class LoadCache(IntEnum):
@@ -67,6 +68,7 @@ class LoadCache(IntEnum):
 N_CACHE = 38
 
 
+@by_reference
 class Data(NamedTuple):
     """What changes: scratch of one plant. lines, counters, cache, history and samples last between calls."""
 
@@ -82,4 +84,3 @@ class Data(NamedTuple):
     history: np.ndarray  # (4, n_state) derivatives of past steps, latest first
     samples: np.ndarray  # (4 samples, 7) rotor loads within past steps, latest first
 
-    by_reference = True

@@ -42,7 +42,7 @@ class Block(NamedTuple):
     offset: int  # of the first
     size: int
     kind: str  # "position", "velocity", or "internal": a state of a load or an actuator
-    steady: str  # how a trim has it: "solved" for, "zero", "averaged" over, or "settled": its own rate is zero
+    steady: str  # how a trim has it: "solved" for, "zero", "averaged" over, "settled": its own rate is zero
 
 
 RIGID_BLOCKS = (

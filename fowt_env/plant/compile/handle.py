@@ -2,7 +2,7 @@
 
 Inside kernels both go by reference. A NamedTuple goes by value, one machine word of each number and seven of
 each array: some 400 for a model, in every call from one kernel to the next. A reference is one word, and a
-field is read where it is used. So a class of NamedTuples with `by_reference = True` is seen by kernels as a
+field is read where it is used. So a class of NamedTuples that is marked by_reference is seen by kernels as a
 Reference, in a Handle and as a field of another such class; its parts are plain values.
 
 A Reference does not keep what it refers to alive. It is made in an entry, whose caller holds the Handle.
@@ -16,6 +16,13 @@ from numba.core.extending import infer_getattr, intrinsic, lower_getattr_generic
 from numba.core.typing.templates import AttributeTemplate
 
 from fowt_env.plant.compile.decorators import entry
+
+
+def by_reference(kind):
+    """Class decorator: kernels see this NamedTuple as a Reference."""
+    kind.by_reference = True
+    return kind
+
 
 if numba.config.DISABLE_JIT:
 
