@@ -785,4 +785,4 @@ def stability(
 
 
 # these add their commands to the app
-from fowt_env.training.cli import train as cli_train  # noqa: E402, F401
+from fowt_env.training.cli import design, plot, report, scores, train  # noqa: E402, F401
