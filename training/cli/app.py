@@ -785,4 +785,8 @@ def stability(
 
 
 # these add their commands to the app
-from fowt_env.training.cli import design, plot, report, scores, train  # noqa: E402, F401
+from fowt_env.training.cli import design as _design  # noqa: E402, F401
+from fowt_env.training.cli import plot as _plot  # noqa: E402, F401
+from fowt_env.training.cli import report as _report  # noqa: E402, F401
+from fowt_env.training.cli import scores as _scores  # noqa: E402, F401
+from fowt_env.training.cli import train as _train  # noqa: E402, F401
