@@ -260,13 +260,13 @@ def _(folder, monkeypatch):
 
 @under("The results folder is of another version")
 def _(folder, monkeypatch):
-    import fowt_env.training.evaluation.results as results
+    from fowt_env.training.evaluation import provenance
     from fowt_env.training.evaluation.evaluate import evaluate
 
     asked = {"cases": "steady_16", "duration": 5.0, "skip": 1.0, "folder": "results/mine"}
     monkeypatch.chdir(folder)
     evaluate("pi", **asked)
-    monkeypatch.setattr(results, "plant_code", lambda: "edited")
+    monkeypatch.setattr(provenance, "plant_code", lambda: "edited")
     return refused(evaluate, "pi", **asked)
 
 
