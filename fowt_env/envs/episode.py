@@ -20,7 +20,7 @@ from fowt_env.plant.measurement import Measure
 from fowt_env.plant.rollout import NON_FINITE, OVERSPEED, RUNNING, advance_scene, observe_scene
 from fowt_env.plant.state import State
 
-BAD_ACTION = -1  # beside the statuses of step.py
+BAD_ACTION = -1  # beside the statuses of rollout.py
 STEP, SATURATED, LIMITED = 0, 1, 2  # entries of Run.counts
 N_COUNTS = 3
 SHOWN_COUNTS = {"saturated_actions": SATURATED, "torque_limited": LIMITED}  # in the infos

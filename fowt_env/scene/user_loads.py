@@ -287,7 +287,7 @@ def build_own_loads(loads: Sequence[Load], base_height: float, depth: float) -> 
 def blamed(loads: Sequence[Load], room: np.ndarray) -> str | None:
     """Words for the load that first gave a number that is not finite; None where none did.
 
-    room: what loads.own.evaluate_own filled.
+    room: what plant.user_loads.evaluate_own filled.
     """
     if not loads or not room[6 * len(loads)]:
         return None
