@@ -166,7 +166,7 @@ class Samples:
         self.add("joint table", table, TEXT, lambda: joint_sea_state(str(table), 12.0))
         for name in ("dlc", "gusts"):
             suite = folder / f"{name}.toml"
-            shutil.copy(ROOT / "training" / "suites" / f"{name}.toml", suite)
+            shutil.copy(ROOT / "training" / "evaluation" / "suites" / f"{name}.toml", suite)
             self.add(f"suite {name}", suite, TEXT, lambda suite=suite: read_suite(suite))
         reader = read_turbine(read_platform("oc3_hywind").turbine)
         design = folder / "design.json"

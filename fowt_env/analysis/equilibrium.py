@@ -28,7 +28,7 @@ ONE_SIDED = 0.9  # horizontal pull of all lines together, of the sum of each one
 GROWTH = 1e-3  # square of a motion's rate of growth, of gravity over the draft
 MOORINGS = {"slack": "slack moorings", "weak": "loose moorings", "one-sided": "moorings to one side"}
 HEAVY = 0.02  # net vertical force on the undisplaced platform that is worth a word, of its weight
-OWN = ("fowt_env", "controllers", "training")  # packages; a warning is for the code that calls them
+OWN = "fowt_env"  # package; a warning is for the code that calls it
 _warned = set()  # hashes of platforms, each with what was odd about it
 
 
@@ -276,8 +276,8 @@ def _kilo(value):
 
 
 def _level_outside():
-    """stacklevel with which warnings.warn of the caller names the first line outside of these packages."""
+    """stacklevel with which warnings.warn of the caller names the first line outside of this package."""
     level, frame = 1, sys._getframe(1)
-    while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] in OWN:
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] == OWN:
         level, frame = level + 1, frame.f_back
     return level

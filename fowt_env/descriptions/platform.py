@@ -1,7 +1,7 @@
 """Platform and turbine descriptions: text files in, checked frozen objects out.
 
 A built-in name or a path to a user's own file works everywhere. Every wrong value is reported with
-the file, the key, the value and the allowed range, all of them at once. Sea states: sea_states.py.
+the file, the key, the value and the allowed range, all of them at once. Sea states: sea_state.py.
 """
 
 import math

@@ -53,7 +53,7 @@ class ActionMap(NamedTuple):
 
 
 def build_action_map(mode, task, turbine, control_dt):
-    """ActionMap of a Mode, a Task and a description.Turbine.
+    """ActionMap of a Mode, a Task and a descriptions.platform.Turbine.
 
     Raises: InputError where the pitch action reaches beyond the actuator.
     """

@@ -21,7 +21,7 @@ from fowt_env.plant.model import Data, LoadCache, Model
 from fowt_env.plant.rollout import NON_FINITE, OVERSPEED, RUNNING, advance_plant, observe_plant
 from fowt_env.plant.state import Command, State
 
-BAD_ACTION = -1  # beside the statuses of step.py
+BAD_ACTION = -1  # beside the statuses of rollout.py
 STEP, SATURATED, LIMITED = 0, 1, 2  # entries of Run.counts
 N_COUNTS = 3
 SHOWN_COUNTS = {"saturated_actions": SATURATED, "torque_limited": LIMITED}  # in the infos

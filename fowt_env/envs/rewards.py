@@ -154,7 +154,7 @@ def weighted_sum(weights, terms):
 
 
 def build_scales(turbine, control_dt):
-    """Scales of a description.Turbine at a control period (s)."""
+    """Scales of a descriptions.platform.Turbine at a control period (s)."""
     law = turbine.torque_law
     return Scales(
         rated_power=float(law.rated_power),

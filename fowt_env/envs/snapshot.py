@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-# arrays of kernels.Run that outlive a control period, and of dynamics.Work: those that carry over, and
+# arrays of episode.Run that outlive a control period, and of dynamics.Work: those that carry over, and
 # stages, whose first row holds the wake's rates as long as the kept loads are fresh
 CARRIED = (
     "x", "u", "memory", "estimate", "action", "measurement", "reading", "past", "observation", "counts",

@@ -1,4 +1,4 @@
-"""Writing results: whole files or none, so that an interrupted run never leaves half a file."""
+"""Tables written and read: CSV, Parquet, and OpenFAST's .outb of a time series."""
 
 from pathlib import Path
 

@@ -86,7 +86,7 @@ OPTIONS = {
     "blade_stations": (None, "None (the turbine file's) or a number of them, 3 up to the file's"),
     "strip_length": (None, "None (a share of the draft) or metres, 0.01 to 1000: cells of exact wave loads"),
     "shear_exponent": (None, "None (the platform file's) or 0 to 1"),
-    "turbine": (None, "None (the platform file's), a name, a path or a description.Turbine"),
+    "turbine": (None, "None (the platform file's), a name, a path or a descriptions.platform.Turbine"),
 }
 ARGUMENTS = ("platform", "wind", "sea", "seed", "rotor", "fidelity", "loads")  # of build_scene beside OPTIONS
 
@@ -252,7 +252,7 @@ def build_scene(
 ) -> Scene:
     """Scene of a platform, a wind and a sea.
 
-    platform  built-in name, path to a TOML file, or a description.Platform
+    platform  built-in name, path to a TOML file, or a descriptions.platform.Platform
     wind      None: no aerodynamics; 0.0: still air; a speed (m/s); or a dict with "kind": steady,
               series, steps, eog, edc, ecd, ews, ewm, ntm, etm (weather/wind.py), or a box of full-field
               wind: bts, box, mann (weather/wind_field.py), rotor-averaged for rotor "table"
@@ -264,7 +264,7 @@ def build_scene(
     fidelity  "reference": everything solved exactly, Runge-Kutta 4; "standard": every blade and station
               by look-up, fast wave sums, Adams-Bashforth 4 (in a box of wind with three rotor loads per
               step); "fast": the rotor as one table
-    loads     further loads on platform and tower, of one's own (scene.user_loads.Load)
+    loads     further loads on platform and tower, of one's own (fowt_env.Load)
     options   see OPTIONS; a platform file may set other defaults. planar: surge, heave and platform pitch
               alone move; of ntm and etm turbulence the part in the plane is kept
 

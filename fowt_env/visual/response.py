@@ -1,6 +1,6 @@
 """Plots of what runs and operating points have in common: box plots, steady schedule, RAOs.
 
-As in plots.py every function returns a matplotlib Figure and, if given a path, writes it there.
+As in time_series.py every function returns a matplotlib Figure and, if given a path, writes it there.
 Needs matplotlib: pip install "fowt-env[plot]".
 """
 

@@ -1,4 +1,4 @@
-"""Linear (Airy) waves as a sum of components, and the spectra that they are drawn from.
+"""The waves of a scene as a sum of components, and the spectra that they are drawn from.
 
 Everything random happens here, before stepping. A component travels towards its heading:
 phase P = k (X cos b + Y sin b) - omega t + e, elevation a cos P (theory.md, 5.4).
@@ -50,7 +50,7 @@ def jonswap(omega, significant_height, peak_period, gamma):
 
 
 def build_waves(sea, *, depth, density, gravity, seed, duration, components=None):
-    """Waves part of a description.SeaState, or None for still water (exactly no waves).
+    """Waves part of a descriptions.platform.SeaState, or None for still water (exactly no waves).
 
     components: number of components of a spectrum; default one per harmonic of 1/duration, so that
     the record does not repeat within it, over the band that holds 99.8 % of the energy (at least 200).

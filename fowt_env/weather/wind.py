@@ -1,8 +1,9 @@
-"""Wind at any instant and point: a time series at the reference height, sheared over the height.
+"""The wind of a scene: a time series at the reference height, built of what a user asks for.
 
 The series is uniform over the rotor apart from the power law and two linear shears; a box of full-field
 wind (wind_field.py) takes its place where a scene has one. Frame: inertial,
-x downwind, y left when looking downwind, z up (state.py). What users may ask for is in wind_spec.py.
+x downwind, y left when looking downwind, z up (state.py). What users may ask for is in
+descriptions/wind.py; plant/aero/wind.py has the wind at any instant and point.
 """
 
 from functools import lru_cache
@@ -58,7 +59,7 @@ def build_wind(spec, *, reference_height, rotor_diameter, shear_exponent, seed, 
     """WindSeries of what a user asked for, None for no aerodynamics at all.
 
     spec               None; a speed in m/s (0: still air); a dictionary with "kind", or the WindSpec that
-                       read_wind made of one (kinds and keys: wind_spec.KINDS); a WindSeries, which is
+                       read_wind made of one (kinds and keys: descriptions.wind.KINDS); a WindSeries, which is
                        returned as it is
     reference_height   hub height, m
     shear_exponent     power law of the site, unless the spec gives one (ewm: 0.11 of the standard)

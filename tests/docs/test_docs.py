@@ -3,6 +3,7 @@
 import html
 import importlib.util
 import os
+import pkgutil
 import re
 import subprocess
 import sys
@@ -230,6 +231,44 @@ def test_links_between_files_hold(page):
     for target in re.findall(r"\]\(([^)\s]+)\)", re.sub(r"`[^`\n]+`", "", text)):
         if ":" not in target and not target.startswith("#"):
             assert ((ROOT / page).parent / target.partition("#")[0]).exists(), f"{page}: {target}"
+
+
+NOT_FILES = {"fowt_env/OC3Hywind-v1", "fowt_env/OC3Hywind-v0"}  # names of environments
+LIVING = [page for page in PROSE if page != "CHANGELOG.md"]  # which keeps the names of its day
+
+
+FOLDERS = "fowt_env|controllers|training|tests|docs|examples"
+
+
+@pytest.mark.parametrize("page", LIVING)
+def test_files_and_modules_that_a_page_names_exist(page):
+    text = (ROOT / page).read_text()
+    for path in re.findall(rf"(?<![\w./:<-])((?:{FOLDERS})/[\w./-]*\w)", text):
+        pattern = re.sub(r"\bALGO\b", "*", path)  # which stands for one of several
+        assert path in NOT_FILES or list(ROOT.glob(pattern)), path
+    for name in re.findall(r"(?<![\w./-])(fowt_env(?:\.\w+)+)", text.replace("fowt_env.NAME", "")):
+        pkgutil.resolve_name(name)
+
+
+ENVIRONMENT = "fowt_env/OC3Hywind"
+
+
+def makers():
+    """{where it stands: text} of all examples and blocks of pages that make an environment by its name."""
+    texts = {path.name: path.read_text() for path in (ROOT / "examples").glob("*.py")}
+    for page in LIVING:
+        for number, found in enumerate(FENCE.finditer((ROOT / page).read_text())):
+            if found[1] == "python":
+                texts[f"{page}, block {number}"] = found[3]
+    return {where: text for where, text in texts.items() if ENVIRONMENT in text}
+
+
+@pytest.mark.parametrize("where", makers())
+def test_a_program_that_makes_an_environment_registers_it_itself(where):
+    """`import fowt_env` does, and so does the name with the module before it."""
+    text = makers()[where]
+    assert re.search(r"^import gymnasium$", text, re.M)
+    assert re.search(r"^(import|from) fowt_env\b", text, re.M) or f"fowt_env:{ENVIRONMENT}" in text
 
 
 def test_links_out_of_docs_lead_to_the_site_s_own_pages():

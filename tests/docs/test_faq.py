@@ -20,8 +20,9 @@ from fowt_env.descriptions.platform import DATA, read_platform
 from fowt_env.envs import FowtEnv
 from fowt_env.plant.compile import announcement as warmup
 from fowt_env.plant.compile import decorators as jit
+from fowt_env.plant.compile.versions import check_numba
 from fowt_env.training.cli import app as cli
-from fowt_env.training.cli import health, requirements
+from fowt_env.training.cli import health
 
 NAME = "fowt_env/OC3Hywind-v1"
 MESSAGES = [block for block in blocks("faq.md") if block.language == "text"]
@@ -71,14 +72,17 @@ def python(code, folder):
 
 
 def missing(name, monkeypatch):
-    """Let imports of a library fail as where it is not installed."""
+    """Let imports of a library or package fail as where it is not installed."""
+
+    def of_it(module):
+        return module == name or module.startswith(f"{name}.")
 
     class Missing:
         def find_spec(self, wanted, path=None, target=None):
-            if wanted.split(".")[0] == name:
+            if of_it(wanted):
                 raise ModuleNotFoundError(f"No module named {name!r}", name=name)
 
-    for loaded in [key for key in sys.modules if key.split(".")[0] == name]:
+    for loaded in [key for key in sys.modules if of_it(key)]:
         monkeypatch.delitem(sys.modules, loaded)
     monkeypatch.setattr(sys, "meta_path", [Missing(), *sys.meta_path])
 
@@ -113,7 +117,7 @@ def _(folder, monkeypatch):
 
 @under("Numba is too old or too new")
 def _(folder, monkeypatch):
-    return message(ImportError, requirements.check_numba, "0.61.0")
+    return message(ImportError, check_numba, "0.61.0")
 
 
 @under("Numba refuses NumPy")
@@ -144,6 +148,12 @@ def _(folder, monkeypatch):
 
     missing("pygame", monkeypatch)
     return refused(load_pygame)
+
+
+@under("A study is not installed")
+def _(folder, monkeypatch):
+    missing("fowt_env.training.studies", monkeypatch)
+    return said("paper", "LC5")
 
 
 @under("ROSCO's library is not there")
@@ -250,13 +260,13 @@ def _(folder, monkeypatch):
 
 @under("The results folder is of another version")
 def _(folder, monkeypatch):
-    import fowt_env.training.evaluation.results as results
+    from fowt_env.training.evaluation import provenance
     from fowt_env.training.evaluation.evaluate import evaluate
 
     asked = {"cases": "steady_16", "duration": 5.0, "skip": 1.0, "folder": "results/mine"}
     monkeypatch.chdir(folder)
     evaluate("pi", **asked)
-    monkeypatch.setattr(results, "plant_code", lambda: "edited")
+    monkeypatch.setattr(provenance, "plant_code", lambda: "edited")
     return refused(evaluate, "pi", **asked)
 
 

@@ -28,7 +28,7 @@ class Spar:
 
 
 def spar_of(platform, *switches):
-    """Spar of a description.Platform with the switches from position on."""
+    """Spar of a descriptions.platform.Platform with the switches from position on."""
     hydro, site = platform.hydro, platform.environment
     return Spar(
         np.array(platform.hull.z), np.array(platform.hull.diameter),

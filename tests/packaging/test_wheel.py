@@ -15,8 +15,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-PACKAGES = ("fowt_env", "controllers", "training")
-CODE = {".py", ".pyc"}
+PACKAGES = {"fowt_env": "fowt_env", "controllers": "fowt_env/controllers", "training": "fowt_env/training"}
+LEFT_OUT = ("fowt_env/training/studies/", "fowt_env/training/validation/reference/")  # of a clone alone
 pytestmark = pytest.mark.slow
 
 
@@ -33,7 +33,7 @@ def built(tmp_path_factory):
     source = folder / "source"
     leave = shutil.ignore_patterns("__pycache__", "*.egg-info")
     for package in PACKAGES:
-        shutil.copytree(ROOT / package, source / package, ignore=leave)
+        shutil.copytree(ROOT / package, source / package, ignore=leave, symlinks=True)
     for path in ROOT.iterdir():
         if path.is_file() and not path.name.startswith("."):
             shutil.copy(path, source)
@@ -43,26 +43,27 @@ def built(tmp_path_factory):
     return sdist, wheel
 
 
-def data_files():
-    """Paths of the packages' files that are not code."""
+def package_files():
+    """Paths of the package's files, code and data, as they are installed: its links as folders."""
     return {
-        path.relative_to(ROOT).as_posix()
-        for package in PACKAGES
-        for path in (ROOT / package).rglob("*")
-        if path.is_file() and path.suffix not in CODE
+        f"{place}/{path.relative_to(ROOT / folder).as_posix()}"
+        for folder, place in PACKAGES.items()
+        for path in (ROOT / folder).rglob("*")
+        if path.is_file() and path.suffix != ".pyc"
     }
 
 
-def test_sdist_and_wheel_hold_every_data_file_and_the_licence(built):
+def test_sdist_and_wheel_hold_the_package_without_the_studies_and_the_licence(built):
     sdist, wheel = built
     with tarfile.open(sdist) as archive:
         in_sdist = {name.partition("/")[2] for name in archive.getnames()}
     in_wheel = set(zipfile.ZipFile(wheel).namelist())
-    assert data_files() - in_sdist == set()
-    assert data_files() - in_wheel == set()
+    wanted = {path for path in package_files() if not path.startswith(LEFT_OUT)}
+    assert wanted < package_files()
+    assert wanted - in_sdist == set()
+    assert {path for path in in_wheel if ".dist-info/" not in path} == wanted
     assert any(name.endswith("LICENSE") for name in in_wheel)
     assert not any(name.endswith(".pth") or ".data/" in name for name in in_wheel)
-    assert not any(name.startswith("tests/") for name in in_wheel)
 
 
 def readme_example(duration):
@@ -77,10 +78,11 @@ def test_the_wheel_runs_the_readme_example_in_an_empty_environment_without_torch
     _, wheel = built
     run(sys.executable, "-m", "venv", tmp_path / "venv")
     python = tmp_path / "venv" / "bin" / "python"
-    run(python, "-m", "pip", "install", "--quiet", "--constraint", ROOT / "constraints.txt", wheel)
     environment = {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}
     environment["FOWT_CACHE_DIR"] = str(tmp_path / "cache")
     options = {"cwd": tmp_path, "env": environment}
+    pip = (python, "-m", "pip", "install", "--quiet", "--constraint", ROOT / "constraints.txt")
+    run(*pip, wheel, **options)
     program = readme_example(5.0) + (
         "import importlib.util, gymnasium\n"
         "assert importlib.util.find_spec('torch') is None\n"
@@ -91,3 +93,11 @@ def test_the_wheel_runs_the_readme_example_in_an_empty_environment_without_torch
     assert "PtfmPitch_[deg]" in text and f"{tmp_path / 'venv'}" in text and "OC3Hywind-v1" in text
     text = run(tmp_path / "venv" / "bin" / "fowt", "doctor", "--no-test", **options)
     assert "missing" in text and 'pip install "fowt-env[plot]"' in text
+    name = "fowt_env:fowt_env/OC3Hywind-v1"
+    program = f"import gymnasium; print(gymnasium.make({name!r}, task='steady').spec.id)"
+    assert run(python, "-c", program, **options).strip() == "fowt_env/OC3Hywind-v1"
+    for command in ("paper", "benchmark stability"):
+        words = [tmp_path / "venv" / "bin" / "fowt", *command.split()]
+        done = subprocess.run(words, capture_output=True, text=True, **options)
+        (line,) = done.stderr.splitlines()
+        assert done.returncode == 2 and f"fowt {command}: needs a clone" in line

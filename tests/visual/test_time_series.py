@@ -112,7 +112,7 @@ def test_without_matplotlib_the_message_names_the_extra():
     code = (
         "import sys; sys.modules['matplotlib'] = None\n"
         "import pandas as pd\n"
-        "from fowt_env import plots\n"
+        "from fowt_env.visual import time_series as plots\n"
         "frame = pd.DataFrame({'Time_[s]': [0.0, 1.0], 'RotSpeed_[rpm]': [12.0, 12.0]})\n"
         "try:\n    plots.plot_run(frame)\n"
         "except plots.InputError as error:\n    print(error)\n"
@@ -123,7 +123,7 @@ def test_without_matplotlib_the_message_names_the_extra():
 
 def test_plotting_leaves_pyplot_alone():
     code = (
-        "import sys, pandas as pd\nfrom fowt_env import plots\n"
+        "import sys, pandas as pd\nfrom fowt_env.visual import time_series as plots\n"
         "plots.plot_run(pd.DataFrame({'Time_[s]': [0.0, 1.0], 'RotSpeed_[rpm]': [12.0, 12.0]}))\n"
         "assert 'matplotlib.pyplot' not in sys.modules"
     )

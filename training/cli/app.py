@@ -27,6 +27,7 @@ from fowt_env.training.cli.doctor import DOCTOR_EXAMPLES, doctor
 from fowt_env.training.cli.tables import figure, print_table, table_width
 
 EXIT_STOPPED, EXIT_INPUT, EXIT_INTERRUPTED = 1, 2, 130
+STUDIES = "fowt_env.training.studies"  # left out of the wheel
 ROUNDING = 1e-9  # a standard deviation below this share of the mean is none
 
 out = Console()
@@ -82,6 +83,20 @@ def reported(command):
             fail(f"ended early by {type(error).__name__}: {error}", EXIT_STOPPED)
 
     return run
+
+
+@contextmanager
+def from_a_clone(command):
+    """Around imports of the studies. Raises: InputError that names the command where they are missing."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        if not (error.name or "").startswith(STUDIES):
+            raise
+        raise InputError(
+            f"fowt {command}: needs a clone of the repository, whose folder training/studies is not installed"
+            " with the package: pip install -e . in the clone"
+        ) from None
 
 
 def _show_warning(message, *where):
@@ -588,8 +603,9 @@ def paper(
     plot: Annotated[bool, typer.Option("--plot/--no-plot", help="Make the plots.")] = True,
 ):
     """Run the paper's load cases and check its claims."""
-    from fowt_env.training.studies.paper.load_cases import run_paper, statistics, wanted_cases
-    from fowt_env.training.studies.paper.report import write_report
+    with from_a_clone("paper"):
+        from fowt_env.training.studies.paper.load_cases import run_paper, statistics, wanted_cases
+        from fowt_env.training.studies.paper.report import write_report
 
     names = wanted_cases(case)
     with progress_bar("paper", None) as update:
@@ -760,8 +776,9 @@ def stability(
     replay: Annotated[str | None, typer.Option(help="Run a stored case again, nothing else.")] = None,
 ):
     """Try to break the simulator: steps, random scenes, hostile actions, extremes, long runs."""
-    from fowt_env.training.studies.robustness import study as stress
-    from fowt_env.training.studies.robustness.random_cases import replay as run_again
+    with from_a_clone("benchmark stability"):
+        from fowt_env.training.studies.robustness import study as stress
+        from fowt_env.training.studies.robustness.random_cases import replay as run_again
 
     if replay is not None:
         outcome = run_again(replay)
@@ -785,4 +802,8 @@ def stability(
 
 
 # these add their commands to the app
-from fowt_env.training.cli import train as cli_train  # noqa: E402, F401
+from fowt_env.training.cli import design as _design  # noqa: E402, F401
+from fowt_env.training.cli import plot as _plot  # noqa: E402, F401
+from fowt_env.training.cli import report as _report  # noqa: E402, F401
+from fowt_env.training.cli import scores as _scores  # noqa: E402, F401
+from fowt_env.training.cli import train as _train  # noqa: E402, F401

@@ -26,7 +26,7 @@ learning_curve.png, tensorboard/. A policy runs as  fowt evaluate --controllers 
 @reported
 def train(
     algo: Annotated[str, typer.Option(help="ppo, sac or tqc.")] = "ppo",
-    task: Annotated[str, typer.Option(help="Task of controllers/policy/agents/ALGO.yml.")] = "above_rated",
+    task: Annotated[str, typer.Option(help="Task of training/rl/ALGO.yml.")] = "above_rated",
     seed: Annotated[int, typer.Option(help="Of networks and episodes.")] = 0,
     steps: Annotated[int | None, typer.Option(help="Decisions; default 2000000, or as before.")] = None,
     out_folder: Annotated[str | None, typer.Option("--out", help="Folder of the run.")] = None,

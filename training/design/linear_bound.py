@@ -75,7 +75,7 @@ class Deviations:
 
 
 class Problem:
-    """The plant of one wind with its weather, in the states of lqr_design.feedback_plant."""
+    """The plant of one wind with its weather, in the states of lqr/design.py's feedback_plant."""
 
     def __init__(self, model, turbine):
         rated = turbine.rated_rotor_speed
@@ -113,7 +113,7 @@ class Problem:
 
     @cached_property
     def kalman(self):
-        """(A, C, L, R) of the estimator of plant and weather from the channels of lqr_design.SENSORS.
+        """(A, C, L, R) of the estimator of plant and weather from the channels of lqr/design.py's SENSORS.
 
         The torque and the pitch command are known to the controller, and so is the integral.
         """

@@ -1,6 +1,6 @@
 """Plots of linear design: poles and damping over the wind, Bode plots, and fronts beside the linear bound.
 
-As in plots.py every function returns a matplotlib Figure and, if given a path, writes it there.
+As in visual/time_series.py every function returns a matplotlib Figure and, if given a path, writes it there.
 Needs matplotlib: pip install "fowt-env[plot]".
 """
 

@@ -1,6 +1,6 @@
 """Plots of agents beside rivals and the linear bound, and of one gust under many controllers.
 
-As in plots.py every function returns a matplotlib Figure and, if given a path, writes it there.
+As in visual/time_series.py every function returns a matplotlib Figure and, if given a path, writes it there.
 """
 
 from fowt_env.errors import InputError

@@ -36,7 +36,7 @@ class Judge(BaseCallback):
         write_table(pd.DataFrame(training.rows), training.folder / "validation.csv")
         if row["score"] < self.best:
             self.best = row["score"]
-            training.rl.export("best.npz")
+            training.export("best.npz")
         return True
 
 

@@ -69,7 +69,7 @@ class TrainingSettings(Record):
     """Settings of a run. The environment's, the decisions' and the algorithm's are checked by these."""
 
     algo: Literal["ppo", "sac", "tqc"]
-    name: str  # of the settings in controllers/policy/agents/ALGO.yml
+    name: str  # of the settings in training/rl/ALGO.yml
     seed: Whole
     steps: Count
     task: str  # of the environment

@@ -82,7 +82,7 @@ LEAST_POWER = 0.995  # of the reference's
 
 
 def resolve(algo, task, seed, steps, changes=None):
-    """Dict of all settings of a run: those of controllers/policy/agents/ALGO.yml for the task, changed.
+    """Dict of all settings of a run: those of training/rl/ALGO.yml for the task, changed.
 
     changes: {dotted key: value}, such as {"environment.action_mode": "direct"}.
     Raises: InputError for unknown names, keys, and numbers outside their range.
@@ -95,7 +95,7 @@ def resolve(algo, task, seed, steps, changes=None):
         table = yaml.safe_load(file)
     tasks = [name for name in table if not name.startswith("_")]
     if task not in tasks:
-        raise unknown(f"task of controllers/policy/agents/{algo}.yml", task, tasks)
+        raise unknown(f"task of training/rl/{algo}.yml", task, tasks)
     for key, value, low in (("seed", seed, 0), ("steps", steps, 1)):
         if type(value) is not int or value < low:
             raise InputError(f"{key} = {value!r}: must be a whole number of at least {low}")

@@ -7,26 +7,15 @@ import sys
 import numpy as np
 import pandas as pd
 import pytest
-from typer.testing import CliRunner
+from command_line import fowt
 
 import fowt_env
 from fowt_env.descriptions.checks import parse_numbers
 from fowt_env.errors import InputError, SimulationStopped
 from fowt_env.plant.compile.announcement import COMPILING_MESSAGE
-from fowt_env.training.cli import app as cli
 from fowt_env.training.cli.arguments import parse_pairs, parse_sea, parse_wind
 
 SHORT = ("--duration", "10", "--wind", "18")
-
-
-def fowt(*arguments, code=0):
-    """(stdout, stderr) of a command that must end with the exit code, and never with a traceback."""
-    result = CliRunner().invoke(cli.app, list(arguments), env={"COLUMNS": "200", "NO_COLOR": "1"})
-    assert result.exit_code == code, (
-        f"{result.exit_code}\n{result.stdout}\n{result.stderr}\n{result.exception!r}"
-    )
-    assert "Traceback" not in result.stderr
-    return result.stdout, result.stderr
 
 
 @pytest.mark.installation

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from test_cli import fowt
+from command_line import fowt
 
 FOUND = Path(__file__).parents[2] / "reference" / "stability"
 

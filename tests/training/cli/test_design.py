@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pandas as pd
-from test_cli import fowt
+from command_line import fowt
 
 
 def test_linearize_writes_models_and_says_where_the_pitch_rests(tmp_path):

@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 
 import fowt_env
 from fowt_env.plant.compile import decorators as jit
+from fowt_env.plant.compile.versions import NUMBA, check_numba, satisfies
 from fowt_env.training.cli import app as cli
 from fowt_env.training.cli import health, requirements
 
@@ -107,11 +108,11 @@ def test_a_numba_that_cannot_compile_the_kernels_is_told_before_it_is_tried(foun
     monkeypatch.setattr(metadata, "requires", lambda name: ["numba>=0.1"])
     monkeypatch.setattr(metadata, "version", lambda name: found if name == "numba" else real(name))
     monkeypatch.setitem(sys.modules, "fowt_env.training.cli.health", None)  # whose import ends the program
-    monkeypatch.delattr(fowt_env, "health")
+    monkeypatch.delattr("fowt_env.training.cli.health")
     stdout = doctor(code=1)
-    assert f"numba {found} is too {word}: pip install 'numba{requirements.NUMBA}'" in stdout
+    assert f"numba {found} is too {word}: pip install 'numba{NUMBA}'" in stdout
     with pytest.raises(ImportError, match=f"numba {found} is too {word}"):
-        requirements.check_numba(found)
+        check_numba(found)
 
 
 def test_the_kernels_of_another_numba_are_not_even_tried():
@@ -132,7 +133,7 @@ def test_a_requirement_that_is_not_met_is_told_and_fails(monkeypatch):
 
 def test_what_numba_itself_refuses_is_told_in_a_line(monkeypatch):
     monkeypatch.setitem(sys.modules, "fowt_env.training.cli.health", None)
-    monkeypatch.delattr(fowt_env, "health")
+    monkeypatch.delattr("fowt_env.training.cli.health")
     stdout = doctor(code=1)
     assert "Traceback" not in stdout and "fowt_env.training.cli.health" in stdout.splitlines()[-1]
 
@@ -147,13 +148,13 @@ def test_what_numba_itself_refuses_is_told_in_a_line(monkeypatch):
     ],
 )  # fmt: skip
 def test_versions_are_compared_by_their_numbers(version, needed, fits):
-    assert requirements.satisfies(version, needed) is fits
+    assert satisfies(version, needed) is fits
 
 
 def test_the_bounds_of_numba_are_those_of_the_metadata():
     with open(Path(fowt_env.__file__).parent.parent / "pyproject.toml", "rb") as file:
         needed = tomllib.load(file)["project"]["dependencies"]
-    assert f"numba{requirements.NUMBA}" in needed
+    assert f"numba{NUMBA}" in needed
 
 
 def test_help_of_the_command_line_does_not_wait_for_numba():

@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
-from test_cli import fowt
+from command_line import fowt
 
 from fowt_env.training.cli.plot import _names
 

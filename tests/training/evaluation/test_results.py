@@ -126,7 +126,7 @@ def test_other_settings_and_versions_are_refused_with_what_to_do(tmp_path, monke
         with pytest.raises(InputError, match="was made by fowt_env .* this is 9.9"):
             evaluate("pi", suite(), folder=tmp_path)
     with monkeypatch.context() as patch:
-        patch.setattr(results, "plant_code", lambda: "other")
+        patch.setattr(provenance, "plant_code", lambda: "other")
         with pytest.raises(InputError, match="another state"):
             evaluate("pi", suite(), folder=tmp_path)
     with monkeypatch.context() as patch:
@@ -138,10 +138,10 @@ def test_other_settings_and_versions_are_refused_with_what_to_do(tmp_path, monke
 
 def test_a_controllers_code_is_its_module_and_what_that_imports():
     def names(factory):
-        paths = results._package_files(factory)
-        return {path.name for path in paths if path.parent == results.ROOT / "controllers"}
+        paths = provenance._package_files(factory)
+        return {path.name for path in paths if path.parent == provenance.CONTROLLERS}
 
-    assert {"eq8.py", "pi.py", "base.py", "tuned.toml"} <= names(CONTROLLERS["eq8_literal"])
+    assert {"printed_eq8.py", "pi.py", "pi_tuned.toml", "tuned.toml"} <= names(CONTROLLERS["eq8_literal"])
     assert not {"constant.py", "__init__.py"} & names(CONTROLLERS["eq8_literal"])
     assert {"constant.py", "__init__.py"} <= names(print)
     codes = [provenance.controller_code(name)["code"] for name in ("pi", "pi_land", "constant")]

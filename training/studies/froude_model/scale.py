@@ -101,7 +101,7 @@ def _table(heading, values):
 
 
 def turbine_text(turbine, name, scale, polars="polars"):
-    """Text of the turbine file of a description.Turbine times the scale. polars: their folder."""
+    """Text of the turbine file of a descriptions.platform.Turbine times the scale. polars: their folder."""
     lines = [LABEL.format(origin=turbine.name, what="TURBINE", scale=scale), "", f'name = "{name}"']
     lines.append(f'source = "{turbine.name} by Froude\'s law, scale {scale:.6g}; not a real turbine"')
     lines += [f"{key} = {toml_value(value)}" for key, value in scaled(turbine, "turbine", scale).items()]
@@ -114,7 +114,7 @@ def turbine_text(turbine, name, scale, polars="polars"):
 
 
 def platform_text(platform, name, turbine_name, scale):
-    """Text of the platform file of a description.Platform times the scale."""
+    """Text of the platform file of a descriptions.platform.Platform times the scale."""
     lines = [LABEL.format(origin=platform.name, what="PLATFORM", scale=scale), ""]
     lines += [f'name = "{name}"', f'turbine = "{turbine_name}"']
     lines.append(f'source = "{platform.name} by Froude\'s law, scale {scale:.6g}; not a real platform"')
@@ -135,7 +135,7 @@ def platform_text(platform, name, turbine_name, scale):
 
 
 def stations_text(turbine, scale):
-    """Text of the blade file of a description.Turbine, lengths times the scale."""
+    """Text of the blade file of a descriptions.platform.Turbine, lengths times the scale."""
     blade = turbine.blade
     rows = [
         f"# Blade of {turbine.name}, lengths times {scale:.6g}, twist as it is (froude_model/scale.py).",
