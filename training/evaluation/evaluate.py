@@ -26,6 +26,7 @@ from fowt_env.files.atomic import replacing
 from fowt_env.files.tables import write_table
 from fowt_env.training.evaluation.cases import Case, Suite, described, named_cases
 from fowt_env.training.evaluation.engines import outcomes
+from fowt_env.training.evaluation.faults import PARKED
 from fowt_env.training.evaluation.guard import attempt
 from fowt_env.training.evaluation.metrics import METRICS, metrics
 from fowt_env.training.evaluation.provenance import controller_code, version_gap, versions
@@ -35,7 +36,6 @@ from fowt_env.training.evaluation.run_case import COLUMNS, CONTROL_DT, SHORTEST_
 __all__ = ["COLUMNS", "SHORTEST_WEATHER", "Case", "evaluate", "metrics", "named_cases", "run_file", "summary"]
 
 DURATION, SKIP, SEEDS = 660.0, 60.0, (1,)  # where neither the caller nor a suite says otherwise
-PARKED = "parked"  # what stands for the controller of a parked turbine
 LARGEST_SEED = 2**63 - 1  # of a column of whole numbers
 # s of wall clock: a run of eleven minutes takes 0.05 s with compiled laws and some minutes with slow Python
 TIME_LIMIT = 3600.0

@@ -13,7 +13,8 @@ import pandas as pd
 
 from fowt_env.errors import InputError
 from fowt_env.training.design.linear_bound import BOUND, RATIOS, fraction_of_bound, ratio_table
-from fowt_env.training.reports.scores import KEY, grouped, markdown_table
+from fowt_env.training.evaluation.results_table import KEY
+from fowt_env.training.reports.scores import grouped, markdown_table
 
 BASELINE = "gspi_oc3"  # whose travel and power the bound keeps
 WIND = "wind_[m/s]"

@@ -22,10 +22,10 @@ from fowt_env.files.atomic import replacing
 from fowt_env.files.tables import write_table
 from fowt_env.training.evaluation.bootstrap import LEAST_SEEDS, crossed_estimate
 from fowt_env.training.evaluation.metrics import METRICS, never_negative
+from fowt_env.training.evaluation.results_table import KEY
 
-__all__ = ["COUNTS", "FIGURES", "Figure", "agent_counts", "agent_scores", "by_kind", "read_results"]
+__all__ = ["COUNTS", "FIGURES", "Figure", "agent_counts", "agent_scores", "by_kind"]
 
-KEY = ["controller", "case", "seed"]
 PAST_ANY = "past a constraint"
 MEASURED = {  # what a turbine's own sensors show
     "time", "rotor_speed", "generator_speed", "blade_pitch", "generator_torque", "platform_pitch",
@@ -106,36 +106,6 @@ def figures_named(names):
         if name not in known:
             raise unknown("figure", name, known)
     return [known[name] for name in names]
-
-
-def read_results(paths, cases=None):
-    """DataFrame of one or several results of fowt evaluate: folders, or CSV files. cases: names to keep.
-
-    Raises: InputError for what is no such file, and where two hold the same run with other figures.
-    """
-    tables = []
-    for path in map(Path, paths):
-        file = path / "results.csv" if path.is_dir() else path
-        if not file.is_file():
-            raise InputError(f"results {str(file)!r}: no such file; make it with fowt evaluate --out")
-        table = pd.read_csv(file)
-        missing = [name for name in (*KEY, "status", *METRICS) if name not in table]
-        if missing:
-            raise InputError(f"results {str(file)!r}: column {missing[0]!r} is missing")
-        tables.append(table[table["controller"] != "parked"])
-    table = pd.concat(tables, ignore_index=True)
-    one = table.drop_duplicates([*KEY, "status", *(figure.metric for figure in FIGURES)])
-    twice = one[one.duplicated(KEY)]
-    if len(twice):
-        name, case, seed = twice.iloc[0][KEY]
-        raise InputError(f"results: {name} on {case}, seed {seed}, is there twice with different figures")
-    if cases is not None:
-        known = list(dict.fromkeys(one["case"]))
-        for name in cases:
-            if name not in known:
-                raise unknown("case of the evaluation", name, known)
-        one = one[one["case"].isin(cases)]
-    return one.reset_index(drop=True)
 
 
 def grouped(table, rivals, groups=None, agents=None):
