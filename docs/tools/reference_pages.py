@@ -9,6 +9,7 @@ is what the function of that name in TABLES returns. A test fails while either i
 """
 
 import re
+from functools import partial
 from math import pi
 from pathlib import Path
 
@@ -19,9 +20,10 @@ from fowt_env.descriptions.platform import read_platform, read_turbine
 from fowt_env.envs import rewards
 from fowt_env.envs.actions import TRACKING_DAMPING, TRACKING_FREQUENCY
 from fowt_env.envs.observations import KNOWN, STANDARD, entries
-from fowt_env.envs.tables import action_table, markdown, observation_table
+from fowt_env.envs.tables import action_table, observation_table
 from fowt_env.envs.tasks import TASKS, Episode
 from fowt_env.files.atomic import replacing
+from fowt_env.files.markdown import markdown_table
 from fowt_env.plant.rollout import (
     BLOWN_UP,
     CAPSIZE,
@@ -36,6 +38,7 @@ from fowt_env.registration import ENVIRONMENTS
 from fowt_env.training.cli.app import app
 
 DOCS = Path(__file__).resolve().parents[1]
+markdown = partial(markdown_table, aligned=True)
 MARK = re.compile(r"(<!-- from the code: (\w+) -->\n).*?(<!-- end -->)", re.S)
 RPM, DEG = 30.0 / pi, 180.0 / pi
 PREVIEW = (2.0, 4.0)  # s, look-ahead times of the example in the table of channels
@@ -284,7 +287,7 @@ def _parameter(parameter):
     shown = "" if default in (None, []) else f"`{default}`"
     if getattr(parameter, "is_flag", False):
         shown = f"`{(parameter.opts if default else pair)[0]}`" if pair else ""
-    return names, shown, _plain(parameter.help or "").replace("|", "\\|")
+    return names, shown, _plain(parameter.help or "")
 
 
 def _examples(epilog):

@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 
 import fowt_env
-from fowt_env.envs import tables
 from fowt_env.envs.rewards import TERMS, build_scales, fill_terms, weight_array
 from fowt_env.envs.tasks import TASKS
+from fowt_env.files.markdown import markdown_table
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measure
 from fowt_env.plant.state import State
 
@@ -69,7 +69,7 @@ def ranking(names=CONTROLLERS, weights=None):
 def markdown(table):
     """The ranking as the table of docs/environment.md."""
     rows = [(f"`{name}`", *(f"{value:.2f}" for value in row)) for name, row in table.T.items()]
-    return tables.markdown(("baseline", "reward of a step", *METRICS), rows)
+    return markdown_table(("baseline", "reward of a step", *METRICS), rows, aligned=True)
 
 
 if __name__ == "__main__":

@@ -19,6 +19,7 @@ import pandas as pd
 from fowt_env.controllers import DESIGN, POLICY, information
 from fowt_env.errors import InputError, unknown
 from fowt_env.files.atomic import replacing
+from fowt_env.files.markdown import markdown_table
 from fowt_env.files.tables import write_table
 from fowt_env.training.evaluation.bootstrap import LEAST_SEEDS, crossed_estimate
 from fowt_env.training.evaluation.metrics import METRICS, never_negative
@@ -263,11 +264,10 @@ def ratio_text(row):
     return f"{text} [{row['low']:.3f}, {row['high']:.3f}]" if np.isfinite(row["low"]) else text
 
 
-def markdown_table(frame):
+def frame_markdown(frame):
     """Markdown text of a DataFrame of texts, its index (if it has a name) as first column."""
     frame = frame.reset_index() if frame.index.name else frame
-    rows = [list(map(str, frame.columns)), ["---"] * frame.shape[1], *frame.astype(str).values.tolist()]
-    return "\n".join("| " + " | ".join(row) + " |" for row in rows) + "\n"
+    return markdown_table(frame.columns, frame.astype(str).to_numpy()) + "\n"
 
 
 def _remark(scores):
@@ -289,12 +289,12 @@ def scores_markdown(scores, counts):
         wide = wide.loc[list(dict.fromkeys(scores["figure"])), names]
         wide.index.name = f"over `{rival}`"
         wide.columns = [f"`{name}`" for name in names]
-        parts.append(markdown_table(wide))
+        parts.append(frame_markdown(wide))
     parts += _remark(scores)
     shown = counts.copy()
     shown["largest overspeed (%)"] = shown["largest overspeed (%)"].map("{:.1f}".format)
     shown["agent"] = shown["agent"].map("`{}`".format)
-    parts.append(markdown_table(shown.drop(columns=PAST_ANY)))
+    parts.append(frame_markdown(shown.drop(columns=PAST_ANY)))
     return "\n".join(parts)
 
 
@@ -309,7 +309,7 @@ def kinds_markdown(scores, counts, figures=None):
         wide = shown.pivot(index="kind", columns="agent", values="text").loc[kinds, names]
         wide.index.name = f"{name} over `{rows['rival'].iloc[0]}`"
         wide.columns = [f"`{agent}`" for agent in names]
-        parts.append(markdown_table(wide))
+        parts.append(frame_markdown(wide))
     parts += _remark(scores)
     columns = counts[["failed", PAST_ANY, "runs"]].to_numpy()
     shown = counts.assign(text=[f"{failed} / {past} of {runs}" for failed, past, runs in columns])
@@ -317,7 +317,7 @@ def kinds_markdown(scores, counts, figures=None):
     wide = shown.pivot(index="kind", columns="agent", values="text").loc[kinds, agents]
     wide.index.name = "failed / past a constraint"
     wide.columns = [f"`{agent}`" for agent in agents]
-    parts.append(markdown_table(wide))
+    parts.append(frame_markdown(wide))
     return "\n".join(parts)
 
 

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from fowt_env.files.atomic import remove_leftovers, replacing
+from fowt_env.files.markdown import markdown_table
 from fowt_env.files.tables import write_table
 from fowt_env.training.validation.openfast_cases import DECAYS
 from fowt_env.visual.time_series import COLOURS, INK, TIME, new_figure, save_figure, spectrum, style_axes
@@ -216,15 +217,15 @@ def markdown(study):
     for case in dict.fromkeys(row.case for row in study.rows):
         rows = [row for row in study.rows if row.case == case]
         against = "OpenFAST" if "against" not in case else "reference"
-        lines += [f"### {case}", "", f"| figure | unit | {against} | here | error % | allowed % | verdict |"]
-        lines.append("|---|---|---|---|---|---|---|")
+        header = ("figure", "unit", against, "here", "error %", "allowed %", "verdict")
+        cells = []
         for row in rows:
             quantity = f"{row.quantity} ({row.note})" if row.note else row.quantity
             error = "" if not np.isfinite(row.error) else f"{row.error:.3g}"
             allowed = "" if not np.isfinite(row.allowed) else f"{row.allowed:g}"
             values = (_number(row.openfast), _number(row.here), error, allowed, row.verdict)
-            lines.append("| " + " | ".join((quantity, row.unit, *values)) + " |")
-        lines.append("")
+            cells.append((quantity, row.unit, *values))
+        lines += [f"### {case}", "", markdown_table(header, cells), ""]
     return "\n".join(lines)
 
 

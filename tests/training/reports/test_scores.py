@@ -188,5 +188,5 @@ def test_any_metric_may_be_a_figure_without_an_aim():
 def test_the_text_has_a_table_per_rival_and_one_of_failures():
     runs = table({"agent": [0.5, 0.6, 0.5]})
     text = scores_markdown(agent_scores(runs, ["rival"]), agent_counts(runs, ["rival"]))
-    assert "| over `rival` | `agent` |" in text and text.count("\n| --- |") == 2
+    assert "| over `rival` | `agent` |" in text and text.count("\n|---|") == 2
     assert "| rotor-speed std | 0.5" in text and "then" in text

@@ -13,6 +13,7 @@ import numpy as np
 
 from fowt_env.errors import unknown
 from fowt_env.files.atomic import replacing
+from fowt_env.files.markdown import markdown_table
 from fowt_env.plant.integrators import INTEGRATORS
 from fowt_env.plant.rollout import RUNNING
 from fowt_env.scene.build import STEPS
@@ -339,12 +340,6 @@ def stored_parts(folder):
     return {part: json.loads(path.read_text()) for part, path in paths.items() if path.is_file()}
 
 
-def _table(columns, rows):
-    """Lines of a Markdown table."""
-    lines = ["| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
-    return lines + ["| " + " | ".join(str(cell).replace("|", "/") for cell in row) + " |" for row in rows]
-
-
 def write_report(folder, path):
     """Write the Markdown report of every part that the folder holds; returns the path."""
     parts = stored_parts(folder)
@@ -360,12 +355,12 @@ def write_report(folder, path):
         [title, c["what"], c["count"], c["found"], c["target"], "holds" if c["holds"] else "**MISSED**"]
         for title, c in claims
     ]
-    lines += _table(columns, rows)
+    lines.append(markdown_table(columns, rows))
     for part, stored in parts.items():
         lines += ["", f"## {TITLES[part]}", "", METHODS[part], ""]
         lines.append(f"Run on {stored['date']}, {stored['minutes']:.1f} minutes.")
         for title, columns, rows in stored["tables"]:
-            lines += ["", f"**{title}**", "", *_table(columns, rows)]
+            lines += ["", f"**{title}**", "", markdown_table(columns, rows)]
     with replacing(path) as temporary:
         Path(temporary).write_text("\n".join(lines) + "\n", encoding="utf-8")
     return Path(path)
