@@ -31,6 +31,7 @@ from scipy.optimize import brentq
 
 from fowt_env.control import check_control_dt
 from fowt_env.controllers.tuned import tuned
+from fowt_env.descriptions.units import DEGREE
 from fowt_env.errors import ControllerError, InputError, unknown
 from fowt_env.plant.aero.blade_elements import build_blade_elements
 from fowt_env.plant.aero.coefficient_table import performance
@@ -40,7 +41,7 @@ PRELOADED = ("libquadmath", "libgfortran", "libmvec")  # bundled with it; a copy
 SWAP_SIZE = 4096  # floats: the library touches entries beyond 3,300 whatever the interface
 TEXT_SIZE = 1024  # of the message that the library returns
 RATIOS = np.linspace(2.0, 20.0, 37)  # tip-speed ratios of the table
-PITCHES = np.radians(np.concatenate([np.arange(-5.0, 30.0, 1.0), np.linspace(30.0, 90.0, 13)]))
+PITCHES = DEGREE * np.concatenate([np.arange(-5.0, 30.0, 1.0), np.linspace(30.0, 90.0, 13)])
 SCHEDULE = 0.5 * pi * np.linspace(0.0, 1.0, 40) ** 2  # blade pitch of the gain table, rad
 POLE_SPEEDS = 45  # winds of the estimator's table of poles
 TORQUE_FREQUENCY, TORQUE_DAMPING = 0.15, 0.7  # rad/s, of the torque loop in ROSCO's NREL 5 MW deck
@@ -432,7 +433,7 @@ def deck_text(values):
 def table_text(table):
     """Text of a Table as ROSCO reads it."""
     lines = ["# Rotor performance", "#", "#", "# Pitch angle vector (deg)"]
-    lines += [_words(np.degrees(table.blade_pitch)), "# TSR vector", _words(table.ratio)]
+    lines += [_words(table.blade_pitch / DEGREE), "# TSR vector", _words(table.ratio)]
     lines += ["# Wind speed vector", "0", ""]
     for name in ("cp", "ct", "cq"):
         rows = (" ".join(f"{value:.6f}" for value in row) for row in getattr(table, name))

@@ -12,8 +12,8 @@ import pandas as pd
 from fowt_env.analysis.trim import trim
 from fowt_env.control import make
 from fowt_env.descriptions.records import is_number
+from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.errors import ControllerInputError, InputError, SimulationStopped, unknown
-from fowt_env.plant.channels import DEG, RPM
 from fowt_env.plant.compile.decorators import control_kernel
 from fowt_env.plant.events import counted
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
@@ -41,18 +41,18 @@ INITIAL = {  # channel: (state, factor to SI)
     "PtfmSurge": (State.SURGE, 1.0),
     "PtfmSway": (State.SWAY, 1.0),
     "PtfmHeave": (State.HEAVE, 1.0),
-    "PtfmRoll": (State.ROLL, 1.0 / DEG),
-    "PtfmPitch": (State.PLATFORM_PITCH, 1.0 / DEG),
-    "PtfmYaw": (State.YAW, 1.0 / DEG),
-    "Azimuth": (State.AZIMUTH, 1.0 / DEG),
-    "RotSpeed": (State.ROTOR_SPEED, 1.0 / RPM),
-    "BldPitch1": (State.BLADE_PITCH, 1.0 / DEG),
+    "PtfmRoll": (State.ROLL, DEGREE),
+    "PtfmPitch": (State.PLATFORM_PITCH, DEGREE),
+    "PtfmYaw": (State.YAW, DEGREE),
+    "Azimuth": (State.AZIMUTH, DEGREE),
+    "RotSpeed": (State.ROTOR_SPEED, RPM),
+    "BldPitch1": (State.BLADE_PITCH, DEGREE),
     "PtfmTVxi": (State.VX, 1.0),
     "PtfmTVyi": (State.VY, 1.0),
     "PtfmTVzi": (State.VZ, 1.0),
-    "PtfmRVxi": (State.WX, 1.0 / DEG),
-    "PtfmRVyi": (State.WY, 1.0 / DEG),
-    "PtfmRVzi": (State.WZ, 1.0 / DEG),
+    "PtfmRVxi": (State.WX, DEGREE),
+    "PtfmRVyi": (State.WY, DEGREE),
+    "PtfmRVzi": (State.WZ, DEGREE),
 }
 
 
@@ -111,7 +111,7 @@ def initial_state(
             x[index] = value * factor
     if abs(x[State.PLATFORM_PITCH]) >= 0.5 * pi:
         raise InputError(
-            f"initial['PtfmPitch'] = {x[State.PLATFORM_PITCH] * DEG:g}: must be inside (-90, 90) deg"
+            f"initial['PtfmPitch'] = {x[State.PLATFORM_PITCH] / DEGREE:g}: must be inside (-90, 90) deg"
         )
     if rates:  # given in inertial axes, kept in body axes
         inertial = np.zeros(6)
@@ -124,8 +124,8 @@ def initial_state(
     drive = scene.turbine.pitch_drive
     if not drive.minimum <= x[State.BLADE_PITCH] <= drive.maximum:
         raise InputError(
-            f"initial['BldPitch1'] = {x[State.BLADE_PITCH] * DEG:g} deg: must be in"
-            f" [{drive.minimum * DEG:g}, {drive.maximum * DEG:g}] deg"
+            f"initial['BldPitch1'] = {x[State.BLADE_PITCH] / DEGREE:g} deg: must be in"
+            f" [{drive.minimum / DEGREE:g}, {drive.maximum / DEGREE:g}] deg"
         )
     u[1] = x[State.BLADE_PITCH]
     return x, u

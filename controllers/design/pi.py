@@ -13,6 +13,7 @@ import numpy as np
 from fowt_env.analysis.linear_model import modes
 from fowt_env.controllers.design.closed_loop import PLATFORM_PERIOD, closed_loop_matrix
 from fowt_env.controllers.pi import PISettings, schedule_gain
+from fowt_env.descriptions.units import DEGREE
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.state import State
 
@@ -67,7 +68,7 @@ def design_pi(models, turbine, omega, zeta, schedule="loop"):
         table.append(
             {
                 "wind_[m/s]": float(wind),
-                "pitch_[deg]": float(np.degrees(pitch)),
+                "pitch_[deg]": float(pitch / DEGREE),
                 "slope_[1/s2]": float(-slope),
                 "KP_[s]": float(small * kp),
                 "KI_[-]": float(small * ki),

@@ -19,6 +19,7 @@ from fowt_env.analysis.trim import calm
 from fowt_env.analysis.wave_excitation import wave_force
 from fowt_env.descriptions.iec import ntm_sigma
 from fowt_env.descriptions.platform import joint_sea_state, sea_state_of
+from fowt_env.descriptions.units import DEGREE
 from fowt_env.errors import InputError, unknown
 from fowt_env.weather.turbulence import amplitudes
 
@@ -244,8 +245,8 @@ def cost(weights, wind, rated_speed):
     q, n = np.zeros((N_FEEDBACK, N_FEEDBACK)), N_PLANT
     speed, lean, rate = (PLANT.index(name) for name in ("rotor_speed", "platform_pitch", "wy"))
     q[speed, speed] += weights.speed / (0.05 * rated_speed) ** 2
-    q[lean, lean] += weights.platform_pitch / np.radians(1.0) ** 2
-    q[rate, rate] += weights.platform_pitch_rate / np.radians(0.1) ** 2
+    q[lean, lean] += weights.platform_pitch / DEGREE**2
+    q[rate, rate] += weights.platform_pitch_rate / (0.1 * DEGREE) ** 2
     power = np.zeros(N_FEEDBACK)
     power[speed], power[n] = 1.0 / rated_speed, 1.0  # shares of rated power
     ratio = wind / WEIGHT_WIND
@@ -253,7 +254,7 @@ def cost(weights, wind, rated_speed):
     q[n + 2, n + 2] += weights.speed_integral / (0.5 * rated_speed) ** 2
     growth = weights.pitch_rate_growth if ratio < 1.0 else weights.pitch_rate_growth_above
     pitch_rate = weights.pitch_rate * ratio**growth
-    r = np.diag([weights.torque_rate / 0.05**2, pitch_rate / np.radians(0.2) ** 2])
+    r = np.diag([weights.torque_rate / 0.05**2, pitch_rate / (0.2 * DEGREE) ** 2])
     return q, r
 
 

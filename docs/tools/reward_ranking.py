@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 import fowt_env
+from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.envs.rewards import TERMS, build_scales, fill_terms, weight_array
 from fowt_env.envs.tasks import TASKS
 from fowt_env.files.markdown import markdown_table
@@ -21,11 +22,11 @@ SEED = 100_001  # of the training range
 DURATION, SKIP = 600.0, 100.0  # s
 METRICS = ("rotor speed std", "platform pitch std", "blade-pitch travel")
 COLUMNS = {  # measurement: (channel, factor to SI)
-    Measure.ROTOR_SPEED: ("RotSpeed_[rpm]", np.pi / 30.0),
+    Measure.ROTOR_SPEED: ("RotSpeed_[rpm]", RPM),
     Measure.GENERATOR_TORQUE: ("GenTq_[kN-m]", 1e3),
-    Measure.PLATFORM_PITCH: ("PtfmPitch_[deg]", np.pi / 180.0),
-    Measure.PLATFORM_PITCH_RATE: ("PtfmRVyi_[deg/s]", np.pi / 180.0),
-    Measure.BLADE_PITCH: ("BldPitch1_[deg]", np.pi / 180.0),
+    Measure.PLATFORM_PITCH: ("PtfmPitch_[deg]", DEGREE),
+    Measure.PLATFORM_PITCH_RATE: ("PtfmRVyi_[deg/s]", DEGREE),
+    Measure.BLADE_PITCH: ("BldPitch1_[deg]", DEGREE),
 }
 
 

@@ -217,7 +217,7 @@ def simulate(
 
 def _note_limits(frame, turbine):
     """Say where a run was at the generator's limits, and that its rotor passed the turbine's overspeed."""
-    from fowt_env.plant.channels import RPM
+    from fowt_env.descriptions.units import RPM
 
     limited = frame["GenTqLim_[-]"].mean()
     if limited > 0.0:
@@ -225,7 +225,7 @@ def _note_limits(frame, turbine):
             f"generator torque at its range or rate limit for {100.0 * limited:.1f} % of the run: it was"
             " commanded more than it can follow"
         )
-    fastest, limit = frame["RotSpeed_[rpm]"].max(), turbine.overspeed * RPM
+    fastest, limit = frame["RotSpeed_[rpm]"].max(), turbine.overspeed / RPM
     if fastest > limit:
         note(
             f"rotor speed of up to {fastest:.2f} rpm is beyond the turbine's overspeed of {limit:g} rpm,"

@@ -32,6 +32,7 @@ from fowt_env.controllers.lqr.design import (
     feedback_plant,
 )
 from fowt_env.controllers.pi import PISettings, schedule_gain
+from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.errors import InputError
 
 BOUND = Path(__file__).parent / "data" / "linear_bound.csv"  # what fowt design bound wrote
@@ -86,13 +87,13 @@ class Problem:
         eye = np.eye(N_FEEDBACK)
         self.rows = {  # output rows, each in units of which one is of order one
             "rotor_speed": eye[SPEED] / (0.05 * rated),
-            "platform_pitch": eye[LEAN] / np.radians(1.0),
-            "travel": rate / np.radians(0.2),
+            "platform_pitch": eye[LEAN] / DEGREE,
+            "travel": rate / (0.2 * DEGREE),
             "power": power / 0.05,
             "torque": eye[TORQUE] / 0.05,
         }
-        self.scales = {"rotor_speed": 0.05 * rated, "platform_pitch": np.radians(1.0)}
-        self.scales |= {"travel": GAUSSIAN_MEAN * np.radians(0.2), "power": 0.05, "torque": 0.05}
+        self.scales = {"rotor_speed": 0.05 * rated, "platform_pitch": DEGREE}
+        self.scales |= {"travel": GAUSSIAN_MEAN * (0.2 * DEGREE), "power": 0.05, "torque": 0.05}
 
     def deviations(self, covariance):
         """Deviations for a covariance (13, 13) of the states."""
@@ -109,7 +110,7 @@ class Problem:
         q = sum(weight * np.outer(self.rows[name], self.rows[name]) for name, weight in weights.items())
         # the integral is not scored; a trace of it makes its mode stable
         q[INTEGRAL, INTEGRAL] += 1e-4 / (0.5 * self.turbine.rated_rotor_speed) ** 2
-        return q, np.diag([TORQUE_RATE / 0.05**2, COMMAND_RATE / np.radians(0.2) ** 2])
+        return q, np.diag([TORQUE_RATE / 0.05**2, COMMAND_RATE / (0.2 * DEGREE) ** 2])
 
     @cached_property
     def kalman(self):
@@ -235,9 +236,9 @@ def _row(wind, information, share, found, base):
         "wind_[m/s]": float(wind),
         "information": information,
         "share_[-]": share,
-        "RotSpeed_std_[rpm]": found.rotor_speed * 30.0 / pi,
-        "PtfmPitch_std_[deg]": np.degrees(found.platform_pitch),
-        "blade_pitch_travel_[deg/s]": np.degrees(found.travel),
+        "RotSpeed_std_[rpm]": found.rotor_speed / RPM,
+        "PtfmPitch_std_[deg]": found.platform_pitch / DEGREE,
+        "blade_pitch_travel_[deg/s]": found.travel / DEGREE,
         "power_std_[%]": 100.0 * found.power,
         "torque_std_[%]": 100.0 * found.torque,
         "speed_ratio_[-]": found.rotor_speed / base.rotor_speed,

@@ -13,6 +13,7 @@ from scipy.linalg import eigvals
 from fowt_env.analysis.linear_model import FORCES, linearize
 from fowt_env.controllers.lqr.design import Weights, scene_at
 from fowt_env.controllers.lqr.law import LQR
+from fowt_env.descriptions.units import RPM
 from fowt_env.errors import InputError
 from fowt_env.files.atomic import replacing
 from fowt_env.files.tables import write_table
@@ -140,7 +141,7 @@ def sweep(variants, cases, seeds, out=None, progress=None, duration=660.0, skip=
             runs += [(label, LQR(scene.turbine, 0.1, chosen)) for label, chosen in weights]
             for label, controller in runs:
                 frame = simulate(scene, controller=controller, duration=duration)
-                found = metrics(frame, skip, scene.turbine.rated_rotor_speed * 30.0 / np.pi)
+                found = metrics(frame, skip, scene.turbine.rated_rotor_speed / RPM)
                 kept = {name: found[name] for name in KEPT}
                 rows.append({"variant": label, "case": case.name, "seed": int(seed), **kept})
                 if progress is not None:

@@ -1,7 +1,6 @@
 """One run of one controller on one case, to its row: what shapes a figure is imported from here."""
 
 from dataclasses import dataclass
-from math import degrees
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +9,7 @@ import pandas as pd
 import fowt_env
 from fowt_env.controllers import make
 from fowt_env.descriptions.records import is_number
+from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.errors import ControllerError, ControllerInputError, InputError, SimulationStopped
 from fowt_env.training.evaluation.faults import faulted, idling
 from fowt_env.training.evaluation.guard import attempt, reason_of
@@ -72,7 +72,7 @@ def scored(run):
             grid_loss=_grid_loss(case),
             **run.options,
         )
-        rated, rate = degrees(turbine.rated_rotor_speed) / 6.0, degrees(turbine.pitch_drive.rate_limit)
+        rated, rate = turbine.rated_rotor_speed / RPM, turbine.pitch_drive.rate_limit / DEGREE
         return frame, metrics(frame, run.skip, rated, rate)
 
     # whatever a controller raises or does costs its run, not the evaluation

@@ -4,12 +4,12 @@ import numpy as np
 from gymnasium.spaces import Box
 from stable_baselines3.common.vec_env import VecEnvWrapper
 
+from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.envs.decisions import Decisions
 from fowt_env.errors import InputError
 from fowt_env.plant.measurement import Measure
 from fowt_env.training.rl.sb3_env import FowtSB3VecEnv
 
-RPM = 30.0 / np.pi
 RECORDED = (Measure.ROTOR_SPEED, Measure.PLATFORM_PITCH, Measure.BLADE_PITCH, Measure.GENERATOR_TORQUE)
 
 
@@ -140,10 +140,9 @@ class ValidationVecEnv(FowtSB3VecEnv):
         power = speed * torque * ratio * 1e-3
         seconds = envs[0].control_dt * (len(record) - 1)
         return {
-            "rotor_speed_std_[rpm]": speed.std(axis=0) * RPM,
-            "platform_pitch_std_[deg]": np.degrees(platform_pitch.std(axis=0)),
-            "blade_pitch_travel_[deg/s]": np.degrees(np.abs(np.diff(blade_pitch, axis=0)).sum(axis=0))
-            / seconds,
+            "rotor_speed_std_[rpm]": speed.std(axis=0) / RPM,
+            "platform_pitch_std_[deg]": platform_pitch.std(axis=0) / DEGREE,
+            "blade_pitch_travel_[deg/s]": np.abs(np.diff(blade_pitch, axis=0)).sum(axis=0) / DEGREE / seconds,
             "shaft_power_mean_[kW]": power.mean(axis=0),
             "shaft_power_std_[kW]": power.std(axis=0),
             "failed": self._failed.astype(float),

@@ -18,6 +18,7 @@ import numpy as np
 import typer
 
 from fowt_env.descriptions.platform import DATA, read_platform, read_turbine
+from fowt_env.descriptions.units import DEGREE
 from fowt_env.errors import InputError
 from fowt_env.files.atomic import replacing
 from fowt_env.training.studies.froude_model.identify import toml_value
@@ -142,7 +143,7 @@ def stations_text(turbine, scale):
         "radius_m,chord_m,twist_deg,airfoil",
     ]
     for radius, chord, twist, airfoil in zip(
-        blade.radius * scale, blade.chord * scale, np.degrees(blade.twist), blade.airfoil, strict=True
+        blade.radius * scale, blade.chord * scale, blade.twist / DEGREE, blade.airfoil, strict=True
     ):
         rows.append(f"{radius:.10g},{chord:.10g},{twist:.10g},{airfoil}")
     return "\n".join(rows) + "\n"
@@ -154,7 +155,7 @@ def _polar_files(turbine):
     for name, polar in turbine.blade.polars.items():
         rows = [f"# {name} of {turbine.name}, unchanged (froude_model/scale.py).", "alpha_deg,cl,cd,cm"]
         for alpha, *values in polar:
-            rows.append(",".join(f"{value:.10g}" for value in (np.degrees(alpha), *values)))
+            rows.append(",".join(f"{value:.10g}" for value in (alpha / DEGREE, *values)))
         files[f"{name}.csv"] = "\n".join(rows) + "\n"
     return files
 

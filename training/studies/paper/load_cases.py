@@ -15,6 +15,7 @@ import pandas as pd
 import fowt_env
 from fowt_env.analysis.trim import trim_held
 from fowt_env.descriptions.platform import read_platform
+from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.mooring import catenary
 from fowt_env.training.validation.signal_errors import harmonics
@@ -31,7 +32,6 @@ SKIP = 100.0  # s left out of statistics, ten surge periods
 SEGMENT = 125.0  # s of a spectrum's window: 12 surge periods
 STEP, OUTPUT = 0.01, 0.05  # s; 0.07 and 0.35 s at full scale
 INTENSITY = 0.03  # of the wind's turbulence, a choice
-RPM = pi / 30.0
 FULL_SCALE = "full_scale"
 
 
@@ -106,7 +106,7 @@ def case_scene(name, duration=DURATION, seed=1, **options):
 def case_point(scene, name):
     """OperatingPoint of a load case's scene with its prescribed rotor speed and blade pitch."""
     case = CASES[name]
-    return trim_held(scene, case.rotor_rpm * RPM, case.blade_pitch_deg * pi / 180.0)
+    return trim_held(scene, case.rotor_rpm * RPM, case.blade_pitch_deg * DEGREE)
 
 
 def run_case(name, duration=DURATION, seed=1, progress=False, **options):

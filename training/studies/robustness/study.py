@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.errors import unknown
 from fowt_env.files.atomic import replacing
 from fowt_env.files.markdown import markdown_table
@@ -153,9 +154,9 @@ def cases_part(sizes, folder, progress):
     peak = tally.peak
     rows = [
         ["kinetic energy of the platform", f"{peak[0] * 1e-6:.0f} MJ"],
-        ["roll or platform pitch", f"{np.degrees(peak[1]):.1f} deg"],
+        ["roll or platform pitch", f"{peak[1] / DEGREE:.1f} deg"],
         ["distance of the body origin from rest", f"{peak[2]:.1f} m"],
-        ["rotor speed", f"{peak[3] * 30.0 / np.pi:.1f} rpm"],
+        ["rotor speed", f"{peak[3] / RPM:.1f} rpm"],
         ["capsizes, each confirmed at a quarter of the step", f"{tally.capsizes}"],
     ]
     found.tables.append(["Largest values over all random cases that ran to their end", ["", "largest"], rows])
@@ -265,7 +266,7 @@ def long_part(sizes, folder, progress):
     difference, turned = long.quaternion_difference()
     found.claim(
         "tumbling body: Euler angles against a quaternion", "60 s, 61 instants",
-        f"rotation matrices differ by {difference:.1e}, turned by {np.degrees(turned):.0f} deg",
+        f"rotation matrices differ by {difference:.1e}, turned by {turned / DEGREE:.0f} deg",
         f"{TURNED:.0e}", difference <= TURNED,
     )  # fmt: skip
     return found
