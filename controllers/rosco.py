@@ -22,7 +22,7 @@ import threading
 import weakref
 from _ctypes import dlclose
 from dataclasses import dataclass
-from math import isfinite, pi
+from math import pi
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +31,7 @@ from scipy.optimize import brentq
 
 from fowt_env.control import check_control_dt
 from fowt_env.controllers.tuned import tuned
+from fowt_env.descriptions.checks import check_number, check_one_of
 from fowt_env.descriptions.units import DEGREE
 from fowt_env.errors import ControllerError, InputError, unknown
 from fowt_env.plant.aero.blade_elements import build_blade_elements
@@ -57,14 +58,10 @@ class RoscoSettings:
     high_pass: float = 0.01  # rad/s, first-order high pass
 
     def __post_init__(self):
-        if self.mode not in (0, 1, 2):
-            raise InputError(f"mode = {self.mode}: must be 0, 1 or 2")
-        if not (isfinite(self.gain) and self.gain <= 0.0):
-            raise InputError(f"gain = {self.gain}: must be finite and <= 0 (beyond it drives the platform)")
+        check_one_of("mode", self.mode, (0, 1, 2))
+        check_number("gain", self.gain, high=0.0, allowed="finite and <= 0 (beyond it drives the platform)")
         for key in ("low_pass", "high_pass"):
-            value = getattr(self, key)
-            if not (isfinite(value) and value > 0.0):
-                raise InputError(f"{key} = {value}: must be positive and finite, rad/s")
+            check_number(key, getattr(self, key), 0.0, low_open=True, allowed="positive and finite, rad/s")
 
 
 def find_library():

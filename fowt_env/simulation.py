@@ -11,7 +11,7 @@ import pandas as pd
 
 from fowt_env.analysis.trim import trim
 from fowt_env.control import make
-from fowt_env.descriptions.records import is_number
+from fowt_env.descriptions.checks import check_number, refusal
 from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.errors import ControllerInputError, InputError, SimulationStopped, unknown
 from fowt_env.plant.compile.decorators import control_kernel
@@ -75,8 +75,7 @@ class _Hold:
 def steps_in(name: str, period: float, dt: float) -> int:
     """Number of physics steps in a period. Raises: InputError if dt does not divide it."""
     for key, value in ((name, period), ("dt", dt)):
-        if not is_number(value) or value <= 0.0:
-            raise InputError(f"{key} = {value!r}: must be a positive number of seconds")
+        check_number(key, value, 0.0, low_open=True, allowed="a positive number of seconds")
     count = round(period / dt)
     if count < 1 or abs(count * dt - period) > 1e-9 * period:
         raise InputError(f"dt = {dt:g} s does not divide {name} = {period:g} s (ratio {period / dt:.6g})")
@@ -100,11 +99,10 @@ def initial_state(
         key = str(name).split("_[")[0]
         if key not in INITIAL:
             raise unknown("channel of initial", name, INITIAL)
-        if not is_number(value):
-            raise InputError(f"initial[{name!r}] = {value!r}: must be a finite number")
+        check_number(f"initial[{name!r}]", value)
         index, factor = INITIAL[key]
         if scene.model.body.plane is not None and index in OUT_OF_PLANE and value != 0.0:
-            raise InputError(f"initial[{name!r}] = {value:g}: must be 0 in a planar scene")
+            raise refusal(f"initial[{name!r}]", value, "0 in a planar scene")
         if State.VX <= index <= State.WZ:
             rates[index] = value * factor
         else:
@@ -204,8 +202,8 @@ def simulate(
     last = steps_in("duration", duration, dt)
     steps_in("duration", duration, output_dt)
     check_duration(scene, duration)
-    if grid_loss is not None and not is_number(grid_loss):
-        raise InputError(f"grid_loss = {grid_loss!r}: must be a time in s, or None")
+    if grid_loss is not None:
+        check_number("grid_loss", grid_loss, allowed="a time in s, or None")
     held = controller is None
     if not held:
         controller = make(controller, scene.turbine, control_dt)

@@ -8,7 +8,7 @@ the hull's force at the spectrum's peak. The controls are the rates of torque an
 import pickle
 from dataclasses import asdict, dataclass, fields, replace
 from functools import lru_cache
-from math import isfinite, pi, sqrt
+from math import inf, pi, sqrt
 
 import numpy as np
 from scipy.linalg import expm, solve_continuous_are, solve_discrete_are
@@ -17,10 +17,11 @@ from scipy.optimize import least_squares
 from fowt_env.analysis.linear_model import linearize
 from fowt_env.analysis.trim import calm
 from fowt_env.analysis.wave_excitation import wave_force
+from fowt_env.descriptions.checks import check_number
 from fowt_env.descriptions.iec import ntm_sigma
 from fowt_env.descriptions.platform import joint_sea_state, sea_state_of
 from fowt_env.descriptions.units import DEGREE
-from fowt_env.errors import InputError, unknown
+from fowt_env.errors import unknown
 from fowt_env.weather.turbulence import amplitudes
 
 SITE = "gulf_of_maine_normal"  # joint sea states, as in the named suites
@@ -59,13 +60,11 @@ class Weights:
 
     def __post_init__(self):
         for item in fields(self):
-            value = getattr(self, item.name)
             positive = item.name in ("pitch_rate", "torque_rate", "schedule_time")
             signed = "_growth" in item.name
-            good = isinstance(value, int | float) and isfinite(value)
-            if not good or not (signed or value > 0.0 or (value == 0.0 and not positive)):
-                allowed = "of either sign" if signed else "positive" if positive else "0 or more"
-                raise InputError(f"weight {item.name} = {value!r}: must be finite and {allowed}")
+            sign = "of either sign" if signed else "positive" if positive else "0 or more"
+            low, value = -inf if signed else 0.0, getattr(self, item.name)
+            check_number(f"weight {item.name}", value, low, low_open=positive, allowed=f"finite and {sign}")
 
     def changed(self, **changes):
         """A copy with some weights changed. Raises: InputError for unknown names."""

@@ -13,21 +13,11 @@ import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 from pydantic_core import PydanticCustomError
 
+from fowt_env.descriptions.checks import interval, is_number, plain_number, short
 from fowt_env.descriptions.units import FILE_UNITS
 
 # Tables that files may give instead of a field: key in the file -> field.
 OTHER_FORMS = {"mooring": "lines"}
-
-
-def plain_number(value):
-    """A numpy scalar as a Python number, which the strict float type takes (and no string or bool)."""
-    return value.item() if isinstance(value, (np.floating, np.integer)) else value
-
-
-def is_number(value):
-    """Whether a value is a finite number that fits a float, and neither bool nor text."""
-    value = plain_number(value)
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= 1e300
 
 
 def bounded(**limits):
@@ -232,27 +222,9 @@ def allowed(model, loc):
     return "a table"
 
 
-def interval(low, high, low_open, high_open, noun="a number"):
-    """A range in words, such as "a number > 0" or "a finite number"."""
-    above = f"{'>' if low_open else '>='} {low:g}" if low > -math.inf else ""
-    below = f"{'<' if high_open else '<='} {high:g}" if high < math.inf else ""
-    if not (above or below):
-        return noun.replace("a ", "a finite ", 1)
-    return f"{noun} {' and '.join(part for part in (above, below) if part)}"
-
-
 def dotted(path):
     """A key as it would be written in the file; positions in lists count from 1."""
     return ".".join(str(part + 1) if isinstance(part, int) else str(part) for part in path)
-
-
-def short(value):
-    """repr of a value, shortened for messages."""
-    try:
-        text = repr(value)
-    except ValueError:  # an integer of more digits than Python prints
-        text = "a very large whole number"
-    return text if len(text) <= 60 else text[:57] + "..."
 
 
 def _element(whole, path, default):

@@ -19,7 +19,7 @@ from rich.progress import (
     TimeElapsedColumn,
 )
 
-from fowt_env.descriptions.checks import parse_numbers
+from fowt_env.descriptions.checks import parse_numbers, parse_whole_numbers
 from fowt_env.errors import ControllerError, InputError, SimulationStopped, unknown
 from fowt_env.files.tables import SERIES_SUFFIXES, table_path, write_table
 from fowt_env.training.cli.arguments import parse_pairs, parse_sea, parse_wind
@@ -330,9 +330,7 @@ def evaluate(
 
     folder = Path(out_folder)
     chosen = chosen_cases(suite, cases)
-    numbers = None if seeds is None else parse_numbers(seeds, "seeds")
-    if any(number != int(number) for number in numbers or ()):
-        raise InputError(f"seeds = {seeds!r}: must be whole numbers")
+    numbers = None if seeds is None else parse_whole_numbers(seeds, "seeds")
     if baseline is not None and baseline not in (names := [name.strip() for name in controllers.split(",")]):
         raise unknown("baseline among --controllers", baseline, names)
     finished = 0
@@ -694,7 +692,7 @@ def accuracy(
 
     chosen = None if axes is None else study.select([name.strip() for name in axes.split(",")])
     folder = Path(out_folder)
-    numbers = [int(number) for number in parse_numbers(seeds, "seeds")]
+    numbers = parse_whole_numbers(seeds, "seeds")
     with progress_bar("accuracy", None) as update:
         table = study.accuracy(
             numbers,

@@ -15,7 +15,7 @@ linear model has no limits of torque, pitch or their rates, and nothing is sampl
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from math import isfinite, pi, sqrt
+from math import pi, sqrt
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +32,7 @@ from fowt_env.controllers.lqr.design import (
     feedback_plant,
 )
 from fowt_env.controllers.pi import PISettings, schedule_gain
+from fowt_env.descriptions.checks import check_number
 from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.errors import InputError
 
@@ -212,13 +213,13 @@ def bound_table(scene, winds=WINDS, information=tuple(INFORMATION), torque_std=T
     torque_std: limit, as a share of rated torque; inf for none.
     Raises: InputError for winds that are not above rated, or a torque_std that is not positive.
     """
-    if not torque_std > 0.0:
-        raise InputError(f"torque_std = {torque_std}: must be positive (inf: no limit)")
+    allowed = "positive (inf: no limit)"
+    check_number("torque_std", torque_std, 0.0, low_open=True, infinite=True, allowed=allowed)
     rows = []
+    low, high = scene.turbine.rated_wind_speed, scene.turbine.cut_out_wind_speed
+    allowed = f"above {low:g} and at most {high:g} m/s"
     for number, wind in enumerate(winds, 1):
-        if not (isfinite(wind) and scene.turbine.rated_wind_speed < wind <= scene.turbine.cut_out_wind_speed):
-            low, high = scene.turbine.rated_wind_speed, scene.turbine.cut_out_wind_speed
-            raise InputError(f"wind = {wind}: must be above {low:g} and at most {high:g} m/s")
+        check_number("wind", wind, low, high, low_open=True, allowed=allowed)
         problem = Problem(design_model(scene, wind), scene.turbine)
         base, _ = gspi_covariance(problem)
         rows.append(_row(wind, "gspi_oc3", float("nan"), base, base))

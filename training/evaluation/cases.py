@@ -12,14 +12,13 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
+from fowt_env.descriptions.checks import is_number, plain_number
 from fowt_env.descriptions.files import locate, raise_problems, read_toml
 from fowt_env.descriptions.platform import joint_sea_state, read_platform
 from fowt_env.descriptions.records import (
     NonNegative,
     Positive,
     Record,
-    is_number,
-    plain_number,
     validate,
 )
 from fowt_env.descriptions.sea_state import SeaState, sea_state_of

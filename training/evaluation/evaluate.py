@@ -20,7 +20,7 @@ import pyarrow.parquet as pq
 
 import fowt_env
 from fowt_env.controllers import make
-from fowt_env.descriptions.records import is_number, plain_number
+from fowt_env.descriptions.checks import check_number, check_whole_number, plain_number
 from fowt_env.errors import InputError
 from fowt_env.files.atomic import replacing
 from fowt_env.files.tables import write_table
@@ -167,8 +167,9 @@ def _plan(controllers, cases, suite, duration, skip, seeds, runs_folder, time_li
     """The Runs of an evaluation, case by case, so that an interrupted one compares what it has."""
     if seeds is not None:
         seeds = [_seed(seed) for seed in seeds]
-    if time_limit is not None and not (is_number(time_limit) and time_limit > 0.0):
-        raise InputError(f"time_limit = {time_limit!r}: must be a positive number of seconds, or None")
+    if time_limit is not None:
+        allowed = "a positive number of seconds, or None"
+        time_limit = check_number("time_limit", time_limit, 0.0, low_open=True, allowed=allowed)
     if runs_folder is not None:
         runs_folder = Path(runs_folder).absolute()  # of here, wherever a controller or a worker goes
     for what, given in (
@@ -208,11 +209,11 @@ def _plan(controllers, cases, suite, duration, skip, seeds, runs_folder, time_li
 
 
 def _seed(value):
-    """A seed as an int. Raises: InputError."""
+    """A seed as an int; a float that is whole counts as one. Raises: InputError."""
     value = plain_number(value)
-    if not is_number(value) or value != int(value) or not 0 <= value <= LARGEST_SEED:
-        raise InputError(f"seeds: {value!r} is none: must be whole numbers in [0, {LARGEST_SEED}]")
-    return int(value)
+    if isinstance(value, float) and value.is_integer():
+        value = int(value)
+    return check_whole_number("seeds", value, 0, LARGEST_SEED)
 
 
 def _first(*values):

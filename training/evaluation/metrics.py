@@ -3,6 +3,7 @@
 import numpy as np
 import rainflow
 
+from fowt_env.descriptions.checks import check_number
 from fowt_env.errors import InputError
 
 TIME = "Time_[s]"
@@ -170,8 +171,7 @@ def _kept(df, skip):
     missing = [name for name in REQUIRED if name not in df.columns]
     if missing:
         raise InputError(f"metrics: the run lacks the columns {', '.join(missing)}")
-    if not skip >= 0.0:
-        raise InputError(f"skip = {skip}: must be 0 or more seconds")
+    check_number("skip", skip, 0.0, allowed="0 or more seconds")
     time = df[TIME].to_numpy()
     kept = df[time >= (time[0] + skip - 1e-9)] if len(time) else df
     if len(kept) < 2:

@@ -8,7 +8,7 @@ import pandas as pd
 
 import fowt_env
 from fowt_env.controllers import make
-from fowt_env.descriptions.records import is_number
+from fowt_env.descriptions.checks import is_number
 from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.errors import ControllerError, ControllerInputError, InputError, SimulationStopped
 from fowt_env.training.evaluation.faults import faulted, idling

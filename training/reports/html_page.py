@@ -17,6 +17,7 @@ from string import Template
 
 import numpy as np
 
+from fowt_env.descriptions.checks import check_number
 from fowt_env.descriptions.files import parse_json
 from fowt_env.errors import InputError, unknown
 from fowt_env.files.atomic import replacing
@@ -101,8 +102,8 @@ def write_report(
     out = folder / "report.html" if out is None else Path(out)
     if out.suffix.lower() not in (".html", ".htm"):
         raise InputError(f"report page {str(out)!r}: must end with .html")
-    if rate is not None and not 0.0 < rate < float("inf"):
-        raise InputError(f"rate = {rate}: must be a positive number of samples per second")
+    if rate is not None:
+        check_number("rate", rate, 0.0, low_open=True, allowed="a positive number of samples per second")
     if not folder.is_dir():
         raise InputError(f"results {str(folder)!r} is no folder: make one with fowt evaluate --out FOLDER")
     table = read_results(folder)

@@ -4,9 +4,9 @@ import numpy as np
 from gymnasium.spaces import Box
 from stable_baselines3.common.vec_env import VecEnvWrapper
 
+from fowt_env.descriptions.checks import check_number
 from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.envs.decisions import Decisions
-from fowt_env.errors import InputError
 from fowt_env.plant.measurement import Measure
 from fowt_env.training.rl.sb3_env import FowtSB3VecEnv
 
@@ -100,8 +100,8 @@ class ValidationVecEnv(FowtSB3VecEnv):
         self.episodes = [{"offsets": {}} | episode for episode in episodes]
         first = self.env.envs[0]
         duration = first.task.duration
-        if skip >= duration:
-            raise InputError(f"validation.skip = {skip}: must be less than the {duration:g} s of an episode")
+        allowed = f"less than the {duration:g} s of an episode"
+        check_number("validation.skip", skip, 0.0, duration, high_open=True, allowed=allowed)
         self.skip = round(skip / first.control_dt)
         self._record = np.full((round(duration / first.control_dt), len(episodes), 4), np.nan)
         self._clock = 0

@@ -6,10 +6,9 @@ drawn anew in every episode as ever; how much noise its sensors have, and how la
 plant. Controllers in the environments (the baseline, the estimator) are designed on the plant of the files.
 """
 
-from math import isfinite
-
 import numpy as np
 
+from fowt_env.descriptions.checks import check_whole_number, is_number
 from fowt_env.envs.sensors import check_sensors
 from fowt_env.errors import InputError, unknown
 from fowt_env.training.evaluation.plant_perturbation import PLANT, PLATFORM, plant_settings
@@ -34,8 +33,7 @@ def check_distribution(where, spec):
     kind, a, b = spec
     if kind not in KINDS:
         raise unknown(f"distribution of {where}", kind, KINDS)
-    numbers = all(isinstance(x, int | float) and not isinstance(x, bool) and isfinite(x) for x in (a, b))
-    ordered = numbers and (b >= 0.0 if kind == "normal" else b >= a)
+    ordered = is_number(a) and is_number(b) and (b >= 0.0 if kind == "normal" else b >= a)
     if not ordered or (kind == "loguniform" and a <= 0.0):
         raise InputError(f"{where} = {spec!r}: must have low <= high (positive for loguniform) or std >= 0")
     return kind, float(a), float(b)
@@ -71,8 +69,7 @@ def randomised(spec, n, seed):
     spec: {"plants": size of the pool, name: distribution or None, ...}. Raises: InputError.
     """
     size = spec.get("plants", 8)
-    if type(size) is not int or not 1 <= size <= 1000:
-        raise InputError(f"randomise.plants = {size!r}: must be a whole number from 1 to 1000")
+    check_whole_number("randomise.plants", size, 1, 1000)
     chosen = distributions(spec)
     rng = np.random.default_rng([seed, 1])
     pool = [draw(chosen, rng) for _ in range(min(size, n))]

@@ -206,7 +206,7 @@ def write_plots(study, folder):
     return paths
 
 
-def _number(value):
+def _shown(value):
     """A figure as text; empty where there is none."""
     return "" if not np.isfinite(value) else f"{value:.5g}"
 
@@ -223,7 +223,7 @@ def markdown(study):
             quantity = f"{row.quantity} ({row.note})" if row.note else row.quantity
             error = "" if not np.isfinite(row.error) else f"{row.error:.3g}"
             allowed = "" if not np.isfinite(row.allowed) else f"{row.allowed:g}"
-            values = (_number(row.openfast), _number(row.here), error, allowed, row.verdict)
+            values = (_shown(row.openfast), _shown(row.here), error, allowed, row.verdict)
             cells.append((quantity, row.unit, *values))
         lines += [f"### {case}", "", markdown_table(header, cells), ""]
     return "\n".join(lines)

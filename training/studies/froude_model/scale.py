@@ -17,6 +17,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
+from fowt_env.descriptions.checks import check_number
 from fowt_env.descriptions.platform import DATA, read_platform, read_turbine
 from fowt_env.descriptions.units import DEGREE
 from fowt_env.errors import InputError
@@ -166,8 +167,7 @@ def write(scale, folder, name, platform=PLATFORM, turbine=TURBINE):
     scale: of lengths, > 0. platform, turbine: the originals, as read_platform and read_turbine take them.
     Raises: InputError for a scale or descriptions that cannot be used.
     """
-    if not (np.isfinite(scale) and 0.001 <= scale <= 100.0):
-        raise InputError(f"scale = {scale!r}: must be a number in [0.001, 100]")
+    check_number("scale", scale, 0.001, 100.0)
     folder = Path(folder)
     machine = read_turbine(turbine)
     home = folder / "turbines" / name
@@ -191,8 +191,7 @@ def scale_of_power(power, turbine=TURBINE):
     """Scale of lengths at which the turbine's rated electrical power becomes `power` (W)."""
     machine = read_turbine(turbine)
     own = machine.torque_law.rated_power * machine.drivetrain.generator_efficiency
-    if not (np.isfinite(power) and power > 0.0):
-        raise InputError(f"power = {power!r}: must be a positive number of watts")
+    check_number("power", power, 0.0, low_open=True, allowed="a positive number of watts")
     return float((power / own) ** (1.0 / POWER_EXPONENT))
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 
 from fowt_env.controllers import make
+from fowt_env.descriptions.checks import check_whole_number
 from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.envs import FowtEnv
 from fowt_env.errors import InputError
@@ -135,8 +136,7 @@ def without_line(scene, line):
 
     Raises: InputError if there is no such line.
     """
-    if not 0 <= line < scene.n_lines:
-        raise InputError(f"line = {line}: must be a whole number from 0 to {scene.n_lines - 1}")
+    check_whole_number("line", line, 0, scene.n_lines - 1)
     # a table is about the rest position of all lines, which is not where the platform goes
     arrays = scene.model.mooring._replace(table=None)[:-1]
     left = [np.ascontiguousarray(np.delete(array, line, axis=0)) for array in arrays]
