@@ -31,6 +31,7 @@ from fowt_env.training.evaluation.guard import attempt
 from fowt_env.training.evaluation.metrics import METRICS, metrics
 from fowt_env.training.evaluation.provenance import controller_code, version_gap, versions
 from fowt_env.training.evaluation.results import check_name, open_results, parquet_of, run_file, write_run
+from fowt_env.training.evaluation.results_table import KEY
 from fowt_env.training.evaluation.run_case import COLUMNS, CONTROL_DT, SHORTEST_WEATHER, Run, lost_row, scored
 
 __all__ = ["COLUMNS", "SHORTEST_WEATHER", "Case", "evaluate", "metrics", "named_cases", "run_file", "summary"]
@@ -327,6 +328,16 @@ class _RowFile:
     def __exit__(self, *exception):
         if self.path is not None:
             self.file.close()
+
+
+def mean_ratios(table, over, columns):
+    """DataFrame by controller: mean over the runs of each column over what controller `over` has in the same.
+
+    NaN where a run of either failed.
+    """
+    values = table.set_index(KEY)[list(columns)].sort_index()
+    base, names = values.loc[over], dict.fromkeys(table["controller"])
+    return pd.DataFrame({name: (values.loc[name] / base).mean(skipna=False) for name in names}).T
 
 
 def summary(table):

@@ -9,11 +9,10 @@ import pandas as pd
 import fowt_env
 from fowt_env.controllers import make
 from fowt_env.descriptions.checks import is_number
-from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.errors import ControllerError, ControllerInputError, InputError, SimulationStopped
 from fowt_env.training.evaluation.faults import faulted, idling
 from fowt_env.training.evaluation.guard import attempt, reason_of
-from fowt_env.training.evaluation.metrics import METRICS, TIME, metrics
+from fowt_env.training.evaluation.metrics import METRICS, TIME, turbine_metrics
 from fowt_env.training.evaluation.model_mismatch import Unaware, shifted_parts
 from fowt_env.training.evaluation.wind_boxes import cached_box
 from fowt_env.weather.wind_field import is_field
@@ -60,7 +59,6 @@ def scored(run):
     if case.shift is not None and case.shift.factors:
         parts = shifted_parts(case.shift, case.platform)
         scene = fowt_env.build_scene(wind=wind, sea=case.sea, seed=run.seed, **options | parts)
-    turbine = scene.turbine
 
     def work():
         frame = fowt_env.simulate(
@@ -72,8 +70,7 @@ def scored(run):
             grid_loss=_grid_loss(case),
             **run.options,
         )
-        rated, rate = turbine.rated_rotor_speed / RPM, turbine.pitch_drive.rate_limit / DEGREE
-        return frame, metrics(frame, run.skip, rated, rate)
+        return frame, turbine_metrics(frame, scene.turbine, run.skip)
 
     # whatever a controller raises or does costs its run, not the evaluation
     outcome, error = attempt(work, run.time_limit)

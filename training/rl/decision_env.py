@@ -8,6 +8,7 @@ from fowt_env.descriptions.checks import check_number
 from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.envs.decisions import Decisions
 from fowt_env.plant.measurement import Measure
+from fowt_env.training.evaluation.metrics import REDUCTIONS, travel
 from fowt_env.training.rl.sb3_env import FowtSB3VecEnv
 
 RECORDED = (Measure.ROTOR_SPEED, Measure.PLATFORM_PITCH, Measure.BLADE_PITCH, Measure.GENERATOR_TORQUE)
@@ -132,18 +133,21 @@ class ValidationVecEnv(FowtSB3VecEnv):
         return result
 
     def figures(self):
-        """{metric: (n,)} of the recorded episodes; NaN for those that failed."""
+        """{metric: (n,)} of the recorded episodes by the formulas of evaluation.metrics; NaN for failed ones.
+
+        They are of what the sensors could measure, control period by control period, and so of the shaft's
+        power, which is the generator's before its losses.
+        """
         record = np.where(self._failed[:, None], np.nan, self._record[self.skip : self._clock - 1])
         speed, platform_pitch, blade_pitch, torque = np.moveaxis(record, 2, 0)
-        envs = self.env.envs
-        ratio = envs[0].scene.turbine.drivetrain.gear_ratio
-        power = speed * torque * ratio * 1e-3
-        seconds = envs[0].control_dt * (len(record) - 1)
+        first, mean, std = self.env.envs[0], REDUCTIONS["mean"], REDUCTIONS["std"]
+        time = first.control_dt * np.arange(len(record))
+        power = speed * torque * first.scene.turbine.drivetrain.gear_ratio * 1e-3
         return {
-            "rotor_speed_std_[rpm]": speed.std(axis=0) / RPM,
-            "platform_pitch_std_[deg]": platform_pitch.std(axis=0) / DEGREE,
-            "blade_pitch_travel_[deg/s]": np.abs(np.diff(blade_pitch, axis=0)).sum(axis=0) / DEGREE / seconds,
-            "shaft_power_mean_[kW]": power.mean(axis=0),
-            "shaft_power_std_[kW]": power.std(axis=0),
+            "rotor_speed_std_[rpm]": std(speed / RPM),
+            "platform_pitch_std_[deg]": std(platform_pitch / DEGREE),
+            "blade_pitch_travel_[deg/s]": travel(time, blade_pitch / DEGREE),
+            "shaft_power_mean_[kW]": mean(power),
+            "shaft_power_std_[kW]": std(power),
             "failed": self._failed.astype(float),
         }

@@ -229,7 +229,11 @@ def decision_env(env):
 
 
 def baseline_figures(settings, reference="gspi_oc3"):
-    """{metric: (n,)} of a compiled controller on the validation episodes of resolved settings."""
+    """{metric: (n,)} of a compiled controller on the validation episodes of resolved settings.
+
+    It is run in the agent's own environment and not by evaluation.evaluate, so that a ratio is of the same
+    weather, start, sensors and control periods.
+    """
     chosen = environment_settings(settings) | {"action_mode": "residual", "baseline": reference}
     env = validation_env(settings, chosen)
     env.reset()
