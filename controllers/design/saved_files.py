@@ -86,10 +86,10 @@ def _factory(content, where, name="design"):
     for key in KEYS:
         if key not in content:
             raise InputError(f"{where}: {key} is missing")
-    if content["kind"] not in tuple(KINDS):  # a list cannot be looked up in a dict
-        raise InputError(f"{where}: {unknown('kind', content['kind'], KINDS)}")
-    _check_keys(content["settings"], KINDS[content["kind"]][0], "settings", where)
-    make, turbine_name = KINDS[content["kind"]][1], content["turbine"]
+    if content["kind"] not in tuple(DESIGN_KINDS):  # a list cannot be looked up in a dict
+        raise InputError(f"{where}: {unknown('kind', content['kind'], DESIGN_KINDS)}")
+    _check_keys(content["settings"], DESIGN_KINDS[content["kind"]][0], "settings", where)
+    make, turbine_name = DESIGN_KINDS[content["kind"]][1], content["turbine"]
     make = make(content["settings"], where)
 
     def factory(turbine, control_dt):
@@ -188,4 +188,5 @@ def _model(row, place, where):
     return DesignModel(**values)
 
 
-KINDS = {"pi": (PI_KEYS, _pi), "lqr": (("weights", "models"), _lqr)}  # kind: keys of settings, maker's maker
+# kind: keys of settings, maker's maker
+DESIGN_KINDS = {"pi": (PI_KEYS, _pi), "lqr": (("weights", "models"), _lqr)}

@@ -284,9 +284,9 @@ case), pareto.png, metrics.png, boxes.png, timeseries_CASE.png, spectra_CASE.png
 goes on where it was stopped; further controllers, cases or seeds are added to the folder."""
 
 
-@app.command(epilog=EVALUATE_EXAMPLES)
+@app.command(name="evaluate", epilog=EVALUATE_EXAMPLES)
 @reported
-def evaluate(
+def evaluate_command(
     controllers: Annotated[
         str, typer.Option(help="Names, policy:NAME, design:FILE or module:Name, by commas.")
     ] = "pi",
@@ -324,8 +324,7 @@ def evaluate(
     plot: Annotated[bool, typer.Option("--plot/--no-plot", help="Make the plots.")] = True,
 ):
     """Score controllers on load cases: a leaderboard with intervals, metrics by case, the runs, and plots."""
-    from fowt_env.training.evaluation.evaluate import evaluate as evaluate_controllers
-    from fowt_env.training.evaluation.evaluate import summary
+    from fowt_env.training.evaluation.evaluate import evaluate, summary
     from fowt_env.training.reports.terminal import chosen_cases, write_leaderboard
 
     folder = Path(out_folder)
@@ -342,7 +341,7 @@ def evaluate(
             update(done, f"evaluating, {done} of {total} runs done", total)
 
         try:
-            table = evaluate_controllers(
+            table = evaluate(
                 controllers,
                 chosen,
                 duration=duration,
@@ -542,7 +541,7 @@ def validate(
     plot: Annotated[bool, typer.Option("--plot/--no-plot", help="Make the plots.")] = True,
 ):
     """Compare this plant with OpenFAST on the same cases: every figure with its verdict, and plots."""
-    from fowt_env.training.validation.report import write_report
+    from fowt_env.training.validation.report import write_validation_report
     from fowt_env.training.validation.validate import GROUPS, validate_cases
 
     names = list(GROUPS) if case == "all" else [name.strip() for name in case.split(",") if name.strip()]
@@ -564,7 +563,7 @@ def validate(
         if row.verdict == "MISSED":
             text = f"{row.case}: {row.quantity}: {row.error:.3g} %, allowed {row.allowed:g} %"
             out.print(f"[red]missed[/red]  {escape(text)}", highlight=False, soft_wrap=True)
-    note("wrote " + ", ".join(str(path) for path in write_report(study, out_folder, plot)))
+    note("wrote " + ", ".join(str(path) for path in write_validation_report(study, out_folder, plot)))
 
 
 PAPER_EXAMPLES = """[bold]Examples[/bold]
@@ -587,7 +586,7 @@ def paper(
 ):
     """Run the paper's load cases and check its claims."""
     from fowt_env.training.studies.paper.load_cases import run_paper, statistics, wanted_cases
-    from fowt_env.training.studies.paper.report import write_report
+    from fowt_env.training.studies.paper.report import write_paper_report
 
     names = wanted_cases(case)
     with progress_bar("paper", None) as update:
@@ -608,7 +607,7 @@ def paper(
         verdict = "[green]holds[/green]" if claim.holds else "[red]FAILS[/red]"
         text = f"Fig. {claim.figure}: {claim.text}: {claim.found}"
         out.print(f"{verdict}  {escape(text)}", highlight=False, soft_wrap=True)
-    note("wrote " + ", ".join(str(path) for path in write_report(study, out_folder, plot)))
+    note("wrote " + ", ".join(str(path) for path in write_paper_report(study, out_folder, plot)))
 
 
 benchmarks = typer.Typer(
@@ -776,7 +775,7 @@ def stability(
         verdict = "[green]holds[/green] " if claim.holds else "[red]MISSED[/red]"
         text = f"{claim.what} ({claim.count}): {claim.found}"
         out.print(f"{verdict} {escape(text)}", highlight=False, soft_wrap=True)
-    path = stress.write_report(out_folder, report or Path(out_folder) / "robustness.md")
+    path = stress.write_robustness_report(out_folder, report or Path(out_folder) / "robustness.md")
     note(f"wrote {path}")
     if not all(claim.holds for claim in claims):
         raise typer.Exit(1)

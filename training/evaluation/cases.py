@@ -28,8 +28,7 @@ from fowt_env.scene.build import OPTIONS
 from fowt_env.training.evaluation.faults import Fault
 from fowt_env.training.evaluation.metrics import METRICS
 from fowt_env.training.evaluation.model_mismatch import Shift
-from fowt_env.weather.wind_field import KINDS as FIELD_KINDS
-from fowt_env.weather.wind_field import REQUIRED, is_field
+from fowt_env.weather.wind_field import FIELD_KINDS, REQUIRED, is_field
 
 FOLDER = Path(__file__).parent / "suites"
 WIND_KINDS = ("rotor-averaged", "full-field")

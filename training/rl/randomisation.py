@@ -18,7 +18,7 @@ SENSORS = {
     "delay": "whole control periods from measurement to reading",
 }
 DEFAULT_SENSORS = {"noise": ("uniform", 0.0, 0.02), "delay": ("uniform", 0.0, 3.0)}
-KINDS = {
+DISTRIBUTIONS = {
     "uniform": lambda rng, low, high: rng.uniform(low, high),
     "loguniform": lambda rng, low, high: float(np.exp(rng.uniform(np.log(low), np.log(high)))),
     # within two standard deviations: a tail must not make a plant that cannot float
@@ -29,10 +29,10 @@ KINDS = {
 def check_distribution(where, spec):
     """(kind, a, b) of a distribution. Raises: InputError naming what is wrong with it."""
     if not isinstance(spec, list | tuple) or len(spec) != 3:
-        raise InputError(f"{where} = {spec!r}: must be [kind, a, b], kind one of {', '.join(KINDS)}")
+        raise InputError(f"{where} = {spec!r}: must be [kind, a, b], kind one of {', '.join(DISTRIBUTIONS)}")
     kind, a, b = spec
-    if kind not in KINDS:
-        raise unknown(f"distribution of {where}", kind, KINDS)
+    if kind not in DISTRIBUTIONS:
+        raise unknown(f"distribution of {where}", kind, DISTRIBUTIONS)
     ordered = is_number(a) and is_number(b) and (b >= 0.0 if kind == "normal" else b >= a)
     if not ordered or (kind == "loguniform" and a <= 0.0):
         raise InputError(f"{where} = {spec!r}: must have low <= high (positive for loguniform) or std >= 0")
@@ -60,7 +60,7 @@ def distributions(spec):
 def draw(chosen, rng):
     """{name: value} of one draw of distributions, in a fixed order."""
     order = [name for name in (*PLANT, *SENSORS) if name in chosen]
-    return {name: float(KINDS[chosen[name][0]](rng, *chosen[name][1:])) for name in order}
+    return {name: float(DISTRIBUTIONS[chosen[name][0]](rng, *chosen[name][1:])) for name in order}
 
 
 def randomised(spec, n, seed):

@@ -229,7 +229,7 @@ def markdown(study):
     return "\n".join(lines)
 
 
-def write_report(study, folder, plots=True):
+def write_validation_report(study, folder, plots=True):
     """Paths written: validation.csv, validation.md and, with plots, one or two images per case."""
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)

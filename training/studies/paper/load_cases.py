@@ -36,7 +36,7 @@ FULL_SCALE = "full_scale"
 
 
 @dataclass(frozen=True)
-class Case:
+class LoadCase:
     """One load case at model scale, as Table 2 of the paper has it."""
 
     wind: float | None  # m/s; None: no wind
@@ -53,9 +53,9 @@ SEAS = (
 )
 WINDS = ((2.02, 62.8, 0.0), (3.36, 85.6, 0.0), (3.56, 85.6, 14.9), (5.93, 0.0, 90.0))
 CASES = {
-    **{f"LC{i}": Case(*wind) for i, wind in enumerate(WINDS, 1)},
-    **{f"LC{i}": Case(None, sea=sea) for i, sea in enumerate(SEAS, 5)},
-    **{f"LC{i}": Case(*wind, sea) for i, (wind, sea) in enumerate(zip(WINDS, SEAS, strict=True), 9)},
+    **{f"LC{i}": LoadCase(*wind) for i, wind in enumerate(WINDS, 1)},
+    **{f"LC{i}": LoadCase(None, sea=sea) for i, sea in enumerate(SEAS, 5)},
+    **{f"LC{i}": LoadCase(*wind, sea) for i, (wind, sea) in enumerate(zip(WINDS, SEAS, strict=True), 9)},
 }
 GROUPS = {
     "wind": ("LC1", "LC2", "LC3", "LC4"),

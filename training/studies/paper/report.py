@@ -207,7 +207,7 @@ def periods_table():
     return markdown_table(("motion", "paper, computed (s)", "here (s)", "difference"), rows)
 
 
-def write_report(study, folder, plot=True):
+def write_paper_report(study, folder, plot=True):
     """Write everything that a study holds into a folder; returns the paths."""
     folder = Path(folder)
     paths, text = [], ["# Against the paper", "", "Written by `fowt paper`.", ""]

@@ -143,7 +143,7 @@ def without_line(scene, line):
     return scene.with_model(mooring=Mooring(*left))
 
 
-class _Run:
+class _ExtremeRun:
     """One extreme run, a control period at a time, with the peaks of its course."""
 
     def __init__(self, case, scene, dt):
@@ -218,7 +218,7 @@ def run_extreme(name, fidelity="standard", seed=1, finer=1, scene=None):
     case = EXTREMES[name]
     if scene is None:
         scene = build_scene(wind=case.wind, sea=case.sea, seed=seed, fidelity=fidelity, duration=DURATION)
-    run = _Run(case, scene, scene.dt / finer)
+    run = _ExtremeRun(case, scene, scene.dt / finer)
     status, time = run.go()
     finite = bool(np.all(np.isfinite(run.x))) and all(isfinite(value) for value in run.peak.values())
     verdict = "finite"

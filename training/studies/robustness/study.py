@@ -341,7 +341,7 @@ def stored_parts(folder):
     return {part: json.loads(path.read_text()) for part, path in paths.items() if path.is_file()}
 
 
-def write_report(folder, path):
+def write_robustness_report(folder, path):
     """Write the Markdown report of every part that the folder holds; returns the path."""
     parts = stored_parts(folder)
     claims = [(TITLES[part], claim) for part, stored in parts.items() for claim in stored["claims"]]
@@ -411,7 +411,8 @@ METHODS = {
         " Momenta and energies are computed from the mass matrix outside the stepping code."
     ),
     "plain": (
-        f"{stability_plain.STEPS} steps of each scene by each integrator, and {stability_plain.ENV_STEPS}"
-        " control periods of environments, in a process without the compiler, with the scenes handed over."
+        f"{stability_plain.STEPS_PER_SCENE} steps of each scene by each integrator, and"
+        f" {stability_plain.ENV_STEPS} control periods of environments, in a process without the compiler,"
+        " with the scenes handed over."
     ),
 }
