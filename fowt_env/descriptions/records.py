@@ -16,6 +16,9 @@ from pydantic_core import PydanticCustomError
 from fowt_env.descriptions.checks import interval, is_number, plain_number, short
 from fowt_env.descriptions.units import FILE_UNITS
 
+# Keys that had another name: the old one -> the one of now.
+RENAMED = {"designed_on": "nominal_plant"}
+
 # Tables that files may give instead of a field: key in the file -> field.
 OTHER_FORMS = {"mooring": "lines"}
 
@@ -133,7 +136,10 @@ def _problem(model, item, origin):
 
 
 def unknown_key(key, name, known):
-    """Problem line for a key that is not known, with the nearest known one."""
+    """Problem line for a key that is not known, with the nearest known one, or what it is called now."""
+    if name in RENAMED:
+        elsewhere = "" if RENAMED[name] in known else f", which is no key here. Allowed: {', '.join(known)}"
+        return f"{key}: is called {RENAMED[name]} now{elsewhere}"
     lowered = {option.lower(): option for option in known}
     nearest = difflib.get_close_matches(str(name).lower(), lowered, n=1)
     hint = f" Did you mean {lowered[nearest[0]]!r}?" if nearest else ""

@@ -77,5 +77,5 @@ def randomised(spec, n, seed):
     for drawn in pool:
         sensors = {"noise": drawn.get("noise", 0.0), "delay": round(drawn.get("delay", 0.0))}
         plant = plant_settings({name: value for name, value in drawn.items() if name in PLANT})
-        settings.append(plant | {"sensors": check_sensors(sensors), "designed_on": {"platform": PLATFORM}})
+        settings.append(plant | {"sensors": check_sensors(sensors), "nominal_plant": {"platform": PLATFORM}})
     return [settings[i % len(settings)] for i in range(n)]
