@@ -12,8 +12,8 @@ from fowt_env.envs.safety import SafetyLayer
 from fowt_env.envs.sensors import draw_sensors, reading_scales
 from fowt_env.errors import InputError
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measure, Measurement
-from fowt_env.training.evaluation.model_mismatch import Shift, Unaware
-from fowt_env.training.evaluation.plant_perturbation import plant_settings
+from fowt_env.training.evaluation.model_mismatch import ModelMismatch
+from fowt_env.training.evaluation.plant_perturbation import PlantPerturbation, plant_settings
 
 QUICK = {"rotor": "table", "wave_components": 20, "wind": {"kind": "ntm", "speed": 18.0, "class": "B"}}
 NAMES = ("rotor_speed", "platform_pitch_rate", "previous_action", "estimated_wind", "estimated_waves")
@@ -190,7 +190,7 @@ def test_environment_and_load_case_give_a_controller_the_same_readings():
             kept.append(measurement)
             return self.law.act(measurement)
 
-    simulate(scene, Unaware(Watched(), known, Shift(**DEGRADED), 5), duration=3.0)
+    simulate(scene, ModelMismatch(Watched(), known, PlantPerturbation(**DEGRADED), 5), duration=3.0)
     law = make("gspi_oc3", scene.turbine, 0.1)
     law.reset(env.measurement())
     for reading in kept[:30]:

@@ -27,7 +27,7 @@ from fowt_env.errors import InputError, unknown
 from fowt_env.scene.build import OPTIONS
 from fowt_env.training.evaluation.faults import Fault
 from fowt_env.training.evaluation.metrics import METRICS
-from fowt_env.training.evaluation.model_mismatch import Shift
+from fowt_env.training.evaluation.plant_perturbation import PlantPerturbation
 from fowt_env.weather.wind_field import FIELD_KINDS, REQUIRED, is_field
 
 FOLDER = Path(__file__).parent / "suites"
@@ -41,7 +41,7 @@ class Case:
     parked: the turbine idles with feathered blades (at rest without wind), so no controller is compared.
     initial: absolute values of channels at the start, as simulate takes them.
     seeds, duration, skip: of this case where they differ from the suite's. shift: how the plant differs from
-    the one that controllers are told of (training.evaluation.model_mismatch).
+    the nominal one, which controllers are prepared for (training.evaluation.model_mismatch).
     """
 
     name: str
@@ -56,7 +56,7 @@ class Case:
     seeds: tuple | None = None
     duration: float | None = None  # s
     skip: float | None = None  # s
-    shift: Shift | None = None  # what of the plant its controllers do not know
+    shift: PlantPerturbation | None = None  # what of the plant its controllers do not know
 
 
 def described(case):
@@ -112,7 +112,7 @@ class CaseEntry(Record):
     seeds: Seeds | None = None
     duration: Positive | None = None
     skip: NonNegative | None = None
-    shift: Shift | None = None
+    shift: PlantPerturbation | None = None
 
 
 class Term(Record):
