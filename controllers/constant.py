@@ -1,12 +1,11 @@
 """Constant commands: what is measured at the start, or given figures."""
 
 from enum import IntEnum
-from math import isfinite
 
 import numpy as np
 
 from fowt_env.control import CompiledController, check_control_dt
-from fowt_env.errors import InputError
+from fowt_env.descriptions.checks import check_number
 from fowt_env.plant.compile.decorators import control_kernel
 
 
@@ -35,8 +34,8 @@ class Constant(CompiledController):
 
     def __init__(self, torque=None, blade_pitch=None, name="constant"):
         for key, value in (("torque", torque), ("blade_pitch", blade_pitch)):
-            if value is not None and not isfinite(value):
-                raise InputError(f"{key} = {value}: must be finite, or None for the measured one")
+            if value is not None:
+                check_number(key, value, allowed="finite, or None for the measured one")
         super().__init__(name, np.zeros(0), len(Memory))
         self.torque = torque
         self.blade_pitch = blade_pitch

@@ -13,7 +13,7 @@ degree (the region-3 pitch) of what the PI law asks for, so that nothing is fed 
 
 from dataclasses import dataclass
 from enum import IntEnum
-from math import exp, inf, isfinite
+from math import exp, inf
 
 import numpy as np
 
@@ -31,7 +31,8 @@ from fowt_env.controllers.pi import (
     write_commands,
 )
 from fowt_env.controllers.tuned import tuned
-from fowt_env.errors import InputError, unknown
+from fowt_env.descriptions.checks import check_number
+from fowt_env.errors import unknown
 from fowt_env.plant.compile.decorators import control_kernel, kernel
 from fowt_env.plant.drivetrain import TorqueCurve, limited
 from fowt_env.plant.measurement import Measure
@@ -58,14 +59,10 @@ class FeedbackSettings:
         if self.signal not in SIGNALS:
             raise unknown("signal", self.signal, SIGNALS)
         for key in ("pitch_gain", "torque_gain"):
-            if not isfinite(getattr(self, key)):
-                raise InputError(f"{key} = {getattr(self, key)}: must be finite")
-        if not (isfinite(self.high_pass) and self.high_pass >= 0.0):
-            raise InputError(f"high_pass = {self.high_pass}: must be >= 0 rad/s and finite; 0: none")
-        if not self.low_pass > self.high_pass:
-            raise InputError(
-                f"low_pass = {self.low_pass}: must exceed high_pass = {self.high_pass} rad/s; inf: none"
-            )
+            check_number(key, getattr(self, key))
+        check_number("high_pass", self.high_pass, 0.0, allowed=">= 0 rad/s and finite; 0: none")
+        allowed = f"above high_pass = {self.high_pass} rad/s; inf: none"
+        check_number("low_pass", self.low_pass, self.high_pass, low_open=True, infinite=True, allowed=allowed)
 
 
 class FeedbackParameter(IntEnum):

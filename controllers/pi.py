@@ -14,7 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from fowt_env.control import CompiledController, check_control_dt
-from fowt_env.errors import InputError, unknown
+from fowt_env.descriptions.checks import check_number
+from fowt_env.errors import unknown
 from fowt_env.plant.compile.decorators import control_kernel, kernel
 from fowt_env.plant.drivetrain import TorqueCurve, build_torque_curve, generator_torque, limited
 from fowt_env.plant.measurement import Measure
@@ -73,17 +74,10 @@ def gains(design_frequency, damping, inertia, rated_speed, gear_ratio, dP_dpitch
         "gear_ratio": gear_ratio,
     }
     for key, value in given.items():
-        _check(key, value, value > 0.0 and isfinite(value), "must be positive and finite")
-    negative = dP_dpitch < 0.0 and isfinite(dP_dpitch)
-    _check("dP_dpitch", dP_dpitch, negative, "must be negative and finite, W/rad")
+        check_number(key, value, 0.0, low_open=True, allowed="positive and finite")
+    check_number("dP_dpitch", dP_dpitch, high=0.0, high_open=True, allowed="negative and finite, W/rad")
     scale = inertia * rated_speed / (gear_ratio * -dP_dpitch)
     return Gains(KP=2.0 * damping * design_frequency * scale, KI=design_frequency**2 * scale)
-
-
-def _check(key, value, good, allowed):
-    """Raise InputError unless good; comparisons with NaN are False, so NaN is never good."""
-    if not good:
-        raise InputError(f"{key} = {value}: {allowed}")
 
 
 @dataclass(frozen=True)
@@ -105,16 +99,15 @@ class PISettings:
 
     def __post_init__(self):
         for key in ("KI", "rated_speed", "gear_ratio", "pitch_rate_limit", "torque_rate_limit"):
-            value = getattr(self, key)
-            _check(key, value, value > 0.0 and isfinite(value), "must be positive and finite")
-        _check("KP", self.KP, self.KP >= 0.0 and isfinite(self.KP), "must be non-negative and finite")
+            check_number(key, getattr(self, key), 0.0, low_open=True, allowed="positive and finite")
+        check_number("KP", self.KP, 0.0, allowed="non-negative and finite")
         for key in ("speed_filter_corner", "gain_schedule_pitch"):
-            value = getattr(self, key)
-            _check(key, value, value > 0.0, "must be positive; inf switches it off")
+            allowed = "positive; inf switches it off"
+            check_number(key, getattr(self, key), 0.0, low_open=True, infinite=True, allowed=allowed)
         low, high = self.pitch_minimum, self.pitch_maximum
-        _check("pitch_maximum", high, isfinite(high) and high > low, f"must exceed pitch_minimum = {low}")
+        check_number("pitch_maximum", high, low, low_open=True, allowed=f"above pitch_minimum = {low}")
         lowest = -0.5 * self.gain_schedule_pitch  # there GK has doubled; it is singular at -beta_K
-        _check("pitch_minimum", low, isfinite(low) and low >= lowest, f"must be finite and >= {lowest} rad")
+        check_number("pitch_minimum", low, lowest, allowed=f"finite and >= {lowest} rad")
         if self.schedule_on not in SCHEDULE_ON:
             raise unknown("schedule_on", self.schedule_on, SCHEDULE_ON)
 

@@ -12,7 +12,7 @@ a control period, adds up to the preview time, keep the blades from following ev
 
 from dataclasses import dataclass, replace
 from enum import IntEnum
-from math import exp, isfinite
+from math import exp
 
 import numpy as np
 
@@ -28,6 +28,7 @@ from fowt_env.controllers.pi import (
     speed_error,
     write_commands,
 )
+from fowt_env.descriptions.checks import check_number
 from fowt_env.errors import InputError
 from fowt_env.plant.compile.decorators import control_kernel, kernel
 from fowt_env.plant.drivetrain import TorqueCurve
@@ -47,10 +48,8 @@ class PreviewSettings:
     gain: float = 1.0  # share of the steady schedule that is fed forward
 
     def __post_init__(self):
-        if not (isfinite(self.preview_time) and 0.5 <= self.preview_time <= 60.0):
-            raise InputError(f"preview_time = {self.preview_time}: must be in [0.5, 60] s")
-        if not (isfinite(self.gain) and 0.0 <= self.gain <= 2.0):
-            raise InputError(f"gain = {self.gain}: must be in [0, 2]")
+        check_number("preview_time", self.preview_time, 0.5, 60.0)
+        check_number("gain", self.gain, 0.0, 2.0)
 
 
 class PreviewParameter(IntEnum):

@@ -22,7 +22,7 @@ import threading
 import weakref
 from _ctypes import dlclose
 from dataclasses import dataclass
-from math import isfinite, pi
+from math import pi
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +31,8 @@ from scipy.optimize import brentq
 
 from fowt_env.control import check_control_dt
 from fowt_env.controllers.tuned import tuned
+from fowt_env.descriptions.checks import check_number, check_one_of
+from fowt_env.descriptions.units import DEGREE
 from fowt_env.errors import ControllerError, InputError, unknown
 from fowt_env.plant.aero.blade_elements import build_blade_elements
 from fowt_env.plant.aero.coefficient_table import performance
@@ -40,7 +42,7 @@ PRELOADED = ("libquadmath", "libgfortran", "libmvec")  # bundled with it; a copy
 SWAP_SIZE = 4096  # floats: the library touches entries beyond 3,300 whatever the interface
 TEXT_SIZE = 1024  # of the message that the library returns
 RATIOS = np.linspace(2.0, 20.0, 37)  # tip-speed ratios of the table
-PITCHES = np.radians(np.concatenate([np.arange(-5.0, 30.0, 1.0), np.linspace(30.0, 90.0, 13)]))
+PITCHES = DEGREE * np.concatenate([np.arange(-5.0, 30.0, 1.0), np.linspace(30.0, 90.0, 13)])
 SCHEDULE = 0.5 * pi * np.linspace(0.0, 1.0, 40) ** 2  # blade pitch of the gain table, rad
 POLE_SPEEDS = 45  # winds of the estimator's table of poles
 TORQUE_FREQUENCY, TORQUE_DAMPING = 0.15, 0.7  # rad/s, of the torque loop in ROSCO's NREL 5 MW deck
@@ -56,14 +58,10 @@ class RoscoSettings:
     high_pass: float = 0.01  # rad/s, first-order high pass
 
     def __post_init__(self):
-        if self.mode not in (0, 1, 2):
-            raise InputError(f"mode = {self.mode}: must be 0, 1 or 2")
-        if not (isfinite(self.gain) and self.gain <= 0.0):
-            raise InputError(f"gain = {self.gain}: must be finite and <= 0 (beyond it drives the platform)")
+        check_one_of("mode", self.mode, (0, 1, 2))
+        check_number("gain", self.gain, high=0.0, allowed="finite and <= 0 (beyond it drives the platform)")
         for key in ("low_pass", "high_pass"):
-            value = getattr(self, key)
-            if not (isfinite(value) and value > 0.0):
-                raise InputError(f"{key} = {value}: must be positive and finite, rad/s")
+            check_number(key, getattr(self, key), 0.0, low_open=True, allowed="positive and finite, rad/s")
 
 
 def find_library():
@@ -432,7 +430,7 @@ def deck_text(values):
 def table_text(table):
     """Text of a Table as ROSCO reads it."""
     lines = ["# Rotor performance", "#", "#", "# Pitch angle vector (deg)"]
-    lines += [_words(np.degrees(table.blade_pitch)), "# TSR vector", _words(table.ratio)]
+    lines += [_words(table.blade_pitch / DEGREE), "# TSR vector", _words(table.ratio)]
     lines += ["# Wind speed vector", "0", ""]
     for name in ("cp", "ct", "cq"):
         rows = (" ".join(f"{value:.6f}" for value in row) for row in getattr(table, name))

@@ -22,6 +22,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
+from fowt_env.descriptions.checks import check_number
 from fowt_env.errors import ControllerError, InputError, unknown
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
@@ -148,9 +149,8 @@ def _shown(value: Any) -> str:
 
 def check_control_dt(control_dt: float) -> float:
     """The control period as a float. Raises: InputError outside (0, 1] s."""
-    if not 0.0 < control_dt <= LONGEST_CONTROL_DT:
-        raise InputError(f"control_dt = {control_dt}: must be in (0, {LONGEST_CONTROL_DT:g}] s")
-    return float(control_dt)
+    allowed = f"in (0, {LONGEST_CONTROL_DT:g}] s"
+    return check_number("control_dt", control_dt, 0.0, LONGEST_CONTROL_DT, low_open=True, allowed=allowed)
 
 
 def catalogue() -> Any:

@@ -11,9 +11,9 @@ import pandas as pd
 
 from fowt_env.analysis.trim import trim
 from fowt_env.control import CompiledController, make
-from fowt_env.descriptions.records import is_number
+from fowt_env.descriptions.checks import check_number, refusal
+from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.errors import ControllerInputError, InputError, SimulationStopped, unknown
-from fowt_env.plant.channels import DEG, RPM
 from fowt_env.plant.compile.decorators import control_kernel
 from fowt_env.plant.events import counted
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
@@ -31,18 +31,18 @@ INITIAL = {  # channel: (state, factor to SI)
     "PtfmSurge": (State.SURGE, 1.0),
     "PtfmSway": (State.SWAY, 1.0),
     "PtfmHeave": (State.HEAVE, 1.0),
-    "PtfmRoll": (State.ROLL, 1.0 / DEG),
-    "PtfmPitch": (State.PLATFORM_PITCH, 1.0 / DEG),
-    "PtfmYaw": (State.YAW, 1.0 / DEG),
-    "Azimuth": (State.AZIMUTH, 1.0 / DEG),
-    "RotSpeed": (State.ROTOR_SPEED, 1.0 / RPM),
-    "BldPitch1": (State.BLADE_PITCH, 1.0 / DEG),
+    "PtfmRoll": (State.ROLL, DEGREE),
+    "PtfmPitch": (State.PLATFORM_PITCH, DEGREE),
+    "PtfmYaw": (State.YAW, DEGREE),
+    "Azimuth": (State.AZIMUTH, DEGREE),
+    "RotSpeed": (State.ROTOR_SPEED, RPM),
+    "BldPitch1": (State.BLADE_PITCH, DEGREE),
     "PtfmTVxi": (State.VX, 1.0),
     "PtfmTVyi": (State.VY, 1.0),
     "PtfmTVzi": (State.VZ, 1.0),
-    "PtfmRVxi": (State.WX, 1.0 / DEG),
-    "PtfmRVyi": (State.WY, 1.0 / DEG),
-    "PtfmRVzi": (State.WZ, 1.0 / DEG),
+    "PtfmRVxi": (State.WX, DEGREE),
+    "PtfmRVyi": (State.WY, DEGREE),
+    "PtfmRVzi": (State.WZ, DEGREE),
 }
 
 
@@ -73,8 +73,7 @@ class HeldCommand(CompiledController):
 def steps_in(name: str, period: float, dt: float) -> int:
     """Number of physics steps in a period. Raises: InputError if dt does not divide it."""
     for key, value in ((name, period), ("dt", dt)):
-        if not is_number(value) or value <= 0.0:
-            raise InputError(f"{key} = {value!r}: must be a positive number of seconds")
+        check_number(key, value, 0.0, low_open=True, allowed="a positive number of seconds")
     count = round(period / dt)
     if count < 1 or abs(count * dt - period) > 1e-9 * period:
         raise InputError(f"dt = {dt:g} s does not divide {name} = {period:g} s (ratio {period / dt:.6g})")
@@ -98,18 +97,17 @@ def initial_state(
         key = str(name).split("_[")[0]
         if key not in INITIAL:
             raise unknown("channel of initial", name, INITIAL)
-        if not is_number(value):
-            raise InputError(f"initial[{name!r}] = {value!r}: must be a finite number")
+        check_number(f"initial[{name!r}]", value)
         index, factor = INITIAL[key]
         if scene.model.rigid_body.plane is not None and index in OUT_OF_PLANE and value != 0.0:
-            raise InputError(f"initial[{name!r}] = {value:g}: must be 0 in a planar scene")
+            raise refusal(f"initial[{name!r}]", value, "0 in a planar scene")
         if State.VX <= index <= State.WZ:
             rates[index] = value * factor
         else:
             x[index] = value * factor
     if abs(x[State.PLATFORM_PITCH]) >= 0.5 * pi:
         raise InputError(
-            f"initial['PtfmPitch'] = {x[State.PLATFORM_PITCH] * DEG:g}: must be inside (-90, 90) deg"
+            f"initial['PtfmPitch'] = {x[State.PLATFORM_PITCH] / DEGREE:g}: must be inside (-90, 90) deg"
         )
     if rates:  # given in inertial axes, kept in body axes
         inertial = np.zeros(6)
@@ -122,8 +120,8 @@ def initial_state(
     drive = scene.turbine.pitch_drive
     if not drive.minimum <= x[State.BLADE_PITCH] <= drive.maximum:
         raise InputError(
-            f"initial['BldPitch1'] = {x[State.BLADE_PITCH] * DEG:g} deg: must be in"
-            f" [{drive.minimum * DEG:g}, {drive.maximum * DEG:g}] deg"
+            f"initial['BldPitch1'] = {x[State.BLADE_PITCH] / DEGREE:g} deg: must be in"
+            f" [{drive.minimum / DEGREE:g}, {drive.maximum / DEGREE:g}] deg"
         )
     u[1] = x[State.BLADE_PITCH]
     return x, u
@@ -204,8 +202,8 @@ def simulate(
     last = steps_in("duration", duration, dt)
     steps_in("duration", duration, output_dt)
     check_duration(scene, duration)
-    if grid_loss is not None and not is_number(grid_loss):
-        raise InputError(f"grid_loss = {grid_loss!r}: must be a time in s, or None")
+    if grid_loss is not None:
+        check_number("grid_loss", grid_loss, allowed="a time in s, or None")
     held = controller is None
     if not held:
         controller = make(controller, scene.turbine, control_dt)

@@ -7,6 +7,7 @@ import numpy as np
 from fowt_env.analysis.linear_model import LinearModel, linearize, modes
 from fowt_env.analysis.trim import trim
 from fowt_env.controllers.pi import PISettings, schedule_gain
+from fowt_env.descriptions.units import DEGREE
 from fowt_env.errors import InputError
 from fowt_env.plant.drivetrain import generator_torque
 from fowt_env.plant.state import State
@@ -28,7 +29,7 @@ def closed_loop_matrix(model: LinearModel, settings: PISettings):
     pitch = float(point.state[State.BLADE_PITCH])
     if not settings.pitch_minimum < pitch < settings.pitch_maximum:
         raise InputError(
-            f"blade pitch {np.degrees(pitch):.4g} deg rests on a limit: the pitch loop is open there;"
+            f"blade pitch {pitch / DEGREE:.4g} deg rests on a limit: the pitch loop is open there;"
             " choose a wind above rated"
         )
     n = len(model.states)

@@ -6,13 +6,14 @@ gains is computed afterwards from the whole plant.
 """
 
 from dataclasses import dataclass
-from math import isfinite
 
 import numpy as np
 
 from fowt_env.analysis.linear_model import modes
 from fowt_env.controllers.design.closed_loop import PLATFORM_PERIOD, closed_loop_matrix
 from fowt_env.controllers.pi import PISettings, schedule_gain
+from fowt_env.descriptions.checks import check_number
+from fowt_env.descriptions.units import DEGREE
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.state import State
 
@@ -39,8 +40,7 @@ def design_pi(models, turbine, omega, zeta, schedule="loop"):
     Raises: InputError for omega or zeta outside their ranges, or fewer than two winds above rated.
     """
     for key, value, high in (("omega", omega, 3.0), ("zeta", zeta, 5.0)):
-        if not (isfinite(value) and 0.0 < value <= high):
-            raise InputError(f"{key} = {value}: must be in (0, {high:g}]")
+        check_number(key, value, 0.0, high, low_open=True)
     if schedule not in SCHEDULES:
         raise unknown("schedule", schedule, SCHEDULES)
     ratio = turbine.drivetrain.gear_ratio
@@ -67,7 +67,7 @@ def design_pi(models, turbine, omega, zeta, schedule="loop"):
         table.append(
             {
                 "wind_[m/s]": float(wind),
-                "pitch_[deg]": float(np.degrees(pitch)),
+                "pitch_[deg]": float(pitch / DEGREE),
                 "slope_[1/s2]": float(-slope),
                 "KP_[s]": float(small * kp),
                 "KI_[-]": float(small * ki),

@@ -15,6 +15,7 @@ import numpy as np
 from fowt_env.controllers.lqr.design import LOWEST_DESIGN_WIND, MODEL_SHAPES, DesignModel, Weights
 from fowt_env.controllers.lqr.law import LQR
 from fowt_env.controllers.pi import PI, PISettings
+from fowt_env.descriptions.checks import is_number
 from fowt_env.descriptions.files import parse_json, read_text
 from fowt_env.errors import InputError, unknown
 from fowt_env.files.atomic import replacing
@@ -85,10 +86,10 @@ def _factory(content, where, name="design"):
     for key in KEYS:
         if key not in content:
             raise InputError(f"{where}: {key} is missing")
-    if content["kind"] not in tuple(KINDS):  # a list cannot be looked up in a dict
-        raise InputError(f"{where}: {unknown('kind', content['kind'], KINDS)}")
-    _check_keys(content["settings"], KINDS[content["kind"]][0], "settings", where)
-    make, turbine_name = KINDS[content["kind"]][1], content["turbine"]
+    if content["kind"] not in tuple(DESIGN_KINDS):  # a list cannot be looked up in a dict
+        raise InputError(f"{where}: {unknown('kind', content['kind'], DESIGN_KINDS)}")
+    _check_keys(content["settings"], DESIGN_KINDS[content["kind"]][0], "settings", where)
+    make, turbine_name = DESIGN_KINDS[content["kind"]][1], content["turbine"]
     make = make(content["settings"], where)
 
     def factory(turbine, control_dt):
@@ -114,11 +115,10 @@ def _check_keys(given, expected, place, where):
             raise InputError(f"{where}: {place}.{key} is missing")
 
 
-def _number(value, place, where):
-    """A finite number. Raises: InputError naming the place and the value."""
-    good = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-    if not good:
-        raise InputError(f"{where}: {place} = {str(value)[:60]}: must be a finite number")
+def _finite(key, value):
+    """A finite number as a float. Raises: InputError that shows a text without quotation marks."""
+    if not is_number(value):
+        raise InputError(f"{key} = {str(value)[:60]}: must be a finite number")
     return float(value)
 
 
@@ -127,7 +127,7 @@ def _pi(settings, where):
     values = {}
     for key, value in settings.items():
         free = key == "gain_schedule_pitch" and value is None
-        values[key] = math.inf if free else _number(value, f"settings.{key}", where)
+        values[key] = math.inf if free else _finite(f"{where}: settings.{key}", value)
     return lambda turbine, control_dt, name: PI(PISettings.published(turbine, **values), control_dt, name)
 
 
@@ -136,7 +136,7 @@ def _lqr(settings, where):
     known = [item.name for item in fields(Weights)]
     _check_keys(settings["weights"], known, "settings.weights", where)
     values = {
-        key: _number(value, f"settings.weights.{key}", where) for key, value in settings["weights"].items()
+        key: _finite(f"{where}: settings.weights.{key}", value) for key, value in settings["weights"].items()
     }
     try:
         weights = Weights(**values)
@@ -176,7 +176,7 @@ def _model(row, place, where):
     values = {}
     for key, shape in MODEL_SHAPES.items():
         if not shape:
-            values[key] = _number(row[key], f"{place}.{key}", where)
+            values[key] = _finite(f"{where}: {place}.{key}", row[key])
             continue
         try:
             array = np.array(row[key], dtype=float)
@@ -188,4 +188,5 @@ def _model(row, place, where):
     return DesignModel(**values)
 
 
-KINDS = {"pi": (PI_KEYS, _pi), "lqr": (("weights", "models"), _lqr)}  # kind: keys of settings, maker's maker
+# kind: keys of settings, maker's maker
+DESIGN_KINDS = {"pi": (PI_KEYS, _pi), "lqr": (("weights", "models"), _lqr)}

@@ -8,7 +8,7 @@ the hull's force at the spectrum's peak. The controls are the rates of torque an
 import pickle
 from dataclasses import asdict, dataclass, fields, replace
 from functools import lru_cache
-from math import isfinite, pi, sqrt
+from math import inf, pi, sqrt
 
 import numpy as np
 from scipy.linalg import expm, solve_continuous_are, solve_discrete_are
@@ -17,9 +17,11 @@ from scipy.optimize import least_squares
 from fowt_env.analysis.linear_model import linearize
 from fowt_env.analysis.trim import without_fluctuations
 from fowt_env.analysis.wave_excitation import wave_force
+from fowt_env.descriptions.checks import check_number
 from fowt_env.descriptions.iec import ntm_sigma
 from fowt_env.descriptions.platform import joint_sea_state, sea_state_of
-from fowt_env.errors import InputError, unknown
+from fowt_env.descriptions.units import DEGREE
+from fowt_env.errors import unknown
 from fowt_env.weather.turbulence import amplitudes
 
 SITE = "gulf_of_maine_normal"  # joint sea states, as in the named suites
@@ -58,13 +60,11 @@ class Weights:
 
     def __post_init__(self):
         for item in fields(self):
-            value = getattr(self, item.name)
             positive = item.name in ("pitch_rate", "torque_rate", "schedule_time")
             signed = "_growth" in item.name
-            good = isinstance(value, int | float) and isfinite(value)
-            if not good or not (signed or value > 0.0 or (value == 0.0 and not positive)):
-                allowed = "of either sign" if signed else "positive" if positive else "0 or more"
-                raise InputError(f"weight {item.name} = {value!r}: must be finite and {allowed}")
+            sign = "of either sign" if signed else "positive" if positive else "0 or more"
+            low, value = -inf if signed else 0.0, getattr(self, item.name)
+            check_number(f"weight {item.name}", value, low, low_open=positive, allowed=f"finite and {sign}")
 
     def changed(self, **changes):
         """A copy with some weights changed. Raises: InputError for unknown names."""
@@ -245,8 +245,8 @@ def cost(weights, wind, rated_speed):
     q, n = np.zeros((N_FEEDBACK, N_FEEDBACK)), N_PLANT
     speed, lean, rate = (PLANT.index(name) for name in ("rotor_speed", "platform_pitch", "wy"))
     q[speed, speed] += weights.speed / (0.05 * rated_speed) ** 2
-    q[lean, lean] += weights.platform_pitch / np.radians(1.0) ** 2
-    q[rate, rate] += weights.platform_pitch_rate / np.radians(0.1) ** 2
+    q[lean, lean] += weights.platform_pitch / DEGREE**2
+    q[rate, rate] += weights.platform_pitch_rate / (0.1 * DEGREE) ** 2
     power = np.zeros(N_FEEDBACK)
     power[speed], power[n] = 1.0 / rated_speed, 1.0  # shares of rated power
     ratio = wind / WEIGHT_WIND
@@ -254,7 +254,7 @@ def cost(weights, wind, rated_speed):
     q[n + 2, n + 2] += weights.speed_integral / (0.5 * rated_speed) ** 2
     growth = weights.pitch_rate_growth if ratio < 1.0 else weights.pitch_rate_growth_above
     pitch_rate = weights.pitch_rate * ratio**growth
-    r = np.diag([weights.torque_rate / 0.05**2, pitch_rate / np.radians(0.2) ** 2])
+    r = np.diag([weights.torque_rate / 0.05**2, pitch_rate / (0.2 * DEGREE) ** 2])
     return q, r
 
 

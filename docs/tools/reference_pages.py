@@ -9,19 +9,21 @@ is what the function of that name in TABLES returns. A test fails while either i
 """
 
 import re
-from math import pi
+from functools import partial
 from pathlib import Path
 
 import typer
 from rich.text import Text
 
 from fowt_env.descriptions.platform import read_platform, read_turbine
+from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.envs import rewards
 from fowt_env.envs.actions import TRACKING_DAMPING, TRACKING_FREQUENCY
 from fowt_env.envs.observations import KNOWN, STANDARD, entries
-from fowt_env.envs.tables import action_table, markdown, observation_table
+from fowt_env.envs.tables import action_table, observation_table
 from fowt_env.envs.tasks import TASKS, Episode
 from fowt_env.files.atomic import replacing
+from fowt_env.files.markdown import markdown_table
 from fowt_env.plant.rollout import (
     BLOWN_UP,
     CAPSIZE,
@@ -36,8 +38,8 @@ from fowt_env.registration import ENVIRONMENTS
 from fowt_env.training.cli.app import app
 
 DOCS = Path(__file__).resolve().parents[1]
+markdown = partial(markdown_table, aligned=True)
 MARK = re.compile(r"(<!-- from the code: (\w+) -->\n).*?(<!-- end -->)", re.S)
-RPM, DEG = 30.0 / pi, 180.0 / pi
 PREVIEW = (2.0, 4.0)  # s, look-ahead times of the example in the table of channels
 
 # Each reward term in the symbols of the page's table; tests evaluate them beside the kernels.
@@ -71,7 +73,7 @@ def reward_formulas():
     """{term: its formula as a Python expression}."""
     values = {name: getattr(rewards, name) for name in ("POWER_MARGIN", "SPEED_MARGIN", "TILT_PERIOD")}
     return {
-        name: text.format(**values, tilt=rewards.TILT_MARGIN * DEG) for name, text in FORMULAS.items()
+        name: text.format(**values, tilt=rewards.TILT_MARGIN / DEGREE) for name, text in FORMULAS.items()
     }
 
 
@@ -97,7 +99,7 @@ def environments():
 def tasks():
     """What sets the tasks apart, and what each episode draws."""
     chosen = list(TASKS.values())
-    rated = turbine().rated_rotor_speed * RPM
+    rated = turbine().rated_rotor_speed / RPM
     rows = [
         ("wind", *(_weather(task.wind) for task in chosen)),
         ("sea", *(_weather(task.sea) for task in chosen)),
@@ -142,8 +144,8 @@ def actuators():
         ),
         (
             "blade pitch",
-            f"{drive.minimum * DEG:g} to {drive.maximum * DEG:g} deg",
-            f"{drive.rate_limit * DEG:g} deg/s, first-order lag of {drive.time_constant:g} s",
+            f"{drive.minimum / DEGREE:g} to {drive.maximum / DEGREE:g} deg",
+            f"{drive.rate_limit / DEGREE:g} deg/s, first-order lag of {drive.time_constant:g} s",
         ),
         (
             "loop of the mode `setpoint`",
@@ -206,9 +208,9 @@ def terminations():
     """Reasons that end an episode in failure."""
     limits = {
         NON_FINITE: "a number of the state is infinite or not a number",
-        CAPSIZED: f"platform pitch beyond +-{CAPSIZE:g} rad ({CAPSIZE * DEG:.0f} deg)",
+        CAPSIZED: f"platform pitch beyond +-{CAPSIZE:g} rad ({CAPSIZE / DEGREE:.0f} deg)",
         BLOWN_UP: f"the platform moves faster than {FASTEST:g} m/s or {FASTEST_TURN:g} rad/s",
-        OVERSPEED: f"rotor speed above {turbine().overspeed * RPM:g} rpm (the turbine's `overspeed_rpm`)",
+        OVERSPEED: f"rotor speed above {turbine().overspeed / RPM:g} rpm (the turbine's `overspeed_rpm`)",
     }
     return markdown(
         ('`info["termination"]`', "when"),
@@ -284,7 +286,7 @@ def _parameter(parameter):
     shown = "" if default in (None, []) else f"`{default}`"
     if getattr(parameter, "is_flag", False):
         shown = f"`{(parameter.opts if default else pair)[0]}`" if pair else ""
-    return names, shown, _plain(parameter.help or "").replace("|", "\\|")
+    return names, shown, _plain(parameter.help or "")
 
 
 def _examples(epilog):

@@ -8,24 +8,30 @@ import numpy as np
 import pandas as pd
 
 import fowt_env
-from fowt_env.envs import tables
+from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.envs.rewards import TERMS, build_scales, fill_terms, weight_array
 from fowt_env.envs.tasks import TASKS
+from fowt_env.files.markdown import markdown_table
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measure
 from fowt_env.plant.state import State
+from fowt_env.training.evaluation.metrics import turbine_metrics
 
 CONTROLLERS = ("lqr", "floating_feedback", "gspi_oc3", "pi_unscheduled", "pi_land", "gspi_land")
 BASELINE = "gspi_oc3"
 WEATHER = ((14.0, 2.5, 8.0), (18.0, 3.5, 8.6), (22.0, 4.7, 9.3))  # mean wind (m/s), Hs (m), Tp (s)
 SEED = 100_001  # of the training range
 DURATION, SKIP = 600.0, 100.0  # s
-METRICS = ("rotor speed std", "platform pitch std", "blade-pitch travel")
+METRICS = {  # what the page calls them: name in training/evaluation/metrics.py
+    "rotor speed std": "RotSpeed_std_[rpm]",
+    "platform pitch std": "PtfmPitch_std_[deg]",
+    "blade-pitch travel": "blade_pitch_travel_[deg/s]",
+}
 COLUMNS = {  # measurement: (channel, factor to SI)
-    Measure.ROTOR_SPEED: ("RotSpeed_[rpm]", np.pi / 30.0),
+    Measure.ROTOR_SPEED: ("RotSpeed_[rpm]", RPM),
     Measure.GENERATOR_TORQUE: ("GenTq_[kN-m]", 1e3),
-    Measure.PLATFORM_PITCH: ("PtfmPitch_[deg]", np.pi / 180.0),
-    Measure.PLATFORM_PITCH_RATE: ("PtfmRVyi_[deg/s]", np.pi / 180.0),
-    Measure.BLADE_PITCH: ("BldPitch1_[deg]", np.pi / 180.0),
+    Measure.PLATFORM_PITCH: ("PtfmPitch_[deg]", DEGREE),
+    Measure.PLATFORM_PITCH_RATE: ("PtfmRVyi_[deg/s]", DEGREE),
+    Measure.BLADE_PITCH: ("BldPitch1_[deg]", DEGREE),
 }
 
 
@@ -57,9 +63,8 @@ def ranking(names=CONTROLLERS, weights=None):
         for name in names:
             frame = fowt_env.simulate(scene, controller=name, duration=DURATION)
             reward = reward_terms(frame, scene).mean(axis=0) @ weights
-            kept = frame[frame["Time_[s]"] >= SKIP]
-            deviations = [kept[column].std() for column in ("RotSpeed_[rpm]", "PtfmPitch_[deg]")]
-            found[name].append([reward, *deviations, kept["BldPitch1_[deg]"].diff().abs().mean()])
+            run = turbine_metrics(frame, scene.turbine, SKIP)
+            found[name].append([reward, *(run[metric] for metric in METRICS.values())])
     table = pd.DataFrame({name: np.mean(rows, axis=0) for name, rows in found.items()}).T
     table.columns = ["reward", *METRICS]
     table[list(METRICS)] /= table.loc[BASELINE, list(METRICS)]
@@ -69,7 +74,7 @@ def ranking(names=CONTROLLERS, weights=None):
 def markdown(table):
     """The ranking as the table of docs/environment.md."""
     rows = [(f"`{name}`", *(f"{value:.2f}" for value in row)) for name, row in table.T.items()]
-    return tables.markdown(("baseline", "reward of a step", *METRICS), rows)
+    return markdown_table(("baseline", "reward of a step", *METRICS), rows, aligned=True)
 
 
 if __name__ == "__main__":

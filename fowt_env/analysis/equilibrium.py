@@ -145,8 +145,8 @@ def _causes(scene, start):
     lines = f" and its lines pull down with {_kilo(pull)} kN" if model.mooring is not None else ""
     found["vertical"] = (
         f"undisplaced it weighs {_kilo(weight)} kN{lines}, against a buoyancy of {_kilo(buoyancy)} kN"
-        f" ({_number(buoyancy / model.hydro.hull.specific_weight)} m3): {_kilo(abs(net))} kN"
-        f" ({_number(abs(net) / model.rigid_body.gravity / 1e3)} t) too {'light' if net > 0.0 else 'heavy'}"
+        f" ({_shown(buoyancy / model.hydro.hull.specific_weight)} m3): {_kilo(abs(net))} kN"
+        f" ({_shown(abs(net) / model.rigid_body.gravity / 1e3)} t) too {'light' if net > 0.0 else 'heavy'}"
     )
     ballast = platform.ballast.mass
     enough = ballast + net / model.rigid_body.gravity
@@ -265,14 +265,14 @@ def _sentences(causes):
     return " ".join(f"{text[0].upper()}{text[1:]}." for text in causes.values())
 
 
-def _number(value):
+def _shown(value):
     """A number with at least three digits, and without an exponent where it is of any real platform."""
     return f"{value:.0f}" if 100.0 <= abs(value) < 1e9 else f"{value:.3g}"
 
 
 def _kilo(value):
     """A number of N or N m in kN or kN m."""
-    return _number(value / 1e3)
+    return _shown(value / 1e3)
 
 
 def _level_outside():

@@ -1,25 +1,113 @@
-"""Checks of single values that several rooms share."""
+"""Checks of single values: what a number is, and the one message about a value that cannot be used.
+
+A message is `key = value: must be ...`, with the allowed range in words.
+"""
 
 import math
 
+import numpy as np
+
 from fowt_env.errors import InputError
+
+
+def plain_number(value):
+    """A numpy scalar as a Python number, which the strict float type takes (and no string or bool)."""
+    return value.item() if isinstance(value, (np.floating, np.integer)) else value
+
+
+def is_number(value):
+    """Whether a value is a finite number that fits a float, and neither bool nor text."""
+    value = plain_number(value)
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= 1e300
+
+
+def is_whole(value):
+    """Whether a value is a whole number by its type, and no bool."""
+    return isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+
+
+def short(value):
+    """repr of a value, shortened for messages."""
+    try:
+        text = repr(plain_number(value))
+    except ValueError:  # an integer of more digits than Python prints
+        text = "a very large whole number"
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def refusal(key, value, allowed):
+    """InputError for a value that is not what is allowed, in words."""
+    return InputError(f"{key} = {short(value)}: must be {allowed}")
+
+
+def interval(low, high, low_open, high_open, noun="a number"):
+    """A range in words, such as "a number > 0" or "a finite number"."""
+    above = f"{'>' if low_open else '>='} {low:g}" if low > -math.inf else ""
+    below = f"{'<' if high_open else '<='} {high:g}" if high < math.inf else ""
+    if not (above or below):
+        return noun.replace("a ", "a finite ", 1)
+    return f"{noun} {' and '.join(part for part in (above, below) if part)}"
+
+
+def check_number(
+    key, value, low=-math.inf, high=math.inf, *, low_open=False, high_open=False, infinite=False, allowed=None
+):
+    """The value as a float. Raises: InputError unless it is a number from low to high.
+
+    low_open, high_open   whether that end itself is left out
+    infinite              whether infinity is a number
+    allowed               the range in other words than "a number in [low, high]"
+    """
+    good = is_number(value) or infinite and isinstance(value, float) and math.isinf(value)
+    if good:
+        good = (low < value if low_open else low <= value) and (value < high if high_open else value <= high)
+    if not good:
+        if allowed is None and math.isfinite(low) and math.isfinite(high):
+            ends = "(" if low_open else "[", ")" if high_open else "]"
+            allowed = f"a number in {ends[0]}{low:g}, {high:g}{ends[1]}"
+        raise refusal(key, value, allowed or interval(low, high, low_open, high_open))
+    return float(value)
+
+
+def check_whole_number(key, value, low=None, high=None):
+    """The value as an int. Raises: InputError unless it is a whole number from low to high (None: no end)."""
+    good = is_whole(value) and (low is None or low <= value) and (high is None or value <= high)
+    if not good:
+        allowed = "a whole number" if low is None else f"a whole number >= {low}"
+        raise refusal(key, value, allowed if high is None else f"a whole number from {low} to {high}")
+    return int(value)
+
+
+def check_one_of(key, value, choices):
+    """The value. Raises: InputError unless it is one of a few."""
+    if value not in tuple(choices):  # a tuple asks for no hash
+        raise refusal(key, value, f"one of {', '.join(map(str, choices))}")
+    return value
 
 
 def parse_numbers(text, what):
     """List of numbers from "1,2,5" or "3:25:1" (start:stop:step, stop included)."""
     if ":" in text:
-        parts = [_number(part) for part in text.split(":")]
+        parts = [parse_number(part) for part in text.split(":")]
         start, stop, step = parts if len(parts) == 3 else (None, None, None)
         if None in (start, stop, step) or step <= 0.0 or stop < start or (stop - start) / step > 10_000:
             raise InputError(f"{what} = {text!r}: must be START:STOP:STEP with STEP > 0 and STOP >= START")
         return [start + step * i for i in range(math.floor((stop - start) / step + 1e-9) + 1)]
-    values = [_number(part) for part in text.split(",") if part.strip()]
+    values = [parse_number(part) for part in text.split(",") if part.strip()]
     if not values or None in values:
         raise InputError(f"{what} = {text!r}: must be numbers separated by commas, or START:STOP:STEP")
     return values
 
 
-def _number(text):
+def parse_whole_numbers(text, what):
+    """List of whole numbers of a text, as parse_numbers takes it."""
+    values = parse_numbers(text, what)
+    if any(value != int(value) for value in values):
+        raise InputError(f"{what} = {text!r}: must be whole numbers")
+    return [int(value) for value in values]
+
+
+def parse_number(text):
     """The finite number that a text means, or None."""
     try:
         value = float(text)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fowt_env.descriptions.records import interval, short
+from fowt_env.descriptions.checks import interval, short
 from fowt_env.errors import InputError
 
 DATA = Path(__file__).parents[1] / "data"

@@ -1,4 +1,4 @@
-"""Base of all descriptions: strict frozen records, handy units in files, and errors that help.
+"""Base of all descriptions: strict frozen records, units of files, and errors that help.
 
 A problem is one line of text: key, value and allowed range. Keys are dotted paths as they stand in the file.
 """
@@ -13,34 +13,14 @@ import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 from pydantic_core import PydanticCustomError
 
-RPM = 2.0 * math.pi / 60.0
-DEGREE = math.pi / 180.0
+from fowt_env.descriptions.checks import interval, is_number, plain_number, short
+from fowt_env.descriptions.units import FILE_UNITS
 
-# Keys that may be given in handy units: key in the file -> (field, factor to SI).
-HANDY_UNITS = {
-    "rated_rotor_speed_rpm": ("rated_rotor_speed", RPM),
-    "overspeed_rpm": ("overspeed", RPM),
-    "rate_limit_deg_per_s": ("rate_limit", DEGREE),
-    "minimum_deg": ("minimum", DEGREE),
-    "maximum_deg": ("maximum", DEGREE),
-    "azimuth_deg": ("azimuth", DEGREE),
-    "region3_min_pitch_deg": ("region3_min_pitch", DEGREE),
-    "gain_schedule_pitch_deg": ("gain_schedule_pitch", DEGREE),
-}
+# Keys that had another name: the old one -> the one of now.
+RENAMED = {"designed_on": "nominal_plant"}
 
 # Tables that files may give instead of a field: key in the file -> field.
 OTHER_FORMS = {"mooring": "lines"}
-
-
-def plain_number(value):
-    """A numpy scalar as a Python number, which the strict float type takes (and no string or bool)."""
-    return value.item() if isinstance(value, (np.floating, np.integer)) else value
-
-
-def is_number(value):
-    """Whether a value is a finite number that fits a float, and neither bool nor text."""
-    value = plain_number(value)
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= 1e300
 
 
 def bounded(**limits):
@@ -85,11 +65,11 @@ class Record(BaseModel):
 def to_si(data, problems, path=()):
     """(data in SI units, {path in SI names: (path in the file, value in the file)}) of nested TOML data.
 
-    Only the keys of HANDY_UNITS are converted; what is no number is left for the validation to reject.
+    Only the keys of FILE_UNITS are converted; what is no number is left for the validation to reject.
     """
     converted, origin = {}, {}
     for key, value in data.items():
-        field, factor = HANDY_UNITS.get(key, (key, None))
+        field, factor = FILE_UNITS.get(key, (key, None))
         here = (*path, field)
         if factor is not None and field in data:
             problems.append(f"{dotted((*path, key))}: given twice, also as {field!r}; allowed: one of them")
@@ -139,8 +119,8 @@ def _problem(model, item, origin):
     key = dotted(shown)
     kind = item["type"]
     if kind == "missing":
-        handy = [name for name, (field, _) in HANDY_UNITS.items() if field == loc[-1]]
-        alias = f" (or {handy[0]})" if handy else ""
+        named = [name for name, (field, _) in FILE_UNITS.items() if field == loc[-1]]
+        alias = f" (or {named[0]})" if named else ""
         return [f"{key}{alias} is missing: must be {allowed(model, loc)}"]
     if kind == "extra_forbidden":
         return [unknown_key(key, shown[-1], _fields_at(model, loc[:-1]))]
@@ -156,7 +136,10 @@ def _problem(model, item, origin):
 
 
 def unknown_key(key, name, known):
-    """Problem line for a key that is not known, with the nearest known one."""
+    """Problem line for a key that is not known, with the nearest known one, or what it is called now."""
+    if name in RENAMED:
+        elsewhere = "" if RENAMED[name] in known else f", which is no key here. Allowed: {', '.join(known)}"
+        return f"{key}: is called {RENAMED[name]} now{elsewhere}"
     lowered = {option.lower(): option for option in known}
     nearest = difflib.get_close_matches(str(name).lower(), lowered, n=1)
     hint = f" Did you mean {lowered[nearest[0]]!r}?" if nearest else ""
@@ -164,13 +147,13 @@ def unknown_key(key, name, known):
 
 
 def _fields_at(model, loc):
-    """Names of the keys allowed in the table at loc, handy-unit names included."""
+    """Names of the keys allowed in the table at loc, those in a unit of files included."""
     here, _ = _type_at(model, loc)
     if not (isinstance(here, type) and issubclass(here, BaseModel)):
         return []
     fields = list(here.model_fields)
-    handy = [name for name, (field, _) in HANDY_UNITS.items() if field in fields]
-    return sorted(fields + handy + [key for key, field in OTHER_FORMS.items() if field in fields])
+    named = [name for name, (field, _) in FILE_UNITS.items() if field in fields]
+    return sorted(fields + named + [key for key, field in OTHER_FORMS.items() if field in fields])
 
 
 def _unwrapped(kind, metadata):
@@ -245,27 +228,9 @@ def allowed(model, loc):
     return "a table"
 
 
-def interval(low, high, low_open, high_open, noun="a number"):
-    """A range in words, such as "a number > 0" or "a finite number"."""
-    above = f"{'>' if low_open else '>='} {low:g}" if low > -math.inf else ""
-    below = f"{'<' if high_open else '<='} {high:g}" if high < math.inf else ""
-    if not (above or below):
-        return noun.replace("a ", "a finite ", 1)
-    return f"{noun} {' and '.join(part for part in (above, below) if part)}"
-
-
 def dotted(path):
     """A key as it would be written in the file; positions in lists count from 1."""
     return ".".join(str(part + 1) if isinstance(part, int) else str(part) for part in path)
-
-
-def short(value):
-    """repr of a value, shortened for messages."""
-    try:
-        text = repr(value)
-    except ValueError:  # an integer of more digits than Python prints
-        text = "a very large whole number"
-    return text if len(text) <= 60 else text[:57] + "..."
 
 
 def _element(whole, path, default):

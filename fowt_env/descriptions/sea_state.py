@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from pydantic import model_validator
 
+from fowt_env.descriptions.checks import check_number, is_number, short
 from fowt_env.descriptions.files import DATA, locate, raise_problems, read_toml
 from fowt_env.descriptions.records import (
     FloatArray,
@@ -16,8 +17,6 @@ from fowt_env.descriptions.records import (
     NumberOrArray,
     Record,
     bounded,
-    is_number,
-    short,
     unknown_key,
     validate,
 )
@@ -248,11 +247,8 @@ def joint_sea_state(table, wind_speed):
         table, problems = validate(JointTable, read_toml(path, "joint table"))
         raise_problems(f"joint table file {str(path)!r}", problems)
     low, high = table.wind[0], table.wind[-1]
-    if not (is_number(wind_speed) and low <= wind_speed <= high):
-        raise InputError(
-            f"wind_speed = {short(wind_speed)}: must be >= {low:g} and <= {high:g} m/s (table {table.name!r})"
-        )
-    speed = float(wind_speed)
+    allowed = f">= {low:g} and <= {high:g} m/s (table {table.name!r})"
+    speed = check_number("wind_speed", wind_speed, low, high, allowed=allowed)
     Hs = float(np.interp(speed, table.wind, table.Hs))
     Tp = float(np.interp(speed, table.wind, table.Tp))
     return _joint_state(table, speed, Hs, Tp, f"{table.name} at {speed:g} m/s")

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fowt_env.descriptions.checks import check_number, check_whole_number, refusal
 from fowt_env.descriptions.iec import REFERENCE_SPEED, TURBULENCE_INTENSITY
 from fowt_env.errors import InputError, unknown
 
@@ -25,12 +26,8 @@ class Number(NamedTuple):
     default: Any = Required
 
     def read(self, where, value):
-        number = as_float(where, value)
-        if not self.low <= number <= self.high:  # NaN is in no range
-            raise InputError(
-                f"{where} = {number}: must be in [{self.low:g}, {self.high:g}] {self.unit}".rstrip()
-            )
-        return number
+        allowed = f"in [{self.low:g}, {self.high:g}] {self.unit}".rstrip()
+        return check_number(where, as_float(where, value), self.low, self.high, allowed=allowed)
 
 
 class Choice(NamedTuple):
@@ -47,7 +44,7 @@ class Choice(NamedTuple):
                 return choice
         if isinstance(value, str):
             raise unknown(where, value, self.allowed)
-        raise InputError(f"{where} = {value!r}: must be one of {', '.join(map(str, self.allowed))}")
+        raise refusal(where, value, f"one of {', '.join(map(str, self.allowed))}")
 
 
 class Flag(NamedTuple):
@@ -57,7 +54,7 @@ class Flag(NamedTuple):
 
     def read(self, where, value):
         if not isinstance(value, (bool, np.bool_)):
-            raise InputError(f"{where} = {value!r}: must be True or False")
+            raise refusal(where, value, "True or False")
         return bool(value)
 
 
@@ -73,7 +70,7 @@ class Samples(NamedTuple):
         try:
             array = np.array(value, dtype=np.float64)
         except (TypeError, ValueError, OverflowError):
-            raise InputError(f"{where} = {value!r}: must be a list of numbers") from None
+            raise refusal(where, value, "a list of numbers") from None
         if array.ndim != 1 or array.size == 0:
             raise InputError(
                 f"{where} has shape {array.shape}: must be a list of at least one number, shape (n,)"
@@ -93,20 +90,17 @@ class Seed(NamedTuple):
     default: Any = Required
 
     def read(self, where, value):
-        whole = isinstance(value, (int, np.integer)) and not isinstance(value, (bool, np.bool_))
-        if not whole or value < 0:
-            raise InputError(f"{where} = {value!r}: must be a whole number >= 0")
-        return int(value)
+        return check_whole_number(where, value, 0)
 
 
 def as_float(where, value):
     """float(value) of a real number; text and booleans are refused."""
     if isinstance(value, (bool, np.bool_, str, bytes)):
-        raise InputError(f"{where} = {value!r}: must be a number")
+        raise refusal(where, value, "a number")
     try:
         return float(value)
     except (TypeError, ValueError, OverflowError):
-        raise InputError(f"{where} = {value!r}: must be a number") from None
+        raise refusal(where, value, "a number") from None
 
 
 SPEED_LIMIT = 100.0  # m/s; above every extreme of the standard (70 m/s)

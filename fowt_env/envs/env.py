@@ -16,6 +16,7 @@ from gymnasium.error import ResetNeeded
 from fowt_env.analysis.trim_cache import exact_trim, near_trim, plant_key
 from fowt_env.control import CompiledController, catalogue, make
 from fowt_env.descriptions.platform import Platform
+from fowt_env.descriptions.records import RENAMED
 from fowt_env.envs.actions import MODES, Mode, build_action_map, start_tracking
 from fowt_env.envs.episode import (
     BAD_ACTION,
@@ -67,30 +68,30 @@ REWARD_KEYS = tuple(f"reward/{name}" for name in TERMS)
 class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     """Floating wind turbine whose generator torque and blade pitch are commanded.
 
-    task         name in TASKS ("above_rated", "full_range", "steady") or a Task
-    platform     built-in name, path or descriptions.platform.Platform
-    rotor        "bem", "lookup" or "table"; None: the task's, or else that of the fidelity
-    action_mode  "direct", "setpoint" or "residual", see the table of actions
-    baseline     compiled controller, by name, that the residual mode adds to; lqr goes on from the sum, so
-                 that what is added in every period is an addition to its rates
-    observation  channel names in place of the task's; "default" among them stands for the task's
-    reward       {term: weight} in place of single weights of the task
-    dt           physics step, s (None: that of the scene's integrator); control_dt: time between
-                 actions, s, a multiple of dt
-    duration     s of an episode; None: the task's
-    wind, sea    in place of the task's, ranges included (None: the task's)
-    wind_preview look-ahead times (s) of the channel wind_preview
-    render_mode  None, "rgb_array" (render() returns a picture) or "human" (every step shows one in a window)
-    fidelity     level of build_scene: "reference", "standard" or "fast"
-    sensors      {"noise": standard deviation of white noise on every reading, as a share of the channel's
-                 scale; "delay": control periods from measurement to reading}, either may be left out. One
-                 reading per control period is what observation, baseline and estimator are given, and
-                 measurement() returns; its noise follows from the weather's seed. Azimuth, last action and
-                 preview are exact; rewards and failures are of the true motions. None: readings are exact
-    designed_on  {"platform": ..., "turbine": ...} as build_scene takes them (the turbine may be left out:
-                 the platform's): the plant that baseline and estimator are designed on, where that is not
-                 the one that moves. None: it is
-    options      further ones go to build_scene, loads of one's own (fowt_env.Load) among them
+    task          name in TASKS ("above_rated", "full_range", "steady") or a Task
+    platform      built-in name, path or description.Platform
+    rotor         "bem", "lookup" or "table"; None: the task's, or else that of the fidelity
+    action_mode   "direct", "setpoint" or "residual", see the table of actions
+    baseline      compiled controller, by name, that the residual mode adds to; lqr goes on from the sum, so
+                  that what is added in every period is an addition to its rates
+    observation   channel names in place of the task's; "default" among them stands for the task's
+    reward        {term: weight} in place of single weights of the task
+    dt            physics step, s (None: that of the scene's integrator); control_dt: time between
+                  actions, s, a multiple of dt
+    duration      s of an episode; None: the task's
+    wind, sea     in place of the task's, ranges included (None: the task's)
+    wind_preview  look-ahead times (s) of the channel wind_preview
+    render_mode   None, "rgb_array" (render() returns a picture) or "human" (every step shows one in a window)
+    fidelity      level of build_scene: "reference", "standard" or "fast"
+    sensors       {"noise": standard deviation of white noise on every reading, as a share of the channel's
+                  scale; "delay": control periods from measurement to reading}, either may be left out. One
+                  reading per control period is what observation, baseline and estimator are given, and
+                  measurement() returns; its noise follows from the weather's seed. Azimuth, last action and
+                  preview are exact; rewards and failures are of the true motions. None: readings are exact
+    nominal_plant {"platform": ..., "turbine": ...} as build_scene takes them (the turbine may be left out:
+                  the platform's): the plant that baseline and estimator are designed on, where that is not
+                  the true one, which moves. None: it is
+    options       further ones go to build_scene, loads of one's own (fowt_env.Load) among them
 
     An episode starts at the operating point of its mean wind, moved by the task's offsets, in wind and
     sea drawn from the task's ranges with the environment's seed: the same seed gives the same bits.
@@ -136,7 +137,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         render_mode: str | None = None,
         fidelity: str = "standard",
         sensors: Mapping[str, Any] | None = None,
-        designed_on: Mapping[str, Any] | None = None,
+        nominal_plant: Mapping[str, Any] | None = None,
         **options: Any,
     ) -> None:
         if render_mode is not None:
@@ -148,6 +149,8 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         if action_mode not in MODES:
             raise unknown("action_mode", action_mode, MODES)
         for key in options:
+            if key in RENAMED:
+                raise InputError(f"setting {key!r} of FowtEnv: is called {RENAMED[key]} now")
             if key not in OPTIONS and key != "loads":
                 raise unknown("setting of FowtEnv", key, {*OPTIONS, "loads", *SETTINGS})
         self.render_mode = render_mode
@@ -168,12 +171,12 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             **options,
         )
         check_duration(self.scene, task.duration)
-        self._designed = None  # the scene of another plant that controllers in the environment know
-        if designed_on is not None:
-            parts = _design_parts(designed_on)
+        self._nominal = None  # the scene of the nominal plant, where that is not the true one
+        if nominal_plant is not None:
+            parts = _nominal_parts(nominal_plant)
             known = {**options, "turbine": parts["turbine"]}
             length = max(task.duration, SHORTEST_WEATHER)
-            self._designed = build_scene(
+            self._nominal = build_scene(
                 parts["platform"], episode.wind, episode.sea, rotor=task.rotor, duration=length,
                 fidelity=fidelity, **known,
             )  # fmt: skip
@@ -190,7 +193,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self._running = False
         # what a snapshot must agree with: the same numbers then mean the same
         seen = (task.observation, task.wind_preview)
-        told = (None if self._designed is None else plant_key(self._designed), self._sensors)
+        told = (None if self._nominal is None else plant_key(self._nominal), self._sensors)
         self._kind = (self._key, action_mode, baseline, *seen, self.dt, self.control_dt, self._last, told)
 
     def twin(self) -> "FowtEnv":
@@ -417,8 +420,8 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             scales = reading_scales(scene.turbine)
             drawn = draw_sensors(self._sensors["noise"], self._sensors["delay"], scales, scene.seed, readings)
             self._setting = self._setting._replace(sensors=drawn)
-        if self._designed is not None and (self._baseline is not None or self._estimator is not None):
-            self._designed = self._designed.with_weather(scene.wind, scene.sea, scene.seed)
+        if self._nominal is not None and (self._baseline is not None or self._estimator is not None):
+            self._nominal = self._nominal.with_weather(scene.wind, scene.sea, scene.seed)
         if self._baseline is not None:
             self._baseline.prepare(self.design_scene)
             self._setting = self._setting._replace(parameters=self._baseline.parameters)
@@ -435,8 +438,8 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
     @property
     def design_scene(self) -> Scene:
-        """Scene that controllers may be designed on: the plant of designed_on, or that which moves."""
-        return self.scene if self._designed is None else self._designed
+        """Scene that controllers may be designed on: the nominal plant, else the true one."""
+        return self.scene if self._nominal is None else self._nominal
 
     def channels(self) -> dict[str, float]:
         """{OpenFAST channel: value in its unit} of the present instant; leaves the run as it is."""
@@ -523,13 +526,13 @@ def named_baseline(name, turbine, control_dt):
     return baseline
 
 
-def _design_parts(given):
-    """{"platform", "turbine"} of what an environment is given as designed_on. Raises: InputError."""
+def _nominal_parts(given):
+    """{"platform", "turbine"} of what an environment is given as nominal_plant. Raises: InputError."""
     if not isinstance(given, Mapping) or "platform" not in given:
-        raise InputError(f"designed_on = {given!r}: must be a dict with a platform, and a turbine or not")
+        raise InputError(f"nominal_plant = {given!r}: must be a dict with a platform, and a turbine or not")
     for key in given:
         if key not in ("platform", "turbine"):
-            raise unknown("key of designed_on", key, ("platform", "turbine"))
+            raise unknown("key of nominal_plant", key, ("platform", "turbine"))
     return {"turbine": None} | dict(given)
 
 

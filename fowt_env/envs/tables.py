@@ -5,15 +5,7 @@ from math import isinf
 from fowt_env.descriptions.platform import read_platform, read_turbine
 from fowt_env.envs.observations import entries
 from fowt_env.envs.rewards import TERMS
-
-
-def markdown(header, rows):
-    """A markdown table of text cells, columns aligned."""
-    cells = [[str(cell) for cell in row] for row in (header, *rows)]
-    widths = [max(len(row[i]) for row in cells) for i in range(len(header))]
-    lines = ["| " + " | ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)) + " |" for row in cells]
-    lines.insert(1, "|" + "|".join("-" * (w + 2) for w in widths) + "|")
-    return "\n".join(lines)
+from fowt_env.files.markdown import markdown_table
 
 
 def _figure(value):
@@ -38,7 +30,7 @@ def action_table(task, turbine):
         ),
         ("residual", 1, f"added to the baseline's blade pitch, +-{task.residual_pitch:g} deg"),
     ]
-    return markdown(("mode", "action", "from -1 to 1"), rows)
+    return markdown_table(("mode", "action", "from -1 to 1"), rows, aligned=True)
 
 
 def observation_table(task, turbine):
@@ -56,7 +48,8 @@ def observation_table(task, turbine):
         )
         for index, entry in enumerate(entries(task.observation, turbine, task.wind_preview))
     ]
-    return markdown(("index", "channel", "unit", "centre", "scale", "low", "high", "meaning"), rows)
+    header = ("index", "channel", "unit", "centre", "scale", "low", "high", "meaning")
+    return markdown_table(header, rows, aligned=True)
 
 
 def reward_table(task):
@@ -65,7 +58,7 @@ def reward_table(task):
         (name, f"{task.weights.get(name, 0.0):g}", f"{term.low:g} to {term.high:g}", term.meaning)
         for name, term in TERMS.items()
     ]
-    return markdown(("term", "weight", "range", "meaning"), rows)
+    return markdown_table(("term", "weight", "range", "meaning"), rows, aligned=True)
 
 
 def task_tables(task, turbine=None):

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fowt_env.descriptions.files import read_text
+from fowt_env.descriptions.units import DEGREE
 from fowt_env.errors import InputError
 
 TIME = "Time_[s]"
@@ -18,7 +19,7 @@ WITH_TIME, WITHOUT_TIME, UNCOMPRESSED, WITH_LENGTH = 1, 2, 3, 4
 NAME_LENGTH = 10  # characters of a channel name and of a unit, its brackets included
 EVEN = 1e-6  # largest deviation of a time from the even grid, as a share of its step
 WIND_COLUMNS = 8
-FINEST_TURN = np.radians(1.0)  # between two samples of a turning wind
+FINEST_TURN = DEGREE  # between two samples of a turning wind
 WIND_ROWS = 1_000_000
 
 

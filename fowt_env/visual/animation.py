@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from fowt_env.descriptions.checks import check_number
 from fowt_env.errors import InputError
 from fowt_env.files.atomic import replacing
 from fowt_env.visual.rendering import AT_REST, COLOURS, LOOSE, TIGHT, TRACES, YELLOW, View
@@ -47,15 +48,13 @@ def animate(scene, runs, path, *, speed=4.0, fps=20, size=(960, 540), start=0.0,
     if not 1 <= len(runs) <= MOST_RUNS:
         raise InputError(f"animation: {len(runs)} runs; must be 1 to {MOST_RUNS}")
     for name, value, top in (("speed", speed, 1000.0), ("fps", fps, 60.0)):
-        if not 0.0 < value <= top:
-            raise InputError(f"{name} = {value}: must be in (0, {top:g}]")
+        check_number(name, value, 0.0, top, low_open=True)
     if any(side % 2 or not 160 <= side <= 4000 for side in size):
         raise InputError(f"size = {size}: both must be even and in [160, 4000]")
     pause = max(2, round(100.0 / fps)) if path.suffix.lower() == ".gif" else 100.0 / fps  # 1/100 s
     tracks = [_Track(label, frame) for label, frame in runs.items()]
     end = max(track.time[-1] for track in tracks)
-    if not tracks[0].time[0] <= start < end:
-        raise InputError(f"start = {start}: must be in [{tracks[0].time[0]:g}, {end:g}) s")
+    check_number("start", start, tracks[0].time[0], end, high_open=True)
     times = np.arange(start, end, 0.01 * pause * speed)
     view = View([scene] * len(tracks), labels=None if list(runs) == [""] else list(runs), size=tuple(size))
 

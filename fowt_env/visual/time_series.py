@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from scipy.signal import welch
 
+from fowt_env.descriptions.checks import check_number
 from fowt_env.errors import InputError
 from fowt_env.files.atomic import replacing
 
@@ -199,8 +200,7 @@ def frequency_marks(frame, platform_pitch_period=None):
     """[(name, Hz)] of the platform-pitch natural frequency, the wave peak and 1P, where there are such."""
     marks = []
     if platform_pitch_period is not None:
-        if not platform_pitch_period > 0.0:
-            raise InputError(f"platform_pitch_period = {platform_pitch_period}: must be positive (s)")
+        check_number("platform_pitch_period", platform_pitch_period, 0.0, low_open=True)
         marks.append(("platform pitch", 1.0 / platform_pitch_period))
     wave = frame.get("Wave1Elev_[m]")
     if wave is not None and np.ptp(wave) > 1e-6:

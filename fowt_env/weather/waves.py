@@ -8,6 +8,7 @@ from math import pi
 
 import numpy as np
 
+from fowt_env.descriptions.checks import check_whole_number
 from fowt_env.errors import InputError
 from fowt_env.plant.hydro.waves import Waves
 
@@ -100,8 +101,7 @@ def _spectral_components(significant_height, peak_period, gamma, duration, compo
     low, high = 0.5 * peak, 5.0 * peak
     if components is None:
         components = max(200, int(np.ceil((high - low) * duration / (2.0 * pi))))
-    if components < 1:
-        raise InputError(f"wave_components = {components}: must be at least 1")
+    check_whole_number("wave_components", components, 1)
     if components > MOST_COMPONENTS:
         raise InputError(
             f"sea: Tp = {peak_period:g} s over duration = {duration:g} s needs {components} wave components,"

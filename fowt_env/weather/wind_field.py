@@ -59,7 +59,7 @@ class Text(NamedTuple):
 
 REQUIRED = object()
 SHIFT = Number(0.0, 1e5, "s", None)
-KINDS = {  # kind -> {key: (rule, default)}; None: found from the box
+FIELD_KINDS = {  # kind -> {key: (rule, default)}; None: found from the box
     "bts": {
         "path": (Text(), REQUIRED),
         "periodic": (Flag(), None),
@@ -89,7 +89,7 @@ KINDS = {  # kind -> {key: (rule, default)}; None: found from the box
 def is_field(spec):
     """Whether a wind specification asks for a box of full-field wind."""
     kind = spec.get("kind") if isinstance(spec, dict) else None
-    return isinstance(spec, WindBox) or (isinstance(kind, str) and kind in KINDS)
+    return isinstance(spec, WindBox) or (isinstance(kind, str) and kind in FIELD_KINDS)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -162,7 +162,7 @@ def read_box(spec, *, hub_height, rotor_diameter, shear_exponent=0.0, seed=0, du
 def _values(spec):
     """Checked values of every key of a specification."""
     kind = spec["kind"]
-    keys = KINDS[kind]
+    keys = FIELD_KINDS[kind]
     for key in spec:
         if key != "kind" and key not in keys:
             raise unknown(f"key of the {kind} wind", key, keys)
@@ -204,7 +204,7 @@ def _from_bts(values, *_):
     velocity, y, z, dt, speed, repeats = read_bts(values["path"])
     y, z = _even("y", y), _even("z", z)
     for key, value in (("dt", dt), ("speed", speed)):
-        KINDS["box"][key][0].read(f"wind.path = {str(values['path'])!r}: {key}", value)
+        FIELD_KINDS["box"][key][0].read(f"wind.path = {str(values['path'])!r}: {key}", value)
     shift, periodic = values["shift"], values["periodic"]
     return WindBox(
         velocity,

@@ -1,4 +1,4 @@
-"""Worn sensors and a plant that controllers do not know: one reading for all of them, and nothing else."""
+"""Degraded sensors and a plant that controllers do not know: one reading for all, and nothing else."""
 
 import numpy as np
 import pytest
@@ -12,13 +12,13 @@ from fowt_env.envs.safety import SafetyLayer
 from fowt_env.envs.sensors import draw_sensors, reading_scales
 from fowt_env.errors import InputError
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measure, Measurement
-from fowt_env.training.evaluation.model_mismatch import Shift, Unaware
-from fowt_env.training.evaluation.plant_perturbation import plant_settings
+from fowt_env.training.evaluation.model_mismatch import ModelMismatch
+from fowt_env.training.evaluation.plant_perturbation import PlantPerturbation, plant_settings
 
 QUICK = {"rotor": "table", "wave_components": 20, "wind": {"kind": "ntm", "speed": 18.0, "class": "B"}}
 NAMES = ("rotor_speed", "platform_pitch_rate", "previous_action", "estimated_wind", "estimated_waves")
 ON_LQR = {"action_mode": "residual", "baseline": "lqr", "observation": NAMES}
-WORN = {"noise": 0.02, "delay": 2}
+DEGRADED = {"noise": 0.02, "delay": 2}
 SHIFTED = plant_settings({"added_mass": 1.2, "mooring_stiffness": 0.8, "upper_mass": 1.05})
 NOMINAL = {"platform": "oc3_hywind"}
 
@@ -42,13 +42,13 @@ def test_sensors_without_noise_and_delay_change_no_bit(settings):
 
 
 def test_designing_on_the_very_plant_changes_no_bit():
-    plain, told = FowtEnv(**ON_LQR, **QUICK), FowtEnv(**ON_LQR, designed_on=NOMINAL, **QUICK)
+    plain, told = FowtEnv(**ON_LQR, **QUICK), FowtEnv(**ON_LQR, nominal_plant=NOMINAL, **QUICK)
     for one, other in zip(run(plain), run(told), strict=True):
         assert np.array_equal(one, other)
 
 
 def test_a_reading_is_what_was_measured_before_and_noise_of_the_stated_size():
-    env = FowtEnv(**(ON_LQR | {"observation": ("rotor_speed",)}), sensors=WORN, **QUICK)
+    env = FowtEnv(**(ON_LQR | {"observation": ("rotor_speed",)}), sensors=DEGRADED, **QUICK)
     _, measured, read = run(env, steps=1500, reach=0.0)
     scales = reading_scales(env.scene.turbine)
     late = np.concatenate([measured[:1], measured[:1], measured[:-2]])
@@ -62,7 +62,7 @@ def test_a_reading_is_what_was_measured_before_and_noise_of_the_stated_size():
     assert env.measurement() == Measurement(*read[-1].tolist())
 
 
-@pytest.mark.parametrize("sensors", [{"noise": 0.02}, {"delay": 3}, WORN])
+@pytest.mark.parametrize("sensors", [{"noise": 0.02}, {"delay": 3}, DEGRADED])
 def test_observation_baseline_and_estimator_are_given_the_same_reading(sensors):
     """lqr and estimator by hand, told what measurement() says: the same estimate, command and motion."""
     env = FowtEnv(sensors=sensors, **ON_LQR, **QUICK)
@@ -86,21 +86,22 @@ def test_observation_baseline_and_estimator_are_given_the_same_reading(sensors):
 
 
 def test_noise_reaches_baseline_and_estimator_but_not_the_reward():
-    exact, worn = FowtEnv(**ON_LQR, **QUICK), FowtEnv(sensors={"noise": 0.05}, **ON_LQR, **QUICK)
-    exact.reset(seed=6), worn.reset(seed=6)
-    assert not np.array_equal(exact._run.estimate, worn._run.estimate)
-    exact.step(np.zeros(2)), worn.step(np.zeros(2))
-    assert exact._run.u[1] != worn._run.u[1]
+    exact, degraded = FowtEnv(**ON_LQR, **QUICK), FowtEnv(sensors={"noise": 0.05}, **ON_LQR, **QUICK)
+    exact.reset(seed=6), degraded.reset(seed=6)
+    assert not np.array_equal(exact._run.estimate, degraded._run.estimate)
+    exact.step(np.zeros(2)), degraded.step(np.zeros(2))
+    assert exact._run.u[1] != degraded._run.u[1]
     deaf = {"action_mode": "direct", "observation": ("rotor_speed",)}
-    exact, worn = FowtEnv(**deaf, **QUICK), FowtEnv(sensors={"noise": 0.05}, **deaf, **QUICK)
-    exact.reset(seed=6), worn.reset(seed=6)
+    exact, degraded = FowtEnv(**deaf, **QUICK), FowtEnv(sensors={"noise": 0.05}, **deaf, **QUICK)
+    exact.reset(seed=6), degraded.reset(seed=6)
     for _ in range(20):
-        (seen, paid, *_), (worn_seen, worn_paid, *_) = exact.step([0.1, 0.2]), worn.step([0.1, 0.2])
-        assert seen[0] != worn_seen[0] and paid == worn_paid
+        seen, paid, *_ = exact.step([0.1, 0.2])
+        read, equally_paid, *_ = degraded.step([0.1, 0.2])
+        assert seen[0] != read[0] and paid == equally_paid
 
 
 def test_readings_repeat_with_the_weather_and_differ_in_another():
-    env = FowtEnv(observation=("rotor_speed",), sensors=WORN, **QUICK)
+    env = FowtEnv(observation=("rotor_speed",), sensors=DEGRADED, **QUICK)
     seen, _, _ = run(env, reset_seed=7)
     again, _, _ = run(env, reset_seed=7)
     _, info = env.reset(seed=8)
@@ -109,9 +110,9 @@ def test_readings_repeat_with_the_weather_and_differ_in_another():
     assert np.array_equal(first, env.reset(options=info["episode"])[0])
 
 
-@pytest.mark.parametrize("sensors", [WORN, {"noise": 0.01}])
+@pytest.mark.parametrize("sensors", [DEGRADED, {"noise": 0.01}])
 def test_the_batch_with_sensors_is_the_single_environment_bit_for_bit(sensors):
-    settings = ON_LQR | QUICK | SHIFTED | {"sensors": sensors, "designed_on": NOMINAL}
+    settings = ON_LQR | QUICK | SHIFTED | {"sensors": sensors, "nominal_plant": NOMINAL}
     batch, single = FowtVectorEnv(2, threads=1, **settings), FowtEnv(**settings)
     given = np.random.default_rng(1).uniform(-1.0, 1.0, (30, 2, 2))
     first = batch.reset(seed=9)[0]
@@ -123,16 +124,16 @@ def test_the_batch_with_sensors_is_the_single_environment_bit_for_bit(sensors):
 
 
 def test_environments_of_a_batch_may_differ_in_noise_and_delay_but_not_in_having_sensors():
-    per_env = [{"sensors": WORN}, {"sensors": {"noise": 0.0}}]
+    per_env = [{"sensors": DEGRADED}, {"sensors": {"noise": 0.0}}]
     batch = FowtVectorEnv(2, threads=1, per_env=per_env, **ON_LQR, **QUICK)
     seen = batch.reset(seed=1)[0]
     assert np.array_equal(seen[1], FowtEnv(**ON_LQR, **QUICK).reset(seed=2)[0])
     with pytest.raises(InputError, match="sensors"):
-        FowtVectorEnv(2, threads=1, per_env=[{"sensors": WORN}, {}], **ON_LQR, **QUICK)
+        FowtVectorEnv(2, threads=1, per_env=[{"sensors": DEGRADED}, {}], **ON_LQR, **QUICK)
 
 
 def test_a_snapshot_goes_on_with_the_same_readings():
-    env, other = (FowtEnv(sensors=WORN, **ON_LQR, **QUICK) for _ in range(2))
+    env, other = (FowtEnv(sensors=DEGRADED, **ON_LQR, **QUICK) for _ in range(2))
     env.reset(seed=2)
     for _ in range(7):
         env.step([0.3, -0.2])
@@ -147,7 +148,7 @@ def test_a_snapshot_goes_on_with_the_same_readings():
 def test_the_drawn_plant_is_not_leaked_to_lqr_estimator_preview_and_safety_layer():
     nominal = FowtEnv(**ON_LQR, **QUICK)
     nominal.reset(seed=1)
-    told = FowtEnv(designed_on=NOMINAL, **ON_LQR, **SHIFTED, **QUICK)
+    told = FowtEnv(nominal_plant=NOMINAL, **ON_LQR, **SHIFTED, **QUICK)
     leaked = FowtEnv(**ON_LQR, **SHIFTED, **QUICK)
     for env, same in ((told, True), (leaked, False)):
         env.reset(seed=1)
@@ -157,14 +158,14 @@ def test_the_drawn_plant_is_not_leaked_to_lqr_estimator_preview_and_safety_layer
     feedforward = {"action_mode": "residual", "baseline": "preview"}
     heavy_air = plant_settings({"air_density": 1.04})
     nominal = FowtEnv(**feedforward, **QUICK)
-    told = FowtEnv(designed_on=NOMINAL, **feedforward, **heavy_air, **QUICK)
+    told = FowtEnv(nominal_plant=NOMINAL, **feedforward, **heavy_air, **QUICK)
     leaked = FowtEnv(**feedforward, **heavy_air, **QUICK)
     for seed in (1, 2):  # the wind foreseen is that of each episode
         for env in (nominal, told, leaked):
             env.reset(seed=seed)
         assert np.array_equal(told._setting.parameters, nominal._setting.parameters)
         assert not np.array_equal(leaked._setting.parameters, nominal._setting.parameters)
-    guarded = SafetyLayer(FowtEnv(designed_on=NOMINAL, **ON_LQR, **SHIFTED, **QUICK), baseline="lqr")
+    guarded = SafetyLayer(FowtEnv(nominal_plant=NOMINAL, **ON_LQR, **SHIFTED, **QUICK), baseline="lqr")
     guarded.reset(seed=1)
     law = make("lqr", guarded.unwrapped.design_scene.turbine, 0.1)
     law.prepare(build_scene(fidelity="standard", **QUICK))
@@ -174,7 +175,7 @@ def test_the_drawn_plant_is_not_leaked_to_lqr_estimator_preview_and_safety_layer
 def test_environment_and_load_case_give_a_controller_the_same_readings():
     """sensors of FowtEnv and noise of a suite's case are the same numbers for the same weather."""
     weather = {"wind": QUICK["wind"], "sea": None, "weather_seed": 5, "offsets": {}}
-    env = FowtEnv(sensors=WORN, designed_on=NOMINAL, action_mode="direct", **SHIFTED, **QUICK)
+    env = FowtEnv(sensors=DEGRADED, nominal_plant=NOMINAL, action_mode="direct", **SHIFTED, **QUICK)
     env.reset(options=weather)
     scene = env.scene
     known = build_scene(wind=QUICK["wind"], seed=5, fidelity="standard", rotor="table")
@@ -189,7 +190,7 @@ def test_environment_and_load_case_give_a_controller_the_same_readings():
             kept.append(measurement)
             return self.law.act(measurement)
 
-    simulate(scene, Unaware(Watched(), known, Shift(**WORN), 5), duration=3.0)
+    simulate(scene, ModelMismatch(Watched(), known, PlantPerturbation(**DEGRADED), 5), duration=3.0)
     law = make("gspi_oc3", scene.turbine, 0.1)
     law.reset(env.measurement())
     for reading in kept[:30]:
@@ -214,9 +215,10 @@ def test_noise_is_drawn_from_the_seed_alone(turbine):
         ({"sensors": {"noise": float("nan")}}, r"sensors.noise = nan"),
         ({"sensors": {"delay": 1.5}}, r"sensors.delay = 1.5"),
         ({"sensors": {"delay": True}}, r"sensors.delay = True"),
-        ({"designed_on": "oc3_hywind"}, "must be a dict with a platform"),
-        ({"designed_on": {"turbine": None}}, "must be a dict with a platform"),
-        ({"designed_on": {"platform": "oc3_hywind", "sea": 1}}, "unknown key of designed_on 'sea'"),
+        ({"designed_on": {"platform": "oc3_hywind"}}, "'designed_on' of FowtEnv: is called nominal_plant"),
+        ({"nominal_plant": "oc3_hywind"}, "must be a dict with a platform"),
+        ({"nominal_plant": {"turbine": None}}, "must be a dict with a platform"),
+        ({"nominal_plant": {"platform": "oc3_hywind", "sea": 1}}, "unknown key of nominal_plant 'sea'"),
     ],
 )
 def test_what_cannot_be_used_is_named(settings, message):

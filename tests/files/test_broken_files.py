@@ -243,7 +243,7 @@ def settings_of_a_stranger():
         "platform": "oc3_hywind", "turbine": "nrel5mw", "rotor": "table", "fidelity": "standard",
         "wind": {"kind": "ntm", "speed": 18.0, "class": "B"}, "sea": "paper_wind_wave", "diffraction": "none",
         "integrator": "ab4", "mooring": "table", "sensors": {"noise": 0.0}, "wave_loads": "fast",
-        "designed_on": {"platform": "oc3_hywind", "turbine": "nrel5mw"},
+        "nominal_plant": {"platform": "oc3_hywind", "turbine": "nrel5mw"},
     }  # fmt: skip
     return settings
 
@@ -257,7 +257,7 @@ def test_no_text_in_the_settings_of_a_stranger_is_looked_up_as_code(text, trappe
 
     sound = settings_of_a_stranger()
     found = list(places(sound))
-    assert ("environment", "baseline") in found and ("environment", "designed_on", "platform") in found
+    assert ("environment", "baseline") in found and ("environment", "nominal_plant", "platform") in found
     for path in found:
         if path == ("name",):  # of the settings among ours: told to people
             continue

@@ -17,7 +17,7 @@ import pandas as pd
 from fowt_env.errors import InputError, unknown
 from fowt_env.scene.build import INTEGRATORS, REFERENCE_STEP, build_scene
 from fowt_env.simulation import initial_state, simulate
-from fowt_env.training.benchmarks.speed import SEA, TURBULENCE, Kind, calibration, header, loop_time
+from fowt_env.training.benchmarks.speed import SEA, TURBULENCE, TimedScene, calibration, header, loop_time
 from fowt_env.training.validation.signal_errors import normalised_rms
 from fowt_env.weather.wind_field import is_field
 
@@ -72,7 +72,7 @@ class Variant:
 
 
 REFERENCE = "reference"  # axis of the runs at twice the finest step
-STEPS = {"rk4": (0.025, 0.05, 0.1), "heun": (0.0125, 0.025, 0.05), "abm4": (0.025, 0.05, 0.1),
+STEP_SIZES = {"rk4": (0.025, 0.05, 0.1), "heun": (0.0125, 0.025, 0.05), "abm4": (0.025, 0.05, 0.1),
          "ab4": (0.025, 0.05, 0.1)}  # fmt: skip
 TABLED = (("mooring", "table"),)
 
@@ -86,7 +86,7 @@ def variants():
     found = [
         Variant("BEM once per step" if name == "ab4" else "integrator and step", name, dt, "bem", "exact")
         for name in INTEGRATORS
-        for dt in STEPS[name]
+        for dt in STEP_SIZES[name]
     ]
     found += [Variant("rotor", "rk4", 0.025, rotor, "exact") for rotor in ("lookup", "table")]
     found += [Variant("waves", "rk4", 0.025, "bem", "fast")]
@@ -108,7 +108,7 @@ def variants():
         Variant("all together", name, dt, rotor, "fast", options)
         for rotor, options in (("lookup", ()), ("table", TABLED))
         for name in INTEGRATORS
-        for dt in STEPS[name][-2:]
+        for dt in STEP_SIZES[name][-2:]
     ]
     return found
 
@@ -204,7 +204,7 @@ def _row(variant, seed, duration, finest, reference, wind, sea, repeats):
     frame, cost = _timed(lambda: simulate(scene, "pi", duration=duration, dt=variant.dt), repeats)
     kernel_seconds = min(duration, max(1.0, float(round(0.2 * TIMED * duration / cost))))
     kernel = loop_time(
-        scene, Kind(wind=wind), *initial_state(scene), variant.dt, kernel_seconds, repeats
+        scene, TimedScene(wind=wind), *initial_state(scene), variant.dt, kernel_seconds, repeats
     )  # fmt: skip
     found = errors(frame, reference)
     worst = max(found, key=found.get)

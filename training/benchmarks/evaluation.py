@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from fowt_env.errors import InputError
+from fowt_env.descriptions.checks import check_whole_number
 from fowt_env.training.evaluation.cases import read_suite
 from fowt_env.training.evaluation.engines import outcomes
 from fowt_env.training.evaluation.evaluate import planned, score, score_and_send
@@ -23,8 +23,7 @@ def evaluation_cost(count=21, suite="above_rated", controller="pi"):
     times of this process, which other processes lengthen only by sharing caches and memory.
     Raises: InputError for count < 1.
     """
-    if count < 1:
-        raise InputError(f"count = {count}: must be at least 1")
+    check_whole_number("count", count, 1)
     chosen = read_suite(suite)
     seeds = range(1, 2 + count // len(chosen.cases))
     with tempfile.TemporaryDirectory() as folder:

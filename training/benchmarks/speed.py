@@ -52,7 +52,7 @@ LOADS = (
 
 
 @dataclass(frozen=True)
-class Kind:
+class TimedScene:
     """A kind of scene: arguments of build_scene, and what is held still."""
 
     wind: object = None
@@ -97,25 +97,27 @@ def _box():
     return box_wind()
 
 
-KINDS = {
-    "full, reference": Kind(TURBULENCE, SEA, "reference"),
-    "full, standard": Kind(TURBULENCE, SEA, "standard"),
-    "full, fast": Kind(TURBULENCE, SEA, "fast"),
-    "full-field handle, standard": Kind(_box, SEA, "standard"),
-    "exact waves, look-up rotor": Kind(TURBULENCE, SEA, "standard", {"wave_loads": "exact"}),
-    "BEM rotor, fast waves": Kind(TURBULENCE, SEA, "standard", {"rotor": "bem"}),
-    "still water, wind": Kind(TURBULENCE, None, absent="waves"),
-    "no wind, waves": Kind(None, SEA, absent="wind, rotor, tower drag"),
-    "still water, no wind": Kind(None, None, absent="waves, wind, rotor, tower drag"),
-    "parked in a storm": Kind(40.0, SEA, parked=True),
-    "planar, fast": Kind(
+TIMED_SCENES = {
+    "full, reference": TimedScene(TURBULENCE, SEA, "reference"),
+    "full, standard": TimedScene(TURBULENCE, SEA, "standard"),
+    "full, fast": TimedScene(TURBULENCE, SEA, "fast"),
+    "full-field box, standard": TimedScene(_box, SEA, "standard"),
+    "exact waves, look-up rotor": TimedScene(TURBULENCE, SEA, "standard", {"wave_loads": "exact"}),
+    "BEM rotor, fast waves": TimedScene(TURBULENCE, SEA, "standard", {"rotor": "bem"}),
+    "still water, wind": TimedScene(TURBULENCE, None, absent="waves"),
+    "no wind, waves": TimedScene(None, SEA, absent="wind, rotor, tower drag"),
+    "still water, no wind": TimedScene(None, None, absent="waves, wind, rotor, tower drag"),
+    "parked in a storm": TimedScene(40.0, SEA, parked=True),
+    "planar, fast": TimedScene(
         TURBULENCE, SEA, "fast", {"planar": True}, absent="sway, roll, yaw: 3x3 instead of 6x6 solve"
     ),
-    "planar": Kind(TURBULENCE, SEA, options={"planar": True}, absent="sway, roll, yaw; 3x3 solve"),
-    "mooring by table": Kind(TURBULENCE, SEA, options={"mooring": "table"}, absent="catenary iterations"),
-    "no mooring": Kind(TURBULENCE, SEA, options={"mooring": False}, absent="mooring"),
-    "platform held": Kind(TURBULENCE, SEA, platform_held=True, absent="6x6 solve (at run time)"),
-    "no water": Kind(
+    "planar": TimedScene(TURBULENCE, SEA, options={"planar": True}, absent="sway, roll, yaw; 3x3 solve"),
+    "mooring by table": TimedScene(
+        TURBULENCE, SEA, options={"mooring": "table"}, absent="catenary iterations"
+    ),
+    "no mooring": TimedScene(TURBULENCE, SEA, options={"mooring": False}, absent="mooring"),
+    "platform held": TimedScene(TURBULENCE, SEA, platform_held=True, absent="6x6 solve (at run time)"),
+    "no water": TimedScene(
         TURBULENCE,
         None,
         options={"hydrodynamics": False, "mooring": False},
@@ -268,9 +270,9 @@ def loop_time(scene, kind, x, u, dt, seconds, repeats=REPEATS):
 
 def measure_kind(name, seconds=600.0, repeats=REPEATS, calls=CHUNK):
     """Row (dict) of one kind of scene: times per step, real-time factors and microseconds per load."""
-    if name not in KINDS:
-        raise unknown("kind of scene", name, KINDS)
-    kind = KINDS[name]
+    if name not in TIMED_SCENES:
+        raise unknown("kind of scene", name, TIMED_SCENES)
+    kind = TIMED_SCENES[name]
     scene = kind.scene()
     if hasattr(scene.wind, "usable"):  # a handle of wind has an end
         seconds = min(seconds, 10.0 * int(scene.wind.usable // 10.0))
@@ -311,10 +313,10 @@ def speed(kinds=None, seconds=600.0, repeats=REPEATS, calls=CHUNK, progress=None
     progress  called with (text, done, total)
     Raises: InputError for an unknown kind.
     """
-    names = list(kinds or KINDS)
+    names = list(kinds or TIMED_SCENES)
     for name in names:
-        if name not in KINDS:
-            raise unknown("kind of scene", name, KINDS)
+        if name not in TIMED_SCENES:
+            raise unknown("kind of scene", name, TIMED_SCENES)
     rows = []
     for done, name in enumerate(names):
         if progress is not None:

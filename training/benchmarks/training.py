@@ -103,7 +103,7 @@ def subject(kind, n, settings, decisions):
     return env, hold, native.env
 
 
-KINDS = (
+VECTOR_ENVS = (
     "SubprocVecEnv", "SyncVectorEnv", "native", "torch alone", "native, decisions", "torch alone, decisions",
 )  # fmt: skip
 
@@ -140,7 +140,7 @@ def measured(kind, n, steps, settings, decisions, algorithm):
     }
 
 
-def benchmark_training(n=64, steps=50_000, kinds=KINDS, progress=None):
+def benchmark_training(n=64, steps=50_000, kinds=VECTOR_ENVS, progress=None):
     """DataFrame with a row per kind of vector environment, PPO as shipped on one torch thread.
 
     An env step is one control period (0.1 s) of the task above_rated at fidelity "standard", residual mode;

@@ -19,7 +19,7 @@ from rich.progress import (
     TimeElapsedColumn,
 )
 
-from fowt_env.descriptions.checks import parse_numbers
+from fowt_env.descriptions.checks import parse_numbers, parse_whole_numbers
 from fowt_env.errors import ControllerError, InputError, SimulationStopped, unknown
 from fowt_env.files.tables import SERIES_SUFFIXES, table_path, write_table
 from fowt_env.training.cli.arguments import parse_pairs, parse_sea, parse_wind
@@ -232,7 +232,7 @@ def simulate(
 
 def _note_limits(frame, turbine):
     """Say where a run was at the generator's limits, and that its rotor passed the turbine's overspeed."""
-    from fowt_env.plant.channels import RPM
+    from fowt_env.descriptions.units import RPM
 
     limited = frame["GenTqLim_[-]"].mean()
     if limited > 0.0:
@@ -240,7 +240,7 @@ def _note_limits(frame, turbine):
             f"generator torque at its range or rate limit for {100.0 * limited:.1f} % of the run: it was"
             " commanded more than it can follow"
         )
-    fastest, limit = frame["RotSpeed_[rpm]"].max(), turbine.overspeed * RPM
+    fastest, limit = frame["RotSpeed_[rpm]"].max(), turbine.overspeed / RPM
     if fastest > limit:
         note(
             f"rotor speed of up to {fastest:.2f} rpm is beyond the turbine's overspeed of {limit:g} rpm,"
@@ -299,9 +299,9 @@ case), pareto.png, metrics.png, boxes.png, timeseries_CASE.png, spectra_CASE.png
 goes on where it was stopped; further controllers, cases or seeds are added to the folder."""
 
 
-@app.command(epilog=EVALUATE_EXAMPLES)
+@app.command(name="evaluate", epilog=EVALUATE_EXAMPLES)
 @reported
-def evaluate(
+def evaluate_command(
     controllers: Annotated[
         str, typer.Option(help="Names, policy:NAME, design:FILE or module:Name, by commas.")
     ] = "pi",
@@ -339,15 +339,12 @@ def evaluate(
     plot: Annotated[bool, typer.Option("--plot/--no-plot", help="Make the plots.")] = True,
 ):
     """Score controllers on load cases: a leaderboard with intervals, metrics by case, the runs, and plots."""
-    from fowt_env.training.evaluation.evaluate import evaluate as evaluate_controllers
-    from fowt_env.training.evaluation.evaluate import summary
+    from fowt_env.training.evaluation.evaluate import evaluate, summary
     from fowt_env.training.reports.terminal import chosen_cases, write_leaderboard
 
     folder = Path(out_folder)
     chosen = chosen_cases(suite, cases)
-    numbers = None if seeds is None else parse_numbers(seeds, "seeds")
-    if any(number != int(number) for number in numbers or ()):
-        raise InputError(f"seeds = {seeds!r}: must be whole numbers")
+    numbers = None if seeds is None else parse_whole_numbers(seeds, "seeds")
     if baseline is not None and baseline not in (names := [name.strip() for name in controllers.split(",")]):
         raise unknown("baseline among --controllers", baseline, names)
     finished = 0
@@ -359,7 +356,7 @@ def evaluate(
             update(done, f"evaluating, {done} of {total} runs done", total)
 
         try:
-            table = evaluate_controllers(
+            table = evaluate(
                 controllers,
                 chosen,
                 duration=duration,
@@ -559,7 +556,7 @@ def validate(
     plot: Annotated[bool, typer.Option("--plot/--no-plot", help="Make the plots.")] = True,
 ):
     """Compare this plant with OpenFAST on the same cases: every figure with its verdict, and plots."""
-    from fowt_env.training.validation.report import write_report
+    from fowt_env.training.validation.report import write_validation_report
     from fowt_env.training.validation.validate import GROUPS, validate_cases
 
     names = list(GROUPS) if case == "all" else [name.strip() for name in case.split(",") if name.strip()]
@@ -581,7 +578,7 @@ def validate(
         if row.verdict == "MISSED":
             text = f"{row.case}: {row.quantity}: {row.error:.3g} %, allowed {row.allowed:g} %"
             out.print(f"[red]missed[/red]  {escape(text)}", highlight=False, soft_wrap=True)
-    note("wrote " + ", ".join(str(path) for path in write_report(study, out_folder, plot)))
+    note("wrote " + ", ".join(str(path) for path in write_validation_report(study, out_folder, plot)))
 
 
 PAPER_EXAMPLES = """[bold]Examples[/bold]
@@ -605,7 +602,7 @@ def paper(
     """Run the paper's load cases and check its claims."""
     with from_a_clone("paper"):
         from fowt_env.training.studies.paper.load_cases import run_paper, statistics, wanted_cases
-        from fowt_env.training.studies.paper.report import write_report
+        from fowt_env.training.studies.paper.report import write_paper_report
 
     names = wanted_cases(case)
     with progress_bar("paper", None) as update:
@@ -626,7 +623,7 @@ def paper(
         verdict = "[green]holds[/green]" if claim.holds else "[red]FAILS[/red]"
         text = f"Fig. {claim.figure}: {claim.text}: {claim.found}"
         out.print(f"{verdict}  {escape(text)}", highlight=False, soft_wrap=True)
-    note("wrote " + ", ".join(str(path) for path in write_report(study, out_folder, plot)))
+    note("wrote " + ", ".join(str(path) for path in write_paper_report(study, out_folder, plot)))
 
 
 benchmarks = typer.Typer(
@@ -710,7 +707,7 @@ def accuracy(
 
     chosen = None if axes is None else study.select([name.strip() for name in axes.split(",")])
     folder = Path(out_folder)
-    numbers = [int(number) for number in parse_numbers(seeds, "seeds")]
+    numbers = parse_whole_numbers(seeds, "seeds")
     with progress_bar("accuracy", None) as update:
         table = study.accuracy(
             numbers,
@@ -795,7 +792,7 @@ def stability(
         verdict = "[green]holds[/green] " if claim.holds else "[red]MISSED[/red]"
         text = f"{claim.what} ({claim.count}): {claim.found}"
         out.print(f"{verdict} {escape(text)}", highlight=False, soft_wrap=True)
-    path = stress.write_report(out_folder, report or Path(out_folder) / "robustness.md")
+    path = stress.write_robustness_report(out_folder, report or Path(out_folder) / "robustness.md")
     note(f"wrote {path}")
     if not all(claim.holds for claim in claims):
         raise typer.Exit(1)

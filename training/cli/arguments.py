@@ -3,7 +3,7 @@
 import json
 from pathlib import Path
 
-from fowt_env.descriptions.checks import _number
+from fowt_env.descriptions.checks import parse_number
 from fowt_env.errors import InputError
 from fowt_env.files.openfast import read_uniform_wind
 from fowt_env.files.tables import read_table
@@ -18,7 +18,7 @@ def parse_wind(text):
     """
     if text is None or text.strip().lower() == "none":
         return None
-    number = _number(text)
+    number = parse_number(text)
     if number is not None:
         return number
     if text.lstrip().startswith("{"):
@@ -28,12 +28,12 @@ def parse_wind(text):
     if Path(text).suffix.lower() in (".wnd", ".hh"):
         return read_uniform_wind(text)
     kind, *rest = text.split(":")
-    if not rest or len(rest) > 2 or _number(rest[0]) is None:
+    if not rest or len(rest) > 2 or parse_number(rest[0]) is None:
         allowed = (
             "a speed (18), KIND:SPEED[:CLASS] (ntm:18:B), JSON, a .csv, .parquet, .wnd or .hh file, or none"
         )
         raise InputError(f"wind = {text!r}: must be {allowed}")
-    spec = {"kind": kind, "speed": _number(rest[0])}
+    spec = {"kind": kind, "speed": parse_number(rest[0])}
     return spec | {"class": rest[1]} if len(rest) == 2 else spec
 
 
@@ -47,7 +47,7 @@ def parse_sea(text):
     keys = SEA_KEYS.get(kind)
     if keys is None or not rest:
         return text  # a name or a path: the library knows them
-    values = [_number(item) for item in rest]
+    values = [parse_number(item) for item in rest]
     if None in values or not 2 <= len(values) <= len(keys):
         form = ":".join((kind, *keys))
         raise InputError(f"sea = {text!r}: must be {form} with a number for each")

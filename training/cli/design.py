@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from fowt_env.descriptions.checks import parse_numbers
+from fowt_env.descriptions.checks import parse_numbers, parse_whole_numbers
 from fowt_env.errors import InputError
 from fowt_env.training.cli.app import app, note, out, progress_bar, reported, show
 from fowt_env.training.cli.arguments import parse_pairs
@@ -259,7 +259,7 @@ def lqr(
         name, _, values = pair.partition("=")
         numbers = parse_numbers(values, f"weight {name}")
         variants = [variant | {name: number} for variant in variants for number in numbers]
-    numbers = [int(number) for number in parse_numbers(seeds, "seeds")]
+    numbers = parse_whole_numbers(seeds, "seeds")
     with progress_bar("simulating", None) as update:
         table = sweep(variants, cases, numbers, out_path, lambda done, total: update(done, total=total))
     means = table.groupby(["case", "variant"], sort=False)[list(SHOWN)].mean().reset_index()

@@ -8,7 +8,7 @@ import typer
 from fowt_env.errors import InputError, unknown
 from fowt_env.training.cli.app import app, note, reported
 
-KINDS = ("series", "spectra", "boxes", "raos", "schedule")
+PLOTS = ("series", "spectra", "boxes", "raos", "schedule")
 PLOT_EXAMPLES = """[bold]Examples[/bold]
 
 [cyan]fowt plot series run.csv[/cyan]  stacked time series, into series.png
@@ -41,8 +41,8 @@ def plot(
     """Plot saved runs: time series, spectra, box plots, response to waves; or the steady schedule."""
     from fowt_env.files.tables import read_table
 
-    if kind not in KINDS:
-        raise unknown("kind of plot", kind, KINDS)
+    if kind not in PLOTS:
+        raise unknown("kind of plot", kind, PLOTS)
     frames = {name: read_table(path) for name, path in _names(files).items()}
     if len(frames) == 1:  # nothing to tell apart
         frames = {"": next(iter(frames.values()))}

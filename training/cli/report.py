@@ -5,8 +5,7 @@ from typing import Annotated
 
 import typer
 
-from fowt_env.descriptions.checks import parse_numbers
-from fowt_env.errors import InputError
+from fowt_env.descriptions.checks import parse_whole_numbers
 from fowt_env.training.cli.app import OptionOption, app, note, progress_bar, reported
 from fowt_env.training.cli.arguments import parse_pairs, parse_sea, parse_wind
 
@@ -44,15 +43,12 @@ def report(
     from fowt_env.training.reports.html_page import write_report
 
     names = None if cases is None else [name.strip() for name in cases.split(",") if name.strip()]
-    numbers = None if seeds is None else parse_numbers(seeds, "seeds")
-    if numbers is not None and any(number != int(number) for number in numbers):
-        raise InputError(f"seeds = {seeds!r}: must be whole numbers")
     with progress_bar("report", None) as update:
         path = write_report(
             Path(folder),
             out_path,
             names,
-            None if numbers is None else [int(number) for number in numbers],
+            None if seeds is None else parse_whole_numbers(seeds, "seeds"),
             rate,
             platform,
             schedule,

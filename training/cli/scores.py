@@ -48,6 +48,14 @@ def _groups(texts):
     return found
 
 
+def _runs(results, cases):
+    """Table of the runs that controllers are scored on. Raises: InputError."""
+    from fowt_env.training.evaluation.metrics import METRICS
+    from fowt_env.training.evaluation.results_table import read_results
+
+    return read_results(results, METRICS, _names(cases), parked=False)
+
+
 def _shown(text, tables, out_path):
     """Print the markdown text, and write it with its tables where a path is given."""
     from fowt_env.training.reports.scores import write_scores
@@ -81,9 +89,9 @@ def rivals(
     out_path: OutOption = None,
 ):
     """Compare agents with rivals over all cases, with a verdict on each aim."""
-    from fowt_env.training.reports.scores import agent_counts, agent_scores, read_results, scores_markdown
+    from fowt_env.training.reports.scores import agent_counts, agent_scores, scores_markdown
 
-    table = read_results(results, _names(cases))
+    table = _runs(results, cases)
     chosen = _names(against), _groups(group), _names(agents)
     found, counts = agent_scores(table, *chosen), agent_counts(table, *chosen)
     _shown(scores_markdown(found, counts), {"": found, "counts": counts}, out_path)
@@ -115,9 +123,9 @@ def by_cases(
     out_path: OutOption = None,
 ):
     """Compare agents with one rival on each kind of case (its winds together), and count what failed."""
-    from fowt_env.training.reports.scores import by_kind, figures_named, kinds_markdown, read_results
+    from fowt_env.training.reports.scores import by_kind, figures_named, kinds_markdown
 
-    table, chosen = read_results(results, _names(cases)), figures_named(_names(figures))
+    table, chosen = _runs(results, cases), figures_named(_names(figures))
     found, counts = by_kind(table, against, _groups(group), _names(agents), chosen, each)
     _shown(kinds_markdown(found, counts), {"": found, "counts": counts}, out_path)
 
@@ -145,10 +153,9 @@ def bound(
     """Say which share of what the linear bound allows each controller reaches, per wind speed."""
     from fowt_env.training.reports.bound_scores import bound_fractions, bound_markdown, read_bound
     from fowt_env.training.reports.score_plots import plot_shares
-    from fowt_env.training.reports.scores import read_results
 
     fronts = read_bound(table_path)
-    found = bound_fractions(read_results(results, _names(cases)), fronts, _groups(group), _names(agents))
+    found = bound_fractions(_runs(results, cases), fronts, _groups(group), _names(agents))
     text = "\n".join(bound_markdown(found, column) for column in ("of_bound_[-]", "of_measured_[-]"))
     _shown(text, {"": found}, out_path)
     if plot is not None:

@@ -15,7 +15,7 @@ linear model has no limits of torque, pitch or their rates, and nothing is sampl
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from math import isfinite, pi, sqrt
+from math import pi, sqrt
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +32,8 @@ from fowt_env.controllers.lqr.design import (
     feedback_plant,
 )
 from fowt_env.controllers.pi import PISettings, schedule_gain
+from fowt_env.descriptions.checks import check_number
+from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.errors import InputError
 
 BOUND = Path(__file__).parent / "data" / "linear_bound.csv"  # what fowt design bound wrote
@@ -86,13 +88,13 @@ class Problem:
         eye = np.eye(N_FEEDBACK)
         self.rows = {  # output rows, each in units of which one is of order one
             "rotor_speed": eye[SPEED] / (0.05 * rated),
-            "platform_pitch": eye[LEAN] / np.radians(1.0),
-            "travel": rate / np.radians(0.2),
+            "platform_pitch": eye[LEAN] / DEGREE,
+            "travel": rate / (0.2 * DEGREE),
             "power": power / 0.05,
             "torque": eye[TORQUE] / 0.05,
         }
-        self.scales = {"rotor_speed": 0.05 * rated, "platform_pitch": np.radians(1.0)}
-        self.scales |= {"travel": GAUSSIAN_MEAN * np.radians(0.2), "power": 0.05, "torque": 0.05}
+        self.scales = {"rotor_speed": 0.05 * rated, "platform_pitch": DEGREE}
+        self.scales |= {"travel": GAUSSIAN_MEAN * (0.2 * DEGREE), "power": 0.05, "torque": 0.05}
 
     def deviations(self, covariance):
         """Deviations for a covariance (13, 13) of the states."""
@@ -109,7 +111,7 @@ class Problem:
         q = sum(weight * np.outer(self.rows[name], self.rows[name]) for name, weight in weights.items())
         # the integral is not scored; a trace of it makes its mode stable
         q[INTEGRAL, INTEGRAL] += 1e-4 / (0.5 * self.turbine.rated_rotor_speed) ** 2
-        return q, np.diag([TORQUE_RATE / 0.05**2, COMMAND_RATE / np.radians(0.2) ** 2])
+        return q, np.diag([TORQUE_RATE / 0.05**2, COMMAND_RATE / (0.2 * DEGREE) ** 2])
 
     @cached_property
     def kalman(self):
@@ -211,13 +213,13 @@ def bound_table(scene, winds=WINDS, information=tuple(INFORMATION), torque_std=T
     torque_std: limit, as a share of rated torque; inf for none.
     Raises: InputError for winds that are not above rated, or a torque_std that is not positive.
     """
-    if not torque_std > 0.0:
-        raise InputError(f"torque_std = {torque_std}: must be positive (inf: no limit)")
+    allowed = "positive (inf: no limit)"
+    check_number("torque_std", torque_std, 0.0, low_open=True, infinite=True, allowed=allowed)
     rows = []
+    low, high = scene.turbine.rated_wind_speed, scene.turbine.cut_out_wind_speed
+    allowed = f"above {low:g} and at most {high:g} m/s"
     for number, wind in enumerate(winds, 1):
-        if not (isfinite(wind) and scene.turbine.rated_wind_speed < wind <= scene.turbine.cut_out_wind_speed):
-            low, high = scene.turbine.rated_wind_speed, scene.turbine.cut_out_wind_speed
-            raise InputError(f"wind = {wind}: must be above {low:g} and at most {high:g} m/s")
+        check_number("wind", wind, low, high, low_open=True, allowed=allowed)
         problem = Problem(design_model(scene, wind), scene.turbine)
         base, _ = gspi_covariance(problem)
         rows.append(_row(wind, "gspi_oc3", float("nan"), base, base))
@@ -235,9 +237,9 @@ def _row(wind, information, share, found, base):
         "wind_[m/s]": float(wind),
         "information": information,
         "share_[-]": share,
-        "RotSpeed_std_[rpm]": found.rotor_speed * 30.0 / pi,
-        "PtfmPitch_std_[deg]": np.degrees(found.platform_pitch),
-        "blade_pitch_travel_[deg/s]": np.degrees(found.travel),
+        "RotSpeed_std_[rpm]": found.rotor_speed / RPM,
+        "PtfmPitch_std_[deg]": found.platform_pitch / DEGREE,
+        "blade_pitch_travel_[deg/s]": found.travel / DEGREE,
         "power_std_[%]": 100.0 * found.power,
         "torque_std_[%]": 100.0 * found.torque,
         "speed_ratio_[-]": found.rotor_speed / base.rotor_speed,

@@ -6,6 +6,7 @@ Needs matplotlib: pip install "fowt-env[plot]".
 
 import numpy as np
 
+from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.errors import InputError
 from fowt_env.visual.time_series import COLOURS, INK, new_figure, save_figure, style_axes
 
@@ -14,15 +15,9 @@ MARKS = ("o", "s", "^", "D", "v", "P", "X")
 SLOW = 0.4  # rad/s: below it surge, platform pitch and heave, above it yaw
 FREQUENCIES = np.geomspace(0.01, 4.0, 400)  # rad/s
 BODE = (  # input, output, title, factor to the unit shown, unit
-    (
-        "blade_pitch_command",
-        "rotor_speed",
-        "blade pitch to rotor speed",
-        30.0 / np.pi * np.pi / 180.0,
-        "rpm/deg",
-    ),
-    ("generator_torque", "rotor_speed", "torque to rotor speed", 30.0 / np.pi * 1e3, "rpm/(kN m)"),
-    ("wind_speed", "platform_pitch", "wind to platform pitch", 180.0 / np.pi, "deg/(m/s)"),
+    ("blade_pitch_command", "rotor_speed", "blade pitch to rotor speed", DEGREE / RPM, "rpm/deg"),
+    ("generator_torque", "rotor_speed", "torque to rotor speed", 1e3 / RPM, "rpm/(kN m)"),
+    ("wind_speed", "platform_pitch", "wind to platform pitch", 1.0 / DEGREE, "deg/(m/s)"),
 )
 WIND = "wind_[m/s]"
 TRAVEL = {"cmap": "coolwarm", "vmin": 0.5, "vmax": 1.5}  # colours of the travel's ratio: white at 1

@@ -4,6 +4,7 @@ Run as fowt linearize and fowt design; every function returns a table that can b
 """
 
 import json
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -17,10 +18,7 @@ from fowt_env.errors import InputError
 from fowt_env.files.atomic import replacing
 from fowt_env.files.tables import write_table
 from fowt_env.plant.state import STATE_INDEX
-from fowt_env.simulation import simulate
-from fowt_env.training.evaluation.cases import named_cases
-from fowt_env.training.evaluation.evaluate import SHORTEST_WEATHER
-from fowt_env.training.evaluation.metrics import metrics
+from fowt_env.training.evaluation.evaluate import evaluate
 
 FIRST_TRAINING_SEED = 1000  # seeds below are for scoring
 INFINITE = 1e3  # rad/s: generalised eigenvalues beyond are zeros at infinity
@@ -120,32 +118,23 @@ def save_study(models, folder):
 def sweep(variants, cases, seeds, out=None, progress=None, duration=660.0, skip=60.0):
     """DataFrame of lqr with each variant of its weights ({name: value} each) and of gspi_oc3, seed by seed.
 
-    Of the metrics it has those of KEPT. seeds must be training seeds, FIRST_TRAINING_SEED and above: the
-    others are for scoring. out: CSV.
+    Of the metrics it has those of KEPT, NaN where a run failed. seeds must be training seeds,
+    FIRST_TRAINING_SEED and above: the others are for scoring. out: CSV.
     Raises: InputError for other seeds or unknown weights.
     """
-    import fowt_env
-
     if min(seeds) < FIRST_TRAINING_SEED:
         raise InputError(f"seeds = {list(seeds)}: tune on seeds of {FIRST_TRAINING_SEED} and above")
-    weights = [(str(variant or "default"), Weights().changed(**variant)) for variant in variants]
-    rows, total = [], len(named_cases(cases)) * len(seeds) * (len(weights) + 1)
-    for case in named_cases(cases):
-        for seed in seeds:
-            options = {"duration": max(SHORTEST_WEATHER, duration), **case.options}
-            scene = fowt_env.build_scene(
-                case.platform, wind=case.wind, sea=case.sea, seed=int(seed), **options
-            )
-            runs = [("gspi_oc3", "gspi_oc3")]
-            runs += [(label, LQR(scene.turbine, 0.1, chosen)) for label, chosen in weights]
-            for label, controller in runs:
-                frame = simulate(scene, controller=controller, duration=duration)
-                found = metrics(frame, skip, scene.turbine.rated_rotor_speed * 30.0 / np.pi)
-                kept = {name: found[name] for name in KEPT}
-                rows.append({"variant": label, "case": case.name, "seed": int(seed), **kept})
-                if progress is not None:
-                    progress(len(rows), total)
-    table = pd.DataFrame(rows)
+    laws = {"gspi_oc3": "gspi_oc3"}
+    for variant in variants:
+        weights = Weights().changed(**variant)
+        laws[str(variant or "default")] = partial(LQR, weights=weights)
+
+    def report(done, total, row):
+        if progress is not None and row is not None:
+            progress(done, total)
+
+    runs = evaluate(laws, cases, duration, skip, seeds, progress=report)
+    table = runs.rename(columns={"controller": "variant"})[["variant", "case", "seed", *KEPT]]
     if out is not None:
         write_table(table, out)
     return table

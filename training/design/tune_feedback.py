@@ -30,7 +30,7 @@ from fowt_env.files.atomic import replacing
 from fowt_env.files.tables import write_table
 from fowt_env.training.evaluation.cases import Case
 from fowt_env.training.evaluation.engines import session
-from fowt_env.training.evaluation.evaluate import evaluate
+from fowt_env.training.evaluation.evaluate import evaluate, mean_ratios
 
 WINDS = (13.0, 17.0, 21.0)
 SEEDS = (1001, 1002)
@@ -111,15 +111,12 @@ def tune(name, duration=660.0, winds=WINDS, seeds=SEEDS, **engine):
         [training_case(wind) for wind in winds],
         duration=duration, seeds=seeds, control_dt=CONTROL_DT, **engine,
     )  # fmt: skip
-    columns = list(FIGURES.values())
-    values = table.set_index(["controller", "case", "seed"])[columns].sort_index()
-    base = values.loc[BASELINE]
     travel = FIGURES["pitch_travel"]
+    ratios, unfed_travel = mean_ratios(table, BASELINE, FIGURES.values()), mean_ratios(table, unfed, [travel])
     rows = []
     for label, (settings, _) in zip(labelled, candidates, strict=True):
-        ratios = (values.loc[label] / base).mean(skipna=False)
-        row = settings | {key: ratios[column] for key, column in FIGURES.items()}
-        row["unfed_travel"] = (values.loc[label, travel] / values.loc[unfed, travel]).mean(skipna=False)
+        row = settings | {key: ratios.loc[label, column] for key, column in FIGURES.items()}
+        row["unfed_travel"] = unfed_travel.loc[label, travel]
         cost = 0.5 * (row["platform_pitch"] + row["rotor_speed"])
         rows.append(row | {"cost": cost if row["unfed_travel"] <= TRAVEL else float("nan")})
     return pd.DataFrame(rows).sort_values("cost", ignore_index=True)

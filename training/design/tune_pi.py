@@ -16,7 +16,7 @@ import typer
 from scipy.optimize import minimize
 
 from fowt_env.controllers.pi import PI, PISettings
-from fowt_env.descriptions.checks import parse_numbers
+from fowt_env.descriptions.checks import parse_whole_numbers
 from fowt_env.errors import InputError
 from fowt_env.files.atomic import replacing
 from fowt_env.scene.build import build_scene
@@ -106,7 +106,7 @@ def main(
     out: Annotated[str, typer.Option(help="File to write.")] = "controllers/pi_tuned.toml",
 ):
     """Search the gains of pi_tuned and write them."""
-    numbers = [int(number) for number in parse_numbers(seeds, "seeds")]
+    numbers = parse_whole_numbers(seeds, "seeds")
 
     def report(factors, relative, value):
         shown = "failed" if relative is None else "  ".join(f"{k} {v:.3f}" for k, v in relative.items())

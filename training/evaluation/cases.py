@@ -12,14 +12,13 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
+from fowt_env.descriptions.checks import is_number, plain_number
 from fowt_env.descriptions.files import locate, raise_problems, read_toml
 from fowt_env.descriptions.platform import joint_sea_state, read_platform
 from fowt_env.descriptions.records import (
     NonNegative,
     Positive,
     Record,
-    is_number,
-    plain_number,
     validate,
 )
 from fowt_env.descriptions.sea_state import SeaState, sea_state_of
@@ -28,9 +27,8 @@ from fowt_env.errors import InputError, unknown
 from fowt_env.scene.build import OPTIONS
 from fowt_env.training.evaluation.faults import Fault
 from fowt_env.training.evaluation.metrics import METRICS
-from fowt_env.training.evaluation.model_mismatch import Shift
-from fowt_env.weather.wind_field import KINDS as FIELD_KINDS
-from fowt_env.weather.wind_field import REQUIRED, is_field
+from fowt_env.training.evaluation.plant_perturbation import PlantPerturbation
+from fowt_env.weather.wind_field import FIELD_KINDS, REQUIRED, is_field
 
 FOLDER = Path(__file__).parent / "suites"
 WIND_KINDS = ("rotor-averaged", "full-field")
@@ -43,7 +41,7 @@ class Case:
     parked: the turbine idles with feathered blades (at rest without wind), so no controller is compared.
     initial: absolute values of channels at the start, as simulate takes them.
     seeds, duration, skip: of this case where they differ from the suite's. shift: how the plant differs from
-    the one that controllers are told of (training.evaluation.model_mismatch).
+    the nominal one, which controllers are prepared for (training.evaluation.model_mismatch).
     """
 
     name: str
@@ -58,7 +56,7 @@ class Case:
     seeds: tuple | None = None
     duration: float | None = None  # s
     skip: float | None = None  # s
-    shift: Shift | None = None  # what of the plant its controllers do not know
+    shift: PlantPerturbation | None = None  # what of the plant its controllers do not know
 
 
 def described(case):
@@ -114,7 +112,7 @@ class CaseEntry(Record):
     seeds: Seeds | None = None
     duration: Positive | None = None
     skip: NonNegative | None = None
-    shift: Shift | None = None
+    shift: PlantPerturbation | None = None
 
 
 class Term(Record):

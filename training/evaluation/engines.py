@@ -16,6 +16,7 @@ from collections import Counter, deque
 from contextlib import contextmanager, suppress
 from multiprocessing import connection
 
+from fowt_env.descriptions.checks import check_whole_number
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.compile.announcement import kernels_compiled
 from fowt_env.training.evaluation.guard import (
@@ -51,8 +52,7 @@ def outcomes(function, tasks, jobs=1, engine="processes", address=None, limit=No
     """
     if engine not in ENGINES:
         raise unknown("engine", engine, ENGINES)
-    if jobs < 1:
-        raise InputError(f"jobs = {jobs}: must be at least 1")
+    check_whole_number("jobs", jobs, 1)
     if address is not None and engine != "ray":
         raise InputError(f"address = {address!r}: needs the engine 'ray'")
     if not tasks:

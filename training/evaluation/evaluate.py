@@ -20,22 +20,23 @@ import pyarrow.parquet as pq
 
 import fowt_env
 from fowt_env.controllers import make
-from fowt_env.descriptions.records import is_number, plain_number
+from fowt_env.descriptions.checks import check_number, check_whole_number, plain_number
 from fowt_env.errors import InputError
 from fowt_env.files.atomic import replacing
 from fowt_env.files.tables import write_table
 from fowt_env.training.evaluation.cases import Case, Suite, described, named_cases
 from fowt_env.training.evaluation.engines import outcomes
+from fowt_env.training.evaluation.faults import PARKED
 from fowt_env.training.evaluation.guard import attempt
 from fowt_env.training.evaluation.metrics import METRICS, metrics
 from fowt_env.training.evaluation.provenance import controller_code, version_gap, versions
 from fowt_env.training.evaluation.results import check_name, open_results, parquet_of, run_file, write_run
+from fowt_env.training.evaluation.results_table import KEY
 from fowt_env.training.evaluation.run_case import COLUMNS, CONTROL_DT, SHORTEST_WEATHER, Run, lost_row, scored
 
 __all__ = ["COLUMNS", "SHORTEST_WEATHER", "Case", "evaluate", "metrics", "named_cases", "run_file", "summary"]
 
 DURATION, SKIP, SEEDS = 660.0, 60.0, (1,)  # where neither the caller nor a suite says otherwise
-PARKED = "parked"  # what stands for the controller of a parked turbine
 LARGEST_SEED = 2**63 - 1  # of a column of whole numbers
 # s of wall clock: a run of eleven minutes takes 0.05 s with compiled laws and some minutes with slow Python
 TIME_LIMIT = 3600.0
@@ -167,8 +168,9 @@ def _plan(controllers, cases, suite, duration, skip, seeds, runs_folder, time_li
     """The Runs of an evaluation, case by case, so that an interrupted one compares what it has."""
     if seeds is not None:
         seeds = [_seed(seed) for seed in seeds]
-    if time_limit is not None and not (is_number(time_limit) and time_limit > 0.0):
-        raise InputError(f"time_limit = {time_limit!r}: must be a positive number of seconds, or None")
+    if time_limit is not None:
+        allowed = "a positive number of seconds, or None"
+        time_limit = check_number("time_limit", time_limit, 0.0, low_open=True, allowed=allowed)
     if runs_folder is not None:
         runs_folder = Path(runs_folder).absolute()  # of here, wherever a controller or a worker goes
     for what, given in (
@@ -208,11 +210,11 @@ def _plan(controllers, cases, suite, duration, skip, seeds, runs_folder, time_li
 
 
 def _seed(value):
-    """A seed as an int. Raises: InputError."""
+    """A seed as an int; a float that is whole counts as one. Raises: InputError."""
     value = plain_number(value)
-    if not is_number(value) or value != int(value) or not 0 <= value <= LARGEST_SEED:
-        raise InputError(f"seeds: {value!r} is none: must be whole numbers in [0, {LARGEST_SEED}]")
-    return int(value)
+    if isinstance(value, float) and value.is_integer():
+        value = int(value)
+    return check_whole_number("seeds", value, 0, LARGEST_SEED)
 
 
 def _first(*values):
@@ -326,6 +328,16 @@ class _RowFile:
     def __exit__(self, *exception):
         if self.path is not None:
             self.file.close()
+
+
+def mean_ratios(table, over, columns):
+    """DataFrame by controller: mean over the runs of each column over what controller `over` has in the same.
+
+    NaN where a run of either failed.
+    """
+    values = table.set_index(KEY)[list(columns)].sort_index()
+    base, names = values.loc[over], dict.fromkeys(table["controller"])
+    return pd.DataFrame({name: (values.loc[name] / base).mean(skipna=False) for name in names}).T
 
 
 def summary(table):

@@ -10,6 +10,8 @@ from fowt_env.control import CheckedController, CompiledController, check_contro
 from fowt_env.controllers.constant import Constant
 from fowt_env.descriptions.records import NonNegative, Positive, Record
 
+PARKED = "parked"  # what stands for the controller of a parked turbine
+
 
 class Fault(Record):
     """A fault of a load case.
@@ -87,4 +89,4 @@ def faulted(controller, fault, turbine, control_dt):
 
 def idling(turbine):
     """Controller of a parked turbine: no generator torque, blades feathered, rotor free to turn."""
-    return Constant(torque=0.0, blade_pitch=turbine.pitch_drive.maximum, name="parked")
+    return Constant(torque=0.0, blade_pitch=turbine.pitch_drive.maximum, name=PARKED)

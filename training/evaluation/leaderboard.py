@@ -8,6 +8,7 @@ import numpy as np
 
 from fowt_env.errors import unknown
 from fowt_env.training.evaluation.bootstrap import LEAST_SEEDS, LEVEL, RESAMPLES, interval, resample_weights
+from fowt_env.training.evaluation.faults import PARKED
 from fowt_env.training.evaluation.metrics import METRICS, never_negative
 
 BASELINES = ("gspi_oc3", "pi")  # the first of these that was evaluated, unless one is named
@@ -130,7 +131,7 @@ def leaderboard(table, baseline=None, score=None, cases=None):
     grid = _Grid(table)
     lost = [name for name, failed in zip(grid.controllers, grid.failed, strict=True) if failed.any()]
     baseline = default_baseline(
-        [name for name in grid.controllers if name != "parked"] or grid.controllers, baseline, lost
+        [name for name in grid.controllers if name != PARKED] or grid.controllers, baseline, lost
     )
     weights = resample_weights(max(1, len(grid.seeds)))
     nothing = np.full(grid.values.shape[1:], np.nan)

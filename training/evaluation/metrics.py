@@ -3,6 +3,8 @@
 import numpy as np
 import rainflow
 
+from fowt_env.descriptions.checks import check_number
+from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.errors import InputError
 
 TIME = "Time_[s]"
@@ -41,12 +43,12 @@ REQUIRED = (
     "BldPitch1_[deg]",
     "GenTq_[kN-m]",
 )
-REDUCTIONS = {
-    "mean": np.mean,
-    "std": np.std,
-    "min": np.min,
-    "max": np.max,
-    "rms": lambda x: np.sqrt(np.mean(x**2)),
+REDUCTIONS = {  # of values over time, the first axis
+    "mean": lambda x: np.mean(x, axis=0),
+    "std": lambda x: np.std(x, axis=0),  # about the run's own mean, N in the denominator
+    "min": lambda x: np.min(x, axis=0),
+    "max": lambda x: np.max(x, axis=0),
+    "rms": lambda x: np.sqrt(np.mean(x**2, axis=0)),
 }
 
 
@@ -90,8 +92,13 @@ def never_negative(metric):
 
 
 def travel(time, value):
-    """Mean absolute rate of a signal: the sum of its steps' sizes per second."""
-    return float(np.sum(np.abs(np.diff(value))) / (time[-1] - time[0]))
+    """Mean absolute rate over time, the first axis of the values: the sum of its steps' sizes per second."""
+    return np.sum(np.abs(np.diff(value, axis=0)), axis=0) / (time[-1] - time[0])
+
+
+def overspeed(fastest, rated):
+    """Greatest rotor speed above the rated one, in percent of it; 0 where it stays below."""
+    return np.maximum(0.0, 100.0 * (fastest / rated - 1.0))  # a plain max() would turn NaN into 0
 
 
 def damage_equivalent_load(values, duration, exponent):
@@ -141,14 +148,12 @@ def metrics(df, skip=0.0, rated_speed_rpm=12.1, pitch_rate_limit=8.0):
         for statistic in statistics:
             value = np.nan if values is None else REDUCTIONS[statistic](values)
             result[_metric_name(channel, statistic)] = float(value)
-    fastest = result["RotSpeed_max_[rpm]"]
-    # a plain max() would turn NaN into 0
-    result["overspeed_[%]"] = float(np.maximum(0.0, 100.0 * (fastest / rated_speed_rpm - 1.0)))
+    result["overspeed_[%]"] = float(overspeed(result["RotSpeed_max_[rpm]"], rated_speed_rpm))
     result["energy_[kWh]"] = float(np.trapezoid(kept["GenPwr_[kW]"], time) / 3600.0)
     blade_pitch = kept["BldPitch1_[deg]"].to_numpy()
-    result["blade_pitch_travel_[deg/s]"] = travel(time, blade_pitch)
+    result["blade_pitch_travel_[deg/s]"] = float(travel(time, blade_pitch))
     result["actuator_duty_[%]"] = 100.0 * result["blade_pitch_travel_[deg/s]"] / pitch_rate_limit
-    result["torque_travel_[kN-m/s]"] = travel(time, kept["GenTq_[kN-m]"].to_numpy())
+    result["torque_travel_[kN-m/s]"] = float(travel(time, kept["GenTq_[kN-m]"].to_numpy()))
     at_limit = kept.get("GenTqLim_[-]")
     limited = np.nan if at_limit is None else float(np.mean(at_limit.to_numpy()[:-1]) * length)
     result["torque_limited_[s]"] = limited
@@ -165,13 +170,17 @@ def metrics(df, skip=0.0, rated_speed_rpm=12.1, pitch_rate_limit=8.0):
     return {name: result[name] for name in METRICS}
 
 
+def turbine_metrics(df, turbine, skip=0.0):
+    """metrics of a run of a turbine (its description): against its rated speed and its pitch drive's rate."""
+    return metrics(df, skip, turbine.rated_rotor_speed / RPM, turbine.pitch_drive.rate_limit / DEGREE)
+
+
 def _kept(df, skip):
     """The scored rows of a run. Raises: InputError."""
     missing = [name for name in REQUIRED if name not in df.columns]
     if missing:
         raise InputError(f"metrics: the run lacks the columns {', '.join(missing)}")
-    if not skip >= 0.0:
-        raise InputError(f"skip = {skip}: must be 0 or more seconds")
+    check_number("skip", skip, 0.0, allowed="0 or more seconds")
     time = df[TIME].to_numpy()
     kept = df[time >= (time[0] + skip - 1e-9)] if len(time) else df
     if len(kept) < 2:

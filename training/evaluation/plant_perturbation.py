@@ -1,6 +1,12 @@
 """Plants whose figures differ from the files': factors on masses, hydrodynamics, moorings and actuators."""
 
+from functools import lru_cache
+from typing import Annotated
+
+from pydantic import Field
+
 from fowt_env.descriptions.platform import read_platform, read_turbine
+from fowt_env.descriptions.records import NonNegative, Positive, Record
 from fowt_env.errors import InputError
 
 # name: (what is drawn, default distribution). Factors multiply the file's value.
@@ -58,3 +64,34 @@ def plant_settings(factors, platform=PLATFORM):
         }
     )
     return {"platform": base, "turbine": turbine}
+
+
+class PlantPerturbation(Record):
+    """How a case's plant differs from the one that its controller knows; names as in PLANT.
+
+    Factors on what the files say. noise: standard deviation of white noise on each reading, as a share of
+    the scale that the channel has in observations (rotor speed: 20 % of rated; blade pitch: 15 deg; platform
+    pitch: 5 deg, its rate: 1 deg/s; nacelle acceleration: 1 m/s2). delay: control periods from
+    measurement to reading.
+    """
+
+    ballast_mass: Positive = 1.0
+    upper_mass: Positive = 1.0
+    added_mass: Positive = 1.0
+    drag: Positive = 1.0
+    mooring_stiffness: Positive = 1.0
+    actuator_lag: Positive = 1.0
+    air_density: Positive = 1.0
+    noise: NonNegative = 0.0
+    delay: Annotated[int, Field(ge=0, le=1000, strict=True)] = 0
+
+    @property
+    def factors(self):
+        """{name of PLANT: factor} of those that are not 1."""
+        return {name: getattr(self, name) for name in PLANT if getattr(self, name) != 1.0}
+
+
+@lru_cache(maxsize=64)
+def perturbed_parts(perturbation, platform="oc3_hywind"):
+    """{"platform", "turbine"} of a built-in platform or file with a PlantPerturbation, for build_scene."""
+    return plant_settings(perturbation.factors, platform)

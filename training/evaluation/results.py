@@ -21,8 +21,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 import fowt_env
+from fowt_env.descriptions.checks import is_number, is_whole
 from fowt_env.descriptions.files import parse_json
-from fowt_env.descriptions.records import is_number
 from fowt_env.errors import InputError
 from fowt_env.files.atomic import remove_leftovers, replacing
 from fowt_env.files.tables import write_table
@@ -100,7 +100,7 @@ def _check_row(row):
         if name in TEXTS:
             sound = isinstance(value, str)
         elif name == "seed":
-            sound = type(value) is int and 0 <= value < 2**63
+            sound = is_whole(value) and 0 <= value < 2**63
         else:
             sound = value is None or is_number(value)
         if not sound:

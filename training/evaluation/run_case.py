@@ -1,7 +1,6 @@
 """One run of one controller on one case, to its row: what shapes a figure is imported from here."""
 
 from dataclasses import dataclass
-from math import degrees
 from pathlib import Path
 from typing import Any
 
@@ -9,12 +8,13 @@ import pandas as pd
 
 import fowt_env
 from fowt_env.controllers import make
-from fowt_env.descriptions.records import is_number
+from fowt_env.descriptions.checks import is_number
 from fowt_env.errors import ControllerError, ControllerInputError, InputError, SimulationStopped
 from fowt_env.training.evaluation.faults import faulted, idling
 from fowt_env.training.evaluation.guard import attempt, reason_of
-from fowt_env.training.evaluation.metrics import METRICS, TIME, metrics
-from fowt_env.training.evaluation.model_mismatch import Unaware, shifted_parts
+from fowt_env.training.evaluation.metrics import METRICS, TIME, turbine_metrics
+from fowt_env.training.evaluation.model_mismatch import ModelMismatch
+from fowt_env.training.evaluation.plant_perturbation import perturbed_parts
 from fowt_env.training.evaluation.wind_boxes import cached_box
 from fowt_env.weather.wind_field import is_field
 
@@ -56,24 +56,22 @@ def scored(run):
     wind = case.wind
     if is_field(wind):
         wind = cached_box(wind, case.platform, run.seed, options)
-    known = scene = fowt_env.build_scene(case.platform, wind=wind, sea=case.sea, seed=run.seed, **options)
+    nominal = scene = fowt_env.build_scene(case.platform, wind=wind, sea=case.sea, seed=run.seed, **options)
     if case.shift is not None and case.shift.factors:
-        parts = shifted_parts(case.shift, case.platform)
+        parts = perturbed_parts(case.shift, case.platform)
         scene = fowt_env.build_scene(wind=wind, sea=case.sea, seed=run.seed, **options | parts)
-    turbine = scene.turbine
 
     def work():
         frame = fowt_env.simulate(
             scene,
-            controller=run_controller(run, known),
+            controller=run_controller(run, nominal),
             duration=run.duration,
             initial=case.initial,
             stop_overspeed=case.fault is None,
             grid_loss=_grid_loss(case),
             **run.options,
         )
-        rated, rate = degrees(turbine.rated_rotor_speed) / 6.0, degrees(turbine.pitch_drive.rate_limit)
-        return frame, metrics(frame, run.skip, rated, rate)
+        return frame, turbine_metrics(frame, scene.turbine, run.skip)
 
     # whatever a controller raises or does costs its run, not the evaluation
     outcome, error = attempt(work, run.time_limit)
@@ -122,20 +120,20 @@ def _grid_loss(case):
     return None if case.fault is None else case.fault.grid_loss
 
 
-def run_controller(run, known):
+def run_controller(run, nominal):
     """What simulate is given as controller: the run's own, with its fault, or a parked turbine's.
 
-    known: the scene that the controller is told of.
+    nominal: the scene that the controller is prepared for.
     Raises: ControllerInputError where it cannot be made.
     """
     case = run.case
     if case.parked:
-        return idling(known.turbine) if known.wind_speed else None
+        return idling(nominal.turbine) if nominal.wind_speed else None
     control_dt = run.options.get("control_dt", CONTROL_DT)
     try:
-        controller = make(run.controller, known.turbine, control_dt)
+        controller = make(run.controller, nominal.turbine, control_dt)
     except InputError as error:
         raise ControllerInputError(str(error)) from error
     if case.shift is not None:
-        controller = Unaware(controller, known, case.shift, run.seed)
-    return faulted(controller, case.fault, known.turbine, control_dt)
+        controller = ModelMismatch(controller, nominal, case.shift, run.seed)
+    return faulted(controller, case.fault, nominal.turbine, control_dt)

@@ -13,7 +13,8 @@ import pandas as pd
 
 from fowt_env.errors import InputError
 from fowt_env.training.design.linear_bound import BOUND, RATIOS, fraction_of_bound, ratio_table
-from fowt_env.training.reports.scores import KEY, grouped, markdown_table
+from fowt_env.training.evaluation.results_table import KEY
+from fowt_env.training.reports.scores import frame_markdown, grouped
 
 BASELINE = "gspi_oc3"  # whose travel and power the bound keeps
 WIND = "wind_[m/s]"
@@ -110,7 +111,7 @@ def bound_markdown(fractions, column="of_bound_[-]"):
         rows[f"`{name}`"] = cells
     wide = pd.DataFrame.from_dict(rows, orient="index")
     wide.index.name = "share of the bound" if column == "of_bound_[-]" else "share, measured channels"
-    return markdown_table(wide)
+    return frame_markdown(wide)
 
 
 def _cell(whole, seeds, column):

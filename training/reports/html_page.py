@@ -16,20 +16,18 @@ from pathlib import Path
 from string import Template
 
 import numpy as np
-import pandas as pd
 
+from fowt_env.descriptions.checks import check_number
 from fowt_env.descriptions.files import parse_json
 from fowt_env.errors import InputError, unknown
 from fowt_env.files.atomic import replacing
 from fowt_env.files.tables import read_table
 from fowt_env.training.evaluation.evaluate import run_file
 from fowt_env.training.evaluation.leaderboard_file import check_leaderboard
+from fowt_env.training.evaluation.results_table import KEY, WORDS, read_results
 from fowt_env.visual.time_series import PANELS, SPECTRA, TIME, frequency_marks, spectrum
 
-TABLES = ("results.csv", "metrics.csv")  # the first that is there
-KEYS = ("controller", "case", "seed", "status")
-WORDS = ("reason", "events")
-NO_METRIC = (*KEYS, *WORDS, "stopped_[s]", "scored_[s]")
+NO_METRIC = (*KEY, *WORDS, "stopped_[s]", "scored_[s]")
 # columns that the leaderboard shows at once, those of them that the table has
 HEADLINE = (
     "RotSpeed_std_[rpm]",
@@ -104,8 +102,10 @@ def write_report(
     out = folder / "report.html" if out is None else Path(out)
     if out.suffix.lower() not in (".html", ".htm"):
         raise InputError(f"report page {str(out)!r}: must end with .html")
-    if rate is not None and not 0.0 < rate < float("inf"):
-        raise InputError(f"rate = {rate}: must be a positive number of samples per second")
+    if rate is not None:
+        check_number("rate", rate, 0.0, low_open=True, allowed="a positive number of samples per second")
+    if not folder.is_dir():
+        raise InputError(f"results {str(folder)!r} is no folder: make one with fowt evaluate --out FOLDER")
     table = read_results(folder)
     board_file, manifest = _leaderboard(folder / "leaderboard.json"), _json_file(folder / "manifest.json")
     say = progress or (lambda done, total, text: None)
@@ -131,44 +131,6 @@ def _plotly_script():
     except ImportError as error:
         raise InputError(f'the report needs plotly ({error}): pip install "fowt-env[report]"') from error
     return get_plotlyjs()
-
-
-def read_results(folder):
-    """DataFrame of an evaluation's runs: KEYS, reason, and every column of figures as floats.
-
-    Raises: InputError for a folder without results or with a table that is none.
-    """
-    path = next((folder / name for name in TABLES if (folder / name).is_file()), None)
-    if path is None:
-        kind = "holds no results.csv" if folder.is_dir() else "is no folder"
-        raise InputError(
-            f"results folder {str(folder)!r} {kind}: make one with fowt evaluate --out {str(folder)!r}"
-        )
-    try:
-        texts = pd.read_csv(path, dtype=str, keep_default_na=False, encoding="utf-8")
-    except (ValueError, pd.errors.ParserError) as error:
-        raise InputError(f"table {str(path)!r} cannot be read: {error}") from None
-    missing = [name for name in KEYS if name not in texts.columns]
-    if missing:
-        raise InputError(f"table {str(path)!r} lacks the columns {', '.join(missing)}")
-    if texts.empty:
-        raise InputError(f"table {str(path)!r} has no runs")
-    table = texts[["controller", "case", "status"]].copy()
-    table["reason"] = texts["reason"] if "reason" in texts.columns else ""
-    try:
-        table["seed"] = pd.to_numeric(texts["seed"]).astype(int)
-    except (ValueError, TypeError, OverflowError) as error:
-        raise InputError(f"table {str(path)!r}: column seed must hold whole numbers ({error})") from None
-    figures = {}
-    for name in texts.columns.drop([n for n in (*KEYS, *WORDS) if n in texts.columns]):
-        numbers = pd.to_numeric(texts[name].replace("", "nan"), errors="coerce")
-        given = ~texts[name].str.lower().isin(["", "nan"])
-        if numbers.notna().sum() == given.sum():  # else a column of words
-            figures[name] = numbers.astype(float).replace([np.inf, -np.inf], np.nan)
-    table = pd.concat([table, pd.DataFrame(figures, index=table.index)], axis=1)
-    if table.duplicated(["controller", "case", "seed"]).any():
-        raise InputError(f"table {str(path)!r}: a controller, case and seed occur twice")
-    return table
 
 
 def _json_file(path):

@@ -19,13 +19,14 @@ import pandas as pd
 from fowt_env.controllers import DESIGN, POLICY, information
 from fowt_env.errors import InputError, unknown
 from fowt_env.files.atomic import replacing
+from fowt_env.files.markdown import markdown_table
 from fowt_env.files.tables import write_table
 from fowt_env.training.evaluation.bootstrap import LEAST_SEEDS, crossed_estimate
 from fowt_env.training.evaluation.metrics import METRICS, never_negative
+from fowt_env.training.evaluation.results_table import KEY
 
-__all__ = ["COUNTS", "FIGURES", "Figure", "agent_counts", "agent_scores", "by_kind", "read_results"]
+__all__ = ["COUNTS", "FIGURES", "Figure", "agent_counts", "agent_scores", "by_kind"]
 
-KEY = ["controller", "case", "seed"]
 PAST_ANY = "past a constraint"
 MEASURED = {  # what a turbine's own sensors show
     "time", "rotor_speed", "generator_speed", "blade_pitch", "generator_torque", "platform_pitch",
@@ -106,36 +107,6 @@ def figures_named(names):
         if name not in known:
             raise unknown("figure", name, known)
     return [known[name] for name in names]
-
-
-def read_results(paths, cases=None):
-    """DataFrame of one or several results of fowt evaluate: folders, or CSV files. cases: names to keep.
-
-    Raises: InputError for what is no such file, and where two hold the same run with other figures.
-    """
-    tables = []
-    for path in map(Path, paths):
-        file = path / "results.csv" if path.is_dir() else path
-        if not file.is_file():
-            raise InputError(f"results {str(file)!r}: no such file; make it with fowt evaluate --out")
-        table = pd.read_csv(file)
-        missing = [name for name in (*KEY, "status", *METRICS) if name not in table]
-        if missing:
-            raise InputError(f"results {str(file)!r}: column {missing[0]!r} is missing")
-        tables.append(table[table["controller"] != "parked"])
-    table = pd.concat(tables, ignore_index=True)
-    one = table.drop_duplicates([*KEY, "status", *(figure.metric for figure in FIGURES)])
-    twice = one[one.duplicated(KEY)]
-    if len(twice):
-        name, case, seed = twice.iloc[0][KEY]
-        raise InputError(f"results: {name} on {case}, seed {seed}, is there twice with different figures")
-    if cases is not None:
-        known = list(dict.fromkeys(one["case"]))
-        for name in cases:
-            if name not in known:
-                raise unknown("case of the evaluation", name, known)
-        one = one[one["case"].isin(cases)]
-    return one.reset_index(drop=True)
 
 
 def grouped(table, rivals, groups=None, agents=None):
@@ -293,11 +264,10 @@ def ratio_text(row):
     return f"{text} [{row['low']:.3f}, {row['high']:.3f}]" if np.isfinite(row["low"]) else text
 
 
-def markdown_table(frame):
+def frame_markdown(frame):
     """Markdown text of a DataFrame of texts, its index (if it has a name) as first column."""
     frame = frame.reset_index() if frame.index.name else frame
-    rows = [list(map(str, frame.columns)), ["---"] * frame.shape[1], *frame.astype(str).values.tolist()]
-    return "\n".join("| " + " | ".join(row) + " |" for row in rows) + "\n"
+    return markdown_table(frame.columns, frame.astype(str).to_numpy()) + "\n"
 
 
 def _remark(scores):
@@ -319,12 +289,12 @@ def scores_markdown(scores, counts):
         wide = wide.loc[list(dict.fromkeys(scores["figure"])), names]
         wide.index.name = f"over `{rival}`"
         wide.columns = [f"`{name}`" for name in names]
-        parts.append(markdown_table(wide))
+        parts.append(frame_markdown(wide))
     parts += _remark(scores)
     shown = counts.copy()
     shown["largest overspeed (%)"] = shown["largest overspeed (%)"].map("{:.1f}".format)
     shown["agent"] = shown["agent"].map("`{}`".format)
-    parts.append(markdown_table(shown.drop(columns=PAST_ANY)))
+    parts.append(frame_markdown(shown.drop(columns=PAST_ANY)))
     return "\n".join(parts)
 
 
@@ -339,7 +309,7 @@ def kinds_markdown(scores, counts, figures=None):
         wide = shown.pivot(index="kind", columns="agent", values="text").loc[kinds, names]
         wide.index.name = f"{name} over `{rows['rival'].iloc[0]}`"
         wide.columns = [f"`{agent}`" for agent in names]
-        parts.append(markdown_table(wide))
+        parts.append(frame_markdown(wide))
     parts += _remark(scores)
     columns = counts[["failed", PAST_ANY, "runs"]].to_numpy()
     shown = counts.assign(text=[f"{failed} / {past} of {runs}" for failed, past, runs in columns])
@@ -347,7 +317,7 @@ def kinds_markdown(scores, counts, figures=None):
     wide = shown.pivot(index="kind", columns="agent", values="text").loc[kinds, agents]
     wide.index.name = "failed / past a constraint"
     wide.columns = [f"`{agent}`" for agent in agents]
-    parts.append(markdown_table(wide))
+    parts.append(frame_markdown(wide))
     return "\n".join(parts)
 
 

@@ -4,12 +4,13 @@ import numpy as np
 from gymnasium.spaces import Box
 from stable_baselines3.common.vec_env import VecEnvWrapper
 
+from fowt_env.descriptions.checks import check_number
+from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.envs.decisions import Decisions
-from fowt_env.errors import InputError
 from fowt_env.plant.measurement import Measure
+from fowt_env.training.evaluation.metrics import REDUCTIONS, travel
 from fowt_env.training.rl.sb3_env import FowtSB3VecEnv
 
-RPM = 30.0 / np.pi
 RECORDED = (Measure.ROTOR_SPEED, Measure.PLATFORM_PITCH, Measure.BLADE_PITCH, Measure.GENERATOR_TORQUE)
 
 
@@ -100,8 +101,8 @@ class ValidationVecEnv(FowtSB3VecEnv):
         self.episodes = [{"offsets": {}} | episode for episode in episodes]
         first = self.env.envs[0]
         duration = first.task.duration
-        if skip >= duration:
-            raise InputError(f"validation.skip = {skip}: must be less than the {duration:g} s of an episode")
+        allowed = f"less than the {duration:g} s of an episode"
+        check_number("validation.skip", skip, 0.0, duration, high_open=True, allowed=allowed)
         self.skip = round(skip / first.control_dt)
         self._record = np.full((round(duration / first.control_dt), len(episodes), 4), np.nan)
         self._clock = 0
@@ -132,19 +133,21 @@ class ValidationVecEnv(FowtSB3VecEnv):
         return result
 
     def figures(self):
-        """{metric: (n,)} of the recorded episodes; NaN for those that failed."""
+        """{metric: (n,)} of the recorded episodes by the formulas of evaluation.metrics; NaN for failed ones.
+
+        They are of what the sensors could measure, control period by control period, and so of the shaft's
+        power, which is the generator's before its losses.
+        """
         record = np.where(self._failed[:, None], np.nan, self._record[self.skip : self._clock - 1])
         speed, platform_pitch, blade_pitch, torque = np.moveaxis(record, 2, 0)
-        envs = self.env.envs
-        ratio = envs[0].scene.turbine.drivetrain.gear_ratio
-        power = speed * torque * ratio * 1e-3
-        seconds = envs[0].control_dt * (len(record) - 1)
+        first, mean, std = self.env.envs[0], REDUCTIONS["mean"], REDUCTIONS["std"]
+        time = first.control_dt * np.arange(len(record))
+        power = speed * torque * first.scene.turbine.drivetrain.gear_ratio * 1e-3
         return {
-            "rotor_speed_std_[rpm]": speed.std(axis=0) * RPM,
-            "platform_pitch_std_[deg]": np.degrees(platform_pitch.std(axis=0)),
-            "blade_pitch_travel_[deg/s]": np.degrees(np.abs(np.diff(blade_pitch, axis=0)).sum(axis=0))
-            / seconds,
-            "shaft_power_mean_[kW]": power.mean(axis=0),
-            "shaft_power_std_[kW]": power.std(axis=0),
+            "rotor_speed_std_[rpm]": std(speed / RPM),
+            "platform_pitch_std_[deg]": std(platform_pitch / DEGREE),
+            "blade_pitch_travel_[deg/s]": travel(time, blade_pitch / DEGREE),
+            "shaft_power_mean_[kW]": mean(power),
+            "shaft_power_std_[kW]": std(power),
             "failed": self._failed.astype(float),
         }

@@ -6,10 +6,9 @@ drawn anew in every episode as ever; how much noise its sensors have, and how la
 plant. Controllers in the environments (the baseline, the estimator) are designed on the plant of the files.
 """
 
-from math import isfinite
-
 import numpy as np
 
+from fowt_env.descriptions.checks import check_whole_number, is_number
 from fowt_env.envs.sensors import check_sensors
 from fowt_env.errors import InputError, unknown
 from fowt_env.training.evaluation.plant_perturbation import PLANT, PLATFORM, plant_settings
@@ -19,7 +18,7 @@ SENSORS = {
     "delay": "whole control periods from measurement to reading",
 }
 DEFAULT_SENSORS = {"noise": ("uniform", 0.0, 0.02), "delay": ("uniform", 0.0, 3.0)}
-KINDS = {
+DISTRIBUTIONS = {
     "uniform": lambda rng, low, high: rng.uniform(low, high),
     "loguniform": lambda rng, low, high: float(np.exp(rng.uniform(np.log(low), np.log(high)))),
     # within two standard deviations: a tail must not make a plant that cannot float
@@ -30,12 +29,11 @@ KINDS = {
 def check_distribution(where, spec):
     """(kind, a, b) of a distribution. Raises: InputError naming what is wrong with it."""
     if not isinstance(spec, list | tuple) or len(spec) != 3:
-        raise InputError(f"{where} = {spec!r}: must be [kind, a, b], kind one of {', '.join(KINDS)}")
+        raise InputError(f"{where} = {spec!r}: must be [kind, a, b], kind one of {', '.join(DISTRIBUTIONS)}")
     kind, a, b = spec
-    if kind not in KINDS:
-        raise unknown(f"distribution of {where}", kind, KINDS)
-    numbers = all(isinstance(x, int | float) and not isinstance(x, bool) and isfinite(x) for x in (a, b))
-    ordered = numbers and (b >= 0.0 if kind == "normal" else b >= a)
+    if kind not in DISTRIBUTIONS:
+        raise unknown(f"distribution of {where}", kind, DISTRIBUTIONS)
+    ordered = is_number(a) and is_number(b) and (b >= 0.0 if kind == "normal" else b >= a)
     if not ordered or (kind == "loguniform" and a <= 0.0):
         raise InputError(f"{where} = {spec!r}: must have low <= high (positive for loguniform) or std >= 0")
     return kind, float(a), float(b)
@@ -62,7 +60,7 @@ def distributions(spec):
 def draw(chosen, rng):
     """{name: value} of one draw of distributions, in a fixed order."""
     order = [name for name in (*PLANT, *SENSORS) if name in chosen]
-    return {name: float(KINDS[chosen[name][0]](rng, *chosen[name][1:])) for name in order}
+    return {name: float(DISTRIBUTIONS[chosen[name][0]](rng, *chosen[name][1:])) for name in order}
 
 
 def randomised(spec, n, seed):
@@ -71,8 +69,7 @@ def randomised(spec, n, seed):
     spec: {"plants": size of the pool, name: distribution or None, ...}. Raises: InputError.
     """
     size = spec.get("plants", 8)
-    if type(size) is not int or not 1 <= size <= 1000:
-        raise InputError(f"randomise.plants = {size!r}: must be a whole number from 1 to 1000")
+    check_whole_number("randomise.plants", size, 1, 1000)
     chosen = distributions(spec)
     rng = np.random.default_rng([seed, 1])
     pool = [draw(chosen, rng) for _ in range(min(size, n))]
@@ -80,5 +77,5 @@ def randomised(spec, n, seed):
     for drawn in pool:
         sensors = {"noise": drawn.get("noise", 0.0), "delay": round(drawn.get("delay", 0.0))}
         plant = plant_settings({name: value for name, value in drawn.items() if name in PLANT})
-        settings.append(plant | {"sensors": check_sensors(sensors), "designed_on": {"platform": PLATFORM}})
+        settings.append(plant | {"sensors": check_sensors(sensors), "nominal_plant": {"platform": PLATFORM}})
     return [settings[i % len(settings)] for i in range(n)]

@@ -8,14 +8,13 @@ from pydantic import Field
 
 from fowt_env.controllers.policy.network_file import ACTIVATIONS
 from fowt_env.controllers.registry import CONTROLLERS
+from fowt_env.descriptions.checks import check_one_of, check_whole_number, is_number, is_whole, refusal
 from fowt_env.descriptions.files import raise_problems, read_text
 from fowt_env.descriptions.records import (
     Fraction,
     NonNegative,
     Positive,
     Record,
-    is_number,
-    short,
     unknown_key,
     validate,
 )
@@ -33,6 +32,10 @@ FORMS = (  # of what the environment takes apart: key, types, in words
     ("reward", dict, "a table of weights"),
     ("randomise", dict, "a table"),
     ("observation", (str, list), "the name of an observation set, or a list of channels"),
+)
+SIMPLE = (  # of what it takes apart, too: key, default, check, what that allows
+    ("num_envs", 1, check_whole_number, 1),
+    ("baseline", "pi", check_one_of, CONTROLLERS),  # an import path would run code of whoever wrote the file
 )
 SCHEDULES = ("learning_rate", "clip_range")  # of an algorithm: numbers that may fall over a run
 GIVEN_BY_TRAINING = (  # arguments of stable-baselines3's algorithms
@@ -94,13 +97,12 @@ def check_settings(settings, where="settings"):
     for key, kinds, words in FORMS:
         value = settings["environment"].get(key)
         if value is not None and not isinstance(value, kinds):
-            problems.append(f"environment.{key} = {short(value)}: must be {words}")
-    n = settings["environment"].get("num_envs", 1)
-    if type(n) is not int or n < 1:
-        problems.append(f"environment.num_envs = {short(n)}: must be a whole number >= 1")
-    baseline = settings["environment"].get("baseline", "pi")
-    if baseline not in tuple(CONTROLLERS):  # an import path would run code of whoever wrote the file
-        problems.append(f"environment.baseline = {short(baseline)}: must be one of {', '.join(CONTROLLERS)}")
+            problems.append(str(refusal(f"environment.{key}", value, words)))
+    for key, default, check, allowed in SIMPLE:
+        try:
+            check(f"environment.{key}", settings["environment"].get(key, default), allowed)
+        except InputError as error:
+            problems.append(str(error))
     raise_problems(where, problems)
     DecisionSettings(**settings["decisions"])
     return settings
@@ -122,7 +124,7 @@ def check_algorithm(kind, name, given):
         if key not in known:
             problems.append(unknown_key(f"algorithm.{key}", key, known))
         elif (wanted := _not_allowed(key, value, known[key])) is not None:
-            problems.append(f"algorithm.{key} = {short(value)}: must be {wanted}")
+            problems.append(str(refusal(f"algorithm.{key}", value, wanted)))
         elif key == "policy_kwargs":
             problems += _policy_problems(value)
     raise_problems(name, problems)
@@ -138,7 +140,7 @@ def _policy_problems(given):
             wanted = "numbers, or lists or tables of them"
         else:
             continue
-        problems.append(f"algorithm.policy_kwargs.{key} = {short(value)}: must be {wanted}")
+        problems.append(str(refusal(f"algorithm.policy_kwargs.{key}", value, wanted)))
     return problems
 
 
@@ -161,7 +163,7 @@ def _not_allowed(key, value, declared):
     if declared is bool:
         return None if isinstance(value, bool) else "true or false"
     if declared is int:
-        return None if type(value) is int else "a whole number"
+        return None if is_whole(value) else "a whole number"
     if declared is float:
         return None if number else "a number"
     if isinstance(value, str) and str not in get_args(declared):

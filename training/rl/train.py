@@ -32,6 +32,7 @@ from pathlib import Path
 
 import numpy as np
 
+from fowt_env.descriptions.checks import check_whole_number
 from fowt_env.envs.decisions import DecisionSettings
 from fowt_env.envs.tasks import SITE, task_of
 from fowt_env.errors import InputError, unknown
@@ -96,9 +97,8 @@ def resolve(algo, task, seed, steps, changes=None):
     tasks = [name for name in table if not name.startswith("_")]
     if task not in tasks:
         raise unknown(f"task of training/rl/{algo}.yml", task, tasks)
-    for key, value, low in (("seed", seed, 0), ("steps", steps, 1)):
-        if type(value) is not int or value < low:
-            raise InputError(f"{key} = {value!r}: must be a whole number of at least {low}")
+    check_whole_number("seed", seed, 0)
+    check_whole_number("steps", steps, 1)
     settings = deepcopy(table[task])
     for key, value in (changes or {}).items():
         _change(settings, key, value)
@@ -229,7 +229,11 @@ def decision_env(env):
 
 
 def baseline_figures(settings, reference="gspi_oc3"):
-    """{metric: (n,)} of a compiled controller on the validation episodes of resolved settings."""
+    """{metric: (n,)} of a compiled controller on the validation episodes of resolved settings.
+
+    It is run in the agent's own environment and not by evaluation.evaluate, so that a ratio is of the same
+    weather, start, sensors and control periods.
+    """
     chosen = environment_settings(settings) | {"action_mode": "residual", "baseline": reference}
     env = validation_env(settings, chosen)
     env.reset()

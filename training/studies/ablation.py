@@ -19,6 +19,7 @@ import yaml
 from scipy.stats import t
 
 from fowt_env.errors import InputError, unknown
+from fowt_env.files.markdown import markdown_table
 from fowt_env.training.rl.train import Training, resolve
 from fowt_env.visual.time_series import COLOURS, new_figure, save_figure, style_axes
 
@@ -129,19 +130,16 @@ def markdown(rows):
     """The figures of ablation_rows as a markdown table: means over seeds, 95 % interval of the score's."""
     groups = rows.groupby("label", sort=False)
     mean = groups[[*COLUMNS, "failed", "score", "decisions_trained", "seconds_trained"]].mean()
-    lines = [
-        f"| | {' | '.join(COLUMNS.values())} | failed | score | seeds | decisions | s |",
-        "|" + "---|" * (len(COLUMNS) + 6),
-    ]
+    rows = []
     for label, row in mean.iterrows():
-        cells = " | ".join(f"{row[name]:.3f}" for name in COLUMNS)
         scores = groups.get_group(label)["score"].to_numpy()
         score, n = f"{row['score']:.3f}", len(scores)
         if n > 1:
             score += f" ± {t.ppf(0.975, n - 1) * scores.std(ddof=1) / np.sqrt(n):.3f}"
-        trained = f"{row['decisions_trained'] / 1e3:.0f} k | {row['seconds_trained']:.0f}"
-        lines.append(f"| {label} | {cells} | {row['failed']:.2f} | {score} | {n} | {trained} |")
-    return "\n".join(lines)
+        trained = f"{row['decisions_trained'] / 1e3:.0f} k", f"{row['seconds_trained']:.0f}"
+        ratios = (f"{row[name]:.3f}" for name in COLUMNS)
+        rows.append((label, *ratios, f"{row['failed']:.2f}", score, n, *trained))
+    return markdown_table(("", *COLUMNS.values(), "failed", "score", "seeds", "decisions", "s"), rows)
 
 
 def main(arguments=None):

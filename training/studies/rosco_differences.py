@@ -11,7 +11,6 @@ import argparse
 from math import exp
 
 import numpy as np
-import pandas as pd
 
 from fowt_env.controllers.gspi import gspi_oc3
 from fowt_env.controllers.pi import (
@@ -27,7 +26,7 @@ from fowt_env.controllers.pi import (
 from fowt_env.controllers.rosco import SCHEDULE, Rosco, RoscoSettings, pitch_gains
 from fowt_env.descriptions.platform import read_turbine
 from fowt_env.training.design.tune_feedback import BASELINE, CONTROL_DT, SEEDS, WINDS, training_case
-from fowt_env.training.evaluation.evaluate import evaluate
+from fowt_env.training.evaluation.evaluate import evaluate, mean_ratios
 
 SHOWN = {
     "rotor speed std": "RotSpeed_std_[rpm]",
@@ -119,9 +118,7 @@ def differences(winds=WINDS, seeds=SEEDS, duration=660.0, names=None, jobs=1):
         laws = {name: laws[name] for name in (BASELINE, *names)}
     cases = [training_case(wind) for wind in winds]
     table = evaluate(laws, cases, duration=duration, seeds=seeds, jobs=jobs, control_dt=CONTROL_DT)
-    values = table.set_index(["controller", "case", "seed"])[list(SHOWN.values())].sort_index()
-    ratios = {name: (values.loc[name] / values.loc[BASELINE]).mean(skipna=False) for name in laws}
-    return pd.DataFrame(ratios).T.set_axis(list(SHOWN), axis=1)
+    return mean_ratios(table, BASELINE, SHOWN.values()).set_axis(list(SHOWN), axis=1)
 
 
 def main(arguments=None):

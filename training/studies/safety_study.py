@@ -8,15 +8,16 @@ torque and blade pitch every 5 s, and one that asks for no torque and flat blade
 
 import argparse
 from dataclasses import replace
-from math import degrees
 
 import numpy as np
 import pandas as pd
 
 from fowt_env.controllers.policy.controller import policy_path, read_policy
+from fowt_env.descriptions.units import RPM
 from fowt_env.envs import TASKS, FowtEnv, SafetyLayer
 from fowt_env.envs.decisions import Decisions, DecisionSettings
 from fowt_env.files.tables import write_table
+from fowt_env.training.evaluation.metrics import turbine_metrics
 from fowt_env.training.rl.train import TASK_FIELDS, resolve, validation_episodes
 
 CARELESS = ("random direct", "no torque, flat blades")
@@ -86,20 +87,20 @@ def episode_figures(agent, env, options):
     """{figure: number} of one episode."""
     observation, _ = env.reset(seed=0, options=options | {"offsets": {}})
     agent.reset(env, observation)
-    rated = env.unwrapped.scene.turbine.rated_rotor_speed
-    speeds, tilts, over, info = [], [], False, {}
+    scene = env.unwrapped.scene
+    rows, over, info = [env.unwrapped.channels()], False, {}
     while not over:
         observation, _, terminated, truncated, info = env.step(agent.act(observation))
-        measured = env.unwrapped.measurement()
-        speeds.append(measured.rotor_speed / rated)
-        tilts.append(degrees(measured.platform_pitch))
+        rows.append(env.unwrapped.channels())
         over = terminated or truncated
+    frame = pd.DataFrame(rows).set_axis([channel.column for channel in scene.channels], axis=1)
+    found = turbine_metrics(frame, scene.turbine)
     return {
         "failed": float("termination" in info),
-        "overspeed_[%]": 100.0 * (max(speeds) - 1.0),
-        "guarded_[%]": 100.0 * info.get("guarded_periods", 0) / len(speeds),
-        "rotor_speed_std_[%]": 100.0 * np.std(speeds),
-        "platform_pitch_std_[deg]": np.std(tilts),
+        "overspeed_[%]": found["overspeed_[%]"],
+        "guarded_[%]": 100.0 * info.get("guarded_periods", 0) / (len(rows) - 1),
+        "rotor_speed_std_[%]": 100.0 * found["RotSpeed_std_[rpm]"] * RPM / scene.turbine.rated_rotor_speed,
+        "platform_pitch_std_[deg]": found["PtfmPitch_std_[deg]"],
     }
 
 

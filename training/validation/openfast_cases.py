@@ -104,7 +104,7 @@ def box_wind(folder=None, bts=None):
 
 
 @dataclass(frozen=True)
-class Run:
+class ReferenceRun:
     """One reference run as this project's plant repeats it."""
 
     case: str  # name of the reference file
@@ -149,26 +149,26 @@ def _start(rotor_speed, blade_pitch):
     return {"RotSpeed": rotor_speed, "BldPitch1": blade_pitch}
 
 
-STEPS = {"kind": "steps", "speeds": [float(v) for v in range(12, 25)], "every": 100.0, "ramp": 0.1}
+WIND_STEPS = {"kind": "steps", "speeds": [float(v) for v in range(12, 25)], "every": 100.0, "ramp": 0.1}
 RUNS = {
     **{
-        case: Run(case, seconds, 0.025, initial={channel: start})
+        case: ReferenceRun(case, seconds, 0.025, initial={channel: start})
         for case, (channel, start, seconds) in DECAYS.items()
     },
-    "float_steady_8mps": Run(
+    "float_steady_8mps": ReferenceRun(
         "float_steady_8mps", 600.0, 0.0125, wind=8.0, controlled=True, initial=_start(9.16, 0.0)
     ),
-    "float_steady_18mps": Run(
+    "float_steady_18mps": ReferenceRun(
         "float_steady_18mps", 600.0, 0.0125, wind=18.0, controlled=True, initial=_start(12.1, 14.92)
     ),
-    "float_windsteps_12_24": Run(
-        "float_windsteps_12_24", 1300.0, 0.025, wind=STEPS, controlled=True, initial=_start(12.1, 3.83)
+    "float_windsteps_12_24": ReferenceRun(
+        "float_windsteps_12_24", 1300.0, 0.025, wind=WIND_STEPS, controlled=True, initial=_start(12.1, 3.83)
     ),
-    "regwave_H3T5": Run("regwave_H3T5", 600.0, 0.025, sea=REGULAR),
-    "regwave_H3T5_displaced": Run(
+    "regwave_H3T5": ReferenceRun("regwave_H3T5", 600.0, 0.025, sea=REGULAR),
+    "regwave_H3T5_displaced": ReferenceRun(
         "regwave_H3T5_displaced", 600.0, 0.025, sea=REGULAR, options={"kinematics_position": "instantaneous"}
     ),
-    "turb_18mps_Hs7.5_uniform": Run(
+    "turb_18mps_Hs7.5_uniform": ReferenceRun(
         "turb_18mps_Hs7.5_uniform",
         600.0,
         0.0125,
@@ -177,7 +177,7 @@ RUNS = {
         controlled=True,
         initial=_start(12.1, 14.92),
     ),
-    "turb_18mps_Hs7.5_box": Run(
+    "turb_18mps_Hs7.5_box": ReferenceRun(
         "turb_18mps_Hs7.5_box",
         600.0,
         0.0125,

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from fowt_env.files.atomic import remove_leftovers, replacing
+from fowt_env.files.markdown import markdown_table
 from fowt_env.files.tables import write_table
 from fowt_env.training.validation.openfast_cases import DECAYS
 from fowt_env.visual.time_series import COLOURS, INK, TIME, new_figure, save_figure, spectrum, style_axes
@@ -205,7 +206,7 @@ def write_plots(study, folder):
     return paths
 
 
-def _number(value):
+def _shown(value):
     """A figure as text; empty where there is none."""
     return "" if not np.isfinite(value) else f"{value:.5g}"
 
@@ -216,19 +217,19 @@ def markdown(study):
     for case in dict.fromkeys(row.case for row in study.rows):
         rows = [row for row in study.rows if row.case == case]
         against = "OpenFAST" if "against" not in case else "reference"
-        lines += [f"### {case}", "", f"| figure | unit | {against} | here | error % | allowed % | verdict |"]
-        lines.append("|---|---|---|---|---|---|---|")
+        header = ("figure", "unit", against, "here", "error %", "allowed %", "verdict")
+        cells = []
         for row in rows:
             quantity = f"{row.quantity} ({row.note})" if row.note else row.quantity
             error = "" if not np.isfinite(row.error) else f"{row.error:.3g}"
             allowed = "" if not np.isfinite(row.allowed) else f"{row.allowed:g}"
-            values = (_number(row.openfast), _number(row.here), error, allowed, row.verdict)
-            lines.append("| " + " | ".join((quantity, row.unit, *values)) + " |")
-        lines.append("")
+            values = (_shown(row.openfast), _shown(row.here), error, allowed, row.verdict)
+            cells.append((quantity, row.unit, *values))
+        lines += [f"### {case}", "", markdown_table(header, cells), ""]
     return "\n".join(lines)
 
 
-def write_report(study, folder, plots=True):
+def write_validation_report(study, folder, plots=True):
     """Paths written: validation.csv, validation.md and, with plots, one or two images per case."""
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)

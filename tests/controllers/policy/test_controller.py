@@ -181,6 +181,7 @@ def rewritten(path, **arrays):
         ({"decisions": {"hold": 0}}, "decisions.hold = 0: must be a whole number from 1 to 100"),
         ({"activation": "tan"}, "activation = 'tan': must be one of .*Did you mean 'tanh'"),
         ({"layers": 3}, "array 'weight_2 is not a file|array 'weight_2'"),
+        ({"designed_on": {"platform": "oc3_hywind"}}, "designed_on: is called nominal_plant now, which is"),
         ({"clip_observatio": 3.0}, "clip_observatio: unknown key. Did you mean 'clip_observation'"),
     ],
 )

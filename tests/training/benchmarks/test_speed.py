@@ -26,7 +26,7 @@ def test_a_kind_of_scene_has_a_time_for_every_load_and_none_for_absent_ones():
         assert row[f"{load} (us)"] >= 0.0
     for figure in ("step_us", "step_x", "loop_x", "simulate_x", "calibration_ms"):
         assert row[figure] > 0.0
-    scene = benchmark.KINDS[STILL].scene()
+    scene = benchmark.TIMED_SCENES[STILL].scene()
     assert scene.model.aero is None and scene.model.hydro.waves is None
 
 

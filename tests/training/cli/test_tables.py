@@ -134,7 +134,7 @@ def validate_command(monkeypatch, tmp_path):
             "second harmonic, position instantaneous, surface instantaneous" * 2, str(number), "m", 1, 1
         )
     monkeypatch.setattr(validate, "validate_cases", lambda *a, **k: study)
-    monkeypatch.setattr(validate_report, "write_report", lambda *a: [])
+    monkeypatch.setattr(validate_report, "write_validation_report", lambda *a: [])
     return ["validate"], ["123", "reported"]
 
 
@@ -146,14 +146,14 @@ def paper_command(monkeypatch, tmp_path):
     table.insert(1, "channel", ["PtfmSurge_[m]", "PtfmPitch_[deg]"])
     monkeypatch.setattr(paper, "run_paper", lambda *a: SimpleNamespace(runs=[1], claims=[]))
     monkeypatch.setattr(paper, "statistics", lambda runs: table)
-    monkeypatch.setattr(paper_report, "write_report", lambda *a: [])
+    monkeypatch.setattr(paper_report, "write_paper_report", lambda *a: [])
     return ["paper", "LC5"], texts_of(table)
 
 
 def benchmark_speed_command(monkeypatch, tmp_path):
     from fowt_env.training.benchmarks import speed as benchmark
 
-    kinds = list(benchmark.KINDS)[:8]
+    kinds = list(benchmark.TIMED_SCENES)[:8]
     table = frame_of(["step_us", "loop_us", "simulate_x", "seconds"], 8, kind=kinds, absent=[""] * 8)
     monkeypatch.setattr(benchmark, "speed", lambda *a, **k: table)
     return ["benchmark", "speed", "--out", str(tmp_path / "speed.csv")], texts_of(table)

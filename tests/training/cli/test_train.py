@@ -6,7 +6,7 @@ from typer.testing import CliRunner
 
 pytest.importorskip("stable_baselines3")
 
-from fowt_env.training.benchmarks.training import KINDS
+from fowt_env.training.benchmarks.training import VECTOR_ENVS
 from fowt_env.training.cli.app import EXIT_INPUT, EXIT_INTERRUPTED, app
 from fowt_env.training.rl import callbacks as train_callbacks
 from fowt_env.training.rl.train import Training
@@ -68,7 +68,7 @@ def test_benchmark_training_writes_a_row_per_kind_of_environment(tmp_path):
     done = call("benchmark", "training", "--envs", "8", "--steps", "1024", "--out", path)
     assert done.exit_code == 0, done.output
     table = pd.read_csv(path, comment="#")
-    assert list(table["kind"]) == list(KINDS) and (table["steps_per_s"] > 0.0).all()
+    assert list(table["kind"]) == list(VECTOR_ENVS) and (table["steps_per_s"] > 0.0).all()
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import pytest
 from fowt_env.envs import FowtEnv
 from fowt_env.errors import InputError
 from fowt_env.training.evaluation.cases import Case, all_cases, named_cases, read_suite
-from fowt_env.training.evaluation.evaluate import COLUMNS, evaluate, summary
+from fowt_env.training.evaluation.evaluate import COLUMNS, evaluate, mean_ratios, summary
 from fowt_env.training.evaluation.faults import Fault
 from fowt_env.training.evaluation.metrics import METRICS
 
@@ -207,3 +207,16 @@ def test_named_suites_hold_their_cases_once():
 def test_settings_that_no_run_could_use_are_named(arguments, message):
     with pytest.raises(InputError, match=message):
         evaluate(**{"controllers": "pi", "cases": [CALM], **SHORT, **arguments})
+
+
+def test_ratios_are_means_over_the_same_runs_and_a_failed_run_leaves_none():
+    rows = [
+        {"controller": name, "case": case, "seed": seed, "x": value, "y": 1.0}
+        for name, values in {"a": (1.0, 2.0, 4.0, 8.0), "b": (2.0, 2.0, 2.0, 2.0)}.items()
+        for (case, seed), value in zip([("c", 1), ("c", 2), ("d", 1), ("d", 2)], values, strict=True)
+    ]
+    found = mean_ratios(pd.DataFrame(rows[::-1]), "a", ["x", "y"])
+    assert found.loc["b"].tolist() == [np.mean([2.0, 1.0, 0.5, 0.25]), 1.0]
+    assert found.loc["a"].tolist() == [1.0, 1.0]
+    rows[-1]["x"] = np.nan
+    assert np.isnan(mean_ratios(pd.DataFrame(rows), "a", ["x"]).loc["b", "x"])

@@ -332,10 +332,10 @@ USED = """
 import sys
 from fowt_env.training.evaluation.cases import Case
 from fowt_env.training.evaluation.run_case import Run, scored
-from fowt_env.training.evaluation.model_mismatch import Shift
+from fowt_env.training.evaluation.plant_perturbation import PlantPerturbation
 sea = {"kind": "jonswap", "Hs": 3.0, "Tp": 9.0}
 wind = {"kind": "ntm", "speed": 18.0, "class": "B"}
-case = Case("c", wind, sea, shift=Shift(noise=0.01))
+case = Case("c", wind, sea, shift=PlantPerturbation(noise=0.01))
 row, _ = scored(Run("constant", "constant", case, 1, 1.0, 0.1, {}, None))
 assert row["status"] == "ok", row["reason"]
 others = [name for name in sys.modules if name.startswith("fowt_env.controllers")]

@@ -2,8 +2,16 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from fowt_env.descriptions.platform import read_turbine
 from fowt_env.errors import InputError
-from fowt_env.training.evaluation.metrics import METRICS, damage_equivalent_load, metrics
+from fowt_env.training.evaluation.metrics import (
+    METRICS,
+    REDUCTIONS,
+    damage_equivalent_load,
+    metrics,
+    travel,
+    turbine_metrics,
+)
 
 pytestmark = pytest.mark.installation
 
@@ -196,3 +204,18 @@ def test_constraint_violations_are_counted_and_timed():
 def test_a_limit_is_not_passed_by_touching_it():
     result = metrics(synthetic_run(**{"RotSpeed_[rpm]": 1.3 * 12.1, "NcIMUTAxs_[m/s^2]": 3.3}))
     assert result["rotor_speed_violations_[-]"] == result["tower_top_acceleration_beyond_[s]"] == 0.0
+
+
+def test_several_runs_beside_each_other_have_the_figures_of_each():
+    time = np.linspace(0.0, 50.0, 501)
+    runs = np.random.default_rng(0).normal(size=(501, 3)).cumsum(axis=0)
+    for name, reduce in REDUCTIONS.items():
+        assert reduce(runs) == pytest.approx([reduce(run) for run in runs.T], rel=1e-12), name
+    assert travel(time, runs) == pytest.approx([travel(time, run) for run in runs.T], rel=1e-12)
+
+
+def test_a_turbine_brings_its_rated_speed_and_the_rate_of_its_pitch_drive():
+    run = synthetic_run(**{"RotSpeed_[rpm]": 13.31, "BldPitch1_[deg]": lambda t: 4.0 + 0.08 * t})
+    found = turbine_metrics(run, read_turbine("nrel5mw"), skip=10.0)  # 12.1 rpm, 8 deg/s
+    assert found["overspeed_[%]"] == pytest.approx(10.0) and found["actuator_duty_[%]"] == pytest.approx(1.0)
+    assert found == pytest.approx(metrics(run, 10.0, 12.1, 8.0), nan_ok=True)

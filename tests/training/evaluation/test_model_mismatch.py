@@ -12,8 +12,8 @@ from fowt_env.errors import InputError
 from fowt_env.plant.measurement import Measurement
 from fowt_env.training.evaluation.cases import Case, described, read_suite
 from fowt_env.training.evaluation.evaluate import evaluate, planned
-from fowt_env.training.evaluation.model_mismatch import Shift, Unaware, reading_scales, shifted_parts
-from fowt_env.training.evaluation.plant_perturbation import PLANT
+from fowt_env.training.evaluation.model_mismatch import ModelMismatch, reading_scales
+from fowt_env.training.evaluation.plant_perturbation import PLANT, PlantPerturbation, perturbed_parts
 from fowt_env.training.evaluation.run_case import run_controller
 from fowt_env.training.rl.randomisation import SENSORS
 
@@ -63,26 +63,26 @@ def measured(time, **values):
     return Measurement(**(dict.fromkeys(Measurement._fields, 0.0) | values | {"time": time}))
 
 
-def unaware(shift, turbine, seed=1):
-    """(Unaware, its Recorder) that was told of nothing but a turbine."""
+def mismatched(shift, turbine, seed=1):
+    """(ModelMismatch, its Recorder) that was prepared with nothing but a turbine."""
     inner = Recorder(turbine, 0.1)
     known = type("Known", (), {"turbine": turbine})()
-    return Unaware(inner, known, shift, seed), inner
+    return ModelMismatch(inner, known, shift, seed), inner
 
 
 def test_a_shift_has_every_quantity_that_training_randomises():
-    assert set(Shift.model_fields) == {*PLANT, *SENSORS}
-    assert Shift(mooring_stiffness=1.2, noise=0.1).factors == {"mooring_stiffness": 1.2}
+    assert set(PlantPerturbation.model_fields) == {*PLANT, *SENSORS}
+    assert PlantPerturbation(mooring_stiffness=1.2, noise=0.1).factors == {"mooring_stiffness": 1.2}
 
 
 def periods(shift):
     """{mode: period} of the plant at rest in still water."""
-    scene = fowt_env.build_scene(fidelity="standard", **shifted_parts(shift))
+    scene = fowt_env.build_scene(fidelity="standard", **perturbed_parts(shift))
     return {mode.name: mode.period for mode in linearize(scene).modes()}
 
 
 def test_a_stiffer_mooring_shortens_the_surge_period_by_its_root():
-    nominal, stiff, soft = (periods(Shift(mooring_stiffness=k)) for k in (1.0, 1.2, 0.8))
+    nominal, stiff, soft = (periods(PlantPerturbation(mooring_stiffness=k)) for k in (1.0, 1.2, 0.8))
     assert stiff["surge"] / nominal["surge"] == pytest.approx(1.2**-0.5, rel=0.01)
     assert soft["surge"] / nominal["surge"] == pytest.approx(0.8**-0.5, rel=0.01)
     # the water plane and the ballast hold the platform's pitch, not the lines
@@ -90,20 +90,20 @@ def test_a_stiffer_mooring_shortens_the_surge_period_by_its_root():
 
 
 def test_more_added_mass_lengthens_the_surge_period_as_its_share_of_the_mass_says():
-    nominal, heavy = periods(Shift()), periods(Shift(added_mass=1.2))
+    nominal, heavy = periods(PlantPerturbation()), periods(PlantPerturbation(added_mass=1.2))
     # the spar's added mass is about that of its displaced water, half of all that surges
     assert 1.03 < heavy["surge"] / nominal["surge"] < 1.07
 
 
 def test_the_run_is_on_the_shifted_plant_and_the_controller_knows_the_nominal_one():
-    shift = Shift(mooring_stiffness=1.2, actuator_lag=2.0)
+    shift = PlantPerturbation(mooring_stiffness=1.2, actuator_lag=2.0)
     run = planned(["lqr"], [windy(shift)], seeds=[1])[0]
     known = fowt_env.build_scene(wind=WIND, sea=run.case.sea, seed=1, fidelity="standard", duration=700.0)
     controller = run_controller(run, known)
     told = make("lqr", known.turbine, 0.1)
     told.prepare(known)
     wrong = fowt_env.build_scene(
-        wind=WIND, sea=run.case.sea, seed=1, fidelity="standard", **shifted_parts(shift)
+        wind=WIND, sea=run.case.sea, seed=1, fidelity="standard", **perturbed_parts(shift)
     )
     controller.prepare(wrong)
     assert np.array_equal(controller.inner.parameters, told.parameters)
@@ -114,7 +114,8 @@ def test_the_run_is_on_the_shifted_plant_and_the_controller_knows_the_nominal_on
 
 def test_a_shifted_mooring_changes_the_motions_and_an_empty_shift_no_bit():
     plain, same, soft = (
-        short(["gspi_oc3"], windy(shift)).iloc[0] for shift in (None, Shift(), Shift(mooring_stiffness=0.8))
+        short(["gspi_oc3"], windy(shift)).iloc[0]
+        for shift in (None, PlantPerturbation(), PlantPerturbation(mooring_stiffness=0.8))
     )
     assert plain.equals(same)
     assert plain["PtfmSurge_mean_[m]"] < soft["PtfmSurge_mean_[m]"]  # it drifts farther on softer lines
@@ -122,7 +123,7 @@ def test_a_shifted_mooring_changes_the_motions_and_an_empty_shift_no_bit():
 
 
 def test_noise_reaches_the_controller_with_its_size_and_no_delay(turbine):
-    controller, inner = unaware(Shift(noise=0.02), turbine)
+    controller, inner = mismatched(PlantPerturbation(noise=0.02), turbine)
     controller.reset(measured(0.0))
     for step in range(4000):
         controller.act(measured(0.1 * step))
@@ -137,7 +138,7 @@ def test_noise_reaches_the_controller_with_its_size_and_no_delay(turbine):
 
 
 def test_a_delay_shows_what_was_measured_as_many_periods_ago(turbine):
-    controller, inner = unaware(Shift(delay=2), turbine)
+    controller, inner = mismatched(PlantPerturbation(delay=2), turbine)
     controller.reset(measured(0.0, surge=0.0))
     for step in range(6):
         controller.act(measured(0.1 * step, surge=float(step)))
@@ -145,19 +146,21 @@ def test_a_delay_shows_what_was_measured_as_many_periods_ago(turbine):
 
 
 def test_noise_is_on_the_readings_and_not_in_the_metrics():
-    plain, noisy = (short({"deaf": Deaf()}, windy(shift)).iloc[0] for shift in (None, Shift(noise=0.5)))
+    noise = PlantPerturbation(noise=0.5)
+    plain, noisy = (short({"deaf": Deaf()}, windy(shift)).iloc[0] for shift in (None, noise))
     assert plain.equals(noisy)  # a controller that looks at nothing runs as without noise
-    felt, truth = (short(["gspi_oc3"], windy(shift)).iloc[0] for shift in (Shift(noise=0.05), None))
+    noise = PlantPerturbation(noise=0.05)
+    felt, truth = (short(["gspi_oc3"], windy(shift)).iloc[0] for shift in (noise, None))
     assert felt["blade_pitch_travel_[deg/s]"] > 1.05 * truth["blade_pitch_travel_[deg/s]"]
     assert felt["RotSpeed_std_[rpm]"] == pytest.approx(truth["RotSpeed_std_[rpm]"], rel=0.1)
 
 
 def test_the_same_seed_gives_the_same_bits_and_another_other_noise(turbine):
-    rows = [short(["gspi_oc3"], windy(Shift(noise=0.02))).iloc[0] for _ in range(2)]
+    rows = [short(["gspi_oc3"], windy(PlantPerturbation(noise=0.02))).iloc[0] for _ in range(2)]
     assert rows[0].equals(rows[1])
     readings = []
     for seed in (1, 1, 2):
-        controller, inner = unaware(Shift(noise=0.02), turbine, seed)
+        controller, inner = mismatched(PlantPerturbation(noise=0.02), turbine, seed)
         controller.reset(measured(0.0))
         readings.append(inner.seen[0])
     assert readings[0] == readings[1] != readings[2]
@@ -166,7 +169,7 @@ def test_the_same_seed_gives_the_same_bits_and_another_other_noise(turbine):
 def test_a_suite_may_carry_shifts_and_names_wrong_ones(tmp_path):
     suite = read_suite("shifted")
     shifts = {case.name.rpartition("_")[0]: case.shift for case in suite.cases}
-    assert shifts["nominal"] is None and shifts["mooring_soft"] == Shift(mooring_stiffness=0.8)
+    assert shifts["nominal"] is None and shifts["mooring_soft"] == PlantPerturbation(mooring_stiffness=0.8)
     assert {tuple(shift.factors.values()) for shift in shifts.values() if shift} >= {(0.8,), (1.2,), (2.0,)}
     assert shifts["noise"].noise > 0.0 and max(suite.seeds) < 1000
     assert described(suite.cases[-1])["shift"] == {"noise": 0.02}

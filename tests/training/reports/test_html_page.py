@@ -13,7 +13,7 @@ import fowt_env  # noqa: E402
 from fowt_env.errors import InputError  # noqa: E402
 from fowt_env.training.cli import app as cli  # noqa: E402
 from fowt_env.training.evaluation.evaluate import run_file  # noqa: E402
-from fowt_env.training.reports.html_page import SCHEDULE_WINDS, read_results, write_report  # noqa: E402
+from fowt_env.training.reports.html_page import SCHEDULE_WINDS, write_report  # noqa: E402
 
 EVIL = "<img src=x onerror=alert(1)></script>&"
 CONTROLLERS = ("calm", "busy", EVIL)
@@ -182,13 +182,6 @@ def test_a_folder_without_results_is_refused(tmp_path):
         write_report(tmp_path)
     with pytest.raises(InputError, match="is no folder"):
         write_report(tmp_path / "none")
-    for text, message in (("", "cannot be read"), ("a,b\n1,2\n", "lacks the columns controller")):
-        (tmp_path / "results.csv").write_text(text)
-        with pytest.raises(InputError, match=message):
-            read_results(tmp_path)
-    (tmp_path / "results.csv").write_text("controller,case,seed,status\npi,a,first,ok\n")
-    with pytest.raises(InputError, match="seed must hold whole numbers"):
-        read_results(tmp_path)
 
 
 def test_the_schedule_is_the_steady_point_of_each_wind(folder, tmp_path):

@@ -5,7 +5,6 @@ import pandas as pd
 import pytest
 
 from fowt_env.errors import InputError
-from fowt_env.files.tables import write_table
 from fowt_env.training.evaluation.bootstrap import interquartile_mean
 from fowt_env.training.evaluation.evaluate import COLUMNS
 from fowt_env.training.evaluation.metrics import METRICS
@@ -20,7 +19,6 @@ from fowt_env.training.reports.scores import (
     figures_named,
     kind_of,
     kinds_markdown,
-    read_results,
     scores_markdown,
     told,
 )
@@ -187,21 +185,8 @@ def test_any_metric_may_be_a_figure_without_an_aim():
     assert scores["ratio"].to_numpy() == pytest.approx(0.55) and list(scores["verdict"]) == ["", "met"]
 
 
-def test_results_are_joined_and_a_run_with_two_answers_is_refused(tmp_path):
-    runs = table({"agent": [0.5, 0.5]})
-    one, two = (write_table(runs, tmp_path / f"{name}.csv") for name in ("one", "two"))
-    assert len(read_results([one, two])) == len(runs)
-    write_table(runs.assign(**{"RotSpeed_std_[rpm]": 9.0}), two)
-    with pytest.raises(InputError, match="is there twice with different figures"):
-        read_results([one, two])
-    with pytest.raises(InputError, match="unknown case of the evaluation"):
-        read_results([one], ["ntm_19"])
-    with pytest.raises(InputError, match="no such file"):
-        read_results([tmp_path / "none"])
-
-
 def test_the_text_has_a_table_per_rival_and_one_of_failures():
     runs = table({"agent": [0.5, 0.6, 0.5]})
     text = scores_markdown(agent_scores(runs, ["rival"]), agent_counts(runs, ["rival"]))
-    assert "| over `rival` | `agent` |" in text and text.count("\n| --- |") == 2
+    assert "| over `rival` | `agent` |" in text and text.count("\n|---|") == 2
     assert "| rotor-speed std | 0.5" in text and "then" in text

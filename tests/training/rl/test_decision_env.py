@@ -1,6 +1,7 @@
 """Decisions: the vector environment against a plain loop over one environment."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
 pytest.importorskip("stable_baselines3")
@@ -8,7 +9,8 @@ pytest.importorskip("stable_baselines3")
 from fowt_env.envs import FowtEnv
 from fowt_env.envs.decisions import Decisions, DecisionSettings
 from fowt_env.errors import InputError
-from fowt_env.training.rl.decision_env import DecisionVecEnv
+from fowt_env.training.evaluation.metrics import turbine_metrics
+from fowt_env.training.rl.decision_env import DecisionVecEnv, ValidationVecEnv
 from fowt_env.training.rl.sb3_env import FowtSB3VecEnv
 
 QUICK = {"rotor": "table", "wave_components": 10, "wind": 18.0, "duration": 8.0}
@@ -87,6 +89,42 @@ def test_the_state_of_a_batch_goes_on_in_another():
         got = other.step(action)
         assert all(np.array_equal(a, b) for a, b in zip(got[:3], want[:3], strict=True))
     assert any(want[2].any() for want in expected)  # through the end of an episode
+
+
+def test_the_figures_of_validation_are_the_metrics_of_its_episodes():
+    sea = {"kind": "jonswap", "Hs": 4.0, "Tp": 10.0}
+    episodes = [
+        {"wind": {"kind": "ntm", "speed": speed, "class": "B"}, "sea": sea, "weather_seed": 1001}
+        for speed in (14.0, 20.0)
+    ]
+    skip, dt = 5.0, 0.1
+    settings = {name: value for name, value in QUICK.items() if name != "wind"} | {"duration": 20.0}
+    settings |= {"action_mode": "residual", "baseline": "gspi_oc3"}
+    env = ValidationVecEnv(episodes, skip, threads=1, **settings)
+    env.reset()
+    rows = [[], []]
+    for _ in range(200):
+        env.step(np.zeros((2, 2)))
+        for row, one in zip(rows, env.env.envs, strict=True):
+            row.append(one.channels())
+    figures = env.figures()
+    names = {
+        "rotor_speed_std_[rpm]": "RotSpeed_std_[rpm]",
+        "platform_pitch_std_[deg]": "PtfmPitch_std_[deg]",
+        "blade_pitch_travel_[deg/s]": "blade_pitch_travel_[deg/s]",
+        "shaft_power_mean_[kW]": "GenPwr_mean_[kW]",
+        "shaft_power_std_[kW]": "GenPwr_std_[kW]",
+    }
+    assert {*names, "failed"} == set(figures)
+    for i, one in enumerate(env.env.envs):
+        columns = [channel.column for channel in one.scene.channels]
+        # the first row is of the end of the first period; after the last step the next episode has begun
+        frame = pd.DataFrame(rows[i][round(skip / dt) : -1]).set_axis(columns, axis=1)
+        found = turbine_metrics(frame, one.scene.turbine)
+        losses = one.scene.turbine.drivetrain.generator_efficiency
+        for name, metric in names.items():
+            factor = losses if name.startswith("shaft_power") else 1.0
+            assert factor * figures[name][i] == pytest.approx(found[metric], rel=1e-12), name
 
 
 def test_restarting_one_row_leaves_the_others():

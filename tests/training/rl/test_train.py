@@ -298,6 +298,7 @@ def test_wrong_settings_are_named(tmp_path):
         ({"decisions.hold": 0}, "decisions.hold = 0: must be a whole number from 1 to 100"),
         ({"environment.num_env": 8}, "environment.num_env: unknown key. Did you mean 'num_envs'"),
         ({"environment.windd": 8}, "environment.windd: unknown key. Did you mean 'wind'"),
+        ({"environment.designed_on": {}}, "environment.designed_on: is called nominal_plant now"),
         ({"environment.threads": 8}, "environment.threads: unknown key"),  # training's own
         ({"environment.baseline": "mine:Law"}, "environment.baseline = 'mine:Law': must be one of const"),
         ({"environment.num_envs": 0}, "environment.num_envs = 0: must be a whole number >= 1"),

@@ -22,7 +22,7 @@ FOUND = Path(__file__).parents[2] / "reference" / "stability"
 
 def keeps_the_margin(name, integrator, duration):
     """Whether a run of twice the default step stays with the fine run."""
-    kind = stability_map.KINDS[name]
+    kind = stability_map.LIMIT_SCENES[name]
     base = kind.scene()
     point = kind.point(base)
     fine, _ = stability_map.excursions(base, point, 0.025, duration)
@@ -45,7 +45,7 @@ def test_default_step_keeps_a_factor_of_two_where_the_rotor_is_sampled_within_a_
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", stability_map.KINDS)
+@pytest.mark.parametrize("name", stability_map.LIMIT_SCENES)
 def test_default_step_keeps_a_factor_of_two_on_the_whole_map(name):
     table = stability_map.stability_map([name], duration=150.0)
     assert (table["margin"] >= stability_map.MARGIN).all()

@@ -79,7 +79,7 @@ def test_search_stops_at_the_first_step_that_fails_even_if_larger_ones_hold():
 
 
 def test_a_step_beyond_the_limit_of_theory_blows_the_plant_up_and_one_below_does_not():
-    kind = stability_map.KINDS["full, look-up rotor"]
+    kind = stability_map.LIMIT_SCENES["full, look-up rotor"]
     base = kind.scene("ab4")
     point = kind.point(base)
     fine, _ = stability_map.excursions(base, point, 0.025, 100.0)
@@ -256,7 +256,7 @@ def test_the_report_counts_what_was_missed(tmp_path, monkeypatch):
 
     monkeypatch.setitem(stability.PARTS, "plain", part)
     stability.study(tmp_path, ["plain"])
-    text = stability.write_report(tmp_path, tmp_path / "report.md").read_text()
+    text = stability.write_robustness_report(tmp_path, tmp_path / "report.md").read_text()
     assert "2 checks, 1 of them missed" in text
     assert "| bad | 4 | 2 | 1 | **MISSED** |" in text and "| x | 1 |" in text
     with pytest.raises(InputError, match="unknown part"):

@@ -28,7 +28,7 @@ from fowt_env.training.validation.openfast_cases import (
     reference,
     steady_reference,
 )
-from fowt_env.training.validation.report import write_report
+from fowt_env.training.validation.report import write_validation_report
 from fowt_env.training.validation.signal_errors import (
     decay_decrement,
     decay_period,
@@ -257,7 +257,7 @@ def test_the_report_has_every_figure_and_its_plots(tmp_path):
             mine, theirs = (anew(row, frame) for frame in study.runs[row.case])
             assert (row.here, row.openfast) == pytest.approx((mine, theirs), rel=2e-3)
             assert abs(mine / theirs - 1.0) < 0.01 * target(row) + 1e-3
-    paths = write_report(study, tmp_path)
+    paths = write_validation_report(study, tmp_path)
     text = (tmp_path / "validation.md").read_text()
     assert text.count("| met |") == len(study.rows) == 24
     assert all(path.stat().st_size > 0 for path in paths) and len(paths) == 3

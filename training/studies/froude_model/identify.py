@@ -18,6 +18,7 @@ from scipy.optimize import brentq, fsolve
 from fowt_env.analysis.linear_model import natural_periods
 from fowt_env.analysis.trim import trim_held
 from fowt_env.descriptions.platform import DATA, Line, read_platform, read_turbine
+from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.files.atomic import replacing
 from fowt_env.plant.mooring import catenary
 from fowt_env.scene.build import build_scene
@@ -34,7 +35,7 @@ AZIMUTHS = (0.0, 120.0, 240.0)  # deg, of the anchors, as in OC3
 BRIDLE = 60.0  # deg to either side: the hull points of a delta, half-way to the next line's
 WET_WEIGHT = 0.02  # N/m, a thin wire: its sag (below 0.3 % of the span) does not matter, a choice
 RATED_WIND = 3.36  # m/s, LC2
-RATED_SPEED = 85.6 * pi / 30.0  # rad/s, LC2
+RATED_SPEED = 85.6 * RPM  # rad/s, LC2
 RATED_THRUST = 703e3  # N at full scale: NREL 5 MW at 11.4 m/s, blade pitch 0
 START = (110.0, 3.4, 0.93, 13.5)  # EA N, anchor radius m, length over span, pitch inertia kg m2
 
@@ -74,7 +75,7 @@ def lines(EA, anchor_radius, stretch, fairlead_radius, fairlead_z):
 
 
 def _point(radius, azimuth, z):
-    angle = azimuth * pi / 180.0
+    angle = azimuth * DEGREE
     return (round(radius * cos(angle), 12), round(radius * sin(angle), 12), z)
 
 
@@ -307,7 +308,7 @@ def write_polars(folder, factor):
         ]
         for alpha, *coefficients in polar:
             values = ",".join(f"{factor * value:.8g}" for value in coefficients)
-            lines_of_text.append(f"{alpha * 180.0 / pi:.6g},{values}")
+            lines_of_text.append(f"{alpha / DEGREE:.6g},{values}")
         with replacing(folder / f"{name}.csv") as path:
             path.write_text("\n".join(lines_of_text) + "\n")
 
@@ -322,7 +323,7 @@ def write_turbine(factor):
         "radius_m,chord_m,twist_deg,airfoil",
     ]
     rows += [
-        f"{r / SCALE:.8g},{c / SCALE:.8g},{t * 180.0 / pi:.8g},{name}"
+        f"{r / SCALE:.8g},{c / SCALE:.8g},{t / DEGREE:.8g},{name}"
         for r, c, t, name in zip(full.radius, full.chord, full.twist, full.airfoil, strict=True)
     ]
     with replacing(folder / "blade.csv") as path:

@@ -17,7 +17,9 @@ from typing import Annotated
 import numpy as np
 import typer
 
+from fowt_env.descriptions.checks import check_number
 from fowt_env.descriptions.platform import DATA, read_platform, read_turbine
+from fowt_env.descriptions.units import DEGREE
 from fowt_env.errors import InputError
 from fowt_env.files.atomic import replacing
 from fowt_env.training.studies.froude_model.identify import toml_value
@@ -142,7 +144,7 @@ def stations_text(turbine, scale):
         "radius_m,chord_m,twist_deg,airfoil",
     ]
     for radius, chord, twist, airfoil in zip(
-        blade.radius * scale, blade.chord * scale, np.degrees(blade.twist), blade.airfoil, strict=True
+        blade.radius * scale, blade.chord * scale, blade.twist / DEGREE, blade.airfoil, strict=True
     ):
         rows.append(f"{radius:.10g},{chord:.10g},{twist:.10g},{airfoil}")
     return "\n".join(rows) + "\n"
@@ -154,7 +156,7 @@ def _polar_files(turbine):
     for name, polar in turbine.blade.polars.items():
         rows = [f"# {name} of {turbine.name}, unchanged (froude_model/scale.py).", "alpha_deg,cl,cd,cm"]
         for alpha, *values in polar:
-            rows.append(",".join(f"{value:.10g}" for value in (np.degrees(alpha), *values)))
+            rows.append(",".join(f"{value:.10g}" for value in (alpha / DEGREE, *values)))
         files[f"{name}.csv"] = "\n".join(rows) + "\n"
     return files
 
@@ -165,8 +167,7 @@ def write(scale, folder, name, platform=PLATFORM, turbine=TURBINE):
     scale: of lengths, > 0. platform, turbine: the originals, as read_platform and read_turbine take them.
     Raises: InputError for a scale or descriptions that cannot be used.
     """
-    if not (np.isfinite(scale) and 0.001 <= scale <= 100.0):
-        raise InputError(f"scale = {scale!r}: must be a number in [0.001, 100]")
+    check_number("scale", scale, 0.001, 100.0)
     folder = Path(folder)
     machine = read_turbine(turbine)
     home = folder / "turbines" / name
@@ -190,8 +191,7 @@ def scale_of_power(power, turbine=TURBINE):
     """Scale of lengths at which the turbine's rated electrical power becomes `power` (W)."""
     machine = read_turbine(turbine)
     own = machine.torque_law.rated_power * machine.drivetrain.generator_efficiency
-    if not (np.isfinite(power) and power > 0.0):
-        raise InputError(f"power = {power!r}: must be a positive number of watts")
+    check_number("power", power, 0.0, low_open=True, allowed="a positive number of watts")
     return float((power / own) ** (1.0 / POWER_EXPONENT))
 
 

@@ -15,6 +15,7 @@ import pandas as pd
 import fowt_env
 from fowt_env.analysis.trim import trim_held
 from fowt_env.descriptions.platform import read_platform
+from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.mooring import catenary
 from fowt_env.training.validation.signal_errors import harmonics
@@ -31,12 +32,11 @@ SKIP = 100.0  # s left out of statistics, ten surge periods
 SEGMENT = 125.0  # s of a spectrum's window: 12 surge periods
 STEP, OUTPUT = 0.01, 0.05  # s; 0.07 and 0.35 s at full scale
 INTENSITY = 0.03  # of the wind's turbulence, a choice
-RPM = pi / 30.0
 FULL_SCALE = "full_scale"
 
 
 @dataclass(frozen=True)
-class Case:
+class LoadCase:
     """One load case at model scale, as Table 2 of the paper has it."""
 
     wind: float | None  # m/s; None: no wind
@@ -53,9 +53,9 @@ SEAS = (
 )
 WINDS = ((2.02, 62.8, 0.0), (3.36, 85.6, 0.0), (3.56, 85.6, 14.9), (5.93, 0.0, 90.0))
 CASES = {
-    **{f"LC{i}": Case(*wind) for i, wind in enumerate(WINDS, 1)},
-    **{f"LC{i}": Case(None, sea=sea) for i, sea in enumerate(SEAS, 5)},
-    **{f"LC{i}": Case(*wind, sea) for i, (wind, sea) in enumerate(zip(WINDS, SEAS, strict=True), 9)},
+    **{f"LC{i}": LoadCase(*wind) for i, wind in enumerate(WINDS, 1)},
+    **{f"LC{i}": LoadCase(None, sea=sea) for i, sea in enumerate(SEAS, 5)},
+    **{f"LC{i}": LoadCase(*wind, sea) for i, (wind, sea) in enumerate(zip(WINDS, SEAS, strict=True), 9)},
 }
 GROUPS = {
     "wind": ("LC1", "LC2", "LC3", "LC4"),
@@ -106,7 +106,7 @@ def case_scene(name, duration=DURATION, seed=1, **options):
 def case_point(scene, name):
     """OperatingPoint of a load case's scene with its prescribed rotor speed and blade pitch."""
     case = CASES[name]
-    return trim_held(scene, case.rotor_rpm * RPM, case.blade_pitch_deg * pi / 180.0)
+    return trim_held(scene, case.rotor_rpm * RPM, case.blade_pitch_deg * DEGREE)
 
 
 def run_case(name, duration=DURATION, seed=1, progress=False, **options):

@@ -7,6 +7,7 @@ import numpy as np
 import fowt_env
 from fowt_env.descriptions.platform import read_platform
 from fowt_env.files.atomic import replacing
+from fowt_env.files.markdown import markdown_table
 from fowt_env.files.tables import write_table
 from fowt_env.training.studies.paper import load_cases as paper
 from fowt_env.visual.time_series import (
@@ -158,10 +159,8 @@ def regular_waves(full, path=None, window=(420.0, 450.0)):
 
 def claims_table(study):
     """Markdown table of the claims with their verdicts."""
-    lines = ["| figure | claim of the paper | found here | verdict |", "|---|---|---|---|"]
-    for claim in study.claims:
-        lines.append(f"| {claim.figure} | {claim.text} | {claim.found} | {_verdict(claim)} |")
-    return "\n".join(lines)
+    rows = [(claim.figure, claim.text, claim.found, _verdict(claim)) for claim in study.claims]
+    return markdown_table(("figure", "claim of the paper", "found here", "verdict"), rows)
 
 
 def _verdict(claim):
@@ -170,49 +169,45 @@ def _verdict(claim):
 
 def double_frequency_table(full):
     """Markdown table of second over first harmonics for the four combinations."""
-    lines = [
-        "| position | surface | surge (m) | pitch (deg) | surge, 2nd/1st | pitch, 2nd/1st | theory.md |",
-        "|---|---|---|---|---|---|---|",
-    ]
+    ratios = ("surge, 2nd/1st", "pitch, 2nd/1st")
+    header = ("position", "surface", "surge (m)", "pitch (deg)", *ratios, "theory.md")
+    rows = []
     for combination, expected in zip(paper.COMBINATIONS, paper.EXPECTED_DOUBLE, strict=True):
         found = paper.double_frequency(full[combination])
         (surge, surge2), (pitch, pitch2) = found[paper.SURGE], found[paper.PITCH]
-        lines.append(
-            f"| {combination[0]} | {combination[1]} | {surge:.4f} | {pitch:.4f}"
-            f" | {surge2:.2f} % | {pitch2:.2f} % |"
-            f" {expected[0]:.2f} %, {expected[1]:.2f} % |"
-        )
-    return "\n".join(lines)
+        theory = f"{expected[0]:.2f} %, {expected[1]:.2f} %"
+        sizes = f"{surge:.4f}", f"{pitch:.4f}", f"{surge2:.2f} %", f"{pitch2:.2f} %"
+        rows.append((*combination[:2], *sizes, theory))
+    return markdown_table(header, rows)
 
 
 def statistics_table(runs):
     """Markdown table of pitch and surge per case."""
     table = paper.statistics(runs)
-    lines = [
-        "| case | pitch mean | std | min | max (deg) | surge mean | std | min | max (m) | thrust mean (N) |",
-        "|---|---|---|---|---|---|---|---|---|---|",
-    ]
+    surge = ("surge mean", "std", "min", "max (m)")
+    header = ("case", "pitch mean", "std", "min", "max (deg)", *surge, "thrust mean (N)")
+    cells = []
     for case in runs:
         rows = table[table["case"] == case].set_index("channel")
-        cells = [case]
+        line = [case]
         for channel, digits in ((paper.PITCH, 2), (paper.SURGE, 3)):
-            cells += [f"{rows.loc[channel, name]:.{digits}f}" for name in ("mean", "std", "min", "max")]
-        cells.append(f"{rows.loc['RtFldFxh_[N]', 'mean']:.2f}")
-        lines.append("| " + " | ".join(cells) + " |")
-    return "\n".join(lines)
+            line += [f"{rows.loc[channel, name]:.{digits}f}" for name in ("mean", "std", "min", "max")]
+        cells.append([*line, f"{rows.loc['RtFldFxh_[N]', 'mean']:.2f}"])
+    return markdown_table(header, cells)
 
 
 def periods_table():
     """Markdown table of the natural periods of the 1:50 model against Table 1."""
     published = read_platform(paper.PLATFORM).published["natural_periods"]
-    lines = ["| motion | paper, computed (s) | here (s) | difference |", "|---|---|---|---|"]
+    rows = []
     for motion, period in fowt_env.natural_periods(fowt_env.build_scene(paper.PLATFORM)).items():
         wanted = published[motion.removeprefix("platform_")]
-        lines.append(f"| {motion} | {wanted:.2f} | {period:.3f} | {100.0 * (period / wanted - 1.0):+.2f} % |")
-    return "\n".join(lines)
+        difference = f"{100.0 * (period / wanted - 1.0):+.2f} %"
+        rows.append((motion, f"{wanted:.2f}", f"{period:.3f}", difference))
+    return markdown_table(("motion", "paper, computed (s)", "here (s)", "difference"), rows)
 
 
-def write_report(study, folder, plot=True):
+def write_paper_report(study, folder, plot=True):
     """Write everything that a study holds into a folder; returns the paths."""
     folder = Path(folder)
     paths, text = [], ["# Against the paper", "", "Written by `fowt paper`.", ""]

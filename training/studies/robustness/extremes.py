@@ -1,15 +1,16 @@
 """Extreme events on the running or parked turbine, and hostile actions on the environment."""
 
 from dataclasses import dataclass, field
-from math import degrees, isfinite, pi
+from math import isfinite, pi
 
 import numpy as np
 import pandas as pd
 
 from fowt_env.controllers import make
+from fowt_env.descriptions.checks import check_whole_number
+from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.envs import FowtEnv
 from fowt_env.errors import InputError
-from fowt_env.plant.channels import DEG, RPM
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
 from fowt_env.plant.mooring import Mooring
 from fowt_env.plant.rollout import RUNNING, STOP_REASONS, advance, forget, observe
@@ -135,15 +136,14 @@ def without_line(scene, line):
 
     Raises: InputError if there is no such line.
     """
-    if not 0 <= line < scene.n_lines:
-        raise InputError(f"line = {line}: must be a whole number from 0 to {scene.n_lines - 1}")
+    check_whole_number("line", line, 0, scene.n_lines - 1)
     # a table is about the rest position of all lines, which is not where the platform goes
     arrays = scene.model.mooring._replace(table=None)[:-1]
     left = [np.ascontiguousarray(np.delete(array, line, axis=0)) for array in arrays]
     return scene.with_model(mooring=Mooring(*left))
 
 
-class _Run:
+class _ExtremeRun:
     """One extreme run, a control period at a time, with the peaks of its course."""
 
     def __init__(self, case, scene, dt):
@@ -195,9 +195,9 @@ class _Run:
         """Add the present instant to the peaks."""
         x = self.x
         values = {
-            "rotor_rpm": abs(x[State.ROTOR_SPEED]) * RPM,
-            "tilt_deg": degrees(max(abs(x[State.ROLL]), abs(x[State.PLATFORM_PITCH]))),
-            "yaw_deg": abs(x[State.YAW]) * DEG,
+            "rotor_rpm": abs(x[State.ROTOR_SPEED]) / RPM,
+            "tilt_deg": max(abs(x[State.ROLL]), abs(x[State.PLATFORM_PITCH])) / DEGREE,
+            "yaw_deg": abs(x[State.YAW]) / DEGREE,
             "offset_m": float(np.hypot(x[State.SURGE], x[State.SWAY])),
             "heave_m": abs(x[State.HEAVE]),
             "tension_MN": float(lines[:, 2].max()) * 1e-6,
@@ -218,14 +218,14 @@ def run_extreme(name, fidelity="standard", seed=1, finer=1, scene=None):
     case = EXTREMES[name]
     if scene is None:
         scene = build_scene(wind=case.wind, sea=case.sea, seed=seed, fidelity=fidelity, duration=DURATION)
-    run = _Run(case, scene, scene.dt / finer)
+    run = _ExtremeRun(case, scene, scene.dt / finer)
     status, time = run.go()
     finite = bool(np.all(np.isfinite(run.x))) and all(isfinite(value) for value in run.peak.values())
     verdict = "finite"
     if status != RUNNING:
         verdict = f"{STOP_REASONS[status]} at {time:.1f} s"
-    elif run.peak["rotor_rpm"] > scene.turbine.overspeed * RPM:
-        verdict = f"finite, beyond the overspeed limit of {scene.turbine.overspeed * RPM:.2f} rpm"
+    elif run.peak["rotor_rpm"] > scene.turbine.overspeed / RPM:
+        verdict = f"finite, beyond the overspeed limit of {scene.turbine.overspeed / RPM:.2f} rpm"
     return {"group": case.group, "case": name, **run.peak, "finite": finite, "verdict": verdict}
 
 

@@ -39,7 +39,7 @@ STORM = {"kind": "jonswap", "Hs": 15.0, "Tp": 16.0}
 
 
 @dataclass(frozen=True)
-class Kind:
+class LimitScene:
     """A kind of scene of the map: arguments of build_scene, and what is held still."""
 
     wind: object = 18.0
@@ -72,21 +72,21 @@ class Kind:
         return OperatingPoint(dict(fixed), fixed.state, fixed.command, fixed.wind_speed, platform="floating")
 
 
-KINDS = {
-    "full, look-up rotor": Kind(),
-    "full, rotor sampled thrice a step": Kind(rotor_samples=3),  # as in a handle of wind
-    "full, BEM rotor": Kind(fidelity="reference", options={"wave_components": 40}),
-    "full, table rotor": Kind(fidelity="fast"),
-    "full, rated wind": Kind(wind=11.4),
-    "full, cut-out wind": Kind(wind=25.0),
-    "no wind, waves": Kind(wind=None),
-    "still water, wind": Kind(sea=None),
-    "parked, 50 m/s, Hs 15 m": Kind(wind=50.0, sea=STORM, rotor_held=True),
-    "idling feathered, 26 m/s": Kind(wind=26.0),
-    "idling feathered, 50 m/s, Hs 15 m": Kind(wind=50.0, sea=STORM),
-    "idling feathered, 70 m/s, Hs 15 m": Kind(wind=70.0, sea=STORM),
-    "no mooring": Kind(options={"mooring": False}),
-    "platform held": Kind(platform_held=True),
+LIMIT_SCENES = {
+    "full, look-up rotor": LimitScene(),
+    "full, rotor sampled thrice a step": LimitScene(rotor_samples=3),  # as in a box of wind
+    "full, BEM rotor": LimitScene(fidelity="reference", options={"wave_components": 40}),
+    "full, table rotor": LimitScene(fidelity="fast"),
+    "full, rated wind": LimitScene(wind=11.4),
+    "full, cut-out wind": LimitScene(wind=25.0),
+    "no wind, waves": LimitScene(wind=None),
+    "still water, wind": LimitScene(sea=None),
+    "parked, 50 m/s, Hs 15 m": LimitScene(wind=50.0, sea=STORM, rotor_held=True),
+    "idling feathered, 26 m/s": LimitScene(wind=26.0),
+    "idling feathered, 50 m/s, Hs 15 m": LimitScene(wind=50.0, sea=STORM),
+    "idling feathered, 70 m/s, Hs 15 m": LimitScene(wind=70.0, sea=STORM),
+    "no mooring": LimitScene(options={"mooring": False}),
+    "platform held": LimitScene(platform_held=True),
 }
 
 
@@ -238,12 +238,12 @@ def stability_map(kinds=None, integrators=INTEGRATORS, duration=DURATION, progre
     margin (measured over default), mode (state that grows first), fastest_1_per_s (largest eigenvalue
     of the plant but for the blade-pitch actuator).
     """
-    names = list(kinds or KINDS)
+    names = list(kinds or LIMIT_SCENES)
     rows = []
     for done, name in enumerate(names):
         if progress is not None:
             progress(f"stability map: {name}", done, len(names))
-        kind = KINDS[name]
+        kind = LIMIT_SCENES[name]
         base = kind.scene()
         point = kind.point(base)
         model = linearize(base, point)

@@ -11,8 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
+from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.errors import unknown
 from fowt_env.files.atomic import replacing
+from fowt_env.files.markdown import markdown_table
 from fowt_env.plant.integrators import INTEGRATORS
 from fowt_env.plant.rollout import RUNNING
 from fowt_env.training.benchmarks.speed import header
@@ -151,9 +153,9 @@ def cases_part(sizes, folder, progress):
     peak = tally.peak
     rows = [
         ["kinetic energy of the platform", f"{peak[0] * 1e-6:.0f} MJ"],
-        ["roll or platform pitch", f"{np.degrees(peak[1]):.1f} deg"],
+        ["roll or platform pitch", f"{peak[1] / DEGREE:.1f} deg"],
         ["distance of the body origin from rest", f"{peak[2]:.1f} m"],
-        ["rotor speed", f"{peak[3] * 30.0 / np.pi:.1f} rpm"],
+        ["rotor speed", f"{peak[3] / RPM:.1f} rpm"],
         ["capsizes, each confirmed at a quarter of the step", f"{tally.capsizes}"],
     ]
     found.tables.append(["Largest values over all random cases that ran to their end", ["", "largest"], rows])
@@ -263,7 +265,7 @@ def long_part(sizes, folder, progress):
     difference, turned = long.quaternion_difference()
     found.claim(
         "tumbling body: Euler angles against a quaternion", "60 s, 61 instants",
-        f"rotation matrices differ by {difference:.1e}, turned by {np.degrees(turned):.0f} deg",
+        f"rotation matrices differ by {difference:.1e}, turned by {turned / DEGREE:.0f} deg",
         f"{TURNED:.0e}", difference <= TURNED,
     )  # fmt: skip
     return found
@@ -338,13 +340,7 @@ def stored_parts(folder):
     return {part: json.loads(path.read_text()) for part, path in paths.items() if path.is_file()}
 
 
-def _table(columns, rows):
-    """Lines of a Markdown table."""
-    lines = ["| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
-    return lines + ["| " + " | ".join(str(cell).replace("|", "/") for cell in row) + " |" for row in rows]
-
-
-def write_report(folder, path):
+def write_robustness_report(folder, path):
     """Write the Markdown report of every part that the folder holds; returns the path."""
     parts = stored_parts(folder)
     claims = [(TITLES[part], claim) for part, stored in parts.items() for claim in stored["claims"]]
@@ -359,12 +355,12 @@ def write_report(folder, path):
         [title, c["what"], c["count"], c["found"], c["target"], "holds" if c["holds"] else "**MISSED**"]
         for title, c in claims
     ]
-    lines += _table(columns, rows)
+    lines.append(markdown_table(columns, rows))
     for part, stored in parts.items():
         lines += ["", f"## {TITLES[part]}", "", METHODS[part], ""]
         lines.append(f"Run on {stored['date']}, {stored['minutes']:.1f} minutes.")
         for title, columns, rows in stored["tables"]:
-            lines += ["", f"**{title}**", "", *_table(columns, rows)]
+            lines += ["", f"**{title}**", "", markdown_table(columns, rows)]
     with replacing(path) as temporary:
         Path(temporary).write_text("\n".join(lines) + "\n", encoding="utf-8")
     return Path(path)
@@ -414,7 +410,8 @@ METHODS = {
         " Momenta and energies are computed from the mass matrix outside the stepping code."
     ),
     "plain": (
-        f"{stability_plain.STEPS} steps of each scene by each integrator, and {stability_plain.ENV_STEPS}"
-        " control periods of environments, in a process without the compiler, with the scenes handed over."
+        f"{stability_plain.STEPS_PER_SCENE} steps of each scene by each integrator, and"
+        f" {stability_plain.ENV_STEPS} control periods of environments, in a process without the compiler,"
+        " with the scenes handed over."
     ),
 }

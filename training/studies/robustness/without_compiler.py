@@ -22,7 +22,7 @@ from fowt_env.plant.rollout import advance, output_row
 from fowt_env.plant.state import State
 from fowt_env.scene.build import build_scene
 
-STEPS = 5
+STEPS_PER_SCENE = 5
 ENV_STEPS = 3
 SEA = {"kind": "jonswap", "Hs": 6.0, "Tp": 10.0}
 ENV = {"rotor": "bem", "wind": 18.0, "wave_components": 8}
@@ -80,8 +80,8 @@ def result(job):
         scene = given[0]
         x, handle = start(scene), scene.handle()
         u = np.array([4.0e4, 0.25])
-        status = advance(handle, x, u, 100, STEPS, 0.05)
-        row = output_row(scene.handle(), x, u, 5.0 + STEPS * 0.05, len(scene.channels))
+        status = advance(handle, x, u, 100, STEPS_PER_SCENE, 0.05)
+        row = output_row(scene.handle(), x, u, 5.0 + STEPS_PER_SCENE * 0.05, len(scene.channels))
         return np.r_[status, x, row]
     mode, snapshot = given
     rng = np.random.default_rng(3)

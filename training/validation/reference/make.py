@@ -106,11 +106,11 @@ def inputs(source):
 # region of the box: columns within this of the axis, rows up to this height, seconds
 SIDE, TOP, LENGTH = 68.0, 162.0, 612.0
 REACH = 78.0  # m from the hub: beyond it no blade station has a corner of its cell
-STEPS = np.array([0.04, 0.08, 0.08])  # m/s, rounding of u, v, w
+ROUNDING = np.array([0.04, 0.08, 0.08])  # m/s, rounding of u, v, w
 
 
 def box(source):
-    """The region of the TurbSim box that rotor and tower meet, rounded to STEPS, differences in time, lzma.
+    """The region of the TurbSim box that rotor and tower meet, rounded, differences in time, lzma.
 
     Points that neither meets are zero.
     """
@@ -124,7 +124,7 @@ def box(source):
     velocity = np.transpose(file["u"], (1, 3, 2, 0))[:count][:, rows][:, :, columns]
     y, z = y[columns], z[rows]
     used = (np.hypot(y[None, :], z[:, None] - 90.0) < REACH) | (np.abs(y[None, :]) < 8.0)
-    codes = np.round(velocity / STEPS).astype(np.int16) * used[None, :, :, None].astype(np.int16)
+    codes = np.round(velocity / ROUNDING).astype(np.int16) * used[None, :, :, None].astype(np.int16)
     steps = np.diff(codes, axis=0, prepend=np.zeros_like(codes[:1]))
     # components and points first: each point's history is then one run of bytes
     packed = np.ascontiguousarray(np.transpose(steps, (3, 1, 2, 0)))
@@ -137,7 +137,7 @@ def box(source):
         about="TurbSim IEC Kaimal 18 m/s class B, seed 180018, 21 x 21 points over 150 x 170 m, shear 0.14;"
         " region of rotor and tower, rounded; see make.py",
         shape=shape,
-        steps=STEPS,
+        steps=ROUNDING,
         y=y,
         z=z,
         dt=dt,

@@ -1,0 +1,18 @@
+"""Units of files, tables and pages, in SI: a figure times its unit is SI, and SI over it the figure."""
+
+from math import pi
+
+RPM = pi / 30.0  # rad/s
+DEGREE = pi / 180.0  # rad
+
+# Keys of files whose figures are in another unit than the field's: key in the file -> (field, unit).
+FILE_UNITS = {
+    "rated_rotor_speed_rpm": ("rated_rotor_speed", RPM),
+    "overspeed_rpm": ("overspeed", RPM),
+    "rate_limit_deg_per_s": ("rate_limit", DEGREE),
+    "minimum_deg": ("minimum", DEGREE),
+    "maximum_deg": ("maximum", DEGREE),
+    "azimuth_deg": ("azimuth", DEGREE),
+    "region3_min_pitch_deg": ("region3_min_pitch", DEGREE),
+    "gain_schedule_pitch_deg": ("gain_schedule_pitch", DEGREE),
+}

@@ -1,0 +1,88 @@
+"""The table of an evaluation read back: one set of checks for reports, scores and whatever else asks."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from fowt_env.errors import InputError, unknown
+from fowt_env.training.evaluation.faults import PARKED
+
+KEY = ["controller", "case", "seed"]  # what tells runs apart
+WORDS = ["status", "reason", "events"]  # columns of text beside those of KEY
+TABLES = ("results.csv", "metrics.csv")  # of a folder: the first that is there
+
+
+def read_results(paths, needed=(), cases=None, parked=True):
+    """DataFrame of the runs of fowt evaluate: controller, case, status, reason, seed, and figures as floats.
+
+    paths    a results folder or CSV file, or a sequence of them, whose runs are joined
+    needed   columns of figures that each of them must have
+    cases    names of the cases to keep; None: all
+    parked   whether the runs of parked turbines are kept, which have no controller
+    A figure that is missing or infinite is NaN; columns of other words are left out. A run that several of
+    the tables hold counts once.
+    Raises: InputError for what is no such table, for an unknown case, and where two tables hold the same run
+    with other figures.
+    """
+    given = [paths] if isinstance(paths, str | Path) else paths
+    tables = [_read_one(Path(path), needed) for path in given]
+    shared = [name for name in tables[0] if all(name in table for table in tables)]
+    table = pd.concat(tables, ignore_index=True)
+    table = table.drop_duplicates([name for name in shared if name != "reason"])
+    twice = table[table.duplicated(KEY)]
+    if len(twice):
+        name, case, seed = twice.iloc[0][KEY]
+        raise InputError(f"results: {name} on {case}, seed {seed}, is there twice with different figures")
+    if not parked:
+        table = table[table["controller"] != PARKED]
+    if cases is not None:
+        known = list(dict.fromkeys(table["case"]))
+        for name in cases:
+            if name not in known:
+                raise unknown("case of the evaluation", name, known)
+        table = table[table["case"].isin(cases)]
+    return table.reset_index(drop=True)
+
+
+def _table_file(path):
+    """File of the table of a folder, or the file itself. Raises: InputError."""
+    files = [path / name for name in TABLES] if path.is_dir() else [path]
+    found = next((file for file in files if file.is_file()), None)
+    if found is None:
+        lack = "holds no results.csv" if path.is_dir() else "is no such file or folder"
+        raise InputError(f"results {str(path)!r} {lack}: make it with fowt evaluate --out FOLDER")
+    return found
+
+
+def _read_one(path, needed):
+    """The checked table of one folder or file."""
+    file = _table_file(path)
+    where = f"table {str(file)!r}"
+    try:
+        texts = pd.read_csv(file, dtype=str, keep_default_na=False, encoding="utf-8")
+    except (ValueError, pd.errors.ParserError) as error:
+        raise InputError(f"{where} cannot be read: {error}") from None
+    missing = [name for name in (*KEY, "status", *needed) if name not in texts.columns]
+    if missing:
+        raise InputError(f"{where} lacks the columns {', '.join(missing)}")
+    if texts.empty:
+        raise InputError(f"{where} has no runs")
+    table = texts[["controller", "case", "status"]].copy()
+    table["reason"] = texts["reason"] if "reason" in texts.columns else ""
+    try:
+        table["seed"] = pd.to_numeric(texts["seed"]).astype(int)
+    except (ValueError, TypeError, OverflowError) as error:
+        raise InputError(f"{where}: column seed must hold whole numbers ({error})") from None
+    figures = {}
+    for name in texts.columns.drop([n for n in (*KEY, *WORDS) if n in texts.columns]):
+        numbers = pd.to_numeric(texts[name].replace("", "nan"), errors="coerce")
+        given = ~texts[name].str.lower().isin(["", "nan"])
+        if numbers.notna().sum() == given.sum():  # else a column of words
+            figures[name] = numbers.astype(float).replace([np.inf, -np.inf], np.nan)
+        elif name in needed:
+            raise InputError(f"{where}: column {name} must hold numbers")
+    table = pd.concat([table, pd.DataFrame(figures, index=table.index)], axis=1)
+    if table.duplicated(KEY).any():
+        raise InputError(f"{where}: a controller, case and seed occur twice")
+    return table
