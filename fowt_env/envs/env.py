@@ -24,11 +24,11 @@ from fowt_env.envs.episode import (
     RUNNING,
     SHOWN_COUNTS,
     STEP,
-    Run,
-    Setting,
+    EpisodeConfig,
+    EpisodeData,
     act,
     act_physical,
-    show_again,
+    rewrite_observation,
     start,
 )
 from fowt_env.envs.observations import (
@@ -188,7 +188,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self._key = plant_key(self.scene)
         self._build(MODES[action_mode], per_control)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (N_ACTIONS,), np.float32)
-        low, high = self._setting.chosen.low, self._setting.chosen.high
+        low, high = self._config.observation_map.low, self._config.observation_map.high
         self.observation_space = gymnasium.spaces.Box(low.astype(np.float32), high.astype(np.float32))
         self._running = False
         # what a snapshot must agree with: the same numbers then mean the same
@@ -202,7 +202,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         other._np_random = other._np_random_seed = None
         other._running = False
         other._view = None
-        other._build(MODES[self.action_mode], self._setting.per_control)
+        other._build(MODES[self.action_mode], self._config.per_control)
         return other
 
     def _build(self, mode, per_control):
@@ -222,12 +222,12 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             watch = self._estimator.law
         watching, sensed = self._estimator is not None, self._sensors is not None
         self._law, self._watch = Handle(None, law), Handle(None, watch)
-        self._setting = Setting(
+        self._config = EpisodeConfig(
             model=scene.model,
             actions=build_action_map(mode, task, turbine, self.control_dt),
             parameters=parameters,
             estimator=self._estimator.parameters if watching else None,
-            chosen=build_observation_map(chosen, task.wind_preview),
+            observation_map=build_observation_map(chosen, task.wind_preview),
             scales=build_scales(turbine, self.control_dt),
             weights=weight_array(task.weights),
             overspeed=float(turbine.overspeed),
@@ -237,7 +237,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         )
         n = scene.n_state
         measurement = np.zeros(N_MEASUREMENTS)
-        self._run = Run(
+        self._episode = EpisodeData(
             data=scene.data(),
             x=np.zeros(n),
             u=np.zeros(2),
@@ -246,13 +246,13 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             action=np.zeros(N_ACTIONS),
             measurement=measurement,
             reading=np.zeros(N_MEASUREMENTS) if sensed else measurement,
-            past=np.zeros((self._sensors["delay"] + 1, N_MEASUREMENTS)) if sensed else None,
+            delay_buffer=np.zeros((self._sensors["delay"] + 1, N_MEASUREMENTS)) if sensed else None,
             observation=np.zeros(len(chosen), dtype=np.float32),
             counts=np.zeros(N_COUNTS, dtype=np.int64),
             reference=np.zeros(len(Reference._fields)),
-            before=np.zeros(N_MEASUREMENTS),
+            previous_measurement=np.zeros(N_MEASUREMENTS),
             dx=np.zeros(n),
-            wanted=np.zeros(2),
+            baseline_command=np.zeros(2),
             signals=np.zeros(PREVIEW + len(task.wind_preview)),
             terms=np.zeros(N_TERMS),
         )
@@ -275,7 +275,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         find = exact_trim if episode.exact_start else near_trim
         state, command = find(scene, self._key, scene.wind_speed)
         self._enter(scene)
-        run = self._run
+        run = self._episode
         run.x[:] = state
         run.u[:] = command
         reference = Reference(float(state[State.PLATFORM_PITCH]), float(state[State.ROTOR_SPEED]))
@@ -285,7 +285,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self.restart_loops()
         if self._estimator is not None:
             self._estimator.reset(self.measurement())
-            show_again(self._handle)
+            rewrite_observation(self._handle)
         self._running = True
         info = {
             "time": 0.0,
@@ -304,12 +304,12 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         """
         if self._baseline is not None:
             self._baseline.reset(self.measurement())
-        elif self._setting.actions.mode == Mode.SETPOINT:
-            start_tracking(self._run.memory, self.measurement(), self._setting.actions)
+        elif self._config.actions.mode == Mode.SETPOINT:
+            start_tracking(self._episode.memory, self.measurement(), self._config.actions)
 
     def _offset(self, offsets):
         """Move the state by {channel: offset in the channel's unit}."""
-        x, drive = self._run.x, self.scene.turbine.pitch_drive
+        x, drive = self._episode.x, self.scene.turbine.pitch_drive
         for name, value in offsets.items():
             index, factor = INITIAL[name]
             x[index] += value * factor
@@ -319,7 +319,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
                 f" {x[State.PLATFORM_PITCH] * DEG:g} deg, must stay inside (-90, 90) deg"
             )
         x[State.BLADE_PITCH] = min(max(x[State.BLADE_PITCH], drive.minimum), drive.maximum)
-        self._run.u[Command.BLADE_PITCH] = x[State.BLADE_PITCH]
+        self._episode.u[Command.BLADE_PITCH] = x[State.BLADE_PITCH]
 
     def step(self, action: npt.ArrayLike) -> StepResult:
         """(observation, reward, terminated, truncated, info) after one control period."""
@@ -350,7 +350,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
     def _result(self, status, reward):
         """What step returns, from the status and reward of a control period."""
-        run = self._run
+        run = self._episode
         step = int(run.counts[STEP])
         info = dict(zip(REWARD_KEYS, run.terms.tolist(), strict=True))
         info["time"] = step * self.dt
@@ -367,7 +367,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
     def _reason(self, status):
         """Why an episode was terminated, with the load of the user's that is to blame, if one is."""
-        fault = self.scene.first_nonfinite_load(self._run.data)
+        fault = self.scene.first_nonfinite_load(self._episode.data)
         return f"{STOP_REASONS[status]}: {fault}" if fault else STOP_REASONS[status]
 
     def get_state(self) -> Snapshot:
@@ -378,7 +378,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         """
         if self._handle is None:
             raise ResetNeeded("call reset() first: there is no state yet")
-        run = self._run
+        run = self._episode
         found = [getattr(run, name) for name in CARRIED] + [getattr(run.data, name) for name in DATA_CARRIED]
         arrays = [None if array is None else array.copy() for array in found]
         generator = None if self._np_random is None else self._np_random.bit_generator.state
@@ -395,7 +395,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             )
         if snapshot.scene is not self.scene or self._handle is None:
             self._enter(snapshot.scene)
-        run, data = self._run, self._run.data
+        run, data = self._episode, self._episode.data
         arrays = iter(snapshot.arrays)
         for name in CARRIED:
             array, saved = getattr(run, name), next(arrays)
@@ -411,30 +411,30 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self._np_random_seed = snapshot.seed
 
     def _enter(self, scene):
-        """Run in the scene's weather from now on, with new scratch: its size follows the wave components."""
+        """Run in the scene's weather from now on, with new data: their size follows the wave components."""
         self.scene = scene
-        self._run = self._run._replace(data=scene.data())
-        self._setting = self._setting._replace(model=scene.model)
+        self._episode = self._episode._replace(data=scene.data())
+        self._config = self._config._replace(model=scene.model)
         if self._sensors is not None:
-            readings = self._last // self._setting.per_control + 1
+            readings = self._last // self._config.per_control + 1
             scales = reading_scales(scene.turbine)
             drawn = draw_sensors(self._sensors["noise"], self._sensors["delay"], scales, scene.seed, readings)
-            self._setting = self._setting._replace(sensors=drawn)
+            self._config = self._config._replace(sensors=drawn)
         if self._nominal is not None and (self._baseline is not None or self._estimator is not None):
             self._nominal = self._nominal.with_weather(scene.wind, scene.sea, scene.seed)
         if self._baseline is not None:
             self._baseline.prepare(self.design_scene)
-            self._setting = self._setting._replace(parameters=self._baseline.parameters)
+            self._config = self._config._replace(parameters=self._baseline.parameters)
         if self._estimator is not None:
             self._estimator.prepare(self.design_scene)
-            self._setting = self._setting._replace(estimator=self._estimator.parameters)
-        self._handle = Handle(self._setting, self._run)
+            self._config = self._config._replace(estimator=self._estimator.parameters)
+        self._handle = Handle(self._config, self._episode)
 
     def measurement(self) -> Measurement:
         """Measurement that a controller is given now (SI), as the sensors read it."""
         if self._handle is None:
             raise ResetNeeded("call reset() first: nothing has been measured yet")
-        return Measurement(*self._run.reading.tolist())
+        return Measurement(*self._episode.reading.tolist())
 
     @property
     def design_scene(self) -> Scene:
@@ -445,7 +445,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         """{OpenFAST channel: value in its unit} of the present instant; leaves the run as it is."""
         if self._handle is None:
             raise ResetNeeded("call reset() first: there is no state yet")
-        run, scene = self._run, self.scene
+        run, scene = self._episode, self.scene
         data = scene.data()
         # what an evaluation at this instant has left
         for name in ("lines", "stages", "cache", "added_mass", "user"):

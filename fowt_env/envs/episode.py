@@ -1,7 +1,7 @@
 """One control period of an environment as one compiled call: command, physics, measurement, reward.
 
-Everything that a period reads is a Setting, everything it writes a Run: arrays of one environment,
-so that many environments are rows of larger ones.
+Everything that a period reads is an EpisodeConfig, everything it writes EpisodeData: arrays of one
+environment, so that many environments are rows of larger ones.
 """
 
 from math import isfinite
@@ -22,20 +22,20 @@ from fowt_env.plant.rollout import NON_FINITE, OVERSPEED, RUNNING, advance_plant
 from fowt_env.plant.state import Command, State
 
 BAD_ACTION = -1  # beside the statuses of rollout.py
-STEP, SATURATED, LIMITED = 0, 1, 2  # entries of Run.counts
+STEP, SATURATED, LIMITED = 0, 1, 2  # entries of EpisodeData.counts
 N_COUNTS = 3
 SHOWN_COUNTS = {"saturated_actions": SATURATED, "torque_limited": LIMITED}  # in the infos
 
 
 @by_reference
-class Setting(NamedTuple):
+class EpisodeConfig(NamedTuple):
     """What stays fixed during an episode."""
 
     model: Model
     actions: ActionMap
     parameters: np.ndarray  # of the baseline law
     estimator: np.ndarray | None  # parameters of the estimator's law
-    chosen: ObservationMap
+    observation_map: ObservationMap
     scales: Scales
     weights: np.ndarray  # (N_TERMS,)
     overspeed: float  # rad/s
@@ -45,7 +45,7 @@ class Setting(NamedTuple):
 
 
 @by_reference
-class Run(NamedTuple):
+class EpisodeData(NamedTuple):
     """What moves during an episode; the arrays down to reference are its whole state."""
 
     data: Data
@@ -56,14 +56,14 @@ class Run(NamedTuple):
     action: np.ndarray  # (2,) last accepted action
     measurement: np.ndarray  # (N_MEASUREMENTS,) at the present instant
     reading: np.ndarray  # the same as sensors show it; without any the measurement itself
-    past: np.ndarray | None  # last measurements, of the sensors' delay
+    delay_buffer: np.ndarray | None  # last measurements, of the sensors' delay
     observation: np.ndarray  # (n,) float32
     # int64: physics steps done, control periods with a clipped action, those with a torque at its limits
     counts: np.ndarray
     reference: np.ndarray  # rewards.Reference of the episode
-    before: np.ndarray  # (N_MEASUREMENTS,) scratch from here on: one control period ago
+    previous_measurement: np.ndarray  # (N_MEASUREMENTS,) scratch from here on: one control period ago
     dx: np.ndarray  # (n_state,)
-    wanted: np.ndarray  # (2,) command of the last period, before the generator's limits
+    baseline_command: np.ndarray  # (2,) command of the last period, before the generator's limits
     signals: np.ndarray  # what observations are made of
     terms: np.ndarray  # (N_TERMS,) of the last period
 
@@ -76,82 +76,88 @@ def copy_into(target, source):
 
 
 @kernel
-def look(setting, run):
+def measure_and_sense(config, episode):
     """Measure and read at the present instant; RUNNING, or NON_FINITE with the last measurement kept."""
-    model = setting.model
-    t = run.counts[STEP] * setting.dt
-    observe_plant(model, run.data, run.x, run.u, t, run.dx, run.measurement)
-    for value in run.measurement:
+    model = config.model
+    t = episode.counts[STEP] * config.dt
+    observe_plant(model, episode.data, episode.x, episode.u, t, episode.dx, episode.measurement)
+    for value in episode.measurement:
         if not isfinite(value):
-            copy_into(run.measurement, run.before)
+            copy_into(episode.measurement, episode.previous_measurement)
             return NON_FINITE
-    period = run.counts[STEP] // setting.per_control
-    take_reading(setting.sensors, period, run.measurement, run.past, run.reading)
+    period = episode.counts[STEP] // config.per_control
+    take_reading(config.sensors, period, episode.measurement, episode.delay_buffer, episode.reading)
     return RUNNING
 
 
 @kernel
-def show(setting, run):
+def write_observation(config, episode):
     """Fill the observation from the present reading."""
-    t = run.counts[STEP] * setting.dt
-    chosen = setting.chosen
+    t = episode.counts[STEP] * config.dt
+    shown = config.observation_map
     fill_signals(
-        t, setting.model, run.x, run.reading, run.action, run.estimate, chosen.preview, run.signals
-    )
-    fill_observation(run.signals, chosen, run.observation)
+        t, config.model, episode.x, episode.reading, episode.action, episode.estimate, shown.preview,
+        episode.signals,
+    )  # fmt: skip
+    fill_observation(episode.signals, shown, episode.observation)
 
 
 @entry
 def start(handle):
     """Measure and show the first instant of an episode; returns the status."""
-    setting, run = model_of(handle), data_of(handle)
+    config, episode = model_of(handle), data_of(handle)
     for i in range(N_COUNTS):
-        run.counts[i] = 0
-    run.data.cache[LoadCache.TORQUE_LIMITED] = 0.0
-    run.data.cache[LoadCache.VALID] = 0.0
-    run.data.cache[LoadCache.STEPS] = 0.0
-    status = look(setting, run)
-    copy_into(run.before, run.measurement)
-    action_of(run.u, run.x[State.ROTOR_SPEED], setting.actions, run.action)
-    show(setting, run)
+        episode.counts[i] = 0
+    episode.data.cache[LoadCache.TORQUE_LIMITED] = 0.0
+    episode.data.cache[LoadCache.VALID] = 0.0
+    episode.data.cache[LoadCache.STEPS] = 0.0
+    status = measure_and_sense(config, episode)
+    copy_into(episode.previous_measurement, episode.measurement)
+    action_of(episode.u, episode.x[State.ROTOR_SPEED], config.actions, episode.action)
+    write_observation(config, episode)
     return status
 
 
 @entry
-def show_again(handle):
+def rewrite_observation(handle):
     """Fill the observation anew, after an estimator was started."""
-    show(model_of(handle), data_of(handle))
+    write_observation(model_of(handle), data_of(handle))
 
 
 @kernel
-def update_estimate(law, setting, run):
+def update_estimate(law, config, episode):
     """Take the period that is over, its command and what is read now into the estimate."""
     if law is None:
         return
-    law(setting.estimator, run.estimate, run.reading, run.u)
+    law(config.estimator, episode.estimate, episode.reading, episode.u)
 
 
 @kernel
-def advance_period(setting, run, estimator):
-    """Advance one control period under run.u, measure, observe and pay; returns (status, reward)."""
-    torque, wanted = run.u[Command.GENERATOR_TORQUE], run.wanted[Command.GENERATOR_TORQUE]
-    was_limited = torque_was_limited(torque, wanted, setting.model.generator)
-    run.counts[LIMITED] += was_limited
-    run.data.cache[LoadCache.TORQUE_LIMITED] = 1.0 if was_limited else 0.0
-    copy_into(run.before, run.measurement)
-    first = run.counts[STEP]
-    status = advance_plant(setting.model, run.data, run.x, run.u, first, setting.per_control, setting.dt)
-    run.counts[STEP] = first + setting.per_control
+def advance_period(config, episode, estimator):
+    """Advance one control period under episode.u, measure, observe and pay; returns (status, reward)."""
+    torque, wanted = episode.u[Command.GENERATOR_TORQUE], episode.baseline_command[Command.GENERATOR_TORQUE]
+    was_limited = torque_was_limited(torque, wanted, config.model.generator)
+    episode.counts[LIMITED] += was_limited
+    episode.data.cache[LoadCache.TORQUE_LIMITED] = 1.0 if was_limited else 0.0
+    copy_into(episode.previous_measurement, episode.measurement)
+    first = episode.counts[STEP]
+    status = advance_plant(
+        config.model, episode.data, episode.x, episode.u, first, config.per_control, config.dt
+    )
+    episode.counts[STEP] = first + config.per_control
     if status != NON_FINITE:
-        seen = look(setting, run)
+        seen = measure_and_sense(config, episode)
         if seen != RUNNING:
             status = seen
-    if status == RUNNING and run.measurement[Measure.ROTOR_SPEED] > setting.overspeed:
+    if status == RUNNING and episode.measurement[Measure.ROTOR_SPEED] > config.overspeed:
         status = OVERSPEED
-    update_estimate(estimator, setting, run)
-    show(setting, run)
-    fill_terms(run.measurement, run.before, run.reference, status != RUNNING, setting.scales, run.terms)
-    return status, weighted_sum(setting.weights, run.terms)
+    update_estimate(estimator, config, episode)
+    write_observation(config, episode)
+    fill_terms(
+        episode.measurement, episode.previous_measurement, episode.reference, status != RUNNING, config.scales,
+        episode.terms,
+    )  # fmt: skip
+    return status, weighted_sum(config.weights, episode.terms)
 
 
 @entry
@@ -161,16 +167,16 @@ def act(handle, law, estimator, action):
     law, estimator: Handles whose data is the control kernel of the baseline and of the estimator, or None;
     Python takes ten times as long to hand over a kernel itself. BAD_ACTION leaves everything as it was.
     """
-    setting, run = model_of(handle), data_of(handle)
-    clipped = accept(action, run.action)
+    config, episode = model_of(handle), data_of(handle)
+    clipped = accept(action, episode.action)
     if clipped < 0:
         return BAD_ACTION, 0.0
-    run.counts[SATURATED] += clipped
+    episode.counts[SATURATED] += clipped
     command_of(
-        run.action, setting.actions, law.data, setting.parameters, run.memory, run.reading, run.u,
-        run.wanted,
+        episode.action, config.actions, law.data, config.parameters, episode.memory, episode.reading,
+        episode.u, episode.baseline_command,
     )  # fmt: skip
-    return advance_period(setting, run, estimator.data)
+    return advance_period(config, episode, estimator.data)
 
 
 @entry
@@ -179,13 +185,13 @@ def act_physical(handle, estimator, torque, blade_pitch):
 
     estimator: as act takes it.
     """
-    setting, run = model_of(handle), data_of(handle)
-    run.wanted[Command.GENERATOR_TORQUE] = torque
-    run.wanted[Command.BLADE_PITCH] = blade_pitch
-    before = run.u[Command.GENERATOR_TORQUE]
-    run.u[Command.GENERATOR_TORQUE] = followed_torque(
-        before, torque, setting.actions.control_dt, setting.model.generator
+    config, episode = model_of(handle), data_of(handle)
+    episode.baseline_command[Command.GENERATOR_TORQUE] = torque
+    episode.baseline_command[Command.BLADE_PITCH] = blade_pitch
+    before = episode.u[Command.GENERATOR_TORQUE]
+    episode.u[Command.GENERATOR_TORQUE] = followed_torque(
+        before, torque, config.actions.control_dt, config.model.generator
     )
-    run.u[Command.BLADE_PITCH] = blade_pitch
-    action_of(run.u, run.x[State.ROTOR_SPEED], setting.actions, run.action)
-    return advance_period(setting, run, estimator.data)
+    episode.u[Command.BLADE_PITCH] = blade_pitch
+    action_of(episode.u, episode.x[State.ROTOR_SPEED], config.actions, episode.action)
+    return advance_period(config, episode, estimator.data)

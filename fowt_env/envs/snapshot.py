@@ -3,11 +3,11 @@
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-# arrays of episode.Run that outlive a control period, and of dynamics.Work: those that carry over, and
-# stages, whose first row holds the wake's rates as long as the kept loads are fresh
+# arrays of episode.EpisodeData that outlive a control period, and of plant.model.Data: those that carry
+# over, and stages, whose first row holds the wake's rates as long as the kept loads are fresh
 CARRIED = (
-    "x", "u", "memory", "estimate", "action", "measurement", "reading", "past", "observation", "counts",
-    "reference", "terms",
+    "x", "u", "memory", "estimate", "action", "measurement", "reading", "delay_buffer", "observation",
+    "counts", "reference", "terms",
 )  # fmt: skip
 DATA_CARRIED = ("lines", "counters", "stages", "cache", "added_mass", "user", "history", "samples")
 

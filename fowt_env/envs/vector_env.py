@@ -110,7 +110,7 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         self._counts = np.zeros((n, N_COUNTS), dtype=np.int64)
         self._terms = np.zeros((n, N_TERMS))
         for i, env in enumerate(self.envs):
-            env._run = env._run._replace(
+            env._episode = env._episode._replace(
                 observation=self._observations[i], counts=self._counts[i], terms=self._terms[i]
             )
 
@@ -380,10 +380,10 @@ def _check_alike(i, env, first):
         raise InputError(f"per_env[{i}]: action_mode = {env.action_mode!r}: must be {first.action_mode!r}")
     if numba.config.DISABLE_JIT:
         return
-    kinds = [numba.typeof(Handle(e._setting, e._run)) for e in (first, env)]
+    kinds = [numba.typeof(Handle(e._config, e._episode)) for e in (first, env)]
     if kinds[0] == kinds[1]:
         return
-    models = [e.scene.model._asdict() | {"sensors": e._setting.sensors} for e in (first, env)]
+    models = [e.scene.model._asdict() | {"sensors": e._config.sensors} for e in (first, env)]
     parts = [n for n in models[0] if numba.typeof(models[0][n]) != numba.typeof(models[1][n])]
     raise InputError(
         f"per_env[{i}]: another compiled kind than the first, in {', '.join(parts)}; use the same"

@@ -250,7 +250,7 @@ def test_residual_actions_add_to_the_baseline_within_their_limits():
     law = moved.scene.turbine.torque_law
     difference = moved.measurement().generator_torque - plain.measurement().generator_torque
     assert difference == pytest.approx(-0.2 * 0.1 * law.rated_torque, rel=1e-9)
-    assert moved._run.u[1] - plain._run.u[1] == pytest.approx(np.radians(2.0), rel=1e-9)
+    assert moved._episode.u[1] - plain._episode.u[1] == pytest.approx(np.radians(2.0), rel=1e-9)
 
 
 def channel_rows(env, commands):
@@ -314,7 +314,7 @@ def test_looking_at_channels_leaves_the_run_as_it_is():
     for _ in range(20):
         env.channels()
         assert np.array_equal(env.step((0.3, 0.1))[0], other.step((0.3, 0.1))[0])
-    assert np.array_equal(env._run.x, other._run.x)
+    assert np.array_equal(env._episode.x, other._episode.x)
     assert set(env.channels()) == {c.name for c in env.scene.channels}
 
 
@@ -357,7 +357,7 @@ def test_capsize_ends_the_episode():
 def test_a_state_that_is_not_finite_ends_the_episode_with_a_finite_observation():
     env = quick()
     env.reset(seed=1)
-    env.unwrapped._run.x[State.VX] = np.inf
+    env.unwrapped._episode.x[State.VX] = np.inf
     observation, reward, terminated, _, info = env.step_physical(4e4, 0.1)
     assert terminated and info["termination"] == "non-finite state"
     assert np.isfinite(reward) and observation in env.observation_space
@@ -419,7 +419,7 @@ def test_episodes_start_at_the_operating_point_of_their_mean_wind():
     env = quick()
     env.reset(seed=0, options=FIXED)
     point = fowt_env.trim(env.scene)
-    assert np.array_equal(env._run.x, point.state) and np.array_equal(env._run.u, point.command)
+    assert np.array_equal(env._episode.x, point.state) and np.array_equal(env._episode.u, point.command)
 
 
 def test_interpolated_operating_points_are_near_the_exact_ones():

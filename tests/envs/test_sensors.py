@@ -26,10 +26,10 @@ NOMINAL = {"platform": "oc3_hywind"}
 def run(env, steps=40, seed=3, reset_seed=4, reach=1.0):
     """Observations of actions drawn with a seed, and all measurements and readings."""
     rng = np.random.default_rng(seed)
-    rows = [(env.reset(seed=reset_seed)[0], env._run.measurement.copy(), env._run.reading.copy())]
+    rows = [(env.reset(seed=reset_seed)[0], env._episode.measurement.copy(), env._episode.reading.copy())]
     for _ in range(steps):
         observation = env.step(rng.uniform(-reach, reach, 2))[0]
-        rows.append((observation, env._run.measurement.copy(), env._run.reading.copy()))
+        rows.append((observation, env._episode.measurement.copy(), env._episode.reading.copy()))
     return [np.array(column) for column in zip(*rows, strict=True)]
 
 
@@ -38,7 +38,8 @@ def test_sensors_without_noise_and_delay_change_no_bit(settings):
     plain, exact = FowtEnv(**settings, **QUICK), FowtEnv(**settings, sensors={}, **QUICK)
     for one, other in zip(run(plain), run(exact), strict=True):
         assert np.array_equal(one, other)
-    assert np.array_equal(plain._run.x, exact._run.x) and np.array_equal(plain._run.u, exact._run.u)
+    assert np.array_equal(plain._episode.x, exact._episode.x)
+    assert np.array_equal(plain._episode.u, exact._episode.u)
 
 
 def test_designing_on_the_very_plant_changes_no_bit():
@@ -57,7 +58,7 @@ def test_a_reading_is_what_was_measured_before_and_noise_of_the_stated_size():
     assert np.abs(noise.std(axis=0) - 1.0).max() < 0.1 and np.abs(noise.mean(axis=0)).max() < 0.1
     assert np.abs(np.corrcoef(noise.T) - np.eye(N_MEASUREMENTS - 1)).max() < 0.12
     rated = env.scene.turbine.rated_rotor_speed
-    seen = env._run.observation[0] * 0.2 * rated + rated
+    seen = env._episode.observation[0] * 0.2 * rated + rated
     assert seen == pytest.approx(read[-1, Measure.ROTOR_SPEED], rel=1e-6)
     assert env.measurement() == Measurement(*read[-1].tolist())
 
@@ -80,17 +81,18 @@ def test_observation_baseline_and_estimator_are_given_the_same_reading(sensors):
         other = hand.step_physical(*law.act(hand.measurement()))[0]
         both = [np.delete(seen, [2, 3]) for seen in (observation, other)]  # the last action differs by mode
         assert np.array_equal(*both)
-        assert np.array_equal(env._run.u, hand._run.u) and np.array_equal(env._run.x, hand._run.x)
-        call_law(watch.kernel, watch.parameters, watch.memory, np.array(hand.measurement()), hand._run.u)
-        assert np.array_equal(watch.memory, env._run.estimate)
+        assert np.array_equal(env._episode.u, hand._episode.u)
+        assert np.array_equal(env._episode.x, hand._episode.x)
+        call_law(watch.kernel, watch.parameters, watch.memory, np.array(hand.measurement()), hand._episode.u)
+        assert np.array_equal(watch.memory, env._episode.estimate)
 
 
 def test_noise_reaches_baseline_and_estimator_but_not_the_reward():
     exact, degraded = FowtEnv(**ON_LQR, **QUICK), FowtEnv(sensors={"noise": 0.05}, **ON_LQR, **QUICK)
     exact.reset(seed=6), degraded.reset(seed=6)
-    assert not np.array_equal(exact._run.estimate, degraded._run.estimate)
+    assert not np.array_equal(exact._episode.estimate, degraded._episode.estimate)
     exact.step(np.zeros(2)), degraded.step(np.zeros(2))
-    assert exact._run.u[1] != degraded._run.u[1]
+    assert exact._episode.u[1] != degraded._episode.u[1]
     deaf = {"action_mode": "direct", "observation": ("rotor_speed",)}
     exact, degraded = FowtEnv(**deaf, **QUICK), FowtEnv(sensors={"noise": 0.05}, **deaf, **QUICK)
     exact.reset(seed=6), degraded.reset(seed=6)
@@ -152,8 +154,8 @@ def test_the_drawn_plant_is_not_leaked_to_lqr_estimator_preview_and_safety_layer
     leaked = FowtEnv(**ON_LQR, **SHIFTED, **QUICK)
     for env, same in ((told, True), (leaked, False)):
         env.reset(seed=1)
-        assert np.array_equal(env._setting.parameters, nominal._setting.parameters) is same
-        assert np.array_equal(env._setting.estimator, nominal._setting.estimator) is same
+        assert np.array_equal(env._config.parameters, nominal._config.parameters) is same
+        assert np.array_equal(env._config.estimator, nominal._config.estimator) is same
     assert told.scene.platform.hydro != nominal.scene.platform.hydro  # it is another plant that moves
     feedforward = {"action_mode": "residual", "baseline": "preview"}
     heavy_air = plant_settings({"air_density": 1.04})
@@ -163,8 +165,8 @@ def test_the_drawn_plant_is_not_leaked_to_lqr_estimator_preview_and_safety_layer
     for seed in (1, 2):  # the wind foreseen is that of each episode
         for env in (nominal, told, leaked):
             env.reset(seed=seed)
-        assert np.array_equal(told._setting.parameters, nominal._setting.parameters)
-        assert not np.array_equal(leaked._setting.parameters, nominal._setting.parameters)
+        assert np.array_equal(told._config.parameters, nominal._config.parameters)
+        assert not np.array_equal(leaked._config.parameters, nominal._config.parameters)
     guarded = SafetyLayer(FowtEnv(nominal_plant=NOMINAL, **ON_LQR, **SHIFTED, **QUICK), baseline="lqr")
     guarded.reset(seed=1)
     law = make("lqr", guarded.unwrapped.design_scene.turbine, 0.1)

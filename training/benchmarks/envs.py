@@ -67,7 +67,7 @@ def arrays_of(part):
 
 def own_bytes(envs):
     """Mean bytes of the arrays that each environment has for itself: those no other one holds."""
-    held = [{id(a): a.nbytes for a in (*arrays_of(env._setting), *arrays_of(env._run))} for env in envs]
+    held = [{id(a): a.nbytes for a in (*arrays_of(env._config), *arrays_of(env._episode))} for env in envs]
     holders = Counter(key for own in held for key in own)
     return sum(n for own in held for key, n in own.items() if holders[key] == 1) / len(envs)
 

@@ -38,7 +38,7 @@ class DecisionVecEnv(VecEnvWrapper):
         self._decision = np.zeros_like(self.decisions.action)
 
     def _actions_in_force(self):
-        return np.array([env._run.action for env in self.base.env.envs])
+        return np.array([env._episode.action for env in self.base.env.envs])
 
     def reset(self):
         """Features (n, size) at the start of new episodes."""
@@ -68,7 +68,7 @@ class DecisionVecEnv(VecEnvWrapper):
                     last = infos[i]["terminal_observation"]
                     infos[i]["terminal_observation"] = decisions.last_features(i, last)
                 ended[i] = True
-                decisions.action[i] = self.base.env.envs[i]._run.action
+                decisions.action[i] = self.base.env.envs[i]._episode.action
                 self._decision[i] = decisions.action[i]
         decisions.see(observations)
         for i in np.flatnonzero(ended):
@@ -127,7 +127,7 @@ class ValidationVecEnv(FowtSB3VecEnv):
             self._failed[i] = not infos[i]["TimeLimit.truncated"]
         self._over |= dones
         if self._clock < len(self._record):
-            row = np.array([env._run.measurement for env in self.env.envs])[:, RECORDED]
+            row = np.array([env._episode.measurement for env in self.env.envs])[:, RECORDED]
             self._record[self._clock, ~self._over] = row[~self._over]
         self._clock += 1
         return result

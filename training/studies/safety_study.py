@@ -46,7 +46,7 @@ class Trained:
         """Start an episode."""
         settings = DecisionSettings(**self.settings["decisions"])
         self.decisions = Decisions(1, len(observation), settings, self.settings["control_dt"])
-        self.decisions.restart(0, observation, env.unwrapped._run.action)
+        self.decisions.restart(0, observation, env.unwrapped._episode.action)
         self.periods = 0
 
     def act(self, observation):

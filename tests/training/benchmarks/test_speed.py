@@ -119,7 +119,7 @@ def test_memory_of_an_environment_is_what_no_other_one_holds():
     envs = [FowtEnv(fidelity="fast", duration=10.0)]
     envs.append(envs[0].twin())
     own = benchmark_envs.own_bytes(envs)
-    shared = max(a.nbytes for a in benchmark_envs.arrays_of(envs[0]._setting))
+    shared = max(a.nbytes for a in benchmark_envs.arrays_of(envs[0]._config))
     assert 100.0 < own < shared
 
 

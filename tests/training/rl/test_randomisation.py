@@ -52,13 +52,13 @@ def test_environments_share_a_pool_of_plants_and_differ_within_it():
 
 def test_the_plain_task_is_not_randomised_and_the_robust_one_is():
     plain, judge = make_envs(small("ppo"))
-    assert {env._setting.sensors for env in environments(plain)} == {None}
+    assert {env._config.sensors for env in environments(plain)} == {None}
     settings = small("ppo") | {"environment": small("ppo")["environment"] | {"randomise": {"plants": 2}}}
     robust, judge = make_envs(settings)
     assert len({env.scene.platform.ballast.mass for env in environments(robust)}) == 2
     assert len({env._sensors["noise"] for env in environments(robust)}) == 2
     assert len({env.scene.platform.ballast.mass for env in environments(judge)}) == 1
-    assert {env._setting.sensors for env in environments(judge)} == {None}
+    assert {env._config.sensors for env in environments(judge)} == {None}
     for algo in ("ppo", "sac", "tqc"):
         assert "randomise" in resolve(algo, "above_rated_robust", 0, 1)["environment"]
         assert "randomise" not in resolve(algo, "above_rated", 0, 1)["environment"]
@@ -76,11 +76,11 @@ def test_on_drawn_plants_baseline_and_estimator_are_those_of_the_plant_in_the_fi
     drawn = chosen | {"environment": chosen["environment"] | {"randomise": {"plants": 2}}}
     plain, robust = make_envs(chosen)[0], make_envs(drawn)[0]
     plain.reset(), robust.reset()
-    reference = environments(plain)[0]._setting
+    reference = environments(plain)[0]._config
     for env in environments(robust):
         assert env.scene.platform != environments(plain)[0].scene.platform
-        assert np.array_equal(env._setting.parameters, reference.parameters)
-        assert np.array_equal(env._setting.estimator, reference.estimator)
+        assert np.array_equal(env._config.parameters, reference.parameters)
+        assert np.array_equal(env._config.estimator, reference.estimator)
 
 
 def test_sensors_of_the_validation_go_round_the_seeds_of_each_wind():

@@ -297,7 +297,7 @@ def attack(env, policy, seed, steps=HOSTILE_STEPS):
         finite = finite and bool(np.all(np.isfinite(observation))) and isfinite(reward)
         if terminated:
             reasons[info["termination"]] = reasons.get(info["termination"], 0) + 1
-        elif not np.all(np.isfinite(env._run.x)):
+        elif not np.all(np.isfinite(env._episode.x)):
             finite = False
         if terminated or truncated:
             resets += 1
