@@ -154,8 +154,8 @@ def advance_period(config, episode, estimator):
     update_estimate(estimator, config, episode)
     write_observation(config, episode)
     fill_terms(
-        episode.measurement, episode.previous_measurement, episode.reference, status != RUNNING, config.scales,
-        episode.terms,
+        episode.measurement, episode.previous_measurement, episode.reference, status != RUNNING,
+        config.scales, episode.terms,
     )  # fmt: skip
     return status, weighted_sum(config.weights, episode.terms)
 
