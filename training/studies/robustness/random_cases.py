@@ -236,11 +236,11 @@ class Runner:
         )  # fmt: skip
         unconverged = int(work.counters[Counter.MOORING_UNCONVERGED])
         outcome = Outcome(int(status), steps * dt, peak, energy, speed, unconverged)
-        outcome.failure = judged(outcome)
+        outcome.failure = failure_of(outcome)
         return outcome
 
 
-def judged(outcome):
+def failure_of(outcome):
     """Why an outcome is a failure, or an empty text. A capsize is the plant's to judge by a finer run."""
     if outcome.status == NON_FINITE:
         return STOP_REASONS[NON_FINITE]
