@@ -115,7 +115,7 @@ class Outcome:
         return self.status not in (RUNNING, NON_FINITE)
 
     @property
-    def told(self):
+    def text(self):
         """The outcome in words."""
         if self.failure:
             return self.failure
