@@ -13,7 +13,7 @@ as runs/small_agent/best.npz, ready for
 import argparse
 import sys
 
-from fowt_env.training.rl.train import Training, baseline_figures, judged, resolve
+from fowt_env.training.rl.train import Training, baseline_figures, resolve, validation_score
 
 RATIOS = ("rotor_speed_std_ratio", "platform_pitch_std_ratio", "blade_pitch_travel_ratio", "failed")
 
@@ -30,13 +30,13 @@ def main(arguments=None):
     run = Training(settings, given.out)
     if not run.run(lambda done, total, text: print(f"\r{done}/{total}: {text}  ", end="", file=sys.stderr)):
         sys.exit("stopped; a checkpoint is in " + given.out)
-    rival = judged(baseline_figures(settings, "pi_unscheduled"), run.reference)
+    baseline = validation_score(baseline_figures(settings, "pi_unscheduled"), run.reference)
     best = min(run.rows, key=lambda row: row["score"])
     print("\nratios to gspi_oc3, means over the validation episodes; lower is better")
     print(f"{'':28}{'agent':>10}{'pi_unscheduled':>18}")
     for name in (*RATIOS, "score"):
-        print(f"{name:28}{best[name]:10.3f}{rival[name]:18.3f}")
-    ahead = best["score"] < rival["score"]
+        print(f"{name:28}{best[name]:10.3f}{baseline[name]:18.3f}")
+    ahead = best["score"] < baseline["score"]
     print("the agent is ahead" if ahead else "the agent is not ahead: train it for longer")
     return ahead
 

@@ -341,7 +341,7 @@ class LQR(CompiledController):
 
 
 class WindEstimator(LQR):
-    """The Kalman filter of LQR without its feedback: told the commands in force, it only estimates.
+    """The Kalman filter of LQR without its feedback: given the commands in force, it only estimates.
 
     memory begins with what it estimates, in the order of ESTIMATED of fowt_env/envs/observations.py.
     """

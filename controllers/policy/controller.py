@@ -59,7 +59,7 @@ def policy_path(name):
 class PolicyController:
     """The agent of a policy file; what it sees, how it decides and acts is as in its training.
 
-    information: measurements that it or its baseline uses, "wind_preview" where it is told the wind ahead.
+    information: measurements that it or its baseline uses, "wind_preview" where the wind ahead is an input.
     Raises: InputError where the file, the turbine or the control period do not fit.
     """
 

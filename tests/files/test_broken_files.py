@@ -229,9 +229,9 @@ def test_a_policy_whose_baseline_is_no_built_in_controller_is_refused_by_the_com
     assert f"baseline = '{text}': must be one of 'constant'" in result.stderr
     result = invoke("evaluate", "--controllers", "policy:self.npz", "--duration", "1", "--skip", "0")
     assert result.exit_code == cli.EXIT_INPUT, result.output
-    from fowt_env.training.reports.scores import told
+    from fowt_env.training.reports.scores import inputs
 
-    assert told("policy:self.npz" if text.startswith("policy:") else text) == ""
+    assert inputs("policy:self.npz" if text.startswith("policy:") else text) == ""
 
 
 def settings_of_a_stranger():

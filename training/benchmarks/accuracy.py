@@ -259,7 +259,7 @@ def _append(out, row):
 
 
 def summary(table):
-    """DataFrame by variant: seeds' mean of error and real-time factor, and whether it is on the front."""
+    """DataFrame by variant: seeds' means of error and real-time factor; whether it is on the Pareto front."""
     if table.empty:
         raise InputError("nothing to summarise: the table has no rows")
     groups = table.groupby(["variant", "axis"], sort=False)
@@ -340,7 +340,7 @@ def _draw_openfast(axes):
 
 
 def _name_front(axes, front):
-    """Numbers at the points of the front, those of the levels with their names; all names beside it."""
+    """Numbers at the points of the Pareto front, the levels' with their names; all names beside it."""
     from fowt_env.visual.time_series import INK
 
     lines = []

@@ -724,7 +724,7 @@ def accuracy(
         speeds = (f"{row['real_time_factor']:.0f}", f"{row['kernel_factor']:.0f}")
         figures = (f"{row['worst']:.3g}", row["worst_of"], *speeds)
         rows.append((row["variant"], *figures, "*" if row["front"] else ""))
-    headings = ("variant", "worst", "of", "x real time", "kernel alone", "front")
+    headings = ("variant", "worst", "of", "x real time", "kernel alone", "Pareto front")
     title = "rms difference over standard deviation, and speed of simulate"
     print_table(out, headings, rows, title, left=(0, 2))
     files = [folder / "accuracy.csv"]
@@ -779,7 +779,7 @@ def stability(
 
     if replay is not None:
         outcome = run_again(replay)
-        out.print(f"reached {outcome.time:.2f} s: {outcome.told}", highlight=False)
+        out.print(f"reached {outcome.time:.2f} s: {outcome.text}", highlight=False)
         raise typer.Exit(1 if outcome.failure else 0)
     chosen = None if parts is None else [name.strip() for name in parts.split(",") if name.strip()]
     sizes = stress.Sizes(cases=cases, steps=steps, hostile_steps=hostile, seed=seed)

@@ -37,20 +37,20 @@ slope: rotor acceleration per blade pitch; KP, KI, omega, zeta: of the rotor loo
 platform_zeta: damping of platform pitch under these gains, without viscous drag, negative where unstable."""
 BOUND_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt design bound --wind 18[/cyan]  what any linear controller could reach at 18 m/s
+[cyan]fowt design bound --wind 18[/cyan]  the performance limit of linear control, at 18 m/s
 
 [cyan]fowt design bound --out bound.csv --plot bound.png[/cyan]  12 to 24 m/s
 
 Deviations are shown over those of gspi_oc3 on the same model, at no more pitch travel and power deviation.
-The front for the measured channels is what a controller without further sensors can hope for."""
+The Pareto front for the measured channels is what a controller without further sensors can hope for."""
 FRONT_EXAMPLES = """[bold]Example[/bold]
 
-[cyan]fowt design front --runs sweep.csv --bound bound.csv --plot front.png[/cyan]  lqr and the bound"""
+[cyan]fowt design front --runs sweep.csv --bound bound.csv --plot front.png[/cyan]  lqr beside the limit"""
 LQR_EXAMPLES = """[bold]Examples[/bold]
 
 [cyan]fowt design lqr[/cyan]  the shipped weights against gspi_oc3 on training seeds
 
-[cyan]fowt design lqr --vary pitch_rate=3,6,12 --out sweep.csv[/cyan]  a front: less travel, more speed error
+[cyan]fowt design lqr --vary pitch_rate=3,6,12 --out sweep.csv[/cyan]  less travel, more speed error
 
 [cyan]fowt design lqr --weight pitch_rate=9 --out my.json[/cyan]  save one, to be run as design:my.json
 
@@ -70,7 +70,7 @@ def save_lqr(weights, path):
 
 
 def _balanced(table):
-    """The point of each front with the least sum of both ratios."""
+    """The point of each Pareto front with the least sum of both ratios."""
     fronts = table[table["information"] != "gspi_oc3"]
     total = fronts["speed_ratio_[-]"] + fronts["pitch_ratio_[-]"]
     best = total.groupby([fronts["wind_[m/s]"], fronts["information"]], sort=False).idxmin()
@@ -180,10 +180,10 @@ def bound(
     wind: Annotated[str, typer.Option(help="Winds above rated, m/s.")] = "12:24:2",
     torque_std: Annotated[float, typer.Option(help="Limit of the torque's deviation, %; or inf.")] = 5.0,
     platform: Annotated[str, typer.Option(help="Platform: a name or a path.")] = "oc3_hywind",
-    out_path: Annotated[str | None, typer.Option("--out", help="Fronts: .csv or .parquet.")] = None,
-    plot: Annotated[str | None, typer.Option(help="Plot of the fronts, e.g. bound.png.")] = None,
+    out_path: Annotated[str | None, typer.Option("--out", help="Pareto fronts: .csv or .parquet.")] = None,
+    plot: Annotated[str | None, typer.Option(help="Plot of the Pareto fronts, e.g. bound.png.")] = None,
 ):
-    """Least rotor-speed and platform-pitch deviations of any linear feedback, by what it knows."""
+    """Find the performance limit: least rotor-speed and platform-pitch deviations of linear feedback."""
     import fowt_env
     from fowt_env.files.tables import table_path, write_table
     from fowt_env.training.design.linear_bound import INFORMATION, bound_table
@@ -212,15 +212,15 @@ def front(
     runs: Annotated[str, typer.Option(help="Table of fowt design lqr --out.")],
     bound_path: Annotated[str, typer.Option("--bound", help="Table of fowt design bound --out.")],
     out_path: Annotated[str | None, typer.Option("--out", help="Ratios: .csv or .parquet.")] = None,
-    plot: Annotated[str | None, typer.Option(help="Pareto plot, e.g. front.png.")] = None,
+    plot: Annotated[str | None, typer.Option(help="Plot of the Pareto fronts, e.g. front.png.")] = None,
 ):
-    """Simulated designs over gspi_oc3, beside the linear bound, and the share of it that they reach."""
+    """Simulated designs over gspi_oc3, beside the performance limit, and the share of it that they reach."""
     from fowt_env.files.tables import read_table, write_table
     from fowt_env.training.design.linear_bound import INFORMATION, ratio_table
 
     fronts = read_table(bound_path)
     table = ratio_table(read_table(runs), fronts)
-    show(table, "over gspi_oc3; of_bound: 1 on the bound")
+    show(table, "over gspi_oc3; of_bound: 1 on the limit")
     if out_path is not None:
         note(f"wrote {write_table(table, out_path)}")
     if plot is not None:

@@ -1,4 +1,4 @@
-"""The commands that score agents: scores rivals, cases, bound, gust."""
+"""The commands that score agents over baselines and against the performance limit: scores."""
 
 from typing import Annotated
 
@@ -11,7 +11,7 @@ from fowt_env.training.cli.arguments import parse_sea, parse_wind
 scores = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode="rich",
-    help="Score agents against rivals, case by case, against the linear bound, in a gust.",
+    help="Score agents over baselines, case by case, against the performance limit, in a gust.",
 )
 app.add_typer(scores, name="scores")
 
@@ -25,7 +25,7 @@ GroupOption = Annotated[
     ),
 ]
 AgentsOption = Annotated[
-    str | None, typer.Option(help="Controllers to score, by commas; default: all that are no rivals.")
+    str | None, typer.Option(help="Controllers to score, by commas; default: all that are no baselines.")
 ]
 CasesOption = Annotated[str | None, typer.Option(help="Cases that count, by commas; default: all.")]
 
@@ -68,7 +68,7 @@ def _shown(text, tables, out_path):
 OutOption = Annotated[
     str | None, typer.Option("--out", metavar="STEM", help="Write STEM.md and the tables as STEM*.csv.")
 ]
-RIVALS_EXAMPLES = """[bold]Examples[/bold]
+BASELINES_EXAMPLES = """[bold]Examples[/bold]
 
 [cyan]fowt scores rivals results/rl --against gspi_oc3,rosco_float --out results/rl/scores[/cyan]
 
@@ -78,17 +78,17 @@ Each figure: interquartile mean of ratios on the same runs, its 95 % interval, a
 missed, first, then (or met), with * where the whole interval does."""
 
 
-@scores.command(epilog=RIVALS_EXAMPLES)
+@scores.command(name="rivals", epilog=BASELINES_EXAMPLES)
 @reported
-def rivals(
+def over_baselines(
     results: FoldersArgument,
-    against: Annotated[str, typer.Option(help="Rivals, by commas.")] = "gspi_oc3,rosco_float",
+    against: Annotated[str, typer.Option(help="Baselines, by commas.")] = "gspi_oc3,rosco_float",
     group: GroupOption = None,
     agents: AgentsOption = None,
     cases: CasesOption = None,
     out_path: OutOption = None,
 ):
-    """Compare agents with rivals over all cases, with a verdict on each aim."""
+    """Compare agents with baselines over all cases, with a verdict on each aim."""
     from fowt_env.training.reports.scores import agent_counts, agent_scores, scores_markdown
 
     table = _runs(results, cases)
@@ -112,7 +112,7 @@ CASES_EXAMPLES = """[bold]Examples[/bold]
 @reported
 def by_cases(
     results: FoldersArgument,
-    against: Annotated[str, typer.Option(help="The rival.")] = "gspi_oc3",
+    against: Annotated[str, typer.Option(help="The baseline.")] = "gspi_oc3",
     group: GroupOption = None,
     agents: AgentsOption = None,
     cases: CasesOption = None,
@@ -122,7 +122,7 @@ def by_cases(
     each: Annotated[bool, typer.Option("--each", help="Every case by itself, winds too.")] = False,
     out_path: OutOption = None,
 ):
-    """Compare agents with one rival on each kind of case (its winds together), and count what failed."""
+    """Compare agents with one baseline on each kind of case (its winds together), and count what failed."""
     from fowt_env.training.reports.scores import by_kind, figures_named, kinds_markdown
 
     table, chosen = _runs(results, cases), figures_named(_names(figures))
@@ -134,7 +134,7 @@ BOUND_EXAMPLES = """[bold]Examples[/bold]
 
 [cyan]fowt scores bound results/rl --plot results/rl/bound.png --out results/rl/bound[/cyan]
 
-In brackets: more blade-pitch travel or power deviation than gspi_oc3, which the bound does not allow."""
+In brackets: more blade-pitch travel or power deviation than gspi_oc3, which the limit does not allow."""
 
 
 @scores.command(epilog=BOUND_EXAMPLES)
@@ -145,12 +145,12 @@ def bound(
     agents: AgentsOption = None,
     cases: CasesOption = None,
     table_path: Annotated[
-        str | None, typer.Option("--bound", help="CSV of fowt design bound; default: the package's.")
+        str | None, typer.Option("--bound", help="Limit: CSV of fowt design bound; default: the package's.")
     ] = None,
-    plot: Annotated[str | None, typer.Option(help="Picture of the fronts with all controllers.")] = None,
+    plot: Annotated[str | None, typer.Option(help="Picture of all controllers and Pareto fronts.")] = None,
     out_path: OutOption = None,
 ):
-    """Say which share of what the linear bound allows each controller reaches, per wind speed."""
+    """Say which share of the performance limit of linear control each controller reaches, per wind speed."""
     from fowt_env.training.reports.bound_scores import bound_fractions, bound_markdown, read_bound
     from fowt_env.training.reports.score_plots import plot_shares
 

@@ -1,4 +1,4 @@
-"""How well any linear controller can do: fronts of rotor-speed against platform-pitch deviation.
+"""The performance limit of linear control: Pareto fronts of rotor-speed and platform-pitch deviation.
 
     python -m fowt_env.training.design.linear_bound      (or fowt design bound --wind 12,14,16,18,20,22,24)
 
@@ -8,8 +8,8 @@ equations, for the least weighted sum of both variances at no more blade-pitch t
 deviation than gspi_oc3 has on the same model, and a torque deviation that the drivetrain can give (the
 torque's own maximum is 10 % above rated). The limits are met by multipliers in the quadratic cost, so
 with full information, and with the measured channels and their noise, each point is optimal among all
-linear controllers. Feedback that is not told of wind or waves is optimal where those are white noise. The
-linear model has no limits of torque, pitch or their rates, and nothing is sampled.
+linear controllers. Feedback without wind or waves among its inputs is optimal where those are white noise.
+The linear model has no limits of torque, pitch or their rates, and nothing is sampled.
 """
 
 from dataclasses import dataclass, replace
@@ -39,7 +39,7 @@ from fowt_env.errors import InputError
 BOUND = Path(__file__).parent / "data" / "linear_bound.csv"  # what fowt design bound wrote
 WINDS = (12.0, 14.0, 16.0, 18.0, 20.0, 22.0, 24.0)  # m/s
 INFORMATION = {  # what the feedback knows: what it is called in plots
-    "full": "state, wind and waves: the bound",
+    "full": "state, wind and waves: the performance limit",
     "wind": "state and wind",
     "state": "state only",
     "measured": "measured channels (Kalman)",
@@ -208,7 +208,7 @@ def front(problem, limits, information, shares=SHARES):
 
 
 def bound_table(scene, winds=WINDS, information=tuple(INFORMATION), torque_std=TORQUE_STD, progress=None):
-    """DataFrame: per wind and information the front, beside gspi_oc3; absolute and over gspi_oc3's.
+    """DataFrame: per wind and information the Pareto front, beside gspi_oc3; absolute and over gspi_oc3's.
 
     torque_std: limit, as a share of rated torque; inf for none.
     Raises: InputError for winds that are not above rated, or a torque_std that is not positive.
@@ -248,9 +248,9 @@ def _row(wind, information, share, found, base):
 
 
 def fraction_of_bound(table, wind, speed_ratio, pitch_ratio, information="full"):
-    """Share of what the front allows that a controller reaches, along the line from gspi_oc3 through it.
+    """Share of what the Pareto front allows that a controller reaches, on the line from gspi_oc3 through it.
 
-    speed_ratio, pitch_ratio: its deviations over those of gspi_oc3. 1: on the front; 0: no better than
+    speed_ratio, pitch_ratio: its deviations over those of gspi_oc3. 1: on the Pareto front; 0: no better than
     gspi_oc3; NaN where the line meets no front (or the controller betters neither).
     """
     here = table[(table["wind_[m/s]"] == float(wind)) & (table["information"] == information)]
@@ -274,7 +274,7 @@ def ratio_table(runs, bound=None):
     """DataFrame of a sweep's means over seeds (sweeps.sweep) over those of its gspi_oc3.
 
     Columns: wind, variant, ratios of speed, platform pitch, power and travel; with a bound_table also the
-    fractions of the bound and of the front for measured channels. Cases are named kind_WIND.
+    fractions of the limit, and of that for measured channels. Cases are named kind_WIND.
     Raises: InputError for a table without the columns, without gspi_oc3, or with other cases.
     """
     needed = ("case", "variant", "seed", *RATIOS.values())

@@ -1,4 +1,4 @@
-"""Plots of linear design: poles and damping over the wind, Bode plots, and fronts beside the linear bound.
+"""Plots of linear design: poles and damping over the wind, Bode plots, and Pareto fronts of linear control.
 
 As in visual/time_series.py every function returns a matplotlib Figure and, if given a path, writes it there.
 Needs matplotlib: pip install "fowt-env[plot]".
@@ -153,7 +153,7 @@ def _right_angles():
 
 
 def plot_bound(table, names, points=None, path=None, title=None):
-    """Fronts of linear_bound.bound_table over gspi_oc3's, a panel per wind, and simulated points.
+    """Pareto fronts of linear_bound.bound_table over gspi_oc3's, a panel per wind, and simulated points.
 
     names: {information: legend text}, in order. points: training.design.linear_bound.ratio_table of simulated
     controllers, coloured by their blade-pitch travel over that of gspi_oc3. Winds without points are left
@@ -165,7 +165,7 @@ def plot_bound(table, names, points=None, path=None, title=None):
     if points is not None:
         winds = [wind for wind in winds if wind in set(points[WIND])]
     if not winds:
-        raise InputError("nothing to plot: no wind has both a front and simulated points")
+        raise InputError("nothing to plot: no wind has both a Pareto front and simulated points")
     columns = min(4, len(winds))
     rows = -(-(len(winds) + (len(winds) > 3)) // columns)
     figure = new_figure(3.0 * columns + 0.8, 2.9 * rows + (1.2 if len(winds) <= 3 else 0.5))

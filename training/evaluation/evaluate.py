@@ -1,4 +1,4 @@
-"""Any controllers on any cases, judged alike: one table of metrics.
+"""Any controllers on any cases, measured alike: one table of metrics.
 
     from fowt_env.training.evaluation.evaluate import evaluate
     table = evaluate(["pi", "pi_land"], "above_rated", seeds=(1, 2), jobs=2)

@@ -1,4 +1,4 @@
-"""What one run is judged by, computed from its OpenFAST-named columns."""
+"""The metrics of one run, computed from its OpenFAST-named columns."""
 
 import numpy as np
 import rainflow

@@ -1,9 +1,9 @@
-"""How much of what the linear bound allows a controller reaches, per wind speed.
+"""How much of the performance limit of linear control a controller reaches, per wind speed.
 
     fowt scores bound results/rl --group agents=policy:ppo_lqr,policy:ppo_lqr_seed1 --plot front.png
 
-The bound (design/linear_bound.py) holds for linear feedback at the blade-pitch travel and power deviation
-of gspi_oc3: a controller that spends more of either is not bound by it, and is marked.
+The limit (design/linear_bound.py) holds for linear feedback at the blade-pitch travel and power deviation
+of gspi_oc3: a controller that spends more of either is not held by it, and is marked.
 """
 
 from pathlib import Path
@@ -16,7 +16,7 @@ from fowt_env.training.design.linear_bound import BOUND, RATIOS, fraction_of_bou
 from fowt_env.training.evaluation.results_table import KEY
 from fowt_env.training.reports.scores import frame_markdown, grouped
 
-BASELINE = "gspi_oc3"  # whose travel and power the bound keeps
+BASELINE = "gspi_oc3"  # whose travel and power the limit keeps
 WIND = "wind_[m/s]"
 MORE = 1.02  # ratios of travel and power deviation above this are more than those of gspi_oc3
 
@@ -25,26 +25,28 @@ def read_bound(path=None):
     """bound_table of a file that fowt design bound wrote; None: the one of this package."""
     file = BOUND if path is None else Path(path)
     if not file.is_file():
-        raise InputError(f"bound {str(file)!r}: there is no such file; make it with fowt design bound --out")
+        raise InputError(
+            f"performance limit {str(file)!r}: there is no such file; make it with fowt design bound --out"
+        )
     return pd.read_csv(file)
 
 
 def bound_fractions(table, bound, groups=None, agents=None):
-    """DataFrame: per agent or group, each of its training seeds and wind the share of the bound it reaches.
+    """DataFrame: per agent or group, each of its training seeds and wind the share of the limit it reaches.
 
     table: of an evaluation with gspi_oc3, cases named kind_WIND; groups, agents as
     scores.grouped takes them. Columns: agent, seed_of (label of the training seed; "" for the
     agent as a whole, whose ratios are the means over its seeds), wind, ratios of linear_bound.RATIOS (mean
     over the weather seeds on which both went well), of_bound_[-], of_measured_[-] (NaN: no better than
-    gspi_oc3, or not above the bound's winds), within (no more travel and power deviation than gspi_oc3's).
-    Raises: InputError without gspi_oc3, without cases at winds of the bound, or where no run went well.
+    gspi_oc3, or none of the limit's winds), within (no more travel and power deviation than gspi_oc3's).
+    Raises: InputError without gspi_oc3, without cases at winds of the limit, or where no run went well.
     """
     chosen = grouped(table, [BASELINE], groups, agents)
     winds = set(bound[WIND])
     good = table[(table["status"] == "ok") & table["case"].map(_wind).isin(winds)]
     base = good[good["controller"] == BASELINE]
     if base.empty:
-        raise InputError("results: no run of gspi_oc3 at a wind of the bound went well (cases kind_WIND)")
+        raise InputError("results: no run of gspi_oc3 at a wind of the limit went well (cases kind_WIND)")
     kinds = {case.rpartition("_")[0] for case in base["case"]}
     if len(kinds) > 1:
         raise InputError(f"results: cases of several kinds ({', '.join(sorted(kinds))}): choose one's cases")
@@ -53,7 +55,7 @@ def bound_fractions(table, bound, groups=None, agents=None):
         parts = [_ratios(good[good["controller"] == label], base, bound, label) for label in labels]
         parts = [part for part in parts if len(part)]
         if not parts:
-            raise InputError(f"{name}: no run at a wind of the bound went well")
+            raise InputError(f"{name}: no run at a wind of the limit went well")
         if len(labels) > 1:
             rows += [part.assign(agent=name) for part in parts]
         whole = pd.concat(parts).groupby(WIND, as_index=False)[list(RATIOS)].mean()
@@ -85,7 +87,7 @@ def _ratios(own, base, bound, label):
 
 
 def _with_fractions(ratios, bound):
-    """The ratios with their shares of the bound and of the front for measured channels."""
+    """The ratios with their shares of the limit, and of that for measured channels."""
     result = ratios.drop(columns="variant", errors="ignore").copy()
     for information, column in (("full", "of_bound_[-]"), ("measured", "of_measured_[-]")):
         result[column] = [
@@ -110,7 +112,8 @@ def bound_markdown(fractions, column="of_bound_[-]"):
             cells[f"{wind:g} m/s"] = _cell(at[at["seed_of"] == ""], at[at["seed_of"] != ""], column)
         rows[f"`{name}`"] = cells
     wide = pd.DataFrame.from_dict(rows, orient="index")
-    wide.index.name = "share of the bound" if column == "of_bound_[-]" else "share, measured channels"
+    full = column == "of_bound_[-]"
+    wide.index.name = "share of the performance limit" if full else "share, measured channels"
     return frame_markdown(wide)
 
 

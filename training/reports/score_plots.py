@@ -1,4 +1,4 @@
-"""Plots of agents beside rivals and the linear bound, and of one gust under many controllers.
+"""Plots of agents beside baselines and the performance limit, and of one gust under many controllers.
 
 As in visual/time_series.py every function returns a matplotlib Figure and, if given a path, writes it there.
 """
@@ -8,7 +8,7 @@ from fowt_env.training.design.plots import WIND, finish_bound
 from fowt_env.visual.time_series import COLOURS, INK, TIME, named_runs, new_figure, save_figure, style_axes
 
 MARKS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*", "p", "h")
-FRONTS = (("full", "-", "the linear bound"), ("measured", "--", "the same, measured channels"))
+FRONTS = (("full", "-", "the performance limit"), ("measured", "--", "the same, measured channels"))
 FRAME = 1.3  # ends of both axes of plot_shares
 HOLLOW = "hollow: more travel or power\ndeviation than gspi_oc3"
 GUST = (  # panels of plot_gust: label, channel
@@ -29,17 +29,17 @@ def look(number):
 
 
 def plot_shares(fractions, bound, path=None, title=None):
-    """Rotor-speed against platform-pitch deviation over gspi_oc3's, a panel per wind, with the fronts.
+    """Rotor-speed against platform-pitch deviation over gspi_oc3's, a panel per wind, with the Pareto fronts.
 
     fractions: bound_scores.bound_fractions; bound: linear_bound.bound_table. Large marks:
     agents; small ones of the same kind: their training seeds. Hollow: more travel or power deviation than
-    gspi_oc3, so that the bound does not hold. Agents beyond FRAME stand in the corner with their figures.
+    gspi_oc3, so that the limit does not hold. Agents beyond FRAME stand in the corner with their figures.
     """
     from fowt_env.training.design.linear_bound import efficient
 
     winds = sorted(fractions[WIND].unique())
     if not winds:
-        raise InputError("nothing to plot: no wind has both a front and runs")
+        raise InputError("nothing to plot: no wind has both a Pareto front and runs")
     columns = min(4, len(winds) + 1)
     rows = -(-(len(winds) + 1) // columns)
     figure = new_figure(3.1 * columns + 0.6, 3.1 * rows + 0.3)

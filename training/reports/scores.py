@@ -1,9 +1,9 @@
-"""How agents compare with rivals on the same runs: interquartile mean of ratios, with 95 % intervals.
+"""How agents compare with baselines on the same runs: interquartile mean of ratios, with 95 % intervals.
 
     fowt evaluate --controllers policy:ppo_lqr,gspi_oc3,rosco_float --seeds 1:6:1 --out results/rl
     fowt scores rivals results/rl --against gspi_oc3,rosco_float
 
-Each ratio is of one metric of an agent over that of a rival in the same wind and waves. Several training
+Each ratio is of one metric of an agent over that of a baseline in the same wind and waves. Several training
 seeds of one configuration make a group, whose interval resamples training and weather seeds
 (training.evaluation.bootstrap).
 """
@@ -36,7 +36,7 @@ MEASURED = {  # what a turbine's own sensors show
 
 @dataclass(frozen=True)
 class Figure:
-    """A metric that is scored as ratio to a rival's, and what is aimed at: first, then; None: nothing.
+    """A metric that is scored as ratio to a baseline's, and what is aimed at: first, then; None: nothing.
 
     more: whether the ratio is to be at least the aim; else at most.
     """
@@ -109,18 +109,18 @@ def figures_named(names):
     return [known[name] for name in names]
 
 
-def grouped(table, rivals, groups=None, agents=None):
+def grouped(table, baselines, groups=None, agents=None):
     """{name: labels of its training seeds} of what is scored: groups, then single agents.
 
-    groups: {name: labels}. agents: labels; None: all that are neither rivals nor in a group.
+    groups: {name: labels}. agents: labels; None: all that are neither baselines nor in a group.
     Raises: InputError for labels that were not run, and names that are taken.
     """
     known = list(dict.fromkeys(table["controller"]))
     groups = dict(groups or {})
     inside = [label for labels in groups.values() for label in labels]
     if agents is None:
-        agents = [name for name in known if name not in rivals and name not in inside]
-    for name in (*rivals, *inside, *agents):
+        agents = [name for name in known if name not in baselines and name not in inside]
+    for name in (*baselines, *inside, *agents):
         if name not in known:
             raise unknown("controller of the evaluation", name, known)
     for name, labels in groups.items():
@@ -138,19 +138,19 @@ def _values(runs, labels, cases, seeds, metric):
     return runs[metric].reindex(index).to_numpy(dtype=float).reshape(len(labels), len(cases), len(seeds))
 
 
-def agent_scores(table, rivals, groups=None, agents=None, figures=FIGURES):
-    """DataFrame: per agent or group, rival and figure the ratio, its interval, and what that reaches.
+def agent_scores(table, baselines, groups=None, agents=None, figures=FIGURES):
+    """DataFrame: per agent or group, baseline and figure the ratio, its interval, and what that reaches.
 
     table: what evaluate.evaluate returns; groups, agents: as grouped takes them. Columns: agent,
-    rival, figure, metric, ratio (interquartile mean over all runs), low, high (NaN for too few seeds:
+    baseline, figure, metric, ratio (interquartile mean over all runs), low, high (NaN for too few seeds:
     training.evaluation.bootstrap.crossed_estimate), pairs (runs with a ratio), runs, training_seeds, verdict
-    (Figure.verdict). Where the rival's figure is 0 there is no ratio.
+    (Figure.verdict). Where the baseline's figure is 0 there is no ratio.
     Raises: InputError for labels that were not run, or where no run of both went well.
     """
-    return _scores(table, rivals, grouped(table, rivals, groups, agents), figures)
+    return _scores(table, baselines, grouped(table, baselines, groups, agents), figures)
 
 
-def _scores(table, rivals, chosen, figures):
+def _scores(table, baselines, chosen, figures):
     """agent_scores of {name: labels}."""
     good = table.set_index(KEY).sort_index()
     made = good.index
@@ -160,11 +160,11 @@ def _scores(table, rivals, chosen, figures):
     for name, labels in chosen.items():
         runs = int(made.get_level_values(0).isin(labels).sum())
         failed = runs - int(good.index.get_level_values(0).isin(labels).sum())
-        for rival in rivals:
+        for baseline in baselines:
             pairs_at_all = 0
             for figure in figures:
                 own = _values(good, list(labels), cases, seeds, figure.metric)
-                other = _values(good, [rival], cases, seeds, figure.metric)
+                other = _values(good, [baseline], cases, seeds, figure.metric)
                 with np.errstate(divide="ignore", invalid="ignore"):
                     ratio = np.where(other != 0.0, own / other, np.nan)
                 pairs = int(np.isfinite(ratio).sum())
@@ -173,7 +173,7 @@ def _scores(table, rivals, chosen, figures):
                 rows.append(
                     {
                         "agent": name,
-                        "rival": rival,
+                        "baseline": baseline,
                         "figure": figure.name,
                         "metric": figure.metric,
                         "ratio": estimate,
@@ -186,17 +186,18 @@ def _scores(table, rivals, chosen, figures):
                     }
                 )
             if not pairs_at_all:
-                raise InputError(f"{name} and {rival}: no run of both went well")
+                raise InputError(f"{name} and {baseline}: no run of both went well")
     return pd.DataFrame(rows)
 
 
-def agent_counts(table, rivals, groups=None, agents=None):
-    """DataFrame: per agent, group and rival the runs, those that failed, and those that passed a constraint.
+def agent_counts(table, baselines, groups=None, agents=None):
+    """DataFrame: per agent, group and baseline its runs, those that failed, those past a constraint.
 
-    Columns: agent, told (see told), runs, failed, the names of COUNTS (runs in which it was passed at least
-    once), past any of them, largest overspeed (%), verdict ("met" where nothing failed or was passed).
+    Columns: agent, inputs (as the function has them), runs, failed, the names of COUNTS (runs in which it was
+    passed at least once), past any of them, largest overspeed (%), verdict ("met" where nothing failed or was
+    passed).
     """
-    return _counts(table, grouped(table, rivals, groups, agents) | {name: (name,) for name in rivals})
+    return _counts(table, grouped(table, baselines, groups, agents) | {name: (name,) for name in baselines})
 
 
 def _counts(table, chosen):
@@ -204,7 +205,7 @@ def _counts(table, chosen):
     rows = []
     for name, labels in chosen.items():
         here = table[table["controller"].isin(labels)]
-        row = {"agent": name, "told": "; ".join(dict.fromkeys(map(told, labels))), "runs": len(here)}
+        row = {"agent": name, "inputs": "; ".join(dict.fromkeys(map(inputs, labels))), "runs": len(here)}
         row["failed"] = int((here["status"] != "ok").sum())
         row |= {text: int((here[metric] > 0).sum()) for text, metric in COUNTS.items()}
         row[PAST_ANY] = int((here[list(COUNTS.values())] > 0).any(axis=1).sum())
@@ -215,8 +216,8 @@ def _counts(table, chosen):
 
 
 @lru_cache(maxsize=256)
-def told(label):
-    """What a controller is told: "measured" for channels of MEASURED, and by name what else it uses.
+def inputs(label):
+    """What a controller uses: "measured" for channels of MEASURED, and by name what else it uses.
 
     "" for labels that name neither a controller of the package nor an agent or design that is still there.
     """
@@ -234,7 +235,7 @@ def kind_of(case):
     return re.sub(r"(_\d+){1,2}$", "", case)
 
 
-def by_kind(table, rival, groups=None, agents=None, figures=FIGURES, each=False):
+def by_kind(table, baseline, groups=None, agents=None, figures=FIGURES, each=False):
     """(scores, counts) as agent_scores and agent_counts give, for each kind of case by itself.
 
     each: every case is a kind of its own; else the winds of a kind (kind_of) are taken together.
@@ -242,15 +243,15 @@ def by_kind(table, rival, groups=None, agents=None, figures=FIGURES, each=False)
     Both have a further first column, kind. A kind in which an agent has no run that went well has NaN
     ratios there.
     """
-    chosen = grouped(table, [rival], groups, agents)
+    chosen = grouped(table, [baseline], groups, agents)
     scores, counts = [], []
     for kind, here in table.groupby(table["case"] if each else table["case"].map(kind_of), sort=False):
-        counts.append(_counts(here, chosen | {rival: (rival,)}).assign(kind=kind))
+        counts.append(_counts(here, chosen | {baseline: (baseline,)}).assign(kind=kind))
         for name, labels in chosen.items():
             try:
-                scores.append(_scores(here, [rival], {name: labels}, figures).assign(kind=kind))
+                scores.append(_scores(here, [baseline], {name: labels}, figures).assign(kind=kind))
             except InputError:  # all failed or none was made, which the counts say
-                blank = {"agent": name, "rival": rival, "kind": kind, "pairs": 0, "verdict": ""}
+                blank = {"agent": name, "baseline": baseline, "kind": kind, "pairs": 0, "verdict": ""}
                 scores.append(pd.DataFrame([blank | {"figure": figure.name} for figure in figures]))
     whole = pd.concat(scores, ignore_index=True), pd.concat(counts, ignore_index=True)
     return tuple(frame[["kind", *frame.columns.drop("kind")]] for frame in whole)
@@ -278,16 +279,16 @@ def _remark(scores):
 
 
 def scores_markdown(scores, counts):
-    """Markdown text of agent_scores and agent_counts: a table for each rival, one of failures."""
+    """Markdown text of agent_scores and agent_counts: a table for each baseline, one of failures."""
     parts = []
     names = list(dict.fromkeys(scores["agent"]))
-    for rival, rows in scores.groupby("rival", sort=False):
+    for baseline, rows in scores.groupby("baseline", sort=False):
         shown = rows.assign(
             text=[f"{ratio_text(row)} {row['verdict']}".rstrip() for _, row in rows.iterrows()]
         )
         wide = shown.pivot(index="figure", columns="agent", values="text")
         wide = wide.loc[list(dict.fromkeys(scores["figure"])), names]
-        wide.index.name = f"over `{rival}`"
+        wide.index.name = f"over `{baseline}`"
         wide.columns = [f"`{name}`" for name in names]
         parts.append(frame_markdown(wide))
     parts += _remark(scores)
@@ -307,7 +308,7 @@ def kinds_markdown(scores, counts, figures=None):
         rows = scores[scores["figure"] == name]
         shown = rows.assign(text=[ratio_text(row) for _, row in rows.iterrows()])
         wide = shown.pivot(index="kind", columns="agent", values="text").loc[kinds, names]
-        wide.index.name = f"{name} over `{rows['rival'].iloc[0]}`"
+        wide.index.name = f"{name} over `{rows['baseline'].iloc[0]}`"
         wide.columns = [f"`{agent}`" for agent in names]
         parts.append(frame_markdown(wide))
     parts += _remark(scores)

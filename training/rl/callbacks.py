@@ -8,7 +8,7 @@ import torch
 from stable_baselines3.common.callbacks import BaseCallback, EvalCallback
 
 from fowt_env.files.tables import write_table
-from fowt_env.training.rl.train import decision_env, judged, seconds_text
+from fowt_env.training.rl.train import decision_env, seconds_text, validation_score
 
 REPORT_EVERY = 1.0  # s
 
@@ -17,7 +17,7 @@ class Stopped(Exception):
     """The run was asked to end, and its checkpoint is written."""
 
 
-class Judge(BaseCallback):
+class ValidationCallback(BaseCallback):
     """After each validation: physical figures against the baseline's, a row of the table, the best policy."""
 
     def __init__(self, training):
@@ -28,8 +28,8 @@ class Judge(BaseCallback):
     def _on_step(self):
         training, evaluation = self.training, self.parent
         figures = decision_env(evaluation.eval_env).base.figures()
-        row = {"decisions": self.num_timesteps, "seconds": training.keeper.seconds()}
-        row |= {"reward": evaluation.last_mean_reward} | judged(figures, training.reference)
+        row = {"decisions": self.num_timesteps, "seconds": training.checkpoint_callback.seconds()}
+        row |= {"reward": evaluation.last_mean_reward} | validation_score(figures, training.reference)
         training.rows.append(row)
         for name, value in row.items():
             self.logger.record(f"validation/{name}", value)
@@ -40,20 +40,20 @@ class Judge(BaseCallback):
         return True
 
 
-class Keeper(BaseCallback):
+class CheckpointCallback(BaseCallback):
     """Checkpoints between an update and the next rollout, progress, and the stop that was asked for."""
 
     def __init__(self, training, report):
         super().__init__()
         self.training = training
         self.report = report
-        self.before = 0.0  # s, of the sittings before this one
+        self.before = 0.0  # s, of the sessions before this one
         self.torch_state = None  # to go on from in the first rollout
         self._begin = self._saved = self._reported = time.monotonic()
         self._first = None
 
     def seconds(self):
-        """Wall time of the run so far, s, over all its sittings."""
+        """Wall time of the run so far, s, over all its sessions."""
         return self.before + time.monotonic() - self._begin
 
     def _on_training_start(self):
@@ -89,15 +89,15 @@ class Keeper(BaseCallback):
         return True
 
 
-def callbacks(training, judge_env, judge, keeper):
-    """[EvalCallback on the validation episodes, Keeper] of a fowt_env.training.rl.train.Training."""
+def callbacks(training, validation_env, validation_callback, checkpoint_callback):
+    """[EvalCallback on the validation episodes, CheckpointCallback] of a training.rl.train.Training."""
     every = max(1, training.settings["validation"]["every"] // training.env.num_envs)
     evaluation = EvalCallback(
-        judge_env,
-        callback_after_eval=judge,
-        n_eval_episodes=judge_env.num_envs,
+        validation_env,
+        callback_after_eval=validation_callback,
+        n_eval_episodes=validation_env.num_envs,
         eval_freq=every,
         deterministic=True,
         verbose=0,
     )
-    return [evaluation, keeper]
+    return [evaluation, checkpoint_callback]

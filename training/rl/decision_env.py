@@ -1,4 +1,4 @@
-"""stable-baselines3 environment whose steps are an agent's decisions, and the one it is validated in."""
+"""stable-baselines3 environment whose steps are an agent's decisions, and that of its validation."""
 
 import numpy as np
 from gymnasium.spaces import Box
@@ -89,7 +89,7 @@ class DecisionVecEnv(VecEnvWrapper):
 
 
 class ValidationVecEnv(FowtSB3VecEnv):
-    """One environment per fixed episode, which every reset starts again; records what it is judged by.
+    """One environment per fixed episode, which every reset starts again; records what is validated.
 
     episodes: options of FowtEnv.reset, one dict each. After all episodes have ended once, figures() has the
     metrics of each, without its first `skip` seconds.

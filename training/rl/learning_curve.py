@@ -65,7 +65,7 @@ def plot_front(runs, path):
 
 
 def main(arguments=None):
-    """Plot the learning curves and the front of several runs.
+    """Plot the learning curves and the Pareto plot of several runs.
 
     python -m fowt_env.training.rl.learning_curve measured=runs/a preview=runs/b --out results/rl
     """

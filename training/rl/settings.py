@@ -57,7 +57,7 @@ class Normalise(Record):
 
 
 class Validation(Record):
-    """Episodes on which an agent is judged as it learns."""
+    """Episodes on which an agent is validated as it learns."""
 
     winds: Annotated[list[Positive], Field(min_length=1)]  # m/s
     first: Whole

@@ -200,9 +200,9 @@ def make_envs(settings):
     base = FowtSB3VecEnv(n, threads=1, per_env=per_env, **chosen)
     env = VecNormalize(VecMonitor(DecisionVecEnv(base, decisions)), **normalise)
     fixed = validation_env(settings, chosen)
-    judge = VecNormalize(VecMonitor(DecisionVecEnv(fixed, decisions)), training=False, **normalise)
-    judge.norm_reward = False
-    return env, judge
+    validation = VecNormalize(VecMonitor(DecisionVecEnv(fixed, decisions)), training=False, **normalise)
+    validation.norm_reward = False
+    return env, validation
 
 
 def validation_env(settings, chosen):
@@ -243,7 +243,7 @@ def baseline_figures(settings, reference="gspi_oc3"):
     return env.figures()
 
 
-def judged(figures, reference):
+def validation_score(figures, reference):
     """{ratio or score: number}: means over episodes of figures over those of the reference; lower is better.
 
     score: mean of the ratios of rotor-speed and platform-pitch standard deviation, plus what travel beyond
@@ -318,7 +318,7 @@ class Training:
             if not self.resume:
                 self._write_settings()  # which say that the folder holds a run
             try:
-                judge, state = self._build()
+                validation, state = self._build()
             except BaseException:
                 if not self.resume:  # it never began: the folder is free for settings that work
                     self.settings_path.unlink(missing_ok=True)
@@ -327,7 +327,7 @@ class Training:
                 self._write_settings()  # they may have more steps now
             with replacing(self.folder / "versions.json") as path:
                 path.write_text(json.dumps(versions(), indent=1), encoding="utf-8")
-            return self._learn(judge, state, report)
+            return self._learn(validation, state, report)
 
     def _build(self):
         """(validation environment, what a resumed run goes on from or None); sets model and env."""
@@ -338,7 +338,7 @@ class Training:
         torch.set_num_threads(int(os.environ.get("FOWT_TORCH_THREADS", "1")))
         kind = make_algorithm(settings["algo"])
         check_algorithm(kind, settings["algo"], settings["algorithm"])
-        self.env, judge = make_envs(settings)
+        self.env, validation = make_envs(settings)
         self._remove_leftovers()
         set_random_seed(settings["seed"])
         state = None
@@ -347,26 +347,27 @@ class Training:
         else:
             self.env.seed(settings["seed"])
             self.model = _new_model(kind, settings, self.env)
-        return judge, state
+        return validation, state
 
-    def _learn(self, judge, state, report):
+    def _learn(self, validation, state, report):
         """Whether the end was reached, once what is left of the run has been trained."""
         from stable_baselines3.common.logger import configure
 
-        from fowt_env.training.rl.callbacks import Judge, Keeper, Stopped, callbacks
+        from fowt_env.training.rl.callbacks import CheckpointCallback, Stopped, ValidationCallback, callbacks
 
         model = self.model
         self.reference = baseline_figures(self.settings)
         model.set_logger(configure(str(self.folder / "tensorboard"), ["tensorboard"]))
-        keeper = Keeper(self, report)
-        judge_after = Judge(self)
-        listeners = callbacks(self, judge, judge_after, keeper)
+        checkpoint_callback = CheckpointCallback(self, report)
+        validation_callback = ValidationCallback(self)
+        listeners = callbacks(self, validation, validation_callback, checkpoint_callback)
         if state is not None:
             listeners[0].n_calls = state["evaluation_calls"]
-            judge_after.best = state["best"]
-            keeper.before = state["seconds"]
-            keeper.torch_state = state["torch"]
-        self.evaluation, self.judge, self.keeper = listeners[0], judge_after, keeper
+            validation_callback.best = state["best"]
+            checkpoint_callback.before = state["seconds"]
+            checkpoint_callback.torch_state = state["torch"]
+        self.evaluation = listeners[0]
+        self.validation_callback, self.checkpoint_callback = validation_callback, checkpoint_callback
         left = self.settings["steps"] - model.num_timesteps
         finished = True
         with self._signals():
@@ -459,9 +460,9 @@ class Training:
             "torch": torch.get_rng_state(),
             "action_space": model.action_space.np_random.bit_generator.state,
             "evaluation_calls": self.evaluation.n_calls,
-            "best": self.judge.best,
+            "best": self.validation_callback.best,
             "rows": self.rows,
-            "seconds": self.keeper.seconds(),
+            "seconds": self.checkpoint_callback.seconds(),
             "episodes": list(model.ep_info_buffer),
         }
         with (folder / "state.pkl").open("wb") as file:

@@ -3,7 +3,7 @@ controllers/policy/agents.
 
     python -m fowt_env.training.studies.publish_agent runs/above_rated_ppo_1 ppo_lqr --machine "two cores"
 
-The card has the command that makes the run again, its seed, wall time and machine, what the agent is told,
+The card has the command that makes the run again, its seed, wall time and machine, the agent's inputs,
 its figures on the validation episodes, and the versions that the run was made with.
 """
 

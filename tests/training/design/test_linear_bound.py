@@ -1,4 +1,4 @@
-"""The linear bound: its covariances by other ways, its optimum against other gains, its weather."""
+"""The performance limit: its covariances by other ways, its optimum against other gains, its weather."""
 
 from dataclasses import replace
 from pathlib import Path

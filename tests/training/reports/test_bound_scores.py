@@ -1,4 +1,4 @@
-"""Shares of the linear bound on a front and runs of known place."""
+"""Shares of the performance limit on a Pareto front and runs of known place."""
 
 import numpy as np
 import pandas as pd

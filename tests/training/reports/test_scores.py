@@ -1,4 +1,4 @@
-"""Scores of agents against rivals on tables whose answers are known."""
+"""Scores of agents against baselines on tables whose answers are known."""
 
 import numpy as np
 import pandas as pd
@@ -17,20 +17,20 @@ from fowt_env.training.reports.scores import (
     agent_scores,
     by_kind,
     figures_named,
+    inputs,
     kind_of,
     kinds_markdown,
     scores_markdown,
-    told,
 )
 
 
 def table(agents, cases=("ntm_18",)):
-    """An evaluation of {agent: ratios, one per seed} beside a rival whose figures differ by case and seed."""
+    """An evaluation of {agent: ratios, one per seed} beside a baseline, by case and seed."""
     rows = []
     seeds = len(next(iter(agents.values())))
     for c, case in enumerate(cases):
         for seed in range(seeds):
-            for name, ratios in {"rival": [1.0] * seeds, **agents}.items():
+            for name, ratios in {"base": [1.0] * seeds, **agents}.items():
                 row = dict.fromkeys(COLUMNS, 0.0)
                 row |= {"controller": name, "case": case, "seed": seed, "status": "ok", "reason": ""}
                 rows.append(row | {figure.metric: ratios[seed] * (c + seed + 1.0) for figure in FIGURES})
@@ -43,7 +43,7 @@ def fail(runs, controller, seed):
 
 
 def test_identical_runs_have_ratio_one_with_an_interval_without_width():
-    scores = agent_scores(table({"agent": [1.0] * 4}, ("ntm_14", "ntm_18")), ["rival"])
+    scores = agent_scores(table({"agent": [1.0] * 4}, ("ntm_14", "ntm_18")), ["base"])
     assert (scores[["ratio", "low", "high"]] == 1.0).all(axis=None)
     assert (scores["pairs"] == 8).all()
     verdicts = dict(zip(scores["figure"], scores["verdict"], strict=True))
@@ -52,7 +52,7 @@ def test_identical_runs_have_ratio_one_with_an_interval_without_width():
 
 def test_ratios_are_taken_run_by_run_and_the_interval_holds_the_mean():
     ratios = np.random.default_rng(1).normal(0.8, 0.05, 40)
-    scores = agent_scores(table({"agent": ratios}), ["rival"])
+    scores = agent_scores(table({"agent": ratios}), ["base"])
     assert list(scores["figure"]) == [figure.name for figure in FIGURES]
     assert scores["ratio"].to_numpy() == pytest.approx(interquartile_mean(ratios))
     assert (scores["low"] < scores["ratio"]).all() and (scores["ratio"] < scores["high"]).all()
@@ -64,31 +64,31 @@ def test_a_group_is_scored_over_all_its_training_seeds():
         name: [mean, mean + 0.01, mean - 0.01, mean]
         for name, mean in (("a", 0.7), ("b", 0.8), ("c", 0.9), ("e", 0.75), ("d", 0.5))
     }
-    scores = agent_scores(table(agents), ["rival"], {"all": ["a", "b", "c", "e"]})
+    scores = agent_scores(table(agents), ["base"], {"all": ["a", "b", "c", "e"]})
     assert set(scores["agent"]) == {"all", "d"}
     whole = scores[scores["agent"] == "all"].iloc[0]
     assert whole["ratio"] == pytest.approx(interquartile_mean(sum((agents[k] for k in "abce"), [])))
     assert (whole["runs"], whole["pairs"], whole["training_seeds"]) == (16, 16, 4)
-    one = agent_scores(table(agents), ["rival"], agents=["b"]).iloc[0]
+    one = agent_scores(table(agents), ["base"], agents=["b"]).iloc[0]
     assert whole["high"] - whole["low"] > 3.0 * (one["high"] - one["low"])
 
 
 def test_ratios_over_fewer_than_four_seeds_have_no_interval_and_the_text_says_so_once():
     agents = {name: [0.5, 0.6, 0.5, 0.6] for name in "abc"}
     for runs, groups in ((table({"a": [0.5, 0.6, 0.5]}), {}), (table(agents), {"all": ["a", "b", "c"]})):
-        scores = agent_scores(runs, ["rival"], groups)
+        scores = agent_scores(runs, ["base"], groups)
         assert np.isfinite(scores["ratio"]).all() and scores[["low", "high"]].isna().all(axis=None)
         assert not scores["verdict"].str.contains("*", regex=False).any()
-        text = scores_markdown(scores, agent_counts(runs, ["rival"], groups))
+        text = scores_markdown(scores, agent_counts(runs, ["base"], groups))
         assert "[" not in text and text.count("No interval: ") == 1
-        assert kinds_markdown(*by_kind(runs, "rival", groups)).count("No interval: ") == 1
-    single = agent_scores(table(agents), ["rival"], agents=["a"])
+        assert kinds_markdown(*by_kind(runs, "base", groups)).count("No interval: ") == 1
+    single = agent_scores(table(agents), ["base"], agents=["a"])
     assert np.isfinite(single[["low", "high"]]).all(axis=None)
-    assert "No interval" not in scores_markdown(single, agent_counts(table(agents), ["rival"], agents=["a"]))
+    assert "No interval" not in scores_markdown(single, agent_counts(table(agents), ["base"], agents=["a"]))
 
 
 def test_ratios_of_deviations_have_intervals_above_zero_however_they_scatter():
-    scores = agent_scores(table({"agent": [0.001, 0.5, 3.0, 0.01]}), ["rival"]).set_index("figure")
+    scores = agent_scores(table({"agent": [0.001, 0.5, 3.0, 0.01]}), ["base"]).set_index("figure")
     assert (scores["low"].drop("mean power") > 0.0).all()
     assert scores.loc["mean power", "low"] < 0.0  # power may be drawn from the grid
 
@@ -96,44 +96,44 @@ def test_ratios_of_deviations_have_intervals_above_zero_however_they_scatter():
 def test_an_agent_with_a_failed_run_reaches_no_aim():
     runs = table({"agent": [0.5] * 5, "other": [0.5] * 5})
     fail(runs, "agent", 2)
-    scores = agent_scores(runs, ["rival"]).set_index(["agent", "figure"])["verdict"]
+    scores = agent_scores(runs, ["base"]).set_index(["agent", "figure"])["verdict"]
     assert set(scores["agent"]) == {"failed"} and scores["other", "rotor-speed std"] == "then*"
 
 
 def test_failed_runs_are_counted_and_left_out():
     runs = table({"agent": [0.5, 0.5, 0.5]})
     fail(runs, "agent", 2)
-    scores, counts = agent_scores(runs, ["rival"]), agent_counts(runs, ["rival"])
+    scores, counts = agent_scores(runs, ["base"]), agent_counts(runs, ["base"])
     assert (scores["pairs"] == 2).all() and (scores["runs"] == 3).all()
-    assert list(counts["agent"]) == ["agent", "rival"] and list(counts["failed"]) == [1, 0]
+    assert list(counts["agent"]) == ["agent", "base"] and list(counts["failed"]) == [1, 0]
     assert list(counts["verdict"]) == ["missed", "met"]
-    fail(runs, "rival", 0)
-    fail(runs, "rival", 1)
+    fail(runs, "base", 0)
+    fail(runs, "base", 1)
     with pytest.raises(InputError, match="no run of both went well"):
-        agent_scores(runs, ["rival"])
+        agent_scores(runs, ["base"])
 
 
 def test_a_passed_constraint_is_a_miss_even_once():
     runs = table({"agent": [0.5, 0.5]})
     runs.loc[(runs["controller"] == "agent") & (runs["seed"] == 1), "rotor_speed_violations_[-]"] = 3.0
-    counts = agent_counts(runs, ["rival"]).set_index("agent")
+    counts = agent_counts(runs, ["base"]).set_index("agent")
     assert counts.loc["agent", "rotor past 130 %"] == 1 and counts.loc["agent", "verdict"] == "missed"
     assert counts.loc["agent", PAST_ANY] == 1 and set(COUNTS.values()) <= set(METRICS)
 
 
-def test_each_controller_stands_with_what_it_is_told():
-    assert told("gspi_oc3") == "measured"
-    assert told("lqr") == "measured, plant_model"
-    assert told("rosco_float") == "measured, wind_speed, plant_model"
-    assert told("policy:ppo_lqr") == "measured, plant_model"
-    assert told("policy:ppo_lqr_preview") == "measured, plant_model, wind_speed, wind_preview"
-    assert told("my_module:Mine") == told("policy:gone.npz") == told("mine") == ""
+def test_each_controller_stands_with_its_inputs():
+    assert inputs("gspi_oc3") == "measured"
+    assert inputs("lqr") == "measured, plant_model"
+    assert inputs("rosco_float") == "measured, wind_speed, plant_model"
+    assert inputs("policy:ppo_lqr") == "measured, plant_model"
+    assert inputs("policy:ppo_lqr_preview") == "measured, plant_model, wind_speed, wind_preview"
+    assert inputs("my_module:Mine") == inputs("policy:gone.npz") == inputs("mine") == ""
 
 
-def test_a_rival_at_zero_gives_no_ratio_and_the_pairs_say_so():
+def test_a_baseline_at_zero_gives_no_ratio_and_the_pairs_say_so():
     runs = table({"agent": [0.5, 0.5]})
-    runs.loc[(runs["controller"] == "rival") & (runs["seed"] == 1), "blade_pitch_travel_[deg/s]"] = 0.0
-    scores = agent_scores(runs, ["rival"]).set_index("figure")
+    runs.loc[(runs["controller"] == "base") & (runs["seed"] == 1), "blade_pitch_travel_[deg/s]"] = 0.0
+    scores = agent_scores(runs, ["base"]).set_index("figure")
     assert scores.loc["blade-pitch travel", "pairs"] == 1 and scores.loc["power std", "pairs"] == 2
     assert scores.loc["blade-pitch travel", "ratio"] == 0.5
 
@@ -153,13 +153,13 @@ def test_verdicts_name_the_aim_that_is_reached_and_whether_all_of_the_interval_d
 def test_kinds_of_cases_are_scored_apart_and_a_kind_that_failed_has_no_ratio():
     runs = table({"agent": [0.5, 0.6]}, ("soft_14", "soft_18", "stiff_14"))
     runs.loc[(runs["controller"] == "agent") & (runs["case"] == "stiff_14"), "status"] = "failed"
-    scores, counts = by_kind(runs, "rival")
+    scores, counts = by_kind(runs, "base")
     soft = scores[scores["kind"] == "soft"]
     assert (soft["pairs"] == 4).all() and soft["ratio"].to_numpy() == pytest.approx(0.55)
     assert scores.loc[scores["kind"] == "stiff", "ratio"].isna().all()
     text = kinds_markdown(scores, counts, ["rotor-speed std"])
     assert "| stiff | - |" in text and "| stiff | 2 / 0 of 2 | 0 / 0 of 2 |" in text
-    every, _ = by_kind(runs, "rival", each=True)
+    every, _ = by_kind(runs, "base", each=True)
     assert list(dict.fromkeys(every["kind"])) == ["soft_14", "soft_18", "stiff_14"]
     assert [kind_of(name) for name in ("ntm_18", "ntm_11_4", "eog_rated", "ss_5")] == [
         "ntm", "ntm", "eog_rated", "ss"
@@ -172,7 +172,7 @@ def test_wrong_names_and_groups_are_refused():
         agent_scores(runs, ["rivla"])
     for groups in ({"agent": ["agent"]}, {"g": ["agent", "agent"]}, {"g": []}):
         with pytest.raises(InputError, match="needs a name that no controller has"):
-            agent_scores(runs, ["rival"], groups)
+            agent_scores(runs, ["base"], groups)
     with pytest.raises(InputError, match="unknown figure 'rotor'"):
         figures_named(["rotor"])
 
@@ -180,13 +180,13 @@ def test_wrong_names_and_groups_are_refused():
 def test_any_metric_may_be_a_figure_without_an_aim():
     runs = table({"agent": [0.5, 0.6]})
     runs["PtfmPitch_max_[deg]"] = runs["PtfmPitch_std_[deg]"]
-    scores, _ = by_kind(runs, "rival", figures=figures_named(["PtfmPitch_max_[deg]", "power std"]))
+    scores, _ = by_kind(runs, "base", figures=figures_named(["PtfmPitch_max_[deg]", "power std"]))
     assert list(scores["figure"]) == ["PtfmPitch_max_[deg]", "power std"]
     assert scores["ratio"].to_numpy() == pytest.approx(0.55) and list(scores["verdict"]) == ["", "met"]
 
 
-def test_the_text_has_a_table_per_rival_and_one_of_failures():
+def test_the_text_has_a_table_per_baseline_and_one_of_failures():
     runs = table({"agent": [0.5, 0.6, 0.5]})
-    text = scores_markdown(agent_scores(runs, ["rival"]), agent_counts(runs, ["rival"]))
-    assert "| over `rival` | `agent` |" in text and text.count("\n|---|") == 2
+    text = scores_markdown(agent_scores(runs, ["base"]), agent_counts(runs, ["base"]))
+    assert "| over `base` | `agent` |" in text and text.count("\n|---|") == 2
     assert "| rotor-speed std | 0.5" in text and "then" in text

@@ -51,14 +51,14 @@ def test_environments_share_a_pool_of_plants_and_differ_within_it():
 
 
 def test_the_plain_task_is_not_randomised_and_the_robust_one_is():
-    plain, judge = make_envs(small("ppo"))
+    plain, validation_env = make_envs(small("ppo"))
     assert {env._config.sensors for env in environments(plain)} == {None}
     settings = small("ppo") | {"environment": small("ppo")["environment"] | {"randomise": {"plants": 2}}}
-    robust, judge = make_envs(settings)
+    robust, validation_env = make_envs(settings)
     assert len({env.scene.platform.ballast.mass for env in environments(robust)}) == 2
     assert len({env._sensors["noise"] for env in environments(robust)}) == 2
-    assert len({env.scene.platform.ballast.mass for env in environments(judge)}) == 1
-    assert {env._config.sensors for env in environments(judge)} == {None}
+    assert len({env.scene.platform.ballast.mass for env in environments(validation_env)}) == 1
+    assert {env._config.sensors for env in environments(validation_env)} == {None}
     for algo in ("ppo", "sac", "tqc"):
         assert "randomise" in resolve(algo, "above_rated_robust", 0, 1)["environment"]
         assert "randomise" not in resolve(algo, "above_rated", 0, 1)["environment"]
@@ -86,8 +86,8 @@ def test_on_drawn_plants_baseline_and_estimator_are_those_of_the_plant_in_the_fi
 def test_sensors_of_the_validation_go_round_the_seeds_of_each_wind():
     settings = small("ppo")
     validation = settings["validation"] | {"winds": [14, 18], "seeds": 2, "sensors": [{}, {"noise": 0.02}]}
-    _, judge = make_envs(settings | {"validation": validation})
-    assert [env._sensors["noise"] for env in environments(judge)] == [0.0, 0.02, 0.0, 0.02]
+    _, validation_env = make_envs(settings | {"validation": validation})
+    assert [env._sensors["noise"] for env in environments(validation_env)] == [0.0, 0.02, 0.0, 0.02]
 
 
 @pytest.mark.parametrize(

@@ -32,9 +32,9 @@ from fowt_env.training.rl.train import (
     Training,
     baseline_figures,
     decision_env,
-    judged,
     make_envs,
     resolve,
+    validation_score,
 )
 from fowt_env.training.studies import publish_agent as publishing
 
@@ -177,13 +177,13 @@ def test_a_run_has_its_folder_to_itself_as_long_as_it_learns_and_no_longer(tmp_p
 
 def test_the_policy_that_is_kept_is_that_of_the_best_validation_also_in_a_resumed_run(tmp_path, monkeypatch):
     scores, networks, runs = [2.0, 1.0, 3.0], [], []
-    real = train_callbacks.judged
+    real = train_callbacks.validation_score
 
-    def judged_otherwise(figures, reference):
+    def scored_otherwise(figures, reference):
         networks.append(parameters(runs[-1]))
         return real(figures, reference) | {"score": scores[len(networks) - 1]}
 
-    monkeypatch.setattr(train_callbacks, "judged", judged_otherwise)
+    monkeypatch.setattr(train_callbacks, "validation_score", scored_otherwise)
     monkeypatch.setattr(train_callbacks, "REPORT_EVERY", 0.0)
     runs.append(Training(small("ppo", steps=192), tmp_path / "run"))
 
@@ -248,32 +248,32 @@ def test_wrong_values_of_settings_are_named(tmp_path):
 
 
 def test_validation_repeats_the_same_episodes_bit_for_bit():
-    _, judge = make_envs(small("ppo"))
+    _, validation = make_envs(small("ppo"))
     rng = np.random.default_rng(0)
     actions = rng.uniform(-1.0, 1.0, (24, 2, 2))
     found = []
     for _ in range(2):
-        judge.reset()
+        validation.reset()
         for action in actions:
-            judge.step(action)
-        found.append(decision_env(judge).base.figures())
+            validation.step(action)
+        found.append(decision_env(validation).base.figures())
     assert found[0].keys() == found[1].keys()
     for name, values in found[0].items():
         assert np.array_equal(values, found[1][name]) and np.all(np.isfinite(values))
     assert found[0]["rotor_speed_std_[rpm]"][0] != found[0]["rotor_speed_std_[rpm]"][1]
 
 
-def test_the_baseline_is_judged_one_against_itself_and_more_travel_or_less_power_cost():
+def test_the_baseline_scores_one_against_itself_and_more_travel_or_less_power_cost():
     reference = baseline_figures(small("ppo"))
-    row = judged(reference, reference)
+    row = validation_score(reference, reference)
     assert row["score"] == pytest.approx(1.0) and row["failed"] == 0.0
     busy = reference | {"blade_pitch_travel_[deg/s]": 1.5 * reference["blade_pitch_travel_[deg/s]"]}
-    assert judged(busy, reference)["score"] == pytest.approx(2.0)
+    assert validation_score(busy, reference)["score"] == pytest.approx(2.0)
     weak = reference | {"shaft_power_mean_[kW]": 0.99 * reference["shaft_power_mean_[kW]"]}
-    assert judged(weak, reference)["score"] == pytest.approx(1.1)
+    assert validation_score(weak, reference)["score"] == pytest.approx(1.1)
     nothing = {name: np.full_like(values, np.nan) for name, values in reference.items()}
     with pytest.warns(RuntimeWarning):
-        assert judged(nothing | {"failed": np.ones(2)}, reference)["score"] == np.inf
+        assert validation_score(nothing | {"failed": np.ones(2)}, reference)["score"] == np.inf
 
 
 def test_wrong_settings_are_named(tmp_path):

@@ -209,7 +209,7 @@ def test_losing_a_line_sets_the_platform_adrift(scene, monkeypatch):
 def test_an_emergency_stop_feathers_at_the_actuators_rate_and_stops_the_rotor(scene, monkeypatch):
     monkeypatch.setattr(stability_extremes, "EVENT", 2.0)
     case = stability_extremes.Extreme("emergency stop", 18.0, CALM, fault="emergency stop", duration=60.0)
-    run = stability_extremes._Run(case, scene, scene.dt)
+    run = stability_extremes._ExtremeRun(case, scene, scene.dt)
     before = run.x[State.ROTOR_SPEED]
     run.go()
     assert run.x[State.BLADE_PITCH] == pytest.approx(scene.turbine.pitch_drive.maximum, abs=1e-6)

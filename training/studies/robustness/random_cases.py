@@ -116,7 +116,7 @@ class Outcome:
         return self.status not in (RUNNING, NON_FINITE)
 
     @property
-    def told(self):
+    def text(self):
         """The outcome in words."""
         if self.failure:
             return self.failure
@@ -244,11 +244,11 @@ class Runner:
         )  # fmt: skip
         unconverged = int(data.counters[Counter.MOORING_UNCONVERGED])
         outcome = Outcome(int(status), steps * dt, peak, energy, speed, unconverged)
-        outcome.failure = judged(outcome)
+        outcome.failure = failure_of(outcome)
         return outcome
 
 
-def judged(outcome):
+def failure_of(outcome):
     """Why an outcome is a failure, or an empty text. A capsize is the plant's to judge by a finer run."""
     if outcome.status == NON_FINITE:
         return STOP_REASONS[NON_FINITE]

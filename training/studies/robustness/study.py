@@ -202,8 +202,8 @@ def extremes_part(sizes, folder, progress):
     found = Found()
     for group, rows in table.groupby("group", sort=False):
         stops = rows[~rows["verdict"].str.startswith("finite")]
-        told = f"{int((~rows['finite']).sum())} not finite, {len(stops)} stopped with their reason"
-        found.claim(f"{group}: state finite", f"{len(rows)} runs", told, "all finite", rows["finite"].all())
+        text = f"{int((~rows['finite']).sum())} not finite, {len(stops)} stopped with their reason"
+        found.claim(f"{group}: state finite", f"{len(rows)} runs", text, "all finite", rows["finite"].all())
     changes = table["step_change"].dropna()
     found.claim(
         "peaks of the extremes with half the step",
@@ -230,12 +230,12 @@ def long_part(sizes, folder, progress):
         for steps, when in ((min(SECULAR_STEPS, sizes.steps), "at the default step"), (sizes.steps, "long")):
             drift = long.free_drift(integrator, steps, progress=progress)
             limits = DRIFT[integrator]
-            told = ", ".join(f"{key} {drift[key]:.1e}" for key in limits)
+            text = ", ".join(f"{key} {drift[key]:.1e}" for key in limits)
             good = drift["status"] == RUNNING and all(drift[key] <= limits[key] for key in limits)
             target = ", ".join(f"{key} {most:.0e}" for key, most in limits.items())
             found.claim(
                 f"free body, {integrator}, {when}: relative change of energy and momenta",
-                f"{steps} steps of {INTEGRATORS[integrator].dt:g} s", told, target, good,
+                f"{steps} steps of {INTEGRATORS[integrator].dt:g} s", text, target, good,
             )  # fmt: skip
     for integrator, most in FLOATING_DRIFT.items():
         drift = long.floating_drift(integrator, sizes.steps, progress=progress)
