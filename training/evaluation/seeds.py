@@ -22,3 +22,14 @@ def seeds_for(purpose, first, count):
             f"{purpose} seeds {first} to {first + count - 1}: must be at least one of 0 to {len(allowed) - 1}"
         )
     return tuple(allowed[first : first + count])
+
+
+def ranges(seeds):
+    """[(first, last)] of the unbroken ranges of seeds in rising order."""
+    found = []
+    for seed in seeds:
+        if found and seed == found[-1][1] + 1:
+            found[-1] = found[-1][0], seed
+        else:
+            found.append((seed, seed))
+    return found

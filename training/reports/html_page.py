@@ -25,6 +25,7 @@ from fowt_env.files.tables import read_table
 from fowt_env.training.evaluation.evaluate import run_file
 from fowt_env.training.evaluation.leaderboard_file import check_leaderboard
 from fowt_env.training.evaluation.results_table import KEY, WORDS, read_results
+from fowt_env.training.evaluation.seeds import ranges
 from fowt_env.visual.time_series import PANELS, SPECTRA, TIME, frequency_marks, spectrum
 
 NO_METRIC = (*KEY, *WORDS, "stopped_[s]", "scored_[s]")
@@ -401,13 +402,8 @@ def _remark(table, board_file, case):
 
 def _numbers(values):
     """1, 2, 3, 7 as "1 to 3, 7"."""
-    runs = []
-    for value in values:
-        if runs and value == runs[-1][1] + 1:
-            runs[-1][1] = value
-        else:
-            runs.append([value, value])
-    return ", ".join(str(a) if a == b else f"{a} to {b}" if b > a + 1 else f"{a}, {b}" for a, b in runs)
+    texts = (str(a) if a == b else f"{a} to {b}" if b > a + 1 else f"{a}, {b}" for a, b in ranges(values))
+    return ", ".join(texts)
 
 
 def _page_data(table, board_file, runs, schedule):

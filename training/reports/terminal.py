@@ -9,6 +9,7 @@ from fowt_env.files.tables import read_table
 from fowt_env.training.evaluation.cases import Score, named_cases, read_suite
 from fowt_env.training.evaluation.leaderboard import leaderboard
 from fowt_env.training.evaluation.results import file_name, run_file, write_json
+from fowt_env.training.evaluation.seeds import ranges
 from fowt_env.visual.response import BOXES, plot_boxes
 from fowt_env.visual.time_series import TIME, plot_evaluation, plot_pareto, plot_runs, plot_spectra
 
@@ -202,13 +203,7 @@ def _seeds(seeds):
 
 def _ranges(seeds):
     """ "1-6, 9" for [1, 2, 3, 4, 5, 6, 9]."""
-    parts = []
-    for seed in seeds:
-        if parts and seed == parts[-1][1] + 1:
-            parts[-1][1] = seed
-        else:
-            parts.append([seed, seed])
-    return ", ".join(str(low) if low == high else f"{low}-{high}" for low, high in parts)
+    return ", ".join(str(low) if low == high else f"{low}-{high}" for low, high in ranges(seeds))
 
 
 def _cell(entry, metric, form, with_interval, with_difference):

@@ -17,10 +17,14 @@ from fowt_env.training.design import sweeps as linear_design
 from fowt_env.training.design import tune_feedback as tune_controllers
 from fowt_env.training.design import tune_pi
 from fowt_env.training.evaluation.cases import FOLDER, read_suite, suite_names
-from fowt_env.training.evaluation.seeds import PURPOSES, TEST, TRAINING, VALIDATION, seeds_for
+from fowt_env.training.evaluation.seeds import PURPOSES, TEST, TRAINING, VALIDATION, ranges, seeds_for
 from fowt_env.training.rl.train import ALGORITHMS, environment_settings, resolve, validation_episodes
 
 ROBUST = "above_rated_robust"
+
+
+def test_seeds_in_a_row_are_one_range():
+    assert ranges([1, 2, 3, 7, 9, 10]) == [(1, 3), (7, 7), (9, 10)] and ranges([]) == []
 
 
 def test_the_ranges_cover_every_seed_once():
