@@ -1,0 +1,79 @@
+"""How long a session's scenes take to compile: six kinds one after the other, with an empty cache of kernels.
+
+The session runs in a process of its own, through names that users have, so the file serves other versions too:
+`python training/benchmarks/compile_time.py` prints one line a scene without importing this project's benchmarks.
+"""
+
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+SESSION = """
+import time
+start, cpu = time.perf_counter(), time.process_time()
+import numpy as np
+import fowt_env
+
+def report(name):
+    global start, cpu
+    now, used = time.perf_counter(), time.process_time()
+    print(f"{name}|{now - start}|{used - cpu}", flush=True)
+    start, cpu = now, used
+
+report("import")
+def run(name, law="pi", initial=None, **what):
+    scene = fowt_env.build_scene(fidelity="standard", **what)
+    begin = {} if initial is None else {"start": "zero", "initial": initial}
+    fowt_env.simulate(scene, law, duration=10.0, **begin)
+    report(name)
+
+turbulence, sea = {"kind": "ntm", "speed": 18.0}, {"kind": "jonswap", "Hs": 6.0, "Tp": 10.0}
+run("decay", None, initial={"PtfmPitch": 5.0})
+run("regular wave", None, sea={"kind": "regular", "H": 6.0, "T": 10.0})
+run("steady wind", wind=14.0)
+run("turbulence and sea", wind=turbulence, sea=sea)
+line = np.linspace(-75.0, 75.0, 16)
+u = 18.0 + np.random.default_rng(0).normal(size=(100, 16, 16))
+run("full-field box", wind={"kind": "box", "u": u, "y": line, "z": line + 90.0, "dt": 0.5, "speed": 18.0}, sea=sea)
+import gymnasium
+env = gymnasium.make("fowt_env:fowt_env/OC3Hywind-v1")
+env.reset(seed=0)
+env.step(np.zeros(2, dtype=np.float32))
+report("environment")
+"""
+NAMES = (
+    "import", "decay", "regular wave", "steady wind", "turbulence and sea", "full-field box", "environment",
+)  # fmt: skip
+
+
+def session(progress=None):
+    """[(scene, seconds, seconds of processor time)] of the session in a new process with an empty cache.
+
+    progress: called with (text, done, total). Raises: RuntimeError with what a failed process printed.
+    """
+    rows = []
+    with tempfile.TemporaryDirectory() as folder:
+        process = subprocess.Popen(
+            [sys.executable, "-W", "ignore", "-c", SESSION],
+            env={**os.environ, "FOWT_CACHE_DIR": folder},
+            cwd=Path(__file__).resolve().parents[2],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        for line in process.stdout:
+            name, seconds, processor = line.split("|")
+            rows.append((name, float(seconds), float(processor)))
+            if progress is not None:
+                progress(name, len(rows), len(NAMES))
+        errors = process.communicate()[1]
+    if process.returncode != 0:
+        raise RuntimeError(f"the session in a new process failed: {errors[-600:]}")
+    return rows
+
+
+if __name__ == "__main__":
+    for scene, seconds, processor in session():
+        print(f"{scene:20} {seconds:6.1f} s, processor {processor:6.1f} s")
