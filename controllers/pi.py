@@ -17,7 +17,7 @@ from fowt_env.control import CompiledController, check_control_dt
 from fowt_env.descriptions.checks import check_number
 from fowt_env.errors import unknown
 from fowt_env.plant.compile.decorators import control_kernel, kernel
-from fowt_env.plant.drivetrain import TorqueCurve, build_torque_curve, generator_torque, limited
+from fowt_env.plant.drivetrain import TorqueCurve, build_torque_curve, clamp, generator_torque, rate_limit
 from fowt_env.plant.measurement import Measure
 
 SCHEDULE_ON = ("commanded", "measured")
@@ -194,7 +194,7 @@ def schedule_pitch_of(parameters, memory, measured_pitch):
     """Blade pitch that sets the gain and the torque region: the last command or the measured one."""
     if parameters[Parameter.SCHEDULE_MEASURED] > 0.5:
         low, high = parameters[Parameter.PITCH_MINIMUM], parameters[Parameter.PITCH_MAXIMUM]
-        return limited(measured_pitch, low, high)
+        return clamp(measured_pitch, low, high)
     return memory[Memory.PITCH_COMMAND]
 
 
@@ -222,12 +222,12 @@ def write_commands(blade_pitch, target, extra_torque, parameters, memory, comman
     curve = curve_of(parameters)
     wanted = generator_torque(memory[Memory.FILTERED_SPEED], blade_pitch, curve)
     if extra_torque != 0.0:
-        wanted = limited(wanted + extra_torque, 0.0, curve.maximum_torque)
+        wanted = clamp(wanted + extra_torque, 0.0, curve.maximum_torque)
     step = dt * parameters[Parameter.TORQUE_RATE_LIMIT]
-    torque += limited(wanted - torque, -step, step)
-    wanted = limited(target, parameters[Parameter.PITCH_MINIMUM], parameters[Parameter.PITCH_MAXIMUM])
+    torque = rate_limit(torque, wanted, step)
+    wanted = clamp(target, parameters[Parameter.PITCH_MINIMUM], parameters[Parameter.PITCH_MAXIMUM])
     step = dt * parameters[Parameter.PITCH_RATE_LIMIT]
-    pitch += limited(wanted - pitch, -step, step)
+    pitch = rate_limit(pitch, wanted, step)
     memory[Memory.TORQUE_COMMAND] = torque
     memory[Memory.PITCH_COMMAND] = pitch
     command[0] = torque
@@ -243,7 +243,7 @@ def pi_target(pitch, error, parameters, memory):
     """
     gain = schedule_gain(pitch, parameters[Parameter.SCHEDULE_PITCH])
     slope = gain * parameters[Parameter.INTEGRAL]
-    integral = limited(
+    integral = clamp(
         memory[Memory.INTEGRAL] + error * parameters[Parameter.CONTROL_DT],
         parameters[Parameter.PITCH_MINIMUM] / slope,
         parameters[Parameter.PITCH_MAXIMUM] / slope,

@@ -28,7 +28,7 @@ from fowt_env.controllers.lqr.design import (
 )
 from fowt_env.errors import InputError
 from fowt_env.plant.compile.decorators import control_kernel, kernel
-from fowt_env.plant.drivetrain import TorqueCurve, build_torque_curve, generator_torque, limited
+from fowt_env.plant.drivetrain import TorqueCurve, build_torque_curve, clamp, generator_torque, rate_limit
 from fowt_env.plant.measurement import Measure
 
 HANDOVER = (0.01745, 0.05236)  # rad of pitch command: torque by the curve below, by feedback above
@@ -143,7 +143,7 @@ def feed_back(p, low, share, memory, row):
 def block_of(p, memory):
     """(start of the block of the wind below the operating wind, share of the way to the next block)."""
     last = p[Head.FIRST_WIND] + (p[Head.WINDS] - 1.0) * p[Head.WIND_STEP]
-    place = (limited(memory[OPERATING_WIND], p[Head.FIRST_WIND], last) - p[Head.FIRST_WIND]) / p[
+    place = (clamp(memory[OPERATING_WIND], p[Head.FIRST_WIND], last) - p[Head.FIRST_WIND]) / p[
         Head.WIND_STEP
     ]
     node = min(int(place), int(p[Head.WINDS]) - 2)
@@ -177,7 +177,7 @@ def lqr_step(p, memory, measurement, command):
     speed_error = measurement[Measure.GENERATOR_SPEED] / p[Head.GEAR_RATIO] - rated
     pitch, torque = memory[PITCH_COMMAND], memory[TORQUE_COMMAND]
     if pitch > p[Head.HANDOVER_LOW] or speed_error > 0.0:
-        memory[INTEGRAL] = limited(memory[INTEGRAL] + dt * speed_error, -INTEGRAL_LIMIT, INTEGRAL_LIMIT)
+        memory[INTEGRAL] = clamp(memory[INTEGRAL] + dt * speed_error, -INTEGRAL_LIMIT, INTEGRAL_LIMIT)
     else:
         memory[INTEGRAL] *= 1.0 - 0.1 * dt  # forgotten in 10 s while the pitch rests
 
@@ -191,20 +191,20 @@ def lqr_step(p, memory, measurement, command):
     for i in range(MOMENT - WIND):
         memory[FED_BACK + N_PLANT + 3 + i] = memory[DEVIATION + WIND + i]
 
-    rate = limited(feed_back(p, low, share, memory, 1), -p[Head.PITCH_RATE_LIMIT], p[Head.PITCH_RATE_LIMIT])
-    pitch = limited(pitch + dt * rate, p[Head.PITCH_MINIMUM], p[Head.PITCH_MAXIMUM])
+    rate = clamp(feed_back(p, low, share, memory, 1), -p[Head.PITCH_RATE_LIMIT], p[Head.PITCH_RATE_LIMIT])
+    pitch = clamp(pitch + dt * rate, p[Head.PITCH_MINIMUM], p[Head.PITCH_MAXIMUM])
     i = Head.CURVE
     curve = TorqueCurve(
         p[i], p[i + 1], p[i + 2], p[i + 3], p[i + 4], p[i + 5],
         p[i + 6], p[i + 7], p[i + 8], p[i + 9], p[i + 10], p[i + 11],
     )  # fmt: skip
     wanted = torque + dt * p[Head.RATED_TORQUE] * feed_back(p, low, share, memory, 0)
-    wanted = limited(wanted, p[Head.TORQUE_LOW], p[Head.TORQUE_HIGH])
+    wanted = clamp(wanted, p[Head.TORQUE_LOW], p[Head.TORQUE_HIGH])
     by_curve = generator_torque(p[Head.GEAR_RATIO] * memory[ROTOR], pitch, curve)
-    blend = limited((pitch - p[Head.HANDOVER_LOW]) / (p[Head.HANDOVER_HIGH] - p[Head.HANDOVER_LOW]), 0.0, 1.0)
+    blend = clamp((pitch - p[Head.HANDOVER_LOW]) / (p[Head.HANDOVER_HIGH] - p[Head.HANDOVER_LOW]), 0.0, 1.0)
     wanted = blend * wanted + (1.0 - blend) * by_curve
     step = dt * p[Head.TORQUE_RATE_LIMIT]
-    torque += limited(wanted - torque, -step, step)
+    torque = rate_limit(torque, wanted, step)
     command[0], command[1] = torque, pitch
 
 

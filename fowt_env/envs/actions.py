@@ -13,8 +13,8 @@ from fowt_env.plant.drivetrain import (
     TorqueLimits,
     build_drivetrain,
     build_torque_limits,
+    clamp,
     followed_torque,
-    limited,
 )
 from fowt_env.plant.measurement import Measure
 from fowt_env.plant.state import Command
@@ -90,21 +90,27 @@ def build_action_map(mode, task, turbine, control_dt):
 @kernel
 def accept(action, accepted):
     """Copy an action, clipped to [-1, 1]. Returns 0, 1 if it was clipped, -1 if it is not finite."""
-    clipped = 0
+    saturated = 0
     for i in range(accepted.shape[0]):
         if not isfinite(action[i]):
             return -1
     for i in range(accepted.shape[0]):
-        accepted[i] = limited(action[i], -1.0, 1.0)
+        accepted[i] = clamp(action[i], -1.0, 1.0)
         if accepted[i] != action[i]:
-            clipped = 1
-    return clipped
+            saturated = 1
+    return saturated
 
 
 @kernel
-def spread(action, low, high):
+def unscale(action, low, high):
     """The value in [low, high] that an action in [-1, 1] asks for."""
     return low + 0.5 * (action + 1.0) * (high - low)
+
+
+@kernel
+def scale(value, low, high):
+    """The action in [-1, 1] that asks for a value, or for the end of [low, high] that it passes."""
+    return clamp(2.0 * (value - low) / (high - low) - 1.0, -1.0, 1.0)
 
 
 @kernel
@@ -112,8 +118,8 @@ def tracking_torque(speed, setpoint, memory, actions):
     """Torque that drives the rotor speed (rad/s) to its set-point; memory[0]: integral part, N m."""
     error = speed - setpoint
     integral = memory[0] + actions.tracking_rate * error * actions.control_dt
-    memory[0] = limited(integral, 0.0, actions.generator.maximum)
-    return limited(actions.tracking_gain * error + memory[0], 0.0, actions.generator.maximum)
+    memory[0] = clamp(integral, 0.0, actions.generator.maximum)
+    return clamp(actions.tracking_gain * error + memory[0], 0.0, actions.generator.maximum)
 
 
 @kernel
@@ -137,8 +143,8 @@ def command_of(action, actions, law, parameters, memory, measurement, u, wanted)
         wanted[0] += action[0] * actions.residual_torque
         wanted[1] += action[1] * actions.residual_pitch
     else:
-        wanted[0] = spread(action[0], actions.low, actions.high)
-        wanted[1] = spread(action[1], actions.pitch_low, actions.pitch_high)
+        wanted[0] = unscale(action[0], actions.low, actions.high)
+        wanted[1] = unscale(action[1], actions.pitch_low, actions.pitch_high)
         if actions.mode == Mode.SETPOINT:
             wanted[0] = tracking_torque(measurement[Measure.ROTOR_SPEED], wanted[0], memory, actions)
     torque = u[Command.GENERATOR_TORQUE]
@@ -159,10 +165,8 @@ def action_of(u, rotor_speed, actions, action):
         action[1] = 0.0
         return
     first = rotor_speed if actions.mode == Mode.SETPOINT else u[Command.GENERATOR_TORQUE]
-    action[0] = limited(2.0 * (first - actions.low) / (actions.high - actions.low) - 1.0, -1.0, 1.0)
-    span = actions.pitch_high - actions.pitch_low
-    pitch = 2.0 * (u[Command.BLADE_PITCH] - actions.pitch_low) / span - 1.0
-    action[1] = limited(pitch, -1.0, 1.0)
+    action[0] = scale(first, actions.low, actions.high)
+    action[1] = scale(u[Command.BLADE_PITCH], actions.pitch_low, actions.pitch_high)
 
 
 def start_tracking(memory, measurement, actions):

@@ -168,10 +168,10 @@ def act(handle, law, estimator, action):
     Python takes ten times as long to hand over a kernel itself. BAD_ACTION leaves everything as it was.
     """
     config, episode = model_of(handle), data_of(handle)
-    clipped = accept(action, episode.action)
-    if clipped < 0:
+    saturated = accept(action, episode.action)
+    if saturated < 0:
         return BAD_ACTION, 0.0
-    episode.counts[SATURATED] += clipped
+    episode.counts[SATURATED] += saturated
     command_of(
         episode.action, config.actions, law.data, config.parameters, episode.memory, episode.reading,
         episode.u, episode.baseline_command,

@@ -88,22 +88,22 @@ def tolerance(x, bounds, margin):
 
 
 @kernel
-def clipped(value, low, high):
-    """The value within its range; NaN gives the upper end."""
-    return max(low, min(high, value))
+def unit_fraction(value):
+    """The value within [0, 1]; NaN gives 1, which clamp would let through."""
+    return max(0.0, min(1.0, value))
 
 
 @kernel
 def power_term(speed, torque, scales):
     """Share of rated power, and how well the rest stays below it."""
     share = scales.gear_ratio * speed * torque / scales.rated_power
-    return clipped(share, 0.0, 1.0) * tolerance(share, (0.0, 1.0), POWER_MARGIN)
+    return unit_fraction(share) * tolerance(share, (0.0, 1.0), POWER_MARGIN)
 
 
 @kernel
 def power_shortfall_term(speed, torque, scales):
     """Minus the share of rated power that is lacking."""
-    return clipped(scales.gear_ratio * speed * torque / scales.rated_power, 0.0, 1.0) - 1.0
+    return unit_fraction(scales.gear_ratio * speed * torque / scales.rated_power) - 1.0
 
 
 @kernel
@@ -123,7 +123,7 @@ def platform_motion_term(platform_pitch, rate, steady_pitch):
 @kernel
 def travel_term(before, after, way):
     """Minus the share of the possible travel that was used in one control period."""
-    return 0.0 - clipped(abs(after - before) / way, 0.0, 1.0)
+    return 0.0 - unit_fraction(abs(after - before) / way)
 
 
 @kernel

@@ -132,9 +132,15 @@ def build_torque_limits(torque_law):
 
 
 @kernel
-def limited(value, low, high):
+def clamp(value, low, high):
     """The value, or the limit that it passes."""
     return min(max(value, low), high)
+
+
+@kernel
+def rate_limit(value, target, step):
+    """The target, or the value moved towards it by a step, the most that it may change."""
+    return value + clamp(target - value, -step, step)
 
 
 @kernel
@@ -169,12 +175,12 @@ def followed_torque(torque, command, period, limits):
     """
     if not isfinite(command):  # which a limit would turn into a torque; the run stops at it instead
         return command
-    target = limited(command, 0.0, limits.maximum)
-    way = limits.rate_limit * period
+    target = clamp(command, 0.0, limits.maximum)
+    step = limits.rate_limit * period
     change = target - torque
-    if abs(change) <= way * (1.0 + SLACK):
+    if abs(change) <= step * (1.0 + SLACK):
         return target
-    return torque + way if change > 0.0 else torque - way
+    return torque + step if change > 0.0 else torque - step
 
 
 @kernel
@@ -204,23 +210,22 @@ def pitch_rate(blade_pitch, command, actuator):
     """Rate of change of the blade pitch, rad/s (theory.md Eq. (8)); 0 without lag, see followed_pitch."""
     if actuator.time_constant <= 0.0:
         return 0.0
-    target = limited(command, actuator.minimum, actuator.maximum)
+    target = clamp(command, actuator.minimum, actuator.maximum)
     rate = (target - blade_pitch) / actuator.time_constant
-    return limited(rate, -actuator.rate_limit, actuator.rate_limit)
+    return clamp(rate, -actuator.rate_limit, actuator.rate_limit)
 
 
 @kernel
 def followed_pitch(blade_pitch, command, dt, actuator):
     """Blade pitch to start a step of dt with, rad: an actuator without lag has no rate to integrate.
 
-    With lag: unchanged. Without: the command, within the position limits and the way that the rate
+    With lag: unchanged. Without: the command, within the position limits and the change that the rate
     limit allows in dt.
     """
     if actuator.time_constant > 0.0:
         return blade_pitch
-    target = limited(command, actuator.minimum, actuator.maximum)
-    way = actuator.rate_limit * dt
-    return blade_pitch + limited(target - blade_pitch, -way, way)
+    target = clamp(command, actuator.minimum, actuator.maximum)
+    return rate_limit(blade_pitch, target, actuator.rate_limit * dt)
 
 
 @kernel
@@ -229,7 +234,7 @@ def pitch_after(blade_pitch, command, dt, actuator):
     if actuator.time_constant <= 0.0:
         return blade_pitch
     lag, fastest = actuator.time_constant, actuator.rate_limit
-    target = limited(command, actuator.minimum, actuator.maximum)
+    target = clamp(command, actuator.minimum, actuator.maximum)
     error = target - blade_pitch
     sign = 1.0 if error > 0.0 else -1.0
     size = abs(error)

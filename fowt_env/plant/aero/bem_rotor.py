@@ -8,7 +8,7 @@ wind alone, at any angle of attack.
 from math import cos, pi, sin, sqrt
 from typing import NamedTuple
 
-from fowt_env.plant.aero.blade_elements import airload, element_of, fade, first_guess, solve_section
+from fowt_env.plant.aero.blade_elements import airload, element_of, first_guess, smoothstep, solve_section
 from fowt_env.plant.aero.wake import PER_ELEMENT, filtered_induction, skew_factor, skew_of
 from fowt_env.plant.aero.wind import wind_at
 from fowt_env.plant.compile.decorators import kernel
@@ -84,7 +84,7 @@ def rotor_load(t, pose, x, now, series, field, rotor, skew, wake, dx, counters):
         return NO_ROTOR_LOAD
     hub = hub_flow(t, pose, now, series, field, rotor.overhang, rotor.hub_height)
     speed, azimuth, blade_pitch = x[State.ROTOR_SPEED], x[State.AZIMUTH], x[State.BLADE_PITCH]
-    induction = fade(speed * rotor.tip_radius, SLOW_ROTOR * hub.speed, FAST_ROTOR * hub.speed)
+    induction = smoothstep(speed * rotor.tip_radius, SLOW_ROTOR * hub.speed, FAST_ROTOR * hub.speed)
     skewed = skew_of(hub, skew)
     stations = rotor.radius.shape[0]
     thrust = torque = fy = fz = my = mz = 0.0

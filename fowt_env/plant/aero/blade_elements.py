@@ -388,7 +388,7 @@ def _solve(guess, side, v_normal, v_tangential, element, polars):
 
 
 @kernel
-def fade(x, low, high):
+def smoothstep(x, low, high):
     """0 below low, 1 above high, smooth between (third order)."""
     if x >= high:
         return 1.0
@@ -432,7 +432,8 @@ def solve_section(v_normal, v_tangential, induction, guess, element, polars):
     side = -1.0 if v_normal < 0.0 else 1.0
     part = 0.0
     if induction > 0.0 and v_tangential > 0.0:
-        part = induction * fade(v_tangential, SLOW_SECTION * abs(v_normal), FAST_SECTION * abs(v_normal))
+        axial = abs(v_normal)
+        part = induction * smoothstep(v_tangential, SLOW_SECTION * axial, FAST_SECTION * axial)
     solved = True
     if part > 0.0:
         solved, f, at = _solve(guess, side, abs(v_normal), v_tangential, element, polars)

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fowt_env.plant.aero.bem_rotor import FAST_ROTOR, NO_ROTOR_LOAD, SLOW_ROTOR, RotorLoad, hub_flow
-from fowt_env.plant.aero.blade_elements import blade_section, elements_key, fade
+from fowt_env.plant.aero.blade_elements import blade_section, elements_key, smoothstep
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.state import State, Wrench
 
@@ -136,7 +136,7 @@ def _fill(theta, blade_pitch, load, rotor):
     radius_of_tip = rotor.tip_radius
     for i in range(theta.shape[0]):
         wind, tip_speed = cos(theta[i]), sin(theta[i])
-        induction = fade(tip_speed, SLOW_ROTOR * abs(wind), FAST_ROTOR * abs(wind))
+        induction = smoothstep(tip_speed, SLOW_ROTOR * abs(wind), FAST_ROTOR * abs(wind))
         for k in range(blade_pitch.shape[0]):
             c = load[i, k]
             for j in range(rotor.radius.shape[0]):

@@ -33,7 +33,7 @@ from fowt_env.plant.aero.blade_elements import (
     BladeElements,
     blade_section,
     elements_key,
-    fade,
+    smoothstep,
 )
 from fowt_env.plant.aero.wind import LOWEST_HEIGHT, wind_at
 from fowt_env.plant.compile.decorators import kernel
@@ -370,7 +370,7 @@ def rotor_lookup_load(t, pose, x, now, series, field, table, counters):
     elements = table.elements
     hub = hub_flow(t, pose, now, series, field, elements.overhang, elements.hub_height)
     speed, azimuth, blade_pitch = x[State.ROTOR_SPEED], x[State.AZIMUTH], x[State.BLADE_PITCH]
-    induction = fade(speed * elements.tip_radius, SLOW_ROTOR * hub.speed, FAST_ROTOR * hub.speed)
+    induction = smoothstep(speed * elements.tip_radius, SLOW_ROTOR * hub.speed, FAST_ROTOR * hub.speed)
     row = _pitch_row(blade_pitch)
     if not (induction == 1.0 and row >= 0.0):
         return rotor_load(t, pose, x, now, series, field, elements, None, None, x, counters)
