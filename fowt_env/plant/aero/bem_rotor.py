@@ -29,7 +29,7 @@ class RotorLoad(NamedTuple):
 NO_ROTOR_LOAD = RotorLoad(NO_LOAD, 0.0, 0.0)
 
 
-class Inflow(NamedTuple):
+class SectionInflow(NamedTuple):
     """Relative wind at a section (m/s) and the direction of its blade, e_r = (0, ey, ez)."""
 
     v_normal: float
@@ -117,7 +117,7 @@ def rotor_load(t, pose, x, now, series, field, rotor, skew, wake, dx, counters):
             section = solve_section(v_normal, v_tangential, induction, guess, element, rotor.polars)
             if not section.solved:
                 counters[Counter.BEM_FALLBACK] += 1.0
-            flow = Inflow(v_normal, v_tangential, ey, ez)
+            flow = SectionInflow(v_normal, v_tangential, ey, ez)
             fn, ft = _wake_load(section, flow, element, blade, j, hub, skewed, skew, wake, x, dx, rotor)
             force_n += rotor.weight[j] * fn
             force_t += rotor.weight[j] * ft

@@ -1,7 +1,7 @@
 """One blade station: blade element momentum, inflow in, loads and induced flow out (theory.md, 5.1).
 
 A station is `blade_section`; its scalar residual is `bem_residual`, and the rest finds the root of that.
-`build_blade_elements` prepares a turbine's stations; rotor.py integrates them over blades and span.
+`build_blade_elements` prepares a turbine's stations; bem_rotor.py integrates them over blades and span.
 
 At very high tip-speed ratios (above about 20: spinning in little or no wind) the published equations have
 their root on a pole, where drag with no flow through the disk makes endless swirl, and the load vanishes.

@@ -1,7 +1,7 @@
 """Rotor loads from one table of the blade element momentum solution, expanded about uniform axial flow.
 
-Much faster than a sweep over all stations (rotor.py, rotor_lookup.py). To first order in what varies over
-the disk, the sum over three or more evenly spaced blades does not depend on the azimuth, and rotational
+Much faster than a sweep over all stations (bem_rotor.py, section_table.py). To first order in what varies
+over the disk, the sum over three or more evenly spaced blades does not depend on the azimuth, and rotational
 symmetry leaves one real coefficient for each of the in-plane force and the in-plane moment per gradient
 of the axial wind (shear, platform pitch and yaw rate), and one for each per cross wind (misalignment,
 platform pitch, motion of the hub). Thrust and torque change to second order in both. All of these are
@@ -9,7 +9,7 @@ integrals along the blade of the derivatives of its line load, tabulated beside 
 inflow angle and the blade pitch.
 
 Left out: what fluctuates with the azimuth (three times per turn and faster), and the change of the cross
-wind over the disk. A box of full-field wind has to be averaged over the rotor first (scene.py does).
+wind over the disk. A box of full-field wind has to be averaged over the rotor first (scene/build.py does).
 """
 
 from math import atan2, cos, sin, sqrt
@@ -82,7 +82,7 @@ class Axis(NamedTuple):
     scale: float  # cells per unit
 
 
-class RotorTable(NamedTuple):
+class CoefficientTable(NamedTuple):
     """Coefficients over inflow angle (n,) and blade pitch (m,), rad."""
 
     theta: Axis
@@ -94,7 +94,7 @@ class RotorTable(NamedTuple):
     density: float  # of the air, kg/m3
 
 
-class Inflow(NamedTuple):
+class DiskInflow(NamedTuple):
     """Wind relative to the moving rotor about the hub, body components, m/s; radii over the tip's.
 
     On a ring of radius r, in the direction e = (y, z) at the angle psi from z, the axial wind is
@@ -191,14 +191,14 @@ def _fill(theta, blade_pitch, load, rotor):
 _built = {}  # one table per set of blade elements in this process: building takes about two seconds
 
 
-def build_rotor_table(rotor):
-    """RotorTable of a BladeElements; the same elements give the table built before."""
+def build_coefficient_table(rotor):
+    """CoefficientTable of a BladeElements; the same elements give the table built before."""
     key = elements_key(rotor)
     if key not in _built:
         theta, blade_pitch = _axis(THETA_STEPS, THETA_END), _axis(PITCH_STEPS, PITCH_END)
         load = np.zeros((len(theta.point), len(blade_pitch.point), N_COEFFICIENTS))
         _fill(theta.point, blade_pitch.point, load, rotor._replace(air_density=1.0))
-        _built[key] = RotorTable(
+        _built[key] = CoefficientTable(
             theta,
             blade_pitch,
             load,
@@ -259,7 +259,7 @@ def table_coefficients(wind, tip_speed, blade_pitch, table):
 
 @kernel
 def _inflow(pose, now, series, table):
-    """Inflow of the rotor in a wind series.
+    """DiskInflow of the rotor in a wind series.
 
     A power law (1 + z)^a = 1 + a z + a (a - 1)/2 z^2 + ... has, on a ring of z = r cos(psi), even powers that
     give a mean and a second harmonic, and odd ones that give a first harmonic.
@@ -282,7 +282,7 @@ def _inflow(pose, now, series, table):
     up, side = a * size * axial + pose.r11 * vertical, pose.r11 * left
     y_up, z_up = a * size * cross_y + pose.r12 * vertical, a * size * cross_z + pose.r13 * vertical
     curl = pose.r33 * y_up + pose.r23 * pose.r12 * left - pose.r32 * z_up - pose.r22 * pose.r13 * left
-    return Inflow(
+    return DiskInflow(
         hub.wx + MEAN_SQUARE * bend,
         0.5 * curl,
         bend,
@@ -296,7 +296,7 @@ def _inflow(pose, now, series, table):
 
 
 @kernel
-def rotor_table_load(pose, x, now, series, table):
+def coefficient_table_load(pose, x, now, series, table):
     """RotorLoad of the state x, averaged over a turn of the rotor. No table or no wind series: zero.
 
     now, series  wind (weather/wind.py), taken where the moving rotor is

@@ -355,7 +355,7 @@ def _sampled_force(t, pose, hub, blade, now, series, field, blade_pitch, low, hi
 
 
 @kernel
-def rotor_lookup_load(t, pose, x, now, series, field, table, counters):
+def section_table_load(t, pose, x, now, series, field, table, counters):
     """RotorLoad of the state x at time t from the tables of the stations. No table or no wind series: zero.
 
     now, series, field  wind (weather/wind.py); every station has the wind of where it is at this instant
