@@ -13,7 +13,7 @@ from fowt_env.descriptions.platform import Platform, Turbine, read_platform, rea
 from fowt_env.descriptions.sea_state import SeaState
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.aero.blade_elements import build_blade_elements
-from fowt_env.plant.aero.coefficient_table import build_coefficient_table
+from fowt_env.plant.aero.coefficient_table import build_rotor_table
 from fowt_env.plant.aero.load import Aero, BemRotor
 from fowt_env.plant.aero.section_table import build_section_table
 from fowt_env.plant.aero.tower_drag import build_tower_drag
@@ -316,7 +316,7 @@ def _aero(platform, turbine, air, rotor, chosen):
         wake = build_dynamic_inflow() if chosen["dynamic_inflow"] else None
         model = BemRotor(elements, skew, wake)
     else:
-        model = build_section_table(elements) if rotor == "lookup" else build_coefficient_table(elements)
+        model = build_section_table(elements) if rotor == "lookup" else build_rotor_table(elements)
     tower = build_tower_drag(platform.tower, density) if chosen["tower_drag"] else None
     return Aero(air.series, air.field, model, tower)
 
