@@ -375,14 +375,14 @@ def _trim(scene, platform):
     return _point(scene, steady, platform)
 
 
-def trim_held(scene, rotor_speed, blade_pitch, platform="floating"):
+def trim_prescribed(scene, rotor_speed, blade_pitch, platform="floating"):
     """OperatingPoint with the rotor driven at a speed (rad/s) and a locked blade pitch (rad).
 
     For model tests, where a motor holds the rotor speed: theory.md Eq. (20). Mean wind, waves flat.
     Raises: InputError as trim does.
     """
     if platform not in PLATFORM_MODES:
-        raise unknown("platform mode of trim_held", platform, PLATFORM_MODES)
+        raise unknown("platform mode of trim_prescribed", platform, PLATFORM_MODES)
     body = scene.model.rigid_body._replace(platform_held=platform == "fixed", rotor_held=True)
     steady = _Steady(without_fluctuations(scene).with_model(rigid_body=body))
     steady.x[State.ROTOR_SPEED] = rotor_speed

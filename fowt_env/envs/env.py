@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
-from fowt_env.analysis.trim_cache import exact_trim, near_trim, plant_key
+from fowt_env.analysis.trim_cache import cached_trim, interpolated_trim, plant_key
 from fowt_env.control import CompiledController, catalogue, make
 from fowt_env.descriptions.platform import Platform
 from fowt_env.descriptions.records import RENAMED
@@ -272,7 +272,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         episode = _chosen(self.task.draw(self.np_random), options)
         scene = self.scene.with_weather(episode.wind, episode.sea, episode.weather_seed)
         check_duration(scene, self.task.duration)
-        find = exact_trim if episode.exact_start else near_trim
+        find = cached_trim if episode.exact_start else interpolated_trim
         state, command = find(scene, self._key, scene.wind_speed)
         self._enter(scene)
         run = self._episode

@@ -28,8 +28,8 @@ class Scales(NamedTuple):
     rated_power: float  # mechanical, at the generator, W
     rated_speed: float  # rotor, rad/s
     gear_ratio: float
-    pitch_way: float  # most that the blade pitch can travel in one control period, rad
-    torque_way: float  # most that the torque may change in one control period, N m
+    max_pitch_increment: float  # most that the blade pitch can travel in one control period, rad
+    max_torque_increment: float  # most that the torque may change in one control period, N m
 
 
 class Reference(NamedTuple):
@@ -121,9 +121,9 @@ def platform_motion_term(platform_pitch, rate, steady_pitch):
 
 
 @kernel
-def travel_term(before, after, way):
+def travel_term(before, after, max_increment):
     """Minus the share of the possible travel that was used in one control period."""
-    return 0.0 - unit_fraction(abs(after - before) / way)
+    return 0.0 - unit_fraction(abs(after - before) / max_increment)
 
 
 @kernel
@@ -137,9 +137,11 @@ def fill_terms(m, before, reference, failed, scales, terms):
         m[Measure.PLATFORM_PITCH], m[Measure.PLATFORM_PITCH_RATE], reference[0]
     )
     terms[TermIndex.PITCH_TRAVEL] = travel_term(
-        before[Measure.BLADE_PITCH], m[Measure.BLADE_PITCH], scales.pitch_way
+        before[Measure.BLADE_PITCH], m[Measure.BLADE_PITCH], scales.max_pitch_increment
     )
-    terms[TermIndex.TORQUE_TRAVEL] = travel_term(before[Measure.GENERATOR_TORQUE], torque, scales.torque_way)
+    terms[TermIndex.TORQUE_TRAVEL] = travel_term(
+        before[Measure.GENERATOR_TORQUE], torque, scales.max_torque_increment
+    )
     terms[TermIndex.FAILURE] = -1.0 if failed else 0.0
     terms[TermIndex.POWER_SHORTFALL] = power_shortfall_term(speed, torque, scales)
 
@@ -160,8 +162,8 @@ def build_scales(turbine, control_dt):
         rated_power=float(law.rated_power),
         rated_speed=float(turbine.rated_rotor_speed),
         gear_ratio=float(turbine.drivetrain.gear_ratio),
-        pitch_way=float(turbine.pitch_drive.rate_limit * control_dt),
-        torque_way=float(law.max_torque_rate * control_dt),
+        max_pitch_increment=float(turbine.pitch_drive.rate_limit * control_dt),
+        max_torque_increment=float(law.max_torque_rate * control_dt),
     )
 
 

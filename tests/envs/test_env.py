@@ -13,7 +13,7 @@ from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
 import fowt_env
-from fowt_env.analysis.trim_cache import GRID, exact_trim, near_trim
+from fowt_env.analysis.trim_cache import GRID, cached_trim, interpolated_trim
 from fowt_env.controllers import make
 from fowt_env.envs import TASKS, FowtEnv, Task
 from fowt_env.envs.observations import KNOWN
@@ -427,11 +427,11 @@ def test_interpolated_operating_points_are_near_the_exact_ones():
     scene, key = env.scene, env._key
     bounds = {State.SURGE: 0.06, State.PLATFORM_PITCH: 3e-4, State.BLADE_PITCH: 1e-3, State.ROTOR_SPEED: 4e-3}
     for speed in (5.125, 7.875, 10.375, 11.375, 11.875, 14.125, 24.875):
-        near, exact = near_trim(scene, key, speed)[0], exact_trim(scene, key, speed)[0]
+        near, exact = interpolated_trim(scene, key, speed)[0], cached_trim(scene, key, speed)[0]
         wider = 20.0 if abs(speed - scene.turbine.rated_wind_speed) < GRID else 1.0  # pitch control sets in
         for index, bound in bounds.items():
             assert abs(near[index] - exact[index]) < wider * bound, (speed, index)
-    assert near_trim(scene, key, 18.0)[0] is exact_trim(scene, key, 18.0)[0]
+    assert interpolated_trim(scene, key, 18.0)[0] is cached_trim(scene, key, 18.0)[0]
 
 
 def test_preview_shows_the_wind_that_comes():

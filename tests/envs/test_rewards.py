@@ -121,11 +121,11 @@ def test_platform_motion_term_is_constant_along_a_free_oscillation_of_thirty_sec
 
 
 def test_travel_terms_cost_one_at_the_rate_limit():
-    pitch_way = TURBINE.pitch_drive.rate_limit * 0.1
-    assert travel_term(0.1, 0.1 + pitch_way, SCALES.pitch_way) == pytest.approx(-1.0, rel=1e-12)
-    assert travel_term(0.1, 0.1 - 0.5 * pitch_way, SCALES.pitch_way) == pytest.approx(-0.5, rel=1e-12)
-    assert travel_term(0.0, 1e9, SCALES.torque_way) == -1.0
-    assert travel_term(0.3, 0.3, SCALES.pitch_way) == 0.0
+    most = TURBINE.pitch_drive.rate_limit * 0.1
+    assert travel_term(0.1, 0.1 + most, SCALES.max_pitch_increment) == pytest.approx(-1.0, rel=1e-12)
+    assert travel_term(0.1, 0.1 - 0.5 * most, SCALES.max_pitch_increment) == pytest.approx(-0.5, rel=1e-12)
+    assert travel_term(0.0, 1e9, SCALES.max_torque_increment) == -1.0
+    assert travel_term(0.3, 0.3, SCALES.max_pitch_increment) == 0.0
 
 
 def test_failure_costs_one():

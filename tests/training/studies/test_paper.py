@@ -6,7 +6,7 @@ from plant_helpers import rates, state
 from typer.testing import CliRunner
 
 import fowt_env
-from fowt_env.analysis.trim import trim_held
+from fowt_env.analysis.trim import trim_prescribed
 from fowt_env.descriptions.platform import read_platform, read_turbine
 from fowt_env.errors import InputError
 from fowt_env.plant.state import State
@@ -78,7 +78,7 @@ def test_the_model_is_oc3_hywind_by_froude_but_for_what_was_identified(model):
 
 def test_rated_thrust_is_froude_scaled_in_lc2_with_the_one_polar_factor(model):
     scene = fowt_env.build_scene(model, wind=3.36)
-    point = trim_held(scene, 85.6 * np.pi / 30.0, 0.0, platform="fixed")
+    point = trim_prescribed(scene, 85.6 * np.pi / 30.0, 0.0, platform="fixed")
     assert point["RtFldFxh"] == pytest.approx(703e3 / 50.0**3 * 1000.0 / 1025.0, rel=1e-4)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 import fowt_env
-from fowt_env.analysis.trim import trim_held
+from fowt_env.analysis.trim import trim_prescribed
 from fowt_env.descriptions.platform import read_platform
 from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.errors import InputError, unknown
@@ -106,7 +106,7 @@ def case_scene(name, duration=DURATION, seed=1, **options):
 def case_point(scene, name):
     """OperatingPoint of a load case's scene with its prescribed rotor speed and blade pitch."""
     case = CASES[name]
-    return trim_held(scene, case.rotor_rpm * RPM, case.blade_pitch_deg * DEGREE)
+    return trim_prescribed(scene, case.rotor_rpm * RPM, case.blade_pitch_deg * DEGREE)
 
 
 def run_case(name, duration=DURATION, seed=1, progress=False, **options):
