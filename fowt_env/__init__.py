@@ -19,8 +19,8 @@ if TYPE_CHECKING:  # the names below, for editors and type checkers
     from fowt_env.plant.measurement import Measurement as Measurement
     from fowt_env.plant.user_loads import Force as Force
     from fowt_env.plant.user_loads import Motion as Motion
-    from fowt_env.scene.build import Scene as Scene
     from fowt_env.scene.build import build_scene as build_scene
+    from fowt_env.scene.scene import Scene as Scene
     from fowt_env.scene.user_loads import Load as Load
     from fowt_env.scene.user_loads import load_kernel as load_kernel
     from fowt_env.simulation import simulate as simulate

@@ -19,7 +19,7 @@ from fowt_env.plant.events import counted
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
 from fowt_env.plant.rollout import OVERSPEED, RUNNING, STOP_REASONS, Schedule, rollout
 from fowt_env.plant.state import OUT_OF_PLANE, State, pose_of
-from fowt_env.scene.build import Scene
+from fowt_env.scene.scene import Scene
 from fowt_env.weather.wind_field import WindBox
 
 # Ctrl-C is heard and progress shown between compiled calls. A call by itself costs 1e-4 s, so they

@@ -19,7 +19,7 @@ from fowt_env.plant.dynamics import derivative
 from fowt_env.plant.hydro.load import BandedStrips
 from fowt_env.plant.rollout import output_row
 from fowt_env.plant.state import N_COMMANDS, Command, State, pose_of
-from fowt_env.scene.build import Scene
+from fowt_env.scene.scene import Scene
 from fowt_env.weather.wind import make_series
 from fowt_env.weather.wind_field import steady_field
 

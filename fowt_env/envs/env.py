@@ -57,7 +57,9 @@ from fowt_env.plant.compile.handle import Handle
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
 from fowt_env.plant.rollout import STOP_REASONS, output
 from fowt_env.plant.state import Command, State
-from fowt_env.scene.build import OPTIONS, Scene, build_scene
+from fowt_env.scene.build import build_scene
+from fowt_env.scene.options import OPTIONS
+from fowt_env.scene.scene import Scene
 from fowt_env.simulation import INITIAL, check_duration, steps_in
 
 SHORTEST_WEATHER = 600.0  # s of random wind and sea: turbulence intensity is defined over 10 min

@@ -13,7 +13,7 @@ from fowt_env.plant.hydro.hydrostatics import submerged
 from fowt_env.plant.mooring import mooring_load
 from fowt_env.plant.rigid_body import accelerate, gravity_load, momentum_rate, solve_spd
 from fowt_env.plant.state import State, Wrench, add, pose_of
-from fowt_env.scene.build import assemble, build_rigid_body
+from fowt_env.scene.mass import assemble, build_rigid_body
 
 REFERENCE = Path(__file__).parents[1] / "reference" / "accelerations.csv"
 DRY = np.zeros((6, 6))  # added mass

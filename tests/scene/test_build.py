@@ -11,7 +11,7 @@ from fowt_env.plant.aero.load import BemRotor
 from fowt_env.plant.hydro.load import BandedStrips, ExactStrips
 from fowt_env.plant.integrators import RungeKutta
 from fowt_env.plant.rollout import rollout
-from fowt_env.scene.build import ARGUMENTS
+from fowt_env.scene.options import ARGUMENTS
 
 NTM = {"kind": "ntm", "speed": 18.0, "class": "B"}
 SEA = {"kind": "jonswap", "Hs": 7.5, "Tp": 10.0, "gamma": 3.3}

@@ -24,7 +24,7 @@ from fowt_env.descriptions.records import (
 from fowt_env.descriptions.sea_state import SeaState, sea_state_of
 from fowt_env.descriptions.wind import read_wind
 from fowt_env.errors import InputError, unknown
-from fowt_env.scene.build import OPTIONS
+from fowt_env.scene.options import OPTIONS
 from fowt_env.training.evaluation.faults import Fault
 from fowt_env.training.evaluation.metrics import METRICS
 from fowt_env.training.evaluation.plant_perturbation import PlantPerturbation

@@ -21,7 +21,7 @@ from fowt_env.descriptions.records import (
 from fowt_env.envs.decisions import DecisionSettings
 from fowt_env.envs.env import SETTINGS
 from fowt_env.errors import InputError
-from fowt_env.scene.build import OPTIONS
+from fowt_env.scene.options import OPTIONS
 
 Count = Annotated[int, Field(ge=1, strict=True)]
 Whole = Annotated[int, Field(ge=0, strict=True)]

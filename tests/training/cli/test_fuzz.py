@@ -13,7 +13,7 @@ from fowt_env import build_scene
 from fowt_env.descriptions.sea_state import SEA_KEYS
 from fowt_env.descriptions.wind import KINDS
 from fowt_env.errors import InputError
-from fowt_env.scene.build import OPTIONS
+from fowt_env.scene.options import OPTIONS
 from fowt_env.training.cli import app as cli
 
 

@@ -1,0 +1,115 @@
+"""Options of build_scene: fidelities, rotor models, single parts; their defaults and what is allowed."""
+
+import numpy as np
+
+from fowt_env.descriptions.checks import check_number, check_whole_number
+from fowt_env.errors import InputError, unknown
+from fowt_env.plant.integrators import INTEGRATORS
+
+ROTORS = ("bem", "lookup", "table")
+FIDELITIES = {
+    # each level's parts; any of them given explicitly overrides its part
+    "reference": {"rotor": "bem", "wave_loads": "exact", "integrator": "rk4", "mooring": "catenary"},
+    "standard": {"rotor": "lookup", "wave_loads": "fast", "integrator": "ab4", "mooring": "catenary"},
+    "fast": {"rotor": "table", "wave_loads": "fast", "integrator": "ab4", "mooring": "table"},
+}
+FIELD_SAMPLES = 3  # rotor loads per step of ab4 in a box of wind, whose cells the blades cross in 0.1 s
+OPTIONS = {
+    # name: (default, allowed values or a description of the allowed range)
+    "kinematics_position": ("instantaneous", ("instantaneous", "fixed")),
+    "surface": ("instantaneous", ("instantaneous", "swl")),
+    "stretching": ("wheeler", ("wheeler", "none")),
+    "diffraction": (None, (None, "none", "maccamy_fuchs")),
+    "skewed_wake": (False, (False, True)),
+    "dynamic_inflow": (False, (False, True)),
+    "tower_drag": (True, (False, True)),
+    "hydrodynamics": (True, (False, True)),
+    # True: the fidelity's; "table": tensions tabulated about rest, solved beyond
+    "mooring": (True, (False, True, "catenary", "table")),
+    "planar": (False, (False, True)),
+    "integrator": (None, (None, *INTEGRATORS)),  # None: the fidelity's
+    # of the rotor's load per step of ab4; None: FIELD_SAMPLES in a box of wind, else 1
+    "rotor_samples": (None, "None or a number of samples, 1 to 10"),
+    "wave_loads": (None, (None, "exact", "fast")),  # None: the fidelity's
+    "current": (None, "None, a speed (m/s) or {'speed', 'heading' (deg), 'exponent'}"),
+    "duration": (700.0, "seconds of random wind and sea, > 0"),
+    "wave_components": (None, "None or a number of components, 1 to 10000"),
+    "blade_stations": (None, "None (the turbine file's) or a number of them, 3 up to the file's"),
+    "strip_length": (None, "None (a share of the draft) or metres, 0.01 to 1000: cells of exact wave loads"),
+    "shear_exponent": (None, "None (the platform file's) or 0 to 1"),
+    "turbine": (None, "None (the platform file's), a name, a path or a descriptions.platform.Turbine"),
+}
+ARGUMENTS = ("platform", "wind", "sea", "seed", "rotor", "fidelity", "loads")  # of build_scene beside OPTIONS
+
+
+def choose_parts(fidelity, rotor, options):
+    """Rotor model of a fidelity, with the other parts filled into options where they were left open."""
+    if fidelity not in tuple(FIDELITIES):  # which may be unhashable
+        raise unknown("fidelity", fidelity, FIDELITIES)
+    level = FIDELITIES[fidelity]
+    if rotor is not None and rotor not in ROTORS:
+        raise unknown("rotor model", rotor, ROTORS)
+    # induction is not in the tables; a level falls back to what has it, an explicit wish is refused
+    needs_induction = options["dynamic_inflow"] or options["skewed_wake"]
+    if needs_induction and rotor not in (None, "bem"):
+        raise InputError(f"rotor = {rotor!r}: skewed_wake and dynamic_inflow need rotor = 'bem'")
+    options["fidelity"] = fidelity
+    options["explicit_wave_loads"] = options["wave_loads"] is not None
+    for part in ("wave_loads", "integrator"):
+        if options[part] is None:
+            options[part] = level[part]
+    if options["mooring"] is True:
+        options["mooring"] = level["mooring"]
+    if rotor is None:
+        rotor = "bem" if needs_induction else level["rotor"]
+    return rotor
+
+
+def checked_options(given, platform):
+    """Options with defaults, the platform file's own ones and the caller's, checked."""
+    options = {name: default for name, (default, _) in OPTIONS.items()}
+    for source, values in (
+        (f"platform {platform.name!r}, options", platform.options),
+        ("build_scene", given),
+    ):
+        for name, value in values.items():
+            if name not in OPTIONS:
+                own = () if values is platform.options else ARGUMENTS
+                raise unknown(f"option of {source}", name, (*OPTIONS, *own))
+            allowed = OPTIONS[name][1]
+            if isinstance(allowed, tuple) and not any(value is a or value == a for a in allowed):
+                raise InputError(f"{name} = {value!r}: allowed {', '.join(repr(a) for a in allowed)}")
+            options[name] = value
+    options["duration"] = check_number("duration", options["duration"], 0.0, 1e6, low_open=True)
+    if options["shear_exponent"] is not None:
+        options["shear_exponent"] = check_number("shear_exponent", options["shear_exponent"], 0.0, 1.0)
+    if options["strip_length"] is not None:
+        options["strip_length"] = check_number("strip_length", options["strip_length"], 0.01, 1e3)
+    for name, most in (("wave_components", 10000), ("rotor_samples", 10)):
+        if options[name] is not None:
+            options[name] = check_whole_number(name, options[name], 1, most)
+    return options
+
+
+def samples_per_step(options, field):
+    """Evaluations of the rotor's load per step."""
+    asked, integrator = options["rotor_samples"], options["integrator"]
+    able = INTEGRATORS[integrator].samples_rotor
+    if asked not in (None, 1) and not able:
+        some = " or ".join(repr(name) for name, method in INTEGRATORS.items() if method.samples_rotor)
+        raise InputError(
+            f"rotor_samples = {asked}: only integrator = {some} evaluates the rotor more than once a step,"
+            f" not {integrator!r}"
+        )
+    if asked is None:
+        asked = FIELD_SAMPLES if field is not None and able else 1
+    return asked
+
+
+def chosen_stations(count, turbine):
+    """Indices of that many of the file's blade stations, root and tip among them; None: all."""
+    if count is None:
+        return None
+    known = len(turbine.blade.radius)
+    check_whole_number("blade_stations", count, 3, known)
+    return np.round(np.linspace(0, known - 1, count)).astype(int)

@@ -1,0 +1,159 @@
+"""Parts of the plant's model from the descriptions: rotor, hull, moorings, current."""
+
+from math import cos, radians, sin
+
+import numpy as np
+
+from fowt_env.descriptions.checks import check_number
+from fowt_env.errors import InputError, unknown
+from fowt_env.plant.aero.blade_elements import build_blade_elements
+from fowt_env.plant.aero.coefficient_table import build_rotor_table
+from fowt_env.plant.aero.load import Aero, BemRotor
+from fowt_env.plant.aero.section_table import build_section_table
+from fowt_env.plant.aero.tower_drag import build_tower_drag
+from fowt_env.plant.aero.wake import build_dynamic_inflow, build_skewed_wake, n_wake_states
+from fowt_env.plant.hydro.added_inertia import build_added_inertia
+from fowt_env.plant.hydro.diffraction import build_strip_diffraction
+from fowt_env.plant.hydro.hydrostatics import build_hull
+from fowt_env.plant.hydro.linear_damping import build_damping
+from fowt_env.plant.hydro.load import BandedStrips, ExactStrips, Hydro
+from fowt_env.plant.hydro.morison import Current, build_strips
+from fowt_env.plant.hydro.wave_bands import (
+    STILL_REFINEMENT,
+    build_fast_waves,
+    build_lane_diffraction,
+    build_lanes,
+    can_be_fast,
+)
+from fowt_env.plant.mooring import build_mooring
+from fowt_env.scene.options import chosen_stations
+from fowt_env.scene.weather import IN_PLANE
+
+
+def wake_states(aero):
+    """Number of states of the wake of an Aero part or None."""
+    rotor = None if aero is None else aero.rotor
+    return n_wake_states(rotor.elements, rotor.wake) if isinstance(rotor, BemRotor) else 0
+
+
+def build_aero(platform, turbine, air, rotor, options):
+    """Aero part of a scene with wind."""
+    density = platform.environment.air_density
+    elements = build_blade_elements(turbine, density, chosen_stations(options["blade_stations"], turbine))
+    if rotor == "bem":
+        skew = build_skewed_wake() if options["skewed_wake"] else None
+        wake = build_dynamic_inflow() if options["dynamic_inflow"] else None
+        model = BemRotor(elements, skew, wake)
+    else:
+        model = build_section_table(elements) if rotor == "lookup" else build_rotor_table(elements)
+    tower = build_tower_drag(platform.tower, density) if options["tower_drag"] else None
+    return Aero(air.series, air.field, model, tower)
+
+
+def build_hydro(platform, waves, current, options):
+    """Hydro part of a scene in water."""
+    site = platform.environment
+    shape = _strips(platform, options)
+    strips = ExactStrips(shape, None)
+    if takes_wave_bands(options, waves, shape):
+        lanes = build_lanes(platform.hull, shape, 1 if waves else STILL_REFINEMENT)
+        strips = BandedStrips(shape, lanes, None, None)
+    return Hydro(
+        hull=build_hull(platform.hull, site.water_density, site.gravity),
+        strips=strips_in_waves(strips, waves, options),
+        waves=waves,
+        current=current,
+        damping=build_damping(platform.hydro),
+        added_inertia=build_added_inertia(platform.hydro.added_mass),
+    )
+
+
+def strips_in_waves(strips, waves, options):
+    """Strips in waves (None: still water). Raises: InputError for a sea beyond the fast path."""
+    diffracting = options["diffraction"] == "maccamy_fuchs" and waves is not None
+    if isinstance(strips, ExactStrips):
+        return strips._replace(
+            diffraction=build_strip_diffraction(waves, strips.shape) if diffracting else None
+        )
+    sea = _fast_sea(waves, strips.shape)
+    return strips._replace(
+        sea=sea, diffraction=build_lane_diffraction(sea, strips.lanes) if diffracting else None
+    )
+
+
+def takes_wave_bands(options, waves, strips):
+    """Whether the strip loads take the fast path; where a level asks for it, seas beyond it go exact."""
+    if options["wave_loads"] != "fast":
+        return False
+    if waves is None or can_be_fast(waves, strips):
+        return True
+    if options["explicit_wave_loads"]:
+        raise InputError(
+            "wave_loads = 'fast': needs waves of one heading, and surface 'instantaneous' with stretching"
+            " 'wheeler' or surface 'swl' with stretching 'none'; use 'exact'"
+        )
+    return False
+
+
+def _fast_sea(waves, strips):
+    """FastWaves of the waves, None in still water. Raises: InputError for a sea beyond the fast path."""
+    if waves is None:
+        return None
+    if not can_be_fast(waves, strips):
+        raise InputError("sea: several headings cannot be summed fast; build_scene(..., wave_loads='exact')")
+    return build_fast_waves(waves, strips)
+
+
+def check_symmetry(lines, current):
+    """Refuse what pulls a planar scene out of its plane."""
+    if current is not None and abs(current.v) > IN_PLANE * abs(current.u):
+        raise InputError("current.heading: must be 0 or 180 deg in a planar scene")
+    mirror = np.array([1.0, -1.0, 1.0, 1.0, -1.0, 1.0, 1.0, 1.0, 1.0, 1.0])
+    rows = [
+        np.array([*line.anchor, *line.fairlead, line.length, line.wet_weight, line.EA, line.seabed_friction])
+        for line in lines
+    ]
+    for row in rows:
+        if not any(np.allclose(other, mirror * row, rtol=1e-6, atol=1e-3) for other in rows):
+            raise InputError(
+                f"mooring line anchored at y = {row[1]:g} m has no mirror image at {-row[1]:g} m; a planar"
+                " scene needs one (planar = False)"
+            )
+
+
+def _strips(platform, options):
+    site = platform.environment
+    return build_strips(
+        platform.hull,
+        platform.hydro,
+        density=site.water_density,
+        depth=site.water_depth,
+        position=options["kinematics_position"],
+        surface=options["surface"],
+        stretching=options["stretching"],
+        cell=options["strip_length"],
+    )
+
+
+def build_current(spec):
+    """Current part, or None where its speed is zero."""
+    if spec is None:
+        return None
+    if not isinstance(spec, dict):
+        spec = {"speed": spec}
+    for key in spec:
+        if key not in ("speed", "heading", "exponent"):
+            raise unknown("key of current", key, ("speed", "heading", "exponent"))
+    if "speed" not in spec:
+        raise InputError("current: the key 'speed' (m/s) is missing")
+    speed = check_number("current.speed", spec["speed"], 0.0, 10.0)
+    heading = radians(check_number("current.heading", spec.get("heading", 0.0), -360.0, 360.0))
+    exponent = check_number("current.exponent", spec.get("exponent", 0.0), 0.0, 10.0)
+    if speed == 0.0:
+        return None
+    return Current(speed * cos(heading), speed * sin(heading), exponent)
+
+
+def build_moorings(lines, wanted):
+    """Mooring part, None without lines or where none is wanted."""
+    return build_mooring(lines, tabulated=wanted == "table") if wanted else None

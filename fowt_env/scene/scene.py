@@ -1,0 +1,178 @@
+"""Scene: a turbine on its platform in its weather, ready to be stepped."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from fowt_env.descriptions.checks import check_whole_number
+from fowt_env.descriptions.platform import Platform, Turbine
+from fowt_env.errors import InputError
+from fowt_env.plant.channels import Channel, channels, to_units, with_hub_wind
+from fowt_env.plant.compile.handle import Handle
+from fowt_env.plant.events import N_COUNTERS
+from fowt_env.plant.hydro.wave_bands import (
+    fast_scratch,
+)
+from fowt_env.plant.integrators import INTEGRATORS, rotor_samples
+from fowt_env.plant.model import N_CACHE, Data
+from fowt_env.plant.rotor_substeps import N_SAMPLE
+from fowt_env.plant.state import Block, state_blocks
+from fowt_env.plant.user_loads import room_of
+from fowt_env.scene.parts import strips_in_waves, wake_states
+from fowt_env.scene.user_loads import Load, first_nonfinite_load
+from fowt_env.scene.weather import Sea, Wind, build_weather
+from fowt_env.weather.wind import hub_series
+from fowt_env.weather.wind_field import WindBox, hub_wind
+
+REFERENCE_STEP = 0.0125  # s, of rk4 at fidelity "reference": errs 2e-6 in heave, 2e-7 elsewhere
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A turbine on its platform in its weather, ready to be stepped.
+
+    model is what kernels read; the rest says where it came from. Scenes are never written to: the
+    state vector and the scratch of a run belong to the run.
+    """
+
+    model: Any  # a dynamics.Model; its parts have many types
+    platform: Platform
+    turbine: Turbine
+    wind: Any  # as asked for
+    sea: Any
+    seed: int
+    rotor: str
+    options: dict
+    wind_speed: float | None  # mean hub wind that a trim uses; None without aerodynamics
+    loads: tuple[Load, ...] = ()  # the user's own
+    label: str = ""  # the platform as it was asked for: name or path
+    trims: dict = field(default_factory=dict, init=False, repr=False)  # {platform mode: OperatingPoint} found
+
+    @property
+    def n_lines(self) -> int:
+        return 0 if self.model.mooring is None else self.model.mooring.length.shape[0]
+
+    @property
+    def load_names(self) -> tuple[str, ...]:
+        return tuple(load.name for load in self.loads)
+
+    @cached_property
+    def blocks(self) -> tuple[Block, ...]:
+        """What the entries of this scene's state vector are, in order."""
+        internal = {"wake": wake_states(self.model.aero)}
+        return state_blocks(internal | {f"load {load.name}": load.states for load in self.loads})
+
+    @property
+    def n_state(self) -> int:
+        return self.blocks[-1].offset + self.blocks[-1].size
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """Output channels of this scene, in row order."""
+        return channels(self.n_lines, self.load_names)
+
+    def values(self, rows: np.ndarray) -> np.ndarray:
+        """A copy of output rows (k, n_channels), in SI as kernels write them, in the units of the channels.
+
+        Where the plant's wind is a rotor average, Wind1VelX to Z become those of a point at the hub.
+        """
+        if self._hub_wind is not None:
+            rows = with_hub_wind(rows, self._hub_wind, self.model.aero.wind.period)
+        return to_units(rows, self.n_lines, self.load_names)
+
+    @cached_property
+    def _hub_wind(self):
+        """(time, (n, 3)) of the wind at the hub where the model's wind is a rotor average, else None."""
+        rotor = self.turbine.rotor
+        if isinstance(self.wind, WindBox):
+            return hub_wind(self.wind, rotor.hub_height) if self.model.aero.field is None else None
+        found = hub_series(
+            self.wind,
+            reference_height=rotor.hub_height,
+            rotor_diameter=2.0 * rotor.tip_radius,
+            seed=self.seed,
+            duration=self.options["duration"],
+        )
+        if found is not None and self.options["planar"]:
+            found[1][:, 1] = 0.0
+        return found
+
+    def data(self) -> Data:
+        """Fresh scratch arrays for one plant of this scene."""
+        hydro = self.model.hydro
+        strips = None if hydro is None else hydro.strips
+        return Data(
+            lines=np.zeros((self.n_lines, 6)),
+            counters=np.zeros(N_COUNTERS),
+            kinematics=np.zeros((7, 0 if strips is None else strips.shape.nodes)),
+            fast=fast_scratch(getattr(strips, "sea", None), getattr(strips, "lanes", None)),
+            added_mass=np.zeros((6, 6)),
+            matrix=np.zeros((6, 6)),
+            stages=np.zeros((5, self.n_state)),
+            cache=np.zeros(N_CACHE),
+            user=np.zeros(room_of(len(self.loads), max((load.states for load in self.loads), default=0))),
+            history=np.zeros((4, self.n_state)),
+            samples=np.zeros((4 * rotor_samples(self.model.integrator), N_SAMPLE)),
+        )
+
+    def handle(self, data: Data | None = None) -> Handle:
+        """The model and data in the form that kernels take from Python."""
+        return Handle(self.model, self.data() if data is None else data)
+
+    def first_nonfinite_load(self, data: Data) -> str | None:
+        """Words for the load of the user's that made a run not finite with this data; None where none did."""
+        return first_nonfinite_load(self.loads, data.user)
+
+    def with_weather(self, wind: Wind, sea: Sea, seed: int) -> "Scene":
+        """A copy in other weather of the same kind: only wind and sea are drawn anew.
+
+        Raises: InputError, also where aerodynamics would appear or vanish (build a scene for that).
+        """
+        seed = check_whole_number("seed", seed, 0)
+        air, waves = build_weather(wind, sea, seed, self.platform, self.turbine, self.rotor, self.options)
+        aero, hydro = self.model.aero, self.model.hydro
+        if (air.series is None) != (aero is None):
+            raise InputError(
+                f"wind = {wind!r}: a scene cannot gain or lose its aerodynamics; use build_scene"
+            )
+        if aero is not None and (air.field is None) != (aero.field is None):
+            raise InputError("wind: a scene cannot gain or lose its box of full-field wind; use build_scene")
+        if hydro is not None:
+            strips = strips_in_waves(hydro.strips, waves, self.options)
+            hydro = hydro._replace(waves=waves, strips=strips)
+        if aero is not None:
+            aero = aero._replace(wind=air.series, field=air.field)
+        model = self.model._replace(aero=aero, hydro=hydro)
+        return replace(self, model=model, wind=air.spec, sea=sea, seed=seed, wind_speed=air.speed)
+
+    @property
+    def dt(self) -> float:
+        """Default physics step, s: that of the scene's integrator, finer at fidelity "reference"."""
+        if self.options["fidelity"] == "reference" and self.options["integrator"] == "rk4":
+            return REFERENCE_STEP
+        return INTEGRATORS[self.options["integrator"]].dt
+
+    def with_model(self, parts: Mapping[str, Any] | None = None, **slots: Any) -> "Scene":
+        """A copy with some parts of the model replaced (same types: no recompilation).
+
+        parts: {path: part}, as {"hydro.damping": ...}; slots: those at the top, as rigid_body=...
+        """
+        model = self.model
+        for path, part in {**(parts or {}), **slots}.items():
+            model = _replaced(model, path.split("."), part)
+        return replace(self, model=model)
+
+    def __repr__(self):
+        return (
+            f"Scene({self.platform.name!r}, wind={self.wind!r}, sea={self.sea!r}, seed={self.seed},"
+            f" rotor={self.rotor!r})"
+        )
+
+
+def _replaced(part, path, value):
+    """A part of a model with that at a path of field names replaced."""
+    name, *rest = path
+    return part._replace(**{name: _replaced(getattr(part, name), rest, value) if rest else value})
