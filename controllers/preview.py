@@ -147,7 +147,7 @@ def rotor_wind(scene):
 
 
 def steady_pitch(scene):
-    """(wind m/s, blade pitch rad) of the steady schedule, platform held, from below rated to cut-out."""
+    """(wind m/s, blade pitch rad) of the steady schedule, platform fixed, from below rated to cut-out."""
     turbine = scene.turbine
     low, high = turbine.rated_wind_speed - BELOW_RATED, turbine.cut_out_wind_speed
     speeds = low + (high - low) * np.linspace(0.0, 1.0, SCHEDULE_SPEEDS) ** 2

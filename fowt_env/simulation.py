@@ -211,7 +211,7 @@ def simulate(
             controller.prepare(scene)
     x, u = initial_state(scene, start, initial)
     if held:
-        scene = scene.with_model({"rigid_body.rotor_held": True})
+        scene = scene.with_model({"rigid_body.rotor_fixed": True})
         controller = HeldCommand()
         per_control = last  # nobody reads the measurements
     overspeed = scene.turbine.overspeed if stop_overspeed else inf

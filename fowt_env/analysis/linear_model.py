@@ -234,7 +234,7 @@ def linearize(scene, operating_point=None):
             " (dynamic_inflow=False)"
         )
     point = trim(scene) if operating_point is None else operating_point
-    body = scene.model.rigid_body._replace(platform_held=point.platform == "fixed")
+    body = scene.model.rigid_body._replace(platform_fixed=point.platform == "fixed")
     plant = _Plant(without_fluctuations(scene, point.wind_speed).with_model(rigid_body=body), scene.n_lines)
     x, u, force = point.state.copy(), point.command.copy(), np.zeros(6)
 

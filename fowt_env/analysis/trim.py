@@ -358,11 +358,11 @@ def trim(scene: Scene, platform: str = "floating") -> OperatingPoint:
 
 def _trim(scene, platform):
     """What trim gives, found anew."""
-    held = platform == "fixed"
-    body = scene.model.rigid_body._replace(platform_held=held, rotor_held=False)
+    fixed = platform == "fixed"
+    body = scene.model.rigid_body._replace(platform_fixed=fixed, rotor_fixed=False)
     steady = _Steady(without_fluctuations(scene).with_model(rigid_body=body))
     steady.settle_rotor()
-    if not held:
+    if not fixed:
         for _ in range(OUTER_ROUNDS):
             # which of pitch and speed is free follows from the rotor's balance on the platform as it is
             free = steady.free_states()
@@ -383,7 +383,7 @@ def trim_prescribed(scene, rotor_speed, blade_pitch, platform="floating"):
     """
     if platform not in PLATFORM_MODES:
         raise unknown("platform mode of trim_prescribed", platform, PLATFORM_MODES)
-    body = scene.model.rigid_body._replace(platform_held=platform == "fixed", rotor_held=True)
+    body = scene.model.rigid_body._replace(platform_fixed=platform == "fixed", rotor_fixed=True)
     steady = _Steady(without_fluctuations(scene).with_model(rigid_body=body))
     steady.x[State.ROTOR_SPEED] = rotor_speed
     steady.x[State.BLADE_PITCH] = steady.u[1] = blade_pitch

@@ -121,7 +121,7 @@ def moulton(order, new, i, history):
 @kernel
 def feathering(x, model):
     """Whether a free rotor's blades are pitched beyond FEATHERING, where its speed is heavily damped."""
-    return x[State.BLADE_PITCH] > FEATHERING and not model.rigid_body.rotor_held
+    return x[State.BLADE_PITCH] > FEATHERING and not model.rigid_body.rotor_fixed
 
 
 @inlined_kernel

@@ -20,7 +20,7 @@ from fowt_env.plant.integrators import INTEGRATORS, rotor_samples
 from fowt_env.plant.model import N_CACHE, Data
 from fowt_env.plant.rotor_substeps import N_SAMPLE
 from fowt_env.plant.state import Block, state_blocks
-from fowt_env.plant.user_loads import room_of
+from fowt_env.plant.user_loads import user_data_size
 from fowt_env.scene.parts import strips_in_waves, wake_states
 from fowt_env.scene.user_loads import Load, first_nonfinite_load
 from fowt_env.scene.weather import Sea, Wind, build_weather
@@ -113,7 +113,9 @@ class Scene:
             matrix=np.zeros((6, 6)),
             stages=np.zeros((5, self.n_state)),
             cache=np.zeros(N_CACHE),
-            user=np.zeros(room_of(len(self.loads), max((load.states for load in self.loads), default=0))),
+            user=np.zeros(
+                user_data_size(len(self.loads), max((load.states for load in self.loads), default=0))
+            ),
             history=np.zeros((4, self.n_state)),
             samples=np.zeros((4 * rotor_samples(self.model.integrator), N_SAMPLE)),
         )

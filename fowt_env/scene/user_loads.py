@@ -298,12 +298,12 @@ def build_user_loads(loads: Sequence[Load], base_height: float, first_state: int
     )
 
 
-def first_nonfinite_load(loads: Sequence[Load], room: np.ndarray) -> str | None:
+def first_nonfinite_load(loads: Sequence[Load], user_data: np.ndarray) -> str | None:
     """Words for the load that first gave a number that is not finite; None where none did.
 
-    room: what plant.user_loads.evaluate_user_loads filled.
+    user_data: what plant.user_loads.evaluate_user_loads filled.
     """
-    if not loads or not room[6 * len(loads)]:
+    if not loads or not user_data[6 * len(loads)]:
         return None
-    load = loads[int(room[6 * len(loads)]) - 1]
+    load = loads[int(user_data[6 * len(loads)]) - 1]
     return f"load {load.name!r} gave a force that is not finite"

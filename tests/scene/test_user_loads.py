@@ -239,7 +239,7 @@ def test_a_load_on_the_nacelle_is_carried_by_the_tower_base_and_one_on_the_hull_
         rows = []
         for strength in (force, Push()):
             scene = stormy(Load("Push", push, strength, point=(0.0, 0.0, z)))
-            held = scene.with_model({"rigid_body.platform_held": True})
+            held = scene.with_model({"rigid_body.platform_fixed": True})
             row = output_row(held.handle(), np.zeros(held.n_state), np.zeros(2), 0.0, len(held.channels))
             rows.append(dict(zip((c.name for c in held.channels), row, strict=True)))
         changes.append({name: rows[0][name] - rows[1][name] for name in rows[0]})

@@ -169,9 +169,10 @@ def _chosen_runs(table, cases, seeds):
         table = table[table["seed"].isin(seeds)]
     if cases is None:
         per_case = max(table.groupby("case").size())
-        room = max(1, MAX_SERIES_RUNS // per_case)
-        if len(known) > room:
-            known = [known[i] for i in np.unique(np.linspace(0, len(known) - 1, room).round().astype(int))]
+        capacity = max(1, MAX_SERIES_RUNS // per_case)
+        if len(known) > capacity:
+            kept = np.unique(np.linspace(0, len(known) - 1, capacity).round().astype(int))
+            known = [known[i] for i in kept]
         cases = known
     return table[table["case"].isin(cases)]
 

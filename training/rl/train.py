@@ -417,7 +417,7 @@ class Training:
     def save(self):
         """Write a checkpoint of the present instant, whole or not at all; the one before it goes.
 
-        Raises: OSError naming it where there is no room; the one before it stays.
+        Raises: OSError naming it where there is no space; the one before it stays.
         """
         target = self.checkpoints / f"step_{self.model.num_timesteps}"
         if target.exists():

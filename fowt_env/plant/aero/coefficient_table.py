@@ -191,7 +191,7 @@ def _fill(theta, blade_pitch, load, rotor):
 _built = {}  # one table per set of blade elements in this process: building takes about two seconds
 
 
-def build_rotor_table(rotor):
+def build_coefficient_table(rotor):
     """CoefficientTable of a BladeElements; the same elements give the table built before."""
     key = elements_key(rotor)
     if key not in _built:

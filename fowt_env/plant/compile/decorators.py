@@ -2,7 +2,7 @@
 
 Numba's own cache watches only the file of the function itself: after an edit of a callee in
 another file a cached caller would go on returning the old result. So the cache lives in a folder
-named by a hash of every source of the plant. A kernel of another room (an environment's, a controller's)
+named by a hash of every source of the plant. A kernel of another package (an environment's, a controller's)
 carries the hash of what its module imports besides. A user's function is compiled anew in each process.
 """
 

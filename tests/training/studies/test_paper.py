@@ -96,7 +96,7 @@ def test_the_committed_model_is_what_the_identification_gives(model):
 def test_a_driven_rotor_turns_the_platform_as_equation_20_says(model):
     # difference to a standing rotor: M1 nu' = -H (0, 0, 0, w_b', w_b w_z, -w_b w_y) with w_b' = 0
     scene = fowt_env.build_scene(model, hydrodynamics=False, mooring=False)
-    body = scene.model.rigid_body._replace(rotor_held=True)
+    body = scene.model.rigid_body._replace(rotor_fixed=True)
     scene = scene.with_model(rigid_body=body)
     spinning = state(vx=0.1, wy=0.2, wz=-0.3, rotor_speed=8.96)
     standing = spinning.copy()

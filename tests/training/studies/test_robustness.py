@@ -34,7 +34,7 @@ def keeps_the_margin(name, integrator, duration):
 
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 @pytest.mark.parametrize(
-    "name", ["full, look-up rotor", "idling feathered, 70 m/s, Hs 15 m", "platform held"]
+    "name", ["full, look-up rotor", "idling feathered, 70 m/s, Hs 15 m", "platform fixed"]
 )
 def test_default_step_keeps_a_factor_of_two_from_blow_up(name, integrator):
     assert keeps_the_margin(name, integrator, 100.0)

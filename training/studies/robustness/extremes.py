@@ -153,7 +153,7 @@ class _ExtremeRun:
         if case.parked:
             self.x[State.ROTOR_SPEED] = self.u[0] = 0.0
             self.x[State.BLADE_PITCH] = self.u[1] = scene.turbine.pitch_drive.maximum
-            self.scene = scene.with_model({"rigid_body.rotor_held": True})
+            self.scene = scene.with_model({"rigid_body.rotor_fixed": True})
         elif self.x[State.ROTOR_SPEED] > 0.0:  # beyond cut-out the trim idles feathered without control
             self.controller = make("pi", scene.turbine, CONTROL_DT)
         self.dx, self.measurement = np.zeros_like(self.x), np.zeros(N_MEASUREMENTS)
