@@ -71,8 +71,8 @@ class FeedbackParameter(IntEnum):
     SIGNAL = Parameter.CURVE + len(TorqueCurve._fields)  # index of the fed-back entry of the measurement
     PITCH_GAIN = SIGNAL + 1
     TORQUE_GAIN = SIGNAL + 2
-    HIGH_DECAY = SIGNAL + 3  # share of the slow part that one period leaves
-    LOW_DECAY = SIGNAL + 4  # share of each low pass that one period leaves
+    HIGH_DECAY = SIGNAL + 3  # fraction of the slow part that one period leaves
+    LOW_DECAY = SIGNAL + 4  # fraction of each low pass that one period leaves
     SCHEDULED = SIGNAL + 5  # 1: pitch_gain follows the gain schedule
 
 

@@ -36,7 +36,7 @@ class Parameter(IntEnum):
     """Entries of the law's parameter array; the fields of TorqueCurve follow from CURVE on."""
 
     CONTROL_DT = 0  # s
-    FILTER_DECAY = 1  # share of the filtered speed that one period leaves
+    FILTER_DECAY = 1  # fraction of the filtered speed that one period leaves
     GEAR_RATIO = 2
     RATED_SPEED = 3  # w_b0, the set-point of the rotor speed, rad/s
     PROPORTIONAL = 4  # G, s

@@ -108,7 +108,7 @@ def tasks():
         ("reach of the blade pitch", *(_range(task.blade_pitch, " deg") for task in chosen)),
         (
             "reach of the set-point",
-            *(_range(tuple(share * rated for share in task.setpoint), " rpm") for task in chosen),
+            *(_range(tuple(fraction * rated for fraction in task.setpoint), " rpm") for task in chosen),
         ),
         ("weather seeds", *(f"{task.weather_seeds[0]} to {task.weather_seeds[1] - 1}" for task in chosen)),
     ]

@@ -142,7 +142,7 @@ class LinearModel:
 class Mode(NamedTuple):
     """One oscillating mode."""
 
-    name: str  # the state with the largest share
+    name: str  # the state with the largest participation
     period: float  # s
     damping_ratio: float
     frequency: float  # rad/s
@@ -160,7 +160,7 @@ def modes(a, names, cm_height, arm):
         if value.imag <= 1e-6:
             continue
         part = dict(zip(names, vector, strict=True))
-        share = {
+        participation = {
             "surge": abs(part["surge"] + cm_height * part["platform_pitch"]),
             "sway": abs(part["sway"] - cm_height * part["roll"]),
             "heave": abs(part["heave"]),
@@ -169,7 +169,7 @@ def modes(a, names, cm_height, arm):
             "yaw": arm * abs(part["yaw"]),
             "rotor_speed": arm / 12.0 * abs(part["rotor_speed"]),
         }
-        name = max(share, key=share.get)
+        name = max(participation, key=participation.get)
         found.append(
             Mode(name, float(2.0 * np.pi / value.imag), float(-value.real / abs(value)), float(abs(value)))
         )

@@ -69,7 +69,7 @@ def build_action_map(mode, task, turbine, control_dt):
     inertia = shaft.inertia_row / shaft.gear_ratio
     low, high = 0.0, law.max_torque
     if mode == Mode.SETPOINT:
-        low, high = (share * turbine.rated_rotor_speed for share in task.setpoint)
+        low, high = (fraction * turbine.rated_rotor_speed for fraction in task.setpoint)
         if low >= high:
             raise InputError(f"task {task.name!r}: setpoint = {task.setpoint}: must be a range (low, high)")
     return ActionMap(

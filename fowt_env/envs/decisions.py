@@ -43,7 +43,7 @@ class Decisions:
         self.settings = settings
         self.seen = np.zeros((n, settings.history + 1, channels), dtype=np.float32)
         self.action = np.zeros((n, N_ACTIONS))
-        self.share = 1.0 if settings.smoothing == 0.0 else 1.0 - exp(-control_dt / settings.smoothing)
+        self.fraction = 1.0 if settings.smoothing == 0.0 else 1.0 - exp(-control_dt / settings.smoothing)
 
     @property
     def size(self):
@@ -75,7 +75,7 @@ class Decisions:
 
     def smooth(self, decision):
         """(n, 2) action of the next control period, towards the decision."""
-        self.action += self.share * (decision - self.action)
+        self.action += self.fraction * (decision - self.action)
         return self.action
 
 

@@ -85,7 +85,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     wind_preview  look-ahead times (s) of the channel wind_preview
     render_mode   None, "rgb_array" (render() returns a picture) or "human" (every step shows one in a window)
     fidelity      level of build_scene: "reference", "standard" or "fast"
-    sensors       {"noise": standard deviation of white noise on every reading, as a share of the channel's
+    sensors       {"noise": standard deviation of white noise on every reading, as a fraction of the channel's
                   scale; "delay": control periods from measurement to reading}, either may be left out. One
                   reading per control period is what observation, baseline and estimator are given, and
                   measurement() returns; its noise follows from the weather's seed. Azimuth, last action and

@@ -16,8 +16,8 @@ from fowt_env.plant.measurement import Measure
 
 AT_MARGIN = 0.1  # value of tolerance() one margin outside its bounds
 STEEPNESS = -log(AT_MARGIN)
-POWER_MARGIN = 0.2  # share of rated power above rated at which the power term has fallen to a tenth
-SPEED_MARGIN = 0.2  # share of rated rotor speed outside the band at which its term has fallen to a tenth
+POWER_MARGIN = 0.2  # fraction of rated power above rated at which the power term has fallen to a tenth
+SPEED_MARGIN = 0.2  # fraction of rated rotor speed outside the band at which its term has fallen to a tenth
 TILT_MARGIN = 5.0 * pi / 180.0  # rad, amplitude of platform pitch at which its term has fallen to a tenth
 TILT_PERIOD = 30.0  # s, about that of platform pitch: turns its rate into an amplitude
 
@@ -66,7 +66,7 @@ TERMS = {
     "pitch_travel": Term(-1.0, 0.0, "blade-pitch travel over the most that the rate limit allows"),
     "torque_travel": Term(-1.0, 0.0, "change of generator torque over the most that the rate limit allows"),
     "failure": Term(-1.0, 0.0, "-1 in the step that ends in failure, else 0"),
-    "power_shortfall": Term(-1.0, 0.0, "minus the share of rated power that is lacking; more counts nothing"),
+    "power_shortfall": Term(-1.0, 0.0, "minus the missing fraction of rated power; more counts nothing"),
 }
 TermIndex = IntEnum("TermIndex", [name.upper() for name in TERMS], start=0)
 N_TERMS = len(TERMS)
@@ -96,13 +96,13 @@ def unit_fraction(value):
 @kernel
 def power_term(speed, torque, scales):
     """Share of rated power, and how well the rest stays below it."""
-    share = scales.gear_ratio * speed * torque / scales.rated_power
-    return unit_fraction(share) * tolerance(share, (0.0, 1.0), POWER_MARGIN)
+    power = scales.gear_ratio * speed * torque / scales.rated_power
+    return unit_fraction(power) * tolerance(power, (0.0, 1.0), POWER_MARGIN)
 
 
 @kernel
 def power_shortfall_term(speed, torque, scales):
-    """Minus the share of rated power that is lacking."""
+    """Minus the missing fraction of rated power."""
     return unit_fraction(scales.gear_ratio * speed * torque / scales.rated_power) - 1.0
 
 
@@ -122,7 +122,7 @@ def platform_motion_term(platform_pitch, rate, steady_pitch):
 
 @kernel
 def travel_term(before, after, max_increment):
-    """Minus the share of the possible travel that was used in one control period."""
+    """Minus the fraction of the possible travel that was used in one control period."""
     return 0.0 - unit_fraction(abs(after - before) / max_increment)
 
 

@@ -54,7 +54,7 @@ def check_sensors(given):
 
 
 def draw_sensors(noise, delay, scales, seed, readings):
-    """Sensors of an episode: noise as a share of the scales (N_MEASUREMENTS,), by the seed of its weather."""
+    """Sensors of an episode: noise as a fraction of the scales (N_MEASUREMENTS,), by its weather's seed."""
     if noise == 0.0:
         return Sensors(np.zeros((1, N_MEASUREMENTS)), delay)
     rng = np.random.default_rng([seed, NOISE_STREAM])

@@ -16,7 +16,7 @@ def action_table(task, turbine):
     """Meaning of the two actions in each mode."""
     law = turbine.torque_law
     rpm = 30.0 / 3.141592653589793
-    low, high = (share * turbine.rated_rotor_speed * rpm for share in task.setpoint)
+    low, high = (fraction * turbine.rated_rotor_speed * rpm for fraction in task.setpoint)
     pitch = f"blade-pitch command, {task.blade_pitch[0]:g} to {task.blade_pitch[1]:g} deg"
     rows = [
         ("direct", 0, f"generator torque, 0 to {law.max_torque * 1e-3:.2f} kN m (high-speed shaft)"),

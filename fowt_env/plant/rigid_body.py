@@ -149,8 +149,8 @@ def accelerate(pose, x, load, torque, added, body, matrix, dx):
         solve_spd(matrix, b)
         dx[State.ROTOR_SPEED] = 0.0
         return
-    share = body.coupling / body.rotor_row
-    matrix[3, 3] -= share * body.coupling
-    b[3] -= share * torque
+    ratio = body.coupling / body.rotor_row
+    matrix[3, 3] -= ratio * body.coupling
+    b[3] -= ratio * torque
     solve_spd(matrix, b)
     dx[State.ROTOR_SPEED] = (torque - body.coupling * b[3]) / body.rotor_row

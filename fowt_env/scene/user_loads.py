@@ -23,7 +23,7 @@ AXES = ("inertial", "body")
 SIGNATURE = types.void(FLOATS, FLOATS, FLOATS)
 ARGUMENTS = 3
 MOST_STATES = 100  # of one load
-IN_PLANE = 1e-9  # share of a force out of the plane of a planar scene that rounding may leave
+IN_PLANE = 1e-9  # fraction of a force out of the plane of a planar scene that rounding may leave
 TRIALS = (  # states that a load is tried in: surge, sway, heave, roll, pitch, yaw, and their rates
     (np.zeros(6), np.zeros(6)),
     (np.array([12.0, -3.0, -1.5, 0.01, 0.07, -0.02]), np.array([0.7, -0.2, 0.4, 0.002, 0.01, 0.001])),

@@ -17,7 +17,7 @@ from fowt_env.weather.wind_field import WindBox, hub_speed, is_field, read_box, 
 # what users may give as wind and sea, see build_scene
 Wind = float | dict[str, Any] | WindSeries | WindBox | None
 Sea = str | Path | Mapping[str, Any] | SeaState | None
-IN_PLANE = 1e-9  # share of a vector out of the plane of a planar scene that rounding may leave
+IN_PLANE = 1e-9  # fraction of a vector out of the plane of a planar scene that rounding may leave
 
 
 class Air(NamedTuple):

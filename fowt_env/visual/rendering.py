@@ -122,9 +122,9 @@ class Surface:
 
 def tension_colour(tension, at_rest):
     """Colour of a line: blue where loose, yellow at its tension at rest, red at one and a half of it."""
-    share = 2.0 * (tension / at_rest - 1.0) if at_rest > 0.0 else 0.0
-    other, share = (TIGHT, min(share, 1.0)) if share > 0.0 else (LOOSE, min(-share, 1.0))
-    return tuple(round(a + share * (b - a)) for a, b in zip(AT_REST, other, strict=True))
+    fraction = 2.0 * (tension / at_rest - 1.0) if at_rest > 0.0 else 0.0
+    other, fraction = (TIGHT, min(fraction, 1.0)) if fraction > 0.0 else (LOOSE, min(-fraction, 1.0))
+    return tuple(round(a + fraction * (b - a)) for a, b in zip(AT_REST, other, strict=True))
 
 
 class TurbinePanel:
@@ -165,8 +165,8 @@ class TurbinePanel:
         pygame = self.pygame
         picture = pygame.Surface(self.inner, pygame.SRCALPHA)
         for y in range(self.inner[1]):
-            share = min(max((y - begin) / max(1, end - begin), 0.0), 1.0)
-            mixed = [round(a + share * (b - a)) for a, b in zip(*colours, strict=True)]
+            fraction = min(max((y - begin) / max(1, end - begin), 0.0), 1.0)
+            mixed = [round(a + fraction * (b - a)) for a, b in zip(*colours, strict=True)]
             pygame.draw.line(picture, mixed, (0, y), (self.inner[0], y))
         return picture
 

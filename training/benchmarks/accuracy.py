@@ -41,7 +41,7 @@ COLUMNS = (
 )  # fmt: skip
 # OpenFAST on the rigid model, 18 m/s uniform turbulence, Hs 7.5 m: (step and strips, real-time factor
 # (CPU), largest |difference| in 40 s to its own reference: surge m, platform pitch deg, rotor speed rpm),
-# and the standard deviations of the same case over 500 s that turn them into shares
+# and the standard deviations of the same case over 500 s that turn them into fractions
 OPENFAST = (
     ("0.0125 s, 1 m: its reference", 1.9, (0.0, 0.0, 0.0)),
     ("0.0125 s, 2 m", 2.9, (0.0025, 0.0013, 0.0009)),

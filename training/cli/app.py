@@ -28,7 +28,7 @@ from fowt_env.training.cli.tables import figure, print_table, table_width
 
 EXIT_STOPPED, EXIT_INPUT, EXIT_INTERRUPTED = 1, 2, 130
 STUDIES = "fowt_env.training.studies"  # left out of the wheel
-ROUNDING = 1e-9  # a standard deviation below this share of the mean is none
+ROUNDING = 1e-9  # a standard deviation below this fraction of the mean is none
 
 out = Console()
 err = Console(stderr=True)

@@ -214,7 +214,7 @@ def front(
     out_path: Annotated[str | None, typer.Option("--out", help="Ratios: .csv or .parquet.")] = None,
     plot: Annotated[str | None, typer.Option(help="Plot of the Pareto fronts, e.g. front.png.")] = None,
 ):
-    """Simulated designs over gspi_oc3, beside the performance limit, and the share of it that they reach."""
+    """Simulated designs over gspi_oc3, beside the performance limit, and the fraction of it they reach."""
     from fowt_env.files.tables import read_table, write_table
     from fowt_env.training.design.linear_bound import INFORMATION, ratio_table
 

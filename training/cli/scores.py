@@ -150,16 +150,16 @@ def bound(
     plot: Annotated[str | None, typer.Option(help="Picture of all controllers and Pareto fronts.")] = None,
     out_path: OutOption = None,
 ):
-    """Say which share of the performance limit of linear control each controller reaches, per wind speed."""
+    """Print the fraction of the performance limit of linear control each controller reaches, per wind."""
     from fowt_env.training.reports.bound_scores import bound_fractions, bound_markdown, read_bound
-    from fowt_env.training.reports.score_plots import plot_shares
+    from fowt_env.training.reports.score_plots import plot_fractions
 
     fronts = read_bound(table_path)
     found = bound_fractions(_runs(results, cases), fronts, _groups(group), _names(agents))
     text = "\n".join(bound_markdown(found, column) for column in ("of_bound_[-]", "of_measured_[-]"))
     _shown(text, {"": found}, out_path)
     if plot is not None:
-        plot_shares(found, fronts, plot)
+        plot_fractions(found, fronts, plot)
         note(f"wrote {plot}")
 
 

@@ -116,7 +116,7 @@ class CaseEntry(Record):
 
 
 class Term(Record):
-    """One term of a score: the metric's share of the sum, relative to the baseline's."""
+    """One term of a score: the metric's weight in the sum, relative to the baseline's."""
 
     metric: str
     weight: Positive

@@ -9,7 +9,7 @@ from fowt_env.visual.time_series import COLOURS, INK, TIME, named_runs, new_figu
 
 MARKS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*", "p", "h")
 FRONTS = (("full", "-", "the performance limit"), ("measured", "--", "the same, measured channels"))
-FRAME = 1.3  # ends of both axes of plot_shares
+FRAME = 1.3  # ends of both axes of plot_fractions
 HOLLOW = "hollow: more travel or power\ndeviation than gspi_oc3"
 GUST = (  # panels of plot_gust: label, channel
     ("wind\n(m/s)", "Wind1VelX_[m/s]"),
@@ -28,7 +28,7 @@ def look(number):
     return COLOURS[number % len(COLOURS)], MARKS[number % len(MARKS)]
 
 
-def plot_shares(fractions, bound, path=None, title=None):
+def plot_fractions(fractions, bound, path=None, title=None):
     """Rotor-speed against platform-pitch deviation over gspi_oc3's, a panel per wind, with the Pareto fronts.
 
     fractions: bound_scores.bound_fractions; bound: linear_bound.bound_table. Large marks:

@@ -98,7 +98,7 @@ def _densities(step, values):
 def _generator(study, disk):
     """The generator of normal turbulence against the rotor average of the box: deviation and spectrum.
 
-    One box of one seed: its own point deviation differs from sigma_1 of the standard, so shares of the point
+    One box of one seed: its own point deviation differs from sigma_1 of the standard: fractions of the point
     variance are compared.
     """
     hub, diameter, _ = _rotor()

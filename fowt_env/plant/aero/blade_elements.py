@@ -37,7 +37,7 @@ TOLERANCE = 1e-8  # of the residual before the last step of Newton's method; aft
 LAST_STEP = 1e-6  # largest last step, times Momentum.scale: the second-order error of loads is then 1e-12
 SMALLEST_ANGLE = 1e-6  # rad; end of a bracket, the residual may be singular at 0
 LARGEST_ANGLE = 1.8  # rad; roots above pi/2 (flow turned by the swirl) only where v_normal > 50 v_tangential
-LEAST_FLOW = 0.01  # least normal flow, as a share of the local speed, that carries the swirl away
+LEAST_FLOW = 0.01  # least normal flow, as a fraction of the local speed, that carries the swirl away
 MAX_NEWTON = 24  # safeguarded Newton steps; usually 2 or 3 are taken
 MAX_BISECTIONS = 180  # a third of them halve the bracket: to pi/2^60, below rounding of the smallest angle
 SLOW_SECTION, FAST_SECTION = 0.01, 0.02  # v_tangential/|v_normal| between which it fades in
@@ -476,8 +476,8 @@ def _fill_guesses(rotor):
     """Solve the momentum balance at the points of rotor.guess and put the angles there."""
     for j in range(rotor.radius.shape[0]):
         for i in range(GUESSES):
-            share = i / (GUESSES - 1.0)
-            blade_pitch = GUESS_PITCH[0] + share * (GUESS_PITCH[1] - GUESS_PITCH[0])
+            fraction = i / (GUESSES - 1.0)
+            blade_pitch = GUESS_PITCH[0] + fraction * (GUESS_PITCH[1] - GUESS_PITCH[0])
             element = element_of(j, blade_pitch, rotor)
             for k in range(GUESSES):
                 p = min(max(k / (GUESSES - 1.0), 1e-4), 1.0 - 1e-4)

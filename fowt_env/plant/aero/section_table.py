@@ -56,7 +56,7 @@ class SectionTable(NamedTuple):
 
     load: np.ndarray  # (blade pitches, n, directions, 2) float32, m2; see _fill
     radius: np.ndarray  # (n,) m
-    arm: np.ndarray  # (n,) m, radius at which the station's share of the blade's force acts
+    arm: np.ndarray  # (n,) m, radius at which the station's part of the blade's force acts
     elements: BladeElements  # of the exact solution
 
 
@@ -105,17 +105,17 @@ class BladeForce(NamedTuple):
 
 @kernel
 def _fill(load, blade_pitch, elements):
-    """Put into load each station's share of the blade's force, normal and tangential, over the air density
+    """Put into load each station's part of the blade's force, normal and tangential, over the air density
     and the square of v_normal + |v_tangential|."""
     for i in range(load.shape[0]):
         for j in range(load.shape[1]):
-            share = elements.weight[j] / elements.air_density
+            weight = elements.weight[j] / elements.air_density
             for k in range(load.shape[2]):
                 v_tangential = 1.0 - k / AHEAD if k <= AHEAD else -(k - AHEAD) / BEHIND
                 v_normal = max(1.0 - abs(v_tangential), IN_PLANE)
                 section = blade_section(v_normal, v_tangential, blade_pitch[i], j, 1.0, elements)
-                load[i, j, k, 0] = share * section.fn
-                load[i, j, k, 1] = share * section.ft
+                load[i, j, k, 0] = weight * section.fn
+                load[i, j, k, 1] = weight * section.ft
 
 
 _built = {}  # one table per blade in this process: building takes about a second
@@ -202,7 +202,7 @@ def _shear(z, profile):
 
 
 @kernel
-def _station_force(v_normal, v_tangential, j, low, high, share):
+def _station_force(v_normal, v_tangential, j, low, high, fraction):
     """(normal, tangential) force of station j over the air density, bilinear between two rows of the table.
 
     Any input is safe; it means something for v_normal > 0.
@@ -213,16 +213,16 @@ def _station_force(v_normal, v_tangential, j, low, high, share):
     place = place if place > 0.0 else 0.0  # not a number too
     k = min(int(place), AHEAD + BEHIND - 1)
     part = place - k
-    n0 = (1.0 - share) * float(low[j, k, 0]) + share * float(high[j, k, 0])
-    t0 = (1.0 - share) * float(low[j, k, 1]) + share * float(high[j, k, 1])
-    n1 = (1.0 - share) * float(low[j, k + 1, 0]) + share * float(high[j, k + 1, 0])
-    t1 = (1.0 - share) * float(low[j, k + 1, 1]) + share * float(high[j, k + 1, 1])
+    n0 = (1.0 - fraction) * float(low[j, k, 0]) + fraction * float(high[j, k, 0])
+    t0 = (1.0 - fraction) * float(low[j, k, 1]) + fraction * float(high[j, k, 1])
+    n1 = (1.0 - fraction) * float(low[j, k + 1, 0]) + fraction * float(high[j, k + 1, 0])
+    t1 = (1.0 - fraction) * float(low[j, k + 1, 1]) + fraction * float(high[j, k + 1, 1])
     square = total * total
     return square * (n0 + part * (n1 - n0)), square * (t0 + part * (t1 - t0))
 
 
 @kernel
-def _sheared_force(pose, hub, blade, now, series, profile, low, high, share, radii, arm):
+def _sheared_force(pose, hub, blade, now, series, profile, low, high, fraction, radii, arm):
     """BladeForce in a wind uniform apart from its shears: v = v0 + v1 radius + v2 profile, no branches."""
     height, left = hub.Z - series.reference_height, hub.Y
     linear = (now.vertical_shear * height + now.horizontal_shear * left) / series.reference_length
@@ -242,7 +242,7 @@ def _sheared_force(pose, hub, blade, now, series, profile, low, high, share, rad
         v_normal = n0 + n1 * radius + n2 * shear
         v_tangential = t0 + t1 * radius + t2 * shear
         outside += 0 if v_normal > 0.0 and v_normal + abs(v_tangential) < LARGEST_SPEED else 1
-        fn, ft = _station_force(v_normal, v_tangential, j, low, high, share)
+        fn, ft = _station_force(v_normal, v_tangential, j, low, high, fraction)
         force_n += fn
         force_t += ft
         moment_n += arm[j] * fn
@@ -263,7 +263,7 @@ def _across(velocity, slice_now, row, column, component, p, q, r, d):
 
 
 @kernel
-def _field_force(t, pose, hub, blade, field, low, high, share, radii, arm):
+def _field_force(t, pose, hub, blade, field, low, high, fraction, radii, arm):
     """BladeForce in a box of wind, station by station without branches; not valid where the blade leaves the
     box or the table.
 
@@ -312,7 +312,7 @@ def _field_force(t, pose, hub, blade, field, low, high, share, radii, arm):
         v_normal = pose.r11 * u + pose.r21 * v + pose.r31 * w - hub.vx - radius * blade.normal_rate
         v_tangential = blade.tangential + radius * blade.spin - (blade.tx * u + blade.ty * v + blade.tz * w)
         outside += 0 if v_normal > 0.0 and v_normal + abs(v_tangential) < LARGEST_SPEED else 1
-        fn, ft = _station_force(v_normal, v_tangential, j, low, high, share)
+        fn, ft = _station_force(v_normal, v_tangential, j, low, high, fraction)
         force_n += fn
         force_t += ft
         moment_n += arm[j] * fn
@@ -321,7 +321,9 @@ def _field_force(t, pose, hub, blade, field, low, high, share, radii, arm):
 
 
 @kernel
-def _sampled_force(t, pose, hub, blade, now, series, field, blade_pitch, low, high, share, table, counters):
+def _sampled_force(
+    t, pose, hub, blade, now, series, field, blade_pitch, low, high, fraction, table, counters
+):
     """BladeForce with the wind sampled station by station, and the exact solution outside the table."""
     elements = table.elements
     force_n = force_t = moment_n = moment_t = 0.0
@@ -339,7 +341,7 @@ def _sampled_force(t, pose, hub, blade, now, series, field, blade_pitch, low, hi
         v_normal = pose.r11 * u + pose.r21 * v + pose.r31 * w - hub.vx - radius * blade.normal_rate
         v_tangential = blade.tangential + radius * blade.spin - (blade.tx * u + blade.ty * v + blade.tz * w)
         if v_normal > 0.0 and v_normal + abs(v_tangential) < LARGEST_SPEED:
-            fn, ft = _station_force(v_normal, v_tangential, j, low, high, share)
+            fn, ft = _station_force(v_normal, v_tangential, j, low, high, fraction)
         else:
             section = blade_section(v_normal, v_tangential, blade_pitch, j, 1.0, elements)
             if not section.solved:
@@ -375,7 +377,7 @@ def section_table_load(t, pose, x, now, series, field, table, counters):
     if not (induction == 1.0 and row >= 0.0):
         return rotor_load(t, pose, x, now, series, field, elements, None, None, x, counters)
     i = int(row)
-    share = row - i
+    fraction = row - i
     low, high = table.load[i], table.load[i + 1]
     bottom, top = hub.Z - elements.tip_radius, hub.Z + elements.tip_radius
     sheared = field is None and bottom > LOWEST_HEIGHT and top < LARGEST_RATIO * bottom
@@ -389,13 +391,13 @@ def section_table_load(t, pose, x, now, series, field, table, counters):
         force = BladeForce(0.0, 0.0, 0.0, 0.0, False)
         if sheared:
             force = _sheared_force(
-                pose, hub, blade, now, series, profile, low, high, share, table.radius, table.arm
+                pose, hub, blade, now, series, profile, low, high, fraction, table.radius, table.arm
             )
         elif field is not None:
-            force = _field_force(t, pose, hub, blade, field, low, high, share, table.radius, table.arm)
+            force = _field_force(t, pose, hub, blade, field, low, high, fraction, table.radius, table.arm)
         if not force.valid:
             force = _sampled_force(
-                t, pose, hub, blade, now, series, field, blade_pitch, low, high, share, table, counters
+                t, pose, hub, blade, now, series, field, blade_pitch, low, high, fraction, table, counters
             )
         thrust += force.force_n
         torque += force.moment_t

@@ -171,7 +171,7 @@ def prominence(frame, channel, frequency, skip=0.0, width=0.1, reach=0.35):
 # --------------------------------------------------------------------------- claims
 
 PEAK = 2.0  # a peak rises to at least this many times its surroundings ...
-VISIBLE = 1e-5  # ... and to this share of the highest one, five decades of a logarithmic axis
+VISIBLE = 1e-5  # ... and to this fraction of the highest one, five decades of a logarithmic axis
 
 
 @dataclass(frozen=True)
@@ -224,9 +224,9 @@ def _pitch(runs, name):
 def _peak(figure, text, runs, case, channel, frequency):
     height = prominence(runs[case], channel, frequency)
     f, density = case_spectrum(runs[case], channel)
-    share = density[np.abs(f / frequency - 1.0) <= 0.1].max() / density.max()
-    found = f"at {frequency:.3f} Hz {height:.3g} times its surroundings, {share:.2g} of the highest"
-    return Claim(figure, text, found, bool(height >= PEAK and share >= VISIBLE))
+    fraction = density[np.abs(f / frequency - 1.0) <= 0.1].max() / density.max()
+    found = f"at {frequency:.3f} Hz {height:.3g} times its surroundings, {fraction:.2g} of the highest"
+    return Claim(figure, text, found, bool(height >= PEAK and fraction >= VISIBLE))
 
 
 def _steady_surge(runs, natural):

@@ -166,10 +166,10 @@ def stable(a, h, integrator, duration=DURATION):
 
 
 def limiting_state(a, h, integrator):
-    """Name of the state with the largest share, EXCITATION as unit, of the fastest-growing vector."""
+    """Name of the state with the largest participation, EXCITATION as unit, of the fastest-growing vector."""
     values, vectors = np.linalg.eig(amplification(a, h, integrator))
-    share = np.abs(vectors[:N, np.argmax(np.abs(values))]) / EXCITATION
-    return STATES[int(np.argmax(share))]
+    participation = np.abs(vectors[:N, np.argmax(np.abs(values))]) / EXCITATION
+    return STATES[int(np.argmax(participation))]
 
 
 def first_unstable(holds, start):

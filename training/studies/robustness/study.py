@@ -135,7 +135,7 @@ def cases_part(sizes, folder, progress):
     found.claim(
         "random scenes and states: kinetic energy and rotor speed bounded",
         f"{tally.cases}",
-        f"{len(reasons) - broken} beyond; largest share of the energy bound {tally.worst_share:.2f}",
+        f"{len(reasons) - broken} beyond; largest ratio to the energy bound {tally.worst_ratio:.2f}",
         "none beyond the bound, no stop or peak that a finer step does not have",
         len(reasons) == broken,
     )
