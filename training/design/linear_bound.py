@@ -44,7 +44,8 @@ INFORMATION = {  # what the feedback knows: what it is called in plots
     "state": "state only",
     "measured": "measured channels (Kalman)",
 }
-FRACTIONS = (0.02, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.68, 0.75, 0.82, 0.88, 0.93, 0.97, 0.99)  # of platform pitch
+# of platform pitch
+FRACTIONS = (0.02, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.68, 0.75, 0.82, 0.88, 0.93, 0.97, 0.99)
 TORQUE_STD = 0.05  # of rated torque: twice this is the way to the torque's maximum
 RATIOS = {  # column of ratio_table: metric
     "speed_ratio_[-]": "RotSpeed_std_[rpm]",
