@@ -54,9 +54,9 @@ def discon_step(parameters, memory, measurement, command):
     low, high = p[Parameter.PITCH_MINIMUM], p[Parameter.PITCH_MAXIMUM]
     error = speed - ratio * p[Parameter.RATED_SPEED]
     integral = clamp(memory[Memory.INTEGRAL] + error * dt, low / slope, high / slope)
-    wanted = clamp(gain * p[Parameter.PROPORTIONAL] / ratio * error + slope * integral, low, high)
+    target = clamp(gain * p[Parameter.PROPORTIONAL] / ratio * error + slope * integral, low, high)
     step = dt * p[Parameter.PITCH_RATE_LIMIT]
-    pitch = clamp(rate_limit(measured_pitch, wanted, step), low, high)
+    pitch = clamp(rate_limit(measured_pitch, target, step), low, high)
 
     memory[Memory.FILTERED_SPEED] = speed
     memory[Memory.INTEGRAL] = integral

@@ -199,13 +199,13 @@ def lqr_step(p, memory, measurement, command):
         p[i], p[i + 1], p[i + 2], p[i + 3], p[i + 4], p[i + 5],
         p[i + 6], p[i + 7], p[i + 8], p[i + 9], p[i + 10], p[i + 11],
     )  # fmt: skip
-    wanted = torque + dt * p[Head.RATED_TORQUE] * feed_back(p, low, fraction, memory, 0)
-    wanted = clamp(wanted, p[Head.TORQUE_LOW], p[Head.TORQUE_HIGH])
+    target = torque + dt * p[Head.RATED_TORQUE] * feed_back(p, low, fraction, memory, 0)
+    target = clamp(target, p[Head.TORQUE_LOW], p[Head.TORQUE_HIGH])
     by_curve = generator_torque(p[Head.GEAR_RATIO] * memory[ROTOR], pitch, curve)
     blend = clamp((pitch - p[Head.HANDOVER_LOW]) / (p[Head.HANDOVER_HIGH] - p[Head.HANDOVER_LOW]), 0.0, 1.0)
-    wanted = blend * wanted + (1.0 - blend) * by_curve
+    target = blend * target + (1.0 - blend) * by_curve
     step = dt * p[Head.TORQUE_RATE_LIMIT]
-    torque = rate_limit(torque, wanted, step)
+    torque = rate_limit(torque, target, step)
     command[0], command[1] = torque, pitch
 
 

@@ -75,9 +75,9 @@ class PolicyController:
         names = tuple(settings["observation"])
         if "azimuth" in names:
             raise InputError(f"{where}: the rotor's azimuth is not among the measurements of a controller")
-        chosen = entries(names, turbine, preview)
-        self._chosen = build_observation_map(chosen, preview)
-        self._decisions = Decisions(1, len(chosen), DecisionSettings(**settings["decisions"]), control_dt)
+        observed = entries(names, turbine, preview)
+        self._observation_map = build_observation_map(observed, preview)
+        self._decisions = Decisions(1, len(observed), DecisionSettings(**settings["decisions"]), control_dt)
         if self.network.mean.shape != (self._decisions.size,):
             raise InputError(
                 f"{where}: {self.network.mean.size} inputs: its observation has {self._decisions.size}"
@@ -90,9 +90,9 @@ class PolicyController:
             residual_pitch=settings["residual_pitch"],
         )
         self._actions = build_action_map(self._mode, task, turbine, control_dt)
-        watching = bool(set(ESTIMATE_CHANNELS) & set(names))
-        self._estimator = WindEstimator(turbine, control_dt) if watching else None
-        self._baseline = self._law = None
+        estimating = bool(set(ESTIMATE_CHANNELS) & set(names))
+        self._estimator = WindEstimator(turbine, control_dt) if estimating else None
+        self._baseline = self._baseline_law = None
         self._parameters, self._memory = np.zeros(1), np.zeros(1)
         if self._mode == Mode.RESIDUAL:
             from fowt_env.controllers import make
@@ -100,10 +100,10 @@ class PolicyController:
             self._baseline = make(settings["baseline"], turbine, control_dt)
             if not isinstance(self._baseline, CompiledController):
                 raise InputError(f"{where}: baseline {settings['baseline']!r} is not a compiled controller")
-            self._law = self._baseline.law
+            self._baseline_law = self._baseline.law
         self._signals = np.zeros(PREVIEW + len(preview))
-        self._seen = np.zeros(len(chosen), dtype=np.float32)
-        self._u, self._wanted = np.zeros(2), np.zeros(2)
+        self._observation = np.zeros(len(observed), dtype=np.float32)
+        self._u, self._commanded = np.zeros(2), np.zeros(2)
         self._accepted = np.zeros(N_ACTIONS)
         self._calls = 0
         self._wind = None
@@ -125,7 +125,7 @@ class PolicyController:
             self._baseline.prepare(scene)
         if self._estimator is not None:
             self._estimator.prepare(scene)
-        if len(self._chosen.preview):
+        if len(self._observation_map.preview):
             from fowt_env.controllers.preview import rotor_wind
 
             if scene.model.aero is None:
@@ -134,7 +134,7 @@ class PolicyController:
 
     def reset(self, measurement):
         """Start afresh: the command in force is the measured one, the history is empty."""
-        if len(self._chosen.preview) and self._wind is None:
+        if len(self._observation_map.preview) and self._wind is None:
             raise InputError(f"controller {self.name!r}: call prepare(scene) before reset(measurement)")
         self._u[:] = measurement.generator_torque, measurement.blade_pitch
         if self._baseline is not None:
@@ -156,37 +156,37 @@ class PolicyController:
                 self._estimator.law, self._estimator.parameters, self._estimator.memory, values, self._u
             )
         if self._calls % decisions.settings.hold == 0:
-            self._look(values)
+            self._observe(values)
             if self._calls == 0:
-                decisions.restart(0, self._seen, self._accepted)
+                decisions.restart(0, self._observation, self._accepted)
             else:
-                decisions.see(self._seen[None])
+                decisions.append(self._observation[None])
             self._decision = self.network(decisions.features())
         self._calls += 1
         self._accepted[:] = np.clip(decisions.smooth(self._decision)[0], -1.0, 1.0)
         command_of(
             self._accepted,
             self._actions,
-            self._law,
+            self._baseline_law,
             self._parameters,
             self._memory,
             values,
             self._u,
-            self._wanted,
+            self._commanded,
         )
         return float(self._u[0]), float(self._u[1])
 
-    def _look(self, values):
+    def _observe(self, values):
         """Fill the observation from measurements (N_MEASUREMENTS,)."""
         self._signals[:N_MEASUREMENTS] = values
         self._signals[FIRST_ACTION : FIRST_ACTION + N_ACTIONS] = self._accepted
         if self._estimator is not None:
             self._signals[ESTIMATES : ESTIMATES + len(ESTIMATED)] = self._estimator.memory[: len(ESTIMATED)]
-        if len(self._chosen.preview):
+        if len(self._observation_map.preview):
             time, speed, period = self._wind
-            ahead = values[Measure.TIME] + self._chosen.preview
+            ahead = values[Measure.TIME] + self._observation_map.preview
             self._signals[PREVIEW:] = np.interp(ahead, time, speed, period=period)
-        fill_observation(self._signals, self._chosen, self._seen)
+        fill_observation(self._signals, self._observation_map, self._observation)
 
 
 def policy(name):

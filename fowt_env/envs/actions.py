@@ -123,35 +123,37 @@ def tracking_torque(speed, setpoint, memory, actions):
 
 
 @kernel
-def baseline_command(law, parameters, memory, measurement, command):
+def baseline_command(baseline_law, parameters, memory, measurement, command):
     """Command of the baseline controller; without one the command stays."""
-    if law is None:
+    if baseline_law is None:
         return
-    law(parameters, memory, measurement, command)
+    baseline_law(parameters, memory, measurement, command)
 
 
 @kernel
-def command_of(action, actions, law, parameters, memory, measurement, u, wanted):
-    """Set u = (generator torque N m, blade pitch rad) from an accepted action; wanted (2,): what it commands.
+def command_of(action, actions, baseline_law, parameters, memory, measurement, u, commanded):
+    """Set u = (generator torque N m, blade pitch rad) from an accepted action.
+
+    commanded (2,): filled with the command before the limits.
 
     The torque in u is what the generator reaches of the command; the pitch actuator limits itself.
     """
-    wanted[Command.GENERATOR_TORQUE] = u[Command.GENERATOR_TORQUE]
-    wanted[Command.BLADE_PITCH] = u[Command.BLADE_PITCH]
+    commanded[Command.GENERATOR_TORQUE] = u[Command.GENERATOR_TORQUE]
+    commanded[Command.BLADE_PITCH] = u[Command.BLADE_PITCH]
     if actions.mode == Mode.RESIDUAL:
-        baseline_command(law, parameters, memory, measurement, wanted)
-        wanted[0] += action[0] * actions.residual_torque
-        wanted[1] += action[1] * actions.residual_pitch
+        baseline_command(baseline_law, parameters, memory, measurement, commanded)
+        commanded[0] += action[0] * actions.residual_torque
+        commanded[1] += action[1] * actions.residual_pitch
     else:
-        wanted[0] = unscale(action[0], actions.low, actions.high)
-        wanted[1] = unscale(action[1], actions.pitch_low, actions.pitch_high)
+        commanded[0] = unscale(action[0], actions.low, actions.high)
+        commanded[1] = unscale(action[1], actions.pitch_low, actions.pitch_high)
         if actions.mode == Mode.SETPOINT:
-            wanted[0] = tracking_torque(measurement[Measure.ROTOR_SPEED], wanted[0], memory, actions)
+            commanded[0] = tracking_torque(measurement[Measure.ROTOR_SPEED], commanded[0], memory, actions)
     torque = u[Command.GENERATOR_TORQUE]
     u[Command.GENERATOR_TORQUE] = followed_torque(
-        torque, wanted[Command.GENERATOR_TORQUE], actions.control_dt, actions.generator
+        torque, commanded[Command.GENERATOR_TORQUE], actions.control_dt, actions.generator
     )
-    u[Command.BLADE_PITCH] = wanted[Command.BLADE_PITCH]
+    u[Command.BLADE_PITCH] = commanded[Command.BLADE_PITCH]
 
 
 @kernel

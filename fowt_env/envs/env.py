@@ -176,11 +176,11 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self._nominal = None  # the scene of the nominal plant, where that is not the true one
         if nominal_plant is not None:
             parts = _nominal_parts(nominal_plant)
-            known = {**options, "turbine": parts["turbine"]}
+            nominal_options = {**options, "turbine": parts["turbine"]}
             length = max(task.duration, SHORTEST_WEATHER)
             self._nominal = build_scene(
                 parts["platform"], episode.wind, episode.sea, rotor=task.rotor, duration=length,
-                fidelity=fidelity, **known,
+                fidelity=fidelity, **nominal_options,
             )  # fmt: skip
         self._sensors = None if sensors is None else check_sensors(sensors)
         self.control_dt = float(control_dt)
@@ -194,9 +194,12 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self.observation_space = gymnasium.spaces.Box(low.astype(np.float32), high.astype(np.float32))
         self._running = False
         # what a snapshot must agree with: the same numbers then mean the same
-        seen = (task.observation, task.wind_preview)
-        told = (None if self._nominal is None else plant_key(self._nominal), self._sensors)
-        self._kind = (self._key, action_mode, baseline, *seen, self.dt, self.control_dt, self._last, told)
+        observed = (task.observation, task.wind_preview)
+        nominal_key = None if self._nominal is None else plant_key(self._nominal)
+        self._kind = (
+            self._key, action_mode, baseline, *observed, self.dt, self.control_dt, self._last,
+            (nominal_key, self._sensors),
+        )  # fmt: skip
 
     def twin(self) -> "FowtEnv":
         """Another environment of the same settings, before its first reset; shares what is never written."""
@@ -210,26 +213,27 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     def _build(self, mode, per_control):
         """Allocate the arrays of a run and fill what never changes."""
         scene, turbine, task = self.scene, self.scene.turbine, self.task
-        chosen = entries(task.observation, turbine, task.wind_preview)
+        observed = entries(task.observation, turbine, task.wind_preview)
         self._baseline = None
-        law = None
+        baseline_law = None
         parameters, memory = np.zeros(1), np.zeros(1)
         if mode == Mode.RESIDUAL:
             self._baseline = named_baseline(self.baseline, self.design_scene.turbine, self.control_dt)
-            law = self._baseline.law
+            baseline_law = self._baseline.law
             parameters, memory = self._baseline.parameters, self._baseline.memory
-        self._estimator = watch = None
+        self._estimator = estimator_law = None
         if set(ESTIMATE_CHANNELS) & set(task.observation):
             self._estimator = catalogue().WindEstimator(self.design_scene.turbine, self.control_dt)
-            watch = self._estimator.law
-        watching, sensed = self._estimator is not None, self._sensors is not None
-        self._law, self._watch = Handle(None, law), Handle(None, watch)
+            estimator_law = self._estimator.law
+        estimating, sensed = self._estimator is not None, self._sensors is not None
+        self._baseline_law = Handle(None, baseline_law)
+        self._estimator_law = Handle(None, estimator_law)
         self._config = EpisodeConfig(
             model=scene.model,
             actions=build_action_map(mode, task, turbine, self.control_dt),
             parameters=parameters,
-            estimator=self._estimator.parameters if watching else None,
-            observation_map=build_observation_map(chosen, task.wind_preview),
+            estimator=self._estimator.parameters if estimating else None,
+            observation_map=build_observation_map(observed, task.wind_preview),
             scales=build_scales(turbine, self.control_dt),
             weights=weight_array(task.weights),
             overspeed=float(turbine.overspeed),
@@ -244,12 +248,12 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             x=np.zeros(n),
             u=np.zeros(2),
             memory=memory,
-            estimate=self._estimator.memory if watching else None,
+            estimate=self._estimator.memory if estimating else None,
             action=np.zeros(N_ACTIONS),
             measurement=measurement,
             reading=np.zeros(N_MEASUREMENTS) if sensed else measurement,
             delay_buffer=np.zeros((self._sensors["delay"] + 1, N_MEASUREMENTS)) if sensed else None,
-            observation=np.zeros(len(chosen), dtype=np.float32),
+            observation=np.zeros(len(observed), dtype=np.float32),
             counts=np.zeros(N_COUNTS, dtype=np.int64),
             reference=np.zeros(len(Reference._fields)),
             previous_measurement=np.zeros(N_MEASUREMENTS),
@@ -271,7 +275,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         """
         super().reset(seed=seed)
         self._running = False  # until all of it has worked
-        episode = _chosen(self.task.draw(self.np_random), options)
+        episode = _with_options(self.task.draw(self.np_random), options)
         scene = self.scene.with_weather(episode.wind, episode.sea, episode.weather_seed)
         check_duration(scene, self.task.duration)
         find = cached_trim if episode.exact_start else interpolated_trim
@@ -328,12 +332,12 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         if not self._running:
             raise ResetNeeded("call reset() first: no episode is running")
         try:
-            asked = np.array(action, dtype=np.float64)  # a copy: steady types, whatever was given
+            requested = np.array(action, dtype=np.float64)  # a copy: steady types, whatever was given
         except (TypeError, ValueError):
             raise InputError(f"action = {action!r}: must be {N_ACTIONS} numbers") from None
-        if asked.shape != (N_ACTIONS,):
-            raise InputError(f"action has shape {asked.shape}: must be ({N_ACTIONS},)")
-        status, reward = act(self._handle, self._law, self._watch, asked)
+        if requested.shape != (N_ACTIONS,):
+            raise InputError(f"action has shape {requested.shape}: must be ({N_ACTIONS},)")
+        status, reward = act(self._handle, self._baseline_law, self._estimator_law, requested)
         if status == BAD_ACTION:
             raise InputError(f"action = {action!r}: must be finite")
         return self._result(status, reward)
@@ -348,7 +352,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         torque, blade_pitch = float(torque), float(blade_pitch)
         if not (isfinite(torque) and isfinite(blade_pitch)):
             raise InputError(f"torque = {torque!r}, blade_pitch = {blade_pitch!r}: must be finite")
-        return self._result(*act_physical(self._handle, self._watch, torque, blade_pitch))
+        return self._result(*act_physical(self._handle, self._estimator_law, torque, blade_pitch))
 
     def _result(self, status, reward):
         """What step returns, from the status and reward of a control period."""
@@ -368,7 +372,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         return run.observation.copy(), reward, terminated, truncated, info
 
     def _reason(self, status):
-        """Why an episode was terminated, with the load of the user's that is to blame, if one is."""
+        """Why an episode was terminated, with the user load that caused it, if one did."""
         fault = self.scene.first_nonfinite_load(self._episode.data)
         return f"{STOP_REASONS[status]}: {fault}" if fault else STOP_REASONS[status]
 
@@ -519,9 +523,9 @@ def named_baseline(name, turbine, control_dt):
 
     Raises: InputError for unknown ones and those written in Python.
     """
-    known = catalogue().CONTROLLERS
-    if isinstance(name, str) and ":" not in name and name not in known:
-        raise unknown("baseline", name, known)
+    names = catalogue().CONTROLLERS
+    if isinstance(name, str) and ":" not in name and name not in names:
+        raise unknown("baseline", name, names)
     baseline = make(name, turbine, control_dt)
     if not isinstance(baseline, CompiledController):
         raise InputError(f"baseline = {name!r}: must be a compiled controller, such as 'pi' or 'gspi_oc3'")
@@ -538,7 +542,7 @@ def _nominal_parts(given):
     return {"turbine": None} | dict(given)
 
 
-def _chosen(drawn, options):
+def _with_options(drawn, options):
     """The drawn Episode with what reset's options give in place of it."""
     changes = {}
     for key, value in (options or {}).items():

@@ -195,14 +195,14 @@ class ObservationMap(NamedTuple):
     preview: np.ndarray
 
 
-def build_observation_map(chosen, preview):
+def build_observation_map(observed, preview):
     """ObservationMap of Entries."""
-    centre = np.array([entry.centre for entry in chosen])
-    scale = np.array([entry.scale for entry in chosen])
-    low = (np.array([entry.low for entry in chosen]) - centre) / scale
-    high = (np.array([entry.high for entry in chosen]) - centre) / scale
+    centre = np.array([entry.centre for entry in observed])
+    scale = np.array([entry.scale for entry in observed])
+    low = (np.array([entry.low for entry in observed]) - centre) / scale
+    high = (np.array([entry.high for entry in observed]) - centre) / scale
     return ObservationMap(
-        np.array([entry.signal for entry in chosen], dtype=np.int64),
+        np.array([entry.signal for entry in observed], dtype=np.int64),
         centre,
         scale,
         low.astype(np.float32).astype(np.float64),
@@ -233,9 +233,11 @@ def fill_signals(t, model, x, reading, action, estimate, preview, signals):
 
 
 @kernel
-def fill_observation(signals, chosen, observation):
+def fill_observation(signals, observation_map, observation):
     """Fill observation (n,) float32 from the signals; an entry that is not finite keeps its last value."""
     for i in range(observation.shape[0]):
-        value = (signals[chosen.signal[i]] - chosen.centre[i]) / chosen.scale[i]
+        entry, centre = observation_map.signal[i], observation_map.centre[i]
+        value = (signals[entry] - centre) / observation_map.scale[i]
         if np.isfinite(value):
-            observation[i] = np.float32(max(chosen.low[i], min(chosen.high[i], value)))
+            low, high = observation_map.low[i], observation_map.high[i]
+            observation[i] = np.float32(max(low, min(high, value)))

@@ -121,14 +121,14 @@ def platform_motion_term(platform_pitch, rate, steady_pitch):
 
 
 @kernel
-def travel_term(before, after, max_increment):
+def travel_term(previous, after, max_increment):
     """Minus the fraction of the possible travel that was used in one control period."""
-    return 0.0 - unit_fraction(abs(after - before) / max_increment)
+    return 0.0 - unit_fraction(abs(after - previous) / max_increment)
 
 
 @kernel
-def fill_terms(m, before, reference, failed, scales, terms):
-    """Fill terms (N_TERMS,) from the measurements m and before, one control period apart."""
+def fill_terms(m, previous, reference, failed, scales, terms):
+    """Fill terms (N_TERMS,) from the measurements m and previous, one control period apart."""
     speed = m[Measure.ROTOR_SPEED]
     torque = m[Measure.GENERATOR_TORQUE]
     terms[TermIndex.POWER] = power_term(speed, torque, scales)
@@ -137,10 +137,10 @@ def fill_terms(m, before, reference, failed, scales, terms):
         m[Measure.PLATFORM_PITCH], m[Measure.PLATFORM_PITCH_RATE], reference[0]
     )
     terms[TermIndex.PITCH_TRAVEL] = travel_term(
-        before[Measure.BLADE_PITCH], m[Measure.BLADE_PITCH], scales.max_pitch_increment
+        previous[Measure.BLADE_PITCH], m[Measure.BLADE_PITCH], scales.max_pitch_increment
     )
     terms[TermIndex.TORQUE_TRAVEL] = travel_term(
-        before[Measure.GENERATOR_TORQUE], torque, scales.max_torque_increment
+        previous[Measure.GENERATOR_TORQUE], torque, scales.max_torque_increment
     )
     terms[TermIndex.FAILURE] = -1.0 if failed else 0.0
     terms[TermIndex.POWER_SHORTFALL] = power_shortfall_term(speed, torque, scales)

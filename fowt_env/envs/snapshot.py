@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 # arrays of episode.EpisodeData that outlive a control period, and of plant.model.Data: those that carry
-# over, and stages, whose first row holds the wake's rates as long as the kept loads are fresh
+# over, and stages, whose first row holds the wake's rates as long as the cached loads are fresh
 CARRIED = (
     "x", "u", "memory", "estimate", "action", "measurement", "reading", "delay_buffer", "observation",
     "counts", "reference", "terms",

@@ -45,7 +45,7 @@ class Adams(NamedTuple):
 
 @inlined_kernel
 def rates(t, x, u, model, data, dx):
-    """dx at an instant under u, from the kept loads where they are fresh."""
+    """dx at an instant under u, from the cached loads where they are fresh."""
     cache = data.cache
     if cache[LoadCache.VALID] < 0.5 or cache[LoadCache.TIME] != t:
         evaluate(t, x, model, data, data.stages[0])
@@ -204,7 +204,7 @@ def rotor_samples(method):
 def take_step(t, x, u, dt, model, method, data):
     """One step of the scene's integrator, x in place."""
     pitch = followed_pitch(x[State.BLADE_PITCH], u[Command.BLADE_PITCH], dt, model.actuator)
-    if pitch != x[State.BLADE_PITCH]:  # an actuator without lag jumps: the kept loads are not of this pitch
+    if pitch != x[State.BLADE_PITCH]:  # an actuator without lag jumps: the cached loads are not of this pitch
         x[State.BLADE_PITCH] = pitch
         data.cache[LoadCache.VALID] = 0.0
     method_step(t, x, u, dt, model, method, data)

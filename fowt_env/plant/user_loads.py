@@ -191,10 +191,10 @@ def fill_place(pose, px, py, pz, body_axes, motion):
 
 
 @kernel
-def fill_water(t, pose, hydro, wanted, body_axes, motion):
-    """Fill the motion of the water at the point (above the still surface: that at it); zero if not wanted."""
+def fill_water(t, pose, hydro, needed, body_axes, motion):
+    """Fill the motion of the water at the point (above the still surface: that at it); zero if not needed."""
     u = v = w = du = dv = dw = 0.0
-    if wanted:
+    if needed:
         z = min(motion[Motion.Z], 0.0)
         u, v, w, du, dv, dw = water_at(t, motion[Motion.X], motion[Motion.Y], z, hydro)
     put(motion, Motion.WATER_X, pose, body_axes, u, v, w)

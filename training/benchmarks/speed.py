@@ -221,7 +221,7 @@ def load_times(scene, x, u, calls=CHUNK, repeats=REPEATS):
     dx, m = np.zeros_like(x), np.zeros(N_MEASUREMENTS)
     row = np.zeros(len(scene.channels))
     forget(handle)
-    output(handle, x, u, 0.0, dx, row)  # fills the kept loads that measure and record read
+    output(handle, x, u, 0.0, dx, row)  # fills the cached loads that measure and record read
     micro = {}
     for part, name in enumerate(LOADS):
         micro[name] = (

@@ -144,7 +144,7 @@ def pi(
     platform: Annotated[str, typer.Option(help="Platform: a name or a path.")] = "oc3_hywind",
     out_path: Annotated[str | None, typer.Option("--out", help="Design: .json.")] = None,
 ):
-    """Gains of a scheduled PI from a wanted frequency and damping ratio, and the platform's damping."""
+    """Gains of a scheduled PI from a specified frequency and damping ratio, and the platform's damping."""
     import pandas as pd
 
     import fowt_env

@@ -35,15 +35,15 @@ class ModelMismatch:
     def reset(self, measurement):
         """Start afresh: full history of the first measurement, noise from its beginning."""
         self.rng = np.random.default_rng([self.seed, NOISE_STREAM])
-        self.past = deque([measurement], maxlen=self.perturbation.delay + 1)
+        self.delay_buffer = deque([measurement], maxlen=self.perturbation.delay + 1)
         self.reading, self.read_at = self._noisy(measurement), measurement.time
         self.inner.reset(self.reading)
 
     def act(self, measurement):
         """What the controller inside answers to its reading."""
         if measurement.time != self.read_at:  # the first instant has been read by reset
-            self.past.append(measurement)
-            late = self.past[0]._replace(time=measurement.time)  # a clock is not late
+            self.delay_buffer.append(measurement)
+            late = self.delay_buffer[0]._replace(time=measurement.time)  # a clock is not late
             self.reading, self.read_at = self._noisy(late), measurement.time
         return self.inner.act(self.reading)
 

@@ -70,20 +70,20 @@ class DecisionVecEnv(VecEnvWrapper):
                 ended[i] = True
                 decisions.action[i] = self.base.env.envs[i]._episode.action
                 self._decision[i] = decisions.action[i]
-        decisions.see(observations)
+        decisions.append(observations)
         for i in np.flatnonzero(ended):
             decisions.restart(i, observations[i], decisions.action[i])
         return decisions.features(), (total / self.settings.hold).astype(np.float32), ended, infos
 
     def get_state(self):
         """Everything that decides how the episodes go on, to be pickled: plants, histories, actions."""
-        return self.base.env.get_state(), self.decisions.seen.copy(), self.decisions.action.copy()
+        return self.base.env.get_state(), self.decisions.observations.copy(), self.decisions.action.copy()
 
     def set_state(self, state):
         """Go on from what get_state returned; returns the features there."""
-        plants, seen, action = state
+        plants, observations, action = state
         self.base.env.set_state(list(plants))
-        self.decisions.seen[:] = seen
+        self.decisions.observations[:] = observations
         self.decisions.action[:] = action
         return self.decisions.features()
 
