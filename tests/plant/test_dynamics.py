@@ -214,14 +214,14 @@ def with_coupling_sign(bare_scene, sign):
     body = weightless(bare_scene).model.rigid_body
 
     def rate(t, x):
-        dx = rates(weightless_scene, x, box=box)
+        dx = rates(weightless_scene, x, handle=handle)
         extra = (1.0 - sign) * body.coupling * x[State.ROTOR_SPEED]
         load = Wrench(0.0, 0.0, 0.0, 0.0, extra * x[State.WZ], -extra * x[State.WY])
         accelerate(pose_of(x), x, load, 0.0, DRY, body, np.zeros((6, 6)), dx)
         return dx
 
     weightless_scene = weightless(bare_scene)
-    box = weightless_scene.handle()
+    handle = weightless_scene.handle()
     x0 = state(**TUMBLING)
     solution = solve_ivp(rate, (0.0, 50.0), x0, method="DOP853", rtol=1e-10, atol=1e-12, max_step=1.0)
     return solution.y.T

@@ -59,7 +59,7 @@ def controller_code(controller):
     object: the file that it comes from, and what that imports from its own folder and this project.
     """
     from fowt_env.controllers import CONTROLLERS
-    from fowt_env.controllers.design import saved_files as saved_design
+    from fowt_env.controllers.design import saved_files
     from fowt_env.controllers.policy.controller import PREFIX, policy_path
 
     if not isinstance(controller, str):
@@ -70,8 +70,8 @@ def controller_code(controller):
         return {"name": name, "code": _digest(_user_files(kind.__module__))}
     if ":" not in controller:
         files = _package_files(CONTROLLERS.get(controller))
-    elif controller.startswith(saved_design.PREFIX):
-        files = [controller.removeprefix(saved_design.PREFIX), *_package_files(saved_design.load_design)]
+    elif controller.startswith(saved_files.PREFIX):
+        files = [controller.removeprefix(saved_files.PREFIX), *_package_files(saved_files.load_design)]
     elif controller.startswith(PREFIX):  # its baseline may be any controller
         files = [policy_path(controller.removeprefix(PREFIX)), *_package_files(None)]
     else:

@@ -12,7 +12,7 @@ import numba
 import pytest
 
 import fowt_env
-from fowt_env.plant.compile import disk_cache as kernel_cache
+from fowt_env.plant.compile import disk_cache
 from fowt_env.plant.compile.announcement import COMPILING_MESSAGE, compilation_announced
 from fowt_env.plant.compile.decorators import KEEP_CACHES, MARKER, PLANT
 from fowt_env.plant.compile.disk_cache import SharedCacheFile
@@ -314,7 +314,7 @@ def apply(function, value):
 def test_what_is_compiled_into_one_of_ours_for_a_users_function_is_not_kept(tmp_path):
     """But for a law it is, which is an address to it."""
     compiled = numba.njit(apply)
-    compiled._cache = kernel_cache.KernelCache(apply, tmp_path)
+    compiled._cache = disk_cache.KernelCache(apply, tmp_path)
     helper = numba.njit(lambda x: x + 1.0)
     assert compiled(helper, 1.0) == 2.0 and compiled((helper, helper)[0], 2.0) == 3.0
     assert not list(tmp_path.rglob("*.nb?"))
@@ -344,10 +344,10 @@ def test_ours_are_kept_in_files_made_for_several_processes_whatever_numba_is_tol
 
 
 def test_another_way_of_numba_to_keep_code_is_noticed(monkeypatch, tmp_path):
-    monkeypatch.setattr(kernel_cache.caching, "IndexDataCacheFile", lambda **given: object())
-    monkeypatch.setattr(kernel_cache.numba, "__version__", "9.9.9")
+    monkeypatch.setattr(disk_cache.caching, "IndexDataCacheFile", lambda **given: object())
+    monkeypatch.setattr(disk_cache.numba, "__version__", "9.9.9")
     with pytest.raises(ImportError, match="numba 9.9.9"):
-        kernel_cache.KernelCache(kernel_folder, tmp_path)
+        disk_cache.KernelCache(kernel_folder, tmp_path)
 
 
 PACKAGES = ("fowt_env", "controllers", "training")
