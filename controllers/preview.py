@@ -112,7 +112,7 @@ class Preview(PI):
         """
         if scene.model.aero is None:
             raise InputError(f"controller {self.name!r}: needs a scene with wind to look ahead")
-        time, speed, period = rotor_wind(scene)
+        time, speed, period = rotor_wind_series(scene)
         step = self.control_dt
         grid = step * np.arange(int(np.ceil(max(time[-1], scene.options["duration"]) / step)) + 1)
         seen = np.interp(grid + self.preview.preview_time, time, speed, period=period)
@@ -136,7 +136,7 @@ class Preview(PI):
         self.memory[PreviewMemory.FORESEEN] = foreseen_pitch(float(measurement.time), self.parameters)
 
 
-def rotor_wind(scene):
+def rotor_wind_series(scene):
     """(time s, wind m/s, period s or None): wind along x averaged over the rotor, as the scene has it."""
     if isinstance(scene.wind, WindBox):
         rotor, box = scene.turbine.rotor, scene.wind

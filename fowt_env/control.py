@@ -26,9 +26,9 @@ from fowt_env.descriptions.checks import check_number
 from fowt_env.errors import ControllerError, InputError, unknown
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
+from fowt_env.plant.state import N_COMMANDS
 
 CATALOGUE = "fowt_env.controllers"
-N_COMMANDS = 2  # command[0]: generator torque, N m, high-speed shaft; command[1]: blade pitch, rad
 EXTRA = {  # what a controller may be told beyond Measurement
     "wind_preview": "the rotor-averaged wind, some seconds before it arrives",
     "plant_model": "the plant's own equations: trims, linear models or performance tables of the scene",

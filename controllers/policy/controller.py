@@ -13,7 +13,14 @@ import numpy as np
 from fowt_env.control import CompiledController, call_law, check_control_dt
 from fowt_env.controllers.lqr.law import WindEstimator
 from fowt_env.controllers.policy.network_file import read_policy
-from fowt_env.envs.actions import MODES, Mode, action_of, build_action_map, command_of, start_tracking
+from fowt_env.envs.actions import (
+    ACTION_MODES,
+    ActionMode,
+    action_of,
+    build_action_map,
+    command_of,
+    start_tracking,
+)
 from fowt_env.envs.decisions import Decisions, DecisionSettings
 from fowt_env.envs.observations import (
     ESTIMATE_CHANNELS,
@@ -30,7 +37,7 @@ from fowt_env.envs.tasks import Task
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measure, Measurement
 
-PREFIX = "policy:"
+POLICY_PREFIX = "policy:"
 AGENTS = Path(__file__).parent / "agents"
 
 
@@ -70,7 +77,7 @@ class PolicyController:
         where = f"policy file {str(path)!r}"
         if abs(check_control_dt(control_dt) - settings["control_dt"]) > 1e-9:
             raise InputError(f"{where}: control_dt = {control_dt}: must be {settings['control_dt']:g} s")
-        self._mode = MODES[settings["action_mode"]]
+        self._mode = ACTION_MODES[settings["action_mode"]]
         preview = tuple(settings["wind_preview"])
         names = tuple(settings["observation"])
         if "azimuth" in names:
@@ -94,7 +101,7 @@ class PolicyController:
         self._estimator = WindEstimator(turbine, control_dt) if estimating else None
         self._baseline = self._baseline_law = None
         self._parameters, self._memory = np.zeros(1), np.zeros(1)
-        if self._mode == Mode.RESIDUAL:
+        if self._mode == ActionMode.RESIDUAL:
             from fowt_env.controllers import make
 
             self._baseline = make(settings["baseline"], turbine, control_dt)
@@ -115,7 +122,7 @@ class PolicyController:
         for part in (self._baseline, self._estimator):
             used += [] if part is None else part.information
         used += [name for name in names if name in Measurement._fields or name == "wind_preview"]
-        if self._mode == Mode.SETPOINT:
+        if self._mode == ActionMode.SETPOINT:
             used.append("rotor_speed")
         return tuple(dict.fromkeys(used))
 
@@ -126,11 +133,11 @@ class PolicyController:
         if self._estimator is not None:
             self._estimator.prepare(scene)
         if len(self._observation_map.preview):
-            from fowt_env.controllers.preview import rotor_wind
+            from fowt_env.controllers.preview import rotor_wind_series
 
             if scene.model.aero is None:
                 raise InputError(f"controller {self.name!r}: needs a scene with wind to look ahead")
-            self._wind = rotor_wind(scene)
+            self._wind = rotor_wind_series(scene)
 
     def reset(self, measurement):
         """Start afresh: the command in force is the measured one, the history is empty."""
@@ -140,7 +147,7 @@ class PolicyController:
         if self._baseline is not None:
             self._baseline.reset(measurement)
             self._parameters, self._memory = self._baseline.parameters, self._baseline.memory
-        elif self._mode == Mode.SETPOINT:
+        elif self._mode == ActionMode.SETPOINT:
             start_tracking(self._memory, measurement, self._actions)
         if self._estimator is not None:
             self._estimator.reset(measurement)
@@ -191,5 +198,5 @@ class PolicyController:
 
 def policy(name):
     """Factory (turbine, control_dt) of the agent that "policy:NAME" or "policy:PATH" names."""
-    path = policy_path(name.removeprefix(PREFIX))
+    path = policy_path(name.removeprefix(POLICY_PREFIX))
     return lambda turbine, control_dt: PolicyController(path, turbine, control_dt, name)

@@ -13,13 +13,13 @@ from fowt_env.errors import InputError, unknown
 from fowt_env.plant.channels import N_FIXED, Out, measure, record
 from fowt_env.plant.compile.decorators import entry
 from fowt_env.plant.compile.handle import data_of, model_of
-from fowt_env.plant.dynamics import evaluate, loads_of, respond
+from fowt_env.plant.dynamics import evaluate_loads, loads_of, respond
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measure
 from fowt_env.plant.model import LoadCache
-from fowt_env.plant.state import STATE_INDEX, STATES, State
+from fowt_env.plant.state import MOTIONS, STATE_INDEX, STATES, State
 
 # velocity steps are small because quadratic drag leaves a false damping proportional to them
-STEPS = np.array([1e-3, 1e-3, 1e-3, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-7, 1e-7, 1e-7, 1e-4, 1e-5])
+STATE_STEPS = np.array([1e-3, 1e-3, 1e-3, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-7, 1e-7, 1e-7, 1e-4, 1e-5])
 INPUTS = ("generator_torque", "blade_pitch_command", "wind_speed")
 INPUT_STEPS = np.array([1.0, 1e-5, 1e-3])
 FORCES = ("fx", "fy", "fz", "mx", "my", "mz")  # on the hull, body components about the body origin
@@ -33,7 +33,6 @@ RECORDED = {  # output: column of the output row, SI
     "rotor_thrust": Out.RTFLDFXH,
     "tower_base_moment": Out.TWRBSMYT,
 }
-MOTIONS = ("surge", "sway", "heave", "roll", "platform_pitch", "yaw")
 
 
 @dataclass(frozen=True)
@@ -186,7 +185,7 @@ def _mean_response(handle, x, u, force, azimuths, dx, measurement, row, rates, m
     recorded[:] = 0.0
     for i in range(azimuths):
         x[State.AZIMUTH] = start + i * (2.0 * pi / 3.0) / azimuths
-        evaluate(0.0, x, model, data, dx)
+        evaluate_loads(0.0, x, model, data, dx)
         for j in range(6):
             data.cache[LoadCache.TOTAL + j] += force[j]
             data.cache[LoadCache.HYDRO + j] += force[j]
@@ -250,7 +249,7 @@ def linearize(scene, operating_point=None):
             columns.append((up - down) / (2.0 * step))
         return np.array(columns).T
 
-    of_states = slopes(x, [int(i) for i in STATE_INDEX], STEPS)
+    of_states = slopes(x, [int(i) for i in STATE_INDEX], STATE_STEPS)
     of_inputs = np.zeros((of_states.shape[0], len(INPUTS)))
     of_inputs[:, :2] = slopes(u, range(2), INPUT_STEPS[:2])
     of_forces = slopes(force, range(6), FORCE_STEPS)

@@ -29,7 +29,7 @@ TOLERANCE = 1e-11  # m/s2 and rad/s2 of remaining acceleration
 OUTER_ROUNDS = 30
 FEATHERED = 0.5 * pi
 HALVINGS = 12
-STEPS = {  # of the differences, m, rad and rad/s
+DIFFERENCE_STEPS = {  # of the differences, m, rad and rad/s
     **dict.fromkeys((0, 1, 2), 1e-3),
     **dict.fromkeys((3, 4, 5), 1e-5),
     int(State.ROTOR_SPEED): 1e-4,
@@ -267,7 +267,7 @@ class _Steady:
         """Derivatives of the residual by the free states, central differences."""
         columns = []
         for index in free:
-            step = STEPS[index]
+            step = DIFFERENCE_STEPS[index]
             keep = self.x[index]
             self.x[index] = keep + step
             up = self.residual(free)

@@ -25,7 +25,7 @@ TRACKING_FREQUENCY = 0.5  # rad/s
 TRACKING_DAMPING = 1.0
 
 
-class Mode(IntEnum):
+class ActionMode(IntEnum):
     """Action modes."""
 
     DIRECT = 0
@@ -33,7 +33,7 @@ class Mode(IntEnum):
     RESIDUAL = 2
 
 
-MODES = {mode.name.lower(): mode for mode in Mode}
+ACTION_MODES = {mode.name.lower(): mode for mode in ActionMode}
 
 
 class ActionMap(NamedTuple):
@@ -53,7 +53,7 @@ class ActionMap(NamedTuple):
 
 
 def build_action_map(mode, task, turbine, control_dt):
-    """ActionMap of a Mode, a Task and a descriptions.platform.Turbine.
+    """ActionMap of a ActionMode, a Task and a descriptions.platform.Turbine.
 
     Raises: InputError where the pitch action reaches beyond the actuator.
     """
@@ -68,7 +68,7 @@ def build_action_map(mode, task, turbine, control_dt):
     shaft = build_drivetrain(turbine)
     inertia = shaft.inertia_row / shaft.gear_ratio
     low, high = 0.0, law.max_torque
-    if mode == Mode.SETPOINT:
+    if mode == ActionMode.SETPOINT:
         low, high = (fraction * turbine.rated_rotor_speed for fraction in task.setpoint)
         if low >= high:
             raise InputError(f"task {task.name!r}: setpoint = {task.setpoint}: must be a range (low, high)")
@@ -140,14 +140,14 @@ def command_of(action, actions, baseline_law, parameters, memory, measurement, u
     """
     commanded[Command.GENERATOR_TORQUE] = u[Command.GENERATOR_TORQUE]
     commanded[Command.BLADE_PITCH] = u[Command.BLADE_PITCH]
-    if actions.mode == Mode.RESIDUAL:
+    if actions.mode == ActionMode.RESIDUAL:
         baseline_command(baseline_law, parameters, memory, measurement, commanded)
         commanded[0] += action[0] * actions.residual_torque
         commanded[1] += action[1] * actions.residual_pitch
     else:
         commanded[0] = unscale(action[0], actions.low, actions.high)
         commanded[1] = unscale(action[1], actions.pitch_low, actions.pitch_high)
-        if actions.mode == Mode.SETPOINT:
+        if actions.mode == ActionMode.SETPOINT:
             commanded[0] = tracking_torque(measurement[Measure.ROTOR_SPEED], commanded[0], memory, actions)
     torque = u[Command.GENERATOR_TORQUE]
     u[Command.GENERATOR_TORQUE] = followed_torque(
@@ -162,11 +162,11 @@ def action_of(u, rotor_speed, actions, action):
 
     In residual mode that is zero: nothing added to the baseline.
     """
-    if actions.mode == Mode.RESIDUAL:
+    if actions.mode == ActionMode.RESIDUAL:
         action[0] = 0.0
         action[1] = 0.0
         return
-    first = rotor_speed if actions.mode == Mode.SETPOINT else u[Command.GENERATOR_TORQUE]
+    first = rotor_speed if actions.mode == ActionMode.SETPOINT else u[Command.GENERATOR_TORQUE]
     action[0] = scale(first, actions.low, actions.high)
     action[1] = scale(u[Command.BLADE_PITCH], actions.pitch_low, actions.pitch_high)
 

@@ -17,7 +17,7 @@ from fowt_env.analysis.trim_cache import cached_trim, interpolated_trim, plant_k
 from fowt_env.control import CompiledController, catalogue, make
 from fowt_env.descriptions.platform import Platform
 from fowt_env.descriptions.records import RENAMED
-from fowt_env.envs.actions import MODES, Mode, build_action_map, start_tracking
+from fowt_env.envs.actions import ACTION_MODES, ActionMode, build_action_map, start_tracking
 from fowt_env.envs.episode import (
     BAD_ACTION,
     N_COUNTS,
@@ -29,7 +29,7 @@ from fowt_env.envs.episode import (
     act,
     act_physical,
     rewrite_observation,
-    start,
+    start_episode,
 )
 from fowt_env.envs.observations import (
     ESTIMATE_CHANNELS,
@@ -41,7 +41,7 @@ from fowt_env.envs.observations import (
 )
 from fowt_env.envs.rewards import (
     N_TERMS,
-    TERMS,
+    REWARD_TERMS,
     Reference,
     build_scales,
     check_weights,
@@ -64,7 +64,7 @@ from fowt_env.simulation import INITIAL, check_duration, steps_in
 
 SHORTEST_WEATHER = 600.0  # s of random wind and sea: turbulence intensity is defined over 10 min
 StepResult = tuple[np.ndarray, float, bool, bool, dict[str, Any]]
-REWARD_KEYS = tuple(f"reward/{name}" for name in TERMS)
+REWARD_KEYS = tuple(f"reward/{name}" for name in REWARD_TERMS)
 
 
 class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
@@ -148,8 +148,8 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             from fowt_env.visual.rendering import load_pygame  # nobody else pays for it
 
             load_pygame()
-        if action_mode not in MODES:
-            raise unknown("action_mode", action_mode, MODES)
+        if action_mode not in ACTION_MODES:
+            raise unknown("action_mode", action_mode, ACTION_MODES)
         for key in options:
             if key in RENAMED:
                 raise InputError(f"setting {key!r} of FowtEnv: is called {RENAMED[key]} now")
@@ -188,7 +188,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         per_control = steps_in("control_dt", control_dt, self.dt if dt is None else dt)
         self._last = per_control * steps_in("duration", task.duration, control_dt)
         self._key = plant_key(self.scene)
-        self._build(MODES[action_mode], per_control)
+        self._build(ACTION_MODES[action_mode], per_control)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (N_ACTIONS,), np.float32)
         low, high = self._config.observation_map.low, self._config.observation_map.high
         self.observation_space = gymnasium.spaces.Box(low.astype(np.float32), high.astype(np.float32))
@@ -207,7 +207,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         other._np_random = other._np_random_seed = None
         other._running = False
         other._view = None
-        other._build(MODES[self.action_mode], self._config.per_control)
+        other._build(ACTION_MODES[self.action_mode], self._config.per_control)
         return other
 
     def _build(self, mode, per_control):
@@ -217,7 +217,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self._baseline = None
         baseline_law = None
         parameters, memory = np.zeros(1), np.zeros(1)
-        if mode == Mode.RESIDUAL:
+        if mode == ActionMode.RESIDUAL:
             self._baseline = named_baseline(self.baseline, self.design_scene.turbine, self.control_dt)
             baseline_law = self._baseline.law
             parameters, memory = self._baseline.parameters, self._baseline.memory
@@ -287,7 +287,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         reference = Reference(float(state[State.PLATFORM_PITCH]), float(state[State.ROTOR_SPEED]))
         run.reference[:] = reference
         self._offset(episode.offsets)
-        start(self._handle)
+        start_episode(self._handle)
         self.restart_loops()
         if self._estimator is not None:
             self._estimator.reset(self.measurement())
@@ -310,7 +310,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         """
         if self._baseline is not None:
             self._baseline.reset(self.measurement())
-        elif self._config.actions.mode == Mode.SETPOINT:
+        elif self._config.actions.mode == ActionMode.SETPOINT:
             start_tracking(self._episode.memory, self.measurement(), self._config.actions)
 
     def _offset(self, offsets):

@@ -103,7 +103,7 @@ def write_observation(config, episode):
 
 
 @entry
-def start(handle):
+def start_episode(handle):
     """Measure and observe the first instant of an episode; returns the status."""
     config, episode = model_of(handle), data_of(handle)
     for i in range(N_COUNTS):

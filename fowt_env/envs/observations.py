@@ -14,7 +14,7 @@ from fowt_env.errors import InputError, unknown
 from fowt_env.plant.aero.load import wind_of
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measure
-from fowt_env.plant.state import State
+from fowt_env.plant.state import MOTIONS, State
 
 DEG = pi / 180.0
 SIN_AZIMUTH = N_MEASUREMENTS  # signals that follow the measurements
@@ -68,7 +68,6 @@ FIXED = (  # channels that look the same for every turbine
     _symmetric("platform_pitch_acceleration", "rad/s2", 0.5 * DEG, 5.0, "pitch acceleration (body y)"),
     _symmetric("wave_elevation", "m", 3.0, 50.0, "water surface at the platform's rest position"),
 )
-MOTIONS = ("surge", "sway", "heave", "roll", "platform_pitch", "yaw")
 RATES = tuple(f"{name}_rate" for name in MOTIONS)
 STANDARD = (*MOTIONS, *RATES, "rotor_speed", "blade_pitch", "generator_torque")
 
@@ -105,7 +104,7 @@ ESTIMATE_CHANNELS = {  # made by the estimator of lqr from what a turbine measur
 }  # fmt: skip
 
 
-def channels(turbine, preview=()):
+def observation_channels(turbine, preview=()):
     """{channel: tuple of its Entries} for a descriptions.platform.Turbine; preview: look-ahead times (s)."""
     rated, law, drive = turbine.rated_rotor_speed, turbine.torque_law, turbine.pitch_drive
     table = {entry.name: (entry,) for entry in FIXED}
@@ -180,7 +179,7 @@ def entries(names, turbine, preview):
     """Entries of an observation in order. Raises: InputError for a preview without times."""
     if "wind_preview" in names and not len(preview):
         raise InputError("wind_preview: give the look-ahead times, for example wind_preview=(2.0, 4.0, 6.0)")
-    table = channels(turbine, preview)
+    table = observation_channels(turbine, preview)
     return tuple(entry for name in names for entry in table[name])
 
 

@@ -1,6 +1,6 @@
 """Named reward terms: each a function of what is measured, bounded, weighted by the task.
 
-To add one: a kernel, a line in TERMS and one in fill_terms. reward = sum of weight * term.
+To add one: a kernel, a line in REWARD_TERMS and one in fill_terms. reward = sum of weight * term.
 """
 
 from collections.abc import Mapping
@@ -39,7 +39,7 @@ class Reference(NamedTuple):
     rotor_speed: float  # rad/s
 
 
-class Term(NamedTuple):
+class RewardTerm(NamedTuple):
     """Range and meaning of a reward term, for tests and documents."""
 
     low: float
@@ -47,29 +47,29 @@ class Term(NamedTuple):
     meaning: str
 
 
-TERMS = {
-    "power": Term(
+REWARD_TERMS = {
+    "power": RewardTerm(
         0.0, 1.0, "generator power over rated; above rated it falls again, to a tenth at 20 % too much"
     ),
-    "rotor_speed": Term(
+    "rotor_speed": RewardTerm(
         0.0,
         1.0,
         "1 between the rotor speed of the episode's operating point and rated (above rated wind: at rated),"
         " a tenth at 20 % of rated outside",
     ),
-    "platform_motion": Term(
+    "platform_motion": RewardTerm(
         0.0,
         1.0,
         "1 with the platform pitch at rest at the operating point, a tenth at an oscillation of 5 deg"
         " amplitude (angle and rate over 2 pi/30 s taken together)",
     ),
-    "pitch_travel": Term(-1.0, 0.0, "blade-pitch travel over the most that the rate limit allows"),
-    "torque_travel": Term(-1.0, 0.0, "change of generator torque over the most that the rate limit allows"),
-    "failure": Term(-1.0, 0.0, "-1 in the step that ends in failure, else 0"),
-    "power_shortfall": Term(-1.0, 0.0, "minus the missing fraction of rated power; more counts nothing"),
+    "pitch_travel": RewardTerm(-1.0, 0.0, "blade-pitch travel over the most that the rate limit allows"),
+    "torque_travel": RewardTerm(-1.0, 0.0, "change of generator torque over the most its rate limit allows"),
+    "failure": RewardTerm(-1.0, 0.0, "-1 in the step that ends in failure, else 0"),
+    "power_shortfall": RewardTerm(-1.0, 0.0, "minus the missing fraction of rated power; more adds nothing"),
 }
-TermIndex = IntEnum("TermIndex", [name.upper() for name in TERMS], start=0)
-N_TERMS = len(TERMS)
+TermIndex = IntEnum("TermIndex", [name.upper() for name in REWARD_TERMS], start=0)
+N_TERMS = len(REWARD_TERMS)
 
 
 @kernel
@@ -148,7 +148,7 @@ def fill_terms(m, previous, reference, failed, scales, terms):
 
 @kernel
 def weighted_sum(weights, terms):
-    """sum of weight * term in the order of TERMS."""
+    """sum of weight * term in the order of REWARD_TERMS."""
     total = 0.0
     for i in range(terms.shape[0]):
         total += weights[i] * terms[i]
@@ -173,8 +173,8 @@ def check_weights(where, weights):
         raise InputError(f"{where} = {weights!r}: must be a dict of reward terms and their weights")
     checked = {}
     for name, weight in weights.items():
-        if name not in TERMS:
-            raise unknown(f"reward term of {where}", name, TERMS)
+        if name not in REWARD_TERMS:
+            raise unknown(f"reward term of {where}", name, REWARD_TERMS)
         number = isinstance(weight, int | float | np.number) and not isinstance(weight, bool)
         if not number or not isfinite(weight) or weight < 0.0:
             raise InputError(f"{where}: weight of {name} = {weight!r}: must be a finite number >= 0")
@@ -183,5 +183,5 @@ def check_weights(where, weights):
 
 
 def weight_array(weights):
-    """(N_TERMS,) weights in the order of TERMS; 0 where none is given."""
-    return np.array([weights.get(name, 0.0) for name in TERMS])
+    """(N_TERMS,) weights in the order of REWARD_TERMS; 0 where none is given."""
+    return np.array([weights.get(name, 0.0) for name in REWARD_TERMS])

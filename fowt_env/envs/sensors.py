@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fowt_env.envs.observations import channels
+from fowt_env.envs.observations import observation_channels
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measure, Measurement
@@ -28,7 +28,7 @@ class Sensors(NamedTuple):
 
 def reading_scales(turbine):
     """(N_MEASUREMENTS,) what noise of 1 is on each field of a Measurement, SI; 0 for the time."""
-    table = channels(turbine)
+    table = observation_channels(turbine)
     scales = {name: table[name][0].scale for name in Measurement._fields if name in table}
     scales["generator_speed"] = turbine.drivetrain.gear_ratio * scales["rotor_speed"]
     scales["time"] = 0.0  # a clock, not a sensor

@@ -4,7 +4,7 @@ from math import isinf
 
 from fowt_env.descriptions.platform import read_platform, read_turbine
 from fowt_env.envs.observations import entries
-from fowt_env.envs.rewards import TERMS
+from fowt_env.envs.rewards import REWARD_TERMS
 from fowt_env.files.markdown import markdown_table
 
 
@@ -56,7 +56,7 @@ def reward_table(task):
     """Weight, range and meaning of each reward term."""
     rows = [
         (name, f"{task.weights.get(name, 0.0):g}", f"{term.low:g} to {term.high:g}", term.meaning)
-        for name, term in TERMS.items()
+        for name, term in REWARD_TERMS.items()
     ]
     return markdown_table(("term", "weight", "range", "meaning"), rows, aligned=True)
 

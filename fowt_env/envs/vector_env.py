@@ -28,7 +28,7 @@ from fowt_env.plant.compile.handle import Handle
 if "OMP_WAIT_POLICY" not in os.environ:
     os.environ.setdefault("GOMP_SPINCOUNT", "3000")
 
-MODES = {mode.value: mode for mode in AutoresetMode}
+AUTORESET_MODES = {mode.value: mode for mode in AutoresetMode}
 INFO_KEYS = (*REWARD_KEYS, "time")  # those of every step that are float64
 INFO_MASKS = tuple(f"_{key}" for key in INFO_KEYS)
 
@@ -72,11 +72,11 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
     ) -> None:
         self.num_envs = _count("num_envs", num_envs, 10**6)
         if isinstance(autoreset_mode, str):
-            if autoreset_mode not in MODES:
-                raise unknown("autoreset_mode", autoreset_mode, MODES)
-            autoreset_mode = MODES[autoreset_mode]
+            if autoreset_mode not in AUTORESET_MODES:
+                raise unknown("autoreset_mode", autoreset_mode, AUTORESET_MODES)
+            autoreset_mode = AUTORESET_MODES[autoreset_mode]
         if not isinstance(autoreset_mode, AutoresetMode):
-            raise unknown("autoreset_mode", autoreset_mode, MODES)
+            raise unknown("autoreset_mode", autoreset_mode, AUTORESET_MODES)
         self.autoreset_mode = autoreset_mode
         self.metadata = self.metadata | {"autoreset_mode": autoreset_mode}
         if settings.get("render_mode") is not None:

@@ -29,7 +29,7 @@ class TorqueCurve(NamedTuple):
     maximum_torque: float  # N m
 
 
-class Drivetrain(NamedTuple):
+class Shaft(NamedTuple):
     """Rigid shaft with gearbox: the figures of theory.md Eq. (7).
 
     inertia_row is I_rx = I_rotor + N_g^2 I_g, the inertia of the rotor-speed equation; coupling is
@@ -102,11 +102,11 @@ def build_torque_curve(torque_law, region3="constant_torque"):
 
 
 def build_drivetrain(turbine):
-    """Drivetrain of a description.Turbine."""
+    """Shaft of a descriptions.platform.Turbine."""
     shaft, rotor_inertia = turbine.drivetrain, turbine.rotor.inertia
     ratio = shaft.gear_ratio
     rated_torque = ratio * turbine.torque_law.rated_torque  # tau_0, low-speed shaft
-    return Drivetrain(
+    return Shaft(
         gear_ratio=float(ratio),
         inertia_row=float(rotor_inertia + ratio**2 * shaft.generator_inertia),
         coupling=float(rotor_inertia + ratio * shaft.generator_inertia),

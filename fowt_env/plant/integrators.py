@@ -12,7 +12,7 @@ from fowt_env.errors import unknown
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.drivetrain import followed_pitch, pitch_after
-from fowt_env.plant.dynamics import derivative, evaluate, respond
+from fowt_env.plant.dynamics import derivative, evaluate_loads, respond
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rigid_body import attitude_rate
 from fowt_env.plant.rotor_substeps import build_substeps, follow_rotor, sample_rotor
@@ -48,7 +48,7 @@ def rates(t, x, u, model, data, dx):
     """dx at an instant under u, from the cached loads where they are fresh."""
     cache = data.cache
     if cache[LoadCache.VALID] < 0.5 or cache[LoadCache.TIME] != t:
-        evaluate(t, x, model, data, data.stages[0])
+        evaluate_loads(t, x, model, data, data.stages[0])
         cache[LoadCache.VALID] = 1.0
         cache[LoadCache.TIME] = t
         cache[LoadCache.ELEVATED] = 0.0

@@ -33,7 +33,7 @@ class Model(NamedTuple):
 
     rigid_body: RigidBody
     layout: object  # channels.Layout
-    drivetrain: object  # drivetrain.Drivetrain
+    drivetrain: object  # drivetrain.Shaft
     actuator: object  # drivetrain.PitchActuator
     generator: object  # drivetrain.TorqueLimits
     hydro: object  # hydro.load.Hydro or None

@@ -21,7 +21,7 @@ from fowt_env.plant.user_loads import MOST_LOADS, N_FORCE, N_MOTION, Motion, Use
 
 AXES = ("inertial", "body")
 SIGNATURE = types.void(FLOATS, FLOATS, FLOATS)
-ARGUMENTS = 3
+KERNEL_ARGUMENTS = 3
 MOST_STATES = 100  # of one load
 IN_PLANE = 1e-9  # fraction of a force out of the plane of a planar scene that rounding may leave
 TRIALS = (  # states that a load is tried in: surge, sway, heave, roll, pitch, yaw, and their rates
@@ -110,7 +110,7 @@ def load_kernel(function: Callable[..., None]) -> LoadKernel:
         return function
     if not isinstance(function, FunctionType):
         raise InputError(f"load_kernel: {function!r} must be a plain Python function")
-    if len(inspect.signature(function).parameters) != ARGUMENTS:
+    if len(inspect.signature(function).parameters) != KERNEL_ARGUMENTS:
         raise InputError(
             f"load kernel {function.__name__!r}: must take three arguments (parameters, motion, force)"
         )

@@ -17,7 +17,7 @@ from fowt_env.analysis.trim_cache import GRID, cached_trim, interpolated_trim
 from fowt_env.controllers import make
 from fowt_env.envs import TASKS, FowtEnv, Task
 from fowt_env.envs.observations import KNOWN
-from fowt_env.envs.rewards import TERMS
+from fowt_env.envs.rewards import REWARD_TERMS
 from fowt_env.errors import InputError
 from fowt_env.plant.state import State
 from fowt_env.registration import ENVIRONMENTS
@@ -324,9 +324,9 @@ def test_reward_is_the_weighted_sum_of_its_visible_terms():
     rng = np.random.default_rng(0)
     for _ in range(50):
         _, reward, _, _, info = env.step(rng.uniform(-1.0, 1.0, 2))
-        terms = {name: info[f"reward/{name}"] for name in TERMS}
+        terms = {name: info[f"reward/{name}"] for name in REWARD_TERMS}
         assert reward == pytest.approx(sum(env.task.weights[n] * v for n, v in terms.items()), rel=1e-12)
-        assert all(TERMS[name].low <= value <= TERMS[name].high for name, value in terms.items())
+        assert all(REWARD_TERMS[n].low <= value <= REWARD_TERMS[n].high for n, value in terms.items())
     assert env.task.weights["power"] == 3.0
     assert env.task.weights["rotor_speed"] == TASKS["above_rated"].weights["rotor_speed"] > 0.0
 

@@ -134,7 +134,7 @@ def pareto_board(controllers):
     figure = dict.fromkeys(("low", "high", "seed_low", "seed_high"), np.nan)
     entries = []
     for name, (speed, pitch, travel) in controllers.items():
-        values = dict(zip(time_series.PARETO, (speed, pitch, travel, 20.0), strict=True))
+        values = dict(zip(time_series.PARETO_METRICS, (speed, pitch, travel, 20.0), strict=True))
         figures = {key: figure | {"mean": value, "worst": value} for key, value in values.items()}
         entries.append({"controller": name, "failed": 0, "metrics": figures})
     return {"controllers": entries, "cases": ["a"], "interval": {"level": 0.95}}

@@ -259,7 +259,7 @@ def _append(out, row):
         pd.DataFrame([row], columns=COLUMNS).to_csv(file, index=False, header=new, float_format="%.8g")
 
 
-def summary(table):
+def accuracy_summary(table):
     """DataFrame by variant: seeds' means of error and real-time factor; whether it is on the Pareto front."""
     if table.empty:
         raise InputError("nothing to summarise: the table has no rows")
@@ -296,7 +296,7 @@ def plot_accuracy(table, path=None):
     """Figure: error over real-time factor, both logarithmic, with the Pareto front and OpenFAST's points."""
     from fowt_env.visual.time_series import COLOURS, INK, new_figure, save_figure, style_axes
 
-    points = summary(table)
+    points = accuracy_summary(table)
     points = points[np.isfinite(points["real_time_factor"]) & (points["worst"] > 0.0)]
     figure = new_figure(8.5, 5.5)
     axes = figure.subplots()

@@ -720,7 +720,7 @@ def accuracy(
             progress=lambda text, done, total: update(done, text, total),
         )
     rows = []
-    for row in study.summary(table).to_dict("records"):
+    for row in study.accuracy_summary(table).to_dict("records"):
         speeds = (f"{row['real_time_factor']:.0f}", f"{row['kernel_factor']:.0f}")
         figures = (f"{row['worst']:.3g}", row["worst_of"], *speeds)
         rows.append((row["variant"], *figures, "*" if row["front"] else ""))

@@ -60,7 +60,7 @@ def controller_code(controller):
     """
     from fowt_env.controllers import CONTROLLERS
     from fowt_env.controllers.design import saved_files
-    from fowt_env.controllers.policy.controller import PREFIX, policy_path
+    from fowt_env.controllers.policy.controller import POLICY_PREFIX, policy_path
 
     if not isinstance(controller, str):
         kind = (
@@ -70,10 +70,10 @@ def controller_code(controller):
         return {"name": name, "code": _digest(_user_files(kind.__module__))}
     if ":" not in controller:
         files = _package_files(CONTROLLERS.get(controller))
-    elif controller.startswith(saved_files.PREFIX):
-        files = [controller.removeprefix(saved_files.PREFIX), *_package_files(saved_files.load_design)]
-    elif controller.startswith(PREFIX):  # its baseline may be any controller
-        files = [policy_path(controller.removeprefix(PREFIX)), *_package_files(None)]
+    elif controller.startswith(saved_files.DESIGN_PREFIX):
+        files = [controller.removeprefix(saved_files.DESIGN_PREFIX), *_package_files(saved_files.load_design)]
+    elif controller.startswith(POLICY_PREFIX):  # its baseline may be any controller
+        files = [policy_path(controller.removeprefix(POLICY_PREFIX)), *_package_files(None)]
     else:
         files = _user_files(controller.partition(":")[0])
     return {"name": controller, "code": _digest(files)}

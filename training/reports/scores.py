@@ -28,7 +28,7 @@ from fowt_env.training.evaluation.results_table import KEY
 __all__ = ["COUNTS", "FIGURES", "Figure", "agent_counts", "agent_scores", "by_kind"]
 
 PAST_ANY = "past a constraint"
-MEASURED = {  # what a turbine's own sensors show
+SENSOR_FIELDS = {  # what a turbine's own sensors show
     "time", "rotor_speed", "generator_speed", "blade_pitch", "generator_torque", "platform_pitch",
     "platform_pitch_rate", "platform_pitch_acceleration", "nacelle_acceleration", "nacelle_velocity",
 }  # fmt: skip
@@ -227,7 +227,8 @@ def inputs(label):
         used = information(label)
     except InputError:
         return ""
-    return ", ".join((["measured"] if set(used) & MEASURED else []) + [x for x in used if x not in MEASURED])
+    measured = ["measured"] if set(used) & SENSOR_FIELDS else []
+    return ", ".join(measured + [x for x in used if x not in SENSOR_FIELDS])
 
 
 def kind_of(case):

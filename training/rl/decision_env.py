@@ -11,7 +11,7 @@ from fowt_env.plant.measurement import Measure
 from fowt_env.training.evaluation.metrics import REDUCTIONS, travel
 from fowt_env.training.rl.sb3_env import FowtSB3VecEnv
 
-RECORDED = (Measure.ROTOR_SPEED, Measure.PLATFORM_PITCH, Measure.BLADE_PITCH, Measure.GENERATOR_TORQUE)
+RECORDED_FIELDS = (Measure.ROTOR_SPEED, Measure.PLATFORM_PITCH, Measure.BLADE_PITCH, Measure.GENERATOR_TORQUE)
 
 
 class DecisionVecEnv(VecEnvWrapper):
@@ -127,7 +127,7 @@ class ValidationVecEnv(FowtSB3VecEnv):
             self._failed[i] = not infos[i]["TimeLimit.truncated"]
         self._over |= dones
         if self._clock < len(self._record):
-            row = np.array([env._episode.measurement for env in self.env.envs])[:, RECORDED]
+            row = np.array([env._episode.measurement for env in self.env.envs])[:, RECORDED_FIELDS]
             self._record[self._clock, ~self._over] = row[~self._over]
         self._clock += 1
         return result

@@ -47,7 +47,7 @@ from fowt_env.plant.state import State, Wrench
 AHEAD, BEHIND = 512, 64
 DENSE_START, DENSE_END, DENSE_ROWS = -5.0, 30.0, 140  # deg, blade pitches where turbines operate
 COARSE_END, COARSE_ROWS = 90.0, 60  # deg, on to feather
-IN_PLANE = 1e-9  # v_normal of the first direction: the limit from upwind, as the load jumps at zero
+LEAST_NORMAL = 1e-9  # v_normal of the first direction: the limit from upwind, as the load jumps at zero
 LARGEST_RATIO = 12.0  # highest over lowest point of the rotor, else wind_at: see _profile
 
 
@@ -77,7 +77,7 @@ class Profile(NamedTuple):
     q5: float
 
 
-class Blade(NamedTuple):
+class BladeMotion(NamedTuple):
     """Directions of a blade and the motion along it. e_r = (0, ey, ez) outwards, e_t = (0, -ez, ey)."""
 
     ey: float
@@ -112,7 +112,7 @@ def _fill(load, blade_pitch, elements):
             weight = elements.weight[j] / elements.air_density
             for k in range(load.shape[2]):
                 v_tangential = 1.0 - k / AHEAD if k <= AHEAD else -(k - AHEAD) / BEHIND
-                v_normal = max(1.0 - abs(v_tangential), IN_PLANE)
+                v_normal = max(1.0 - abs(v_tangential), LEAST_NORMAL)
                 section = blade_section(v_normal, v_tangential, blade_pitch[i], j, 1.0, elements)
                 load[i, j, k, 0] = weight * section.fn
                 load[i, j, k, 1] = weight * section.ft
@@ -178,7 +178,7 @@ def _profile(low, high, series):
 def _blade(psi, rotor_speed, pose, hub):
     """Blade at the azimuth psi."""
     ey, ez = -sin(psi), cos(psi)
-    return Blade(
+    return BladeMotion(
         ey,
         ez,
         pose.r12 * ey + pose.r13 * ez,

@@ -30,13 +30,13 @@ def test_the_key_and_its_folders_are_private_whatever_the_umask(checkpoint, tmp_
 
 @pytest.mark.parametrize("mode", [0o620, 0o640, 0o604, 0o602])
 def test_a_key_that_others_may_know_or_have_put_there_seals_nothing(mode, checkpoint, tmp_path):
-    (tmp_path / "own" / "config" / checkpoint_signature.KEY).chmod(mode)
+    (tmp_path / "own" / "config" / checkpoint_signature.KEY_FILE).chmod(mode)
     assert not checkpoint_signature.is_own(checkpoint)
 
 
 def test_a_key_of_another_user_seals_nothing(checkpoint, tmp_path, monkeypatch):
     if os.geteuid() == 0:
-        os.chown(tmp_path / "own" / "config" / checkpoint_signature.KEY, 54321, -1)
+        os.chown(tmp_path / "own" / "config" / checkpoint_signature.KEY_FILE, 54321, -1)
     else:
         monkeypatch.setattr(os, "geteuid", lambda: 54321)
     assert not checkpoint_signature.is_own(checkpoint)

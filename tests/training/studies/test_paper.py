@@ -30,7 +30,7 @@ def natural():
 
 @pytest.fixture(scope="module")
 def runs():
-    return {name: load_cases.run_case(name) for name in load_cases.CASES}
+    return {name: load_cases.run_load_case(name) for name in load_cases.CASES}
 
 
 def verdicts(runs, natural):
@@ -172,7 +172,7 @@ def test_fig_12_wind_sets_the_mean_and_waves_the_range(runs, natural):
 
 def test_the_judge_sees_no_double_frequency_where_waves_act_at_rest(natural):
     # fixed position and still-water integration leave 0.05 % at twice the frequency
-    frame = load_cases.run_case("LC5", kinematics_position="fixed", surface="swl", stretching="none")
+    frame = load_cases.run_load_case("LC5", kinematics_position="fixed", surface="swl", stretching="none")
     found = verdicts({"LC5": frame}, natural)
     assert found["LC5: surge spectrum peaks at the wave frequency"]
     assert not found["LC5: surge spectrum peaks at twice the wave frequency"]

@@ -119,7 +119,7 @@ def test_a_case_runs_alike_alone_and_among_others(scene, runner, tmp_path):
         runner.run(random_cases.draw_state(rng, scene.turbine), [], 5.0)
         outcome = runner.run(state, commands, 5.0)
         case = random_cases._case(scene, 18.0, CALM, 0, state, commands, 5.0)
-        path = random_cases.store([(case, "made up")], tmp_path)[0]
+        path = random_cases.store_case([(case, "made up")], tmp_path)[0]
         again = random_cases.replay(path)
         assert again.status == outcome.status
         assert np.array_equal(again.peak, outcome.peak)

@@ -17,8 +17,8 @@ from fowt_env.plant.rollout import RUNNING, STOP_REASONS, advance, forget, obser
 from fowt_env.plant.state import State
 from fowt_env.scene.build import build_scene
 from fowt_env.simulation import initial_state
+from fowt_env.training.evaluation.run_case import CONTROL_DT
 
-CONTROL_DT = 0.1  # s
 EVENT = 60.0  # s at which gusts start and faults happen
 DURATION = 180.0  # s of a run: two minutes after the event
 STEEPEST = 0.142  # height over length of the steepest regular wave in deep water (Michell)

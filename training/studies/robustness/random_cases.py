@@ -27,10 +27,10 @@ from fowt_env.plant.state import Command, State, pose_of
 from fowt_env.scene.build import build_scene
 from fowt_env.scene.options import FIDELITIES
 from fowt_env.simulation import hold
+from fowt_env.training.evaluation.run_case import CONTROL_DT
 
 DURATION = 30.0  # s of each case: three wave periods, one of platform pitch
 WEATHER = 60.0  # s of random wind and sea
-CONTROL_DT = 0.1  # s
 SEGMENT = 1.0  # s between changes of an open-loop command
 PER_WEATHER = 50  # initial states in each weather
 PLANTS = ("standard",) * 44 + ("reference",) + ("fast",) * 5  # fidelity of each weather, in turn
@@ -85,7 +85,7 @@ def _run_case(
 
 
 @entry
-def run_case(
+def run_random_case(
     handle, x, u, act, parameters, memory, measurement, dx, commands, per_control, per_segment, last, dt, peak
 ):
     """Advance x by last steps of dt; returns (status, steps done).
@@ -239,7 +239,7 @@ class Runner:
                 self.controller.memory,
             )
         peak = np.zeros(4)
-        status, steps = run_case(
+        status, steps = run_random_case(
             handle, x, u, law, parameters, memory, self.measurement, self.dx, commands,
             round(CONTROL_DT / dt), round(SEGMENT / dt), round(duration / dt), dt, peak,
         )  # fmt: skip
@@ -344,7 +344,7 @@ def _case(scene, wind, sea, seed, state, commands, duration):
     }  # fmt: skip
 
 
-def case_scene(case):
+def random_case_scene(case):
     """Scene of a case."""
     return build_scene(
         wind=case["wind"], sea=case["sea"], seed=case["seed"], fidelity=case["fidelity"],
@@ -367,7 +367,7 @@ def replay(case):
     missing = [key for key in KEYS if key not in case]
     if missing:
         raise InputError(f"case: {', '.join(missing)} missing; needs {', '.join(KEYS)}")
-    return Runner(case_scene(case), case["dt"]).run(case["state"], case["commands"], case["duration"])
+    return Runner(random_case_scene(case), case["dt"]).run(case["state"], case["commands"], case["duration"])
 
 
 def finer(scene, case):
@@ -474,7 +474,7 @@ def _count(tally, scene, case, outcome):
     np.maximum(tally.peak, outcome.peak, out=tally.peak)
 
 
-def store(failures, folder):
+def store_case(failures, folder):
     """Write each (case, reason) as a JSON file for replay; returns the paths."""
     paths = []
     for number, (case, reason) in enumerate(failures):

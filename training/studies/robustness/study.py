@@ -40,7 +40,7 @@ STEP_CHANGE = 0.05  # of an extreme's peak with half the step
 
 
 @dataclass
-class Claim:
+class RobustnessClaim:
     """One row of the summary."""
 
     what: str
@@ -58,8 +58,8 @@ class Found:
     tables: list = field(default_factory=list)
 
     def claim(self, what, count, found, target, holds):
-        """Add a Claim."""
-        self.claims.append(Claim(what, str(count), found, target, bool(holds)))
+        """Add a RobustnessClaim."""
+        self.claims.append(RobustnessClaim(what, str(count), found, target, bool(holds)))
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,7 @@ def _factor(value):
 def cases_part(sizes, folder, progress):
     """Found of the random scenes and states; failures are stored as replayable files in folder/failures."""
     tally = random_cases.random_cases(sizes.cases, sizes.seed, sizes.per_weather, progress=progress)
-    paths = random_cases.store(tally.failures, Path(folder) / "failures")
+    paths = random_cases.store_case(tally.failures, Path(folder) / "failures")
     reasons = [reason for _, reason in tally.failures]
     broken = sum("exception" in reason or "non-finite" in reason for reason in reasons)
     found = Found()
