@@ -17,7 +17,8 @@ from fowt_env.plant.hydro.diffraction import build_strip_diffraction
 from fowt_env.plant.hydro.hydrostatics import build_hull
 from fowt_env.plant.hydro.linear_damping import build_damping
 from fowt_env.plant.hydro.load import BandedStrips, ExactStrips, Hydro
-from fowt_env.plant.hydro.morison import Current, build_strips
+from fowt_env.plant.hydro.morison import Current
+from fowt_env.plant.hydro.strips import build_strips
 from fowt_env.plant.hydro.wave_bands import (
     STILL_REFINEMENT,
     build_fast_waves,

@@ -4,7 +4,7 @@ u(X, Y, Z, t) = box(t + shift - X/U, Y, Z), trilinear in time and both coordinat
 station or the tower is. The shift is InflowWind's: half the grid width over the mean wind, so that the
 wind upstream by half a width is known at the start. Outside the grid: below it the wind falls linearly to
 zero at the still-water level, as in InflowWind without tower points; beside and above it the edge's wind
-holds (and scene/weather.py refuses grids that do not hold the rotor).
+holds (read_box refuses grids that do not hold the rotor).
 
 Sources of boxes: TurbSim files (turbsim.py), the user's arrays, Mann turbulence (hipersim).
 """

@@ -7,7 +7,8 @@ from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.hydro.added_inertia import added_inertia_load
 from fowt_env.plant.hydro.hydrostatics import hydrostatic_load
 from fowt_env.plant.hydro.linear_damping import damping_load
-from fowt_env.plant.hydro.morison import Strips, current_at, morison_load
+from fowt_env.plant.hydro.morison import current_at, morison_load
+from fowt_env.plant.hydro.strips import Strips
 from fowt_env.plant.hydro.wave_bands import fast_morison_load, surface_elevation
 from fowt_env.plant.hydro.waves import elevation, wave_kinematics
 from fowt_env.plant.state import NO_LOAD, Wrench, add

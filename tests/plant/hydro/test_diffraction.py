@@ -22,7 +22,8 @@ from fowt_env.plant.hydro.diffraction import (
     inertia_coefficient,
 )
 from fowt_env.plant.hydro.load import BandedStrips, ExactStrips
-from fowt_env.plant.hydro.morison import GAUSS_OFFSET, axis_surface, build_strips, morison_load, wet_cell
+from fowt_env.plant.hydro.morison import morison_load
+from fowt_env.plant.hydro.strips import GAUSS_OFFSET, axis_surface, build_strips, wet_cell
 from fowt_env.plant.hydro.wave_bands import (
     LANES,
     build_fast_waves,

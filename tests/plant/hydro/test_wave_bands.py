@@ -10,7 +10,8 @@ from naive.strips import strip_load
 
 from fowt_env.descriptions.platform import read_platform, sea_state_of
 from fowt_env.plant.hydro import wave_bands as fast_waves
-from fowt_env.plant.hydro.morison import Current, axis_surface, build_strips, current_at, morison_load
+from fowt_env.plant.hydro.morison import Current, current_at, morison_load
+from fowt_env.plant.hydro.strips import axis_surface, build_strips
 from fowt_env.plant.hydro.wave_bands import (
     build_fast_waves,
     build_lanes,
