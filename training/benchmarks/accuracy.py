@@ -15,7 +15,8 @@ import numpy as np
 import pandas as pd
 
 from fowt_env.errors import InputError, unknown
-from fowt_env.scene.build import INTEGRATORS, build_scene
+from fowt_env.plant.integrators import INTEGRATORS
+from fowt_env.scene.build import build_scene
 from fowt_env.scene.scene import REFERENCE_STEP
 from fowt_env.simulation import initial_state, simulate
 from fowt_env.training.benchmarks.speed import SEA, TURBULENCE, TimedScene, calibration, header, loop_time
