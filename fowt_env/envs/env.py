@@ -71,7 +71,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     """Floating wind turbine whose generator torque and blade pitch are commanded.
 
     task          name in TASKS ("above_rated", "full_range", "steady") or a Task
-    platform      built-in name, path or description.Platform
+    platform      built-in name, path or descriptions.platform.Platform
     rotor         "bem", "lookup" or "table"; None: the task's, or else that of the fidelity
     action_mode   "direct", "setpoint" or "residual", see the table of actions
     baseline      compiled controller, by name, that the residual mode adds to; lqr goes on from the sum, so

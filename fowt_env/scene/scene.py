@@ -38,7 +38,7 @@ class Scene:
     state vector and the scratch of a run belong to the run.
     """
 
-    model: Any  # a dynamics.Model; its parts have many types
+    model: Any  # a plant.model.Model; its parts have many types
     platform: Platform
     turbine: Turbine
     wind: Any  # as asked for

@@ -146,7 +146,7 @@ kernel = _decorator(**_HOUSE, _nrt=False)
 
 # No fastmath anywhere: LLVM then orders a sum differently in each caller's copy of a function, and a
 # process that compiles gets other last bits than one that loads from disk (seen on the look-up rotor
-# and the wave sums). Where a sum's time counts, lane_sums.py writes it in a fixed order of lanes.
+# and the wave sums). Where a sum's time counts, vector_sums.py writes it in a fixed order of lanes.
 
 # A kernel put into its caller whatever its size. A call hands over a scene by value, some 400 words: that
 # takes longer than most loads, so what lies between a run and its loads is put into the run.
