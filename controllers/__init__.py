@@ -43,7 +43,7 @@ def named(name):
 
 
 def information(name):
-    """What a controller of CONTROLLERS or an agent uses: Measurement fields and entries of control.EXTRA.
+    """What a controller of CONTROLLERS or an agent uses: Measurement fields and PRIVILEGED_INPUTS.
 
     Raises: InputError for an unknown name.
     """

@@ -254,6 +254,8 @@ def cli_page():
 def _commands(command, name):
     """Sections of a command's subcommands, in the order in which they are listed."""
     for key, inner in command.commands.items():
+        if inner.hidden:
+            continue
         full = f"{name} {key}"
         if hasattr(inner, "commands"):
             yield f"\n## `{full}`\n\n{_plain(inner.help)}\n"

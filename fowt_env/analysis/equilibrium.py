@@ -150,7 +150,7 @@ def _causes(scene, start):
     )
     ballast = platform.ballast.mass
     enough = ballast + net / model.rigid_body.gravity
-    if len(found) == 1 and enough > 0.0:  # with wrong moorings the ballast is not to blame
+    if len(found) == 1 and enough > 0.0:  # with wrong moorings the ballast is not the cause
         found["vertical"] += f"; ballast.mass = {enough:.6g} kg (now {ballast:.6g}) would float at this draft"
     return found
 

@@ -200,7 +200,7 @@ def _mean_response(handle, x, u, force, azimuths, dx, measurement, row, rates, m
 
 
 class _Plant:
-    """State rates and outputs of a calm scene at any state, command and further force."""
+    """State rates and outputs of a scene without fluctuations at any state, command and further force."""
 
     def __init__(self, scene, n_lines):
         self.handle = scene.handle()

@@ -139,7 +139,7 @@ SETTLING = 8  # Newton steps for a block of internal states; one is enough where
 
 @dataclass
 class _Steady:
-    """Residual evaluations of a calm scene about one state vector."""
+    """Residual evaluations of a scene without fluctuations about one state vector."""
 
     scene: object
 

@@ -91,8 +91,8 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
                   measurement() returns; its noise follows from the weather's seed. Azimuth, last action and
                   preview are exact; rewards and failures are of the true motions. None: readings are exact
     nominal_plant {"platform": ..., "turbine": ...} as build_scene takes them (the turbine may be left out:
-                  the platform's): the plant that baseline and estimator are designed on, where that is not
-                  the true one, which moves. None: it is
+                  the platform's): the plant that baseline and estimator are designed on, where it differs
+                  from the true plant, which is simulated. None: the true plant
     options       further ones go to build_scene, loads of one's own (fowt_env.Load) among them
 
     An episode starts at the operating point of its mean wind, moved by the task's offsets, in wind and

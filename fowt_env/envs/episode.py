@@ -134,7 +134,7 @@ def update_estimate(estimator_law, config, episode):
 
 @kernel
 def advance_period(config, episode, estimator_law):
-    """Advance one control period under episode.u, measure, observe and pay; returns (status, reward)."""
+    """Advance one control period under episode.u, measure, observe and reward; returns (status, reward)."""
     torque = episode.u[Command.GENERATOR_TORQUE]
     commanded = episode.baseline_command[Command.GENERATOR_TORQUE]
     was_limited = torque_was_limited(torque, commanded, config.model.generator)

@@ -1,4 +1,4 @@
-"""Tasks: what an episode is drawn from, what is seen, what is paid, and how long it lasts."""
+"""Tasks: what an episode is drawn from, what is observed and rewarded, and how long it lasts."""
 
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -34,7 +34,7 @@ class Episode(NamedTuple):
 
 @dataclass(frozen=True)
 class Task:
-    """What an agent is asked to do.
+    """What an agent has to do.
 
     wind, sea: as build_scene takes them, where a tuple (low, high) in place of a number is a range
     from which each episode draws uniformly. sea may also be {"kind": "joint", "table": name}: the

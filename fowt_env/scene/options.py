@@ -49,7 +49,7 @@ def choose_parts(fidelity, rotor, options):
     level = FIDELITIES[fidelity]
     if rotor is not None and rotor not in ROTORS:
         raise unknown("rotor model", rotor, ROTORS)
-    # induction is not in the tables; a level falls back to what has it, an explicit wish is refused
+    # induction is not in the tables; a level falls back to what has it, an explicit choice is refused
     needs_induction = options["dynamic_inflow"] or options["skewed_wake"]
     if needs_induction and rotor not in (None, "bem"):
         raise InputError(f"rotor = {rotor!r}: skewed_wake and dynamic_inflow need rotor = 'bem'")

@@ -63,7 +63,7 @@ def contents(folder):
 
 @pytest.fixture(scope="module")
 def evaluation(tmp_path_factory):
-    """Folder of a small evaluation that went well, with its page."""
+    """Folder of a small evaluation that succeeded, with its page."""
     pytest.importorskip("plotly", reason="plotly is not installed")
     folder = tmp_path_factory.mktemp("evaluation") / "results"
     for words in ((*EVALUATE, "--out", folder, "--no-plot"), ("report", folder, "--no-schedule")):

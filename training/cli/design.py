@@ -54,7 +54,8 @@ LQR_EXAMPLES = """[bold]Examples[/bold]
 
 [cyan]fowt design lqr --weight pitch_rate=9 --out my.json[/cyan]  save one, to be run as design:my.json
 
-Raising pitch_rate saves travel, platform_pitch calms the platform, power holds the power and spends speed."""
+Raising pitch_rate saves travel, platform_pitch reduces platform motion, power smooths
+the power at the cost of rotor speed."""
 
 
 def save_lqr(weights, path):
@@ -240,12 +241,12 @@ def lqr(
         list[str] | None, typer.Option(metavar="WEIGHT=VALUE", help="A weight for all variants; repeats.")
     ] = None,
     cases: Annotated[str, typer.Option(help="Cases or suites.")] = "ntm_14,ntm_18,ntm_22",
-    seeds: Annotated[str, typer.Option(help="Training seeds, 1000 and above.")] = "1001,1002",
+    seeds: Annotated[str, typer.Option(help="Validation seeds, 1000 and above.")] = "1001,1002",
     out_path: Annotated[
         str | None, typer.Option("--out", help="All runs: .csv; or, without runs, the design: .json.")
     ] = None,
 ):
-    """Sweep the weights of lqr on training seeds, beside gspi_oc3; or save one design (--out .json)."""
+    """Sweep the weights of lqr on validation seeds, beside gspi_oc3; or save one design (--out .json)."""
     from fowt_env.training.design.sweeps import SHOWN, sweep
 
     fixed = parse_pairs(weight, "weight")

@@ -37,16 +37,16 @@ def bound_fractions(table, bound, groups=None, agents=None):
     table: of an evaluation with gspi_oc3, cases named kind_WIND; groups, agents as
     scores.grouped takes them. Columns: agent, seed_of (label of the training seed; "" for the
     agent as a whole, whose ratios are the means over its seeds), wind, ratios of linear_bound.RATIOS (mean
-    over the weather seeds on which both went well), of_bound_[-], of_measured_[-] (NaN: no better than
+    over the weather seeds on which both succeeded), of_bound_[-], of_measured_[-] (NaN: no better than
     gspi_oc3, or none of the limit's winds), within (no more travel and power deviation than gspi_oc3's).
-    Raises: InputError without gspi_oc3, without cases at winds of the limit, or where no run went well.
+    Raises: InputError without gspi_oc3, without cases at winds of the limit, or where no run succeeded.
     """
     chosen = grouped(table, [BASELINE], groups, agents)
     winds = set(bound[WIND])
     good = table[(table["status"] == "ok") & table["case"].map(_wind).isin(winds)]
     base = good[good["controller"] == BASELINE]
     if base.empty:
-        raise InputError("results: no run of gspi_oc3 at a wind of the limit went well (cases kind_WIND)")
+        raise InputError("results: no run of gspi_oc3 at a wind of the limit succeeded (cases kind_WIND)")
     kinds = {case.rpartition("_")[0] for case in base["case"]}
     if len(kinds) > 1:
         raise InputError(f"results: cases of several kinds ({', '.join(sorted(kinds))}): choose one's cases")
@@ -55,7 +55,7 @@ def bound_fractions(table, bound, groups=None, agents=None):
         parts = [_ratios(good[good["controller"] == label], base, bound, label) for label in labels]
         parts = [part for part in parts if len(part)]
         if not parts:
-            raise InputError(f"{name}: no run at a wind of the limit went well")
+            raise InputError(f"{name}: no run at a wind of the limit succeeded")
         if len(labels) > 1:
             rows += [part.assign(agent=name) for part in parts]
         whole = pd.concat(parts).groupby(WIND, as_index=False)[list(RATIOS)].mean()

@@ -181,7 +181,7 @@ def _remarks(board, intervals):
     if baseline is None and board["controllers"]:
         lines.append("no paired differences: every controller has failed runs")
     if baseline in failed:
-        lines.append(f"baseline {baseline}: {failed[baseline]} failed; pairs are of the runs that went well")
+        lines.append(f"baseline {baseline}: {failed[baseline]} failed; pairs are of the runs that succeeded")
     return lines
 
 
@@ -235,7 +235,7 @@ def evaluation_plots(table, board, folder):
 
     pareto.png sets rotor-speed against platform-pitch deviation; metrics.png compares the controllers over
     all cases; boxes.png has quartiles and extremes, timeseries_CASE.png and spectra_CASE.png the series
-    and spectra, of the first seed of each case that went well.
+    and spectra, of the first seed of each case that succeeded.
     """
     manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
     good = table[table["status"] == "ok"]

@@ -1,4 +1,4 @@
-"""Whose checkpoint it is: loading one executes code from it, so one's own are told from those of strangers.
+"""Whose checkpoint it is: loading one executes code from it, so one's own are recognised.
 
 A checkpoint that a run of this user wrote carries a seal, a keyed hash (HMAC-SHA256) of all its files. The
 key is in the user's configuration folder (FOWT_CONFIG_DIR, else XDG_CONFIG_HOME/fowt_env or

@@ -87,7 +87,7 @@ def _check(path):
 
 
 class _Locator(caching.UserProvidedCacheLocator):
-    """Where a kernel's files are: in the folder that it is told, and not where numba's settings say."""
+    """Where a kernel's files are: in the folder that it is given, and not where numba's settings say."""
 
     def __init__(self, function, path, folder, stamp):
         self._py_file = path

@@ -114,7 +114,7 @@ def test_a_controller_that_failed_in_bad_weather_shows_no_gain_and_its_row_says_
 
 def test_a_baseline_that_failed_is_said_to_have():
     _, _, _, remarks = leaderboard_rows(board([1, 2, 3, 4, 5], x="ok", lost=5, baseline="x"))
-    assert remarks[-1] == "baseline x: 1 run failed; pairs are of the runs that went well"
+    assert remarks[-1] == "baseline x: 1 run failed; pairs are of the runs that succeeded"
     title, _, _, remarks = leaderboard_rows(board([1, 2], pi="failed"))
     assert "difference" not in title
     assert remarks[-1] == "no paired differences: every controller has failed runs"
