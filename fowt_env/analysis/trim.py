@@ -93,8 +93,8 @@ def without_fluctuations(scene, wind_speed=None):
         }
         parts["hydro.waves"] = waves._replace(**one | {"amplitude": np.zeros(1), "velocity": np.zeros(1)})
         if isinstance(hydro.strips, BandedStrips):
-            sea = hydro.strips.sea
-            parts["hydro.strips.sea"] = sea._replace(weight=np.zeros_like(sea.weight))
+            bands = hydro.strips.bands
+            parts["hydro.strips.bands"] = bands._replace(weight=np.zeros_like(bands.weight))
     if aero is not None:
         speed = scene.wind_speed if wind_speed is None else wind_speed
         if aero.field is not None:

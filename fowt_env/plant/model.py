@@ -75,7 +75,7 @@ class Data(NamedTuple):
     lines: np.ndarray  # (n_lines, 6) mooring warm start and results
     counters: np.ndarray  # (N_COUNTERS,)
     kinematics: np.ndarray  # (7, n_nodes) water kinematics at the strip nodes
-    fast: object  # hydro.wave_bands.FastScratch, the same for strips with wave bands
+    bands: object  # hydro.wave_bands.BandScratch, the same for strips with wave bands
     added_mass: np.ndarray  # (6, 6) of the last evaluation, symmetric, about the body origin
     matrix: np.ndarray  # (6, 6) mass with added mass, solved in place
     stages: np.ndarray  # (5, n_state) derivatives and states within a step

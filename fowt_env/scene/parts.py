@@ -18,14 +18,9 @@ from fowt_env.plant.hydro.hydrostatics import build_hull
 from fowt_env.plant.hydro.linear_damping import build_damping
 from fowt_env.plant.hydro.load import BandedStrips, ExactStrips, Hydro
 from fowt_env.plant.hydro.morison import Current
+from fowt_env.plant.hydro.strip_quadrature import STILL_REFINEMENT, build_quadrature
 from fowt_env.plant.hydro.strips import build_strips
-from fowt_env.plant.hydro.wave_bands import (
-    STILL_REFINEMENT,
-    build_fast_waves,
-    build_lane_diffraction,
-    build_lanes,
-    can_be_fast,
-)
+from fowt_env.plant.hydro.wave_bands import build_band_diffraction, build_wave_bands, can_use_bands
 from fowt_env.plant.mooring import build_mooring
 from fowt_env.scene.options import chosen_stations
 from fowt_env.scene.weather import IN_PLANE
@@ -57,8 +52,8 @@ def build_hydro(platform, waves, current, options):
     shape = _strips(platform, options)
     strips = ExactStrips(shape, None)
     if takes_wave_bands(options, waves, shape):
-        lanes = build_lanes(platform.hull, shape, 1 if waves else STILL_REFINEMENT)
-        strips = BandedStrips(shape, lanes, None, None)
+        quadrature = build_quadrature(platform.hull, shape, 1 if waves else STILL_REFINEMENT)
+        strips = BandedStrips(shape, quadrature, None, None)
     return Hydro(
         hull=build_hull(platform.hull, site.water_density, site.gravity),
         strips=strips_in_waves(strips, waves, options),
@@ -76,9 +71,9 @@ def strips_in_waves(strips, waves, options):
         return strips._replace(
             diffraction=build_strip_diffraction(waves, strips.shape) if diffracting else None
         )
-    sea = _fast_sea(waves, strips.shape)
+    bands = wave_bands_of(waves, strips.shape)
     return strips._replace(
-        sea=sea, diffraction=build_lane_diffraction(sea, strips.lanes) if diffracting else None
+        bands=bands, diffraction=build_band_diffraction(bands, strips.quadrature) if diffracting else None
     )
 
 
@@ -86,7 +81,7 @@ def takes_wave_bands(options, waves, strips):
     """Whether the strip loads take the fast path; where a level asks for it, seas beyond it go exact."""
     if options["wave_loads"] != "fast":
         return False
-    if waves is None or can_be_fast(waves, strips):
+    if waves is None or can_use_bands(waves, strips):
         return True
     if options["explicit_wave_loads"]:
         raise InputError(
@@ -96,13 +91,13 @@ def takes_wave_bands(options, waves, strips):
     return False
 
 
-def _fast_sea(waves, strips):
-    """FastWaves of the waves, None in still water. Raises: InputError for a sea beyond the fast path."""
+def wave_bands_of(waves, strips):
+    """WaveBands of the waves, None in still water. Raises: InputError for a sea beyond the fast path."""
     if waves is None:
         return None
-    if not can_be_fast(waves, strips):
+    if not can_use_bands(waves, strips):
         raise InputError("sea: several headings cannot be summed fast; build_scene(..., wave_loads='exact')")
-    return build_fast_waves(waves, strips)
+    return build_wave_bands(waves, strips)
 
 
 def check_symmetry(lines, current):

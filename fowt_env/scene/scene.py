@@ -14,7 +14,7 @@ from fowt_env.plant.channels import Channel, channels, to_units, with_hub_wind
 from fowt_env.plant.compile.handle import Handle
 from fowt_env.plant.events import N_COUNTERS
 from fowt_env.plant.hydro.wave_bands import (
-    fast_scratch,
+    band_scratch,
 )
 from fowt_env.plant.integrators import INTEGRATORS, rotor_samples
 from fowt_env.plant.model import N_CACHE, Data
@@ -108,7 +108,7 @@ class Scene:
             lines=np.zeros((self.n_lines, 6)),
             counters=np.zeros(N_COUNTERS),
             kinematics=np.zeros((7, 0 if strips is None else strips.shape.nodes)),
-            fast=fast_scratch(getattr(strips, "sea", None), getattr(strips, "lanes", None)),
+            bands=band_scratch(getattr(strips, "bands", None), getattr(strips, "quadrature", None)),
             added_mass=np.zeros((6, 6)),
             matrix=np.zeros((6, 6)),
             stages=np.zeros((5, self.n_state)),

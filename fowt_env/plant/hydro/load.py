@@ -5,11 +5,12 @@ from typing import NamedTuple
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.hydro.added_inertia import added_inertia_load
+from fowt_env.plant.hydro.banded_strips import banded_strip_load
 from fowt_env.plant.hydro.hydrostatics import hydrostatic_load
 from fowt_env.plant.hydro.linear_damping import damping_load
 from fowt_env.plant.hydro.morison import current_at, morison_load
 from fowt_env.plant.hydro.strips import Strips
-from fowt_env.plant.hydro.wave_bands import fast_morison_load, surface_elevation
+from fowt_env.plant.hydro.wave_bands import surface_elevation
 from fowt_env.plant.hydro.waves import elevation, wave_kinematics
 from fowt_env.plant.state import NO_LOAD, Wrench, add
 
@@ -25,9 +26,9 @@ class BandedStrips(NamedTuple):
     """The same by a few wave numbers at the nodes of a fixed quadrature."""
 
     shape: Strips
-    lanes: object  # wave_bands.Lanes
-    sea: object  # wave_bands.FastWaves, or None in still water
-    diffraction: object  # wave_bands.LaneDiffraction or None
+    quadrature: object  # wave_bands.StripQuadrature
+    bands: object  # wave_bands.WaveBands, or None in still water
+    diffraction: object  # wave_bands.BandDiffraction or None
 
 
 class Hydro(NamedTuple):
@@ -61,8 +62,8 @@ def _exact(t, pose, hydro, strips, data):
 
 @kernel
 def _banded(t, pose, hydro, strips, data):
-    return fast_morison_load(
-        t, pose, strips.lanes, strips.sea, hydro.current, data.fast, strips.diffraction
+    return banded_strip_load(
+        t, pose, strips.quadrature, strips.bands, hydro.current, data.bands, strips.diffraction
     )
 
 
@@ -77,7 +78,7 @@ def _plain_elevation(t, waves, strips, data):
 
 @kernel
 def _banded_elevation(t, waves, strips, data):
-    return surface_elevation(t, waves, strips.sea, data.fast)
+    return surface_elevation(t, waves, strips.bands, data.bands)
 
 
 _elevation = chosen_by_class("strips", {ExactStrips: _plain_elevation, BandedStrips: _banded_elevation})

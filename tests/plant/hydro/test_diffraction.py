@@ -14,6 +14,7 @@ from plant_helpers import make_pose
 from fowt_env import build_scene, simulate
 from fowt_env.descriptions.platform import sea_state_of
 from fowt_env.errors import InputError
+from fowt_env.plant.hydro.banded_strips import banded_strip_load
 from fowt_env.plant.hydro.diffraction import (
     TERMS,
     build_strip_diffraction,
@@ -23,15 +24,9 @@ from fowt_env.plant.hydro.diffraction import (
 )
 from fowt_env.plant.hydro.load import BandedStrips, ExactStrips
 from fowt_env.plant.hydro.morison import morison_load
+from fowt_env.plant.hydro.strip_quadrature import BLOCK, build_quadrature
 from fowt_env.plant.hydro.strips import GAUSS_OFFSET, axis_surface, build_strips, wet_cell
-from fowt_env.plant.hydro.wave_bands import (
-    LANES,
-    build_fast_waves,
-    build_lane_diffraction,
-    build_lanes,
-    fast_morison_load,
-    fast_scratch,
-)
+from fowt_env.plant.hydro.wave_bands import band_scratch, build_band_diffraction, build_wave_bands
 from fowt_env.weather.waves import build_waves, wave_number
 
 pytestmark = pytest.mark.installation
@@ -100,9 +95,10 @@ def exact(t, moving, strips, waves, diffraction=None):
 
 
 def fast(t, moving, platform, strips, waves, diffracted=True):
-    lanes, sea = build_lanes(platform.hull, strips), build_fast_waves(waves, strips)
-    part = build_lane_diffraction(sea, lanes) if diffracted else None
-    return fast_morison_load(t, make_pose(*moving), lanes, sea, None, fast_scratch(sea, lanes), part)
+    quadrature, sea = build_quadrature(platform.hull, strips), build_wave_bands(waves, strips)
+    part = build_band_diffraction(sea, quadrature) if diffracted else None
+    scratch = band_scratch(sea, quadrature)
+    return banded_strip_load(t, make_pose(*moving), quadrature, sea, None, scratch, part)
 
 
 # The coefficient
@@ -212,8 +208,8 @@ FAST_SEAS = {
 def test_fast_load_is_close_to_the_exact_one(sea, platform, site):
     strips, waves = strips_of(platform), waves_of(FAST_SEAS[sea], site)
     part = build_strip_diffraction(waves, strips)
-    lanes, fields = build_lanes(platform.hull, strips), build_fast_waves(waves, strips)
-    lane_part, scratch = build_lane_diffraction(fields, lanes), fast_scratch(fields, lanes)
+    quadrature, fields = build_quadrature(platform.hull, strips), build_wave_bands(waves, strips)
+    lane_part, scratch = build_band_diffraction(fields, quadrature), band_scratch(fields, quadrature)
     rng = np.random.default_rng(4)
     quick, full, plain = [], [], []
     while len(full) < 60:
@@ -221,7 +217,7 @@ def test_fast_load_is_close_to_the_exact_one(sea, platform, site):
         pose = make_pose(*moving)
         if axis_surface(t, pose, strips, waves)[0] < strips.section_bottom[0] + 0.1:
             continue  # the exact path's first section may not run dry without a small step
-        quick.append(fast_morison_load(t, pose, lanes, fields, None, scratch, lane_part).wrench)
+        quick.append(banded_strip_load(t, pose, quadrature, fields, None, scratch, lane_part).wrench)
         full.append(exact(t, moving, strips, waves, part).wrench)
         plain.append(exact(t, moving, strips, waves).wrench)
     quick, full, plain = np.array(quick), np.array(full), np.array(plain)
@@ -242,17 +238,17 @@ def test_seabed_reflection_is_turned_with_its_wave(platform, site):
     series = part.series.copy()
     series[..., 0], series[..., TERMS] = 0.3, 0.8
     part = part._replace(series=series)
-    lanes, sea = build_lanes(platform.hull, strips), build_fast_waves(waves, strips)
-    lane_part = build_lane_diffraction(sea, lanes)
+    quadrature, sea = build_quadrature(platform.hull, strips), build_wave_bands(waves, strips)
+    lane_part = build_band_diffraction(sea, quadrature)
     lane_series = lane_part.series.copy()
     lane_series[:] = 0.0
-    lane_series[..., :LANES] = 0.3
-    lane_series[..., TERMS * LANES : (TERMS + 1) * LANES] = 0.8
+    lane_series[..., :BLOCK] = 0.3
+    lane_series[..., TERMS * BLOCK : (TERMS + 1) * BLOCK] = 0.8
     lane_part = lane_part._replace(series=lane_series)
-    scratch = fast_scratch(sea, lanes)
+    scratch = band_scratch(sea, quadrature)
     tilted = (np.zeros(3), rotation(0.05, -0.08, 0.0), np.zeros(3), np.zeros(3))
     for t in (0.0, 9.0, 31.0):
-        quick = fast_morison_load(t, make_pose(*tilted), lanes, sea, None, scratch, lane_part).wrench
+        quick = banded_strip_load(t, make_pose(*tilted), quadrature, sea, None, scratch, lane_part).wrench
         full = exact(t, tilted, strips, waves, part).wrench
         assert np.allclose(quick[:2], full[:2], rtol=0.0, atol=2e-4 * np.abs(full[:2]).max())
         assert np.allclose(quick[3:5], full[3:5], rtol=0.0, atol=2e-4 * np.abs(full[3:5]).max())

@@ -9,17 +9,12 @@ import pytest
 from naive.strips import strip_load
 
 from fowt_env.descriptions.platform import read_platform, sea_state_of
-from fowt_env.plant.hydro import wave_bands as fast_waves
+from fowt_env.plant.hydro import strip_quadrature, wave_bands
+from fowt_env.plant.hydro.banded_strips import banded_strip_load
 from fowt_env.plant.hydro.morison import Current, current_at, morison_load
+from fowt_env.plant.hydro.strip_quadrature import build_quadrature
 from fowt_env.plant.hydro.strips import axis_surface, build_strips
-from fowt_env.plant.hydro.wave_bands import (
-    build_fast_waves,
-    build_lanes,
-    can_be_fast,
-    fast_morison_load,
-    fast_scratch,
-    phasors,
-)
+from fowt_env.plant.hydro.wave_bands import band_scratch, build_wave_bands, can_use_bands, phasors
 from fowt_env.plant.state import N_RIGID, State, pose_of
 from fowt_env.weather.waves import build_waves
 
@@ -99,10 +94,10 @@ def as_array(load):
 
 def compare(waves, strips, cases, current=None):
     """(fast, naive) arrays (n, 8) over the cases."""
-    lanes = build_lanes(PLATFORM.hull, strips)
-    sea = None if waves is None else build_fast_waves(waves, strips)
-    scratch = fast_scratch(sea, lanes)
-    fast = [as_array(fast_morison_load(t, pose_of(x), lanes, sea, current, scratch)) for t, x in cases]
+    quadrature = build_quadrature(PLATFORM.hull, strips)
+    sea = None if waves is None else build_wave_bands(waves, strips)
+    scratch = band_scratch(sea, quadrature)
+    fast = [as_array(banded_strip_load(t, pose_of(x), quadrature, sea, current, scratch)) for t, x in cases]
     return np.array(fast), np.array([naive_load(t, x, strips, waves, current) for t, x in cases])
 
 
@@ -142,12 +137,12 @@ def test_load_stays_bounded_and_similar_at_thirty_degrees():
 
 def test_load_stays_finite_in_any_attitude():
     strips, waves = strips_for(), waves_of("storm")
-    lanes, sea = build_lanes(PLATFORM.hull, strips), build_fast_waves(waves, strips)
-    scratch = fast_scratch(sea, lanes)
+    quadrature, sea = build_quadrature(PLATFORM.hull, strips), build_wave_bands(waves, strips)
+    scratch = band_scratch(sea, quadrature)
     rng = np.random.default_rng(3)
     for t, x in random_states(200, 0.0, seed=3, drift=300.0):
         x[State.HEAVE : State.VX] = rng.uniform(-1.0, 1.0, 5) * [200.0, np.pi, np.pi, np.pi, 0.0]
-        load = as_array(fast_morison_load(t, pose_of(x), lanes, sea, None, scratch))
+        load = as_array(banded_strip_load(t, pose_of(x), quadrature, sea, None, scratch))
         assert np.all(np.isfinite(load))
         assert np.abs(load[:2]).max() < 1e9
 
@@ -180,7 +175,7 @@ def test_error_does_not_grow_with_time_or_drift(drift):
 
 def test_phasors_hold_over_a_hundred_thousand_steps():
     waves = waves_of("rough")
-    sea = build_fast_waves(waves, strips_for())
+    sea = build_wave_bands(waves, strips_for())
     cosine, sine = np.zeros((2, sea.component.shape[1]))
     n = waves.omega.size
     for step in (0, 1, 99_999, 100_000):
@@ -195,20 +190,20 @@ def test_phasors_hold_over_a_hundred_thousand_steps():
 @pytest.mark.parametrize("surface, stretching", [("instantaneous", "wheeler"), ("swl", "none")])
 def test_switches_agree_with_the_plain_sum(position, surface, stretching):
     strips, waves = strips_for(position, surface, stretching), waves_of("rough")
-    assert can_be_fast(waves, strips)
+    assert can_use_bands(waves, strips)
     fast, naive = compare(waves, strips, list(random_states(40, 4.0, seed=5)))
     assert spread_error(fast, naive) < 3e-4
 
 
 def test_load_agrees_with_morison_load_while_the_surface_stays_on_its_section():
     strips, waves = strips_for(), waves_of("rough")
-    lanes, sea = build_lanes(PLATFORM.hull, strips), build_fast_waves(waves, strips)
-    scratch, nodes = fast_scratch(sea, lanes), np.zeros((7, strips.nodes))
+    quadrature, sea = build_quadrature(PLATFORM.hull, strips), build_wave_bands(waves, strips)
+    scratch, nodes = band_scratch(sea, quadrature), np.zeros((7, strips.nodes))
     fast, exact = [], []
     for t, x in random_states(100, 4.0, seed=6):
         pose = pose_of(x)
         if axis_surface(t, pose, strips, waves)[0] > strips.section_bottom[0] + 0.1:
-            fast.append(as_array(fast_morison_load(t, pose, lanes, sea, None, scratch)))
+            fast.append(as_array(banded_strip_load(t, pose, quadrature, sea, None, scratch)))
             exact.append(as_array(morison_load(t, pose, strips, waves, None, nodes)))
     assert len(fast) > 80
     assert spread_error(np.array(fast), np.array(exact)) < 2e-4
@@ -245,7 +240,7 @@ def test_still_water_leaves_drag_and_spin_terms_alone():
 
 
 def test_no_hull_no_load():
-    load = fast_morison_load(0.0, pose_of(np.zeros(N_RIGID)), None, None, None, None)
+    load = banded_strip_load(0.0, pose_of(np.zeros(N_RIGID)), None, None, None, None)
     assert as_array(load).tolist() == [0.0] * 8
 
 
@@ -266,36 +261,36 @@ def test_ramp_raises_the_waves_from_rest():
 
 def test_same_call_gives_the_same_bits_whatever_came_before():
     strips, waves = strips_for(), waves_of("rough")
-    lanes, sea = build_lanes(PLATFORM.hull, strips), build_fast_waves(waves, strips)
-    used, fresh = fast_scratch(sea, lanes), fast_scratch(sea, lanes)
-    used.phasor[:], used.field[:], used.lanes[:] = np.nan, np.nan, np.nan
+    quadrature, sea = build_quadrature(PLATFORM.hull, strips), build_wave_bands(waves, strips)
+    used, fresh = band_scratch(sea, quadrature), band_scratch(sea, quadrature)
+    used.phasor[:], used.field[:], used.nodes[:] = np.nan, np.nan, np.nan
     for t, x in random_states(20, 4.0, seed=12):
-        one = fast_morison_load(t, pose_of(x), lanes, sea, None, used)
-        assert one == fast_morison_load(t, pose_of(x), lanes, sea, None, fresh)
+        one = banded_strip_load(t, pose_of(x), quadrature, sea, None, used)
+        assert one == banded_strip_load(t, pose_of(x), quadrature, sea, None, fresh)
 
 
 def test_spread_seas_and_nodes_above_the_water_are_left_to_the_exact_path():
     crossed = {"kind": "components", "omega": [0.5, 0.7], "amplitude": [1.0, 1.0], "phase": [0.0, 1.0]}
-    assert not can_be_fast(waves_of({**crossed, "heading": [0.0, 30.0]}), strips_for())
-    assert can_be_fast(waves_of({**crossed, "heading": [30.0, 30.0]}), strips_for())
-    assert not can_be_fast(waves_of("rough"), strips_for(stretching="none"))
-    assert not can_be_fast(waves_of("rough"), strips_for(surface="swl"))
+    assert not can_use_bands(waves_of({**crossed, "heading": [0.0, 30.0]}), strips_for())
+    assert can_use_bands(waves_of({**crossed, "heading": [30.0, 30.0]}), strips_for())
+    assert not can_use_bands(waves_of("rough"), strips_for(stretching="none"))
+    assert not can_use_bands(waves_of("rough"), strips_for(surface="swl"))
 
 
 def test_a_new_episode_differs_in_its_phases_alone():
     strips = strips_for()
-    one, two = (build_fast_waves(waves_of("rough", seed), strips) for seed in (0, 1))
+    one, two = (build_wave_bands(waves_of("rough", seed), strips) for seed in (0, 1))
     assert np.array_equal(one.weight, two.weight) and np.array_equal(one.number, two.number)
-    assert not np.array_equal(one.component[fast_waves.TURN], two.component[fast_waves.TURN])
+    assert not np.array_equal(one.component[wave_bands.TURN], two.component[wave_bands.TURN])
 
 
 def test_wider_bands_are_more_accurate(monkeypatch):
     cases = list(random_states(40, 4.0, seed=13))
-    monkeypatch.setattr(fast_waves, "SURFACE_NODES", 8)
-    monkeypatch.setattr(fast_waves, "NODES_AT_LEAST", 6)
+    monkeypatch.setattr(strip_quadrature, "SURFACE_NODES", 8)
+    monkeypatch.setattr(strip_quadrature, "NODES_AT_LEAST", 6)
     errors = []
     for band in (4, 6, 8):
-        monkeypatch.setattr(fast_waves, "BAND", band)
+        monkeypatch.setattr(wave_bands, "BAND", band)
         errors.append(spread_error(*compare(waves_of("rough"), strips_for(), cases)))
     assert errors[0] > 3.0 * errors[1] > 6.0 * errors[2]
 

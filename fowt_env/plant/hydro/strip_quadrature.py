@@ -1,0 +1,110 @@
+"""Quadrature nodes of the hull for the strip loads of wave bands: side by side in blocks."""
+
+from math import log
+from typing import NamedTuple
+
+import numpy as np
+
+from fowt_env.plant.compile.decorators import kernel
+
+BLOCK = 16  # nodes computed side by side; a hull with more of them takes several blocks
+SURFACE_NODES = 4  # Gauss nodes of the surface section
+# Gauss nodes of a section below: this + this * ln(depth ratio); 3 of the taper, 8 of the cylinder of OC3
+NODES_AT_LEAST, NODES_PER_LOG = -2, 4.2
+# in still water a node costs next to nothing, and a decay's drag may turn its sign along the hull
+STILL_REFINEMENT = 2
+# rows of a block of StripQuadrature.table: the section's ends (body z), the node's share of the wet height
+# above the bottom, its weight's share of it, and its diameter D0 + D1 z
+BOTTOM, TOP, SHARE, SPREAD, D0, D1, N_TABLE = range(7)
+# rows of a block of BandScratch.nodes
+Z, WEIGHT, AR, AI, BR, BI, U, W, DU, DW, P, CU, CV, N_ROWS = range(14)
+
+
+class StripQuadrature(NamedTuple):
+    """Quadrature nodes of the hull, BLOCK to a block; unused ones have no weight.
+
+    Few arrays on purpose: a call hands over seven words for each of them.
+    """
+
+    table: np.ndarray  # (blocks, N_TABLE * BLOCK), rows BOTTOM to D1 (below) one after the other
+    keel: int  # node that holds the keel, without weight
+    density: float
+    added_mass_coefficient: float
+    drag_coefficient: float
+    heave_added_mass: float  # A33, kg
+    axial_drag: float  # 0.5 rho C_Dz A of the keel, kg/m
+    keel_z: float
+    keel_area: float
+    top_z: float
+    depth: float
+    instantaneous_position: bool
+    instantaneous_surface: bool
+    wheeler: bool
+
+
+def build_quadrature(hull, strips, refinement=1):
+    """StripQuadrature of a hull (description.Hull) with the constants of its exact twin, a Strips part.
+
+    refinement: times as many nodes below the surface section.
+    """
+    columns = []
+    sections = list(zip(hull.z[:-1], hull.z[1:], hull.diameter[:-1], hull.diameter[1:], strict=True))[::-1]
+    for number, (bottom, top, lower, upper) in enumerate(sections):
+        if number == 0:
+            share, spread = _gauss(SURFACE_NODES)
+            lower = upper  # a cylinder: the water plane of loads/hydrostatics.py cuts it
+        else:
+            # Gauss in the logarithm of depth: wave motion at depth D varies over D
+            stretch = log(bottom / top)
+            at, weight = _gauss(refinement * (NODES_AT_LEAST + round(NODES_PER_LOG * stretch)))
+            z = top * np.exp(stretch * at)
+            share, spread = (z - bottom) / (top - bottom), -weight * z * stretch / (top - bottom)
+        slope = (upper - lower) / (top - bottom)
+        for a, b in zip(share, spread, strict=True):
+            columns.append((bottom, top, a, b, lower - slope * bottom, slope))
+    keel = len(columns)
+    count = -(-(keel + 1) // BLOCK) * BLOCK
+    columns += [(hull.z[0], hull.z[1], 0.0, 0.0, hull.diameter[0], 0.0)] * (count - keel)
+    table = np.array(columns).T.reshape(N_TABLE, -1, BLOCK).transpose(1, 0, 2)
+    return StripQuadrature(
+        aligned(table.reshape(-1, N_TABLE * BLOCK)),
+        keel,
+        strips.density,
+        strips.added_mass_coefficient,
+        strips.drag_coefficient,
+        strips.heave_added_mass,
+        0.5 * strips.density * strips.axial_drag_coefficient * strips.keel_area,
+        strips.keel_z,
+        strips.keel_area,
+        strips.top_z,
+        strips.depth,
+        strips.instantaneous_position,
+        strips.instantaneous_surface,
+        strips.wheeler,
+    )
+
+
+def _gauss(n):
+    """Gauss-Legendre nodes and weights (n,) on [0, 1], from 0 on."""
+    x, w = np.polynomial.legendre.leggauss(n)
+    return 0.5 * (1.0 + x), 0.5 * w
+
+
+def aligned(values):
+    """Copy of a float64 array that begins on a 64-byte boundary, where vector loads are fastest."""
+    values = np.asarray(values, dtype=np.float64)
+    raw = np.empty(values.size + 8)
+    start = (-raw.ctypes.data // 8) % 8
+    copy = raw[start : start + values.size].reshape(values.shape)
+    copy[...] = values
+    return copy
+
+
+@kernel
+def place_nodes(z_surf, table, node):
+    """Body z and weight of a block's nodes for the surface at z_surf; table: that of the block."""
+    for n in range(BLOCK):
+        bottom = table[BOTTOM * BLOCK + n]
+        wet = min(max(z_surf, bottom), table[TOP * BLOCK + n]) - bottom
+        node[Z * BLOCK + n] = bottom + wet * table[SHARE * BLOCK + n]
+        node[WEIGHT * BLOCK + n] = wet * table[SPREAD * BLOCK + n]
