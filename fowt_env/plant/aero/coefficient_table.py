@@ -74,7 +74,7 @@ class Coefficients(NamedTuple):
 N_COEFFICIENTS = len(Coefficients._fields)
 
 
-class Axis(NamedTuple):
+class TableAxis(NamedTuple):
     """Points of one variable, and a table that finds the interval a value lies in."""
 
     point: np.ndarray  # (n,) increasing
@@ -85,8 +85,8 @@ class Axis(NamedTuple):
 class CoefficientTable(NamedTuple):
     """Coefficients over inflow angle (n,) and blade pitch (m,), rad."""
 
-    theta: Axis
-    blade_pitch: Axis
+    theta: TableAxis
+    blade_pitch: TableAxis
     load: np.ndarray  # (n, m, N_COEFFICIENTS) in the order of Coefficients
     tip_radius: float
     overhang: float
@@ -113,7 +113,7 @@ class DiskInflow(NamedTuple):
 
 
 def _axis(steps, end):
-    """Axis from the list of (start, step), with the last point at end (deg); rad."""
+    """TableAxis from the list of (start, step), with the last point at end (deg); rad."""
     edges = [start for start, _ in steps] + [end]
     parts = [
         np.linspace(low, high, max(1, round((high - low) / step)), endpoint=False)
@@ -123,7 +123,7 @@ def _axis(steps, end):
     scale = CELLS / (point[-1] - point[0])
     start = point[0] + np.arange(CELLS) / scale - 1e-9  # a cell's own rounding must not overshoot
     cell = np.clip(np.searchsorted(point, start, side="right") - 1, 0, len(point) - 2)
-    return Axis(point, cell.astype(np.int64), float(scale))
+    return TableAxis(point, cell.astype(np.int64), float(scale))
 
 
 @kernel
