@@ -41,14 +41,14 @@ class Scene:
     model: Any  # a plant.model.Model; its parts have many types
     platform: Platform
     turbine: Turbine
-    wind: Any  # as asked for
+    wind: Any  # as given
     sea: Any
     seed: int
     rotor: str
     options: dict
     wind_speed: float | None  # mean hub wind that a trim uses; None without aerodynamics
     loads: tuple[Load, ...] = ()  # the user's own
-    label: str = ""  # the platform as it was asked for: name or path
+    label: str = ""  # the platform as it was given: name or path
     trims: dict = field(default_factory=dict, init=False, repr=False)  # {platform mode: OperatingPoint} found
 
     @property

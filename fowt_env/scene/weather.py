@@ -21,7 +21,7 @@ IN_PLANE = 1e-9  # fraction of a vector out of the plane of a planar scene that 
 
 
 class Air(NamedTuple):
-    """Wind of a scene: what was asked for (a box once read), its parts, and the mean hub wind of a trim."""
+    """Wind of a scene: what was given (a box once read), its parts, and the mean hub wind of a trim."""
 
     spec: object
     series: object  # WindSeries or None

@@ -26,7 +26,7 @@ class ModelMismatch:
             inner = CheckedController(inner)
         self.name, self.information = inner.name, tuple(inner.information)
         self.inner, self.nominal, self.perturbation, self.seed = inner, nominal, perturbation, seed
-        self.spread = perturbation.noise * reading_scales(nominal.turbine)
+        self.noise_std = perturbation.noise * reading_scales(nominal.turbine)
 
     def prepare(self, scene):
         """Hand the nominal scene, not that of the run, to the controller inside."""
@@ -51,5 +51,5 @@ class ModelMismatch:
         """The Measurement with noise; without any it is the same object."""
         if not self.perturbation.noise:
             return measurement
-        values = np.array(measurement) + self.spread * self.rng.normal(size=len(measurement))
+        values = np.array(measurement) + self.noise_std * self.rng.normal(size=len(measurement))
         return Measurement(*values.tolist())
