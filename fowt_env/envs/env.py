@@ -52,7 +52,7 @@ from fowt_env.envs.snapshot import CARRIED, DATA_CARRIED, Snapshot
 from fowt_env.envs.tables import task_tables
 from fowt_env.envs.tasks import TASKS, Episode, Task, check_offset, task_of
 from fowt_env.errors import InputError, unknown
-from fowt_env.plant.channels import DEG
+from fowt_env.plant.channels import DEG_PER_RAD
 from fowt_env.plant.compile.handle import Handle
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
 from fowt_env.plant.rollout import STOP_REASONS, output
@@ -322,7 +322,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         if abs(x[State.PLATFORM_PITCH]) >= 0.5 * pi:
             raise InputError(
                 f"offsets['PtfmPitch'] = {offsets['PtfmPitch']:g}: leads to"
-                f" {x[State.PLATFORM_PITCH] * DEG:g} deg, must stay inside (-90, 90) deg"
+                f" {x[State.PLATFORM_PITCH] * DEG_PER_RAD:g} deg, must stay inside (-90, 90) deg"
             )
         x[State.BLADE_PITCH] = min(max(x[State.BLADE_PITCH], drive.minimum), drive.maximum)
         self._episode.u[Command.BLADE_PITCH] = x[State.BLADE_PITCH]

@@ -10,13 +10,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fowt_env.descriptions.units import DEGREE
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.aero.load import wind_of
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measure
 from fowt_env.plant.state import MOTIONS, State
 
-DEG = pi / 180.0
 SIN_AZIMUTH = N_MEASUREMENTS  # signals that follow the measurements
 COS_AZIMUTH = N_MEASUREMENTS + 1
 FIRST_ACTION = N_MEASUREMENTS + 2
@@ -54,18 +54,18 @@ FIXED = (  # channels that look the same for every turbine
     _symmetric("surge", "m", 20.0, 200.0, "platform position downwind"),
     _symmetric("sway", "m", 10.0, 200.0, "platform position to the left"),
     _symmetric("heave", "m", 2.0, 50.0, "platform position upwards"),
-    _symmetric("roll", "rad", 2.0 * DEG, pi, "platform roll"),
-    _symmetric("platform_pitch", "rad", 5.0 * DEG, 0.5 * pi, "platform pitch, positive downwind"),
-    _symmetric("yaw", "rad", 5.0 * DEG, 2.0 * pi, "platform yaw"),
+    _symmetric("roll", "rad", 2.0 * DEGREE, pi, "platform roll"),
+    _symmetric("platform_pitch", "rad", 5.0 * DEGREE, 0.5 * pi, "platform pitch, positive downwind"),
+    _symmetric("yaw", "rad", 5.0 * DEGREE, 2.0 * pi, "platform yaw"),
     _symmetric("surge_rate", "m/s", 1.0, 50.0, "time derivative of surge"),
     _symmetric("sway_rate", "m/s", 0.5, 50.0, "time derivative of sway"),
     _symmetric("heave_rate", "m/s", 0.5, 50.0, "time derivative of heave"),
-    _symmetric("roll_rate", "rad/s", 0.5 * DEG, 2.0, "time derivative of roll"),
-    _symmetric("platform_pitch_rate", "rad/s", DEG, 2.0, "time derivative of platform pitch"),
-    _symmetric("yaw_rate", "rad/s", 0.5 * DEG, 2.0, "time derivative of yaw"),
+    _symmetric("roll_rate", "rad/s", 0.5 * DEGREE, 2.0, "time derivative of roll"),
+    _symmetric("platform_pitch_rate", "rad/s", DEGREE, 2.0, "time derivative of platform pitch"),
+    _symmetric("yaw_rate", "rad/s", 0.5 * DEGREE, 2.0, "time derivative of yaw"),
     _symmetric("nacelle_acceleration", "m/s2", 1.0, 100.0, "fore-aft acceleration of the tower top"),
     _symmetric("nacelle_velocity", "m/s", 1.0, 100.0, "fore-aft velocity of the tower top"),
-    _symmetric("platform_pitch_acceleration", "rad/s2", 0.5 * DEG, 5.0, "pitch acceleration (body y)"),
+    _symmetric("platform_pitch_acceleration", "rad/s2", 0.5 * DEGREE, 5.0, "pitch acceleration (body y)"),
     _symmetric("wave_elevation", "m", 3.0, 50.0, "water surface at the platform's rest position"),
 )
 RATES = tuple(f"{name}_rate" for name in MOTIONS)
@@ -116,7 +116,7 @@ def observation_channels(turbine, preview=()):
     )  # fmt: skip
     table["blade_pitch"] = (
         Entry(
-            "blade_pitch", "rad", int(Measure.BLADE_PITCH), 0.0, 15.0 * DEG, drive.minimum, drive.maximum,
+            "blade_pitch", "rad", int(Measure.BLADE_PITCH), 0.0, 15.0 * DEGREE, drive.minimum, drive.maximum,
             "collective blade pitch, positive to feather",
         ),
     )  # fmt: skip
