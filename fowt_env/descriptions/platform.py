@@ -443,9 +443,9 @@ def read_platform(name_or_path: str | Path) -> Platform:
     if "mooring" in data:
         if "lines" in data:
             problems.append("lines: given twice, also as [mooring]; allowed: one of them")
-        spread, found = validate(_MooringFile, {"mooring": data.pop("mooring")}, origin)
+        group, found = validate(_MooringFile, {"mooring": data.pop("mooring")}, origin)
         problems += found
-        data["lines"] = spread.mooring.lines() if spread else ()
+        data["lines"] = group.mooring.lines() if group else ()
     if isinstance(data.get("lines"), list):
         data["lines"] = tuple(data["lines"])
     if isinstance(data.get("turbine"), str):
