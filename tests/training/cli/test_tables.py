@@ -166,7 +166,7 @@ def benchmark_accuracy_command(monkeypatch, tmp_path):
     row = {"variant": name, "worst": 0.0123, "worst_of": "PtfmPitch_[deg]", "front": True}
     row |= {"real_time_factor": 30412.4, "kernel_factor": 123456.4}
     monkeypatch.setattr(benchmark_accuracy, "accuracy", lambda *a, **k: None)
-    monkeypatch.setattr(benchmark_accuracy, "summary", lambda table: pd.DataFrame([row]))
+    monkeypatch.setattr(benchmark_accuracy, "accuracy_summary", lambda table: pd.DataFrame([row]))
     return ["benchmark", "accuracy", "--no-plot"], ["0.0123", "30412", "123456"]
 
 
