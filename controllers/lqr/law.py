@@ -124,8 +124,8 @@ def predict(p, low, fraction, memory, torque, pitch):
     torque -= between(p, low, fraction, TORQUE)
     pitch -= between(p, low, fraction, PITCH)
     for i in range(N_STATE):
-        by_torque, by_pitch = (between(p, low, fraction, B + 2 * i), between(p, low, fraction, B + 2 * i + 1))
-        change = by_torque * torque + by_pitch * pitch
+        by_torque = between(p, low, fraction, B + 2 * i)
+        change = by_torque * torque + between(p, low, fraction, B + 2 * i + 1) * pitch
         for j in range(N_STATE):
             change += between(p, low, fraction, A + i * N_STATE + j) * memory[DEVIATION + j]
         memory[i] += change - memory[DEVIATION + i]

@@ -134,9 +134,8 @@ def baseline_command(baseline_law, parameters, memory, measurement, command):
 def command_of(action, actions, baseline_law, parameters, memory, measurement, u, commanded):
     """Set u = (generator torque N m, blade pitch rad) from an accepted action.
 
-    commanded (2,): filled with the command before the limits.
-
-    The torque in u is what the generator reaches of the command; the pitch actuator limits itself.
+    commanded (2,): filled with the command before the limits. The torque in u is what the generator reaches
+    of it; the pitch actuator limits itself.
     """
     commanded[Command.GENERATOR_TORQUE] = u[Command.GENERATOR_TORQUE]
     commanded[Command.BLADE_PITCH] = u[Command.BLADE_PITCH]
