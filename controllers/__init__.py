@@ -1,10 +1,10 @@
 """Built-in controllers. fowt_env.control asks here for what a name stands for."""
 
 from fowt_env.control import CheckedController, CompiledController, Controller, make
-from fowt_env.controllers.design.saved_files import PREFIX as DESIGN
+from fowt_env.controllers.design.saved_files import DESIGN_PREFIX as DESIGN
 from fowt_env.controllers.design.saved_files import load_design
 from fowt_env.controllers.lqr.law import WindEstimator
-from fowt_env.controllers.policy.controller import PREFIX as POLICY
+from fowt_env.controllers.policy.controller import POLICY_PREFIX as POLICY
 from fowt_env.controllers.policy.controller import policy, shipped_agents
 from fowt_env.controllers.registry import CONTROLLERS
 from fowt_env.descriptions.platform import read_turbine
@@ -43,7 +43,7 @@ def named(name):
 
 
 def information(name):
-    """What a controller of CONTROLLERS or an agent uses: Measurement fields and entries of control.EXTRA.
+    """What a controller of CONTROLLERS or an agent uses: Measurement fields and PRIVILEGED_INPUTS.
 
     Raises: InputError for an unknown name.
     """

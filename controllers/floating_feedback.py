@@ -34,7 +34,7 @@ from fowt_env.controllers.tuned import tuned
 from fowt_env.descriptions.checks import check_number
 from fowt_env.errors import unknown
 from fowt_env.plant.compile.decorators import control_kernel, kernel
-from fowt_env.plant.drivetrain import TorqueCurve, limited
+from fowt_env.plant.drivetrain import TorqueCurve, clamp
 from fowt_env.plant.measurement import Measure
 
 SIGNALS = {"nacelle_velocity": Measure.NACELLE_VELOCITY, "platform_pitch_rate": Measure.PLATFORM_PITCH_RATE}
@@ -71,8 +71,8 @@ class FeedbackParameter(IntEnum):
     SIGNAL = Parameter.CURVE + len(TorqueCurve._fields)  # index of the fed-back entry of the measurement
     PITCH_GAIN = SIGNAL + 1
     TORQUE_GAIN = SIGNAL + 2
-    HIGH_DECAY = SIGNAL + 3  # share of the slow part that one period leaves
-    LOW_DECAY = SIGNAL + 4  # share of each low pass that one period leaves
+    HIGH_DECAY = SIGNAL + 3  # fraction of the slow part that one period leaves
+    LOW_DECAY = SIGNAL + 4  # fraction of each low pass that one period leaves
     SCHEDULED = SIGNAL + 5  # 1: pitch_gain follows the gain schedule
 
 
@@ -106,11 +106,11 @@ def feedback_law(parameters, memory, measurement, command):
     pitch = schedule_pitch_of(p, memory, measurement[Measure.BLADE_PITCH])
     target = pi_target(pitch, error, p, memory)
     motion = band_passed(measurement[int(p[FeedbackParameter.SIGNAL])], p, memory)
-    fade = limited(target / curve_of(p).region3_min_pitch, 0.0, 1.0)
-    gain = fade * p[FeedbackParameter.PITCH_GAIN]
+    fraction = clamp(target / curve_of(p).region3_min_pitch, 0.0, 1.0)
+    gain = fraction * p[FeedbackParameter.PITCH_GAIN]
     if p[FeedbackParameter.SCHEDULED] > 0.5:
         gain *= schedule_gain(pitch, p[Parameter.SCHEDULE_PITCH])
-    extra_torque = fade * p[FeedbackParameter.TORQUE_GAIN] * motion
+    extra_torque = fraction * p[FeedbackParameter.TORQUE_GAIN] * motion
     write_commands(pitch, target + gain * motion, extra_torque, p, memory, command)
 
 

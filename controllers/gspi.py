@@ -46,8 +46,8 @@ def gspi_law(parameters, memory, measurement, command):
     if isnan(last):  # the first call: no time has passed yet
         periods, last = 1, speed
     for k in range(1, periods + 1):
-        share = k / periods
-        pi_step(parameters, memory, (1.0 - share) * last + share * speed, pitch, command)
+        fraction = k / periods
+        pi_step(parameters, memory, (1.0 - fraction) * last + fraction * speed, pitch, command)
     memory[SampledMemory.LAST_SPEED] = speed
 
 

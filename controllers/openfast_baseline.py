@@ -18,7 +18,7 @@ import numpy as np
 from fowt_env.control import CompiledController, check_control_dt
 from fowt_env.controllers.pi import Parameter, PISettings, curve_of, schedule_gain
 from fowt_env.plant.compile.decorators import control_kernel, kernel
-from fowt_env.plant.drivetrain import generator_torque, limited
+from fowt_env.plant.drivetrain import clamp, generator_torque, rate_limit
 from fowt_env.plant.measurement import Measure
 
 
@@ -46,17 +46,17 @@ def discon_step(parameters, memory, measurement, command):
     torque = generator_torque(speed, last_pitch, curve_of(p))
     if not first:
         step = dt * p[Parameter.TORQUE_RATE_LIMIT]
-        torque = last_torque + limited(torque - last_torque, -step, step)
+        torque = rate_limit(last_torque, torque, step)
 
     gain = schedule_gain(last_pitch, p[Parameter.SCHEDULE_PITCH])
     ratio = p[Parameter.GEAR_RATIO]
     slope = gain * p[Parameter.INTEGRAL] / ratio
     low, high = p[Parameter.PITCH_MINIMUM], p[Parameter.PITCH_MAXIMUM]
     error = speed - ratio * p[Parameter.RATED_SPEED]
-    integral = limited(memory[Memory.INTEGRAL] + error * dt, low / slope, high / slope)
-    wanted = limited(gain * p[Parameter.PROPORTIONAL] / ratio * error + slope * integral, low, high)
+    integral = clamp(memory[Memory.INTEGRAL] + error * dt, low / slope, high / slope)
+    target = clamp(gain * p[Parameter.PROPORTIONAL] / ratio * error + slope * integral, low, high)
     step = dt * p[Parameter.PITCH_RATE_LIMIT]
-    pitch = limited(measured_pitch + limited(wanted - measured_pitch, -step, step), low, high)
+    pitch = clamp(rate_limit(measured_pitch, target, step), low, high)
 
     memory[Memory.FILTERED_SPEED] = speed
     memory[Memory.INTEGRAL] = integral

@@ -17,7 +17,7 @@ from fowt_env.control import CompiledController, check_control_dt
 from fowt_env.descriptions.checks import check_number
 from fowt_env.errors import unknown
 from fowt_env.plant.compile.decorators import control_kernel, kernel
-from fowt_env.plant.drivetrain import TorqueCurve, build_torque_curve, generator_torque, limited
+from fowt_env.plant.drivetrain import TorqueCurve, build_torque_curve, clamp, generator_torque, rate_limit
 from fowt_env.plant.measurement import Measure
 
 SCHEDULE_ON = ("commanded", "measured")
@@ -36,7 +36,7 @@ class Parameter(IntEnum):
     """Entries of the law's parameter array; the fields of TorqueCurve follow from CURVE on."""
 
     CONTROL_DT = 0  # s
-    FILTER_DECAY = 1  # share of the filtered speed that one period leaves
+    FILTER_DECAY = 1  # fraction of the filtered speed that one period leaves
     GEAR_RATIO = 2
     RATED_SPEED = 3  # w_b0, the set-point of the rotor speed, rad/s
     PROPORTIONAL = 4  # G, s
@@ -194,7 +194,7 @@ def schedule_pitch_of(parameters, memory, measured_pitch):
     """Blade pitch that sets the gain and the torque region: the last command or the measured one."""
     if parameters[Parameter.SCHEDULE_MEASURED] > 0.5:
         low, high = parameters[Parameter.PITCH_MINIMUM], parameters[Parameter.PITCH_MAXIMUM]
-        return limited(measured_pitch, low, high)
+        return clamp(measured_pitch, low, high)
     return memory[Memory.PITCH_COMMAND]
 
 
@@ -220,14 +220,14 @@ def write_commands(blade_pitch, target, extra_torque, parameters, memory, comman
     dt = parameters[Parameter.CONTROL_DT]
     torque, pitch = memory[Memory.TORQUE_COMMAND], memory[Memory.PITCH_COMMAND]
     curve = curve_of(parameters)
-    wanted = generator_torque(memory[Memory.FILTERED_SPEED], blade_pitch, curve)
+    target_torque = generator_torque(memory[Memory.FILTERED_SPEED], blade_pitch, curve)
     if extra_torque != 0.0:
-        wanted = limited(wanted + extra_torque, 0.0, curve.maximum_torque)
+        target_torque = clamp(target_torque + extra_torque, 0.0, curve.maximum_torque)
     step = dt * parameters[Parameter.TORQUE_RATE_LIMIT]
-    torque += limited(wanted - torque, -step, step)
-    wanted = limited(target, parameters[Parameter.PITCH_MINIMUM], parameters[Parameter.PITCH_MAXIMUM])
+    torque = rate_limit(torque, target_torque, step)
+    target_pitch = clamp(target, parameters[Parameter.PITCH_MINIMUM], parameters[Parameter.PITCH_MAXIMUM])
     step = dt * parameters[Parameter.PITCH_RATE_LIMIT]
-    pitch += limited(wanted - pitch, -step, step)
+    pitch = rate_limit(pitch, target_pitch, step)
     memory[Memory.TORQUE_COMMAND] = torque
     memory[Memory.PITCH_COMMAND] = pitch
     command[0] = torque
@@ -243,7 +243,7 @@ def pi_target(pitch, error, parameters, memory):
     """
     gain = schedule_gain(pitch, parameters[Parameter.SCHEDULE_PITCH])
     slope = gain * parameters[Parameter.INTEGRAL]
-    integral = limited(
+    integral = clamp(
         memory[Memory.INTEGRAL] + error * parameters[Parameter.CONTROL_DT],
         parameters[Parameter.PITCH_MINIMUM] / slope,
         parameters[Parameter.PITCH_MAXIMUM] / slope,

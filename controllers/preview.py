@@ -45,7 +45,7 @@ class PreviewSettings:
     """How the preview is used. Raises: InputError naming the key, value and allowed range."""
 
     preview_time: float = 3.0  # s that the wind is known ahead
-    gain: float = 1.0  # share of the steady schedule that is fed forward
+    gain: float = 1.0  # fraction of the steady schedule that is fed forward
 
     def __post_init__(self):
         check_number("preview_time", self.preview_time, 0.5, 60.0)
@@ -74,9 +74,9 @@ def foreseen_pitch(time, parameters):
     if place >= last:
         return parameters[PreviewParameter.SERIES + last]
     i = int(place)
-    share = place - i
+    fraction = place - i
     first = PreviewParameter.SERIES + i
-    return (1.0 - share) * parameters[first] + share * parameters[first + 1]
+    return (1.0 - fraction) * parameters[first] + fraction * parameters[first + 1]
 
 
 @control_kernel
@@ -86,8 +86,8 @@ def preview_law(parameters, memory, measurement, command):
     foreseen = foreseen_pitch(measurement[Measure.TIME], p)
     error = speed_error(p, memory, measurement[Measure.GENERATOR_SPEED])
     pitch = schedule_pitch_of(p, memory, measurement[Measure.BLADE_PITCH])
-    share = (1.0 + 2.0 * pitch / p[Parameter.SCHEDULE_PITCH]) / p[Parameter.INTEGRAL]  # dI/d beta
-    memory[Memory.INTEGRAL] += share * (foreseen - memory[PreviewMemory.FORESEEN])
+    slope = (1.0 + 2.0 * pitch / p[Parameter.SCHEDULE_PITCH]) / p[Parameter.INTEGRAL]  # dI/d beta
+    memory[Memory.INTEGRAL] += slope * (foreseen - memory[PreviewMemory.FORESEEN])
     memory[PreviewMemory.FORESEEN] = foreseen
     write_commands(pitch, pi_target(pitch, error, p, memory), 0.0, p, memory, command)
 
@@ -112,7 +112,7 @@ class Preview(PI):
         """
         if scene.model.aero is None:
             raise InputError(f"controller {self.name!r}: needs a scene with wind to look ahead")
-        time, speed, period = rotor_wind(scene)
+        time, speed, period = rotor_wind_series(scene)
         step = self.control_dt
         grid = step * np.arange(int(np.ceil(max(time[-1], scene.options["duration"]) / step)) + 1)
         seen = np.interp(grid + self.preview.preview_time, time, speed, period=period)
@@ -136,7 +136,7 @@ class Preview(PI):
         self.memory[PreviewMemory.FORESEEN] = foreseen_pitch(float(measurement.time), self.parameters)
 
 
-def rotor_wind(scene):
+def rotor_wind_series(scene):
     """(time s, wind m/s, period s or None): wind along x averaged over the rotor, as the scene has it."""
     if isinstance(scene.wind, WindBox):
         rotor, box = scene.turbine.rotor, scene.wind
@@ -147,7 +147,7 @@ def rotor_wind(scene):
 
 
 def steady_pitch(scene):
-    """(wind m/s, blade pitch rad) of the steady schedule, platform held, from below rated to cut-out."""
+    """(wind m/s, blade pitch rad) of the steady schedule, platform fixed, from below rated to cut-out."""
     turbine = scene.turbine
     low, high = turbine.rated_wind_speed - BELOW_RATED, turbine.cut_out_wind_speed
     speeds = low + (high - low) * np.linspace(0.0, 1.0, SCHEDULE_SPEEDS) ** 2

@@ -1,8 +1,8 @@
 """ROSCO, the reference open-source controller, through its own library, with the published OC3 gains.
 
 Abbas et al., Wind Energ. Sci. 7, 2022. The library (libdiscon of the PyPI wheel `rosco`, installed with
---no-deps: its toolbox is not used) is called like OpenFAST calls it, by the Bladed interface. What it is
-told of the plant is written for the scene at hand: DISCON.IN from the turbine's description, and the Cp, Ct,
+--no-deps: its toolbox is not used) is called like OpenFAST calls it, by the Bladed interface. Its data
+of the plant are written for the scene at hand: DISCON.IN from the turbine's description, and the Cp, Ct,
 Cq table from this project's blade elements. Gains and schedule of the blade pitch are those published for
 OC3-Hywind, as no ROSCO tuning of it is published and the automatic one turns the proportional gain positive
 beyond 16 deg; torque above rated is constant as there. Below rated ROSCO does what it does by default: an

@@ -4,8 +4,8 @@ A controller has reset(measurement) and act(measurement). Beside these it may ha
 
 - prepare(scene), called once per run before reset: for what a measurement does not carry, such as steady
   operating points, a preview of the wind or the rotor's performance table;
-- information, a tuple of the Measurement fields that it uses and of whatever else it is told (EXTRA), so
-  that a comparison can say who knew what.
+- information, a tuple of the Measurement fields that it uses and of its PRIVILEGED_INPUTS, so that a
+  comparison can say who knew what.
 
 The built-in controllers are built on the simulator, and so it imports none of them: it knows the name of the
 package that has them (CATALOGUE), and imports that when a run or an environment asks for a name.
@@ -26,10 +26,10 @@ from fowt_env.descriptions.checks import check_number
 from fowt_env.errors import ControllerError, InputError, unknown
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
+from fowt_env.plant.state import N_COMMANDS
 
 CATALOGUE = "fowt_env.controllers"
-N_COMMANDS = 2  # command[0]: generator torque, N m, high-speed shaft; command[1]: blade pitch, rad
-EXTRA = {  # what a controller may be told beyond Measurement
+PRIVILEGED_INPUTS = {  # what a controller may be given beyond Measurement
     "wind_preview": "the rotor-averaged wind, some seconds before it arrives",
     "plant_model": "the plant's own equations: trims, linear models or performance tables of the scene",
 }
@@ -67,7 +67,7 @@ class CompiledController:
     """
 
     kernel: Callable[..., None] | None = None
-    information: tuple[str, ...] = ()  # what the law uses: Measurement fields and entries of EXTRA
+    information: tuple[str, ...] = ()  # what the law uses: Measurement fields and PRIVILEGED_INPUTS
 
     def __init__(self, name: str, parameters: npt.ArrayLike, n_memory: int) -> None:
         self.name = str(name)

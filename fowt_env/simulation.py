@@ -178,7 +178,7 @@ def simulate(
     dt          physics step, s; must divide control_dt and output_dt, and output_dt the duration.
                 None: scene.dt (0.0125 s at fidelity "reference", 0.1 s at the others)
     start       "trim" or "zero"; initial then sets absolute values of named channels
-    progress    True shows a bar; a callable is called with the share done
+    progress    True shows a bar; a callable is called with the fraction done
     stop_overspeed  end the run, as an environment does, at a control instant with a rotor speed beyond the
                 turbine file's overspeed
     grid_loss   time (s) from which the generator is off the grid and has no torque; None: never
@@ -211,7 +211,7 @@ def simulate(
             controller.prepare(scene)
     x, u = initial_state(scene, start, initial)
     if held:
-        scene = scene.with_model({"rigid_body.rotor_held": True})
+        scene = scene.with_model({"rigid_body.rotor_fixed": True})
         controller = HeldCommand()
         per_control = last  # nobody reads the measurements
     overspeed = scene.turbine.overspeed if stop_overspeed else inf
@@ -306,7 +306,7 @@ class _Loop:
 
 
 class _bar:
-    """Context that hands out a callable taking the share done: nothing, rich's bar, or the user's own."""
+    """Context that hands out a callable taking the fraction done: nothing, rich's bar, or the user's own."""
 
     def __init__(self, progress):
         self.progress = progress
@@ -316,13 +316,13 @@ class _bar:
         if callable(self.progress):
             return self.progress
         if not self.progress:
-            return lambda share: None
+            return lambda fraction: None
         from rich.progress import Progress
 
         self.bar = Progress(transient=True)
         self.bar.start()
         task = self.bar.add_task("simulating", total=1.0)
-        return lambda share: self.bar.update(task, completed=share)
+        return lambda fraction: self.bar.update(task, completed=fraction)
 
     def __exit__(self, *_):
         if self.bar is not None:

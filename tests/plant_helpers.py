@@ -8,26 +8,26 @@ from fowt_env.plant.rollout import forget, observe
 from fowt_env.plant.state import Pose, State
 
 
-def _rates(box, t, x, u, dx):
+def _rates(handle, t, x, u, dx):
     """Fill dx by what is compiled for the runs themselves: a kernel of the tests would not be kept."""
-    forget(box)
-    observe(box, x, u, t, dx, np.zeros(N_MEASUREMENTS))
+    forget(handle)
+    observe(handle, x, u, t, dx, np.zeros(N_MEASUREMENTS))
 
 
-def rates(scene, x, u=(0.0, 0.0), t=0.0, box=None):
+def rates(scene, x, u=(0.0, 0.0), t=0.0, handle=None):
     """dx/dt of a scene as a new array."""
     dx = np.zeros_like(x)
-    _rates(scene.handle() if box is None else box, float(t), x, np.array(u, dtype=float), dx)
+    _rates(scene.handle() if handle is None else handle, float(t), x, np.array(u, dtype=float), dx)
     return dx
 
 
 def integrate(scene, x0, duration, u=(0.0, 0.0), samples=51, rtol=1e-13, atol=1e-14):
     """(times, states (samples, n_state)) by an eighth-order method far finer than the plant's own."""
-    box, u = scene.handle(), np.array(u, dtype=float)
+    handle, u = scene.handle(), np.array(u, dtype=float)
 
     def rate(t, x):
         dx = np.zeros_like(x)
-        _rates(box, t, x, u, dx)
+        _rates(handle, t, x, u, dx)
         return dx
 
     # absolute tolerance in the size of each state: positions grow to kilometres in free fall

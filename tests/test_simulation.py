@@ -420,9 +420,9 @@ def test_many_steps_are_one_step_many_times(wave_scene):
     x0, u = random_state(np.random.default_rng(1)), np.zeros(2)
     together, alone = x0.copy(), x0.copy()
     assert advance(wave_scene.handle(), together, u, 7, 40, 0.05) == 0
-    box = wave_scene.handle()
+    handle = wave_scene.handle()
     for i in range(40):
-        assert advance(box, alone, u, 7 + i, 1, 0.05) == 0
+        assert advance(handle, alone, u, 7 + i, 1, 0.05) == 0
     assert np.array_equal(together, alone)
 
 

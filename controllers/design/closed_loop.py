@@ -47,8 +47,8 @@ def closed_loop_matrix(model: LinearModel, settings: PISettings):
     a[:n, :n] = model.A
     command = np.zeros(n + 2)
     filtered = not isinf(settings.speed_filter_corner)
-    seen = n if filtered else speed
-    command[seen] += proportional
+    measured_speed = n if filtered else speed
+    command[measured_speed] += proportional
     command[n + 1] += integral
     command[blade] += feedback
     a[:n] += np.outer(model.B[:, 1], command)
@@ -57,11 +57,11 @@ def closed_loop_matrix(model: LinearModel, settings: PISettings):
     torques = [
         generator_torque(ratio * (centre + s * TORQUE_STEP), pitch, settings.curve) for s in (1.0, -1.0)
     ]
-    a[:n, seen] += model.B[:, 0] * (torques[0] - torques[1]) / (2.0 * TORQUE_STEP)
+    a[:n, measured_speed] += model.B[:, 0] * (torques[0] - torques[1]) / (2.0 * TORQUE_STEP)
     corner = settings.speed_filter_corner if filtered else 1.0
     a[n, speed] += corner
     a[n, n] -= corner
-    a[n + 1, seen] += 1.0
+    a[n + 1, measured_speed] += 1.0
     return a, (*model.states, "filtered_speed", "speed_integral")
 
 

@@ -1,4 +1,4 @@
-"""PI gains and gain schedule from a wanted frequency and damping ratio, on linear models over the wind.
+"""PI gains and gain schedule from a specified frequency and damping ratio, on linear models over the wind.
 
 The rotor alone, as in the published design (theory.md, Eq. (A6)): its acceleration per blade pitch is taken
 from each linear model, the aerodynamic damping of its speed is left out. What the platform makes of the

@@ -20,7 +20,7 @@ from fowt_env.descriptions.files import parse_json, read_text
 from fowt_env.errors import InputError, unknown
 from fowt_env.files.atomic import replacing
 
-PREFIX = "design:"
+DESIGN_PREFIX = "design:"
 FORMAT, VERSION = "fowt-design", 1
 KEYS = ("format", "version", "kind", "platform", "turbine", "command", "settings")
 PI_KEYS = ("KP", "KI", "gain_schedule_pitch")

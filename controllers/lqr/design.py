@@ -248,7 +248,7 @@ def cost(weights, wind, rated_speed):
     q[lean, lean] += weights.platform_pitch / DEGREE**2
     q[rate, rate] += weights.platform_pitch_rate / (0.1 * DEGREE) ** 2
     power = np.zeros(N_FEEDBACK)
-    power[speed], power[n] = 1.0 / rated_speed, 1.0  # shares of rated power
+    power[speed], power[n] = 1.0 / rated_speed, 1.0  # fractions of rated power
     ratio = wind / WEIGHT_WIND
     q += weights.power * ratio**weights.power_growth / 0.05**2 * np.outer(power, power)
     q[n + 2, n + 2] += weights.speed_integral / (0.5 * rated_speed) ** 2

@@ -28,7 +28,7 @@ from fowt_env.controllers.lqr.design import (
 )
 from fowt_env.errors import InputError
 from fowt_env.plant.compile.decorators import control_kernel, kernel
-from fowt_env.plant.drivetrain import TorqueCurve, build_torque_curve, generator_torque, limited
+from fowt_env.plant.drivetrain import TorqueCurve, build_torque_curve, clamp, generator_torque, rate_limit
 from fowt_env.plant.measurement import Measure
 
 HANDOVER = (0.01745, 0.05236)  # rad of pitch command: torque by the curve below, by feedback above
@@ -83,67 +83,68 @@ N_MEMORY = STARTED + 1
 
 
 @kernel
-def between(p, low, share, place):
+def between(p, low, fraction, place):
     """Entry of the blocks at `place`, between two winds."""
-    return (1.0 - share) * p[low + place] + share * p[low + BLOCK + place]
+    return (1.0 - fraction) * p[low + place] + fraction * p[low + BLOCK + place]
 
 
 @kernel
-def deviate(p, low, share, memory):
+def deviate(p, low, fraction, memory):
     """Fill DEVIATION: estimate less the trim of the operating wind."""
     for i in range(N_STATE):
         memory[DEVIATION + i] = memory[i]
     for i in range(N_PLANT):
-        memory[DEVIATION + i] -= between(p, low, share, TRIM + i)
+        memory[DEVIATION + i] -= between(p, low, fraction, TRIM + i)
     memory[DEVIATION + WIND] -= memory[OPERATING_WIND]
     memory[DEVIATION + WIND + 1] -= memory[OPERATING_WIND]
 
 
 @kernel
-def correct(p, low, share, memory, measurement):
+def correct(p, low, fraction, memory, measurement):
     """Correct the estimate with what is measured of rotor, blades, platform and nacelle."""
     y = memory[INNOVATION : INNOVATION + N_SENSORS]
-    y[0] = measurement[Measure.GENERATOR_SPEED] / p[Head.GEAR_RATIO] - between(p, low, share, TRIM + ROTOR)
-    y[1] = measurement[Measure.BLADE_PITCH] - between(p, low, share, TRIM + ROTOR + 1)
-    y[2] = measurement[Measure.PLATFORM_PITCH] - between(p, low, share, TRIM + 1)
+    y[0] = measurement[Measure.GENERATOR_SPEED] / p[Head.GEAR_RATIO] - between(p, low, fraction, TRIM + ROTOR)
+    y[1] = measurement[Measure.BLADE_PITCH] - between(p, low, fraction, TRIM + ROTOR + 1)
+    y[2] = measurement[Measure.PLATFORM_PITCH] - between(p, low, fraction, TRIM + 1)
     y[3] = measurement[Measure.PLATFORM_PITCH_RATE]
     y[4] = measurement[Measure.NACELLE_ACCELERATION]
-    deviate(p, low, share, memory)
+    deviate(p, low, fraction, memory)
     for i in range(N_SENSORS):
         for j in range(N_STATE):
-            y[i] -= between(p, low, share, C + i * N_STATE + j) * memory[DEVIATION + j]
+            y[i] -= between(p, low, fraction, C + i * N_STATE + j) * memory[DEVIATION + j]
     for i in range(N_STATE):
         for j in range(N_SENSORS):
-            memory[i] += between(p, low, share, L + i * N_SENSORS + j) * y[j]
+            memory[i] += between(p, low, fraction, L + i * N_SENSORS + j) * y[j]
 
 
 @kernel
-def predict(p, low, share, memory, torque, pitch):
+def predict(p, low, fraction, memory, torque, pitch):
     """Advance the estimate by one period under the commands."""
-    deviate(p, low, share, memory)
-    torque -= between(p, low, share, TORQUE)
-    pitch -= between(p, low, share, PITCH)
+    deviate(p, low, fraction, memory)
+    torque -= between(p, low, fraction, TORQUE)
+    pitch -= between(p, low, fraction, PITCH)
     for i in range(N_STATE):
-        change = between(p, low, share, B + 2 * i) * torque + between(p, low, share, B + 2 * i + 1) * pitch
+        by_torque = between(p, low, fraction, B + 2 * i)
+        change = by_torque * torque + between(p, low, fraction, B + 2 * i + 1) * pitch
         for j in range(N_STATE):
-            change += between(p, low, share, A + i * N_STATE + j) * memory[DEVIATION + j]
+            change += between(p, low, fraction, A + i * N_STATE + j) * memory[DEVIATION + j]
         memory[i] += change - memory[DEVIATION + i]
 
 
 @kernel
-def feed_back(p, low, share, memory, row):
+def feed_back(p, low, fraction, memory, row):
     """Rate that row 0 (torque, rated torques a second) or 1 (pitch command, rad/s) of the gain asks for."""
     total = 0.0
     for j in range(N_FEEDBACK):
-        total -= between(p, low, share, K + row * N_FEEDBACK + j) * memory[FED_BACK + j]
+        total -= between(p, low, fraction, K + row * N_FEEDBACK + j) * memory[FED_BACK + j]
     return total
 
 
 @kernel
 def block_of(p, memory):
-    """(start of the block of the wind below the operating wind, share of the way to the next block)."""
+    """(start of the block of the wind below the operating wind, fraction of the way to the next block)."""
     last = p[Head.FIRST_WIND] + (p[Head.WINDS] - 1.0) * p[Head.WIND_STEP]
-    place = (limited(memory[OPERATING_WIND], p[Head.FIRST_WIND], last) - p[Head.FIRST_WIND]) / p[
+    place = (clamp(memory[OPERATING_WIND], p[Head.FIRST_WIND], last) - p[Head.FIRST_WIND]) / p[
         Head.WIND_STEP
     ]
     node = min(int(place), int(p[Head.WINDS]) - 2)
@@ -157,14 +158,14 @@ def estimate(p, memory, measurement, command):
     At the first instant reset has left the estimate, and no command has acted.
     """
     if memory[STARTED] != 0.0:
-        low, share = block_of(p, memory)
-        predict(p, low, share, memory, command[0], command[1])
+        low, fraction = block_of(p, memory)
+        predict(p, low, fraction, memory, command[0], command[1])
         decay = p[Head.SCHEDULE_DECAY]
         memory[OPERATING_WIND] = decay * memory[OPERATING_WIND] + (1.0 - decay) * memory[WIND + 1]
         memory[TORQUE_COMMAND], memory[PITCH_COMMAND] = command[0], command[1]
     memory[STARTED] = 1.0
-    low, share = block_of(p, memory)
-    correct(p, low, share, memory, measurement)
+    low, fraction = block_of(p, memory)
+    correct(p, low, fraction, memory, measurement)
 
 
 @kernel
@@ -172,39 +173,39 @@ def lqr_step(p, memory, measurement, command):
     """One period of the sampled law."""
     dt, rated = p[Head.CONTROL_DT], p[Head.RATED_SPEED]
     estimate(p, memory, measurement, command)
-    low, share = block_of(p, memory)
+    low, fraction = block_of(p, memory)
 
     speed_error = measurement[Measure.GENERATOR_SPEED] / p[Head.GEAR_RATIO] - rated
     pitch, torque = memory[PITCH_COMMAND], memory[TORQUE_COMMAND]
     if pitch > p[Head.HANDOVER_LOW] or speed_error > 0.0:
-        memory[INTEGRAL] = limited(memory[INTEGRAL] + dt * speed_error, -INTEGRAL_LIMIT, INTEGRAL_LIMIT)
+        memory[INTEGRAL] = clamp(memory[INTEGRAL] + dt * speed_error, -INTEGRAL_LIMIT, INTEGRAL_LIMIT)
     else:
         memory[INTEGRAL] *= 1.0 - 0.1 * dt  # forgotten in 10 s while the pitch rests
 
-    deviate(p, low, share, memory)
+    deviate(p, low, fraction, memory)
     for i in range(N_PLANT):
         memory[FED_BACK + i] = memory[DEVIATION + i]
     memory[FED_BACK + ROTOR] = memory[ROTOR] - rated
     memory[FED_BACK + N_PLANT] = torque / p[Head.RATED_TORQUE] - 1.0
-    memory[FED_BACK + N_PLANT + 1] = pitch - between(p, low, share, PITCH)
+    memory[FED_BACK + N_PLANT + 1] = pitch - between(p, low, fraction, PITCH)
     memory[FED_BACK + N_PLANT + 2] = memory[INTEGRAL]
     for i in range(MOMENT - WIND):
         memory[FED_BACK + N_PLANT + 3 + i] = memory[DEVIATION + WIND + i]
 
-    rate = limited(feed_back(p, low, share, memory, 1), -p[Head.PITCH_RATE_LIMIT], p[Head.PITCH_RATE_LIMIT])
-    pitch = limited(pitch + dt * rate, p[Head.PITCH_MINIMUM], p[Head.PITCH_MAXIMUM])
+    rate = clamp(feed_back(p, low, fraction, memory, 1), -p[Head.PITCH_RATE_LIMIT], p[Head.PITCH_RATE_LIMIT])
+    pitch = clamp(pitch + dt * rate, p[Head.PITCH_MINIMUM], p[Head.PITCH_MAXIMUM])
     i = Head.CURVE
     curve = TorqueCurve(
         p[i], p[i + 1], p[i + 2], p[i + 3], p[i + 4], p[i + 5],
         p[i + 6], p[i + 7], p[i + 8], p[i + 9], p[i + 10], p[i + 11],
     )  # fmt: skip
-    wanted = torque + dt * p[Head.RATED_TORQUE] * feed_back(p, low, share, memory, 0)
-    wanted = limited(wanted, p[Head.TORQUE_LOW], p[Head.TORQUE_HIGH])
+    target = torque + dt * p[Head.RATED_TORQUE] * feed_back(p, low, fraction, memory, 0)
+    target = clamp(target, p[Head.TORQUE_LOW], p[Head.TORQUE_HIGH])
     by_curve = generator_torque(p[Head.GEAR_RATIO] * memory[ROTOR], pitch, curve)
-    blend = limited((pitch - p[Head.HANDOVER_LOW]) / (p[Head.HANDOVER_HIGH] - p[Head.HANDOVER_LOW]), 0.0, 1.0)
-    wanted = blend * wanted + (1.0 - blend) * by_curve
+    blend = clamp((pitch - p[Head.HANDOVER_LOW]) / (p[Head.HANDOVER_HIGH] - p[Head.HANDOVER_LOW]), 0.0, 1.0)
+    target = blend * target + (1.0 - blend) * by_curve
     step = dt * p[Head.TORQUE_RATE_LIMIT]
-    torque += limited(wanted - torque, -step, step)
+    torque = rate_limit(torque, target, step)
     command[0], command[1] = torque, pitch
 
 

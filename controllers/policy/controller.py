@@ -13,7 +13,14 @@ import numpy as np
 from fowt_env.control import CompiledController, call_law, check_control_dt
 from fowt_env.controllers.lqr.law import WindEstimator
 from fowt_env.controllers.policy.network_file import read_policy
-from fowt_env.envs.actions import MODES, Mode, action_of, build_action_map, command_of, start_tracking
+from fowt_env.envs.actions import (
+    ACTION_MODES,
+    ActionMode,
+    action_of,
+    build_action_map,
+    command_of,
+    start_tracking,
+)
 from fowt_env.envs.decisions import Decisions, DecisionSettings
 from fowt_env.envs.observations import (
     ESTIMATE_CHANNELS,
@@ -30,7 +37,7 @@ from fowt_env.envs.tasks import Task
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measure, Measurement
 
-PREFIX = "policy:"
+POLICY_PREFIX = "policy:"
 AGENTS = Path(__file__).parent / "agents"
 
 
@@ -70,14 +77,14 @@ class PolicyController:
         where = f"policy file {str(path)!r}"
         if abs(check_control_dt(control_dt) - settings["control_dt"]) > 1e-9:
             raise InputError(f"{where}: control_dt = {control_dt}: must be {settings['control_dt']:g} s")
-        self._mode = MODES[settings["action_mode"]]
+        self._mode = ACTION_MODES[settings["action_mode"]]
         preview = tuple(settings["wind_preview"])
         names = tuple(settings["observation"])
         if "azimuth" in names:
             raise InputError(f"{where}: the rotor's azimuth is not among the measurements of a controller")
-        chosen = entries(names, turbine, preview)
-        self._chosen = build_observation_map(chosen, preview)
-        self._decisions = Decisions(1, len(chosen), DecisionSettings(**settings["decisions"]), control_dt)
+        observed = entries(names, turbine, preview)
+        self._observation_map = build_observation_map(observed, preview)
+        self._decisions = Decisions(1, len(observed), DecisionSettings(**settings["decisions"]), control_dt)
         if self.network.mean.shape != (self._decisions.size,):
             raise InputError(
                 f"{where}: {self.network.mean.size} inputs: its observation has {self._decisions.size}"
@@ -90,20 +97,20 @@ class PolicyController:
             residual_pitch=settings["residual_pitch"],
         )
         self._actions = build_action_map(self._mode, task, turbine, control_dt)
-        watching = bool(set(ESTIMATE_CHANNELS) & set(names))
-        self._estimator = WindEstimator(turbine, control_dt) if watching else None
-        self._baseline = self._law = None
+        estimating = bool(set(ESTIMATE_CHANNELS) & set(names))
+        self._estimator = WindEstimator(turbine, control_dt) if estimating else None
+        self._baseline = self._baseline_law = None
         self._parameters, self._memory = np.zeros(1), np.zeros(1)
-        if self._mode == Mode.RESIDUAL:
+        if self._mode == ActionMode.RESIDUAL:
             from fowt_env.controllers import make
 
             self._baseline = make(settings["baseline"], turbine, control_dt)
             if not isinstance(self._baseline, CompiledController):
                 raise InputError(f"{where}: baseline {settings['baseline']!r} is not a compiled controller")
-            self._law = self._baseline.law
+            self._baseline_law = self._baseline.law
         self._signals = np.zeros(PREVIEW + len(preview))
-        self._seen = np.zeros(len(chosen), dtype=np.float32)
-        self._u, self._wanted = np.zeros(2), np.zeros(2)
+        self._observation = np.zeros(len(observed), dtype=np.float32)
+        self._u, self._commanded = np.zeros(2), np.zeros(2)
         self._accepted = np.zeros(N_ACTIONS)
         self._calls = 0
         self._wind = None
@@ -115,7 +122,7 @@ class PolicyController:
         for part in (self._baseline, self._estimator):
             used += [] if part is None else part.information
         used += [name for name in names if name in Measurement._fields or name == "wind_preview"]
-        if self._mode == Mode.SETPOINT:
+        if self._mode == ActionMode.SETPOINT:
             used.append("rotor_speed")
         return tuple(dict.fromkeys(used))
 
@@ -125,22 +132,22 @@ class PolicyController:
             self._baseline.prepare(scene)
         if self._estimator is not None:
             self._estimator.prepare(scene)
-        if len(self._chosen.preview):
-            from fowt_env.controllers.preview import rotor_wind
+        if len(self._observation_map.preview):
+            from fowt_env.controllers.preview import rotor_wind_series
 
             if scene.model.aero is None:
                 raise InputError(f"controller {self.name!r}: needs a scene with wind to look ahead")
-            self._wind = rotor_wind(scene)
+            self._wind = rotor_wind_series(scene)
 
     def reset(self, measurement):
         """Start afresh: the command in force is the measured one, the history is empty."""
-        if len(self._chosen.preview) and self._wind is None:
+        if len(self._observation_map.preview) and self._wind is None:
             raise InputError(f"controller {self.name!r}: call prepare(scene) before reset(measurement)")
         self._u[:] = measurement.generator_torque, measurement.blade_pitch
         if self._baseline is not None:
             self._baseline.reset(measurement)
             self._parameters, self._memory = self._baseline.parameters, self._baseline.memory
-        elif self._mode == Mode.SETPOINT:
+        elif self._mode == ActionMode.SETPOINT:
             start_tracking(self._memory, measurement, self._actions)
         if self._estimator is not None:
             self._estimator.reset(measurement)
@@ -156,40 +163,40 @@ class PolicyController:
                 self._estimator.law, self._estimator.parameters, self._estimator.memory, values, self._u
             )
         if self._calls % decisions.settings.hold == 0:
-            self._look(values)
+            self._observe(values)
             if self._calls == 0:
-                decisions.restart(0, self._seen, self._accepted)
+                decisions.restart(0, self._observation, self._accepted)
             else:
-                decisions.see(self._seen[None])
+                decisions.append(self._observation[None])
             self._decision = self.network(decisions.features())
         self._calls += 1
         self._accepted[:] = np.clip(decisions.smooth(self._decision)[0], -1.0, 1.0)
         command_of(
             self._accepted,
             self._actions,
-            self._law,
+            self._baseline_law,
             self._parameters,
             self._memory,
             values,
             self._u,
-            self._wanted,
+            self._commanded,
         )
         return float(self._u[0]), float(self._u[1])
 
-    def _look(self, values):
+    def _observe(self, values):
         """Fill the observation from measurements (N_MEASUREMENTS,)."""
         self._signals[:N_MEASUREMENTS] = values
         self._signals[FIRST_ACTION : FIRST_ACTION + N_ACTIONS] = self._accepted
         if self._estimator is not None:
             self._signals[ESTIMATES : ESTIMATES + len(ESTIMATED)] = self._estimator.memory[: len(ESTIMATED)]
-        if len(self._chosen.preview):
+        if len(self._observation_map.preview):
             time, speed, period = self._wind
-            ahead = values[Measure.TIME] + self._chosen.preview
+            ahead = values[Measure.TIME] + self._observation_map.preview
             self._signals[PREVIEW:] = np.interp(ahead, time, speed, period=period)
-        fill_observation(self._signals, self._chosen, self._seen)
+        fill_observation(self._signals, self._observation_map, self._observation)
 
 
 def policy(name):
     """Factory (turbine, control_dt) of the agent that "policy:NAME" or "policy:PATH" names."""
-    path = policy_path(name.removeprefix(PREFIX))
+    path = policy_path(name.removeprefix(POLICY_PREFIX))
     return lambda turbine, control_dt: PolicyController(path, turbine, control_dt, name)

@@ -17,7 +17,7 @@ from pydantic import Field
 from fowt_env.controllers.registry import CONTROLLERS
 from fowt_env.descriptions.files import parse_json, raise_problems
 from fowt_env.descriptions.records import Finite, NonNegative, Positive, Record, unknown_key, validate
-from fowt_env.envs.actions import MODES
+from fowt_env.envs.actions import ACTION_MODES
 from fowt_env.envs.decisions import DecisionSettings
 from fowt_env.envs.observations import KNOWN, N_ACTIONS
 from fowt_env.errors import InputError
@@ -41,7 +41,7 @@ class PolicySettings(Record):
     clip_observation: Positive
     control_dt: Positive
     decisions: dict[str, Any]  # of DecisionSettings
-    action_mode: Literal[tuple(MODES)]
+    action_mode: Literal[tuple(ACTION_MODES)]
     baseline: Literal[tuple(CONTROLLERS)]  # an import path would run code
     observation: Annotated[list[Literal[KNOWN]], Field(min_length=1, max_length=200)]
     wind_preview: Annotated[list[NonNegative], Field(max_length=200)]  # s

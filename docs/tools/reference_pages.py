@@ -61,7 +61,7 @@ OPTIONS = {  # of reset: the value that is taken in place of the drawn one
     "offsets": "`{channel: offset}` from the operating point, in the channel's unit, for all drawn ones",
     "exact_start": "whether the operating point is exact (so where `wind` is given) or interpolated",
 }
-assert set(OPTIONS) == set(Episode._fields) and set(FORMULAS) == set(rewards.TERMS)
+assert set(OPTIONS) == set(Episode._fields) and set(FORMULAS) == set(rewards.REWARD_TERMS)
 
 
 def turbine():
@@ -108,7 +108,7 @@ def tasks():
         ("reach of the blade pitch", *(_range(task.blade_pitch, " deg") for task in chosen)),
         (
             "reach of the set-point",
-            *(_range(tuple(share * rated for share in task.setpoint), " rpm") for task in chosen),
+            *(_range(tuple(fraction * rated for fraction in task.setpoint), " rpm") for task in chosen),
         ),
         ("weather seeds", *(f"{task.weather_seeds[0]} to {task.weather_seeds[1] - 1}" for task in chosen)),
     ]
@@ -192,7 +192,7 @@ def reward():
             f"{term.low:g} to {term.high:g}",
             *(f"{task.weights.get(name, 0.0):g}" for task in TASKS.values()),
         )
-        for name, term in rewards.TERMS.items()
+        for name, term in rewards.REWARD_TERMS.items()
     ]
     return markdown(("term", "formula", "range", *(f"`{name}`" for name in TASKS)), rows)
 
@@ -200,7 +200,7 @@ def reward():
 def meanings():
     """What each term rewards, in words."""
     return markdown(
-        ("term", "meaning"), [(f"`{name}`", term.meaning) for name, term in rewards.TERMS.items()]
+        ("term", "meaning"), [(f"`{name}`", term.meaning) for name, term in rewards.REWARD_TERMS.items()]
     )
 
 
@@ -254,6 +254,8 @@ def cli_page():
 def _commands(command, name):
     """Sections of a command's subcommands, in the order in which they are listed."""
     for key, inner in command.commands.items():
+        if inner.hidden:
+            continue
         full = f"{name} {key}"
         if hasattr(inner, "commands"):
             yield f"\n## `{full}`\n\n{_plain(inner.help)}\n"

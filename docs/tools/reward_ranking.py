@@ -9,7 +9,7 @@ import pandas as pd
 
 import fowt_env
 from fowt_env.descriptions.units import DEGREE, RPM
-from fowt_env.envs.rewards import TERMS, build_scales, fill_terms, weight_array
+from fowt_env.envs.rewards import REWARD_TERMS, build_scales, fill_terms, weight_array
 from fowt_env.envs.tasks import TASKS
 from fowt_env.files.markdown import markdown_table
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measure
@@ -46,7 +46,7 @@ def reward_terms(frame, scene, control_dt=0.1):
     # a row has the torque that its controller has just set, a measurement the one until then
     torque = measured[:, Measure.GENERATOR_TORQUE]
     torque[1:], torque[0] = torque[:-1].copy(), point.command[0]
-    terms = np.zeros((len(frame) - 1, len(TERMS)))
+    terms = np.zeros((len(frame) - 1, len(REWARD_TERMS)))
     for i in range(1, len(frame)):
         fill_terms(measured[i], measured[i - 1], reference, False, scales, terms[i - 1])
     return terms

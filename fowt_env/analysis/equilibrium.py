@@ -13,7 +13,7 @@ from fowt_env.plant.mooring import SLACK
 from fowt_env.plant.rollout import CAPSIZE
 from fowt_env.plant.state import State, pose_of
 
-MOTIONS = ("surge", "sway", "heave", "roll", "platform pitch", "yaw")
+MOTION_LABELS = ("surge", "sway", "heave", "roll", "platform pitch", "yaw")
 LOADS = {  # name: where Data.cache has its wrench
     "rotor": LoadCache.ROTOR,
     "tower drag": LoadCache.TOWER,
@@ -150,7 +150,7 @@ def _causes(scene, start):
     )
     ballast = platform.ballast.mass
     enough = ballast + net / model.rigid_body.gravity
-    if len(found) == 1 and enough > 0.0:  # with wrong moorings the ballast is not to blame
+    if len(found) == 1 and enough > 0.0:  # with wrong moorings the ballast is not the cause
         found["vertical"] += f"; ballast.mass = {enough:.6g} kg (now {ballast:.6g}) would float at this draft"
     return found
 
@@ -212,8 +212,8 @@ def _growing(scene, slope):
     if np.max(np.linalg.eigvals(slope).real) <= limit:
         return {}
     values, shapes = np.linalg.eig(slope)
-    names = MOTIONS if len(slope) == 6 else (MOTIONS[0], MOTIONS[2], MOTIONS[4])
-    arms = [0.5 * draft if name in MOTIONS[3:] else 1.0 for name in names]
+    names = MOTION_LABELS if len(slope) == 6 else (MOTION_LABELS[0], MOTION_LABELS[2], MOTION_LABELS[4])
+    arms = [0.5 * draft if name in MOTION_LABELS[3:] else 1.0 for name in names]
     found = {}
     for value, shape in zip(values, shapes.T, strict=True):
         if value.real > limit:
@@ -231,7 +231,7 @@ def _left(scene, end):
     most = max(abs(part) for part in parts.values())
     shown = ", ".join(f"{name} {_kilo(part)}" for name, part in parts.items() if abs(part) > 1e-3 * most)
     unit = "kN" if motion < 3 else "kN m about the centre of mass"
-    return f"with {_kilo(total[motion])} {unit} left in {MOTIONS[motion]}: {shown}"
+    return f"with {_kilo(total[motion])} {unit} left in {MOTION_LABELS[motion]}: {shown}"
 
 
 def _by_load(scene, end):

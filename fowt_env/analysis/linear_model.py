@@ -13,13 +13,13 @@ from fowt_env.errors import InputError, unknown
 from fowt_env.plant.channels import N_FIXED, Out, measure, record
 from fowt_env.plant.compile.decorators import entry
 from fowt_env.plant.compile.handle import data_of, model_of
-from fowt_env.plant.dynamics import evaluate, loads_of, respond
+from fowt_env.plant.dynamics import evaluate_loads, loads_of, respond
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measure
 from fowt_env.plant.model import LoadCache
-from fowt_env.plant.state import STATE_INDEX, STATES, State
+from fowt_env.plant.state import MOTIONS, STATE_INDEX, STATES, State
 
 # velocity steps are small because quadratic drag leaves a false damping proportional to them
-STEPS = np.array([1e-3, 1e-3, 1e-3, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-7, 1e-7, 1e-7, 1e-4, 1e-5])
+STATE_STEPS = np.array([1e-3, 1e-3, 1e-3, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-7, 1e-7, 1e-7, 1e-4, 1e-5])
 INPUTS = ("generator_torque", "blade_pitch_command", "wind_speed")
 INPUT_STEPS = np.array([1.0, 1e-5, 1e-3])
 FORCES = ("fx", "fy", "fz", "mx", "my", "mz")  # on the hull, body components about the body origin
@@ -33,7 +33,6 @@ RECORDED = {  # output: column of the output row, SI
     "rotor_thrust": Out.RTFLDFXH,
     "tower_base_moment": Out.TWRBSMYT,
 }
-MOTIONS = ("surge", "sway", "heave", "roll", "platform_pitch", "yaw")
 
 
 @dataclass(frozen=True)
@@ -142,7 +141,7 @@ class LinearModel:
 class Mode(NamedTuple):
     """One oscillating mode."""
 
-    name: str  # the state with the largest share
+    name: str  # the state with the largest participation
     period: float  # s
     damping_ratio: float
     frequency: float  # rad/s
@@ -160,7 +159,7 @@ def modes(a, names, cm_height, arm):
         if value.imag <= 1e-6:
             continue
         part = dict(zip(names, vector, strict=True))
-        share = {
+        participation = {
             "surge": abs(part["surge"] + cm_height * part["platform_pitch"]),
             "sway": abs(part["sway"] - cm_height * part["roll"]),
             "heave": abs(part["heave"]),
@@ -169,7 +168,7 @@ def modes(a, names, cm_height, arm):
             "yaw": arm * abs(part["yaw"]),
             "rotor_speed": arm / 12.0 * abs(part["rotor_speed"]),
         }
-        name = max(share, key=share.get)
+        name = max(participation, key=participation.get)
         found.append(
             Mode(name, float(2.0 * np.pi / value.imag), float(-value.real / abs(value)), float(abs(value)))
         )
@@ -186,7 +185,7 @@ def _mean_response(handle, x, u, force, azimuths, dx, measurement, row, rates, m
     recorded[:] = 0.0
     for i in range(azimuths):
         x[State.AZIMUTH] = start + i * (2.0 * pi / 3.0) / azimuths
-        evaluate(0.0, x, model, data, dx)
+        evaluate_loads(0.0, x, model, data, dx)
         for j in range(6):
             data.cache[LoadCache.TOTAL + j] += force[j]
             data.cache[LoadCache.HYDRO + j] += force[j]
@@ -201,7 +200,7 @@ def _mean_response(handle, x, u, force, azimuths, dx, measurement, row, rates, m
 
 
 class _Plant:
-    """State rates and outputs of a calm scene at any state, command and further force."""
+    """State rates and outputs of a scene without fluctuations at any state, command and further force."""
 
     def __init__(self, scene, n_lines):
         self.handle = scene.handle()
@@ -234,7 +233,7 @@ def linearize(scene, operating_point=None):
             " (dynamic_inflow=False)"
         )
     point = trim(scene) if operating_point is None else operating_point
-    body = scene.model.rigid_body._replace(platform_held=point.platform == "fixed")
+    body = scene.model.rigid_body._replace(platform_fixed=point.platform == "fixed")
     plant = _Plant(without_fluctuations(scene, point.wind_speed).with_model(rigid_body=body), scene.n_lines)
     x, u, force = point.state.copy(), point.command.copy(), np.zeros(6)
 
@@ -250,7 +249,7 @@ def linearize(scene, operating_point=None):
             columns.append((up - down) / (2.0 * step))
         return np.array(columns).T
 
-    of_states = slopes(x, [int(i) for i in STATE_INDEX], STEPS)
+    of_states = slopes(x, [int(i) for i in STATE_INDEX], STATE_STEPS)
     of_inputs = np.zeros((of_states.shape[0], len(INPUTS)))
     of_inputs[:, :2] = slopes(u, range(2), INPUT_STEPS[:2])
     of_forces = slopes(force, range(6), FORCE_STEPS)

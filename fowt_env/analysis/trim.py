@@ -29,7 +29,7 @@ TOLERANCE = 1e-11  # m/s2 and rad/s2 of remaining acceleration
 OUTER_ROUNDS = 30
 FEATHERED = 0.5 * pi
 HALVINGS = 12
-STEPS = {  # of the differences, m, rad and rad/s
+DIFFERENCE_STEPS = {  # of the differences, m, rad and rad/s
     **dict.fromkeys((0, 1, 2), 1e-3),
     **dict.fromkeys((3, 4, 5), 1e-5),
     int(State.ROTOR_SPEED): 1e-4,
@@ -139,7 +139,7 @@ SETTLING = 8  # Newton steps for a block of internal states; one is enough where
 
 @dataclass
 class _Steady:
-    """Residual evaluations of a calm scene about one state vector."""
+    """Residual evaluations of a scene without fluctuations about one state vector."""
 
     scene: object
 
@@ -267,7 +267,7 @@ class _Steady:
         """Derivatives of the residual by the free states, central differences."""
         columns = []
         for index in free:
-            step = STEPS[index]
+            step = DIFFERENCE_STEPS[index]
             keep = self.x[index]
             self.x[index] = keep + step
             up = self.residual(free)
@@ -358,11 +358,11 @@ def trim(scene: Scene, platform: str = "floating") -> OperatingPoint:
 
 def _trim(scene, platform):
     """What trim gives, found anew."""
-    held = platform == "fixed"
-    body = scene.model.rigid_body._replace(platform_held=held, rotor_held=False)
+    fixed = platform == "fixed"
+    body = scene.model.rigid_body._replace(platform_fixed=fixed, rotor_fixed=False)
     steady = _Steady(without_fluctuations(scene).with_model(rigid_body=body))
     steady.settle_rotor()
-    if not held:
+    if not fixed:
         for _ in range(OUTER_ROUNDS):
             # which of pitch and speed is free follows from the rotor's balance on the platform as it is
             free = steady.free_states()
@@ -375,15 +375,15 @@ def _trim(scene, platform):
     return _point(scene, steady, platform)
 
 
-def trim_held(scene, rotor_speed, blade_pitch, platform="floating"):
+def trim_prescribed(scene, rotor_speed, blade_pitch, platform="floating"):
     """OperatingPoint with the rotor driven at a speed (rad/s) and a locked blade pitch (rad).
 
     For model tests, where a motor holds the rotor speed: theory.md Eq. (20). Mean wind, waves flat.
     Raises: InputError as trim does.
     """
     if platform not in PLATFORM_MODES:
-        raise unknown("platform mode of trim_held", platform, PLATFORM_MODES)
-    body = scene.model.rigid_body._replace(platform_held=platform == "fixed", rotor_held=True)
+        raise unknown("platform mode of trim_prescribed", platform, PLATFORM_MODES)
+    body = scene.model.rigid_body._replace(platform_fixed=platform == "fixed", rotor_fixed=True)
     steady = _Steady(without_fluctuations(scene).with_model(rigid_body=body))
     steady.x[State.ROTOR_SPEED] = rotor_speed
     steady.x[State.BLADE_PITCH] = steady.u[1] = blade_pitch

@@ -26,7 +26,7 @@ def _values(part):
     return part.model_dump() if isinstance(part, Record) else part
 
 
-def exact_trim(scene, key, speed):
+def cached_trim(scene, key, speed):
     """(state, command) of trim() at a mean wind speed (m/s); computed once per process.
 
     The arrays are shared: copy before writing. A box of wind has a profile of its own, so that its
@@ -42,7 +42,7 @@ def exact_trim(scene, key, speed):
     return _KNOWN[entry]
 
 
-def near_trim(scene, key, speed):
+def interpolated_trim(scene, key, speed):
     """(state, command) at a mean wind speed (m/s), linear between exact trims GRID apart.
 
     Exact in the cell that holds the cut-out wind, where the operating point jumps.
@@ -50,7 +50,7 @@ def near_trim(scene, key, speed):
     cell = floor(speed / GRID)
     weight = speed / GRID - cell
     if weight == 0.0 or cell * GRID <= scene.turbine.cut_out_wind_speed < (cell + 1) * GRID:
-        return exact_trim(scene, key, speed)
-    low = exact_trim(scene, key, cell * GRID)
-    high = exact_trim(scene, key, (cell + 1) * GRID)
+        return cached_trim(scene, key, speed)
+    low = cached_trim(scene, key, cell * GRID)
+    high = cached_trim(scene, key, (cell + 1) * GRID)
     return tuple((1.0 - weight) * a + weight * b for a, b in zip(low, high, strict=True))

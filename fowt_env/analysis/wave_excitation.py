@@ -23,7 +23,7 @@ AMPLITUDE = 1e-3  # m; the force is odd in it but for drag, which is left out: f
 PAIRS = 8  # pairs of poles: 16 states
 POLE_DAMPING = 0.5  # neighbours then overlap
 LEADS = np.arange(0.0, 12.01, 0.5)  # s, of which the best fit is taken
-WEIGHT_FLOOR = 0.1  # share of a component's largest force below which errors count as absolute
+WEIGHT_FLOOR = 0.1  # fraction of a component's largest force below which errors count as absolute
 BANDS = ((0.2, 0.4), (0.4, 0.8), (0.8, 1.2), (1.2, 1.8))  # rad/s, for the report of the fit
 
 
@@ -77,7 +77,7 @@ class WaveFilter:
     """State-space model of the wave force: dz/dt = A z + B eta(t + lead), force = C z.
 
     A (m, m), B (m,), C (6, m); lead in s; errors {(low, high) rad/s: largest error of the force vector
-    in that band over its size, each component in shares of its greatest}.
+    in that band over its size, each component in fractions of its greatest}.
     """
 
     A: np.ndarray
@@ -135,7 +135,7 @@ def _resonators(frequencies):
 
 
 def _band_errors(omega, force, fitted):
-    """{band: largest relative error of the force vector} with each component in shares of its greatest."""
+    """{band: largest relative error of the force vector} with each component in fractions of its greatest."""
     scale = np.abs(force).max(axis=0)
     used = scale > 1e-9 * scale.max()
     if not used.any():

@@ -40,7 +40,7 @@ __all__ = [  # the one place to import descriptions from
     "Drivetrain",
     "Environment",
     "Hull",
-    "Hydro",
+    "HydroCoefficients",
     "Line",
     "MooringSpread",
     "Nacelle",
@@ -65,8 +65,8 @@ __all__ = [  # the one place to import descriptions from
 
 Vector3 = tuple[Finite, Finite, Finite]
 Inertia = tuple[NonNegative, NonNegative, NonNegative]
-Row = tuple[Finite, Finite, Finite, Finite, Finite, Finite]
-SixBySix = tuple[Row, Row, Row, Row, Row, Row]
+SixNumbers = tuple[Finite, Finite, Finite, Finite, Finite, Finite]
+SixBySix = tuple[SixNumbers, SixNumbers, SixNumbers, SixNumbers, SixNumbers, SixNumbers]
 SixDamping = tuple[NonNegative, NonNegative, NonNegative, NonNegative, NonNegative, NonNegative]
 
 
@@ -112,7 +112,7 @@ class Hull(Record):
         return self
 
 
-class Hydro(Record):
+class HydroCoefficients(Record):
     """Strip coefficients, axial terms and the additional linear terms of the platform."""
 
     added_mass_coefficient: NonNegative  # C_A, transverse
@@ -173,7 +173,7 @@ class Platform(Record):
     environment: Environment
     ballast: Ballast
     hull: Hull
-    hydro: Hydro
+    hydro: HydroCoefficients
     tower: Tower
     lines: tuple[Line, ...] = ()
     options: dict = Field(default_factory=dict)  # defaults of build_scene's options
@@ -443,9 +443,9 @@ def read_platform(name_or_path: str | Path) -> Platform:
     if "mooring" in data:
         if "lines" in data:
             problems.append("lines: given twice, also as [mooring]; allowed: one of them")
-        spread, found = validate(_MooringFile, {"mooring": data.pop("mooring")}, origin)
+        group, found = validate(_MooringFile, {"mooring": data.pop("mooring")}, origin)
         problems += found
-        data["lines"] = spread.mooring.lines() if spread else ()
+        data["lines"] = group.mooring.lines() if group else ()
     if isinstance(data.get("lines"), list):
         data["lines"] = tuple(data["lines"])
     if isinstance(data.get("turbine"), str):

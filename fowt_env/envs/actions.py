@@ -13,8 +13,8 @@ from fowt_env.plant.drivetrain import (
     TorqueLimits,
     build_drivetrain,
     build_torque_limits,
+    clamp,
     followed_torque,
-    limited,
 )
 from fowt_env.plant.measurement import Measure
 from fowt_env.plant.state import Command
@@ -25,7 +25,7 @@ TRACKING_FREQUENCY = 0.5  # rad/s
 TRACKING_DAMPING = 1.0
 
 
-class Mode(IntEnum):
+class ActionMode(IntEnum):
     """Action modes."""
 
     DIRECT = 0
@@ -33,7 +33,7 @@ class Mode(IntEnum):
     RESIDUAL = 2
 
 
-MODES = {mode.name.lower(): mode for mode in Mode}
+ACTION_MODES = {mode.name.lower(): mode for mode in ActionMode}
 
 
 class ActionMap(NamedTuple):
@@ -53,7 +53,7 @@ class ActionMap(NamedTuple):
 
 
 def build_action_map(mode, task, turbine, control_dt):
-    """ActionMap of a Mode, a Task and a descriptions.platform.Turbine.
+    """ActionMap of a ActionMode, a Task and a descriptions.platform.Turbine.
 
     Raises: InputError where the pitch action reaches beyond the actuator.
     """
@@ -68,8 +68,8 @@ def build_action_map(mode, task, turbine, control_dt):
     shaft = build_drivetrain(turbine)
     inertia = shaft.inertia_row / shaft.gear_ratio
     low, high = 0.0, law.max_torque
-    if mode == Mode.SETPOINT:
-        low, high = (share * turbine.rated_rotor_speed for share in task.setpoint)
+    if mode == ActionMode.SETPOINT:
+        low, high = (fraction * turbine.rated_rotor_speed for fraction in task.setpoint)
         if low >= high:
             raise InputError(f"task {task.name!r}: setpoint = {task.setpoint}: must be a range (low, high)")
     return ActionMap(
@@ -90,21 +90,27 @@ def build_action_map(mode, task, turbine, control_dt):
 @kernel
 def accept(action, accepted):
     """Copy an action, clipped to [-1, 1]. Returns 0, 1 if it was clipped, -1 if it is not finite."""
-    clipped = 0
+    saturated = 0
     for i in range(accepted.shape[0]):
         if not isfinite(action[i]):
             return -1
     for i in range(accepted.shape[0]):
-        accepted[i] = limited(action[i], -1.0, 1.0)
+        accepted[i] = clamp(action[i], -1.0, 1.0)
         if accepted[i] != action[i]:
-            clipped = 1
-    return clipped
+            saturated = 1
+    return saturated
 
 
 @kernel
-def spread(action, low, high):
+def unscale(action, low, high):
     """The value in [low, high] that an action in [-1, 1] asks for."""
     return low + 0.5 * (action + 1.0) * (high - low)
+
+
+@kernel
+def scale(value, low, high):
+    """The action in [-1, 1] that asks for a value, or for the end of [low, high] that it passes."""
+    return clamp(2.0 * (value - low) / (high - low) - 1.0, -1.0, 1.0)
 
 
 @kernel
@@ -112,40 +118,41 @@ def tracking_torque(speed, setpoint, memory, actions):
     """Torque that drives the rotor speed (rad/s) to its set-point; memory[0]: integral part, N m."""
     error = speed - setpoint
     integral = memory[0] + actions.tracking_rate * error * actions.control_dt
-    memory[0] = limited(integral, 0.0, actions.generator.maximum)
-    return limited(actions.tracking_gain * error + memory[0], 0.0, actions.generator.maximum)
+    memory[0] = clamp(integral, 0.0, actions.generator.maximum)
+    return clamp(actions.tracking_gain * error + memory[0], 0.0, actions.generator.maximum)
 
 
 @kernel
-def baseline_command(law, parameters, memory, measurement, command):
+def baseline_command(baseline_law, parameters, memory, measurement, command):
     """Command of the baseline controller; without one the command stays."""
-    if law is None:
+    if baseline_law is None:
         return
-    law(parameters, memory, measurement, command)
+    baseline_law(parameters, memory, measurement, command)
 
 
 @kernel
-def command_of(action, actions, law, parameters, memory, measurement, u, wanted):
-    """Set u = (generator torque N m, blade pitch rad) from an accepted action; wanted (2,): what it commands.
+def command_of(action, actions, baseline_law, parameters, memory, measurement, u, commanded):
+    """Set u = (generator torque N m, blade pitch rad) from an accepted action.
 
-    The torque in u is what the generator reaches of the command; the pitch actuator limits itself.
+    commanded (2,): filled with the command before the limits. The torque in u is what the generator reaches
+    of it; the pitch actuator limits itself.
     """
-    wanted[Command.GENERATOR_TORQUE] = u[Command.GENERATOR_TORQUE]
-    wanted[Command.BLADE_PITCH] = u[Command.BLADE_PITCH]
-    if actions.mode == Mode.RESIDUAL:
-        baseline_command(law, parameters, memory, measurement, wanted)
-        wanted[0] += action[0] * actions.residual_torque
-        wanted[1] += action[1] * actions.residual_pitch
+    commanded[Command.GENERATOR_TORQUE] = u[Command.GENERATOR_TORQUE]
+    commanded[Command.BLADE_PITCH] = u[Command.BLADE_PITCH]
+    if actions.mode == ActionMode.RESIDUAL:
+        baseline_command(baseline_law, parameters, memory, measurement, commanded)
+        commanded[0] += action[0] * actions.residual_torque
+        commanded[1] += action[1] * actions.residual_pitch
     else:
-        wanted[0] = spread(action[0], actions.low, actions.high)
-        wanted[1] = spread(action[1], actions.pitch_low, actions.pitch_high)
-        if actions.mode == Mode.SETPOINT:
-            wanted[0] = tracking_torque(measurement[Measure.ROTOR_SPEED], wanted[0], memory, actions)
+        commanded[0] = unscale(action[0], actions.low, actions.high)
+        commanded[1] = unscale(action[1], actions.pitch_low, actions.pitch_high)
+        if actions.mode == ActionMode.SETPOINT:
+            commanded[0] = tracking_torque(measurement[Measure.ROTOR_SPEED], commanded[0], memory, actions)
     torque = u[Command.GENERATOR_TORQUE]
     u[Command.GENERATOR_TORQUE] = followed_torque(
-        torque, wanted[Command.GENERATOR_TORQUE], actions.control_dt, actions.generator
+        torque, commanded[Command.GENERATOR_TORQUE], actions.control_dt, actions.generator
     )
-    u[Command.BLADE_PITCH] = wanted[Command.BLADE_PITCH]
+    u[Command.BLADE_PITCH] = commanded[Command.BLADE_PITCH]
 
 
 @kernel
@@ -154,15 +161,13 @@ def action_of(u, rotor_speed, actions, action):
 
     In residual mode that is zero: nothing added to the baseline.
     """
-    if actions.mode == Mode.RESIDUAL:
+    if actions.mode == ActionMode.RESIDUAL:
         action[0] = 0.0
         action[1] = 0.0
         return
-    first = rotor_speed if actions.mode == Mode.SETPOINT else u[Command.GENERATOR_TORQUE]
-    action[0] = limited(2.0 * (first - actions.low) / (actions.high - actions.low) - 1.0, -1.0, 1.0)
-    span = actions.pitch_high - actions.pitch_low
-    pitch = 2.0 * (u[Command.BLADE_PITCH] - actions.pitch_low) / span - 1.0
-    action[1] = limited(pitch, -1.0, 1.0)
+    first = rotor_speed if actions.mode == ActionMode.SETPOINT else u[Command.GENERATOR_TORQUE]
+    action[0] = scale(first, actions.low, actions.high)
+    action[1] = scale(u[Command.BLADE_PITCH], actions.pitch_low, actions.pitch_high)
 
 
 def start_tracking(memory, measurement, actions):

@@ -19,7 +19,7 @@ class DecisionSettings:
 
     hold: int = 5  # control periods from one decision to the next
     smoothing: float = 0.5  # s, time constant of the low pass from decision to action; 0: none
-    history: int = 8  # earlier decision instants that are seen beside the present one
+    history: int = 8  # earlier decision instants that are inputs beside the present one
 
     def __post_init__(self):
         for key, low, high in (("hold", 1, 100), ("history", 0, 200)):
@@ -35,30 +35,30 @@ class DecisionSettings:
 class Decisions:
     """History and smoothed actions of n environments.
 
-    seen (n, history + 1, channels) float32: observations at decision instants, newest first.
+    observations (n, history + 1, channels) float32: observations at decision instants, newest first.
     action (n, 2): in force, in [-1, 1].
     """
 
     def __init__(self, n, channels, settings, control_dt):
         self.settings = settings
-        self.seen = np.zeros((n, settings.history + 1, channels), dtype=np.float32)
+        self.observations = np.zeros((n, settings.history + 1, channels), dtype=np.float32)
         self.action = np.zeros((n, N_ACTIONS))
-        self.share = 1.0 if settings.smoothing == 0.0 else 1.0 - exp(-control_dt / settings.smoothing)
+        self.fraction = 1.0 if settings.smoothing == 0.0 else 1.0 - exp(-control_dt / settings.smoothing)
 
     @property
     def size(self):
         """Number of features."""
-        return self.seen.shape[1] * self.seen.shape[2]
+        return self.observations.shape[1] * self.observations.shape[2]
 
     def restart(self, rows, observations, actions):
         """Forget the past of some rows: all history is the observation, the action is the one in force."""
-        self.seen[rows] = np.asarray(observations, dtype=np.float32)[..., None, :]
+        self.observations[rows] = np.asarray(observations, dtype=np.float32)[..., None, :]
         self.action[rows] = actions
 
-    def see(self, observations):
+    def append(self, observations):
         """Take the observations (n, channels) of a new decision instant."""
-        self.seen[:, 1:] = self.seen[:, :-1].copy()
-        self.seen[:, 0] = observations
+        self.observations[:, 1:] = self.observations[:, :-1].copy()
+        self.observations[:, 0] = observations
 
     def features(self):
         """(n, size) float32: the newest observation, then its change over each earlier interval.
@@ -66,21 +66,22 @@ class Decisions:
         Changes, as they carry the rates that plain lags would hide in differences of nearly equal numbers
         once everything is scaled to unit variance.
         """
-        return features_of(self.seen)
+        return features_of(self.observations)
 
     def last_features(self, row, observation):
         """(size,) features of a row if the observation came next; nothing is remembered."""
-        seen = np.concatenate([np.asarray(observation, dtype=np.float32)[None], self.seen[row, :-1]])
-        return features_of(seen[None])[0]
+        newest = np.asarray(observation, dtype=np.float32)[None]
+        observations = np.concatenate([newest, self.observations[row, :-1]])
+        return features_of(observations[None])[0]
 
     def smooth(self, decision):
         """(n, 2) action of the next control period, towards the decision."""
-        self.action += self.share * (decision - self.action)
+        self.action += self.fraction * (decision - self.action)
         return self.action
 
 
-def features_of(seen):
-    """(n, features) of seen (n, instants, channels), see Decisions.features."""
-    changes = seen[:, :-1] - seen[:, 1:]
-    n = len(seen)
-    return np.concatenate([seen[:, 0], changes.reshape(n, -1)], axis=1)
+def features_of(observations):
+    """(n, features) of observations (n, instants, channels), see Decisions.features."""
+    changes = observations[:, :-1] - observations[:, 1:]
+    n = len(observations)
+    return np.concatenate([observations[:, 0], changes.reshape(n, -1)], axis=1)

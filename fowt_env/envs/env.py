@@ -13,11 +13,11 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
-from fowt_env.analysis.trim_cache import exact_trim, near_trim, plant_key
+from fowt_env.analysis.trim_cache import cached_trim, interpolated_trim, plant_key
 from fowt_env.control import CompiledController, catalogue, make
 from fowt_env.descriptions.platform import Platform
 from fowt_env.descriptions.records import RENAMED
-from fowt_env.envs.actions import MODES, Mode, build_action_map, start_tracking
+from fowt_env.envs.actions import ACTION_MODES, ActionMode, build_action_map, start_tracking
 from fowt_env.envs.episode import (
     BAD_ACTION,
     N_COUNTS,
@@ -29,7 +29,7 @@ from fowt_env.envs.episode import (
     act,
     act_physical,
     rewrite_observation,
-    start,
+    start_episode,
 )
 from fowt_env.envs.observations import (
     ESTIMATE_CHANNELS,
@@ -41,7 +41,7 @@ from fowt_env.envs.observations import (
 )
 from fowt_env.envs.rewards import (
     N_TERMS,
-    TERMS,
+    REWARD_TERMS,
     Reference,
     build_scales,
     check_weights,
@@ -52,7 +52,7 @@ from fowt_env.envs.snapshot import CARRIED, DATA_CARRIED, Snapshot
 from fowt_env.envs.tables import task_tables
 from fowt_env.envs.tasks import TASKS, Episode, Task, check_offset, task_of
 from fowt_env.errors import InputError, unknown
-from fowt_env.plant.channels import DEG
+from fowt_env.plant.channels import DEG_PER_RAD
 from fowt_env.plant.compile.handle import Handle
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
 from fowt_env.plant.rollout import STOP_REASONS, output
@@ -64,14 +64,14 @@ from fowt_env.simulation import INITIAL, check_duration, steps_in
 
 SHORTEST_WEATHER = 600.0  # s of random wind and sea: turbulence intensity is defined over 10 min
 StepResult = tuple[np.ndarray, float, bool, bool, dict[str, Any]]
-REWARD_KEYS = tuple(f"reward/{name}" for name in TERMS)
+REWARD_KEYS = tuple(f"reward/{name}" for name in REWARD_TERMS)
 
 
 class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     """Floating wind turbine whose generator torque and blade pitch are commanded.
 
     task          name in TASKS ("above_rated", "full_range", "steady") or a Task
-    platform      built-in name, path or description.Platform
+    platform      built-in name, path or descriptions.platform.Platform
     rotor         "bem", "lookup" or "table"; None: the task's, or else that of the fidelity
     action_mode   "direct", "setpoint" or "residual", see the table of actions
     baseline      compiled controller, by name, that the residual mode adds to; lqr goes on from the sum, so
@@ -85,14 +85,14 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     wind_preview  look-ahead times (s) of the channel wind_preview
     render_mode   None, "rgb_array" (render() returns a picture) or "human" (every step shows one in a window)
     fidelity      level of build_scene: "reference", "standard" or "fast"
-    sensors       {"noise": standard deviation of white noise on every reading, as a share of the channel's
+    sensors       {"noise": standard deviation of white noise on every reading, as a fraction of the channel's
                   scale; "delay": control periods from measurement to reading}, either may be left out. One
                   reading per control period is what observation, baseline and estimator are given, and
                   measurement() returns; its noise follows from the weather's seed. Azimuth, last action and
                   preview are exact; rewards and failures are of the true motions. None: readings are exact
     nominal_plant {"platform": ..., "turbine": ...} as build_scene takes them (the turbine may be left out:
-                  the platform's): the plant that baseline and estimator are designed on, where that is not
-                  the true one, which moves. None: it is
+                  the platform's): the plant that baseline and estimator are designed on, where it differs
+                  from the true plant, which is simulated. None: the true plant
     options       further ones go to build_scene, loads of one's own (fowt_env.Load) among them
 
     An episode starts at the operating point of its mean wind, moved by the task's offsets, in wind and
@@ -148,8 +148,8 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             from fowt_env.visual.rendering import load_pygame  # nobody else pays for it
 
             load_pygame()
-        if action_mode not in MODES:
-            raise unknown("action_mode", action_mode, MODES)
+        if action_mode not in ACTION_MODES:
+            raise unknown("action_mode", action_mode, ACTION_MODES)
         for key in options:
             if key in RENAMED:
                 raise InputError(f"setting {key!r} of FowtEnv: is called {RENAMED[key]} now")
@@ -176,11 +176,11 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self._nominal = None  # the scene of the nominal plant, where that is not the true one
         if nominal_plant is not None:
             parts = _nominal_parts(nominal_plant)
-            known = {**options, "turbine": parts["turbine"]}
+            nominal_options = {**options, "turbine": parts["turbine"]}
             length = max(task.duration, SHORTEST_WEATHER)
             self._nominal = build_scene(
                 parts["platform"], episode.wind, episode.sea, rotor=task.rotor, duration=length,
-                fidelity=fidelity, **known,
+                fidelity=fidelity, **nominal_options,
             )  # fmt: skip
         self._sensors = None if sensors is None else check_sensors(sensors)
         self.control_dt = float(control_dt)
@@ -188,15 +188,18 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         per_control = steps_in("control_dt", control_dt, self.dt if dt is None else dt)
         self._last = per_control * steps_in("duration", task.duration, control_dt)
         self._key = plant_key(self.scene)
-        self._build(MODES[action_mode], per_control)
+        self._build(ACTION_MODES[action_mode], per_control)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (N_ACTIONS,), np.float32)
         low, high = self._config.observation_map.low, self._config.observation_map.high
         self.observation_space = gymnasium.spaces.Box(low.astype(np.float32), high.astype(np.float32))
         self._running = False
         # what a snapshot must agree with: the same numbers then mean the same
-        seen = (task.observation, task.wind_preview)
-        told = (None if self._nominal is None else plant_key(self._nominal), self._sensors)
-        self._kind = (self._key, action_mode, baseline, *seen, self.dt, self.control_dt, self._last, told)
+        observed = (task.observation, task.wind_preview)
+        nominal_key = None if self._nominal is None else plant_key(self._nominal)
+        self._kind = (
+            self._key, action_mode, baseline, *observed, self.dt, self.control_dt, self._last,
+            (nominal_key, self._sensors),
+        )  # fmt: skip
 
     def twin(self) -> "FowtEnv":
         """Another environment of the same settings, before its first reset; shares what is never written."""
@@ -204,32 +207,33 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         other._np_random = other._np_random_seed = None
         other._running = False
         other._view = None
-        other._build(MODES[self.action_mode], self._config.per_control)
+        other._build(ACTION_MODES[self.action_mode], self._config.per_control)
         return other
 
     def _build(self, mode, per_control):
         """Allocate the arrays of a run and fill what never changes."""
         scene, turbine, task = self.scene, self.scene.turbine, self.task
-        chosen = entries(task.observation, turbine, task.wind_preview)
+        observed = entries(task.observation, turbine, task.wind_preview)
         self._baseline = None
-        law = None
+        baseline_law = None
         parameters, memory = np.zeros(1), np.zeros(1)
-        if mode == Mode.RESIDUAL:
+        if mode == ActionMode.RESIDUAL:
             self._baseline = named_baseline(self.baseline, self.design_scene.turbine, self.control_dt)
-            law = self._baseline.law
+            baseline_law = self._baseline.law
             parameters, memory = self._baseline.parameters, self._baseline.memory
-        self._estimator = watch = None
+        self._estimator = estimator_law = None
         if set(ESTIMATE_CHANNELS) & set(task.observation):
             self._estimator = catalogue().WindEstimator(self.design_scene.turbine, self.control_dt)
-            watch = self._estimator.law
-        watching, sensed = self._estimator is not None, self._sensors is not None
-        self._law, self._watch = Handle(None, law), Handle(None, watch)
+            estimator_law = self._estimator.law
+        estimating, sensed = self._estimator is not None, self._sensors is not None
+        self._baseline_law = Handle(None, baseline_law)
+        self._estimator_law = Handle(None, estimator_law)
         self._config = EpisodeConfig(
             model=scene.model,
             actions=build_action_map(mode, task, turbine, self.control_dt),
             parameters=parameters,
-            estimator=self._estimator.parameters if watching else None,
-            observation_map=build_observation_map(chosen, task.wind_preview),
+            estimator=self._estimator.parameters if estimating else None,
+            observation_map=build_observation_map(observed, task.wind_preview),
             scales=build_scales(turbine, self.control_dt),
             weights=weight_array(task.weights),
             overspeed=float(turbine.overspeed),
@@ -244,12 +248,12 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             x=np.zeros(n),
             u=np.zeros(2),
             memory=memory,
-            estimate=self._estimator.memory if watching else None,
+            estimate=self._estimator.memory if estimating else None,
             action=np.zeros(N_ACTIONS),
             measurement=measurement,
             reading=np.zeros(N_MEASUREMENTS) if sensed else measurement,
             delay_buffer=np.zeros((self._sensors["delay"] + 1, N_MEASUREMENTS)) if sensed else None,
-            observation=np.zeros(len(chosen), dtype=np.float32),
+            observation=np.zeros(len(observed), dtype=np.float32),
             counts=np.zeros(N_COUNTS, dtype=np.int64),
             reference=np.zeros(len(Reference._fields)),
             previous_measurement=np.zeros(N_MEASUREMENTS),
@@ -271,10 +275,10 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         """
         super().reset(seed=seed)
         self._running = False  # until all of it has worked
-        episode = _chosen(self.task.draw(self.np_random), options)
+        episode = _with_options(self.task.draw(self.np_random), options)
         scene = self.scene.with_weather(episode.wind, episode.sea, episode.weather_seed)
         check_duration(scene, self.task.duration)
-        find = exact_trim if episode.exact_start else near_trim
+        find = cached_trim if episode.exact_start else interpolated_trim
         state, command = find(scene, self._key, scene.wind_speed)
         self._enter(scene)
         run = self._episode
@@ -283,7 +287,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         reference = Reference(float(state[State.PLATFORM_PITCH]), float(state[State.ROTOR_SPEED]))
         run.reference[:] = reference
         self._offset(episode.offsets)
-        start(self._handle)
+        start_episode(self._handle)
         self.restart_loops()
         if self._estimator is not None:
             self._estimator.reset(self.measurement())
@@ -306,7 +310,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         """
         if self._baseline is not None:
             self._baseline.reset(self.measurement())
-        elif self._config.actions.mode == Mode.SETPOINT:
+        elif self._config.actions.mode == ActionMode.SETPOINT:
             start_tracking(self._episode.memory, self.measurement(), self._config.actions)
 
     def _offset(self, offsets):
@@ -318,7 +322,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         if abs(x[State.PLATFORM_PITCH]) >= 0.5 * pi:
             raise InputError(
                 f"offsets['PtfmPitch'] = {offsets['PtfmPitch']:g}: leads to"
-                f" {x[State.PLATFORM_PITCH] * DEG:g} deg, must stay inside (-90, 90) deg"
+                f" {x[State.PLATFORM_PITCH] * DEG_PER_RAD:g} deg, must stay inside (-90, 90) deg"
             )
         x[State.BLADE_PITCH] = min(max(x[State.BLADE_PITCH], drive.minimum), drive.maximum)
         self._episode.u[Command.BLADE_PITCH] = x[State.BLADE_PITCH]
@@ -328,12 +332,12 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         if not self._running:
             raise ResetNeeded("call reset() first: no episode is running")
         try:
-            asked = np.array(action, dtype=np.float64)  # a copy: steady types, whatever was given
+            requested = np.array(action, dtype=np.float64)  # a copy: steady types, whatever was given
         except (TypeError, ValueError):
             raise InputError(f"action = {action!r}: must be {N_ACTIONS} numbers") from None
-        if asked.shape != (N_ACTIONS,):
-            raise InputError(f"action has shape {asked.shape}: must be ({N_ACTIONS},)")
-        status, reward = act(self._handle, self._law, self._watch, asked)
+        if requested.shape != (N_ACTIONS,):
+            raise InputError(f"action has shape {requested.shape}: must be ({N_ACTIONS},)")
+        status, reward = act(self._handle, self._baseline_law, self._estimator_law, requested)
         if status == BAD_ACTION:
             raise InputError(f"action = {action!r}: must be finite")
         return self._result(status, reward)
@@ -348,7 +352,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         torque, blade_pitch = float(torque), float(blade_pitch)
         if not (isfinite(torque) and isfinite(blade_pitch)):
             raise InputError(f"torque = {torque!r}, blade_pitch = {blade_pitch!r}: must be finite")
-        return self._result(*act_physical(self._handle, self._watch, torque, blade_pitch))
+        return self._result(*act_physical(self._handle, self._estimator_law, torque, blade_pitch))
 
     def _result(self, status, reward):
         """What step returns, from the status and reward of a control period."""
@@ -368,7 +372,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         return run.observation.copy(), reward, terminated, truncated, info
 
     def _reason(self, status):
-        """Why an episode was terminated, with the load of the user's that is to blame, if one is."""
+        """Why an episode was terminated, with the user load that caused it, if one did."""
         fault = self.scene.first_nonfinite_load(self._episode.data)
         return f"{STOP_REASONS[status]}: {fault}" if fault else STOP_REASONS[status]
 
@@ -519,9 +523,9 @@ def named_baseline(name, turbine, control_dt):
 
     Raises: InputError for unknown ones and those written in Python.
     """
-    known = catalogue().CONTROLLERS
-    if isinstance(name, str) and ":" not in name and name not in known:
-        raise unknown("baseline", name, known)
+    names = catalogue().CONTROLLERS
+    if isinstance(name, str) and ":" not in name and name not in names:
+        raise unknown("baseline", name, names)
     baseline = make(name, turbine, control_dt)
     if not isinstance(baseline, CompiledController):
         raise InputError(f"baseline = {name!r}: must be a compiled controller, such as 'pi' or 'gspi_oc3'")
@@ -538,7 +542,7 @@ def _nominal_parts(given):
     return {"turbine": None} | dict(given)
 
 
-def _chosen(drawn, options):
+def _with_options(drawn, options):
     """The drawn Episode with what reset's options give in place of it."""
     changes = {}
     for key, value in (options or {}).items():

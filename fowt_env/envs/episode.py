@@ -94,17 +94,17 @@ def measure_and_sense(config, episode):
 def write_observation(config, episode):
     """Fill the observation from the present reading."""
     t = episode.counts[STEP] * config.dt
-    shown = config.observation_map
+    observation_map = config.observation_map
     fill_signals(
-        t, config.model, episode.x, episode.reading, episode.action, episode.estimate, shown.preview,
-        episode.signals,
+        t, config.model, episode.x, episode.reading, episode.action, episode.estimate,
+        observation_map.preview, episode.signals,
     )  # fmt: skip
-    fill_observation(episode.signals, shown, episode.observation)
+    fill_observation(episode.signals, observation_map, episode.observation)
 
 
 @entry
-def start(handle):
-    """Measure and show the first instant of an episode; returns the status."""
+def start_episode(handle):
+    """Measure and observe the first instant of an episode; returns the status."""
     config, episode = model_of(handle), data_of(handle)
     for i in range(N_COUNTS):
         episode.counts[i] = 0
@@ -125,18 +125,19 @@ def rewrite_observation(handle):
 
 
 @kernel
-def update_estimate(law, config, episode):
+def update_estimate(estimator_law, config, episode):
     """Take the period that is over, its command and what is read now into the estimate."""
-    if law is None:
+    if estimator_law is None:
         return
-    law(config.estimator, episode.estimate, episode.reading, episode.u)
+    estimator_law(config.estimator, episode.estimate, episode.reading, episode.u)
 
 
 @kernel
-def advance_period(config, episode, estimator):
-    """Advance one control period under episode.u, measure, observe and pay; returns (status, reward)."""
-    torque, wanted = episode.u[Command.GENERATOR_TORQUE], episode.baseline_command[Command.GENERATOR_TORQUE]
-    was_limited = torque_was_limited(torque, wanted, config.model.generator)
+def advance_period(config, episode, estimator_law):
+    """Advance one control period under episode.u, measure, observe and reward; returns (status, reward)."""
+    torque = episode.u[Command.GENERATOR_TORQUE]
+    commanded = episode.baseline_command[Command.GENERATOR_TORQUE]
+    was_limited = torque_was_limited(torque, commanded, config.model.generator)
     episode.counts[LIMITED] += was_limited
     episode.data.cache[LoadCache.TORQUE_LIMITED] = 1.0 if was_limited else 0.0
     copy_into(episode.previous_measurement, episode.measurement)
@@ -146,12 +147,12 @@ def advance_period(config, episode, estimator):
     )
     episode.counts[STEP] = first + config.per_control
     if status != NON_FINITE:
-        seen = measure_and_sense(config, episode)
-        if seen != RUNNING:
-            status = seen
+        sensed = measure_and_sense(config, episode)
+        if sensed != RUNNING:
+            status = sensed
     if status == RUNNING and episode.measurement[Measure.ROTOR_SPEED] > config.overspeed:
         status = OVERSPEED
-    update_estimate(estimator, config, episode)
+    update_estimate(estimator_law, config, episode)
     write_observation(config, episode)
     fill_terms(
         episode.measurement, episode.previous_measurement, episode.reference, status != RUNNING,
@@ -161,37 +162,37 @@ def advance_period(config, episode, estimator):
 
 
 @entry
-def act(handle, law, estimator, action):
+def act(handle, baseline_law, estimator_law, action):
     """One control period under an action (2,) in [-1, 1]; returns (status, reward).
 
-    law, estimator: Handles whose data is the control kernel of the baseline and of the estimator, or None;
-    Python takes ten times as long to hand over a kernel itself. BAD_ACTION leaves everything as it was.
+    baseline_law, estimator_law: Handles whose data is the control kernel, or None; Python takes ten times as
+    long to hand over a kernel itself. BAD_ACTION leaves everything as it was.
     """
     config, episode = model_of(handle), data_of(handle)
-    clipped = accept(action, episode.action)
-    if clipped < 0:
+    saturated = accept(action, episode.action)
+    if saturated < 0:
         return BAD_ACTION, 0.0
-    episode.counts[SATURATED] += clipped
+    episode.counts[SATURATED] += saturated
     command_of(
-        episode.action, config.actions, law.data, config.parameters, episode.memory, episode.reading,
-        episode.u, episode.baseline_command,
+        episode.action, config.actions, baseline_law.data, config.parameters, episode.memory,
+        episode.reading, episode.u, episode.baseline_command,
     )  # fmt: skip
-    return advance_period(config, episode, estimator.data)
+    return advance_period(config, episode, estimator_law.data)
 
 
 @entry
-def act_physical(handle, estimator, torque, blade_pitch):
+def act_physical(handle, estimator_law, torque, blade_pitch):
     """One control period under a physical command, as simulate applies it; returns (status, reward).
 
-    estimator: as act takes it.
+    estimator_law: as act takes it.
     """
     config, episode = model_of(handle), data_of(handle)
     episode.baseline_command[Command.GENERATOR_TORQUE] = torque
     episode.baseline_command[Command.BLADE_PITCH] = blade_pitch
-    before = episode.u[Command.GENERATOR_TORQUE]
+    previous_torque = episode.u[Command.GENERATOR_TORQUE]
     episode.u[Command.GENERATOR_TORQUE] = followed_torque(
-        before, torque, config.actions.control_dt, config.model.generator
+        previous_torque, torque, config.actions.control_dt, config.model.generator
     )
     episode.u[Command.BLADE_PITCH] = blade_pitch
     action_of(episode.u, episode.x[State.ROTOR_SPEED], config.actions, episode.action)
-    return advance_period(config, episode, estimator.data)
+    return advance_period(config, episode, estimator_law.data)

@@ -21,15 +21,15 @@ def first_unusable(actions, active):
 
 
 @entry
-def act_some(handles, law, estimator, actions, active, statuses, rewards, first, last):
+def act_some(handles, baseline_law, estimator_law, actions, active, statuses, rewards, first, last):
     """One control period of the active environments first <= i < last, see act_all."""
     for i in range(first, last):
         if active[i]:
-            statuses[i], rewards[i] = act(handles[i], law, estimator, actions[i])
+            statuses[i], rewards[i] = act(handles[i], baseline_law, estimator_law, actions[i])
 
 
 @entry
-def act_all(handles, law, estimator, actions, active, statuses, rewards):
+def act_all(handles, baseline_law, estimator_law, actions, active, statuses, rewards):
     """One control period of each active environment under its row of actions (n, 2), on this thread.
 
     handles: list of n Handles of one type. Fills statuses (n,) and rewards (n,). Returns -1, or the index of
@@ -37,12 +37,12 @@ def act_all(handles, law, estimator, actions, active, statuses, rewards):
     """
     bad = first_unusable(actions, active)
     if bad < 0:
-        act_some(handles, law, estimator, actions, active, statuses, rewards, 0, len(handles))
+        act_some(handles, baseline_law, estimator_law, actions, active, statuses, rewards, 0, len(handles))
     return bad
 
 
 @parallel_entry
-def act_all_parallel(handles, law, estimator, actions, active, statuses, rewards, parts):
+def act_all_parallel(handles, baseline_law, estimator_law, actions, active, statuses, rewards, parts):
     """As act_all, in as many parts, side by side, as there are threads to run them."""
     bad = first_unusable(actions, active)
     if bad < 0:
@@ -51,8 +51,8 @@ def act_all_parallel(handles, law, estimator, actions, active, statuses, rewards
             k = np.int64(part)  # prange counts unsigned
             act_some(
                 handles,
-                law,
-                estimator,
+                baseline_law,
+                estimator_law,
                 actions,
                 active,
                 statuses,
@@ -66,12 +66,12 @@ def act_all_parallel(handles, law, estimator, actions, active, statuses, rewards
 @contextmanager
 def thread_limit(threads):
     """Within the block, compiled loops use this many threads; afterwards as many as before."""
-    before = numba.get_num_threads()
-    if threads == before:  # set_num_threads takes microseconds
+    previous = numba.get_num_threads()
+    if threads == previous:  # set_num_threads takes microseconds
         yield
         return
     numba.set_num_threads(threads)
     try:
         yield
     finally:
-        numba.set_num_threads(before)
+        numba.set_num_threads(previous)

@@ -10,13 +10,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fowt_env.descriptions.units import DEGREE
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.aero.load import wind_of
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measure
-from fowt_env.plant.state import State
+from fowt_env.plant.state import MOTIONS, State
 
-DEG = pi / 180.0
 SIN_AZIMUTH = N_MEASUREMENTS  # signals that follow the measurements
 COS_AZIMUTH = N_MEASUREMENTS + 1
 FIRST_ACTION = N_MEASUREMENTS + 2
@@ -54,21 +54,20 @@ FIXED = (  # channels that look the same for every turbine
     _symmetric("surge", "m", 20.0, 200.0, "platform position downwind"),
     _symmetric("sway", "m", 10.0, 200.0, "platform position to the left"),
     _symmetric("heave", "m", 2.0, 50.0, "platform position upwards"),
-    _symmetric("roll", "rad", 2.0 * DEG, pi, "platform roll"),
-    _symmetric("platform_pitch", "rad", 5.0 * DEG, 0.5 * pi, "platform pitch, positive downwind"),
-    _symmetric("yaw", "rad", 5.0 * DEG, 2.0 * pi, "platform yaw"),
+    _symmetric("roll", "rad", 2.0 * DEGREE, pi, "platform roll"),
+    _symmetric("platform_pitch", "rad", 5.0 * DEGREE, 0.5 * pi, "platform pitch, positive downwind"),
+    _symmetric("yaw", "rad", 5.0 * DEGREE, 2.0 * pi, "platform yaw"),
     _symmetric("surge_rate", "m/s", 1.0, 50.0, "time derivative of surge"),
     _symmetric("sway_rate", "m/s", 0.5, 50.0, "time derivative of sway"),
     _symmetric("heave_rate", "m/s", 0.5, 50.0, "time derivative of heave"),
-    _symmetric("roll_rate", "rad/s", 0.5 * DEG, 2.0, "time derivative of roll"),
-    _symmetric("platform_pitch_rate", "rad/s", DEG, 2.0, "time derivative of platform pitch"),
-    _symmetric("yaw_rate", "rad/s", 0.5 * DEG, 2.0, "time derivative of yaw"),
+    _symmetric("roll_rate", "rad/s", 0.5 * DEGREE, 2.0, "time derivative of roll"),
+    _symmetric("platform_pitch_rate", "rad/s", DEGREE, 2.0, "time derivative of platform pitch"),
+    _symmetric("yaw_rate", "rad/s", 0.5 * DEGREE, 2.0, "time derivative of yaw"),
     _symmetric("nacelle_acceleration", "m/s2", 1.0, 100.0, "fore-aft acceleration of the tower top"),
     _symmetric("nacelle_velocity", "m/s", 1.0, 100.0, "fore-aft velocity of the tower top"),
-    _symmetric("platform_pitch_acceleration", "rad/s2", 0.5 * DEG, 5.0, "pitch acceleration (body y)"),
+    _symmetric("platform_pitch_acceleration", "rad/s2", 0.5 * DEGREE, 5.0, "pitch acceleration (body y)"),
     _symmetric("wave_elevation", "m", 3.0, 50.0, "water surface at the platform's rest position"),
 )
-MOTIONS = ("surge", "sway", "heave", "roll", "platform_pitch", "yaw")
 RATES = tuple(f"{name}_rate" for name in MOTIONS)
 STANDARD = (*MOTIONS, *RATES, "rotor_speed", "blade_pitch", "generator_torque")
 
@@ -105,7 +104,7 @@ ESTIMATE_CHANNELS = {  # made by the estimator of lqr from what a turbine measur
 }  # fmt: skip
 
 
-def channels(turbine, preview=()):
+def observation_channels(turbine, preview=()):
     """{channel: tuple of its Entries} for a descriptions.platform.Turbine; preview: look-ahead times (s)."""
     rated, law, drive = turbine.rated_rotor_speed, turbine.torque_law, turbine.pitch_drive
     table = {entry.name: (entry,) for entry in FIXED}
@@ -117,7 +116,7 @@ def channels(turbine, preview=()):
     )  # fmt: skip
     table["blade_pitch"] = (
         Entry(
-            "blade_pitch", "rad", int(Measure.BLADE_PITCH), 0.0, 15.0 * DEG, drive.minimum, drive.maximum,
+            "blade_pitch", "rad", int(Measure.BLADE_PITCH), 0.0, 15.0 * DEGREE, drive.minimum, drive.maximum,
             "collective blade pitch, positive to feather",
         ),
     )  # fmt: skip
@@ -180,7 +179,7 @@ def entries(names, turbine, preview):
     """Entries of an observation in order. Raises: InputError for a preview without times."""
     if "wind_preview" in names and not len(preview):
         raise InputError("wind_preview: give the look-ahead times, for example wind_preview=(2.0, 4.0, 6.0)")
-    table = channels(turbine, preview)
+    table = observation_channels(turbine, preview)
     return tuple(entry for name in names for entry in table[name])
 
 
@@ -195,14 +194,14 @@ class ObservationMap(NamedTuple):
     preview: np.ndarray
 
 
-def build_observation_map(chosen, preview):
+def build_observation_map(observed, preview):
     """ObservationMap of Entries."""
-    centre = np.array([entry.centre for entry in chosen])
-    scale = np.array([entry.scale for entry in chosen])
-    low = (np.array([entry.low for entry in chosen]) - centre) / scale
-    high = (np.array([entry.high for entry in chosen]) - centre) / scale
+    centre = np.array([entry.centre for entry in observed])
+    scale = np.array([entry.scale for entry in observed])
+    low = (np.array([entry.low for entry in observed]) - centre) / scale
+    high = (np.array([entry.high for entry in observed]) - centre) / scale
     return ObservationMap(
-        np.array([entry.signal for entry in chosen], dtype=np.int64),
+        np.array([entry.signal for entry in observed], dtype=np.int64),
         centre,
         scale,
         low.astype(np.float32).astype(np.float64),
@@ -233,9 +232,11 @@ def fill_signals(t, model, x, reading, action, estimate, preview, signals):
 
 
 @kernel
-def fill_observation(signals, chosen, observation):
+def fill_observation(signals, observation_map, observation):
     """Fill observation (n,) float32 from the signals; an entry that is not finite keeps its last value."""
     for i in range(observation.shape[0]):
-        value = (signals[chosen.signal[i]] - chosen.centre[i]) / chosen.scale[i]
+        entry, centre = observation_map.signal[i], observation_map.centre[i]
+        value = (signals[entry] - centre) / observation_map.scale[i]
         if np.isfinite(value):
-            observation[i] = np.float32(max(chosen.low[i], min(chosen.high[i], value)))
+            low, high = observation_map.low[i], observation_map.high[i]
+            observation[i] = np.float32(max(low, min(high, value)))

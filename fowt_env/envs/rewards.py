@@ -1,6 +1,6 @@
 """Named reward terms: each a function of what is measured, bounded, weighted by the task.
 
-To add one: a kernel, a line in TERMS and one in fill_terms. reward = sum of weight * term.
+To add one: a kernel, a line in REWARD_TERMS and one in fill_terms. reward = sum of weight * term.
 """
 
 from collections.abc import Mapping
@@ -16,8 +16,8 @@ from fowt_env.plant.measurement import Measure
 
 AT_MARGIN = 0.1  # value of tolerance() one margin outside its bounds
 STEEPNESS = -log(AT_MARGIN)
-POWER_MARGIN = 0.2  # share of rated power above rated at which the power term has fallen to a tenth
-SPEED_MARGIN = 0.2  # share of rated rotor speed outside the band at which its term has fallen to a tenth
+POWER_MARGIN = 0.2  # fraction of rated power above rated at which the power term has fallen to a tenth
+SPEED_MARGIN = 0.2  # fraction of rated rotor speed outside the band at which its term has fallen to a tenth
 TILT_MARGIN = 5.0 * pi / 180.0  # rad, amplitude of platform pitch at which its term has fallen to a tenth
 TILT_PERIOD = 30.0  # s, about that of platform pitch: turns its rate into an amplitude
 
@@ -28,8 +28,8 @@ class Scales(NamedTuple):
     rated_power: float  # mechanical, at the generator, W
     rated_speed: float  # rotor, rad/s
     gear_ratio: float
-    pitch_way: float  # most that the blade pitch can travel in one control period, rad
-    torque_way: float  # most that the torque may change in one control period, N m
+    max_pitch_increment: float  # most that the blade pitch can travel in one control period, rad
+    max_torque_increment: float  # most that the torque may change in one control period, N m
 
 
 class Reference(NamedTuple):
@@ -39,7 +39,7 @@ class Reference(NamedTuple):
     rotor_speed: float  # rad/s
 
 
-class Term(NamedTuple):
+class RewardTerm(NamedTuple):
     """Range and meaning of a reward term, for tests and documents."""
 
     low: float
@@ -47,29 +47,29 @@ class Term(NamedTuple):
     meaning: str
 
 
-TERMS = {
-    "power": Term(
+REWARD_TERMS = {
+    "power": RewardTerm(
         0.0, 1.0, "generator power over rated; above rated it falls again, to a tenth at 20 % too much"
     ),
-    "rotor_speed": Term(
+    "rotor_speed": RewardTerm(
         0.0,
         1.0,
         "1 between the rotor speed of the episode's operating point and rated (above rated wind: at rated),"
         " a tenth at 20 % of rated outside",
     ),
-    "platform_motion": Term(
+    "platform_motion": RewardTerm(
         0.0,
         1.0,
         "1 with the platform pitch at rest at the operating point, a tenth at an oscillation of 5 deg"
         " amplitude (angle and rate over 2 pi/30 s taken together)",
     ),
-    "pitch_travel": Term(-1.0, 0.0, "blade-pitch travel over the most that the rate limit allows"),
-    "torque_travel": Term(-1.0, 0.0, "change of generator torque over the most that the rate limit allows"),
-    "failure": Term(-1.0, 0.0, "-1 in the step that ends in failure, else 0"),
-    "power_shortfall": Term(-1.0, 0.0, "minus the share of rated power that is lacking; more counts nothing"),
+    "pitch_travel": RewardTerm(-1.0, 0.0, "blade-pitch travel over the most that the rate limit allows"),
+    "torque_travel": RewardTerm(-1.0, 0.0, "change of generator torque over the most its rate limit allows"),
+    "failure": RewardTerm(-1.0, 0.0, "-1 in the step that ends in failure, else 0"),
+    "power_shortfall": RewardTerm(-1.0, 0.0, "minus the missing fraction of rated power; more adds nothing"),
 }
-TermIndex = IntEnum("TermIndex", [name.upper() for name in TERMS], start=0)
-N_TERMS = len(TERMS)
+TermIndex = IntEnum("TermIndex", [name.upper() for name in REWARD_TERMS], start=0)
+N_TERMS = len(REWARD_TERMS)
 
 
 @kernel
@@ -88,22 +88,22 @@ def tolerance(x, bounds, margin):
 
 
 @kernel
-def clipped(value, low, high):
-    """The value within its range; NaN gives the upper end."""
-    return max(low, min(high, value))
+def unit_fraction(value):
+    """The value within [0, 1]; NaN gives 1, which clamp would let through."""
+    return max(0.0, min(1.0, value))
 
 
 @kernel
 def power_term(speed, torque, scales):
     """Share of rated power, and how well the rest stays below it."""
-    share = scales.gear_ratio * speed * torque / scales.rated_power
-    return clipped(share, 0.0, 1.0) * tolerance(share, (0.0, 1.0), POWER_MARGIN)
+    power = scales.gear_ratio * speed * torque / scales.rated_power
+    return unit_fraction(power) * tolerance(power, (0.0, 1.0), POWER_MARGIN)
 
 
 @kernel
 def power_shortfall_term(speed, torque, scales):
-    """Minus the share of rated power that is lacking."""
-    return clipped(scales.gear_ratio * speed * torque / scales.rated_power, 0.0, 1.0) - 1.0
+    """Minus the missing fraction of rated power."""
+    return unit_fraction(scales.gear_ratio * speed * torque / scales.rated_power) - 1.0
 
 
 @kernel
@@ -121,14 +121,14 @@ def platform_motion_term(platform_pitch, rate, steady_pitch):
 
 
 @kernel
-def travel_term(before, after, way):
-    """Minus the share of the possible travel that was used in one control period."""
-    return 0.0 - clipped(abs(after - before) / way, 0.0, 1.0)
+def travel_term(previous, after, max_increment):
+    """Minus the fraction of the possible travel that was used in one control period."""
+    return 0.0 - unit_fraction(abs(after - previous) / max_increment)
 
 
 @kernel
-def fill_terms(m, before, reference, failed, scales, terms):
-    """Fill terms (N_TERMS,) from the measurements m and before, one control period apart."""
+def fill_terms(m, previous, reference, failed, scales, terms):
+    """Fill terms (N_TERMS,) from the measurements m and previous, one control period apart."""
     speed = m[Measure.ROTOR_SPEED]
     torque = m[Measure.GENERATOR_TORQUE]
     terms[TermIndex.POWER] = power_term(speed, torque, scales)
@@ -137,16 +137,18 @@ def fill_terms(m, before, reference, failed, scales, terms):
         m[Measure.PLATFORM_PITCH], m[Measure.PLATFORM_PITCH_RATE], reference[0]
     )
     terms[TermIndex.PITCH_TRAVEL] = travel_term(
-        before[Measure.BLADE_PITCH], m[Measure.BLADE_PITCH], scales.pitch_way
+        previous[Measure.BLADE_PITCH], m[Measure.BLADE_PITCH], scales.max_pitch_increment
     )
-    terms[TermIndex.TORQUE_TRAVEL] = travel_term(before[Measure.GENERATOR_TORQUE], torque, scales.torque_way)
+    terms[TermIndex.TORQUE_TRAVEL] = travel_term(
+        previous[Measure.GENERATOR_TORQUE], torque, scales.max_torque_increment
+    )
     terms[TermIndex.FAILURE] = -1.0 if failed else 0.0
     terms[TermIndex.POWER_SHORTFALL] = power_shortfall_term(speed, torque, scales)
 
 
 @kernel
 def weighted_sum(weights, terms):
-    """sum of weight * term in the order of TERMS."""
+    """sum of weight * term in the order of REWARD_TERMS."""
     total = 0.0
     for i in range(terms.shape[0]):
         total += weights[i] * terms[i]
@@ -160,8 +162,8 @@ def build_scales(turbine, control_dt):
         rated_power=float(law.rated_power),
         rated_speed=float(turbine.rated_rotor_speed),
         gear_ratio=float(turbine.drivetrain.gear_ratio),
-        pitch_way=float(turbine.pitch_drive.rate_limit * control_dt),
-        torque_way=float(law.max_torque_rate * control_dt),
+        max_pitch_increment=float(turbine.pitch_drive.rate_limit * control_dt),
+        max_torque_increment=float(law.max_torque_rate * control_dt),
     )
 
 
@@ -171,8 +173,8 @@ def check_weights(where, weights):
         raise InputError(f"{where} = {weights!r}: must be a dict of reward terms and their weights")
     checked = {}
     for name, weight in weights.items():
-        if name not in TERMS:
-            raise unknown(f"reward term of {where}", name, TERMS)
+        if name not in REWARD_TERMS:
+            raise unknown(f"reward term of {where}", name, REWARD_TERMS)
         number = isinstance(weight, int | float | np.number) and not isinstance(weight, bool)
         if not number or not isfinite(weight) or weight < 0.0:
             raise InputError(f"{where}: weight of {name} = {weight!r}: must be a finite number >= 0")
@@ -181,5 +183,5 @@ def check_weights(where, weights):
 
 
 def weight_array(weights):
-    """(N_TERMS,) weights in the order of TERMS; 0 where none is given."""
-    return np.array([weights.get(name, 0.0) for name in TERMS])
+    """(N_TERMS,) weights in the order of REWARD_TERMS; 0 where none is given."""
+    return np.array([weights.get(name, 0.0) for name in REWARD_TERMS])

@@ -6,7 +6,7 @@ import gymnasium
 
 from fowt_env.errors import InputError
 
-AHEAD = 1.0  # s: the rotor speed is judged by where it will be, since feathering takes its time
+AHEAD = 1.0  # s: the rotor speed is checked where it will be, since feathering takes its time
 
 
 class SafetyLayer(gymnasium.Wrapper):

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fowt_env.envs.observations import channels
+from fowt_env.envs.observations import observation_channels
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measure, Measurement
@@ -28,7 +28,7 @@ class Sensors(NamedTuple):
 
 def reading_scales(turbine):
     """(N_MEASUREMENTS,) what noise of 1 is on each field of a Measurement, SI; 0 for the time."""
-    table = channels(turbine)
+    table = observation_channels(turbine)
     scales = {name: table[name][0].scale for name in Measurement._fields if name in table}
     scales["generator_speed"] = turbine.drivetrain.gear_ratio * scales["rotor_speed"]
     scales["time"] = 0.0  # a clock, not a sensor
@@ -39,11 +39,11 @@ def check_sensors(given):
     """{"noise", "delay"} of what an environment is given as sensors. Raises: InputError."""
     if not isinstance(given, Mapping):
         raise InputError(f"sensors = {given!r}: must be a dict with noise and delay")
-    chosen = {"noise": 0.0, "delay": 0} | dict(given)
+    settings = {"noise": 0.0, "delay": 0} | dict(given)
     for key in given:
         if key not in ("noise", "delay"):
             raise unknown("key of sensors", key, ("noise", "delay"))
-    noise, delay = chosen["noise"], chosen["delay"]
+    noise, delay = settings["noise"], settings["delay"]
     number = isinstance(noise, int | float | np.number) and not isinstance(noise, bool)
     if not number or not (isfinite(noise) and noise >= 0.0):
         raise InputError(f"sensors.noise = {noise!r}: must be a finite number >= 0")
@@ -54,7 +54,7 @@ def check_sensors(given):
 
 
 def draw_sensors(noise, delay, scales, seed, readings):
-    """Sensors of an episode: noise as a share of the scales (N_MEASUREMENTS,), by the seed of its weather."""
+    """Sensors of an episode: noise as a fraction of the scales (N_MEASUREMENTS,), by its weather's seed."""
     if noise == 0.0:
         return Sensors(np.zeros((1, N_MEASUREMENTS)), delay)
     rng = np.random.default_rng([seed, NOISE_STREAM])
@@ -62,20 +62,20 @@ def draw_sensors(noise, delay, scales, seed, readings):
 
 
 @kernel
-def take_reading(sensors, period, measurement, past, reading):
+def take_reading(sensors, period, measurement, delay_buffer, reading):
     """Fill the reading (N_MEASUREMENTS,) of a control period from what is measured now; None: it is that.
 
-    past: (delay + 1, N_MEASUREMENTS) last measurements, a ring; at period 0 all of them are the first.
+    delay_buffer: (delay + 1, N_MEASUREMENTS) ring of last measurements; at period 0 all are the first.
     """
     if sensors is None:
         return
-    size = past.shape[0]
+    size = delay_buffer.shape[0]
     for row in range(size):
         if period == 0 or row == period % size:
             for i in range(N_MEASUREMENTS):
-                past[row, i] = measurement[i]
+                delay_buffer[row, i] = measurement[i]
     late = (period + 1) % size
     drawn = min(period, sensors.noise.shape[0] - 1)
     for i in range(N_MEASUREMENTS):
-        reading[i] = past[late, i] + sensors.noise[drawn, i]
+        reading[i] = delay_buffer[late, i] + sensors.noise[drawn, i]
     reading[Measure.TIME] = measurement[Measure.TIME]

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 # arrays of episode.EpisodeData that outlive a control period, and of plant.model.Data: those that carry
-# over, and stages, whose first row holds the wake's rates as long as the kept loads are fresh
+# over, and stages, whose first row holds the wake's rates as long as the cached loads are fresh
 CARRIED = (
     "x", "u", "memory", "estimate", "action", "measurement", "reading", "delay_buffer", "observation",
     "counts", "reference", "terms",
@@ -17,7 +17,7 @@ class Snapshot(NamedTuple):
 
     kind: tuple  # settings that an environment must share to go on from here
     scene: Any  # scene.Scene with the weather of the episode
-    arrays: tuple  # copies, in the order of CARRIED and WORK_CARRIED; None for what the run lacks
+    arrays: tuple  # copies, in the order of CARRIED and DATA_CARRIED; None for what the run lacks
     running: bool
     generator: Mapping[str, Any] | None  # state of the random generator; None before the first draw
     seed: int | None  # that the generator was made from

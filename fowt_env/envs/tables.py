@@ -4,7 +4,7 @@ from math import isinf
 
 from fowt_env.descriptions.platform import read_platform, read_turbine
 from fowt_env.envs.observations import entries
-from fowt_env.envs.rewards import TERMS
+from fowt_env.envs.rewards import REWARD_TERMS
 from fowt_env.files.markdown import markdown_table
 
 
@@ -16,7 +16,7 @@ def action_table(task, turbine):
     """Meaning of the two actions in each mode."""
     law = turbine.torque_law
     rpm = 30.0 / 3.141592653589793
-    low, high = (share * turbine.rated_rotor_speed * rpm for share in task.setpoint)
+    low, high = (fraction * turbine.rated_rotor_speed * rpm for fraction in task.setpoint)
     pitch = f"blade-pitch command, {task.blade_pitch[0]:g} to {task.blade_pitch[1]:g} deg"
     rows = [
         ("direct", 0, f"generator torque, 0 to {law.max_torque * 1e-3:.2f} kN m (high-speed shaft)"),
@@ -56,7 +56,7 @@ def reward_table(task):
     """Weight, range and meaning of each reward term."""
     rows = [
         (name, f"{task.weights.get(name, 0.0):g}", f"{term.low:g} to {term.high:g}", term.meaning)
-        for name, term in TERMS.items()
+        for name, term in REWARD_TERMS.items()
     ]
     return markdown_table(("term", "weight", "range", "meaning"), rows, aligned=True)
 

@@ -1,4 +1,4 @@
-"""Tasks: what an episode is drawn from, what is seen, what is paid, and how long it lasts."""
+"""Tasks: what an episode is drawn from, what is observed and rewarded, and how long it lasts."""
 
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -34,7 +34,7 @@ class Episode(NamedTuple):
 
 @dataclass(frozen=True)
 class Task:
-    """What an agent is asked to do.
+    """What an agent has to do.
 
     wind, sea: as build_scene takes them, where a tuple (low, high) in place of a number is a range
     from which each episode draws uniformly. sea may also be {"kind": "joint", "table": name}: the
@@ -52,8 +52,8 @@ class Task:
     weights: dict = field(default_factory=lambda: dict(WEIGHTS))  # {reward term: weight}
     offsets: dict = field(default_factory=lambda: dict(START))  # {channel: (low, high)} added to the trim
     blade_pitch: tuple = (0.0, 30.0)  # deg, reach of the pitch action
-    setpoint: tuple = (0.5, 1.15)  # share of rated rotor speed, reach of the set-point action
-    residual_torque: float = 0.1  # largest addition to the baseline's torque, share of rated torque
+    setpoint: tuple = (0.5, 1.15)  # fraction of rated rotor speed, reach of the set-point action
+    residual_torque: float = 0.1  # largest addition to the baseline's torque, fraction of rated torque
     residual_pitch: float = 2.0  # deg, largest addition to the baseline's blade pitch
     wind_preview: tuple = ()  # s, look-ahead times of the channel wind_preview
     weather_seeds: tuple = (0, LARGEST_SEED)  # range (low, below) from which an episode's weather is drawn

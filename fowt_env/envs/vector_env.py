@@ -28,13 +28,13 @@ from fowt_env.plant.compile.handle import Handle
 if "OMP_WAIT_POLICY" not in os.environ:
     os.environ.setdefault("GOMP_SPINCOUNT", "3000")
 
-MODES = {mode.value: mode for mode in AutoresetMode}
+AUTORESET_MODES = {mode.value: mode for mode in AutoresetMode}
 INFO_KEYS = (*REWARD_KEYS, "time")  # those of every step that are float64
 INFO_MASKS = tuple(f"_{key}" for key in INFO_KEYS)
 
 
 class FowtVectorEnv(gymnasium.vector.VectorEnv):
-    """num_envs environments, each with its own weather, random generator and, if wished, settings.
+    """num_envs environments, each with its own weather, random generator and, optionally, settings.
 
     num_envs         how many
     autoreset_mode   a gymnasium.vector.AutoresetMode or its value: "NextStep" (as Gymnasium's own vector
@@ -72,11 +72,11 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
     ) -> None:
         self.num_envs = _count("num_envs", num_envs, 10**6)
         if isinstance(autoreset_mode, str):
-            if autoreset_mode not in MODES:
-                raise unknown("autoreset_mode", autoreset_mode, MODES)
-            autoreset_mode = MODES[autoreset_mode]
+            if autoreset_mode not in AUTORESET_MODES:
+                raise unknown("autoreset_mode", autoreset_mode, AUTORESET_MODES)
+            autoreset_mode = AUTORESET_MODES[autoreset_mode]
         if not isinstance(autoreset_mode, AutoresetMode):
-            raise unknown("autoreset_mode", autoreset_mode, MODES)
+            raise unknown("autoreset_mode", autoreset_mode, AUTORESET_MODES)
         self.autoreset_mode = autoreset_mode
         self.metadata = self.metadata | {"autoreset_mode": autoreset_mode}
         if settings.get("render_mode") is not None:
@@ -93,15 +93,15 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         self.single_action_space = first.action_space
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
-        self._law, self._watch = first._law, first._watch
+        self._baseline_law, self._estimator_law = first._baseline_law, first._estimator_law
         self._share_rows()
         self._statuses = np.full(num_envs, RUNNING, dtype=np.int64)
         self._rewards = np.zeros(num_envs)
         self._last = np.array([env._last for env in self.envs])
         self._dt = np.array([env.dt for env in self.envs])
         self._ended = np.zeros(num_envs, dtype=bool)  # waiting for the reset of the next step
-        self._handlees = None
-        self._held = [None] * num_envs  # what the compiled list holds, for comparison
+        self._handles = None
+        self._listed = [None] * num_envs  # handles in the compiled list, for comparison
 
     def _share_rows(self):
         """Make the arrays that the outside reads rows of common ones."""
@@ -131,17 +131,17 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
             seeds = list(seed)
             if len(seeds) != n:
                 raise InputError(f"seed has {len(seeds)} entries: must be a number or {n} of them")
-        chosen: Sequence[int] = range(n)
+        indices: Sequence[int] = range(n)
         if isinstance(options, list):
             if len(options) != n:
                 raise InputError(f"options has {len(options)} entries: must be a dict or {n} of them")
         else:
             options = dict(options or {})
             if "reset_mask" in options:
-                chosen = np.flatnonzero(self._mask(options.pop("reset_mask"))).tolist()
+                indices = np.flatnonzero(self._mask(options.pop("reset_mask"))).tolist()
             options = [options] * n
         infos: dict[str, Any] = {}
-        for i in chosen:
+        for i in indices:
             infos = self._reset_one(i, infos, seeds[i], options[i])
         return self._observations.copy(), infos
 
@@ -151,7 +151,7 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
             raise InputError(f"options['reset_mask']: must be a bool array of shape ({self.num_envs},)")
         if not mask.any():
             raise InputError("options['reset_mask']: must name at least one environment")
-        if self._handlees is None and not mask.all():
+        if self._handles is None and not mask.all():
             raise ResetNeeded("call reset() of all environments first")
         return mask
 
@@ -168,23 +168,23 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         return infos
 
     def _renew(self, i):
-        """Put the environment's present box, if it is another than before, into the compiled list."""
-        box = self.envs[i]._handle
-        if box is self._held[i]:
+        """Put the environment's present handle, if it has changed, into the compiled list."""
+        handle = self.envs[i]._handle
+        if handle is self._listed[i]:
             return
-        self._held[i] = box
-        if self._handlees is None:
-            if any(held is None for held in self._held):
+        self._listed[i] = handle
+        if self._handles is None:
+            if any(listed is None for listed in self._listed):
                 return
-            self._handlees = numba.typed.List(self._held)
+            self._handles = numba.typed.List(self._listed)
         else:
-            self._handlees[i] = box
+            self._handles[i] = handle
 
     def step(
         self, actions: npt.ArrayLike
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """(observations, rewards, terminations, truncations, infos) after one control period of each."""
-        if self._handlees is None:
+        if self._handles is None:
             raise ResetNeeded("call reset() first: no episode is running")
         resets = self._ended.nonzero()[0]
         if len(resets) and self.autoreset_mode == AutoresetMode.DISABLED:
@@ -218,21 +218,24 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
     def _act(self, actions, active):
         """One control period of the active environments under checked actions."""
         try:
-            asked = np.array(actions, dtype=np.float64)  # a copy: steady types, whatever was given
+            requested = np.array(actions, dtype=np.float64)  # a copy: steady types, whatever was given
         except (TypeError, ValueError):
             raise InputError(
                 f"actions = {actions!r}: must be ({self.num_envs}, {N_ACTIONS}) numbers"
             ) from None
-        if asked.shape != (self.num_envs, N_ACTIONS):
-            raise InputError(f"actions have shape {asked.shape}: must be ({self.num_envs}, {N_ACTIONS})")
-        given = (self._handlees, self._law, self._watch, asked, active, self._statuses, self._rewards)
+        if requested.shape != (self.num_envs, N_ACTIONS):
+            raise InputError(f"actions have shape {requested.shape}: must be ({self.num_envs}, {N_ACTIONS})")
+        arguments = (
+            self._handles, self._baseline_law, self._estimator_law, requested, active, self._statuses,
+            self._rewards,
+        )  # fmt: skip
         if self.threads == 1:
-            bad = act_all(*given)
+            bad = act_all(*arguments)
         else:
             with thread_limit(self.threads):
-                bad = act_all_parallel(*given, self.threads)
+                bad = act_all_parallel(*arguments, self.threads)
         if bad >= 0:
-            raise InputError(f"action of environment {bad} = {asked[bad].tolist()}: must be finite")
+            raise InputError(f"action of environment {bad} = {requested[bad].tolist()}: must be finite")
 
     def _infos(self, infos, shown, terminations):
         """Infos of a step with those of the shown environments added, as _add_info would."""
@@ -350,7 +353,7 @@ def _environments(num_envs, per_env, settings):
         raise InputError(f"per_env: must be a list of {num_envs} dicts of settings")
     built, envs = [], []
     for i, own in enumerate(per_env):
-        same = next((env for known, env in built if known is own or _equal(known, own)), None)
+        same = next((env for one, env in built if one is own or _equal(one, own)), None)
         if same is not None:
             envs.append(same.twin())
             continue

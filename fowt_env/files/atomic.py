@@ -8,7 +8,7 @@ import stat
 from contextlib import contextmanager
 from pathlib import Path
 
-NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
+NO_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
 _LEFTOVER = re.compile(r"\..*-(\d+)-[a-z0-9_]{8}(?:\.[^.]*)?")  # file of `replacing`, its process
 
 
@@ -17,7 +17,7 @@ def replacing(path):
     """Path of a temporary file beside `path` that takes its place when the block ends well.
 
     A file that is replaced leaves its rights to the new one; a link goes on pointing, to the new content.
-    Raises: OSError naming the path where there cannot be one, or the disk has no room for it.
+    Raises: OSError naming the path where there cannot be one, or the disk has no space for it.
     """
     path = Path(path)
     target = Path(os.path.realpath(path)) if path.is_symlink() else path
@@ -36,13 +36,13 @@ def replacing(path):
         os.replace(name, target)
     except BaseException as error:
         name.unlink(missing_ok=True)
-        if isinstance(error, OSError) and error.errno in NO_ROOM:  # it names nothing, or the temporary file
-            raise no_room(error, path) from error
+        if isinstance(error, OSError) and error.errno in NO_SPACE:  # it names nothing, or the temporary file
+            raise no_space(error, path) from error
         raise
 
 
-def no_room(error, path):
-    """OSError that names the path which there was no room to write."""
+def no_space(error, path):
+    """OSError that names the path which there was no space to write."""
     return OSError(error.errno, f"cannot be written: {os.strerror(error.errno)}", str(path))
 
 

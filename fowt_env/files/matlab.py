@@ -8,7 +8,7 @@ from fowt_env.files.atomic import replacing
 
 
 def write_mat(model: Any, path: str | Path) -> Path:
-    """The path written: a MATLAB file (version 5) of an analysis.LinearModel, SI and radians.
+    """The path written: a MATLAB file (version 5) of an analysis.linear_model.LinearModel, SI and radians.
 
     It holds the model's matrices by their names (A, B and those of outputs where it has them), the cell
     arrays states, inputs and outputs, and the operating point: x0 and u0 in the order of states and inputs

@@ -17,7 +17,7 @@ TIME = "Time_[s]"
 # OpenFAST's FileIDs. 3 is double precision, time by its start and step; the others round to 16 bits
 WITH_TIME, WITHOUT_TIME, UNCOMPRESSED, WITH_LENGTH = 1, 2, 3, 4
 NAME_LENGTH = 10  # characters of a channel name and of a unit, its brackets included
-EVEN = 1e-6  # largest deviation of a time from the even grid, as a share of its step
+EVEN = 1e-6  # largest deviation of a time from the even grid, as a fraction of its step
 WIND_COLUMNS = 8
 FINEST_TURN = DEGREE  # between two samples of a turning wind
 WIND_ROWS = 1_000_000

@@ -16,8 +16,8 @@ from fowt_env.plant.rigid_body import momentum_rate
 from fowt_env.plant.state import Command, State, pose_of
 from fowt_env.plant.user_loads import record_user_loads, to_inertial
 
-DEG = 180.0 / pi
-RPM = 30.0 / pi
+DEG_PER_RAD = 180.0 / pi
+RPM_PER_RAD_S = 30.0 / pi
 
 
 class Channel(NamedTuple):
@@ -37,27 +37,27 @@ FIXED_CHANNELS = (
     Channel("PtfmSurge", "m", 1.0),
     Channel("PtfmSway", "m", 1.0),
     Channel("PtfmHeave", "m", 1.0),
-    Channel("PtfmRoll", "deg", DEG),
-    Channel("PtfmPitch", "deg", DEG),
-    Channel("PtfmYaw", "deg", DEG),
+    Channel("PtfmRoll", "deg", DEG_PER_RAD),
+    Channel("PtfmPitch", "deg", DEG_PER_RAD),
+    Channel("PtfmYaw", "deg", DEG_PER_RAD),
     Channel("PtfmTVxi", "m/s", 1.0),
     Channel("PtfmTVyi", "m/s", 1.0),
     Channel("PtfmTVzi", "m/s", 1.0),
-    Channel("PtfmRVxi", "deg/s", DEG),
-    Channel("PtfmRVyi", "deg/s", DEG),
-    Channel("PtfmRVzi", "deg/s", DEG),
+    Channel("PtfmRVxi", "deg/s", DEG_PER_RAD),
+    Channel("PtfmRVyi", "deg/s", DEG_PER_RAD),
+    Channel("PtfmRVzi", "deg/s", DEG_PER_RAD),
     Channel("PtfmTAxi", "m/s^2", 1.0),
     Channel("PtfmTAyi", "m/s^2", 1.0),
     Channel("PtfmTAzi", "m/s^2", 1.0),
-    Channel("PtfmRAxi", "deg/s^2", DEG),
-    Channel("PtfmRAyi", "deg/s^2", DEG),
-    Channel("PtfmRAzi", "deg/s^2", DEG),
+    Channel("PtfmRAxi", "deg/s^2", DEG_PER_RAD),
+    Channel("PtfmRAyi", "deg/s^2", DEG_PER_RAD),
+    Channel("PtfmRAzi", "deg/s^2", DEG_PER_RAD),
     Channel("NcIMUTAxs", "m/s^2", 1.0),
     Channel("NcIMUTAys", "m/s^2", 1.0),
-    Channel("Azimuth", "deg", DEG),
-    Channel("RotSpeed", "rpm", RPM),
-    Channel("GenSpeed", "rpm", RPM),
-    Channel("BldPitch1", "deg", DEG),
+    Channel("Azimuth", "deg", DEG_PER_RAD),
+    Channel("RotSpeed", "rpm", RPM_PER_RAD_S),
+    Channel("GenSpeed", "rpm", RPM_PER_RAD_S),
+    Channel("BldPitch1", "deg", DEG_PER_RAD),
     Channel("GenTq", "kN-m", 1e-3),
     Channel("GenPwr", "kW", 1e-3),
     Channel("GenTqLim", "-", 1.0),

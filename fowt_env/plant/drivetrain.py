@@ -29,7 +29,7 @@ class TorqueCurve(NamedTuple):
     maximum_torque: float  # N m
 
 
-class Drivetrain(NamedTuple):
+class Shaft(NamedTuple):
     """Rigid shaft with gearbox: the figures of theory.md Eq. (7).
 
     inertia_row is I_rx = I_rotor + N_g^2 I_g, the inertia of the rotor-speed equation; coupling is
@@ -64,7 +64,7 @@ SLACK = 1e-9  # relative, by which a command may miss a limit in rounding
 
 
 def build_torque_curve(torque_law, region3="constant_torque"):
-    """TorqueCurve of a description.TorqueLaw; region3 is "constant_torque" or "constant_power".
+    """TorqueCurve of a descriptions.platform.TorqueLaw; region3 is "constant_torque" or "constant_power".
 
     The slip line of region 2.5 rises from the synchronous speed, region3_start/(1 + slip), to the
     region-3 torque at region3_start; it takes over from the parabola where the two meet.
@@ -102,11 +102,11 @@ def build_torque_curve(torque_law, region3="constant_torque"):
 
 
 def build_drivetrain(turbine):
-    """Drivetrain of a description.Turbine."""
+    """Shaft of a descriptions.platform.Turbine."""
     shaft, rotor_inertia = turbine.drivetrain, turbine.rotor.inertia
     ratio = shaft.gear_ratio
     rated_torque = ratio * turbine.torque_law.rated_torque  # tau_0, low-speed shaft
-    return Drivetrain(
+    return Shaft(
         gear_ratio=float(ratio),
         inertia_row=float(rotor_inertia + ratio**2 * shaft.generator_inertia),
         coupling=float(rotor_inertia + ratio * shaft.generator_inertia),
@@ -117,7 +117,7 @@ def build_drivetrain(turbine):
 
 
 def build_pitch_actuator(pitch_drive):
-    """PitchActuator of a description.PitchDrive."""
+    """PitchActuator of a descriptions.platform.PitchDrive."""
     return PitchActuator(
         time_constant=float(pitch_drive.time_constant),
         rate_limit=float(pitch_drive.rate_limit),
@@ -127,14 +127,20 @@ def build_pitch_actuator(pitch_drive):
 
 
 def build_torque_limits(torque_law):
-    """TorqueLimits of a description.TorqueLaw."""
+    """TorqueLimits of a descriptions.platform.TorqueLaw."""
     return TorqueLimits(maximum=float(torque_law.max_torque), rate_limit=float(torque_law.max_torque_rate))
 
 
 @kernel
-def limited(value, low, high):
+def clamp(value, low, high):
     """The value, or the limit that it passes."""
     return min(max(value, low), high)
+
+
+@kernel
+def rate_limit(value, target, step):
+    """The target, or the value moved towards it by a step, the most that it may change."""
+    return value + clamp(target - value, -step, step)
 
 
 @kernel
@@ -169,12 +175,12 @@ def followed_torque(torque, command, period, limits):
     """
     if not isfinite(command):  # which a limit would turn into a torque; the run stops at it instead
         return command
-    target = limited(command, 0.0, limits.maximum)
-    way = limits.rate_limit * period
+    target = clamp(command, 0.0, limits.maximum)
+    step = limits.rate_limit * period
     change = target - torque
-    if abs(change) <= way * (1.0 + SLACK):
+    if abs(change) <= step * (1.0 + SLACK):
         return target
-    return torque + way if change > 0.0 else torque - way
+    return torque + step if change > 0.0 else torque - step
 
 
 @kernel
@@ -204,23 +210,22 @@ def pitch_rate(blade_pitch, command, actuator):
     """Rate of change of the blade pitch, rad/s (theory.md Eq. (8)); 0 without lag, see followed_pitch."""
     if actuator.time_constant <= 0.0:
         return 0.0
-    target = limited(command, actuator.minimum, actuator.maximum)
+    target = clamp(command, actuator.minimum, actuator.maximum)
     rate = (target - blade_pitch) / actuator.time_constant
-    return limited(rate, -actuator.rate_limit, actuator.rate_limit)
+    return clamp(rate, -actuator.rate_limit, actuator.rate_limit)
 
 
 @kernel
 def followed_pitch(blade_pitch, command, dt, actuator):
     """Blade pitch to start a step of dt with, rad: an actuator without lag has no rate to integrate.
 
-    With lag: unchanged. Without: the command, within the position limits and the way that the rate
+    With lag: unchanged. Without: the command, within the position limits and the change that the rate
     limit allows in dt.
     """
     if actuator.time_constant > 0.0:
         return blade_pitch
-    target = limited(command, actuator.minimum, actuator.maximum)
-    way = actuator.rate_limit * dt
-    return blade_pitch + limited(target - blade_pitch, -way, way)
+    target = clamp(command, actuator.minimum, actuator.maximum)
+    return rate_limit(blade_pitch, target, actuator.rate_limit * dt)
 
 
 @kernel
@@ -229,7 +234,7 @@ def pitch_after(blade_pitch, command, dt, actuator):
     if actuator.time_constant <= 0.0:
         return blade_pitch
     lag, fastest = actuator.time_constant, actuator.rate_limit
-    target = limited(command, actuator.minimum, actuator.maximum)
+    target = clamp(command, actuator.minimum, actuator.maximum)
     error = target - blade_pitch
     sign = 1.0 if error > 0.0 else -1.0
     size = abs(error)

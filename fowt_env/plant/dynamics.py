@@ -32,7 +32,7 @@ class Loads(NamedTuple):
 
 
 @kernel
-def evaluate(t, x, model, data, dx):
+def evaluate_loads(t, x, model, data, dx):
     """Every load at a state, into data; writes only the rates of internal states into dx. No command."""
     pose = pose_in(x, model.rigid_body.plane)
     aero = aero_load(t, pose, x, model.aero, data, dx)
@@ -77,7 +77,7 @@ def respond(x, u, model, data, dx):
 def derivative(t, x, u, model, data, dx):
     """dx = f(t, x, u); u is a Command."""
     data.cache[LoadCache.VALID] = 0.0
-    evaluate(t, x, model, data, dx)
+    evaluate_loads(t, x, model, data, dx)
     respond(x, u, model, data, dx)
 
 

@@ -12,7 +12,7 @@ from fowt_env.errors import unknown
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.drivetrain import followed_pitch, pitch_after
-from fowt_env.plant.dynamics import derivative, evaluate, respond
+from fowt_env.plant.dynamics import derivative, evaluate_loads, respond
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rigid_body import attitude_rate
 from fowt_env.plant.rotor_substeps import build_substeps, follow_rotor, sample_rotor
@@ -45,10 +45,10 @@ class Adams(NamedTuple):
 
 @inlined_kernel
 def rates(t, x, u, model, data, dx):
-    """dx at an instant under u, from the kept loads where they are fresh."""
+    """dx at an instant under u, from the cached loads where they are fresh."""
     cache = data.cache
     if cache[LoadCache.VALID] < 0.5 or cache[LoadCache.TIME] != t:
-        evaluate(t, x, model, data, data.stages[0])
+        evaluate_loads(t, x, model, data, data.stages[0])
         cache[LoadCache.VALID] = 1.0
         cache[LoadCache.TIME] = t
         cache[LoadCache.ELEVATED] = 0.0
@@ -121,7 +121,7 @@ def moulton(order, new, i, history):
 @kernel
 def feathering(x, model):
     """Whether a free rotor's blades are pitched beyond FEATHERING, where its speed is heavily damped."""
-    return x[State.BLADE_PITCH] > FEATHERING and not model.rigid_body.rotor_held
+    return x[State.BLADE_PITCH] > FEATHERING and not model.rigid_body.rotor_fixed
 
 
 @inlined_kernel
@@ -204,7 +204,7 @@ def rotor_samples(method):
 def take_step(t, x, u, dt, model, method, data):
     """One step of the scene's integrator, x in place."""
     pitch = followed_pitch(x[State.BLADE_PITCH], u[Command.BLADE_PITCH], dt, model.actuator)
-    if pitch != x[State.BLADE_PITCH]:  # an actuator without lag jumps: the kept loads are not of this pitch
+    if pitch != x[State.BLADE_PITCH]:  # an actuator without lag jumps: the cached loads are not of this pitch
         x[State.BLADE_PITCH] = pitch
         data.cache[LoadCache.VALID] = 0.0
     method_step(t, x, u, dt, model, method, data)

@@ -22,8 +22,8 @@ class RigidBody(NamedTuple):
     gravity: float
     coupling: float  # H = I_rotor + N_g I_g
     rotor_row: float  # I_rx = I_rotor + N_g^2 I_g
-    platform_held: bool
-    rotor_held: bool
+    platform_fixed: bool
+    rotor_fixed: bool
     plane: object = None  # True: surge, heave and platform pitch alone move; None: all six motions
 
 
@@ -33,7 +33,7 @@ class Model(NamedTuple):
 
     rigid_body: RigidBody
     layout: object  # channels.Layout
-    drivetrain: object  # drivetrain.Drivetrain
+    drivetrain: object  # drivetrain.Shaft
     actuator: object  # drivetrain.PitchActuator
     generator: object  # drivetrain.TorqueLimits
     hydro: object  # hydro.load.Hydro or None
@@ -80,7 +80,7 @@ class Data(NamedTuple):
     matrix: np.ndarray  # (6, 6) mass with added mass, solved in place
     stages: np.ndarray  # (5, n_state) derivatives and states within a step
     cache: np.ndarray  # (N_CACHE,), see LoadCache
-    user: np.ndarray  # (user_loads.room_of(n),) wrench of each of the user's loads, and what they are given
+    user: np.ndarray  # (user_loads.user_data_size(n),) wrench of each user load, and its inputs
     history: np.ndarray  # (4, n_state) derivatives of past steps, latest first
     samples: np.ndarray  # (4 samples, 7) rotor loads within past steps, latest first
 

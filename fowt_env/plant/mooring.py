@@ -68,7 +68,7 @@ class Catenary(NamedTuple):
 
 
 def build_mooring(lines, tabulated=False):
-    """Mooring of a platform's `description.Line` records (tabulated: with a LineTable); None without any."""
+    """Mooring of a platform's `Line` records (tabulated: with a LineTable); None without any."""
     if not lines:
         return None
 

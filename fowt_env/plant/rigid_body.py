@@ -121,16 +121,16 @@ def accelerate_in_plane(pose, load, torque, added, body, dx):
     dx[State.VZ] = b2
     dx[State.WY] = b3
     dx[State.VY] = dx[State.WX] = dx[State.WZ] = 0.0
-    dx[State.ROTOR_SPEED] = 0.0 if body.rotor_held else torque / body.rotor_row
+    dx[State.ROTOR_SPEED] = 0.0 if body.rotor_fixed else torque / body.rotor_row
 
 
 @kernel
 def accelerate(pose, x, load, torque, added, body, matrix, dx):
     """Solve (M1 + A_a, M2; M2^T, I_rx) (nu', w_b') = loads - C1 nu - C2 w_b into dx."""
     b = dx[State.VX : State.WZ + 1]
-    if body.platform_held:
+    if body.platform_fixed:
         b[:] = 0.0
-        dx[State.ROTOR_SPEED] = 0.0 if body.rotor_held else torque / body.rotor_row
+        dx[State.ROTOR_SPEED] = 0.0 if body.rotor_fixed else torque / body.rotor_row
         return
     if body.plane is not None:
         accelerate_in_plane(pose, load, torque, added, body, dx)
@@ -145,12 +145,12 @@ def accelerate(pose, x, load, torque, added, body, matrix, dx):
     for i in range(6):
         for j in range(6):
             matrix[i, j] = body.mass_matrix[i, j] + added[i, j]
-    if body.rotor_held:
+    if body.rotor_fixed:
         solve_spd(matrix, b)
         dx[State.ROTOR_SPEED] = 0.0
         return
-    share = body.coupling / body.rotor_row
-    matrix[3, 3] -= share * body.coupling
-    b[3] -= share * torque
+    ratio = body.coupling / body.rotor_row
+    matrix[3, 3] -= ratio * body.coupling
+    b[3] -= ratio * torque
     solve_spd(matrix, b)
     dx[State.ROTOR_SPEED] = (torque - body.coupling * b[3]) / body.rotor_row

@@ -85,13 +85,13 @@ def observe(handle, x, u, t, dx, measurement):
 
 @entry
 def output(handle, x, u, t, dx, row):
-    """Fill one output row (n_channels,) in SI at time t under u; kept loads as in observe."""
+    """Fill one output row (n_channels,) in SI at time t under u; cached loads as in observe."""
     output_plant(model_of(handle), data_of(handle), x, u, t, dx, row)
 
 
 @entry
 def forget(handle):
-    """Drop kept loads and past derivatives: the state was changed from outside."""
+    """Drop cached loads and past derivatives: the state was changed from outside."""
     data_of(handle).cache[LoadCache.VALID] = 0.0
     data_of(handle).cache[LoadCache.STEPS] = 0.0
 

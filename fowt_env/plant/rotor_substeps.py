@@ -87,14 +87,14 @@ def follow_rotor(dt, model, substeps, data, y):
     samples, weight = data.samples, substeps.weight
     fx = fy = fz = mx = my = mz = torque = 0.0
     for k in range(samples.shape[0]):
-        share = weight[k]
-        fx += share * samples[k, 0]
-        fy += share * samples[k, 1]
-        fz += share * samples[k, 2]
-        mx += share * samples[k, 3]
-        my += share * samples[k, 4]
-        mz += share * samples[k, 5]
-        torque += share * samples[k, 6]
+        fraction = weight[k]
+        fx += fraction * samples[k, 0]
+        fy += fraction * samples[k, 1]
+        fz += fraction * samples[k, 2]
+        mx += fraction * samples[k, 3]
+        my += fraction * samples[k, 4]
+        mz += fraction * samples[k, 5]
+        torque += fraction * samples[k, 6]
     extra, still = data.stages[3], data.stages[2]
     for i in range(still.shape[0]):
         still[i] = 0.0  # without velocities the equation of motion has no terms but the load

@@ -64,6 +64,9 @@ def state_blocks(internal):
     return tuple(blocks)
 
 
+MOTIONS = ("surge", "sway", "heave", "roll", "platform_pitch", "yaw")  # of the platform, as names
+
+
 class Command(IntEnum):
     """Index of each command in the flat (N_COMMANDS,) float64 vector."""
 

@@ -103,7 +103,7 @@ class UserLoads(NamedTuple):
     kernel7: object
 
 
-def room_of(count, most_states=0):
+def user_data_size(count, most_states=0):
     """Entries of Data.user that this many loads need: six of each, the first to fail, Motion and Force."""
     return 6 * count + 1 + N_MOTION + N_FORCE + 2 * most_states if count else 0
 
@@ -191,10 +191,10 @@ def fill_place(pose, px, py, pz, body_axes, motion):
 
 
 @kernel
-def fill_water(t, pose, hydro, wanted, body_axes, motion):
-    """Fill the motion of the water at the point (above the still surface: that at it); zero if not wanted."""
+def fill_water(t, pose, hydro, needed, body_axes, motion):
+    """Fill the motion of the water at the point (above the still surface: that at it); zero if not needed."""
     u = v = w = du = dv = dw = 0.0
-    if wanted:
+    if needed:
         z = min(motion[Motion.Z], 0.0)
         u, v, w, du, dv, dw = water_at(t, motion[Motion.X], motion[Motion.Y], z, hydro)
     put(motion, Motion.WATER_X, pose, body_axes, u, v, w)
@@ -213,16 +213,16 @@ def body_wrench(pose, px, py, pz, body_axes, force):
 
 @kernel
 def evaluate_user_loads(t, pose, x, aero, hydro, user, data, dx):
-    """Fill data.user (room_of(n, most),): the wrench of each load, body axes about the body origin.
+    """Fill data.user (user_data_size(n, most),): the wrench of each load, body axes about the body origin.
 
     Entry 6 n becomes the number, from 1, of the first load that gave a number that is not finite while
     what it was given was finite. Rates of the loads' own states go into dx.
     """
     if user is None:
         return
-    n, room = user.point.shape[0], data.user
+    n, user_data = user.point.shape[0], data.user
     after = 6 * n + 1 + N_MOTION + user.most_states
-    motion, force = room[6 * n + 1 : after], room[after:]
+    motion, force = user_data[6 * n + 1 : after], user_data[after:]
     fill_common(t, pose, x, surface_at_origin(t, hydro, data), motion)
     for i in range(n):
         px, py, pz = user.point[i, 0], user.point[i, 1], user.point[i, 2]
@@ -242,21 +242,24 @@ def evaluate_user_loads(t, pose, x, aero, hydro, user, data, dx):
             total += force[j]
         for j in range(N_MOTION + states):
             given += motion[j]
-        if room[6 * n] == 0.0 and not isfinite(total) and isfinite(given):
-            room[6 * n] = i + 1.0
+        if user_data[6 * n] == 0.0 and not isfinite(total) and isfinite(given):
+            user_data[6 * n] = i + 1.0
         for j in range(states):
             dx[first + j] = force[Force.RATE + j]
         load = body_wrench(pose, px, py, pz, axes, force)
         k = 6 * i
-        room[k], room[k + 1], room[k + 2] = load.fx, load.fy, load.fz
-        room[k + 3], room[k + 4], room[k + 5] = load.mx, load.my, load.mz
+        user_data[k], user_data[k + 1], user_data[k + 2] = load.fx, load.fy, load.fz
+        user_data[k + 3], user_data[k + 4], user_data[k + 5] = load.mx, load.my, load.mz
 
 
 @kernel
-def user_wrench(i, room):
+def user_wrench(i, user_data):
     """Wrench of load i, as evaluate_user_loads left it in data.user."""
     k = 6 * i
-    return Wrench(room[k], room[k + 1], room[k + 2], room[k + 3], room[k + 4], room[k + 5])
+    return Wrench(
+        user_data[k], user_data[k + 1], user_data[k + 2],
+        user_data[k + 3], user_data[k + 4], user_data[k + 5],
+    )  # fmt: skip
 
 
 @kernel

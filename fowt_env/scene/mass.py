@@ -36,7 +36,7 @@ def _upper_bodies(platform, turbine):
     ]
 
 
-def build_rigid_body(platform, turbine, platform_held=False, rotor_held=False, plane=None):
+def build_rigid_body(platform, turbine, platform_fixed=False, rotor_fixed=False, plane=None):
     """RigidBody part: Eq. (10) from the four rigid bodies. plane: True holds sway, roll and yaw at zero."""
     ballast = platform.ballast
     matrix = assemble(
@@ -51,8 +51,8 @@ def build_rigid_body(platform, turbine, platform_held=False, rotor_held=False, p
         float(platform.environment.gravity),
         drivetrain.coupling,
         drivetrain.inertia_row,
-        platform_held,
-        rotor_held,
+        platform_fixed,
+        rotor_fixed,
         plane,
     )
 

@@ -35,7 +35,7 @@ OPTIONS = {
     "duration": (700.0, "seconds of random wind and sea, > 0"),
     "wave_components": (None, "None or a number of components, 1 to 10000"),
     "blade_stations": (None, "None (the turbine file's) or a number of them, 3 up to the file's"),
-    "strip_length": (None, "None (a share of the draft) or metres, 0.01 to 1000: cells of exact wave loads"),
+    "strip_length": (None, "None (fraction of the draft) or metres, 0.01 to 1000: cells of exact wave loads"),
     "shear_exponent": (None, "None (the platform file's) or 0 to 1"),
     "turbine": (None, "None (the platform file's), a name, a path or a descriptions.platform.Turbine"),
 }
@@ -49,7 +49,7 @@ def choose_parts(fidelity, rotor, options):
     level = FIDELITIES[fidelity]
     if rotor is not None and rotor not in ROTORS:
         raise unknown("rotor model", rotor, ROTORS)
-    # induction is not in the tables; a level falls back to what has it, an explicit wish is refused
+    # induction is not in the tables; a level falls back to what has it, an explicit choice is refused
     needs_induction = options["dynamic_inflow"] or options["skewed_wake"]
     if needs_induction and rotor not in (None, "bem"):
         raise InputError(f"rotor = {rotor!r}: skewed_wake and dynamic_inflow need rotor = 'bem'")

@@ -7,7 +7,7 @@ import numpy as np
 from fowt_env.descriptions.checks import check_number
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.aero.blade_elements import build_blade_elements
-from fowt_env.plant.aero.coefficient_table import build_rotor_table
+from fowt_env.plant.aero.coefficient_table import build_coefficient_table
 from fowt_env.plant.aero.load import Aero, BemRotor
 from fowt_env.plant.aero.section_table import build_section_table
 from fowt_env.plant.aero.tower_drag import build_tower_drag
@@ -41,7 +41,7 @@ def build_aero(platform, turbine, air, rotor, options):
         wake = build_dynamic_inflow() if options["dynamic_inflow"] else None
         model = BemRotor(elements, skew, wake)
     else:
-        model = build_section_table(elements) if rotor == "lookup" else build_rotor_table(elements)
+        model = build_section_table(elements) if rotor == "lookup" else build_coefficient_table(elements)
     tower = build_tower_drag(platform.tower, density) if options["tower_drag"] else None
     return Aero(air.series, air.field, model, tower)
 

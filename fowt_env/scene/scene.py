@@ -20,7 +20,7 @@ from fowt_env.plant.integrators import INTEGRATORS, rotor_samples
 from fowt_env.plant.model import N_CACHE, Data
 from fowt_env.plant.rotor_substeps import N_SAMPLE
 from fowt_env.plant.state import Block, state_blocks
-from fowt_env.plant.user_loads import room_of
+from fowt_env.plant.user_loads import user_data_size
 from fowt_env.scene.parts import strips_in_waves, wake_states
 from fowt_env.scene.user_loads import Load, first_nonfinite_load
 from fowt_env.scene.weather import Sea, Wind, build_weather
@@ -38,17 +38,17 @@ class Scene:
     state vector and the scratch of a run belong to the run.
     """
 
-    model: Any  # a dynamics.Model; its parts have many types
+    model: Any  # a plant.model.Model; its parts have many types
     platform: Platform
     turbine: Turbine
-    wind: Any  # as asked for
+    wind: Any  # as given
     sea: Any
     seed: int
     rotor: str
     options: dict
     wind_speed: float | None  # mean hub wind that a trim uses; None without aerodynamics
     loads: tuple[Load, ...] = ()  # the user's own
-    label: str = ""  # the platform as it was asked for: name or path
+    label: str = ""  # the platform as it was given: name or path
     trims: dict = field(default_factory=dict, init=False, repr=False)  # {platform mode: OperatingPoint} found
 
     @property
@@ -113,7 +113,9 @@ class Scene:
             matrix=np.zeros((6, 6)),
             stages=np.zeros((5, self.n_state)),
             cache=np.zeros(N_CACHE),
-            user=np.zeros(room_of(len(self.loads), max((load.states for load in self.loads), default=0))),
+            user=np.zeros(
+                user_data_size(len(self.loads), max((load.states for load in self.loads), default=0))
+            ),
             history=np.zeros((4, self.n_state)),
             samples=np.zeros((4 * rotor_samples(self.model.integrator), N_SAMPLE)),
         )

@@ -21,9 +21,9 @@ from fowt_env.plant.user_loads import MOST_LOADS, N_FORCE, N_MOTION, Motion, Use
 
 AXES = ("inertial", "body")
 SIGNATURE = types.void(FLOATS, FLOATS, FLOATS)
-ARGUMENTS = 3
+KERNEL_ARGUMENTS = 3
 MOST_STATES = 100  # of one load
-IN_PLANE = 1e-9  # share of a force out of the plane of a planar scene that rounding may leave
+IN_PLANE = 1e-9  # fraction of a force out of the plane of a planar scene that rounding may leave
 TRIALS = (  # states that a load is tried in: surge, sway, heave, roll, pitch, yaw, and their rates
     (np.zeros(6), np.zeros(6)),
     (np.array([12.0, -3.0, -1.5, 0.01, 0.07, -0.02]), np.array([0.7, -0.2, 0.4, 0.002, 0.01, 0.001])),
@@ -110,7 +110,7 @@ def load_kernel(function: Callable[..., None]) -> LoadKernel:
         return function
     if not isinstance(function, FunctionType):
         raise InputError(f"load_kernel: {function!r} must be a plain Python function")
-    if len(inspect.signature(function).parameters) != ARGUMENTS:
+    if len(inspect.signature(function).parameters) != KERNEL_ARGUMENTS:
         raise InputError(
             f"load kernel {function.__name__!r}: must take three arguments (parameters, motion, force)"
         )
@@ -298,12 +298,12 @@ def build_user_loads(loads: Sequence[Load], base_height: float, first_state: int
     )
 
 
-def first_nonfinite_load(loads: Sequence[Load], room: np.ndarray) -> str | None:
+def first_nonfinite_load(loads: Sequence[Load], user_data: np.ndarray) -> str | None:
     """Words for the load that first gave a number that is not finite; None where none did.
 
-    room: what plant.user_loads.evaluate_user_loads filled.
+    user_data: what plant.user_loads.evaluate_user_loads filled.
     """
-    if not loads or not room[6 * len(loads)]:
+    if not loads or not user_data[6 * len(loads)]:
         return None
-    load = loads[int(room[6 * len(loads)]) - 1]
+    load = loads[int(user_data[6 * len(loads)]) - 1]
     return f"load {load.name!r} gave a force that is not finite"

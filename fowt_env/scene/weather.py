@@ -17,11 +17,11 @@ from fowt_env.weather.wind_field import WindBox, hub_speed, is_field, read_box, 
 # what users may give as wind and sea, see build_scene
 Wind = float | dict[str, Any] | WindSeries | WindBox | None
 Sea = str | Path | Mapping[str, Any] | SeaState | None
-IN_PLANE = 1e-9  # share of a vector out of the plane of a planar scene that rounding may leave
+IN_PLANE = 1e-9  # fraction of a vector out of the plane of a planar scene that rounding may leave
 
 
 class Air(NamedTuple):
-    """Wind of a scene: what was asked for (a box once read), its parts, and the mean hub wind of a trim."""
+    """Wind of a scene: what was given (a box once read), its parts, and the mean hub wind of a trim."""
 
     spec: object
     series: object  # WindSeries or None

@@ -13,7 +13,7 @@ import numpy as np
 from fowt_env.descriptions.checks import check_number
 from fowt_env.errors import InputError
 from fowt_env.files.atomic import replacing
-from fowt_env.visual.rendering import AT_REST, COLOURS, LOOSE, TIGHT, TRACES, YELLOW, View
+from fowt_env.visual.rendering import AT_REST, LOOSE, RGB_COLOURS, TIGHT, TRACES, YELLOW, View
 
 SUFFIXES = (".gif", ".mp4")
 MOST_RUNS = 4
@@ -30,7 +30,7 @@ DRAWN = (
 )
 GIF_COLOURS = 128
 # small or rare in a picture, but to be kept in the palette: this many rows of the sample are given to them
-KEY_COLOURS = (*COLOURS, YELLOW, LOOSE, AT_REST, TIGHT)
+KEY_COLOURS = (*RGB_COLOURS, YELLOW, LOOSE, AT_REST, TIGHT)
 SWATCH = 160
 
 

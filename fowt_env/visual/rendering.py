@@ -38,7 +38,7 @@ SEABED, CREST, STEEL, YELLOW, WHITE = (
     (240, 190, 40),
     (246, 247, 249),
 )
-COLOURS = ((0, 114, 178), (213, 94, 0), (0, 158, 115), (204, 121, 167))
+RGB_COLOURS = ((0, 114, 178), (213, 94, 0), (0, 158, 115), (204, 121, 167))
 LOOSE, AT_REST, TIGHT = (90, 170, 230), (250, 236, 150), (220, 50, 40)  # of a line, by its tension
 
 # label, channel, unit, format, smallest height of the panel
@@ -62,7 +62,7 @@ def load_pygame():
     return pygame
 
 
-class Pose:
+class PlatformPose:
     """Where the platform is: position (3,), m, and rotation (3, 3) from body to inertial axes."""
 
     def __init__(self, row):
@@ -122,9 +122,9 @@ class Surface:
 
 def tension_colour(tension, at_rest):
     """Colour of a line: blue where loose, yellow at its tension at rest, red at one and a half of it."""
-    share = 2.0 * (tension / at_rest - 1.0) if at_rest > 0.0 else 0.0
-    other, share = (TIGHT, min(share, 1.0)) if share > 0.0 else (LOOSE, min(-share, 1.0))
-    return tuple(round(a + share * (b - a)) for a, b in zip(AT_REST, other, strict=True))
+    fraction = 2.0 * (tension / at_rest - 1.0) if at_rest > 0.0 else 0.0
+    other, fraction = (TIGHT, min(fraction, 1.0)) if fraction > 0.0 else (LOOSE, min(-fraction, 1.0))
+    return tuple(round(a + fraction * (b - a)) for a, b in zip(AT_REST, other, strict=True))
 
 
 class TurbinePanel:
@@ -155,7 +155,7 @@ class TurbinePanel:
         self.scene = scene
         waves = None if scene.model.hydro is None else scene.model.hydro.waves
         self.surface = Surface(waves, self._pixels / self.scale + self.left)
-        rest = Pose(
+        rest = PlatformPose(
             dict.fromkeys(("PtfmSurge", "PtfmSway", "PtfmHeave", "PtfmRoll", "PtfmPitch", "PtfmYaw"), 0.0)
         )
         self.tension_at_rest = [tension for _, tension in mooring_shapes(scene, rest)]
@@ -165,8 +165,8 @@ class TurbinePanel:
         pygame = self.pygame
         picture = pygame.Surface(self.inner, pygame.SRCALPHA)
         for y in range(self.inner[1]):
-            share = min(max((y - begin) / max(1, end - begin), 0.0), 1.0)
-            mixed = [round(a + share * (b - a)) for a, b in zip(*colours, strict=True)]
+            fraction = min(max((y - begin) / max(1, end - begin), 0.0), 1.0)
+            mixed = [round(a + fraction * (b - a)) for a, b in zip(*colours, strict=True)]
             pygame.draw.line(picture, mixed, (0, y), (self.inner[0], y))
         return picture
 
@@ -179,7 +179,7 @@ class TurbinePanel:
     def draw(self, row, label=None):
         """The picture of a row of channels, at its final size."""
         pygame, canvas = self.pygame, self._canvas
-        pose = Pose(row)
+        pose = PlatformPose(row)
         canvas.blit(self._sky, (0, 0))
         self._hull(canvas, pose)
         self._sea_over(canvas, row["Time"])
@@ -269,9 +269,9 @@ class TurbinePanel:
         tip, head = x + unit * speed, 0.014 * self.inner[1]
         if abs(speed) > 0.05:
             back = tip - np.sign(speed) * 1.6 * head
-            pygame.draw.line(canvas, COLOURS[0], (x, y), (back, y), 3 * SAMPLING)
-            pygame.draw.polygon(canvas, COLOURS[0], [(tip, y), (back, y - head), (back, y + head)])
-        text = self._fonts[0].render(f"{speed:.1f} m/s", True, COLOURS[0])
+            pygame.draw.line(canvas, RGB_COLOURS[0], (x, y), (back, y), 3 * SAMPLING)
+            pygame.draw.polygon(canvas, RGB_COLOURS[0], [(tip, y), (back, y - head), (back, y + head)])
+        text = self._fonts[0].render(f"{speed:.1f} m/s", True, RGB_COLOURS[0])
         canvas.blit(text, (x, y + 1.2 * head))
 
     def _words(self, canvas, row, label):
@@ -312,7 +312,7 @@ class MooringPanel:
         bed = self.level + self.depth * self.scale
         pygame.draw.rect(picture, (20, 62, 100), (0, self.level, self.size[0], bed - self.level))
         pygame.draw.rect(picture, SEABED, (0, bed, self.size[0], 3))
-        pose = Pose(row)
+        pose = PlatformPose(row)
         texts = []
         for number, (points, tension) in enumerate(mooring_shapes(scene, pose)):
             colour = tension_colour(tension, at_rest[number])
@@ -373,13 +373,13 @@ class TracePanel:
                 y = box.bottom - box.height * (history[:, 1 + number] - middle + half) / (2.0 * half)
                 if len(x) > 1:
                     line = np.column_stack([x, y])
-                    pygame.draw.aalines(picture, COLOURS[index % len(COLOURS)], False, line)
-                    pygame.draw.aalines(picture, COLOURS[index % len(COLOURS)], False, line + (0, 1))
+                    pygame.draw.aalines(picture, RGB_COLOURS[index % len(RGB_COLOURS)], False, line)
+                    pygame.draw.aalines(picture, RGB_COLOURS[index % len(RGB_COLOURS)], False, line + (0, 1))
             picture.blit(self._font.render(f"{label} ({unit})", True, SOFT), (10, top + 7))
             right = self.size[0] - 10
             for index, history in reversed(list(enumerate(data))):
                 text = self._bold.render(
-                    format(history[-1, 1 + number], form), True, COLOURS[index % len(COLOURS)]
+                    format(history[-1, 1 + number], form), True, RGB_COLOURS[index % len(RGB_COLOURS)]
                 )
                 right -= text.get_width()
                 picture.blit(text, (right, top + 6))

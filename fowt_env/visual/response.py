@@ -31,7 +31,7 @@ SCHEDULE = (
     ("generator torque (kN m)", "GenTq_[kN-m]"),
     ("platform pitch (deg)", "PtfmPitch_[deg]"),
 )
-MOTIONS = (
+MOTION_CHANNELS = (
     ("surge\n(m/m)", "PtfmSurge_[m]"),
     ("heave\n(m/m)", "PtfmHeave_[m]"),
     ("platform pitch\n(deg/m)", "PtfmPitch_[deg]"),
@@ -181,7 +181,7 @@ def plot_raos(runs, path=None, title=None, skip=0.0, segment=None):
     Solid where the coherence is above one half, faint below: there other things than waves move it.
     """
     runs = named_runs(runs if isinstance(runs, dict) else {"": runs})
-    panels = _shown(MOTIONS, list(runs.values()), "run")
+    panels = _shown(MOTION_CHANNELS, list(runs.values()), "run")
     figure, places = _grid(panels, min(2, len(panels)), 4.6, 2.4)
     for axes, (name, channel) in zip(places, panels, strict=True):
         for number, (label, frame) in enumerate(runs.items()):

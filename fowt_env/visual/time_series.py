@@ -265,7 +265,7 @@ def plot_evaluation(table, metrics, path=None, title=None):
     return save_figure(figure, path)
 
 
-PARETO = ("RotSpeed_std_[rpm]", "PtfmPitch_std_[deg]", "blade_pitch_travel_[deg/s]", "overspeed_[%]")
+PARETO_METRICS = ("RotSpeed_std_[rpm]", "PtfmPitch_std_[deg]", "blade_pitch_travel_[deg/s]", "overspeed_[%]")
 LARGEST_MARK = 900.0  # points squared, of the controller that travels most
 
 
@@ -278,7 +278,7 @@ def plot_pareto(board, path=None, title=None):
     """
     entries = []
     for entry in board["controllers"]:
-        figures = [entry["metrics"][name] for name in PARETO]
+        figures = [entry["metrics"][name] for name in PARETO_METRICS]
         if all(np.isfinite([figure["mean"] for figure in figures])) and figures[0]["mean"] > 0.0:
             entries.append((entry["controller"], entry["failed"], figures))
     if not entries:

@@ -119,10 +119,10 @@ def amplitudes(speed, sigma, height, diameter, samples, step, average):
     inside = slice(1, (samples + 1) // 2)  # neither the mean nor, for even samples, the Nyquist bin
     for row, (length_ratio, sigma_ratio) in enumerate(zip(LENGTH_RATIO, SIGMA_RATIO, strict=True)):
         length = length_ratio * length_scale(height)
-        share = _kaimal_below(frequency[inside] + half_bin, speed, length) - _kaimal_below(
+        fraction = _kaimal_below(frequency[inside] + half_bin, speed, length) - _kaimal_below(
             frequency[inside] - half_bin, speed, length
         )
-        variance[row, inside] = (sigma_ratio * sigma) ** 2 * share / share.sum()
+        variance[row, inside] = (sigma_ratio * sigma) ** 2 * fraction / fraction.sum()
     if average == "rotor":
         kr = coherence_wave_number(frequency, speed, height) * 0.5 * diameter
         variance[3:] = 4.0 * variance[0] * disk_gradient(kr)  # per diameter, not per radius

@@ -287,13 +287,13 @@ def _average(field, hub_height, radius, weight, azimuths, value):
                 angle = 2.0 * np.pi * (a + 0.5) / azimuths
                 y, z = radius[r] * np.cos(angle), radius[r] * np.sin(angle)
                 u, v, w = field_at(t, 0.0, y, hub_height + z, field)
-                share = weight[r] / total
-                value[i, 0] += share * u
-                value[i, 1] += share * v
-                value[i, 2] += share * w
-                value[i, 3] += share * u * z
-                value[i, 4] += share * u * y
-                second += share * z * z
+                fraction = weight[r] / total
+                value[i, 0] += fraction * u
+                value[i, 1] += fraction * v
+                value[i, 2] += fraction * w
+                value[i, 3] += fraction * u * z
+                value[i, 4] += fraction * u * y
+                second += fraction * z * z
         value[i, 3] /= second
         value[i, 4] /= second
 
@@ -303,7 +303,7 @@ def rotor_average(box, hub_height, rotor_diameter, weights="area", chord=None):
 
     value (n, 5): means of u, v, w over the disk, and the gradients of the plane that fits u best, per
     rotor diameter. weights: "area", or "chord" with chord = (radius, chord) of the blade: each ring then
-    counts as chord times radius, as its share in thrust does at a given rotor speed.
+    counts as chord times radius, as its contribution to the thrust does at a given rotor speed.
     """
     node, weight = np.polynomial.legendre.leggauss(DISK_RADII)
     radius = 0.25 * rotor_diameter * (node + 1.0)

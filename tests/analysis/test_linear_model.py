@@ -106,7 +106,7 @@ def test_inputs_act_where_they_should(storm_scene, turbine):
     assert model.B[model.index("vx"), 2] > 0.0
 
 
-def test_linear_model_of_a_held_platform_has_no_platform_motion(storm_scene):
+def test_linear_model_of_a_fixed_platform_has_no_platform_motion(storm_scene):
     model = linearize(storm_scene, fowt_env.trim(storm_scene, platform="fixed"))
     assert np.all(model.A[6:12] == 0.0) and np.all(model.B[6:12] == 0.0)
     assert model.A[model.index("rotor_speed"), model.index("rotor_speed")] < 0.0

@@ -62,9 +62,9 @@ def test_platform_stays_at_trim_in_still_water(still_scene):
 
 def remaining(scene, point):
     """Azimuth-averaged derivative at an operating point."""
-    box = without_fluctuations(scene).handle()
+    handle = without_fluctuations(scene).handle()
     dx, mean = np.zeros(scene.n_state), np.zeros(scene.n_state)
-    mean_derivative(box, point.state.copy(), point.command.copy(), AZIMUTHS, dx, mean)
+    mean_derivative(handle, point.state.copy(), point.command.copy(), AZIMUTHS, dx, mean)
     return mean
 
 

@@ -6,7 +6,13 @@ import pytest
 from fowt_env import build_scene, simulate
 from fowt_env.controllers import make
 from fowt_env.controllers.pi import PISettings
-from fowt_env.controllers.preview import Preview, PreviewSettings, foreseen_pitch, rotor_wind, steady_pitch
+from fowt_env.controllers.preview import (
+    Preview,
+    PreviewSettings,
+    foreseen_pitch,
+    rotor_wind_series,
+    steady_pitch,
+)
 from fowt_env.errors import InputError
 from fowt_env.plant.measurement import Measurement
 
@@ -88,7 +94,7 @@ def test_of_a_full_field_it_sees_the_rotor_average():
     u = wave[:, None, None] + 0.02 * grid[None, :, None] + 0.01 * grid[None, None, :]
     box = {"kind": "box", "u": u, "y": grid, "z": 90.0 + grid, "dt": 0.5, "speed": 18.0, "periodic": True}
     scene = build_scene("oc3_hywind", wind=box, duration=60.0, fidelity="standard")
-    time, speed, period = rotor_wind(scene)
+    time, speed, period = rotor_wind_series(scene)
     assert period == pytest.approx(64.0)
     assert time == pytest.approx(0.5 * np.arange(128) - 80.0 / 18.0)
     assert speed == pytest.approx(wave, abs=1e-4)  # the box holds single precision

@@ -10,7 +10,7 @@ import pytest
 from naive.turbine import turbine
 
 from fowt_env import build_scene, controllers
-from fowt_env.control import EXTRA
+from fowt_env.control import PRIVILEGED_INPUTS
 from fowt_env.controllers import CONTROLLERS, CheckedController, information, make
 from fowt_env.controllers.constant import Constant
 from fowt_env.controllers.policy.controller import shipped_agents
@@ -111,7 +111,7 @@ def test_every_name_says_what_it_is(name):
 def test_every_name_says_what_it_uses(name):
     used = information(name)
     assert used
-    assert set(used) <= {*Measurement._fields, *EXTRA}
+    assert set(used) <= {*Measurement._fields, *PRIVILEGED_INPUTS}
 
 
 def test_a_scene_reaches_only_controllers_that_ask_for_it():

@@ -11,7 +11,7 @@ from fowt_env.descriptions.platform import read_turbine
 
 ROOT = Path(fowt_env.__file__).resolve().parent.parent
 FACTOR = re.compile(r"\bpi\s*/\s*(180|30)\b|\bpi\s*/\s*60\b|\b(180|30|60)(\.0)?\s*/\s*\(?(np\.|math\.)?pi\b")
-OWN = ("fowt_env/plant", "fowt_env/envs")  # floors below and beside, whose kernels freeze their own factors
+OWN = ("fowt_env/plant", "fowt_env/envs")  # layers below and beside, whose kernels freeze their own factors
 SOURCES = [
     path
     for top in ("fowt_env", "controllers", "training", "docs/tools")

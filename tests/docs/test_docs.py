@@ -17,7 +17,7 @@ from doc_pages import DOCS, FENCE
 
 from fowt_env.controllers.policy.controller import shipped_agents
 from fowt_env.descriptions.platform import read_turbine
-from fowt_env.envs.rewards import N_TERMS, TERMS, build_scales, fill_terms
+from fowt_env.envs.rewards import N_TERMS, REWARD_TERMS, build_scales, fill_terms
 from fowt_env.envs.tasks import TASKS
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measure
 
@@ -95,7 +95,7 @@ def test_the_printed_reward_formulas_give_what_the_kernels_give():
         }  # fmt: skip
         terms = np.full(N_TERMS, np.nan)
         fill_terms(now, before, reference, failed, scales, terms)
-        printed = [eval(formulas[term], {"__builtins__": {}}, names) for term in TERMS]
+        printed = [eval(formulas[term], {"__builtins__": {}}, names) for term in REWARD_TERMS]
         np.testing.assert_allclose(terms, printed, rtol=1e-12, atol=1e-15)
 
 
@@ -105,7 +105,7 @@ def test_the_info_table_has_every_key_and_no_other():
     told = {"reset": set(), "step": set(), "step, at a failure": set()}
     for key, where, _ in rows:
         name = key.strip("`")
-        names = [f"reward/{term}" for term in TERMS] if name == "reward/<term>" else [name]
+        names = [f"reward/{term}" for term in REWARD_TERMS] if name == "reward/<term>" else [name]
         for place in where.split(", ") if "failure" not in where else [where]:
             told[place].update(names)
     env = gymnasium.make("fowt_env/OC3Hywind-v1", task="above_rated").unwrapped

@@ -18,8 +18,7 @@ import fowt_env
 from fowt_env.controllers import make
 from fowt_env.descriptions.platform import DATA, read_platform
 from fowt_env.envs import FowtEnv
-from fowt_env.plant.compile import announcement as warmup
-from fowt_env.plant.compile import decorators as jit
+from fowt_env.plant.compile import announcement, decorators
 from fowt_env.plant.compile.versions import check_numba
 from fowt_env.training.cli import app as cli
 from fowt_env.training.cli import health
@@ -96,7 +95,7 @@ def episode(**settings):
 
 @under("The first run takes a minute")
 def _(folder, monkeypatch):
-    return warmup.COMPILING_MESSAGE
+    return announcement.COMPILING_MESSAGE
 
 
 @under("Every run takes a minute")
@@ -111,7 +110,7 @@ def _(folder, monkeypatch):
     (folder / "kernels").mkdir()
     (folder / "kernels").chmod(0o777)
     with pytest.warns(RuntimeWarning) as caught:
-        assert jit._cache_folder([]) is None
+        assert decorators._cache_folder([]) is None
     return str(caught[0].message)
 
 

@@ -13,11 +13,11 @@ from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
 import fowt_env
-from fowt_env.analysis.trim_cache import GRID, exact_trim, near_trim
+from fowt_env.analysis.trim_cache import GRID, cached_trim, interpolated_trim
 from fowt_env.controllers import make
 from fowt_env.envs import TASKS, FowtEnv, Task
 from fowt_env.envs.observations import KNOWN
-from fowt_env.envs.rewards import TERMS
+from fowt_env.envs.rewards import REWARD_TERMS
 from fowt_env.errors import InputError
 from fowt_env.plant.state import State
 from fowt_env.registration import ENVIRONMENTS
@@ -324,9 +324,9 @@ def test_reward_is_the_weighted_sum_of_its_visible_terms():
     rng = np.random.default_rng(0)
     for _ in range(50):
         _, reward, _, _, info = env.step(rng.uniform(-1.0, 1.0, 2))
-        terms = {name: info[f"reward/{name}"] for name in TERMS}
+        terms = {name: info[f"reward/{name}"] for name in REWARD_TERMS}
         assert reward == pytest.approx(sum(env.task.weights[n] * v for n, v in terms.items()), rel=1e-12)
-        assert all(TERMS[name].low <= value <= TERMS[name].high for name, value in terms.items())
+        assert all(REWARD_TERMS[n].low <= value <= REWARD_TERMS[n].high for n, value in terms.items())
     assert env.task.weights["power"] == 3.0
     assert env.task.weights["rotor_speed"] == TASKS["above_rated"].weights["rotor_speed"] > 0.0
 
@@ -427,11 +427,11 @@ def test_interpolated_operating_points_are_near_the_exact_ones():
     scene, key = env.scene, env._key
     bounds = {State.SURGE: 0.06, State.PLATFORM_PITCH: 3e-4, State.BLADE_PITCH: 1e-3, State.ROTOR_SPEED: 4e-3}
     for speed in (5.125, 7.875, 10.375, 11.375, 11.875, 14.125, 24.875):
-        near, exact = near_trim(scene, key, speed)[0], exact_trim(scene, key, speed)[0]
+        near, exact = interpolated_trim(scene, key, speed)[0], cached_trim(scene, key, speed)[0]
         wider = 20.0 if abs(speed - scene.turbine.rated_wind_speed) < GRID else 1.0  # pitch control sets in
         for index, bound in bounds.items():
             assert abs(near[index] - exact[index]) < wider * bound, (speed, index)
-    assert near_trim(scene, key, 18.0)[0] is exact_trim(scene, key, 18.0)[0]
+    assert interpolated_trim(scene, key, 18.0)[0] is cached_trim(scene, key, 18.0)[0]
 
 
 def test_preview_shows_the_wind_that_comes():

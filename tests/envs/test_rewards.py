@@ -12,7 +12,7 @@ from fowt_env.envs import FowtEnv
 from fowt_env.envs.rewards import (
     AT_MARGIN,
     N_TERMS,
-    TERMS,
+    REWARD_TERMS,
     TermIndex,
     build_scales,
     check_weights,
@@ -121,11 +121,11 @@ def test_platform_motion_term_is_constant_along_a_free_oscillation_of_thirty_sec
 
 
 def test_travel_terms_cost_one_at_the_rate_limit():
-    pitch_way = TURBINE.pitch_drive.rate_limit * 0.1
-    assert travel_term(0.1, 0.1 + pitch_way, SCALES.pitch_way) == pytest.approx(-1.0, rel=1e-12)
-    assert travel_term(0.1, 0.1 - 0.5 * pitch_way, SCALES.pitch_way) == pytest.approx(-0.5, rel=1e-12)
-    assert travel_term(0.0, 1e9, SCALES.torque_way) == -1.0
-    assert travel_term(0.3, 0.3, SCALES.pitch_way) == 0.0
+    most = TURBINE.pitch_drive.rate_limit * 0.1
+    assert travel_term(0.1, 0.1 + most, SCALES.max_pitch_increment) == pytest.approx(-1.0, rel=1e-12)
+    assert travel_term(0.1, 0.1 - 0.5 * most, SCALES.max_pitch_increment) == pytest.approx(-0.5, rel=1e-12)
+    assert travel_term(0.0, 1e9, SCALES.max_torque_increment) == -1.0
+    assert travel_term(0.3, 0.3, SCALES.max_pitch_increment) == 0.0
 
 
 def test_failure_costs_one():
@@ -137,8 +137,8 @@ def test_failure_costs_one():
 def test_terms_stay_in_their_ranges_whatever_is_measured():
     rng = np.random.default_rng(5)
     size = np.array([1e-3, 1.0, 10.0, 1e5, 1e9, 1e300])
-    low = np.array([term.low for term in TERMS.values()])
-    high = np.array([term.high for term in TERMS.values()])
+    low = np.array([term.low for term in REWARD_TERMS.values()])
+    high = np.array([term.high for term in REWARD_TERMS.values()])
     for _ in range(2000):
         now, before = rng.normal(size=(2, N_MEASUREMENTS)) * rng.choice(size, (2, N_MEASUREMENTS))
         terms = terms_of(now, before, rng.normal(size=2), bool(rng.integers(2)))
@@ -148,8 +148,8 @@ def test_terms_stay_in_their_ranges_whatever_is_measured():
 def test_every_term_has_a_weight_in_the_sum():
     rng = np.random.default_rng(1)
     terms = rng.normal(size=N_TERMS)
-    weights = dict(zip(TERMS, rng.uniform(size=N_TERMS).tolist(), strict=True))
-    expected = sum(weights[name] * terms[TermIndex[name.upper()]] for name in TERMS)
+    weights = dict(zip(REWARD_TERMS, rng.uniform(size=N_TERMS).tolist(), strict=True))
+    expected = sum(weights[name] * terms[TermIndex[name.upper()]] for name in REWARD_TERMS)
     assert weighted_sum(weight_array(weights), terms) == pytest.approx(expected, rel=1e-14)
     assert np.array_equal(weight_array({"power": 2.0}), [2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
 
@@ -180,7 +180,7 @@ def test_the_default_weights_rank_controllers_as_their_metrics_do():
     assert gaps.min() > 0.1  # of some 9 that perfection is paid
     page = (Path(__file__).resolve().parents[2] / "docs" / "environment.md").read_text()
     assert tool.markdown(table) in page, tool.markdown(table)
-    even = tool.ranking(("lqr", "pi_unscheduled", "gspi_oc3"), {name: 1.0 for name in TERMS})
+    even = tool.ranking(("lqr", "pi_unscheduled", "gspi_oc3"), {name: 1.0 for name in REWARD_TERMS})
     assert even.index[0] == "pi_unscheduled"
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from fowt_env.envs import TASKS, Task, task_tables
 from fowt_env.envs.observations import DEFAULT, KNOWN, STANDARD, check_channels
-from fowt_env.envs.rewards import TERMS
+from fowt_env.envs.rewards import REWARD_TERMS
 from fowt_env.envs.tasks import task_of
 from fowt_env.errors import InputError
 
@@ -122,5 +122,5 @@ def test_default_among_the_channels_stands_for_the_task_s_own():
 def test_tables_show_every_entry_and_every_term():
     task = replace(TASKS["above_rated"], observation=KNOWN, wind_preview=(2.0, 4.0))
     text = task_tables(task)
-    for word in (*TERMS, *STANDARD, "wind_preview_4s", "sin_azimuth", "47.40 kN m", "0 to 30 deg"):
+    for word in (*REWARD_TERMS, *STANDARD, "wind_preview_4s", "sin_azimuth", "47.40 kN m", "0 to 30 deg"):
         assert word in text

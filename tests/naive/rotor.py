@@ -66,7 +66,7 @@ def roots(ratio, *section):
     return [f for f in found if abs(residual(f, ratio, *section)) < 1e-6]  # not the jumps
 
 
-def fade(x, low, high):
+def smoothstep(x, low, high):
     """Smooth step of third order."""
     x = np.clip((x - low) / (high - low), 0.0, 1.0)
     return x * x * (3 - 2 * x)
@@ -76,7 +76,7 @@ def solve(v_normal, v_tangential, theta, radius, chord, polar, rotor):
     """(f, a, a', fn, ft) of one section of a fast rotor: the greatest root; none for v_tangential <= 0."""
     part = 0.0
     if v_tangential > 0:
-        part = fade(v_tangential / max(abs(v_normal), 1e-300), 0.01, 0.02)
+        part = smoothstep(v_tangential / max(abs(v_normal), 1e-300), 0.01, 0.02)
     f, a, ap = np.arctan2(v_normal, v_tangential), 0.0, 0.0
     if part > 0:
         mirrored = v_normal < 0

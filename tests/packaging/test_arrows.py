@@ -1,4 +1,4 @@
-"""The rooms and what each may import: an arrow goes from a room to one further down, never up."""
+"""The layers and what each may import: an arrow goes from a layer to one further down, never up."""
 
 import ast
 from pathlib import Path
@@ -8,8 +8,8 @@ import pytest
 import fowt_env
 
 ROOT = Path(fowt_env.__file__).resolve().parent.parent
-# from the ground up; a room imports itself and what stands before it
-FLOORS = (
+# from the ground up; a layer imports itself and what stands before it
+LAYERS = (
     "errors", "folders", "registration", "plant", "descriptions", "weather", "scene", "files", "analysis",
     "control", "simulation", "visual", "envs", "controllers", "training", "training.evaluation",
     "training.design", "training.rl", "training.reports", "training.validation", "training.benchmarks",
@@ -31,8 +31,8 @@ def module_paths():
 MODULES = module_paths()
 
 
-def room_of(module):
-    """The room that a module is in."""
+def layer_of(module):
+    """The layer that a module is in."""
     head, *rest = module.split(".")
     return ".".join((head, *rest[:1])) if head == "training" and rest else head
 
@@ -52,16 +52,16 @@ def imports(path):
 
 @pytest.mark.parametrize("module", sorted(set(MODULES) - {""}))
 def test_imports_go_down(module):
-    room = room_of(module)
-    assert room in FLOORS, f"{module} lies in no room"
-    above = FLOORS[FLOORS.index(room) + 1 :]
-    up = [name for name in imports(MODULES[module]) if room_of(name) in above]
+    layer = layer_of(module)
+    assert layer in LAYERS, f"{module} lies in no layer"
+    above = LAYERS[LAYERS.index(layer) + 1 :]
+    up = [name for name in imports(MODULES[module]) if layer_of(name) in above]
     assert not up
 
 
 @pytest.mark.parametrize("module", sorted(set(MODULES) - {""}))
-def test_files_are_read_from_a_module_s_own_room_or_below(module):
-    """A path that starts at __file__ and climbs leaves the room."""
+def test_files_are_read_from_a_module_s_own_layer_or_below(module):
+    """A path that starts at __file__ and climbs leaves the layer."""
     for node in ast.walk(ast.parse(MODULES[module].read_text(encoding="utf-8"))):
         if isinstance(node, ast.Constant) and isinstance(node.value, str):
             head = node.value.partition("/")[0]

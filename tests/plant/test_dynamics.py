@@ -95,22 +95,22 @@ def test_where_the_generator_sits_and_what_it_weighs_does_not_matter(platform, t
     assert np.abs(moved - naive_accelerations(row, platform, turbine)).max() < 1e-11
 
 
-def test_held_rotor_moves_the_platform_as_a_prescribed_speed_does(platform, turbine):
-    body = build_rigid_body(platform, turbine, rotor_held=True)
+def test_fixed_rotor_moves_the_platform_as_a_prescribed_speed_does(platform, turbine):
+    body = build_rigid_body(platform, turbine, rotor_fixed=True)
     for row in reference_states()[:60]:
         expected = naive_accelerations(row, platform, turbine, held=True)
         assert np.abs(project_accelerations(row, turbine, body) - expected).max() < 1e-11
 
 
-def test_held_platform_leaves_the_rotor_alone(platform, turbine):
-    body = build_rigid_body(platform, turbine, platform_held=True)
+def test_fixed_platform_leaves_the_rotor_alone(platform, turbine):
+    body = build_rigid_body(platform, turbine, platform_fixed=True)
     drivetrain = build_drivetrain(turbine)
     row = reference_states()[0]
     accelerations = project_accelerations(row, turbine, body)
     torque = row["hub_mx"] - drivetrain.gear_ratio * row["generator_torque"]
     assert np.all(accelerations[:6] == 0.0)
     assert accelerations[6] == pytest.approx(torque / drivetrain.inertia_row, rel=1e-14)
-    both = build_rigid_body(platform, turbine, platform_held=True, rotor_held=True)
+    both = build_rigid_body(platform, turbine, platform_fixed=True, rotor_fixed=True)
     assert np.all(project_accelerations(row, turbine, both) == 0.0)
 
 
@@ -214,14 +214,14 @@ def with_coupling_sign(bare_scene, sign):
     body = weightless(bare_scene).model.rigid_body
 
     def rate(t, x):
-        dx = rates(weightless_scene, x, box=box)
+        dx = rates(weightless_scene, x, handle=handle)
         extra = (1.0 - sign) * body.coupling * x[State.ROTOR_SPEED]
         load = Wrench(0.0, 0.0, 0.0, 0.0, extra * x[State.WZ], -extra * x[State.WY])
         accelerate(pose_of(x), x, load, 0.0, DRY, body, np.zeros((6, 6)), dx)
         return dx
 
     weightless_scene = weightless(bare_scene)
-    box = weightless_scene.handle()
+    handle = weightless_scene.handle()
     x0 = state(**TUMBLING)
     solution = solve_ivp(rate, (0.0, 50.0), x0, method="DOP853", rtol=1e-10, atol=1e-12, max_step=1.0)
     return solution.y.T

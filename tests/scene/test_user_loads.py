@@ -130,7 +130,7 @@ def test_at_a_loaded_trim_the_rest_of_the_plant_balances_the_load_exactly():
     load = Load("Push", push, Push(2e5, 3e4, -1e5, 1e6, 2e6, 3e6), point=(2.0, -1.0, -50.0))
     point, scene = trim(still(load)), still()
     data = scene.data()
-    rates(scene, point.state, box=scene.handle(data))
+    rates(scene, point.state, handle=scene.handle(data))
     pose = pose_of(point.state)
     turn = np.array([getattr(pose, f"r{i}{j}") for i in (1, 2, 3) for j in (1, 2, 3)]).reshape(3, 3)
     force, moment = turn.T @ load.parameters[:3], turn.T @ load.parameters[3:]
@@ -239,7 +239,7 @@ def test_a_load_on_the_nacelle_is_carried_by_the_tower_base_and_one_on_the_hull_
         rows = []
         for strength in (force, Push()):
             scene = stormy(Load("Push", push, strength, point=(0.0, 0.0, z)))
-            held = scene.with_model({"rigid_body.platform_held": True})
+            held = scene.with_model({"rigid_body.platform_fixed": True})
             row = output_row(held.handle(), np.zeros(held.n_state), np.zeros(2), 0.0, len(held.channels))
             rows.append(dict(zip((c.name for c in held.channels), row, strict=True)))
         changes.append({name: rows[0][name] - rows[1][name] for name in rows[0]})

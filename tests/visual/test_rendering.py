@@ -17,7 +17,7 @@ from fowt_env.errors import InputError  # noqa: E402
 from fowt_env.plant.hydro.waves import elevation  # noqa: E402
 from fowt_env.visual import rendering  # noqa: E402
 from fowt_env.visual.animation import animate  # noqa: E402
-from fowt_env.visual.rendering import COLOURS, Pose, Surface, TurbinePanel, View, mooring_shapes  # noqa: E402
+from fowt_env.visual.rendering import RGB_COLOURS, PlatformPose, Surface, TurbinePanel, View, mooring_shapes  # noqa: E402
 
 QUICK = {"rotor": "table", "wave_components": 20}
 WEATHER = {"wind": 18.0, "sea": {"kind": "jonswap", "Hs": 5.0, "Tp": 10.0}}
@@ -51,7 +51,7 @@ def test_lines_end_at_anchor_and_fairlead_wherever_the_platform_is(scene):
         REST,
         REST | {"PtfmSurge": 25.0, "PtfmSway": -9.0, "PtfmHeave": -2.0, "PtfmPitch": 7.0, "PtfmYaw": 12.0},
     ):
-        pose = Pose(row)
+        pose = PlatformPose(row)
         shapes = mooring_shapes(scene, pose)
         assert len(shapes) == 3
         for i, (points, tension) in enumerate(shapes):
@@ -64,7 +64,7 @@ def test_drawn_tension_and_pose_are_those_of_the_plant(env):
     for _ in range(20):
         env.step(np.array([0.3, -0.2]))
     row = env.channels()
-    for i, (_, tension) in enumerate(mooring_shapes(env.scene, Pose(row))):
+    for i, (_, tension) in enumerate(mooring_shapes(env.scene, PlatformPose(row))):
         assert 1e-3 * tension == pytest.approx(row[f"FAIRTEN{i + 1}"], rel=1e-9)
 
 
@@ -108,7 +108,7 @@ def test_lines_are_drawn_where_they_were_computed_in_their_tension_s_colour(stil
     view.draw([ROW])
     picture, panel = view.array().astype(int), view.panels[0]
     seen = 0
-    for number, (points, tension) in enumerate(mooring_shapes(still, Pose(ROW))):
+    for number, (points, tension) in enumerate(mooring_shapes(still, PlatformPose(ROW))):
         colour = np.array(rendering.tension_colour(tension, panel.tension_at_rest[number]))
         for x, y in panel.pixels(points)[:-1] / rendering.SAMPLING:
             if 2 < x < panel.size[0] - 3 and 2 < y < panel.size[1] - 3:
@@ -250,7 +250,7 @@ def test_a_gif_shows_the_runs_beside_each_other(scene, runs, tmp_path):
         image.seek(9)
         last = np.asarray(image.convert("RGB")).astype(int)
     assert np.abs(last - first).max(axis=2).mean() > 1.0
-    for colour in COLOURS[:2]:  # both traces keep their colours in the palette
+    for colour in RGB_COLOURS[:2]:  # both traces keep their colours in the palette
         assert (np.abs(last - colour).max(axis=2) < 12).sum() > 20
 
 

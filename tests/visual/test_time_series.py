@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip("matplotlib", reason="matplotlib is not installed: the extra `plot` is missing")
 
 from fowt_env.errors import InputError  # noqa: E402
-from fowt_env.visual import time_series as plots  # noqa: E402
+from fowt_env.visual import time_series  # noqa: E402
 
 PNG = b"\x89PNG\r\n\x1a\n"
 
@@ -33,22 +33,22 @@ def run(shift=0.0, n=6001):
 
 def test_stacked_plot_has_a_labelled_panel_per_channel(tmp_path):
     path = tmp_path / "new" / "run.png"
-    figure = plots.plot_run(run(), path, title="a run")
+    figure = time_series.plot_run(run(), path, title="a run")
     assert path.read_bytes().startswith(PNG) and path.stat().st_size > 20_000
-    assert len(figure.axes) == len(plots.PANELS)
-    for axes, (label, channel) in zip(figure.axes, plots.PANELS, strict=True):
+    assert len(figure.axes) == len(time_series.PANELS)
+    for axes, (label, channel) in zip(figure.axes, time_series.PANELS, strict=True):
         assert axes.get_ylabel() == label and "(" in label  # the unit
         assert axes.get_legend().get_texts()[0].get_text() == channel.split("_[")[0]
         np.testing.assert_array_equal(axes.lines[0].get_ydata(), run()[channel])
 
 
 def test_a_run_without_a_channel_has_no_panel_for_it():
-    figure = plots.plot_run(run().drop(columns="FAIRTEN1_[kN]"))
-    assert len(figure.axes) == len(plots.PANELS) - 1
+    figure = time_series.plot_run(run().drop(columns="FAIRTEN1_[kN]"))
+    assert len(figure.axes) == len(time_series.PANELS) - 1
 
 
 def test_overlay_draws_each_run_and_the_common_weather_once(tmp_path):
-    figure = plots.plot_runs({"pi": run(), "pi_land": run(1.0)}, tmp_path / "both.svg")
+    figure = time_series.plot_runs({"pi": run(), "pi_land": run(1.0)}, tmp_path / "both.svg")
     texts = {axes.get_ylabel(): [t.get_text() for t in axes.get_legend().get_texts()] for axes in figure.axes}
     assert texts["wave\n(m)"] == ["Wave1Elev · all"]
     assert texts["rotor speed\n(rpm)"] == ["RotSpeed · pi", "RotSpeed · pi_land"]
@@ -57,14 +57,14 @@ def test_overlay_draws_each_run_and_the_common_weather_once(tmp_path):
 
 def test_spectrum_holds_the_variance_and_peaks_at_the_period():
     frame = run()
-    frequency, density = plots.spectrum(frame["Time_[s]"], frame["Wave1Elev_[m]"])
+    frequency, density = time_series.spectrum(frame["Time_[s]"], frame["Wave1Elev_[m]"])
     assert frequency[np.argmax(density)] == pytest.approx(0.1, abs=0.005)
     assert np.trapezoid(density, frequency) == pytest.approx(2.0, rel=0.01)  # 2^2 / 2
 
 
 def test_spectra_mark_platform_pitch_wave_and_1p(tmp_path):
     path = tmp_path / "spectra.png"
-    figure = plots.plot_spectra(run(), path, platform_pitch_period=29.9)
+    figure = time_series.plot_spectra(run(), path, platform_pitch_period=29.9)
     assert path.read_bytes().startswith(PNG)
     marks = sorted(line.get_xdata()[0] for line in figure.axes[1].lines[1:])
     assert marks == pytest.approx([1.0 / 29.9, 0.1, 0.2], abs=0.005)
@@ -74,7 +74,7 @@ def test_spectra_mark_platform_pitch_wave_and_1p(tmp_path):
 
 def test_still_water_has_no_wave_mark():
     frame = run().assign(**{"Wave1Elev_[m]": 0.0})
-    figure = plots.plot_spectra(frame)
+    figure = time_series.plot_spectra(frame)
     assert [text.get_text().split()[0] for text in figure.axes[0].texts] == ["1P"]
 
 
@@ -88,7 +88,7 @@ def test_evaluation_plot_leaves_failed_runs_out_and_says_so(tmp_path):
             "PtfmPitch_std_[deg]": [1.0, 2.0, 3.0, np.nan],
         }
     )
-    figure = plots.plot_evaluation(table, ["PtfmPitch_std_[deg]"], tmp_path / "metrics.png")
+    figure = time_series.plot_evaluation(table, ["PtfmPitch_std_[deg]"], tmp_path / "metrics.png")
     assert (tmp_path / "metrics.png").read_bytes().startswith(PNG)
     assert "1 of 4 runs failed" in figure.legends[0].get_title().get_text()
     np.testing.assert_array_equal(figure.axes[0].containers[0].lines[0].get_ydata(), [1.0, 2.0])
@@ -96,15 +96,15 @@ def test_evaluation_plot_leaves_failed_runs_out_and_says_so(tmp_path):
 
 def test_wrong_input_is_named_and_leaves_no_file(tmp_path):
     with pytest.raises(InputError, match="unknown ending"):
-        plots.plot_run(run(), tmp_path / "run.docx")
+        time_series.plot_run(run(), tmp_path / "run.docx")
     with pytest.raises(InputError, match="no runs"):
-        plots.plot_runs({})
+        time_series.plot_runs({})
     with pytest.raises(InputError, match=r"Time_\[s\]"):
-        plots.plot_run(run().drop(columns="Time_[s]"))
+        time_series.plot_run(run().drop(columns="Time_[s]"))
     with pytest.raises(InputError, match="platform_pitch_period = 0"):
-        plots.plot_spectra(run(), platform_pitch_period=0.0)
+        time_series.plot_spectra(run(), platform_pitch_period=0.0)
     with pytest.raises(InputError, match="evenly"):
-        plots.spectrum([0.0, 0.1, 0.5, 0.6], [0.0, 1.0, 0.0, 1.0])
+        time_series.spectrum([0.0, 0.1, 0.5, 0.6], [0.0, 1.0, 0.0, 1.0])
     assert not list(tmp_path.iterdir())
 
 
@@ -112,7 +112,7 @@ def test_without_matplotlib_the_message_names_the_extra():
     code = (
         "import sys; sys.modules['matplotlib'] = None\n"
         "import pandas as pd\n"
-        "from fowt_env.visual import time_series as plots\n"
+        "from fowt_env.visual import time_series\n"
         "frame = pd.DataFrame({'Time_[s]': [0.0, 1.0], 'RotSpeed_[rpm]': [12.0, 12.0]})\n"
         "try:\n    plots.plot_run(frame)\n"
         "except plots.InputError as error:\n    print(error)\n"
@@ -123,7 +123,7 @@ def test_without_matplotlib_the_message_names_the_extra():
 
 def test_plotting_leaves_pyplot_alone():
     code = (
-        "import sys, pandas as pd\nfrom fowt_env.visual import time_series as plots\n"
+        "import sys, pandas as pd\nfrom fowt_env.visual import time_series\n"
         "plots.plot_run(pd.DataFrame({'Time_[s]': [0.0, 1.0], 'RotSpeed_[rpm]': [12.0, 12.0]}))\n"
         "assert 'matplotlib.pyplot' not in sys.modules"
     )
@@ -134,7 +134,7 @@ def pareto_board(controllers):
     figure = dict.fromkeys(("low", "high", "seed_low", "seed_high"), np.nan)
     entries = []
     for name, (speed, pitch, travel) in controllers.items():
-        values = dict(zip(plots.PARETO, (speed, pitch, travel, 20.0), strict=True))
+        values = dict(zip(time_series.PARETO_METRICS, (speed, pitch, travel, 20.0), strict=True))
         figures = {key: figure | {"mean": value, "worst": value} for key, value in values.items()}
         entries.append({"controller": name, "failed": 0, "metrics": figures})
     return {"controllers": entries, "cases": ["a"], "interval": {"level": 0.95}}
@@ -143,7 +143,7 @@ def pareto_board(controllers):
 def test_pareto_marks_have_areas_in_the_ratio_of_pitch_travel_and_names_that_do_not_overlap(tmp_path):
     controllers = {f"controller_{i}": (1.0 + 0.004 * i, 0.9, 0.1 * (i + 1)) for i in range(9)}
     controllers["failed"] = (np.nan, np.nan, np.nan)
-    figure = plots.plot_pareto(pareto_board(controllers), tmp_path / "pareto.png")
+    figure = time_series.plot_pareto(pareto_board(controllers), tmp_path / "pareto.png")
     axes = figure.axes[0]
     sizes = [mark.get_sizes()[0] for mark in axes.collections if hasattr(mark, "get_sizes")]
     assert len(sizes) == 9  # what never finished a run has no place
@@ -157,7 +157,7 @@ def test_pareto_marks_have_areas_in_the_ratio_of_pitch_travel_and_names_that_do_
 
 def test_a_pareto_plot_of_failures_alone_is_refused():
     with pytest.raises(InputError, match="nothing to plot"):
-        plots.plot_pareto(pareto_board({"x": (np.nan, np.nan, np.nan)}))
+        time_series.plot_pareto(pareto_board({"x": (np.nan, np.nan, np.nan)}))
 
 
 def test_a_pareto_plot_has_bars_for_intervals_and_the_range_of_the_seeds_where_there_are_none():
@@ -167,7 +167,7 @@ def test_a_pareto_plot_has_bars_for_intervals_and_the_range_of_the_seeds_where_t
         figure.update(seed_low=0.8 * figure["mean"], seed_high=1.2 * figure["mean"])
 
     def drawn():
-        axes = plots.plot_pareto(board).axes[0]
+        axes = time_series.plot_pareto(board).axes[0]
         ends = np.concatenate(
             [line.vertices for part in axes.containers for bar in part[2] for line in bar.get_paths()]
         )

@@ -205,7 +205,7 @@ def test_a_scene_with_a_box_takes_another_box_but_no_series():
         box.with_weather(15.0, None, 1)
 
 
-def test_the_rotor_table_gets_the_rotor_average_of_a_box():
+def test_the_coefficient_table_gets_the_rotor_average_of_a_box():
     spec = {"kind": "box", "u": np.full((120, 9, 11), 12.0), "y": Y, "z": Z, "dt": 0.5, "speed": 12.0}
     scene = fowt_env.build_scene("oc3_hywind", wind=spec, rotor="table")
     assert scene.model.aero.field is None

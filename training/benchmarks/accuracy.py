@@ -42,7 +42,7 @@ COLUMNS = (
 )  # fmt: skip
 # OpenFAST on the rigid model, 18 m/s uniform turbulence, Hs 7.5 m: (step and strips, real-time factor
 # (CPU), largest |difference| in 40 s to its own reference: surge m, platform pitch deg, rotor speed rpm),
-# and the standard deviations of the same case over 500 s that turn them into shares
+# and the standard deviations of the same case over 500 s that turn them into fractions
 OPENFAST = (
     ("0.0125 s, 1 m: its reference", 1.9, (0.0, 0.0, 0.0)),
     ("0.0125 s, 2 m", 2.9, (0.0025, 0.0013, 0.0009)),
@@ -260,7 +260,7 @@ def _append(out, row):
         pd.DataFrame([row], columns=COLUMNS).to_csv(file, index=False, header=new, float_format="%.8g")
 
 
-def summary(table):
+def accuracy_summary(table):
     """DataFrame by variant: seeds' means of error and real-time factor; whether it is on the Pareto front."""
     if table.empty:
         raise InputError("nothing to summarise: the table has no rows")
@@ -297,7 +297,7 @@ def plot_accuracy(table, path=None):
     """Figure: error over real-time factor, both logarithmic, with the Pareto front and OpenFAST's points."""
     from fowt_env.visual.time_series import COLOURS, INK, new_figure, save_figure, style_axes
 
-    points = summary(table)
+    points = accuracy_summary(table)
     points = points[np.isfinite(points["real_time_factor"]) & (points["worst"] > 0.0)]
     figure = new_figure(8.5, 5.5)
     axes = figure.subplots()

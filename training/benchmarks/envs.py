@@ -83,8 +83,11 @@ def single_costs(env, seconds):
     batch.reset(seed=0)
     actions = np.zeros((few, 2))
     active = np.ones(few, dtype=bool)
-    given = (batch._boxes, batch._law, batch._watch, actions, active, batch._statuses, batch._rewards)
-    physics = timed(lambda: act_all(*given), seconds) / few
+    arguments = (
+        batch._handles, batch._baseline_law, batch._estimator_law, actions, active, batch._statuses,
+        batch._rewards,
+    )  # fmt: skip
+    physics = timed(lambda: act_all(*arguments), seconds) / few
     single = batch.envs[0].twin()
     single.reset(seed=0)
     state = single.get_state()

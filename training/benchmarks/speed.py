@@ -53,13 +53,13 @@ LOADS = (
 
 @dataclass(frozen=True)
 class TimedScene:
-    """A kind of scene: arguments of build_scene, and what is held still."""
+    """A kind of scene: arguments of build_scene, and what is fixed."""
 
     wind: object = None
     sea: object = None
     fidelity: str = "standard"
     options: dict = field(default_factory=dict)
-    platform_held: bool = False
+    platform_fixed: bool = False
     parked: bool = False  # rotor at rest, blades feathered
     absent: str = ""  # what this kind leaves out of the compiled code
 
@@ -78,9 +78,9 @@ class TimedScene:
         scene = build_scene(
             wind=wind, sea=self.sea, seed=seed, fidelity=self.fidelity, duration=duration, **self.options
         )
-        if not self.platform_held:
+        if not self.platform_fixed:
             return scene
-        return scene.with_model({"rigid_body.platform_held": True})
+        return scene.with_model({"rigid_body.platform_fixed": True})
 
     def start(self, scene):
         """(state, command) that runs of this kind begin with."""
@@ -116,12 +116,12 @@ TIMED_SCENES = {
         TURBULENCE, SEA, options={"mooring": "table"}, absent="catenary iterations"
     ),
     "no mooring": TimedScene(TURBULENCE, SEA, options={"mooring": False}, absent="mooring"),
-    "platform held": TimedScene(TURBULENCE, SEA, platform_held=True, absent="6x6 solve (at run time)"),
+    "platform fixed": TimedScene(TURBULENCE, SEA, platform_fixed=True, absent="6x6 solve (at run time)"),
     "no water": TimedScene(
         TURBULENCE,
         None,
         options={"hydrodynamics": False, "mooring": False},
-        platform_held=True,
+        platform_fixed=True,
         absent="strips, waves, buoyancy, mooring; 6x6 solve (at run time)",
     ),  # fmt: skip
 }
@@ -221,7 +221,7 @@ def load_times(scene, x, u, calls=CHUNK, repeats=REPEATS):
     dx, m = np.zeros_like(x), np.zeros(N_MEASUREMENTS)
     row = np.zeros(len(scene.channels))
     forget(handle)
-    output(handle, x, u, 0.0, dx, row)  # fills the kept loads that measure and record read
+    output(handle, x, u, 0.0, dx, row)  # fills the cached loads that measure and record read
     micro = {}
     for part, name in enumerate(LOADS):
         micro[name] = (
@@ -280,7 +280,7 @@ def measure_kind(name, seconds=600.0, repeats=REPEATS, calls=CHUNK):
     dt = scene.dt
     held = scene
     if not kind.controlled:
-        held = scene.with_model({"rigid_body.rotor_held": True})
+        held = scene.with_model({"rigid_body.rotor_fixed": True})
     waves = None if scene.model.hydro is None else scene.model.hydro.waves
     row = {
         "kind": name,

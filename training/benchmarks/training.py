@@ -1,4 +1,4 @@
-"""Speed of PPO on the native vector environment and others: shares of physics, torch and Python."""
+"""Speed of PPO on the native vector environment and others: time fractions of physics, torch and Python."""
 
 import time
 
@@ -126,8 +126,8 @@ def measured(kind, n, steps, settings, decisions, algorithm):
     model.learn(rounds * rollout, reset_num_timesteps=False)
     wall = time.perf_counter() - begin
     env.close()
-    shares = {label: seconds / wall for label, seconds in clock.seconds.items()}
-    physics, torch = shares.get("physics", np.nan), shares.get("torch", np.nan)
+    fractions = {label: seconds / wall for label, seconds in clock.seconds.items()}
+    physics, torch = fractions.get("physics", np.nan), fractions.get("torch", np.nan)
     return {
         "kind": kind,
         "envs": n,

@@ -28,7 +28,7 @@ from fowt_env.training.cli.tables import figure, print_table, table_width
 
 EXIT_STOPPED, EXIT_INPUT, EXIT_INTERRUPTED = 1, 2, 130
 STUDIES = "fowt_env.training.studies"  # left out of the wheel
-ROUNDING = 1e-9  # a standard deviation below this share of the mean is none
+ROUNDING = 1e-9  # a standard deviation below this fraction of the mean is none
 
 out = Console()
 err = Console(stderr=True)
@@ -170,7 +170,9 @@ def simulate(
     sea: Annotated[
         str, typer.Option(help="Name, jonswap:HS:TP[:GAMMA], regular:H:T, JSON, or none (still water).")
     ] = "none",
-    controller: Annotated[str, typer.Option(help="Name, module:Name, design:FILE or none (held).")] = "pi",
+    controller: Annotated[
+        str, typer.Option(help="Name, module:Name, design:FILE or none (constant command).")
+    ] = "pi",
     duration: Annotated[float, typer.Option(help="Length of the run, s.")] = 600.0,
     dt: Annotated[float | None, typer.Option(help="Physics step, s; default: that of the fidelity.")] = None,
     control_dt: Annotated[float, typer.Option(help="Control period, s; a multiple of dt.")] = 0.1,
@@ -191,7 +193,7 @@ def simulate(
     out_path: Annotated[str | None, typer.Option("--out", help="Series: .csv, .parquet or .outb.")] = None,
     plot: Annotated[str | None, typer.Option(help="Stacked plot of the run, e.g. run.png.")] = None,
 ):
-    """Simulate one run, print what it was like, and save its time series and plot."""
+    """Simulate one run, print its statistics, and save its time series and plot."""
     import fowt_env
 
     if out_path is not None:
@@ -257,7 +259,7 @@ def show(frame, title=None):
 
 
 def _save_run(frame, out_path, plot, title):
-    """Write the time series and the plot that were asked for, and say where."""
+    """Write the requested time series and plot, and print where."""
     if out_path is not None:
         note(f"wrote {write_table(frame, out_path)} ({len(frame)} rows)")
     if plot is not None:
@@ -294,16 +296,16 @@ EVALUATE_EXAMPLES = """[bold]Examples[/bold]
 [cyan]fowt evaluate --suite mysuite.toml --controllers pi,mymodule:Mine --baseline pi[/cyan]  your own cases
 
 [bold]Files written[/bold]: runs/CONTROLLER/CASE_seedN.parquet, results.csv (a row per run), leaderboard.json
-(means, intervals, paired differences, versions), manifest.json (what was asked for), summary.csv (means by
+(means, intervals, paired differences, versions), manifest.json (the settings), summary.csv (means by
 case), pareto.png, metrics.png, boxes.png, timeseries_CASE.png, spectra_CASE.png. The same command
-goes on where it was stopped; further controllers, cases or seeds are added to the folder."""
+resumes where it was stopped; further controllers, cases or seeds are added to the folder."""
 
 
 @app.command(name="evaluate", epilog=EVALUATE_EXAMPLES)
 @reported
 def evaluate_command(
     controllers: Annotated[
-        str, typer.Option(help="Names, policy:NAME, design:FILE or module:Name, by commas.")
+        str, typer.Option(help="Names, policy:NAME, design:FILE or module:Name, comma-separated.")
     ] = "pi",
     suite: Annotated[
         str | None, typer.Option(help="Suite: a name of fowt list suites, or a path to a TOML file.")
@@ -311,7 +313,7 @@ def evaluate_command(
     cases: Annotated[
         str | None,
         typer.Option(
-            help="Cases or suites, by commas; with --suite: those of its cases. Default: above_rated."
+            help="Cases or suites, comma-separated; with --suite: those of its cases. Default: above_rated."
         ),
     ] = None,
     seeds: Annotated[
@@ -331,7 +333,7 @@ def evaluate_command(
     engine: Annotated[str, typer.Option(help="processes, or ray.")] = "processes",
     address: Annotated[str | None, typer.Option(help="Address of a running Ray cluster.")] = None,
     time_limit: Annotated[
-        float, typer.Option(help="Seconds of the clock after which a run fails; 0: never.")
+        float, typer.Option(help="Wall-clock seconds after which a run fails; 0: never.")
     ] = 3600.0,
     out_folder: Annotated[
         str, typer.Option("--out", help="Folder for what is written.")
@@ -370,7 +372,7 @@ def evaluate_command(
                 time_limit=time_limit or None,
             )
         except KeyboardInterrupt:
-            place = f"in {folder / 'results.csv'}; the same command goes on with the others"
+            place = f"in {folder / 'results.csv'}; the same command continues with the others"
             fail(f"interrupted; the {finished} finished runs are {place}", EXIT_INTERRUPTED)
     board = write_leaderboard(table, folder, baseline)
     means = summary(table)
@@ -426,7 +428,7 @@ TRIM_EXAMPLES = """[bold]Examples[/bold]
 
 [cyan]fowt trim[/cyan]  the floating turbine from cut-in to cut-out
 
-[cyan]fowt trim --winds 8,11.4,18 --fixed --out steady.csv[/cyan]  platform held still, into a file
+[cyan]fowt trim --winds 8,11.4,18 --fixed --out steady.csv[/cyan]  fixed platform, into a file
 
 [cyan]fowt trim --plot schedule.png[/cyan]  the steady schedule as a picture"""
 TRIM_CHANNELS = (
@@ -447,7 +449,7 @@ TRIM_CHANNELS = (
 def trim(
     platform: PlatformOption = "oc3_hywind",
     winds: Annotated[str, typer.Option(help="Steady winds, m/s: 8,11.4,18 or START:STOP:STEP.")] = "4:24:1",
-    fixed: Annotated[bool, typer.Option("--fixed", help="Hold the platform still.")] = False,
+    fixed: Annotated[bool, typer.Option("--fixed", help="Fix the platform.")] = False,
     rotor: RotorOption = None,
     option: OptionOption = None,
     out_path: Annotated[str | None, typer.Option("--out", help="All channels: .csv or .parquet.")] = None,
@@ -493,7 +495,7 @@ def list_names(
         str, typer.Argument(help="platforms, turbines, seas, controllers, agents, suites or cases; or all.")
     ] = "all",
 ):
-    """List the names that the other commands know."""
+    """List the names that the other commands accept."""
     from fowt_env.controllers import CONTROLLERS
     from fowt_env.controllers.policy.controller import shipped_agents
     from fowt_env.descriptions.platform import names
@@ -546,7 +548,7 @@ VALIDATE_EXAMPLES = """[bold]Examples[/bold]
 @reported
 def validate(
     case: Annotated[
-        str, typer.Option(help="decays, steady, floating, waves, steps, turbulence, costs by commas; or all.")
+        str, typer.Option(help="Any of decays, steady, floating, waves, steps, turbulence, costs; or all.")
     ] = "decays,steady,floating,waves,steps,turbulence",
     out_folder: Annotated[
         str, typer.Option("--out", help="Folder for what is written.")
@@ -595,7 +597,7 @@ PAPER_EXAMPLES = """[bold]Examples[/bold]
 @app.command(epilog=PAPER_EXAMPLES)
 @reported
 def paper(
-    case: Annotated[str, typer.Argument(help="LC1 to LC12 by commas, all (of them), or full_scale.")] = "all",
+    case: Annotated[str, typer.Argument(help="LC1 to LC12, comma-separated; all; or full_scale.")] = "all",
     out_folder: Annotated[str, typer.Option("--out", help="Folder for what is written.")] = "results/paper",
     plot: Annotated[bool, typer.Option("--plot/--no-plot", help="Make the plots.")] = True,
 ):
@@ -643,13 +645,15 @@ ACCURACY_EXAMPLES = """[bold]Examples[/bold]
 
 [cyan]fowt benchmark accuracy --seeds 1 --duration 100 --axes "all together"[/cyan]  a first look
 
-[bold]Files written[/bold]: accuracy.csv (a row as each run ends; a new start goes on), accuracy.png."""
+[bold]Files written[/bold]: accuracy.csv (a row as each run ends; a rerun resumes), accuracy.png."""
 
 
 @benchmarks.command(epilog=SPEED_EXAMPLES)
 @reported
 def speed(
-    kinds: Annotated[str | None, typer.Option(help="Kinds of scene, by semicolons; default: all.")] = None,
+    kinds: Annotated[
+        str | None, typer.Option(help="Kinds of scene, semicolon-separated; default: all.")
+    ] = None,
     seconds: Annotated[float, typer.Option(help="Simulated seconds of a run.")] = 600.0,
     repeats: Annotated[int, typer.Option(help="Repeats; the median counts.")] = 5,
     starts: Annotated[bool, typer.Option("--starts", help="Also time the first and a later start.")] = False,
@@ -691,7 +695,9 @@ def accuracy(
     seeds: Annotated[str, typer.Option(help="1,2,3 or 1:6:1.")] = "1,2,3",
     duration: Annotated[float, typer.Option(help="Length of each run, s.")] = 600.0,
     finest: Annotated[float, typer.Option(help="Step of the reference, s.")] = 0.00625,
-    axes: Annotated[str | None, typer.Option(help="Axes of the sweep, by commas; default: all.")] = None,
+    axes: Annotated[
+        str | None, typer.Option(help="Axes of the sweep, comma-separated; default: all.")
+    ] = None,
     repeats: Annotated[int, typer.Option(min=1, help="Timed repeats of short runs; the median counts.")] = 5,
     box: Annotated[
         bool, typer.Option("--box", help="Wind of the stored full-field TurbSim box instead.")
@@ -720,7 +726,7 @@ def accuracy(
             progress=lambda text, done, total: update(done, text, total),
         )
     rows = []
-    for row in study.summary(table).to_dict("records"):
+    for row in study.accuracy_summary(table).to_dict("records"):
         speeds = (f"{row['real_time_factor']:.0f}", f"{row['kernel_factor']:.0f}")
         figures = (f"{row['worst']:.3g}", row["worst_of"], *speeds)
         rows.append((row["variant"], *figures, "*" if row["front"] else ""))
@@ -745,7 +751,7 @@ def evaluation(
         str, typer.Option("--out", help="CSV to write.")
     ] = "results/benchmark/evaluation.csv",
 ):
-    """Time the runs of an evaluation on one core, and with --ray what handing them out costs."""
+    """Time the runs of an evaluation on one core, and with --ray the overhead of distributing them."""
     from fowt_env.training.benchmarks import evaluation as study
     from fowt_env.training.benchmarks import speed as bench
 
@@ -761,10 +767,10 @@ def evaluation(
 @benchmarks.command(epilog=STABILITY_EXAMPLES)
 @reported
 def stability(
-    parts: Annotated[str | None, typer.Option(help="Parts, by commas; default: all.")] = None,
+    parts: Annotated[str | None, typer.Option(help="Parts, comma-separated; default: all.")] = None,
     cases: Annotated[int, typer.Option(min=1, help="Random scenes and states.")] = 2000,
     steps: Annotated[int, typer.Option(min=1000, help="Steps of the long runs.")] = 200_000,
-    hostile: Annotated[int, typer.Option(min=1, help="Control periods of each hostile policy.")] = 600,
+    hostile: Annotated[int, typer.Option(min=1, help="Control periods of each adversarial policy.")] = 600,
     seed: Annotated[int, typer.Option(min=0, help="Of everything random.")] = 0,
     out_folder: Annotated[
         str, typer.Option("--out", help="Folder for what is written.")
@@ -772,7 +778,7 @@ def stability(
     report: Annotated[str | None, typer.Option(help="Report; default: robustness.md in --out.")] = None,
     replay: Annotated[str | None, typer.Option(help="Run a stored case again, nothing else.")] = None,
 ):
-    """Try to break the simulator: steps, random scenes, hostile actions, extremes, long runs."""
+    """Stress-test the simulator: steps, random scenes, adversarial actions, extremes, long runs."""
     with from_a_clone("benchmark stability"):
         from fowt_env.training.studies.robustness import study as stress
         from fowt_env.training.studies.robustness.random_cases import replay as run_again

@@ -54,7 +54,8 @@ LQR_EXAMPLES = """[bold]Examples[/bold]
 
 [cyan]fowt design lqr --weight pitch_rate=9 --out my.json[/cyan]  save one, to be run as design:my.json
 
-Raising pitch_rate saves travel, platform_pitch calms the platform, power holds the power and spends speed."""
+Raising pitch_rate saves travel, platform_pitch reduces platform motion, power smooths
+the power at the cost of rotor speed."""
 
 
 def save_lqr(weights, path):
@@ -144,7 +145,7 @@ def pi(
     platform: Annotated[str, typer.Option(help="Platform: a name or a path.")] = "oc3_hywind",
     out_path: Annotated[str | None, typer.Option("--out", help="Design: .json.")] = None,
 ):
-    """Gains of a scheduled PI from a wanted frequency and damping ratio, and the platform's damping."""
+    """Gains of a scheduled PI from a specified frequency and damping ratio, and the platform's damping."""
     import pandas as pd
 
     import fowt_env
@@ -214,7 +215,7 @@ def front(
     out_path: Annotated[str | None, typer.Option("--out", help="Ratios: .csv or .parquet.")] = None,
     plot: Annotated[str | None, typer.Option(help="Plot of the Pareto fronts, e.g. front.png.")] = None,
 ):
-    """Simulated designs over gspi_oc3, beside the performance limit, and the share of it that they reach."""
+    """Simulated designs over gspi_oc3, beside the performance limit, and the fraction of it they reach."""
     from fowt_env.files.tables import read_table, write_table
     from fowt_env.training.design.linear_bound import INFORMATION, ratio_table
 
@@ -240,12 +241,12 @@ def lqr(
         list[str] | None, typer.Option(metavar="WEIGHT=VALUE", help="A weight for all variants; repeats.")
     ] = None,
     cases: Annotated[str, typer.Option(help="Cases or suites.")] = "ntm_14,ntm_18,ntm_22",
-    seeds: Annotated[str, typer.Option(help="Training seeds, 1000 and above.")] = "1001,1002",
+    seeds: Annotated[str, typer.Option(help="Validation seeds, 1000 and above.")] = "1001,1002",
     out_path: Annotated[
         str | None, typer.Option("--out", help="All runs: .csv; or, without runs, the design: .json.")
     ] = None,
 ):
-    """Sweep the weights of lqr on training seeds, beside gspi_oc3; or save one design (--out .json)."""
+    """Sweep the weights of lqr on validation seeds, beside gspi_oc3; or save one design (--out .json)."""
     from fowt_env.training.design.sweeps import SHOWN, sweep
 
     fixed = parse_pairs(weight, "weight")

@@ -68,20 +68,19 @@ def _names(files):
 
 def _draw(kind, frames, path, title, skip, platform):
     """Write the picture of a kind."""
-    from fowt_env.visual import response as plots_response
-    from fowt_env.visual import time_series as plots
+    from fowt_env.visual import response, time_series
 
     if kind == "series":
-        plots.plot_runs(frames, path, title)
+        time_series.plot_runs(frames, path, title)
     elif kind == "spectra":
         period = None if platform.lower() == "none" else _platform_pitch_period(platform)
-        plots.plot_spectra(frames, path, title, skip, platform_pitch_period=period)
+        time_series.plot_spectra(frames, path, title, skip, platform_pitch_period=period)
     elif kind == "boxes":
-        plots_response.plot_boxes({"": frames}, path, title, skip)
+        response.plot_boxes({"": frames}, path, title, skip)
     elif kind == "raos":
-        plots_response.plot_raos(frames, path, title, skip)
+        response.plot_raos(frames, path, title, skip)
     else:
-        plots_response.plot_schedule(frames, path, title)
+        response.plot_schedule(frames, path, title)
 
 
 def _platform_pitch_period(platform):

@@ -26,7 +26,7 @@ def report(
         str | None, typer.Option("--out", help="The page; default: report.html in the folder.")
     ] = None,
     cases: Annotated[
-        str | None, typer.Option(help="Cases whose time series go in, by commas; default: up to 64 runs.")
+        str | None, typer.Option(help="Cases with time series, comma-separated; default: up to 64 runs.")
     ] = None,
     seeds: Annotated[
         str | None, typer.Option(help="Seeds whose time series go in: 1,2; default: the first.")
@@ -68,7 +68,9 @@ ANIMATE_EXAMPLES = """[bold]Examples[/bold]
 @reported
 def animate(
     out_path: Annotated[str, typer.Argument(help="The animation: .gif or .mp4.")],
-    controllers: Annotated[str, typer.Option(help="One to four, by commas; see fowt list.")] = "pi,pi_land",
+    controllers: Annotated[
+        str, typer.Option(help="One to four, comma-separated; see fowt list.")
+    ] = "pi,pi_land",
     platform: Annotated[str, typer.Option(help="Platform: a name or a path.")] = "oc3_hywind",
     wind: Annotated[
         str, typer.Option(help="As for fowt simulate.")
@@ -77,7 +79,7 @@ def animate(
     duration: Annotated[float, typer.Option(help="Length of the runs, s.")] = 80.0,
     seed: Annotated[int, typer.Option(help="Seed of wind and waves.")] = 0,
     speed: Annotated[float, typer.Option(help="How many times faster than real time.")] = 5.0,
-    fps: Annotated[float, typer.Option(help="Pictures a second.")] = 15.0,
+    fps: Annotated[float, typer.Option(help="Frames per second.")] = 15.0,
     width: Annotated[int, typer.Option(help="Pixels.")] = 960,
     height: Annotated[int, typer.Option(help="Pixels.")] = 540,
     fidelity: Annotated[str, typer.Option(help="reference, standard or fast.")] = "standard",

@@ -11,7 +11,7 @@ from fowt_env.training.cli.arguments import parse_sea, parse_wind
 scores = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode="rich",
-    help="Score agents over baselines, case by case, against the performance limit, in a gust.",
+    help="Score agents relative to baselines, case by case, against the performance limit, in a gust.",
 )
 app.add_typer(scores, name="scores")
 
@@ -25,9 +25,9 @@ GroupOption = Annotated[
     ),
 ]
 AgentsOption = Annotated[
-    str | None, typer.Option(help="Controllers to score, by commas; default: all that are no baselines.")
+    str | None, typer.Option(help="Controllers to score, comma-separated; default: all but the baselines.")
 ]
-CasesOption = Annotated[str | None, typer.Option(help="Cases that count, by commas; default: all.")]
+CasesOption = Annotated[str | None, typer.Option(help="Cases that count, comma-separated; default: all.")]
 
 
 def _names(text):
@@ -70,19 +70,20 @@ OutOption = Annotated[
 ]
 BASELINES_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt scores rivals results/rl --against gspi_oc3,rosco_float --out results/rl/scores[/cyan]
+[cyan]fowt scores baselines results/rl --against gspi_oc3,rosco_float --out results/rl/scores[/cyan]
 
-[cyan]fowt scores rivals results/rl --group preview=policy:ppo_lqr_preview,policy:ppo_lqr_preview_seed1[/cyan]
+[cyan]fowt scores baselines results/rl --group lqr=policy:ppo_lqr,policy:ppo_lqr_seed1[/cyan]
 
-Each figure: interquartile mean of ratios on the same runs, its 95 % interval, and what that reaches:
-missed, first, then (or met), with * where the whole interval does."""
+Each figure: interquartile mean of ratios on the same runs, its 95 % interval, and its verdict against
+the aims: missed, first, then (or met), with * where the whole interval reaches it."""
 
 
-@scores.command(name="rivals", epilog=BASELINES_EXAMPLES)
+@scores.command(name="baselines", epilog=BASELINES_EXAMPLES)
+@scores.command(name="rivals", hidden=True)  # its former name
 @reported
 def over_baselines(
     results: FoldersArgument,
-    against: Annotated[str, typer.Option(help="Baselines, by commas.")] = "gspi_oc3,rosco_float",
+    against: Annotated[str, typer.Option(help="Baselines, comma-separated.")] = "gspi_oc3,rosco_float",
     group: GroupOption = None,
     agents: AgentsOption = None,
     cases: CasesOption = None,
@@ -117,7 +118,7 @@ def by_cases(
     agents: AgentsOption = None,
     cases: CasesOption = None,
     figures: Annotated[
-        str, typer.Option(help="Figures or metrics whose tables are made, by commas.")
+        str, typer.Option(help="Figures or metrics whose tables are made, comma-separated.")
     ] = "rotor-speed std,platform-pitch std,blade-pitch travel,tower-base DEL",
     each: Annotated[bool, typer.Option("--each", help="Every case by itself, winds too.")] = False,
     out_path: OutOption = None,
@@ -150,16 +151,16 @@ def bound(
     plot: Annotated[str | None, typer.Option(help="Picture of all controllers and Pareto fronts.")] = None,
     out_path: OutOption = None,
 ):
-    """Say which share of the performance limit of linear control each controller reaches, per wind speed."""
+    """Print the fraction of the performance limit of linear control each controller reaches, per wind."""
     from fowt_env.training.reports.bound_scores import bound_fractions, bound_markdown, read_bound
-    from fowt_env.training.reports.score_plots import plot_shares
+    from fowt_env.training.reports.score_plots import plot_fractions
 
     fronts = read_bound(table_path)
     found = bound_fractions(_runs(results, cases), fronts, _groups(group), _names(agents))
     text = "\n".join(bound_markdown(found, column) for column in ("of_bound_[-]", "of_measured_[-]"))
     _shown(text, {"": found}, out_path)
     if plot is not None:
-        plot_shares(found, fronts, plot)
+        plot_fractions(found, fronts, plot)
         note(f"wrote {plot}")
 
 
@@ -172,7 +173,9 @@ GUST_EXAMPLES = """[bold]Examples[/bold]
 @reported
 def gust(
     plot: Annotated[str, typer.Argument(help="The picture.")],
-    controllers: Annotated[str, typer.Option(help="By commas; see fowt list.")] = "gspi_oc3,rosco_float,lqr",
+    controllers: Annotated[
+        str, typer.Option(help="Comma-separated; see fowt list.")
+    ] = "gspi_oc3,rosco_float,lqr",
     wind: Annotated[
         str, typer.Option(help="As for fowt simulate.")
     ] = '{"kind": "eog", "speed": 18, "class": "B", "start": 200}',

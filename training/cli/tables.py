@@ -63,8 +63,8 @@ def _print_lines(console, cells, ways, style):
         texts = []
         for lines, (size, left) in zip(cells, ways, strict=True):
             text = lines[line] if line < len(lines) else ""
-            room = " " * (size - cell_len(text))
-            texts.append(text + room if left else room + text)
+            padding = " " * (size - cell_len(text))
+            texts.append(text + padding if left else padding + text)
         console.print(Text(GAP.join(texts).rstrip(), style=style), soft_wrap=True)
 
 

@@ -27,10 +27,10 @@ learning_curve.png, tensorboard/. A policy runs as  fowt evaluate --controllers 
 def train(
     algo: Annotated[str, typer.Option(help="ppo, sac or tqc.")] = "ppo",
     task: Annotated[str, typer.Option(help="Task of training/rl/ALGO.yml.")] = "above_rated",
-    seed: Annotated[int, typer.Option(help="Of networks and episodes.")] = 0,
+    seed: Annotated[int, typer.Option(help="Random seed of networks and episodes.")] = 0,
     steps: Annotated[int | None, typer.Option(help="Decisions; default 2000000, or as before.")] = None,
     out_folder: Annotated[str | None, typer.Option("--out", help="Folder of the run.")] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on from the newest checkpoint.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Continue from the newest checkpoint.")] = False,
     trust_zip: Annotated[
         bool,
         typer.Option("--trust-zip", help="With --resume: load a checkpoint of others, executing its code."),
@@ -48,7 +48,7 @@ def train(
             raise InputError("--set: a resumed run keeps its settings; only --steps may grow")
         run = Training(None if steps is None else {"steps": steps}, folder, resume=True, trusted=trust_zip)
         if trust_zip:
-            note(f"warning: executing code from the checkpoint in {folder}, as asked")
+            note(f"warning: executing code from the checkpoint in {folder}, as requested")
     else:
         settings = resolve(
             algo, task, seed, 2_000_000 if steps is None else steps, parse_pairs(change, "set")
@@ -84,7 +84,7 @@ def export_policy(
             f"{folder}: loading a stable-baselines3 checkpoint executes code from it; if it is yours, or you"
             " trust whoever made it, add --trust-zip"
         )
-    note(f"warning: executing code from the checkpoint in {folder}, as asked")
+    note(f"warning: executing code from the checkpoint in {folder}, as requested")
     note(f"wrote {export_run(folder, out_path)}")
 
 
@@ -95,7 +95,7 @@ def training(
     steps: Annotated[int, typer.Option(help="Steps of PPO that are timed.")] = 50_000,
     out_path: Annotated[str, typer.Option("--out", help="CSV to write.")] = "results/benchmark/training.csv",
 ):
-    """Time PPO on each kind of vector environment, and say what physics, torch and Python take."""
+    """Time PPO on each kind of vector environment, and print the time of physics, torch and Python."""
     from fowt_env.training.benchmarks.speed import write_csv
     from fowt_env.training.benchmarks.training import benchmark_training
 

@@ -44,7 +44,8 @@ INFORMATION = {  # what the feedback knows: what it is called in plots
     "state": "state only",
     "measured": "measured channels (Kalman)",
 }
-SHARES = (0.02, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.68, 0.75, 0.82, 0.88, 0.93, 0.97, 0.99)  # of platform pitch
+# of platform pitch
+FRACTIONS = (0.02, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.68, 0.75, 0.82, 0.88, 0.93, 0.97, 0.99)
 TORQUE_STD = 0.05  # of rated torque: twice this is the way to the torque's maximum
 RATIOS = {  # column of ratio_table: metric
     "speed_ratio_[-]": "RotSpeed_std_[rpm]",
@@ -67,7 +68,7 @@ TORQUE, COMMAND, INTEGRAL, WIND, WAVE = N_PLANT, N_PLANT + 1, N_PLANT + 2, N_PLA
 
 @dataclass(frozen=True)
 class Deviations:
-    """Standard deviations of a closed loop: rad/s, rad, mean |rad/s|, shares of rated power and torque."""
+    """Standard deviations of a closed loop: rad/s, rad, mean |rad/s|, fractions of rated power and torque."""
 
     rotor_speed: float
     platform_pitch: float
@@ -104,9 +105,9 @@ class Problem:
         }
         return Deviations(**found)
 
-    def cost(self, share, *multipliers):
-        """(Q, R) with a share of platform pitch and multipliers on travel, power and torque."""
-        weights = {"rotor_speed": 1.0 - share, "platform_pitch": share}
+    def cost(self, fraction, *multipliers):
+        """(Q, R) with a fraction of platform pitch and multipliers on travel, power and torque."""
+        weights = {"rotor_speed": 1.0 - fraction, "platform_pitch": fraction}
         weights |= dict(zip(LIMITED, multipliers, strict=True))
         q = sum(weight * np.outer(self.rows[name], self.rows[name]) for name, weight in weights.items())
         # the integral is not scored; a trace of it makes its mode stable
@@ -181,19 +182,19 @@ def gspi_covariance(problem, settings=None):
     return found, a[np.ix_(keep, keep)]
 
 
-def front(problem, limits, information, shares=SHARES):
-    """[(share, Deviations)] that are best for each share of platform pitch, limits (Deviations) kept.
+def front(problem, limits, information, fractions=FRACTIONS):
+    """[(fraction, Deviations)] that are best for each fraction of platform pitch, limits (Deviations) kept.
 
-    Each multiplier grows while its limit is exceeded and shrinks while there is room. Shares at which ROUNDS
+    Each multiplier grows while its limit is exceeded and shrinks while it is kept. Fractions at which ROUNDS
     rounds of that end outside the limits are left out.
     Raises: InputError where that is all of them.
     """
     found, multipliers = [], np.log([1.0, 0.3, 0.1])
     wanted = np.array([getattr(limits, name) for name in LIMITED])
-    for share in shares:
+    for fraction in fractions:
         for _ in range(ROUNDS):
             reached = problem.deviations(
-                problem.closed(information, *problem.cost(share, *np.exp(multipliers)))
+                problem.closed(information, *problem.cost(fraction, *np.exp(multipliers)))
             )
             excess = np.log(np.array([getattr(reached, name) for name in LIMITED]) / wanted)
             slack = (excess < 0.0) & (multipliers <= LOWEST)
@@ -201,7 +202,7 @@ def front(problem, limits, information, shares=SHARES):
                 break
             multipliers = np.clip(multipliers + STEP * excess, LOWEST, HIGHEST)
         if excess.max() < 2.0 * TOLERANCE:
-            found.append((float(share), reached))
+            found.append((float(fraction), reached))
     if not found:
         raise InputError(f"information {information!r}: no gains meet the limits of gspi_oc3")
     return found
@@ -210,7 +211,7 @@ def front(problem, limits, information, shares=SHARES):
 def bound_table(scene, winds=WINDS, information=tuple(INFORMATION), torque_std=TORQUE_STD, progress=None):
     """DataFrame: per wind and information the Pareto front, beside gspi_oc3; absolute and over gspi_oc3's.
 
-    torque_std: limit, as a share of rated torque; inf for none.
+    torque_std: limit, as a fraction of rated torque; inf for none.
     Raises: InputError for winds that are not above rated, or a torque_std that is not positive.
     """
     allowed = "positive (inf: no limit)"
@@ -225,18 +226,18 @@ def bound_table(scene, winds=WINDS, information=tuple(INFORMATION), torque_std=T
         rows.append(_row(wind, "gspi_oc3", float("nan"), base, base))
         limits = replace(base, torque=torque_std)
         for name in information:
-            rows += [_row(wind, name, share, d, base) for share, d in front(problem, limits, name)]
+            rows += [_row(wind, name, fraction, d, base) for fraction, d in front(problem, limits, name)]
         if progress is not None:
             progress(number, len(winds))
     return pd.DataFrame(rows)
 
 
-def _row(wind, information, share, found, base):
+def _row(wind, information, fraction, found, base):
     """One row of bound_table."""
     return {
         "wind_[m/s]": float(wind),
         "information": information,
-        "share_[-]": share,
+        "share_[-]": fraction,
         "RotSpeed_std_[rpm]": found.rotor_speed / RPM,
         "PtfmPitch_std_[deg]": found.platform_pitch / DEGREE,
         "blade_pitch_travel_[deg/s]": found.travel / DEGREE,

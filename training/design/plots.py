@@ -10,8 +10,8 @@ from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.errors import InputError
 from fowt_env.visual.time_series import COLOURS, INK, new_figure, save_figure, style_axes
 
-MOTIONS = ("surge", "sway", "heave", "roll", "platform_pitch", "yaw", "rotor_speed")
-MARKS = ("o", "s", "^", "D", "v", "P", "X")
+MODE_NAMES = ("surge", "sway", "heave", "roll", "platform_pitch", "yaw", "rotor_speed")
+MODE_MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 SLOW = 0.4  # rad/s: below it surge, platform pitch and heave, above it yaw
 FREQUENCIES = np.geomspace(0.01, 4.0, 400)  # rad/s
 BODE = (  # input, output, title, factor to the unit shown, unit
@@ -46,14 +46,14 @@ def plot_poles(models, path=None, title=None):
         style_axes(axes)
         shown = [(w, m) for w, m in found if not slow or m.frequency < SLOW]
         for wind, mode in shown:
-            mark = MARKS[MOTIONS.index(mode.name)]
+            mark = MODE_MARKERS[MODE_NAMES.index(mode.name)]
             place = (-mode.damping_ratio * mode.frequency, 2.0 * np.pi / mode.period)
             axes.scatter(
                 *place, marker=mark, s=36, color=colours[wind], edgecolor=INK, linewidth=0.3, zorder=3
             )
         _damping_lines(axes)
         axes.set_xlabel("real part (1/s)", fontsize=9, color=INK)
-    for name, mark in zip(MOTIONS, MARKS, strict=True):
+    for name, mark in zip(MODE_NAMES, MODE_MARKERS, strict=True):
         if name in {mode.name for _, mode in found}:
             panels[0].scatter([], [], marker=mark, color="#888888", label=name.replace("_", " "))
     panels[0].legend(fontsize=8, frameon=False, loc="center left", bbox_to_anchor=(0.02, 0.55))
@@ -88,14 +88,14 @@ def plot_damping(models, path=None, title=None):
         raise InputError("nothing to plot: no linear models were given")
     figure = new_figure(9.0, 5.6)
     panels = figure.subplots(2, 1, sharex=True)
-    for index, name in enumerate(MOTIONS):
+    for index, name in enumerate(MODE_NAMES):
         found = [
             (wind, mode) for wind, model in models.items() for mode in model.modes() if mode.name == name
         ]
         if not found:
             continue
         winds = [wind for wind, _ in found]
-        style = {"color": COLOURS[index], "marker": MARKS[index], "markersize": 4, "linewidth": 1.0}
+        style = {"color": COLOURS[index], "marker": MODE_MARKERS[index], "markersize": 4, "linewidth": 1.0}
         panels[0].plot(winds, [mode.period for _, mode in found], label=name.replace("_", " "), **style)
         panels[1].plot(winds, [mode.damping_ratio for _, mode in found], **style)
     for axes, label in zip(panels, ("period (s)", "damping ratio"), strict=True):

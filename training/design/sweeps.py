@@ -19,8 +19,8 @@ from fowt_env.files.atomic import replacing
 from fowt_env.files.tables import write_table
 from fowt_env.plant.state import STATE_INDEX
 from fowt_env.training.evaluation.evaluate import evaluate
+from fowt_env.training.evaluation.seeds import VALIDATION
 
-FIRST_TRAINING_SEED = 1000  # seeds below are for scoring
 INFINITE = 1e3  # rad/s: generalised eigenvalues beyond are zeros at infinity
 MODEL_SUFFIXES = (".json", ".npz")
 SHOWN = ("RotSpeed_std_[rpm]", "PtfmPitch_std_[deg]", "GenPwr_std_[kW]", "blade_pitch_travel_[deg/s]")
@@ -119,11 +119,11 @@ def sweep(variants, cases, seeds, out=None, progress=None, duration=660.0, skip=
     """DataFrame of lqr with each variant of its weights ({name: value} each) and of gspi_oc3, seed by seed.
 
     Of the metrics it has those of KEPT, NaN where a run failed. seeds must be training seeds,
-    FIRST_TRAINING_SEED and above: the others are for scoring. out: CSV.
+    seeds.VALIDATION.start and above: the others are for scoring. out: CSV.
     Raises: InputError for other seeds or unknown weights.
     """
-    if min(seeds) < FIRST_TRAINING_SEED:
-        raise InputError(f"seeds = {list(seeds)}: tune on seeds of {FIRST_TRAINING_SEED} and above")
+    if min(seeds) < VALIDATION.start:
+        raise InputError(f"seeds = {list(seeds)}: tune on seeds of {VALIDATION.start} and above")
     laws = {"gspi_oc3": "gspi_oc3"}
     for variant in variants:
         weights = Weights().changed(**variant)

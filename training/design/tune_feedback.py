@@ -31,11 +31,11 @@ from fowt_env.files.tables import write_table
 from fowt_env.training.evaluation.cases import Case
 from fowt_env.training.evaluation.engines import session
 from fowt_env.training.evaluation.evaluate import evaluate, mean_ratios
+from fowt_env.training.evaluation.run_case import CONTROL_DT
 
 WINDS = (13.0, 17.0, 21.0)
 SEEDS = (1001, 1002)
 SITE = "gulf_of_maine_normal"
-CONTROL_DT = 0.1
 BASELINE = "gspi_oc3"
 UNFED = {"floating_feedback": "gspi_oc3", "rosco_float": "rosco"}
 TRAVEL = 1.0  # most blade-pitch travel, over that of the law without feedback

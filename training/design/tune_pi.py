@@ -23,14 +23,14 @@ from fowt_env.scene.build import build_scene
 from fowt_env.training.evaluation.cases import read_suite
 from fowt_env.training.evaluation.engines import session
 from fowt_env.training.evaluation.evaluate import evaluate
+from fowt_env.training.evaluation.run_case import CONTROL_DT
+from fowt_env.training.evaluation.seeds import VALIDATION
 
 FACTORS = ("KP", "KI", "gain_schedule_pitch")
-FIRST_TRAINING_SEED = 1000  # below it lie the seeds of the suites
 WEIGHED = ("RotSpeed_std_[rpm]", "PtfmPitch_std_[deg]")
 TRAVEL = "blade_pitch_travel_[deg/s]"
 PENALTY = 20.0  # on travel beyond that of pi: 1 % more has to be worth 20 % of the deviations
 FAILED = 10.0  # cost of gains with which a run fails
-CONTROL_DT = 0.1  # s
 
 
 def candidate(turbine, factors, control_dt=CONTROL_DT):
@@ -62,8 +62,8 @@ def search(seeds, suite="above_rated", evaluations=60, report=None, **engine):
     engine: jobs, engine and address of evaluate.
     Raises: InputError for seeds below 1000, which are those of the suites.
     """
-    if any(seed < FIRST_TRAINING_SEED for seed in seeds):
-        raise InputError(f"seeds = {list(seeds)}: training seeds must be {FIRST_TRAINING_SEED} or more")
+    if any(seed < VALIDATION.start for seed in seeds):
+        raise InputError(f"seeds = {list(seeds)}: tuning seeds must be {VALIDATION.start} or more")
     chosen = read_suite(suite)
     turbine = build_scene(chosen.cases[0].platform).turbine
     table = evaluate("pi", chosen, seeds=seeds, **engine)

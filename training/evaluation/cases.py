@@ -115,8 +115,8 @@ class CaseEntry(Record):
     shift: PlantPerturbation | None = None
 
 
-class Term(Record):
-    """One term of a score: the metric's share of the sum, relative to the baseline's."""
+class ScoreTerm(Record):
+    """One term of a score: the metric's weight in the sum, relative to the baseline's."""
 
     metric: str
     weight: Positive
@@ -130,7 +130,7 @@ class Score(Record):
     """
 
     baseline: str
-    term: tuple[Term, ...]
+    term: tuple[ScoreTerm, ...]
     power: str | None = None  # metric of which more is better: the sum is divided by it over the baseline's
     limits: dict[str, NonNegative] = {}
 

@@ -29,13 +29,13 @@ from fowt_env.training.evaluation.guard import (
 )
 
 ENGINES = ("processes", "ray")
-NICENESS = "RAY_worker_niceness"  # environment variable by which Ray is told how nice its workers are
+NICENESS = "RAY_worker_niceness"  # environment variable that sets the niceness of Ray's workers
 WINDOW = 4  # Ray tasks handed out per processor
 ATTEMPTS = 3  # tries of one run before a worker that dies on it is taken as its own doing
 PATIENCE = 10.0  # s that a worker has to end after its last task
 NO_WORKERS = (
     f"worker processes died {ATTEMPTS} times (out of memory, killed, or started by a program without"
-    " `if __name__ == '__main__':`); {} runs are left: the same command goes on with them"
+    " `if __name__ == '__main__':`); {} runs are left: the same command continues with them"
 )
 DONE, RAISED, UNREADABLE = "done", "raised", "unreadable"  # what an answer of a worker is
 

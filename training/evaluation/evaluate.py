@@ -32,12 +32,21 @@ from fowt_env.training.evaluation.metrics import METRICS, metrics
 from fowt_env.training.evaluation.provenance import controller_code, version_gap, versions
 from fowt_env.training.evaluation.results import check_name, open_results, parquet_of, run_file, write_run
 from fowt_env.training.evaluation.results_table import KEY
-from fowt_env.training.evaluation.run_case import COLUMNS, CONTROL_DT, SHORTEST_WEATHER, Run, lost_row, scored
+from fowt_env.training.evaluation.run_case import (
+    COLUMNS,
+    CONTROL_DT,
+    SHORTEST_CASE_WEATHER,
+    Run,
+    lost_row,
+    scored,
+)
 
-__all__ = ["COLUMNS", "SHORTEST_WEATHER", "Case", "evaluate", "metrics", "named_cases", "run_file", "summary"]
+__all__ = [
+    "COLUMNS", "SHORTEST_CASE_WEATHER", "Case", "evaluate", "metrics", "named_cases", "run_file", "summary",
+]  # fmt: skip
 
 DURATION, SKIP, SEEDS = 660.0, 60.0, (1,)  # where neither the caller nor a suite says otherwise
-LARGEST_SEED = 2**63 - 1  # of a column of whole numbers
+LARGEST_RUN_SEED = 2**63 - 1  # of a column of whole numbers
 # s of wall clock: a run of eleven minutes takes 0.05 s with compiled laws and some minutes with slow Python
 TIME_LIMIT = 3600.0
 
@@ -214,7 +223,7 @@ def _seed(value):
     value = plain_number(value)
     if isinstance(value, float) and value.is_integer():
         value = int(value)
-    return check_whole_number("seeds", value, 0, LARGEST_SEED)
+    return check_whole_number("seeds", value, 0, LARGEST_RUN_SEED)
 
 
 def _first(*values):

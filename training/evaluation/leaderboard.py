@@ -174,7 +174,7 @@ def _entry(values, base, runs, failed, weights):
     gap, gap_low, gap_high = _figures(values - base, weights)
     # the baseline over the same runs, so that a failed run does not shift it
     reference = _figures(np.where(pairs, base, np.nan), np.ones((1, weights.shape[1])))[0]
-    # a share of nothing, or of what rounding left of nothing, says nothing
+    # a ratio to zero, or to what rounding left of zero, says nothing
     measured = np.abs(gap) < MOST_OF_REFERENCE * np.abs(reference)
     percent = 100.0 * np.divide(gap, np.abs(reference), out=np.full_like(gap, np.nan), where=measured)
     return {

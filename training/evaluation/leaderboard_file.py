@@ -10,36 +10,36 @@ from pydantic import BaseModel, ConfigDict, Field
 from fowt_env.descriptions.records import validate
 from fowt_env.errors import InputError
 
-Count = Annotated[int, Field(ge=0, le=10**9)]
-Number = Annotated[float, Field(ge=-1e300, le=1e300)]
+WholeNumber = Annotated[int, Field(ge=0, le=10**9)]
+FiniteNumber = Annotated[float, Field(ge=-1e300, le=1e300)]
 
 
 class _Part(BaseModel):
     model_config = ConfigDict(frozen=True, strict=True)
 
 
-class Figure(_Part):
+class Statistic(_Part):
     """A mean or a difference with the ends of its interval; null where there is none."""
 
-    mean: Number | None
-    low: Number | None = None
-    high: Number | None = None
+    mean: FiniteNumber | None
+    low: FiniteNumber | None = None
+    high: FiniteNumber | None = None
 
 
 class Figures(_Part):
     """What a controller did, over all cases or in one."""
 
-    runs: Count
-    failed: Count
-    metrics: dict[str, Figure]
-    difference: dict[str, Figure]
+    runs: WholeNumber
+    failed: WholeNumber
+    metrics: dict[str, Statistic]
+    difference: dict[str, Statistic]
 
 
-class Entry(Figures):
+class LeaderboardEntry(Figures):
     """A controller."""
 
     controller: str
-    score: Figure | None = None
+    score: Statistic | None = None
     cases: dict[str, Figures] = {}
 
 
@@ -56,7 +56,7 @@ class LeaderboardFile(_Part):
 
     baseline: str | None
     interval: Interval | None = None
-    controllers: list[Entry]
+    controllers: list[LeaderboardEntry]
 
 
 def check_leaderboard(content, path):

@@ -34,7 +34,7 @@ TOWER_EXPONENT, CHAIN_EXPONENT = 4.0, 3.0
 BLADE_PITCH_RATE_LIMIT = 10.0  # deg/s
 TOWER_TOP_ACCELERATION_LIMIT = 3.3  # m/s2
 ROTOR_SPEED_LIMIT = 1.3  # of rated: 15.73 rpm
-REQUIRED = (
+REQUIRED_CHANNELS = (
     TIME,
     "RotSpeed_[rpm]",
     "GenPwr_[kW]",
@@ -177,7 +177,7 @@ def turbine_metrics(df, turbine, skip=0.0):
 
 def _kept(df, skip):
     """The scored rows of a run. Raises: InputError."""
-    missing = [name for name in REQUIRED if name not in df.columns]
+    missing = [name for name in REQUIRED_CHANNELS if name not in df.columns]
     if missing:
         raise InputError(f"metrics: the run lacks the columns {', '.join(missing)}")
     check_number("skip", skip, 0.0, allowed="0 or more seconds")

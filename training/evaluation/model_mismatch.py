@@ -26,7 +26,7 @@ class ModelMismatch:
             inner = CheckedController(inner)
         self.name, self.information = inner.name, tuple(inner.information)
         self.inner, self.nominal, self.perturbation, self.seed = inner, nominal, perturbation, seed
-        self.spread = perturbation.noise * reading_scales(nominal.turbine)
+        self.noise_std = perturbation.noise * reading_scales(nominal.turbine)
 
     def prepare(self, scene):
         """Hand the nominal scene, not that of the run, to the controller inside."""
@@ -35,15 +35,15 @@ class ModelMismatch:
     def reset(self, measurement):
         """Start afresh: full history of the first measurement, noise from its beginning."""
         self.rng = np.random.default_rng([self.seed, NOISE_STREAM])
-        self.past = deque([measurement], maxlen=self.perturbation.delay + 1)
+        self.delay_buffer = deque([measurement], maxlen=self.perturbation.delay + 1)
         self.reading, self.read_at = self._noisy(measurement), measurement.time
         self.inner.reset(self.reading)
 
     def act(self, measurement):
         """What the controller inside answers to its reading."""
         if measurement.time != self.read_at:  # the first instant has been read by reset
-            self.past.append(measurement)
-            late = self.past[0]._replace(time=measurement.time)  # a clock is not late
+            self.delay_buffer.append(measurement)
+            late = self.delay_buffer[0]._replace(time=measurement.time)  # a clock is not late
             self.reading, self.read_at = self._noisy(late), measurement.time
         return self.inner.act(self.reading)
 
@@ -51,5 +51,5 @@ class ModelMismatch:
         """The Measurement with noise; without any it is the same object."""
         if not self.perturbation.noise:
             return measurement
-        values = np.array(measurement) + self.spread * self.rng.normal(size=len(measurement))
+        values = np.array(measurement) + self.noise_std * self.rng.normal(size=len(measurement))
         return Measurement(*values.tolist())

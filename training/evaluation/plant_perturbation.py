@@ -69,7 +69,7 @@ def plant_settings(factors, platform=PLATFORM):
 class PlantPerturbation(Record):
     """How a case's plant differs from the one that its controller knows; names as in PLANT.
 
-    Factors on what the files say. noise: standard deviation of white noise on each reading, as a share of
+    Factors on what the files say. noise: standard deviation of white noise on each reading, as a fraction of
     the scale that the channel has in observations (rotor speed: 20 % of rated; blade pitch: 15 deg; platform
     pitch: 5 deg, its rate: 1 deg/s; nacelle acceleration: 1 m/s2). delay: control periods from
     measurement to reading.

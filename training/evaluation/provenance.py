@@ -32,7 +32,7 @@ def plant_files():
     """Sorted files that shape a run: sources that it imports and data, but for the controllers'."""
 
     def inside(path):
-        return _room(path) in ("simulator", "training") or path in ALWAYS
+        return _package_of(path) in ("simulator", "training") or path in ALWAYS
 
     return sorted([*imported_files([RUN], [PACKAGE.parent], inside), *_data(PACKAGE / "data")])
 
@@ -59,8 +59,8 @@ def controller_code(controller):
     object: the file that it comes from, and what that imports from its own folder and this project.
     """
     from fowt_env.controllers import CONTROLLERS
-    from fowt_env.controllers.design import saved_files as saved_design
-    from fowt_env.controllers.policy.controller import PREFIX, policy_path
+    from fowt_env.controllers.design import saved_files
+    from fowt_env.controllers.policy.controller import POLICY_PREFIX, policy_path
 
     if not isinstance(controller, str):
         kind = (
@@ -70,10 +70,10 @@ def controller_code(controller):
         return {"name": name, "code": _digest(_user_files(kind.__module__))}
     if ":" not in controller:
         files = _package_files(CONTROLLERS.get(controller))
-    elif controller.startswith(saved_design.PREFIX):
-        files = [controller.removeprefix(saved_design.PREFIX), *_package_files(saved_design.load_design)]
-    elif controller.startswith(PREFIX):  # its baseline may be any controller
-        files = [policy_path(controller.removeprefix(PREFIX)), *_package_files(None)]
+    elif controller.startswith(saved_files.DESIGN_PREFIX):
+        files = [controller.removeprefix(saved_files.DESIGN_PREFIX), *_package_files(saved_files.load_design)]
+    elif controller.startswith(POLICY_PREFIX):  # its baseline may be any controller
+        files = [policy_path(controller.removeprefix(POLICY_PREFIX)), *_package_files(None)]
     else:
         files = _user_files(controller.partition(":")[0])
     return {"name": controller, "code": _digest(files)}
@@ -99,7 +99,7 @@ def _user_files(module):
     top = folder / module.partition(".")[0]
 
     def inside(path):
-        own = path.is_relative_to(folder) and _room(path) is None
+        own = path.is_relative_to(folder) and _package_of(path) is None
         return path == file or own and (path.is_relative_to(top) or not INSTALLED & set(path.parts))
 
     return _with_own(imported_files([file], [folder], inside), [folder, PACKAGE.parent])
@@ -129,10 +129,10 @@ def _module_file(name):
 def _with_own(files, roots):
     """Files, and what they import of this project's controllers, and with those of fowt_env."""
     files, registry = set(files), CONTROLLERS / "__init__.py"  # which imports every controller
-    for room in ("controllers", "simulator"):
+    for package in ("controllers", "simulator"):
 
-        def inside(path, known=frozenset(files), room=room):
-            return path in known or _room(path) == room and path != registry
+        def inside(path, known=frozenset(files), package=package):
+            return path in known or _package_of(path) == package and path != registry
 
         files |= set(imported_files(files, roots, inside))
     return sorted(files)
@@ -143,7 +143,7 @@ def _located(path):
     return path if path.is_relative_to(PACKAGE) else path.resolve()
 
 
-def _room(path):
+def _package_of(path):
     """What of this project a file belongs to: "controllers", "training", "simulator", or None."""
     if not path.is_relative_to(PACKAGE):
         return None

@@ -19,7 +19,7 @@ from fowt_env.training.evaluation.wind_boxes import cached_box
 from fowt_env.weather.wind_field import is_field
 
 CONTROL_DT = 0.1  # s, simulate's own
-SHORTEST_WEATHER = 700.0  # s of wind and waves: shorter runs see the start of the same realisation
+SHORTEST_CASE_WEATHER = 700.0  # s of wind and waves: shorter runs see the start of the same realisation
 COLUMNS = (
     *("controller", "case", "seed", "status", "reason", "events", "stopped_[s]", "scored_[s]"),
     *METRICS,
@@ -52,7 +52,7 @@ def scored(run):
     Raises: InputError for settings that no controller could use.
     """
     case = run.case
-    options = {"duration": max(SHORTEST_WEATHER, run.duration), **case.options}
+    options = {"duration": max(SHORTEST_CASE_WEATHER, run.duration), **case.options}
     wind = case.wind
     if is_field(wind):
         wind = cached_box(wind, case.platform, run.seed, options)

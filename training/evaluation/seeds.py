@@ -1,6 +1,6 @@
 """Which weather seeds are for what: training, validation and test never share one, by construction.
 
-A realisation of wind and waves is fixed by its weather seed (scene.build_scene's seed). Each purpose has a
+A realisation of wind and waves is fixed by its weather seed (build_scene's seed). Each purpose has a
 range of its own, and the ranges do not touch.
 """
 

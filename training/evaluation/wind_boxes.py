@@ -47,7 +47,7 @@ def cached_box(spec, platform, seed, options):
         except Exception:  # whatever a broken file makes numpy raise: it is made again
             pass
     box = read_box(spec, **arguments)
-    with suppress(OSError), replacing(path) as temporary:  # without room it is made again the next time
+    with suppress(OSError), replacing(path) as temporary:  # without space it is made again the next time
         np.savez(temporary, **{key: getattr(box, key) for key in (*ARRAYS, *NUMBERS)})
     return box
 

@@ -32,21 +32,21 @@ def read_bound(path=None):
 
 
 def bound_fractions(table, bound, groups=None, agents=None):
-    """DataFrame: per agent or group, each of its training seeds and wind the share of the limit it reaches.
+    """DataFrame: per agent or group, each of its training seeds and wind: fraction of the limit reached.
 
     table: of an evaluation with gspi_oc3, cases named kind_WIND; groups, agents as
     scores.grouped takes them. Columns: agent, seed_of (label of the training seed; "" for the
     agent as a whole, whose ratios are the means over its seeds), wind, ratios of linear_bound.RATIOS (mean
-    over the weather seeds on which both went well), of_bound_[-], of_measured_[-] (NaN: no better than
+    over the weather seeds on which both succeeded), of_bound_[-], of_measured_[-] (NaN: no better than
     gspi_oc3, or none of the limit's winds), within (no more travel and power deviation than gspi_oc3's).
-    Raises: InputError without gspi_oc3, without cases at winds of the limit, or where no run went well.
+    Raises: InputError without gspi_oc3, without cases at winds of the limit, or where no run succeeded.
     """
     chosen = grouped(table, [BASELINE], groups, agents)
     winds = set(bound[WIND])
     good = table[(table["status"] == "ok") & table["case"].map(_wind).isin(winds)]
     base = good[good["controller"] == BASELINE]
     if base.empty:
-        raise InputError("results: no run of gspi_oc3 at a wind of the limit went well (cases kind_WIND)")
+        raise InputError("results: no run of gspi_oc3 at a wind of the limit succeeded (cases kind_WIND)")
     kinds = {case.rpartition("_")[0] for case in base["case"]}
     if len(kinds) > 1:
         raise InputError(f"results: cases of several kinds ({', '.join(sorted(kinds))}): choose one's cases")
@@ -55,7 +55,7 @@ def bound_fractions(table, bound, groups=None, agents=None):
         parts = [_ratios(good[good["controller"] == label], base, bound, label) for label in labels]
         parts = [part for part in parts if len(part)]
         if not parts:
-            raise InputError(f"{name}: no run at a wind of the limit went well")
+            raise InputError(f"{name}: no run at a wind of the limit succeeded")
         if len(labels) > 1:
             rows += [part.assign(agent=name) for part in parts]
         whole = pd.concat(parts).groupby(WIND, as_index=False)[list(RATIOS)].mean()
@@ -87,7 +87,7 @@ def _ratios(own, base, bound, label):
 
 
 def _with_fractions(ratios, bound):
-    """The ratios with their shares of the limit, and of that for measured channels."""
+    """The ratios with their fractions of the limit, and of that for measured channels."""
     result = ratios.drop(columns="variant", errors="ignore").copy()
     for information, column in (("full", "of_bound_[-]"), ("measured", "of_measured_[-]")):
         result[column] = [
@@ -100,7 +100,7 @@ def _with_fractions(ratios, bound):
 def bound_markdown(fractions, column="of_bound_[-]"):
     """Markdown text of bound_fractions: agents by winds; in brackets where travel or power deviation is more.
 
-    A group has the range over its training seeds behind the share of its mean ratios; "worse" is a
+    A group has the range over its training seeds behind the fraction of its mean ratios; "worse" is a
     controller that is no better than gspi_oc3 in either deviation.
     """
     rows = {}
@@ -113,7 +113,7 @@ def bound_markdown(fractions, column="of_bound_[-]"):
         rows[f"`{name}`"] = cells
     wide = pd.DataFrame.from_dict(rows, orient="index")
     full = column == "of_bound_[-]"
-    wide.index.name = "share of the performance limit" if full else "share, measured channels"
+    wide.index.name = "fraction of the performance limit" if full else "fraction, measured channels"
     return frame_markdown(wide)
 
 
@@ -121,8 +121,8 @@ def _cell(whole, seeds, column):
     """Text of one agent at one wind."""
     if whole.empty:
         return "-"
-    share, within = whole[column].iloc[0], whole["within"].iloc[0]
-    text = "worse" if not np.isfinite(share) else f"{share:.2f}"
+    fraction, within = whole[column].iloc[0], whole["within"].iloc[0]
+    text = "worse" if not np.isfinite(fraction) else f"{fraction:.2f}"
     if len(seeds) and np.isfinite(seeds[column]).any():
         text += f" ({seeds[column].min():.2f} to {seeds[column].max():.2f})"
     return text if within else f"[{text}]"

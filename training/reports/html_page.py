@@ -30,7 +30,7 @@ from fowt_env.visual.time_series import PANELS, SPECTRA, TIME, frequency_marks, 
 
 NO_METRIC = (*KEY, *WORDS, "stopped_[s]", "scored_[s]")
 # columns that the leaderboard shows at once, those of them that the table has
-HEADLINE = (
+PAGE_METRICS = (
     "RotSpeed_std_[rpm]",
     "overspeed_[%]",
     "PtfmPitch_std_[deg]",
@@ -42,7 +42,7 @@ HEADLINE = (
     "FAIRTEN_DEL_[kN]",
     "NcIMUTAxs_rms_[m/s^2]",
 )
-PARETO = ("PtfmPitch_std_[deg]", "RotSpeed_std_[rpm]", "blade_pitch_travel_[deg/s]")  # across, up, size
+PARETO_AXES = ("PtfmPitch_std_[deg]", "RotSpeed_std_[rpm]", "blade_pitch_travel_[deg/s]")  # across, up, size
 ALL_CASES = ""
 MEAN, DIFFERENCE = "mean", "difference"
 # what the shown size allows; stated on the page
@@ -52,7 +52,7 @@ MAX_SERIES_RUNS = 64  # whose time series are in the page, unless cases are name
 SPECTRUM_RANGE = (0.002, 1.0)  # Hz
 SPECTRUM_SPAN = 1e-7  # of the peak: what lies lower is not drawn
 PERCENTILES = (1.0, 25.0, 50.0, 75.0, 99.0)
-SAMPLED = (  # channels whose samples have boxes
+SAMPLED_CHANNELS = (  # channels whose samples have boxes
     "RotSpeed_[rpm]",
     "GenPwr_[kW]",
     "PtfmPitch_[deg]",
@@ -169,9 +169,10 @@ def _chosen_runs(table, cases, seeds):
         table = table[table["seed"].isin(seeds)]
     if cases is None:
         per_case = max(table.groupby("case").size())
-        room = max(1, MAX_SERIES_RUNS // per_case)
-        if len(known) > room:
-            known = [known[i] for i in np.unique(np.linspace(0, len(known) - 1, room).round().astype(int))]
+        capacity = max(1, MAX_SERIES_RUNS // per_case)
+        if len(known) > capacity:
+            kept = np.unique(np.linspace(0, len(known) - 1, capacity).round().astype(int))
+            known = [known[i] for i in kept]
         cases = known
     return table[table["case"].isin(cases)]
 
@@ -193,7 +194,7 @@ def _read_runs(folder, table, chosen, rate, say):
         skip = _skipped(row, frame)
         kept = frame[frame[TIME] >= frame[TIME].iloc[0] + skip - 1e-9]
         if row["status"] == "ok" and len(kept):
-            for channel in (name for name in SAMPLED if name in frame.columns):
+            for channel in (name for name in SAMPLED_CHANNELS if name in frame.columns):
                 cell = samples.setdefault(channel, {}).setdefault((row["controller"], row["case"]), [])
                 cell.append(kept[channel].to_numpy())
         if index in drawn:
@@ -303,7 +304,7 @@ def _schedule(asked, own, say):
 def _metric_columns(table):
     """[{name, label, unit, headline, better}] of the table's metrics, the headline ones first."""
     names = [name for name in table.columns if name not in NO_METRIC and table[name].notna().any()]
-    first = [name for name in HEADLINE if name in names]
+    first = [name for name in PAGE_METRICS if name in names]
     columns = []
     for name in [*first, *(name for name in names if name not in first)]:
         label, _, unit = name.partition("_[")
@@ -429,11 +430,11 @@ def _page_data(table, board_file, runs, schedule):
         "controllers": list(dict.fromkeys(table["controller"])),
         "cases": cases,
         "metrics": metrics,
-        "sort": next((name for name in ("score", PARETO[1]) if name in shown), "controller"),
+        "sort": next((name for name in ("score", PARETO_AXES[1]) if name in shown), "controller"),
         "views": titles,
         "board": views,
         "remarks": {case: _remark(table, board_file, case) for case in [ALL_CASES, *cases]},
-        "pareto": list(PARETO),
+        "pareto": list(PARETO_AXES),
         "runs": points,
         "quantiles": runs["quantiles"],
         "series": runs["series"],

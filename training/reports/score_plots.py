@@ -7,9 +7,9 @@ from fowt_env.errors import InputError
 from fowt_env.training.design.plots import WIND, finish_bound
 from fowt_env.visual.time_series import COLOURS, INK, TIME, named_runs, new_figure, save_figure, style_axes
 
-MARKS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*", "p", "h")
+AGENT_MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*", "p", "h")
 FRONTS = (("full", "-", "the performance limit"), ("measured", "--", "the same, measured channels"))
-FRAME = 1.3  # ends of both axes of plot_shares
+FRAME = 1.3  # ends of both axes of plot_fractions
 HOLLOW = "hollow: more travel or power\ndeviation than gspi_oc3"
 GUST = (  # panels of plot_gust: label, channel
     ("wind\n(m/s)", "Wind1VelX_[m/s]"),
@@ -23,12 +23,12 @@ GUST = (  # panels of plot_gust: label, channel
 )
 
 
-def look(number):
+def agent_style(number):
     """(colour, mark) of the number-th of several controllers; no two of the first 84 have both."""
-    return COLOURS[number % len(COLOURS)], MARKS[number % len(MARKS)]
+    return COLOURS[number % len(COLOURS)], AGENT_MARKERS[number % len(AGENT_MARKERS)]
 
 
-def plot_shares(fractions, bound, path=None, title=None):
+def plot_fractions(fractions, bound, path=None, title=None):
     """Rotor-speed against platform-pitch deviation over gspi_oc3's, a panel per wind, with the Pareto fronts.
 
     fractions: bound_scores.bound_fractions; bound: linear_bound.bound_table. Large marks:
@@ -58,8 +58,8 @@ def plot_shares(fractions, bound, path=None, title=None):
         at = fractions[fractions[WIND] == wind]
         beyond = 0
         for number, name in enumerate(names):
-            beyond += _marks(axes, at[at["agent"] == name], *look(number), beyond)
-            colour, mark = look(number)  # the same in the legend, whatever the first wind has
+            beyond += _marks(axes, at[at["agent"] == name], *agent_style(number), beyond)
+            colour, mark = agent_style(number)  # the same in the legend, whatever the first wind has
             style = {"facecolor": colour, "edgecolor": INK, "linewidth": 0.5}
             axes.scatter([], [], marker=mark, s=46, label=name, **style)
         axes.scatter([], [], marker="o", s=46, facecolor="none", edgecolor=INK, label=HOLLOW)

@@ -1,7 +1,7 @@
 """How agents compare with baselines on the same runs: interquartile mean of ratios, with 95 % intervals.
 
     fowt evaluate --controllers policy:ppo_lqr,gspi_oc3,rosco_float --seeds 1:6:1 --out results/rl
-    fowt scores rivals results/rl --against gspi_oc3,rosco_float
+    fowt scores baselines results/rl --against gspi_oc3,rosco_float
 
 Each ratio is of one metric of an agent over that of a baseline in the same wind and waves. Several training
 seeds of one configuration make a group, whose interval resamples training and weather seeds
@@ -28,7 +28,7 @@ from fowt_env.training.evaluation.results_table import KEY
 __all__ = ["COUNTS", "FIGURES", "Figure", "agent_counts", "agent_scores", "by_kind"]
 
 PAST_ANY = "past a constraint"
-MEASURED = {  # what a turbine's own sensors show
+SENSOR_FIELDS = {  # what a turbine's own sensors show
     "time", "rotor_speed", "generator_speed", "blade_pitch", "generator_torque", "platform_pitch",
     "platform_pitch_rate", "platform_pitch_acceleration", "nacelle_acceleration", "nacelle_velocity",
 }  # fmt: skip
@@ -145,7 +145,7 @@ def agent_scores(table, baselines, groups=None, agents=None, figures=FIGURES):
     baseline, figure, metric, ratio (interquartile mean over all runs), low, high (NaN for too few seeds:
     training.evaluation.bootstrap.crossed_estimate), pairs (runs with a ratio), runs, training_seeds, verdict
     (Figure.verdict). Where the baseline's figure is 0 there is no ratio.
-    Raises: InputError for labels that were not run, or where no run of both went well.
+    Raises: InputError for labels that were not run, or where no run of both succeeded.
     """
     return _scores(table, baselines, grouped(table, baselines, groups, agents), figures)
 
@@ -186,7 +186,7 @@ def _scores(table, baselines, chosen, figures):
                     }
                 )
             if not pairs_at_all:
-                raise InputError(f"{name} and {baseline}: no run of both went well")
+                raise InputError(f"{name} and {baseline}: no run of both succeeded")
     return pd.DataFrame(rows)
 
 
@@ -227,7 +227,8 @@ def inputs(label):
         used = information(label)
     except InputError:
         return ""
-    return ", ".join((["measured"] if set(used) & MEASURED else []) + [x for x in used if x not in MEASURED])
+    measured = ["measured"] if set(used) & SENSOR_FIELDS else []
+    return ", ".join(measured + [x for x in used if x not in SENSOR_FIELDS])
 
 
 def kind_of(case):
@@ -240,7 +241,7 @@ def by_kind(table, baseline, groups=None, agents=None, figures=FIGURES, each=Fal
 
     each: every case is a kind of its own; else the winds of a kind (kind_of) are taken together.
 
-    Both have a further first column, kind. A kind in which an agent has no run that went well has NaN
+    Both have a further first column, kind. A kind in which an agent has no run that succeeded has NaN
     ratios there.
     """
     chosen = grouped(table, [baseline], groups, agents)

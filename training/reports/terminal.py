@@ -14,7 +14,7 @@ from fowt_env.visual.response import BOXES, plot_boxes
 from fowt_env.visual.time_series import TIME, plot_evaluation, plot_pareto, plot_runs, plot_spectra
 
 # printed columns: heading, metric, format
-HEADLINE = (
+PRINTED_METRICS = (
     ("rotor\nspeed\nmean\nrpm", "RotSpeed_mean_[rpm]", ".2f"),
     ("rotor\nspeed\nstd\nrpm", "RotSpeed_std_[rpm]", ".3f"),
     ("over-\nspeed\nmax\n%", "overspeed_[%]", ".1f"),
@@ -53,7 +53,7 @@ def summary_rows(means, width):
         ("runs", [f"{n - failed}/{n}" for n, failed in zip(means["runs"], means["failed"], strict=True)]),
     ]
     optional = {}
-    for heading, name, form in HEADLINE:
+    for heading, name, form in PRINTED_METRICS:
         texts = ["-" if value != value else format(value, form) for value in means[name]]
         optional[name] = (heading, texts)
     for name in (None, *DROPPED_FIRST):
@@ -181,7 +181,7 @@ def _remarks(board, intervals):
     if baseline is None and board["controllers"]:
         lines.append("no paired differences: every controller has failed runs")
     if baseline in failed:
-        lines.append(f"baseline {baseline}: {failed[baseline]} failed; pairs are of the runs that went well")
+        lines.append(f"baseline {baseline}: {failed[baseline]} failed; pairs are of the runs that succeeded")
     return lines
 
 
@@ -235,7 +235,7 @@ def evaluation_plots(table, board, folder):
 
     pareto.png sets rotor-speed against platform-pitch deviation; metrics.png compares the controllers over
     all cases; boxes.png has quartiles and extremes, timeseries_CASE.png and spectra_CASE.png the series
-    and spectra, of the first seed of each case that went well.
+    and spectra, of the first seed of each case that succeeded.
     """
     manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
     good = table[table["status"] == "ok"]
@@ -243,7 +243,8 @@ def evaluation_plots(table, board, folder):
         return []
     paths = [folder / "pareto.png", folder / "metrics.png"]
     plot_pareto(board, paths[0])
-    plot_evaluation(table, [name for _, name, _ in HEADLINE], paths[1], "Mean over seeds, with their range")
+    names = [name for _, name, _ in PRINTED_METRICS]
+    plot_evaluation(table, names, paths[1], "Mean over seeds, with their range")
     boxes = {}
     for case, about in manifest["cases"].items():
         rows = good[good["case"] == case]

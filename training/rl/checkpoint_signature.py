@@ -1,4 +1,4 @@
-"""Whose checkpoint it is: loading one executes code from it, so one's own are told from those of strangers.
+"""Whose checkpoint it is: loading one executes code from it, so one's own are recognised.
 
 A checkpoint that a run of this user wrote carries a seal, a keyed hash (HMAC-SHA256) of all its files. The
 key is in the user's configuration folder (FOWT_CONFIG_DIR, else XDG_CONFIG_HOME/fowt_env or
@@ -15,7 +15,7 @@ import stat
 from fowt_env.folders import distrust, make_private, user_folder
 
 SEAL = "seal.txt"
-KEY = "checkpoint_key"
+KEY_FILE = "checkpoint_key"
 KEY_BYTES = 32
 
 
@@ -29,10 +29,10 @@ def _key():
     folder = config_folder()
     if folder is None:
         return None
-    path = folder / KEY
+    path = folder / KEY_FILE
     try:
         make_private(folder)
-        temporary = path.with_name(f".{KEY}-{os.getpid()}-{secrets.token_hex(4)}")
+        temporary = path.with_name(f".{KEY_FILE}-{os.getpid()}-{secrets.token_hex(4)}")
         if not path.exists():
             handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
             with os.fdopen(handle, "wb") as file:

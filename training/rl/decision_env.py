@@ -11,7 +11,7 @@ from fowt_env.plant.measurement import Measure
 from fowt_env.training.evaluation.metrics import REDUCTIONS, travel
 from fowt_env.training.rl.sb3_env import FowtSB3VecEnv
 
-RECORDED = (Measure.ROTOR_SPEED, Measure.PLATFORM_PITCH, Measure.BLADE_PITCH, Measure.GENERATOR_TORQUE)
+RECORDED_FIELDS = (Measure.ROTOR_SPEED, Measure.PLATFORM_PITCH, Measure.BLADE_PITCH, Measure.GENERATOR_TORQUE)
 
 
 class DecisionVecEnv(VecEnvWrapper):
@@ -70,20 +70,20 @@ class DecisionVecEnv(VecEnvWrapper):
                 ended[i] = True
                 decisions.action[i] = self.base.env.envs[i]._episode.action
                 self._decision[i] = decisions.action[i]
-        decisions.see(observations)
+        decisions.append(observations)
         for i in np.flatnonzero(ended):
             decisions.restart(i, observations[i], decisions.action[i])
         return decisions.features(), (total / self.settings.hold).astype(np.float32), ended, infos
 
     def get_state(self):
         """Everything that decides how the episodes go on, to be pickled: plants, histories, actions."""
-        return self.base.env.get_state(), self.decisions.seen.copy(), self.decisions.action.copy()
+        return self.base.env.get_state(), self.decisions.observations.copy(), self.decisions.action.copy()
 
     def set_state(self, state):
         """Go on from what get_state returned; returns the features there."""
-        plants, seen, action = state
+        plants, observations, action = state
         self.base.env.set_state(list(plants))
-        self.decisions.seen[:] = seen
+        self.decisions.observations[:] = observations
         self.decisions.action[:] = action
         return self.decisions.features()
 
@@ -127,7 +127,7 @@ class ValidationVecEnv(FowtSB3VecEnv):
             self._failed[i] = not infos[i]["TimeLimit.truncated"]
         self._over |= dones
         if self._clock < len(self._record):
-            row = np.array([env._episode.measurement for env in self.env.envs])[:, RECORDED]
+            row = np.array([env._episode.measurement for env in self.env.envs])[:, RECORDED_FIELDS]
             self._record[self._clock, ~self._over] = row[~self._over]
         self._clock += 1
         return result

@@ -14,7 +14,7 @@ from fowt_env.errors import InputError, unknown
 from fowt_env.training.evaluation.plant_perturbation import PLANT, PLATFORM, plant_settings
 
 SENSORS = {
-    "noise": "white noise of every reading, standard deviation as a share of the channel's observation scale",
+    "noise": "white noise of every reading, standard deviation over the channel's observation scale",
     "delay": "whole control periods from measurement to reading",
 }
 DEFAULT_SENSORS = {"noise": ("uniform", 0.0, 0.02), "delay": ("uniform", 0.0, 3.0)}

@@ -23,7 +23,7 @@ from fowt_env.envs.env import SETTINGS
 from fowt_env.errors import InputError
 from fowt_env.scene.options import OPTIONS
 
-Count = Annotated[int, Field(ge=1, strict=True)]
+PositiveInteger = Annotated[int, Field(ge=1, strict=True)]
 Whole = Annotated[int, Field(ge=0, strict=True)]
 Switch = Annotated[bool, Field(strict=True)]
 TASK_FIELDS = ("residual_pitch", "residual_torque", "blade_pitch", "setpoint")
@@ -61,8 +61,8 @@ class Validation(Record):
 
     winds: Annotated[list[Positive], Field(min_length=1)]  # m/s
     first: Whole
-    seeds: Count
-    every: Count  # decisions
+    seeds: PositiveInteger
+    every: PositiveInteger  # decisions
     skip: NonNegative = 60.0  # s
     # of FowtEnv, in turn over the seeds of each wind; none: exact readings
     sensors: list[dict[str, Any]] = []
@@ -74,7 +74,7 @@ class TrainingSettings(Record):
     algo: Literal["ppo", "sac", "tqc"]
     name: str  # of the settings in training/rl/ALGO.yml
     seed: Whole
-    steps: Count
+    steps: PositiveInteger
     task: str  # of the environment
     environment: dict[str, Any]
     decisions: dict[str, Any]

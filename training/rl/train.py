@@ -76,7 +76,7 @@ OBSERVATIONS = {  # information sets that agents are compared with
 SECTIONS = ("environment", "decisions", "algorithm", "normalise", "validation", "checkpoint_minutes", "task")
 VERSIONS = ("fowt-env", "stable-baselines3", "sb3-contrib", "torch", "numpy", "numba", "gymnasium")
 RATIOS = ("rotor_speed_std_[rpm]", "platform_pitch_std_[deg]", "blade_pitch_travel_[deg/s]")
-FAILURE_COST = 10.0  # of the validation score, per share of episodes that failed
+FAILURE_COST = 10.0  # of the validation score, per fraction of episodes that failed
 TRAVEL_COST = 2.0  # of the validation score, per unit of blade-pitch travel beyond the baseline's
 POWER_COST = 20.0  # of the validation score, per unit of mean power short of LEAST_POWER
 LEAST_POWER = 0.995  # of the reference's
@@ -417,7 +417,7 @@ class Training:
     def save(self):
         """Write a checkpoint of the present instant, whole or not at all; the one before it goes.
 
-        Raises: OSError naming it where there is no room; the one before it stays.
+        Raises: OSError naming it where there is no space; the one before it stays.
         """
         target = self.checkpoints / f"step_{self.model.num_timesteps}"
         if target.exists():

@@ -147,7 +147,7 @@ def main(arguments=None):
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", default="runs/ablation", help="folder of the runs")
     parser.add_argument("--table", default=str(TABLE), help="file of variants")
-    parser.add_argument("--only", help="variants, separated by commas")
+    parser.add_argument("--only", help="variants, separated comma-separated")
     parser.add_argument("--steps", type=int, help="decisions of each run, in place of the file's")
     parser.add_argument("--report", metavar="PICTURE", help="train nothing: plot and print what there is")
     given = parser.parse_args(arguments)
@@ -164,7 +164,7 @@ def main(arguments=None):
                 print(f"\r{name} {seed}: {done}/{total}: {text}  ", end="", file=sys.stderr)
 
             if not run_variant(table, name, seed, given.out, given.steps, report):
-                sys.exit(f"stopped; the same command goes on with {name}, seed {seed}")
+                sys.exit(f"stopped; the same command continues with {name}, seed {seed}")
 
 
 if __name__ == "__main__":

@@ -40,7 +40,7 @@ def changes_of(settings):
     return changes
 
 
-def command_of(settings):
+def training_command(settings):
     """Command line that makes the run again."""
     given = "".join(f" --set '{key}={json.dumps(value)}'" for key, value in changes_of(settings).items())
     return (
@@ -65,7 +65,7 @@ def publish(folder, name, machine):
     versions = json.loads((folder / "versions.json").read_text(encoding="utf-8"))
     known = information(f"policy:{policy}")
     lines = [
-        f"command = {json.dumps(command_of(settings))}",
+        f"command = {json.dumps(training_command(settings))}",
         f"seed = {settings['seed']}",
         f"decisions = {about['steps']}  # of the policy that was kept",
         f"decisions_trained = {int(rows['decisions'].iloc[-1])}",

@@ -125,7 +125,7 @@ def safety_study(agents, progress=print):
 def main(arguments=None):
     """Run the study, print and write it."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--agents", default="", help="names or paths of policies, by commas")
+    parser.add_argument("--agents", default="", help="names or paths of policies, comma-separated")
     parser.add_argument("--out", default="results/safety.csv")
     given = parser.parse_args(arguments)
     table = safety_study([name for name in given.agents.split(",") if name])

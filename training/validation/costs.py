@@ -27,7 +27,7 @@ def cheaper_choices(study):
         SETTLED,
         SPEED,
         SURGE,
-        TENSIONS,
+        TENSION_CHANNELS,
         THRUST,
         _name,
         _since,
@@ -41,7 +41,7 @@ def cheaper_choices(study):
 
     def compare(choice, dearer, cheaper):
         dear, cheap = _since((dearer, cheaper), SETTLED)
-        for channel in (PITCH, SURGE, SPEED, THRUST, TENSIONS[0]):
+        for channel in (PITCH, SURGE, SPEED, THRUST, TENSION_CHANNELS[0]):
             name, unit = _name(channel)
             study.add(choice, f"{name}, mean", unit, dear[channel].mean(), cheap[channel].mean())
             study.add(choice, f"{name}, standard deviation", unit, dear[channel].std(), cheap[channel].std())
@@ -98,7 +98,7 @@ def _densities(step, values):
 def _generator(study, disk):
     """The generator of normal turbulence against the rotor average of the box: deviation and spectrum.
 
-    One box of one seed: its own point deviation differs from sigma_1 of the standard, so shares of the point
+    One box of one seed: its own point deviation differs from sigma_1 of the standard: fractions of the point
     variance are compared.
     """
     hub, diameter, _ = _rotor()

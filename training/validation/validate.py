@@ -22,10 +22,10 @@ from fowt_env.training.validation.signal_errors import (
 )
 
 TIME = "Time_[s]"
-MOTIONS = (
+MOTION_CHANNELS = (
     "PtfmSurge_[m]", "PtfmSway_[m]", "PtfmHeave_[m]", "PtfmRoll_[deg]", "PtfmPitch_[deg]", "PtfmYaw_[deg]",
 )  # fmt: skip
-TENSIONS = ("FAIRTEN1_[kN]", "FAIRTEN2_[kN]", "FAIRTEN3_[kN]")
+TENSION_CHANNELS = ("FAIRTEN1_[kN]", "FAIRTEN2_[kN]", "FAIRTEN3_[kN]")
 SPEED, PITCH, SURGE, BLADE = "RotSpeed_[rpm]", "PtfmPitch_[deg]", "PtfmSurge_[m]", "BldPitch1_[deg]"
 THRUST, POWER = "RtFldFxh_[N]", "GenPwr_[kW]"
 SETTLED = 100.0  # s left out of statistics
@@ -157,7 +157,7 @@ def floating(study):
     for case in ("float_steady_8mps", "float_steady_18mps"):
         for start, words in ((0.0, "whole record"), (SETTLED, f"t >= {SETTLED:g} s")):
             ours, theirs = _since(study.pair(case), start)
-            for channel in (SURGE, PITCH, *TENSIONS, SPEED):
+            for channel in (SURGE, PITCH, *TENSION_CHANNELS, SPEED):
                 name, unit = _name(channel)
                 error = 100.0 * normalised_rms(ours[channel], theirs[channel])
                 quantity = f"{name}, normalised rms error, {words}"
@@ -167,7 +167,7 @@ def floating(study):
 def waves(study):
     """Regular wave H 3 m T 5 s: first harmonics 1 %; second ones reported for four kinds of kinematics."""
     omega = 2.0 * pi / 5.0
-    channels = (SURGE, "PtfmHeave_[m]", PITCH, *TENSIONS)
+    channels = (SURGE, "PtfmHeave_[m]", PITCH, *TENSION_CHANNELS)
     for case in ("regwave_H3T5", "regwave_H3T5_displaced"):
         ours, theirs = _since(study.pair(case), *WAVE_WINDOW)
         for channel in channels:
@@ -186,7 +186,7 @@ def waves(study):
         frames = [RUNS["regwave_H3T5"].frame(study.folder, **options)]
         if surface == "swl":
             frames.append(study.pair(second[position])[1])
-        for channel in (SURGE, PITCH, TENSIONS[0]):
+        for channel in (SURGE, PITCH, TENSION_CHANNELS[0]):
             name, unit = _name(channel)
             ratio = []
             for frame in frames:
@@ -217,7 +217,7 @@ def turbulence(study):
     """18 m/s turbulence with Hs 7.5 m, uniform and full field: deviations 3 %, bands 5 %, rms errors 10 %."""
     for case in ("turb_18mps_Hs7.5_uniform", "turb_18mps_Hs7.5_box"):
         ours, theirs = _since(study.pair(case), SETTLED)
-        for channel in (*MOTIONS, SPEED, BLADE, POWER, THRUST, *TENSIONS):
+        for channel in (*MOTION_CHANNELS, SPEED, BLADE, POWER, THRUST, *TENSION_CHANNELS):
             name, unit = _name(channel)
             both = [frame[channel].std() for frame in (theirs, ours)]
             study.add(case, f"{name}, standard deviation", unit, *both, allowed=3.0)

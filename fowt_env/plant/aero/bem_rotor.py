@@ -8,7 +8,7 @@ wind alone, at any angle of attack.
 from math import cos, pi, sin, sqrt
 from typing import NamedTuple
 
-from fowt_env.plant.aero.blade_elements import airload, element_of, fade, first_guess, solve_section
+from fowt_env.plant.aero.blade_elements import airload, element_of, first_guess, smoothstep, solve_section
 from fowt_env.plant.aero.wake import PER_ELEMENT, filtered_induction, skew_factor, skew_of
 from fowt_env.plant.aero.wind import wind_at
 from fowt_env.plant.compile.decorators import kernel
@@ -29,7 +29,7 @@ class RotorLoad(NamedTuple):
 NO_ROTOR_LOAD = RotorLoad(NO_LOAD, 0.0, 0.0)
 
 
-class Inflow(NamedTuple):
+class SectionInflow(NamedTuple):
     """Relative wind at a section (m/s) and the direction of its blade, e_r = (0, ey, ez)."""
 
     v_normal: float
@@ -84,7 +84,7 @@ def rotor_load(t, pose, x, now, series, field, rotor, skew, wake, dx, counters):
         return NO_ROTOR_LOAD
     hub = hub_flow(t, pose, now, series, field, rotor.overhang, rotor.hub_height)
     speed, azimuth, blade_pitch = x[State.ROTOR_SPEED], x[State.AZIMUTH], x[State.BLADE_PITCH]
-    induction = fade(speed * rotor.tip_radius, SLOW_ROTOR * hub.speed, FAST_ROTOR * hub.speed)
+    induction = smoothstep(speed * rotor.tip_radius, SLOW_ROTOR * hub.speed, FAST_ROTOR * hub.speed)
     skewed = skew_of(hub, skew)
     stations = rotor.radius.shape[0]
     thrust = torque = fy = fz = my = mz = 0.0
@@ -117,7 +117,7 @@ def rotor_load(t, pose, x, now, series, field, rotor, skew, wake, dx, counters):
             section = solve_section(v_normal, v_tangential, induction, guess, element, rotor.polars)
             if not section.solved:
                 counters[Counter.BEM_FALLBACK] += 1.0
-            flow = Inflow(v_normal, v_tangential, ey, ez)
+            flow = SectionInflow(v_normal, v_tangential, ey, ez)
             fn, ft = _wake_load(section, flow, element, blade, j, hub, skewed, skew, wake, x, dx, rotor)
             force_n += rotor.weight[j] * fn
             force_t += rotor.weight[j] * ft

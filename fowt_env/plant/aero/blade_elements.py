@@ -1,7 +1,7 @@
 """One blade station: blade element momentum, inflow in, loads and induced flow out (theory.md, 5.1).
 
 A station is `blade_section`; its scalar residual is `bem_residual`, and the rest finds the root of that.
-`build_blade_elements` prepares a turbine's stations; rotor.py integrates them over blades and span.
+`build_blade_elements` prepares a turbine's stations; bem_rotor.py integrates them over blades and span.
 
 At very high tip-speed ratios (above about 20: spinning in little or no wind) the published equations have
 their root on a pole, where drag with no flow through the disk makes endless swirl, and the load vanishes.
@@ -37,7 +37,7 @@ TOLERANCE = 1e-8  # of the residual before the last step of Newton's method; aft
 LAST_STEP = 1e-6  # largest last step, times Momentum.scale: the second-order error of loads is then 1e-12
 SMALLEST_ANGLE = 1e-6  # rad; end of a bracket, the residual may be singular at 0
 LARGEST_ANGLE = 1.8  # rad; roots above pi/2 (flow turned by the swirl) only where v_normal > 50 v_tangential
-LEAST_FLOW = 0.01  # least normal flow, as a share of the local speed, that carries the swirl away
+LEAST_FLOW = 0.01  # least normal flow, as a fraction of the local speed, that carries the swirl away
 MAX_NEWTON = 24  # safeguarded Newton steps; usually 2 or 3 are taken
 MAX_BISECTIONS = 180  # a third of them halve the bracket: to pi/2^60, below rounding of the smallest angle
 SLOW_SECTION, FAST_SECTION = 0.01, 0.02  # v_tangential/|v_normal| between which it fades in
@@ -388,7 +388,7 @@ def _solve(guess, side, v_normal, v_tangential, element, polars):
 
 
 @kernel
-def fade(x, low, high):
+def smoothstep(x, low, high):
     """0 below low, 1 above high, smooth between (third order)."""
     if x >= high:
         return 1.0
@@ -432,7 +432,8 @@ def solve_section(v_normal, v_tangential, induction, guess, element, polars):
     side = -1.0 if v_normal < 0.0 else 1.0
     part = 0.0
     if induction > 0.0 and v_tangential > 0.0:
-        part = induction * fade(v_tangential, SLOW_SECTION * abs(v_normal), FAST_SECTION * abs(v_normal))
+        axial = abs(v_normal)
+        part = induction * smoothstep(v_tangential, SLOW_SECTION * axial, FAST_SECTION * axial)
     solved = True
     if part > 0.0:
         solved, f, at = _solve(guess, side, abs(v_normal), v_tangential, element, polars)
@@ -475,8 +476,8 @@ def _fill_guesses(rotor):
     """Solve the momentum balance at the points of rotor.guess and put the angles there."""
     for j in range(rotor.radius.shape[0]):
         for i in range(GUESSES):
-            share = i / (GUESSES - 1.0)
-            blade_pitch = GUESS_PITCH[0] + share * (GUESS_PITCH[1] - GUESS_PITCH[0])
+            fraction = i / (GUESSES - 1.0)
+            blade_pitch = GUESS_PITCH[0] + fraction * (GUESS_PITCH[1] - GUESS_PITCH[0])
             element = element_of(j, blade_pitch, rotor)
             for k in range(GUESSES):
                 p = min(max(k / (GUESSES - 1.0), 1e-4), 1.0 - 1e-4)

@@ -1,7 +1,7 @@
 """Rotor loads from one table of the blade element momentum solution, expanded about uniform axial flow.
 
-Much faster than a sweep over all stations (rotor.py, rotor_lookup.py). To first order in what varies over
-the disk, the sum over three or more evenly spaced blades does not depend on the azimuth, and rotational
+Much faster than a sweep over all stations (bem_rotor.py, section_table.py). To first order in what varies
+over the disk, the sum over three or more evenly spaced blades does not depend on the azimuth, and rotational
 symmetry leaves one real coefficient for each of the in-plane force and the in-plane moment per gradient
 of the axial wind (shear, platform pitch and yaw rate), and one for each per cross wind (misalignment,
 platform pitch, motion of the hub). Thrust and torque change to second order in both. All of these are
@@ -9,7 +9,7 @@ integrals along the blade of the derivatives of its line load, tabulated beside 
 inflow angle and the blade pitch.
 
 Left out: what fluctuates with the azimuth (three times per turn and faster), and the change of the cross
-wind over the disk. A box of full-field wind has to be averaged over the rotor first (scene.py does).
+wind over the disk. A box of full-field wind has to be averaged over the rotor first (scene/build.py does).
 """
 
 from math import atan2, cos, sin, sqrt
@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fowt_env.plant.aero.bem_rotor import FAST_ROTOR, NO_ROTOR_LOAD, SLOW_ROTOR, RotorLoad, hub_flow
-from fowt_env.plant.aero.blade_elements import blade_section, elements_key, fade
+from fowt_env.plant.aero.blade_elements import blade_section, elements_key, smoothstep
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.state import State, Wrench
 
@@ -74,7 +74,7 @@ class Coefficients(NamedTuple):
 N_COEFFICIENTS = len(Coefficients._fields)
 
 
-class Axis(NamedTuple):
+class TableAxis(NamedTuple):
     """Points of one variable, and a table that finds the interval a value lies in."""
 
     point: np.ndarray  # (n,) increasing
@@ -82,11 +82,11 @@ class Axis(NamedTuple):
     scale: float  # cells per unit
 
 
-class RotorTable(NamedTuple):
+class CoefficientTable(NamedTuple):
     """Coefficients over inflow angle (n,) and blade pitch (m,), rad."""
 
-    theta: Axis
-    blade_pitch: Axis
+    theta: TableAxis
+    blade_pitch: TableAxis
     load: np.ndarray  # (n, m, N_COEFFICIENTS) in the order of Coefficients
     tip_radius: float
     overhang: float
@@ -94,7 +94,7 @@ class RotorTable(NamedTuple):
     density: float  # of the air, kg/m3
 
 
-class Inflow(NamedTuple):
+class DiskInflow(NamedTuple):
     """Wind relative to the moving rotor about the hub, body components, m/s; radii over the tip's.
 
     On a ring of radius r, in the direction e = (y, z) at the angle psi from z, the axial wind is
@@ -113,7 +113,7 @@ class Inflow(NamedTuple):
 
 
 def _axis(steps, end):
-    """Axis from the list of (start, step), with the last point at end (deg); rad."""
+    """TableAxis from the list of (start, step), with the last point at end (deg); rad."""
     edges = [start for start, _ in steps] + [end]
     parts = [
         np.linspace(low, high, max(1, round((high - low) / step)), endpoint=False)
@@ -123,7 +123,7 @@ def _axis(steps, end):
     scale = CELLS / (point[-1] - point[0])
     start = point[0] + np.arange(CELLS) / scale - 1e-9  # a cell's own rounding must not overshoot
     cell = np.clip(np.searchsorted(point, start, side="right") - 1, 0, len(point) - 2)
-    return Axis(point, cell.astype(np.int64), float(scale))
+    return TableAxis(point, cell.astype(np.int64), float(scale))
 
 
 @kernel
@@ -136,7 +136,7 @@ def _fill(theta, blade_pitch, load, rotor):
     radius_of_tip = rotor.tip_radius
     for i in range(theta.shape[0]):
         wind, tip_speed = cos(theta[i]), sin(theta[i])
-        induction = fade(tip_speed, SLOW_ROTOR * abs(wind), FAST_ROTOR * abs(wind))
+        induction = smoothstep(tip_speed, SLOW_ROTOR * abs(wind), FAST_ROTOR * abs(wind))
         for k in range(blade_pitch.shape[0]):
             c = load[i, k]
             for j in range(rotor.radius.shape[0]):
@@ -158,47 +158,47 @@ def _fill(theta, blade_pitch, load, rotor):
                 co, si = wind / size, v_tangential / size
                 n_n, t_n = (2.0 * co * n - si * n1) / size, (2.0 * co * t - si * t1) / size
                 n_t, t_t = (2.0 * si * n + co * n1) / size, (2.0 * si * t + co * t1) / size
-                share = rotor.blades * rotor.weight[j] / radius_of_tip
+                weight = rotor.blades * rotor.weight[j] / radius_of_tip
                 arm = rotor.blades * rotor.moment_weight[j] / radius_of_tip**2
                 bend = r * r - MEAN_SQUARE
-                c[0] += share * n / radius_of_tip
+                c[0] += weight * n / radius_of_tip
                 c[1] += arm * t / radius_of_tip
-                c[2] += share * bend * n_n / radius_of_tip
+                c[2] += weight * bend * n_n / radius_of_tip
                 c[3] += arm * bend * t_n / radius_of_tip
                 c[4] += 0.5 * arm * r * n_n / radius_of_tip
                 c[5] += 0.5 * arm * n_t / radius_of_tip
-                c[6] += 0.5 * share * r * t_n / radius_of_tip
-                c[7] += 0.5 * share * t_t / radius_of_tip
+                c[6] += 0.5 * weight * r * t_n / radius_of_tip
+                c[7] += 0.5 * weight * t_t / radius_of_tip
                 c[14] += 0.5 * arm * r**3 * n_n / radius_of_tip
-                c[15] += 0.5 * share * r**3 * t_n / radius_of_tip
-                share, arm = share / (square * radius_of_tip), arm / (square * radius_of_tip)
+                c[15] += 0.5 * weight * r**3 * t_n / radius_of_tip
+                weight, arm = weight / (square * radius_of_tip), arm / (square * radius_of_tip)
                 n_nn, t_nn = 2.0 * (n - co * si * n1) + si * si * n2, 2.0 * (t - co * si * t1) + si * si * t2
                 n_tt, t_tt = 2.0 * (n + co * si * n1) + co * co * n2, 2.0 * (t + co * si * t1) + co * co * t2
                 cosine, half_sine = co * co - si * si, co * si
                 n_nt, t_nt = cosine * n1 - half_sine * n2, cosine * t1 - half_sine * t2
-                c[8] += 0.25 * share * r * r * n_nn
-                c[9] += 0.5 * share * r * n_nt
-                c[10] += 0.25 * share * n_tt
+                c[8] += 0.25 * weight * r * r * n_nn
+                c[9] += 0.5 * weight * r * n_nt
+                c[10] += 0.25 * weight * n_tt
                 c[11] += 0.25 * arm * r * r * t_nn
                 c[12] += 0.5 * arm * r * t_nt
                 c[13] += 0.25 * arm * t_tt
                 c[16] += 0.25 * arm * r**3 * n_nn
                 c[17] += 0.25 * arm * r * r * n_nt
-                c[18] += 0.25 * share * r**3 * t_nn
-                c[19] += 0.25 * share * r * r * t_nt
+                c[18] += 0.25 * weight * r**3 * t_nn
+                c[19] += 0.25 * weight * r * r * t_nt
 
 
 _built = {}  # one table per set of blade elements in this process: building takes about two seconds
 
 
-def build_rotor_table(rotor):
-    """RotorTable of a BladeElements; the same elements give the table built before."""
+def build_coefficient_table(rotor):
+    """CoefficientTable of a BladeElements; the same elements give the table built before."""
     key = elements_key(rotor)
     if key not in _built:
         theta, blade_pitch = _axis(THETA_STEPS, THETA_END), _axis(PITCH_STEPS, PITCH_END)
         load = np.zeros((len(theta.point), len(blade_pitch.point), N_COEFFICIENTS))
         _fill(theta.point, blade_pitch.point, load, rotor._replace(air_density=1.0))
-        _built[key] = RotorTable(
+        _built[key] = CoefficientTable(
             theta,
             blade_pitch,
             load,
@@ -259,7 +259,7 @@ def table_coefficients(wind, tip_speed, blade_pitch, table):
 
 @kernel
 def _inflow(pose, now, series, table):
-    """Inflow of the rotor in a wind series.
+    """DiskInflow of the rotor in a wind series.
 
     A power law (1 + z)^a = 1 + a z + a (a - 1)/2 z^2 + ... has, on a ring of z = r cos(psi), even powers that
     give a mean and a second harmonic, and odd ones that give a first harmonic.
@@ -282,7 +282,7 @@ def _inflow(pose, now, series, table):
     up, side = a * size * axial + pose.r11 * vertical, pose.r11 * left
     y_up, z_up = a * size * cross_y + pose.r12 * vertical, a * size * cross_z + pose.r13 * vertical
     curl = pose.r33 * y_up + pose.r23 * pose.r12 * left - pose.r32 * z_up - pose.r22 * pose.r13 * left
-    return Inflow(
+    return DiskInflow(
         hub.wx + MEAN_SQUARE * bend,
         0.5 * curl,
         bend,
@@ -296,7 +296,7 @@ def _inflow(pose, now, series, table):
 
 
 @kernel
-def rotor_table_load(pose, x, now, series, table):
+def coefficient_table_load(pose, x, now, series, table):
     """RotorLoad of the state x, averaged over a turn of the rotor. No table or no wind series: zero.
 
     now, series  wind (weather/wind.py), taken where the moving rotor is

@@ -3,8 +3,8 @@
 from typing import NamedTuple
 
 from fowt_env.plant.aero.bem_rotor import RotorLoad, rotor_load
-from fowt_env.plant.aero.coefficient_table import RotorTable, rotor_table_load
-from fowt_env.plant.aero.section_table import SectionTable, rotor_lookup_load
+from fowt_env.plant.aero.coefficient_table import CoefficientTable, coefficient_table_load
+from fowt_env.plant.aero.section_table import SectionTable, section_table_load
 from fowt_env.plant.aero.tower_drag import tower_load
 from fowt_env.plant.aero.wind import WindSeries, wind_at, wind_now
 from fowt_env.plant.compile.decorators import kernel
@@ -25,7 +25,7 @@ class Aero(NamedTuple):
 
     wind: WindSeries
     field: object  # wind_field.WindField, which replaces the series, or None
-    rotor: object  # BemRotor, SectionTable or RotorTable
+    rotor: object  # BemRotor, SectionTable or CoefficientTable
     tower: object  # tower_drag.TowerDrag or None
 
 
@@ -48,17 +48,17 @@ def _solved(t, pose, x, now, aero, rotor, dx, counters):
 
 @kernel
 def _by_sections(t, pose, x, now, aero, rotor, dx, counters):
-    return rotor_lookup_load(t, pose, x, now, aero.wind, aero.field, rotor, counters)
+    return section_table_load(t, pose, x, now, aero.wind, aero.field, rotor, counters)
 
 
 @kernel
 def _by_coefficients(t, pose, x, now, aero, rotor, dx, counters):
-    return rotor_table_load(pose, x, now, aero.wind, rotor)
+    return coefficient_table_load(pose, x, now, aero.wind, rotor)
 
 
 # (t, pose, x, now, aero, rotor, dx, counters) -> RotorLoad; of dx the wake's rates alone are written
 rotor_part = chosen_by_class(
-    "rotor", {BemRotor: _solved, SectionTable: _by_sections, RotorTable: _by_coefficients}
+    "rotor", {BemRotor: _solved, SectionTable: _by_sections, CoefficientTable: _by_coefficients}
 )
 
 

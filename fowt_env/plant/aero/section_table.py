@@ -33,7 +33,7 @@ from fowt_env.plant.aero.blade_elements import (
     BladeElements,
     blade_section,
     elements_key,
-    fade,
+    smoothstep,
 )
 from fowt_env.plant.aero.wind import LOWEST_HEIGHT, wind_at
 from fowt_env.plant.compile.decorators import kernel
@@ -47,7 +47,7 @@ from fowt_env.plant.state import State, Wrench
 AHEAD, BEHIND = 512, 64
 DENSE_START, DENSE_END, DENSE_ROWS = -5.0, 30.0, 140  # deg, blade pitches where turbines operate
 COARSE_END, COARSE_ROWS = 90.0, 60  # deg, on to feather
-IN_PLANE = 1e-9  # v_normal of the first direction: the limit from upwind, as the load jumps at zero
+LEAST_NORMAL = 1e-9  # v_normal of the first direction: the limit from upwind, as the load jumps at zero
 LARGEST_RATIO = 12.0  # highest over lowest point of the rotor, else wind_at: see _profile
 
 
@@ -56,7 +56,7 @@ class SectionTable(NamedTuple):
 
     load: np.ndarray  # (blade pitches, n, directions, 2) float32, m2; see _fill
     radius: np.ndarray  # (n,) m
-    arm: np.ndarray  # (n,) m, radius at which the station's share of the blade's force acts
+    arm: np.ndarray  # (n,) m, radius at which the station's part of the blade's force acts
     elements: BladeElements  # of the exact solution
 
 
@@ -77,7 +77,7 @@ class Profile(NamedTuple):
     q5: float
 
 
-class Blade(NamedTuple):
+class BladeMotion(NamedTuple):
     """Directions of a blade and the motion along it. e_r = (0, ey, ez) outwards, e_t = (0, -ez, ey)."""
 
     ey: float
@@ -105,17 +105,17 @@ class BladeForce(NamedTuple):
 
 @kernel
 def _fill(load, blade_pitch, elements):
-    """Put into load each station's share of the blade's force, normal and tangential, over the air density
+    """Put into load each station's part of the blade's force, normal and tangential, over the air density
     and the square of v_normal + |v_tangential|."""
     for i in range(load.shape[0]):
         for j in range(load.shape[1]):
-            share = elements.weight[j] / elements.air_density
+            weight = elements.weight[j] / elements.air_density
             for k in range(load.shape[2]):
                 v_tangential = 1.0 - k / AHEAD if k <= AHEAD else -(k - AHEAD) / BEHIND
-                v_normal = max(1.0 - abs(v_tangential), IN_PLANE)
+                v_normal = max(1.0 - abs(v_tangential), LEAST_NORMAL)
                 section = blade_section(v_normal, v_tangential, blade_pitch[i], j, 1.0, elements)
-                load[i, j, k, 0] = share * section.fn
-                load[i, j, k, 1] = share * section.ft
+                load[i, j, k, 0] = weight * section.fn
+                load[i, j, k, 1] = weight * section.ft
 
 
 _built = {}  # one table per blade in this process: building takes about a second
@@ -178,7 +178,7 @@ def _profile(low, high, series):
 def _blade(psi, rotor_speed, pose, hub):
     """Blade at the azimuth psi."""
     ey, ez = -sin(psi), cos(psi)
-    return Blade(
+    return BladeMotion(
         ey,
         ez,
         pose.r12 * ey + pose.r13 * ez,
@@ -202,7 +202,7 @@ def _shear(z, profile):
 
 
 @kernel
-def _station_force(v_normal, v_tangential, j, low, high, share):
+def _station_force(v_normal, v_tangential, j, low, high, fraction):
     """(normal, tangential) force of station j over the air density, bilinear between two rows of the table.
 
     Any input is safe; it means something for v_normal > 0.
@@ -213,16 +213,16 @@ def _station_force(v_normal, v_tangential, j, low, high, share):
     place = place if place > 0.0 else 0.0  # not a number too
     k = min(int(place), AHEAD + BEHIND - 1)
     part = place - k
-    n0 = (1.0 - share) * float(low[j, k, 0]) + share * float(high[j, k, 0])
-    t0 = (1.0 - share) * float(low[j, k, 1]) + share * float(high[j, k, 1])
-    n1 = (1.0 - share) * float(low[j, k + 1, 0]) + share * float(high[j, k + 1, 0])
-    t1 = (1.0 - share) * float(low[j, k + 1, 1]) + share * float(high[j, k + 1, 1])
+    n0 = (1.0 - fraction) * float(low[j, k, 0]) + fraction * float(high[j, k, 0])
+    t0 = (1.0 - fraction) * float(low[j, k, 1]) + fraction * float(high[j, k, 1])
+    n1 = (1.0 - fraction) * float(low[j, k + 1, 0]) + fraction * float(high[j, k + 1, 0])
+    t1 = (1.0 - fraction) * float(low[j, k + 1, 1]) + fraction * float(high[j, k + 1, 1])
     square = total * total
     return square * (n0 + part * (n1 - n0)), square * (t0 + part * (t1 - t0))
 
 
 @kernel
-def _sheared_force(pose, hub, blade, now, series, profile, low, high, share, radii, arm):
+def _sheared_force(pose, hub, blade, now, series, profile, low, high, fraction, radii, arm):
     """BladeForce in a wind uniform apart from its shears: v = v0 + v1 radius + v2 profile, no branches."""
     height, left = hub.Z - series.reference_height, hub.Y
     linear = (now.vertical_shear * height + now.horizontal_shear * left) / series.reference_length
@@ -242,7 +242,7 @@ def _sheared_force(pose, hub, blade, now, series, profile, low, high, share, rad
         v_normal = n0 + n1 * radius + n2 * shear
         v_tangential = t0 + t1 * radius + t2 * shear
         outside += 0 if v_normal > 0.0 and v_normal + abs(v_tangential) < LARGEST_SPEED else 1
-        fn, ft = _station_force(v_normal, v_tangential, j, low, high, share)
+        fn, ft = _station_force(v_normal, v_tangential, j, low, high, fraction)
         force_n += fn
         force_t += ft
         moment_n += arm[j] * fn
@@ -263,7 +263,7 @@ def _across(velocity, slice_now, row, column, component, p, q, r, d):
 
 
 @kernel
-def _field_force(t, pose, hub, blade, field, low, high, share, radii, arm):
+def _field_force(t, pose, hub, blade, field, low, high, fraction, radii, arm):
     """BladeForce in a box of wind, station by station without branches; not valid where the blade leaves the
     box or the table.
 
@@ -312,7 +312,7 @@ def _field_force(t, pose, hub, blade, field, low, high, share, radii, arm):
         v_normal = pose.r11 * u + pose.r21 * v + pose.r31 * w - hub.vx - radius * blade.normal_rate
         v_tangential = blade.tangential + radius * blade.spin - (blade.tx * u + blade.ty * v + blade.tz * w)
         outside += 0 if v_normal > 0.0 and v_normal + abs(v_tangential) < LARGEST_SPEED else 1
-        fn, ft = _station_force(v_normal, v_tangential, j, low, high, share)
+        fn, ft = _station_force(v_normal, v_tangential, j, low, high, fraction)
         force_n += fn
         force_t += ft
         moment_n += arm[j] * fn
@@ -321,7 +321,9 @@ def _field_force(t, pose, hub, blade, field, low, high, share, radii, arm):
 
 
 @kernel
-def _sampled_force(t, pose, hub, blade, now, series, field, blade_pitch, low, high, share, table, counters):
+def _sampled_force(
+    t, pose, hub, blade, now, series, field, blade_pitch, low, high, fraction, table, counters
+):
     """BladeForce with the wind sampled station by station, and the exact solution outside the table."""
     elements = table.elements
     force_n = force_t = moment_n = moment_t = 0.0
@@ -339,7 +341,7 @@ def _sampled_force(t, pose, hub, blade, now, series, field, blade_pitch, low, hi
         v_normal = pose.r11 * u + pose.r21 * v + pose.r31 * w - hub.vx - radius * blade.normal_rate
         v_tangential = blade.tangential + radius * blade.spin - (blade.tx * u + blade.ty * v + blade.tz * w)
         if v_normal > 0.0 and v_normal + abs(v_tangential) < LARGEST_SPEED:
-            fn, ft = _station_force(v_normal, v_tangential, j, low, high, share)
+            fn, ft = _station_force(v_normal, v_tangential, j, low, high, fraction)
         else:
             section = blade_section(v_normal, v_tangential, blade_pitch, j, 1.0, elements)
             if not section.solved:
@@ -355,7 +357,7 @@ def _sampled_force(t, pose, hub, blade, now, series, field, blade_pitch, low, hi
 
 
 @kernel
-def rotor_lookup_load(t, pose, x, now, series, field, table, counters):
+def section_table_load(t, pose, x, now, series, field, table, counters):
     """RotorLoad of the state x at time t from the tables of the stations. No table or no wind series: zero.
 
     now, series, field  wind (weather/wind.py); every station has the wind of where it is at this instant
@@ -370,12 +372,12 @@ def rotor_lookup_load(t, pose, x, now, series, field, table, counters):
     elements = table.elements
     hub = hub_flow(t, pose, now, series, field, elements.overhang, elements.hub_height)
     speed, azimuth, blade_pitch = x[State.ROTOR_SPEED], x[State.AZIMUTH], x[State.BLADE_PITCH]
-    induction = fade(speed * elements.tip_radius, SLOW_ROTOR * hub.speed, FAST_ROTOR * hub.speed)
+    induction = smoothstep(speed * elements.tip_radius, SLOW_ROTOR * hub.speed, FAST_ROTOR * hub.speed)
     row = _pitch_row(blade_pitch)
     if not (induction == 1.0 and row >= 0.0):
         return rotor_load(t, pose, x, now, series, field, elements, None, None, x, counters)
     i = int(row)
-    share = row - i
+    fraction = row - i
     low, high = table.load[i], table.load[i + 1]
     bottom, top = hub.Z - elements.tip_radius, hub.Z + elements.tip_radius
     sheared = field is None and bottom > LOWEST_HEIGHT and top < LARGEST_RATIO * bottom
@@ -389,13 +391,13 @@ def rotor_lookup_load(t, pose, x, now, series, field, table, counters):
         force = BladeForce(0.0, 0.0, 0.0, 0.0, False)
         if sheared:
             force = _sheared_force(
-                pose, hub, blade, now, series, profile, low, high, share, table.radius, table.arm
+                pose, hub, blade, now, series, profile, low, high, fraction, table.radius, table.arm
             )
         elif field is not None:
-            force = _field_force(t, pose, hub, blade, field, low, high, share, table.radius, table.arm)
+            force = _field_force(t, pose, hub, blade, field, low, high, fraction, table.radius, table.arm)
         if not force.valid:
             force = _sampled_force(
-                t, pose, hub, blade, now, series, field, blade_pitch, low, high, share, table, counters
+                t, pose, hub, blade, now, series, field, blade_pitch, low, high, fraction, table, counters
             )
         thrust += force.force_n
         torque += force.moment_t

@@ -54,8 +54,8 @@ def field_at(t, X, Y, Z, field):
     d = up * left * ground
     u = v = w = 0.0
     for number in range(2):
-        cut, share = (velocity[i], 1.0 - late) if number == 0 else (velocity[after], late)
-        p, q, r, s = share * a, share * b, share * c, share * d
+        cut, fraction = (velocity[i], 1.0 - late) if number == 0 else (velocity[after], late)
+        p, q, r, s = fraction * a, fraction * b, fraction * c, fraction * d
         u += p * cut[k, j, 0] + q * cut[k, j + 1, 0] + r * cut[k + 1, j, 0] + s * cut[k + 1, j + 1, 0]
         v += p * cut[k, j, 1] + q * cut[k, j + 1, 1] + r * cut[k + 1, j, 1] + s * cut[k + 1, j + 1, 1]
         w += p * cut[k, j, 2] + q * cut[k, j + 1, 2] + r * cut[k + 1, j, 2] + s * cut[k + 1, j + 1, 2]

@@ -2,7 +2,7 @@
 
 Numba's own cache watches only the file of the function itself: after an edit of a callee in
 another file a cached caller would go on returning the old result. So the cache lives in a folder
-named by a hash of every source of the plant. A kernel of another room (an environment's, a controller's)
+named by a hash of every source of the plant. A kernel of another package (an environment's, a controller's)
 carries the hash of what its module imports besides. A user's function is compiled anew in each process.
 """
 
@@ -146,7 +146,7 @@ kernel = _decorator(**_HOUSE, _nrt=False)
 
 # No fastmath anywhere: LLVM then orders a sum differently in each caller's copy of a function, and a
 # process that compiles gets other last bits than one that loads from disk (seen on the look-up rotor
-# and the wave sums). Where a sum's time counts, lane_sums.py writes it in a fixed order of lanes.
+# and the wave sums). Where a sum's time counts, vector_sums.py writes it in a fixed order of lanes.
 
 # A kernel put into its caller whatever its size. A call hands over a scene by value, some 400 words: that
 # takes longer than most loads, so what lies between a run and its loads is put into the run.

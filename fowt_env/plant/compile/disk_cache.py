@@ -2,7 +2,7 @@
 
 Numba reads a function's index, adds an entry and writes it back without a lock, and numbers the files of
 machine code by what it read: of two processes that compile at once one loses its entry, or finds the other's
-code under it. A broken file, or no room for a new one, ends the program. Here entries are added under a lock,
+code under it. A broken file, or a full disk, ends the program. Here entries are added under a lock,
 a broken file is as good as none, and what cannot be kept is compiled again the next time.
 
 The files are pickles, which run code as they are read: one that may be from somebody else is not.
@@ -38,7 +38,7 @@ class SharedCacheFile(caching.IndexDataCacheFile):
                     )
                 self._save_data(names[key], data)
                 self._save_index(names)
-        except OSError:  # no room, or no longer a place to write
+        except OSError:  # no space, or no longer a place to write
             return
 
     @contextmanager
@@ -87,7 +87,7 @@ def _check(path):
 
 
 class _Locator(caching.UserProvidedCacheLocator):
-    """Where a kernel's files are: in the folder that it is told, and not where numba's settings say."""
+    """Where a kernel's files are: in the folder that it is given, and not where numba's settings say."""
 
     def __init__(self, function, path, folder, stamp):
         self._py_file = path

@@ -16,7 +16,7 @@ from fowt_env.plant.state import NO_LOAD, Wrench
 SLICE_NODES = 24  # Gauss points per section in the partly wet zone; 1e-4 of the volume at 60 deg
 
 
-class Hull(NamedTuple):
+class BuoyantHull(NamedTuple):
     """Outer shape of the floater and the constants of its closed-form buoyancy."""
 
     specific_weight: float  # rho g, N/m3
@@ -32,7 +32,7 @@ class Hull(NamedTuple):
 
 
 def build_hull(hull, water_density, gravity):
-    """Hull part from a description.Hull."""
+    """BuoyantHull of a descriptions.platform.Hull."""
     z = np.ascontiguousarray(hull.z, dtype=np.float64)
     radius = np.ascontiguousarray(hull.diameter, dtype=np.float64) / 2.0
     volume = moment = 0.0
@@ -41,7 +41,7 @@ def build_hull(hull, water_density, gravity):
         volume += part
         moment += first
     x, w = np.polynomial.legendre.leggauss(SLICE_NODES)
-    return Hull(
+    return BuoyantHull(
         float(water_density * gravity),
         float(radius[-1]),
         float(z[-2]),

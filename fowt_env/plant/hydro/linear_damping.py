@@ -19,7 +19,7 @@ class LinearDamping(NamedTuple):
 
 
 def build_damping(hydro):
-    """LinearDamping of a description.Hydro, or None where every coefficient is zero."""
+    """LinearDamping of a descriptions.platform.HydroCoefficients, or None where every coefficient is zero."""
     values = (*hydro.linear_damping, hydro.yaw_stiffness)
     if not any(values):
         return None

@@ -34,7 +34,7 @@ class BandedStrips(NamedTuple):
 class Hydro(NamedTuple):
     """The floater in the water."""
 
-    hull: object  # hydrostatics.Hull
+    hull: object  # hydrostatics.BuoyantHull
     strips: object  # ExactStrips or BandedStrips
     waves: object  # waves.Waves or None
     current: object  # morison.Current or None

@@ -38,8 +38,8 @@ def current_at(z, depth, current):
     """(u, v) of the current at inertial height z."""
     if current is None:
         return 0.0, 0.0
-    share = min(max((depth + z) / depth, 0.0), 1.0) ** current.exponent
-    return current.u * share, current.v * share
+    fraction = min(max((depth + z) / depth, 0.0), 1.0) ** current.exponent
+    return current.u * fraction, current.v * fraction
 
 
 @kernel

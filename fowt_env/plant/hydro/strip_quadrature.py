@@ -13,9 +13,9 @@ SURFACE_NODES = 4  # Gauss nodes of the surface section
 NODES_AT_LEAST, NODES_PER_LOG = -2, 4.2
 # in still water a node costs next to nothing, and a decay's drag may turn its sign along the hull
 STILL_REFINEMENT = 2
-# rows of a block of StripQuadrature.table: the section's ends (body z), the node's share of the wet height
-# above the bottom, its weight's share of it, and its diameter D0 + D1 z
-BOTTOM, TOP, SHARE, SPREAD, D0, D1, N_TABLE = range(7)
+# rows of a block of StripQuadrature.table: the section's ends (body z), the node's fraction of the wet height
+# above the bottom, its weight's fraction of it, and its diameter D0 + D1 z
+BOTTOM, TOP, HEIGHT_FRACTION, WEIGHT_FRACTION, D0, D1, N_TABLE = range(7)
 # rows of a block of BandScratch.nodes
 Z, WEIGHT, AR, AI, BR, BI, U, W, DU, DW, P, CU, CV, N_ROWS = range(14)
 
@@ -43,7 +43,7 @@ class StripQuadrature(NamedTuple):
 
 
 def build_quadrature(hull, strips, refinement=1):
-    """StripQuadrature of a hull (description.Hull) with the constants of its exact twin, a Strips part.
+    """StripQuadrature of a descriptions.platform.Hull with the constants of its exact twin, a Strips part.
 
     refinement: times as many nodes below the surface section.
     """
@@ -51,16 +51,16 @@ def build_quadrature(hull, strips, refinement=1):
     sections = list(zip(hull.z[:-1], hull.z[1:], hull.diameter[:-1], hull.diameter[1:], strict=True))[::-1]
     for number, (bottom, top, lower, upper) in enumerate(sections):
         if number == 0:
-            share, spread = _gauss(SURFACE_NODES)
-            lower = upper  # a cylinder: the water plane of loads/hydrostatics.py cuts it
+            fraction, weight_fraction = _gauss(SURFACE_NODES)
+            lower = upper  # a cylinder: the water plane of hydrostatics.py cuts it
         else:
             # Gauss in the logarithm of depth: wave motion at depth D varies over D
             stretch = log(bottom / top)
             at, weight = _gauss(refinement * (NODES_AT_LEAST + round(NODES_PER_LOG * stretch)))
             z = top * np.exp(stretch * at)
-            share, spread = (z - bottom) / (top - bottom), -weight * z * stretch / (top - bottom)
+            fraction, weight_fraction = (z - bottom) / (top - bottom), -weight * z * stretch / (top - bottom)
         slope = (upper - lower) / (top - bottom)
-        for a, b in zip(share, spread, strict=True):
+        for a, b in zip(fraction, weight_fraction, strict=True):
             columns.append((bottom, top, a, b, lower - slope * bottom, slope))
     keel = len(columns)
     count = -(-(keel + 1) // BLOCK) * BLOCK
@@ -106,5 +106,5 @@ def place_nodes(z_surf, table, node):
     for n in range(BLOCK):
         bottom = table[BOTTOM * BLOCK + n]
         wet = min(max(z_surf, bottom), table[TOP * BLOCK + n]) - bottom
-        node[Z * BLOCK + n] = bottom + wet * table[SHARE * BLOCK + n]
-        node[WEIGHT * BLOCK + n] = wet * table[SPREAD * BLOCK + n]
+        node[Z * BLOCK + n] = bottom + wet * table[HEIGHT_FRACTION * BLOCK + n]
+        node[WEIGHT * BLOCK + n] = wet * table[WEIGHT_FRACTION * BLOCK + n]

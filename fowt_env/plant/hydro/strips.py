@@ -47,9 +47,9 @@ class Strips(NamedTuple):
 
 
 def build_strips(hull, hydro, *, density, depth, position, surface, stretching, cell=None):
-    """Strips from description.Hull and description.Hydro with the three kinematics switches.
+    """Strips from a Hull and HydroCoefficients (descriptions.platform) with the three kinematics switches.
 
-    cell: longest cell below the surface section, m; None: a share of the draft, so that models of any
+    cell: longest cell below the surface section, m; None: a fraction of the draft, so that models of any
     scale are cut alike.
     """
     z = list(hull.z)

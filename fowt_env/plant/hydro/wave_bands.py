@@ -83,7 +83,7 @@ class WaveBands(NamedTuple):
 
 
 class BandDiffraction(NamedTuple):
-    """Coefficient over 1 + C_A (loads/diffraction.py) of every K at every node; 1 at the keel's."""
+    """Coefficient over 1 + C_A (diffraction.py) of every K at every node; 1 at the keel's."""
 
     series: np.ndarray  # (blocks, M, 2 TERMS BLOCK): powers of z - centre, real parts first
     centre: np.ndarray  # (blocks, BLOCK) body z

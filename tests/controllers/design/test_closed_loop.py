@@ -22,7 +22,7 @@ def above_rated():
 def nonlinear_closed_loop(scene, settings):
     """z -> dz/dt of plant, filtered speed and integral, continuous in time; and z at the trim."""
     point = trim(scene)
-    box = without_fluctuations(scene).handle()
+    handle = without_fluctuations(scene).handle()
     rows = list(STATE_INDEX)
     ratio, gk = settings.gear_ratio, settings.gain_schedule_pitch
 
@@ -43,7 +43,7 @@ def nonlinear_closed_loop(scene, settings):
             [generator_torque(ratio * filtered, blade, settings.curve), command(blade, filtered, integral)]
         )
         dx, mean = np.zeros_like(x), np.zeros_like(x)
-        mean_derivative(box, x, u, AZIMUTHS, dx, mean)
+        mean_derivative(handle, x, u, AZIMUTHS, dx, mean)
         speed = x[State.ROTOR_SPEED]
         return np.r_[
             mean[rows], settings.speed_filter_corner * (speed - filtered), filtered - settings.rated_speed

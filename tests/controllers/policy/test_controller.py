@@ -101,7 +101,7 @@ def test_the_controller_commands_what_the_environment_would_do_with_its_decision
     for period in range(120):
         if period % 3 == 0:
             if period:
-                decisions.see(observation[None])
+                decisions.append(observation[None])
             decision = network(decisions.features())
         command = agent.act(env.measurement())
         observation, _, terminated, _, _ = env.step(decisions.smooth(decision)[0])

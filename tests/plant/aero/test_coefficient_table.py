@@ -4,7 +4,7 @@ import pytest
 from fowt_env.descriptions.platform import read_turbine
 from fowt_env.plant.aero.bem_rotor import NO_ROTOR_LOAD, rotor_load
 from fowt_env.plant.aero.blade_elements import build_blade_elements
-from fowt_env.plant.aero.coefficient_table import build_rotor_table, rotor_table_load
+from fowt_env.plant.aero.coefficient_table import build_coefficient_table, coefficient_table_load
 from fowt_env.plant.aero.wind import wind_now
 from fowt_env.plant.events import N_COUNTERS
 from fowt_env.plant.state import N_RIGID, State, pose_of
@@ -13,7 +13,7 @@ from fowt_env.weather.wind import make_series
 pytestmark = pytest.mark.installation
 
 ROTOR = build_blade_elements(read_turbine("nrel5mw"), 1.225)
-TABLE = build_rotor_table(ROTOR)
+TABLE = build_coefficient_table(ROTOR)
 RATED_THRUST, RATED_TORQUE = 750e3, 4.18e6
 OPERATION = [  # wind m/s, rotor speed rad/s, blade pitch rad: operating points from cut-in to cut-out
     (4.0, 0.752, 0.0),
@@ -41,7 +41,7 @@ def state(speed, blade_pitch, azimuth=0.0, velocity=(0,) * 6):
 
 
 def from_table(x, series, table=TABLE):
-    return rotor_table_load(pose_of(x), x, wind_now(0.0, series), series, table)
+    return coefficient_table_load(pose_of(x), x, wind_now(0.0, series), series, table)
 
 
 def from_sections(x, series):
@@ -63,13 +63,13 @@ def test_absent_table_or_wind_gives_exactly_zero():
     x = state(1.2, 0.0)
     assert from_table(x, wind_series(10.0), None) == NO_ROTOR_LOAD
     assert from_table(x, None) == NO_ROTOR_LOAD
-    empty = build_rotor_table(ROTOR._replace(air_density=0.0))
+    empty = build_coefficient_table(ROTOR._replace(air_density=0.0))
     assert np.all(np.array(from_table(x, wind_series(10.0), empty).wrench) == 0.0)
 
 
 def test_same_rotor_is_tabulated_once():
     again = build_blade_elements(read_turbine("nrel5mw"), 1.225)
-    assert build_rotor_table(again) is TABLE
+    assert build_coefficient_table(again) is TABLE
 
 
 def test_every_coefficient_is_finite_and_bounded():

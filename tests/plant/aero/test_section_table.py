@@ -22,7 +22,7 @@ from fowt_env.plant.aero.section_table import (
     _shear,
     _station_force,
     build_section_table,
-    rotor_lookup_load,
+    section_table_load,
 )
 from fowt_env.plant.aero.wind import wind_now
 from fowt_env.plant.aero.wind_field import WindField
@@ -62,7 +62,7 @@ def loads(states, winds, series, field, rotor, table, counters, exact, quick):
         series.value[0] = winds[i]
         now, pose = wind_now(0.0, series), pose_of(x)
         a = rotor_load(0.0, pose, x, now, series, field, rotor, None, None, x, counters)
-        b = rotor_lookup_load(0.0, pose, x, now, series, field, table, counters)
+        b = section_table_load(0.0, pose, x, now, series, field, table, counters)
         for out, load in ((exact, a), (quick, b)):
             w = load.wrench
             out[i, 0], out[i, 1], out[i, 2] = w.fx, w.fy, w.fz
@@ -127,9 +127,9 @@ def test_absent_table_or_wind_gives_exactly_zero():
     x, winds = one()
     series = series_of(winds[0])
     now, pose, counters = wind_now(0.0, series), pose_of(x[0]), np.zeros(N_COUNTERS)
-    assert rotor_lookup_load(0.0, pose, x[0], now, series, None, None, counters) == NO_ROTOR_LOAD
+    assert section_table_load(0.0, pose, x[0], now, series, None, None, counters) == NO_ROTOR_LOAD
     calm = wind_now(0.0, None)
-    assert rotor_lookup_load(0.0, pose, x[0], calm, None, None, TABLE, counters) == NO_ROTOR_LOAD
+    assert section_table_load(0.0, pose, x[0], calm, None, None, TABLE, counters) == NO_ROTOR_LOAD
     thin = build_blade_elements(TURBINE, 0.0)
     for speed in (1.2, 0.0):
         states, winds = one(speed)
@@ -349,7 +349,7 @@ import sys
 import numpy as np
 from fowt_env.descriptions.platform import read_turbine
 from fowt_env.plant.aero.blade_elements import build_blade_elements
-from fowt_env.plant.aero.section_table import SectionTable, rotor_lookup_load
+from fowt_env.plant.aero.section_table import SectionTable, section_table_load
 from fowt_env.plant.state import pose_of
 from fowt_env.weather.wind import make_series
 from fowt_env.plant.aero.wind import wind_now
@@ -364,7 +364,7 @@ for x, row in zip(given["states"], given["winds"]):
         [0.0], [row], reference_height=90.0, reference_length=126.0, shear_exponent=0.14
     )
     for box in (None, field):
-        load = rotor_lookup_load(
+        load = section_table_load(
             0.0, pose_of(x), x, wind_now(0.0, series), series, box, table, np.zeros(8)
         )
         print(*[repr(float(value)) for value in (*load.wrench, load.thrust, load.torque)])

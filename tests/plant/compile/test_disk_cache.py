@@ -12,7 +12,7 @@ import numba
 import pytest
 
 import fowt_env
-from fowt_env.plant.compile import disk_cache as kernel_cache
+from fowt_env.plant.compile import disk_cache
 from fowt_env.plant.compile.announcement import COMPILING_MESSAGE, compilation_announced
 from fowt_env.plant.compile.decorators import KEEP_CACHES, MARKER, PLANT
 from fowt_env.plant.compile.disk_cache import SharedCacheFile
@@ -314,7 +314,7 @@ def apply(function, value):
 def test_what_is_compiled_into_one_of_ours_for_a_users_function_is_not_kept(tmp_path):
     """But for a law it is, which is an address to it."""
     compiled = numba.njit(apply)
-    compiled._cache = kernel_cache.KernelCache(apply, tmp_path)
+    compiled._cache = disk_cache.KernelCache(apply, tmp_path)
     helper = numba.njit(lambda x: x + 1.0)
     assert compiled(helper, 1.0) == 2.0 and compiled((helper, helper)[0], 2.0) == 3.0
     assert not list(tmp_path.rglob("*.nb?"))
@@ -344,25 +344,25 @@ def test_ours_are_kept_in_files_made_for_several_processes_whatever_numba_is_tol
 
 
 def test_another_way_of_numba_to_keep_code_is_noticed(monkeypatch, tmp_path):
-    monkeypatch.setattr(kernel_cache.caching, "IndexDataCacheFile", lambda **given: object())
-    monkeypatch.setattr(kernel_cache.numba, "__version__", "9.9.9")
+    monkeypatch.setattr(disk_cache.caching, "IndexDataCacheFile", lambda **given: object())
+    monkeypatch.setattr(disk_cache.numba, "__version__", "9.9.9")
     with pytest.raises(ImportError, match="numba 9.9.9"):
-        kernel_cache.KernelCache(kernel_folder, tmp_path)
+        disk_cache.KernelCache(kernel_folder, tmp_path)
 
 
-ROOMS = ("fowt_env", "controllers", "training")
+PACKAGES = ("fowt_env", "controllers", "training")
 
 
 def copied_code(tmp_path):
     """Folder with a copy of the sources."""
     code = tmp_path / "code"
-    for path in (path for room in ROOMS for path in (ROOT / room).rglob("*.py")):
+    for path in (path for package in PACKAGES for path in (ROOT / package).rglob("*.py")):
         copy = code / path.relative_to(ROOT)
         copy.parent.mkdir(parents=True, exist_ok=True)
         copy.write_bytes(path.read_bytes())
-    for room in ROOMS[1:]:
-        if not (code / "fowt_env" / room).exists():
-            (code / "fowt_env" / room).symlink_to(code / room, target_is_directory=True)
+    for package in PACKAGES[1:]:
+        if not (code / "fowt_env" / package).exists():
+            (code / "fowt_env" / package).symlink_to(code / package, target_is_directory=True)
     return code
 
 
@@ -414,7 +414,7 @@ def test_kernels_of_other_sources_of_the_plant_are_never_used(tmp_path):
 def _module_files():
     """{module name: path} of the package."""
     files = {}
-    for path in (path for room in ROOMS for path in (ROOT / room).rglob("*.py")):
+    for path in (path for package in PACKAGES for path in (ROOT / package).rglob("*.py")):
         parts = path.relative_to(ROOT).with_suffix("").parts
         parts = parts if parts[0] == "fowt_env" else ("fowt_env", *parts)
         files[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
@@ -472,7 +472,7 @@ def test_broken_files_are_compiled_anew(tmp_path):
     assert output(start(SMALL, folder)) == ["0.25"]
 
 
-def test_without_room_for_machine_code_kernels_work_all_the_same(tmp_path):
+def test_without_space_for_machine_code_kernels_work_all_the_same(tmp_path):
     limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))\n"
     assert output(start(limit + SMALL, tmp_path / "cache")) == ["0.25"]
     assert not list((tmp_path / "cache").rglob("*.nbc"))

@@ -48,7 +48,7 @@ def test_accelerations_are_those_of_the_equation_of_motion_with_that_matrix_and_
     a, b = rates(plain, x), rates(heavy, x)
     body = plain.model.rigid_body
     handle = plain.handle(data := plain.data())
-    rates(plain, x, box=handle)
+    rates(plain, x, handle=handle)
     mass = body.mass_matrix + data.added_mass
     mass[3, 3] -= body.coupling**2 / body.rotor_row
     v, w = x[State.VX : State.VZ + 1], x[State.WX : State.WZ + 1]

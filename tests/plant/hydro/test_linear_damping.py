@@ -2,13 +2,13 @@ import numpy as np
 import pytest
 from plant_helpers import random_state
 
-from fowt_env.descriptions.platform import Hydro
+from fowt_env.descriptions.platform import HydroCoefficients
 from fowt_env.plant.hydro.linear_damping import LinearDamping, build_damping, damping_load
 from fowt_env.plant.state import NO_LOAD, State, pose_of
 
 pytestmark = pytest.mark.installation
 
-NOTHING = Hydro(added_mass_coefficient=1.0, drag_coefficient=0.6, heave_added_mass=0.0)
+NOTHING = HydroCoefficients(added_mass_coefficient=1.0, drag_coefficient=0.6, heave_added_mass=0.0)
 
 
 def test_no_coefficients_no_part_no_load():

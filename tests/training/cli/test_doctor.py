@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 import fowt_env
-from fowt_env.plant.compile import decorators as jit
+from fowt_env.plant.compile import decorators
 from fowt_env.plant.compile.versions import NUMBA, check_numba, satisfies
 from fowt_env.training.cli import app as cli
 from fowt_env.training.cli import health, requirements
@@ -76,7 +76,7 @@ def test_the_cache_is_measured_and_other_versions_counted(tmp_path, monkeypatch)
     (folder / "loads" / "kernel.nbi").write_bytes(b"0" * 2_000_000)
     for name in ("0123456789abcdef", "somebody's"):
         (tmp_path / name).mkdir()
-        (tmp_path / name / jit.MARKER).touch()
+        (tmp_path / name / decorators.MARKER).touch()
     monkeypatch.setattr(health, "CACHE_FOLDER", folder)
     monkeypatch.setattr("fowt_env.plant.compile.announcement.CACHE_FOLDER", folder)
     state = health.cache_state()

@@ -32,7 +32,7 @@ def results(tmp_path):
 
 
 def test_rivals_prints_the_table_that_it_writes(results):
-    done = call("rivals", results, "--against", "gspi_oc3", "--group", "g=a,b", "--out", results / "s")
+    done = call("baselines", results, "--against", "gspi_oc3", "--group", "g=a,b", "--out", results / "s")
     assert done.exit_code == 0, done.output
     assert "| rotor-speed std | 0.725 first |" in done.output and "| `g` |  | 16 | 0 |" in done.output
     assert done.output.count("No interval: ") == 1  # of two training seeds
@@ -47,7 +47,7 @@ def test_cases_scores_each_kind_and_bound_draws_its_picture(results):
     assert done.exit_code == 0 and "| ntm | 0.700 [0.700, 0.700] | 0.750 [0.750, 0.750] |" in done.output
     done = call("bound", results, "--plot", results / "bound.png")
     assert done.exit_code == 0, done.output
-    assert "| share of the performance limit | 14 m/s | 18 m/s |" in done.output
+    assert "| fraction of the performance limit | 14 m/s | 18 m/s |" in done.output
     assert (results / "bound.png").stat().st_size > 10_000
 
 
@@ -61,10 +61,10 @@ def test_gust_draws_its_picture_of_each_controller(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("rivals", "{}", "--against", "gspi"), "unknown controller of the evaluation 'gspi'"),
-        (("rivals", "{}", "--group", "g"), "must be NAME=LABEL,LABEL"),
-        (("rivals", "{}", "--group", "g=a", "--group", "g=b"), "there twice"),
-        (("rivals", "nowhere"), "no such file"),
+        (("baselines", "{}", "--against", "gspi"), "unknown controller of the evaluation 'gspi'"),
+        (("baselines", "{}", "--group", "g"), "must be NAME=LABEL,LABEL"),
+        (("baselines", "{}", "--group", "g=a", "--group", "g=b"), "there twice"),
+        (("baselines", "nowhere"), "no such file"),
         (("cases", "{}", "--figures", "power"), "unknown figure 'power'"),
         (("bound", "{}", "--bound", "nowhere.csv"), "there is no such file"),
         (("gust", "x.png", "--start", "300"), "start = 300 s"),

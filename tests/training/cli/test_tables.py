@@ -72,25 +72,25 @@ def trim_command(monkeypatch, tmp_path):
 
 
 def linearize_command(monkeypatch, tmp_path):
-    from fowt_env.training.design import sweeps as linear_design
+    from fowt_env.training.design import sweeps
 
     modes = frame_of(["wind_[m/s]", "period_[s]", "damping_ratio_[-]", *"abcdefgh"], 3)
     modes.insert(1, "mode", ["surge", "platform_pitch", "heave"])
     zeros = frame_of(["wind_[m/s]", "real_[rad/s]", "imag_[rad/s]"], 2)
-    monkeypatch.setattr(linear_design, "models_over", lambda *a: {18.0: SimpleNamespace(pitch_rests=False)})
-    monkeypatch.setattr(linear_design, "mode_table", lambda models: modes)
-    monkeypatch.setattr(linear_design, "zero_table", lambda models: zeros)
+    monkeypatch.setattr(sweeps, "models_over", lambda *a: {18.0: SimpleNamespace(pitch_rests=False)})
+    monkeypatch.setattr(sweeps, "mode_table", lambda models: modes)
+    monkeypatch.setattr(sweeps, "zero_table", lambda models: zeros)
     return ["linearize", "--winds", "18"], texts_of(modes) + texts_of(zeros)
 
 
 def design_pi_command(monkeypatch, tmp_path):
     from fowt_env.controllers.design import pi as pi_design
-    from fowt_env.training.design import sweeps as linear_design
+    from fowt_env.training.design import sweeps
 
     names = ["wind_[m/s]", "blade_pitch_[deg]", "slope_[1/s2]", "KP_[s]", "KI_[-]", "omega_[rad/s]"]
     table = frame_of([*names, "zeta_[-]", "platform_zeta_[-]", "platform_omega_[rad/s]"], 3)
     found = SimpleNamespace(table=table.to_dict("records"), KP=1.0, KI=1.0, gain_schedule_pitch=1.0)
-    monkeypatch.setattr(linear_design, "models_over", lambda *a: {})
+    monkeypatch.setattr(sweeps, "models_over", lambda *a: {})
     monkeypatch.setattr(pi_design, "design_pi", lambda *a: found)
     return ["design", "pi", "--winds", "18"], texts_of(table)
 
@@ -106,26 +106,26 @@ def design_bound_command(monkeypatch, tmp_path):
 
 
 def design_front_command(monkeypatch, tmp_path):
-    from fowt_env.files import tables as outputs
+    from fowt_env.files import tables
     from fowt_env.training.design import linear_bound
 
     table = frame_of(["wind_[m/s]", *linear_bound.RATIOS, "of_bound_[-]", "of_measured_[-]"], 3)
     table.insert(1, "variant", ["{'pitch_rate': 8.0}", "{'pitch_rate': 80.0}", "default"])
-    monkeypatch.setattr(outputs, "read_table", lambda path: table)
+    monkeypatch.setattr(tables, "read_table", lambda path: table)
     monkeypatch.setattr(linear_bound, "ratio_table", lambda *a: table)
     return ["design", "front", "--runs", "a.csv", "--bound", "b.csv"], texts_of(table)
 
 
 def design_lqr_command(monkeypatch, tmp_path):
-    from fowt_env.training.design import sweeps as linear_design
+    from fowt_env.training.design import sweeps
 
-    table = frame_of(linear_design.SHOWN, 2, case=["ntm_18"] * 2, variant=["gspi_oc3", "{'pitch_rate': 8.0}"])
-    monkeypatch.setattr(linear_design, "sweep", lambda *a: table)
+    table = frame_of(sweeps.SHOWN, 2, case=["ntm_18"] * 2, variant=["gspi_oc3", "{'pitch_rate': 8.0}"])
+    monkeypatch.setattr(sweeps, "sweep", lambda *a: table)
     return ["design", "lqr"], texts_of(table)
 
 
 def validate_command(monkeypatch, tmp_path):
-    from fowt_env.training.validation import report as validate_report
+    from fowt_env.training.validation import report as validation_report
     from fowt_env.training.validation import validate
 
     study = validate.Study()
@@ -134,18 +134,18 @@ def validate_command(monkeypatch, tmp_path):
             "second harmonic, position instantaneous, surface instantaneous" * 2, str(number), "m", 1, 1
         )
     monkeypatch.setattr(validate, "validate_cases", lambda *a, **k: study)
-    monkeypatch.setattr(validate_report, "write_validation_report", lambda *a: [])
+    monkeypatch.setattr(validation_report, "write_validation_report", lambda *a: [])
     return ["validate"], ["123", "reported"]
 
 
 def paper_command(monkeypatch, tmp_path):
-    from fowt_env.training.studies.paper import load_cases as paper
+    from fowt_env.training.studies.paper import load_cases
     from fowt_env.training.studies.paper import report as paper_report
 
     table = frame_of(["mean", "std", "min", "max"], 2, case=["LC5"] * 2)
     table.insert(1, "channel", ["PtfmSurge_[m]", "PtfmPitch_[deg]"])
-    monkeypatch.setattr(paper, "run_paper", lambda *a: SimpleNamespace(runs=[1], claims=[]))
-    monkeypatch.setattr(paper, "statistics", lambda runs: table)
+    monkeypatch.setattr(load_cases, "run_paper", lambda *a: SimpleNamespace(runs=[1], claims=[]))
+    monkeypatch.setattr(load_cases, "statistics", lambda runs: table)
     monkeypatch.setattr(paper_report, "write_paper_report", lambda *a: [])
     return ["paper", "LC5"], texts_of(table)
 
@@ -166,7 +166,7 @@ def benchmark_accuracy_command(monkeypatch, tmp_path):
     row = {"variant": name, "worst": 0.0123, "worst_of": "PtfmPitch_[deg]", "front": True}
     row |= {"real_time_factor": 30412.4, "kernel_factor": 123456.4}
     monkeypatch.setattr(benchmark_accuracy, "accuracy", lambda *a, **k: None)
-    monkeypatch.setattr(benchmark_accuracy, "summary", lambda table: pd.DataFrame([row]))
+    monkeypatch.setattr(benchmark_accuracy, "accuracy_summary", lambda table: pd.DataFrame([row]))
     return ["benchmark", "accuracy", "--no-plot"], ["0.0123", "30412", "123456"]
 
 

@@ -8,7 +8,7 @@ pytest.importorskip("stable_baselines3")
 
 from fowt_env.training.benchmarks.training import VECTOR_ENVS
 from fowt_env.training.cli.app import EXIT_INPUT, EXIT_INTERRUPTED, app
-from fowt_env.training.rl import callbacks as train_callbacks
+from fowt_env.training.rl import callbacks
 from fowt_env.training.rl.train import Training
 
 SMALL = (
@@ -49,7 +49,7 @@ def test_an_interrupted_run_ends_with_a_checkpoint_its_own_exit_code_and_goes_on
         run.stop = True  # as an interrupt does
         return whole(run)
 
-    monkeypatch.setattr(train_callbacks, "REPORT_EVERY", 0.0)
+    monkeypatch.setattr(callbacks, "REPORT_EVERY", 0.0)
     monkeypatch.setattr(Training, "save", save_and_ask)
     stopped = train(folder, 96, "--set", "checkpoint_minutes=0")
     assert stopped.exit_code == EXIT_INTERRUPTED, stopped.output

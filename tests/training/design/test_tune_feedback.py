@@ -11,7 +11,7 @@ from fowt_env.controllers.floating_feedback import FeedbackSettings, FloatingFee
 from fowt_env.controllers.pi import PISettings
 from fowt_env.controllers.tuned import TUNED
 from fowt_env.errors import InputError
-from fowt_env.training.design import tune_feedback as tune_controllers
+from fowt_env.training.design import tune_feedback
 from fowt_env.training.design.tune_feedback import (
     FEEDBACK_GRID,
     FIGURES,
@@ -32,7 +32,7 @@ SHORT = {"duration": 90.0, "winds": (17.0,), "seeds": (1001,)}
 def small(monkeypatch):
     """A grid of three: hardly any feedback, some, and far too much."""
     grid = FEEDBACK_GRID | {"pitch_gain": (0.001, 0.05, 0.5), "low_pass": (0.3,)}
-    monkeypatch.setattr(tune_controllers, "FEEDBACK_GRID", grid)
+    monkeypatch.setattr(tune_feedback, "FEEDBACK_GRID", grid)
     return grid
 
 
@@ -59,7 +59,7 @@ def test_a_small_grid_has_the_figures_of_single_evaluations_and_rules_out_travel
 
 def test_a_failed_setting_is_never_chosen(small, monkeypatch):
     def failing(turbine):
-        found = tune_controllers.feedback_settings(turbine)
+        found = tune_feedback.feedback_settings(turbine)
         found[1][1].parameters[:] = float("nan")
         return found
 
@@ -106,9 +106,9 @@ def test_the_command_writes_the_grids_and_the_choice(tmp_path, monkeypatch):
         values = {key: grid[0] for key, grid in GRIDS[name].items()}
         return pd.DataFrame([values | dict.fromkeys((*FIGURES, "unfed_travel", "cost"), 0.5)])
 
-    monkeypatch.setattr(tune_controllers, "tune", stored)
-    monkeypatch.setattr(tune_controllers, "TUNED", tmp_path / "tuned.toml")
-    tune_controllers.main(["--jobs", "3", "--out", str(tmp_path / "grids")])
+    monkeypatch.setattr(tune_feedback, "tune", stored)
+    monkeypatch.setattr(tune_feedback, "TUNED", tmp_path / "tuned.toml")
+    tune_feedback.main(["--jobs", "3", "--out", str(tmp_path / "grids")])
     read = tomllib.loads((tmp_path / "tuned.toml").read_text())
     assert {name: read[name]["settings"]["low_pass"] for name in read} == dict.fromkeys(TUNABLE, 0.05)
     assert pd.read_csv(tmp_path / "grids" / "tune_rosco_float.csv")["cost"].tolist() == [0.5]

@@ -6,13 +6,13 @@ import pytest
 
 from fowt_env.errors import InputError
 from fowt_env.training.evaluation.bootstrap import interval, resample_weights
-from fowt_env.training.evaluation.cases import Score, Term
+from fowt_env.training.evaluation.cases import Score, ScoreTerm
 from fowt_env.training.evaluation.evaluate import COLUMNS
 from fowt_env.training.evaluation.leaderboard import case_means, leaderboard
 from fowt_env.training.evaluation.metrics import METRICS, never_negative
 
 STD = "RotSpeed_std_[rpm]"
-SPEED_SCORE = Score(baseline="pi", term=(Term(metric=STD, weight=1.0),))
+SPEED_SCORE = Score(baseline="pi", term=(ScoreTerm(metric=STD, weight=1.0),))
 
 
 def table(figures):
@@ -218,7 +218,7 @@ def test_resamples_without_a_value_are_left_out():
 def scored(x, limits=None, power=None):
     rule = Score(
         baseline="pi",
-        term=(Term(metric=STD, weight=3.0), Term(metric="PtfmPitch_std_[deg]", weight=1.0)),
+        term=(ScoreTerm(metric=STD, weight=3.0), ScoreTerm(metric="PtfmPitch_std_[deg]", weight=1.0)),
         power=power,
         limits=limits or {},
     )
@@ -267,7 +267,7 @@ def test_a_suites_score_is_the_mean_over_its_cases_of_the_ratios_of_their_means(
 
 
 def test_a_score_needs_its_baseline_and_all_runs_of_both():
-    rule = Score(baseline="gspi_oc3", term=(Term(metric=STD, weight=1.0),))
+    rule = Score(baseline="gspi_oc3", term=(ScoreTerm(metric=STD, weight=1.0),))
     board = leaderboard(table({("pi", "a", 1): 1.0}), score=rule)
     assert entry(board, "pi")["score"]["mean"] is None and "gspi_oc3" in entry(board, "pi")["score"]["why"]
     for lost, why in (("x", "1 failed run"), ("pi", "1 failed run of 'pi'")):

@@ -64,7 +64,7 @@ def test_without_a_folder_of_ones_own_boxes_are_made_each_time(given, made, tmp_
     assert not list(tmp_path.rglob("*.npz"))
 
 
-def test_a_box_for_which_there_is_no_room_is_used_all_the_same(made, tmp_path, monkeypatch):
+def test_a_box_for_which_there_is_no_space_is_used_all_the_same(made, tmp_path, monkeypatch):
     def full(file, **arrays):
         raise OSError(28, "No space left on device")
 

@@ -9,7 +9,7 @@ pytest.importorskip("matplotlib", reason="matplotlib is not installed: the extra
 from fowt_env.errors import InputError  # noqa: E402
 from fowt_env.training.evaluation.evaluate import COLUMNS  # noqa: E402
 from fowt_env.training.reports.bound_scores import bound_fractions, bound_markdown, read_bound  # noqa: E402
-from fowt_env.training.reports.score_plots import plot_gust, plot_shares  # noqa: E402
+from fowt_env.training.reports.score_plots import plot_fractions, plot_gust  # noqa: E402
 
 SPEED, LEAN, TRAVEL, POWER = (
     "RotSpeed_std_[rpm]", "PtfmPitch_std_[deg]", "blade_pitch_travel_[deg/s]", "GenPwr_std_[kW]",
@@ -84,7 +84,7 @@ def test_the_picture_has_a_panel_per_wind_and_a_mark_for_each_agent_and_training
     agents = {"a": (0.7, 0.7, 1.0, 1.0), "b": (0.8, 0.8, 1.3, 1.0), "far": (0.5, 4.0, 1.0, 1.0)}
     table = runs(agents, ("ntm_14", "ntm_18"))
     found = bound_fractions(table, read_bound(), {"both": ["a", "b"]})
-    figure = plot_shares(found, read_bound(), tmp_path / "shares.png")
+    figure = plot_fractions(found, read_bound(), tmp_path / "shares.png")
     assert (tmp_path / "shares.png").stat().st_size > 10_000
     drawn = [axes for axes in figure.axes if axes.get_title()]
     assert [axes.get_title() for axes in drawn] == ["14 m/s", "18 m/s"]

@@ -109,7 +109,7 @@ def test_failed_runs_are_counted_and_left_out():
     assert list(counts["verdict"]) == ["missed", "met"]
     fail(runs, "base", 0)
     fail(runs, "base", 1)
-    with pytest.raises(InputError, match="no run of both went well"):
+    with pytest.raises(InputError, match="no run of both succeeded"):
         agent_scores(runs, ["base"])
 
 

@@ -10,8 +10,8 @@ from fowt_env.training.evaluation.leaderboard import leaderboard
 from fowt_env.training.evaluation.metrics import METRICS
 from fowt_env.training.reports.terminal import (
     DROPPED_FIRST,
-    HEADLINE,
     LEADERBOARD_DROPS,
+    PRINTED_METRICS,
     chosen_cases,
     evaluation_plots,
     leaderboard_rows,
@@ -32,7 +32,7 @@ def means():
 
 
 def test_headline_and_dropped_columns_are_metrics():
-    names = [name for _, name, _ in HEADLINE]
+    names = [name for _, name, _ in PRINTED_METRICS]
     assert set(names) <= set(METRICS) and set(DROPPED_FIRST) < set(names)
 
 
@@ -48,7 +48,7 @@ def test_printed_rows_fit_the_width_and_say_what_failed(width):
 
 
 def test_a_wide_terminal_gets_every_column():
-    assert len(summary_rows(means(), 200)[0]) == 3 + len(HEADLINE)
+    assert len(summary_rows(means(), 200)[0]) == 3 + len(PRINTED_METRICS)
 
 
 def board(seeds, pi="ok", x="failed", factor=1.0, lost=None, baseline=None):
@@ -114,7 +114,7 @@ def test_a_controller_that_failed_in_bad_weather_shows_no_gain_and_its_row_says_
 
 def test_a_baseline_that_failed_is_said_to_have():
     _, _, _, remarks = leaderboard_rows(board([1, 2, 3, 4, 5], x="ok", lost=5, baseline="x"))
-    assert remarks[-1] == "baseline x: 1 run failed; pairs are of the runs that went well"
+    assert remarks[-1] == "baseline x: 1 run failed; pairs are of the runs that succeeded"
     title, _, _, remarks = leaderboard_rows(board([1, 2], pi="failed"))
     assert "difference" not in title
     assert remarks[-1] == "no paired differences: every controller has failed runs"

@@ -26,8 +26,7 @@ from fowt_env.controllers.policy.controller import AGENTS, shipped_agents
 from fowt_env.controllers.policy.network_file import read_policy
 from fowt_env.errors import InputError
 from fowt_env.training.cli.arguments import parse_pairs
-from fowt_env.training.rl import callbacks as train_callbacks
-from fowt_env.training.rl import train
+from fowt_env.training.rl import callbacks, train
 from fowt_env.training.rl.train import (
     Training,
     baseline_figures,
@@ -36,7 +35,7 @@ from fowt_env.training.rl.train import (
     resolve,
     validation_score,
 )
-from fowt_env.training.studies import publish_agent as publishing
+from fowt_env.training.studies import publish_agent
 
 
 def parameters(run):
@@ -45,7 +44,7 @@ def parameters(run):
 
 def stopped_run(settings, folder, monkeypatch, after):
     """A run that was asked to stop after some decisions."""
-    monkeypatch.setattr(train_callbacks, "REPORT_EVERY", 0.0)
+    monkeypatch.setattr(callbacks, "REPORT_EVERY", 0.0)
     run = Training(settings, folder)
 
     def report(done, total, text):
@@ -169,7 +168,7 @@ def test_a_run_has_its_folder_to_itself_as_long_as_it_learns_and_no_longer(tmp_p
         refusals.append(caught)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(train_callbacks, "REPORT_EVERY", 0.0)
+        patch.setattr(callbacks, "REPORT_EVERY", 0.0)
         assert run.run(report)
     assert refusals
     assert Training({"steps": 48}, run.folder, resume=True).run()
@@ -177,14 +176,14 @@ def test_a_run_has_its_folder_to_itself_as_long_as_it_learns_and_no_longer(tmp_p
 
 def test_the_policy_that_is_kept_is_that_of_the_best_validation_also_in_a_resumed_run(tmp_path, monkeypatch):
     scores, networks, runs = [2.0, 1.0, 3.0], [], []
-    real = train_callbacks.validation_score
+    real = callbacks.validation_score
 
     def scored_otherwise(figures, reference):
         networks.append(parameters(runs[-1]))
         return real(figures, reference) | {"score": scores[len(networks) - 1]}
 
-    monkeypatch.setattr(train_callbacks, "validation_score", scored_otherwise)
-    monkeypatch.setattr(train_callbacks, "REPORT_EVERY", 0.0)
+    monkeypatch.setattr(callbacks, "validation_score", scored_otherwise)
+    monkeypatch.setattr(callbacks, "REPORT_EVERY", 0.0)
     runs.append(Training(small("ppo", steps=192), tmp_path / "run"))
 
     def report(done, total, text):
@@ -354,8 +353,8 @@ def test_a_published_agent_has_a_card_whose_command_makes_the_same_settings(tmp_
     settings = small("ppo")
     run = Training(settings, tmp_path / "run")
     run.run()
-    monkeypatch.setattr(publishing, "AGENTS", tmp_path)
-    policy, card = publishing.publish(run.folder, "small", "a test")
+    monkeypatch.setattr(publish_agent, "AGENTS", tmp_path)
+    policy, card = publish_agent.publish(run.folder, "small", "a test")
     assert policy.read_bytes() == (run.folder / "best.npz").read_bytes()
     with card.open("rb") as file:
         found = tomllib.load(file)
@@ -370,7 +369,7 @@ def test_a_published_agent_has_a_card_whose_command_makes_the_same_settings(tmp_
 
 def test_every_shipped_agent_has_a_card_and_is_small():
     for name in shipped_agents():
-        assert (AGENTS / f"{name}.npz").stat().st_size < publishing.LARGEST_FILE
+        assert (AGENTS / f"{name}.npz").stat().st_size < publish_agent.LARGEST_FILE
         with (AGENTS / f"{name}.toml").open("rb") as file:
             card = tomllib.load(file)
         assert {"command", "seed", "wall_time", "machine", "information", "validation", "versions"} <= set(

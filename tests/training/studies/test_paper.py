@@ -6,13 +6,13 @@ from plant_helpers import rates, state
 from typer.testing import CliRunner
 
 import fowt_env
-from fowt_env.analysis.trim import trim_held
+from fowt_env.analysis.trim import trim_prescribed
 from fowt_env.descriptions.platform import read_platform, read_turbine
 from fowt_env.errors import InputError
 from fowt_env.plant.state import State
 from fowt_env.training.cli.app import app
-from fowt_env.training.studies.froude_model import identify as identify_model
-from fowt_env.training.studies.paper import load_cases as paper
+from fowt_env.training.studies.froude_model import identify
+from fowt_env.training.studies.paper import load_cases
 from fowt_env.training.studies.paper import report as paper_report
 
 TABLE_1 = {"surge": 10.24, "sway": 10.24, "heave": 3.66, "roll": 4.27, "platform_pitch": 4.27, "yaw": 3.15}
@@ -20,28 +20,28 @@ TABLE_1 = {"surge": 10.24, "sway": 10.24, "heave": 3.66, "roll": 4.27, "platform
 
 @pytest.fixture(scope="module")
 def model():
-    return read_platform(paper.PLATFORM)
+    return read_platform(load_cases.PLATFORM)
 
 
 @pytest.fixture(scope="module")
 def natural():
-    return paper.natural_frequencies()
+    return load_cases.natural_frequencies()
 
 
 @pytest.fixture(scope="module")
 def runs():
-    return {name: paper.run_case(name) for name in paper.CASES}
+    return {name: load_cases.run_load_case(name) for name in load_cases.CASES}
 
 
 def verdicts(runs, natural):
-    return {claim.text: claim.holds for claim in paper.claims(runs, natural)}
+    return {claim.text: claim.holds for claim in load_cases.claims(runs, natural)}
 
 
 # The model
 
 
 def test_the_six_computed_periods_of_table_1_are_met_within_half_a_percent():
-    periods = fowt_env.natural_periods(fowt_env.build_scene(paper.PLATFORM))
+    periods = fowt_env.natural_periods(fowt_env.build_scene(load_cases.PLATFORM))
     assert periods == pytest.approx(TABLE_1, rel=0.005)
 
 
@@ -50,13 +50,13 @@ def test_only_lines_hold_the_model_and_all_of_their_parameters_are_positive(mode
     assert len(model.lines) == 6
     for line in model.lines:
         assert min(line.length, line.wet_weight, line.EA) > 0.0
-        rest = identify_model.pull_at_rest(line)
+        rest = identify.pull_at_rest(line)
         assert rest.regime == 2 and rest.anchor_tension > 0.9 * rest.fairlead_tension  # taut, no touchdown
     assert min(model.ballast.mass, *model.ballast.inertia) > 0.0
 
 
 def test_the_model_floats_at_its_design_draft():
-    point = fowt_env.trim(fowt_env.build_scene(paper.PLATFORM))
+    point = fowt_env.trim(fowt_env.build_scene(load_cases.PLATFORM))
     # the nacelle's offset leans it by a tenth of a degree, which lowers it a little
     assert abs(point["PtfmHeave"]) < 1e-4
 
@@ -78,13 +78,13 @@ def test_the_model_is_oc3_hywind_by_froude_but_for_what_was_identified(model):
 
 def test_rated_thrust_is_froude_scaled_in_lc2_with_the_one_polar_factor(model):
     scene = fowt_env.build_scene(model, wind=3.36)
-    point = trim_held(scene, 85.6 * np.pi / 30.0, 0.0, platform="fixed")
+    point = trim_prescribed(scene, 85.6 * np.pi / 30.0, 0.0, platform="fixed")
     assert point["RtFldFxh"] == pytest.approx(703e3 / 50.0**3 * 1000.0 / 1025.0, rel=1e-4)
 
 
 @pytest.mark.slow
 def test_the_committed_model_is_what_the_identification_gives(model):
-    again, _ = identify_model.identify()
+    again, _ = identify.identify()
     assert again.ballast.mass == pytest.approx(model.ballast.mass, rel=1e-6)
     assert again.ballast.inertia[0] == pytest.approx(model.ballast.inertia[0], rel=1e-6)
     for one, other in zip(again.lines, model.lines, strict=True):
@@ -96,7 +96,7 @@ def test_the_committed_model_is_what_the_identification_gives(model):
 def test_a_driven_rotor_turns_the_platform_as_equation_20_says(model):
     # difference to a standing rotor: M1 nu' = -H (0, 0, 0, w_b', w_b w_z, -w_b w_y) with w_b' = 0
     scene = fowt_env.build_scene(model, hydrodynamics=False, mooring=False)
-    body = scene.model.rigid_body._replace(rotor_held=True)
+    body = scene.model.rigid_body._replace(rotor_fixed=True)
     scene = scene.with_model(rigid_body=body)
     spinning = state(vx=0.1, wy=0.2, wz=-0.3, rotor_speed=8.96)
     standing = spinning.copy()
@@ -110,11 +110,11 @@ def test_a_driven_rotor_turns_the_platform_as_equation_20_says(model):
 # The mooring, Fig. 5
 
 
-@pytest.mark.parametrize("platform", [paper.PLATFORM, "oc3_hywind"])
+@pytest.mark.parametrize("platform", [load_cases.PLATFORM, "oc3_hywind"])
 @pytest.mark.parametrize("direction", ["surge", "sway"])
 def test_a_static_pull_is_zero_at_rest_and_grows_with_the_offset(platform, direction):
-    offsets = np.linspace(-1.0, 1.0, 21) * {paper.PLATFORM: 0.25, "oc3_hywind": 20.0}[platform]
-    table = paper.static_pull(read_platform(platform), direction, offsets)
+    offsets = np.linspace(-1.0, 1.0, 21) * {load_cases.PLATFORM: 0.25, "oc3_hywind": 20.0}[platform]
+    table = load_cases.static_pull(read_platform(platform), direction, offsets)
     force = table["force_[N]"].to_numpy()
     assert abs(force[10]) < 1e-6 * np.abs(force).max()
     assert np.all(np.diff(force) > 0.0)
@@ -129,7 +129,7 @@ def test_a_static_pull_is_zero_at_rest_and_grows_with_the_offset(platform, direc
 
 def test_every_load_case_runs_and_stays_finite(runs):
     for frame in runs.values():
-        assert len(frame) == round(paper.DURATION / paper.OUTPUT) + 1
+        assert len(frame) == round(load_cases.DURATION / load_cases.OUTPUT) + 1
         assert np.isfinite(frame.to_numpy()).all()
 
 
@@ -172,7 +172,7 @@ def test_fig_12_wind_sets_the_mean_and_waves_the_range(runs, natural):
 
 def test_the_judge_sees_no_double_frequency_where_waves_act_at_rest(natural):
     # fixed position and still-water integration leave 0.05 % at twice the frequency
-    frame = paper.run_case("LC5", kinematics_position="fixed", surface="swl", stretching="none")
+    frame = load_cases.run_load_case("LC5", kinematics_position="fixed", surface="swl", stretching="none")
     found = verdicts({"LC5": frame}, natural)
     assert found["LC5: surge spectrum peaks at the wave frequency"]
     assert not found["LC5: surge spectrum peaks at twice the wave frequency"]
@@ -184,8 +184,8 @@ def test_the_judge_sees_no_peaks_of_the_other_case(runs, natural):
 
 
 def test_the_pitch_peak_of_a_regular_wave_is_its_start(runs, natural):
-    late = paper.settled(runs["LC5"], 300.0)
-    late = late.assign(**{paper.TIME: late[paper.TIME] - 300.0})
+    late = load_cases.settled(runs["LC5"], 300.0)
+    late = late.assign(**{load_cases.TIME: late[load_cases.TIME] - 300.0})
     found = verdicts({"LC5": late}, natural)
     assert not found["LC5: surge spectrum peaks at the pitch frequency"]
     assert found["LC5: surge spectrum peaks at twice the wave frequency"]
@@ -196,19 +196,19 @@ def test_the_pitch_peak_of_a_regular_wave_is_its_start(runs, natural):
 
 @pytest.mark.slow
 def test_fig_15_double_frequency_of_the_four_combinations_is_that_of_theory():
-    for combination, expected in zip(paper.COMBINATIONS, paper.EXPECTED_DOUBLE, strict=True):
-        found = paper.double_frequency(paper.regular_wave(*combination))
-        assert (found[paper.SURGE][1], found[paper.PITCH][1]) == pytest.approx(expected, abs=0.03)
+    for combination, expected in zip(load_cases.COMBINATIONS, load_cases.EXPECTED_DOUBLE, strict=True):
+        found = load_cases.double_frequency(load_cases.regular_wave(*combination))
+        assert (found[load_cases.SURGE][1], found[load_cases.PITCH][1]) == pytest.approx(expected, abs=0.03)
 
 
 # The command
 
 
 def test_case_names_are_checked():
-    assert paper.wanted_cases("lc5, LC2") == ["LC5", "LC2"]
-    assert paper.wanted_cases("all") == list(paper.CASES)
+    assert load_cases.wanted_cases("lc5, LC2") == ["LC5", "LC2"]
+    assert load_cases.wanted_cases("all") == list(load_cases.CASES)
     with pytest.raises(InputError, match="LC13"):
-        paper.wanted_cases("LC13")
+        load_cases.wanted_cases("LC13")
 
 
 def test_the_command_writes_series_statistics_and_claims(tmp_path):
@@ -223,9 +223,9 @@ def test_the_command_writes_series_statistics_and_claims(tmp_path):
 def test_plots_of_a_few_cases_are_made(runs, natural, tmp_path):
     few = {name: runs[name] for name in ("LC1", "LC5")}
     for name, make in {
-        "box": lambda path: paper_report.box_plots(few, paper.PITCH, path),
-        "spectra": lambda path: paper_report.spectra(few, paper.SURGE, natural, path),
-        "series": lambda path: paper_report.time_series(few, paper.SURGE, path),
+        "box": lambda path: paper_report.box_plots(few, load_cases.PITCH, path),
+        "spectra": lambda path: paper_report.spectra(few, load_cases.SURGE, natural, path),
+        "series": lambda path: paper_report.time_series(few, load_cases.SURGE, path),
         "pull": paper_report.static_pulls,
     }.items():
         make(tmp_path / f"{name}.png")

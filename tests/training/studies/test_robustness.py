@@ -10,31 +10,33 @@ from scipy.integrate import solve_ivp
 from fowt_env.plant.integrators import INTEGRATORS
 from fowt_env.plant.rollout import RUNNING, advance
 from fowt_env.plant.state import State
-from fowt_env.training.studies.robustness import extremes as stability_extremes
-from fowt_env.training.studies.robustness import long_runs as stability_long
-from fowt_env.training.studies.robustness import random_cases as stability_cases
-from fowt_env.training.studies.robustness import step_limits as stability_map
-from fowt_env.training.studies.robustness import study as stability
-from fowt_env.training.studies.robustness import without_compiler as stability_plain
+from fowt_env.training.studies.robustness import (
+    extremes,
+    long_runs,
+    random_cases,
+    step_limits,
+    study,
+    without_compiler,
+)
 
 FOUND = Path(__file__).parents[2] / "reference" / "stability"
 
 
 def keeps_the_margin(name, integrator, duration):
     """Whether a run of twice the default step stays with the fine run."""
-    kind = stability_map.LIMIT_SCENES[name]
+    kind = step_limits.LIMIT_SCENES[name]
     base = kind.scene()
     point = kind.point(base)
-    fine, _ = stability_map.excursions(base, point, 0.025, duration)
-    scene = stability_long.with_integrator(base, integrator, kind.rotor_samples)
-    step = stability_map.MARGIN * INTEGRATORS[integrator].dt
-    late = stability_map.excursions(scene, point, step, duration)[1]
-    return bool(np.all(late <= stability_map.GROWTH * (fine + stability_map.FLOOR)))
+    fine, _ = step_limits.excursions(base, point, 0.025, duration)
+    scene = long_runs.with_integrator(base, integrator, kind.rotor_samples)
+    step = step_limits.MARGIN * INTEGRATORS[integrator].dt
+    late = step_limits.excursions(scene, point, step, duration)[1]
+    return bool(np.all(late <= step_limits.GROWTH * (fine + step_limits.FLOOR)))
 
 
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 @pytest.mark.parametrize(
-    "name", ["full, look-up rotor", "idling feathered, 70 m/s, Hs 15 m", "platform held"]
+    "name", ["full, look-up rotor", "idling feathered, 70 m/s, Hs 15 m", "platform fixed"]
 )
 def test_default_step_keeps_a_factor_of_two_from_blow_up(name, integrator):
     assert keeps_the_margin(name, integrator, 100.0)
@@ -45,10 +47,10 @@ def test_default_step_keeps_a_factor_of_two_where_the_rotor_is_sampled_within_a_
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", stability_map.LIMIT_SCENES)
+@pytest.mark.parametrize("name", step_limits.LIMIT_SCENES)
 def test_default_step_keeps_a_factor_of_two_on_the_whole_map(name):
-    table = stability_map.stability_map([name], duration=150.0)
-    assert (table["margin"] >= stability_map.MARGIN).all()
+    table = step_limits.stability_map([name], duration=150.0)
+    assert (table["margin"] >= step_limits.MARGIN).all()
     both = table[np.isfinite(table["measured_s"]) & np.isfinite(table["theory_s"])]
     assert (both["measured_s"] > 0.8 * both["theory_s"]).all()
 
@@ -58,81 +60,81 @@ def no_failure(tally):
 
 
 def test_random_scenes_and_states_stay_finite_and_bounded():
-    assert no_failure(stability_cases.random_cases(100, seed=11, per_weather=10, plants=("standard",)))
+    assert no_failure(random_cases.random_cases(100, seed=11, per_weather=10, plants=("standard",)))
 
 
 @pytest.mark.slow
 def test_many_random_scenes_and_states_of_every_fidelity_stay_finite_and_bounded():
     plants = ("standard", "fast", "standard", "standard", "reference")
     # `fowt benchmark stability --cases N` runs more
-    assert no_failure(stability_cases.random_cases(500, seed=12, plants=plants))
+    assert no_failure(random_cases.random_cases(500, seed=12, plants=plants))
 
 
 @pytest.mark.parametrize("case", sorted(FOUND.glob("*.json")), ids=lambda path: path.stem)
 def test_cases_that_once_broke_the_bounds_keep_them(case):
-    assert stability_cases.replay(case).failure == ""
+    assert random_cases.replay(case).failure == ""
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", stability_extremes.EXTREMES)
+@pytest.mark.parametrize("name", extremes.EXTREMES)
 def test_extremes_stay_finite(name):
-    assert stability_extremes.run_extreme(name)["finite"]
+    assert extremes.run_extreme(name)["finite"]
 
 
 def test_idling_in_the_50_year_storm_does_not_depend_on_the_step():
     # the feathered blades damp the rotor so much that Adams-Bashforth alone blows up at its default step
     name = "50-year storm, wind from 0 deg off, idling"
-    default, half = (stability_extremes.run_extreme(name, finer=finer) for finer in (1, 2))
-    for key in stability_extremes.PEAKS:
+    default, half = (extremes.run_extreme(name, finer=finer) for finer in (1, 2))
+    for key in extremes.PEAKS:
         assert default[key] == pytest.approx(half[key], rel=0.01)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("mode", ["direct", "setpoint", "residual"])
 def test_hostile_actions_leave_everything_finite_or_end_with_the_reason(mode):
-    table = stability_extremes.hostile(modes=(mode,), tasks=("above_rated",), steps=600)
+    table = extremes.hostile(modes=(mode,), tasks=("above_rated",), steps=600)
     assert table["finite"].all()
 
 
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_free_body_keeps_energy_and_momenta_at_the_default_step(integrator):
-    drift = stability_long.free_drift(integrator, 10_000)
+    drift = long_runs.free_drift(integrator, 10_000)
     assert drift["status"] == RUNNING
-    for key, most in stability.DRIFT[integrator].items():
+    for key, most in study.DRIFT[integrator].items():
         assert drift[key] <= most
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_free_body_keeps_energy_and_momenta_over_ten_million_steps(integrator):
-    drift = stability_long.free_drift(integrator, 10_000_000)
+    drift = long_runs.free_drift(integrator, 10_000_000)
     assert drift["status"] == RUNNING
-    for key, most in stability.DRIFT[integrator].items():
+    for key, most in study.DRIFT[integrator].items():
         assert drift[key] <= most
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("integrator, most", stability.FLOATING_DRIFT.items())
+@pytest.mark.parametrize("integrator, most", study.FLOATING_DRIFT.items())
 def test_undamped_floating_body_keeps_its_energy(integrator, most):
     # a tenth of the documented steps and of the change allowed over them
-    drift = stability_long.floating_drift(integrator, 1_000_000)
+    drift = long_runs.floating_drift(integrator, 1_000_000)
     assert drift["status"] == RUNNING and drift["energy"] <= 0.1 * most
 
 
 @pytest.mark.slow
 def test_memory_does_not_grow():
-    assert stability_long.plant_memory(1_000_000)["growth_MB"] <= stability.MEMORY_MB
-    assert stability_long.environment_memory(50_000)["growth_MB"] <= stability.MEMORY_MB
+    assert long_runs.plant_memory(1_000_000)["growth_MB"] <= study.MEMORY_MB
+    assert long_runs.environment_memory(50_000)["growth_MB"] <= study.MEMORY_MB
 
 
 @pytest.mark.slow
 def test_every_integrator_converges_at_its_order():
-    for integrator, order in stability_long.measured_orders().items():
-        assert order >= stability_long.ORDERS[integrator] - stability.ORDER_SLACK
+    for integrator, order in long_runs.measured_orders().items():
+        assert order >= long_runs.ORDERS[integrator] - study.ORDER_SLACK
 
 
 def test_euler_angles_of_a_tumbling_body_follow_a_quaternion_and_bodies_one_by_one(platform, turbine):
-    scene = stability_long.free_scene()
+    scene = long_runs.free_scene()
     x = np.zeros(15)
     x[3:6], x[10:13] = (0.5, 0.3, -1.0), (0.6, 0.02, 0.25)
     x[State.ROTOR_SPEED] = 1.2671
@@ -153,12 +155,12 @@ def test_euler_angles_of_a_tumbling_body_follow_a_quaternion_and_bodies_one_by_o
 
 
 def test_without_the_compiler_a_scene_gives_the_same_numbers():
-    jobs = stability_plain.jobs(
-        {"still water": {}, "empty space": stability_plain.SCENES["empty space"]}, False
+    jobs = without_compiler.jobs(
+        {"still water": {}, "empty space": without_compiler.SCENES["empty space"]}, False
     )
-    assert max(stability_plain.differences(jobs).values()) <= stability.PLAIN
+    assert max(without_compiler.differences(jobs).values()) <= study.PLAIN
 
 
 @pytest.mark.slow
 def test_without_the_compiler_every_scene_and_environment_gives_the_same_numbers():
-    assert max(stability_plain.differences().values()) <= stability.PLAIN
+    assert max(without_compiler.differences().values()) <= study.PLAIN

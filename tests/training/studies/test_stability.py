@@ -13,28 +13,24 @@ from fowt_env.plant.integrators import INTEGRATORS
 from fowt_env.plant.state import STATES, State
 from fowt_env.scene.build import build_scene
 from fowt_env.training.cli.app import app
-from fowt_env.training.studies.robustness import extremes as stability_extremes
-from fowt_env.training.studies.robustness import long_runs as stability_long
-from fowt_env.training.studies.robustness import random_cases as stability_cases
-from fowt_env.training.studies.robustness import step_limits as stability_map
-from fowt_env.training.studies.robustness import study as stability
+from fowt_env.training.studies.robustness import extremes, long_runs, random_cases, step_limits, study
 
 CALM = {"kind": "jonswap", "Hs": 3.0, "Tp": 9.0}
 
 
 @pytest.fixture(scope="module")
 def scene():
-    return build_scene(wind=18.0, sea=CALM, fidelity="standard", duration=stability_cases.WEATHER)
+    return build_scene(wind=18.0, sea=CALM, fidelity="standard", duration=random_cases.WEATHER)
 
 
 @pytest.fixture(scope="module")
 def runner(scene):
-    return stability_cases.Runner(scene, scene.dt)
+    return random_cases.Runner(scene, scene.dt)
 
 
 def diagonal(value):
     a = value * np.eye(len(STATES))
-    a[stability_map.PITCH, stability_map.PITCH] = -1e-3
+    a[step_limits.PITCH, step_limits.PITCH] = -1e-3
     return a
 
 
@@ -43,7 +39,7 @@ def oscillator(frequency):
     a = np.zeros((len(STATES), len(STATES)))
     a[:6, 6:12] = np.eye(6)
     a[6:12, :6] = -(frequency**2) * np.eye(6)
-    a[stability_map.PITCH, stability_map.PITCH] = -1e-3
+    a[step_limits.PITCH, step_limits.PITCH] = -1e-3
     return a
 
 
@@ -56,56 +52,56 @@ def oscillator(frequency):
     ],
 )
 def test_theory_has_the_limits_of_the_textbook(a, integrator, limit):
-    found = stability_map.first_unstable(
-        lambda h: stability_map.stable(a, h, integrator, duration=3000.0), 0.05
+    found = step_limits.first_unstable(
+        lambda h: step_limits.stable(a, h, integrator, duration=3000.0), 0.05
     )
-    assert found == pytest.approx(limit, rel=2.0 * stability_map.RESOLUTION)
+    assert found == pytest.approx(limit, rel=2.0 * step_limits.RESOLUTION)
 
 
 def test_adams_bashforth_alone_is_stable_to_three_tenths():
     # speeds that drive nothing: the positions' Adams-Moulton step has no part in it
     a = np.zeros((len(STATES), len(STATES)))
     a[6:13, 6:13] = -np.eye(7)
-    a[stability_map.PITCH, stability_map.PITCH] = -1e-3
-    found = stability_map.first_unstable(lambda h: stability_map.stable(a, h, "ab4", 3000.0), 0.05)
-    assert found == pytest.approx(0.3, rel=2.0 * stability_map.RESOLUTION)
+    a[step_limits.PITCH, step_limits.PITCH] = -1e-3
+    found = step_limits.first_unstable(lambda h: step_limits.stable(a, h, "ab4", 3000.0), 0.05)
+    assert found == pytest.approx(0.3, rel=2.0 * step_limits.RESOLUTION)
 
 
 def test_search_stops_at_the_first_step_that_fails_even_if_larger_ones_hold():
-    found = stability_map.first_unstable(lambda h: not 0.3 < h < 0.5, 0.1)
-    assert found == pytest.approx(0.3, rel=stability_map.RESOLUTION)
-    assert stability_map.first_unstable(lambda h: False, 0.1) == 0.0
-    assert stability_map.first_unstable(lambda h: True, 0.1) == float("inf")
+    found = step_limits.first_unstable(lambda h: not 0.3 < h < 0.5, 0.1)
+    assert found == pytest.approx(0.3, rel=step_limits.RESOLUTION)
+    assert step_limits.first_unstable(lambda h: False, 0.1) == 0.0
+    assert step_limits.first_unstable(lambda h: True, 0.1) == float("inf")
 
 
 def test_a_step_beyond_the_limit_of_theory_blows_the_plant_up_and_one_below_does_not():
-    kind = stability_map.LIMIT_SCENES["full, look-up rotor"]
+    kind = step_limits.LIMIT_SCENES["full, look-up rotor"]
     base = kind.scene("ab4")
     point = kind.point(base)
-    fine, _ = stability_map.excursions(base, point, 0.025, 100.0)
-    model = stability_map.linearize(base, point)
-    limit = stability_map.first_unstable(lambda h: stability_map.stable(model.A, h, "ab4", 100.0), 0.1)
+    fine, _ = step_limits.excursions(base, point, 0.025, 100.0)
+    model = step_limits.linearize(base, point)
+    limit = step_limits.first_unstable(lambda h: step_limits.stable(model.A, h, "ab4", 100.0), 0.1)
     for factor, expected in ((0.8, True), (1.3, False)):
-        late = stability_map.excursions(base, point, factor * limit, 100.0)[1]
-        assert np.all(late <= stability_map.GROWTH * (fine + stability_map.FLOOR)) == expected
+        late = step_limits.excursions(base, point, factor * limit, 100.0)[1]
+        assert np.all(late <= step_limits.GROWTH * (fine + step_limits.FLOOR)) == expected
 
 
 def test_same_seed_same_cases():
     first, second = (
-        stability_cases.random_cases(12, seed=3, per_weather=6, duration=5.0, plants=("standard",))
+        random_cases.random_cases(12, seed=3, per_weather=6, duration=5.0, plants=("standard",))
         for _ in range(2)
     )
     assert first.cases == 12 and first.weathers == 2
     assert np.array_equal(first.peak, second.peak)
-    other = stability_cases.random_cases(12, seed=4, per_weather=6, duration=5.0, plants=("standard",))
+    other = random_cases.random_cases(12, seed=4, per_weather=6, duration=5.0, plants=("standard",))
     assert not np.array_equal(first.peak, other.peak)
 
 
 def test_drawn_weather_reaches_the_ends_of_the_range_and_is_never_refused(turbine):
     rng = np.random.default_rng(1)
-    winds = [stability_cases.draw_wind(rng) for _ in range(400)]
-    seas = [stability_cases.draw_sea(rng) for _ in range(400)]
-    states = np.array([stability_cases.draw_state(rng, turbine) for _ in range(400)])
+    winds = [random_cases.draw_wind(rng) for _ in range(400)]
+    seas = [random_cases.draw_sea(rng) for _ in range(400)]
+    states = np.array([random_cases.draw_state(rng, turbine) for _ in range(400)])
     assert {wind["kind"] for wind in winds} >= {"steady", "ntm", "etm", "ewm", "eog", "ecd", "edc", "ews"}
     assert max(wind.get("speed", 0.0) for wind in winds) > 65.0
     assert max(sea.get("Hs", 0.0) for sea in seas) > 16.0
@@ -119,19 +115,19 @@ def test_drawn_weather_reaches_the_ends_of_the_range_and_is_never_refused(turbin
 def test_a_case_runs_alike_alone_and_among_others(scene, runner, tmp_path):
     rng = np.random.default_rng(5)
     for commands in (np.zeros((0, 2)), np.array([[4e4, 0.2]])):
-        state = stability_cases.draw_state(rng, scene.turbine)
-        runner.run(stability_cases.draw_state(rng, scene.turbine), [], 5.0)
+        state = random_cases.draw_state(rng, scene.turbine)
+        runner.run(random_cases.draw_state(rng, scene.turbine), [], 5.0)
         outcome = runner.run(state, commands, 5.0)
-        case = stability_cases._case(scene, 18.0, CALM, 0, state, commands, 5.0)
-        path = stability_cases.store([(case, "made up")], tmp_path)[0]
-        again = stability_cases.replay(path)
+        case = random_cases._case(scene, 18.0, CALM, 0, state, commands, 5.0)
+        path = random_cases.store_case([(case, "made up")], tmp_path)[0]
+        again = random_cases.replay(path)
         assert again.status == outcome.status
         assert np.array_equal(again.peak, outcome.peak)
 
 
 def test_a_plant_that_gains_energy_is_a_failure(scene):
     driven = LinearDamping(-2e7, -2e7, -2e7, -1e10, -1e10, -1e9, 0.0)
-    outcome = stability_cases.Runner(scene.with_model({"hydro.damping": driven}), 0.1).run(
+    outcome = random_cases.Runner(scene.with_model({"hydro.damping": driven}), 0.1).run(
         np.r_[5.0, np.zeros(6), 0.5, np.zeros(5), 1.2, 0.2], [[4e4, 0.2]], 30.0
     )
     assert outcome.failure
@@ -147,8 +143,8 @@ def test_an_exception_is_a_failure_with_its_weather(monkeypatch):
     def broken(*_):
         raise ZeroDivisionError("made up")
 
-    monkeypatch.setattr(stability_cases, "Runner", broken)
-    tally = stability_cases.random_cases(5, per_weather=5, plants=("standard",))
+    monkeypatch.setattr(random_cases, "Runner", broken)
+    tally = random_cases.random_cases(5, per_weather=5, plants=("standard",))
     ((case, reason),) = tally.failures
     assert "ZeroDivisionError" in reason and {"wind", "sea", "seed"} <= set(case)
 
@@ -160,12 +156,12 @@ def test_a_file_that_is_no_case_is_refused(text, message, tmp_path):
     path = tmp_path / "case.json"
     path.write_text(text)
     with pytest.raises(InputError, match=message):
-        stability_cases.replay(path)
+        random_cases.replay(path)
 
 
 def test_potential_energy_is_the_work_against_the_plants_own_loads(still_scene):
     scene = still_scene
-    box = scene.handle()
+    handle = scene.handle()
     quiet = scene.model.hydro.strips.shape._replace(
         added_mass_coefficient=0.0, drag_coefficient=0.0, heave_added_mass=0.0
     )
@@ -179,7 +175,7 @@ def test_potential_energy_is_the_work_against_the_plants_own_loads(still_scene):
         moved = [x.copy(), x.copy()]
         moved[0][i] += step
         moved[1][i] -= step
-        high, low = (stability_cases.potential_energy(box, y) for y in moved)
+        high, low = (random_cases.potential_energy(handle, y) for y in moved)
         slope.append((high - low) / (2.0 * step))
     from plant_helpers import rates  # in tests/
 
@@ -188,28 +184,28 @@ def test_potential_energy_is_the_work_against_the_plants_own_loads(still_scene):
 
 
 def test_a_lost_line_leaves_the_others_as_they_are(still_scene):
-    left = stability_extremes.without_line(still_scene, 1)
+    left = extremes.without_line(still_scene, 1)
     assert left.n_lines == 2
     assert np.array_equal(left.model.mooring.anchor, still_scene.model.mooring.anchor[[0, 2]])
     with pytest.raises(InputError, match="from 0 to 2"):
-        stability_extremes.without_line(still_scene, 3)
+        extremes.without_line(still_scene, 3)
 
 
 def test_losing_a_line_sets_the_platform_adrift(scene, monkeypatch):
-    monkeypatch.setattr(stability_extremes, "EVENT", 5.0)
-    case = stability_extremes.Extreme("line loss", 18.0, CALM, fault="line loss", line=1, duration=50.0)
-    monkeypatch.setitem(stability_extremes.EXTREMES, "lost", case)
-    kept = stability_extremes.Extreme("line loss", 18.0, CALM, duration=50.0)
-    monkeypatch.setitem(stability_extremes.EXTREMES, "kept", kept)
-    lost, kept = (stability_extremes.run_extreme(name, scene=scene) for name in ("lost", "kept"))
+    monkeypatch.setattr(extremes, "EVENT", 5.0)
+    case = extremes.Extreme("line loss", 18.0, CALM, fault="line loss", line=1, duration=50.0)
+    monkeypatch.setitem(extremes.EXTREMES, "lost", case)
+    kept = extremes.Extreme("line loss", 18.0, CALM, duration=50.0)
+    monkeypatch.setitem(extremes.EXTREMES, "kept", kept)
+    lost, kept = (extremes.run_extreme(name, scene=scene) for name in ("lost", "kept"))
     assert lost["finite"] and kept["finite"]
     assert lost["offset_m"] > kept["offset_m"] + 5.0
 
 
 def test_an_emergency_stop_feathers_at_the_actuators_rate_and_stops_the_rotor(scene, monkeypatch):
-    monkeypatch.setattr(stability_extremes, "EVENT", 2.0)
-    case = stability_extremes.Extreme("emergency stop", 18.0, CALM, fault="emergency stop", duration=60.0)
-    run = stability_extremes._ExtremeRun(case, scene, scene.dt)
+    monkeypatch.setattr(extremes, "EVENT", 2.0)
+    case = extremes.Extreme("emergency stop", 18.0, CALM, fault="emergency stop", duration=60.0)
+    run = extremes._ExtremeRun(case, scene, scene.dt)
     before = run.x[State.ROTOR_SPEED]
     run.go()
     assert run.x[State.BLADE_PITCH] == pytest.approx(scene.turbine.pitch_drive.maximum, abs=1e-6)
@@ -217,54 +213,54 @@ def test_an_emergency_stop_feathers_at_the_actuators_rate_and_stops_the_rotor(sc
 
 
 def test_a_rotor_without_torque_and_pitch_runs_away_and_the_verdict_says_so(scene, monkeypatch):
-    case = stability_extremes.Extreme(
+    case = extremes.Extreme(
         "grid loss", 18.0, CALM, fault="grid loss, no pitch action", duration=100.0
     )
-    monkeypatch.setitem(stability_extremes.EXTREMES, "runaway", case)
-    row = stability_extremes.run_extreme("runaway", scene=scene)
+    monkeypatch.setitem(extremes.EXTREMES, "runaway", case)
+    row = extremes.run_extreme("runaway", scene=scene)
     assert row["finite"] and "overspeed" in row["verdict"]
 
 
 def test_every_extreme_can_be_built():
-    scene = build_scene(wind=18.0, sea=CALM, fidelity="standard", duration=stability_extremes.DURATION)
-    for case in stability_extremes.EXTREMES.values():
+    scene = build_scene(wind=18.0, sea=CALM, fidelity="standard", duration=extremes.DURATION)
+    for case in extremes.EXTREMES.values():
         scene.with_weather(case.wind, case.sea, 1)
 
 
 def test_hostile_actions_are_counted_and_no_numbers_are_refused():
     env = FowtEnv()
-    policy = stability_extremes.POLICIES[0]
-    row = stability_extremes.attack(env, policy, 1, steps=40)
+    policy = extremes.POLICIES[0]
+    row = extremes.attack(env, policy, 1, steps=40)
     assert row["finite"] and row["steps"] == 40
-    assert stability_extremes.refused_alike(env, 2) == len(stability_extremes.REFUSED)
+    assert extremes.refused_alike(env, 2) == len(extremes.REFUSED)
 
 
 def test_constant_zero_torque_ends_with_the_reason():
     env = FowtEnv(wind=18.0)
-    policy = next(p for p in stability_extremes.POLICIES if p.name == "constant (-1, -1)")
-    row = stability_extremes.attack(env, policy, 1, steps=300)
+    policy = next(p for p in extremes.POLICIES if p.name == "constant (-1, -1)")
+    row = extremes.attack(env, policy, 1, steps=300)
     assert any("overspeed" in reason for reason in row["ends"])
 
 
 def test_the_report_counts_what_was_missed(tmp_path, monkeypatch):
     def part(sizes, folder, progress):
-        found = stability.Found()
+        found = study.Found()
         found.claim("good", 3, "1", "1", True)
         found.claim("bad", 4, "2", "1", False)
         found.tables.append(["Values", ["a", "b"], [["x", "1"]]])
         return found
 
-    monkeypatch.setitem(stability.PARTS, "plain", part)
-    stability.study(tmp_path, ["plain"])
-    text = stability.write_robustness_report(tmp_path, tmp_path / "report.md").read_text()
+    monkeypatch.setitem(study.PARTS, "plain", part)
+    study.study(tmp_path, ["plain"])
+    text = study.write_robustness_report(tmp_path, tmp_path / "report.md").read_text()
     assert "2 checks, 1 of them missed" in text
     assert "| bad | 4 | 2 | 1 | **MISSED** |" in text and "| x | 1 |" in text
     with pytest.raises(InputError, match="unknown part"):
-        stability.study(tmp_path, ["maps"])
+        study.study(tmp_path, ["maps"])
 
 
 def test_replay_from_the_command_line_tells_the_outcome(scene, tmp_path):
-    case = stability_cases._case(scene, 18.0, CALM, 0, np.zeros(15), [[0.0, 1.5]], 2.0)
+    case = random_cases._case(scene, 18.0, CALM, 0, np.zeros(15), [[0.0, 1.5]], 2.0)
     path = tmp_path / "case.json"
     path.write_text(json.dumps(case))
     done = CliRunner().invoke(app, ["benchmark", "stability", "--replay", str(path)])
@@ -278,16 +274,16 @@ def test_replay_from_the_command_line_tells_the_outcome(scene, tmp_path):
 def test_momenta_and_energy_are_those_of_the_bodies_one_by_one(platform, turbine):
     from naive import rigid_body
 
-    scene, x = stability_long.free_scene(), stability_long.free_start()
+    scene, x = long_runs.free_scene(), long_runs.free_start()
     parts = rigid_body.bodies(platform, turbine)
     R = rigid_body.rotation(*x[3:6])
     speed = x[State.ROTOR_SPEED]
     linear, angular = rigid_body.momenta(parts, x[:3], R, x[7:10], x[10:13], speed)
-    found = stability_long.momenta(scene, x)
+    found = long_runs.momenta(scene, x)
     assert np.allclose(found[0], linear, rtol=1e-9) and np.allclose(found[1], angular, rtol=1e-9)
     expected = rigid_body.kinetic_energy(parts, x[7:10], x[10:13], speed)
-    assert stability_long.kinetic_energy(scene, x) == pytest.approx(expected, rel=1e-9)
+    assert long_runs.kinetic_energy(scene, x) == pytest.approx(expected, rel=1e-9)
 
 
 def test_default_steps_are_those_of_the_scene():
-    assert {name: method.order for name, method in INTEGRATORS.items()} == stability_long.ORDERS
+    assert {name: method.order for name, method in INTEGRATORS.items()} == long_runs.ORDERS

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.optimize import brentq, fsolve
 
 from fowt_env.analysis.linear_model import natural_periods
-from fowt_env.analysis.trim import trim_held
+from fowt_env.analysis.trim import trim_prescribed
 from fowt_env.descriptions.platform import DATA, Line, read_platform, read_turbine
 from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.files.atomic import replacing
@@ -258,7 +258,7 @@ def polar_factor(platform):
 
     def excess(factor):
         scene = build_scene(platform, wind=RATED_WIND, turbine=weakened(turbine, factor))
-        point = trim_held(scene, RATED_SPEED, 0.0, platform="fixed")
+        point = trim_prescribed(scene, RATED_SPEED, 0.0, platform="fixed")
         return 1e3 * point["RotThrust"] - target
 
     return brentq(excess, 0.2, 1.0, xtol=1e-9)

@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 import fowt_env
-from fowt_env.analysis.trim import trim_held
+from fowt_env.analysis.trim import trim_prescribed
 from fowt_env.descriptions.platform import read_platform
 from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.errors import InputError, unknown
@@ -24,7 +24,7 @@ from fowt_env.weather.turbulence import turbulence
 
 PLATFORM = "liu_1_50"
 TIME, SURGE, PITCH = "Time_[s]", "PtfmSurge_[m]", "PtfmPitch_[deg]"
-MOTIONS = (
+MOTION_CHANNELS = (
     SURGE, "PtfmSway_[m]", "PtfmHeave_[m]", "PtfmRoll_[deg]", PITCH, "PtfmYaw_[deg]",
 )  # fmt: skip
 DURATION = 500.0  # s at model scale, 59 min at full scale
@@ -91,7 +91,7 @@ def model_wind(speed, hub_height, diameter, duration, seed):
     return {"kind": "series", "time": time, "speed": speed + value[:, 0]}
 
 
-def case_scene(name, duration=DURATION, seed=1, **options):
+def load_case_scene(name, duration=DURATION, seed=1, **options):
     """Scene of a model-scale load case; options as in build_scene."""
     case = CASES[name]
     platform = read_platform(PLATFORM)
@@ -106,14 +106,14 @@ def case_scene(name, duration=DURATION, seed=1, **options):
 def case_point(scene, name):
     """OperatingPoint of a load case's scene with its prescribed rotor speed and blade pitch."""
     case = CASES[name]
-    return trim_held(scene, case.rotor_rpm * RPM, case.blade_pitch_deg * DEGREE)
+    return trim_prescribed(scene, case.rotor_rpm * RPM, case.blade_pitch_deg * DEGREE)
 
 
-def run_case(name, duration=DURATION, seed=1, progress=False, **options):
+def run_load_case(name, duration=DURATION, seed=1, progress=False, **options):
     """DataFrame of a model-scale load case, started from its steady state."""
-    scene = case_scene(name, duration, seed, **options)
+    scene = load_case_scene(name, duration, seed, **options)
     case, point = CASES[name], case_point(scene, name)
-    initial = {column.split("_[")[0]: point[column.split("_[")[0]] for column in MOTIONS}
+    initial = {column.split("_[")[0]: point[column.split("_[")[0]] for column in MOTION_CHANNELS}
     return fowt_env.simulate(
         scene,
         controller=None,
@@ -137,7 +137,7 @@ def statistics(runs):
     rows = []
     for case, frame in runs.items():
         part = settled(frame)
-        channels = [*MOTIONS, "RtFldFxh_[N]", *(c for c in frame.columns if c.startswith("FAIRTEN"))]
+        channels = [*MOTION_CHANNELS, "RtFldFxh_[N]", *(c for c in frame.columns if c.startswith("FAIRTEN"))]
         for channel in channels:
             x = part[channel].to_numpy()
             quartiles = np.percentile(x, (25.0, 50.0, 75.0))
@@ -171,11 +171,11 @@ def prominence(frame, channel, frequency, skip=0.0, width=0.1, reach=0.35):
 # --------------------------------------------------------------------------- claims
 
 PEAK = 2.0  # a peak rises to at least this many times its surroundings ...
-VISIBLE = 1e-5  # ... and to this share of the highest one, five decades of a logarithmic axis
+VISIBLE = 1e-5  # ... and to this fraction of the highest one, five decades of a logarithmic axis
 
 
 @dataclass(frozen=True)
-class Claim:
+class PaperClaim:
     """One qualitative claim of the paper, what was found here, and whether it holds."""
 
     figure: str
@@ -200,7 +200,7 @@ def natural_frequencies():
 
 
 def claims(runs, natural):
-    """[Claim] of section 8 that the given model-scale runs can judge."""
+    """[PaperClaim] of section 8 that the given model-scale runs can judge."""
     having = set(runs)
     found = []
     for needs, judge in (
@@ -224,15 +224,15 @@ def _pitch(runs, name):
 def _peak(figure, text, runs, case, channel, frequency):
     height = prominence(runs[case], channel, frequency)
     f, density = case_spectrum(runs[case], channel)
-    share = density[np.abs(f / frequency - 1.0) <= 0.1].max() / density.max()
-    found = f"at {frequency:.3f} Hz {height:.3g} times its surroundings, {share:.2g} of the highest"
-    return Claim(figure, text, found, bool(height >= PEAK and share >= VISIBLE))
+    fraction = density[np.abs(f / frequency - 1.0) <= 0.1].max() / density.max()
+    found = f"at {frequency:.3f} Hz {height:.3g} times its surroundings, {fraction:.2g} of the highest"
+    return PaperClaim(figure, text, found, bool(height >= PEAK and fraction >= VISIBLE))
 
 
 def _steady_surge(runs, natural):
     surge = settled(runs["LC1"])[SURGE]
     text = f"mean {surge.mean():.4f} m, std {surge.std():.4f} m"
-    return [Claim("6", "LC1: surge is nearly steady", text, bool(surge.std() < 0.1 * surge.mean()))]
+    return [PaperClaim("6", "LC1: surge is nearly steady", text, bool(surge.std() < 0.1 * surge.mean()))]
 
 
 def _rated_surge_peak(runs, natural):
@@ -244,8 +244,8 @@ def _pitch_over_wind(runs, natural):
     mean = {name: _pitch(runs, name).mean() for name in GROUPS["wind"]}
     text = ", ".join(f"{name} {value:.2f}" for name, value in mean.items()) + " deg"
     return [
-        Claim("8", "mean pitch is largest at rated wind (LC2)", text, max(mean, key=mean.get) == "LC2"),
-        Claim(
+        PaperClaim("8", "mean pitch is largest at rated wind (LC2)", text, max(mean, key=mean.get) == "LC2"),
+        PaperClaim(
             "8",
             "mean pitch falls above rated (LC2 > LC3 > LC4)",
             text,
@@ -274,9 +274,9 @@ def _waves_have_no_mean(runs, natural):
     shift = max(abs(_pitch(runs, name).mean() - still) for name in GROUPS["waves"])
     text = ", ".join(f"{name} {value:.2f}" for name, value in spread.items())
     return [
-        Claim("10", "LC5 to LC8: the range grows with the waves", f"std {text} deg",
+        PaperClaim("10", "LC5 to LC8: the range grows with the waves", f"std {text} deg",
               list(spread.values()) == sorted(spread.values())),
-        Claim("10", "LC5 to LC8: waves leave the mean alone", f"means within {shift:.3f} deg",
+        PaperClaim("10", "LC5 to LC8: waves leave the mean alone", f"means within {shift:.3f} deg",
               bool(shift < 0.1 * spread["LC8"])),
     ]  # fmt: skip
 
@@ -303,9 +303,10 @@ def _mean_and_range(runs, natural):
         f"{name} {ratio:.2f}" for name, ratio in zip(GROUPS["wind and waves"], ratios, strict=True)
     )
     return [
-        Claim("12", "LC9 to LC12: wind sets the mean", f"within {shift:.2f} deg of the mean in wind alone",
-              bool(shift < 0.1 * largest)),
-        Claim("12", "LC10 to LC12: waves set the range", f"std over that in waves alone: {text}", nearer),
+        PaperClaim("12", "LC9 to LC12: wind sets the mean",
+              f"within {shift:.2f} deg of the mean in wind alone", bool(shift < 0.1 * largest)),
+        PaperClaim("12", "LC10 to LC12: waves set the range", f"std over that in waves alone: {text}",
+              nearer),
     ]  # fmt: skip
 
 
@@ -412,7 +413,7 @@ def run_paper(names, report=None):
 
     for name in models:
         say(name)
-        study.runs[name] = run_case(name)
+        study.runs[name] = run_load_case(name)
     if models:
         study.claims = claims(study.runs, natural_frequencies())
     if FULL_SCALE in names:

@@ -9,7 +9,7 @@ from fowt_env.descriptions.platform import read_platform
 from fowt_env.files.atomic import replacing
 from fowt_env.files.markdown import markdown_table
 from fowt_env.files.tables import write_table
-from fowt_env.training.studies.paper import load_cases as paper
+from fowt_env.training.studies.paper import load_cases
 from fowt_env.visual.time_series import (
     COLOURS,
     INK,
@@ -22,13 +22,14 @@ from fowt_env.visual.time_series import (
 )
 
 LABELS = {
-    paper.SURGE: "surge (m)",
+    load_cases.SURGE: "surge (m)",
     "PtfmHeave_[m]": "heave (m)",
-    paper.PITCH: "platform pitch (deg)",
+    load_cases.PITCH: "platform pitch (deg)",
     "FAIRTEN1_[kN]": "tension 1 (kN)",
     "FAIRTEN2_[kN]": "tension 2 (kN)",
 }
-PULLS = {"model": (paper.PLATFORM, 0.25), "OC3-Hywind": ("oc3_hywind", 20.0)}  # platform, largest offset m
+# platform, largest offset m
+PULLS = {"model": (load_cases.PLATFORM, 0.25), "OC3-Hywind": ("oc3_hywind", 20.0)}
 
 
 def _axes(figure, rows, columns=1, **options):
@@ -40,7 +41,7 @@ def _axes(figure, rows, columns=1, **options):
 
 def _groups(runs):
     """{group: [case]} of the groups with at least one run."""
-    having = {name: [case for case in cases if case in runs] for name, cases in paper.GROUPS.items()}
+    having = {name: [case for case in cases if case in runs] for name, cases in load_cases.GROUPS.items()}
     return {name: cases for name, cases in having.items() if cases}
 
 
@@ -51,7 +52,7 @@ def box_plots(runs, channel, path=None):
     for axes, (name, cases) in zip(
         _axes(figure, 1, len(groups), sharey=True)[0], groups.items(), strict=True
     ):
-        values = [paper.settled(runs[case])[channel].to_numpy() for case in cases]
+        values = [load_cases.settled(runs[case])[channel].to_numpy() for case in cases]
         axes.boxplot(values, tick_labels=cases, whis=(0, 100), medianprops={"color": COLOURS[1]})
         axes.set_title(name, fontsize=9, color=INK)
     figure.axes[0].set_ylabel(LABELS[channel], fontsize=9, color=INK)
@@ -81,7 +82,7 @@ def spectra(runs, channel, natural, path=None):
     ):
         top = 0.0
         for number, case in enumerate(cases):
-            frequency, density = paper.case_spectrum(runs[case], channel)
+            frequency, density = load_cases.case_spectrum(runs[case], channel)
             axes.loglog(frequency[1:], density[1:], color=COLOURS[number], linewidth=0.9, label=case)
             top = max(top, density[1:].max())
         for motion in ("surge", "heave", "platform_pitch"):
@@ -100,8 +101,8 @@ def static_pulls(path=None):
     figure = new_figure(9.0, 6.4)
     for row, (name, (platform, reach)) in zip(_axes(figure, 2, 2), PULLS.items(), strict=True):
         for axes, direction in zip(row, ("surge", "sway"), strict=True):
-            table = paper.static_pull(read_platform(platform), direction, np.linspace(-reach, reach, 81))
-            unit, factor = ("N", 1.0) if platform == paper.PLATFORM else ("kN", 1e-3)
+            table = load_cases.static_pull(read_platform(platform), direction, np.linspace(-reach, reach, 81))
+            unit, factor = ("N", 1.0) if platform == load_cases.PLATFORM else ("kN", 1e-3)
             offset = table["offset_[m]"]
             axes.plot(offset, factor * table["force_[N]"], color=INK, label="restoring force")
             tensions = [column for column in table if column.startswith("tension")]
@@ -126,7 +127,8 @@ def static_pulls(path=None):
 def decays(full, path=None):
     """The surge and pitch decays of Figs 13 and 14."""
     figure = new_figure(9.0, 4.4)
-    for axes, (name, (_, _, channel, _)) in zip(_axes(figure, 2)[:, 0], paper.DECAYS.items(), strict=True):
+    rows = _axes(figure, 2)[:, 0]
+    for axes, (name, (_, _, channel, _)) in zip(rows, load_cases.DECAYS.items(), strict=True):
         axes.plot(full[name][TIME], full[name][channel], color=COLOURS[0], linewidth=1.0)
         axes.set_ylabel(LABELS[channel], fontsize=9, color=INK)
         axes.margins(x=0.0)
@@ -136,10 +138,10 @@ def decays(full, path=None):
 
 def regular_waves(full, path=None, window=(420.0, 450.0)):
     """Fig. 15: surge, pitch and tension in the regular wave, and spectra for the four combinations."""
-    channels = (paper.SURGE, paper.PITCH, "FAIRTEN1_[kN]")
+    channels = (load_cases.SURGE, load_cases.PITCH, "FAIRTEN1_[kN]")
     figure = new_figure(9.0, 6.4)
     for row, channel in zip(_axes(figure, len(channels), 2), channels, strict=True):
-        for number, combination in enumerate(paper.COMBINATIONS):
+        for number, combination in enumerate(load_cases.COMBINATIONS):
             frame = full[combination]
             label = f"{combination[0]} position, {combination[1]} surface"
             part = frame[(frame[TIME] >= window[0]) & (frame[TIME] <= window[1])]
@@ -172,9 +174,9 @@ def double_frequency_table(full):
     ratios = ("surge, 2nd/1st", "pitch, 2nd/1st")
     header = ("position", "surface", "surge (m)", "pitch (deg)", *ratios, "theory.md")
     rows = []
-    for combination, expected in zip(paper.COMBINATIONS, paper.EXPECTED_DOUBLE, strict=True):
-        found = paper.double_frequency(full[combination])
-        (surge, surge2), (pitch, pitch2) = found[paper.SURGE], found[paper.PITCH]
+    for combination, expected in zip(load_cases.COMBINATIONS, load_cases.EXPECTED_DOUBLE, strict=True):
+        found = load_cases.double_frequency(full[combination])
+        (surge, surge2), (pitch, pitch2) = found[load_cases.SURGE], found[load_cases.PITCH]
         theory = f"{expected[0]:.2f} %, {expected[1]:.2f} %"
         sizes = f"{surge:.4f}", f"{pitch:.4f}", f"{surge2:.2f} %", f"{pitch2:.2f} %"
         rows.append((*combination[:2], *sizes, theory))
@@ -183,14 +185,14 @@ def double_frequency_table(full):
 
 def statistics_table(runs):
     """Markdown table of pitch and surge per case."""
-    table = paper.statistics(runs)
+    table = load_cases.statistics(runs)
     surge = ("surge mean", "std", "min", "max (m)")
     header = ("case", "pitch mean", "std", "min", "max (deg)", *surge, "thrust mean (N)")
     cells = []
     for case in runs:
         rows = table[table["case"] == case].set_index("channel")
         line = [case]
-        for channel, digits in ((paper.PITCH, 2), (paper.SURGE, 3)):
+        for channel, digits in ((load_cases.PITCH, 2), (load_cases.SURGE, 3)):
             line += [f"{rows.loc[channel, name]:.{digits}f}" for name in ("mean", "std", "min", "max")]
         cells.append([*line, f"{rows.loc['RtFldFxh_[N]', 'mean']:.2f}"])
     return markdown_table(header, cells)
@@ -198,9 +200,9 @@ def statistics_table(runs):
 
 def periods_table():
     """Markdown table of the natural periods of the 1:50 model against Table 1."""
-    published = read_platform(paper.PLATFORM).published["natural_periods"]
+    published = read_platform(load_cases.PLATFORM).published["natural_periods"]
     rows = []
-    for motion, period in fowt_env.natural_periods(fowt_env.build_scene(paper.PLATFORM)).items():
+    for motion, period in fowt_env.natural_periods(fowt_env.build_scene(load_cases.PLATFORM)).items():
         wanted = published[motion.removeprefix("platform_")]
         difference = f"{100.0 * (period / wanted - 1.0):+.2f} %"
         rows.append((motion, f"{wanted:.2f}", f"{period:.3f}", difference))
@@ -214,7 +216,7 @@ def write_paper_report(study, folder, plot=True):
     if study.runs:
         for case, frame in study.runs.items():
             paths.append(Path(write_table(frame, folder / "runs" / f"{case}.parquet")))
-        paths.append(Path(write_table(paper.statistics(study.runs), folder / "statistics.csv")))
+        paths.append(Path(write_table(load_cases.statistics(study.runs), folder / "statistics.csv")))
         text += ["## Natural periods of the model", "", periods_table(), "", "## Claims", ""]
         text += [claims_table(study), "", "## Statistics, model scale", "", statistics_table(study.runs), ""]
     if study.full:
@@ -229,8 +231,8 @@ def _plots(study, folder):
     """Paths of all plots."""
     made = {}
     if study.runs:
-        natural = paper.natural_frequencies()
-        for name, channel in (("pitch", paper.PITCH), ("surge", paper.SURGE)):
+        natural = load_cases.natural_frequencies()
+        for name, channel in (("pitch", load_cases.PITCH), ("surge", load_cases.SURGE)):
             made[f"box_{name}"] = lambda path, c=channel: box_plots(study.runs, c, path)
             made[f"spectra_{name}"] = lambda path, c=channel: spectra(study.runs, c, natural, path)
             made[f"series_{name}"] = lambda path, c=channel: time_series(study.runs, c, path)

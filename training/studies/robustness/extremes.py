@@ -17,8 +17,8 @@ from fowt_env.plant.rollout import RUNNING, STOP_REASONS, advance, forget, obser
 from fowt_env.plant.state import State
 from fowt_env.scene.build import build_scene
 from fowt_env.simulation import initial_state
+from fowt_env.training.evaluation.run_case import CONTROL_DT
 
-CONTROL_DT = 0.1  # s
 EVENT = 60.0  # s at which gusts start and faults happen
 DURATION = 180.0  # s of a run: two minutes after the event
 STEEPEST = 0.142  # height over length of the steepest regular wave in deep water (Michell)
@@ -153,7 +153,7 @@ class _ExtremeRun:
         if case.parked:
             self.x[State.ROTOR_SPEED] = self.u[0] = 0.0
             self.x[State.BLADE_PITCH] = self.u[1] = scene.turbine.pitch_drive.maximum
-            self.scene = scene.with_model({"rigid_body.rotor_held": True})
+            self.scene = scene.with_model({"rigid_body.rotor_fixed": True})
         elif self.x[State.ROTOR_SPEED] > 0.0:  # beyond cut-out the trim idles feathered without control
             self.controller = make("pi", scene.turbine, CONTROL_DT)
         self.dx, self.measurement = np.zeros_like(self.x), np.zeros(N_MEASUREMENTS)

@@ -27,10 +27,10 @@ from fowt_env.plant.state import Command, State, pose_of
 from fowt_env.scene.build import build_scene
 from fowt_env.scene.options import FIDELITIES
 from fowt_env.simulation import hold
+from fowt_env.training.evaluation.run_case import CONTROL_DT
 
 DURATION = 30.0  # s of each case: three wave periods, one of platform pitch
 WEATHER = 60.0  # s of random wind and sea
-CONTROL_DT = 0.1  # s
 SEGMENT = 1.0  # s between changes of an open-loop command
 PER_WEATHER = 50  # initial states in each weather
 PLANTS = ("standard",) * 44 + ("reference",) + ("fast",) * 5  # fidelity of each weather, in turn
@@ -85,7 +85,7 @@ def _run_case(
 
 
 @entry
-def run_case(
+def run_random_case(
     handle, x, u, act, parameters, memory, measurement, dx, commands, per_control, per_segment, last, dt, peak
 ):
     """Advance x by last steps of dt; returns (status, steps done).
@@ -127,10 +127,10 @@ class Outcome:
 
 
 @kernel
-def line_energy(H, V, length, weight, EA, node, share):
+def line_energy(H, V, length, weight, EA, node, quadrature):
     """Elastic and gravity energy (J) of a frictionless line under fairlead tensions H and V.
 
-    node, share: points and weights of Gauss-Legendre quadrature over [-1, 1].
+    node, quadrature: points and weights of Gauss-Legendre quadrature over [-1, 1].
     """
     lying = max(0.0, length - V / weight)
     start = V - weight * (length - lying)
@@ -141,12 +141,12 @@ def line_energy(H, V, length, weight, EA, node, share):
         tension = hypot(H, vertical)
         height = (tension - hypot(H, start)) / weight
         height += (vertical * vertical - start * start) / (2.0 * EA * weight)
-        total += share[i] * (length - lying) / 2.0 * (tension * tension / (2.0 * EA) + weight * height)
+        total += quadrature[i] * (length - lying) / 2.0 * (tension * tension / (2.0 * EA) + weight * height)
     return total
 
 
 @entry
-def _potential_energy(handle, x, node, share):
+def _potential_energy(handle, x, node, quadrature):
     model, data, pose = model_of(handle), data_of(handle), pose_of(x)
     body = model.rigid_body
     total = body.gravity * (body.mass * pose.z + body.s_x * pose.r31 + body.s_z * pose.r33)
@@ -156,7 +156,7 @@ def _potential_energy(handle, x, node, share):
         mooring_load(pose, lines, data.lines, data.counters)
         for i in range(lines.length.shape[0]):
             H, V = data.lines[i, 0], data.lines[i, 1]
-            total += line_energy(H, V, lines.length[i], lines.weight[i], lines.EA[i], node, share)
+            total += line_energy(H, V, lines.length[i], lines.weight[i], lines.EA[i], node, quadrature)
     return total
 
 
@@ -239,7 +239,7 @@ class Runner:
                 self.controller.memory,
             )
         peak = np.zeros(4)
-        status, steps = run_case(
+        status, steps = run_random_case(
             handle, x, u, law, parameters, memory, self.measurement, self.dx, commands,
             round(CONTROL_DT / dt), round(SEGMENT / dt), round(duration / dt), dt, peak,
         )  # fmt: skip
@@ -344,7 +344,7 @@ def _case(scene, wind, sea, seed, state, commands, duration):
     }  # fmt: skip
 
 
-def case_scene(case):
+def random_case_scene(case):
     """Scene of a case."""
     return build_scene(
         wind=case["wind"], sea=case["sea"], seed=case["seed"], fidelity=case["fidelity"],
@@ -367,7 +367,7 @@ def replay(case):
     missing = [key for key in KEYS if key not in case]
     if missing:
         raise InputError(f"case: {', '.join(missing)} missing; needs {', '.join(KEYS)}")
-    return Runner(case_scene(case), case["dt"]).run(case["state"], case["commands"], case["duration"])
+    return Runner(random_case_scene(case), case["dt"]).run(case["state"], case["commands"], case["duration"])
 
 
 def finer(scene, case):
@@ -387,7 +387,7 @@ class Tally:
     failures: list = field(default_factory=list)  # (case dict, reason)
     capsizes: int = 0  # confirmed by a finer step
     unconverged: int = 0
-    worst_share: float = 0.0  # largest peak of energy over its bound
+    worst_ratio: float = 0.0  # largest peak of energy over its bound
     peak: np.ndarray = field(default_factory=lambda: np.zeros(4))
     checked: int = 0  # most energetic cases compared with a finer step
     difference: float = 0.0  # largest relative difference of their peak energies
@@ -470,11 +470,11 @@ def _count(tally, scene, case, outcome):
         else:
             tally.failures.append((case, f"{STOP_REASONS[outcome.status]}, but not at a finer step"))
         return
-    tally.worst_share = max(tally.worst_share, outcome.peak[0] / outcome.energy_bound)
+    tally.worst_ratio = max(tally.worst_ratio, outcome.peak[0] / outcome.energy_bound)
     np.maximum(tally.peak, outcome.peak, out=tally.peak)
 
 
-def store(failures, folder):
+def store_case(failures, folder):
     """Write each (case, reason) as a JSON file for replay; returns the paths."""
     paths = []
     for number, (case, reason) in enumerate(failures):

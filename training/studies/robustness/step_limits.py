@@ -40,14 +40,14 @@ STORM = {"kind": "jonswap", "Hs": 15.0, "Tp": 16.0}
 
 @dataclass(frozen=True)
 class LimitScene:
-    """A kind of scene of the map: arguments of build_scene, and what is held still."""
+    """A kind of scene of the map: arguments of build_scene, and what is fixed."""
 
     wind: object = 18.0
     sea: object = field(default_factory=lambda: dict(SEA))
     fidelity: str = "standard"
     options: dict = field(default_factory=dict)
-    platform_held: bool = False
-    rotor_held: bool = False
+    platform_fixed: bool = False
+    rotor_fixed: bool = False
     rotor_samples: int = 1  # of ab4
 
     def scene(self, integrator="rk4"):
@@ -56,7 +56,9 @@ class LimitScene:
             wind=self.wind, sea=self.sea, seed=1, fidelity=self.fidelity, integrator=integrator,
             **self.options,
         )  # fmt: skip
-        body = scene.model.rigid_body._replace(platform_held=self.platform_held, rotor_held=self.rotor_held)
+        body = scene.model.rigid_body._replace(
+            platform_fixed=self.platform_fixed, rotor_fixed=self.rotor_fixed
+        )
         return scene.with_model(rigid_body=body)
 
     def point(self, scene):
@@ -64,10 +66,10 @@ class LimitScene:
 
         Without moorings nothing balances the thrust: then the upright platform, which drifts from there.
         """
-        if not self.platform_held and self.options.get("mooring", True):
+        if not self.platform_fixed and self.options.get("mooring", True):
             return trim(scene)
         fixed = trim(scene, platform="fixed")
-        if self.platform_held:
+        if self.platform_fixed:
             return fixed
         return OperatingPoint(dict(fixed), fixed.state, fixed.command, fixed.wind_speed, platform="floating")
 
@@ -81,12 +83,12 @@ LIMIT_SCENES = {
     "full, cut-out wind": LimitScene(wind=25.0),
     "no wind, waves": LimitScene(wind=None),
     "still water, wind": LimitScene(sea=None),
-    "parked, 50 m/s, Hs 15 m": LimitScene(wind=50.0, sea=STORM, rotor_held=True),
+    "parked, 50 m/s, Hs 15 m": LimitScene(wind=50.0, sea=STORM, rotor_fixed=True),
     "idling feathered, 26 m/s": LimitScene(wind=26.0),
     "idling feathered, 50 m/s, Hs 15 m": LimitScene(wind=50.0, sea=STORM),
     "idling feathered, 70 m/s, Hs 15 m": LimitScene(wind=70.0, sea=STORM),
     "no mooring": LimitScene(options={"mooring": False}),
-    "platform held": LimitScene(platform_held=True),
+    "platform fixed": LimitScene(platform_fixed=True),
 }
 
 
@@ -164,10 +166,10 @@ def stable(a, h, integrator, duration=DURATION):
 
 
 def limiting_state(a, h, integrator):
-    """Name of the state with the largest share, EXCITATION as unit, of the fastest-growing vector."""
+    """Name of the state with the largest participation, EXCITATION as unit, of the fastest-growing vector."""
     values, vectors = np.linalg.eig(amplification(a, h, integrator))
-    share = np.abs(vectors[:N, np.argmax(np.abs(values))]) / EXCITATION
-    return STATES[int(np.argmax(share))]
+    participation = np.abs(vectors[:N, np.argmax(np.abs(values))]) / EXCITATION
+    return STATES[int(np.argmax(participation))]
 
 
 def first_unstable(holds, start):
@@ -199,9 +201,9 @@ def excursions(scene, point, dt, duration=DURATION):
     x, u = point.state.copy(), point.command.copy()
     rows = np.array(STATE_INDEX)
     moved = EXCITATION.copy()
-    if scene.model.rigid_body.platform_held:
+    if scene.model.rigid_body.platform_fixed:
         moved[: 2 * len(MOTIONS)] = 0.0
-    if scene.model.rigid_body.rotor_held:
+    if scene.model.rigid_body.rotor_fixed:
         moved[STATES.index("rotor_speed")] = 0.0
     centre = x[rows].copy()
     x[rows] += moved

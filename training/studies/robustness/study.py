@@ -19,10 +19,7 @@ from fowt_env.plant.integrators import INTEGRATORS
 from fowt_env.plant.rollout import RUNNING
 from fowt_env.training.benchmarks.speed import header
 from fowt_env.training.studies.robustness import extremes as stability_extremes
-from fowt_env.training.studies.robustness import long_runs as stability_long
-from fowt_env.training.studies.robustness import random_cases as stability_cases
-from fowt_env.training.studies.robustness import step_limits as stability_map
-from fowt_env.training.studies.robustness import without_compiler as stability_plain
+from fowt_env.training.studies.robustness import long_runs, random_cases, step_limits, without_compiler
 
 MEMORY_MB = 5.0  # growth that counts as none: less than a byte per step of the documented run
 # relative changes of the free body over 10000000 default steps: kinetic energy, linear momentum, angular
@@ -43,7 +40,7 @@ STEP_CHANGE = 0.05  # of an extreme's peak with half the step
 
 
 @dataclass
-class Claim:
+class RobustnessClaim:
     """One row of the summary."""
 
     what: str
@@ -61,8 +58,8 @@ class Found:
     tables: list = field(default_factory=list)
 
     def claim(self, what, count, found, target, holds):
-        """Add a Claim."""
-        self.claims.append(Claim(what, str(count), found, target, bool(holds)))
+        """Add a RobustnessClaim."""
+        self.claims.append(RobustnessClaim(what, str(count), found, target, bool(holds)))
 
 
 @dataclass(frozen=True)
@@ -70,18 +67,18 @@ class Sizes:
     """How much is run; the documented run has 100000 cases and 10000000 steps."""
 
     cases: int = 2000
-    per_weather: int = stability_cases.PER_WEATHER
+    per_weather: int = random_cases.PER_WEATHER
     steps: int = 200_000
     hostile_steps: int = 600
     seed: int = 0
     kinds: tuple | None = None  # of the map; None: all
     extremes: tuple | None = None
-    map_duration: float = stability_map.DURATION
+    map_duration: float = step_limits.DURATION
 
 
 def map_part(sizes, folder, progress):
     """Found of the stability map."""
-    table = stability_map.stability_map(sizes.kinds, duration=sizes.map_duration, progress=progress)
+    table = step_limits.stability_map(sizes.kinds, duration=sizes.map_duration, progress=progress)
     found = Found()
     for integrator in INTEGRATORS:
         rows = table[table["integrator"] == integrator]
@@ -90,14 +87,14 @@ def map_part(sizes, folder, progress):
             f"{integrator}: default step of {INTEGRATORS[integrator].dt:g} s",
             f"{len(rows)} kinds of scene",
             f"least margin {least['margin']:.1f} ({least['kind']})",
-            f"factor {stability_map.MARGIN:g} below the first blow-up",
-            least["margin"] >= stability_map.MARGIN,
+            f"factor {step_limits.MARGIN:g} below the first blow-up",
+            least["margin"] >= step_limits.MARGIN,
         )
     both = table[np.isfinite(table["theory_s"]) & np.isfinite(table["measured_s"])]
     ratio = both["measured_s"] / both["theory_s"]
     found.claim(
         "measured limit over that of theory",
-        f"{len(table)} limits, {len(both)} below {stability_map.LARGEST_STEP:g} s in both",
+        f"{len(table)} limits, {len(both)} below {step_limits.LARGEST_STEP:g} s in both",
         f"{ratio.min():.2f} to {ratio.max():.2f}, median {ratio.median():.3f}" if len(both) else "none",
         "none below 0.8: theory misses no faster mode",
         len(both) == 0 or ratio.min() > 0.8,
@@ -115,7 +112,7 @@ def map_part(sizes, folder, progress):
 
 
 def _limit(value):
-    return f"{value:.3f}" if np.isfinite(value) else f"> {stability_map.LARGEST_STEP:g}"
+    return f"{value:.3f}" if np.isfinite(value) else f"> {step_limits.LARGEST_STEP:g}"
 
 
 def _factor(value):
@@ -124,8 +121,8 @@ def _factor(value):
 
 def cases_part(sizes, folder, progress):
     """Found of the random scenes and states; failures are stored as replayable files in folder/failures."""
-    tally = stability_cases.random_cases(sizes.cases, sizes.seed, sizes.per_weather, progress=progress)
-    paths = stability_cases.store(tally.failures, Path(folder) / "failures")
+    tally = random_cases.random_cases(sizes.cases, sizes.seed, sizes.per_weather, progress=progress)
+    paths = random_cases.store_case(tally.failures, Path(folder) / "failures")
     reasons = [reason for _, reason in tally.failures]
     broken = sum("exception" in reason or "non-finite" in reason for reason in reasons)
     found = Found()
@@ -135,7 +132,7 @@ def cases_part(sizes, folder, progress):
     found.claim(
         "random scenes and states: kinetic energy and rotor speed bounded",
         f"{tally.cases}",
-        f"{len(reasons) - broken} beyond; largest share of the energy bound {tally.worst_share:.2f}",
+        f"{len(reasons) - broken} beyond; largest ratio to the energy bound {tally.worst_ratio:.2f}",
         "none beyond the bound, no stop or peak that a finer step does not have",
         len(reasons) == broken,
     )
@@ -143,8 +140,8 @@ def cases_part(sizes, folder, progress):
         "the most energetic case of every twentieth weather at a quarter of the step",
         f"{tally.checked}",
         f"peak energies differ by at most {tally.difference:.2%}",
-        f"{stability_cases.AGREE:.0%}",
-        tally.difference <= stability_cases.AGREE,
+        f"{random_cases.AGREE:.0%}",
+        tally.difference <= random_cases.AGREE,
     )
     found.claim(
         "mooring lines that missed their tolerance", f"{tally.cases}", f"{tally.unconverged}", "none",
@@ -225,7 +222,7 @@ def extremes_part(sizes, folder, progress):
 
 def long_part(sizes, folder, progress):
     """Found of the long runs, the orders and the quaternion."""
-    long, found = stability_long, Found()
+    long, found = long_runs, Found()
     for integrator in INTEGRATORS:
         for steps, when in ((min(SECULAR_STEPS, sizes.steps), "at the default step"), (sizes.steps, "long")):
             drift = long.free_drift(integrator, steps, progress=progress)
@@ -276,7 +273,7 @@ def plain_part(sizes, folder, progress):
     found = Found()
     if progress is not None:
         progress("runs without the compiler", 0, 1)
-    differences = stability_plain.differences()
+    differences = without_compiler.differences()
     worst = max(differences, key=differences.get)
     found.claim(
         "NUMBA_DISABLE_JIT=1 against compiled, scenes by integrators and environments",
@@ -369,9 +366,9 @@ def write_robustness_report(folder, path):
 METHODS = {
     "map": (
         f"Each run starts off its operating point in every state, keeps its command, and lasts"
-        f" {stability_map.DURATION:g} s. It has blown up where it stops, or where a state's peak over the"
-        f" second half is more than {stability_map.GROWTH:g} times that of a run with"
-        f" {stability_map.FINE_STEP:g} s steps. Steps grow by {stability_map.SCAN - 1:.0%} from the default"
+        f" {step_limits.DURATION:g} s. It has blown up where it stops, or where a state's peak over the"
+        f" second half is more than {step_limits.GROWTH:g} times that of a run with"
+        f" {step_limits.FINE_STEP:g} s steps. Steps grow by {step_limits.SCAN - 1:.0%} from the default"
         " until the first blow-up, then bisection. Theory is the amplification matrix of the very scheme on"
         " the linear model about the same point: blade pitch by its own exact law,"
         " Adams positions by Adams-Moulton from the new velocities. Its limit is where errors double over"
@@ -387,10 +384,10 @@ METHODS = {
         " offsets to 30 m (lines taut on one side and slack on the other), tilt to 30 deg, yaw to 30 deg,"
         " speeds to 3 m/s and 0.1 rad/s, rotor from rest to 150 %, any blade pitch; a third under the PI, a"
         f" third under a constant command, a third under a new random command every second."
-        f" {stability_cases.DURATION:g} s each. The bound on the platform's kinetic energy is"
-        f" {stability_cases.FACTOR:g} times the sum of the energy it starts with, its own at the speed of"
+        f" {random_cases.DURATION:g} s each. The bound on the platform's kinetic energy is"
+        f" {random_cases.FACTOR:g} times the sum of the energy it starts with, its own at the speed of"
         " the water, and the work that the wind's thrust can do over the hub's travel; that on the rotor"
-        f" speed a tip-speed ratio of {stability_cases.FASTEST_TIP:g}. A failure is stored as JSON and runs"
+        f" speed a tip-speed ratio of {random_cases.FASTEST_TIP:g}. A failure is stored as JSON and runs"
         " again by `fowt benchmark stability --replay FILE`."
     ),
     "hostile": (
@@ -410,8 +407,8 @@ METHODS = {
         " Momenta and energies are computed from the mass matrix outside the stepping code."
     ),
     "plain": (
-        f"{stability_plain.STEPS_PER_SCENE} steps of each scene by each integrator, and"
-        f" {stability_plain.ENV_STEPS} control periods of environments, in a process without the compiler,"
+        f"{without_compiler.STEPS_PER_SCENE} steps of each scene by each integrator, and"
+        f" {without_compiler.ENV_STEPS} control periods of environments, in a process without the compiler,"
         " with the scenes handed over."
     ),
 }

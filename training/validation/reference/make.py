@@ -13,8 +13,8 @@ import numpy as np
 import pandas as pd
 
 HERE = Path(__file__).resolve().parent
-MOTIONS = ["surge_m", "sway_m", "heave_m", "roll_deg", "pitch_deg", "yaw_deg"]
-TENSIONS = ["fair_tension1_kN", "fair_tension2_kN", "fair_tension3_kN"]
+MOTION_COLUMNS = ["surge_m", "sway_m", "heave_m", "roll_deg", "pitch_deg", "yaw_deg"]
+TENSION_COLUMNS = ["fair_tension1_kN", "fair_tension2_kN", "fair_tension3_kN"]
 ROTOR = ["rotor_speed_rpm", "blade_pitch_deg", "gen_power_elec_kW", "aero_thrust_kN", "aero_torque_kNm"]
 HYDRO = ["hydro_Fx_kN", "hydro_Fz_kN", "hydro_My_kNm"]
 MODEL = (
@@ -29,7 +29,7 @@ SEA = (
 )
 CASES = {  # case -> (columns, settings)
     **{
-        f"decay_{name}": (MOTIONS, f"dt 0.025 s; free decay from {start}; {STILL}")
+        f"decay_{name}": (MOTION_COLUMNS, f"dt 0.025 s; free decay from {start}; {STILL}")
         for name, start in (
             ("surge", "10 m"),
             ("sway", "10 m"),
@@ -40,32 +40,32 @@ CASES = {  # case -> (columns, settings)
         )
     },
     "float_steady_8mps": (
-        MOTIONS + ROTOR + TENSIONS,
+        MOTION_COLUMNS + ROTOR + TENSION_COLUMNS,
         f"dt 0.0125 s; uniform steady 8 m/s; rotor 9.16 rpm, blade pitch 0; {WIND}",
     ),
     "float_steady_18mps": (
-        MOTIONS + ROTOR + TENSIONS,
+        MOTION_COLUMNS + ROTOR + TENSION_COLUMNS,
         f"dt 0.0125 s; uniform steady 18 m/s; rotor 12.1 rpm, blade pitch 14.92 deg; {WIND}",
     ),
     "float_windsteps_12_24": (
-        MOTIONS + ROTOR + TENSIONS,
+        MOTION_COLUMNS + ROTOR + TENSION_COLUMNS,
         "dt 0.025 s; uniform wind, 12 m/s, then +1 m/s every 100 s (0.1 s ramp); rotor 12.1 rpm, blade pitch"
         f" 3.83 deg; {WIND}",
     ),
     "regwave_H3T5": (
-        MOTIONS + TENSIONS + HYDRO,
+        MOTION_COLUMNS + TENSION_COLUMNS + HYDRO,
         f"dt 0.025 s; regular wave H 3 m T 5 s, crest at t = 0, no ramp; WaveDisp 0; {STILL}",
     ),
     "regwave_H3T5_displaced": (
-        MOTIONS + TENSIONS + HYDRO,
+        MOTION_COLUMNS + TENSION_COLUMNS + HYDRO,
         f"dt 0.025 s; regular wave H 3 m T 5 s, crest at t = 0, no ramp; WaveDisp 1; {STILL}",
     ),
     "turb_18mps_Hs7.5_uniform": (
-        ["wave_elev_m", *MOTIONS, *ROTOR, *TENSIONS],
+        ["wave_elev_m", *MOTION_COLUMNS, *ROTOR, *TENSION_COLUMNS],
         f"dt 0.0125 s; hub wind of wind_hub_18mps blown uniformly over rotor and tower; {SEA}",
     ),
     "turb_18mps_Hs7.5_box": (
-        ["wave_elev_m", *MOTIONS, *ROTOR, *TENSIONS],
+        ["wave_elev_m", *MOTION_COLUMNS, *ROTOR, *TENSION_COLUMNS],
         f"dt 0.0125 s; full-field TurbSim box; {SEA}",
     ),
 }

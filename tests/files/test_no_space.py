@@ -63,7 +63,7 @@ def contents(folder):
 
 @pytest.fixture(scope="module")
 def evaluation(tmp_path_factory):
-    """Folder of a small evaluation that went well, with its page."""
+    """Folder of a small evaluation that succeeded, with its page."""
     pytest.importorskip("plotly", reason="plotly is not installed")
     folder = tmp_path_factory.mktemp("evaluation") / "results"
     for words in ((*EVALUATE, "--out", folder, "--no-plot"), ("report", folder, "--no-schedule")):
@@ -73,7 +73,7 @@ def evaluation(tmp_path_factory):
 
 
 @pytest.mark.parametrize("name", ["run.csv", "run.parquet", "run.outb", "run.png"])
-def test_simulate_without_room_names_the_file_and_keeps_the_old_one(tmp_path, name):
+def test_simulate_without_space_names_the_file_and_keeps_the_old_one(tmp_path, name):
     path = tmp_path / name
     path.write_text("old")
     with files_of_at_most(2000):
@@ -81,7 +81,7 @@ def test_simulate_without_room_names_the_file_and_keeps_the_old_one(tmp_path, na
     assert contents(tmp_path) == {path: b"old"}
 
 
-def test_evaluate_without_room_keeps_the_runs_there_are_and_goes_on_later(evaluation):
+def test_evaluate_without_space_keeps_the_runs_there_are_and_goes_on_later(evaluation):
     before = contents(evaluation)
     more = (*EVALUATE, "--seeds", "1,2", "--out", evaluation, "--no-plot")
     with files_of_at_most(8000):
@@ -95,7 +95,7 @@ def test_evaluate_without_room_keeps_the_runs_there_are_and_goes_on_later(evalua
     assert len(pd.read_csv(evaluation / "results.csv")) == 2
 
 
-def test_report_without_room_keeps_the_old_page(evaluation):
+def test_report_without_space_keeps_the_old_page(evaluation):
     before = contents(evaluation)
     with files_of_at_most(100_000):
         refused("report", evaluation, "--no-schedule", named=evaluation / "report.html")
@@ -103,7 +103,7 @@ def test_report_without_room_keeps_the_old_page(evaluation):
 
 
 @pytest.mark.parametrize("ending", [".gif", ".mp4"])
-def test_animate_without_room_names_the_file_and_keeps_the_old_one(tmp_path, ending):
+def test_animate_without_space_names_the_file_and_keeps_the_old_one(tmp_path, ending):
     pytest.importorskip("pygame", reason="pygame is not installed")
     pytest.importorskip("imageio_ffmpeg", reason="imageio_ffmpeg is not installed")
     path = tmp_path / f"run{ending}"
@@ -114,7 +114,7 @@ def test_animate_without_room_names_the_file_and_keeps_the_old_one(tmp_path, end
     assert contents(tmp_path) == {path: b"old"}
 
 
-def test_train_without_room_keeps_the_checkpoint_before_and_goes_on_later(tmp_path):
+def test_train_without_space_keeps_the_checkpoint_before_and_goes_on_later(tmp_path):
     pytest.importorskip("stable_baselines3", reason="stable_baselines3 is not installed")
     folder = tmp_path / "run"
     assert invoke(*TRAIN, "--out", folder).exit_code == 0
@@ -128,7 +128,7 @@ def test_train_without_room_keeps_the_checkpoint_before_and_goes_on_later(tmp_pa
     assert result.exit_code == 0, result.output
 
 
-def test_validate_without_room_keeps_the_old_table(tmp_path):
+def test_validate_without_space_keeps_the_old_table(tmp_path):
     words = ("validate", "--case", "steady", "--no-plot", "--out", tmp_path)
     result = invoke(*words)
     assert result.exit_code == 0, result.output

@@ -1,0 +1,59 @@
+"""The glossary names files that exist, names that are defined in them, and units in one spelling."""
+
+import ast
+
+import pytest
+from doc_pages import DOCS
+
+ROOT = DOCS.parent
+HEADINGS = ["word", "meaning", "unit", "name", "file"]
+UNITS = {"-", "m", "m2", "s", "rad", "kg", "kg m", "kg m2", "N", "N m", "m/s", "m/s2", "rad/s", "deg/s"}
+
+
+def rows():
+    """{word: {heading: cell}} of all tables of the page."""
+    found = {}
+    for line in (DOCS / "glossary.md").read_text(encoding="utf-8").splitlines():
+        if line.startswith("| ") and not line.startswith("| word "):
+            cells = [cell.strip() for cell in line.strip("|").split(" | ")]
+            assert len(cells) == len(HEADINGS), line
+            assert cells[0] not in found, f"{cells[0]} is there twice"
+            found[cells[0]] = dict(zip(HEADINGS, cells, strict=True))
+    return found
+
+
+ROWS = rows()
+
+
+def defined(path):
+    """Names that a source gives a meaning: functions, classes, assigned names, fields and parameters."""
+    names = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            names.add(node.name)
+        elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+            names.add(node.id)
+        elif isinstance(node, ast.arg):
+            names.add(node.arg)
+    return names
+
+
+def test_the_glossary_has_the_words_that_the_code_is_built_of():
+    assert len(ROWS) >= 60
+    assert {"scene", "model", "data", "handle", "trim", "episode", "suite", "wave bands"} <= set(ROWS)
+
+
+@pytest.mark.parametrize("word", ROWS)
+def test_a_word_is_defined_where_the_glossary_says(word):
+    row = ROWS[word]
+    name, file = row["name"].strip("`"), ROOT / row["file"].strip("`")
+    assert row["name"] == f"`{name}`" and row["file"].startswith("`") and row["file"].endswith("`")
+    assert file.is_file(), row["file"]
+    assert name in defined(file), f"{name} is not defined in {row['file']}"
+
+
+@pytest.mark.parametrize("word", ROWS)
+def test_units_have_one_spelling(word):
+    units = ROWS[word]["unit"].split(", ")
+    assert set(units) <= UNITS and len(set(units)) == len(units), units
+    assert ROWS[word]["meaning"] and not ROWS[word]["meaning"].endswith(".")
