@@ -7,7 +7,7 @@ from fowt_env.controllers.lqr.law import WindEstimator
 from fowt_env.controllers.policy.controller import POLICY_PREFIX as POLICY
 from fowt_env.controllers.policy.controller import policy, shipped_agents
 from fowt_env.controllers.registry import CONTROLLERS
-from fowt_env.descriptions.platform import read_turbine
+from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.errors import unknown
 
 if __name__ != "fowt_env.controllers":  # a module that is imported under two names exists twice

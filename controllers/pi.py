@@ -113,7 +113,7 @@ class PISettings:
 
     @classmethod
     def published(cls, turbine, gain_set="oc3", region3="constant_torque", scheduled=True, **changes):
-        """Settings of a descriptions.platform.Turbine with one of its published gain sets, "oc3" or "land".
+        """Settings of a descriptions.turbine.Turbine with one of its published gain sets, "oc3" or "land".
 
         changes: fields of PISettings that replace the published ones.
         """

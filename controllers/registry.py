@@ -10,7 +10,7 @@ from fowt_env.controllers.preview import preview
 from fowt_env.controllers.printed_eq8 import eq8_literal
 from fowt_env.controllers.rosco import rosco, rosco_float
 
-CONTROLLERS = {  # name -> factory(turbine: descriptions.platform.Turbine, control_dt: float) -> controller
+CONTROLLERS = {  # name -> factory(turbine: descriptions.turbine.Turbine, control_dt: float) -> controller
     "constant": constant,
     "eq8_literal": eq8_literal,
     "floating_feedback": floating_feedback,

@@ -29,7 +29,7 @@ __version__ = "0.1.0"
 
 _PUBLIC = {
     "build_scene": "fowt_env.scene.build",
-    "Scene": "fowt_env.scene.build",
+    "Scene": "fowt_env.scene.scene",
     "trim": "fowt_env.analysis.trim",
     "OperatingPoint": "fowt_env.analysis.trim",
     "simulate": "fowt_env.simulation",

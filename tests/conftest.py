@@ -4,7 +4,8 @@ import os
 
 import pytest
 
-from fowt_env.descriptions.platform import read_platform, read_turbine
+from fowt_env.descriptions.platform import read_platform
+from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.scene.build import build_scene
 
 os.environ.setdefault("SDL_VIDEODRIVER", "dummy")  # windows of render mode "human" without a display

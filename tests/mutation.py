@@ -144,8 +144,9 @@ class Samples:
 
     def _descriptions(self):
         from fowt_env.controllers.design.saved_files import load_design
-        from fowt_env.descriptions.platform import read_platform, read_turbine
+        from fowt_env.descriptions.platform import read_platform
         from fowt_env.descriptions.sea_state import joint_sea_state, sea_state_of
+        from fowt_env.descriptions.turbine import read_turbine
         from fowt_env.scene.build import build_scene
         from fowt_env.training.evaluation.cases import read_suite
 

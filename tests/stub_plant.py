@@ -12,7 +12,8 @@ import pandas as pd
 
 import fowt_env
 from fowt_env.controllers import make
-from fowt_env.descriptions.platform import read_platform, read_turbine
+from fowt_env.descriptions.platform import read_platform
+from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.plant.measurement import Measurement
 from fowt_env.training.evaluation import guard
 

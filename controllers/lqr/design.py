@@ -19,7 +19,7 @@ from fowt_env.analysis.trim import without_fluctuations
 from fowt_env.analysis.wave_excitation import wave_force
 from fowt_env.descriptions.checks import check_number
 from fowt_env.descriptions.iec import ntm_sigma
-from fowt_env.descriptions.platform import joint_sea_state, sea_state_of
+from fowt_env.descriptions.sea_state import joint_sea_state, sea_state_of
 from fowt_env.descriptions.units import DEGREE
 from fowt_env.errors import unknown
 from fowt_env.weather.turbulence import amplitudes

@@ -15,7 +15,8 @@ from pathlib import Path
 import typer
 from rich.text import Text
 
-from fowt_env.descriptions.platform import read_platform, read_turbine
+from fowt_env.descriptions.platform import read_platform
+from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.envs import rewards
 from fowt_env.envs.actions import TRACKING_DAMPING, TRACKING_FREQUENCY
@@ -35,7 +36,7 @@ from fowt_env.plant.rollout import (
     STOP_REASONS,
 )
 from fowt_env.registration import ENVIRONMENTS
-from fowt_env.training.cli.app import app
+from fowt_env.training.cli.console import app
 
 DOCS = Path(__file__).resolve().parents[1]
 markdown = partial(markdown_table, aligned=True)

@@ -11,7 +11,7 @@ from math import pi
 
 import numpy as np
 
-from fowt_env.descriptions.platform import sea_state_of
+from fowt_env.descriptions.sea_state import sea_state_of
 from fowt_env.plant.compile.decorators import entry
 from fowt_env.plant.hydro.morison import morison_load
 from fowt_env.plant.state import State, pose_of

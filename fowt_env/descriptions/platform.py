@@ -6,16 +6,13 @@ the file, the key, the value and the allowed range, all of them at once. Sea sta
 
 import math
 from pathlib import Path
-from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from fowt_env.descriptions.files import DATA, column, locate, raise_problems, read_table, read_toml
+from fowt_env.descriptions.files import DATA, locate, raise_problems, read_toml
 from fowt_env.descriptions.records import (
     Finite,
-    FloatArray,
-    Fraction,
     NonNegative,
     Positive,
     Record,
@@ -23,48 +20,9 @@ from fowt_env.descriptions.records import (
     to_si,
     validate,
 )
-from fowt_env.descriptions.sea_state import (
-    SeaState,
-    iec_gamma,
-    joint_sea_state,
-    joint_tables,
-    read_sea_state,
-    sea_state_of,
-    sea_states,
-)
-from fowt_env.errors import InputError, unknown
+from fowt_env.descriptions.turbine import Inertia, Vector3, turbine_file, turbine_names
+from fowt_env.errors import InputError
 
-__all__ = [  # the one place to import descriptions from
-    "Ballast",
-    "Blade",
-    "Drivetrain",
-    "Environment",
-    "Hull",
-    "HydroCoefficients",
-    "Line",
-    "MooringSpread",
-    "Nacelle",
-    "PitchDrive",
-    "PitchGains",
-    "Platform",
-    "Rotor",
-    "SeaState",
-    "TorqueLaw",
-    "Tower",
-    "Turbine",
-    "iec_gamma",
-    "joint_sea_state",
-    "joint_tables",
-    "names",
-    "read_platform",
-    "read_sea_state",
-    "read_turbine",
-    "sea_state_of",
-    "sea_states",
-]
-
-Vector3 = tuple[Finite, Finite, Finite]
-Inertia = tuple[NonNegative, NonNegative, NonNegative]
 SixNumbers = tuple[Finite, Finite, Finite, Finite, Finite, Finite]
 SixBySix = tuple[SixNumbers, SixNumbers, SixNumbers, SixNumbers, SixNumbers, SixNumbers]
 SixDamping = tuple[NonNegative, NonNegative, NonNegative, NonNegative, NonNegative, NonNegative]
@@ -226,216 +184,24 @@ class MooringSpread(Record):
         )
 
 
-class Nacelle(Record):
-    """Nacelle with the generator rotor locked; positions relative to the tower axis and still water."""
-
-    mass: NonNegative
-    cm_downwind: Finite
-    cm_height: Finite
-    inertia: Inertia  # about its own centre of mass
-
-
-class Rotor(Record):
-    """Rotor masses and geometry at zero tilt and cone."""
-
-    blades: Annotated[int, Field(strict=True, ge=1, le=6)] = 3
-    mass: Positive
-    overhang: Finite  # rotor centre upwind of the tower axis, positive length
-    hub_height: Positive
-    hub_radius: Positive
-    tip_radius: Positive
-    inertia: Positive  # about the shaft
-    inertia_diameter: Positive  # about a diameter
-
-    @model_validator(mode="after")
-    def _radii(self):
-        if self.tip_radius <= self.hub_radius:
-            raise ValueError(f"tip_radius = {self.tip_radius}: must exceed hub_radius = {self.hub_radius}")
-        return self
-
-
-class Drivetrain(Record):
-    """Rigid shaft with gearbox; losses as in theory.md Eq. (7)."""
-
-    gear_ratio: Positive
-    generator_inertia: NonNegative  # about the high-speed shaft
-    mesh_loss: NonNegative = 0.0  # zeta_m
-    bearing_loss: NonNegative = 0.0  # zeta_v
-    generator_efficiency: Fraction
-
-
-class PitchDrive(Record):
-    """Blade-pitch actuator. time_constant 0: the command is followed at once."""
-
-    time_constant: NonNegative  # tau_p, s
-    rate_limit: Positive  # rad/s
-    minimum: Finite  # rad
-    maximum: Finite  # rad
-
-    @model_validator(mode="after")
-    def _limits(self):
-        if self.maximum <= self.minimum:
-            raise ValueError(f"maximum = {self.maximum}: must exceed minimum = {self.minimum}")
-        return self
-
-
-class TorqueLaw(Record):
-    """Generator torque against filtered high-speed-shaft speed (theory.md, section 3)."""
-
-    rated_torque: Positive  # N m, high-speed shaft
-    rated_power: Positive  # mechanical, W
-    rated_speed: Positive  # rad/s, high-speed shaft
-    cut_in_speed: Positive
-    region2_start_speed: Positive
-    region2_constant: Positive  # N m/(rad/s)^2
-    transition_speed: Positive  # region 2.5 to 3
-    slip_percent: Positive
-    region3_min_pitch: NonNegative  # rad
-    max_torque: Positive
-    max_torque_rate: Positive
-    speed_filter_corner: Positive  # rad/s
-
-    @model_validator(mode="after")
-    def _order(self):
-        if not self.cut_in_speed < self.region2_start_speed < self.transition_speed <= self.rated_speed:
-            raise ValueError(
-                f"cut_in_speed = {self.cut_in_speed}, region2_start_speed = {self.region2_start_speed}, "
-                f"transition_speed = {self.transition_speed}, rated_speed = {self.rated_speed}: "
-                "must be cut_in_speed < region2_start_speed < transition_speed <= rated_speed"
-            )
-        if self.max_torque < self.rated_torque:
-            raise ValueError(f"max_torque = {self.max_torque}: must be >= rated_torque = {self.rated_torque}")
-        return self
-
-
-class PitchGains(Record):
-    """Published PI gains on generator speed, and their schedule."""
-
-    KP: Positive  # s
-    KI: Positive  # -
-    gain_schedule_pitch: Positive  # beta_K, rad
-
-
-class Blade(Record):
-    """Blade stations (increasing radius) with one polar each.
-
-    The stations are those where the aerodynamics are evaluated. The line loads fall to zero at the hub and
-    tip radius of the Rotor, which are not stations.
-    """
-
-    radius: FloatArray  # (n,) m from the rotor axis
-    chord: FloatArray  # (n,) m
-    twist: FloatArray  # (n,) rad, positive towards feather
-    airfoil: tuple[str, ...]  # (n,)
-    polars: dict[str, np.ndarray]  # name -> (m, 4): alpha rad from -pi to pi, cl, cd, cm
-
-    @model_validator(mode="after")
-    def _stations(self):
-        sizes = [len(values) for values in (self.radius, self.chord, self.twist, self.airfoil)]
-        if len(set(sizes)) != 1 or sizes[0] < 2:
-            raise ValueError(f"radius, chord, twist, airfoil need the same length, at least 2; got {sizes}")
-        for name, bad, rule in (
-            ("radius", ~(np.diff(self.radius, prepend=0.0) > 0), "increasing, > 0"),
-            ("chord", ~(np.isfinite(self.chord) & (self.chord > 0)), "finite, > 0"),
-            ("twist", ~np.isfinite(self.twist), "finite"),
-        ):
-            if bad.any():
-                first = int(np.argmax(bad))
-                raise ValueError(f"{name}.{first + 1} = {getattr(self, name)[first]}: must be {rule}")
-        for name in self.airfoil:
-            if name not in self.polars:
-                raise ValueError(str(unknown("airfoil", name, self.polars)))
-        for name, polar in self.polars.items():
-            if problem := _polar_problem(polar):
-                raise ValueError(f"polars.{name}: {problem}")
-        return self
-
-
-def _polar_problem(polar):
-    """What is wrong with a (m, 4) polar in rad, in words; None if nothing is."""
-    if polar.ndim != 2 or polar.shape[0] < 2 or polar.shape[1] != 4 or not np.isfinite(polar).all():
-        return f"shape {polar.shape}: must be finite numbers, (m >= 2, 4)"
-    degrees = np.degrees(polar[:, 0])
-    steps = np.diff(degrees)
-    if (steps <= 0).any():
-        first = int(np.argmax(steps <= 0))
-        return f"alpha = {degrees[first + 1]:g} deg after {degrees[first]:g} deg: must increase"
-    if abs(degrees[0] + 180.0) > 1e-6 or abs(degrees[-1] - 180.0) > 1e-6:
-        return f"alpha covers {degrees[0]:g} to {degrees[-1]:g} deg: must cover -180 to 180 deg"
-    return None
-
-
-class Turbine(Record):
-    """A wind turbine: rotor, nacelle, drivetrain, actuator and its published controller data."""
-
-    name: str
-    rated_rotor_speed: Positive  # rad/s
-    rated_wind_speed: Positive
-    cut_in_wind_speed: Positive
-    cut_out_wind_speed: Positive
-    overspeed: Positive  # rad/s: failure threshold of the environment
-    rotor: Rotor
-    nacelle: Nacelle
-    drivetrain: Drivetrain
-    pitch_drive: PitchDrive
-    torque_law: TorqueLaw
-    gains: dict[Literal["oc3", "land"], PitchGains]
-    blade: Blade
-    source: str = ""
-
-    @model_validator(mode="after")
-    def _consistent(self):
-        problems = []
-        if not self.cut_in_wind_speed < self.rated_wind_speed < self.cut_out_wind_speed:
-            problems.append(
-                f"rated_wind_speed = {self.rated_wind_speed}: must be between cut_in_wind_speed = "
-                f"{self.cut_in_wind_speed} and cut_out_wind_speed = {self.cut_out_wind_speed}"
-            )
-        if self.overspeed <= self.rated_rotor_speed:
-            problems.append(
-                f"overspeed = {self.overspeed:g}: must be > rated_rotor_speed = {self.rated_rotor_speed:g}"
-            )
-        hub, tip = self.rotor.hub_radius, self.rotor.tip_radius
-        for i, radius in enumerate(self.blade.radius, 1):
-            if not hub < radius < tip:
-                problems.append(
-                    f"blade.radius.{i} = {radius:g}: must be > hub_radius = {hub} and < tip_radius = {tip} m"
-                )
-        if problems:
-            raise ValueError("\n".join(problems))
-        return self
-
-
 # --------------------------------------------------------------------------- readers
-
-
-def names(kind):
-    """Sorted built-in names of a kind: "platforms", "turbines", "sea_states" or "joint_tables"."""
-    if kind == "platforms":
-        return sorted(path.stem for path in (DATA / "platforms").glob("*.toml"))
-    if kind == "turbines":
-        return sorted(path.parent.name for path in (DATA / "turbines").glob("*/turbine.toml"))
-    if kind == "sea_states":
-        return sorted(sea_states())
-    if kind == "joint_tables":
-        return sorted(joint_tables())
-    raise unknown("kind of description", kind, ("platforms", "turbines", "sea_states", "joint_tables"))
 
 
 def _platform_file(name):
     return DATA / "platforms" / f"{name}.toml"
 
 
-def _turbine_file(name):
-    return DATA / "turbines" / name / "turbine.toml"
+def platform_names():
+    """Sorted names of the built-in platforms."""
+    return sorted(path.stem for path in (DATA / "platforms").glob("*.toml"))
 
 
 def read_platform(name_or_path: str | Path) -> Platform:
-    """Platform from a built-in name (names("platforms")) or a user's TOML file.
+    """Platform from a built-in name (platform_names()) or a user's TOML file.
 
     The turbine of the result is a built-in name or an absolute path; in the file it is relative to the file.
     """
-    path = locate("platform", name_or_path, names("platforms"), _platform_file)
+    path = locate("platform", name_or_path, platform_names(), _platform_file)
     data = read_toml(path, "platform")
     problems = []
     free = {key: data.pop(key) for key in ("options", "published") if key in data}
@@ -450,8 +216,8 @@ def read_platform(name_or_path: str | Path) -> Platform:
         data["lines"] = tuple(data["lines"])
     if isinstance(data.get("turbine"), str):
         try:
-            turbine = locate("turbine", data["turbine"], names("turbines"), _turbine_file, path.parent)
-            if data["turbine"] not in names("turbines"):
+            turbine = locate("turbine", data["turbine"], turbine_names(), turbine_file, path.parent)
+            if data["turbine"] not in turbine_names():
                 data["turbine"] = str(turbine.resolve())
         except InputError as error:
             problems.append(f"turbine: {error}")
@@ -462,88 +228,3 @@ def read_platform(name_or_path: str | Path) -> Platform:
 
 class _MooringFile(Record):
     mooring: MooringSpread
-
-
-def read_turbine(name_or_path: str | Path) -> Turbine:
-    """Turbine from a built-in name (names("turbines")) or a user's TOML file.
-
-    blade.stations and blade.polars are paths relative to the file or, if not there, to the folder of the
-    built-in turbines ("nrel5mw/blade.csv", "nrel5mw/polars").
-    """
-    path = locate("turbine", name_or_path, names("turbines"), _turbine_file)
-    problems = []
-    data, origin = to_si(read_toml(path, "turbine"), problems)
-    blade, blade_problems = validate(_BladeFile, {"blade": data.pop("blade")} if "blade" in data else {})
-    if blade is not None:
-        try:
-            data["blade"] = _read_blade(blade.blade, path.parent)
-        except InputError as error:
-            blade_problems.append(str(error))
-    turbine, found = validate(Turbine, data, origin)
-    if blade_problems:  # which say why the record has no blade
-        found = [problem for problem in found if not problem.startswith("blade is missing")]
-    raise_problems(f"turbine file {str(path)!r}", problems + found + blade_problems)
-    return turbine
-
-
-class _BladeTable(Record):
-    stations: str
-    polars: str
-
-
-class _BladeFile(Record):
-    blade: _BladeTable
-
-
-def _beside(folder, text):
-    """Path relative to folder or else to the built-in turbines; the first if neither exists."""
-    try:
-        mine = folder / Path(text).expanduser()
-        builtin = DATA / "turbines" / text
-        return builtin if builtin.exists() and not mine.exists() else mine
-    except (OSError, ValueError, RuntimeError) as error:
-        raise InputError(f"path {text[:60]!r} cannot be used: {error}") from None
-
-
-def _read_blade(table, folder):
-    """Blade from the station file and polar folder that a turbine file names."""
-    path = _beside(folder, table.stations)
-    rows = read_table(path, "blade", ("radius_m", "chord_m", "twist_deg", "airfoil"))
-    problems = []
-    radius = column(rows, "radius_m", problems, 0.0)
-    chord = column(rows, "chord_m", problems, 0.0)
-    twist = np.deg2rad(column(rows, "twist_deg", problems, -180.0, 180.0, open_ends=False))
-    for (number, row), before, here in zip(rows[1:], radius[:-1], radius[1:], strict=True):
-        if here <= before:
-            problems.append(f"line {number}: radius_m = {row['radius_m']}: must increase from row to row")
-    if len(rows) < 2:
-        problems.append("has 1 row; allowed: at least 2")
-    polar_folder = _beside(folder, table.polars)
-    try:
-        files = {file.stem: file for file in sorted(polar_folder.glob("*.csv"))}
-    except (OSError, ValueError) as error:
-        raise InputError(f"polars folder {str(polar_folder)!r} cannot be read: {error}") from None
-    if not files:
-        raise InputError(f"blade.polars = {table.polars!r}: no CSV files in a folder {str(polar_folder)!r}")
-    airfoils = tuple(row["airfoil"] for _, row in rows)
-    polars = {}
-    for (number, _), name in zip(rows, airfoils, strict=True):
-        if name not in files:
-            problems.append(f"line {number}: {unknown('airfoil', name, files)}")
-        elif name not in polars:
-            polars[name] = _read_polar(files[name])
-    raise_problems(f"blade file {str(path)!r}", problems)
-    return Blade(radius=radius, chord=chord, twist=twist, airfoil=airfoils, polars=polars)
-
-
-def _read_polar(path):
-    """(m, 4) array alpha (rad), cl, cd, cm of a polar file."""
-    rows = read_table(path, "polar", ("alpha_deg", "cl", "cd", "cm"))
-    problems = []
-    alpha = column(rows, "alpha_deg", problems, -180.0, 180.0, open_ends=False)
-    coefficients = [column(rows, name, problems) for name in ("cl", "cd", "cm")]
-    polar = np.column_stack([np.deg2rad(alpha), *coefficients])
-    if not problems and (problem := _polar_problem(polar)):
-        problems.append(problem)
-    raise_problems(f"polar file {str(path)!r}", problems)
-    return polar

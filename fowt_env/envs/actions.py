@@ -53,7 +53,7 @@ class ActionMap(NamedTuple):
 
 
 def build_action_map(mode, task, turbine, control_dt):
-    """ActionMap of a ActionMode, a Task and a descriptions.platform.Turbine.
+    """ActionMap of a ActionMode, a Task and a descriptions.turbine.Turbine.
 
     Raises: InputError where the pitch action reaches beyond the actuator.
     """

@@ -105,7 +105,7 @@ ESTIMATE_CHANNELS = {  # made by the estimator of lqr from what a turbine measur
 
 
 def observation_channels(turbine, preview=()):
-    """{channel: tuple of its Entries} for a descriptions.platform.Turbine; preview: look-ahead times (s)."""
+    """{channel: tuple of its Entries} for a descriptions.turbine.Turbine; preview: look-ahead times (s)."""
     rated, law, drive = turbine.rated_rotor_speed, turbine.torque_law, turbine.pitch_drive
     table = {entry.name: (entry,) for entry in FIXED}
     table["rotor_speed"] = (

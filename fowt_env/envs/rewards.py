@@ -156,7 +156,7 @@ def weighted_sum(weights, terms):
 
 
 def build_scales(turbine, control_dt):
-    """Scales of a descriptions.platform.Turbine at a control period (s)."""
+    """Scales of a descriptions.turbine.Turbine at a control period (s)."""
     law = turbine.torque_law
     return Scales(
         rated_power=float(law.rated_power),

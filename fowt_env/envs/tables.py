@@ -2,7 +2,8 @@
 
 from math import isinf
 
-from fowt_env.descriptions.platform import read_platform, read_turbine
+from fowt_env.descriptions.platform import read_platform
+from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.envs.observations import entries
 from fowt_env.envs.rewards import REWARD_TERMS
 from fowt_env.files.markdown import markdown_table

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fowt_env.descriptions.platform import joint_sea_state, joint_tables, sea_state_of
+from fowt_env.descriptions.sea_state import joint_sea_state, joint_tables, sea_state_of
 from fowt_env.descriptions.wind import read_wind
 from fowt_env.envs.observations import STANDARD, check_channels
 from fowt_env.envs.rewards import check_weights

@@ -102,7 +102,7 @@ def build_torque_curve(torque_law, region3="constant_torque"):
 
 
 def build_drivetrain(turbine):
-    """Shaft of a descriptions.platform.Turbine."""
+    """Shaft of a descriptions.turbine.Turbine."""
     shaft, rotor_inertia = turbine.drivetrain, turbine.rotor.inertia
     ratio = shaft.gear_ratio
     rated_torque = ratio * turbine.torque_law.rated_torque  # tau_0, low-speed shaft

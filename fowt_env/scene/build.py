@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from fowt_env.descriptions.checks import check_whole_number
-from fowt_env.descriptions.platform import Platform, Turbine, read_platform, read_turbine
+from fowt_env.descriptions.platform import Platform, read_platform
+from fowt_env.descriptions.turbine import Turbine, read_turbine
 from fowt_env.plant.drivetrain import build_drivetrain, build_pitch_actuator, build_torque_limits
 from fowt_env.plant.integrators import build_integrator
 from fowt_env.plant.model import Model

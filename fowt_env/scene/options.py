@@ -37,7 +37,7 @@ OPTIONS = {
     "blade_stations": (None, "None (the turbine file's) or a number of them, 3 up to the file's"),
     "strip_length": (None, "None (fraction of the draft) or metres, 0.01 to 1000: cells of exact wave loads"),
     "shear_exponent": (None, "None (the platform file's) or 0 to 1"),
-    "turbine": (None, "None (the platform file's), a name, a path or a descriptions.platform.Turbine"),
+    "turbine": (None, "None (the platform file's), a name, a path or a descriptions.turbine.Turbine"),
 }
 ARGUMENTS = ("platform", "wind", "sea", "seed", "rotor", "fidelity", "loads")  # of build_scene beside OPTIONS
 

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from fowt_env.descriptions.checks import check_whole_number
-from fowt_env.descriptions.platform import Platform, Turbine
+from fowt_env.descriptions.platform import Platform
+from fowt_env.descriptions.turbine import Turbine
 from fowt_env.errors import InputError
 from fowt_env.plant.channels import Channel, channels, to_units, with_hub_wind
 from fowt_env.plant.compile.handle import Handle

@@ -6,8 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fowt_env.descriptions.platform import sea_state_of
-from fowt_env.descriptions.sea_state import SeaState
+from fowt_env.descriptions.sea_state import SeaState, sea_state_of
 from fowt_env.errors import InputError
 from fowt_env.plant.aero.wind import WindSeries
 from fowt_env.weather.waves import build_waves

@@ -12,7 +12,9 @@ import fowt_env
 from fowt_env.analysis import equilibrium
 from fowt_env.analysis.equilibrium import check_equilibrium, evaluated
 from fowt_env.analysis.trim import AZIMUTHS, mean_derivative, trim, without_fluctuations
-from fowt_env.descriptions.platform import DATA, names, read_platform, read_turbine
+from fowt_env.descriptions.builtin import names
+from fowt_env.descriptions.platform import DATA, read_platform
+from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.envs import FowtEnv
 from fowt_env.errors import InputError
 from fowt_env.plant.hydro.hydrostatics import hydrostatic_load

@@ -5,7 +5,7 @@ import pytest
 from naive.discon import Discon
 
 from fowt_env import controllers
-from fowt_env.descriptions.platform import read_turbine
+from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.plant.measurement import Measurement
 
 pytestmark = pytest.mark.installation

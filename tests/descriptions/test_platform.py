@@ -10,18 +10,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fowt_env.descriptions import platform as description
+from fowt_env.descriptions.builtin import names
 from fowt_env.descriptions.files import MAX_BYTES
-from fowt_env.descriptions.platform import (
+from fowt_env.descriptions.platform import read_platform
+from fowt_env.descriptions.sea_state import (
     SeaState,
     iec_gamma,
     joint_sea_state,
-    names,
-    read_platform,
     read_sea_state,
-    read_turbine,
     sea_state_of,
     sea_states,
 )
+from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.errors import InputError
 
 PLATFORM = description.DATA / "platforms" / "oc3_hywind.toml"

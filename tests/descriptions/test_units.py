@@ -7,7 +7,7 @@ import pytest
 
 import fowt_env
 from fowt_env.descriptions import units
-from fowt_env.descriptions.platform import read_turbine
+from fowt_env.descriptions.turbine import read_turbine
 
 ROOT = Path(fowt_env.__file__).resolve().parent.parent
 FACTOR = re.compile(r"\bpi\s*/\s*(180|30)\b|\bpi\s*/\s*60\b|\b(180|30|60)(\.0)?\s*/\s*\(?(np\.|math\.)?pi\b")

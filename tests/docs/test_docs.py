@@ -16,7 +16,7 @@ import pytest
 from doc_pages import DOCS, FENCE
 
 from fowt_env.controllers.policy.controller import shipped_agents
-from fowt_env.descriptions.platform import read_turbine
+from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.envs.rewards import N_TERMS, REWARD_TERMS, build_scales, fill_terms
 from fowt_env.envs.tasks import TASKS
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measure

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import fowt_env
-from fowt_env.descriptions.platform import read_turbine
+from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.envs import FowtEnv
 from fowt_env.envs.rewards import (
     AT_MARGIN,

@@ -19,9 +19,10 @@ from fowt_env.controllers import make
 from fowt_env.controllers.policy.controller import AGENTS
 from fowt_env.controllers.policy.network_file import read_policy
 from fowt_env.descriptions.files import parse_json, read_toml
-from fowt_env.descriptions.platform import read_turbine
+from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.errors import InputError
 from fowt_env.training.cli import app as cli
+from fowt_env.training.cli import console
 from fowt_env.training.evaluation import provenance
 from fowt_env.training.evaluation.metrics import METRICS
 from fowt_env.training.reports import html_page
@@ -133,7 +134,7 @@ def test_a_stable_baselines3_zip_is_refused_where_a_policy_is_meant(tmp_path, ma
     with zipfile.ZipFile(path, "w") as file:
         file.writestr("data", pickle.dumps(Bomb(mark)))
     result = invoke("simulate", "--controller", f"policy:{path}", "--duration", "1")
-    assert result.exit_code == cli.EXIT_INPUT and "runs code of its author" in result.stderr
+    assert result.exit_code == console.EXIT_INPUT and "runs code of its author" in result.stderr
     assert not mark.exists()
 
 
@@ -157,7 +158,7 @@ def test_a_checkpoint_of_a_stranger_is_not_loaded_unless_it_is_trusted(tmp_path,
     monkeypatch.chdir(tmp_path)
     folder = checkpoint_of_a_stranger(tmp_path / "run", mark)
     result = invoke(*words, str(folder))
-    assert result.exit_code == cli.EXIT_INPUT, result.output
+    assert result.exit_code == console.EXIT_INPUT, result.output
     assert "--trust-zip" in result.stderr and "executes code" in result.stderr
     assert not mark.exists()
 
@@ -225,10 +226,10 @@ def test_a_policy_whose_baseline_is_no_built_in_controller_is_refused_by_the_com
     settings = read_policy(AGENTS / "ppo_lqr.npz")[0] | {"baseline": text}
     policy_of_a_stranger(settings, "self.npz")
     result = invoke("simulate", "--controller", "policy:self.npz", "--duration", "1")
-    assert result.exit_code == cli.EXIT_INPUT, result.output
+    assert result.exit_code == console.EXIT_INPUT, result.output
     assert f"baseline = '{text}': must be one of 'constant'" in result.stderr
     result = invoke("evaluate", "--controllers", "policy:self.npz", "--duration", "1", "--skip", "0")
-    assert result.exit_code == cli.EXIT_INPUT, result.output
+    assert result.exit_code == console.EXIT_INPUT, result.output
     from fowt_env.training.reports.scores import inputs
 
     assert inputs("policy:self.npz" if text.startswith("policy:") else text) == ""
@@ -276,7 +277,7 @@ def test_a_folder_of_nothing_but_settings_is_refused_where_its_baseline_is_no_bu
     settings = changed(settings_of_a_stranger(), ("environment", "baseline"), text)
     Path("run", "settings.yml").write_text(yaml.safe_dump(settings))
     result = invoke("train", "--resume", "--out", "run")
-    assert result.exit_code == cli.EXIT_INPUT
+    assert result.exit_code == console.EXIT_INPUT
     assert f"environment.baseline = '{text}': must be one of constant, " in result.stderr
     assert [path.name for path in Path("run").iterdir()] == ["settings.yml"]
 

@@ -17,6 +17,7 @@ from typer.testing import CliRunner
 from fowt_env.files.atomic import is_leftover
 from fowt_env.files.tables import write_table
 from fowt_env.training.cli import app as cli
+from fowt_env.training.cli import console
 from fowt_env.training.evaluation import results
 
 SHORT = ("--wind", "18", "--duration", "20", "--option", "wave_components=10")
@@ -50,7 +51,7 @@ def refused(*words, named):
     """Assert that a command ends with one line that names a path, and without a traceback."""
     result = invoke(*words)
     assert isinstance(result.exception, SystemExit), result.exception
-    assert result.exit_code == cli.EXIT_INPUT, result.output
+    assert result.exit_code == console.EXIT_INPUT, result.output
     lines = [line for line in result.stderr.splitlines() if line.startswith("Error:")]
     assert len(lines) == 1 and str(named) in lines[0] and "cannot be written" in lines[0], result.stderr
     assert "Traceback" not in result.output

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from naive import waves as naive
 
-from fowt_env.descriptions.platform import SeaState
+from fowt_env.descriptions.sea_state import SeaState
 from fowt_env.plant.hydro.waves import elevation, ramp_factor, wave_kinematics
 from fowt_env.weather.waves import build_waves, jonswap, wave_number
 

@@ -1,14 +1,15 @@
 """How long a session's scenes take to compile: six kinds one after the other, with an empty cache of kernels.
 
-The session runs in a process of its own, through names that users have, so the file serves other versions too:
-`python training/benchmarks/compile_time.py` prints one line a scene without importing this project's benchmarks.
+The session runs in a process of its own and uses public names alone, so that another version of this project
+can be timed by `python compile_time.py` in its environment.
 """
 
 import os
 import subprocess
 import sys
 import tempfile
-from pathlib import Path
+
+import pandas as pd
 
 SESSION = """
 import time
@@ -36,7 +37,8 @@ run("steady wind", wind=14.0)
 run("turbulence and sea", wind=turbulence, sea=sea)
 line = np.linspace(-75.0, 75.0, 16)
 u = 18.0 + np.random.default_rng(0).normal(size=(100, 16, 16))
-run("full-field box", wind={"kind": "box", "u": u, "y": line, "z": line + 90.0, "dt": 0.5, "speed": 18.0}, sea=sea)
+box = {"kind": "box", "u": u, "y": line, "z": line + 90.0, "dt": 0.5, "speed": 18.0}
+run("full-field box", wind=box, sea=sea)
 import gymnasium
 env = gymnasium.make("fowt_env:fowt_env/OC3Hywind-v1")
 env.reset(seed=0)
@@ -49,7 +51,7 @@ NAMES = (
 
 
 def session(progress=None):
-    """[(scene, seconds, seconds of processor time)] of the session in a new process with an empty cache.
+    """DataFrame (scene, seconds, processor_seconds) of the session in a new process with an empty cache.
 
     progress: called with (text, done, total). Raises: RuntimeError with what a failed process printed.
     """
@@ -58,7 +60,7 @@ def session(progress=None):
         process = subprocess.Popen(
             [sys.executable, "-W", "ignore", "-c", SESSION],
             env={**os.environ, "FOWT_CACHE_DIR": folder},
-            cwd=Path(__file__).resolve().parents[2],
+            cwd=folder,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
@@ -71,9 +73,8 @@ def session(progress=None):
         errors = process.communicate()[1]
     if process.returncode != 0:
         raise RuntimeError(f"the session in a new process failed: {errors[-600:]}")
-    return rows
+    return pd.DataFrame(rows, columns=["scene", "seconds", "processor_seconds"])
 
 
 if __name__ == "__main__":
-    for scene, seconds, processor in session():
-        print(f"{scene:20} {seconds:6.1f} s, processor {processor:6.1f} s")
+    print(session().round(1).to_string(index=False))

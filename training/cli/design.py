@@ -8,8 +8,8 @@ import typer
 
 from fowt_env.descriptions.checks import parse_numbers, parse_whole_numbers
 from fowt_env.errors import InputError
-from fowt_env.training.cli.app import app, note, out, progress_bar, reported, show
 from fowt_env.training.cli.arguments import parse_pairs
+from fowt_env.training.cli.console import app, note, out, progress_bar, reported, show
 
 design = typer.Typer(no_args_is_help=True, rich_markup_mode="rich", help="Tune controllers.")
 app.add_typer(design, name="design")

@@ -8,6 +8,7 @@ from rich.markup import escape
 
 from fowt_env.errors import InputError
 from fowt_env.training.cli import requirements
+from fowt_env.training.cli.console import app, reported
 
 DOCTOR_EXAMPLES = """[bold]Examples[/bold]
 
@@ -20,6 +21,8 @@ DOCTOR_EXAMPLES = """[bold]Examples[/bold]
 out = Console()
 
 
+@app.command(epilog=DOCTOR_EXAMPLES)
+@reported
 def doctor(
     test: Annotated[bool, typer.Option("--test/--no-test", help="Run the self-test.")] = True,
 ):

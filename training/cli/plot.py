@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from fowt_env.errors import InputError, unknown
-from fowt_env.training.cli.app import app, note, reported
+from fowt_env.training.cli.console import app, note, reported
 
 PLOTS = ("series", "spectra", "boxes", "raos", "schedule")
 PLOT_EXAMPLES = """[bold]Examples[/bold]

@@ -6,8 +6,8 @@ from typing import Annotated
 import typer
 
 from fowt_env.descriptions.checks import parse_whole_numbers
-from fowt_env.training.cli.app import OptionOption, app, note, progress_bar, reported
 from fowt_env.training.cli.arguments import parse_pairs, parse_sea, parse_wind
+from fowt_env.training.cli.console import OptionOption, app, note, progress_bar, reported
 
 REPORT_EXAMPLES = """[bold]Examples[/bold]
 

@@ -5,8 +5,8 @@ from typing import Annotated
 import typer
 
 from fowt_env.errors import InputError
-from fowt_env.training.cli.app import app, note, out, progress_bar, reported
 from fowt_env.training.cli.arguments import parse_sea, parse_wind
+from fowt_env.training.cli.console import app, note, out, progress_bar, reported
 
 scores = typer.Typer(
     no_args_is_help=True,

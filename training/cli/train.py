@@ -6,8 +6,9 @@ from typing import Annotated
 import typer
 
 from fowt_env.errors import InputError
-from fowt_env.training.cli.app import EXIT_INTERRUPTED, app, benchmarks, note, out, progress_bar, reported
 from fowt_env.training.cli.arguments import parse_pairs
+from fowt_env.training.cli.benchmark import benchmarks
+from fowt_env.training.cli.console import EXIT_INTERRUPTED, app, note, out, progress_bar, reported
 
 TRAIN_EXAMPLES = """[bold]Examples[/bold]
 

@@ -24,7 +24,8 @@ from fowt_env.controllers.floating_feedback import FeedbackSettings, FloatingFee
 from fowt_env.controllers.pi import PISettings
 from fowt_env.controllers.rosco import Rosco, RoscoSettings
 from fowt_env.controllers.tuned import TUNED
-from fowt_env.descriptions.platform import joint_sea_state, read_turbine
+from fowt_env.descriptions.sea_state import joint_sea_state
+from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.errors import InputError, unknown
 from fowt_env.files.atomic import replacing
 from fowt_env.files.tables import write_table

@@ -14,14 +14,14 @@ from pydantic import BeforeValidator, Field
 
 from fowt_env.descriptions.checks import is_number, plain_number
 from fowt_env.descriptions.files import locate, raise_problems, read_toml
-from fowt_env.descriptions.platform import joint_sea_state, read_platform
+from fowt_env.descriptions.platform import read_platform
 from fowt_env.descriptions.records import (
     NonNegative,
     Positive,
     Record,
     validate,
 )
-from fowt_env.descriptions.sea_state import SeaState, sea_state_of
+from fowt_env.descriptions.sea_state import SeaState, joint_sea_state, sea_state_of
 from fowt_env.descriptions.wind import read_wind
 from fowt_env.errors import InputError, unknown
 from fowt_env.scene.options import OPTIONS

@@ -5,8 +5,9 @@ from typing import Annotated
 
 from pydantic import Field
 
-from fowt_env.descriptions.platform import read_platform, read_turbine
+from fowt_env.descriptions.platform import read_platform
 from fowt_env.descriptions.records import NonNegative, Positive, Record
+from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.errors import InputError
 
 # name: (what is drawn, default distribution). Factors multiply the file's value.

@@ -6,7 +6,8 @@ from contextlib import suppress
 
 import numpy as np
 
-from fowt_env.descriptions.platform import Platform, Turbine, read_platform, read_turbine
+from fowt_env.descriptions.platform import Platform, read_platform
+from fowt_env.descriptions.turbine import Turbine, read_turbine
 from fowt_env.files.atomic import replacing
 from fowt_env.folders import cache_root, distrust, make_private
 from fowt_env.weather.wind_field import WindBox, read_box

@@ -177,7 +177,7 @@ def validation_episodes(settings):
 
 def _sea_at(speed):
     """JONSWAP sea of the site's normal sea state at a wind speed (m/s)."""
-    from fowt_env.descriptions.platform import joint_sea_state
+    from fowt_env.descriptions.sea_state import joint_sea_state
 
     state = joint_sea_state(SITE, speed)
     return {"kind": "jonswap", "Hs": state.Hs, "Tp": state.Tp}

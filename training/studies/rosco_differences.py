@@ -24,7 +24,7 @@ from fowt_env.controllers.pi import (
     write_commands,
 )
 from fowt_env.controllers.rosco import SCHEDULE, Rosco, RoscoSettings, pitch_gains
-from fowt_env.descriptions.platform import read_turbine
+from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.training.design.tune_feedback import BASELINE, CONTROL_DT, SEEDS, WINDS, training_case
 from fowt_env.training.evaluation.evaluate import evaluate, mean_ratios
 

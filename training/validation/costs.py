@@ -4,7 +4,8 @@ import numpy as np
 import pandas as pd
 
 from fowt_env.descriptions.iec import ntm_sigma
-from fowt_env.descriptions.platform import read_platform, read_turbine
+from fowt_env.descriptions.platform import read_platform
+from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.training.validation.openfast_cases import PLATFORM, RUNS, box_wind
 from fowt_env.training.validation.signal_errors import normalised_rms
 from fowt_env.weather.turbulence import turbulence

@@ -11,7 +11,7 @@ import pytest
 import fowt_env
 from fowt_env.controllers import information, make
 from fowt_env.controllers.policy.controller import read_policy, shipped_agents
-from fowt_env.descriptions.platform import read_turbine
+from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.envs import TASKS, FowtEnv
 from fowt_env.envs.observations import entries
 from fowt_env.errors import InputError

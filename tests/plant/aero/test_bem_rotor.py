@@ -7,7 +7,7 @@ import pytest
 from naive import rotor as naive
 from numba import njit
 
-from fowt_env.descriptions.platform import read_turbine
+from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.errors import InputError
 from fowt_env.plant.aero.bem_rotor import NO_ROTOR_LOAD, rotor_load
 from fowt_env.plant.aero.blade_elements import bem_residual, blade_section, build_blade_elements
@@ -399,7 +399,7 @@ PLAIN = """
 import numpy as np
 from fowt_env.plant.aero.blade_elements import build_blade_elements
 from fowt_env.plant.aero.bem_rotor import rotor_load
-from fowt_env.descriptions.platform import read_turbine
+from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.plant.state import pose_of
 from fowt_env.weather.wind import make_series
 from fowt_env.plant.aero.wind import wind_now

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from fowt_env.descriptions.platform import read_turbine
+from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.plant.aero.bem_rotor import NO_ROTOR_LOAD, rotor_load
 from fowt_env.plant.aero.blade_elements import build_blade_elements
 from fowt_env.plant.aero.coefficient_table import build_coefficient_table, coefficient_table_load

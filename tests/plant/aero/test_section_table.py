@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numba import config, njit
 
-from fowt_env.descriptions.platform import read_turbine
+from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.plant.aero.bem_rotor import NO_ROTOR_LOAD, hub_flow, rotor_load
 from fowt_env.plant.aero.blade_elements import blade_section, build_blade_elements
 from fowt_env.plant.aero.section_table import (
@@ -347,7 +347,7 @@ def test_a_table_serves_every_air_density():
 PLAIN = """
 import sys
 import numpy as np
-from fowt_env.descriptions.platform import read_turbine
+from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.plant.aero.blade_elements import build_blade_elements
 from fowt_env.plant.aero.section_table import SectionTable, section_table_load
 from fowt_env.plant.state import pose_of

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from fowt_env.descriptions.platform import read_turbine
+from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.plant.aero.bem_rotor import hub_flow, rotor_load, wake_equilibrium
 from fowt_env.plant.aero.blade_elements import blade_section, build_blade_elements
 from fowt_env.plant.aero.wake import (

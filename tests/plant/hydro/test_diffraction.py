@@ -12,7 +12,7 @@ from naive.rigid_body import rotation
 from plant_helpers import make_pose
 
 from fowt_env import build_scene, simulate
-from fowt_env.descriptions.platform import sea_state_of
+from fowt_env.descriptions.sea_state import sea_state_of
 from fowt_env.errors import InputError
 from fowt_env.plant.hydro.banded_strips import banded_strip_load
 from fowt_env.plant.hydro.diffraction import (

@@ -7,7 +7,7 @@ from naive.morison import spar_of
 from naive.rigid_body import rotation
 from plant_helpers import make_pose
 
-from fowt_env.descriptions.platform import SeaState
+from fowt_env.descriptions.sea_state import SeaState
 from fowt_env.plant.hydro.morison import Current, morison_load
 from fowt_env.plant.hydro.strip_kinematics import strip_kinematics
 from fowt_env.plant.hydro.strips import GAUSS_OFFSET, axis_surface, build_strips, wet_cell

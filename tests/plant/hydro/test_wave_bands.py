@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from naive.strips import strip_load
 
-from fowt_env.descriptions.platform import read_platform, sea_state_of
+from fowt_env.descriptions.platform import read_platform
+from fowt_env.descriptions.sea_state import sea_state_of
 from fowt_env.plant.hydro import strip_quadrature, wave_bands
 from fowt_env.plant.hydro.banded_strips import banded_strip_load
 from fowt_env.plant.hydro.morison import Current, current_at, morison_load

@@ -15,6 +15,7 @@ from fowt_env.descriptions.wind import KINDS
 from fowt_env.errors import InputError
 from fowt_env.scene.options import OPTIONS
 from fowt_env.training.cli import app as cli
+from fowt_env.training.cli import console
 
 
 def examples(count):
@@ -83,8 +84,8 @@ def check_command(arguments, odd):
             os.chdir(before)
     if result.exception is not None and not isinstance(result.exception, SystemExit):
         raise result.exception
-    assert result.exit_code in (0, cli.EXIT_STOPPED, cli.EXIT_INPUT), result.output
-    if result.exit_code == cli.EXIT_INPUT:
+    assert result.exit_code in (0, console.EXIT_STOPPED, console.EXIT_INPUT), result.output
+    if result.exit_code == console.EXIT_INPUT:
         said = result.stderr.lower()
         names = [option.strip("-").replace("-", "_") for option in odd] + [o.strip("-") for o in odd]
         values = [value.strip().partition("=")[0][:20].lower() for value in odd.values()]

@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 import fowt_env
 from fowt_env.training.cli import app as cli
 from fowt_env.training.cli import tables as cli_tables
+from fowt_env.training.cli.simulate import TRIM_CHANNELS
 
 WIDTHS = {"80 columns": {"COLUMNS": "80"}, "a pipe": {}}
 
@@ -65,7 +66,7 @@ def simulate_command(monkeypatch, tmp_path):
 
 
 def trim_command(monkeypatch, tmp_path):
-    points = frame_of(cli.TRIM_CHANNELS, 2)
+    points = frame_of(TRIM_CHANNELS, 2)
     rows = iter(points.to_dict("records"))
     monkeypatch.setattr(fowt_env, "trim", lambda *a, **k: next(rows))
     return ["trim", "--winds", "8,18"], texts_of(points)

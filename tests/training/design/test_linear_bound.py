@@ -13,7 +13,7 @@ from fowt_env.analysis.linear_model import linearize
 from fowt_env.analysis.wave_excitation import wave_force
 from fowt_env.controllers.lqr.design import MOMENT, N_FEEDBACK, N_PLANT, PLANT, design_model, wind_filter
 from fowt_env.descriptions.iec import ntm_sigma
-from fowt_env.descriptions.platform import joint_sea_state, sea_state_of
+from fowt_env.descriptions.sea_state import joint_sea_state, sea_state_of
 from fowt_env.errors import InputError
 from fowt_env.training.design import linear_bound
 from fowt_env.training.design.linear_bound import (

@@ -14,7 +14,8 @@ import stub_plant
 from typer.testing import CliRunner
 
 import fowt_env
-from fowt_env.descriptions.platform import read_platform, read_turbine
+from fowt_env.descriptions.platform import read_platform
+from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.errors import InputError
 from fowt_env.training.cli import app as cli
 from fowt_env.training.evaluation import engines, guard, provenance, results

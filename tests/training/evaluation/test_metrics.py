@@ -2,7 +2,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from fowt_env.descriptions.platform import read_turbine
+from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.errors import InputError
 from fowt_env.training.evaluation.metrics import (
     METRICS,

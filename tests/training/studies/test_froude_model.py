@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from fowt_env import build_scene, natural_periods, simulate, trim
-from fowt_env.descriptions.platform import DATA, Line, read_platform, read_turbine
+from fowt_env.descriptions.platform import DATA, Line, read_platform
+from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.errors import InputError
 from fowt_env.training.studies.froude_model.scale import (
     EXPONENTS,

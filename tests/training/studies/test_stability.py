@@ -12,7 +12,7 @@ from fowt_env.plant.hydro.linear_damping import LinearDamping
 from fowt_env.plant.integrators import INTEGRATORS
 from fowt_env.plant.state import STATES, State
 from fowt_env.scene.build import build_scene
-from fowt_env.training.cli.app import app
+from fowt_env.training.cli.console import app
 from fowt_env.training.studies.robustness import extremes, long_runs, random_cases, step_limits, study
 
 CALM = {"kind": "jonswap", "Hs": 3.0, "Tp": 9.0}

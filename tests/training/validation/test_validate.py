@@ -11,7 +11,8 @@ import pytest
 
 from fowt_env.analysis.trim import trim
 from fowt_env.controllers import CONTROLLERS
-from fowt_env.descriptions.platform import read_platform, read_turbine
+from fowt_env.descriptions.platform import read_platform
+from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.errors import InputError
 from fowt_env.plant.aero.blade_elements import build_blade_elements, lift_drag
 from fowt_env.plant.channels import Out

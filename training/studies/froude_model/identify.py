@@ -17,7 +17,8 @@ from scipy.optimize import brentq, fsolve
 
 from fowt_env.analysis.linear_model import natural_periods
 from fowt_env.analysis.trim import trim_prescribed
-from fowt_env.descriptions.platform import DATA, Line, read_platform, read_turbine
+from fowt_env.descriptions.platform import DATA, Line, read_platform
+from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.files.atomic import replacing
 from fowt_env.plant.mooring import catenary

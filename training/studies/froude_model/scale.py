@@ -18,7 +18,8 @@ import numpy as np
 import typer
 
 from fowt_env.descriptions.checks import check_number
-from fowt_env.descriptions.platform import DATA, read_platform, read_turbine
+from fowt_env.descriptions.platform import DATA, read_platform
+from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.descriptions.units import DEGREE
 from fowt_env.errors import InputError
 from fowt_env.files.atomic import replacing
@@ -103,7 +104,7 @@ def _table(heading, values):
 
 
 def turbine_text(turbine, name, scale, polars="polars"):
-    """Text of the turbine file of a descriptions.platform.Turbine times the scale. polars: their folder."""
+    """Text of the turbine file of a descriptions.turbine.Turbine times the scale. polars: their folder."""
     lines = [LABEL.format(origin=turbine.name, what="TURBINE", scale=scale), "", f'name = "{name}"']
     lines.append(f'source = "{turbine.name} by Froude\'s law, scale {scale:.6g}; not a real turbine"')
     lines += [f"{key} = {toml_value(value)}" for key, value in scaled(turbine, "turbine", scale).items()]
@@ -137,7 +138,7 @@ def platform_text(platform, name, turbine_name, scale):
 
 
 def stations_text(turbine, scale):
-    """Text of the blade file of a descriptions.platform.Turbine, lengths times the scale."""
+    """Text of the blade file of a descriptions.turbine.Turbine, lengths times the scale."""
     blade = turbine.blade
     rows = [
         f"# Blade of {turbine.name}, lengths times {scale:.6g}, twist as it is (froude_model/scale.py).",

@@ -97,7 +97,7 @@ def load_case_scene(name, duration=DURATION, seed=1, **options):
     platform = read_platform(PLATFORM)
     wind = None
     if case.wind is not None:
-        rotor = fowt_env.descriptions.platform.read_turbine(platform.turbine).rotor
+        rotor = fowt_env.descriptions.turbine.read_turbine(platform.turbine).rotor
         wind = model_wind(case.wind, rotor.hub_height, 2.0 * rotor.tip_radius, duration, seed)
     options = {"fidelity": "standard", "integrator": "rk4", "duration": duration} | options
     return fowt_env.build_scene(platform, wind=wind, sea=case.sea, seed=seed, **options)

@@ -1,0 +1,160 @@
+"""fowt evaluate: controllers on the cases of a suite."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.markup import escape
+
+from fowt_env.descriptions.checks import parse_whole_numbers
+from fowt_env.errors import InputError, unknown
+from fowt_env.files.tables import write_table
+from fowt_env.training.cli.console import (
+    EXIT_INTERRUPTED,
+    app,
+    err,
+    fail,
+    note,
+    out,
+    progress_bar,
+    reported,
+)
+from fowt_env.training.cli.tables import print_table, table_width
+
+EVALUATE_EXAMPLES = """[bold]Examples[/bold]
+
+[cyan]fowt evaluate --suite above_rated --controllers pi,pi_land --jobs 2[/cyan]  the headline comparison
+
+[cyan]fowt evaluate --controllers pi --cases above_rated[/cyan]  the PI of Eq. (8), 12 to 24 m/s, one seed
+
+[cyan]fowt evaluate --controllers pi,pi_land --cases ntm_18,paper_18 --seeds 1,2,3 --jobs 2[/cyan]
+
+[cyan]fowt evaluate --suite mysuite.toml --controllers pi,mymodule:Mine --baseline pi[/cyan]  your own cases
+
+[bold]Files written[/bold]: runs/CONTROLLER/CASE_seedN.parquet, results.csv (a row per run), leaderboard.json
+(means, intervals, paired differences, versions), manifest.json (the settings), summary.csv (means by
+case), pareto.png, metrics.png, boxes.png, timeseries_CASE.png, spectra_CASE.png. The same command
+resumes where it was stopped; further controllers, cases or seeds are added to the folder."""
+
+
+@app.command(name="evaluate", epilog=EVALUATE_EXAMPLES)
+@reported
+def evaluate_command(
+    controllers: Annotated[
+        str, typer.Option(help="Names, policy:NAME, design:FILE or module:Name, comma-separated.")
+    ] = "pi",
+    suite: Annotated[
+        str | None, typer.Option(help="Suite: a name of fowt list suites, or a path to a TOML file.")
+    ] = None,
+    cases: Annotated[
+        str | None,
+        typer.Option(
+            help="Cases or suites, comma-separated; with --suite: those of its cases. Default: above_rated."
+        ),
+    ] = None,
+    seeds: Annotated[
+        str | None,
+        typer.Option(help="1,2,3 or 1:6:1, same for each controller. Default: the suite's, else 1."),
+    ] = None,
+    duration: Annotated[
+        float | None, typer.Option(help="Length of each run, s. Default: the suite's, else 660.")
+    ] = None,
+    skip: Annotated[
+        float | None, typer.Option(help="Seconds at the start not scored. Default: the suite's, else 60.")
+    ] = None,
+    baseline: Annotated[
+        str | None, typer.Option(help="Controller of the paired differences. Default: gspi_oc3, else pi.")
+    ] = None,
+    jobs: Annotated[int, typer.Option(help="Worker processes.")] = 1,
+    engine: Annotated[str, typer.Option(help="processes, or ray.")] = "processes",
+    address: Annotated[str | None, typer.Option(help="Address of a running Ray cluster.")] = None,
+    time_limit: Annotated[
+        float, typer.Option(help="Wall-clock seconds after which a run fails; 0: never.")
+    ] = 3600.0,
+    out_folder: Annotated[
+        str, typer.Option("--out", help="Folder for what is written.")
+    ] = "results/evaluation",
+    plot: Annotated[bool, typer.Option("--plot/--no-plot", help="Make the plots.")] = True,
+):
+    """Score controllers on load cases: a leaderboard with intervals, metrics by case, the runs, and plots."""
+    from fowt_env.training.evaluation.evaluate import evaluate, summary
+    from fowt_env.training.reports.terminal import chosen_cases, write_leaderboard
+
+    folder = Path(out_folder)
+    chosen = chosen_cases(suite, cases)
+    numbers = None if seeds is None else parse_whole_numbers(seeds, "seeds")
+    if baseline is not None and baseline not in (names := [name.strip() for name in controllers.split(",")]):
+        raise unknown("baseline among --controllers", baseline, names)
+    finished = 0
+    with progress_bar("evaluating", None) as update:
+
+        def report(done, total, _):
+            nonlocal finished
+            finished = done
+            update(done, f"evaluating, {done} of {total} runs done", total)
+
+        try:
+            table = evaluate(
+                controllers,
+                chosen,
+                duration=duration,
+                skip=skip,
+                seeds=None if numbers is None else [int(number) for number in numbers],
+                jobs=jobs,
+                progress=report,
+                folder=folder,
+                engine=engine,
+                address=address,
+                time_limit=time_limit or None,
+            )
+        except KeyboardInterrupt:
+            place = f"in {folder / 'results.csv'}; the same command continues with the others"
+            fail(f"interrupted; the {finished} finished runs are {place}", EXIT_INTERRUPTED)
+    board = write_leaderboard(table, folder, baseline)
+    means = summary(table)
+    write_table(means, folder / "summary.csv")
+    _print_evaluation(table, means, board)
+    plots = _evaluation_plots(table, board, folder) if plot else []
+    note(f"wrote results.csv, leaderboard.json, summary.csv, runs/ and {len(plots)} plots in {folder}")
+
+
+def _print_evaluation(table, means, board):
+    """Print metrics by case and the leaderboard, and on stderr what failed or passed a limit of the score."""
+    from fowt_env.training.reports.terminal import leaderboard_rows, summary_rows
+
+    width = table_width(out) or float("inf")
+    headings, rows, failures = summary_rows(means, width)
+    print_table(out, headings, rows, keys=2, left=(0, 1), red=_places(failures))
+    out.print()
+    title, headings, rows, remarks = leaderboard_rows(board, width)
+    print_table(out, headings, rows, title, red=_places(e["failed"] for e in board["controllers"]))
+    for remark in remarks:
+        out.print(remark, markup=False, highlight=False, soft_wrap=True)
+    for row in table[table["status"] != "ok"].to_dict("records"):
+        run = f"{row['controller']}, {row['case']}, seed {row['seed']}"
+        err.print(
+            f"[red]failed: {escape(run)}: {escape(row['reason'])}[/red]", soft_wrap=True, highlight=False
+        )
+    eventful = table[table["events"] != ""]
+    if len(eventful):
+        note(f"{len(eventful)} of {len(table)} runs had rare numerical events: column events of results.csv")
+    for entry in board["controllers"]:
+        if entry["score"] and not entry["score"]["valid"]:
+            note(f"no valid score of {entry['controller']}: {entry['score']['why']}")
+
+
+def _places(flags):
+    """Numbers of the flags that are set."""
+    return [place for place, flag in enumerate(flags) if flag]
+
+
+def _evaluation_plots(table, board, folder):
+    """Paths of the plots made; none, with a note, where matplotlib is missing."""
+    from fowt_env.training.reports.terminal import evaluation_plots
+
+    try:
+        with progress_bar("plotting", None):
+            return evaluation_plots(table, board, folder)
+    except InputError as error:
+        note(f"no plots: {error}")
+        return []

@@ -1,0 +1,263 @@
+"""fowt simulate, trim and list: one run, operating points, names."""
+
+from typing import Annotated
+
+import typer
+from rich.columns import Columns
+from rich.markup import escape
+
+from fowt_env.descriptions.checks import parse_numbers
+from fowt_env.errors import SimulationStopped, unknown
+from fowt_env.files.tables import SERIES_SUFFIXES, table_path, write_table
+from fowt_env.training.cli.arguments import parse_pairs, parse_sea, parse_wind
+from fowt_env.training.cli.console import (
+    OptionOption,
+    PlatformOption,
+    RotorOption,
+    app,
+    note,
+    out,
+    progress_bar,
+    reported,
+)
+from fowt_env.training.cli.tables import figure, print_table
+
+ROUNDING = 1e-9  # a standard deviation below this fraction of the mean is none
+SIMULATE_EXAMPLES = """[bold]Examples[/bold]
+
+[cyan]fowt simulate --wind 18 --sea paper_wind_wave --plot run.png[/cyan]  steady wind, irregular sea
+
+[cyan]fowt simulate --wind ntm:18:B --seed 3 --controller pi_land --out run.csv[/cyan]  turbulence, land gains
+
+[cyan]fowt simulate --wind none --sea regular:3:5 --controller none --start zero[/cyan]  waves alone
+
+[cyan]fowt simulate --wind none --start zero --controller none --initial PtfmSurge=10[/cyan]  free decay
+
+[cyan]fowt simulate --wind '{"kind": "etm", "speed": 18, "class": "A"}'[/cyan]  any wind, as JSON"""
+
+
+@app.command(epilog=SIMULATE_EXAMPLES)
+@reported
+def simulate(
+    platform: PlatformOption = "oc3_hywind",
+    wind: Annotated[
+        str,
+        typer.Option(
+            help="m/s, KIND:SPEED[:CLASS] (ntm:18:B), JSON, a .csv of time and speed, a .wnd or .hh, or none."
+        ),
+    ] = "18",
+    sea: Annotated[
+        str, typer.Option(help="Name, jonswap:HS:TP[:GAMMA], regular:H:T, JSON, or none (still water).")
+    ] = "none",
+    controller: Annotated[
+        str, typer.Option(help="Name, module:Name, design:FILE or none (constant command).")
+    ] = "pi",
+    duration: Annotated[float, typer.Option(help="Length of the run, s.")] = 600.0,
+    dt: Annotated[float | None, typer.Option(help="Physics step, s; default: that of the fidelity.")] = None,
+    control_dt: Annotated[float, typer.Option(help="Control period, s; a multiple of dt.")] = 0.1,
+    output_dt: Annotated[float, typer.Option(help="Output period, s; a multiple of dt.")] = 0.1,
+    seed: Annotated[int, typer.Option(help="Seed of wind and waves.")] = 0,
+    fidelity: Annotated[
+        str,
+        typer.Option(
+            help="reference, standard (1000 times faster, within 0.1 %), or fast (rotor as a table)."
+        ),
+    ] = "standard",
+    rotor: RotorOption = None,
+    start: Annotated[str, typer.Option(help="trim (steady state of the mean wind) or zero.")] = "trim",
+    initial: Annotated[
+        list[str] | None, typer.Option(metavar="CHANNEL=VALUE", help="Start value, OpenFAST units; repeats.")
+    ] = None,
+    option: OptionOption = None,
+    out_path: Annotated[str | None, typer.Option("--out", help="Series: .csv, .parquet or .outb.")] = None,
+    plot: Annotated[str | None, typer.Option(help="Stacked plot of the run, e.g. run.png.")] = None,
+):
+    """Simulate one run, print its statistics, and save its time series and plot."""
+    import fowt_env
+
+    if out_path is not None:
+        table_path(out_path, SERIES_SUFFIXES)  # a wrong ending should not cost a run
+    options = {"duration": max(700.0, duration), **parse_pairs(option, "option")}
+    scene = fowt_env.build_scene(
+        platform,
+        wind=parse_wind(wind),
+        sea=parse_sea(sea),
+        seed=seed,
+        rotor=rotor,
+        fidelity=fidelity,
+        **options,
+    )
+    title = f"{platform} · wind {wind} · sea {sea} · controller {controller} · seed {seed}"
+    with progress_bar("simulating", 1.0) as update:
+        try:
+            frame = fowt_env.simulate(
+                scene,
+                controller=None if controller.lower() == "none" else controller,
+                duration=duration,
+                dt=dt,
+                control_dt=control_dt,
+                output_dt=output_dt,
+                start=start,
+                initial=parse_pairs(initial, "initial") or None,
+                progress=update,
+            )
+        except (SimulationStopped, KeyboardInterrupt) as error:
+            rows = getattr(error, "frame", None)  # what there is of the run
+            if rows is not None and len(rows):
+                _save_run(rows, out_path, None, title)
+            raise
+    _print_channels(frame, title)
+    _note_limits(frame, scene.turbine)
+    _save_run(frame, out_path, plot, title)
+
+
+def _note_limits(frame, turbine):
+    """Say where a run was at the generator's limits, and that its rotor passed the turbine's overspeed."""
+    from fowt_env.descriptions.units import RPM
+
+    limited = frame["GenTqLim_[-]"].mean()
+    if limited > 0.0:
+        note(
+            f"generator torque at its range or rate limit for {100.0 * limited:.1f} % of the run: it was"
+            " commanded more than it can follow"
+        )
+    fastest, limit = frame["RotSpeed_[rpm]"].max(), turbine.overspeed / RPM
+    if fastest > limit:
+        note(
+            f"rotor speed of up to {fastest:.2f} rpm is beyond the turbine's overspeed of {limit:g} rpm,"
+            " where an environment ends and an evaluation counts the run as failed"
+        )
+
+
+def _save_run(frame, out_path, plot, title):
+    """Write the requested time series and plot, and print where."""
+    if out_path is not None:
+        note(f"wrote {write_table(frame, out_path)} ({len(frame)} rows)")
+    if plot is not None:
+        from fowt_env.visual.time_series import plot_run
+
+        plot_run(frame, plot, title)
+        note(f"wrote {plot}")
+
+
+def _print_channels(frame, title):
+    """Print mean, standard deviation and range of the main channels."""
+    from fowt_env.visual.time_series import PANELS
+
+    rows = []
+    for channel in dict.fromkeys([*(channel for _, channel in PANELS), "GenTq_[kN-m]", "RotThrust_[kN]"]):
+        if channel in frame.columns:
+            x = frame[channel]
+            mean, deviation = x.mean(), x.std(ddof=0)
+            if deviation < ROUNDING * abs(mean):
+                deviation = 0.0  # what the sums of a constant leave
+            values = (mean, deviation, x.min(), x.max())
+            rows.append((channel.replace("_", " "), *map(figure, values)))
+    print_table(out, ("channel", "mean", "std", "min", "max"), rows, title)
+
+
+TRIM_EXAMPLES = """[bold]Examples[/bold]
+
+[cyan]fowt trim[/cyan]  the floating turbine from cut-in to cut-out
+
+[cyan]fowt trim --winds 8,11.4,18 --fixed --out steady.csv[/cyan]  fixed platform, into a file
+
+[cyan]fowt trim --plot schedule.png[/cyan]  the steady schedule as a picture"""
+TRIM_CHANNELS = (
+    "RotSpeed",
+    "BldPitch1",
+    "GenTq",
+    "GenPwr",
+    "RotThrust",
+    "PtfmSurge",
+    "PtfmHeave",
+    "PtfmPitch",
+    "FAIRTEN1",
+)
+
+
+@app.command(epilog=TRIM_EXAMPLES)
+@reported
+def trim(
+    platform: PlatformOption = "oc3_hywind",
+    winds: Annotated[str, typer.Option(help="Steady winds, m/s: 8,11.4,18 or START:STOP:STEP.")] = "4:24:1",
+    fixed: Annotated[bool, typer.Option("--fixed", help="Fix the platform.")] = False,
+    rotor: RotorOption = None,
+    option: OptionOption = None,
+    out_path: Annotated[str | None, typer.Option("--out", help="All channels: .csv or .parquet.")] = None,
+    plot: Annotated[str | None, typer.Option(help="Plot of the schedule, e.g. schedule.png.")] = None,
+):
+    """Print the steady operating point over wind speed."""
+    import pandas as pd
+
+    import fowt_env
+
+    if out_path is not None:
+        table_path(out_path)
+    speeds = parse_numbers(winds, "winds")
+    options = parse_pairs(option, "option")
+    rows = []
+    with progress_bar("trimming", len(speeds)) as update:
+        for number, speed in enumerate(speeds, 1):
+            scene = fowt_env.build_scene(platform, wind=speed, rotor=rotor, **options)
+            point = fowt_env.trim(scene, platform="fixed" if fixed else "floating")
+            rows.append({"wind": speed, **point})
+            update(number, f"wind {speed:g} m/s")
+    units = {channel.name: channel.unit for channel in scene.channels}
+    title = f"{platform}, {'fixed' if fixed else 'floating'}, steady wind"
+    shown = [name for name in TRIM_CHANNELS if name in rows[0]]
+    headings = ["wind\nm/s", *(f"{name}\n{units.get(name, '')}" for name in shown)]
+    lines = [(f"{row['wind']:g}", *(figure(row[name]) for name in shown)) for row in rows]
+    print_table(out, headings, lines, title, left=())
+    names = {"wind": "Wind_[m/s]"} | {name: f"{name}_[{unit}]" for name, unit in units.items()}
+    points = pd.DataFrame(rows).rename(columns=names)
+    if out_path is not None:
+        note(f"wrote {write_table(points, out_path)}")
+    if plot is not None:
+        from fowt_env.visual.response import plot_schedule
+
+        plot_schedule(points, plot, title)
+        note(f"wrote {plot}")
+
+
+@app.command(name="list")
+@reported
+def list_names(
+    kind: Annotated[
+        str, typer.Argument(help="platforms, turbines, seas, controllers, agents, suites or cases; or all.")
+    ] = "all",
+):
+    """List the names that the other commands accept."""
+    from fowt_env.controllers import CONTROLLERS
+    from fowt_env.controllers.policy.controller import shipped_agents
+    from fowt_env.descriptions.builtin import names
+    from fowt_env.training.evaluation.cases import all_cases, read_suite, suite_names
+
+    known = {
+        "platforms": lambda: names("platforms"),
+        "turbines": lambda: names("turbines"),
+        "seas": lambda: names("sea_states"),
+        "controllers": lambda: list(CONTROLLERS),
+        "agents": lambda: [f"policy:{name}" for name in shipped_agents()],
+        "suites": lambda: [f"{suite} ({len(read_suite(suite).cases)} cases)" for suite in suite_names()],
+        "cases": lambda: list(all_cases()),
+    }
+    if kind != "all" and kind not in known:
+        raise unknown("kind of name", kind, ("all", *known))
+    for heading in known if kind == "all" else (kind,):
+        out.print(f"[bold]{heading}[/bold]")
+        if heading == "controllers":
+            _print_controllers(CONTROLLERS)
+            continue
+        out.print(Columns(map(escape, known[heading]()), padding=(0, 3), expand=False), highlight=False)
+
+
+def _print_controllers(factories):
+    """Print the controllers: name, what each is, and what it uses."""
+    from fowt_env.controllers import information
+
+    rows = [
+        (name, factory.__doc__.splitlines()[0], ", ".join(information(name)))
+        for name, factory in factories.items()
+    ]
+    print_table(out, ("name", "what it is", "what it uses"), rows, prose=(1, 2))
