@@ -417,9 +417,8 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             raise InputError(f"state = {type(snapshot).__name__}: must be what get_state() returned")
         if snapshot.kind != self._kind:
             raise InputError(
-                "state: is of an environment with another plant, action mode, observation, duration or time"
-                " step, or of one that has a sea where this has none or the reverse; must be of one with these"
-                " settings"
+                "state: is of an environment with another plant, kind of weather, action mode, observation,"
+                " duration or time step; must be of one with these settings"
             )
 
     def _nominal_in(self, scene):
