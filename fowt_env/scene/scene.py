@@ -138,7 +138,7 @@ class Scene:
         """A copy in other weather whose model has the same types, so that nothing is compiled anew.
 
         sea None is still water. In a scene that was built with a sea it is a wave without height: to rounding
-        the loads of a scene built in still water, at up to the cost of a sea of one component.
+        the loads of a scene built in still water, in twice the time.
         Raises: InputError, also where aerodynamics, a box of wind or a sea would be gained, or the first two
         lost (build a scene for that).
         """

@@ -6,6 +6,7 @@ x downwind, y left when looking downwind, z up (state.py). What users may ask fo
 descriptions/wind.py; plant/aero/wind.py has the wind at any instant and point.
 """
 
+import operator
 from functools import lru_cache
 from math import cos, hypot, radians, sin
 
@@ -60,17 +61,18 @@ def _kernel_array(values):
 
 
 def _of_kernel_types(series):
-    """A user's WindSeries with the types of every other one."""
+    """A user's WindSeries with the types of every other one; itself where it has them."""
     time, value, *numbers = series
-    return WindSeries(_kernel_array(time), _kernel_array(value), *map(float, numbers))
+    typed = WindSeries(_kernel_array(time), _kernel_array(value), *map(float, numbers))
+    return series if all(map(operator.is_, typed, series)) else typed
 
 
 def build_wind(spec, *, reference_height, rotor_diameter, shear_exponent, seed, duration):
     """WindSeries of what a user asked for, None for no aerodynamics at all.
 
     spec               None; a speed in m/s (0: still air); a dictionary with "kind", or the WindSpec that
-                       read_wind made of one (kinds and keys: descriptions.wind.KINDS); a WindSeries, of
-                       which only types are changed
+                       read_wind made of one (kinds and keys: descriptions.wind.KINDS); a WindSeries, which is
+                       returned as it is, but for types
     reference_height   hub height, m
     shear_exponent     power law of the site, unless the spec gives one (ewm: 0.11 of the standard)
     seed               of turbulence: int >= 0 or numpy SeedSequence, unless the spec gives one
