@@ -1,4 +1,4 @@
-"""Weather of an episode: one compiled kind for all that an environment takes, and refusals that cost nothing."""
+"""Weather of an episode: one compiled kind for all that an environment takes; refusals change nothing."""
 
 import numba
 import numpy as np
