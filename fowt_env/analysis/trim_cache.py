@@ -9,7 +9,7 @@ from fowt_env.analysis.trim import trim
 from fowt_env.descriptions.records import Record
 
 GRID = 0.25  # m/s between exact trims; between them the state is linear in the wind speed
-_KNOWN = {}  # (plant, shear exponent, wind speed) -> (state, command)
+_KNOWN = {}  # (plant, water, shear exponent, wind speed) -> (state, command)
 
 
 def plant_key(scene):
@@ -19,6 +19,13 @@ def plant_key(scene):
     loads = tuple(load.key() for load in scene.loads)
     parts = (_values(scene.platform), _values(scene.turbine), scene.rotor, options, loads)
     return hashlib.sha256(pickle.dumps(parts)).hexdigest()
+
+
+def _water(scene):
+    """What a trim's last bits depend on beside the plant: the form and the nodes of strips in a current."""
+    hydro = scene.model.hydro
+    quadrature = None if hydro is None else getattr(hydro.strips, "quadrature", None)
+    return scene.weather_kind, None if quadrature is None else quadrature.table.shape
 
 
 def _values(part):
@@ -35,7 +42,7 @@ def cached_trim(scene, key, speed):
     if scene.model.aero.field is not None:
         point = trim(scene)
         return point.state, point.command
-    entry = (key, scene.model.aero.wind.shear_exponent, float(speed))
+    entry = (key, _water(scene), scene.model.aero.wind.shear_exponent, float(speed))
     if entry not in _KNOWN:
         point = trim(replace(scene, wind_speed=float(speed)))
         _KNOWN[entry] = (point.state, point.command)

@@ -64,6 +64,13 @@ class SeaState(Record):
     source: str = ""
     confidence: str = ""
 
+    @property
+    def height(self) -> float:
+        """Wave height, m: H or Hs, of components the largest that they can add up to; 0: still water."""
+        if self.kind == "components":
+            return 2.0 * float(np.sum(self.amplitude))
+        return (self.H if self.kind == "regular" else self.Hs) or 0.0
+
     @model_validator(mode="before")
     @classmethod
     def _kind_keys(cls, data):

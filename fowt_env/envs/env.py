@@ -2,11 +2,12 @@
 
 import inspect
 from collections.abc import Mapping, Sequence
+from contextlib import contextmanager
 from copy import copy, deepcopy
 from dataclasses import replace
 from math import isfinite, pi
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import gymnasium
 import numpy as np
@@ -17,6 +18,7 @@ from fowt_env.analysis.trim_cache import cached_trim, interpolated_trim, plant_k
 from fowt_env.control import CompiledController, catalogue, make
 from fowt_env.descriptions.platform import Platform
 from fowt_env.descriptions.records import RENAMED
+from fowt_env.descriptions.sea_state import sea_state_of
 from fowt_env.envs.actions import ACTION_MODES, ActionMode, build_action_map, start_tracking
 from fowt_env.envs.episode import (
     BAD_ACTION,
@@ -62,6 +64,7 @@ from fowt_env.scene.options import OPTIONS
 from fowt_env.scene.scene import Scene
 from fowt_env.simulation import INITIAL, check_duration, steps_in
 
+SMALL_SEA = {"kind": "regular", "H": 1e-3, "T": 10.0}  # of a scene whose first draw happens to have no waves
 SHORTEST_WEATHER = 600.0  # s of random wind and sea: turbulence intensity is defined over 10 min
 StepResult = tuple[np.ndarray, float, bool, bool, dict[str, Any]]
 REWARD_KEYS = tuple(f"reward/{name}" for name in REWARD_TERMS)
@@ -100,7 +103,10 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     Where the mean wind is drawn, the operating point is linear between exact ones 0.25 m/s apart: right
     to 0.05 m of surge and 0.03 deg of blade pitch, in the cells next to rated wind to 0.9 m and 0.6 deg.
     reset(options=...) takes "wind", "sea", "weather_seed" and "offsets" in place of what is drawn; the
-    info of reset has them under "episode", and given as options they replay the episode.
+    info of reset has them under "episode", and given as options they replay the episode. Weather never
+    compiles anything anew: an environment whose task has a sea takes any sea, None for still water, but one
+    built in still water takes none; neither is a box of full-field wind exchanged for another wind. What is
+    refused leaves the environment as it was, in its episode.
 
     An action beyond [-1, 1] counts as the nearest end, and info["saturated_actions"] counts the periods
     in which that happened. The torque stays within the generator's range and moves at most as fast as its
@@ -163,10 +169,13 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self.baseline = baseline
         steps_in("duration", task.duration, control_dt)
         episode = task.draw(np.random.default_rng(0))
+        sea = episode.sea
+        if task.has_sea and sea_state_of(sea).height == 0.0:
+            sea = SMALL_SEA
         self.scene = build_scene(
             platform,
             wind=episode.wind,
-            sea=episode.sea,
+            sea=sea,
             rotor=task.rotor,
             duration=max(task.duration, SHORTEST_WEATHER),
             fidelity=fidelity,
@@ -179,7 +188,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             nominal_options = {**options, "turbine": parts["turbine"]}
             length = max(task.duration, SHORTEST_WEATHER)
             self._nominal = build_scene(
-                parts["platform"], episode.wind, episode.sea, rotor=task.rotor, duration=length,
+                parts["platform"], episode.wind, sea, rotor=task.rotor, duration=length,
                 fidelity=fidelity, **nominal_options,
             )  # fmt: skip
         self._sensors = None if sensors is None else check_sensors(sensors)
@@ -194,7 +203,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self.observation_space = gymnasium.spaces.Box(low.astype(np.float32), high.astype(np.float32))
         self._running = False
         # what a snapshot must agree with: the same numbers then mean the same
-        observed = (task.observation, task.wind_preview)
+        observed = (self.scene.weather_kind, task.observation, task.wind_preview)
         nominal_key = None if self._nominal is None else plant_key(self._nominal)
         self._kind = (
             self._key, action_mode, baseline, *observed, self.dt, self.control_dt, self._last,
@@ -271,22 +280,33 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
         options: "wind", "sea", "weather_seed", "offsets" ({channel: added to the operating point}) in
         place of what is drawn; "exact_start": whether the operating point is exact (it is where the wind
-        is given) or interpolated. Raises: InputError for other keys and values that cannot be used.
+        is given) or interpolated. Raises: InputError for other keys and values that cannot be used; the
+        environment is then as it was before.
         """
+        with kept_if_refused([self]):
+            planned = self._plan(seed, options)
+        return self._begin(planned)
+
+    def _plan(self, seed, options):
+        """Start of a new episode, drawn with the generator; nothing else changes. Raises as reset."""
         super().reset(seed=seed)
-        self._running = False  # until all of it has worked
         episode = _with_options(self.task.draw(self.np_random), options)
         scene = self.scene.with_weather(episode.wind, episode.sea, episode.weather_seed)
         check_duration(scene, self.task.duration)
         find = cached_trim if episode.exact_start else interpolated_trim
         state, command = find(scene, self._key, scene.wind_speed)
-        self._enter(scene)
-        run = self._episode
-        run.x[:] = state
-        run.u[:] = command
         reference = Reference(float(state[State.PLATFORM_PITCH]), float(state[State.ROTOR_SPEED]))
-        run.reference[:] = reference
-        self._offset(episode.offsets)
+        state, command = _moved(state, command, episode.offsets, scene.turbine.pitch_drive)
+        return Start(episode, scene, self._nominal_in(scene), state, command, reference)
+
+    def _begin(self, planned):
+        """(observation, info) at the start of the episode that was planned."""
+        self._running = False  # until all of it has worked
+        self._enter(planned.scene, planned.nominal)
+        run = self._episode
+        run.x[:] = planned.state
+        run.u[:] = planned.command
+        run.reference[:] = planned.reference
         start_episode(self._handle)
         self.restart_loops()
         if self._estimator is not None:
@@ -297,7 +317,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             "time": 0.0,
             **dict.fromkeys(SHOWN_COUNTS, 0),
             "wind_speed": self.scene.wind_speed,
-            "episode": deepcopy(episode._asdict()),
+            "episode": deepcopy(planned.episode._asdict()),
         }
         if self.render_mode == "human":
             self.render()
@@ -312,20 +332,6 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             self._baseline.reset(self.measurement())
         elif self._config.actions.mode == ActionMode.SETPOINT:
             start_tracking(self._episode.memory, self.measurement(), self._config.actions)
-
-    def _offset(self, offsets):
-        """Move the state by {channel: offset in the channel's unit}."""
-        x, drive = self._episode.x, self.scene.turbine.pitch_drive
-        for name, value in offsets.items():
-            index, factor = INITIAL[name]
-            x[index] += value * factor
-        if abs(x[State.PLATFORM_PITCH]) >= 0.5 * pi:
-            raise InputError(
-                f"offsets['PtfmPitch'] = {offsets['PtfmPitch']:g}: leads to"
-                f" {x[State.PLATFORM_PITCH] * DEG_PER_RAD:g} deg, must stay inside (-90, 90) deg"
-            )
-        x[State.BLADE_PITCH] = min(max(x[State.BLADE_PITCH], drive.minimum), drive.maximum)
-        self._episode.u[Command.BLADE_PITCH] = x[State.BLADE_PITCH]
 
     def step(self, action: npt.ArrayLike) -> StepResult:
         """(observation, reward, terminated, truncated, info) after one control period."""
@@ -392,15 +398,9 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
     def set_state(self, snapshot: Snapshot) -> None:
         """Go on from a Snapshot. Raises: InputError for one from an environment of other settings."""
-        if not isinstance(snapshot, Snapshot):
-            raise InputError(f"state = {type(snapshot).__name__}: must be what get_state() returned")
-        if snapshot.kind != self._kind:
-            raise InputError(
-                "state: is of an environment with another plant, action mode, observation, duration or time"
-                " step; must be of one with these settings"
-            )
+        self._check_snapshot(snapshot)
         if snapshot.scene is not self.scene or self._handle is None:
-            self._enter(snapshot.scene)
+            self._enter(snapshot.scene, self._nominal_in(snapshot.scene))
         run, data = self._episode, self._episode.data
         arrays = iter(snapshot.arrays)
         for name in CARRIED:
@@ -416,9 +416,25 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             self.np_random.bit_generator.state = snapshot.generator
         self._np_random_seed = snapshot.seed
 
-    def _enter(self, scene):
+    def _check_snapshot(self, snapshot):
+        """Refuse what is no Snapshot of an environment with these settings."""
+        if not isinstance(snapshot, Snapshot):
+            raise InputError(f"state = {type(snapshot).__name__}: must be what get_state() returned")
+        if snapshot.kind != self._kind:
+            raise InputError(
+                "state: is of an environment with another plant, kind of weather, action mode, observation,"
+                " duration or time step; must be of one with these settings"
+            )
+
+    def _nominal_in(self, scene):
+        """Scene of the nominal plant in the weather of another scene, where anything is designed on it."""
+        if self._nominal is None or (self._baseline is None and self._estimator is None):
+            return self._nominal
+        return self._nominal.with_weather(scene.wind, scene.sea, scene.seed)
+
+    def _enter(self, scene, nominal):
         """Run in the scene's weather from now on, with new data: their size follows the wave components."""
-        self.scene = scene
+        self.scene, self._nominal = scene, nominal
         self._episode = self._episode._replace(data=scene.data())
         self._config = self._config._replace(model=scene.model)
         if self._sensors is not None:
@@ -426,8 +442,6 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             scales = reading_scales(scene.turbine)
             drawn = draw_sensors(self._sensors["noise"], self._sensors["delay"], scales, scene.seed, readings)
             self._config = self._config._replace(sensors=drawn)
-        if self._nominal is not None and (self._baseline is not None or self._estimator is not None):
-            self._nominal = self._nominal.with_weather(scene.wind, scene.sea, scene.seed)
         if self._baseline is not None:
             self._baseline.prepare(self.design_scene)
             self._config = self._config._replace(parameters=self._baseline.parameters)
@@ -491,6 +505,34 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         super().close()
 
 
+class Start(NamedTuple):
+    """A new episode with all of it done that may be refused, so that it can be begun without fail."""
+
+    episode: Episode
+    scene: Scene
+    nominal: Scene | None
+    state: np.ndarray  # (n_state,) operating point with the offsets
+    command: np.ndarray  # (2,)
+    reference: Reference
+
+
+@contextmanager
+def kept_if_refused(envs):
+    """Whatever is raised in the block puts the environments' random generators back as they were."""
+    before = [
+        (env._np_random, env._np_random_seed, env._np_random and env._np_random.bit_generator.state)
+        for env in envs
+    ]
+    try:
+        yield
+    except BaseException:
+        for env, (generator, seed, state) in zip(envs, before, strict=True):
+            env._np_random, env._np_random_seed = generator, seed
+            if generator is not None:
+                generator.bit_generator.state = state
+        raise
+
+
 FowtEnv.__doc__ = f"{FowtEnv.__doc__}\n{task_tables(TASKS['above_rated'])}"
 
 
@@ -540,6 +582,22 @@ def _nominal_parts(given):
         if key not in ("platform", "turbine"):
             raise unknown("key of nominal_plant", key, ("platform", "turbine"))
     return {"turbine": None} | dict(given)
+
+
+def _moved(state, command, offsets, drive):
+    """(state, command) moved by {channel: offset in its unit}, the blade pitch within its drive's range."""
+    x, u = state.copy(), command.copy()
+    for name, value in offsets.items():
+        index, factor = INITIAL[name]
+        x[index] += value * factor
+    if abs(x[State.PLATFORM_PITCH]) >= 0.5 * pi:
+        raise InputError(
+            f"offsets['PtfmPitch'] = {offsets['PtfmPitch']:g}: leads to"
+            f" {x[State.PLATFORM_PITCH] * DEG_PER_RAD:g} deg, must stay inside (-90, 90) deg"
+        )
+    x[State.BLADE_PITCH] = min(max(x[State.BLADE_PITCH], drive.minimum), drive.maximum)
+    u[Command.BLADE_PITCH] = x[State.BLADE_PITCH]
+    return x, u
 
 
 def _with_options(drawn, options):

@@ -92,6 +92,13 @@ class Task:
         return Episode(wind, sea, seed, offsets, self.fixed_wind)
 
     @property
+    def has_sea(self):
+        """Whether an episode may have waves; the kernels then sum waves in all of them."""
+        if isinstance(self.sea, dict) and self.sea.get("kind") == "joint":
+            return True
+        return sea_state_of(_weather(self.wind, self.sea, _highest)[1]).height > 0.0
+
+    @property
     def fixed_wind(self):
         """Whether every episode has the same mean wind (a box of wind always starts from its own)."""
         if is_field(self.wind):

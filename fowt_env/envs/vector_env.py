@@ -13,7 +13,7 @@ from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
-from fowt_env.envs.env import REWARD_KEYS, FowtEnv
+from fowt_env.envs.env import REWARD_KEYS, FowtEnv, kept_if_refused
 from fowt_env.envs.episode import N_COUNTS, RUNNING, SHOWN_COUNTS, STEP
 from fowt_env.envs.episode_batch import act_all, act_all_parallel, thread_limit
 from fowt_env.envs.observations import N_ACTIONS
@@ -122,7 +122,7 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
     ) -> tuple[np.ndarray, dict[str, Any]]:
         """(observations, infos) at the start of new episodes, of all or of options["reset_mask"] (n,) bool.
 
-        Raises: InputError, also for what FowtEnv.reset refuses.
+        Raises: InputError, also for what FowtEnv.reset refuses; all are then as they were before.
         """
         n = self.num_envs
         if seed is None or isinstance(seed, int | np.integer):
@@ -140,10 +140,19 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
             if "reset_mask" in options:
                 indices = np.flatnonzero(self._mask(options.pop("reset_mask"))).tolist()
             options = [options] * n
+        with kept_if_refused([self.envs[i] for i in indices]):
+            planned = [self._plan(i, seeds[i], options[i]) for i in indices]
         infos: dict[str, Any] = {}
-        for i in indices:
-            infos = self._reset_one(i, infos, seeds[i], options[i])
+        for i, start in zip(indices, planned, strict=True):
+            infos = self._begin(i, start, infos)
         return self._observations.copy(), infos
+
+    def _plan(self, i, seed, options):
+        """Start of a new episode of one environment. Raises: InputError, which names the environment."""
+        try:
+            return self.envs[i]._plan(seed, options or None)
+        except InputError as error:
+            raise InputError(f"environment {i}: {error}") from None
 
     def _mask(self, mask):
         """The reset mask, checked."""
@@ -155,9 +164,9 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
             raise ResetNeeded("call reset() of all environments first")
         return mask
 
-    def _reset_one(self, i, infos, seed=None, options=None):
-        """Reset one environment; returns the infos with its own added."""
-        _, info = self.envs[i].reset(seed=seed, options=options or None)
+    def _begin(self, i, start, infos):
+        """Begin a planned episode of one environment; returns the infos with its own added."""
+        _, info = self.envs[i]._begin(start)
         self._ended[i] = False
         self._renew(i)
         episode = info.pop("episode")
@@ -211,7 +220,7 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
                 ended = np.zeros_like(ended)
         infos = self._infos(infos, active, terminations)
         for i in resets:
-            infos = self._reset_one(i, infos)
+            infos = self._begin(i, self._plan(i, None, None), infos)
         self._ended = ended
         return self._observations.copy(), rewards, terminations, truncations, infos
 
@@ -291,6 +300,8 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
             snapshots = [snapshots] * self.num_envs
         if len(snapshots) != self.num_envs:
             raise InputError(f"state: {len(snapshots)} snapshots: must be one, or {self.num_envs}")
+        for env, snapshot in zip(self.envs, snapshots, strict=True):
+            env._check_snapshot(snapshot)
         for i, (env, snapshot) in enumerate(zip(self.envs, snapshots, strict=True)):
             env.set_state(snapshot)
             self._ended[i] = not snapshot.running

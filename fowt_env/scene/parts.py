@@ -24,6 +24,7 @@ from fowt_env.plant.hydro.wave_bands import build_band_diffraction, build_wave_b
 from fowt_env.plant.mooring import build_mooring
 from fowt_env.scene.options import chosen_stations
 from fowt_env.scene.weather import IN_PLANE
+from fowt_env.weather.waves import flat_waves, is_flat
 
 
 def wake_states(aero):
@@ -52,7 +53,7 @@ def build_hydro(platform, waves, current, options):
     shape = _strips(platform, options)
     strips = ExactStrips(shape, None)
     if takes_wave_bands(options, waves, shape):
-        quadrature = build_quadrature(platform.hull, shape, 1 if waves else STILL_REFINEMENT)
+        quadrature = build_quadrature(platform.hull, shape, _refinement(waves))
         strips = BandedStrips(shape, quadrature, None, None)
     return Hydro(
         hull=build_hull(platform.hull, site.water_density, site.gravity),
@@ -62,6 +63,27 @@ def build_hydro(platform, waves, current, options):
         damping=build_damping(platform.hydro),
         added_inertia=build_added_inertia(platform.hydro.added_mass),
     )
+
+
+def hydro_in_waves(hydro, waves, platform, options):
+    """Hydro of a scene with a sea in other waves (None: still water) of the same types.
+
+    Raises: InputError for a sea beyond the fast path.
+    """
+    if waves is None:
+        site = platform.environment
+        waves = flat_waves(depth=site.water_depth, density=site.water_density, gravity=site.gravity)
+    strips = hydro.strips
+    if isinstance(strips, BandedStrips) and (is_flat(waves) or is_flat(hydro.waves)):
+        nodes = build_quadrature(platform.hull, strips.shape, _refinement(waves))
+        quadrature = strips.quadrature._replace(table=nodes.table, keel=nodes.keel)
+        strips = strips._replace(quadrature=quadrature)
+    return hydro._replace(waves=waves, strips=strips_in_waves(strips, waves, options))
+
+
+def _refinement(waves):
+    """How many times as many nodes the strips take as in a sea."""
+    return STILL_REFINEMENT if is_flat(waves) else 1
 
 
 def strips_in_waves(strips, waves, options):
@@ -96,7 +118,9 @@ def wave_bands_of(waves, strips):
     if waves is None:
         return None
     if not can_use_bands(waves, strips):
-        raise InputError("sea: several headings cannot be summed fast; build_scene(..., wave_loads='exact')")
+        raise InputError(
+            "sea: several headings cannot be summed fast; use wave_loads = 'exact' from the start"
+        )
     return build_wave_bands(waves, strips)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fowt_env.descriptions.checks import check_whole_number
+from fowt_env.descriptions.checks import check_whole_number, short
 from fowt_env.descriptions.platform import Platform
 from fowt_env.descriptions.turbine import Turbine
 from fowt_env.errors import InputError
@@ -22,7 +22,7 @@ from fowt_env.plant.model import N_CACHE, Data
 from fowt_env.plant.rotor_substeps import N_SAMPLE
 from fowt_env.plant.state import Block, state_blocks
 from fowt_env.plant.user_loads import user_data_size
-from fowt_env.scene.parts import strips_in_waves, wake_states
+from fowt_env.scene.parts import hydro_in_waves, wake_states
 from fowt_env.scene.user_loads import Load, first_nonfinite_load
 from fowt_env.scene.weather import Sea, Wind, build_weather
 from fowt_env.weather.wind import hub_series
@@ -101,6 +101,14 @@ class Scene:
             found[1][:, 1] = 0.0
         return found
 
+    @property
+    def weather_kind(self) -> tuple[bool, bool, bool, str]:
+        """What with_weather keeps: aerodynamics or not, a box of wind, waves; and the class of the strips."""
+        aero, hydro = self.model.aero, self.model.hydro
+        field = aero is not None and aero.field is not None
+        waves = hydro is not None and hydro.waves is not None
+        return aero is not None, field, waves, "" if hydro is None else type(hydro.strips).__name__
+
     def data(self) -> Data:
         """Fresh scratch arrays for one plant of this scene."""
         hydro = self.model.hydro
@@ -130,22 +138,32 @@ class Scene:
         return first_nonfinite_load(self.loads, data.user)
 
     def with_weather(self, wind: Wind, sea: Sea, seed: int) -> "Scene":
-        """A copy in other weather of the same kind: only wind and sea are drawn anew.
+        """A copy in other weather whose model has the same types, so that nothing is compiled anew.
 
-        Raises: InputError, also where aerodynamics would appear or vanish (build a scene for that).
+        sea None is still water. In a scene that was built with a sea it is a wave without height: to rounding
+        the loads of a scene built in still water, in twice the time.
+        Raises: InputError, also where aerodynamics, a box of wind or a sea would be gained, or the first two
+        lost (build a scene for that).
         """
         seed = check_whole_number("seed", seed, 0)
         air, waves = build_weather(wind, sea, seed, self.platform, self.turbine, self.rotor, self.options)
         aero, hydro = self.model.aero, self.model.hydro
         if (air.series is None) != (aero is None):
             raise InputError(
-                f"wind = {wind!r}: a scene cannot gain or lose its aerodynamics; use build_scene"
+                f"wind = {short(wind)}: a scene cannot gain or lose its aerodynamics; use build_scene"
             )
         if aero is not None and (air.field is None) != (aero.field is None):
-            raise InputError("wind: a scene cannot gain or lose its box of full-field wind; use build_scene")
-        if hydro is not None:
-            strips = strips_in_waves(hydro.strips, waves, self.options)
-            hydro = hydro._replace(waves=waves, strips=strips)
+            raise InputError(
+                f"wind = {short(wind)}: a scene cannot gain or lose its box of full-field wind;"
+                " use build_scene"
+            )
+        if waves is not None and hydro.waves is None:
+            raise InputError(
+                f"sea = {short(sea)}: a scene built in still water cannot gain a sea; build it with one"
+                " (build_scene, or FowtEnv, with sea = ...), and sea = None is still water in it"
+            )
+        if hydro is not None and hydro.waves is not None:
+            hydro = hydro_in_waves(hydro, waves, self.platform, self.options)
         if aero is not None:
             aero = aero._replace(wind=air.series, field=air.field)
         model = self.model._replace(aero=aero, hydro=hydro)

@@ -102,11 +102,7 @@ def _in_plane(air):
 
 def _check_sea(state, depth):
     """Refuse a sea that does not fit into the water."""
-    if state is None:
-        return
-    if state.kind == "components":
-        height = 2.0 * float(np.sum(state.amplitude))
-    else:
-        height = state.H if state.kind == "regular" else state.Hs
-    if height is not None and height > depth:
-        raise InputError(f"sea: wave height {height:g} m: must not exceed the water depth of {depth:g} m")
+    if state.height > depth:
+        raise InputError(
+            f"sea: wave height {state.height:g} m: must not exceed the water depth of {depth:g} m"
+        )

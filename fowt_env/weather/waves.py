@@ -12,6 +12,7 @@ from fowt_env.descriptions.checks import check_whole_number
 from fowt_env.errors import InputError
 from fowt_env.plant.hydro.waves import Waves
 
+FLAT_PERIOD = 10.0  # s, of the component that stands for still water
 MOST_COMPONENTS = 1_000_000  # of a sea drawn without a number of them: more take minutes and gigabytes
 
 
@@ -78,6 +79,18 @@ def build_waves(sea, *, depth, density, gravity, seed, duration, components=None
     k = wave_number(omega, depth, gravity)
     random = sea.kind not in ("regular", "components")
     return _pack(omega, k, amplitude, phase, heading, depth, density, sea.ramp, random)
+
+
+def flat_waves(*, depth, density, gravity):
+    """Waves part of one component without height: still water in a scene whose kernels sum waves."""
+    omega, none = np.array([2.0 * pi / FLAT_PERIOD]), np.zeros(1)
+    k = wave_number(omega, depth, gravity)
+    return _pack(omega, k, none, none, none, depth, density, 0.0, False)
+
+
+def is_flat(waves):
+    """Whether a Waves part, or None, is still water."""
+    return waves is None or not waves.amplitude.any()
 
 
 def _pack(omega, k, amplitude, phase, heading, depth, density, ramp, random):

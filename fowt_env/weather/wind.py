@@ -6,6 +6,7 @@ x downwind, y left when looking downwind, z up (state.py). What users may ask fo
 descriptions/wind.py; plant/aero/wind.py has the wind at any instant and point.
 """
 
+import operator
 from functools import lru_cache
 from math import cos, hypot, radians, sin
 
@@ -35,8 +36,7 @@ def rotor_factor(exponent, height, diameter):
 
 def make_series(time, value, *, reference_height, reference_length, shear_exponent, period=0.0):
     """WindSeries of samples value (n, 5) at time (n,) s; finds out whether the time is uniform."""
-    time = np.ascontiguousarray(time, dtype=np.float64)
-    value = np.ascontiguousarray(value, dtype=np.float64)
+    time, value = _kernel_array(time), _kernel_array(value)
     inverse_step = 0.0
     if time.size > 1:
         step = (time[-1] - time[0]) / (time.size - 1)
@@ -55,20 +55,34 @@ def make_series(time, value, *, reference_height, reference_length, shear_expone
     )
 
 
+def _kernel_array(values):
+    """The values as float64 of the one type that kernels are compiled for: C-contiguous and writeable."""
+    return np.require(values, np.float64, "CAW")
+
+
+def _of_kernel_types(series):
+    """A user's WindSeries with the types of every other one; itself where it has them."""
+    time, value, *numbers = series
+    typed = WindSeries(_kernel_array(time), _kernel_array(value), *map(float, numbers))
+    return series if all(map(operator.is_, typed, series)) else typed
+
+
 def build_wind(spec, *, reference_height, rotor_diameter, shear_exponent, seed, duration):
     """WindSeries of what a user asked for, None for no aerodynamics at all.
 
     spec               None; a speed in m/s (0: still air); a dictionary with "kind", or the WindSpec that
                        read_wind made of one (kinds and keys: descriptions.wind.KINDS); a WindSeries, which is
-                       returned as it is
+                       returned as it is, but for types
     reference_height   hub height, m
     shear_exponent     power law of the site, unless the spec gives one (ewm: 0.11 of the standard)
     seed               of turbulence: int >= 0 or numpy SeedSequence, unless the spec gives one
     duration           s, which turbulence has to cover before it repeats
     Raises: InputError naming the key, its value and what is allowed.
     """
-    if spec is None or isinstance(spec, WindSeries):
-        return spec
+    if spec is None:
+        return None
+    if isinstance(spec, WindSeries):
+        return _of_kernel_types(spec)
     spec = read_wind(spec)
     height = Number(1.0, 1000.0, "m").read("reference_height", reference_height)
     diameter = Number(1.0, 1000.0, "m").read("rotor_diameter", rotor_diameter)

@@ -125,10 +125,10 @@ class WindBox:
         """WindField of the box."""
         dy, dz = self.y[1] - self.y[0], self.z[1] - self.z[0]
         return WindField(
-            np.ascontiguousarray(self.velocity, dtype=np.float32),
-            1.0 / self.dt,
+            np.require(self.velocity, np.float32, "CAW"),  # the one type that kernels are compiled for
+            float(1.0 / self.dt),
             float(self.shift),
-            1.0 / self.speed,
+            float(1.0 / self.speed),
             float(self.y[0]),
             float(self.z[0]),
             float(1.0 / dy),

@@ -334,6 +334,12 @@ def _(folder, monkeypatch):
     return refused(fowt_env.build_scene().with_weather, 18.0, None, 0)
 
 
+@under("A scene cannot gain a sea")
+def _(folder, monkeypatch):
+    sea = {"kind": "regular", "H": 3.0, "T": 9.0}
+    return refused(fowt_env.build_scene().with_weather, None, sea, 0)
+
+
 def plain(text):
     """The text with its white space made single."""
     return " ".join(text.split())
