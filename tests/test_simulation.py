@@ -443,55 +443,11 @@ def test_steps_are_fourth_order(wave_scene):
     assert np.all(orders > 3.7) and np.all(orders < 4.5)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "integrator, lowest, highest", [("heun", 1.9, 2.1), ("abm4", 2.7, 4.3), ("ab4", 3.3, 5.0)]
-)
-def test_other_integrators_converge_at_their_order(integrator, lowest, highest, wave_scene):
-    # the Adams methods start with steps of lower order, which shows in the corrected one
-    scene = fowt_env.build_scene("oc3_hywind", sea=wave_scene.sea, integrator=integrator)
-    scene = scene.with_model({"hydro.strips.shape.drag_coefficient": 0.0})
-    exact_scene = wave_scene.with_model({"hydro.strips.shape": scene.model.hydro.strips.shape})
-    x0, _ = initial_state(exact_scene, initial={"PtfmSurge": 1.0, "PtfmPitch": 1.0, "PtfmYaw": 1.0})
-
-    def end(of, dt):
-        x = x0.copy()
-        assert advance(of.handle(), x, np.zeros(2), 0, round(8.0 / dt), dt) == 0
-        return x
-
-    exact = end(exact_scene, 0.00625)
-    errors = [np.linalg.norm((end(scene, dt) - exact)[:13]) for dt in (0.05, 0.025)]
-    assert lowest < np.log2(errors[0] / errors[1]) < highest
-
-
 def test_default_step_is_accurate_in_waves(wave_scene):
     options = dict(duration=60.0, output_dt=0.2, control_dt=0.2)
     coarse, fine = run(wave_scene, dt=0.1, **options), run(wave_scene, dt=0.0125, **options)
     for column in ("PtfmSurge_[m]", "PtfmPitch_[deg]"):
         assert np.abs(coarse[column] - fine[column]).max() < 1e-3 * np.ptp(fine[column])
-
-
-# Absent is zero strength
-
-
-def test_no_sea_is_a_sea_of_no_height(still_scene, wave_scene):
-    waves = wave_scene.model.hydro.waves
-    flat = waves._replace(amplitude=0.0 * waves.amplitude, velocity=0.0 * waves.velocity)
-    flat = wave_scene.with_model({"hydro.waves": flat})
-    options = dict(duration=20.0, initial={"PtfmSurge": 4.0, "PtfmPitch": 3.0, "PtfmRoll": 1.0})
-    without, zero = run(still_scene, **options), run(flat, **options)
-    assert np.allclose(without[COLUMNS], zero[COLUMNS], rtol=0.0, atol=1e-11)
-
-
-def test_no_aerodynamics_is_air_without_density(storm_scene, platform):
-    thin = platform.model_copy(
-        update={"environment": platform.environment.model_copy(update={"air_density": 0.0})}
-    )
-    weather = dict(sea=storm_scene.sea, seed=3, duration=60.0, wave_components=60)
-    options = dict(duration=10.0, start="zero", initial={"RotSpeed": 0.0, "BldPitch1": 0.0})
-    empty = run(fowt_env.build_scene(thin, wind=18.0, **weather), **options)
-    without = run(fowt_env.build_scene(thin, wind=None, **weather), **options)
-    assert np.allclose(empty[COLUMNS], without[COLUMNS], rtol=0.0, atol=1e-11)
 
 
 # Response in waves

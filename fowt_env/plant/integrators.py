@@ -176,8 +176,8 @@ class Method(NamedTuple):
     samples_rotor: bool = False  # whether it can evaluate the rotor's load more than once a step
 
 
-# The limits are the textbook's, but for oscillation under Adams-Bashforth, 0.43 by itself: positions are moved
-# by the new velocities, which doubles it.
+# The limits are the textbook's, but for an oscillation under Adams-Bashforth (0.43 by itself): the new
+# velocities move the positions.
 INTEGRATORS = {
     "rk4": Method(
         order=4, evaluations=4, dt=0.05, decay_limit=2.785, oscillation_limit=2.828,
