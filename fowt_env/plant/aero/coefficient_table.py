@@ -315,7 +315,8 @@ def rotor_table_load(pose, x, now, series, table, counters):
     cy, cz = flow.cross_y, flow.cross_z
     steepest = sqrt((gy + qy) * (gy + qy) + (gz + qz) * (gz + qz))
     if steepest > STEEPEST * s:
-        counters[Counter.ROTOR_TABLE_CLAMPED] += 1.0
+        if now.u != 0.0:  # in still air there is next to no load to be wrong
+            counters[Counter.ROTOR_TABLE_CLAMPED] += 1.0
         held = STEEPEST * s / steepest
         gy, gz, qy, qz = held * gy, held * gz, held * qy, held * qz
     my, mz = gy + HIGHER_SQUARE * qy, gz + HIGHER_SQUARE * qz
