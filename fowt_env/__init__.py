@@ -15,6 +15,7 @@ if TYPE_CHECKING:  # the names below, for editors and type checkers
     from fowt_env.analysis.trim import trim as trim
     from fowt_env.errors import ControllerError as ControllerError
     from fowt_env.errors import InputError as InputError
+    from fowt_env.errors import PlantWarning as PlantWarning
     from fowt_env.errors import SimulationStopped as SimulationStopped
     from fowt_env.plant.measurement import Measurement as Measurement
     from fowt_env.plant.user_loads import Force as Force
@@ -42,6 +43,7 @@ _PUBLIC = {
     "load_kernel": "fowt_env.scene.user_loads",
     "InputError": "fowt_env.errors",
     "SimulationStopped": "fowt_env.errors",
+    "PlantWarning": "fowt_env.errors",
     "ControllerError": "fowt_env.errors",
 }
 __all__ = sorted(_PUBLIC)

@@ -1,6 +1,7 @@
 """The errors that users meet. Each message names the key, the value and what is allowed."""
 
 import difflib
+import sys
 from collections.abc import Iterable
 from typing import Any
 
@@ -24,6 +25,19 @@ class SimulationStopped(RuntimeError):
         self.reason = reason
         self.time = time
         self.frame = frame
+
+
+class PlantWarning(UserWarning):
+    """A run whose loads were less accurate than they are meant to be, as DataFrame.attrs["events"] counts."""
+
+
+def level_outside() -> int:
+    """stacklevel with which warnings.warn of the caller names the first line outside of this package."""
+    own = __name__.partition(".")[0]
+    level, frame = 1, sys._getframe(1)
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] == own:
+        level, frame = level + 1, frame.f_back
+    return level
 
 
 MOST_LISTED, NEAREST = 30, 5  # names that are all listed; how many are where there are more

@@ -1,5 +1,6 @@
 """One run of a scene with a controller, to a table of OpenFAST channels."""
 
+import warnings
 from collections.abc import Callable
 from contextlib import contextmanager
 from math import inf, pi
@@ -13,9 +14,16 @@ from fowt_env.analysis.trim import trim
 from fowt_env.control import CompiledController, make
 from fowt_env.descriptions.checks import check_number, refusal
 from fowt_env.descriptions.units import DEGREE, RPM
-from fowt_env.errors import ControllerInputError, InputError, SimulationStopped, unknown
+from fowt_env.errors import (
+    ControllerInputError,
+    InputError,
+    PlantWarning,
+    SimulationStopped,
+    level_outside,
+    unknown,
+)
 from fowt_env.plant.compile.decorators import control_kernel
-from fowt_env.plant.events import counted
+from fowt_env.plant.events import counted, harm
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
 from fowt_env.plant.rollout import OVERSPEED, RUNNING, STOP_REASONS, Schedule, rollout
 from fowt_env.plant.state import OUT_OF_PLANE, State, pose_of
@@ -188,7 +196,8 @@ def simulate(
     GenTqLim is 1 while it differs from the command.
 
     attrs["events"] of the DataFrame: {name: count} of what the plant met outside its usual range
-    (fowt_env.plant.events), of those that happened.
+    (fowt_env.plant.events), of those that happened. A PlantWarning says so at the end of a run whose loads
+    were less accurate for it.
 
     Raises: InputError before anything runs (ControllerInputError where the controller raised it, whenever
     that is); SimulationStopped (with the rows so far) on capsize, a numerical blow-up, a
@@ -220,7 +229,10 @@ def simulate(
     loop = _Loop(scene, controller, x, u, schedule)
     with _bar(progress) as report, _controllers_own():
         loop.go(report)
-    return loop.frame()
+    frame = loop.frame()
+    if found := harm(frame.attrs["events"]):
+        warnings.warn(f"{scene.label}: {found}", PlantWarning, stacklevel=level_outside())
+    return frame
 
 
 @contextmanager

@@ -1,6 +1,7 @@
 import os
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ from fowt_env.controllers import make
 from fowt_env.controllers.constant import Constant
 from fowt_env.errors import ControllerError, InputError, SimulationStopped
 from fowt_env.plant.compile.decorators import control_kernel
-from fowt_env.plant.events import Counter
+from fowt_env.plant.events import EVENTS, Counter
 from fowt_env.plant.rollout import Schedule, advance
 from fowt_env.plant.state import State, pose_of
 from fowt_env.simulation import initial_state
@@ -139,11 +140,66 @@ def test_what_the_time_step_blows_up_is_not_called_a_capsize(platform):
         run(scene, dt=0.1, duration=20.0)
 
 
-def test_rare_events_of_a_run_are_handed_out(still_scene):
-    assert run(still_scene, duration=1.0).attrs["events"] == {}
-    loop = run(still_scene, duration=1.0, start="zero", initial={"PtfmHeave": -60.0})
-    assert set(loop.attrs["events"]) <= {event.name for event in Counter}
-    assert loop.attrs["events"]["HYDROSTATIC_FALLBACK"] > 0
+# Rare events: a scene for each counter that really makes it happen
+
+
+def under_water():
+    """The hull's upper cylinder lies below the water plane."""
+    return fowt_env.build_scene(), {"start": "zero", "initial": {"PtfmHeave": -60.0}}
+
+
+def without_roots():
+    """Polars so large that no inflow angle balances them, in air so thin that the loads stay finite."""
+    scene = fowt_env.build_scene(wind=8.0)
+    elements = scene.model.aero.rotor.elements
+    segment = elements.polars.segment.copy()
+    segment[:, 1] = 1e160
+    broken = elements._replace(polars=elements.polars._replace(segment=segment), air_density=1e-165)
+    return scene.with_model({"aero.rotor.elements": broken}), {}
+
+
+def without_equilibrium():
+    """Lines that shrink under tension and are too short: they have no catenary."""
+    scene = fowt_env.build_scene()
+    lines = scene.model.mooring
+    shrinking = lines._replace(length=0.93 * lines.length, EA=-lines.EA)
+    return scene.with_model(mooring=shrinking), {"start": "zero"}
+
+
+def yawing():
+    """A rotor as one table that yaws at 10 deg/s: the wind along a blade is steeper than the table takes."""
+    return fowt_env.build_scene(wind=10.0, fidelity="fast"), {"initial": {"PtfmRVzi": 10.0}}
+
+
+HAPPENINGS = {
+    Counter.BEM_FALLBACK: without_roots,
+    Counter.HYDROSTATIC_FALLBACK: under_water,
+    Counter.MOORING_UNCONVERGED: without_equilibrium,
+    Counter.ROTOR_TABLE_CLAMPED: yawing,
+}
+
+
+@pytest.mark.parametrize("event", Counter, ids=lambda event: event.name)
+def test_a_rare_event_of_a_run_is_handed_out_and_warned_of_where_it_does_harm(event):
+    scene, options = HAPPENINGS[event]()
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        frame = run(scene, duration=0.1, dt=0.0125, **options)
+    assert list(frame.attrs["events"]) == [event.name] and frame.attrs["events"][event.name] > 0
+    told = [str(w.message) for w in caught if issubclass(w.category, fowt_env.PlantWarning)]
+    if not EVENTS[event].harmful:
+        assert told == []
+        return
+    (text,) = told
+    assert f"{event.name} {frame.attrs['events'][event.name]}: " in text
+    assert EVENTS[event].meaning in text and EVENTS[event].advice in text
+    assert [w.filename for w in caught if str(w.message) == text] == [__file__]
+
+
+def test_an_ordinary_run_has_no_rare_events(storm_scene):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert run(storm_scene, duration=1.0).attrs["events"] == {}
 
 
 # Rows and time
@@ -443,55 +499,11 @@ def test_steps_are_fourth_order(wave_scene):
     assert np.all(orders > 3.7) and np.all(orders < 4.5)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "integrator, lowest, highest", [("heun", 1.9, 2.1), ("abm4", 2.7, 4.3), ("ab4", 3.3, 5.0)]
-)
-def test_other_integrators_converge_at_their_order(integrator, lowest, highest, wave_scene):
-    # the Adams methods start with steps of lower order, which shows in the corrected one
-    scene = fowt_env.build_scene("oc3_hywind", sea=wave_scene.sea, integrator=integrator)
-    scene = scene.with_model({"hydro.strips.shape.drag_coefficient": 0.0})
-    exact_scene = wave_scene.with_model({"hydro.strips.shape": scene.model.hydro.strips.shape})
-    x0, _ = initial_state(exact_scene, initial={"PtfmSurge": 1.0, "PtfmPitch": 1.0, "PtfmYaw": 1.0})
-
-    def end(of, dt):
-        x = x0.copy()
-        assert advance(of.handle(), x, np.zeros(2), 0, round(8.0 / dt), dt) == 0
-        return x
-
-    exact = end(exact_scene, 0.00625)
-    errors = [np.linalg.norm((end(scene, dt) - exact)[:13]) for dt in (0.05, 0.025)]
-    assert lowest < np.log2(errors[0] / errors[1]) < highest
-
-
 def test_default_step_is_accurate_in_waves(wave_scene):
     options = dict(duration=60.0, output_dt=0.2, control_dt=0.2)
     coarse, fine = run(wave_scene, dt=0.1, **options), run(wave_scene, dt=0.0125, **options)
     for column in ("PtfmSurge_[m]", "PtfmPitch_[deg]"):
         assert np.abs(coarse[column] - fine[column]).max() < 1e-3 * np.ptp(fine[column])
-
-
-# Absent is zero strength
-
-
-def test_no_sea_is_a_sea_of_no_height(still_scene, wave_scene):
-    waves = wave_scene.model.hydro.waves
-    flat = waves._replace(amplitude=0.0 * waves.amplitude, velocity=0.0 * waves.velocity)
-    flat = wave_scene.with_model({"hydro.waves": flat})
-    options = dict(duration=20.0, initial={"PtfmSurge": 4.0, "PtfmPitch": 3.0, "PtfmRoll": 1.0})
-    without, zero = run(still_scene, **options), run(flat, **options)
-    assert np.allclose(without[COLUMNS], zero[COLUMNS], rtol=0.0, atol=1e-11)
-
-
-def test_no_aerodynamics_is_air_without_density(storm_scene, platform):
-    thin = platform.model_copy(
-        update={"environment": platform.environment.model_copy(update={"air_density": 0.0})}
-    )
-    weather = dict(sea=storm_scene.sea, seed=3, duration=60.0, wave_components=60)
-    options = dict(duration=10.0, start="zero", initial={"RotSpeed": 0.0, "BldPitch1": 0.0})
-    empty = run(fowt_env.build_scene(thin, wind=18.0, **weather), **options)
-    without = run(fowt_env.build_scene(thin, wind=None, **weather), **options)
-    assert np.allclose(empty[COLUMNS], without[COLUMNS], rtol=0.0, atol=1e-11)
 
 
 # Response in waves

@@ -25,6 +25,8 @@ from fowt_env.envs.tables import action_table, observation_table
 from fowt_env.envs.tasks import TASKS, Episode
 from fowt_env.files.atomic import replacing
 from fowt_env.files.markdown import markdown_table
+from fowt_env.plant.events import EVENTS
+from fowt_env.plant.integrators import INTEGRATORS
 from fowt_env.plant.rollout import (
     BLOWN_UP,
     CAPSIZE,
@@ -36,7 +38,8 @@ from fowt_env.plant.rollout import (
     STOP_REASONS,
 )
 from fowt_env.registration import ENVIRONMENTS
-from fowt_env.training.cli.console import app
+from fowt_env.scene.loads import LOADS
+from fowt_env.training.cli.app import app
 
 DOCS = Path(__file__).resolve().parents[1]
 markdown = partial(markdown_table, aligned=True)
@@ -224,15 +227,48 @@ def options():
     return markdown(("option", "meaning"), [(f"`{name}`", text) for name, text in OPTIONS.items()])
 
 
-TABLES = (
-    environments, tasks, offsets, actions, actuators, observation, channels, reward, meanings, terminations,
-    options,
-)  # fmt: skip
+def events():
+    """Counters of rare events."""
+    rows = [(f"`{c.name}`", e.meaning, "yes" if e.harmful else "no", e.advice) for c, e in EVENTS.items()]
+    return markdown(("counter", "what it counts", "loads less accurate", "what to do"), rows)
 
 
-def environment_page(text):
-    """The page's text with each marked table as the code gives it now."""
-    made = {table.__name__: table for table in TABLES}
+def loads():
+    """The loads of the plant, with what leaves each out."""
+    rows = []
+    for name, load in LOADS.items():
+        absent = [f"`{option}={value!r}`" for option, value in load.without.items()]
+        absent += [f"`{key}` zero in the platform file" for key in load.keys]
+        files = ", ".join(f"`{file}`" for file in load.file.split(", "))
+        rows.append((name, load.summary, load.section, files, ", ".join(absent) or "always there"))
+    return markdown(("load", "what it is", "section", "in `fowt_env/plant/`", "left out by"), rows)
+
+
+def integrators():
+    """Facts of the integrators."""
+    rows = [
+        (
+            f"`{name}`", method.order, method.evaluations, f"{method.dt:g}", f"{method.decay_limit:g}",
+            f"{method.oscillation_limit:g}" if method.oscillation_limit else "none",
+        )
+        for name, method in INTEGRATORS.items()
+    ]  # fmt: skip
+    head = ("name", "order", "evaluations per step", "default step, s", "decay", "oscillation")
+    return markdown(head, rows)
+
+
+TABLES = {
+    "environment.md": (
+        environments, tasks, offsets, actions, actuators, observation, channels, reward, meanings,
+        terminations, options, events,
+    ),
+    "theory.md": (loads, integrators),
+}  # fmt: skip
+
+
+def with_tables(page, text):
+    """Text of a page of TABLES with each marked table as the code gives it now."""
+    made = {table.__name__: table for table in TABLES[page]}
     found = [match.group(2) for match in MARK.finditer(text)]
     if sorted(found) != sorted(made):
         raise ValueError(f"marks {found} are not one for each of {list(made)}")
@@ -313,10 +349,10 @@ def _plain(text):
 
 
 def main():
-    """Write both pages."""
-    page = DOCS / "environment.md"
-    for path, text in ((page, environment_page(page.read_text())), (DOCS / "cli.md", cli_page())):
-        with replacing(path) as target:
+    """Write the pages."""
+    pages = {page: with_tables(page, (DOCS / page).read_text()) for page in TABLES}
+    for page, text in (pages | {"cli.md": cli_page()}).items():
+        with replacing(DOCS / page) as target:
             target.write_text(text)
 
 

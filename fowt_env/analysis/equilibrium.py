@@ -1,13 +1,12 @@
 """Whether a steady state is one that a platform can be in, and what pulls at it where there is none."""
 
-import sys
 import warnings
 from math import acos, cos, degrees, hypot, pi, sqrt
 from typing import NamedTuple
 
 import numpy as np
 
-from fowt_env.errors import InputError
+from fowt_env.errors import InputError, level_outside
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.mooring import SLACK
 from fowt_env.plant.rollout import CAPSIZE
@@ -28,7 +27,6 @@ ONE_SIDED = 0.9  # horizontal pull of all lines together, of the sum of each one
 GROWTH = 1e-3  # square of a motion's rate of growth, of gravity over the draft
 MOORINGS = {"slack": "slack moorings", "weak": "loose moorings", "one-sided": "moorings to one side"}
 HEAVY = 0.02  # net vertical force on the undisplaced platform that is worth a word, of its weight
-OWN = "fowt_env"  # package; a warning is for the code that calls it
 _warned = set()  # hashes of platforms, each with what was odd about it
 
 
@@ -85,7 +83,7 @@ def check_equilibrium(scene, rest, start, slope, fresh_slope):
     if "tilt" in odd or "unstable" in odd:
         causes["upright"] = _metacentre(scene)
     text = f"{label(scene)}: {'; '.join(odd.values())} ({_place(rest)}). {_sentences(causes)}"
-    warnings.warn(text.rstrip(), stacklevel=_level_outside())
+    warnings.warn(text.rstrip(), stacklevel=level_outside())
 
 
 def unbalanced(scene, start, end, ending=None):
@@ -273,11 +271,3 @@ def _shown(value):
 def _kilo(value):
     """A number of N or N m in kN or kN m."""
     return _shown(value / 1e3)
-
-
-def _level_outside():
-    """stacklevel with which warnings.warn of the caller names the first line outside of this package."""
-    level, frame = 1, sys._getframe(1)
-    while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] == OWN:
-        level, frame = level + 1, frame.f_back
-    return level

@@ -56,6 +56,7 @@ from fowt_env.envs.tasks import TASKS, Episode, Task, check_offset, task_of
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.channels import DEG_PER_RAD
 from fowt_env.plant.compile.handle import Handle
+from fowt_env.plant.events import counted
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
 from fowt_env.plant.rollout import STOP_REASONS, output
 from fowt_env.plant.state import Command, State
@@ -120,7 +121,8 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     A picture shows one control period, so that 30 of them a second are three times real time.
 
     info of each step: "time" (s), "saturated_actions", "torque_limited", "reward/<term>" for each term before
-    weighting.
+    weighting; at a reset and at the end of an episode "events" too: {name: count} of what the plant met
+    outside its usual range (fowt_env.plant.events), of those that happened.
 
     Raises: InputError for settings and actions that cannot be used.
     """
@@ -316,6 +318,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         info = {
             "time": 0.0,
             **dict.fromkeys(SHOWN_COUNTS, 0),
+            "events": self._events(),
             "wind_speed": self.scene.wind_speed,
             "episode": deepcopy(planned.episode._asdict()),
         }
@@ -372,6 +375,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         if terminated:
             info["termination"] = self._reason(status)
         if terminated or truncated:
+            info["events"] = self._events()
             self._running = False
         if self.render_mode == "human":
             self.render()
@@ -381,6 +385,10 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         """Why an episode was terminated, with the user load that caused it, if one did."""
         fault = self.scene.first_nonfinite_load(self._episode.data)
         return f"{STOP_REASONS[status]}: {fault}" if fault else STOP_REASONS[status]
+
+    def _events(self):
+        """{event: count} since the reset, of the rare events that happened (fowt_env.plant.events)."""
+        return counted(self._episode.data.counters)
 
     def get_state(self) -> Snapshot:
         """Snapshot of all that decides how the run goes on: plant, controller, counters, weather, draws.

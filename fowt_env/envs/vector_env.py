@@ -210,7 +210,8 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         truncations &= active & ~terminations
         ended = terminations | truncations
         infos = {}
-        if ended.any():
+        over = ended.any()
+        if over:
             for i in np.flatnonzero(ended):
                 self.envs[i]._running = False
             if self.autoreset_mode == AutoresetMode.SAME_STEP:
@@ -219,6 +220,9 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
                 resets = np.flatnonzero(ended)
                 ended = np.zeros_like(ended)
         infos = self._infos(infos, active, terminations)
+        if over:
+            for i in (active & ended).nonzero()[0]:
+                infos = self._add_info(infos, {"events": self.envs[i]._events()}, int(i))
         for i in resets:
             infos = self._begin(i, self._plan(i, None, None), infos)
         self._ended = ended
@@ -285,6 +289,8 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         info |= {key: int(self._counts[i, entry]) for key, entry in SHOWN_COUNTS.items()}
         if self._statuses[i] != RUNNING:
             info["termination"] = self.envs[i]._reason(self._statuses[i])
+        if self._statuses[i] != RUNNING or self._counts[i, STEP] >= self._last[i]:
+            info["events"] = self.envs[i]._events()
         return info
 
     def get_state(self) -> tuple[Snapshot, ...]:

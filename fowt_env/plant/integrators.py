@@ -27,13 +27,13 @@ FEATHERING = 0.53
 class RungeKutta(NamedTuple):
     """Classical Runge-Kutta 4."""
 
-    evaluations: int = 4
+    stages: int = 4
 
 
 class Heun(NamedTuple):
     """Explicit trapezoidal rule."""
 
-    evaluations: int = 2
+    stages: int = 2
 
 
 class Adams(NamedTuple):
@@ -165,18 +165,37 @@ class Method(NamedTuple):
     """An integrator, and what is known of it."""
 
     order: int  # of convergence on a smooth plant
+    evaluations: int  # of the loads per step
     dt: float  # s, default step: within half its limit of stability for every built-in scene
+    # largest decay rate (1/s) of a velocity times dt that does not grow, and largest frequency (rad/s) of an
+    # undamped oscillation times dt; 0: one grows at any step, however slowly
+    decay_limit: float
+    oscillation_limit: float
     part: tuple  # what a model has in its slot `integrator`; its class chooses the step
     step: object  # (t, x, u, dt, model, method, data): one step of x in place
     samples_rotor: bool = False  # whether it can evaluate the rotor's load more than once a step
 
 
+# The limits are the textbook's, but for an oscillation under Adams-Bashforth (0.43 by itself): the new
+# velocities move the positions.
 INTEGRATORS = {
-    "rk4": Method(order=4, dt=0.05, part=RungeKutta(), step=rk4),
-    "heun": Method(order=2, dt=0.05, part=Heun(), step=heun),
-    "abm4": Method(order=4, dt=0.1, part=Adams(corrector=True), step=adams),
-    "ab4": Method(order=4, dt=0.1, part=Adams(corrector=False), step=adams, samples_rotor=True),
-}
+    "rk4": Method(
+        order=4, evaluations=4, dt=0.05, decay_limit=2.785, oscillation_limit=2.828,
+        part=RungeKutta(), step=rk4,
+    ),
+    "heun": Method(
+        order=2, evaluations=2, dt=0.05, decay_limit=2.0, oscillation_limit=0.0,
+        part=Heun(), step=heun,
+    ),
+    "abm4": Method(
+        order=4, evaluations=2, dt=0.1, decay_limit=1.285, oscillation_limit=0.0,
+        part=Adams(corrector=True), step=adams,
+    ),
+    "ab4": Method(
+        order=4, evaluations=1, dt=0.1, decay_limit=0.3, oscillation_limit=0.929,
+        part=Adams(corrector=False), step=adams, samples_rotor=True,
+    ),
+}  # fmt: skip
 method_step = chosen_by_class("method", {type(m.part): m.step for m in INTEGRATORS.values()}, inlined=True)
 
 

@@ -1,19 +1,78 @@
 """Options of build_scene: fidelities, rotor models, single parts; their defaults and what is allowed."""
 
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
 import numpy as np
 
 from fowt_env.descriptions.checks import check_number, check_whole_number
 from fowt_env.errors import InputError, unknown
+from fowt_env.plant.aero.blade_elements import BladeElements
+from fowt_env.plant.aero.coefficient_table import build_coefficient_table
+from fowt_env.plant.aero.load import BemRotor
+from fowt_env.plant.aero.section_table import build_section_table
+from fowt_env.plant.aero.wake import build_dynamic_inflow, build_skewed_wake
 from fowt_env.plant.integrators import INTEGRATORS
 
-ROTORS = ("bem", "lookup", "table")
+
+class RotorModel(NamedTuple):
+    """A model of the rotor, and what is known of it."""
+
+    summary: str
+    build: Callable[[BladeElements, Mapping[str, Any]], Any]  # (elements, options) -> part of the model
+    induction: bool  # whether it has states or angles of the wake: dynamic_inflow, skewed_wake
+    full_field: bool  # whether blades meet a box of wind point by point; else its average over the rotor
+    error: float  # of a motion or tension at most, rms over its standard deviation: docs/performance.md
+
+
+class Fidelity(NamedTuple):
+    """Parts that a level of fidelity chooses; any of them given explicitly overrides its part."""
+
+    summary: str
+    rotor: str
+    wave_loads: str
+    integrator: str
+    mooring: str
+    error: float  # of a motion or tension at most, rms over its standard deviation: docs/performance.md
+    dt: float | None = None  # s, default step with its own integrator; None: that of the integrator
+
+
+def _build_bem(elements, options):
+    skew = build_skewed_wake() if options["skewed_wake"] else None
+    wake = build_dynamic_inflow() if options["dynamic_inflow"] else None
+    return BemRotor(elements, skew, wake)
+
+
+ROTORS = {
+    "bem": RotorModel(
+        "blade-element momentum solved at every blade and station",
+        _build_bem, induction=True, full_field=True, error=0.0,
+    ),
+    "lookup": RotorModel(
+        "the same sweep from a table per station",
+        lambda elements, options: build_section_table(elements), induction=False, full_field=True, error=2e-4,
+    ),
+    "table": RotorModel(
+        "the whole rotor as one table",
+        lambda elements, options: build_coefficient_table(elements), induction=False, full_field=False, error=2e-2,
+    ),
+}  # fmt: skip
 FIDELITIES = {
-    # each level's parts; any of them given explicitly overrides its part
-    "reference": {"rotor": "bem", "wave_loads": "exact", "integrator": "rk4", "mooring": "catenary"},
-    "standard": {"rotor": "lookup", "wave_loads": "fast", "integrator": "ab4", "mooring": "catenary"},
-    "fast": {"rotor": "table", "wave_loads": "fast", "integrator": "ab4", "mooring": "table"},
-}
-FIELD_SAMPLES = 3  # rotor loads per step of ab4 in a box of wind, whose cells the blades cross in 0.1 s
+    "reference": Fidelity(
+        "everything solved exactly, Runge-Kutta 4",
+        rotor="bem", wave_loads="exact", integrator="rk4", mooring="catenary", error=3e-6,
+        dt=0.0125,
+    ),
+    "standard": Fidelity(
+        "every blade and station by look-up, fast wave sums, Adams-Bashforth 4",
+        rotor="lookup", wave_loads="fast", integrator="ab4", mooring="catenary", error=5e-4,
+    ),
+    "fast": Fidelity(
+        "the rotor and the tensions of the lines as tables",
+        rotor="table", wave_loads="fast", integrator="ab4", mooring="table", error=2e-2,
+    ),
+}  # fmt: skip
+FIELD_SAMPLES = 3  # rotor loads per step in a box of wind, whose cells the blades cross in 0.1 s
 OPTIONS = {
     # name: (default, allowed values or a description of the allowed range)
     "kinematics_position": ("instantaneous", ("instantaneous", "fixed")),
@@ -28,7 +87,7 @@ OPTIONS = {
     "mooring": (True, (False, True, "catenary", "table")),
     "planar": (False, (False, True)),
     "integrator": (None, (None, *INTEGRATORS)),  # None: the fidelity's
-    # of the rotor's load per step of ab4; None: FIELD_SAMPLES in a box of wind, else 1
+    # of the rotor's load per step, of an integrator that samples it; None: FIELD_SAMPLES in a box, else 1
     "rotor_samples": (None, "None or a number of samples, 1 to 10"),
     "wave_loads": (None, (None, "exact", "fast")),  # None: the fidelity's
     "current": (None, "None, a speed (m/s) or {'speed', 'heading' (deg), 'exponent'}"),
@@ -47,22 +106,32 @@ def choose_parts(fidelity, rotor, options):
     if fidelity not in tuple(FIDELITIES):  # which may be unhashable
         raise unknown("fidelity", fidelity, FIDELITIES)
     level = FIDELITIES[fidelity]
-    if rotor is not None and rotor not in ROTORS:
+    if rotor is not None and rotor not in tuple(ROTORS):
         raise unknown("rotor model", rotor, ROTORS)
     # induction is not in the tables; a level falls back to what has it, an explicit choice is refused
+    able = [name for name, model in ROTORS.items() if model.induction]
     needs_induction = options["dynamic_inflow"] or options["skewed_wake"]
-    if needs_induction and rotor not in (None, "bem"):
-        raise InputError(f"rotor = {rotor!r}: skewed_wake and dynamic_inflow need rotor = 'bem'")
+    if needs_induction and rotor is not None and rotor not in able:
+        need = " or ".join(repr(name) for name in able)
+        raise InputError(f"rotor = {rotor!r}: skewed_wake and dynamic_inflow need rotor = {need}")
     options["fidelity"] = fidelity
     options["explicit_wave_loads"] = options["wave_loads"] is not None
     for part in ("wave_loads", "integrator"):
         if options[part] is None:
-            options[part] = level[part]
+            options[part] = getattr(level, part)
     if options["mooring"] is True:
-        options["mooring"] = level["mooring"]
+        options["mooring"] = level.mooring
     if rotor is None:
-        rotor = "bem" if needs_induction else level["rotor"]
+        rotor = able[0] if needs_induction and level.rotor not in able else level.rotor
     return rotor
+
+
+def default_step(options):
+    """Default physics step (s): that of the fidelity with its own integrator, else that of the integrator."""
+    level, integrator = FIDELITIES[options["fidelity"]], options["integrator"]
+    if level.dt is not None and integrator == level.integrator:
+        return level.dt
+    return INTEGRATORS[integrator].dt
 
 
 def checked_options(given, platform):

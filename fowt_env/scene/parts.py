@@ -7,11 +7,9 @@ import numpy as np
 from fowt_env.descriptions.checks import check_number
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.aero.blade_elements import build_blade_elements
-from fowt_env.plant.aero.coefficient_table import build_coefficient_table
 from fowt_env.plant.aero.load import Aero, BemRotor
-from fowt_env.plant.aero.section_table import build_section_table
 from fowt_env.plant.aero.tower_drag import build_tower_drag
-from fowt_env.plant.aero.wake import build_dynamic_inflow, build_skewed_wake, n_wake_states
+from fowt_env.plant.aero.wake import n_wake_states
 from fowt_env.plant.hydro.added_inertia import build_added_inertia
 from fowt_env.plant.hydro.diffraction import build_strip_diffraction
 from fowt_env.plant.hydro.hydrostatics import build_hull
@@ -22,7 +20,7 @@ from fowt_env.plant.hydro.strip_quadrature import STILL_REFINEMENT, build_quadra
 from fowt_env.plant.hydro.strips import build_strips
 from fowt_env.plant.hydro.wave_bands import build_band_diffraction, build_wave_bands, can_use_bands
 from fowt_env.plant.mooring import build_mooring
-from fowt_env.scene.options import chosen_stations
+from fowt_env.scene.options import ROTORS, chosen_stations
 from fowt_env.scene.weather import IN_PLANE
 from fowt_env.weather.waves import flat_waves, is_flat
 
@@ -37,12 +35,7 @@ def build_aero(platform, turbine, air, rotor, options):
     """Aero part of a scene with wind."""
     density = platform.environment.air_density
     elements = build_blade_elements(turbine, density, chosen_stations(options["blade_stations"], turbine))
-    if rotor == "bem":
-        skew = build_skewed_wake() if options["skewed_wake"] else None
-        wake = build_dynamic_inflow() if options["dynamic_inflow"] else None
-        model = BemRotor(elements, skew, wake)
-    else:
-        model = build_section_table(elements) if rotor == "lookup" else build_coefficient_table(elements)
+    model = ROTORS[rotor].build(elements, options)
     tower = build_tower_drag(platform.tower, density) if options["tower_drag"] else None
     return Aero(air.series, air.field, model, tower)
 

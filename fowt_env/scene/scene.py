@@ -17,18 +17,17 @@ from fowt_env.plant.events import N_COUNTERS
 from fowt_env.plant.hydro.wave_bands import (
     band_scratch,
 )
-from fowt_env.plant.integrators import INTEGRATORS, rotor_samples
+from fowt_env.plant.integrators import rotor_samples
 from fowt_env.plant.model import N_CACHE, Data
 from fowt_env.plant.rotor_substeps import N_SAMPLE
 from fowt_env.plant.state import Block, state_blocks
 from fowt_env.plant.user_loads import user_data_size
+from fowt_env.scene.options import default_step
 from fowt_env.scene.parts import hydro_in_waves, wake_states
 from fowt_env.scene.user_loads import Load, first_nonfinite_load
 from fowt_env.scene.weather import Sea, Wind, build_weather
 from fowt_env.weather.wind import hub_series
 from fowt_env.weather.wind_field import WindBox, hub_wind
-
-REFERENCE_STEP = 0.0125  # s, of rk4 at fidelity "reference": errs 2e-6 in heave, 2e-7 elsewhere
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,10 +170,8 @@ class Scene:
 
     @property
     def dt(self) -> float:
-        """Default physics step, s: that of the scene's integrator, finer at fidelity "reference"."""
-        if self.options["fidelity"] == "reference" and self.options["integrator"] == "rk4":
-            return REFERENCE_STEP
-        return INTEGRATORS[self.options["integrator"]].dt
+        """Default physics step, s: that of the scene's integrator, or a finer one of its fidelity."""
+        return default_step(self.options)
 
     def with_model(self, parts: Mapping[str, Any] | None = None, **slots: Any) -> "Scene":
         """A copy with some parts of the model replaced (same types: no recompilation).

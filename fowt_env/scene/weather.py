@@ -9,6 +9,7 @@ import numpy as np
 from fowt_env.descriptions.sea_state import SeaState, sea_state_of
 from fowt_env.errors import InputError
 from fowt_env.plant.aero.wind import WindSeries
+from fowt_env.scene.options import ROTORS
 from fowt_env.weather.waves import build_waves
 from fowt_env.weather.wind import build_wind, make_series, nominal_speed
 from fowt_env.weather.wind_field import WindBox, hub_speed, is_field, read_box, rotor_average
@@ -46,7 +47,7 @@ def build_air(wind, seed, turbine, rotor, shear, duration):
     )
     speed = hub_speed(box, hub)
     like = {"reference_height": hub, "reference_length": diameter, "shear_exponent": 0.0}
-    if rotor == "table":
+    if not ROTORS[rotor].full_field:
         period = box.velocity.shape[0] * box.dt if box.periodic else 0.0
         return Air(box, make_series(*rotor_average(box, hub, diameter), period=period, **like), None, speed)
     mean = make_series(np.zeros(1), np.array([[speed, 0.0, 0.0, 0.0, 0.0]]), **like)
@@ -83,8 +84,9 @@ def _in_plane(air):
     if air.series is None:
         return air
     if air.field is not None:
+        averaging = " or ".join(repr(name) for name, model in ROTORS.items() if not model.full_field)
         raise InputError(
-            "wind: a box of full-field wind is not planar; use rotor = 'table' or planar = False"
+            f"wind: a box of full-field wind is not planar; use rotor = {averaging} or planar = False"
         )
     value = air.series.value.copy()
     across = np.abs(value[:, [1, 4]]).max()

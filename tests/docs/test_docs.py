@@ -36,18 +36,21 @@ PAGES = tool("reference_pages")
 AGAIN = "python docs/tools/reference_pages.py writes it anew"
 
 
-def test_the_tables_of_the_environment_page_are_those_of_the_code():
-    text = (DOCS / "environment.md").read_text()
-    assert PAGES.environment_page(text) == text, AGAIN
+@pytest.mark.parametrize("page", PAGES.TABLES)
+def test_the_tables_of_a_page_are_those_of_the_code(page):
+    text = (DOCS / page).read_text()
+    assert PAGES.with_tables(page, text) == text, AGAIN
 
 
 def test_a_table_that_is_not_the_code_s_is_noticed():
     text = (DOCS / "environment.md").read_text()
     assert text.count("| -20    |") == 1
     changed = text.replace("| -20    |", "| -21    |")
-    assert PAGES.environment_page(changed) == text
+    assert PAGES.with_tables("environment.md", changed) == text
     with pytest.raises(ValueError, match="rewards"):
-        PAGES.environment_page(text.replace("from the code: reward -->", "from the code: rewards -->"))
+        PAGES.with_tables(
+            "environment.md", text.replace("from the code: reward -->", "from the code: rewards -->")
+        )
 
 
 def test_the_page_of_the_command_line_is_that_of_the_commands():

@@ -174,6 +174,16 @@ def test_actions_beyond_the_range_saturate_and_are_counted():
     assert env.reset(seed=0)[1]["saturated_actions"] == 0
 
 
+def test_rare_events_are_in_the_infos_of_a_reset_and_of_the_end():
+    env = quick(duration=0.3)
+    deep = FIXED | {"wind": 18.0, "sea": "still", "offsets": {"PtfmHeave": -60.0}}  # under water
+    assert env.reset(options=deep)[1]["events"] == {"HYDROSTATIC_FALLBACK": 1}
+    infos = [env.step((0.0, 0.0))[4] for _ in range(3)]
+    assert ["events" in info for info in infos] == [False, False, True]
+    assert infos[-1]["events"] == {"HYDROSTATIC_FALLBACK": 4}  # ab4 with two loads in each of its first steps
+    assert env.reset(seed=1)[1]["events"] == {}
+
+
 def test_action_types_do_not_matter_and_compile_nothing_anew():
     from fowt_env.envs.episode import act
 

@@ -105,6 +105,24 @@ def test_resets_values_and_infos_are_those_of_gymnasium_s_own_vector_environment
     assert ends[0] >= 1 and ends[1] >= 3, ends
 
 
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep", "Disabled"])
+def test_rare_events_of_each_are_in_the_infos_of_its_end(mode):
+    env = vector(2, autoreset_mode=mode, duration=0.2)
+    single = FowtEnv(**QUICK, duration=0.2)
+    options = [{"offsets": {"PtfmHeave": -60.0}}, {}]
+    _, infos = env.reset(seed=0, options=options)
+    expected = [single.reset(seed=i, options=options[i])[1] for i in range(2)]
+    assert [of_one(infos, i)["events"] for i in range(2)] == [info["events"] for info in expected]
+    assert "events" not in env.step(np.zeros((2, 2)))[4]
+    infos = env.step(np.zeros((2, 2)))[4]
+    infos = infos["final_info"] if mode == "SameStep" else infos
+    single.reset(seed=0, options=options[0])
+    single.step((0.0, 0.0))
+    events = single.step((0.0, 0.0))[4]["events"]
+    assert events["HYDROSTATIC_FALLBACK"] > 1
+    assert [of_one(infos, i)["events"] for i in range(2)] == [events, {}]
+
+
 def test_disabled_autoreset_leaves_the_resets_to_the_caller():
     env = vector(3, autoreset_mode="Disabled", duration=0.2)
     env.reset(seed=0)

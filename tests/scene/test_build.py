@@ -8,8 +8,7 @@ import pytest
 from fowt_env import build_scene, simulate
 from fowt_env.errors import InputError
 from fowt_env.plant.aero.load import BemRotor
-from fowt_env.plant.hydro.load import BandedStrips, ExactStrips
-from fowt_env.plant.integrators import RungeKutta
+from fowt_env.plant.hydro.load import ExactStrips
 from fowt_env.plant.rollout import rollout
 from fowt_env.scene.options import ARGUMENTS
 
@@ -68,13 +67,6 @@ def test_a_level_falls_back_to_what_the_scene_needs():
     assert isinstance(spread.model.hydro.strips, ExactStrips)
     skewed = build_scene(wind=8.0, fidelity="standard", skewed_wake=True)
     assert skewed.rotor == "bem" and isinstance(skewed.model.aero.rotor, BemRotor)
-
-
-def test_an_explicit_part_overrides_its_level():
-    scene = build_scene(wind=8.0, sea=SEA, fidelity="standard", rotor="bem", integrator="rk4")
-    assert isinstance(scene.model.aero.rotor, BemRotor) and isinstance(scene.model.integrator, RungeKutta)
-    assert isinstance(scene.model.hydro.strips, BandedStrips)
-    assert scene.dt == 0.05
 
 
 def test_new_weather_cannot_add_or_remove_aerodynamics():

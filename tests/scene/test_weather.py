@@ -149,8 +149,8 @@ def test_still_water_in_a_scene_with_a_sea_has_no_elevation_and_numbers_of_its_o
     still = build_scene(fidelity="standard").model.hydro.strips
     assert isinstance(still, BandedStrips)
     # drag turns its sign along a hull in still water, and the nodes are those that it takes there
-    assert np.array_equal(flat.model.hydro.strips.lanes.table, still.lanes.table)
-    assert scene.model.hydro.strips.lanes.table.size < still.lanes.table.size
+    assert np.array_equal(flat.model.hydro.strips.quadrature.table, still.quadrature.table)
+    assert scene.model.hydro.strips.quadrature.table.size < still.quadrature.table.size
 
 
 @pytest.mark.parametrize("fidelity", ["standard", "reference"])
@@ -191,6 +191,6 @@ def test_a_trim_is_not_taken_from_strips_with_other_nodes(monkeypatch):
     key = trim_cache.plant_key(scene)
     assert key == trim_cache.plant_key(still) == trim_cache.plant_key(exact)
     flat = scene.with_weather(14.0, None, 0)
-    states = [trim_cache.exact_trim(each, key, 14.0)[0][0] for each in (still, flat, scene, exact)]
+    states = [trim_cache.cached_trim(each, key, 14.0)[0][0] for each in (still, flat, scene, exact)]
     assert states == [1, 2, 3, 4]
-    assert trim_cache.exact_trim(scene.with_weather(14.0, LONG_CRESTED, 2), key, 14.0)[0][0] == 3
+    assert trim_cache.cached_trim(scene.with_weather(14.0, LONG_CRESTED, 2), key, 14.0)[0][0] == 3

@@ -17,7 +17,7 @@ import pandas as pd
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.integrators import INTEGRATORS
 from fowt_env.scene.build import build_scene
-from fowt_env.scene.scene import REFERENCE_STEP
+from fowt_env.scene.options import FIDELITIES
 from fowt_env.simulation import initial_state, simulate
 from fowt_env.training.benchmarks.speed import SEA, TURBULENCE, TimedScene, calibration, header, loop_time
 from fowt_env.training.validation.signal_errors import normalised_rms
@@ -74,9 +74,19 @@ class Variant:
 
 
 REFERENCE = "reference"  # axis of the runs at twice the finest step
-STEP_SIZES = {"rk4": (0.025, 0.05, 0.1), "heun": (0.0125, 0.025, 0.05), "abm4": (0.025, 0.05, 0.1),
-         "ab4": (0.025, 0.05, 0.1)}  # fmt: skip
+LARGER_STEPS = {"rk4": 0.1}  # s, largest of the sweep where it is not the default step
 TABLED = (("mooring", "table"),)
+
+
+def step_sizes(integrator):
+    """Three steps of an integrator, s, each twice the one before."""
+    largest = LARGER_STEPS.get(integrator, INTEGRATORS[integrator].dt)
+    return (0.25 * largest, 0.5 * largest, largest)
+
+
+def _axis(integrator):
+    """Axis of the rows that compare integrators with the BEM rotor."""
+    return "BEM once per step" if INTEGRATORS[integrator].evaluations == 1 else "integrator and step"
 
 
 def variants():
@@ -86,9 +96,7 @@ def variants():
     step against at every stage (rk4 of the same step).
     """
     found = [
-        Variant("BEM once per step" if name == "ab4" else "integrator and step", name, dt, "bem", "exact")
-        for name in INTEGRATORS
-        for dt in STEP_SIZES[name]
+        Variant(_axis(name), name, dt, "bem", "exact") for name in INTEGRATORS for dt in step_sizes(name)
     ]
     found += [Variant("rotor", "rk4", 0.025, rotor, "exact") for rotor in ("lookup", "table")]
     found += [Variant("waves", "rk4", 0.025, "bem", "fast")]
@@ -110,16 +118,16 @@ def variants():
         Variant("all together", name, dt, rotor, "fast", options)
         for rotor, options in (("lookup", ()), ("table", TABLED))
         for name in INTEGRATORS
-        for dt in STEP_SIZES[name][-2:]
+        for dt in step_sizes(name)[-2:]
     ]
     return found
 
 
-# which variants are the levels of build_scene; its reference has the step of scene.REFERENCE_STEP
+# which variants are the levels of build_scene
 LEVELS = {
     "ab4 0.1 s, lookup, fast waves": "standard",
     "ab4 0.1 s, table, fast waves, mooring by table": "fast",
-    f"rk4 {REFERENCE_STEP:g} s, bem, exact waves": "reference",
+    f"rk4 {FIDELITIES['reference'].dt:g} s, bem, exact waves": "reference",
 }
 
 

@@ -1,5 +1,6 @@
 """One run of one controller on one case, to its row: what shapes a figure is imported from here."""
 
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -9,7 +10,7 @@ import pandas as pd
 import fowt_env
 from fowt_env.controllers import make
 from fowt_env.descriptions.checks import is_number
-from fowt_env.errors import ControllerError, ControllerInputError, InputError, SimulationStopped
+from fowt_env.errors import ControllerError, ControllerInputError, InputError, PlantWarning, SimulationStopped
 from fowt_env.training.evaluation.faults import faulted, idling
 from fowt_env.training.evaluation.guard import attempt, reason_of
 from fowt_env.training.evaluation.metrics import METRICS, TIME, turbine_metrics
@@ -62,15 +63,17 @@ def scored(run):
         scene = fowt_env.build_scene(wind=wind, sea=case.sea, seed=run.seed, **options | parts)
 
     def work():
-        frame = fowt_env.simulate(
-            scene,
-            controller=run_controller(run, nominal),
-            duration=run.duration,
-            initial=case.initial,
-            stop_overspeed=case.fault is None,
-            grid_loss=_grid_loss(case),
-            **run.options,
-        )
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", PlantWarning)  # the row's events say the same
+            frame = fowt_env.simulate(
+                scene,
+                controller=run_controller(run, nominal),
+                duration=run.duration,
+                initial=case.initial,
+                stop_overspeed=case.fault is None,
+                grid_loss=_grid_loss(case),
+                **run.options,
+            )
         return frame, turbine_metrics(frame, scene.turbine, run.skip)
 
     # whatever a controller raises or does costs its run, not the evaluation

@@ -20,6 +20,7 @@ import numpy as np
 from fowt_env.plant.aero.bem_rotor import FAST_ROTOR, NO_ROTOR_LOAD, SLOW_ROTOR, RotorLoad, hub_flow
 from fowt_env.plant.aero.blade_elements import blade_section, elements_key, smoothstep
 from fowt_env.plant.compile.decorators import kernel
+from fowt_env.plant.events import Counter
 from fowt_env.plant.state import State, Wrench
 
 # Angle theta = atan2(speed * tip radius, axial wind): 0 parked, 90 deg no wind, 180 deg parked in reversed
@@ -296,10 +297,11 @@ def _inflow(pose, now, series, table):
 
 
 @kernel
-def coefficient_table_load(pose, x, now, series, table):
+def coefficient_table_load(pose, x, now, series, table, counters):
     """RotorLoad of the state x, averaged over a turn of the rotor. No table or no wind series: zero.
 
     now, series  wind (weather/wind.py), taken where the moving rotor is
+    counters     counters[Counter.ROTOR_TABLE_CLAMPED] grows by one where the wind is steeper than STEEPEST
     """
     if table is None:
         return NO_ROTOR_LOAD
@@ -313,6 +315,8 @@ def coefficient_table_load(pose, x, now, series, table):
     cy, cz = flow.cross_y, flow.cross_z
     steepest = sqrt((gy + qy) * (gy + qy) + (gz + qz) * (gz + qz))
     if steepest > STEEPEST * s:
+        if now.u != 0.0:  # in still air there is next to no load to be wrong
+            counters[Counter.ROTOR_TABLE_CLAMPED] += 1.0
         held = STEEPEST * s / steepest
         gy, gz, qy, qz = held * gy, held * gz, held * qy, held * qz
     my, mz = gy + HIGHER_SQUARE * qy, gz + HIGHER_SQUARE * qz

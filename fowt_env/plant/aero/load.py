@@ -53,7 +53,7 @@ def _by_sections(t, pose, x, now, aero, rotor, dx, counters):
 
 @kernel
 def _by_coefficients(t, pose, x, now, aero, rotor, dx, counters):
-    return coefficient_table_load(pose, x, now, aero.wind, rotor)
+    return coefficient_table_load(pose, x, now, aero.wind, rotor, counters)
 
 
 # (t, pose, x, now, aero, rotor, dx, counters) -> RotorLoad; of dx the wake's rates alone are written

@@ -6,7 +6,7 @@ from fowt_env.plant.aero.bem_rotor import NO_ROTOR_LOAD, rotor_load
 from fowt_env.plant.aero.blade_elements import build_blade_elements
 from fowt_env.plant.aero.coefficient_table import build_coefficient_table, coefficient_table_load
 from fowt_env.plant.aero.wind import wind_now
-from fowt_env.plant.events import N_COUNTERS
+from fowt_env.plant.events import N_COUNTERS, Counter
 from fowt_env.plant.state import N_RIGID, State, pose_of
 from fowt_env.weather.wind import make_series
 
@@ -40,8 +40,9 @@ def state(speed, blade_pitch, azimuth=0.0, velocity=(0,) * 6):
     return x
 
 
-def from_table(x, series, table=TABLE):
-    return coefficient_table_load(pose_of(x), x, wind_now(0.0, series), series, table)
+def from_table(x, series, table=TABLE, counters=None):
+    counters = np.zeros(N_COUNTERS) if counters is None else counters
+    return coefficient_table_load(pose_of(x), x, wind_now(0.0, series), series, table, counters)
 
 
 def from_sections(x, series):
@@ -65,6 +66,15 @@ def test_absent_table_or_wind_gives_exactly_zero():
     assert from_table(x, None) == NO_ROTOR_LOAD
     empty = build_coefficient_table(ROTOR._replace(air_density=0.0))
     assert np.all(np.array(from_table(x, wind_series(10.0), empty).wrench) == 0.0)
+
+
+def test_wind_steeper_than_the_table_takes_is_counted_and_a_usual_one_is_not():
+    counters = np.zeros(N_COUNTERS)
+    from_table(state(1.2, 0.1), wind_series(15.0), counters=counters)
+    assert not counters.any()
+    yawing = state(1.2, 0.1, velocity=(0, 0, 0, 0, 0, 0.2))
+    from_table(yawing, wind_series(15.0), counters=counters)
+    assert counters[Counter.ROTOR_TABLE_CLAMPED] == counters.sum() == 1.0
 
 
 def test_same_rotor_is_tabulated_once():

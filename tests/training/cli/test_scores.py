@@ -7,7 +7,8 @@ from typer.testing import CliRunner
 pytest.importorskip("matplotlib", reason="matplotlib is not installed: the extra `plot` is missing")
 
 from fowt_env.files.tables import write_table  # noqa: E402
-from fowt_env.training.cli.console import EXIT_INPUT, app  # noqa: E402
+from fowt_env.training.cli.app import app  # noqa: E402
+from fowt_env.training.cli.console import EXIT_INPUT
 from fowt_env.training.evaluation.evaluate import COLUMNS  # noqa: E402
 from fowt_env.training.reports.scores import FIGURES  # noqa: E402
 

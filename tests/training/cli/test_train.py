@@ -7,7 +7,8 @@ from typer.testing import CliRunner
 pytest.importorskip("stable_baselines3")
 
 from fowt_env.training.benchmarks.training import VECTOR_ENVS
-from fowt_env.training.cli.console import EXIT_INPUT, EXIT_INTERRUPTED, app
+from fowt_env.training.cli.app import app
+from fowt_env.training.cli.console import EXIT_INPUT, EXIT_INTERRUPTED
 from fowt_env.training.rl import callbacks
 from fowt_env.training.rl.train import Training
 

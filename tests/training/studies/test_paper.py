@@ -11,7 +11,7 @@ from fowt_env.descriptions.platform import read_platform
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.errors import InputError
 from fowt_env.plant.state import State
-from fowt_env.training.cli.console import app
+from fowt_env.training.cli.app import app
 from fowt_env.training.studies.froude_model import identify
 from fowt_env.training.studies.paper import load_cases
 from fowt_env.training.studies.paper import report as paper_report

@@ -9,10 +9,9 @@ from typer.testing import CliRunner
 from fowt_env.envs import FowtEnv
 from fowt_env.errors import InputError
 from fowt_env.plant.hydro.linear_damping import LinearDamping
-from fowt_env.plant.integrators import INTEGRATORS
 from fowt_env.plant.state import STATES, State
 from fowt_env.scene.build import build_scene
-from fowt_env.training.cli.console import app
+from fowt_env.training.cli.app import app
 from fowt_env.training.studies.robustness import extremes, long_runs, random_cases, step_limits, study
 
 CALM = {"kind": "jonswap", "Hs": 3.0, "Tp": 9.0}
@@ -283,7 +282,3 @@ def test_momenta_and_energy_are_those_of_the_bodies_one_by_one(platform, turbine
     assert np.allclose(found[0], linear, rtol=1e-9) and np.allclose(found[1], angular, rtol=1e-9)
     expected = rigid_body.kinetic_energy(parts, x[7:10], x[10:13], speed)
     assert long_runs.kinetic_energy(scene, x) == pytest.approx(expected, rel=1e-9)
-
-
-def test_default_steps_are_those_of_the_scene():
-    assert {name: method.order for name, method in INTEGRATORS.items()} == long_runs.ORDERS

@@ -20,7 +20,6 @@ from fowt_env.simulation import initial_state
 from fowt_env.training.studies.robustness.random_cases import Runner, platform_energy, potential_energy
 
 CHUNK = 100_000  # steps between looks at the invariants
-ORDERS = {"rk4": 4, "heun": 2, "abm4": 4, "ab4": 4}
 WEATHER_SEA = {"kind": "jonswap", "Hs": 6.0, "Tp": 10.0}
 
 

@@ -230,7 +230,7 @@ def measured_limit(scene, point, fine, duration=DURATION):
     def holds(dt):
         return bool(np.all(excursions(scene, point, dt, duration)[1] <= GROWTH * (fine + FLOOR)))
 
-    return first_unstable(holds, INTEGRATORS[scene.options["integrator"].dt])
+    return first_unstable(holds, INTEGRATORS[scene.options["integrator"]].dt)
 
 
 def stability_map(kinds=None, integrators=INTEGRATORS, duration=DURATION, progress=None):

@@ -254,7 +254,7 @@ def long_part(sizes, folder, progress):
         memory["growth_MB"] <= MEMORY_MB,
     )  # fmt: skip
     for integrator, order in long.measured_orders().items():
-        least = long.ORDERS[integrator] - ORDER_SLACK
+        least = INTEGRATORS[integrator].order - ORDER_SLACK
         found.claim(
             f"order of {integrator}", "steps of 0.05 and 0.025 s", f"{order:.2f}", f"{least:.2f} or more",
             order >= least,

@@ -1,0 +1,97 @@
+"""The loads of the plant: where each is computed and kept, what leaves it out, what scales it to nothing."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+NOTHING: Mapping[str, Any] = MappingProxyType({})
+
+
+class LoadFacts(NamedTuple):
+    """What is known of a load."""
+
+    summary: str
+    file: str  # of fowt_env/plant, with its equation
+    section: str  # of docs/theory.md
+    slot: str | None  # path in plant.model.Model that is None where it is absent; None: always there
+    total: str  # entry of plant.model.LoadCache that holds it beside others of its kind
+    without: Mapping[str, Any] = NOTHING  # arguments of build_scene that leave it out
+    keys: tuple[str, ...] = ()  # or keys of the platform file, all of them zero
+    strength: tuple[str, ...] = ()  # paths in the model, of those that it has: all at zero, so is the load
+    mirrored: bool = True  # whether a mirrored state and weather give the mirrored load
+
+
+STRIPS = ("hydro.strips.shape.", "hydro.strips.lanes.")
+LOADS = {
+    "weight": LoadFacts(
+        "weight of platform, tower, nacelle and rotor",
+        "rigid_body.py", "2.4", None, "TOTAL", strength=("rigid_body.gravity",),
+    ),
+    "buoyancy": LoadFacts(
+        "hydrostatic pressure up to the still-water plane, at the present attitude",
+        "hydro/hydrostatics.py", "5.3", "hydro", "HYDRO", {"hydrodynamics": False},
+        strength=("hydro.hull.specific_weight",),
+    ),
+    "strips": LoadFacts(
+        "Morison's fluid inertia and drag on strips across the hull, and wave pressure on its taper",
+        "hydro/morison.py, hydro/wave_bands.py", "5.4", "hydro", "HYDRO", {"hydrodynamics": False},
+        strength=tuple(f"{form}density" for form in STRIPS),
+    ),
+    "keel": LoadFacts(
+        "added mass, drag and wave pressure on the keel plate, along the axis",
+        "hydro/morison.py, hydro/wave_bands.py", "5.4", "hydro", "HYDRO", {"hydrodynamics": False},
+        strength=tuple(
+            f"{form}{name}"
+            for form in STRIPS
+            for name in ("heave_added_mass", "keel_area", "axial_drag_coefficient", "axial_drag")
+        ),
+    ),
+    "waves": LoadFacts(
+        "motion and pressure of the water that strips and keel meet; without it the water is still",
+        "hydro/waves.py", "5.4", "hydro.waves", "HYDRO", {"sea": None},
+        strength=("hydro.waves.amplitude", "hydro.waves.velocity", "hydro.strips.sea.weight"),
+    ),
+    "diffraction": LoadFacts(
+        "MacCamy and Fuchs' coefficient of fluid inertia in waves; without it 1 + C_A",
+        "hydro/diffraction.py", "5.4", "hydro.strips.diffraction", "HYDRO", {"diffraction": "none"},
+    ),
+    "current": LoadFacts(
+        "steady velocity of the water that strips meet",
+        "hydro/morison.py", "5.4", "hydro.current", "HYDRO", {"current": None},
+        strength=("hydro.current.u", "hydro.current.v"),
+    ),
+    "linear damping": LoadFacts(
+        "additional damping of each motion, and a spring in yaw",
+        "hydro/linear_damping.py", "5.6", "hydro.damping", "HYDRO",
+        keys=("hydro.linear_damping", "hydro.yaw_stiffness"),
+        strength=tuple(
+            f"hydro.damping.{name}"
+            for name in ("surge", "sway", "heave", "roll", "platform_pitch", "yaw", "yaw_stiffness")
+        ),
+    ),
+    "constant added mass": LoadFacts(
+        "added mass of a potential-flow code, with its velocity-dependent terms",
+        "hydro/added_inertia.py", "5.6", "hydro.added_inertia", "HYDRO",
+        keys=("hydro.added_mass",), strength=("hydro.added_inertia.matrix",),
+    ),
+    "moorings": LoadFacts(
+        "elastic catenaries on the seabed, at rest in the present place",
+        "mooring.py", "5.5", "mooring", "MOORING", {"mooring": False},
+    ),
+    "rotor": LoadFacts(
+        "thrust, torque and the other loads of the blades",
+        "aero/bem_rotor.py, aero/section_table.py, aero/coefficient_table.py", "5.1", "aero", "ROTOR",
+        {"wind": None},
+        strength=("aero.rotor.elements.air_density", "aero.rotor.density"),
+        mirrored=False,  # blades turn one way
+    ),
+    "tower drag": LoadFacts(
+        "drag of the wind on the tower",
+        "aero/tower_drag.py", "5.2", "aero.tower", "TOWER", {"tower_drag": False},
+        strength=("aero.tower.factor",),
+    ),
+    "user loads": LoadFacts(
+        "loads of one's own, `fowt_env.Load`",
+        "user_loads.py", "5.6", "user", "TOTAL", {"loads": ()}, mirrored=False,
+    ),
+}  # fmt: skip

@@ -1,0 +1,225 @@
+"""Each row of INTEGRATORS against what the compiled step does, and that a new one is a row."""
+
+import ast
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from plant_helpers import integrate, state
+
+import fowt_env
+from fowt_env import Force, Load, Motion, build_scene, linearize, load_kernel
+from fowt_env.analysis.linear_model import STATES
+from fowt_env.plant.integrators import INTEGRATORS, START_STEPS, build_integrator
+from fowt_env.plant.measurement import N_MEASUREMENTS
+from fowt_env.plant.model import LoadCache
+from fowt_env.plant.rollout import RUNNING, advance, forget, observe
+from fowt_env.plant.state import State
+
+PACKAGE = Path(fowt_env.__file__).parent
+MASS = 1e6  # kg, of the body under the spring
+OSCILLATIONS = [name for name, method in INTEGRATORS.items() if method.oscillation_limit]
+NO_OSCILLATIONS = [name for name in INTEGRATORS if name not in OSCILLATIONS]
+
+
+@load_kernel
+def spring(parameters, motion, force):
+    """A spring that stiffens and a damper on surge, sway and heave."""
+    for i in range(3):
+        place = motion[Motion.X + i]
+        pull = parameters[0] * place + parameters[1] * place * place * place
+        force[Force.FX + i] = -pull - parameters[2] * motion[Motion.VX + i]
+
+
+def free_body(integrator, stiffness, stiffening=0.0, damping=0.0):
+    """A weightless body in empty space on that spring alone."""
+    load = Load("Spring", spring, [stiffness, stiffening, damping])
+    scene = build_scene(hydrodynamics=False, mooring=False, loads=[load])
+    return scene.with_model(
+        rigid_body=scene.model.rigid_body._replace(gravity=0.0), integrator=build_integrator(integrator)
+    )
+
+
+def mode(integrator, stiffness, damping):
+    """A point mass whose surge has this stiffness (1/s2) and damping (1/s) over its mass."""
+    scene = free_body(integrator, MASS * stiffness, damping=MASS * damping)
+    body = scene.model.rigid_body
+    matrix = np.diag([MASS, MASS, MASS, 1e9, 1e9, 1e9])
+    return scene.with_model(rigid_body=body._replace(mass_matrix=matrix, mass=MASS, s_x=0.0, s_z=0.0))
+
+
+def grows(scene, dt, steps):
+    """Whether a disturbance in surge is larger than at the beginning at the end of so many steps."""
+    x = state(surge=1e-6, vx=1e-6)
+    status = advance(scene.handle(), x, np.zeros(2), 0, steps, dt)
+    return status != RUNNING or max(abs(x[State.SURGE]), abs(x[State.VX])) > 1e-4
+
+
+@pytest.mark.parametrize("name", INTEGRATORS)
+def test_it_converges_at_its_order(name):
+    scene = free_body(name, 4e6, 1e5, 1e5)
+    x0 = state(surge=2.0, sway=-1.0, roll=0.2, yaw=0.4, vx=1.0, wy=0.03, rotor_speed=1.2671)
+    duration, u = 8.0, np.zeros(2)
+    end = integrate(scene, x0, duration, samples=2)[1][-1]
+
+    def error(dt):
+        # a multistep method is given its past: its own first steps are of lower order and would hide it
+        _, start = integrate(scene, x0, START_STEPS * dt, samples=START_STEPS + 1)
+        data = scene.data()
+        handle = scene.handle(data)
+        for k in range(START_STEPS):
+            forget(handle)
+            rates = data.history[START_STEPS - 1 - k]
+            observe(handle, start[k], u, k * dt, rates, np.zeros(N_MEASUREMENTS))
+        forget(handle)
+        data.cache[LoadCache.STEPS] = START_STEPS
+        x = start[-1].copy()
+        assert advance(handle, x, u, START_STEPS, round(duration / dt) - START_STEPS, dt) == RUNNING
+        return np.linalg.norm((x - end)[:13])
+
+    order = np.log2(error(0.05) / error(0.025))
+    assert order == pytest.approx(INTEGRATORS[name].order, abs=0.35)
+
+
+@pytest.mark.parametrize("name", INTEGRATORS)
+def test_a_decay_is_stable_below_its_limit_and_not_above(name):
+    scene, limit = mode(name, 0.0, 1.0), INTEGRATORS[name].decay_limit
+    assert not grows(scene, 0.98 * limit, 3000)
+    assert grows(scene, 1.02 * limit, 3000)
+
+
+@pytest.mark.parametrize("name", OSCILLATIONS)
+def test_an_oscillation_is_stable_below_its_limit_and_not_above(name):
+    scene, limit = mode(name, 1.0, 0.0), INTEGRATORS[name].oscillation_limit
+    assert not grows(scene, 0.98 * limit, 3000)
+    assert not grows(scene, 0.3 * limit, 3000)
+    assert grows(scene, 1.02 * limit, 3000)
+
+
+@pytest.mark.parametrize("name", NO_OSCILLATIONS)
+def test_an_oscillation_grows_at_any_step_where_there_is_no_limit(name):
+    assert grows(mode(name, 1.0, 0.0), 0.3, 200_000)
+
+
+@pytest.fixture(scope="module")
+def stiffest():
+    """Largest rate (1/s) of a mode of the turbine in operation, the blade pitch left out: it is exact."""
+    model = linearize(build_scene(wind=18.0, fidelity="standard"))
+    kept = [i for i, name in enumerate(STATES) if name != "blade_pitch"]
+    return np.abs(np.linalg.eigvals(model.A[np.ix_(kept, kept)])).max()
+
+
+@pytest.mark.parametrize("name", INTEGRATORS)
+def test_its_default_step_is_within_half_its_limit_in_operation(name, stiffest):
+    assert 0.3 < stiffest < 2.0
+    assert 2.0 * INTEGRATORS[name].dt * stiffest < INTEGRATORS[name].decay_limit
+
+
+@pytest.mark.parametrize("name", INTEGRATORS)
+def test_loads_are_evaluated_as_often_as_it_says(name):
+    def count(steps):
+        scene = build_scene(integrator=name)
+        data = scene.data()
+        x = state(heave=-60.0)  # under water, where each evaluation is counted
+        assert advance(scene.handle(data), x, np.zeros(2), 0, steps, 0.01) == RUNNING
+        return data.counters.sum()
+
+    counted = count(14) - count(4)
+    assert counted == 10 * INTEGRATORS[name].evaluations
+
+
+def test_integrators_of_one_class_share_one_compiled_step():
+    before = len(advance.signatures)
+    for name in INTEGRATORS:
+        scene = mode(name, 1.0, 0.0)
+        advance(scene.handle(), state(surge=1.0), np.zeros(2), 0, 1, 0.05)
+    compiled = len(advance.signatures)
+    assert compiled - before <= len({type(method.part) for method in INTEGRATORS.values()})
+    for name in INTEGRATORS:
+        advance(mode(name, 2.0, 0.1).handle(), state(surge=1.0), np.zeros(2), 0, 1, 0.05)
+    assert len(advance.signatures) == compiled
+
+
+# A new integrator is a class, a step and a row of integrators.py
+
+MIDPOINT = """
+
+class Midpoint(NamedTuple):
+    \"\"\"Explicit midpoint rule.\"\"\"
+
+    stages: int = 2
+
+
+@inlined_kernel
+def midpoint(t, x, u, dt, model, method, data):
+    \"\"\"One step of the explicit midpoint rule, blade pitch exact.\"\"\"
+    k1, k2, y = data.stages[0], data.stages[1], data.stages[4]
+    rates(t, x, u, model, data, k1)
+    half = pitch_after(x[State.BLADE_PITCH], u[Command.BLADE_PITCH], 0.5 * dt, model.actuator)
+    whole = pitch_after(x[State.BLADE_PITCH], u[Command.BLADE_PITCH], dt, model.actuator)
+    for i in range(x.shape[0]):
+        y[i] = x[i] + 0.5 * dt * k1[i]
+    y[State.BLADE_PITCH] = half
+    derivative(t + 0.5 * dt, y, u, model, data, k2)
+    for i in range(x.shape[0]):
+        x[i] += dt * k2[i]
+    x[State.BLADE_PITCH] = whole
+
+
+"""
+ROW = """    "midpoint": Method(
+        order=2, evaluations=2, dt=0.05, decay_limit=2.0, oscillation_limit=0.0,
+        part=Midpoint(), step=midpoint,
+    ),
+"""
+USE = """
+import numpy as np
+import fowt_env
+from fowt_env import build_scene, simulate
+
+assert fowt_env.__file__.startswith({folder!r})
+scene = build_scene(integrator="midpoint", hydrodynamics=False)
+assert scene.dt == 0.05
+fine = build_scene(integrator="rk4", hydrodynamics=False)
+start = {{"PtfmSurge": 1.0, "PtfmHeave": -20.0}}
+ends = [
+    simulate(of, None, duration=0.4, dt=dt, control_dt=0.4, output_dt=0.4, start="zero", initial=start)
+    for of, dt in ((fine, 0.0125), (scene, 0.1), (scene, 0.05))
+]
+exact, coarse, half = (frame["PtfmHeave_[m]"].iloc[-1] for frame in ends)
+assert 1.7 < np.log2((coarse - exact) / (half - exact)) < 2.3
+"""
+
+
+def test_a_new_integrator_is_a_row_of_one_file(tmp_path):
+    shutil.copytree(PACKAGE, tmp_path / "fowt_env", ignore=shutil.ignore_patterns("__pycache__"))
+    file = tmp_path / "fowt_env" / "plant" / "integrators.py"
+    text = file.read_text()
+    for mark, new in (("class Method(NamedTuple)", MIDPOINT.lstrip()), ('    "heun": Method(', ROW)):
+        assert text.count(mark) == 1
+        text = text.replace(mark, new + mark)
+    file.write_text(text)
+    ran = subprocess.run(
+        [sys.executable, "-c", USE.format(folder=str(tmp_path))],
+        env=os.environ | {"PYTHONPATH": str(tmp_path), "NUMBA_DISABLE_JIT": "1"},
+        cwd=tmp_path, capture_output=True, text=True, timeout=600,
+    )  # fmt: skip
+    assert ran.returncode == 0, ran.stderr
+
+
+def test_no_module_of_the_simulator_but_the_fidelities_names_an_integrator():
+    allowed = {"plant/integrators.py", "scene/options.py"}
+    rooms = [path for path in PACKAGE.iterdir() if path.name not in ("controllers", "training")]
+    files = [file for room in rooms for file in ([room] if room.suffix == ".py" else room.rglob("*.py"))]
+    assert len(files) > 50
+    naming = {
+        file.relative_to(PACKAGE).as_posix()
+        for file in files
+        for node in ast.walk(ast.parse(file.read_text()))
+        if isinstance(node, ast.Constant) and node.value in tuple(INTEGRATORS)
+    }
+    assert naming <= allowed

@@ -1,0 +1,137 @@
+"""Each row of ROTORS and FIDELITIES: it builds what it says, and errs by no more than it says."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+from plant_helpers import state
+
+import fowt_env
+from fowt_env import build_scene
+from fowt_env.descriptions.platform import read_platform
+from fowt_env.errors import InputError
+from fowt_env.plant.aero.load import rotor_part
+from fowt_env.plant.aero.wind import wind_now
+from fowt_env.plant.events import N_COUNTERS
+from fowt_env.plant.hydro.load import BandedStrips, ExactStrips
+from fowt_env.plant.integrators import INTEGRATORS
+from fowt_env.plant.state import pose_of
+from fowt_env.scene.options import FIDELITIES, ROTORS
+from fowt_env.training.validation.openfast_cases import box_wind
+
+ACCURACY = Path(fowt_env.__file__).resolve().parent.parent / "docs" / "figures" / "accuracy.csv"
+STRIPS = {"exact": ExactStrips, "fast": BandedStrips}
+EXACT = min(ROTORS, key=lambda name: ROTORS[name].error)
+# wind (m/s), rotor speed (rad/s), blade pitch (rad) of operation from cut-in to cut-out
+OPERATION = ((5.0, 0.75, 0.0), (8.0, 0.96, 0.0), (11.4, 1.267, 0.0), (18.0, 1.267, 0.26), (24.0, 1.267, 0.39))
+
+
+def stored_errors(axis):
+    """{(rotor, variant): largest error over the seeds} of an axis of docs/figures/accuracy.csv."""
+    found = {}
+    with ACCURACY.open() as lines:
+        for row in csv.DictReader(line for line in lines if not line.startswith("#")):
+            if row["axis"] in axis:
+                key = row["rotor"], row["variant"]
+                found[key] = max(found.get(key, 0.0), float(row["worst"]))
+    return found
+
+
+# Rotors
+
+
+def load_of(name, wind, speed, blade_pitch, density=1.225):
+    """(thrust, torque, wrench) of a rotor in uniform wind, mean over a turn: (8,)."""
+    platform = read_platform("oc3_hywind")
+    site = platform.environment.model_copy(update={"air_density": density})
+    scene = build_scene(
+        platform.model_copy(update={"environment": site}), wind=float(wind), rotor=name, shear_exponent=0.0
+    )
+    aero, counters = scene.model.aero, np.zeros(N_COUNTERS)
+    rows = []
+    for azimuth in np.linspace(0.0, 2.0 * np.pi / 3.0, 8, endpoint=False):
+        x = state(rotor_speed=speed, blade_pitch=blade_pitch, azimuth=azimuth)
+        now = wind_now(0.0, aero.wind)
+        found = rotor_part(0.0, pose_of(x), x, now, aero, aero.rotor, np.zeros_like(x), counters)
+        rows.append([found.thrust, found.torque, *found.wrench])
+    return np.mean(rows, axis=0)
+
+
+@pytest.mark.parametrize("name", ROTORS)
+def test_its_loads_in_operation_are_those_of_the_exact_one(name):
+    exact = np.array([load_of(EXACT, *point) for point in OPERATION])
+    loads = np.array([load_of(name, *point) for point in OPERATION])
+    assert np.all(np.isfinite(loads)) and np.all(loads[:, :2] > 0.0)
+    # uniform wind: the same solution but for the interpolation in tables, 0.1 % in operation
+    assert np.all(np.abs(loads - exact)[:, :2].max(axis=0) < 1e-3 * exact[:, :2].max(axis=0))
+
+
+@pytest.mark.parametrize("name", ROTORS)
+def test_no_density_and_no_wind_at_rest_are_no_load(name):
+    assert not load_of(name, *OPERATION[1], density=0.0).any()
+    assert not load_of(name, 0.0, 0.0, 0.0).any()
+
+
+@pytest.mark.parametrize("option", ["dynamic_inflow", "skewed_wake"])
+@pytest.mark.parametrize("name", ROTORS)
+def test_induction_is_taken_by_those_that_have_it_and_refused_by_the_others(name, option):
+    if ROTORS[name].induction:
+        assert build_scene(wind=8.0, rotor=name, **{option: True}).rotor == name
+        return
+    with pytest.raises(InputError, match=f"rotor = '{name}': skewed_wake and dynamic_inflow need rotor = "):
+        build_scene(wind=8.0, rotor=name, **{option: True})
+
+
+@pytest.mark.parametrize("name", ROTORS)
+def test_a_box_of_wind_is_met_by_the_blades_or_averaged(name):
+    scene = build_scene(wind=box_wind(), rotor=name, duration=100.0)
+    assert (scene.model.aero.field is not None) == ROTORS[name].full_field
+
+
+def test_its_error_is_the_largest_of_the_stored_ones():
+    stored = {rotor: worst for (rotor, _), worst in stored_errors(["rotor"]).items()}
+    assert {EXACT, *stored} == set(ROTORS) and ROTORS[EXACT].error == 0.0
+    for name, worst in stored.items():
+        assert worst <= ROTORS[name].error <= 2.0 * worst
+
+
+# Fidelities
+
+
+@pytest.mark.parametrize("name", FIDELITIES)
+def test_a_level_has_its_parts_and_its_step(name):
+    level, scene = FIDELITIES[name], build_scene(wind=12.0, sea="paper_wind_wave", fidelity=name)
+    model = scene.model
+    assert scene.rotor == level.rotor and type(model.hydro.strips) is STRIPS[level.wave_loads]
+    assert scene.options["integrator"] == level.integrator
+    assert type(model.integrator) is type(INTEGRATORS[level.integrator].part)
+    assert (model.mooring.table is not None) == (level.mooring == "table")
+    assert scene.dt == (level.dt or INTEGRATORS[level.integrator].dt)
+
+
+@pytest.mark.parametrize("name", FIDELITIES)
+def test_what_is_given_overrides_a_level(name):
+    for rotor in ROTORS:
+        assert build_scene(wind=12.0, fidelity=name, rotor=rotor).rotor == rotor
+    for loads, kind in STRIPS.items():
+        assert type(build_scene(fidelity=name, wave_loads=loads).model.hydro.strips) is kind
+    for integrator, method in INTEGRATORS.items():
+        scene = build_scene(fidelity=name, integrator=integrator)
+        assert type(scene.model.integrator) is type(method.part)
+        own = integrator == FIDELITIES[name].integrator and FIDELITIES[name].dt
+        assert scene.dt == (own or method.dt)
+    for mooring in ("catenary", "table"):
+        table = build_scene(fidelity=name, mooring=mooring).model.mooring.table
+        assert (table is not None) == (mooring == "table")
+
+
+def test_levels_err_as_stored_each_more_than_the_one_before():
+    stored = stored_errors(["reference", "all together"])
+    for level in FIDELITIES.values():
+        dt = level.dt or INTEGRATORS[level.integrator].dt
+        tabled = ", mooring by table" if level.mooring == "table" else ""
+        variant = f"{level.integrator} {dt:g} s, {level.rotor}, {level.wave_loads} waves{tabled}"
+        assert stored[level.rotor, variant] <= level.error <= 2.0 * stored[level.rotor, variant]
+    errors = [level.error for level in FIDELITIES.values()]
+    assert errors == sorted(errors)
