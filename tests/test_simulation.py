@@ -15,11 +15,11 @@ from fowt_env.control import CompiledController
 from fowt_env.controllers import make
 from fowt_env.controllers.constant import Constant
 from fowt_env.errors import ControllerError, InputError, SimulationStopped
+from fowt_env.initial_conditions import initial_state
 from fowt_env.plant.compile.decorators import control_kernel
 from fowt_env.plant.events import EVENTS, Counter
 from fowt_env.plant.rollout import Schedule, advance
 from fowt_env.plant.state import State, pose_of
-from fowt_env.simulation import initial_state
 
 ROOT = Path(__file__).resolve().parent.parent
 COLUMNS = ["PtfmSurge_[m]", "PtfmHeave_[m]", "PtfmPitch_[deg]", "PtfmYaw_[deg]"]

@@ -386,7 +386,7 @@ def trim_prescribed(scene, rotor_speed, blade_pitch, platform="floating"):
     body = scene.model.rigid_body._replace(platform_fixed=platform == "fixed", rotor_fixed=True)
     steady = _Steady(without_fluctuations(scene).with_model(rigid_body=body))
     steady.x[State.ROTOR_SPEED] = rotor_speed
-    steady.x[State.BLADE_PITCH] = steady.u[1] = blade_pitch
+    steady.x[State.BLADE_PITCH] = steady.u[Command.BLADE_PITCH] = blade_pitch
     if platform == "floating":
         remaining = steady.settle(steady.motions())
         if not remaining < 1e3 * TOLERANCE:

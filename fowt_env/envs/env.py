@@ -54,6 +54,7 @@ from fowt_env.envs.snapshot import CARRIED, DATA_CARRIED, Snapshot
 from fowt_env.envs.tables import task_tables
 from fowt_env.envs.tasks import TASKS, Episode, Task, check_offset, task_of
 from fowt_env.errors import InputError, unknown
+from fowt_env.initial_conditions import INITIAL
 from fowt_env.plant.channels import DEG_PER_RAD
 from fowt_env.plant.compile.handle import Handle
 from fowt_env.plant.events import counted
@@ -63,7 +64,7 @@ from fowt_env.plant.state import Command, State
 from fowt_env.scene.build import build_scene
 from fowt_env.scene.options import OPTIONS
 from fowt_env.scene.scene import Scene
-from fowt_env.simulation import INITIAL, check_duration, steps_in
+from fowt_env.simulation import check_duration, steps_in
 
 SMALL_SEA = {"kind": "regular", "H": 1e-3, "T": 10.0}  # of a scene whose first draw happens to have no waves
 SHORTEST_WEATHER = 600.0  # s of random wind and sea: turbulence intensity is defined over 10 min

@@ -10,9 +10,9 @@ from fowt_env.descriptions.wind import read_wind
 from fowt_env.envs.observations import STANDARD, check_channels
 from fowt_env.envs.rewards import check_weights
 from fowt_env.errors import InputError, unknown
+from fowt_env.initial_conditions import INITIAL
 from fowt_env.plant.aero.wind import WindSeries
 from fowt_env.plant.state import State
-from fowt_env.simulation import INITIAL
 from fowt_env.weather.wind import nominal_speed
 from fowt_env.weather.wind_field import is_field
 

@@ -8,7 +8,8 @@ import numpy as np
 from scipy.signal import csd, welch
 
 from fowt_env.errors import InputError
-from fowt_env.visual.time_series import COLOURS, INK, TIME, named_runs, new_figure, save_figure, style_axes
+from fowt_env.visual.style import COLOURS, INK, new_figure, save_figure, style_axes
+from fowt_env.visual.time_series import TIME, named_runs
 
 WAVE = "Wave1Elev_[m]"
 WIND = "Wind_[m/s]"  # column of `fowt trim --out`

@@ -135,7 +135,7 @@ def _(folder, monkeypatch):
 
 @under("A part is not installed")
 def _(folder, monkeypatch):
-    from fowt_env.visual.time_series import new_figure
+    from fowt_env.visual.style import new_figure
 
     missing("matplotlib", monkeypatch)
     return refused(new_figure, 1.0, 1.0)

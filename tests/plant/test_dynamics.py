@@ -12,7 +12,7 @@ from fowt_env.plant.drivetrain import build_drivetrain, shaft_torque
 from fowt_env.plant.hydro.hydrostatics import submerged
 from fowt_env.plant.mooring import mooring_load
 from fowt_env.plant.rigid_body import accelerate, gravity_load, momentum_rate, solve_spd
-from fowt_env.plant.state import State, Wrench, add, pose_of
+from fowt_env.plant.state import N_RIGID, State, Wrench, add, pose_of
 from fowt_env.scene.mass import assemble, build_rigid_body
 
 REFERENCE = Path(__file__).parents[1] / "reference" / "accelerations.csv"
@@ -244,7 +244,7 @@ def test_euler_angles_and_a_quaternion_lead_to_the_same_place(bare_scene):
     def rate(t, y):
         R = rigid_body.quaternion_rotation(y[3:7])
         pose = make_pose(y[:3], R, y[7:10], y[10:13])
-        x, dx = np.zeros(15), np.zeros(15)
+        x, dx = np.zeros(15), np.zeros(N_RIGID)
         x[State.VX : State.WZ + 1], x[State.ROTOR_SPEED] = y[7:13], y[13]
         accelerate(pose, x, gravity_load(pose, body), 0.0, DRY, body, np.zeros((6, 6)), dx)
         return np.r_[R @ y[7:10], rigid_body.quaternion_rate(y[3:7], y[10:13]), dx[SPEEDS]]
@@ -268,7 +268,7 @@ def test_pinned_heavy_gyrostat_keeps_energy_and_vertical_angular_momentum(platfo
 
     def solve(q, w, speed, force):
         pose = make_pose(np.zeros(3), rigid_body.quaternion_rotation(q), np.zeros(3), w)
-        x, dx = np.zeros(15), np.zeros(15)
+        x, dx = np.zeros(15), np.zeros(N_RIGID)
         x[State.WX : State.WZ + 1], x[State.ROTOR_SPEED] = w, speed
         load = add(gravity_load(pose, body), Wrench(*force, 0.0, 0.0, 0.0))
         accelerate(pose, x, load, 0.0, DRY, body, np.zeros((6, 6)), dx)

@@ -78,22 +78,6 @@ def test_still_water_has_no_wave_mark():
     assert [text.get_text().split()[0] for text in figure.axes[0].texts] == ["1P"]
 
 
-def test_evaluation_plot_leaves_failed_runs_out_and_says_so(tmp_path):
-    table = pd.DataFrame(
-        {
-            "controller": ["a", "a", "b", "b"],
-            "case": ["x", "y", "x", "y"],
-            "seed": 1,
-            "status": ["ok", "ok", "ok", "failed"],
-            "PtfmPitch_std_[deg]": [1.0, 2.0, 3.0, np.nan],
-        }
-    )
-    figure = time_series.plot_evaluation(table, ["PtfmPitch_std_[deg]"], tmp_path / "metrics.png")
-    assert (tmp_path / "metrics.png").read_bytes().startswith(PNG)
-    assert "1 of 4 runs failed" in figure.legends[0].get_title().get_text()
-    np.testing.assert_array_equal(figure.axes[0].containers[0].lines[0].get_ydata(), [1.0, 2.0])
-
-
 def test_wrong_input_is_named_and_leaves_no_file(tmp_path):
     with pytest.raises(InputError, match="unknown ending"):
         time_series.plot_run(run(), tmp_path / "run.docx")
@@ -114,8 +98,8 @@ def test_without_matplotlib_the_message_names_the_extra():
         "import pandas as pd\n"
         "from fowt_env.visual import time_series\n"
         "frame = pd.DataFrame({'Time_[s]': [0.0, 1.0], 'RotSpeed_[rpm]': [12.0, 12.0]})\n"
-        "try:\n    plots.plot_run(frame)\n"
-        "except plots.InputError as error:\n    print(error)\n"
+        "try:\n    time_series.plot_run(frame)\n"
+        "except time_series.InputError as error:\n    print(error)\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert "fowt-env[plot]" in done.stdout
@@ -124,61 +108,9 @@ def test_without_matplotlib_the_message_names_the_extra():
 def test_plotting_leaves_pyplot_alone():
     code = (
         "import sys, pandas as pd\nfrom fowt_env.visual import time_series\n"
-        "plots.plot_run(pd.DataFrame({'Time_[s]': [0.0, 1.0], 'RotSpeed_[rpm]': [12.0, 12.0]}))\n"
+        "time_series.plot_run(pd.DataFrame({'Time_[s]': [0.0, 1.0], 'RotSpeed_[rpm]': [12.0, 12.0]}))\n"
         "assert 'matplotlib.pyplot' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-def pareto_board(controllers):
-    figure = dict.fromkeys(("low", "high", "seed_low", "seed_high"), np.nan)
-    entries = []
-    for name, (speed, pitch, travel) in controllers.items():
-        values = dict(zip(time_series.PARETO_METRICS, (speed, pitch, travel, 20.0), strict=True))
-        figures = {key: figure | {"mean": value, "worst": value} for key, value in values.items()}
-        entries.append({"controller": name, "failed": 0, "metrics": figures})
-    return {"controllers": entries, "cases": ["a"], "interval": {"level": 0.95}}
-
-
-def test_pareto_marks_have_areas_in_the_ratio_of_pitch_travel_and_names_that_do_not_overlap(tmp_path):
-    controllers = {f"controller_{i}": (1.0 + 0.004 * i, 0.9, 0.1 * (i + 1)) for i in range(9)}
-    controllers["failed"] = (np.nan, np.nan, np.nan)
-    figure = time_series.plot_pareto(pareto_board(controllers), tmp_path / "pareto.png")
-    axes = figure.axes[0]
-    sizes = [mark.get_sizes()[0] for mark in axes.collections if hasattr(mark, "get_sizes")]
-    assert len(sizes) == 9  # what never finished a run has no place
-    assert sizes[3] / sizes[0] == pytest.approx(4.0)
-    assert sizes[8] / sizes[0] == pytest.approx(9.0 * np.pi / 4.0)  # a square: all of its box
-    figure.draw_without_rendering()
-    boxes = [text.get_window_extent() for text in axes.texts]
-    assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
-    assert (tmp_path / "pareto.png").stat().st_size > 10_000
-
-
-def test_a_pareto_plot_of_failures_alone_is_refused():
-    with pytest.raises(InputError, match="nothing to plot"):
-        time_series.plot_pareto(pareto_board({"x": (np.nan, np.nan, np.nan)}))
-
-
-def test_a_pareto_plot_has_bars_for_intervals_and_the_range_of_the_seeds_where_there_are_none():
-    board = pareto_board({"x": (1.0, 0.9, 0.1)})
-    (entry,) = board["controllers"]
-    for figure in entry["metrics"].values():
-        figure.update(seed_low=0.8 * figure["mean"], seed_high=1.2 * figure["mean"])
-
-    def drawn():
-        axes = time_series.plot_pareto(board).axes[0]
-        ends = np.concatenate(
-            [line.vertices for part in axes.containers for bar in part[2] for line in bar.get_paths()]
-        )
-        caps = sum(len(part[1]) for part in axes.containers)
-        return ends[:, 0].min(), ends[:, 0].max(), caps, axes.get_title(loc="left")
-
-    low, high, caps, title = drawn()
-    assert (low, high) == pytest.approx((0.8, 1.2)) and caps == 0
-    assert title.startswith("means over 1 case; ") and "range over the seeds" in title and "%" not in title
-    for figure in entry["metrics"].values():
-        figure.update(low=0.9 * figure["mean"], high=1.1 * figure["mean"])
-    low, high, caps, title = drawn()
-    assert (low, high) == pytest.approx((0.9, 1.1)) and caps == 4
-    assert "bars: 95 % intervals" in title and "range" not in title

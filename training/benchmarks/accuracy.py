@@ -15,10 +15,11 @@ import numpy as np
 import pandas as pd
 
 from fowt_env.errors import InputError, unknown
+from fowt_env.initial_conditions import initial_state
 from fowt_env.plant.integrators import INTEGRATORS
 from fowt_env.scene.build import build_scene
 from fowt_env.scene.options import FIDELITIES
-from fowt_env.simulation import initial_state, simulate
+from fowt_env.simulation import simulate
 from fowt_env.training.benchmarks.speed import SEA, TURBULENCE, TimedScene, calibration, header, loop_time
 from fowt_env.training.validation.signal_errors import normalised_rms
 from fowt_env.weather.wind_field import is_field
@@ -303,7 +304,7 @@ def openfast_points():
 
 def plot_accuracy(table, path=None):
     """Figure: error over real-time factor, both logarithmic, with the Pareto front and OpenFAST's points."""
-    from fowt_env.visual.time_series import COLOURS, INK, new_figure, save_figure, style_axes
+    from fowt_env.visual.style import COLOURS, INK, new_figure, save_figure, style_axes
 
     points = accuracy_summary(table)
     points = points[np.isfinite(points["real_time_factor"]) & (points["worst"] > 0.0)]
@@ -330,7 +331,7 @@ def plot_accuracy(table, path=None):
 
 def _draw_openfast(axes):
     """OpenFAST's points; its reference, which differs by nothing from itself, on the lower edge."""
-    from fowt_env.visual.time_series import INK
+    from fowt_env.visual.style import INK
 
     theirs = openfast_points()
     style = {"color": "black", "markersize": 6, "markerfacecolor": "none", "linestyle": "none"}
@@ -351,7 +352,7 @@ def _draw_openfast(axes):
 
 def _name_front(axes, front):
     """Numbers at the points of the Pareto front, the levels' with their names; all names beside it."""
-    from fowt_env.visual.time_series import INK
+    from fowt_env.visual.style import INK
 
     lines = []
     for number, row in enumerate(front.to_dict("records"), 1):

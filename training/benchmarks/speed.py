@@ -23,6 +23,7 @@ import fowt_env
 from fowt_env.controllers import make
 from fowt_env.errors import InputError, unknown
 from fowt_env.files.atomic import replacing
+from fowt_env.initial_conditions import initial_state
 from fowt_env.plant.aero.load import rotor_part
 from fowt_env.plant.aero.tower_drag import tower_load
 from fowt_env.plant.aero.wind import wind_now
@@ -36,9 +37,9 @@ from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.mooring import mooring_load
 from fowt_env.plant.rollout import Schedule, advance, forget, observe, output, rollout
-from fowt_env.plant.state import State, pose_of
+from fowt_env.plant.state import Command, State, pose_of
 from fowt_env.scene.build import build_scene
-from fowt_env.simulation import HeldCommand, initial_state, simulate
+from fowt_env.simulation import HeldCommand, simulate
 
 CALIBRATION_STEPS = 10_000_000
 REPEATS = 5
@@ -86,8 +87,8 @@ class TimedScene:
         """(state, command) that runs of this kind begin with."""
         x, u = initial_state(scene, self.begin)
         if self.parked:
-            x[State.ROTOR_SPEED] = u[0] = 0.0
-            x[State.BLADE_PITCH] = u[1] = scene.turbine.pitch_drive.maximum
+            x[State.ROTOR_SPEED] = u[Command.GENERATOR_TORQUE] = 0.0
+            x[State.BLADE_PITCH] = u[Command.BLADE_PITCH] = scene.turbine.pitch_drive.maximum
         return x, u
 
 

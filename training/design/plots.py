@@ -8,7 +8,7 @@ import numpy as np
 
 from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.errors import InputError
-from fowt_env.visual.time_series import COLOURS, INK, new_figure, save_figure, style_axes
+from fowt_env.visual.style import COLOURS, INK, new_figure, save_figure, style_axes
 
 MODE_NAMES = ("surge", "sway", "heave", "roll", "platform_pitch", "yaw", "rotor_speed")
 MODE_MARKERS = ("o", "s", "^", "D", "v", "P", "X")

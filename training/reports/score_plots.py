@@ -5,7 +5,8 @@ As in visual/time_series.py every function returns a matplotlib Figure and, if g
 
 from fowt_env.errors import InputError
 from fowt_env.training.design.plots import WIND, finish_bound
-from fowt_env.visual.time_series import COLOURS, INK, TIME, named_runs, new_figure, save_figure, style_axes
+from fowt_env.visual.style import COLOURS, INK, new_figure, save_figure, style_axes
+from fowt_env.visual.time_series import TIME, named_runs
 
 AGENT_MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*", "p", "h")
 FRONTS = (("full", "-", "the performance limit"), ("measured", "--", "the same, measured channels"))

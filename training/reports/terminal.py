@@ -10,8 +10,9 @@ from fowt_env.training.evaluation.cases import Score, named_cases, read_suite
 from fowt_env.training.evaluation.leaderboard import leaderboard
 from fowt_env.training.evaluation.results import file_name, run_file, write_json
 from fowt_env.training.evaluation.seeds import ranges
+from fowt_env.training.reports.evaluation_plots import plot_evaluation, plot_pareto
 from fowt_env.visual.response import BOXES, plot_boxes
-from fowt_env.visual.time_series import TIME, plot_evaluation, plot_pareto, plot_runs, plot_spectra
+from fowt_env.visual.time_series import TIME, plot_runs, plot_spectra
 
 # printed columns: heading, metric, format
 PRINTED_METRICS = (

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from fowt_env.visual.time_series import COLOURS, new_figure, save_figure, style_axes
+from fowt_env.visual.style import COLOURS, new_figure, save_figure, style_axes
 
 PANELS = (
     ("reward", "validation return"),

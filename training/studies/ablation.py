@@ -21,7 +21,7 @@ from scipy.stats import t
 from fowt_env.errors import InputError, unknown
 from fowt_env.files.markdown import markdown_table
 from fowt_env.training.rl.train import Training, resolve
-from fowt_env.visual.time_series import COLOURS, new_figure, save_figure, style_axes
+from fowt_env.visual.style import COLOURS, new_figure, save_figure, style_axes
 
 TABLE = Path(__file__).with_suffix(".yml")
 KEYS = ("steps", "seeds", "common", "variants")

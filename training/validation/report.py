@@ -8,7 +8,8 @@ from fowt_env.files.atomic import remove_leftovers, replacing
 from fowt_env.files.markdown import markdown_table
 from fowt_env.files.tables import write_table
 from fowt_env.training.validation.openfast_cases import DECAYS
-from fowt_env.visual.time_series import COLOURS, INK, TIME, new_figure, save_figure, spectrum, style_axes
+from fowt_env.visual.style import COLOURS, INK, new_figure, save_figure, style_axes
+from fowt_env.visual.time_series import TIME, spectrum
 
 LABELS = {
     "PtfmSurge_[m]": "surge\n(m)",

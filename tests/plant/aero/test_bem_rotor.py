@@ -400,13 +400,13 @@ import numpy as np
 from fowt_env.plant.aero.blade_elements import build_blade_elements
 from fowt_env.plant.aero.bem_rotor import rotor_load
 from fowt_env.descriptions.turbine import read_turbine
-from fowt_env.plant.state import pose_of
+from fowt_env.plant.state import N_RIGID, pose_of
 from fowt_env.weather.wind import make_series
 from fowt_env.plant.aero.wind import wind_now
 rotor = build_blade_elements(read_turbine("nrel5mw"), 1.225)
 series = make_series([0.0], [[%r, 1.0, 0.5, 0.5, 0.2]], reference_height=90.0, reference_length=126.0,
                      shear_exponent=0.14)
-x = np.zeros(15); x[3:7] = 0.02, 0.05, 0.1, 0.3; x[7:13] = 0.01; x[13:15] = %r, %r
+x = np.zeros(N_RIGID); x[3:7] = 0.02, 0.05, 0.1, 0.3; x[7:13] = 0.01; x[13:15] = %r, %r
 load = rotor_load(0.0, pose_of(x), x, wind_now(0.0, series), series, None, rotor, None, None, x.copy(),
                   np.zeros(3))
 print(*(v.hex() for v in map(float, load.wrench)))
@@ -422,7 +422,7 @@ def test_plain_python_agrees_with_the_compiled_rotor(U, speed, beta):
     )  # fmt: skip
     values = [float.fromhex(v) for v in plain.stdout.split()]
     series = wind_series(U, 1.0, 0.5, 0.5, 0.2, 0.14)
-    x = np.zeros(15)
+    x = np.zeros(N_RIGID)
     x[3:7], x[7:13], x[13:15] = (0.02, 0.05, 0.1, 0.3), 0.01, (speed, beta)
     compiled = load(x, series).wrench
     assert values == pytest.approx(list(compiled), rel=1e-9, abs=1e-3)

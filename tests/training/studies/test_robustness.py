@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 from fowt_env.plant.integrators import INTEGRATORS
 from fowt_env.plant.rollout import RUNNING, advance
-from fowt_env.plant.state import State
+from fowt_env.plant.state import N_RIGID, State
 from fowt_env.training.studies.robustness import (
     extremes,
     long_runs,
@@ -135,7 +135,7 @@ def test_every_integrator_converges_at_its_order():
 
 def test_euler_angles_of_a_tumbling_body_follow_a_quaternion_and_bodies_one_by_one(platform, turbine):
     scene = long_runs.free_scene()
-    x = np.zeros(15)
+    x = np.zeros(N_RIGID)
     x[3:6], x[10:13] = (0.5, 0.3, -1.0), (0.6, 0.02, 0.25)
     x[State.ROTOR_SPEED] = 1.2671
     zero = np.zeros(3)

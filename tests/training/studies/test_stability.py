@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 from fowt_env.envs import FowtEnv
 from fowt_env.errors import InputError
 from fowt_env.plant.hydro.linear_damping import LinearDamping
-from fowt_env.plant.state import STATES, State
+from fowt_env.plant.state import N_RIGID, STATES, State
 from fowt_env.scene.build import build_scene
 from fowt_env.training.cli.app import app
 from fowt_env.training.studies.robustness import extremes, long_runs, random_cases, step_limits, study
@@ -133,7 +133,7 @@ def test_a_plant_that_gains_energy_is_a_failure(scene):
 
 
 def test_a_state_that_is_no_number_is_a_failure(scene, runner):
-    state = np.zeros(15)
+    state = np.zeros(N_RIGID)
     state[State.VX] = np.nan
     assert "non-finite" in runner.run(state, [[0.0, 0.0]], 1.0).failure
 
@@ -166,7 +166,7 @@ def test_potential_energy_is_the_work_against_the_plants_own_loads(still_scene):
     )
     damping = scene.model.hydro.damping._replace(yaw_stiffness=0.0)
     plant = scene.with_model({"hydro.strips.shape": quiet, "hydro.damping": damping})
-    x = np.zeros(15)
+    x = np.zeros(N_RIGID)
     x[:3] = 4.0, -2.0, 0.7
     step = 1e-3
     slope = []
@@ -259,7 +259,7 @@ def test_the_report_counts_what_was_missed(tmp_path, monkeypatch):
 
 
 def test_replay_from_the_command_line_tells_the_outcome(scene, tmp_path):
-    case = random_cases._case(scene, 18.0, CALM, 0, np.zeros(15), [[0.0, 1.5]], 2.0)
+    case = random_cases._case(scene, 18.0, CALM, 0, np.zeros(N_RIGID), [[0.0, 1.5]], 2.0)
     path = tmp_path / "case.json"
     path.write_text(json.dumps(case))
     done = CliRunner().invoke(app, ["benchmark", "stability", "--replay", str(path)])

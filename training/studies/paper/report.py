@@ -10,16 +10,8 @@ from fowt_env.files.atomic import replacing
 from fowt_env.files.markdown import markdown_table
 from fowt_env.files.tables import write_table
 from fowt_env.training.studies.paper import load_cases
-from fowt_env.visual.time_series import (
-    COLOURS,
-    INK,
-    TIME,
-    new_figure,
-    plot_run,
-    save_figure,
-    spectrum,
-    style_axes,
-)
+from fowt_env.visual.style import COLOURS, INK, new_figure, save_figure, style_axes
+from fowt_env.visual.time_series import TIME, plot_run, spectrum
 
 LABELS = {
     load_cases.SURGE: "surge (m)",

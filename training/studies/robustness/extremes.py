@@ -11,12 +11,12 @@ from fowt_env.descriptions.checks import check_whole_number
 from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.envs import FowtEnv
 from fowt_env.errors import InputError
+from fowt_env.initial_conditions import initial_state
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
 from fowt_env.plant.mooring import Mooring
 from fowt_env.plant.rollout import RUNNING, STOP_REASONS, advance, forget, observe
-from fowt_env.plant.state import State
+from fowt_env.plant.state import Command, State
 from fowt_env.scene.build import build_scene
-from fowt_env.simulation import initial_state
 from fowt_env.training.evaluation.run_case import CONTROL_DT
 
 EVENT = 60.0  # s at which gusts start and faults happen
@@ -151,8 +151,8 @@ class _ExtremeRun:
         self.x, self.u = initial_state(scene)
         self.controller = None
         if case.parked:
-            self.x[State.ROTOR_SPEED] = self.u[0] = 0.0
-            self.x[State.BLADE_PITCH] = self.u[1] = scene.turbine.pitch_drive.maximum
+            self.x[State.ROTOR_SPEED] = self.u[Command.GENERATOR_TORQUE] = 0.0
+            self.x[State.BLADE_PITCH] = self.u[Command.BLADE_PITCH] = scene.turbine.pitch_drive.maximum
             self.scene = scene.with_model({"rigid_body.rotor_fixed": True})
         elif self.x[State.ROTOR_SPEED] > 0.0:  # beyond cut-out the trim idles feathered without control
             self.controller = make("pi", scene.turbine, CONTROL_DT)

@@ -23,7 +23,7 @@ from fowt_env.plant.integrators import build_integrator, rates, take_step
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
 from fowt_env.plant.mooring import mooring_load
 from fowt_env.plant.rollout import NON_FINITE, RUNNING, STOP_REASONS, observe, status_of
-from fowt_env.plant.state import Command, State, pose_of
+from fowt_env.plant.state import N_RIGID, Command, State, pose_of
 from fowt_env.scene.build import build_scene
 from fowt_env.scene.options import FIDELITIES
 from fowt_env.simulation import hold
@@ -311,7 +311,7 @@ def draw_sea(rng):
 
 def draw_state(rng, turbine):
     """(15,) state anywhere in the valid range: lines taut to slack, 30 deg of tilt, rotor to 150 %."""
-    x = np.zeros(15)
+    x = np.zeros(N_RIGID)
     offset, bearing = rng.uniform(0.0, 30.0), rng.uniform(0.0, 2.0 * pi)
     x[:3] = offset * cos(bearing), offset * sin(bearing), rng.uniform(-8.0, 8.0)
     tilt, towards = radians(rng.uniform(0.0, 30.0)), rng.uniform(0.0, 2.0 * pi)

@@ -1,0 +1,81 @@
+"""State and command that a run begins with."""
+
+from math import pi
+
+import numpy as np
+
+from fowt_env.analysis.trim import trim
+from fowt_env.descriptions.checks import check_number, refusal
+from fowt_env.descriptions.units import DEGREE, RPM
+from fowt_env.errors import (
+    InputError,
+    unknown,
+)
+from fowt_env.plant.state import OUT_OF_PLANE, Command, State, pose_of
+from fowt_env.scene.scene import Scene
+
+STARTS = ("trim", "zero")
+INITIAL = {  # channel: (state, factor to SI)
+    "PtfmSurge": (State.SURGE, 1.0),
+    "PtfmSway": (State.SWAY, 1.0),
+    "PtfmHeave": (State.HEAVE, 1.0),
+    "PtfmRoll": (State.ROLL, DEGREE),
+    "PtfmPitch": (State.PLATFORM_PITCH, DEGREE),
+    "PtfmYaw": (State.YAW, DEGREE),
+    "Azimuth": (State.AZIMUTH, DEGREE),
+    "RotSpeed": (State.ROTOR_SPEED, RPM),
+    "BldPitch1": (State.BLADE_PITCH, DEGREE),
+    "PtfmTVxi": (State.VX, 1.0),
+    "PtfmTVyi": (State.VY, 1.0),
+    "PtfmTVzi": (State.VZ, 1.0),
+    "PtfmRVxi": (State.WX, DEGREE),
+    "PtfmRVyi": (State.WY, DEGREE),
+    "PtfmRVzi": (State.WZ, DEGREE),
+}
+
+
+def initial_state(
+    scene: Scene, start: str = "trim", initial: dict[str, float] | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """(state, command) that a run begins with.
+
+    start: "trim" the floating steady state in the mean wind; "zero" all platform states zero, with
+    the rotor speed and blade pitch of that wind on a fixed platform. initial: {channel: absolute value}.
+    """
+    if start not in STARTS:
+        raise unknown("start", start, STARTS)
+    point = trim(scene, platform="floating" if start == "trim" else "fixed")
+    x, u = point.state.copy(), point.command.copy()
+    rates = {}
+    for name, value in (initial or {}).items():
+        key = str(name).split("_[")[0]
+        if key not in INITIAL:
+            raise unknown("channel of initial", name, INITIAL)
+        check_number(f"initial[{name!r}]", value)
+        index, factor = INITIAL[key]
+        if scene.model.rigid_body.plane is not None and index in OUT_OF_PLANE and value != 0.0:
+            raise refusal(f"initial[{name!r}]", value, "0 in a planar scene")
+        if State.VX <= index <= State.WZ:
+            rates[index] = value * factor
+        else:
+            x[index] = value * factor
+    if abs(x[State.PLATFORM_PITCH]) >= 0.5 * pi:
+        raise InputError(
+            f"initial['PtfmPitch'] = {x[State.PLATFORM_PITCH] / DEGREE:g}: must be inside (-90, 90) deg"
+        )
+    if rates:  # given in inertial axes, kept in body axes
+        inertial = np.zeros(6)
+        for index, value in rates.items():
+            inertial[index - State.VX] = value
+        p = pose_of(x)
+        rotation = np.array([[p.r11, p.r12, p.r13], [p.r21, p.r22, p.r23], [p.r31, p.r32, p.r33]])
+        x[State.VX : State.VX + 3] = rotation.T @ inertial[:3]
+        x[State.WX : State.WX + 3] = rotation.T @ inertial[3:]
+    drive = scene.turbine.pitch_drive
+    if not drive.minimum <= x[State.BLADE_PITCH] <= drive.maximum:
+        raise InputError(
+            f"initial['BldPitch1'] = {x[State.BLADE_PITCH] / DEGREE:g} deg: must be in"
+            f" [{drive.minimum / DEGREE:g}, {drive.maximum / DEGREE:g}] deg"
+        )
+    u[Command.BLADE_PITCH] = x[State.BLADE_PITCH]
+    return x, u
