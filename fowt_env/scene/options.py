@@ -54,7 +54,8 @@ ROTORS = {
     ),
     "table": RotorModel(
         "the whole rotor as one table",
-        lambda elements, options: build_coefficient_table(elements), induction=False, full_field=False, error=2e-2,
+        lambda elements, options: build_coefficient_table(elements),
+        induction=False, full_field=False, error=2e-2,
     ),
 }  # fmt: skip
 FIDELITIES = {

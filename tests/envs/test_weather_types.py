@@ -8,7 +8,7 @@ from gymnasium.error import ResetNeeded
 from fowt_env.analysis.trim import mean_derivative
 from fowt_env.descriptions.sea_state import JointTable
 from fowt_env.envs import FowtEnv, FowtVectorEnv
-from fowt_env.envs.episode import act, act_physical, start
+from fowt_env.envs.episode import act, act_physical, start_episode
 from fowt_env.envs.episode_batch import act_all
 from fowt_env.envs.tasks import Task
 from fowt_env.errors import InputError
@@ -31,7 +31,7 @@ EPISODES = [
     {"wind": {"kind": "steps", "speeds": [13.0, 15.0], "every": 50.0}, "sea": "still"},
     {"wind": BOX, "sea": JONSWAP},  # rotor-averaged for the table: a series
 ]
-ENTRIES = (act, act_physical, act_all, start, mean_derivative)
+ENTRIES = (act, act_physical, act_all, start_episode, mean_derivative)
 
 
 def quick(**settings):
