@@ -5,6 +5,7 @@ import os
 import signal
 import sys
 import time
+import warnings
 from types import SimpleNamespace
 
 import numpy as np
@@ -52,6 +53,8 @@ def simulate(scene, controller=None, duration=10.0, initial=None, **options):
             raise
     frame = pd.DataFrame({"Time_[s]": times, **series})
     frame.attrs["events"] = {"BEM_FALLBACK": 0, "MOORING_UNCONVERGED": 3} if scene.seed == 2 else {}
+    if scene.seed == 2:  # as simulate does, for the line that called it
+        warnings.warn("MOORING_UNCONVERGED 3", fowt_env.PlantWarning, stacklevel=2)
     return frame
 
 

@@ -64,7 +64,7 @@ SLACK = 1e-9  # relative, by which a command may miss a limit in rounding
 
 
 def build_torque_curve(torque_law, region3="constant_torque"):
-    """TorqueCurve of a descriptions.platform.TorqueLaw; region3 is "constant_torque" or "constant_power".
+    """TorqueCurve of a descriptions.turbine.TorqueLaw; region3 is "constant_torque" or "constant_power".
 
     The slip line of region 2.5 rises from the synchronous speed, region3_start/(1 + slip), to the
     region-3 torque at region3_start; it takes over from the parabola where the two meet.
@@ -117,7 +117,7 @@ def build_drivetrain(turbine):
 
 
 def build_pitch_actuator(pitch_drive):
-    """PitchActuator of a descriptions.platform.PitchDrive."""
+    """PitchActuator of a descriptions.turbine.PitchDrive."""
     return PitchActuator(
         time_constant=float(pitch_drive.time_constant),
         rate_limit=float(pitch_drive.rate_limit),
@@ -127,7 +127,7 @@ def build_pitch_actuator(pitch_drive):
 
 
 def build_torque_limits(torque_law):
-    """TorqueLimits of a descriptions.platform.TorqueLaw."""
+    """TorqueLimits of a descriptions.turbine.TorqueLaw."""
     return TorqueLimits(maximum=float(torque_law.max_torque), rate_limit=float(torque_law.max_torque_rate))
 
 

@@ -17,6 +17,7 @@ from fowt_env.descriptions.sea_state import (
     SeaState,
     iec_gamma,
     joint_sea_state,
+    joint_tables,
     read_sea_state,
     sea_state_of,
     sea_states,
@@ -465,7 +466,7 @@ def test_gamma_follows_the_iec_rule_where_it_is_not_given():
 
 @pytest.mark.parametrize("name", names("joint_tables"))
 def test_joint_sea_states_equal_the_rows_and_are_linear_between_them(name):
-    table = description.joint_tables()[name]
+    table = joint_tables()[name]
     for wind, Hs, Tp in zip(table.wind, table.Hs, table.Tp, strict=True):
         state = joint_sea_state(name, wind)
         assert (state.wind, state.Hs, state.Tp) == (wind, Hs, Tp)

@@ -105,7 +105,7 @@ def test_the_printed_reward_formulas_give_what_the_kernels_give():
 def test_the_info_table_has_every_key_and_no_other():
     section = (DOCS / "environment.md").read_text().partition("\n## Info\n")[2].partition("\n## ")[0]
     rows = [line.strip("| ").split(" | ") for line in section.splitlines() if line.startswith("| `")]
-    told = {"reset": set(), "step": set(), "step, at a failure": set()}
+    told = {"reset": set(), "step": set(), "last step": set(), "step, at a failure": set()}
     for key, where, _ in rows:
         name = key.strip("`")
         names = [f"reward/{term}" for term in REWARD_TERMS] if name == "reward/<term>" else [name]
@@ -115,7 +115,7 @@ def test_the_info_table_has_every_key_and_no_other():
     assert set(env.reset(seed=1)[1]) == told["reset"]
     assert set(env.step([0.0, 0.0])[4]) == told["step"]
     env.reset(seed=1, options={"offsets": {"RotSpeed": 6.0}})
-    assert set(env.step([0.0, 0.0])[4]) == told["step"] | told["step, at a failure"]
+    assert set(env.step([0.0, 0.0])[4]) == told["step"] | told["last step"] | told["step, at a failure"]
 
 
 def test_every_task_is_in_the_reference():

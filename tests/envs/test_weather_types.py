@@ -166,7 +166,7 @@ def test_the_kind_follows_from_all_that_a_task_can_draw(sea, waves):
 def test_a_snapshot_of_still_water_is_not_for_an_environment_with_a_sea():
     env, still = quick(task="steady", sea=JONSWAP), quick(task="steady")
     for each in (env, still):
-        each.reset(seed=1)
+        each.reset(seed=7)
     with pytest.raises(InputError, match="kind of weather"):
         env.set_state(still.get_state())
     batch = FowtVectorEnv(2, threads=1, task="steady", sea=JONSWAP, **QUICK)

@@ -6,7 +6,7 @@ blade is a placeholder: nothing that uses this record looks at it.
 
 import numpy as np
 
-from fowt_env.descriptions import platform as description
+from fowt_env.descriptions import turbine as description
 
 
 def torque_law(**changes):

@@ -42,6 +42,16 @@ def test_a_run_at_the_generator_s_limits_or_past_the_overspeed_says_so(tmp_path,
     assert "overspeed" not in quiet and "rate limit" not in quiet
 
 
+def test_a_run_with_harmful_rare_events_says_so_in_one_line():
+    arguments = ["simulate", "--wind", "none", "--controller", "none", "--start", "zero", "--duration", "1"]
+    quiet = fowt(*arguments, "--initial", "PtfmHeave=-60")  # under water: counted, and as accurate as ever
+    assert "Warning" not in quiet[1]
+    arguments = ["simulate", "--wind", "10", "--controller", "none", "--fidelity", "fast", "--duration", "1"]
+    result = fowt(*arguments, "--initial", "PtfmRVzi=10")
+    (line,) = (line for line in result[1].splitlines() if line.startswith("Warning"))
+    assert line.startswith("Warning: oc3_hywind: ROTOR_TABLE_CLAMPED") and line.endswith("needs it")
+
+
 def test_parquet_holds_the_same_bits(tmp_path):
     wind = json.dumps({"kind": "ntm", "speed": 16, "class": "A"})
     for name in ("a", "b"):

@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 import fowt_env
 from fowt_env.training.cli import app as cli
 from fowt_env.training.cli import tables as cli_tables
+from fowt_env.training.cli.evaluate import _print_evaluation
 from fowt_env.training.cli.simulate import TRIM_CHANNELS
 
 WIDTHS = {"80 columns": {"COLUMNS": "80"}, "a pipe": {}}
@@ -212,7 +213,7 @@ def test_evaluate_prints_every_figure_of_what_it_shows_in_full(width, capsys):
     ]
     table = pd.DataFrame(rows)
     means, board = summary(table), leaderboard(table)
-    cli._print_evaluation(table, means, board)
+    _print_evaluation(table, means, board)
     printed = capsys.readouterr().out
     wanted = [*summary_rows(means, width or 999)[1], *leaderboard_rows(board, width or 999)[2]]
     assert_whole(printed, " ".join(" ".join(row) for row in wanted).split(), None)

@@ -18,6 +18,7 @@ from fowt_env.descriptions.platform import read_platform
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.errors import InputError
 from fowt_env.training.cli import app as cli
+from fowt_env.training.cli.console import EXIT_STOPPED
 from fowt_env.training.evaluation import engines, guard, provenance, results
 from fowt_env.training.evaluation.cases import Case
 from fowt_env.training.evaluation.evaluate import COLUMNS, evaluate
@@ -160,7 +161,7 @@ def test_a_controller_that_leaves_the_working_folder_takes_nothing_with_it(plant
 def test_a_command_that_is_ended_from_inside_says_so_and_does_not_return_0(monkeypatch):
     monkeypatch.setattr(fowt_env, "simulate", lambda *arguments, **options: sys.exit(0))
     result = CliRunner().invoke(cli.app, ["simulate", "--duration", "5", "--wind", "none"])
-    assert result.exit_code == cli.EXIT_STOPPED and "SystemExit: 0" in result.stderr
+    assert result.exit_code == EXIT_STOPPED and "SystemExit: 0" in result.stderr
 
 
 def test_the_command_goes_through_to_its_leaderboard_and_says_what_failed_and_what_was_rare(plant, tmp_path):

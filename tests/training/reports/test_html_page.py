@@ -12,6 +12,7 @@ pytest.importorskip("plotly", reason="plotly is not installed: the extra `report
 import fowt_env  # noqa: E402
 from fowt_env.errors import InputError  # noqa: E402
 from fowt_env.training.cli import app as cli  # noqa: E402
+from fowt_env.training.cli.console import EXIT_INPUT  # noqa: E402
 from fowt_env.training.evaluation.evaluate import run_file  # noqa: E402
 from fowt_env.training.reports.html_page import SCHEDULE_WINDS, write_report  # noqa: E402
 
@@ -210,7 +211,7 @@ def test_a_page_comes_out_where_the_platform_of_the_evaluation_is_a_file_of_anot
 
 def test_the_command_names_what_is_wrong(tmp_path):
     result = CliRunner().invoke(cli.app, ["report", str(tmp_path)])
-    assert result.exit_code == cli.EXIT_INPUT and "holds no results.csv" in result.stderr
+    assert result.exit_code == EXIT_INPUT and "holds no results.csv" in result.stderr
 
 
 @pytest.fixture(scope="module")
