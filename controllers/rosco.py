@@ -29,6 +29,7 @@ import numpy as np
 from scipy.interpolate import RectBivariateSpline
 from scipy.optimize import brentq
 
+from fowt_env.caches import Cache
 from fowt_env.control import check_control_dt
 from fowt_env.controllers.tuned import tuned
 from fowt_env.descriptions.checks import check_number, check_one_of
@@ -273,16 +274,19 @@ class Table:
     cq: np.ndarray
 
 
-_tables = {}  # (id of the turbine, density) -> (turbine, Table): runs of one scene share it
+_tables = Cache(16)  # (id of the turbine, density) -> (turbine, Table): runs of one scene share it
 
 
 def _table(turbine, density):
     """Table of a turbine's blade elements."""
     key = (id(turbine), density)
-    if key not in _tables:
+
+
+    def make():
         cp, ct, cq = performance(build_blade_elements(turbine, density), RATIOS, PITCHES)
-        _tables[key] = turbine, Table(RATIOS, PITCHES, cp, ct, cq)
-    return _tables[key][1]
+        return turbine, Table(RATIOS, PITCHES, cp, ct, cq)  # with the turbine, whose id is then its own
+
+    return _tables.get(key, make)[1]
 
 
 def poles(turbine, density, table):

@@ -7,7 +7,6 @@ the hull's force at the spectrum's peak. The controls are the rates of torque an
 
 import pickle
 from dataclasses import asdict, dataclass, fields, replace
-from functools import lru_cache
 from math import inf, pi, sqrt
 
 import numpy as np
@@ -17,6 +16,7 @@ from scipy.optimize import least_squares
 from fowt_env.analysis.linear_model import linearize
 from fowt_env.analysis.trim import without_fluctuations
 from fowt_env.analysis.wave_excitation import wave_force
+from fowt_env.caches import Cache, cached
 from fowt_env.descriptions.checks import check_number
 from fowt_env.descriptions.iec import ntm_sigma
 from fowt_env.descriptions.sea_state import joint_sea_state, sea_state_of
@@ -103,7 +103,7 @@ MODEL_SHAPES = {  # of the fields of DesignModel
 }
 
 
-@lru_cache(maxsize=64)
+@cached(64)
 def wind_filter(speed, height, diameter):
     """(T1, T2, noise): v = noise white / ((1 + T1 s)(1 + T2 s)) like the rotor-averaged Kaimal wind.
 
@@ -176,15 +176,13 @@ def _state_rows():
     return [State[name.upper()] for name in PLANT]
 
 
-_REMEMBERED = {}  # (platform, turbine, rotor model) as bytes -> DesignModels
+_MODELS = Cache(16)  # (platform, turbine, rotor model) as bytes -> DesignModels
 
 
 def design_models(scene):
     """DesignModels of the scene's platform over WINDS; remembered per platform, turbine and rotor model."""
     key = pickle.dumps((scene.platform, scene.turbine, scene.rotor))
-    if key not in _REMEMBERED:
-        _REMEMBERED[key] = tuple(design_model(scene, speed) for speed in WINDS)
-    return _REMEMBERED[key]
+    return _MODELS.get(key, lambda: tuple(design_model(scene, speed) for speed in WINDS))
 
 
 def sampled(a, b, dt):

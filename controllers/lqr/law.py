@@ -14,6 +14,7 @@ from math import exp
 
 import numpy as np
 
+from fowt_env.caches import Cache
 from fowt_env.control import CompiledController, check_control_dt
 from fowt_env.controllers.lqr import design
 from fowt_env.controllers.lqr.design import (
@@ -233,7 +234,7 @@ def blocks(models, weights, rated_speed, dt):
     return np.array(rows)
 
 
-_BLOCKS = {}  # (id of models, weights, control period) -> (models, their blocks): environments make many
+_BLOCKS = Cache(32)  # (id of models, weights, control period) -> (models, their blocks)
 
 
 class LQR(CompiledController):
@@ -278,11 +279,10 @@ class LQR(CompiledController):
     def take(self, models):
         """Take the gains for DesignModels of winds 1 m/s apart."""
         known = (id(models), self.weights, self.control_dt)
-        if known not in _BLOCKS:
-            rated = self.turbine.rated_rotor_speed
-            # the models are kept with what was made of them, so that their id stays theirs
-            _BLOCKS[known] = models, blocks(models, self.weights, rated, self.control_dt)
-        self.install(models[0].wind, _BLOCKS[known][1])
+        rated = self.turbine.rated_rotor_speed
+        # the models are kept with what was made of them, so that their id stays theirs
+        made = _BLOCKS.get(known, lambda: (models, blocks(models, self.weights, rated, self.control_dt)))
+        self.install(models[0].wind, made[1])
 
     def install(self, first_wind, table):
         """Take the blocks of winds 1 m/s apart."""

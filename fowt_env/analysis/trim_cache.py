@@ -6,10 +6,11 @@ from dataclasses import replace
 from math import floor
 
 from fowt_env.analysis.trim import trim
+from fowt_env.caches import Cache
 from fowt_env.descriptions.records import Record
 
 GRID = 0.25  # m/s between exact trims; between them the state is linear in the wind speed
-_KNOWN = {}  # (plant, water, shear exponent, wind speed) -> (state, command)
+_TRIMS = Cache(4096)  # (plant, water, shear exponent, wind speed) -> (state, command)
 
 
 def plant_key(scene):
@@ -40,13 +41,13 @@ def cached_trim(scene, key, speed):
     trim is not remembered.
     """
     if scene.model.aero.field is not None:
-        point = trim(scene)
-        return point.state, point.command
+        return _state_and_command(trim(scene))
     entry = (key, _water(scene), scene.model.aero.wind.shear_exponent, float(speed))
-    if entry not in _KNOWN:
-        point = trim(replace(scene, wind_speed=float(speed)))
-        _KNOWN[entry] = (point.state, point.command)
-    return _KNOWN[entry]
+    return _TRIMS.get(entry, lambda: _state_and_command(trim(replace(scene, wind_speed=float(speed)))))
+
+
+def _state_and_command(point):
+    return point.state, point.command
 
 
 def interpolated_trim(scene, key, speed):

@@ -22,12 +22,6 @@ from fowt_env.envs.snapshot import Snapshot
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.compile.handle import Handle
 
-# GNU's OpenMP, which runs numba's threads on Linux, lets an idle thread spin for milliseconds: best between
-# steps on a quiet machine, ruinous beside other programs (docs/performance.md). This many turns are some 50
-# microseconds, longer than what lies between two steps. Read when numba starts its threads.
-if "OMP_WAIT_POLICY" not in os.environ:
-    os.environ.setdefault("GOMP_SPINCOUNT", "3000")
-
 AUTORESET_MODES = {mode.value: mode for mode in AutoresetMode}
 INFO_KEYS = (*REWARD_KEYS, "time")  # those of every step that are float64
 INFO_MASKS = tuple(f"_{key}" for key in INFO_KEYS)
@@ -83,6 +77,7 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
             raise InputError(
                 f"render_mode = {settings['render_mode']!r}: a vector environment has no pictures"
             )
+        _shorten_spinning()
         most = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined] # set when numba starts
         self.threads = min(numba.get_num_threads(), num_envs) if threads is None else threads
         _count("threads", self.threads, most)
@@ -408,3 +403,14 @@ def _check_alike(i, env, first):
     raise InputError(
         f"per_env[{i}]: another compiled kind than the first, in {', '.join(parts)}; use the same"
     )
+
+
+def _shorten_spinning():
+    """Have idle threads sleep soon, unless the user has decided on that; read when numba starts its threads.
+
+    GNU's OpenMP, which runs them on Linux, lets an idle thread spin for milliseconds: best between steps on a
+    quiet machine, ruinous beside other programs (docs/performance.md). This many turns are some 50
+    microseconds, longer than what lies between two steps.
+    """
+    if "OMP_WAIT_POLICY" not in os.environ:
+        os.environ.setdefault("GOMP_SPINCOUNT", "3000")

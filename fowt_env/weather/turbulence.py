@@ -22,10 +22,10 @@ Assumptions, stated because the standard leaves them open:
   the same strength. The point series has the standard deviation sigma_1 over its period.
 """
 
-from functools import lru_cache
 
 import numpy as np
 
+from fowt_env.caches import cached
 from fowt_env.descriptions.iec import length_scale
 
 LENGTH_RATIO = np.array([8.1, 2.7, 0.66])  # L_u, L_v, L_w over Lambda_1 (IEC Annex B)
@@ -40,7 +40,7 @@ TABLE_SIZE = 2000  # log-spaced; log-log interpolation is then within 1e-5
 PAIR_NODES = 200  # quadrature over pair distances, quadratically denser towards 0
 
 
-@lru_cache(maxsize=1)
+@cached(1)
 def _pair_tables():
     """Logarithms of k R, of the mean coherence of pairs, and of its gradient moment; (n,) each.
 
@@ -105,7 +105,7 @@ def _kaimal_below(frequency, speed, length):
     return 1.0 - (1.0 + 6.0 * frequency * length / speed) ** (-2.0 / 3.0)
 
 
-@lru_cache(maxsize=64)
+@cached(64)
 def amplitudes(speed, sigma, height, diameter, samples, step, average):
     """Amplitudes (m/s) of u, v, w, vertical_shear, horizontal_shear at k/(samples step); (5, m).
 

@@ -7,11 +7,11 @@ descriptions/wind.py; plant/aero/wind.py has the wind at any instant and point.
 """
 
 import operator
-from functools import lru_cache
 from math import cos, hypot, radians, sin
 
 import numpy as np
 
+from fowt_env.caches import cached
 from fowt_env.descriptions.iec import EXTREME_SHEAR_EXPONENT, etm_sigma, extreme_speed, ntm_sigma
 from fowt_env.descriptions.wind import SHARED, Number, Seed, read_wind
 from fowt_env.errors import InputError
@@ -22,7 +22,7 @@ from fowt_env.weather.turbulence import SHORTEST_PERIOD, hub_turbulence, turbule
 OPENING = 60.0  # s; the platform trims to the mean of this much of a user's series
 
 
-@lru_cache(maxsize=64)
+@cached(64)
 def rotor_factor(exponent, height, diameter):
     """Mean over radius and azimuth of the power law (Z/height)**exponent, every length of blade alike."""
     if exponent == 0.0:
@@ -115,7 +115,7 @@ def build_wind(spec, *, reference_height, rotor_diameter, shear_exponent, seed, 
     )
 
 
-@lru_cache(maxsize=8)
+@cached(8)
 def _even_times(period, samples):
     """Sample times (samples,) from 0 to the period, s: one array for all series alike, never written."""
     return np.linspace(0.0, period, samples)

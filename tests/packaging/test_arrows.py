@@ -10,7 +10,8 @@ import fowt_env
 ROOT = Path(fowt_env.__file__).resolve().parent.parent
 # from the ground up; a layer imports itself and what stands before it
 LAYERS = (
-    "errors", "folders", "registration", "plant", "descriptions", "weather", "scene", "files", "analysis",
+    "errors", "caches", "folders", "registration", "plant", "descriptions", "weather", "scene", "files",
+    "analysis",
     "control", "initial_conditions", "simulation", "visual", "envs", "controllers", "training",
     "training.evaluation", "training.design", "training.rl", "training.reports", "training.validation",
     "training.benchmarks", "training.studies", "training.cli",

@@ -7,6 +7,7 @@ import pytest
 from fowt_env import build_scene
 from fowt_env.analysis import trim_cache
 from fowt_env.analysis.trim import OperatingPoint, mean_derivative
+from fowt_env.caches import Cache
 from fowt_env.errors import InputError
 from fowt_env.plant.aero.wind import WindSeries
 from fowt_env.plant.hydro.load import BandedStrips, ExactStrips
@@ -184,7 +185,7 @@ def test_a_trim_is_not_taken_from_strips_with_other_nodes(monkeypatch):
         return OperatingPoint({}, np.full(3, len(found)), np.zeros(2), scene.wind_speed, "floating")
 
     monkeypatch.setattr(trim_cache, "trim", trim)
-    monkeypatch.setattr(trim_cache, "_KNOWN", {})
+    monkeypatch.setattr(trim_cache, "_TRIMS", Cache(100))
     options = dict(wind=14.0, fidelity="standard", current=0.5)
     still, scene = build_scene(**options), build_scene(sea=JONSWAP, **options)
     exact = build_scene(sea=CROSSING, **options)

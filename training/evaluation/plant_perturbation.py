@@ -1,10 +1,10 @@
 """Plants whose figures differ from the files': factors on masses, hydrodynamics, moorings and actuators."""
 
-from functools import lru_cache
 from typing import Annotated
 
 from pydantic import Field
 
+from fowt_env.caches import cached
 from fowt_env.descriptions.platform import read_platform
 from fowt_env.descriptions.records import NonNegative, Positive, Record
 from fowt_env.descriptions.turbine import read_turbine
@@ -92,7 +92,7 @@ class PlantPerturbation(Record):
         return {name: getattr(self, name) for name in PLANT if getattr(self, name) != 1.0}
 
 
-@lru_cache(maxsize=64)
+@cached(64)
 def perturbed_parts(perturbation, platform="oc3_hywind"):
     """{"platform", "turbine"} of a built-in platform or file with a PlantPerturbation, for build_scene."""
     return plant_settings(perturbation.factors, platform)

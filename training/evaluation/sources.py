@@ -1,8 +1,9 @@
 """Which files a program depends on, by the imports that stand in them, at their top or inside a function."""
 
 import ast
-from functools import lru_cache
 from pathlib import Path
+
+from fowt_env.caches import cached
 
 
 def imported_files(starts, roots, inside):
@@ -26,7 +27,7 @@ def imported_files(starts, roots, inside):
     return sorted(found)
 
 
-@lru_cache(maxsize=4096)
+@cached(4096)
 def _imports(path, stamp):
     """(level, module) of every import in a file, of `from a import b` also a.b; none of what is no Python."""
     try:

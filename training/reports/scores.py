@@ -10,12 +10,12 @@ seeds of one configuration make a group, whose interval resamples training and w
 
 import re
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
+from fowt_env.caches import cached
 from fowt_env.controllers import DESIGN, POLICY, information
 from fowt_env.errors import InputError, unknown
 from fowt_env.files.atomic import replacing
@@ -215,7 +215,7 @@ def _counts(table, chosen):
     return pd.DataFrame(rows)
 
 
-@lru_cache(maxsize=256)
+@cached(256)
 def inputs(label):
     """What a controller uses: "measured" for channels of MEASURED, and by name what else it uses.
 

@@ -30,6 +30,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
+from fowt_env.caches import Cache
 from fowt_env.errors import InputError
 from fowt_env.plant.compile.decorators import kernel
 
@@ -485,7 +486,7 @@ def _fill_guesses(rotor):
                 rotor.guess[j, i, k] = f if found else 0.0
 
 
-_guesses = {}  # one table per blade in this process: filling one takes a fifth of a second
+_guesses = Cache(32)  # one table per blade: filling one takes a fifth of a second
 
 
 def elements_key(elements):
@@ -499,10 +500,12 @@ def _guess_table(elements):
     if numba.config.DISABLE_JIT:
         return elements.guess
     key = elements_key(elements._replace(air_density=0.0))
-    if key not in _guesses:
-        _fill_guesses(elements)
-        _guesses[key] = elements.guess
-    return _guesses[key]
+    return _guesses.get(key, lambda: _filled_guess(elements))
+
+
+def _filled_guess(elements):
+    _fill_guesses(elements)
+    return elements.guess
 
 
 def _hat_weights(radius, hub_radius, tip_radius):

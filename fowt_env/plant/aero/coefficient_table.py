@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fowt_env.caches import Cache
 from fowt_env.plant.aero.bem_rotor import FAST_ROTOR, NO_ROTOR_LOAD, SLOW_ROTOR, RotorLoad, hub_flow
 from fowt_env.plant.aero.blade_elements import blade_section, elements_key, smoothstep
 from fowt_env.plant.compile.decorators import kernel
@@ -189,26 +190,28 @@ def _fill(theta, blade_pitch, load, rotor):
                 c[19] += 0.25 * weight * r * r * t_nt
 
 
-_built = {}  # one table per set of blade elements in this process: building takes about two seconds
+_tables = Cache(8)  # one per set of blade elements: building takes about two seconds
 
 
 def build_coefficient_table(rotor):
     """CoefficientTable of a BladeElements; the same elements give the table built before."""
-    key = elements_key(rotor)
-    if key not in _built:
-        theta, blade_pitch = _axis(THETA_STEPS, THETA_END), _axis(PITCH_STEPS, PITCH_END)
-        load = np.zeros((len(theta.point), len(blade_pitch.point), N_COEFFICIENTS))
-        _fill(theta.point, blade_pitch.point, load, rotor._replace(air_density=1.0))
-        _built[key] = CoefficientTable(
-            theta,
-            blade_pitch,
-            load,
-            float(rotor.tip_radius),
-            float(rotor.overhang),
-            float(rotor.hub_height),
-            float(rotor.air_density),
-        )
-    return _built[key]
+    return _tables.get(elements_key(rotor), lambda: _filled_table(rotor))
+
+
+def _filled_table(rotor):
+    """CoefficientTable of BladeElements, computed."""
+    theta, blade_pitch = _axis(THETA_STEPS, THETA_END), _axis(PITCH_STEPS, PITCH_END)
+    load = np.zeros((len(theta.point), len(blade_pitch.point), N_COEFFICIENTS))
+    _fill(theta.point, blade_pitch.point, load, rotor._replace(air_density=1.0))
+    return CoefficientTable(
+        theta,
+        blade_pitch,
+        load,
+        float(rotor.tip_radius),
+        float(rotor.overhang),
+        float(rotor.hub_height),
+        float(rotor.air_density),
+    )
 
 
 @kernel

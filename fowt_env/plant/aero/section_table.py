@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fowt_env.caches import Cache
 from fowt_env.plant.aero.bem_rotor import (
     FAST_ROTOR,
     NO_ROTOR_LOAD,
@@ -118,7 +119,7 @@ def _fill(load, blade_pitch, elements):
                 load[i, j, k, 1] = weight * section.ft
 
 
-_built = {}  # one table per blade in this process: building takes about a second
+_tables = Cache(8)  # one per blade, 18 MB each: building takes about a second
 
 
 def build_section_table(elements):
@@ -128,16 +129,19 @@ def build_section_table(elements):
     """
     unit = elements._replace(air_density=1.0)
     key = elements_key(unit)
-    if key not in _built:
-        dense = np.linspace(DENSE_START, DENSE_END, DENSE_ROWS, endpoint=False)
-        coarse = np.linspace(DENSE_END, COARSE_END, COARSE_ROWS + 1)
-        blade_pitch = np.radians(np.concatenate((dense, coarse)))
-        shape = (len(blade_pitch), len(elements.radius), AHEAD + BEHIND + 1, 2)
-        load = np.zeros(shape, dtype=np.float32)
-        _fill(load, blade_pitch, unit)
-        _built[key] = load
+    load = _tables.get(key, lambda: _filled_table(unit))
     arm = np.ascontiguousarray(elements.moment_weight / elements.weight, dtype=np.float64)
-    return SectionTable(_built[key], elements.radius, arm, elements)
+    return SectionTable(load, elements.radius, arm, elements)
+
+
+def _filled_table(elements):
+    """The loads of a SectionTable."""
+    dense = np.linspace(DENSE_START, DENSE_END, DENSE_ROWS, endpoint=False)
+    coarse = np.linspace(DENSE_END, COARSE_END, COARSE_ROWS + 1)
+    blade_pitch = np.radians(np.concatenate((dense, coarse)))
+    load = np.zeros((len(blade_pitch), len(elements.radius), AHEAD + BEHIND + 1, 2), dtype=np.float32)
+    _fill(load, blade_pitch, elements)
+    return load
 
 
 @kernel

@@ -1,0 +1,85 @@
+import ast
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import fowt_env
+from fowt_env.caches import _CACHES, Cache, cached, clear_caches
+
+ROOT = Path(fowt_env.__file__).resolve().parents[1]
+FOLDERS = ("fowt_env", "controllers", "training")
+SOURCES = sorted(path for folder in FOLDERS for path in (ROOT / folder).rglob("*.py"))
+
+
+@pytest.fixture
+def cache():
+    made = Cache(2)
+    yield made
+    _CACHES.remove(made)
+
+
+def test_a_value_is_made_once_and_the_least_used_one_goes(cache):
+    made = []
+
+    def get(key):
+        return cache.get(key, lambda: made.append(key) or key.upper())
+
+    assert [get(key) for key in "abacb"] == ["A", "B", "A", "C", "B"]
+    assert made == ["a", "b", "c", "b"]  # c pushed b out, since a was used after b
+    assert len(cache) == 2
+
+
+def test_one_call_empties_every_cache(cache):
+    calls = []
+    function = cached(4)(lambda x: calls.append(x) or x)
+    cache.get("a", lambda: 1)
+    function(1), function(1)
+    clear_caches()
+    function(1)
+    assert len(cache) == 0 and calls == [1, 1]
+    _CACHES.remove(function)
+
+
+def test_what_is_computed_anew_has_the_same_bits():
+    def run():
+        scene = fowt_env.build_scene(wind={"kind": "ntm", "speed": 14.0}, fidelity="fast")
+        return fowt_env.simulate(scene, "lqr", duration=2.0)
+
+    before = run()
+    clear_caches()
+    assert run().equals(before)
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_values_are_kept_in_bounded_caches_alone(path):
+    """No functools cache, and no empty container at the top of a module that would grow."""
+    if path.name == "caches.py":
+        return
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and node.module == "functools":
+            names = {alias.name for alias in node.names} & {"lru_cache", "cache"}
+            assert not names or path.parts[-3:-1] == ("plant", "compile"), names
+    for node in tree.body:
+        if isinstance(node, ast.Assign) and isinstance(node.value, ast.Dict):
+            assert node.value.keys, f"line {node.lineno}: an unbounded cache?"
+
+
+def test_the_import_changes_neither_environment_variables_nor_numba():
+    code = (
+        "import os, numba\n"
+        "from numba import config\n"
+        "settings = {name: getattr(config, name) for name in dir(config) if name.isupper()}\n"
+        "variables = dict(os.environ)\n"
+        "import fowt_env, fowt_env.envs, fowt_env.controllers, fowt_env.training.cli.app\n"
+        "for name in fowt_env.__all__: getattr(fowt_env, name)\n"
+        "assert dict(os.environ) == variables, set(os.environ.items()) ^ set(variables.items())\n"
+        "after = {name: getattr(config, name) for name in settings}\n"
+        "assert after == settings, {name for name in after if after[name] != settings[name]}\n"
+    )
+    environment = {key: value for key, value in os.environ.items() if not key.startswith(("OMP", "GOMP"))}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
