@@ -21,7 +21,7 @@ class LoadFacts(NamedTuple):
     mirrored: bool = True  # whether a mirrored state and weather give the mirrored load
 
 
-STRIPS = ("hydro.strips.shape.", "hydro.strips.lanes.")
+STRIPS = ("hydro.strips.shape.", "hydro.strips.quadrature.")
 LOADS = {
     "weight": LoadFacts(
         "weight of platform, tower, nacelle and rotor",
@@ -40,16 +40,15 @@ LOADS = {
     "keel": LoadFacts(
         "added mass, drag and wave pressure on the keel plate, along the axis",
         "hydro/morison.py, hydro/wave_bands.py", "5.4", "hydro", "HYDRO", {"hydrodynamics": False},
-        strength=tuple(
-            f"{form}{name}"
-            for form in STRIPS
-            for name in ("heave_added_mass", "keel_area", "axial_drag_coefficient", "axial_drag")
+        strength=(
+            *(f"{STRIPS[0]}{name}" for name in ("heave_added_mass", "keel_area", "axial_drag_coefficient")),
+            *(f"{STRIPS[1]}{name}" for name in ("heave_added_mass", "keel_area", "axial_drag")),
         ),
     ),
     "waves": LoadFacts(
         "motion and pressure of the water that strips and keel meet; without it the water is still",
         "hydro/waves.py", "5.4", "hydro.waves", "HYDRO", {"sea": None},
-        strength=("hydro.waves.amplitude", "hydro.waves.velocity", "hydro.strips.sea.weight"),
+        strength=("hydro.waves.amplitude", "hydro.waves.velocity", "hydro.strips.bands.weight"),
     ),
     "diffraction": LoadFacts(
         "MacCamy and Fuchs' coefficient of fluid inertia in waves; without it 1 + C_A",

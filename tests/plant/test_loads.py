@@ -23,6 +23,7 @@ from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rollout import forget, observe
 from fowt_env.plant.state import State
 from fowt_env.scene.loads import LOADS
+from fowt_env.scene.options import ROTORS
 
 ROOT = Path(fowt_env.__file__).resolve().parent.parent
 FORMS = ("exact", "fast")  # of the wave loads
@@ -228,6 +229,14 @@ def test_other_numbers_compile_nothing(form):
 @pytest.mark.parametrize("name", WITH_SLOT)
 def test_a_scene_without_it_is_compiled_without_it(name):
     assert numba.typeof(scene_less("exact", name).handle()) != kind_of("exact")
+
+
+@pytest.mark.parametrize("name", WITH_STRENGTH)
+def test_each_of_its_strengths_is_in_a_form_of_the_model(name):
+    models = [scene_of(form).model for form in FORMS]
+    models += [build_scene(wind=8.0, rotor=rotor).model for rotor in ROTORS]
+    for path in LOADS[name].strength:
+        assert any(part_at(model, path) is not None for model in models), path
 
 
 @pytest.mark.parametrize("name", LOADS)
