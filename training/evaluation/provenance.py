@@ -144,11 +144,14 @@ def _located(path):
 
 
 def _package_of(path):
-    """What of this project a file belongs to: "controllers", "training", "simulator", or None."""
+    """What of this project a file belongs to: "controllers", "training", "visual", "simulator", or None.
+
+    visual draws what was computed: environments import it, and it shapes no run.
+    """
     if not path.is_relative_to(PACKAGE):
         return None
     part = path.relative_to(PACKAGE).parts[0]
-    return part if part in ("controllers", "training") else "simulator"
+    return part if part in ("controllers", "training", "visual") else "simulator"
 
 
 def versions():

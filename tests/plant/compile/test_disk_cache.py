@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numba
 import pytest
+from copied_code import LOOKS, PACKAGES, copied_code, edit
 
 import fowt_env
 from fowt_env.plant.compile import disk_cache
@@ -336,7 +337,8 @@ def test_numba_code_of_other_packages_is_kept_where_it_would_be_without_ours(tmp
 def test_ours_are_kept_in_files_made_for_several_processes_whatever_numba_is_told(tmp_path):
     code = (
         "from fowt_env.plant.hydro.waves import ramp_factor as f\nfrom fowt_env.simulation import hold\n"
-        "print(*(type(g._cache._cache_file).__name__ for g in (f, hold)), f._cache.cache_path)\n"
+        "files = [type(g._cache._cache_file).__name__ for g in (f, hold.compiled)]\n"
+        "print(*files, f._cache.cache_path)\n"
     )
     variables = {"NUMBA_CACHE_DIR": str(tmp_path), "NUMBA_CACHE_LOCATOR_CLASSES": "InTreeCacheLocator"}
     *kinds, used = output(start(code, tmp_path / "cache", **variables))
@@ -348,22 +350,6 @@ def test_another_way_of_numba_to_keep_code_is_noticed(monkeypatch, tmp_path):
     monkeypatch.setattr(disk_cache.numba, "__version__", "9.9.9")
     with pytest.raises(ImportError, match="numba 9.9.9"):
         disk_cache.KernelCache(kernel_folder, tmp_path)
-
-
-PACKAGES = ("fowt_env", "controllers", "training")
-
-
-def copied_code(tmp_path):
-    """Folder with a copy of the sources."""
-    code = tmp_path / "code"
-    for path in (path for package in PACKAGES for path in (ROOT / package).rglob("*.py")):
-        copy = code / path.relative_to(ROOT)
-        copy.parent.mkdir(parents=True, exist_ok=True)
-        copy.write_bytes(path.read_bytes())
-    for package in PACKAGES[1:]:
-        if not (code / "fowt_env" / package).exists():
-            (code / "fowt_env" / package).symlink_to(code / package, target_is_directory=True)
-    return code
 
 
 def test_kernels_outside_the_plant_are_kept_until_what_they_import_changes(tmp_path):
@@ -387,6 +373,41 @@ def test_kernels_outside_the_plant_are_kept_until_what_they_import_changes(tmp_p
     for expected in (["20.0", "0"], ["20.0", "1"]):
         assert output(start(program, tmp_path / "cache", code)) == expected
     assert len(list((tmp_path / "cache" / "kernels").iterdir())) == 1
+
+
+KEYS = """
+import re
+from fowt_env.plant.compile.decorators import CACHE_FOLDER, PACKAGE, PLANT, _outside_hash
+from fowt_env.plant.hydro.waves import ramp_factor
+compiled = re.compile("^@(inlined_kernel|kernel|entry|parallel_entry|control_kernel)$", re.MULTILINE)
+for room in (PACKAGE, PACKAGE / "controllers", PACKAGE / "training"):  # the last two may be links
+    for path in room.rglob("*.py"):
+        if PLANT not in path.parents and compiled.search(path.read_text()):
+            print(path.relative_to(PACKAGE).as_posix(), _outside_hash(str(path)))
+print("folder", CACHE_FOLDER.name)
+ramp_factor(1.0, 4.0)
+print("loaded", sum(ramp_factor.stats.cache_hits.values()))
+"""
+
+
+def keys(code, cache):
+    """{kernels' file: hash of what they depend on outside the plant}, and what became of one of the plant."""
+    words = output(start(KEYS, cache, code))
+    return dict(zip(words[::2], words[1::2], strict=True))
+
+
+def test_an_edit_of_a_text_or_a_plot_compiles_nothing(tmp_path):
+    code, cache = copied_code(tmp_path), tmp_path / "cache"
+    before = keys(code, cache)
+    assert {"envs/episode.py", "envs/rewards.py", "simulation.py"} < set(before) and before["loaded"] == "0"
+    for folder in LOOKS:
+        edit(code / folder)
+    assert keys(code, cache) == before | {"loaded": "1"}
+    edit(code / "fowt_env" / "envs" / "rewards.py")  # and of a reward what uses it
+    after = keys(code, cache)
+    changed = {name for name in before if after[name] != before[name]} - {"loaded"}
+    assert {"envs/rewards.py", "envs/episode.py"} <= changed
+    assert not {"folder", "simulation.py", "controllers/pi.py"} & changed
 
 
 def test_kernels_of_other_sources_of_the_plant_are_never_used(tmp_path):

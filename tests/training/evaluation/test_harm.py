@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import stub_plant
+from copied_code import LOOKS, copied_code, edit
 from typer.testing import CliRunner
 
 import fowt_env
@@ -360,9 +361,50 @@ def test_what_a_run_imports_is_in_the_hash_of_the_plant_and_what_people_look_at_
     names = {path.relative_to(provenance.PACKAGE).as_posix() for path in provenance.plant_files()}
     data = "data/platforms/oc3_hywind.toml"
     assert {data, "training/evaluation/metrics.py", "training/evaluation/faults.py"} <= names
-    plots = ("visual/time_series", "visual/response", "visual/animation")
-    looks = (*plots, "training/cli", "training/reports", "controllers/pi")
+    looks = ("visual", "training/cli", "training/reports", "controllers/pi")
     assert not [name for name in names if name.startswith(looks)]
+
+
+CODES = """
+import sys
+sys.path.insert(0, "")
+from fowt_env.controllers import CONTROLLERS
+from fowt_env.training.evaluation.provenance import controller_code, plant_code
+print("plant", plant_code())
+for name in (*CONTROLLERS, "policy:agent.npz", "own:Law"):
+    print(name, controller_code(name)["code"])
+"""
+OWN = "from fowt_env.controllers.pi import pi as Law\nfrom fowt_env.envs import FowtEnv\n"
+
+
+def codes(code, folder):
+    """{what is hashed in a manifest: its hash} of a copy of the sources."""
+    environment = os.environ | {"PYTHONPATH": str(code)}
+    done = subprocess.run(
+        [sys.executable, "-c", CODES], env=environment, cwd=folder, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    words = done.stdout.split()
+    return dict(zip(words[::2], words[1::2], strict=True))
+
+
+def test_an_edit_of_a_text_or_a_plot_voids_no_results_and_one_of_what_shapes_a_run_does(tmp_path):
+    code = copied_code(tmp_path)
+    (tmp_path / "own.py").write_text(OWN)
+    (tmp_path / "agent.npz").write_bytes(b"")
+    before = codes(code, tmp_path)
+
+    def changed_by(*places):
+        for place in places:
+            edit(code / place)
+        after = codes(code, tmp_path)
+        return {name for name in before if after[name] != before[name]}
+
+    assert changed_by(*LOOKS) == set()
+    pi = {"pi", "pi_land", "pi_land_power", "pi_tuned", "pi_unscheduled", "own:Law", "policy:agent.npz"}
+    after_law = changed_by("controllers/pi.py")
+    assert pi <= after_law and not {"plant", "constant"} & after_law
+    assert "plant" in changed_by("fowt_env/scene/build.py")
 
 
 PROJECT = {
