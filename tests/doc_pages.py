@@ -1,5 +1,6 @@
-"""Fenced blocks of the documentation's pages, for the tests that run them."""
+"""What stands in the pages of the documentation and in sources, for the tests that compare them."""
 
+import ast
 import re
 import shlex
 from pathlib import Path
@@ -31,6 +32,19 @@ def blocks(page):
         headings = re.findall(r"^#+ (.*)$", FENCE.sub("", text[: match.start()]), re.M)
         found.append(Block(match[1], match[2] or "", match[3], headings[-1]))
     return found
+
+
+def defined(path):
+    """Names that a source gives a meaning: functions, classes, assigned names, fields and parameters."""
+    names = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            names.add(node.name)
+        elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+            names.add(node.id)
+        elif isinstance(node, ast.arg):
+            names.add(node.arg)
+    return names
 
 
 def fowt(line):

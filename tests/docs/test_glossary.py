@@ -1,9 +1,7 @@
 """The glossary names files that exist, names that are defined in them, and units in one spelling."""
 
-import ast
-
 import pytest
-from doc_pages import DOCS
+from doc_pages import DOCS, defined
 
 ROOT = DOCS.parent
 HEADINGS = ["word", "meaning", "unit", "name", "file"]
@@ -23,19 +21,6 @@ def rows():
 
 
 ROWS = rows()
-
-
-def defined(path):
-    """Names that a source gives a meaning: functions, classes, assigned names, fields and parameters."""
-    names = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.FunctionDef | ast.ClassDef):
-            names.add(node.name)
-        elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
-            names.add(node.id)
-        elif isinstance(node, ast.arg):
-            names.add(node.arg)
-    return names
 
 
 def test_the_glossary_has_the_words_that_the_code_is_built_of():

@@ -1,6 +1,7 @@
 """The layers and what each may import: an arrow goes from a layer to one further down, never up."""
 
 import ast
+import re
 from pathlib import Path
 
 import pytest
@@ -67,3 +68,15 @@ def test_files_are_read_from_a_module_s_own_layer_or_below(module):
         if isinstance(node, ast.Constant) and isinstance(node.value, str):
             head = node.value.partition("/")[0]
             assert head not in ("tests", "examples", "docs") or " " in node.value, node.value
+
+
+def test_the_page_for_contributors_lists_the_layers():
+    """Each list from the top down, as the imports go."""
+    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    lists = r"Within `fowt_env` it is (.*?); within `training` it is (.*?)\. "
+    simulator, training = re.search(lists, text, re.S).groups()
+    apart = ("errors", "caches", "folders", "registration", "controllers")  # the first four for all to import
+    inside = [name for name in LAYERS if name not in apart and name.partition(".")[0] != "training"]
+    assert re.findall(r"`(\w+)`", simulator) == inside[::-1]
+    inside = [name.partition(".")[2] for name in LAYERS if name.startswith("training.")]
+    assert re.findall(r"`(\w+)`", training) == inside[::-1]

@@ -1,0 +1,61 @@
+"""CONTRIBUTING.md says where things are: a row for each folder, and a file for each question."""
+
+import re
+
+import pytest
+from doc_pages import DOCS, defined
+
+ROOT = DOCS.parent
+TEXT = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+PROGRAMS = "training/studies/"  # one row for all beneath it
+QUOTED = re.compile(r"`([^`]+)`")
+
+
+def table(heading):
+    """Cells of the rows of the table whose first heading this is."""
+    lines = TEXT.partition(f"| {heading} |")[2].splitlines()[2:]
+    rows = lines[: lines.index("")]
+    assert rows, heading
+    return [[cell.strip() for cell in row.strip("| ").split(" | ")] for row in rows]
+
+
+PLACES = [place for cells in table("place") for place in QUOTED.findall(cells[0])]
+QUESTIONS = {cells[0]: cells[1:] for cells in table("where is, or how do I")}
+
+
+def source_folders():
+    """Folders of the packages that hold sources, and tests/."""
+    for package in ("fowt_env", "controllers", "training"):
+        for path in (ROOT / package).rglob("*.py"):
+            folder = path.relative_to(ROOT).parent.as_posix() + "/"
+            yield PROGRAMS if folder.startswith(PROGRAMS) else folder
+    yield "tests/"
+
+
+def test_every_folder_and_every_file_beside_them_has_one_row():
+    files = {path.relative_to(ROOT).as_posix() for path in (ROOT / "fowt_env").glob("[!_]*.py")}
+    # what lies in these two, but for the first lines of packages, has rows of its own
+    needed = files | set(source_folders()) - {"fowt_env/", "training/", "training/validation/reference/"}
+    assert needed <= set(PLACES), needed - set(PLACES)
+    assert len(PLACES) == len(set(PLACES))
+
+
+def test_folders_without_a_row_hold_no_source_of_their_own():
+    """Of training/ and of the reference series, whose program is beside them."""
+    assert {path.name for path in (ROOT / "training").glob("*.py")} == {"__init__.py"}
+    assert "training/validation/reference/" in TEXT
+
+
+@pytest.mark.parametrize("place", PLACES)
+def test_a_place_is_there(place):
+    assert (ROOT / place).is_dir() if place.endswith("/") else (ROOT / place).is_file()
+
+
+@pytest.mark.parametrize("question", QUESTIONS)
+def test_an_answer_is_one_file_and_what_to_look_for_is_defined_in_it(question):
+    file, names = QUESTIONS[question]
+    (path,) = QUOTED.findall(file)
+    assert (ROOT / path).is_file(), path
+    assert f"{path.rpartition('/')[0]}/" in {*PLACES, "fowt_env/"}
+    wanted = QUOTED.findall(names)
+    assert wanted and set(wanted) <= defined(ROOT / path), set(wanted) - defined(ROOT / path)
