@@ -37,7 +37,7 @@ demo: $(VENV)/.installed-plot
 	$(BIN)/fowt evaluate --controllers pi --cases above_rated --seeds 1 --out results/demo
 
 test: $(VENV)/.installed-dev
-	@echo "some five minutes on two cores, most of them for compiling kernels, which are kept"
+	@echo "minutes, most of them for compiling kernels, which are kept"
 	$(TESTS) -m installation --durations=10
 
 test-all: $(VENV)/.installed-dev

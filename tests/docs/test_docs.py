@@ -13,13 +13,14 @@ import gymnasium
 import numpy as np
 import pandas as pd
 import pytest
-from doc_pages import DOCS, FENCE
+from doc_pages import DOCS, FENCE, defined
 
 from fowt_env.controllers.policy.controller import shipped_agents
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.envs.rewards import N_TERMS, REWARD_TERMS, build_scales, fill_terms
 from fowt_env.envs.tasks import TASKS
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measure
+from fowt_env.training.benchmarks import compile_time
 
 ROOT = DOCS.parent
 
@@ -214,6 +215,12 @@ def test_the_errors_of_the_levels_are_the_largest_of_the_stored_sweep():
         assert float(error) == float(f"{seeds.max():.{digits}e}"), level
 
 
+def test_the_table_of_compile_times_has_the_rows_of_the_benchmark():
+    table = (ROOT / SPEED).read_text().partition("<!-- measured: fowt benchmark compile -->")[2]
+    rows = re.findall(r"^\| ([\w -]+) \| [^|]+ \| \d+\.\d \|$", table.partition("<!-- end -->")[0], re.M)
+    assert rows == list(compile_time.NAMES)
+
+
 NUMBERS = {"nine": 9, "sixteen": 16}
 
 
@@ -251,6 +258,16 @@ def test_files_and_modules_that_a_page_names_exist(page):
         assert path in NOT_FILES or list(ROOT.glob(pattern)), path
     for name in re.findall(r"(?<![\w./-])(fowt_env(?:\.\w+)+)", text.replace("fowt_env.NAME", "")):
         pkgutil.resolve_name(name)
+
+
+PLACED = re.compile(r"`(\w+)`(?: in| of)? \(?`((?:fowt_env|controllers|training)/[\w/]+\.py)`")
+
+
+def test_a_name_that_a_page_puts_into_a_file_is_defined_there():
+    """As in "`rollout` in `fowt_env/plant/rollout.py`", or with the file in brackets after it."""
+    found = {place for page in LIVING for place in PLACED.findall((ROOT / page).read_text())}
+    assert len(found) > 12
+    assert not [(name, file) for name, file in found if name not in defined(ROOT / file)]
 
 
 ENVIRONMENT = "fowt_env/OC3Hywind"
