@@ -1,5 +1,6 @@
 """How Gymnasium learns of the environments."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -46,14 +47,64 @@ def test_python_starts_without_a_line_of_this_project():
     assert python(code) == "False"
 
 
-@pytest.mark.parametrize("name", ["controllers", "training"])
-def test_modules_of_a_user_s_folder_do_not_hide_the_installed_ones(tmp_path, name):
-    (tmp_path / "controllers.py").write_text("raise RuntimeError('a file of the user')")
-    (tmp_path / "training").mkdir()
-    (tmp_path / "training" / "__init__.py").write_text("raise RuntimeError('a folder of the user')")
-    code = f"import fowt_env.{name} as package; print(package.__name__)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path)
-    assert done.stdout.strip() == f"fowt_env.{name}", done.stderr
+LAW = """
+class Law:
+    def reset(self, measurement):
+        pass
+
+    def act(self, measurement):
+        return 4e4, 0.2
+"""
+USES = {
+    "import": "import fowt_env.controllers, fowt_env.training; print('done')",
+    "simulate": (
+        "import fowt_env; scene = fowt_env.build_scene()\n"
+        "print('done' if len(fowt_env.simulate(scene, controller='pi', duration=0.1)) == 2 else 'short')"
+    ),
+    "user's controller": (
+        "import fowt_env; scene = fowt_env.build_scene()\n"
+        "run = fowt_env.simulate(scene, controller='controllers:Law', duration=0.2)\n"
+        "print('done' if run['GenTq_[kN-m]'].iloc[-1] > 0.0 else run)"
+    ),
+    "help": (
+        "import sys; from fowt_env.training.cli.app import main; sys.argv = ['fowt', 'evaluate', '--help']\n"
+        "try: main()\nexcept SystemExit as end: print('done' if not end.code else end)"
+    ),
+}
+
+
+def in_users_folder(folder, *command):
+    """Last line of what a command prints in a folder with a controllers.py and a training/ of the user's."""
+    (folder / "controllers.py").write_text(LAW)
+    (folder / "training").mkdir()
+    (folder / "training" / "__init__.py").write_text("raise RuntimeError('a folder of the user')")
+    variables = os.environ | {"NUMBA_DISABLE_JIT": "1"}
+    done = subprocess.run(command, env=variables, capture_output=True, text=True, cwd=folder, timeout=120)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip().splitlines()[-1]
+
+
+@pytest.mark.parametrize("use", USES)
+def test_modules_of_a_user_s_folder_do_not_hide_the_installed_ones(tmp_path, use):
+    assert in_users_folder(tmp_path, sys.executable, "-c", USES[use]) == "done"
+
+
+def test_nor_do_they_for_the_installed_command(tmp_path):
+    fowt = Path(sys.executable).with_name("fowt")
+    if not fowt.exists():
+        pytest.skip("the command is not installed beside this Python")
+    assert in_users_folder(tmp_path, str(fowt), "list", "controllers")
+
+
+def test_what_is_installed_has_one_name_alone(tmp_path):
+    """Also where it is installed editable: nothing of a clone but fowt_env can be imported."""
+    names = "('controllers', 'training', 'tests')"
+    code = f"from importlib.util import find_spec; print([name for name in {names} if find_spec(name)])"
+    variables = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=variables, capture_output=True, text=True, cwd=tmp_path
+    )
+    assert done.stdout.strip() == "[]", done.stderr
 
 
 @pytest.mark.parametrize("name", ["controllers", "training"])

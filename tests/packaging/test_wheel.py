@@ -17,6 +17,17 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = {"fowt_env": "fowt_env", "controllers": "fowt_env/controllers", "training": "fowt_env/training"}
 LEFT_OUT = ("fowt_env/training/studies/", "fowt_env/training/validation/reference/")  # of a clone alone
+SHIPPED = {  # one of each kind of file that is no source
+    "fowt_env/py.typed",
+    "fowt_env/data/sea_states.toml",
+    "fowt_env/data/turbines/nrel5mw/polars/NACA64_A17.csv",
+    "fowt_env/controllers/tuned.toml",
+    "fowt_env/controllers/policy/agents/ppo_lqr.npz",
+    "fowt_env/training/design/data/linear_bound.csv",
+    "fowt_env/training/evaluation/suites/above_rated.toml",
+    "fowt_env/training/reports/page/page.html",
+    "fowt_env/training/rl/ppo.yml",
+}
 pytestmark = pytest.mark.slow
 
 
@@ -62,6 +73,9 @@ def test_sdist_and_wheel_hold_the_package_without_the_studies_and_the_licence(bu
     assert wanted < package_files()
     assert wanted - in_sdist == set()
     assert {path for path in in_wheel if ".dist-info/" not in path} == wanted
+    tops = {path.partition("/")[0] for path in in_wheel}
+    assert len(tops) == 2 and "fowt_env" in tops  # and what pip needs to know of it
+    assert SHIPPED <= in_wheel
     assert any(name.endswith("LICENSE") for name in in_wheel)
     assert not any(name.endswith(".pth") or ".data/" in name for name in in_wheel)
 
