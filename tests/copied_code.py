@@ -7,8 +7,6 @@ import fowt_env
 ROOT = Path(fowt_env.__file__).resolve().parent.parent
 PACKAGES = ("fowt_env", "controllers", "training")
 LOOKS = ("fowt_env/visual", "training/cli", "training/reports")  # what people read and look at
-
-
 SUFFIXES = {".py", ".toml", ".csv"}
 
 
