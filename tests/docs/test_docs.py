@@ -15,6 +15,7 @@ import pandas as pd
 import pytest
 from doc_pages import DOCS, FENCE, defined
 
+import fowt_env
 from fowt_env.controllers.policy.controller import shipped_agents
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.envs.rewards import N_TERMS, REWARD_TERMS, build_scales, fill_terms
@@ -258,6 +259,13 @@ def test_files_and_modules_that_a_page_names_exist(page):
         assert path in NOT_FILES or list(ROOT.glob(pattern)), path
     for name in re.findall(r"(?<![\w./-])(fowt_env(?:\.\w+)+)", text.replace("fowt_env.NAME", "")):
         pkgutil.resolve_name(name)
+
+
+def test_the_page_of_the_package_has_its_public_names_first():
+    first = (DOCS / "api" / "fowt_env.md").read_text().partition("\n## Further names\n")[0]
+    names = re.findall(r"^::: [\w.]+\.(\w+)$(?!\n    options)", first, re.M)
+    names += [name for group in re.findall(r"members: \[(.*)\]", first) for name in group.split(", ")]
+    assert sorted(names) == fowt_env.__all__
 
 
 PLACED = re.compile(r"`(\w+)`(?: in| of)? \(?`((?:fowt_env|controllers|training)/[\w/]+\.py)`")
