@@ -127,7 +127,7 @@ def _keep(compiled, function):
 
 
 def _decorator(linked=False, **options):
-    """Decorator: numba.njit with these options, and kept on disk. linked: for kernels to call, see linked.py."""
+    """Decorator: numba.njit with these options, kept on disk. linked: for kernels to call, see linked.py."""
 
     def decorate(function):
         if numba.config.DISABLE_JIT:
@@ -157,7 +157,7 @@ kernel = _decorator(**_HOUSE, _nrt=False, linked=True)
 # takes longer than most loads, so what lies between a run and its loads is put into the run.
 inlined_kernel = _decorator(**_HOUSE, _nrt=False, forceinline=True, linked=True)
 
-# Functions that take a Box, which is a counted reference, or that allocate.
+# Functions that Python calls: they take Handles, which are counted references, or allocate.
 entry = _decorator(**_HOUSE)
 
 # The same with its prange loops spread over threads.

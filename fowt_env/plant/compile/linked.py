@@ -1,9 +1,9 @@
-"""Kernels for kernels: typed and optimised once, and linked into their callers without machine code of their own.
+"""Kernels for kernels: typed and lowered once, and linked into their callers without machine code of their own.
 
-Numba makes machine code of every function that it compiles, with a copy of all that it calls. Of a kernel that
-kernels alone call it is never run, since each caller has a copy: a third of the time of compiling a scene.
-Here such a kernel ends as LLVM's code, which callers link, and which the disk cache keeps in place of machine
-code. Called from Python, as in tests, it is compiled once more as numba does it.
+Numba optimises every function that it compiles with a copy of all that it calls, and makes machine code of it.
+That of a kernel which kernels alone call is never run, since each caller has a copy: 40 % of the time of
+compiling a scene. Here such a kernel ends as LLVM's code, which callers link, and which the disk cache keeps
+instead. Called from Python, as in tests, it is compiled once more as numba does it.
 """
 
 import llvmlite.binding as llvm
@@ -25,14 +25,7 @@ class LinkedLibrary(JITCodeLibrary):
         self._finalized = True
 
     def _optimize_final_module(self):
-        mode = __import__("os").environ.get("OPTM", "full")
-        if mode == "full":
-            return super()._optimize_final_module()
-        if mode == "cheap":
-            passes, builder = self._codegen._module_pass_manager(
-                loop_vectorize=False, slp_vectorize=False, opt=self._codegen._opt_level, cost="cheap"
-            )
-            passes.run(self._final_module, builder)
+        """Nothing: the caller that gets machine code optimises all that it has linked at once."""
 
     def serialized(self):
         """(name, code) for the disk cache."""
@@ -108,8 +101,6 @@ class LinkedDispatcher(CPUDispatcher):
         args, _ = sigutils.normalize_signature(sig)
         if self._twin is None:
             self._twin = numba.jit(**self.targetoptions)(self.py_func)
-        import os
-        if os.environ.get("TWIN"): print("TWIN", self.py_func.__module__, self.py_func.__name__)
         function = self._twin.compile(tuple(args))
         self._insert([kind._code for kind in args], function, False)
         return function
