@@ -243,8 +243,8 @@ class _Loop:
             raise SimulationStopped(f"stopped at t = {time:.3f} s: {reason}", reason, time, self.frame())
 
     def frame(self):
-        """Rows so far in channel units."""
-        values = self.scene.values(self.rows[: self.filled])
+        """Rows in channel units, at the end of the run: they are converted where they are."""
+        values = self.scene.values(self.rows[: self.filled], overwrite=True)
         frame = pd.DataFrame(values, columns=[c.column for c in self.scene.channels])
         frame.attrs["events"] = counted(self.data.counters)
         return frame

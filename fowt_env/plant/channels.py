@@ -289,16 +289,19 @@ def tower_base(pose, x, dx, loads, body, layout, row):
     row[Out.TWRBSMZT] = mz
 
 
-def with_hub_wind(rows, hub_wind, period):
-    """A copy of rows (k, n_channels) in SI with the wind (time, value (n, 3)) at the hub; period 0: none."""
+def put_hub_wind(rows, hub_wind, period):
+    """Put the wind (time, value (n, 3)) at the hub into rows (k, n_channels) in SI; period 0: none."""
     time, value = hub_wind
     at = rows[:, Out.TIME] % period if period > 0.0 else rows[:, Out.TIME]
-    rows = rows.copy()
     for column in range(3):
         rows[:, Out.WIND1VELX + column] = np.interp(at, time, value[:, column])
-    return rows
 
 
 def to_units(rows, n_lines, loads=()):
     """Rows (k, n_channels) in SI -> a copy in the units of channels(n_lines, loads)."""
-    return rows * np.array([c.scale for c in channels(n_lines, loads)])
+    return rows * scales(n_lines, loads)
+
+
+def scales(n_lines, loads=()):
+    """(n_channels,) factors from SI to the units of channels(n_lines, loads)."""
+    return np.array([c.scale for c in channels(n_lines, loads)])

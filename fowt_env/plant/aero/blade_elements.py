@@ -32,7 +32,7 @@ import numpy as np
 
 from fowt_env.caches import Cache
 from fowt_env.errors import InputError
-from fowt_env.plant.compile.decorators import kernel
+from fowt_env.plant.compile.decorators import entry, kernel
 
 TOLERANCE = 1e-8  # of the residual before the last step of Newton's method; after it, about its square
 LAST_STEP = 1e-6  # largest last step, times Momentum.scale: the second-order error of loads is then 1e-12
@@ -472,7 +472,7 @@ def solve_section(v_normal, v_tangential, induction, guess, element, polars):
     return Section(phi, 0.0, 0.0, cn, ct, half * square * cn, half * square * ct, 0.0, 0.0, 0.0, solved)
 
 
-@kernel
+@entry
 def _fill_guesses(rotor):
     """Solve the momentum balance at the points of rotor.guess and put the angles there."""
     for j in range(rotor.radius.shape[0]):

@@ -20,7 +20,7 @@ import numpy as np
 from fowt_env.caches import Cache
 from fowt_env.plant.aero.bem_rotor import FAST_ROTOR, NO_ROTOR_LOAD, SLOW_ROTOR, RotorLoad, hub_flow
 from fowt_env.plant.aero.blade_elements import blade_section, elements_key, smoothstep
-from fowt_env.plant.compile.decorators import kernel
+from fowt_env.plant.compile.decorators import entry, kernel
 from fowt_env.plant.events import Counter
 from fowt_env.plant.state import State, Wrench
 
@@ -128,7 +128,7 @@ def _axis(steps, end):
     return TableAxis(point, cell.astype(np.int64), float(scale))
 
 
-@kernel
+@entry
 def _fill(theta, blade_pitch, load, rotor):
     """Put the coefficients of the blade element momentum solution into load; rotor in air of density 1.
 

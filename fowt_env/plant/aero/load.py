@@ -7,7 +7,7 @@ from fowt_env.plant.aero.coefficient_table import CoefficientTable, coefficient_
 from fowt_env.plant.aero.section_table import SectionTable, section_table_load
 from fowt_env.plant.aero.tower_drag import tower_load
 from fowt_env.plant.aero.wind import WindSeries, wind_at, wind_now
-from fowt_env.plant.compile.decorators import kernel
+from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.state import NO_LOAD, Wrench
 
@@ -39,30 +39,31 @@ class AeroLoad(NamedTuple):
 NO_AERO_LOAD = AeroLoad(RotorLoad(NO_LOAD, 0.0, 0.0), NO_LOAD)
 
 
-@kernel
+@inlined_kernel
 def _solved(t, pose, x, now, aero, rotor, dx, counters):
     return rotor_load(
         t, pose, x, now, aero.wind, aero.field, rotor.elements, rotor.skew, rotor.wake, dx, counters
     )
 
 
-@kernel
+@inlined_kernel
 def _by_sections(t, pose, x, now, aero, rotor, dx, counters):
     return section_table_load(t, pose, x, now, aero.wind, aero.field, rotor, counters)
 
 
-@kernel
+@inlined_kernel
 def _by_coefficients(t, pose, x, now, aero, rotor, dx, counters):
     return coefficient_table_load(pose, x, now, aero.wind, rotor, counters)
 
 
 # (t, pose, x, now, aero, rotor, dx, counters) -> RotorLoad; of dx the wake's rates alone are written
 rotor_part = chosen_by_class(
-    "rotor", {BemRotor: _solved, SectionTable: _by_sections, CoefficientTable: _by_coefficients}
+    "rotor", {BemRotor: _solved, SectionTable: _by_sections, CoefficientTable: _by_coefficients},
+    inlined=True,
 )
 
 
-@kernel
+@inlined_kernel
 def aero_load(t, pose, x, aero, data, dx):
     """AeroLoad at a state; writes the wake's rates into dx."""
     if aero is None:

@@ -37,7 +37,7 @@ from fowt_env.plant.aero.blade_elements import (
     smoothstep,
 )
 from fowt_env.plant.aero.wind import LOWEST_HEIGHT, wind_at
-from fowt_env.plant.compile.decorators import kernel
+from fowt_env.plant.compile.decorators import entry, kernel
 from fowt_env.plant.compile.prefetch import prefetch
 from fowt_env.plant.events import Counter
 from fowt_env.plant.state import State, Wrench
@@ -104,7 +104,7 @@ class BladeForce(NamedTuple):
     valid: bool  # False: some station lies outside the table
 
 
-@kernel
+@entry
 def _fill(load, blade_pitch, elements):
     """Put into load each station's part of the blade's force, normal and tangential, over the air density
     and the square of v_normal + |v_tangential|."""

@@ -28,6 +28,7 @@ from numba.core.ccallback import CFunc  # noqa: E402
 
 from fowt_env.folders import cache_root, distrust, make_private  # noqa: E402
 from fowt_env.plant.compile.disk_cache import KernelCache  # noqa: E402
+from fowt_env.plant.compile.linked import LinkedDispatcher  # noqa: E402
 from fowt_env.plant.compile.sources import imported_at_top  # noqa: E402
 
 KEEP_CACHES = 4  # folders of older sources kept, so that switching branches does not recompile
@@ -122,16 +123,20 @@ def _keep(compiled, function):
     if CACHE_FOLDER is None or not path.startswith(f"{PACKAGE}{os.sep}"):
         return
     stamp = "" if path.startswith(f"{PLANT}{os.sep}") else _outside_hash(path)
-    compiled._cache = KernelCache(function, CACHE_FOLDER, stamp)
+    compiled._cache = KernelCache(function, CACHE_FOLDER, stamp, isinstance(compiled, LinkedDispatcher))
 
 
-def _decorator(**options):
-    """Decorator: numba.njit with these options, and kept on disk."""
+def _decorator(linked=False, **options):
+    """Decorator: numba.njit with these options, kept on disk. linked: for kernels to call, see linked.py."""
 
     def decorate(function):
-        compiled = numba.njit(**options)(function)
-        if compiled is not function:  # as it is under NUMBA_DISABLE_JIT
-            _keep(compiled, function)
+        if numba.config.DISABLE_JIT:
+            return function
+        if linked:
+            compiled = LinkedDispatcher(function, targetoptions=options | {"nopython": True})
+        else:
+            compiled = numba.njit(**options)(function)
+        _keep(compiled, function)
         return compiled
 
     return decorate
@@ -142,7 +147,7 @@ _HOUSE = {"error_model": "numpy", "nogil": True}
 # _nrt=False: numba counts references at every slice and call that takes arrays, each an atomic
 # instruction; without them a step takes a third less time. Such a kernel must not allocate, nor
 # return an array or a part that holds one.
-kernel = _decorator(**_HOUSE, _nrt=False)
+kernel = _decorator(**_HOUSE, _nrt=False, linked=True)
 
 # No fastmath anywhere: LLVM then orders a sum differently in each caller's copy of a function, and a
 # process that compiles gets other last bits than one that loads from disk (seen on the look-up rotor
@@ -150,9 +155,9 @@ kernel = _decorator(**_HOUSE, _nrt=False)
 
 # A kernel put into its caller whatever its size. A call hands over a scene by value, some 400 words: that
 # takes longer than most loads, so what lies between a run and its loads is put into the run.
-inlined_kernel = _decorator(**_HOUSE, _nrt=False, forceinline=True)
+inlined_kernel = _decorator(**_HOUSE, _nrt=False, forceinline=True, linked=True)
 
-# Functions that take a Box, which is a counted reference, or that allocate.
+# Functions that Python calls: they take Handles, which are counted references, or allocate.
 entry = _decorator(**_HOUSE)
 
 # The same with its prange loops spread over threads.

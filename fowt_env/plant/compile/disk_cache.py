@@ -21,6 +21,7 @@ import numba
 from numba.core import caching
 
 from fowt_env.folders import distrust, make_private
+from fowt_env.plant.compile import linked
 
 
 class SharedCacheFile(caching.IndexDataCacheFile):
@@ -116,14 +117,25 @@ class _Files(caching.CompileResultCacheImpl):
         self._filename_base = self.get_filename_base(f"{module}.{function.__qualname__}", "")
 
 
+class _LinkedFiles(_Files):
+    """The same for kernels that are linked into their callers: no machine code."""
+
+    def reduce(self, cres):
+        return linked.reduced(cres)
+
+    def rebuild(self, target_context, payload):
+        return linked.rebuilt(target_context, payload)
+
+
 class KernelCache(caching.FunctionCache):
     """Cache of one compiled function beneath a folder, for compiled functions' attribute _cache.
 
     stamp: whatever it depends on beside its own file, its key and the name of the folder.
+    links: whether it is a kernel of linked.py.
     """
 
-    def __init__(self, function, folder, stamp=""):
-        self._impl_class = partial(_Files, folder=folder, stamp=stamp)
+    def __init__(self, function, folder, stamp="", links=False):
+        self._impl_class = partial(_LinkedFiles if links else _Files, folder=folder, stamp=stamp)
         super().__init__(function)
         file = getattr(self, "_cache_file", None)
         if type(file) is not caching.IndexDataCacheFile:

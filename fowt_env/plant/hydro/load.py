@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from fowt_env.plant.compile.decorators import kernel
+from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.hydro.added_inertia import added_inertia_load
 from fowt_env.plant.hydro.banded_strips import banded_strip_load
@@ -53,14 +53,14 @@ class HydroLoad(NamedTuple):
 NO_HYDRO_LOAD = HydroLoad(NO_LOAD, NO_LOAD, NO_LOAD)
 
 
-@kernel
+@inlined_kernel
 def _exact(t, pose, hydro, strips, data):
     return morison_load(
         t, pose, strips.shape, hydro.waves, hydro.current, data.kinematics, strips.diffraction
     )
 
 
-@kernel
+@inlined_kernel
 def _banded(t, pose, hydro, strips, data):
     return banded_strip_load(
         t, pose, strips.quadrature, strips.bands, hydro.current, data.bands, strips.diffraction
@@ -68,7 +68,7 @@ def _banded(t, pose, hydro, strips, data):
 
 
 # (t, pose, hydro, strips, data) -> morison.StripLoad
-strip_load = chosen_by_class("strips", {ExactStrips: _exact, BandedStrips: _banded})
+strip_load = chosen_by_class("strips", {ExactStrips: _exact, BandedStrips: _banded}, inlined=True)
 
 
 @kernel
@@ -109,7 +109,7 @@ def _water(t, X, Y, Z, waves, current, depth):
     return u + moved.u, v + moved.v, moved.w, moved.du, moved.dv, moved.dw
 
 
-@kernel
+@inlined_kernel
 def hydro_load(t, pose, x, hydro, data):
     """HydroLoad at a state; fills data.added_mass."""
     if hydro is None:

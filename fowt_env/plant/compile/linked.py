@@ -1,0 +1,131 @@
+"""Kernels for kernels: typed and lowered once, and linked into their callers, without machine code.
+
+Numba optimises every function that it compiles with a copy of all that it calls, and makes machine code of
+it. That of a kernel which kernels alone call is never run, since each caller has a copy: 40 % of the time of
+compiling a scene. Here such a kernel ends as LLVM's code, which callers link, and which the disk cache keeps
+instead. Called from Python, as in tests, it is compiled once more as numba does it.
+"""
+
+import llvmlite.binding as llvm
+import numba
+from numba.core import sigutils
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompilerBase, CompileResult, DefaultPassBuilder
+from numba.core.compiler_machinery import register_pass
+from numba.core.registry import CPUDispatcher
+from numba.core.typed_passes import NativeLowering
+
+
+class LinkedLibrary(JITCodeLibrary):
+    """Code of a kernel that callers link: no machine code is made of it."""
+
+    def _finalize_final_module(self):
+        self._finalize_dynamic_globals()
+        self._verify_declare_only_symbols()
+        self._finalized = True
+
+    def _optimize_final_module(self):
+        """Nothing: the caller that gets machine code optimises all that it has linked at once."""
+
+    def serialized(self):
+        """(name, code) for the disk cache."""
+        return self.name, self._get_module_for_linking().as_bitcode()
+
+    @classmethod
+    def rebuilt(cls, codegen, name, code):
+        """The library that was serialized so."""
+        library = cls(codegen, name)
+        library._final_module = library._shared_module = llvm.parse_bitcode(code)
+        library._finalize_final_module()
+        return library
+
+
+class Key:
+    """What stands for a linked kernel where numba has the function that Python calls."""
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class LinkedLowering(NativeLowering):
+    """Numba's lowering into a LinkedLibrary."""
+
+    _name = "linked_lowering"
+
+    def run_pass(self, state):
+        state.library = LinkedLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.flags.no_compile = state.flags.no_cpython_wrapper = state.flags.no_cfunc_wrapper = True
+        super().run_pass(state)
+        lowered, key = state["cr"], Key()
+        state.targetctx.insert_user_function(key, lowered.fndesc, [state.library])
+        state.reload_init.extend(state.library._reload_init)
+        state["cr"] = lowered._replace(cfunc=key)
+        return True
+
+
+class LinkedCompiler(CompilerBase):
+    """Numba's pipeline with LinkedLowering at its end."""
+
+    def define_pipelines(self):
+        passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        passes.passes = [
+            (LinkedLowering, "linked lowering") if kind is NativeLowering else (kind, text)
+            for kind, text in passes.passes
+        ]
+        passes.finalize()
+        return [passes]
+
+
+class LinkedDispatcher(CPUDispatcher):
+    """Dispatcher of a kernel for kernels."""
+
+    def __init__(self, py_func, locals=None, targetoptions=None, pipeline_class=LinkedCompiler):
+        super().__init__(py_func, locals, targetoptions, pipeline_class)
+        self._twin = None  # the same as Python calls it
+        self._called_from_python = False
+
+    def add_overload(self, cres):
+        """Numba's, but Python does not find it."""
+        self.overloads[tuple(cres.signature.args)] = cres
+
+    def _compile_for_args(self, *args, **kws):
+        self._called_from_python = True
+        try:
+            return super()._compile_for_args(*args, **kws)
+        finally:
+            self._called_from_python = False
+
+    def compile(self, sig):
+        """The Key of a signature's code or, called from Python, its function."""
+        if not self._called_from_python:
+            return super().compile(sig)
+        self._called_from_python = False  # what it calls is compiled from here
+        args, _ = sigutils.normalize_signature(sig)
+        if self._twin is None:
+            self._twin = numba.jit(**self.targetoptions)(self.py_func)
+        function = self._twin.compile(tuple(args))
+        self._insert([kind._code for kind in args], function, False)
+        return function
+
+
+def reduced(cres):
+    """A CompileResult of a linked kernel in parts that can be pickled."""
+    descriptor = cres.fndesc
+    descriptor.typemap = descriptor.calltypes = None
+    return cres.library.serialized(), descriptor, cres.environment, cres.signature, cres.reload_init
+
+
+def rebuilt(target_context, parts):
+    """The CompileResult whose reduced form is given."""
+    (name, code), descriptor, environment, signature, reload_init = parts
+    for function in reload_init:
+        function()
+    library = LinkedLibrary.rebuilt(target_context.codegen(), name, code)
+    empty = dict.fromkeys(CompileResult._fields)
+    return CompileResult(
+        **empty
+        | {
+            "target_context": target_context, "typing_context": target_context.typing_context,
+            "library": library, "environment": environment, "entry_point": Key(), "fndesc": descriptor,
+            "type_annotation": "", "signature": signature, "objectmode": False, "lifted": (),
+            "reload_init": reload_init, "referenced_envs": (),
+        }
+    )  # fmt: skip
