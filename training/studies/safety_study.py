@@ -53,7 +53,7 @@ class Trained:
         """Action of the coming control period."""
         if self.periods % self.decisions.settings.hold == 0:
             if self.periods:
-                self.decisions.see(observation[None])
+                self.decisions.append(observation[None])
             self.decision = self.network(self.decisions.features())
         self.periods += 1
         return self.decisions.smooth(self.decision)[0]

@@ -134,6 +134,7 @@ def _decorator(linked=False, **options):
             return function
         if linked:
             compiled = LinkedDispatcher(function, targetoptions=options | {"nopython": True})
+            compiled.keep = _keep
         else:
             compiled = numba.njit(**options)(function)
         _keep(compiled, function)

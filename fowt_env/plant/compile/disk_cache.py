@@ -120,6 +120,10 @@ class _Files(caching.CompileResultCacheImpl):
 class _LinkedFiles(_Files):
     """The same for kernels that are linked into their callers: no machine code."""
 
+    def __init__(self, function, folder, stamp):
+        super().__init__(function, folder, stamp)
+        self._filename_base += ".linked"
+
     def reduce(self, cres):
         return linked.reduced(cres)
 

@@ -6,6 +6,8 @@ compiling a scene. Here such a kernel ends as LLVM's code, which callers link, a
 instead. Called from Python, as in tests, it is compiled once more as numba does it.
 """
 
+from functools import cached_property
+
 import llvmlite.binding as llvm
 import numba
 from numba.core import sigutils
@@ -79,8 +81,16 @@ class LinkedDispatcher(CPUDispatcher):
 
     def __init__(self, py_func, locals=None, targetoptions=None, pipeline_class=LinkedCompiler):
         super().__init__(py_func, locals, targetoptions, pipeline_class)
-        self._twin = None  # the same as Python calls it
+        self.keep = None  # keep(compiled, function): has the disk cache keep the machine code of the twin
         self._called_from_python = False
+
+    @cached_property
+    def twin(self):
+        """The same function as numba compiles it for Python."""
+        twin = numba.jit(**self.targetoptions)(self.py_func)
+        if self.keep is not None:
+            self.keep(twin, self.py_func)
+        return twin
 
     def add_overload(self, cres):
         """Numba's, but Python does not find it."""
@@ -99,9 +109,7 @@ class LinkedDispatcher(CPUDispatcher):
             return super().compile(sig)
         self._called_from_python = False  # what it calls is compiled from here
         args, _ = sigutils.normalize_signature(sig)
-        if self._twin is None:
-            self._twin = numba.jit(**self.targetoptions)(self.py_func)
-        function = self._twin.compile(tuple(args))
+        function = self.twin.compile(tuple(args))
         self._insert([kind._code for kind in args], function, False)
         return function
 

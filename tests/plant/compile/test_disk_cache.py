@@ -21,7 +21,7 @@ from fowt_env.plant.compile.sources import imported_at_top
 
 ROOT = Path(fowt_env.__file__).resolve().parent.parent
 SMALL = "from fowt_env.plant.hydro.waves import ramp_factor; print(ramp_factor(1.0, 4.0))\n"
-HITS = "print(sum(ramp_factor.stats.cache_hits.values()))\n"
+HITS = "print(sum(ramp_factor.twin.stats.cache_hits.values()))\n"
 WHERE = "from fowt_env.plant.compile.decorators import CACHE_FOLDER; print(CACHE_FOLDER)\n"
 DAY = 86400.0
 DECAY = """
@@ -386,7 +386,7 @@ for room in (PACKAGE, PACKAGE / "controllers", PACKAGE / "training"):  # the las
             print(path.relative_to(PACKAGE).as_posix(), _outside_hash(str(path)))
 print("folder", CACHE_FOLDER.name)
 ramp_factor(1.0, 4.0)
-print("loaded", sum(ramp_factor.stats.cache_hits.values()))
+print("loaded", sum(ramp_factor.twin.stats.cache_hits.values()))
 """
 
 

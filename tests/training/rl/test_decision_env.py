@@ -130,7 +130,7 @@ def test_the_figures_of_validation_are_the_metrics_of_its_episodes():
 def test_restarting_one_row_leaves_the_others():
     decisions = Decisions(2, 1, DecisionSettings(history=2), 0.1)
     for value in (1.0, 2.0, 4.0):
-        decisions.see(np.full((2, 1), value))
+        decisions.append(np.full((2, 1), value))
     decisions.restart(0, np.array([7.0]), np.array([0.1, 0.2]))
     assert decisions.features().tolist() == [[7.0, 0.0, 0.0], [4.0, 2.0, 1.0]]
 

@@ -64,10 +64,10 @@ def test_the_model_floats_at_its_design_draft():
 
 def test_the_model_is_oc3_hywind_by_froude_but_for_what_was_identified(model):
     full = read_platform("oc3_hywind")
-    assert np.allclose(np.array(model.hydro.hull.z) * 50.0, full.hull.z)
-    assert np.allclose(np.array(model.hydro.hull.diameter) * 50.0, full.hull.diameter)
+    assert np.allclose(np.array(model.hull.z) * 50.0, full.hull.z)
+    assert np.allclose(np.array(model.hull.diameter) * 50.0, full.hull.diameter)
     factor = 50.0**3 * full.environment.water_density / model.environment.water_density
-    assert model.aero.tower.mass * factor == pytest.approx(full.tower.mass)
+    assert model.tower.mass * factor == pytest.approx(full.tower.mass)
     assert model.ballast.mass * factor == pytest.approx(full.ballast.mass, rel=0.03)  # identified: 2.5 % less
     assert model.ballast.inertia[0] * factor * 2500.0 == pytest.approx(full.ballast.inertia[0], rel=0.04)
     turbine, original = read_turbine(model.turbine), read_turbine(full.turbine)

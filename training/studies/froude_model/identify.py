@@ -350,7 +350,7 @@ def write():
     for name in ("environment", "ballast", "hull", "hydro", "tower"):
         text.append(f"\n[{name}]  # {MARKS[name]}")
         values = getattr(platform, name).model_dump()
-        text += [f"{key} = {toml_value(value)}" for key, value in values.items()]
+        text += [f"{key} = {toml_value(value)}" for key, value in values.items() if value is not None]
     text.append(
         "\n# Three taut lines, each a pair from anchor to two points of the hull, 60 deg to either side: that"
         "\n# stands for the delta connection. EA (wire, spring), length, anchor radius: identified; fairlead"

@@ -40,6 +40,7 @@ EXPONENTS = {  # record: {field: exponent of the scale, or one for each entry}
         "added_mass_coefficient": SAME, "drag_coefficient": SAME, "heave_added_mass": MASS,
         "axial_drag_coefficient": SAME, "yaw_stiffness": MOMENT,
         "linear_damping": (*[FORCE - SPEED] * 3, *[MOMENT - RATE] * 3),
+        "added_mass": [[MASS] * 3 + [MASS + LENGTH] * 3] * 3 + [[MASS + LENGTH] * 3 + [INERTIA] * 3] * 3,
     },
     "tower": {
         "mass": MASS, "cm_height": LENGTH, "inertia": INERTIA, "base_height": LENGTH, "top_height": LENGTH,
@@ -86,7 +87,7 @@ def scaled(record, name, scale):
     """{field: value} of a description record times its powers of the scale. name: key of EXPONENTS."""
     result = {}
     for field, value in record.model_dump().items():
-        if field not in EXPONENTS[name]:
+        if field not in EXPONENTS[name] or value is None:
             continue
         exponent = EXPONENTS[name][field]
         if isinstance(value, int):
