@@ -154,8 +154,8 @@ kernel = _decorator(**_HOUSE, _nrt=False, linked=True)
 # process that compiles gets other last bits than one that loads from disk (seen on the look-up rotor
 # and the wave sums). Where a sum's time counts, vector_sums.py writes it in a fixed order of lanes.
 
-# A kernel put into its caller whatever its size. A call hands over a scene by value, some 400 words: that
-# takes longer than most loads, so what lies between a run and its loads is put into the run.
+# A kernel put into its caller whatever its size. A call hands over a part of the model by value, up to some
+# hundred words: that takes longer than many a load, so what merely hands parts on is put into its caller.
 inlined_kernel = _decorator(**_HOUSE, _nrt=False, forceinline=True, linked=True)
 
 # Functions that Python calls: they take Handles, which are counted references, or allocate.

@@ -1,0 +1,62 @@
+"""Kernels that are linked into their callers: no machine code of their own, and the same figures."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+
+from fowt_env.plant.compile.decorators import entry, kernel
+from fowt_env.plant.compile.linked import LinkedLibrary
+
+
+@kernel
+def cubic(x):
+    return x * x * x - 0.1 * x
+
+
+@kernel
+def slope(x):
+    return (cubic(x + 1e-3) - cubic(x - 1e-3)) / 2e-3
+
+
+@entry
+def slopes(x, out):
+    for i in range(x.shape[0]):
+        out[i] = slope(x[i])
+
+
+def test_a_kernel_is_linked_into_its_caller_without_machine_code():
+    x = np.linspace(-2.0, 2.0, 9)
+    out = np.empty(9)
+    slopes(x, out)
+    for function in (slope, cubic):
+        (result,) = function.overloads.values()
+        assert isinstance(result.library, LinkedLibrary)
+        assert not result.library._codegen._engine.is_symbol_defined(result.fndesc.mangled_name)
+    assert np.array_equal(out, [slope.py_func(value) for value in x])
+
+
+def test_python_calls_it_with_the_same_bits():
+    values = np.random.default_rng(0).normal(size=50)
+    out = np.empty(50)
+    slopes(values, out)
+    assert [slope(value) for value in values] == out.tolist()
+    assert slope.twin.signatures and slope(2) == slope.py_func(2)  # of another type: compiled for it
+
+
+def test_callers_of_another_process_link_what_is_on_disk(tmp_path):
+    code = (
+        "from fowt_env.plant.compile.decorators import entry\n"
+        "from fowt_env.plant.hydro.waves import ramp_factor\n"
+        "@entry\ndef factor(t):\n    return ramp_factor(t, 4.0)\n"
+        "print(factor(1.0), sum(ramp_factor.stats.cache_hits.values()))\n"
+    )
+    environment = {**os.environ, "FOWT_CACHE_DIR": str(tmp_path)}
+    found = [
+        subprocess.run(
+            [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True
+        ).stdout.split()
+        for _ in range(2)
+    ]
+    assert found == [["0.25", "0"], ["0.25", "1"]]
