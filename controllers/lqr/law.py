@@ -9,7 +9,6 @@ Filter and feedback go on from the command in force, whoever gave it: what the r
 environment adds to one command stays in the next, so that it is an addition to the rates.
 """
 
-from enum import IntEnum
 from math import exp
 
 import numpy as np
@@ -21,11 +20,31 @@ from fowt_env.controllers.lqr.design import (
     MOMENT,
     N_FEEDBACK,
     N_PLANT,
-    N_SENSORS,
-    N_STATE,
     WAVE,
     WIND,
     Weights,
+)
+from fowt_env.controllers.lqr.estimator import (
+    BLOCK,
+    BLOCKS,
+    DEVIATION,
+    FED_BACK,
+    INTEGRAL,
+    N_MEMORY,
+    OPERATING_WIND,
+    PITCH,
+    PITCH_COMMAND,
+    ROTOR,
+    TORQUE,
+    TORQUE_COMMAND,
+    TRIM,
+    Head,
+    K,
+    between,
+    block_of,
+    deviate,
+    estimate,
+    estimator_law,
 )
 from fowt_env.errors import InputError
 from fowt_env.plant.compile.decorators import control_kernel, kernel
@@ -35,101 +54,6 @@ from fowt_env.plant.measurement import Measure
 HANDOVER = (0.01745, 0.05236)  # rad of pitch command: torque by the curve below, by feedback above
 TORQUE_RANGE = (0.5, 1.1)  # of rated, for the feedback's torque
 INTEGRAL_LIMIT = 1.0  # rad, of the speed integral
-ROTOR = 4  # place of the rotor speed in PLANT
-
-
-class Head(IntEnum):
-    """First entries of the parameter array; the torque curve follows, then a block per wind."""
-
-    CONTROL_DT = 0
-    RATED_SPEED = 1
-    RATED_TORQUE = 2
-    GEAR_RATIO = 3
-    PITCH_MINIMUM = 4
-    PITCH_MAXIMUM = 5
-    PITCH_RATE_LIMIT = 6
-    TORQUE_RATE_LIMIT = 7
-    FIRST_WIND = 8
-    WIND_STEP = 9
-    WINDS = 10
-    SCHEDULE_DECAY = 11
-    TORQUE_LOW = 12
-    TORQUE_HIGH = 13
-    HANDOVER_LOW = 14
-    HANDOVER_HIGH = 15
-    CURVE = 16
-
-
-BLOCKS = Head.CURVE + len(TorqueCurve._fields)
-# places within the block of one wind
-TRIM = 0
-TORQUE = TRIM + N_PLANT
-PITCH = TORQUE + 1
-A = PITCH + 1
-B = A + N_STATE * N_STATE
-C = B + N_STATE * 2
-L = C + N_SENSORS * N_STATE
-K = L + N_STATE * N_SENSORS
-BLOCK = K + 2 * N_FEEDBACK
-# places in the memory: absolute estimate, then
-OPERATING_WIND = N_STATE
-INTEGRAL = OPERATING_WIND + 1
-TORQUE_COMMAND = INTEGRAL + 1
-PITCH_COMMAND = TORQUE_COMMAND + 1
-INNOVATION = PITCH_COMMAND + 1
-DEVIATION = INNOVATION + N_SENSORS
-FED_BACK = DEVIATION + N_STATE
-STARTED = FED_BACK + N_FEEDBACK  # whether a command is in force yet
-N_MEMORY = STARTED + 1
-
-
-@kernel
-def between(p, low, fraction, place):
-    """Entry of the blocks at `place`, between two winds."""
-    return (1.0 - fraction) * p[low + place] + fraction * p[low + BLOCK + place]
-
-
-@kernel
-def deviate(p, low, fraction, memory):
-    """Fill DEVIATION: estimate less the trim of the operating wind."""
-    for i in range(N_STATE):
-        memory[DEVIATION + i] = memory[i]
-    for i in range(N_PLANT):
-        memory[DEVIATION + i] -= between(p, low, fraction, TRIM + i)
-    memory[DEVIATION + WIND] -= memory[OPERATING_WIND]
-    memory[DEVIATION + WIND + 1] -= memory[OPERATING_WIND]
-
-
-@kernel
-def correct(p, low, fraction, memory, measurement):
-    """Correct the estimate with what is measured of rotor, blades, platform and nacelle."""
-    y = memory[INNOVATION : INNOVATION + N_SENSORS]
-    y[0] = measurement[Measure.GENERATOR_SPEED] / p[Head.GEAR_RATIO] - between(p, low, fraction, TRIM + ROTOR)
-    y[1] = measurement[Measure.BLADE_PITCH] - between(p, low, fraction, TRIM + ROTOR + 1)
-    y[2] = measurement[Measure.PLATFORM_PITCH] - between(p, low, fraction, TRIM + 1)
-    y[3] = measurement[Measure.PLATFORM_PITCH_RATE]
-    y[4] = measurement[Measure.NACELLE_ACCELERATION]
-    deviate(p, low, fraction, memory)
-    for i in range(N_SENSORS):
-        for j in range(N_STATE):
-            y[i] -= between(p, low, fraction, C + i * N_STATE + j) * memory[DEVIATION + j]
-    for i in range(N_STATE):
-        for j in range(N_SENSORS):
-            memory[i] += between(p, low, fraction, L + i * N_SENSORS + j) * y[j]
-
-
-@kernel
-def predict(p, low, fraction, memory, torque, pitch):
-    """Advance the estimate by one period under the commands."""
-    deviate(p, low, fraction, memory)
-    torque -= between(p, low, fraction, TORQUE)
-    pitch -= between(p, low, fraction, PITCH)
-    for i in range(N_STATE):
-        by_torque = between(p, low, fraction, B + 2 * i)
-        change = by_torque * torque + between(p, low, fraction, B + 2 * i + 1) * pitch
-        for j in range(N_STATE):
-            change += between(p, low, fraction, A + i * N_STATE + j) * memory[DEVIATION + j]
-        memory[i] += change - memory[DEVIATION + i]
 
 
 @kernel
@@ -139,34 +63,6 @@ def feed_back(p, low, fraction, memory, row):
     for j in range(N_FEEDBACK):
         total -= between(p, low, fraction, K + row * N_FEEDBACK + j) * memory[FED_BACK + j]
     return total
-
-
-@kernel
-def block_of(p, memory):
-    """(start of the block of the wind below the operating wind, fraction of the way to the next block)."""
-    last = p[Head.FIRST_WIND] + (p[Head.WINDS] - 1.0) * p[Head.WIND_STEP]
-    place = (clamp(memory[OPERATING_WIND], p[Head.FIRST_WIND], last) - p[Head.FIRST_WIND]) / p[
-        Head.WIND_STEP
-    ]
-    node = min(int(place), int(p[Head.WINDS]) - 2)
-    return BLOCKS + node * BLOCK, place - node
-
-
-@kernel
-def estimate(p, memory, measurement, command):
-    """Bring the estimate to the present: over the last period under its command, then what is measured.
-
-    At the first instant reset has left the estimate, and no command has acted.
-    """
-    if memory[STARTED] != 0.0:
-        low, fraction = block_of(p, memory)
-        predict(p, low, fraction, memory, command[0], command[1])
-        decay = p[Head.SCHEDULE_DECAY]
-        memory[OPERATING_WIND] = decay * memory[OPERATING_WIND] + (1.0 - decay) * memory[WIND + 1]
-        memory[TORQUE_COMMAND], memory[PITCH_COMMAND] = command[0], command[1]
-    memory[STARTED] = 1.0
-    low, fraction = block_of(p, memory)
-    correct(p, low, fraction, memory, measurement)
 
 
 @kernel
@@ -214,12 +110,6 @@ def lqr_step(p, memory, measurement, command):
 def lqr_law(parameters, memory, measurement, command):
     """Compiled form of lqr_step, one type for all control laws."""
     lqr_step(parameters, memory, measurement, command)
-
-
-@control_kernel
-def estimator_law(parameters, memory, measurement, command):
-    """The estimate alone; the command in force is read and stays."""
-    estimate(parameters, memory, measurement, command)
 
 
 def blocks(models, weights, rated_speed, dt):
