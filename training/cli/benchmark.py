@@ -32,7 +32,7 @@ ACCURACY_EXAMPLES = """[bold]Examples[/bold]
 
 COMPILE_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt benchmark compile[/cyan]  some two minutes; compiled kernels of other runs are left as they are"""
+[cyan]fowt benchmark compile[/cyan]  a minute or two; kernels of other runs are left as they are"""
 
 
 @benchmarks.command(name="compile", epilog=COMPILE_EXAMPLES)

@@ -7,7 +7,7 @@ from numba.core import event
 
 from fowt_env.plant.compile.decorators import CACHE_FOLDER
 
-COMPILING_MESSAGE = "compiling kernels (first run of this kind of scene only, 10 s to 2 min) ..."
+COMPILING_MESSAGE = "compiling kernels (first run of this kind of scene only, 5 s to 1 min) ..."
 
 
 class _Once(event.Listener):
