@@ -10,6 +10,7 @@ from functools import cached_property
 
 import llvmlite.binding as llvm
 import numba
+from llvmlite import ir
 from numba.core import sigutils
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, CompileResult, DefaultPassBuilder
@@ -42,6 +43,20 @@ class LinkedLibrary(JITCodeLibrary):
         return library
 
 
+def place_environment(codegen, name, environment):
+    """Define the variable that a kernel's code finds its Environment by, in which a print looks things up.
+
+    Of variables of a common name in several modules the first one counts, so that callers find this one.
+    """
+    module = codegen._create_empty_module(name)
+    variable = ir.GlobalVariable(module, ir.IntType(8).as_pointer(), name)
+    variable.linkage = "common"
+    variable.initializer = ir.Constant(variable.value_type, None)
+    codegen._add_module(llvm.parse_assembly(str(module)))
+    codegen._engine.finalize_object()
+    codegen.set_env(name, environment)
+
+
 class Key:
     """What stands for a linked kernel where numba has the function that Python calls."""
 
@@ -60,6 +75,7 @@ class LinkedLowering(NativeLowering):
         state.targetctx.insert_user_function(key, lowered.fndesc, [state.library])
         state.reload_init.extend(state.library._reload_init)
         state["cr"] = lowered._replace(cfunc=key)
+        place_environment(state.library.codegen, state.targetctx.get_env_name(lowered.fndesc), lowered.env)
         return True
 
 
@@ -127,6 +143,7 @@ def rebuilt(target_context, parts):
     for function in reload_init:
         function()
     library = LinkedLibrary.rebuilt(target_context.codegen(), name, code)
+    place_environment(library.codegen, target_context.get_env_name(descriptor), environment)
     empty = dict.fromkeys(CompileResult._fields)
     return CompileResult(
         **empty

@@ -60,3 +60,17 @@ def test_callers_of_another_process_link_what_is_on_disk(tmp_path):
         for _ in range(2)
     ]
     assert found == [["0.25", "0"], ["0.25", "1"]]
+
+
+def test_a_kernel_may_print_for_whoever_looks_for_a_fault(tmp_path):
+    code = (
+        "from fowt_env.plant.compile.decorators import entry, kernel\n"
+        "@kernel\ndef loud(t):\n    print('at', t)\n    return 2.0 * t\n"
+        "@entry\ndef caller(t):\n    return loud(t)\n"
+        "print(caller(1.5))\n"
+    )
+    (tmp_path / "loud.py").write_text(code)  # numba reads the source
+    done = subprocess.run(
+        [sys.executable, "loud.py"], cwd=tmp_path, capture_output=True, text=True, timeout=120, check=True
+    )
+    assert done.stdout.split("\n")[:2] == ["at 1.5", "3.0"], done.stderr
