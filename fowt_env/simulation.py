@@ -58,13 +58,13 @@ class HeldCommand(CompiledController):
         """Nothing to start."""
 
 
-def steps_in(name: str, period: float, dt: float) -> int:
-    """Number of physics steps in a period. Raises: InputError if dt does not divide it."""
-    for key, value in ((name, period), ("dt", dt)):
+def steps_in(name: str, period: float, dt: float, step: str = "dt") -> int:
+    """Number of steps of dt (s), called step, in a period. Raises: InputError if dt does not divide it."""
+    for key, value in ((name, period), (step, dt)):
         check_number(key, value, 0.0, low_open=True, allowed="a positive number of seconds")
     count = round(period / dt)
     if count < 1 or abs(count * dt - period) > 1e-9 * period:
-        raise InputError(f"dt = {dt:g} s does not divide {name} = {period:g} s (ratio {period / dt:.6g})")
+        raise InputError(f"{step} = {dt:g} s does not divide {name} = {period:g} s (ratio {period / dt:.6g})")
     return count
 
 
@@ -142,7 +142,7 @@ def simulate(
     per_control = steps_in("control_dt", control_dt, dt)
     per_output = steps_in("output_dt", output_dt, dt)
     last = steps_in("duration", duration, dt)
-    steps_in("duration", duration, output_dt)
+    steps_in("duration", duration, output_dt, "output_dt")
     check_duration(scene, duration)
     if grid_loss is not None:
         check_number("grid_loss", grid_loss, allowed="a time in s, or None")

@@ -5,7 +5,6 @@ second-order filter fitted to its Kaimal spectrum, the waves of the site's sea a
 the hull's force at the spectrum's peak. The controls are the rates of torque and blade-pitch command.
 """
 
-import pickle
 from dataclasses import asdict, dataclass, fields, replace
 from math import inf, pi, sqrt
 
@@ -15,6 +14,7 @@ from scipy.optimize import least_squares
 
 from fowt_env.analysis.linear_model import linearize
 from fowt_env.analysis.trim import without_fluctuations
+from fowt_env.analysis.trim_cache import plant_key, water_key
 from fowt_env.analysis.wave_excitation import wave_force
 from fowt_env.caches import Cache, cached
 from fowt_env.descriptions.checks import check_number
@@ -176,12 +176,13 @@ def _state_rows():
     return [State[name.upper()] for name in PLANT]
 
 
-_MODELS = Cache(16)  # (platform, turbine, rotor model) as bytes -> DesignModels
+_MODELS = Cache(16)  # all that a design depends on -> DesignModels
 
 
 def design_models(scene):
-    """DesignModels of the scene's platform over WINDS; remembered per platform, turbine and rotor model."""
-    key = pickle.dumps((scene.platform, scene.turbine, scene.rotor))
+    """DesignModels of the scene's plant over WINDS; remembered per plant, whatever its weather."""
+    aero = scene.model.aero
+    key = (plant_key(scene), water_key(scene), aero.wind.shear_exponent, aero.field is None)
     return _MODELS.get(key, lambda: tuple(design_model(scene, speed) for speed in WINDS))
 
 

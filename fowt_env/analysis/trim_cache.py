@@ -22,7 +22,7 @@ def plant_key(scene):
     return hashlib.sha256(pickle.dumps(parts)).hexdigest()
 
 
-def _water(scene):
+def water_key(scene):
     """What a trim's last bits depend on beside the plant: the form and the nodes of strips in a current."""
     hydro = scene.model.hydro
     quadrature = None if hydro is None else getattr(hydro.strips, "quadrature", None)
@@ -42,7 +42,7 @@ def cached_trim(scene, key, speed):
     """
     if scene.model.aero.field is not None:
         return _state_and_command(trim(scene))
-    entry = (key, _water(scene), scene.model.aero.wind.shear_exponent, float(speed))
+    entry = (key, water_key(scene), scene.model.aero.wind.shear_exponent, float(speed))
     return _TRIMS.get(entry, lambda: _state_and_command(trim(replace(scene, wind_speed=float(speed)))))
 
 

@@ -170,7 +170,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self.task = task
         self.action_mode = action_mode
         self.baseline = baseline
-        steps_in("duration", task.duration, control_dt)
+        steps_in("duration", task.duration, control_dt, "control_dt")
         episode = task.draw(np.random.default_rng(0))
         sea = episode.sea
         if task.has_sea and sea_state_of(sea).height == 0.0:
@@ -198,7 +198,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self.control_dt = float(control_dt)
         self.dt = min(self.scene.dt, self.control_dt) if dt is None else float(dt)
         per_control = steps_in("control_dt", control_dt, self.dt if dt is None else dt)
-        self._last = per_control * steps_in("duration", task.duration, control_dt)
+        self._last = per_control * steps_in("duration", task.duration, control_dt, "control_dt")
         self._key = plant_key(self.scene)
         self._build(ACTION_MODES[action_mode], per_control)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (N_ACTIONS,), np.float32)

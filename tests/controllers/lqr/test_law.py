@@ -1,9 +1,11 @@
 """lqr on a training seed beside the baseline, and what it refuses."""
 
+import numpy as np
 import pytest
 
 from fowt_env import build_scene, simulate
-from fowt_env.controllers.lqr.design import Weights
+from fowt_env.caches import clear_caches
+from fowt_env.controllers.lqr.design import Weights, design_models
 from fowt_env.controllers.lqr.law import LQR
 from fowt_env.errors import InputError
 from fowt_env.training.evaluation.cases import named_cases
@@ -33,3 +35,15 @@ def test_bad_weights_are_named(turbine):
         Weights().changed(pich_rate=1.0)
     with pytest.raises(InputError, match="prepare"):
         LQR(turbine, 0.1).reset(None)
+
+
+def test_the_design_for_a_scene_does_not_depend_on_which_weather_came_first():
+    still = build_scene("oc3_hywind", wind=12.0, fidelity="fast")
+    sea = {"kind": "regular", "H": 6.0, "T": 10.0}
+    waves = build_scene("oc3_hywind", wind=14.0, sea=sea, fidelity="fast")
+    clear_caches()
+    alone = design_models(waves)
+    clear_caches()
+    design_models(still)
+    for one, other in zip(alone, design_models(waves), strict=True):
+        assert all(np.array_equal(value, getattr(other, name)) for name, value in vars(one).items())
