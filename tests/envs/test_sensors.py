@@ -170,7 +170,7 @@ def test_the_drawn_plant_is_not_leaked_to_lqr_estimator_preview_and_safety_layer
     guarded = SafetyLayer(FowtEnv(nominal_plant=NOMINAL, **ON_LQR, **SHIFTED, **QUICK), baseline="lqr")
     guarded.reset(seed=1)
     law = make("lqr", guarded.unwrapped.design_scene.turbine, 0.1)
-    law.prepare(build_scene(fidelity="standard", **QUICK))
+    law.prepare(FowtEnv(**ON_LQR, **QUICK).scene)
     assert np.array_equal(guarded._baseline.parameters, law.parameters)
 
 
