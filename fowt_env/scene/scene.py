@@ -14,9 +14,7 @@ from fowt_env.errors import InputError
 from fowt_env.plant.channels import Channel, channels, put_hub_wind, scales
 from fowt_env.plant.compile.handle import Handle
 from fowt_env.plant.events import N_COUNTERS
-from fowt_env.plant.hydro.wave_bands import (
-    band_scratch,
-)
+from fowt_env.plant.hydro.wave_bands import band_scratch
 from fowt_env.plant.integrators import rotor_samples
 from fowt_env.plant.model import N_CACHE, Data
 from fowt_env.plant.rotor_substeps import N_SAMPLE

@@ -11,6 +11,8 @@ import tempfile
 
 import pandas as pd
 
+from fowt_env import InputError
+
 SESSION = """
 import time
 start, cpu = time.perf_counter(), time.process_time()
@@ -53,7 +55,7 @@ NAMES = (
 def session(progress=None):
     """DataFrame (scene, seconds, processor_seconds) of the session in a new process with an empty cache.
 
-    progress: called with (text, done, total). Raises: RuntimeError with what a failed process printed.
+    progress: called with (text, done, total). Raises: InputError with what a failed process printed.
     """
     rows = []
     with tempfile.TemporaryDirectory() as folder:
@@ -72,7 +74,7 @@ def session(progress=None):
                 progress(name, len(rows), len(NAMES))
         errors = process.communicate()[1]
     if process.returncode != 0:
-        raise RuntimeError(f"the session in a new process failed: {errors[-600:]}")
+        raise InputError(f"the session in a new process failed: {errors[-600:]}")
     return pd.DataFrame(rows, columns=["scene", "seconds", "processor_seconds"])
 
 
