@@ -34,7 +34,7 @@ from fowt_env.plant.compile.decorators import control_kernel, kernel
 from fowt_env.plant.drivetrain import TorqueCurve
 from fowt_env.plant.measurement import Measure
 from fowt_env.plant.state import State
-from fowt_env.weather.wind_field import WindBox, rotor_average
+from fowt_env.weather.preview import rotor_wind_series
 
 SCHEDULE_SPEEDS = 15  # trims from rated to cut-out wind, square-root spaced: the schedule is steep at rated
 BELOW_RATED = 0.5  # m/s below the published rated wind that the schedule starts
@@ -134,16 +134,6 @@ class Preview(PI):
             raise InputError(f"controller {self.name!r}: call prepare(scene) before reset(measurement)")
         super().reset(measurement)
         self.memory[PreviewMemory.FORESEEN] = foreseen_pitch(float(measurement.time), self.parameters)
-
-
-def rotor_wind_series(scene):
-    """(time s, wind m/s, period s or None): wind along x averaged over the rotor, as the scene has it."""
-    if isinstance(scene.wind, WindBox):
-        rotor, box = scene.turbine.rotor, scene.wind
-        time, value = rotor_average(box, rotor.hub_height, 2.0 * rotor.tip_radius)
-        return time, value[:, 0], len(value) * box.dt if box.periodic else None
-    series = scene.model.aero.wind
-    return series.time, series.value[:, 0], series.period if series.period > 0.0 else None
 
 
 def steady_pitch(scene):

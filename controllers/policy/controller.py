@@ -36,6 +36,7 @@ from fowt_env.envs.observations import (
 from fowt_env.envs.tasks import Task
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measure, Measurement
+from fowt_env.weather.preview import rotor_wind_series
 
 POLICY_PREFIX = "policy:"
 AGENTS = Path(__file__).parent / "agents"
@@ -133,8 +134,6 @@ class PolicyController:
         if self._estimator is not None:
             self._estimator.prepare(scene)
         if len(self._observation_map.preview):
-            from fowt_env.controllers.preview import rotor_wind_series
-
             if scene.model.aero is None:
                 raise InputError(f"controller {self.name!r}: needs a scene with wind to look ahead")
             self._wind = rotor_wind_series(scene)
