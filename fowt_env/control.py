@@ -39,7 +39,7 @@ from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.measurement import N_MEASUREMENTS, SENSOR_FIELDS, Measurement
 from fowt_env.plant.sensing import GIVEN, HIDDEN
 from fowt_env.plant.state import N_COMMANDS
-from fowt_env.weather.preview import Preview, check_leads, exact_preview
+from fowt_env.weather.preview import Preview, check_times, exact_preview
 
 CATALOGUE = "fowt_env.controllers"
 PRIVILEGED_INPUTS = {  # what a controller may be given beyond Measurement
@@ -288,12 +288,20 @@ def preview_leads(controller: Any) -> tuple[float, ...]:
     declared = "wind_preview" in controller.information
     if not times and not declared:
         return ()
+    if not times:
+        raise InputError(
+            f"controller {controller.name!r}: declares 'wind_preview' and has no preview_times: how far ahead it"
+            " is to be given the wind (s, increasing)"
+        )
     if not declared:
         raise InputError(
             f"controller {controller.name!r}: has preview_times = {times!r} and does not declare"
             " 'wind_preview' in its attribute information"
         )
-    return check_leads(times, f"controller {controller.name!r}: preview_times")
+    try:
+        return tuple(check_times(times).tolist())
+    except InputError as error:
+        raise InputError(f"controller {controller.name!r}: {error}") from None
 
 
 def foreseen(scene: Any, leads: tuple[float, ...], preview: Any, duration: float) -> Preview:
@@ -304,7 +312,9 @@ def foreseen(scene: Any, leads: tuple[float, ...], preview: Any, duration: float
     if isinstance(preview, str):
         if preview != EXACT:
             raise unknown("preview", preview, (EXACT,))
-        found = exact_preview(scene, leads, duration)
+        if duration > scene.options["duration"]:  # of a box of wind that repeats
+            scene = replace(scene, options=scene.options | {"duration": duration})
+        found = exact_preview(scene, leads)
     else:
         found = preview(scene, leads) if callable(preview) else preview
     try:

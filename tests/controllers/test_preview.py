@@ -10,11 +10,11 @@ from fowt_env.controllers.preview import (
     Preview,
     PreviewSettings,
     foreseen_pitch,
-    rotor_wind_series,
     steady_pitch,
 )
 from fowt_env.errors import InputError
 from fowt_env.plant.measurement import Measurement
+from fowt_env.weather.preview import rotor_wind_series
 
 DT = 0.1
 STILL = Measurement(*[0.0] * len(Measurement._fields))
