@@ -49,7 +49,7 @@ from fowt_env.envs.rewards import (
     check_weights,
     weight_array,
 )
-from fowt_env.envs.sensors import Sensors, check_sensors, draw_sensors, reading_scales
+from fowt_env.envs.sensors import check_sensors, draw_sensors, reading_scales
 from fowt_env.envs.snapshot import CARRIED, DATA_CARRIED, Snapshot
 from fowt_env.envs.tables import task_tables
 from fowt_env.envs.tasks import TASKS, Episode, Task, check_offset, task_of
@@ -60,6 +60,7 @@ from fowt_env.plant.compile.handle import Handle
 from fowt_env.plant.events import counted
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
 from fowt_env.plant.rollout import STOP_REASONS, output
+from fowt_env.plant.sensing import new_past
 from fowt_env.plant.state import Command, State
 from fowt_env.scene.build import build_scene
 from fowt_env.scene.options import OPTIONS
@@ -251,7 +252,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             overspeed=float(turbine.overspeed),
             dt=self.dt,
             per_control=per_control,
-            sensors=Sensors(np.zeros((1, N_MEASUREMENTS)), self._sensors["delay"]) if sensed else None,
+            sensors=self._drawn(scene, per_control) if sensed else None,
         )
         n = scene.n_state
         measurement = np.zeros(N_MEASUREMENTS)
@@ -264,7 +265,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             action=np.zeros(N_ACTIONS),
             measurement=measurement,
             reading=np.zeros(N_MEASUREMENTS) if sensed else measurement,
-            delay_buffer=np.zeros((self._sensors["delay"] + 1, N_MEASUREMENTS)) if sensed else None,
+            past=new_past(self._config.sensors.chain) if sensed else None,
             observation=np.zeros(len(observed), dtype=np.float32),
             counts=np.zeros(N_COUNTS, dtype=np.int64),
             reference=np.zeros(len(Reference._fields)),
@@ -447,10 +448,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self._episode = self._episode._replace(data=scene.data())
         self._config = self._config._replace(model=scene.model)
         if self._sensors is not None:
-            readings = self._last // self._config.per_control + 1
-            scales = reading_scales(scene.turbine)
-            drawn = draw_sensors(self._sensors["noise"], self._sensors["delay"], scales, scene.seed, readings)
-            self._config = self._config._replace(sensors=drawn)
+            self._config = self._config._replace(sensors=self._drawn(scene, self._config.per_control))
         if self._baseline is not None:
             self._baseline.prepare(self.design_scene)
             self._config = self._config._replace(parameters=self._baseline.parameters)
@@ -458,6 +456,12 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             self._estimator.prepare(self.design_scene)
             self._config = self._config._replace(estimator=self._estimator.parameters)
         self._handle = Handle(self._config, self._episode)
+
+    def _drawn(self, scene, per_control):
+        """Sensors of an episode in a scene's weather."""
+        readings = self._last // per_control + 1
+        scales = reading_scales(scene.turbine)
+        return draw_sensors(self._sensors, scales, self.control_dt, scene.seed, readings)
 
     def measurement(self) -> Measurement:
         """Measurement that a controller is given now (SI), as the sensors read it."""

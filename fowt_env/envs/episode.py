@@ -12,13 +12,13 @@ import numpy as np
 from fowt_env.envs.actions import ActionMap, accept, action_of, command_of
 from fowt_env.envs.observations import ObservationMap, fill_observation, fill_signals
 from fowt_env.envs.rewards import Scales, fill_terms, weighted_sum
-from fowt_env.envs.sensors import Sensors, take_reading
 from fowt_env.plant.compile.decorators import entry, kernel
 from fowt_env.plant.compile.handle import by_reference, data_of, model_of
 from fowt_env.plant.drivetrain import followed_torque, torque_was_limited
 from fowt_env.plant.measurement import Measure
 from fowt_env.plant.model import Data, LoadCache, Model
 from fowt_env.plant.rollout import NON_FINITE, OVERSPEED, RUNNING, advance_plant, observe_plant
+from fowt_env.plant.sensing import Sensors, take_reading
 from fowt_env.plant.state import Command, State
 
 BAD_ACTION = -1  # beside the statuses of rollout.py
@@ -56,7 +56,7 @@ class EpisodeData(NamedTuple):
     action: np.ndarray  # (2,) last accepted action
     measurement: np.ndarray  # (N_MEASUREMENTS,) at the present instant
     reading: np.ndarray  # the same as sensors show it; without any the measurement itself
-    delay_buffer: np.ndarray | None  # last measurements, of the sensors' delay
+    past: np.ndarray | None  # what the sensors remember: delays, low passes and integrals
     observation: np.ndarray  # (n,) float32
     # int64: physics steps done, control periods with a clipped action, those with a torque at its limits
     counts: np.ndarray
@@ -86,7 +86,7 @@ def measure_and_sense(config, episode):
             copy_into(episode.measurement, episode.previous_measurement)
             return NON_FINITE
     period = episode.counts[STEP] // config.per_control
-    take_reading(config.sensors, period, episode.measurement, episode.delay_buffer, episode.reading)
+    take_reading(config.sensors, period, episode.measurement, episode.past, episode.reading)
     return RUNNING
 
 

@@ -14,7 +14,7 @@ from fowt_env.errors import ControllerError, ControllerInputError, InputError, P
 from fowt_env.training.evaluation.faults import faulted, idling
 from fowt_env.training.evaluation.guard import attempt, reason_of
 from fowt_env.training.evaluation.metrics import METRICS, TIME, turbine_metrics
-from fowt_env.training.evaluation.model_mismatch import ModelMismatch
+from fowt_env.training.evaluation.model_mismatch import perturbed_sensors
 from fowt_env.training.evaluation.plant_perturbation import perturbed_parts
 from fowt_env.training.evaluation.wind_boxes import cached_box
 from fowt_env.weather.wind_field import is_field
@@ -72,7 +72,8 @@ def scored(run):
                 initial=case.initial,
                 stop_overspeed=case.fault is None,
                 grid_loss=_grid_loss(case),
-                **run.options,
+                nominal=nominal,
+                **run.options | _sensors(run, nominal.turbine),
             )
         return frame, turbine_metrics(frame, scene.turbine, run.skip)
 
@@ -123,6 +124,14 @@ def _grid_loss(case):
     return None if case.fault is None else case.fault.grid_loss
 
 
+def _sensors(run, turbine):
+    """{"sensors": SensorChain} of a case that degrades them, in place of the run's own; else nothing."""
+    shift = run.case.shift
+    control_dt = run.options.get("control_dt", CONTROL_DT)
+    chain = None if shift is None else perturbed_sensors(shift, turbine, control_dt)
+    return {} if chain is None else {"sensors": chain}
+
+
 def run_controller(run, nominal):
     """What simulate is given as controller: the run's own, with its fault, or a parked turbine's.
 
@@ -137,6 +146,4 @@ def run_controller(run, nominal):
         controller = make(run.controller, nominal.turbine, control_dt)
     except InputError as error:
         raise ControllerInputError(str(error)) from error
-    if case.shift is not None:
-        controller = ModelMismatch(controller, nominal, case.shift, run.seed)
     return faulted(controller, case.fault, nominal.turbine, control_dt)
