@@ -5,8 +5,9 @@ beta_ss/dV) dV. The law adds to its integral what moves its own pitch by these i
 schedule and limits stay those of the PI law, and whatever beta_ss gets wrong the integral takes back. The
 gain schedule multiplies the integral and falls as the blades turn: at rest beta = GK(beta) KI I, so
 dI = d beta (1 + 2 beta/beta_K)/KI, theory.md (A7). The wind is the
-rotor-averaged one, `preview_time` ahead of the rotor, as the run foresees it. Two equal first-order low passes whose delay, with that of the blade-pitch actuator and half
-a control period, adds up to the preview time, keep the blades from following every gust.
+rotor-averaged one, `preview_time` ahead of the rotor, as the run foresees it. Two equal first-order low
+passes whose delay, with that of the blade-pitch actuator and half a control period, adds up to the preview
+time, keep the blades from following every gust.
 """
 
 from dataclasses import dataclass, replace

@@ -283,7 +283,6 @@ def _table(turbine, density):
     """Table of a turbine's blade elements."""
     key = (id(turbine), density)
 
-
     def make():
         cp, ct, cq = performance(build_blade_elements(turbine, density), RATIOS, PITCHES)
         return turbine, Table(RATIOS, PITCHES, cp, ct, cq)  # with the turbine, whose id is then its own

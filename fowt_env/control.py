@@ -11,8 +11,9 @@ A controller has reset(measurement) and act(measurement). Beside these it may ha
 - prepare(scene), called once per run before reset. Where "plant_model" is declared it is given the scene of
   the run in steady wind (rated) and still water: the plant's equations, and nothing of the weather that is
   coming. Where it is not, the scene has a `turbine` and nothing else;
-- preview_times, where "wind_preview" is declared: how far ahead (s, increasing) it is given the rotor-averaged
-  wind, as `measurement.wind_preview`, or after the N_MEASUREMENTS entries of a compiled law's array.
+- preview_times, where "wind_preview" is declared: how far ahead (s, increasing) it is given the
+  rotor-averaged wind, as `measurement.wind_preview`, or after the N_MEASUREMENTS entries of a compiled law's
+  array.
 
 The built-in controllers are built on the simulator, and so it imports none of them: it knows the name of the
 package that has them (CATALOGUE), and imports that when a run or an environment asks for a name.
@@ -237,6 +238,11 @@ def view_of(controller: Any) -> Callable[[Sequence[float]], MeasurementView]:
     return _view_class(controller.name, tuple(controller.information)).take
 
 
+def with_wind_ahead(measurement: Measurement, wind: Sequence[float]) -> MeasurementView:
+    """The measurement with the wind (m/s) that is foreseen, of which nothing else is hidden."""
+    return _view_class("", (*Measurement._fields, "wind_preview")).take([*measurement, *wind])
+
+
 def wind_ahead(measurement: Any) -> tuple[float, ...]:
     """The foreseen wind that a measurement carries; () where it carries none."""
     return getattr(measurement, "_ahead", ())
@@ -272,8 +278,8 @@ def hidden(controller: Any, chain: tuple[str, Sequence[str]] | None = None) -> n
             continue
         if getattr(controller, "declared", True):
             raise InputError(
-                f"controller {controller.name!r}: declares {field!r}, which the sensor chain {name!r} does not"
-                f" have; it has {', '.join(available)}"
+                f"controller {controller.name!r}: declares {field!r}, which the sensor chain {name!r} does"
+                f" not have; it has {', '.join(available)}"
             )
         values[index] = HIDDEN
     return values
@@ -290,8 +296,8 @@ def preview_leads(controller: Any) -> tuple[float, ...]:
         return ()
     if not times:
         raise InputError(
-            f"controller {controller.name!r}: declares 'wind_preview' and has no preview_times: how far ahead it"
-            " is to be given the wind (s, increasing)"
+            f"controller {controller.name!r}: declares 'wind_preview' and has no preview_times: how far ahead"
+            " it is to be given the wind (s, increasing)"
         )
     if not declared:
         raise InputError(
@@ -354,7 +360,7 @@ class Known:
 
 
 def known_scene(scene: Any, controller: Any) -> Any:
-    """What a controller's prepare is given of a scene: its plant in steady wind at rated, or its turbine alone.
+    """What a controller's prepare is given of a scene: its plant in steady rated wind, or its turbine alone.
 
     The plant is in still water, with the seed 0; nothing of the run's weather can be read from it.
     """

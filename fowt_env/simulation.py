@@ -159,7 +159,7 @@ def simulate(
                 the true motions; the noise follows from the scene's seed and is the same for every controller
     preview     where the controller has preview_times, what it is given of the wind ahead: "exact", a Preview
                 (fowt_env.weather.preview), or a function of (scene, preview_times) that returns one
-    nominal     scene whose plant the controller is designed on where that is not the one that runs; None: it is
+    nominal     scene whose plant the controller is designed on, where that is not the one that runs
 
     A controller is given what its `information` declares and nothing else (fowt_env.control).
 
@@ -169,7 +169,8 @@ def simulate(
 
     attrs["events"] of the DataFrame: {name: count} of what the plant met outside its usual range
     (fowt_env.plant.events), of those that happened. A PlantWarning says so at the end of a run whose loads
-    were less accurate for it. attrs["tripped"]: time (s) at which the protection stopped the turbine, or None.
+    were less accurate for it. attrs["tripped"]: time (s) at which the protection stopped the turbine, or
+    None.
 
     Raises: InputError before anything runs (ControllerInputError where the controller raised it, whenever
     that is); SimulationStopped (with the rows so far) on capsize, a numerical blow-up, a

@@ -1,4 +1,4 @@
-"""What a controller is given of a run: what it declares, through the sensors, and nothing of the weather ahead."""
+"""What a controller is given of a run: what it declares, through its sensors, and no weather ahead."""
 
 import copy
 import pickle
@@ -129,7 +129,9 @@ def test_what_a_python_controller_does_not_declare_raises_by_name_and_by_index(g
     for asks in (lambda m: m.wind_speed, lambda m: m[Measure.WIND_SPEED], lambda m: m[-2]):
         curious = Curious(("rotor_speed",))
         curious.asks = asks
-        with pytest.raises(ControllerError, match=r"'curious' reads 'wind_speed' at t = 0.000 s.*information"):
+        with pytest.raises(
+            ControllerError, match=r"'curious' reads 'wind_speed' at t = 0.000 s.*information"
+        ):
             run(gust_scene, curious)
     curious = Curious(("rotor_speed",))
     curious.asks = lambda m: m.wind_preview
@@ -312,7 +314,9 @@ def test_in_still_air_there_is_nothing_to_look_ahead_at():
 
 
 def test_a_field_that_the_chain_does_not_have_is_refused_where_it_is_declared(gust_scene):
-    message = "'recorder': declares 'surge', which the sensor chain 'standard' does not have; it has rotor_speed"
+    message = (
+        "'recorder': declares 'surge', which the sensor chain 'standard' does not have; it has rotor_speed"
+    )
     with pytest.raises(InputError, match=message):
         run(gust_scene, Recorder(("surge",)), sensors="standard")
     watcher = Watcher()
@@ -341,15 +345,21 @@ def test_readings_are_those_of_the_chain_taken_one_by_one(gust_scene, chain):
     true, read = Recorder(Measurement._fields, calls=200), Recorder(chain.available, calls=200)
     run(gust_scene, true, duration=20.0)
     frame = run(gust_scene, read, duration=20.0, sensors=chain)
-    noise = {name: chain.sensors[name].noise if name in chain.sensors else 0.0 for name in Measurement._fields}
+    noise = {
+        name: chain.sensors[name].noise if name in chain.sensors else 0.0 for name in Measurement._fields
+    }
     drawn = draw_noise(np.array(list(noise.values())), gust_scene.seed, 200)
     twin = NaiveSensors(chain, 0.1, drawn)
     for measured, reading in zip(true.seen(), read.seen(), strict=True):
         wanted = twin.read(Measurement(*measured[:N_MEASUREMENTS]))
         got = dict(zip(Measurement._fields, reading[:N_MEASUREMENTS], strict=True))
         for name in Measurement._fields:
-            assert got[name] == pytest.approx(wanted.get(name, np.nan), rel=1e-12, abs=1e-12, nan_ok=True), name
-    pd.testing.assert_frame_equal(frame, run(gust_scene, Recorder((), calls=200), duration=20.0), check_exact=True)
+            assert got[name] == pytest.approx(wanted.get(name, np.nan), rel=1e-12, abs=1e-12, nan_ok=True), (
+                name
+            )
+    pd.testing.assert_frame_equal(
+        frame, run(gust_scene, Recorder((), calls=200), duration=20.0), check_exact=True
+    )
 
 
 def test_exact_sensors_change_no_bit(storm_scene):

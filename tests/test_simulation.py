@@ -150,7 +150,9 @@ def test_a_trip_is_an_emergency_stop_at_the_instant_in_which_the_speed_is_passed
     stopped = run(storm_scene, controller=stop, **options)
     pd.testing.assert_frame_equal(tripped, stopped, check_exact=True)
     assert tripped["BldPitch1_[deg]"].iloc[-1] == pytest.approx(90.0, abs=0.1)
-    pd.testing.assert_frame_equal(tripped[free["Time_[s]"] < at], free[free["Time_[s]"] < at], check_exact=True)
+    pd.testing.assert_frame_equal(
+        tripped[free["Time_[s]"] < at], free[free["Time_[s]"] < at], check_exact=True
+    )
 
 
 def test_a_trip_stays_when_the_speed_has_fallen_and_takes_the_torque(storm_scene):

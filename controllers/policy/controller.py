@@ -157,9 +157,7 @@ class PolicyController:
         ahead = np.array(wind_ahead(measurement))
         decisions = self._decisions
         if self._estimator is not None and self._calls > 0:  # the first instant is that of the reset
-            call_law(
-                self._estimator.law, self._estimator.parameters, self._estimator.memory, values, self._u
-            )
+            call_law(self._estimator.law, self._estimator.parameters, self._estimator.memory, values, self._u)
         if self._calls % decisions.settings.hold == 0:
             self._observe(values, ahead)
             if self._calls == 0:

@@ -25,7 +25,9 @@ class Sensor:
     time_constant: float = 0.0  # s, of a first-order low pass; 0: none
     delay: float = 0.0  # s from measurement to reading, taken as the nearest whole number of control periods
     step: float = 0.0  # of the quantisation; 0: none
-    integral_of: str | None = None  # field whose reading is integrated instead, as an acceleration to a velocity
+    integral_of: str | None = (
+        None  # field whose reading is integrated instead, as an acceleration to a velocity
+    )
     high_pass: float = 0.0  # rad/s, of the first-order high pass on such an integral
     source: str = ""
     confidence: str = ""

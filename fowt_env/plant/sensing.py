@@ -1,4 +1,4 @@
-"""Between the plant and a controller: sensors, what the controller may know, and the wind that is foreseen."""
+"""Between plant and controller: sensors, what the controller may know, and the wind that is foreseen."""
 
 from enum import IntEnum
 from typing import NamedTuple
@@ -49,7 +49,7 @@ def open_chain() -> np.ndarray:
 
 
 def new_past(chain: np.ndarray) -> np.ndarray:
-    """Memory of a chain: a ring of (longest delay + 1) measurements, then the low passes, then the integrals."""
+    """Memory of a chain: a ring of (longest delay + 1) measurements, the low passes, the integrals."""
     return np.zeros((int(chain[Setting.DELAY].max()) + 3, N_MEASUREMENTS))
 
 

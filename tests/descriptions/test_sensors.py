@@ -31,7 +31,9 @@ def test_a_name_a_chain_and_nothing_at_all_are_understood():
         sensor_chain(0.02)
 
 
-@pytest.mark.parametrize("key, value", [("noise", -1.0), ("time_constant", -0.1), ("delay", 101.0), ("step", "x")])
+@pytest.mark.parametrize(
+    "key, value", [("noise", -1.0), ("time_constant", -0.1), ("delay", 101.0), ("step", "x")]
+)
 def test_a_figure_out_of_range_is_named(key, value):
     with pytest.raises(InputError, match=f"{key} = "):
         Sensor(**{key: value})

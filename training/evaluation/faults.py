@@ -48,7 +48,10 @@ class FaultedController:
         self.feathered = float(feathered)  # rad
         self.step = radians(fault.rate) * check_control_dt(control_dt)  # rad per control period
         self.stuck = self.target = None
-        self.information = (*getattr(inner, "information", SENSOR_FIELDS), "blade_pitch")  # where a fault finds the blades
+        self.information = (
+            *getattr(inner, "information", SENSOR_FIELDS),
+            "blade_pitch",
+        )  # where a fault finds the blades
         self.declared = getattr(inner, "declared", True)
         self.preview_times = tuple(getattr(inner, "preview_times", ()))
 

@@ -1,8 +1,8 @@
 """Load cases on a plant that no controller knows: masses, moorings and actuators off, sensors noisy.
 
 The run is that of the true plant, a perturbed one. The controller is made for the nominal turbine and
-prepared with the nominal scene, so that one that designs itself on the plant's equations (lqr, rosco, preview)
-designs on the wrong ones, as it would at sea. Metrics are of the true motions: noise is on the
+prepared with the nominal scene, so that one that designs itself on the plant's equations (lqr, rosco,
+preview) designs on the wrong ones, as it would at sea. Metrics are of the true motions: noise is on the
 controller's readings alone.
 """
 
