@@ -1,4 +1,4 @@
-"""Nacelle lidars: where their beams look, how they average along them, and how often; by name or from a file."""
+"""Nacelle lidars: where their beams look, how they average along them, how often; by name or from a file."""
 
 import functools
 from typing import Annotated
@@ -15,8 +15,8 @@ Distance = bounded(ge=10.0, le=1000.0)  # m
 class Lidar(Record):
     """A lidar on the nacelle that looks upwind; keys and units as in data/lidars.toml.
 
-    Either azimuth and elevation of each beam, or beams and half_angle; either pulse_length, or lens_radius and
-    wavelength; with none of these it measures at points.
+    Either azimuth and elevation of each beam, or beams and half_angle; either pulse_length, or lens_radius
+    and wavelength; with none of these it measures at points.
     """
 
     name: str = ""

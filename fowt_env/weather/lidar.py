@@ -1,29 +1,30 @@
 """What a lidar on the nacelle knows of the wind that is on its way to the rotor, with the errors that it has.
 
-The rotor-effective wind is estimated as is usual (Schlipf, "Lidar-Assisted Control Concepts for Wind Turbines",
-PhD thesis, Stuttgart 2015; Guo, Schlipf, Cheng, Wind Energ. Sci. 8, 149, 2023): each line-of-sight speed is
-taken for u times the cosine of its beam, the last measurements of all beams and distances are averaged, each
-advanced by the travel of the wind at its mean speed, then filtered and buffered until the wind is due. Errors come from
+The rotor-effective wind is estimated as is usual (Schlipf, "Lidar-Assisted Control Concepts for Wind
+Turbines", PhD thesis, Stuttgart 2015; Guo, Schlipf, Cheng, Wind Energ. Sci. 8, 149, 2023): each line-of-sight
+speed is taken for u times the cosine of its beam, the last measurements of all beams and distances are
+averaged, each advanced by the travel of the wind at its mean speed, then filtered, and buffered until the wind
+is due. Errors come from
 - v and w in the line of sight, and from seeing some points of the disc instead of all of it;
 - the average along the beam: Gaussian (pulsed) or Lorentzian (focused continuous wave);
-- wind that evolves on its way: squared coherence exp(-a sqrt((f d/V)^2 + (b d)^2)) of points d apart along the
-  wind, a = 8.4 sigma/V + 0.05 with sigma^2 = sigma_u^2 + sigma_v^2 + sigma_w^2 and b = 0.25 L^-1.24 with L = 8.1
-  Lambda_1 (m), of large-eddy simulations: Simley and Pao, American Control Conference 2015, Eq. (7). The coherence
-  of two points is the product of this one's root and the IEC's across the wind (Chen, Guo, Schlipf, Cheng, Wind
-  Energ. Sci. 7, 539, 2022);
+- wind that evolves on its way: squared coherence exp(-a sqrt((f d/V)^2 + (b d)^2)) of points d apart along
+  the wind, a = 8.4 sigma/V + 0.05 with sigma^2 = sigma_u^2 + sigma_v^2 + sigma_w^2 and b = 0.25 L^-1.24 with
+  L = 8.1 Lambda_1 (m), from large-eddy simulations: Simley and Pao, American Control Conference 2015, Eq. (7).
+  The coherence of two points is the root of this one times the IEC's across the wind (Chen, Guo, Schlipf,
+  Cheng, Wind Energ. Sci. 7, 539, 2022);
 - one beam after another, each held until its next shot, and shots lost to blades that pass in front;
-- the low pass, whose corner is where the transfer function S_RL/S_LL falls by 3 dB, so that it lets through what
-  rotor and lidar have in common; its delay is that with which it follows the rotor best;
+- the low pass, whose corner is where the transfer function S_RL/S_LL falls below 1 by 3 dB, so that it lets
+  through what rotor and lidar have in common; its delay is that with which it follows the rotor best;
 - the power law, which the points see elsewhere than the rotor.
 The motion of the nacelle along the wind adds to each line of sight at the time of measuring (Motion).
 
-In a rotor-averaged wind the estimate is drawn, given that very wind: with R the rotor's mean and L the lidar's,
-L(f) = (S_RL/S_RR) R(f) + N(f), and N, of spectrum S_LL - |S_RL|^2/S_RR, from a stream of the seed of its own. A box of
-wind is sampled where the beams look, and evolves in addition. Gusts, steps and series of the user's are taken to
-fill the disc and not to evolve.
+In a rotor-averaged wind the estimate is drawn, given that very wind: with R the rotor's mean and L the
+lidar's, L(f) = (S_RL/S_RR) R(f) + N(f), and N, of spectrum S_LL - |S_RL|^2/S_RR, from a stream of the seed
+of its own. A box of wind is sampled where the beams look, and evolves in addition. Gusts, steps and series of
+the user's are taken to fill the disc and not to evolve.
 
-Left out: the induction zone, yaw misalignment, tilt of the beams with the platform, its drift and sideways motion, noise of
-the line-of-sight speed (below 0.1 m/s a shot, which averaging and filtering make small).
+Left out: the induction zone, yaw misalignment, tilt of the beams with the platform, its drift and sideways
+motion, noise of the line-of-sight speed (of a shot, which averaging and filtering make small).
 """
 
 from bisect import bisect_left
@@ -147,7 +148,7 @@ def points(lidar, first=0):
 
 
 def evolution(speed, sigma, height):
-    """(a, b) of the coherence along the wind, b in 1/m; sigma: of u at a point, m/s. Simley and Pao (2015)."""
+    """(a, b in 1/m) of the coherence along the wind, Simley and Pao (2015); sigma: of u at a point, m/s."""
     total = sigma * np.sqrt((SIGMA_RATIO**2).sum())
     return 8.4 * total / speed + 0.05, 0.25 * (LENGTH_RATIO[0] * length_scale(height)) ** -1.24
 
@@ -189,7 +190,7 @@ def disk_coherence(k, distance, radius):
 
 @cached(64)
 def _pairs(lidar, first):
-    """(distance across, along, late, weight (3, n)) of pairs of points, those that lie alike to 1 mm together.
+    """(distance across, along, late, weight (3, n)) of pairs of points, those alike to 1 mm together.
 
     late: difference of Points.late, m. weight: of S_u, S_v, S_w in the lidar's spectrum.
     """
@@ -256,8 +257,11 @@ def _point_spectra(frequency, speed, sigma, height):
 
 
 def blocked_share(lidar, rotor, blade):
-    """Share of shots that passing blades take away: the azimuths at which a blade, flat in the rotor plane and as
-    wide as its chord where the beam crosses the plane, lies in front of it; mean over the beams."""
+    """Share of shots that passing blades take away, mean over the beams.
+
+    That of the azimuths at which a blade lies in front of the beam, flat in the rotor plane and as wide as its
+    chord where the beam crosses the plane.
+    """
     if lidar.behind_rotor is None:
         return 0.0
     slope_y, slope_z = directions(lidar)
@@ -270,7 +274,7 @@ def blocked_share(lidar, rotor, blade):
 def sampling(lidar, blocked, frequency):
     """(n,) complex gain of shots that are held for a scan, or for more where the next ones are lost.
 
-    A beam whose shots are lost with a probability holds a value for a geometrically distributed number of scans.
+    A beam whose shots are lost with a probability holds a value for a geometric number of scans.
     """
     turn = 2.0 * np.pi * frequency * lidar.scan_period
     held = np.sinc(frequency * lidar.scan_period) * np.exp(-0.5j * turn)
@@ -331,7 +335,8 @@ def lidar_horizon(scene, preset="four_beam_pulsed"):
 def lidar_tuning(scene, preset="four_beam_pulsed", ahead=0.0):
     """Tuning of a lidar in the mean wind of a scene that knows the wind some time (s) ahead.
 
-    It uses all distances from which the wind is still far enough after the filter. preset: as in lidar_preview.
+    It uses all distances from which the wind is still far enough after the filter. preset: as in
+    lidar_preview.
     Raises: InputError where it does not know the wind that far ahead, and for a scene without wind.
     """
     lidar, place = _placed(scene, preset)
@@ -358,8 +363,8 @@ def _placed(scene, preset):
     blocked = blocked_share(lidar, rotor, scene.turbine.blade)
     if blocked > 0.9:
         raise InputError(
-            f"lidar {lidar.name!r}: the blades of {scene.turbine.name!r} take away {100.0 * blocked:.0f} % of its shots:"
-            " must be at most 90 %; mount it elsewhere (behind_rotor, above_shaft)"
+            f"lidar {lidar.name!r}: the blades of {scene.turbine.name!r} take away {100.0 * blocked:.0f} % of its"
+            " shots: must be at most 90 %; mount it elsewhere (behind_rotor, above_shaft)"
         )
     return lidar, (speed, rotor.hub_height, _radius(scene), blocked)
 
@@ -391,11 +396,12 @@ def _drawn(scene):
 def lidar_preview(scene, times, preset="four_beam_pulsed", seed=None):
     """Preview of the rotor-averaged wind at times (k,) s ahead, as a lidar on the nacelle estimates it.
 
-    preset  name of a built-in lidar (descriptions.lidar.lidars), path to a TOML file with its keys, or a Lidar
+    preset  name of a built-in lidar (descriptions.lidar.lidars), a path to a TOML file with its keys, or a
+            Lidar
     seed    of what rotor and lidar do not share; None: that of the scene
     All times are served by one filter, made for the last of them, and one buffer.
-    Raises: InputError for times that do not increase from 0 to 600 s or go beyond what the lidar knows (naming it, its
-    horizon in this wind and what was asked), and for a scene without wind.
+    Raises: InputError for times that do not increase from 0 to 600 s or go beyond what the lidar knows (naming
+    it, its horizon in this wind and what was asked), and for a scene without wind.
     """
     times = check_times(times)
     lidar, (speed, _, _, blocked) = _placed(scene, preset)
@@ -421,7 +427,7 @@ def lidar_preview(scene, times, preset="four_beam_pulsed", seed=None):
 
 
 def _profile_factor(scene, lidar, tuned):
-    """Mean wind at the lidar's points over that of the rotor, whose own factor its series does not have either."""
+    """Factor on the series of a rotor, which is without the power law, for what of this the lidar sees more."""
     series, p = scene.model.aero.wind, points(lidar, tuned.first)
     height = np.maximum(series.reference_height + p.z, LOWEST_HEIGHT)
     seen = p.weight @ (height / series.reference_height) ** series.shear_exponent
@@ -463,9 +469,9 @@ def _in_box(scene, lidar, tuned, seed):
     height = hub + p.z
     if max(np.abs(p.y).max() - box.y[-1], box.z[0] - height.min(), height.max() - box.z[-1]) > 0.0:
         raise InputError(
-            f"wind: the grid from y = {box.y[0]:g} to {box.y[-1]:g} m and z = {box.z[0]:g} to {box.z[-1]:g} m must"
-            f" hold what the lidar {lidar.name!r} looks at, y to {np.abs(p.y).max():.0f} m either way and z from"
-            f" {height.min():.0f} to {height.max():.0f} m"
+            f"wind: the grid from y = {box.y[0]:g} to {box.y[-1]:g} m and z = {box.z[0]:g} to {box.z[-1]:g} m"
+            f" must hold what the lidar {lidar.name!r} looks at, y to {np.abs(p.y).max():.0f} m either way and z"
+            f" from {height.min():.0f} to {height.max():.0f} m"
         )
     seen = np.zeros(box.velocity.shape[0])
     columns = (p.late / speed, p.y, height, p.weight, p.across, p.up)
@@ -507,7 +513,7 @@ def _as_given(scene, lidar, tuned):
 
 
 def _filtered(time, value, period, lidar, blocked, tuned, seed):
-    """(n,) wind at even times (n,) s as the lidar gives it: sampled, held and low-passed, all that made up for.
+    """(n,) wind at even times (n,) s as the lidar gives it: sampled, held, low-passed, these delays made good.
 
     seed: of what sampling folds into it; None: nothing. The ends of a wind without a period are held.
     """

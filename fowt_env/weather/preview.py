@@ -17,7 +17,7 @@ SAME_INSTANT = 1e-9  # s within which two instants are one
 
 
 class Motion(NamedTuple):
-    """How the fore-aft velocity of the nacelle, positive downwind, gets into a preview of a lidar that rides on it.
+    """How the fore-aft velocity of the nacelle, positive downwind, gets into the preview of a lidar on it.
 
     With y the velocity behind a first-order low pass of the corner, dy/dt = corner (velocity - y),
     z(t) = sum of weight_k y(t - offset_k), and the value j of the preview is changed by -z(t - delay_j).
@@ -76,7 +76,7 @@ def exact_preview(scene, times):
 
 
 def series_ahead(scene, start, speed, period, times):
-    """Preview of a wind speed (n,) m/s at times start (n,) s that repeats with a period (s), or holds its ends."""
+    """Preview of a speed (n,) m/s at times start (n,) s that repeats with a period (s), or holds its ends."""
     end = max(scene.options["duration"], start[-1])
     knots = start
     if period is not None:
@@ -93,8 +93,8 @@ def series_ahead(scene, start, speed, period, times):
 def add_motion(preview, time, velocity):
     """(len(times), n) values of a preview at times (n,) s, with what the nacelle's velocity (n,) m/s changes.
 
-    The reference of what a run does step by step. The velocity, positive downwind, is linear between the times,
-    which are even; before the first it stood at its first value.
+    The reference of what a run does step by step. The velocity, positive downwind, is linear between the
+    times, which are even; before the first it stood at its first value.
     """
     values = np.array([np.interp(time, preview.time, value) for value in preview.values])
     if preview.motion is None:
