@@ -3,13 +3,13 @@
 The rotor-effective wind is estimated as is usual (Schlipf, "Lidar-Assisted Control Concepts for Wind
 Turbines", PhD thesis, Stuttgart 2015; Guo, Schlipf, Cheng, Wind Energ. Sci. 8, 149, 2023): each line-of-sight
 speed is taken for u times the cosine of its beam, the last measurements of all beams and distances are
-averaged, each advanced by the travel of the wind at its mean speed, then filtered, and buffered until the wind
-is due. Errors come from
+averaged, each advanced by the travel of the wind at its mean speed, then filtered, and buffered until the
+wind is due. Errors come from
 - v and w in the line of sight, and from seeing some points of the disc instead of all of it;
 - the average along the beam: Gaussian (pulsed) or Lorentzian (focused continuous wave);
 - wind that evolves on its way: squared coherence exp(-a sqrt((f d/V)^2 + (b d)^2)) of points d apart along
   the wind, a = 8.4 sigma/V + 0.05 with sigma^2 = sigma_u^2 + sigma_v^2 + sigma_w^2 and b = 0.25 L^-1.24 with
-  L = 8.1 Lambda_1 (m), from large-eddy simulations: Simley and Pao, American Control Conference 2015, Eq. (7).
+  L = 8.1 Lambda_1 (m), of large-eddy simulations: Simley and Pao, American Control Conference 2015, Eq. 7.
   The coherence of two points is the root of this one times the IEC's across the wind (Chen, Guo, Schlipf,
   Cheng, Wind Energ. Sci. 7, 539, 2022);
 - one beam after another, each held until its next shot, and shots lost to blades that pass in front;
@@ -59,9 +59,11 @@ FREQUENCIES = np.geomspace(1e-4, 5.0, 120)  # Hz
 DISK_NODES = 60  # in each part of a disc seen from a point
 TUNING_CLASS = "B"  # of the normal turbulence model, for which the filter is made whatever the weather
 TUNING_PERIOD = 600.0  # s of wind that the filter is to follow
+TUNING_HIGHEST = 1.0  # Hz
 MINUS_3_DB = 10.0 ** (-3.0 / 20.0)
 LEADS = np.arange(0.0, 60.0, 0.05)  # s; delays of the filter that are looked through
 SLOWEST = 1.0  # m/s of mean wind
+LEAST_INSIDE = 0.8  # of a lidar's weights that a box of wind must hold
 STEP = 0.1  # s between values, where the wind is no even series
 SETTLING = 300.0  # s beyond the ends of such a wind, after which the filter has forgotten
 
@@ -259,8 +261,8 @@ def _point_spectra(frequency, speed, sigma, height):
 def blocked_share(lidar, rotor, blade):
     """Share of shots that passing blades take away, mean over the beams.
 
-    That of the azimuths at which a blade lies in front of the beam, flat in the rotor plane and as wide as its
-    chord where the beam crosses the plane.
+    That of the azimuths at which a blade lies in front of the beam, flat in the rotor plane and as wide as
+    its chord where the beam crosses the plane.
     """
     if lidar.behind_rotor is None:
         return 0.0
@@ -292,24 +294,27 @@ def tuning(lidar, first, speed, height, radius, blocked):
 
     blocked: share of shots lost. radius as in shares.
     """
-    frequency = np.arange(1.0, TUNING_PERIOD) / TUNING_PERIOD
+    frequency = np.arange(1, int(TUNING_HIGHEST * TUNING_PERIOD)) / TUNING_PERIOD
     sigma = ntm_sigma(speed, TUNING_CLASS)
-    rotor, cross, own = lidar_spectra(lidar, frequency, speed, sigma, height, radius, first)
+    found = shares(lidar, first, speed, sigma, height, radius)
+    rotor, cross, own = (at_frequencies(values, frequency) for values in found)
+    samples = int(round(TUNING_PERIOD / STEP))
+    point = amplitudes(speed, sigma, height, 2.0 * radius, samples, STEP, "point")
+    variance = 0.5 * point[:3, 1 : frequency.size + 1] ** 2
+    rotor, cross, own = rotor * variance[0], cross * variance[0], (own * variance).sum(axis=0)
     gain = np.abs(cross) / own
     below = np.flatnonzero(gain < MINUS_3_DB)
     corner = np.inf
     if below.size:
-        last = max(below[0], 1)
-        corner = (
-            2.0 * np.pi * np.interp(-MINUS_3_DB, -gain[last - 1 : last + 1], frequency[last - 1 : last + 1])
-        )
-    gain = sampling(lidar, blocked, frequency) * low_pass(frequency, corner)
-    common = np.cos(2.0 * np.pi * np.outer(LEADS, frequency)) @ (gain * cross).real
-    common -= np.sin(2.0 * np.pi * np.outer(LEADS, frequency)) @ (gain * cross).imag
+        near = slice(max(below[0] - 1, 0), below[0] + 1)
+        corner = 2.0 * np.pi * np.interp(-MINUS_3_DB, -gain[near], frequency[near])
+    passed = low_pass(frequency, corner)
+    gain = sampling(lidar, blocked, frequency) * passed
+    turn = 2.0 * np.pi * np.outer(LEADS, frequency)
+    common = np.cos(turn) @ (gain * cross).real - np.sin(turn) @ (gain * cross).imag
     lead = float(LEADS[np.argmax(common)])
-    held = held_noise(lidar, blocked, frequency, own / TUNING_PERIOD) * TUNING_PERIOD
-    left = rotor + np.abs(gain) ** 2 * own + np.abs(low_pass(frequency, corner)) ** 2 * held
-    error = np.sqrt(max((left.sum() - 2.0 * common.max()) / TUNING_PERIOD, 0.0))
+    left = rotor + np.abs(gain) ** 2 * own + np.abs(passed) ** 2 * held_noise(lidar, blocked, frequency, own)
+    error = np.sqrt(max(left.sum() - 2.0 * common.max(), 0.0))
     travel = (lidar.distances[first] - (lidar.behind_rotor or 0.0)) / speed
     return Tuning(first, float(corner), lead, travel - lead, float(error))
 
@@ -363,8 +368,8 @@ def _placed(scene, preset):
     blocked = blocked_share(lidar, rotor, scene.turbine.blade)
     if blocked > 0.9:
         raise InputError(
-            f"lidar {lidar.name!r}: the blades of {scene.turbine.name!r} take away {100.0 * blocked:.0f} % of its"
-            " shots: must be at most 90 %; mount it elsewhere (behind_rotor, above_shaft)"
+            f"lidar {lidar.name!r}: the blades of {scene.turbine.name!r} take away {100.0 * blocked:.0f} %"
+            " of its shots: must be at most 90 %; mount it elsewhere (behind_rotor, above_shaft)"
         )
     return lidar, (speed, rotor.hub_height, _radius(scene), blocked)
 
@@ -400,8 +405,8 @@ def lidar_preview(scene, times, preset="four_beam_pulsed", seed=None):
             Lidar
     seed    of what rotor and lidar do not share; None: that of the scene
     All times are served by one filter, made for the last of them, and one buffer.
-    Raises: InputError for times that do not increase from 0 to 600 s or go beyond what the lidar knows (naming
-    it, its horizon in this wind and what was asked), and for a scene without wind.
+    Raises: InputError for times that do not increase from 0 to 600 s or go beyond what the lidar knows, with
+    its horizon in this wind and what was asked, and for a scene without wind.
     """
     times = check_times(times)
     lidar, (speed, _, _, blocked) = _placed(scene, preset)
@@ -427,7 +432,7 @@ def lidar_preview(scene, times, preset="four_beam_pulsed", seed=None):
 
 
 def _profile_factor(scene, lidar, tuned):
-    """Factor on the series of a rotor, which is without the power law, for what of this the lidar sees more."""
+    """Factor on the rotor's series, which is without the power law, for what of this the lidar sees more."""
     series, p = scene.model.aero.wind, points(lidar, tuned.first)
     height = np.maximum(series.reference_height + p.z, LOWEST_HEIGHT)
     seen = p.weight @ (height / series.reference_height) ** series.shear_exponent
@@ -462,20 +467,24 @@ def _noise(variance, count, seed, stream):
 def _in_box(scene, lidar, tuned, seed):
     """(time, wind, period) that the lidar sees of a box of wind, due at the rotor; unfiltered.
 
-    Raises: InputError where its points are not within the grid.
+    Beams leave a box of little more than the rotor with their far ends; what lies within the grid counts.
+    Raises: InputError where that is too little.
     """
     box, p = scene.wind, points(lidar, tuned.first)
     hub, speed = scene.turbine.rotor.hub_height, box.speed
     height = hub + p.z
-    if max(np.abs(p.y).max() - box.y[-1], box.z[0] - height.min(), height.max() - box.z[-1]) > 0.0:
+    inside = (np.abs(p.y) <= box.y[-1]) & (height >= box.z[0]) & (height <= box.z[-1])
+    if p.weight[inside].sum() < LEAST_INSIDE:
         raise InputError(
             f"wind: the grid from y = {box.y[0]:g} to {box.y[-1]:g} m and z = {box.z[0]:g} to {box.z[-1]:g} m"
-            f" must hold what the lidar {lidar.name!r} looks at, y to {np.abs(p.y).max():.0f} m either way and z"
-            f" from {height.min():.0f} to {height.max():.0f} m"
+            f" must hold {LEAST_INSIDE:g} of what the lidar {lidar.name!r} looks at, y to"
+            f" {np.abs(p.y).max():.0f} m either way and z from {height.min():.0f} to {height.max():.0f} m:"
+            f" it holds {p.weight[inside].sum():.2f}"
         )
+    weight = p.weight * inside / p.weight[inside].sum()
     seen = np.zeros(box.velocity.shape[0])
-    columns = (p.late / speed, p.y, height, p.weight, p.across, p.up)
-    _look(box.field(), *(np.ascontiguousarray(column) for column in columns), seen)
+    columns = (p.late / speed, p.y, height, weight, p.across, p.up)
+    _look(box.field(), *(np.ascontiguousarray(column[inside]) for column in columns), seen)
     count, radius = seen.size, scene.turbine.rotor.tip_radius
     frequency = np.arange(1, count // 2 + 1) / (count * box.dt)
     sigma = ntm_sigma(speed, TUNING_CLASS)
@@ -506,14 +515,14 @@ def _look(field, late, y, z, weight, across, up, seen):
 def _as_given(scene, lidar, tuned):
     """(time, wind, period) that the lidar sees of a wind that fills the disc, at even times; unfiltered."""
     start, wind, period = rotor_wind_series(scene)
-    span = start[-1] - start[0] if period is None else period
-    count = max(int(np.ceil(span / STEP)), 1)
+    span = max(start[-1] - start[0], STEP) if period is None else period
+    count = int(np.ceil(span / STEP - 1e-9))
     time = start[0] + span / count * np.arange(count + (period is None))
     return time, _profile_factor(scene, lidar, tuned) * np.interp(time, start, wind, period=period), period
 
 
 def _filtered(time, value, period, lidar, blocked, tuned, seed):
-    """(n,) wind at even times (n,) s as the lidar gives it: sampled, held, low-passed, these delays made good.
+    """(n,) wind at even times (n,) s as the lidar gives it: sampled, held, low-passed, all without delay.
 
     seed: of what sampling folds into it; None: nothing. The ends of a wind without a period are held.
     """
