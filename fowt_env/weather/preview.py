@@ -16,11 +16,25 @@ LONGEST = 600.0  # s ahead
 SAME_INSTANT = 1e-9  # s within which two instants are one
 
 
+class Motion(NamedTuple):
+    """How the fore-aft velocity of the nacelle, positive downwind, gets into the preview of a lidar on it.
+
+    With y the velocity behind a first-order low pass of the corner, dy/dt = corner (velocity - y),
+    z(t) = sum of weight_k y(t - offset_k), and the value j of the preview is changed by -z(t - delay_j).
+    """
+
+    corner: float  # rad/s; inf: no low pass
+    offset: np.ndarray  # (k,) s
+    weight: np.ndarray  # (k,) adding up to 1
+    delay: np.ndarray  # (len(times),) s
+
+
 class Preview(NamedTuple):
     """Wind along x over the rotor some times ahead, as it is known: values[j] of t + times[j] at time t."""
 
     time: np.ndarray  # (n,) s, increasing; the ends are held
     values: np.ndarray  # (len(times), n) m/s
+    motion: Motion | None = None  # what the nacelle's own motion adds to it; None: nothing
 
 
 def check_times(times):
@@ -58,8 +72,11 @@ def exact_preview(scene, times):
     period, and of other wind the last value holds, as in the plant.
     Raises: InputError for times that do not increase from 0 to 600 s, or a scene without wind.
     """
-    times = check_times(times)
-    start, speed, period = rotor_wind_series(scene)
+    return series_ahead(scene, *rotor_wind_series(scene), check_times(times))
+
+
+def series_ahead(scene, start, speed, period, times):
+    """Preview of a speed (n,) m/s at times start (n,) s that repeats with a period (s), or holds its ends."""
     end = max(scene.options["duration"], start[-1])
     knots = start
     if period is not None:
@@ -71,3 +88,34 @@ def exact_preview(scene, times):
     time = time[np.concatenate([[True], np.diff(time) > SAME_INSTANT])]
     values = np.array([np.interp(time + ahead, start, speed, period=period) for ahead in times])
     return Preview(time, values.reshape(len(times), time.size))
+
+
+def add_motion(preview, time, velocity):
+    """(len(times), n) values of a preview at times (n,) s, with what the nacelle's velocity (n,) m/s changes.
+
+    The reference of what a run does step by step. The velocity, positive downwind, is linear between the
+    times, which are even; before the first it stood at its first value.
+    """
+    values = np.array([np.interp(time, preview.time, value) for value in preview.values])
+    if preview.motion is None:
+        return values
+    corner, offset, weight, delay = preview.motion
+    slow = low_passed(velocity, corner * (time[1] - time[0]))
+    mixed = sum(w * np.interp(time - o, time, slow) for o, w in zip(offset, weight, strict=True))
+    return values - np.array([np.interp(time - late, time, mixed) for late in delay])
+
+
+def low_passed(value, step):
+    """(n,) a series, linear between its samples, behind a first-order low pass that starts settled.
+
+    step: time between samples times the corner, rad.
+    """
+    if np.isinf(step):
+        return np.array(value, dtype=np.float64)
+    decay = np.exp(-step)
+    new = 1.0 - (1.0 - decay) / step  # exact for a ramp from one sample to the next
+    old = 1.0 - decay - new
+    slow = np.array(value, dtype=np.float64)
+    for i in range(1, slow.size):
+        slow[i] = decay * slow[i - 1] + old * value[i - 1] + new * value[i]
+    return slow
