@@ -235,6 +235,20 @@ def _turn(value, direction):
     value[:, 1] = along * sin(direction) + across * cos(direction)
 
 
+def drawn_turbulence(spec, *, reference_height, rotor_diameter, seed, duration):
+    """Arguments of turbulence() for a wind that build_wind draws from spectra, with its "average"; else None.
+
+    Arguments as in build_wind.
+    """
+    if spec is None or isinstance(spec, WindSeries):
+        return None
+    spec = read_wind(spec)
+    if not _is_turbulent(spec):
+        return None
+    drawn = _drawn(spec, float(reference_height), float(rotor_diameter), seed, duration)
+    return drawn | {"average": spec["average"]}
+
+
 def hub_series(spec, *, reference_height, rotor_diameter, seed, duration):
     """(time, value (n, 3)) of u, v, w at the hub over one period, where build_wind gives a rotor average.
 

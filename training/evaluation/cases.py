@@ -24,6 +24,7 @@ from fowt_env.descriptions.records import (
     validate,
 )
 from fowt_env.descriptions.sea_state import SeaState, joint_sea_state, sea_state_of
+from fowt_env.descriptions.sensors import EXACT, sensor_chain
 from fowt_env.descriptions.wind import read_wind
 from fowt_env.errors import InputError, unknown
 from fowt_env.scene.options import OPTIONS
@@ -35,8 +36,6 @@ from fowt_env.weather.wind_field import FIELD_KINDS, REQUIRED, is_field
 FOLDER = Path(__file__).parent / "suites"
 WIND_KINDS = ("rotor-averaged", "full-field")
 TRIP = 1.3  # fraction of rated rotor speed at which a turbine's protection stops it
-EXACT, STANDARD = "exact", "standard"  # readings as they are, and through the chain of real sensors
-SENSORS = (EXACT, STANDARD)
 
 
 @dataclass(frozen=True)
@@ -366,9 +365,8 @@ def _case(entry, speed, file, folder):
 
 
 def check_sensors(name):
-    """Name of a sensor chain, if there is one. Raises: InputError."""
-    if name not in SENSORS:
-        raise unknown("sensors", name, SENSORS)
+    """Name of a built-in sensor chain, or "exact", if there is one. Raises: InputError."""
+    sensor_chain(name)
     return name
 
 

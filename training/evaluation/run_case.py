@@ -1,6 +1,5 @@
 """One run of one controller on one case, to its row: what shapes a figure is imported from here."""
 
-import inspect
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,13 +11,12 @@ import fowt_env
 from fowt_env.controllers import make
 from fowt_env.descriptions.checks import is_number
 from fowt_env.descriptions.sea_state import sea_state_of
-from fowt_env.descriptions.units import RPM
 from fowt_env.descriptions.wind import read_wind
 from fowt_env.errors import ControllerError, ControllerInputError, InputError, PlantWarning, SimulationStopped
 from fowt_env.training.evaluation.faults import faulted, idling
 from fowt_env.training.evaluation.guard import attempt, reason_of
 from fowt_env.training.evaluation.metrics import METRICS, TIME, turbine_metrics
-from fowt_env.training.evaluation.model_mismatch import ModelMismatch
+from fowt_env.training.evaluation.model_mismatch import perturbed_sensors
 from fowt_env.training.evaluation.plant_perturbation import perturbed_parts
 from fowt_env.training.evaluation.wind_boxes import cached_box
 from fowt_env.weather.wind import GUSTS
@@ -71,7 +69,6 @@ def scored(run):
         scene = fowt_env.build_scene(wind=wind, sea=case.sea, seed=run.seed, **options | parts)
 
     trip = None if case.parked else case.trip
-    protected = _protection(trip, case.sensors)
 
     def work():
         with warnings.catch_warnings():
@@ -83,8 +80,9 @@ def scored(run):
                 initial=case.initial,
                 stop_overspeed=case.fault is None and trip is None,
                 grid_loss=_grid_loss(case),
-                **protected,
-                **run.options,
+                trip=trip,
+                nominal=nominal,
+                **{"sensors": case.sensors} | run.options | _degraded(run, nominal.turbine),
             )
         return frame, turbine_metrics(
             frame, scene.turbine, run.skip, _is_steady(case, nominal), _gust_start(case)
@@ -94,7 +92,7 @@ def scored(run):
     outcome, error = attempt(work, run.time_limit)
     if error is None:
         frame, figures = outcome
-        ended = _tripped(frame, trip, scene.turbine)
+        ended = frame.attrs["tripped"]
         if ended is None:
             return _row(run, OK, frame) | figures, frame
         reason = f"overspeed trip at {ended:.1f} s: rotor speed beyond {trip:g} of rated"
@@ -124,23 +122,6 @@ def _gust_start(case):
     if case.parked or not isinstance(case.wind, dict) or case.wind.get("kind") not in GUSTS:
         return None
     return read_wind(case.wind)["start"]
-
-
-def _protection(trip, sensors):
-    """{"trip", "sensors"} as simulate takes them, of what is not its default."""
-    given = {} if trip is None else {"trip": trip}
-    if sensors != "exact":
-        given["sensors"] = sensors
-    known = inspect.signature(fowt_env.simulate).parameters
-    return {key: value for key, value in given.items() if key in known}
-
-
-def _tripped(frame, trip, turbine):
-    """Time (s) at which the protection tripped in a run; None: it did not."""
-    if trip is None or "tripped" in frame.attrs:
-        return frame.attrs.get("tripped")
-    fast = frame["RotSpeed_[rpm]"].to_numpy() > trip * turbine.rated_rotor_speed / RPM
-    return float(frame[TIME].to_numpy()[fast][0]) if fast.any() else None
 
 
 def _row(run, status, frame):
@@ -174,6 +155,14 @@ def _grid_loss(case):
     return None if case.fault is None else case.fault.grid_loss
 
 
+def _degraded(run, turbine):
+    """{"sensors": SensorChain} of a case that degrades them, in place of the run's own; else nothing."""
+    shift = run.case.shift
+    control_dt = run.options.get("control_dt", CONTROL_DT)
+    chain = None if shift is None else perturbed_sensors(shift, turbine, control_dt)
+    return {} if chain is None else {"sensors": chain}
+
+
 def run_controller(run, nominal):
     """What simulate is given as controller: the run's own, with its fault, or a parked turbine's.
 
@@ -188,6 +177,4 @@ def run_controller(run, nominal):
         controller = make(run.controller, nominal.turbine, control_dt)
     except InputError as error:
         raise ControllerInputError(str(error)) from error
-    if case.shift is not None:
-        controller = ModelMismatch(controller, nominal, case.shift, run.seed)
     return faulted(controller, case.fault, nominal.turbine, control_dt)

@@ -23,6 +23,7 @@ from fowt_env.errors import InputError, unknown
 from fowt_env.files.atomic import replacing
 from fowt_env.files.markdown import markdown_table
 from fowt_env.files.tables import write_table
+from fowt_env.plant.measurement import SENSOR_FIELDS
 from fowt_env.training.evaluation.bootstrap import LEAST_SEEDS, LEVEL, crossed_ratio, holm
 from fowt_env.training.evaluation.failures import failures_as_worst
 from fowt_env.training.evaluation.metrics import METRICS, mean_exponent, never_negative
@@ -32,10 +33,6 @@ from fowt_env.training.evaluation.run_case import OK, TRIPPED
 __all__ = ["COUNTS", "FIGURES", "Figure", "agent_counts", "agent_scores", "by_kind"]
 
 PAST_ANY = "past a constraint"
-SENSOR_FIELDS = {  # what a turbine's own sensors show
-    "time", "rotor_speed", "generator_speed", "blade_pitch", "generator_torque", "platform_pitch",
-    "platform_pitch_rate", "platform_pitch_acceleration", "nacelle_acceleration", "nacelle_velocity",
-}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -239,7 +236,7 @@ def inputs(label):
         used = information(label)
     except InputError:
         return ""
-    measured = ["measured"] if set(used) & SENSOR_FIELDS else []
+    measured = ["measured"] if set(used) & set(SENSOR_FIELDS) else []
     return ", ".join(measured + [x for x in used if x not in SENSOR_FIELDS])
 
 
