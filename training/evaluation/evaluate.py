@@ -93,8 +93,8 @@ def evaluate(
     A run that the protection ended (the case's trip) has status "tripped", the reason, and metrics of what it
     was. Failed runs have status "failed", the reason, and NaN metrics; so have those of a controller that
     cannot be prepared, as where its library is missing, that calls sys.exit, or whose worker process dies
-    three times. Column events: rare numerical events of the run and how often each came. A parked turbine has no
-    controller: such a case is run once, under the name "parked".
+    three times. Column events: rare numerical events of the run and how often each came. A parked turbine has
+    no controller: such a case is run once, under the name "parked".
     Raises: InputError for settings that no run could use.
     """
     if folder is not None:
