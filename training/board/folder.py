@@ -1,11 +1,11 @@
 """The folder of a standing board: its settings, its frozen suites, its submissions, what was judged.
 
-    board.toml            seeds, limits, and the suites of each regime
-    suites/*.toml         copies of the suites, taken when the board was made: a later version changes no board
-    submissions/NAME/     what was added
-    runs/                 results folders of the public seeds, one for each suite and kind of preview
-    history.csv           a row for every submission, regime and judging
-    board.csv, index.html what was judged last
+board.toml            seeds, limits, and the suites of each regime
+suites/*.toml         copies of the suites, taken when the board was made: a later version changes no board
+submissions/NAME/     what was added
+runs/                 results folders of the public seeds, one for each suite and kind of preview
+history.csv           a row for every submission, regime and judging
+board.csv, index.html what was judged last
 """
 
 import shutil
@@ -35,7 +35,8 @@ REGIMES = (  # name, suites: of a new board
 
 
 class Regime(Record):
-    """Suites that are read together: the winds a controller was made for, gusts, plants that it does not know."""
+    """Suites that are read together: the winds a controller was made for, gusts, plants that it does not
+    know."""
 
     name: str
     suites: Annotated[tuple[str, ...], BeforeValidator(tuple)] = Field(min_length=1)
@@ -61,7 +62,8 @@ class Board:
         path = self.folder / SETTINGS
         if not path.is_file():
             raise InputError(
-                f"board {str(folder)!r}: has no {SETTINGS}: make one with fowt leaderboard add, or give another"
+                f"board {str(folder)!r}: has no {SETTINGS}: make one with fowt leaderboard add, or give"
+                f" another"
                 " --board"
             )
         self.settings, problems = validate(BoardFile, read_toml(path, "board"))
@@ -90,7 +92,11 @@ class Board:
     def submissions(self) -> list:
         """Submissions of the board, by name."""
         folder = self.folder / "submissions"
-        return [read_submission(path) for path in sorted(folder.iterdir()) if path.is_dir()] if folder.is_dir() else []
+        return (
+            [read_submission(path) for path in sorted(folder.iterdir()) if path.is_dir()]
+            if folder.is_dir()
+            else []
+        )
 
     def add(self, source: Path | str) -> str:
         """Copy a submission into the board; its name. Nothing of it is run.
@@ -127,7 +133,12 @@ def new_board(folder: Path | str, title: str = "Controllers of floating wind tur
         raise InputError(f"board {str(folder)!r}: is there already")
     seeds = read_suite(REGIMES[0][1][0]).seeds
     (folder / "suites").mkdir(parents=True, exist_ok=True)
-    lines = [f'title = "{title}"', 'baseline = "gspi_oc3"', f"seeds = {list(seeds)} # public", "call_limit = 0.1 # s"]
+    lines = [
+        f'title = "{title}"',
+        'baseline = "gspi_oc3"',
+        f"seeds = {list(seeds)} # public",
+        "call_limit = 0.1 # s",
+    ]
     for name, suites in REGIMES:
         lines += ["", "[[regime]]", f'name = "{name}"', f"suites = {list(suites)}".replace("'", '"')]
         for suite in suites:

@@ -1,9 +1,11 @@
 """A controller in a process of its own, which is given its readings and nothing else.
 
 The process has a copy of the submission's folder, an empty home folder, none of the caller's environment
-variables but those in KEPT, and a limit of memory. Its answers are two numbers or a text of fixed form: they are
+variables but those in KEPT, and a limit of memory. Its answers are two numbers or a text of fixed form:
+they are
 not unpickled, so that nothing which it sends runs code here. It starts anew for every run, so that nothing
-carries over from one run to the next. It is no jail: it may read whatever this user may read, and open connections
+carries over from one run to the next. It is no jail: it may read whatever this user may read, and open
+connections
 (docs: what a board cannot detect).
 """
 
@@ -17,8 +19,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any

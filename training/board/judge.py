@@ -1,7 +1,9 @@
 """Judging: every submission run anew on the board's suites, every figure computed from the time series.
 
-Submissions bring no results. Controllers of Python files run in processes of their own (training.board.isolated);
-the organiser's secret seeds are in none of the files that the page is made of, but for their number and the hash
+Submissions bring no results. Controllers of Python files run in processes of their own
+(training.board.isolated);
+the organiser's secret seeds are in none of the files that the page is made of, but for their number and
+the hash
 of their file, with which the organiser can prove later which they were.
 """
 
@@ -22,9 +24,11 @@ from fowt_env.scene.build import build_scene
 from fowt_env.training.board.folder import Board, read_seeds
 from fowt_env.training.board.submission import BUILT_IN, POLICY_FILE, PYTHON_FILE
 from fowt_env.training.evaluation.evaluate import evaluate
-from fowt_env.training.evaluation.metrics import METRICS, turbine_metrics
+from fowt_env.training.evaluation.metrics import METRICS
 from fowt_env.training.evaluation.results import run_file
 from fowt_env.training.evaluation.results_table import KEY
+from fowt_env.training.evaluation.run_case import run_metrics
+from fowt_env.weather.wind_field import is_field
 
 RELATIVE = 1e-9  # to which figures computed anew agree with those of the rows
 
@@ -55,7 +59,8 @@ def judge(board, jobs=1, secret=None, private=None, trust_code=False, progress=N
     code = [each.name for each in submissions if each.kind == PYTHON_FILE]
     if code and not trust_code:
         raise InputError(
-            f"submissions {', '.join(code)}: hold Python code of their authors, which judging runs: read it, then give"
+            f"submissions {', '.join(code)}: hold Python code of their authors, which judging runs: read"
+            f" it, then give"
             " --trust-code (each runs in a process of its own, with this user's rights)"
         )
     if (secret is None) != (private is None):
@@ -107,13 +112,15 @@ def computed_anew(table, folder, suite):
         case = cases[row["case"]]
         frame = read_table(run_file(Path(folder) / "runs", *row[list(KEY)]))
         skip = suite.skip if case.skip is None else case.skip
-        turbine = build_scene(case.platform, **case.options).turbine
-        figures = turbine_metrics(frame, turbine, skip)
+        wind = None if is_field(case.wind) else case.wind  # a box takes minutes and rests nowhere
+        scene = build_scene(case.platform, wind=wind, sea=case.sea, seed=int(row["seed"]), **case.options)
+        figures = run_metrics(frame, case, scene, skip)
         for metric in METRICS:
             old, new = float(row[metric]), float(figures[metric])
             if not np.isclose(old, new, rtol=RELATIVE, atol=1e-12, equal_nan=True):
                 raise InputError(
-                    f"results {str(folder)!r}: {metric} of {', '.join(map(str, row[list(KEY)]))} is {old:.10g} in the"
+                    f"results {str(folder)!r}: {metric} of {', '.join(map(str, row[list(KEY)]))} is"
+                    f" {old:.10g} in the"
                     f" table and {new:.10g} from its series: remove the folder and judge again"
                 )
     return table

@@ -1,4 +1,5 @@
-"""A submission to a standing board: a folder with a card and, unless it names a built-in controller, its code.
+"""A submission to a standing board: a folder with a card and, unless it names a built-in controller, its
+code.
 
     my_controller/
         card.toml            who made it, what it is given, under what licence
@@ -108,7 +109,8 @@ def read_submission(folder: Path | str) -> Submission:
     raise_problems(where, problems)
     if not NAME.fullmatch(card.name):
         problems.append(
-            f"name = {card.name!r}: must be 1 to 50 lower-case letters, digits, '_' or '-', a letter or digit first"
+            f"name = {card.name!r}: must be 1 to 50 lower-case letters, digits, '_' or '-', a letter or"
+            f" digit first"
         )
     for key in ("author", "licence"):
         if not getattr(card, key).strip():
@@ -138,7 +140,9 @@ def _kind(card, folder, problems):
                 problems.append(f"controller: {error}")
         return POLICY_FILE
     if card.controller not in CONTROLLERS:
-        problems.append(f"controller: {unknown('controller', card.controller, CONTROLLERS)}; or FILE.npz, FILE.py:Name")
+        problems.append(
+            f"controller: {unknown('controller', card.controller, CONTROLLERS)}; or FILE.npz, FILE.py:Name"
+        )
     return BUILT_IN
 
 
@@ -162,7 +166,8 @@ def _check_information(card, kind, problems):
             problems.append(f"information: {unknown('input', name, INPUTS)}")
     if bool(card.preview_times) != ("wind_preview" in card.information):
         problems.append(
-            f"preview_times = {list(card.preview_times)}: must be given with 'wind_preview' in information, and"
+            f"preview_times = {list(card.preview_times)}: must be given with 'wind_preview' in information,"
+            f" and"
             " only then"
         )
     if list(card.preview_times) != sorted(set(card.preview_times)):
@@ -180,7 +185,8 @@ def files_of(folder: Path) -> list[Path]:
     size = sum(path.stat().st_size for path in found)
     if size > LARGEST_FOLDER:
         raise InputError(
-            f"submission {str(folder)!r}: {size / 1e6:.0f} MB: at most {LARGEST_FOLDER / 1e6:.0f} MB are allowed"
+            f"submission {str(folder)!r}: {size / 1e6:.0f} MB: at most {LARGEST_FOLDER / 1e6:.0f} MB are"
+            f" allowed"
         )
     return found
 

@@ -24,7 +24,8 @@ ADD_EXAMPLES = """A submission is a folder with card.toml and the controller tha
     information = ["generator_speed", "blade_pitch"]
     tuning = "gains by hand, seeds 1001 to 1004"
 
-[cyan]fowt leaderboard add my_controller[/cyan]  into ./board, which is made with the package's own controllers if there is none"""
+[cyan]fowt leaderboard add my_controller[/cyan]  into ./board, which is made with the package's own
+controllers if there is none"""
 
 
 @board_app.command(name="add", epilog=ADD_EXAMPLES)
@@ -40,8 +41,8 @@ def add_command(
     for folder in submissions:
         read_submission(folder)
     if not (board / SETTINGS).exists():
-        made = new_board(board)
-        note(f"made the board {board} with the controllers of the package: {', '.join(s.name for s in made.submissions())}")
+        first = ", ".join(each.name for each in new_board(board).submissions())
+        note(f"made the board {board} with the controllers of the package: {first}")
     for folder in submissions:
         name = Board(board).add(folder)
         note(f"added {name}; judge it with: fowt leaderboard run --board {board}")
@@ -49,11 +50,13 @@ def add_command(
 
 RUN_EXAMPLES = """[cyan]fowt leaderboard run --jobs 2[/cyan]  all submissions on the public seeds
 
-[cyan]fowt leaderboard run --secret seeds.txt --private private --trust-code[/cyan]  on the organiser's seeds too
+[cyan]fowt leaderboard run --secret seeds.txt --private private --trust-code[/cyan]  on the organiser's
+seeds too
 
-Python files run only with [bold]--trust-code[/bold], each in a process of its own, with your user's rights: read
-them first, or judge in a container. The same command goes on where it was stopped. Written: index.html, board.csv,
-history.csv and runs/ in the board's folder; runs of secret seeds in the folder --private."""
+Python files run only with [bold]--trust-code[/bold], each in a process of its own, with your user's
+rights: read
+them first, or judge in a container. The same command goes on where it was stopped. Written: index.html,
+board.csv, history.csv and runs/ in the board's folder; runs of secret seeds in the folder --private."""
 
 
 @board_app.command(name="run", epilog=RUN_EXAMPLES)
@@ -61,9 +64,13 @@ history.csv and runs/ in the board's folder; runs of secret seeds in the folder 
 def run_command(
     board: BoardOption = Path("board"),
     jobs: Annotated[int, typer.Option(help="Worker processes.")] = 1,
-    secret: Annotated[Path | None, typer.Option(help="File of the organiser's seeds, one a line, from 1000 on.")] = None,
+    secret: Annotated[
+        Path | None, typer.Option(help="File of the organiser's seeds, one a line, from 1000 on.")
+    ] = None,
     private: Annotated[Path | None, typer.Option(help="Folder for the runs of the secret seeds.")] = None,
-    trust_code: Annotated[bool, typer.Option("--trust-code", help="Run submissions that are Python files.")] = False,
+    trust_code: Annotated[
+        bool, typer.Option("--trust-code", help="Run submissions that are Python files.")
+    ] = False,
 ):
     """Run every submission on the board's frozen suites and write its page."""
     from fowt_env.training.board.folder import Board

@@ -97,7 +97,12 @@ def test_a_folder_without_a_board_is_refused(tmp_path):
 
 @pytest.mark.parametrize(
     ("text", "words"),
-    [("", "whole numbers"), ("1001 x", "whole numbers"), ("1001\n1001", "twice"), ("5", "is a published one")],
+    [
+        ("", "whole numbers"),
+        ("1001 x", "whole numbers"),
+        ("1001\n1001", "twice"),
+        ("5", "is a published one"),
+    ],
 )
 def test_secret_seeds_are_checked(tmp_path, text, words):
     path = tmp_path / "seeds.txt"
