@@ -186,8 +186,10 @@ def _page(judged, frame, history):
         f" <b>{baseline}</b>; public seeds {seeds}. {_secret(judged)}</p>",
         "<p class=small>Ratios are of lifetime means over the baseline's on the same wind and waves, less is"
         " better but for energy (power up to rated). In brackets: 95 % interval of the score; * a difference"
-        " from the baseline whose p-value, after Holm's correction over the row, is at most 0.05. Ranks: first"
-        " those within every limit, then those beyond one, then those with failed or tripped runs, which count"
+        " from the baseline whose p-value, after Holm's correction over the row, is at most 0.05. Ranks:"
+        " first"
+        " those within every limit, then those beyond one, then those with failed or tripped runs, which"
+        " count"
         " as the worst of all.</p>",
     ]
     for regime in board.settings.regime:
