@@ -10,6 +10,7 @@ from fowt_env.controllers.policy.network_file import ACTIVATIONS
 from fowt_env.controllers.registry import CONTROLLERS
 from fowt_env.descriptions.checks import check_one_of, check_whole_number, is_number, is_whole, refusal
 from fowt_env.descriptions.files import raise_problems, read_text
+from fowt_env.descriptions.iec import TURBULENCE_INTENSITY
 from fowt_env.descriptions.records import (
     Fraction,
     NonNegative,
@@ -56,6 +57,9 @@ class Normalise(Record):
     epsilon: Positive = 1e-8
 
 
+REFERENCE = "lqr"  # controller that validation compares with, where its settings name none
+
+
 class Validation(Record):
     """Episodes on which an agent is validated as it learns."""
 
@@ -64,6 +68,11 @@ class Validation(Record):
     seeds: PositiveInteger
     every: PositiveInteger  # decisions
     skip: NonNegative = 60.0  # s
+    reference: Literal[tuple(CONTROLLERS)] = REFERENCE  # that figures are ratios to
+    # classes of turbulence, in turn over the seeds of each wind
+    intensities: Annotated[list[Literal[tuple(TURBULENCE_INTENSITY)]], Field(min_length=1)] = ["B"]
+    steady: list[Positive] = []  # m/s, winds in which an agent must come to rest in still water
+    gusts: list[Positive] = []  # m/s, mean winds of a gust (EOG) and a change of direction (EDC) each
     # of FowtEnv, in turn over the seeds of each wind; none: exact readings
     sensors: list[dict[str, Any]] = []
 
