@@ -74,8 +74,9 @@ BASELINES_EXAMPLES = """[bold]Examples[/bold]
 
 [cyan]fowt scores baselines results/rl --group lqr=policy:ppo_lqr,policy:ppo_lqr_seed1[/cyan]
 
-Each figure: interquartile mean of ratios on the same runs, its 95 % interval, and its verdict against
-the aims: missed, first, then (or met), with * where the whole interval reaches it."""
+Each figure: ratio of lifetime means on the same runs, its 95 % interval, and its verdict against the aims:
+missed, first, then (or met), with * where that is no chance finding (p at most 0.05 after Holm's correction
+for all aims). Failed and tripped runs count with the worst figures of all controllers on their case."""
 
 
 @scores.command(name="baselines", epilog=BASELINES_EXAMPLES)
