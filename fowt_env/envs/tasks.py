@@ -280,7 +280,7 @@ def _mixture(low, high):
     """What a controller meets at mean winds from low to high (m/s), in shares that agents can learn from."""
     speed = (low, high)
     return (
-        (0.65, {"kind": "ntm", "speed": speed, "class": "B"}, JOINT),
+        (0.65, {"kind": "ntm", "speed": speed, "class": "B", "sigma": "drawn"}, JOINT),
         (0.05, {"kind": "steady", "speed": speed}, None),
         (0.1, {"kind": "steady", "speed": speed}, JOINT),
         (0.1, {"kind": "eog", "speed": speed, "start": GUST_START}, JOINT),

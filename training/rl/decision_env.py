@@ -13,6 +13,7 @@ from fowt_env.training.evaluation.metrics import REDUCTIONS, TOWER_EXPONENT, dam
 from fowt_env.training.rl.sb3_env import FowtSB3VecEnv
 
 SETTLED_AFTER = 300.0  # s, from which on an episode of steady wind must be at rest
+SWING_AFTER = 500.0  # s, and its blade pitch: by then surge has died down
 RECORDED_FIELDS = (Measure.ROTOR_SPEED, Measure.PLATFORM_PITCH, Measure.BLADE_PITCH, Measure.GENERATOR_TORQUE)
 
 
@@ -141,8 +142,8 @@ class ValidationVecEnv(FowtSB3VecEnv):
         """{metric: (n,)} of the recorded episodes by the formulas of evaluation.metrics; NaN for failed ones.
 
         They are of what the sensors could measure, control period by control period, and so of the shaft's
-        power, which is the generator's before its losses. Largest offset of the rotor speed from rated and
-        swing of the blade pitch, peak to peak, are of the time after SETTLED_AFTER.
+        power, which is the generator's before its losses. Offset of the mean rotor speed from rated is of the
+        time after SETTLED_AFTER, the swing of the blade pitch, peak to peak, of that after SWING_AFTER.
         """
         record = np.where(self._failed[:, None], np.nan, self._record[self.skip : self._clock - 1])
         speed, platform_pitch, blade_pitch, torque = np.moveaxis(record, 2, 0)
@@ -154,9 +155,8 @@ class ValidationVecEnv(FowtSB3VecEnv):
         # of the low-speed shaft: what the generator takes and what turns its inertia
         acceleration = np.gradient(speed, first.control_dt, axis=0) if len(speed) > 1 else 0.0 * speed
         shaft = gear * (torque + gear * turbine.drivetrain.generator_inertia * acceleration) * 1e-3
-        last = record[max(0, round(SETTLED_AFTER / first.control_dt) - self.skip) :]
-        calm = last if len(last) else np.full((1, *record.shape[1:]), np.nan)
-        offset = np.abs(calm[:, :, 0] / turbine.rated_rotor_speed - 1.0)
+        settled, still = (self._after(record, start) for start in (SETTLED_AFTER, SWING_AFTER))
+        offset = mean(settled[:, :, 0]) / turbine.rated_rotor_speed - 1.0
         return {
             "rotor_speed_std_[rpm]": std(speed / RPM),
             "platform_pitch_std_[deg]": std(platform_pitch / DEGREE),
@@ -168,7 +168,12 @@ class ValidationVecEnv(FowtSB3VecEnv):
             "shaft_torque_DEL_[kN-m]": np.array(
                 [damage_equivalent_load(series, time[-1], TOWER_EXPONENT) for series in shaft.T]
             ),
-            "rotor_speed_offset_[%]": 100.0 * offset.max(axis=0),
-            "blade_pitch_swing_[deg]": np.ptp(calm[:, :, 2], axis=0) / DEGREE,
+            "rotor_speed_offset_[%]": 100.0 * np.abs(offset),
+            "blade_pitch_swing_[deg]": np.ptp(still[:, :, 2], axis=0) / DEGREE,
             "failed": self._failed.astype(float),
         }
+
+    def _after(self, record, start):
+        """Rows of the record from a time (s) of the episode on; one of NaN where there are none."""
+        rows = record[max(0, round(start / self.env.envs[0].control_dt) - self.skip) :]
+        return rows if len(rows) else np.full((1, *record.shape[1:]), np.nan)

@@ -10,7 +10,6 @@ from fowt_env.controllers.policy.network_file import ACTIVATIONS
 from fowt_env.controllers.registry import CONTROLLERS
 from fowt_env.descriptions.checks import check_one_of, check_whole_number, is_number, is_whole, refusal
 from fowt_env.descriptions.files import raise_problems, read_text
-from fowt_env.descriptions.iec import TURBULENCE_INTENSITY
 from fowt_env.descriptions.records import (
     Fraction,
     NonNegative,
@@ -19,6 +18,7 @@ from fowt_env.descriptions.records import (
     unknown_key,
     validate,
 )
+from fowt_env.descriptions.wind import NTM_SIGMA
 from fowt_env.envs.decisions import DecisionSettings
 from fowt_env.envs.env import SETTINGS
 from fowt_env.errors import InputError
@@ -69,12 +69,11 @@ class Validation(Record):
     every: PositiveInteger  # decisions
     skip: NonNegative = 60.0  # s
     reference: Literal[tuple(CONTROLLERS)] = REFERENCE  # that figures are ratios to
-    # classes of turbulence, in turn over the seeds of each wind
-    intensities: Annotated[list[Literal[tuple(TURBULENCE_INTENSITY)]], Field(min_length=1)] = ["B"]
+    sigma: Literal[NTM_SIGMA.allowed] = "90%"  # of the turbulence, as of the ntm wind
     steady: list[Positive] = []  # m/s, winds in which an agent must come to rest in still water
     gusts: list[Positive] = []  # m/s, mean winds of a gust (EOG) and a change of direction (EDC) each
-    # of FowtEnv, in turn over the seeds of each wind; none: exact readings
-    sensors: list[dict[str, Any]] = []
+    # of FowtEnv, in turn over the seeds of each wind; none: exact readings, as always in steady wind
+    sensors: list[dict[str, Any] | str] = []
 
 
 class TrainingSettings(Record):
