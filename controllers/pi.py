@@ -276,7 +276,7 @@ class PI(CompiledController):
     """
 
     kernel = staticmethod(pi_law)
-    information = ("generator_speed", "blade_pitch")
+    information = ("generator_speed", "blade_pitch", "generator_torque")
 
     def __init__(self, settings, control_dt, name="pi"):
         super().__init__(name, settings.parameters(check_control_dt(control_dt)), len(Memory))

@@ -5,9 +5,9 @@ beta_ss/dV) dV. The law adds to its integral what moves its own pitch by these i
 schedule and limits stay those of the PI law, and whatever beta_ss gets wrong the integral takes back. The
 gain schedule multiplies the integral and falls as the blades turn: at rest beta = GK(beta) KI I, so
 dI = d beta (1 + 2 beta/beta_K)/KI, theory.md (A7). The wind is the
-rotor-averaged one, `preview_time` ahead of the rotor and without measuring error: an upper bound of what a
-lidar can give. Two equal first-order low passes whose delay, with that of the blade-pitch actuator and half
-a control period, adds up to the preview time, keep the blades from following every gust.
+rotor-averaged one, `preview_time` ahead of the rotor, as the run foresees it. Two equal first-order low
+passes whose delay, with that of the blade-pitch actuator and half a control period, adds up to the preview
+time, keep the blades from following every gust.
 """
 
 from dataclasses import dataclass, replace
@@ -17,7 +17,7 @@ from math import exp
 import numpy as np
 
 from fowt_env.analysis.trim import trim, without_fluctuations
-from fowt_env.control import check_control_dt
+from fowt_env.control import check_control_dt, wind_ahead
 from fowt_env.controllers.pi import (
     PI,
     Memory,
@@ -32,9 +32,8 @@ from fowt_env.descriptions.checks import check_number
 from fowt_env.errors import InputError
 from fowt_env.plant.compile.decorators import control_kernel, kernel
 from fowt_env.plant.drivetrain import TorqueCurve
-from fowt_env.plant.measurement import Measure
+from fowt_env.plant.measurement import N_MEASUREMENTS, Measure
 from fowt_env.plant.state import State
-from fowt_env.weather.wind_field import WindBox, rotor_average
 
 SCHEDULE_SPEEDS = 15  # trims from rated to cut-out wind, square-root spaced: the schedule is steep at rated
 BELOW_RATED = 0.5  # m/s below the published rated wind that the schedule starts
@@ -53,42 +52,58 @@ class PreviewSettings:
 
 
 class PreviewParameter(IntEnum):
-    """Entries of the law's parameter array beyond those of the PI law; the foreseen pitch follows SERIES."""
+    """Entries of the law's parameter array beyond those of the PI law."""
 
-    STEP = Parameter.CURVE + len(TorqueCurve._fields)  # s between entries of the series
-    LAST = STEP + 1  # index of its last entry
-    SERIES = STEP + 2
+    GAIN = Parameter.CURVE + len(TorqueCurve._fields)
+    DECAY = GAIN + 1  # fraction of each low pass that one period leaves
+    WIND = GAIN + 2  # SCHEDULE_SPEEDS winds of the steady schedule, m/s
+    PITCH = WIND + SCHEDULE_SPEEDS  # and the blade pitch there, rad
 
 
 class PreviewMemory(IntEnum):
     """Entries of the law's memory array beyond those it shares with the PI law."""
 
-    FORESEEN = len(Memory)  # blade pitch of the schedule at the last call, rad
+    LOW_ONE = len(Memory)  # blade pitch of the schedule for the wind ahead after one low pass, rad
+    LOW_TWO = len(Memory) + 1  # and after both
 
 
 @kernel
-def foreseen_pitch(time, parameters):
-    """Filtered blade pitch of the steady schedule for the wind foreseen at a time (s), rad; ends are held."""
-    last = int(parameters[PreviewParameter.LAST])
-    place = max(time / parameters[PreviewParameter.STEP], 0.0)
-    if place >= last:
-        return parameters[PreviewParameter.SERIES + last]
-    i = int(place)
-    fraction = place - i
-    first = PreviewParameter.SERIES + i
-    return (1.0 - fraction) * parameters[first] + fraction * parameters[first + 1]
+def scheduled_pitch(wind, parameters):
+    """Blade pitch (rad) times GAIN of the steady schedule at a wind (m/s); its ends are held."""
+    first, last = PreviewParameter.WIND, PreviewParameter.PITCH - 1
+    gain, pitch = parameters[PreviewParameter.GAIN], PreviewParameter.PITCH - PreviewParameter.WIND
+    if wind <= parameters[first]:
+        return gain * parameters[first + pitch]
+    if wind >= parameters[last]:
+        return gain * parameters[last + pitch]
+    i = first
+    while parameters[i + 1] <= wind:
+        i += 1
+    fraction = (wind - parameters[i]) / (parameters[i + 1] - parameters[i])
+    return gain * ((1.0 - fraction) * parameters[i + pitch] + fraction * parameters[i + 1 + pitch])
+
+
+@kernel
+def foreseen_change(wind, parameters, memory):
+    """Change (rad) over this period of the filtered blade pitch for the wind ahead; advances the filter."""
+    decay = parameters[PreviewParameter.DECAY]
+    one = (1.0 - decay) * scheduled_pitch(wind, parameters) + decay * memory[PreviewMemory.LOW_ONE]
+    two = (1.0 - decay) * one + decay * memory[PreviewMemory.LOW_TWO]
+    change = two - memory[PreviewMemory.LOW_TWO]
+    memory[PreviewMemory.LOW_ONE] = one
+    memory[PreviewMemory.LOW_TWO] = two
+    return change
 
 
 @control_kernel
 def preview_law(parameters, memory, measurement, command):
     """One period: what the wind's change asks for goes into the integral, then the PI law."""
     p = parameters
-    foreseen = foreseen_pitch(measurement[Measure.TIME], p)
+    change = foreseen_change(measurement[N_MEASUREMENTS], p, memory)
     error = speed_error(p, memory, measurement[Measure.GENERATOR_SPEED])
     pitch = schedule_pitch_of(p, memory, measurement[Measure.BLADE_PITCH])
     slope = (1.0 + 2.0 * pitch / p[Parameter.SCHEDULE_PITCH]) / p[Parameter.INTEGRAL]  # dI/d beta
-    memory[Memory.INTEGRAL] += slope * (foreseen - memory[PreviewMemory.FORESEEN])
-    memory[PreviewMemory.FORESEEN] = foreseen
+    memory[Memory.INTEGRAL] += slope * change
     write_commands(pitch, pi_target(pitch, error, p, memory), 0.0, p, memory, command)
 
 
@@ -96,54 +111,50 @@ class Preview(PI):
     """PI of a PISettings with the feedforward of a PreviewSettings; needs prepare(scene) before reset."""
 
     kernel = staticmethod(preview_law)
-    information = (*PI.information, "time", "wind_preview", "plant_model")
+    information = (*PI.information, "wind_preview", "plant_model")
 
     def __init__(self, settings, preview, control_dt, name="preview"):
         super().__init__(settings, control_dt, name)
         self.preview = preview
         self.control_dt = check_control_dt(control_dt)
+        self.preview_times = (float(preview.preview_time),)
+        self.parameters = np.append(self.parameters, np.zeros(2 + 2 * SCHEDULE_SPEEDS))
         self.memory = np.zeros(len(Memory) + len(PreviewMemory))
         self.prepared = False
 
     def prepare(self, scene):
-        """Look up the steady pitch of the coming wind, filter it, and keep it as a series.
+        """Look up the steady blade pitch of the scene's plant over the wind.
 
-        Raises: InputError for a scene without wind.
+        Raises: InputError for a scene without wind, and where the preview is shorter than the blades' lag.
         """
         if scene.model.aero is None:
             raise InputError(f"controller {self.name!r}: needs a scene with wind to look ahead")
-        time, speed, period = rotor_wind_series(scene)
         step = self.control_dt
-        grid = step * np.arange(int(np.ceil(max(time[-1], scene.options["duration"]) / step)) + 1)
-        seen = np.interp(grid + self.preview.preview_time, time, speed, period=period)
-        pitch = self.preview.gain * np.interp(seen, *steady_pitch(scene))
         delay = self.preview.preview_time - scene.turbine.pitch_drive.time_constant - 0.5 * step
         if delay <= 0.0:
             raise InputError(
                 f"preview_time = {self.preview.preview_time} s: must exceed the actuator's lag and half a"
                 f" control period, {self.preview.preview_time - delay:g} s"
             )
-        pitch = twice_low_passed(pitch, exp(-2.0 * step / delay))
-        head = self.parameters[: PreviewParameter.STEP]
-        self.parameters = np.concatenate([head, [step, len(pitch) - 1.0], pitch])
+        p = self.parameters
+        p[PreviewParameter.GAIN] = self.preview.gain
+        p[PreviewParameter.DECAY] = exp(-2.0 * step / delay)
+        p[PreviewParameter.WIND : PreviewParameter.PITCH], p[PreviewParameter.PITCH :] = steady_pitch(scene)
         self.prepared = True
 
     def reset(self, measurement):
-        """Start as PI.reset, nothing foreseen yet. Raises: InputError where prepare() was not called."""
+        """Start as PI.reset, the wind ahead taken as a steady one. Raises: InputError without prepare()."""
         if not self.prepared:
             raise InputError(f"controller {self.name!r}: call prepare(scene) before reset(measurement)")
         super().reset(measurement)
-        self.memory[PreviewMemory.FORESEEN] = foreseen_pitch(float(measurement.time), self.parameters)
-
-
-def rotor_wind_series(scene):
-    """(time s, wind m/s, period s or None): wind along x averaged over the rotor, as the scene has it."""
-    if isinstance(scene.wind, WindBox):
-        rotor, box = scene.turbine.rotor, scene.wind
-        time, value = rotor_average(box, rotor.hub_height, 2.0 * rotor.tip_radius)
-        return time, value[:, 0], len(value) * box.dt if box.periodic else None
-    series = scene.model.aero.wind
-    return series.time, series.value[:, 0], series.period if series.period > 0.0 else None
+        ahead = wind_ahead(measurement)
+        if len(ahead) != 1:
+            raise InputError(
+                f"controller {self.name!r}: the measurement has {len(ahead)} winds ahead: must be 1, at"
+                f" {self.preview_times[0]:g} s"
+            )
+        start = scheduled_pitch(ahead[0], self.parameters)
+        self.memory[PreviewMemory.LOW_ONE] = self.memory[PreviewMemory.LOW_TWO] = start
 
 
 def steady_pitch(scene):
@@ -156,15 +167,6 @@ def steady_pitch(scene):
     return speeds, np.array([point.state[State.BLADE_PITCH] for point in steady])
 
 
-def twice_low_passed(value, decay):
-    """(n,) the series after two first-order low passes that start settled at its first entry."""
-    from scipy.signal import lfilter  # takes a third of a second to load, at every start otherwise
-
-    for _ in range(2):
-        value, _ = lfilter([1.0 - decay], [1.0, -decay], value, zi=[decay * value[0]])
-    return value
-
-
 def preview(turbine, control_dt):
-    """OC3 gains with feedforward of the rotor-averaged wind 3 s ahead, known without error."""
+    """OC3 gains with feedforward of the rotor-averaged wind 3 s ahead."""
     return Preview(PISettings.published(turbine), PreviewSettings(), control_dt)

@@ -58,7 +58,7 @@ class Eq8Literal(CompiledController):
     """
 
     kernel = staticmethod(literal_law)
-    information = ("time", "generator_speed", "blade_pitch")
+    information = ("time", "generator_speed", "blade_pitch", "generator_torque")
 
     def __init__(self, settings, control_dt, name="eq8_literal"):
         parameters = settings.parameters(check_control_dt(control_dt))

@@ -129,6 +129,7 @@ class Rosco:
         felt = {0: (), 1: ("nacelle_acceleration",), 2: ("platform_pitch_acceleration",)}[settings.mode]
         used = ("time", "rotor_speed", "generator_speed", "generator_torque", "blade_pitch", "wind_speed")
         self.information = (*used, *felt, "plant_model")
+        self._felt = felt
         self._forget()
 
     def _forget(self):
@@ -192,7 +193,8 @@ class Rosco:
         s[13], s[14] = power, self._efficiency * power
         s[19], s[20], s[22], s[26] = m.generator_speed, m.rotor_speed, m.generator_torque, m.wind_speed
         s[48], s[49], s[50] = TEXT_SIZE, len(self._deck), len(OUT_NAME)
-        s[52], s[82] = m.nacelle_acceleration, m.platform_pitch_acceleration
+        for entry, name in ((52, "nacelle_acceleration"), (82, "platform_pitch_acceleration")):
+            s[entry] = getattr(m, name) if name in self._felt else 0.0
         s[60] = 3.0
         failed = self._library.call(s, self._deck)
         if failed is not None:
@@ -280,7 +282,6 @@ _tables = Cache(16)  # (id of the turbine, density) -> (turbine, Table): runs of
 def _table(turbine, density):
     """Table of a turbine's blade elements."""
     key = (id(turbine), density)
-
 
     def make():
         cp, ct, cq = performance(build_blade_elements(turbine, density), RATIOS, PITCHES)

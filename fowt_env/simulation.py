@@ -3,15 +3,25 @@
 import warnings
 from collections.abc import Callable
 from contextlib import contextmanager
-from math import inf
+from math import inf, isinf, radians
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from fowt_env.control import CompiledController, make
+from fowt_env.control import (
+    EXACT,
+    CompiledController,
+    foreseen,
+    hidden,
+    known_scene,
+    make,
+    preview_leads,
+    view_of,
+)
 from fowt_env.descriptions.checks import check_number
+from fowt_env.descriptions.sensors import SensorChain, sensor_chain
 from fowt_env.errors import (
     ControllerInputError,
     InputError,
@@ -23,15 +33,27 @@ from fowt_env.initial_conditions import initial_state
 from fowt_env.plant.compile.decorators import control_kernel
 from fowt_env.plant.events import counted, harm
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
-from fowt_env.plant.rollout import OVERSPEED, RUNNING, STOP_REASONS, Schedule, rollout
+from fowt_env.plant.rollout import (
+    OVERSPEED,
+    RUNNING,
+    STOP_REASONS,
+    Protection,
+    Schedule,
+    new_protection,
+    rollout,
+)
+from fowt_env.plant.sensing import Reader, Setting, new_past, open_reader
 from fowt_env.plant.state import State
 from fowt_env.scene.scene import Scene
+from fowt_env.weather.preview import Preview
+from fowt_env.weather.sensor_noise import draw_sensors
 from fowt_env.weather.wind_field import WindBox
 
 # Ctrl-C is heard and progress shown between compiled calls. A call by itself costs 1e-4 s, so they
 # grow longer until they last about CHUNK_TIME.
 FIRST_CHUNK = 20.0  # simulated seconds
 CHUNK_TIME = 0.05  # s of the clock
+FEATHERING = radians(8.0)  # rad/s of an emergency stop: the rate of NREL/TP-500-38060's pitch drive
 
 
 @control_kernel
@@ -50,6 +72,7 @@ class HeldCommand(CompiledController):
     """The law of controller=None: the command stays as it is."""
 
     kernel = staticmethod(hold)
+    information = ("generator_torque", "blade_pitch")
 
     def __init__(self) -> None:
         super().__init__("none", np.zeros(1), 1)
@@ -108,6 +131,10 @@ def simulate(
     progress: bool | Callable[[float], object] = False,
     stop_overspeed: bool = False,
     grid_loss: float | None = None,
+    trip: float | None = None,
+    sensors: str | SensorChain | None = None,
+    preview: str | Preview | Callable[[Scene, tuple[float, ...]], Preview] = EXACT,
+    nominal: Scene | None = None,
 ) -> pd.DataFrame:
     """DataFrame of one run, columns named as OpenFAST writes them (`PtfmPitch_[deg]`).
 
@@ -123,6 +150,18 @@ def simulate(
     stop_overspeed  end the run, as an environment does, at a control instant with a rotor speed beyond the
                 turbine file's overspeed
     grid_loss   time (s) from which the generator is off the grid and has no torque; None: never
+    trip        rotor speed over rated, above 1, at which the protection stops the turbine: from that control
+                instant on the controller is not heard, the generator has no torque and the blades feather at
+                8 deg/s (the pitch drive's limit, if that is slower) to the drive's maximum. The run goes
+                on to its end. None: no protection
+    sensors     what the controller reads: None or "exact" for the measurements as they are, the name of a
+                built-in chain ("standard") or a SensorChain (fowt_env.descriptions.sensors). Rows are of
+                the true motions; the noise follows from the scene's seed and is the same for every controller
+    preview     where the controller has preview_times, what it is given of the wind ahead: "exact", a Preview
+                (fowt_env.weather.preview), or a function of (scene, preview_times) that returns one
+    nominal     scene whose plant the controller is designed on, where that is not the one that runs
+
+    A controller is given what its `information` declares and nothing else (fowt_env.control).
 
     The generator torque stays within [0, max_torque] of the turbine file and moves in a control period at
     most as far as its max_torque_rate allows, whatever is commanded: GenTq is the torque in force, and
@@ -130,12 +169,13 @@ def simulate(
 
     attrs["events"] of the DataFrame: {name: count} of what the plant met outside its usual range
     (fowt_env.plant.events), of those that happened. A PlantWarning says so at the end of a run whose loads
-    were less accurate for it.
+    were less accurate for it. attrs["tripped"]: time (s) at which the protection stopped the turbine, or
+    None.
 
     Raises: InputError before anything runs (ControllerInputError where the controller raised it, whenever
     that is); SimulationStopped (with the rows so far) on capsize, a numerical blow-up, a
-    non-finite state or, where it is to stop there, overspeed; ControllerError if a controller returns
-    anything but two finite numbers.
+    non-finite state or command or, where it is to stop there, overspeed; ControllerError if a controller
+    returns anything but two finite numbers or reads what it does not declare.
     """
     if dt is None:
         dt = min(scene.dt, control_dt, output_dt)
@@ -146,20 +186,36 @@ def simulate(
     check_duration(scene, duration)
     if grid_loss is not None:
         check_number("grid_loss", grid_loss, allowed="a time in s, or None")
+    if trip is not None:
+        check_number("trip", trip, 1.0, low_open=True, allowed="above 1, of rated rotor speed, or None")
+    chain = sensor_chain(sensors)
     held = controller is None
     if not held:
         controller = make(controller, scene.turbine, control_dt)
         with _controllers_own():
-            controller.prepare(scene)
+            controller.prepare(known_scene(scene if nominal is None else nominal, controller))
     x, u = initial_state(scene, start, initial)
     if held:
         scene = scene.with_model({"rigid_body.rotor_fixed": True})
         controller = HeldCommand()
         per_control = last  # nobody reads the measurements
+        chain = None
     overspeed = scene.turbine.overspeed if stop_overspeed else inf
     loss = inf if grid_loss is None else grid_loss - 1e-9  # an instant may miss it by rounding
-    schedule = Schedule(float(dt), per_control, per_output, last, float(overspeed), float(loss))
-    loop = _Loop(scene, controller, x, u, schedule)
+    drive = scene.turbine.pitch_drive
+    schedule = Schedule(
+        float(dt),
+        per_control,
+        per_output,
+        last,
+        float(overspeed),
+        float(loss),
+        inf if trip is None else float(trip * scene.turbine.rated_rotor_speed),
+        min(FEATHERING, drive.rate_limit) * per_control * dt,
+        drive.maximum,
+    )
+    reader = reader_of(scene, controller, chain, preview, schedule)
+    loop = _Loop(scene, controller, x, u, schedule, reader)
     with _bar(progress) as report, _controllers_own():
         loop.go(report)
     frame = loop.frame()
@@ -177,10 +233,33 @@ def _controllers_own():
         raise ControllerInputError(str(error)) from error
 
 
+def reader_of(
+    scene: Scene,
+    controller: Any,
+    chain: SensorChain | None,
+    preview: Any,
+    schedule: Schedule,
+) -> Reader:
+    """Reader of a run: what the controller declares, through the chain (None: exact), and the wind ahead.
+
+    Raises: InputError where the controller declares what the chain or the scene does not have.
+    """
+    control_dt, duration = schedule.per_control * schedule.dt, schedule.last * schedule.dt
+    readings = -(-schedule.last // schedule.per_control) + 1
+    sensors = draw_sensors(chain, control_dt, scene.seed, readings)
+    available = None if chain is None else (chain.name, chain.available)
+    sensors.chain[Setting.HIDDEN] = hidden(controller, available)
+    leads = preview_leads(controller)
+    time, values = np.zeros(0), np.zeros((0, 0))
+    if leads:
+        time, values = foreseen(scene, leads, preview, duration)
+    return Reader(sensors, new_past(sensors.chain), time, values, np.zeros(N_MEASUREMENTS + len(leads)))
+
+
 class _Loop:
     """A run in chunks, compiled where the controller is."""
 
-    def __init__(self, scene, controller, x, u, schedule):
+    def __init__(self, scene, controller, x, u, schedule, reader=None):
         self.scene = scene
         self.controller = controller
         self.data = scene.data()
@@ -188,17 +267,22 @@ class _Loop:
         self.x, self.u, self.schedule = x, u, schedule
         self.dx = np.zeros_like(x)
         self.measurement = np.zeros(N_MEASUREMENTS)
+        self.protection = new_protection()
+        self.reader = open_reader() if reader is None else reader
+        self.view = view_of(controller)
         self.rows = np.empty((schedule.last // schedule.per_output + 1, len(scene.channels)))
         self.filled = 0
         self.compiled = isinstance(controller, CompiledController)
         if self.compiled:
             self.law = controller.law, controller.parameters, controller.memory
+            self.read_by_law = self.reader
         else:
             self.law = given.compiled, np.zeros(2), np.zeros(1)
+            self.read_by_law = open_reader()  # the controller has its reading already
 
     def go(self, report):
         """Run to the end. Raises: SimulationStopped; KeyboardInterrupt with the frame so far."""
-        self.controller.reset(self._measured(0))
+        self.controller.reset(self._read(0))
         last = self.schedule.last
         size = max(1, round(FIRST_CHUNK / self.schedule.dt)) if self.compiled else self.schedule.per_control
         step = 0
@@ -207,7 +291,7 @@ class _Loop:
                 began = perf_counter()
                 if not self.compiled:
                     self._ask(step)
-                step = self._roll(step, min(step + size, last))
+                step = self._roll(step, min(step + size, last), self.read_by_law)
                 if self.compiled and perf_counter() - began < 0.25 * CHUNK_TIME:
                     size *= 4
                 report(step / last)
@@ -215,25 +299,26 @@ class _Loop:
             interrupt.frame = self.frame()  # what is done is not lost: the caller may keep it
             raise
 
-    def _roll(self, first, end):
+    def _roll(self, first, end, reader):
         status, step, count = rollout(
-            self.handle, self.x, self.u, *self.law, self.measurement, self.dx, self.schedule, first, end,
-            self.rows[self.filled :],
+            self.handle, self.x, self.u, *self.law, reader, self.protection, self.measurement, self.dx,
+            self.schedule, first, end, self.rows[self.filled :],
         )  # fmt: skip
         self.filled += count
         self._check(status, step)
         return step
 
-    def _measured(self, step):
-        """Measurement at a step that is at hand."""
-        self._roll(step, step)
-        return Measurement(*self.measurement.tolist())
+    def _read(self, step):
+        """What the controller is given at a step that is at hand."""
+        self._roll(step, step, self.reader)
+        return self.view(self.reader.reading.tolist())
 
     def _ask(self, step):
-        """Have a controller in Python say what to do from a step on."""
+        """Have a controller in Python say what to do from a step on; one that is stopped is not asked."""
         if self.x[State.ROTOR_SPEED] > self.schedule.overspeed:
             self._check(OVERSPEED, step)
-        self.law[1][:] = self.controller.act(self._measured(step))
+        if np.isinf(self.protection[Protection.TRIPPED_AT]):
+            self.law[1][:] = self.controller.act(self._read(step))
 
     def _check(self, status, step):
         if status != RUNNING:
@@ -247,6 +332,8 @@ class _Loop:
         values = self.scene.values(self.rows[: self.filled], overwrite=True)
         frame = pd.DataFrame(values, columns=[c.column for c in self.scene.channels])
         frame.attrs["events"] = counted(self.data.counters)
+        tripped = float(self.protection[Protection.TRIPPED_AT])
+        frame.attrs["tripped"] = None if isinf(tripped) else tripped
         return frame
 
 

@@ -20,6 +20,7 @@ from fowt_env.plant.compile.decorators import control_kernel
 from fowt_env.plant.events import EVENTS, Counter
 from fowt_env.plant.rollout import Schedule, advance
 from fowt_env.plant.state import State, pose_of
+from fowt_env.training.evaluation.faults import Fault, FaultedController
 
 ROOT = Path(__file__).resolve().parent.parent
 COLUMNS = ["PtfmSurge_[m]", "PtfmHeave_[m]", "PtfmPitch_[deg]", "PtfmYaw_[deg]"]
@@ -130,6 +131,51 @@ def test_a_run_goes_on_past_the_overspeed_unless_it_is_to_stop_there(storm_scene
     np.testing.assert_array_equal(stopped.value.frame.to_numpy(), frame.to_numpy()[:first])
     with pytest.raises(SimulationStopped, match="overspeed"):  # an environment ends at its last instant too
         run(storm_scene, **free | {"duration": first * 0.1}, stop_overspeed=True)
+
+
+EMERGENCY = {"gspi_oc3": "gspi_oc3", "in Python": Delegate}
+
+
+@pytest.mark.parametrize("kind", EMERGENCY)
+def test_a_trip_is_an_emergency_stop_at_the_instant_in_which_the_speed_is_passed(storm_scene, kind):
+    """Against a wrapper that overrides the controller from a time on."""
+    controller, options = EMERGENCY[kind], {"duration": 40.0, "grid_loss": 5.0}
+    free = run(storm_scene, controller=controller, **options)
+    speed = free["RotSpeed_[rpm]"] / 12.1
+    at = float(free["Time_[s]"][speed > 1.1].iloc[0])
+    tripped = run(storm_scene, controller=controller, trip=1.1, **options)
+    assert tripped.attrs["tripped"] == pytest.approx(at, abs=1e-9)
+    inner = make(controller, storm_scene.turbine, 0.1)
+    stop = FaultedController(inner, Fault(kind="emergency_stop", time=at), np.radians(90.0), 0.1)
+    stopped = run(storm_scene, controller=stop, **options)
+    pd.testing.assert_frame_equal(tripped, stopped, check_exact=True)
+    assert tripped["BldPitch1_[deg]"].iloc[-1] == pytest.approx(90.0, abs=0.1)
+    pd.testing.assert_frame_equal(
+        tripped[free["Time_[s]"] < at], free[free["Time_[s]"] < at], check_exact=True
+    )
+
+
+def test_a_trip_stays_when_the_speed_has_fallen_and_takes_the_torque(storm_scene):
+    """From a rotor that starts too fast; over many compiled calls, as a progress bar has them."""
+    fast = {"RotSpeed": 13.5}
+    frame = run(storm_scene, controller="pi", trip=1.1, duration=60.0, initial=fast)
+    assert frame.attrs["tripped"] == 0.0
+    assert frame["RotSpeed_[rpm]"].iloc[-1] < 6.0
+    assert (frame["GenTq_[kN-m]"] == 0.0).all()
+
+
+def test_without_a_trip_or_below_it_no_bit_changes(storm_scene):
+    plain = run(storm_scene, controller="pi", duration=10.0)
+    assert plain.attrs["tripped"] is None
+    quiet = run(storm_scene, controller="pi", duration=10.0, trip=1.5)
+    pd.testing.assert_frame_equal(plain, quiet, check_exact=True)
+    assert quiet.attrs["tripped"] is None
+
+
+@pytest.mark.parametrize("trip", [1.0, 0.5, -1.3, np.inf, "fast"])
+def test_a_trip_at_or_below_rated_is_refused(storm_scene, trip):
+    with pytest.raises(InputError, match="trip = .*above 1"):
+        run(storm_scene, trip=trip)
 
 
 def test_what_the_time_step_blows_up_is_not_called_a_capsize(platform):
@@ -346,6 +392,7 @@ def test_control_instants_are_control_dt_apart(storm_scene, turbine):
 
 def test_a_controller_that_asks_is_given_the_scene_once_before_it_starts(storm_scene):
     class Asking(Delegate):
+        information = (*make("pi", storm_scene.turbine, 0.1).information, "plant_model")
         calls = []
 
         def prepare(self, scene):
@@ -357,7 +404,8 @@ def test_a_controller_that_asks_is_given_the_scene_once_before_it_starts(storm_s
 
     asking = Asking(storm_scene.turbine, 0.1)
     run(storm_scene, controller=asking, duration=1.0)
-    assert asking.calls == [storm_scene, "reset"]
+    known, then = asking.calls
+    assert known.platform is storm_scene.platform and then == "reset"
 
 
 def test_controller_that_returns_nan_is_named(storm_scene, turbine):
@@ -404,14 +452,14 @@ def test_capsize_stops_the_run_and_keeps_the_rows(still_scene):
     assert stop.frame["PtfmPitch_[deg]"].iloc[0] == pytest.approx(78.0)
 
 
-def test_compiled_run_stops_on_a_state_that_is_not_a_number(storm_scene):
+def test_compiled_run_stops_on_a_command_that_is_not_a_number(storm_scene):
     x, u = initial_state(storm_scene)
     closed = simulation._Loop(storm_scene, CompiledNan(), x, u, Schedule(0.05, 2, 2, 200, np.inf, np.inf))
-    with pytest.raises(SimulationStopped, match="non-finite state") as caught:
+    with pytest.raises(SimulationStopped, match="command is not finite") as caught:
         closed.go(lambda share: None)
-    assert 1.0 < caught.value.time <= 1.1 + 1e-9  # the end of the control period that went wrong
+    assert caught.value.time == pytest.approx(1.0)  # the control instant that went wrong
     frame = caught.value.frame
-    assert len(frame) == 11
+    assert len(frame) == 10
     assert np.isfinite(frame[COLUMNS].to_numpy()).all()
 
 

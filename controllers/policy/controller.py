@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fowt_env.control import CompiledController, call_law, check_control_dt
+from fowt_env.control import CompiledController, call_law, check_control_dt, view_of, wind_ahead
 from fowt_env.controllers.lqr.law import WindEstimator
 from fowt_env.controllers.policy.network_file import read_policy
 from fowt_env.envs.actions import (
@@ -35,7 +35,7 @@ from fowt_env.envs.observations import (
 )
 from fowt_env.envs.tasks import Task
 from fowt_env.errors import InputError, unknown
-from fowt_env.plant.measurement import N_MEASUREMENTS, Measure, Measurement
+from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
 
 POLICY_PREFIX = "policy:"
 AGENTS = Path(__file__).parent / "agents"
@@ -113,8 +113,12 @@ class PolicyController:
         self._u, self._commanded = np.zeros(2), np.zeros(2)
         self._accepted = np.zeros(N_ACTIONS)
         self._calls = 0
-        self._wind = None
         self.information = self._information(names)
+        own = preview if "wind_preview" in names else ()
+        based = () if self._baseline is None else self._baseline.preview_times
+        self.preview_times = tuple(sorted({*own, *based}))
+        self._own_leads = [self.preview_times.index(lead) for lead in own]
+        self._baseline_leads = [self.preview_times.index(lead) for lead in based]
 
     def _information(self, names):
         """Measurements and extras that the agent and its baseline use, each once."""
@@ -122,48 +126,40 @@ class PolicyController:
         for part in (self._baseline, self._estimator):
             used += [] if part is None else part.information
         used += [name for name in names if name in Measurement._fields or name == "wind_preview"]
-        if self._mode == ActionMode.SETPOINT:
+        used += ["generator_torque", "blade_pitch"]  # where the commands start
+        if self._mode != ActionMode.RESIDUAL:
             used.append("rotor_speed")
         return tuple(dict.fromkeys(used))
 
     def prepare(self, scene):
-        """Take the coming wind, where the agent sees it, and what the baseline needs of the scene."""
-        if self._baseline is not None:
-            self._baseline.prepare(scene)
-        if self._estimator is not None:
-            self._estimator.prepare(scene)
-        if len(self._observation_map.preview):
-            from fowt_env.controllers.preview import rotor_wind_series
-
-            if scene.model.aero is None:
-                raise InputError(f"controller {self.name!r}: needs a scene with wind to look ahead")
-            self._wind = rotor_wind_series(scene)
+        """Hand the plant to the parts that are designed on it."""
+        for part in (self._baseline, self._estimator):
+            if part is not None:
+                part.prepare(scene)
 
     def reset(self, measurement):
         """Start afresh: the command in force is the measured one, the history is empty."""
-        if len(self._observation_map.preview) and self._wind is None:
-            raise InputError(f"controller {self.name!r}: call prepare(scene) before reset(measurement)")
         self._u[:] = measurement.generator_torque, measurement.blade_pitch
         if self._baseline is not None:
-            self._baseline.reset(measurement)
+            self._baseline.reset(self._for_baseline(measurement))
             self._parameters, self._memory = self._baseline.parameters, self._baseline.memory
         elif self._mode == ActionMode.SETPOINT:
             start_tracking(self._memory, measurement, self._actions)
         if self._estimator is not None:
             self._estimator.reset(measurement)
-        action_of(self._u, float(measurement.rotor_speed), self._actions, self._accepted)
+        speed = 0.0 if self._mode == ActionMode.RESIDUAL else float(measurement.rotor_speed)
+        action_of(self._u, speed, self._actions, self._accepted)
         self._calls = 0
 
     def act(self, measurement):
         """(generator torque, blade pitch); every `hold` calls the network decides anew."""
-        values = np.array(measurement, dtype=np.float64)
+        values = np.array([*measurement], dtype=np.float64)
+        ahead = np.array(wind_ahead(measurement))
         decisions = self._decisions
         if self._estimator is not None and self._calls > 0:  # the first instant is that of the reset
-            call_law(
-                self._estimator.law, self._estimator.parameters, self._estimator.memory, values, self._u
-            )
+            call_law(self._estimator.law, self._estimator.parameters, self._estimator.memory, values, self._u)
         if self._calls % decisions.settings.hold == 0:
-            self._observe(values)
+            self._observe(values, ahead)
             if self._calls == 0:
                 decisions.restart(0, self._observation, self._accepted)
             else:
@@ -177,22 +173,29 @@ class PolicyController:
             self._baseline_law,
             self._parameters,
             self._memory,
-            values,
+            self._baseline_reading(values, ahead),
             self._u,
             self._commanded,
         )
         return float(self._u[0]), float(self._u[1])
 
-    def _observe(self, values):
-        """Fill the observation from measurements (N_MEASUREMENTS,)."""
+    def _for_baseline(self, measurement):
+        """The measurement with the wind ahead at the baseline's own leads."""
+        ahead = wind_ahead(measurement)
+        return view_of(self._baseline)([*measurement, *(ahead[i] for i in self._baseline_leads)])
+
+    def _baseline_reading(self, values, ahead):
+        """What the baseline's law reads: (N_MEASUREMENTS + its leads,)."""
+        return np.concatenate([values, ahead[self._baseline_leads]]) if self._baseline_leads else values
+
+    def _observe(self, values, ahead):
+        """Fill the observation from measurements (N_MEASUREMENTS,) and the wind ahead."""
         self._signals[:N_MEASUREMENTS] = values
         self._signals[FIRST_ACTION : FIRST_ACTION + N_ACTIONS] = self._accepted
         if self._estimator is not None:
             self._signals[ESTIMATES : ESTIMATES + len(ESTIMATED)] = self._estimator.memory[: len(ESTIMATED)]
-        if len(self._observation_map.preview):
-            time, speed, period = self._wind
-            ahead = values[Measure.TIME] + self._observation_map.preview
-            self._signals[PREVIEW:] = np.interp(ahead, time, speed, period=period)
+        if self._own_leads:
+            self._signals[PREVIEW:] = ahead[self._own_leads]
         fill_observation(self._signals, self._observation_map, self._observation)
 
 

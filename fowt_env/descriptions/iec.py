@@ -3,6 +3,8 @@
 The same formulas can be read in the theory page of pyIECWind, https://pyiecwind.readthedocs.io.
 """
 
+from math import exp, log1p, sqrt
+
 REFERENCE_SPEED = {"I": 50.0, "II": 42.5, "III": 37.5}  # Vref, m/s, of the wind turbine classes
 TURBULENCE_INTENSITY = {"A+": 0.18, "A": 0.16, "B": 0.14, "C": 0.12}  # Iref; A+ from ed. 4
 EXTREME_SHEAR_EXPONENT = 0.11  # of the extreme wind models, 6.3.2.1
@@ -16,6 +18,23 @@ def length_scale(height):
 def ntm_sigma(speed, turbulence_class):
     """Point standard deviation sigma_1 (m/s) of the normal turbulence model (NTM), its 90 % quantile."""
     return TURBULENCE_INTENSITY[turbulence_class] * (0.75 * speed + 5.6)
+
+
+def ntm_sigma_distribution(speed, turbulence_class):
+    """(mean, standard deviation), m/s, of the log-normal sigma_1 of the NTM at a wind speed.
+
+    E = I_ref (0.75 V + 3.8 m/s), D = 1.4 m/s I_ref (IEC 61400-1 ed. 3, 6.3.1.3), of which ntm_sigma is the
+    90 % quantile that the standard designs with.
+    """
+    intensity = TURBULENCE_INTENSITY[turbulence_class]
+    return intensity * (0.75 * speed + 3.8), 1.4 * intensity
+
+
+def ntm_sigma_at(speed, turbulence_class, normal):
+    """sigma_1 (m/s) of the NTM as far along its log-normal distribution as a standard normal number says."""
+    mean, deviation = ntm_sigma_distribution(speed, turbulence_class)
+    variance = log1p((deviation / mean) ** 2)  # of ln sigma_1
+    return mean * exp(normal * sqrt(variance) - 0.5 * variance)
 
 
 def etm_sigma(speed, turbulence_class, turbine_class):

@@ -110,6 +110,8 @@ MOVING = Number(1.0, SPEED_LIMIT, "m/s")
 DIRECTION = Number(-180.0, 180.0, "deg", 0.0)  # towards which the wind blows, from +x towards +y
 TURBINE_CLASS = Choice(tuple(REFERENCE_SPEED), "I")
 TURBULENCE_CLASS = Choice(tuple(TURBULENCE_INTENSITY), "B")
+# of the normal turbulence model: the standard's representative value, or one drawn from its distribution
+NTM_SIGMA = Choice(("90%", "drawn"), "90%")
 START = Number(0.0, 1e6, "s", 60.0)
 SIGN = Choice((1, -1), 1)
 COMPONENT = Samples(-SPEED_LIMIT, SPEED_LIMIT, "m/s", None)
@@ -147,7 +149,7 @@ KINDS = {
     "edc": GUST | {"sign": SIGN},
     "ecd": {"speed": MOVING, "start": START, "sign": SIGN},
     "ews": GUST | {"sign": SIGN, "orientation": Choice(("vertical", "horizontal"), "vertical")},
-    "ntm": {"speed": MOVING, "class": TURBULENCE_CLASS} | RANDOM,
+    "ntm": {"speed": MOVING, "class": TURBULENCE_CLASS, "sigma": NTM_SIGMA} | RANDOM,
     "etm": {"speed": MOVING, "class": TURBULENCE_CLASS, "turbine_class": TURBINE_CLASS} | RANDOM,
     "ewm": {"turbine_class": TURBINE_CLASS, "recurrence": Choice((50, 1), 50), "turbulent": Flag(False)}
     | RANDOM,

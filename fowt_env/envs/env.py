@@ -15,10 +15,20 @@ import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
 from fowt_env.analysis.trim_cache import cached_trim, interpolated_trim, plant_key
-from fowt_env.control import CompiledController, catalogue, make
+from fowt_env.control import (
+    CompiledController,
+    catalogue,
+    hidden,
+    known_scene,
+    make,
+    preview_leads,
+    view_of,
+    with_wind_ahead,
+)
 from fowt_env.descriptions.platform import Platform
 from fowt_env.descriptions.records import RENAMED
 from fowt_env.descriptions.sea_state import sea_state_of
+from fowt_env.descriptions.sensors import SensorChain
 from fowt_env.envs.actions import ACTION_MODES, ActionMode, build_action_map, start_tracking
 from fowt_env.envs.episode import (
     BAD_ACTION,
@@ -28,6 +38,7 @@ from fowt_env.envs.episode import (
     STEP,
     EpisodeConfig,
     EpisodeData,
+    Given,
     act,
     act_physical,
     rewrite_observation,
@@ -49,7 +60,7 @@ from fowt_env.envs.rewards import (
     check_weights,
     weight_array,
 )
-from fowt_env.envs.sensors import Sensors, check_sensors, draw_sensors, reading_scales
+from fowt_env.envs.sensors import check_sensors, draw_sensors, reading_scales
 from fowt_env.envs.snapshot import CARRIED, DATA_CARRIED, Snapshot
 from fowt_env.envs.tables import task_tables
 from fowt_env.envs.tasks import TASKS, Episode, Task, check_offset, task_of
@@ -60,11 +71,13 @@ from fowt_env.plant.compile.handle import Handle
 from fowt_env.plant.events import counted
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
 from fowt_env.plant.rollout import STOP_REASONS, output
+from fowt_env.plant.sensing import new_past
 from fowt_env.plant.state import Command, State
 from fowt_env.scene.build import build_scene
 from fowt_env.scene.options import OPTIONS
 from fowt_env.scene.scene import Scene
 from fowt_env.simulation import check_duration, steps_in
+from fowt_env.weather.preview import exact_preview
 
 SMALL_SEA = {"kind": "regular", "H": 1e-3, "T": 10.0}  # of a scene whose first draw happens to have no waves
 SHORTEST_WEATHER = 600.0  # s of random wind and sea: turbulence intensity is defined over 10 min
@@ -90,8 +103,9 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     wind_preview  look-ahead times (s) of the channel wind_preview
     render_mode   None, "rgb_array" (render() returns a picture) or "human" (every step shows one in a window)
     fidelity      level of build_scene: "reference", "standard" or "fast"
-    sensors       {"noise": standard deviation of white noise on every reading, as a fraction of the channel's
-                  scale; "delay": control periods from measurement to reading}, either may be left out. One
+    sensors       the name of a chain of sensors ("standard"), a SensorChain, or {"noise": standard deviation
+                  of white noise on every reading, as a fraction of the channel's scale; "delay": control
+                  periods from measurement to reading}, of which either may be left out. One
                   reading per control period is what observation, baseline and estimator are given, and
                   measurement() returns; its noise follows from the weather's seed. Azimuth, last action and
                   preview are exact; rewards and failures are of the true motions. None: readings are exact
@@ -147,7 +161,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         wind_preview: Sequence[float] | None = None,
         render_mode: str | None = None,
         fidelity: str = "standard",
-        sensors: Mapping[str, Any] | None = None,
+        sensors: str | SensorChain | Mapping[str, Any] | None = None,
         nominal_plant: Mapping[str, Any] | None = None,
         **options: Any,
     ) -> None:
@@ -195,6 +209,10 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
                 fidelity=fidelity, **nominal_options,
             )  # fmt: skip
         self._sensors = None if sensors is None else check_sensors(sensors)
+        self._chain = None  # (name, fields) of a sensor chain, which may lack what is asked for
+        if isinstance(self._sensors, SensorChain):
+            self._chain = self._sensors.name, self._sensors.available
+            _check_shown(task.observation, self._chain)
         self.control_dt = float(control_dt)
         self.dt = min(self.scene.dt, self.control_dt) if dt is None else float(dt)
         per_control = steps_in("control_dt", control_dt, self.dt if dt is None else dt)
@@ -237,6 +255,11 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         if set(ESTIMATE_CHANNELS) & set(task.observation):
             self._estimator = catalogue().WindEstimator(self.design_scene.turbine, self.control_dt)
             estimator_law = self._estimator.law
+            hidden(self._estimator, self._chain)  # refuses what the sensors do not show
+        leads, given = (), None
+        if self._baseline is not None:
+            leads = preview_leads(self._baseline)
+            given = Given(hidden(self._baseline, self._chain), *self._foresee(scene, leads))
         estimating, sensed = self._estimator is not None, self._sensors is not None
         self._baseline_law = Handle(None, baseline_law)
         self._estimator_law = Handle(None, estimator_law)
@@ -251,10 +274,12 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             overspeed=float(turbine.overspeed),
             dt=self.dt,
             per_control=per_control,
-            sensors=Sensors(np.zeros((1, N_MEASUREMENTS)), self._sensors["delay"]) if sensed else None,
+            sensors=self._drawn(scene, per_control) if sensed else None,
+            given=given,
         )
         n = scene.n_state
         measurement = np.zeros(N_MEASUREMENTS)
+        reading = np.zeros(N_MEASUREMENTS) if sensed else measurement
         self._episode = EpisodeData(
             data=scene.data(),
             x=np.zeros(n),
@@ -263,14 +288,15 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             estimate=self._estimator.memory if estimating else None,
             action=np.zeros(N_ACTIONS),
             measurement=measurement,
-            reading=np.zeros(N_MEASUREMENTS) if sensed else measurement,
-            delay_buffer=np.zeros((self._sensors["delay"] + 1, N_MEASUREMENTS)) if sensed else None,
+            reading=reading,
+            past=new_past(self._config.sensors.chain) if sensed else None,
             observation=np.zeros(len(observed), dtype=np.float32),
             counts=np.zeros(N_COUNTS, dtype=np.int64),
             reference=np.zeros(len(Reference._fields)),
             previous_measurement=np.zeros(N_MEASUREMENTS),
             dx=np.zeros(n),
             baseline_command=np.zeros(2),
+            baseline_reading=reading if self._baseline is None else np.zeros(N_MEASUREMENTS + len(leads)),
             signals=np.zeros(PREVIEW + len(task.wind_preview)),
             terms=np.zeros(N_TERMS),
         )
@@ -333,7 +359,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         For whoever took over through step_physical and hands back: the loops have not followed.
         """
         if self._baseline is not None:
-            self._baseline.reset(self.measurement())
+            self._baseline.reset(view_of(self._baseline)(self._episode.baseline_reading.tolist()))
         elif self._config.actions.mode == ActionMode.SETPOINT:
             start_tracking(self._episode.memory, self.measurement(), self._config.actions)
 
@@ -447,23 +473,40 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self._episode = self._episode._replace(data=scene.data())
         self._config = self._config._replace(model=scene.model)
         if self._sensors is not None:
-            readings = self._last // self._config.per_control + 1
-            scales = reading_scales(scene.turbine)
-            drawn = draw_sensors(self._sensors["noise"], self._sensors["delay"], scales, scene.seed, readings)
-            self._config = self._config._replace(sensors=drawn)
+            self._config = self._config._replace(sensors=self._drawn(scene, self._config.per_control))
         if self._baseline is not None:
-            self._baseline.prepare(self.design_scene)
-            self._config = self._config._replace(parameters=self._baseline.parameters)
+            self._baseline.prepare(known_scene(self.design_scene, self._baseline))
+            ahead = self._foresee(scene, self._baseline.preview_times)
+            given = Given(self._config.given.hidden, *ahead)
+            self._config = self._config._replace(parameters=self._baseline.parameters, given=given)
         if self._estimator is not None:
-            self._estimator.prepare(self.design_scene)
+            self._estimator.prepare(known_scene(self.design_scene, self._estimator))
             self._config = self._config._replace(estimator=self._estimator.parameters)
         self._handle = Handle(self._config, self._episode)
 
-    def measurement(self) -> Measurement:
-        """Measurement that a controller is given now (SI), as the sensors read it."""
+    def _drawn(self, scene, per_control):
+        """Sensors of an episode in a scene's weather."""
+        readings = self._last // per_control + 1
+        scales = reading_scales(scene.turbine)
+        return draw_sensors(self._sensors, scales, self.control_dt, scene.seed, readings)
+
+    @staticmethod
+    def _foresee(scene, leads):
+        """(time (k,), wind (leads, k)) of a scene as a controller of these leads (s) is given it."""
+        return exact_preview(scene, leads) if leads else (np.zeros(0), np.zeros((0, 0)))
+
+    def measurement(self, preview_times: Sequence[float] = ()) -> Measurement:
+        """Measurement of all fields now (SI), as the sensors read them.
+
+        preview_times: increasing, s; with them it has wind_preview, the rotor-averaged wind that far ahead.
+        """
         if self._handle is None:
             raise ResetNeeded("call reset() first: nothing has been measured yet")
-        return Measurement(*self._episode.reading.tolist())
+        measurement = Measurement(*self._episode.reading.tolist())
+        if not len(preview_times):
+            return measurement
+        time, values = self._foresee(self.scene, tuple(preview_times))
+        return with_wind_ahead(measurement, [float(np.interp(measurement.time, time, row)) for row in values])
 
     @property
     def design_scene(self) -> Scene:
@@ -567,6 +610,16 @@ def _adapted(
 
 # settings of FowtEnv by name, those of build_scene apart
 SETTINGS = tuple(name for name in inspect.signature(FowtEnv).parameters if name != "options")
+
+
+def _check_shown(names, chain):
+    """Refuse observation channels that a chain (name, fields) of sensors does not show."""
+    for name in names:
+        if name in Measurement._fields and name not in chain[1]:
+            raise InputError(
+                f"observation: {name!r}: the sensor chain {chain[0]!r} does not have it; it has"
+                f" {', '.join(chain[1])}"
+            )
 
 
 def named_baseline(name, turbine, control_dt):

@@ -12,19 +12,27 @@ import numpy as np
 from fowt_env.envs.actions import ActionMap, accept, action_of, command_of
 from fowt_env.envs.observations import ObservationMap, fill_observation, fill_signals
 from fowt_env.envs.rewards import Scales, fill_terms, weighted_sum
-from fowt_env.envs.sensors import Sensors, take_reading
 from fowt_env.plant.compile.decorators import entry, kernel
 from fowt_env.plant.compile.handle import by_reference, data_of, model_of
 from fowt_env.plant.drivetrain import followed_torque, torque_was_limited
-from fowt_env.plant.measurement import Measure
+from fowt_env.plant.measurement import N_MEASUREMENTS, Measure
 from fowt_env.plant.model import Data, LoadCache, Model
 from fowt_env.plant.rollout import NON_FINITE, OVERSPEED, RUNNING, advance_plant, observe_plant
+from fowt_env.plant.sensing import Sensors, read_preview, take_reading
 from fowt_env.plant.state import Command, State
 
 BAD_ACTION = -1  # beside the statuses of rollout.py
 STEP, SATURATED, LIMITED = 0, 1, 2  # entries of EpisodeData.counts
 N_COUNTS = 3
 SHOWN_COUNTS = {"saturated_actions": SATURATED, "torque_limited": LIMITED}  # in the infos
+
+
+class Given(NamedTuple):
+    """What a baseline controller declares, and the wind ahead that it is given."""
+
+    hidden: np.ndarray  # (N_MEASUREMENTS,) added to a reading: fowt_env.control.mask
+    preview_time: np.ndarray  # (k,) s; no entry: no wind ahead
+    preview: np.ndarray  # (leads, k) m/s
 
 
 @by_reference
@@ -42,6 +50,7 @@ class EpisodeConfig(NamedTuple):
     dt: float  # s
     per_control: int  # physics steps in a control period
     sensors: Sensors | None  # between the plant and its readers; None: readings are the measurements
+    given: Given | None  # what the baseline is given of a reading; None: there is no baseline
 
 
 @by_reference
@@ -56,7 +65,7 @@ class EpisodeData(NamedTuple):
     action: np.ndarray  # (2,) last accepted action
     measurement: np.ndarray  # (N_MEASUREMENTS,) at the present instant
     reading: np.ndarray  # the same as sensors show it; without any the measurement itself
-    delay_buffer: np.ndarray | None  # last measurements, of the sensors' delay
+    past: np.ndarray | None  # what the sensors remember: delays, low passes and integrals
     observation: np.ndarray  # (n,) float32
     # int64: physics steps done, control periods with a clipped action, those with a torque at its limits
     counts: np.ndarray
@@ -64,6 +73,9 @@ class EpisodeData(NamedTuple):
     previous_measurement: np.ndarray  # (N_MEASUREMENTS,) scratch from here on: one control period ago
     dx: np.ndarray  # (n_state,)
     baseline_command: np.ndarray  # (2,) command of the last period, before the generator's limits
+    baseline_reading: (
+        np.ndarray
+    )  # (N_MEASUREMENTS + leads,) what the baseline is given; the reading without one
     signals: np.ndarray  # what observations are made of
     terms: np.ndarray  # (N_TERMS,) of the last period
 
@@ -86,8 +98,19 @@ def measure_and_sense(config, episode):
             copy_into(episode.measurement, episode.previous_measurement)
             return NON_FINITE
     period = episode.counts[STEP] // config.per_control
-    take_reading(config.sensors, period, episode.measurement, episode.delay_buffer, episode.reading)
+    take_reading(config.sensors, period, episode.measurement, episode.past, episode.reading)
+    give_reading(config.given, t, episode.reading, episode.baseline_reading)
     return RUNNING
+
+
+@kernel
+def give_reading(given, t, reading, baseline_reading):
+    """Fill what the baseline is given at time t (s) from the reading."""
+    if given is None:
+        return
+    for i in range(N_MEASUREMENTS):
+        baseline_reading[i] = reading[i] + given.hidden[i]
+    read_preview(t, given.preview_time, given.preview, baseline_reading)
 
 
 @kernel
@@ -175,7 +198,7 @@ def act(handle, baseline_law, estimator_law, action):
     episode.counts[SATURATED] += saturated
     command_of(
         episode.action, config.actions, baseline_law.data, config.parameters, episode.memory,
-        episode.reading, episode.u, episode.baseline_command,
+        episode.baseline_reading, episode.u, episode.baseline_command,
     )  # fmt: skip
     return advance_period(config, episode, estimator_law.data)
 

@@ -4,6 +4,7 @@ from math import isfinite, pi
 
 import gymnasium
 
+from fowt_env.control import known_scene
 from fowt_env.errors import InputError
 
 AHEAD = 1.0  # s: the rotor speed is checked where it will be, since feathering takes its time
@@ -56,7 +57,7 @@ class SafetyLayer(gymnasium.Wrapper):
     def reset(self, **options):
         """As the environment's; the agent has the turbine."""
         observation, info = self.env.reset(**options)
-        self._baseline.prepare(self.env.unwrapped.design_scene)
+        self._baseline.prepare(known_scene(self.env.unwrapped.design_scene, self._baseline))
         self._left = 0
         self._last_speed = None
         self.guarded_periods = 0
@@ -65,7 +66,7 @@ class SafetyLayer(gymnasium.Wrapper):
     def step(self, action):
         """One control period under the action, or under the guard's command."""
         plant = self.env.unwrapped
-        measured = plant.measurement()
+        measured = plant.measurement(self._baseline.preview_times)
         speed, rate = self._projected(measured.rotor_speed), abs(measured.platform_pitch_rate)
         if speed > self._fastest or rate > self._steepest:
             if self._left == 0:

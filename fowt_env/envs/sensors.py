@@ -1,29 +1,24 @@
-"""Sensors between the plant and all who read it: late by whole control periods, with white noise.
+"""Sensors of an environment: what its setting stands for, and their figures and noise in one episode.
 
 One reading is made per control period, and observation, baseline, set-point loop and estimator are given that
-same one. Rewards, failures and outputs are of the true motions.
+same one. Rewards, failures and outputs are of the true motions. The readings are made as those of simulate
+are, by fowt_env/plant/sensing.py.
 """
 
 from collections.abc import Mapping
 from math import isfinite
-from typing import NamedTuple
 
 import numpy as np
 
+from fowt_env.descriptions.sensors import SensorChain, sensor_chain
 from fowt_env.envs.observations import observation_channels
 from fowt_env.errors import InputError, unknown
-from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measure, Measurement
+from fowt_env.plant.sensing import Sensors, Setting, open_chain
+from fowt_env.weather.sensor_noise import draw_noise
+from fowt_env.weather.sensor_noise import draw_sensors as draw_chain
 
-NOISE_STREAM = 3  # of a run's seed: apart from that of its weather
 LONGEST_DELAY = 1000  # control periods
-
-
-class Sensors(NamedTuple):
-    """What stays fixed in an episode: its noise is drawn beforehand, so that a snapshot needs none of it."""
-
-    noise: np.ndarray  # (readings, N_MEASUREMENTS), SI; one row, repeated, where there is none
-    delay: int  # control periods
 
 
 def reading_scales(turbine):
@@ -36,9 +31,16 @@ def reading_scales(turbine):
 
 
 def check_sensors(given):
-    """{"noise", "delay"} of what an environment is given as sensors. Raises: InputError."""
+    """What an environment is given as sensors: {"noise", "delay"}, or a SensorChain; "exact" is None.
+
+    Raises: InputError.
+    """
+    if isinstance(given, str | SensorChain):
+        return sensor_chain(given)
     if not isinstance(given, Mapping):
-        raise InputError(f"sensors = {given!r}: must be a dict with noise and delay")
+        raise InputError(
+            f"sensors = {given!r}: must be a dict with noise and delay, a SensorChain or the name of one"
+        )
     settings = {"noise": 0.0, "delay": 0} | dict(given)
     for key in given:
         if key not in ("noise", "delay"):
@@ -53,29 +55,19 @@ def check_sensors(given):
     return {"noise": float(noise), "delay": int(delay)}
 
 
-def draw_sensors(noise, delay, scales, seed, readings):
-    """Sensors of an episode: noise as a fraction of the scales (N_MEASUREMENTS,), by its weather's seed."""
-    if noise == 0.0:
-        return Sensors(np.zeros((1, N_MEASUREMENTS)), delay)
-    rng = np.random.default_rng([seed, NOISE_STREAM])
-    return Sensors(noise * scales * rng.normal(size=(readings, N_MEASUREMENTS)), delay)
+def draw_sensors(settings, scales, control_dt, seed, readings):
+    """Sensors of an episode from what check_sensors returned, by the seed of its weather.
 
-
-@kernel
-def take_reading(sensors, period, measurement, delay_buffer, reading):
-    """Fill the reading (N_MEASUREMENTS,) of a control period from what is measured now; None: it is that.
-
-    delay_buffer: (delay + 1, N_MEASUREMENTS) ring of last measurements; at period 0 all are the first.
+    A noise is a fraction of the scales (N_MEASUREMENTS,). What a SensorChain does not have reads as NaN.
     """
-    if sensors is None:
-        return
-    size = delay_buffer.shape[0]
-    for row in range(size):
-        if period == 0 or row == period % size:
-            for i in range(N_MEASUREMENTS):
-                delay_buffer[row, i] = measurement[i]
-    late = (period + 1) % size
-    drawn = min(period, sensors.noise.shape[0] - 1)
-    for i in range(N_MEASUREMENTS):
-        reading[i] = delay_buffer[late, i] + sensors.noise[drawn, i]
-    reading[Measure.TIME] = measurement[Measure.TIME]
+    if isinstance(settings, SensorChain):
+        sensors = draw_chain(settings, control_dt, seed, readings)
+        for name in Measurement._fields:
+            if name != "time" and name not in settings.sensors:
+                sensors.chain[Setting.HIDDEN, Measure[name.upper()]] = np.nan
+        return sensors
+    chain = open_chain()
+    chain[Setting.DELAY] = settings["delay"]
+    if settings["noise"] == 0.0:
+        return Sensors(chain, np.zeros((1, N_MEASUREMENTS)))
+    return Sensors(chain, draw_noise(settings["noise"] * scales, seed, readings))

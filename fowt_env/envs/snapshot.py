@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 # arrays of episode.EpisodeData that outlive a control period, and of plant.model.Data: those that carry
 # over, and stages, whose first row holds the wake's rates as long as the cached loads are fresh
 CARRIED = (
-    "x", "u", "memory", "estimate", "action", "measurement", "reading", "delay_buffer", "observation",
-    "counts", "reference", "terms",
+    "x", "u", "memory", "estimate", "action", "measurement", "reading", "baseline_reading", "past",
+    "observation", "counts", "reference", "terms",
 )  # fmt: skip
 DATA_CARRIED = ("lines", "counters", "stages", "cache", "added_mass", "user", "history", "samples")
 

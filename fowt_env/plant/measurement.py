@@ -39,3 +39,7 @@ class Measurement(NamedTuple):
 
 Measure = IntEnum("Measure", [name.upper() for name in Measurement._fields], start=0)
 N_MEASUREMENTS = len(Measurement._fields)
+SENSOR_FIELDS = (  # what a turbine's own sensors show
+    "time", "rotor_speed", "generator_speed", "blade_pitch", "generator_torque", "platform_pitch",
+    "platform_pitch_rate", "platform_pitch_acceleration", "nacelle_acceleration", "nacelle_velocity",
+)  # fmt: skip

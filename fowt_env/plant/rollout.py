@@ -1,6 +1,7 @@
 """Fixed-step advance of one plant, and the compiled loop of a whole run with its controller."""
 
-from math import isfinite
+from enum import IntEnum
+from math import inf, isfinite
 from typing import NamedTuple
 
 import numpy as np
@@ -11,10 +12,12 @@ from fowt_env.plant.compile.handle import data_of, model_of
 from fowt_env.plant.drivetrain import followed_torque, torque_was_limited
 from fowt_env.plant.dynamics import loads_of
 from fowt_env.plant.integrators import rates, take_step
+from fowt_env.plant.measurement import Measure
 from fowt_env.plant.model import LoadCache
+from fowt_env.plant.sensing import Setting, read
 from fowt_env.plant.state import Command, State
 
-RUNNING, NON_FINITE, CAPSIZED, OVERSPEED, BLOWN_UP = 0, 1, 2, 3, 4
+RUNNING, NON_FINITE, CAPSIZED, OVERSPEED, BLOWN_UP, BAD_COMMAND = 0, 1, 2, 3, 4, 5
 CAPSIZE = 1.4  # rad (80 deg) of platform pitch: the Euler angles are singular at 90 deg
 # No floating platform moves as fast: a state beyond is the time step's doing, not the sea's. A hull that
 # capsizes passes 80 deg at some 0.5 rad/s.
@@ -25,6 +28,8 @@ STOP_REASONS = {
     OVERSPEED: "overspeed (rotor speed beyond the turbine file's limit)",
     BLOWN_UP: f"numerical blow-up (platform faster than {FASTEST:g} m/s or {FASTEST_TURN:g} rad/s): loads too"
     " stiff for the time step",
+    BAD_COMMAND: "the controller's command is not finite (what its information does not declare, it reads as"
+    " NaN)",
 }
 
 
@@ -131,21 +136,54 @@ class Schedule(NamedTuple):
     last: int  # step at which the run ends, with a row
     overspeed: float  # rotor speed (rad/s) beyond which the run ends at the next control instant
     grid_loss: float  # s, time from which the generator has no torque
+    trip: float = inf  # rotor speed (rad/s) beyond which the protection stops the turbine at the next one
+    feathering: float = 0.0  # rad in a control period, of such a stop
+    feathered: float = 0.0  # rad, where it ends
+
+
+class Protection(IntEnum):
+    """Entries of a run's protection array, which outlives the calls of rollout."""
+
+    TRIPPED_AT = 0  # s; infinite: not yet
+    TARGET = 1  # rad, blade pitch commanded since
+
+
+def new_protection():
+    """Protection array of a turbine that has not tripped."""
+    return np.array([inf, 0.0])
+
+
+@kernel
+def stop_turbine(t, x, u, schedule, protection):
+    """Put the command of an emergency stop into u: no torque, blades feathering from where they were."""
+    if protection[Protection.TRIPPED_AT] > t:
+        protection[Protection.TRIPPED_AT] = t
+        protection[Protection.TARGET] = x[State.BLADE_PITCH]
+    target = min(protection[Protection.TARGET] + schedule.feathering, schedule.feathered)
+    protection[Protection.TARGET] = target
+    u[Command.GENERATOR_TORQUE] = 0.0
+    u[Command.BLADE_PITCH] = target
 
 
 @entry
-def rollout(handle, x, u, law, parameters, memory, measurement, dx, schedule, first, end, out):
+def rollout(
+    handle, x, u, law, parameters, memory, reader, protection, measurement, dx, schedule, first, end, out
+):
     """Closed loop over the instants first <= step < end, and at the run's last one; rows go to out.
 
     law      compiled control law (CompiledController.law), called at every control instant
-    first    = end: nothing moves, and measurement is filled as at that instant
+    reader   Reader: what stands between measurement and law
+    protection  new_protection() of the run; once it has tripped, the law is not called again
+    first    = end: nothing moves, and measurement and the reader's reading are filled as at that instant
     out      (k, n_channels) of the rows to come, SI
-    Returns (status, step reached, rows written). x (n_state,), u, memory and measurement are written.
+    Returns (status, step reached, rows written). x (n_state,), u, memory, reader, protection and measurement
+    are written.
     """
     model, data = model_of(handle), data_of(handle)
     dt, rows = schedule.dt, 0
     if first == end:
         observe_plant(model, data, x, u, first * dt, dx, measurement)
+        read(reader, first // schedule.per_control, first * dt, measurement)
         return RUNNING, first, rows
     for step in range(first, end + 1):
         t = step * dt
@@ -156,10 +194,19 @@ def rollout(handle, x, u, law, parameters, memory, measurement, dx, schedule, fi
             return OVERSPEED, step, rows
         if not ending and step % schedule.per_control == 0:
             observe_plant(model, data, x, u, t, dx, measurement)
-            torque = u[Command.GENERATOR_TORQUE]
-            law(parameters, memory, measurement, u)
-            period = schedule.per_control * dt
-            follow_torque(t, torque, u, period, model.generator, schedule.grid_loss, data.cache)
+            torque, grid_loss = u[Command.GENERATOR_TORQUE], schedule.grid_loss
+            if protection[Protection.TRIPPED_AT] <= t or x[State.ROTOR_SPEED] > schedule.trip:
+                stop_turbine(t, x, u, schedule, protection)
+                grid_loss = t
+            else:
+                read(reader, step // schedule.per_control, t, measurement)
+                hidden = reader.sensors.chain[Setting.HIDDEN]
+                u[Command.GENERATOR_TORQUE] += hidden[Measure.GENERATOR_TORQUE]
+                u[Command.BLADE_PITCH] += hidden[Measure.BLADE_PITCH]
+                law(parameters, memory, reader.reading, u)
+                if not (isfinite(u[Command.GENERATOR_TORQUE]) and isfinite(u[Command.BLADE_PITCH])):
+                    return BAD_COMMAND, step, rows
+            follow_torque(t, torque, u, schedule.per_control * dt, model.generator, grid_loss, data.cache)
         if ending or step % schedule.per_output == 0:
             if rows == out.shape[0]:
                 raise IndexError("rollout: out has too few rows")

@@ -18,15 +18,15 @@ Assumptions, stated because the standard leaves them open:
 - The rotor-averaged wind is the mean over azimuth and radius: the multiples of the blade-passing
   frequency, which a blade meets by slicing through gusts, are not in it.
 - v and w get the coherence of u (the standard gives none for them), and are independent of u.
-- The amplitudes follow the spectrum exactly and only the phases are random, so that every seed has
-  the same strength. The point series has the standard deviation sigma_1 over its period.
+- The amplitudes follow the spectrum exactly and only the phases are random: the point series has the
+  standard deviation sigma_1 over its period. sigma_1 itself is the standard's 90 % quantile in every
+  seed, or drawn from its distribution (drawn_ntm_sigma).
 """
-
 
 import numpy as np
 
 from fowt_env.caches import cached
-from fowt_env.descriptions.iec import length_scale
+from fowt_env.descriptions.iec import length_scale, ntm_sigma_at
 
 LENGTH_RATIO = np.array([8.1, 2.7, 0.66])  # L_u, L_v, L_w over Lambda_1 (IEC Annex B)
 SIGMA_RATIO = np.array([1.0, 0.8, 0.5])  # sigma of u, v, w over sigma_1 (IEC Annex B)
@@ -35,6 +35,7 @@ COHERENCE_OFFSET = 0.12
 SHORTEST_PERIOD = 600.0  # s; sigma_1 is defined over 10 min, a shorter record would squeeze it into gusts
 STEP = 0.1  # s
 OWN_PHASES = 5  # first random generator of what a point has beyond the disc average (0 to 4: turbulence)
+SIGMA_STREAM = 8  # random generator of a drawn sigma_1 (OWN_PHASES has 5 to 7)
 TABLE_RANGE = (1e-6, 1e4)  # of k R; beyond it the averages are 1 and 0 to 1e-6 and 1e-7
 TABLE_SIZE = 2000  # log-spaced; log-log interpolation is then within 1e-5
 PAIR_NODES = 200  # quadrature over pair distances, quadratically denser towards 0
@@ -154,6 +155,16 @@ def component_generator(seed, component):
         seed = np.random.SeedSequence(seed)
     child = np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, component))
     return np.random.Generator(np.random.PCG64(child))
+
+
+def drawn_ntm_sigma(speed, turbulence_class, seed):
+    """sigma_1 (m/s) of the normal turbulence model, drawn from its log-normal distribution.
+
+    A seed draws one number, its place in the distribution, from a stream of its own (SIGMA_STREAM), so that
+    the phases of a seed are those that it has without. sigma_1 follows from that place and the mean wind:
+    a seed that is gusty is so at every wind speed. seed: as in component_generator.
+    """
+    return ntm_sigma_at(speed, turbulence_class, component_generator(seed, SIGMA_STREAM).normal())
 
 
 def turbulence(

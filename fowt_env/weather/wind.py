@@ -17,7 +17,7 @@ from fowt_env.descriptions.wind import SHARED, Number, Seed, read_wind
 from fowt_env.errors import InputError
 from fowt_env.plant.aero.wind import LOWEST_HEIGHT, WindSeries
 from fowt_env.weather import gusts
-from fowt_env.weather.turbulence import SHORTEST_PERIOD, hub_turbulence, turbulence
+from fowt_env.weather.turbulence import SHORTEST_PERIOD, drawn_ntm_sigma, hub_turbulence, turbulence
 
 OPENING = 60.0  # s; the platform trims to the mean of this much of a user's series
 
@@ -206,12 +206,6 @@ def _turbulent(spec, height, diameter, seed, duration):
 def _drawn(spec, height, diameter, seed, duration):
     """Arguments of turbulence(): speed, sigma, height, diameter, period, seed. Raises: InputError."""
     speed = nominal_speed(spec)
-    if spec.kind == "ntm":
-        sigma = ntm_sigma(speed, spec["class"])
-    elif spec.kind == "etm":
-        sigma = etm_sigma(speed, spec["class"], spec["turbine_class"])
-    else:
-        sigma = 0.11 * speed  # the turbulent extreme wind of IEC 61400-1
     duration = Number(0.0, 1e5, "s").read("duration", duration)
     period = spec["period"]
     if period is None:
@@ -222,6 +216,14 @@ def _drawn(spec, height, diameter, seed, duration):
         seed = spec["seed"]
     elif not isinstance(seed, np.random.SeedSequence):
         seed = Seed().read("seed", seed)
+    if spec.kind == "etm":
+        sigma = etm_sigma(speed, spec["class"], spec["turbine_class"])
+    elif spec.kind == "ewm":
+        sigma = 0.11 * speed  # the turbulent extreme wind of IEC 61400-1
+    elif spec["sigma"] == "drawn":
+        sigma = drawn_ntm_sigma(speed, spec["class"], seed)
+    else:
+        sigma = ntm_sigma(speed, spec["class"])
     place = {"height": height, "diameter": diameter}
     return {"speed": speed, "sigma": sigma, **place, "period": period, "seed": seed}
 
@@ -231,6 +233,20 @@ def _turn(value, direction):
     along, across = value[:, 0].copy(), value[:, 1].copy()
     value[:, 0] = along * cos(direction) - across * sin(direction)
     value[:, 1] = along * sin(direction) + across * cos(direction)
+
+
+def drawn_turbulence(spec, *, reference_height, rotor_diameter, seed, duration):
+    """Arguments of turbulence() for a wind that build_wind draws from spectra, with its "average"; else None.
+
+    Arguments as in build_wind.
+    """
+    if spec is None or isinstance(spec, WindSeries):
+        return None
+    spec = read_wind(spec)
+    if not _is_turbulent(spec):
+        return None
+    drawn = _drawn(spec, float(reference_height), float(rotor_diameter), seed, duration)
+    return drawn | {"average": spec["average"]}
 
 
 def hub_series(spec, *, reference_height, rotor_diameter, seed, duration):

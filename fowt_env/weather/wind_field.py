@@ -17,11 +17,12 @@ from typing import NamedTuple
 import numpy as np
 
 from fowt_env.descriptions.iec import length_scale, ntm_sigma
-from fowt_env.descriptions.wind import MOVING, TURBULENCE_CLASS, Flag, Number, Seed
+from fowt_env.descriptions.wind import MOVING, NTM_SIGMA, TURBULENCE_CLASS, Flag, Number, Seed
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.aero.wind_field import WindField, field_at
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.weather.turbsim import read_bts
+from fowt_env.weather.turbulence import drawn_ntm_sigma
 
 MARGIN = 75.0  # m of platform drift against the wind that a box must still cover at the end of a run
 DISK_RADII, DISK_AZIMUTHS = 12, 36  # points of the rotor average
@@ -79,6 +80,7 @@ FIELD_KINDS = {  # kind -> {key: (rule, default)}; None: found from the box
     "mann": {
         "speed": (MOVING, REQUIRED),
         "class": (TURBULENCE_CLASS, "B"),
+        "sigma": (NTM_SIGMA, "90%"),
         "seed": (Seed(), None),
         "dt": (Number(0.05, 1.0, "s"), 0.2),
         "shear_exponent": (Number(0.0, 1.0, ""), None),
@@ -142,7 +144,7 @@ def read_box(spec, *, hub_height, rotor_diameter, shear_exponent=0.0, seed=0, du
 
     bts   path; periodic (None: as the file says); shift (s, None: half the grid width over the mean wind)
     box   u (n_time, n_z, n_y) m/s, optionally v and w; y, z (m); dt (s); speed (m/s)
-    mann  speed (m/s), class of the IEC normal turbulence model, seed, dt; hipersim makes the box
+    mann  speed (m/s), class and sigma of the IEC normal turbulence model, seed, dt; hipersim makes the box
     Raises: InputError naming the key and what is allowed, and where the grid does not hold the rotor.
     """
     if isinstance(spec, WindBox):
@@ -226,6 +228,7 @@ def _from_mann(values, hub_height, rotor_diameter, shear_exponent, seed, duratio
             "Mann boxes are made by hipersim, which is not installed: pip install 'fowt-env[mann]'"
         ) from None
     speed, dt = values["speed"], values["dt"]
+    seed = seed if values["seed"] is None else values["seed"]
     n_time = 2 ** ceil(np.log2((duration + 2.0 * rotor_diameter / speed) / dt))
     n_side = 32
     step = 1.2 * rotor_diameter / (n_side - 1)
@@ -234,12 +237,14 @@ def _from_mann(values, hub_height, rotor_diameter, shear_exponent, seed, duratio
         Gamma=3.9,
         Nxyz=(n_time, n_side, n_side),
         dxyz=(speed * dt, step, step),
-        seed=seed if values["seed"] is None else values["seed"],
+        seed=seed,
     )
     # x of that box points downwind: the slice that arrives first is the one farthest downstream
     velocity = np.transpose(np.asarray(made.uvw), (1, 3, 2, 0))[::-1].astype(np.float32)
     middle = n_side // 2
-    velocity *= ntm_sigma(speed, values["class"]) / velocity[:, middle, middle, 0].std()
+    drawn = values["sigma"] == "drawn"  # as the rotor-averaged wind of the same seed draws it
+    sigma = drawn_ntm_sigma(speed, values["class"], seed) if drawn else ntm_sigma(speed, values["class"])
+    velocity *= sigma / velocity[:, middle, middle, 0].std()
     line = step * (np.arange(n_side) - 0.5 * (n_side - 1))
     z = hub_height + line
     exponent = shear_exponent if values["shear_exponent"] is None else values["shear_exponent"]

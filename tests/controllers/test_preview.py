@@ -4,17 +4,17 @@ import numpy as np
 import pytest
 
 from fowt_env import build_scene, simulate
+from fowt_env.control import view_of
 from fowt_env.controllers import make
 from fowt_env.controllers.pi import PISettings
 from fowt_env.controllers.preview import (
     Preview,
     PreviewSettings,
-    foreseen_pitch,
-    rotor_wind_series,
     steady_pitch,
 )
 from fowt_env.errors import InputError
 from fowt_env.plant.measurement import Measurement
+from fowt_env.weather.preview import exact_preview, rotor_wind_series
 
 DT = 0.1
 STILL = Measurement(*[0.0] * len(Measurement._fields))
@@ -36,6 +36,25 @@ def measured(scene, pitch):
     )
 
 
+def given(law, scene, measurement):
+    """The measurement as a run gives it to the law, with the wind that is then ahead."""
+    time, values = exact_preview(scene, law.preview_times)
+    return view_of(law)([*measurement, *(np.interp(measurement.time, time, row) for row in values)])
+
+
+def foreseen(scene, settings, times):
+    """(n,) what the steady schedule asks for, filtered as a whole: series first, then the low passes."""
+    from scipy.signal import lfilter
+
+    time, speed, period = rotor_wind_series(scene)
+    seen = np.interp(times + settings.preview_time, time, speed, period=period)
+    pitch = settings.gain * np.interp(seen, *steady_pitch(scene))
+    decay = np.exp(-2.0 * DT / (settings.preview_time - scene.turbine.pitch_drive.time_constant - 0.5 * DT))
+    for _ in range(2):
+        pitch, _ = lfilter([1.0 - decay], [1.0, -decay], pitch, zi=[decay * pitch[0]])
+    return pitch
+
+
 @pytest.fixture(scope="module")
 def step_scene():
     """The wind steps from 17.5 to 18.5 m/s at 60 s."""
@@ -49,8 +68,9 @@ def test_a_step_of_the_wind_turns_the_blades_by_what_the_steady_schedule_says(st
     wanted = gain * (np.interp(18.5, speeds, pitches) - np.interp(17.5, speeds, pitches))
     law = previewing(step_scene, gain=gain)
     start = measured(step_scene, np.interp(17.5, speeds, pitches))
-    law.reset(start)
-    pitch = np.array([law.act(start._replace(time=DT * k))[1] for k in range(1100)])
+    law.reset(given(law, step_scene, start))
+    time = DT * np.arange(1100)
+    pitch = np.array([law.act(given(law, step_scene, start._replace(time=t)))[1] for t in time])
     moved = pitch - start.blade_pitch
     # no speed error ever: all that moves the blades is the feedforward
     assert moved[:560] == pytest.approx(0.0, abs=1e-5)
@@ -71,8 +91,14 @@ def test_the_steady_schedule_rises_from_rated_and_is_where_runs_settle(step_scen
 
 def test_it_starts_before_the_wind_comes_and_has_turned_by_then(step_scene):
     law = previewing(step_scene)
-    times = DT * np.arange(1200)
-    series = np.array([foreseen_pitch(t, law.parameters) for t in times])
+    times = DT * np.arange(1170)
+    law.reset(given(law, step_scene, STILL))
+    series = []
+    for t in times:
+        law.act(given(law, step_scene, STILL._replace(time=t)))
+        series.append(law.memory[-1])
+    series = np.array(series)
+    np.testing.assert_allclose(series, foreseen(step_scene, law.preview, times), rtol=1e-9)
     share = (series - series[0]) / (series[-1] - series[0])
     assert share[times <= 57.0 - 1e-9].max() < 1e-9 < share[times > 57.3].min()
     assert 0.5 < np.interp(60.0, times, share) < 0.7  # two equal poles with that mean delay
@@ -108,6 +134,11 @@ def test_a_run_without_wind_or_preparation_is_refused():
         make("preview", still.turbine, DT).prepare(still)
     with pytest.raises(InputError, match=r"call prepare\(scene\)"):
         make("preview", still.turbine, DT).reset(STILL)
+
+
+def test_a_measurement_without_the_wind_ahead_is_refused(step_scene):
+    with pytest.raises(InputError, match="has 0 winds ahead: must be 1, at 3 s"):
+        previewing(step_scene).reset(STILL)
 
 
 @pytest.mark.parametrize(

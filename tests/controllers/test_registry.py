@@ -10,7 +10,7 @@ import pytest
 from naive.turbine import turbine
 
 from fowt_env import build_scene, controllers
-from fowt_env.control import PRIVILEGED_INPUTS
+from fowt_env.control import PRIVILEGED_INPUTS, with_wind_ahead
 from fowt_env.controllers import CONTROLLERS, CheckedController, information, make
 from fowt_env.controllers.constant import Constant
 from fowt_env.controllers.policy.controller import shipped_agents
@@ -55,6 +55,11 @@ def scene():
     return build_scene("oc3_hywind", wind=18.0, duration=100.0, fidelity="standard")
 
 
+def ahead(controller, measurement, wind=18.0):
+    """The measurement with a steady wind at all times that the controller looks ahead."""
+    return with_wind_ahead(measurement, [wind] * len(controller.preview_times))
+
+
 def prepared(name, scene):
     """A controller by name, told of a scene."""
     if name in ROSCO:
@@ -68,11 +73,12 @@ def prepared(name, scene):
 def test_every_controller_commands_within_the_turbines_limits(name, scene):
     controller = prepared(name, scene)
     rng = np.random.default_rng(4)
-    controller.reset(RATED)
+    wind = np.random.default_rng(5).uniform(0.0, 40.0, 500)
+    controller.reset(ahead(controller, RATED))
     for k in range(500):
         speed, blade_pitch = rng.uniform(0.0, 200.0), rng.uniform(0.0, 1.5)
         m = RATED._replace(time=0.1 * k, generator_speed=speed, blade_pitch=blade_pitch)
-        torque, pitch = controller.act(m)
+        torque, pitch = controller.act(ahead(controller, m, wind[k]))
         assert 0.0 <= torque <= 47402.91
         assert 0.0 <= pitch <= 1.570796
 
@@ -82,22 +88,23 @@ def test_reset_forgets(name, scene):
     controller = prepared(name, scene)
 
     def run():
-        controller.reset(RATED)
-        return [controller.act(RATED._replace(time=0.1 * k, generator_speed=120.0 + k)) for k in range(50)]
+        controller.reset(ahead(controller, RATED))
+        states = [RATED._replace(time=0.1 * k, generator_speed=120.0 + k) for k in range(50)]
+        return [controller.act(ahead(controller, state)) for state in states]
 
     first = run()
     for k in range(200):
-        controller.act(RATED._replace(time=5.0 + 0.1 * k, generator_speed=140.0))
+        controller.act(ahead(controller, RATED._replace(time=5.0 + 0.1 * k, generator_speed=140.0), 14.0))
     assert run() == first
 
 
 @pytest.mark.parametrize("name", sorted(set(CONTROLLERS) - ROSCO))
 def test_every_controller_of_ours_survives_pickling(name, scene):
     controller = prepared(name, scene)
-    controller.reset(RATED)
-    controller.act(RATED)
+    controller.reset(ahead(controller, RATED))
+    controller.act(ahead(controller, RATED))
     twin = pickle.loads(pickle.dumps(controller))
-    later = RATED._replace(time=0.1, generator_speed=130.0)
+    later = ahead(controller, RATED._replace(time=0.1, generator_speed=130.0))
     assert twin.act(later) == controller.act(later)
 
 

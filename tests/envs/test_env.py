@@ -25,6 +25,7 @@ from fowt_env.registration import ENVIRONMENTS
 QUICK = {"rotor": "table", "wave_components": 20}
 NTM = {"kind": "ntm", "speed": 18.0, "class": "B"}
 SEA = {"kind": "jonswap", "Hs": 3.0, "Tp": 9.0}
+DRAWN = ("90%", "drawn")
 FIXED = {"wind": NTM, "sea": SEA, "weather_seed": 7, "offsets": {}}
 
 
@@ -108,6 +109,19 @@ def test_another_seed_gives_another_start_and_another_episode():
     # every episode starts from rest, and above rated at rated torque
     assert np.all(moved[:6]) and not np.any(moved[6:12]) and np.array_equal(moved[12:], [True, True, False])
     assert rollout(env, 1) != rollout(env, 2)
+
+
+def test_turbulence_of_a_drawn_strength_is_drawn_anew_for_each_episode():
+    winds = {sigma: {"kind": "ntm", "speed": (12.0, 24.0), "class": "B", "sigma": sigma} for sigma in DRAWN}
+    envs = {sigma: quick(wind=wind) for sigma, wind in winds.items()}
+    ratios = []
+    for seed in range(3):
+        deviations = {}
+        for sigma, env in envs.items():
+            env.reset(seed=seed)
+            deviations[sigma] = env.scene.model.aero.wind.value[:-1, 0].std()
+        ratios.append(deviations["drawn"] / deviations["90%"])
+    assert len(set(ratios)) == 3 and 0.6 < min(ratios) < max(ratios) < 1.3
 
 
 @pytest.mark.parametrize("task", TASKS)

@@ -12,7 +12,7 @@ from fowt_env.envs.safety import SafetyLayer
 from fowt_env.envs.sensors import draw_sensors, reading_scales
 from fowt_env.errors import InputError
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measure, Measurement
-from fowt_env.training.evaluation.model_mismatch import ModelMismatch
+from fowt_env.training.evaluation.model_mismatch import perturbed_sensors
 from fowt_env.training.evaluation.plant_perturbation import PlantPerturbation, plant_settings
 
 QUICK = {"rotor": "table", "wave_components": 20, "wind": {"kind": "ntm", "speed": 18.0, "class": "B"}}
@@ -184,6 +184,8 @@ def test_environment_and_load_case_give_a_controller_the_same_readings():
     kept = []
 
     class Watched:
+        information = Measurement._fields
+
         def __init__(self):
             self.law = make("gspi_oc3", known.turbine, 0.1)
             self.reset = self.law.reset
@@ -192,7 +194,8 @@ def test_environment_and_load_case_give_a_controller_the_same_readings():
             kept.append(measurement)
             return self.law.act(measurement)
 
-    simulate(scene, ModelMismatch(Watched(), known, PlantPerturbation(**DEGRADED), 5), duration=3.0)
+    sensors = perturbed_sensors(PlantPerturbation(**DEGRADED), known.turbine, 0.1)
+    simulate(scene, Watched(), duration=3.0, nominal=known, sensors=sensors)
     law = make("gspi_oc3", scene.turbine, 0.1)
     law.reset(env.measurement())
     for reading in kept[:30]:
@@ -203,9 +206,80 @@ def test_environment_and_load_case_give_a_controller_the_same_readings():
 
 def test_noise_is_drawn_from_the_seed_alone(turbine):
     scales = reading_scales(turbine)
-    rows = [draw_sensors(0.02, 0, scales, seed, 50).noise for seed in (1, 1, 2)]
+    rows = [draw_sensors({"noise": 0.02, "delay": 0}, scales, 0.1, seed, 50).noise for seed in (1, 1, 2)]
     assert np.array_equal(rows[0], rows[1]) and not np.array_equal(rows[0], rows[2])
-    assert draw_sensors(0.0, 4, scales, 1, 50).noise.shape == (1, N_MEASUREMENTS)
+    assert draw_sensors({"noise": 0.0, "delay": 4}, scales, 0.1, 1, 50).noise.shape == (1, N_MEASUREMENTS)
+
+
+BY_NAME = {"observation": ("rotor_speed", "platform_pitch"), "sensors": "standard"}
+
+
+def test_a_chain_by_name_gives_environment_and_run_the_same_readings():
+    weather = {"wind": QUICK["wind"], "sea": None, "weather_seed": 5, "offsets": {}}
+    env = FowtEnv(action_mode="direct", **BY_NAME, **QUICK)
+    env.reset(options=weather)
+    kept = []
+
+    class Watched:
+        def __init__(self):
+            self.law = make("gspi_oc3", env.scene.turbine, 0.1)
+            self.reset = self.law.reset
+
+        def act(self, measurement):
+            kept.append(np.array(measurement))
+            return self.law.act(measurement)
+
+    simulate(env.scene, Watched(), duration=3.0, sensors="standard")
+    law = make("gspi_oc3", env.scene.turbine, 0.1)
+    law.reset(env.measurement())
+    for reading in kept:
+        seen = env.measurement()
+        both = np.isfinite(reading)
+        np.testing.assert_allclose(np.array(seen)[both], reading[both], rtol=1e-9, atol=1e-9)
+        env.step_physical(*law.act(seen))
+    assert np.isnan(env.measurement().surge)  # no sensor of the chain shows it
+
+
+def test_the_baseline_is_given_what_it_declares(turbine):
+    plain, told = (FowtEnv(action_mode="residual", baseline="pi", **BY_NAME, **QUICK) for _ in range(2))
+    plain.reset(seed=3), told.reset(seed=3)
+    shown = np.isfinite(plain._episode.baseline_reading)
+    names = {name for name, given in zip(Measurement._fields, shown, strict=True) if given}
+    assert names == {"time", *make("pi", turbine, 0.1).information}
+    plain.step([0.1, 0.2])
+    assert np.array_equal(shown, np.isfinite(plain._episode.baseline_reading))
+
+
+def test_a_preview_baseline_is_given_the_wind_ahead_as_in_a_run():
+    env = FowtEnv(action_mode="residual", baseline="preview", observation=("rotor_speed",), **QUICK)
+    env.reset(seed=4)
+    start = dict(zip(("torque", "pitch"), env._episode.u, strict=True))
+    pitch = []
+    for _ in range(60):
+        env.step(np.zeros(2))
+        pitch.append(env._episode.u[1])
+    law = make("preview", env.scene.turbine, 0.1)
+    hand = FowtEnv(action_mode="direct", observation=("rotor_speed",), **QUICK)
+    hand.reset(seed=4)
+    law.prepare(hand.scene)
+    law.reset(hand.measurement(law.preview_times))
+    for wanted in pitch:
+        command = law.act(hand.measurement(law.preview_times))
+        assert command[1] == pytest.approx(wanted, rel=1e-9)
+        hand.step_physical(*command)
+    assert np.ptp([start["pitch"], *pitch]) > 1e-3
+
+
+@pytest.mark.parametrize(
+    "settings, message",
+    [
+        ({"observation": ("surge",)}, "observation: 'surge': the sensor chain 'standard' does not have it"),
+        ({"sensors": "standart"}, "unknown sensor chain"),
+    ],
+)
+def test_what_a_chain_does_not_show_is_refused(settings, message):
+    with pytest.raises(InputError, match=message):
+        FowtEnv(**(BY_NAME | settings), **QUICK)
 
 
 @pytest.mark.parametrize(

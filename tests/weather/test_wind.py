@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from fowt_env.descriptions.iec import ntm_sigma
+from fowt_env.descriptions.iec import ntm_sigma, ntm_sigma_distribution
 from fowt_env.descriptions.wind import KINDS, read_wind
 from fowt_env.errors import InputError
 from fowt_env.plant.aero.wind import LOWEST_HEIGHT, NO_WIND, wind_at, wind_now
@@ -205,6 +205,39 @@ def test_turbulent_wind_has_its_mean_and_point_deviation(kind, sigma):
     assert u.mean() == pytest.approx(18.0, rel=1e-12) and u.std() == pytest.approx(sigma, rel=1e-9)
 
 
+def drawn(seed, speed=18.0, **changes):
+    spec = {"kind": "ntm", "speed": speed, "class": "B", "average": "point"} | changes
+    return build(spec, seed=seed).value[:-1, 0]
+
+
+def test_a_drawn_sigma_has_the_standards_mean_deviation_and_90_percent_quantile():
+    found = np.array([drawn(seed, sigma="drawn").std() for seed in range(1000, 1400)])
+    # IEC 61400-1 ed. 3, 6.3.1.3: E = 0.14 (0.75 18 + 3.8), D = 1.4 0.14; three standard errors of 400
+    assert found.mean() == pytest.approx(0.14 * 17.3, abs=3.0 * 0.196 / 20.0)
+    assert found.std() == pytest.approx(0.196, rel=0.11)
+    # the representative value is the 90 % quantile, rounded by the standard to 5.6 m/s
+    assert 0.855 < np.mean(found < ntm_sigma(18.0, "B")) < 0.945
+    assert np.exp(np.log(found).mean()) < found.mean()  # skewed as a log-normal is
+
+
+def test_a_drawn_sigma_is_the_seeds_own_and_changes_nothing_but_the_strength():
+    for seed in (1001, 1002):
+        plain, other = drawn(seed), drawn(seed, sigma="drawn")
+        np.testing.assert_array_equal(drawn(seed, sigma="90%"), plain)  # what a user gets who says nothing
+        np.testing.assert_array_equal(drawn(seed, sigma="drawn"), other)
+        ratio = other.std() / plain.std()
+        np.testing.assert_allclose(other - 18.0, ratio * (plain - 18.0), atol=1e-9)  # the same phases
+        assert abs(ratio - 1.0) > 1e-3
+    # one place in the distribution for all winds of a seed: gusty at one wind, gusty at all
+    places = []
+    for speed in (12.0, 24.0):
+        mean, deviation = ntm_sigma_distribution(speed, "B")
+        spread = np.sqrt(np.log1p((deviation / mean) ** 2))
+        sigma = drawn(1003, speed, sigma="drawn").std()
+        places.append((np.log(sigma / mean) + 0.5 * spread**2) / spread)
+    assert places[0] == pytest.approx(places[1], abs=1e-9)
+
+
 def test_turbulence_lasts_at_least_as_long_as_asked():
     for duration in (10.0, 700.0, 3601.0):
         series = build({"kind": "ntm", "speed": 12.0}, duration=duration)
@@ -347,6 +380,9 @@ def test_mean_of_a_gust_is_the_wind_before_it():
         ({"kind": "eog", "speed": 12.0, "turbine_class": "IV"}, "wind.turbine_class 'IV' I, II, III"),
         ({"kind": "ntm", "speed": 0.0}, "wind.speed = 0.0 [1, 100]"),
         ({"kind": "ntm", "speed": 12.0, "class": "D"}, "wind.class 'D' A, A+, B, C"),
+        ({"kind": "ntm", "speed": 12.0, "sigma": "free"}, "wind.sigma 'free' 90%, drawn"),
+        ({"kind": "ntm", "speed": 12.0, "sigma": 2.0}, "wind.sigma = 2.0 90%, drawn"),
+        ({"kind": "etm", "speed": 12.0, "sigma": "drawn"}, "'sigma'"),
         ({"kind": "ntm", "speed": 12.0, "class": 1}, "wind.class = 1 A+, A, B, C"),
         ({"kind": "ntm", "speed": 12.0, "seed": -1}, "wind.seed = -1 >= 0"),
         ({"kind": "ntm", "speed": 12.0, "seed": 1.5}, "wind.seed = 1.5 whole"),

@@ -8,8 +8,10 @@ import pytest
 from scipy.interpolate import RegularGridInterpolator
 
 import fowt_env
+from fowt_env.descriptions.iec import ntm_sigma
 from fowt_env.errors import InputError
 from fowt_env.plant.aero.wind_field import field_at
+from fowt_env.weather.turbulence import drawn_ntm_sigma
 from fowt_env.weather.wind_field import WindBox, hub_speed, read_box, rotor_average, steady_field
 
 HUB, DIAMETER = 90.0, 126.0
@@ -170,6 +172,10 @@ def test_a_mann_box_has_the_standards_deviation_and_the_sites_shear():
     ratio = np.interp(140.0, box.z, mean) / np.interp(90.0, box.z, mean)
     assert ratio == pytest.approx((140.0 / 90.0) ** 0.14, rel=0.03)
     assert isinstance(box, WindBox) and box.periodic
+    other = read_box(spec | {"sigma": "drawn"}, hub_height=HUB, rotor_diameter=DIAMETER, duration=600.0)
+    deviation = other.at(np.arange(0.0, 600.0, 1.0), 0.0, 0.0, HUB)[:, 0].std()
+    expected = drawn_ntm_sigma(18.0, "B", 2) / ntm_sigma(18.0, "B")
+    assert deviation / hub[:, 0].std() == pytest.approx(expected, rel=1e-5)
 
 
 def scenes():

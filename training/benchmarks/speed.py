@@ -20,6 +20,7 @@ import numpy as np
 import pandas as pd
 
 import fowt_env
+from fowt_env.control import EXACT
 from fowt_env.controllers import make
 from fowt_env.errors import InputError, unknown
 from fowt_env.files.atomic import replacing
@@ -36,10 +37,10 @@ from fowt_env.plant.hydro.load import strip_load
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.mooring import mooring_load
-from fowt_env.plant.rollout import Schedule, advance, forget, observe, output, rollout
+from fowt_env.plant.rollout import Schedule, advance, forget, new_protection, observe, output, rollout
 from fowt_env.plant.state import Command, State, pose_of
 from fowt_env.scene.build import build_scene
-from fowt_env.simulation import HeldCommand, simulate
+from fowt_env.simulation import HeldCommand, reader_of, simulate
 
 CALIBRATION_STEPS = 10_000_000
 REPEATS = 5
@@ -255,6 +256,7 @@ def loop_time(scene, kind, x, u, dt, seconds, repeats=REPEATS):
     rows = np.zeros((2, len(scene.channels)))  # of the first and the last instant
     last = round(seconds / dt)
     schedule = Schedule(float(dt), round(0.1 / dt), last + 1, last, inf, inf)
+    reader = reader_of(scene, controller, None, EXACT, schedule)
 
     def go():
         y, v = x.copy(), u.copy()
@@ -262,8 +264,8 @@ def loop_time(scene, kind, x, u, dt, seconds, repeats=REPEATS):
         observe(handle, y, v, 0.0, dx, m)
         controller.reset(Measurement(*m.tolist()))
         rollout(
-            handle, y, v, controller.law, controller.parameters, controller.memory, m, dx, schedule, 0, last,
-            rows,
+            handle, y, v, controller.law, controller.parameters, controller.memory, reader, new_protection(),
+            m, dx, schedule, 0, last, rows,
         )  # fmt: skip
 
     return median_time(go, repeats)
@@ -297,9 +299,7 @@ def measure_kind(name, seconds=600.0, repeats=REPEATS, calls=CHUNK):
     row["simulate_x"] = float("nan")
     if not kind.parked:  # simulate starts from the running rotor
         whole = median_time(
-            lambda: simulate(
-                scene, "pi" if kind.controlled else None, duration=seconds, start=kind.begin
-            ),
+            lambda: simulate(scene, "pi" if kind.controlled else None, duration=seconds, start=kind.begin),
             repeats,
         )
         row["simulate_x"] = seconds / whole

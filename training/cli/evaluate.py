@@ -31,6 +31,8 @@ EVALUATE_EXAMPLES = """[bold]Examples[/bold]
 
 [cyan]fowt evaluate --suite mysuite.toml --controllers pi,mymodule:Mine --baseline pi[/cyan]  your own cases
 
+[cyan]fowt evaluate --suite above_rated --sensors exact --out results/exact[/cyan]  without noise and delay
+
 [bold]Files written[/bold]: runs/CONTROLLER/CASE_seedN.parquet, results.csv (a row per run), leaderboard.json
 (means, intervals, paired differences, versions), manifest.json (the settings), summary.csv (means by
 case), pareto.png, metrics.png, boxes.png, timeseries_CASE.png, spectra_CASE.png. The same command
@@ -61,6 +63,9 @@ def evaluate_command(
     ] = None,
     skip: Annotated[
         float | None, typer.Option(help="Seconds at the start not scored. Default: the suite's, else 60.")
+    ] = None,
+    sensors: Annotated[
+        str | None, typer.Option(help="exact, or the name of a sensor chain. Default: each case's own.")
     ] = None,
     baseline: Annotated[
         str | None, typer.Option(help="Controller of the paired differences. Default: gspi_oc3, else pi.")
@@ -106,6 +111,7 @@ def evaluate_command(
                 engine=engine,
                 address=address,
                 time_limit=time_limit or None,
+                sensors=sensors,
             )
         except KeyboardInterrupt:
             place = f"in {folder / 'results.csv'}; the same command continues with the others"
@@ -119,7 +125,7 @@ def evaluate_command(
 
 
 def _print_evaluation(table, means, board):
-    """Print metrics by case and the leaderboard, and on stderr what failed or passed a limit of the score."""
+    """Print metrics by case and the leaderboard, and on stderr what failed, tripped or has no valid score."""
     from fowt_env.training.reports.terminal import leaderboard_rows, summary_rows
 
     width = table_width(out) or float("inf")
@@ -127,13 +133,17 @@ def _print_evaluation(table, means, board):
     print_table(out, headings, rows, keys=2, left=(0, 1), red=_places(failures))
     out.print()
     title, headings, rows, remarks = leaderboard_rows(board, width)
-    print_table(out, headings, rows, title, red=_places(e["failed"] for e in board["controllers"]))
+    print_table(
+        out, headings, rows, title, red=_places(e["failed"] + e["tripped"] for e in board["controllers"])
+    )
     for remark in remarks:
         out.print(remark, markup=False, highlight=False, soft_wrap=True)
     for row in table[table["status"] != "ok"].to_dict("records"):
         run = f"{row['controller']}, {row['case']}, seed {row['seed']}"
         err.print(
-            f"[red]failed: {escape(run)}: {escape(row['reason'])}[/red]", soft_wrap=True, highlight=False
+            f"[red]{row['status']}: {escape(run)}: {escape(row['reason'])}[/red]",
+            soft_wrap=True,
+            highlight=False,
         )
     eventful = table[table["events"] != ""]
     if len(eventful):

@@ -6,7 +6,12 @@ bootstrap), and so are the training seeds of an agent with all their runs.
 
 Fewer than LEAST_SEEDS seeds have no interval: Student's t makes one of two seeds 6.5 times as wide as the
 normal one, beyond anything that a figure can be, and of their deviation next to nothing is known.
+
+Means over the cases are lifetime means: each case counts by its share of the lifetime, and what adds up by a
+power of it (variances, damage) is averaged by that power.
 """
+
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import norm as normal
@@ -16,6 +21,8 @@ LEVEL = 0.95
 LEAST_SEEDS = 4
 RESAMPLES = 10_000
 RANDOM_SEED = 20191
+LEAST_P = 1e-6
+P_STEPS = 40  # halvings of the logarithm of a p-value: exact to 1e-10
 
 
 def resample_weights(n, resamples=RESAMPLES, random_seed=RANDOM_SEED):
@@ -51,9 +58,11 @@ def interval(estimate, resampled, n, positive=False):
 def _spread(estimate, resampled, n):
     """(2, metrics): how far the ends of the interval are from the estimate, for n seeds."""
     tails = [50.0 * (1.0 - LEVEL), 50.0 * (1.0 + LEVEL)]
-    upper = 0.5 * (1.0 + LEVEL)
-    widening = np.sqrt(n / (n - 1.0)) * student.ppf(upper, n - 1) / normal.ppf(upper)
-    return np.nanpercentile(resampled - estimate, tails, axis=0) * widening
+    away = _known(resampled - estimate)
+    percentile = (
+        np.nanpercentile if np.isnan(away).any() else np.percentile
+    )  # the slower one where it must be
+    return percentile(away, tails, axis=0) * _widening(n, 1.0 - LEVEL)
 
 
 def _known(values):
@@ -61,58 +70,164 @@ def _known(values):
     return np.where(np.isnan(values).all(axis=0), 0.0, values)
 
 
-def interquartile_mean(values, weights=None):
-    """Mean of the middle half of values (n,); with weights (..., n) one mean for each row of them.
+def case_means(values, weights):
+    """(resamples, metrics) weighted means over the seeds of values (seeds, metrics); NaN is no value.
 
-    Where a quartile falls inside a value (n no multiple of 4, or weights), that value counts in part.
+    With a single value there is nothing to resample: it is the mean of every resample. A resample that has
+    drawn no value is NaN.
     """
-    values = np.asarray(values, dtype=np.float64)
-    weights = np.ones(values.shape) if weights is None else weights
-    order = np.argsort(values)
-    upper = np.cumsum(weights[..., order], axis=-1)
-    lower = np.concatenate([np.zeros_like(upper[..., :1]), upper[..., :-1]], axis=-1)
-    total = upper[..., -1:]
-    kept = np.clip(np.minimum(upper, 0.75 * total) - np.maximum(lower, 0.25 * total), 0.0, None)
-    with np.errstate(invalid="ignore"):
-        return kept @ values[order] / (0.5 * total[..., 0])
-
-
-def crossed_estimate(values, resamples=RESAMPLES, positive=False):
-    """(estimate, low, high): interquartile mean of values (training seeds, cases, weather seeds), NaN: none.
-
-    Each kind of seed is resampled by itself, the interval is widened for how few there are (interval), and
-    the two combine as independent errors do, each side by the root of its squares. A kind with a single
-    seed adds nothing: the interval is then for that one alone. No interval (NaN) where a kind has two or
-    more, but fewer than LEAST_SEEDS, or where neither has two.
-    positive: whether no value can be below zero, as ratios of positive figures; as interval takes it.
-    """
-    values = np.asarray(values, dtype=np.float64)
     there = np.isfinite(values)
-    nothing = float("nan"), float("nan")
-    if not there.any():
-        return float("nan"), *nothing
-    known = values[there]
-    estimate = interquartile_mean(known)
-    log = positive and known.min() > 0.0
-    centre = np.log(estimate) if log else estimate
-    down, up = [], []
-    for axis in (0, 2):
-        n = int(there.any(axis=tuple({0, 1, 2} - {axis})).sum())
-        if n == 1:
-            continue
-        if n < LEAST_SEEDS:
-            return float(estimate), *nothing
-        drawn = resample_weights(values.shape[axis], resamples, RANDOM_SEED + axis)
-        means = interquartile_mean(known, drawn[:, np.nonzero(there)[axis]])
-        below, above = _spread(centre, np.log(means) if log else means, n)
-        down.append(max(0.0, -below))
-        up.append(max(0.0, above))
-    if not down:
-        return float(estimate), *nothing
-    low, high = centre - np.hypot.reduce(down), centre + np.hypot.reduce(up)
+    filled = np.where(there, values, 0.0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        means = (weights @ filled) / (weights @ there.astype(np.float64))
+    single = there.sum(axis=0) == 1
+    means[:, single] = filled[:, single].sum(axis=0)
+    return means
+
+
+def lifetime_means(values, weights, shares, exponents):
+    """(resamples, metrics): (sum over cases of share x mean over seeds of x^p)^(1/p) of x = values.
+
+    values (cases, seeds, metrics), NaN is no value; weights (resamples, seeds) of the seeds; shares (cases,)
+    of the lifetime; exponents p (metrics,). Shares of cases without any value of a metric go to the others.
+    NaN where no case with a share has a value.
+    """
+    share = np.where(np.isfinite(values).any(axis=1), np.asarray(shares)[:, None], 0.0)  # (cases, metrics)
+    bent = exponents != 1.0
+    total = np.zeros((len(weights), values.shape[-1]))
+    with np.errstate(all="ignore"):
+        share = share / share.sum(axis=0)  # NaN where no case has one
+        for part, each in zip(share, values**exponents, strict=True):
+            means = case_means(each, weights)
+            means *= part
+            means[:, part == 0.0] = 0.0  # not NaN where the case has no value
+            total += means
+        total[:, bent] **= 1.0 / exponents[bent]
+    return total
+
+
+def _widening(n, alpha):
+    """By how much the 1 - alpha interval of n resampled values is widened; alpha of any shape, in (0, 1]."""
+    tail = np.minimum(0.5 * alpha, 0.5 - 1e-9)
+    return np.sqrt(n / (n - 1.0)) * student.isf(tail, n - 1) / normal.isf(tail)
+
+
+def p_values(deviations, distance):
+    """(metrics,) two-sided p-values: 1 less the level of the interval that just reaches so far.
+
+    deviations  [(resampled less estimate (resamples, metrics), n)], one for each kind of seed that is
+                resampled; as independent errors each side combines by the root of its squares
+    distance    (metrics,) from the estimate to the value that is tested, in the same terms (logarithms)
+    At the least LEAST_P, which resamples cannot resolve; NaN of a NaN distance, or without deviations.
+    """
+    distance = np.asarray(distance, dtype=np.float64)
+    if not deviations:
+        return np.full(distance.shape, np.nan)
+    ordered = [(np.sort(_known(each), axis=0), n) for each, n in deviations]
+    low, high = np.full(distance.shape, np.log(LEAST_P)), np.zeros(distance.shape)
+    for _ in range(P_STEPS):
+        middle = 0.5 * (low + high)
+        alpha = np.exp(middle)
+        tail = np.where(distance < 0.0, 0.5 * alpha, 1.0 - 0.5 * alpha)
+        reach = [
+            np.maximum(0.0, np.sign(distance) * _quantile(each, tail) * _widening(n, alpha))
+            for each, n in ordered
+        ]
+        beyond = np.abs(distance) > np.hypot.reduce(reach)  # then p is smaller
+        low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
+    p = np.where(distance == 0.0, 1.0, np.exp(high))
+    return np.where(np.isfinite(distance), p, np.nan)
+
+
+def _quantile(ordered, q):
+    """(metrics,) quantiles q (metrics,) of columns in rising order, NaN at their ends left out."""
+    last = np.isfinite(ordered).sum(axis=0) - 1
+    place = np.maximum(last, 0) * q
+    below = np.floor(place).astype(int)
+    above = np.minimum(below + 1, np.maximum(last, 0))
+    columns = np.arange(ordered.shape[1])
+    return ordered[below, columns] + (place - below) * (ordered[above, columns] - ordered[below, columns])
+
+
+def holm(p):
+    """(n,) p-values adjusted for being several (Holm, Scandinavian Journal of Statistics 6(2), 1979).
+
+    Of those at most alpha none is a chance finding but with probability alpha. The k-th smallest of n times
+    n + 1 - k, and none below a smaller one's; NaN is no test.
+    """
+    p = np.asarray(p, dtype=np.float64)
+    adjusted = np.full(p.shape, np.nan)
+    order = [place for place in np.argsort(p) if np.isfinite(p[place])]
+    running = 0.0
+    for rank, place in enumerate(order):
+        running = max(running, min(1.0, (len(order) - rank) * p[place]))
+        adjusted[place] = running
+    return adjusted
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A ratio with its 95 % interval (NaN: none), and what its p-values come from."""
+
+    value: float
+    low: float = float("nan")
+    high: float = float("nan")
+    deviations: tuple = ()  # as p_values takes them
+    log: bool = False  # whether they are of the logarithm
+
+    def p_value(self, tested):
+        """Two-sided p-value of the hypothesis that the ratio is the one tested; NaN without an interval."""
+        if not np.isfinite(self.low):
+            return float("nan")
+        own, other = np.log([self.value, tested]) if self.log else (self.value, tested)
+        return float(p_values(self.deviations, np.array([other - own]))[0])
+
+
+def crossed_ratio(own, base, shares, exponent=1.0, resamples=RESAMPLES, positive=False):
+    """Estimate of the ratio of lifetime means over a baseline's on the same runs, mean over training seeds.
+
+    own (training seeds, cases, weather seeds), base (cases, weather seeds), NaN: none; shares and exponent as
+    lifetime_means takes them. Each kind of seed is resampled by itself, the interval is widened for how few
+    there are (interval), and the two combine as independent errors do, each side by the root of its squares.
+    A kind with a single seed adds nothing: the interval is then for that one alone. No interval where a kind
+    has two or more, but fewer than LEAST_SEEDS, or where neither has two.
+    positive: whether no value can be below zero; as interval takes it.
+    """
+    own = np.asarray(own, dtype=np.float64)
+    there = np.isfinite(own) & np.isfinite(base)
+    used = there.any(axis=(1, 2))
+    if not used.any():
+        return Estimate(float("nan"))
+    mine, other = (np.where(there, values, np.nan) for values in (own, np.broadcast_to(base, own.shape)))
+
+    def ratios(weights):  # (resamples, training seeds)
+        means = [
+            lifetime_means(np.moveaxis(values[used], 0, -1), weights, shares, np.full(used.sum(), exponent))
+            for values in (mine, other)
+        ]
+        with np.errstate(all="ignore"):
+            return np.where(means[1] != 0.0, means[0] / means[1], np.nan)
+
+    single = ratios(np.ones((1, own.shape[2])))[0]
+    value = float(single.mean())
+    seeds, members = int(there.any(axis=(0, 1)).sum()), int(used.sum())
+    if not np.isfinite(value) or max(seeds, members) < 2 or {seeds, members} & set(range(2, LEAST_SEEDS)):
+        return Estimate(value)
+    drawn = []
+    if seeds > 1:
+        drawn.append((ratios(resample_weights(own.shape[2], resamples, RANDOM_SEED + 2)).mean(axis=1), seeds))
+    if members > 1:
+        weights = resample_weights(members, resamples, RANDOM_SEED)
+        drawn.append((weights @ single / members, members))
+    log = positive and min(value, *(np.nanmin(each) for each, _ in drawn)) > 0.0
+    centre = np.log(value) if log else value
+    deviations = tuple(((np.log(each) if log else each)[:, None] - centre, n) for each, n in drawn)
+    sides = [_spread(np.zeros(1), each, n) for each, n in deviations]
+    low = centre - np.hypot.reduce([max(0.0, -side[0][0]) for side in sides])
+    high = centre + np.hypot.reduce([max(0.0, side[1][0]) for side in sides])
     if log:
         with np.errstate(over="ignore"):
             low, high = np.exp(low), np.exp(high)
-    elif positive and known.min() == 0.0:
+    elif positive and min(value, *(np.nanmin(each) for each, _ in drawn)) >= 0.0:
         low = max(0.0, low)
-    return float(estimate), float(low), float(high)
+    return Estimate(value, float(low), float(high), deviations, log)

@@ -6,7 +6,9 @@ in its wind and picks the row of its sea's table.
 """
 
 import functools
+from collections import Counter
 from dataclasses import dataclass, field, replace
+from math import exp
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -22,6 +24,7 @@ from fowt_env.descriptions.records import (
     validate,
 )
 from fowt_env.descriptions.sea_state import SeaState, joint_sea_state, sea_state_of
+from fowt_env.descriptions.sensors import EXACT, sensor_chain
 from fowt_env.descriptions.wind import read_wind
 from fowt_env.errors import InputError, unknown
 from fowt_env.scene.options import OPTIONS
@@ -32,6 +35,7 @@ from fowt_env.weather.wind_field import FIELD_KINDS, REQUIRED, is_field
 
 FOLDER = Path(__file__).parent / "suites"
 WIND_KINDS = ("rotor-averaged", "full-field")
+TRIP = 1.3  # fraction of rated rotor speed at which a turbine's protection stops it
 
 
 @dataclass(frozen=True)
@@ -57,6 +61,16 @@ class Case:
     duration: float | None = None  # s
     skip: float | None = None  # s
     shift: PlantPerturbation | None = None  # what of the plant its controllers do not know
+    trip: float | None = TRIP  # fraction of rated rotor speed; None: no protection
+    sensors: str = EXACT  # sensor chain that controllers read through, by its name
+
+
+def mean_speed(case):
+    """Mean wind speed (m/s) of a Case; None where it has none by itself (no wind, a series, a file)."""
+    if is_number(case.wind):
+        return float(case.wind)
+    speed = case.wind.get("speed") if isinstance(case.wind, dict) else None
+    return float(speed) if is_number(speed) else None
 
 
 def described(case):
@@ -72,6 +86,8 @@ def described(case):
         "parked": case.parked,
         "initial": case.initial,
         "shift": None if case.shift is None else case.shift.model_dump(exclude_defaults=True),
+        "trip": case.trip,
+        "sensors": case.sensors,
     }
     return _plain(values)
 
@@ -97,6 +113,15 @@ def _many(value):
 Seeds = Annotated[tuple[Annotated[int, Field(ge=0, strict=True)], ...], BeforeValidator(_many)]
 
 
+def _no_trip(value):
+    """None for false, which is how a TOML file says that there is none."""
+    return None if value is False else value
+
+
+# of rated rotor speed; false: none
+Trip = Annotated[Annotated[float, Field(gt=1.0, le=3.0, strict=True)] | None, BeforeValidator(_no_trip)]
+
+
 class CaseEntry(Record):
     """One [[case]] of a suite file, before it is spread over its wind speeds."""
 
@@ -113,6 +138,20 @@ class CaseEntry(Record):
     duration: Positive | None = None
     skip: NonNegative | None = None
     shift: PlantPerturbation | None = None
+    trip: Trip = None  # where it is given; else the suite's
+    sensors: str | None = None
+
+
+class Site(Record):
+    """How often winds blow at a place: the Weibull distribution of ten-minute means at hub height."""
+
+    A: Positive  # m/s, scale
+    k: Positive  # shape
+    source: str
+
+    def below(self, speed):
+        """Share of the time with a mean wind below a speed, m/s."""
+        return 1.0 - exp(-((max(speed, 0.0) / self.A) ** self.k))
 
 
 class ScoreTerm(Record):
@@ -123,16 +162,24 @@ class ScoreTerm(Record):
 
 
 class Score(Record):
-    """One number per controller: the weighted mean of metric/baseline, over relative power; less is better.
-
-    limits: metrics that must not exceed a value in any run; a controller beyond one has a score, but no
-    valid one.
-    """
+    """A number per controller: the weighted mean of metric/baseline, over relative power; less is better."""
 
     baseline: str
     term: tuple[ScoreTerm, ...]
     power: str | None = None  # metric of which more is better: the sum is divided by it over the baseline's
-    limits: dict[str, NonNegative] = {}
+
+
+class Limits(Record):
+    """What a controller must not exceed; beyond one it ranks below those within all of them.
+
+    run: {metric: greatest value in any run}. lifetime: {metric: greatest mean over the lifetime}. relative:
+    {metric: greatest ratio of its mean over the lifetime to that of `baseline` on the same runs}.
+    """
+
+    run: dict[str, NonNegative] = {}
+    lifetime: dict[str, NonNegative] = {}
+    relative: dict[str, Positive] = {}
+    baseline: str = "gspi_oc3"
 
 
 class SuiteFile(Record):
@@ -150,6 +197,10 @@ class SuiteFile(Record):
     left_out: str = ""
     case: tuple[CaseEntry, ...]
     score: Score | None = None
+    trip: Trip = TRIP
+    sensors: str = EXACT
+    site: Site | None = None
+    limits: Limits = Limits()
 
 
 @dataclass(frozen=True)
@@ -167,6 +218,34 @@ class Suite:
     cases: tuple
     left_out: str = ""
     score: Score | None = None
+    site: Site | None = None
+    limits: Limits = Limits()
+    weights: dict = field(default_factory=dict)  # {case: share of the lifetime}; {}: every case alike
+
+
+def lifetime_weights(cases, site):
+    """{name: share of the lifetime} of Cases by their mean wind speeds; {} without a Site.
+
+    The winds of the cases stand for bins that meet half-way between them; the outer bins reach as far out as
+    in. A bin's share is its probability over that of all bins; cases of one wind share it alike. A parked
+    turbine and a case without a mean wind speed have no share.
+    Raises: InputError where only one wind or none is left, which makes no bins.
+    """
+    if site is None:
+        return {}
+    winds = {case.name: None if case.parked else mean_speed(case) for case in cases}
+    count = Counter(speed for speed in winds.values() if speed is not None)
+    speeds = sorted(count)
+    if len(speeds) < 2:
+        raise InputError(f"site: needs cases of two mean wind speeds or more, there are {len(speeds)}")
+    edges = [0.5 * (low + high) for low, high in zip(speeds, speeds[1:], strict=False)]
+    edges = [2.0 * speeds[0] - edges[0], *edges, 2.0 * speeds[-1] - edges[-1]]
+    share = {speed: site.below(high) - site.below(low)
+             for speed, low, high in zip(speeds, edges, edges[1:], strict=False)}  # fmt: skip
+    total = sum(share.values())
+    return {
+        name: 0.0 if speed is None else share[speed] / count[speed] / total for name, speed in winds.items()
+    }
 
 
 def suite_names():
@@ -207,7 +286,7 @@ def _read(path):
     problems += [f"case {name!r}: named twice" for name in sorted(set(names)) if names.count(name) > 1]
     if not file.case:
         problems.append("case is missing: at least one [[case]] is needed")
-    problems += _score_problems(file.score)
+    problems += _metric_problems(file)
     for case in cases:
         duration, skip = case.duration or file.duration, file.skip if case.skip is None else case.skip
         if not duration > skip:
@@ -221,18 +300,28 @@ def _read(path):
             problems.append(
                 f"case {case.name!r}: wind = {file.wind!r} of the suite does not fit its kind of wind"
             )
+    weights = {}
+    try:
+        weights = lifetime_weights(cases, file.site)
+    except InputError as error:
+        problems.append(str(error))
     raise_problems(where, problems)
     fields = {key: getattr(file, key) for key in ("version", "description", "source", "wind", "left_out")}
-    rest = {key: getattr(file, key) for key in ("seeds", "duration", "skip", "score")}
-    return Suite(path.stem, cases=tuple(cases), **fields, **rest)
+    rest = {key: getattr(file, key) for key in ("seeds", "duration", "skip", "score", "site", "limits")}
+    return Suite(path.stem, cases=tuple(cases), weights=weights, **fields, **rest)
 
 
-def _score_problems(score):
-    """One line per metric of a Score that there is not."""
-    named = [] if score is None else [term.metric for term in score.term] + list(score.limits)
-    if score is not None and score.power is not None:
-        named.append(score.power)
-    return [f"score: {unknown('metric', name, METRICS)}" for name in named if name not in METRICS]
+def _metric_problems(file):
+    """One line per metric of a file's score and limits that there is not."""
+    score, named = file.score, {"limits": [*file.limits.run, *file.limits.lifetime, *file.limits.relative]}
+    if score is not None:
+        named["score"] = [term.metric for term in score.term] + ([score.power] if score.power else [])
+    return [
+        f"{where}: {unknown('metric', name, METRICS)}"
+        for where, names in named.items()
+        for name in names
+        if name not in METRICS
+    ]
 
 
 def _spread(entry, file, folder):
@@ -270,7 +359,15 @@ def _case(entry, speed, file, folder):
         entry.duration,
         entry.skip,
         entry.shift,
+        entry.trip if "trip" in entry.model_fields_set else file.trip,
+        check_sensors(file.sensors if entry.sensors is None else entry.sensors),
     )
+
+
+def check_sensors(name):
+    """Name of a built-in sensor chain, or "exact", if there is one. Raises: InputError."""
+    sensor_chain(name)
+    return name
 
 
 def _wind(spec, speed, folder):

@@ -12,6 +12,7 @@ import csv
 import io
 import socket
 from contextlib import closing
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -24,8 +25,9 @@ from fowt_env.descriptions.checks import check_number, check_whole_number, plain
 from fowt_env.errors import InputError
 from fowt_env.files.atomic import replacing
 from fowt_env.files.tables import write_table
-from fowt_env.training.evaluation.cases import Case, Suite, described, named_cases
+from fowt_env.training.evaluation.cases import Case, Suite, check_sensors, described, named_cases
 from fowt_env.training.evaluation.engines import outcomes
+from fowt_env.training.evaluation.failures import failures_as_worst
 from fowt_env.training.evaluation.faults import PARKED
 from fowt_env.training.evaluation.guard import attempt
 from fowt_env.training.evaluation.metrics import METRICS, metrics
@@ -35,7 +37,9 @@ from fowt_env.training.evaluation.results_table import KEY
 from fowt_env.training.evaluation.run_case import (
     COLUMNS,
     CONTROL_DT,
+    OK,
     SHORTEST_CASE_WEATHER,
+    TRIPPED,
     Run,
     lost_row,
     scored,
@@ -65,6 +69,7 @@ def evaluate(
     engine="processes",
     address=None,
     time_limit=TIME_LIMIT,
+    sensors=None,
     **options,
 ):
     """DataFrame with one row per controller, case and seed, and the columns COLUMNS.
@@ -83,11 +88,13 @@ def evaluate(
     engine        "processes" or "ray" (address: of a running cluster)
     time_limit    seconds of wall clock after which a run fails; None: none. With jobs = 1 it is heard in the
                   main thread alone, and not by C code that never returns; with more, the worker is ended
+    sensors       name of the sensor chain of all cases, "exact" for none; None: each case's own
     options       further options of simulate: dt, control_dt, output_dt, start
-    Failed runs have status "failed", the reason, and NaN metrics; so have those of a controller that cannot
-    be prepared, as where its library is missing, that calls sys.exit, or whose worker process dies three
-    times. Column events: rare numerical events of the run and how often each came. A parked turbine has no
-    controller: such a case is run once, under the name "parked".
+    A run that the protection ended (the case's trip) has status "tripped", the reason, and metrics of what it
+    was. Failed runs have status "failed", the reason, and NaN metrics; so have those of a controller that
+    cannot be prepared, as where its library is missing, that calls sys.exit, or whose worker process dies
+    three times. Column events: rare numerical events of the run and how often each came. A parked turbine has
+    no controller: such a case is run once, under the name "parked".
     Raises: InputError for settings that no run could use.
     """
     if folder is not None:
@@ -97,7 +104,7 @@ def evaluate(
     controllers = _labelled(controllers)
     suite = cases if isinstance(cases, Suite) else None
     given = (duration, skip, seeds, runs_folder, time_limit)
-    runs = _plan(controllers, _case_list(cases), suite, *given, options)
+    runs = _plan(controllers, _sensed(_case_list(cases), sensors), suite, *given, options)
     _check_controllers(controllers, runs)
     if folder is not None:
         with open_results(folder, _settings(controllers, runs, suite, options), COLUMNS) as results:
@@ -112,11 +119,13 @@ def evaluate(
     return table
 
 
-def planned(controllers, cases, duration=None, skip=None, seeds=None, runs_folder=None, **options):
+def planned(
+    controllers, cases, duration=None, skip=None, seeds=None, runs_folder=None, sensors=None, **options
+):
     """List of the Runs that evaluate would make of these arguments, for score."""
     suite = cases if isinstance(cases, Suite) else None
     given = (duration, skip, seeds, runs_folder, TIME_LIMIT)
-    return _plan(_labelled(controllers), _case_list(cases), suite, *given, options)
+    return _plan(_labelled(controllers), _sensed(_case_list(cases), sensors), suite, *given, options)
 
 
 def _go(runs, total, jobs, progress, engine, address, keep):
@@ -173,6 +182,11 @@ def _case_list(cases):
     return list(cases)
 
 
+def _sensed(cases, sensors):
+    """The Cases, with other sensors where they are named. Raises: InputError."""
+    return cases if sensors is None else [replace(case, sensors=check_sensors(sensors)) for case in cases]
+
+
 def _plan(controllers, cases, suite, duration, skip, seeds, runs_folder, time_limit, options):
     """The Runs of an evaluation, case by case, so that an interrupted one compares what it has."""
     if seeds is not None:
@@ -191,7 +205,7 @@ def _plan(controllers, cases, suite, duration, skip, seeds, runs_folder, time_li
             raise InputError(f"{what}: at least one is needed")
     if len(set(seeds or ())) < len(seeds or ()) or len({case.name for case in cases}) < len(cases):
         raise InputError("seeds and names of cases must differ from each other")
-    runs, places = [], {}
+    runs, places, weights = [], {}, (suite and suite.weights) or {}
     for case in cases:
         check_name("cases: the name", case.name)
         length = float(_first(duration, case.duration, suite and suite.duration, DURATION))
@@ -207,7 +221,9 @@ def _plan(controllers, cases, suite, duration, skip, seeds, runs_folder, time_li
         for seed in _first(chosen, seeds, case.seeds, suite and suite.seeds, SEEDS):
             for label, controller in ({PARKED: None} if case.parked else controllers).items():
                 path = None if runs_folder is None else run_file(runs_folder, label, case.name, seed)
-                run = Run(label, controller, case, seed, length, start, dict(options), path, time_limit)
+                weight = weights.get(case.name, float("nan"))
+                given = (label, controller, case, seed, length, start, dict(options), path, time_limit)
+                run = Run(*given, weight)
                 other = places.setdefault(str(path).casefold(), run)
                 if path is not None and other is not run:
                     raise InputError(
@@ -252,7 +268,10 @@ def _settings(controllers, runs, suite, options):
     if suite is not None:
         keys = ("name", "version", "description", "source", "wind", "left_out")
         about = {key: getattr(suite, key) for key in keys}
-        about["score"] = None if suite.score is None else suite.score.model_dump()
+        for key in ("score", "site", "limits"):
+            part = getattr(suite, key)
+            about[key] = None if part is None else part.model_dump()
+        about["weights"] = dict(suite.weights)
     return {
         "suite": about,
         "options": options,
@@ -342,17 +361,28 @@ class _RowFile:
 def mean_ratios(table, over, columns):
     """DataFrame by controller: mean over the runs of each column over what controller `over` has in the same.
 
-    NaN where a run of either failed.
+    NaN where a run of either failed or tripped.
     """
-    values = table.set_index(KEY)[list(columns)].sort_index()
+    ended_well = table["status"] == OK
+    values = (
+        table[list(columns)]
+        .where(ended_well, axis=0)
+        .set_index(pd.MultiIndex.from_frame(table[KEY]))
+        .sort_index()
+    )
     base, names = values.loc[over], dict.fromkeys(table["controller"])
     return pd.DataFrame({name: (values.loc[name] / base).mean(skipna=False) for name in names}).T
 
 
 def summary(table):
-    """DataFrame by controller and case: runs, failures, and each metric's mean over the successful seeds."""
-    good = table.copy()
-    good.loc[good["status"] != "ok", list(METRICS)] = float("nan")
-    groups = good.groupby(["controller", "case"], sort=False)
-    counts = groups["status"].agg(runs="size", failed=lambda status: int((status != "ok").sum()))
+    """DataFrame by controller and case: runs, those that failed or tripped, metrics' means over the seeds.
+
+    A run that failed or tripped has the worst figures of its case (failures.py).
+    """
+    groups = failures_as_worst(table).groupby(["controller", "case"], sort=False)
+    lost = {
+        "failed": lambda status: int((~status.isin((OK, TRIPPED))).sum()),
+        "tripped": lambda status: int((status == TRIPPED).sum()),
+    }
+    counts = groups["status"].agg(runs="size", **lost)
     return counts.join(groups[list(METRICS)].mean()).reset_index()

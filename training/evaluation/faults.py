@@ -9,6 +9,7 @@ from typing import Literal
 from fowt_env.control import CheckedController, CompiledController, check_control_dt
 from fowt_env.controllers.constant import Constant
 from fowt_env.descriptions.records import NonNegative, Positive, Record
+from fowt_env.plant.measurement import SENSOR_FIELDS
 
 PARKED = "parked"  # what stands for the controller of a parked turbine
 
@@ -47,7 +48,12 @@ class FaultedController:
         self.feathered = float(feathered)  # rad
         self.step = radians(fault.rate) * check_control_dt(control_dt)  # rad per control period
         self.stuck = self.target = None
-        self.information = tuple(getattr(inner, "information", ()))
+        self.information = (
+            *getattr(inner, "information", SENSOR_FIELDS),
+            "blade_pitch",
+        )  # where a fault finds the blades
+        self.declared = getattr(inner, "declared", True)
+        self.preview_times = tuple(getattr(inner, "preview_times", ()))
 
     def prepare(self, scene):
         """Hand the scene of the coming run to the inner controller, where it asks for it."""

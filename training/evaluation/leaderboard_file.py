@@ -31,6 +31,7 @@ class Figures(_Part):
 
     runs: WholeNumber
     failed: WholeNumber
+    tripped: WholeNumber = 0
     metrics: dict[str, Statistic]
     difference: dict[str, Statistic]
 
@@ -39,6 +40,8 @@ class LeaderboardEntry(Figures):
     """A controller."""
 
     controller: str
+    rank: WholeNumber | None = None
+    beyond: list[str] = []
     score: Statistic | None = None
     cases: dict[str, Figures] = {}
 

@@ -34,6 +34,9 @@ TOWER_EXPONENT, CHAIN_EXPONENT = 4.0, 3.0
 BLADE_PITCH_RATE_LIMIT = 10.0  # deg/s
 TOWER_TOP_ACCELERATION_LIMIT = 3.3  # m/s2
 ROTOR_SPEED_LIMIT = 1.3  # of rated: 15.73 rpm
+SETTLED_END = 300.0  # s at the end of a run over which it must have settled
+SETTLED_BAND = 5.0  # % of rated rotor speed about its final mean, beyond which it has not
+FINAL = 100.0  # s at the end, of that mean and of what still oscillates: some periods of the platform's pitch
 REQUIRED_CHANNELS = (
     TIME,
     "RotSpeed_[rpm]",
@@ -62,6 +65,7 @@ METRICS = (
     *(_metric_name(channel, s) for channel, statistics in STATISTICS.items() for s in statistics),
     "overspeed_[%]",
     "energy_[kWh]",
+    "GenPwr_capped_mean_[kW]",
     "blade_pitch_travel_[deg/s]",
     "actuator_duty_[%]",
     "torque_travel_[kN-m/s]",
@@ -77,18 +81,48 @@ METRICS = (
     "tower_top_acceleration_violations_[-]",
     "rotor_speed_beyond_[s]",
     "rotor_speed_violations_[-]",
+    "RotSpeed_offset_[%]",
+    "BldPitch_oscillation_[deg]",
+    "settling_time_[s]",
 )
 
 # what names of figures that cannot be below zero have in them
 _NEVER_NEGATIVE = (
     *("_std_", "_rms_", "_DEL_", "_travel_", "_duty_"),
     *("_limited_", "_beyond_", "_violations_", "FAIRTEN_"),
+    *("_offset_", "_oscillation_", "settling_time_"),
 )
+# what names of figures have in them of which less, or more, is better; of any other neither can be said
+_LESS_IS_BETTER = (*_NEVER_NEGATIVE, "overspeed", "_max_")
+_MORE_IS_BETTER = ("energy", "GenPwr_capped_mean", "GenPwr_mean")
+_WEATHER = ("Wind", "Wave")
 
 
 def never_negative(metric):
     """Whether a metric cannot be below zero: deviations, travel, fatigue, tensions, times and counts."""
     return any(part in metric for part in _NEVER_NEGATIVE)
+
+
+def better(metric):
+    """-1 where less of a metric is better, 1 where more is, 0 where neither can be said."""
+    if metric.startswith(_WEATHER):
+        return 0
+    if any(part in metric for part in _MORE_IS_BETTER):
+        return 1
+    return -1 if any(part in metric for part in _LESS_IS_BETTER) else 0
+
+
+def mean_exponent(metric):
+    """Exponent p with which a metric is averaged over winds and seeds: (mean of x^p)^(1/p).
+
+    Damage-equivalent loads: that of their S-N curve, since damage adds up. Standard deviations and rms: 2,
+    since variances add up: their mean is the deviation of the whole lifetime about the means of the single
+    runs, so that what the means themselves do from wind to wind, which is the wind's doing and no
+    controller's, is no part of it. Any other: 1.
+    """
+    if "_DEL_" in metric:
+        return CHAIN_EXPONENT if metric.startswith("FAIRTEN") else TOWER_EXPONENT
+    return 2.0 if "_std_" in metric or "_rms_" in metric else 1.0
 
 
 def travel(time, value):
@@ -124,19 +158,34 @@ def beyond(time, value, limit):
     return float(np.sum(above) * (time[-1] - time[0]) / (len(time) - 1)), float(rises)
 
 
-def metrics(df, skip=0.0, rated_speed_rpm=12.1, pitch_rate_limit=8.0):
+def metrics(
+    df,
+    skip=0.0,
+    rated_speed_rpm=12.1,
+    pitch_rate_limit=8.0,
+    rated_power_kW=5000.0,
+    steady=False,
+    gust_start=None,
+):
     """{metric: value} of a run, in the order and with the names of METRICS.
 
     df                output of simulate: evenly spaced rows
     skip              seconds at the start that are left out (start-up transient)
     rated_speed_rpm   overspeed is the greatest rotor speed above this, in percent of it
     pitch_rate_limit  of the blade-pitch drive, deg/s: the actuator duty is the mean rate in percent of it
+    rated_power_kW    electrical: power beyond it counts neither as energy nor in the capped mean
+    steady            whether the wind is steady and above rated, and the water still: the run has then an
+                      offset and an oscillation, else NaN
+    gust_start        time (s) of a gust after which the rotor has to settle; None: no settling time (NaN)
     Standard deviations are about the run's own mean (N in the denominator). Travel is the sum of
     absolute steps per second. DEL: 1 Hz damage-equivalent load, exponent 4 (tower base fore-aft, shaft
     torque) or 3 (fairlead). torque_limited: seconds in which the generator could not follow its command,
     being at the end of its range or its rate. FAIRTEN: the line for which the figure is greatest.
     beyond: seconds past a constraint (blade-pitch rate 10 deg/s, tower-top acceleration 3.3 m/s2, rotor
-    speed 1.3 times rated), violations: how often it was passed.
+    speed 1.3 times rated), violations: how often it was passed. RotSpeed_offset: size of the mean rotor
+    speed's distance from rated over the last 300 s, in percent of it; BldPitch_oscillation: greatest minus
+    least blade pitch of the last 100 s. settling_time: from the gust's start to the last instant at which the
+    rotor speed is further than 5 % of rated from its mean over the last 100 s.
     Raises: InputError for missing columns or if skip leaves fewer than two rows.
     """
     kept = _kept(df, skip)
@@ -149,7 +198,9 @@ def metrics(df, skip=0.0, rated_speed_rpm=12.1, pitch_rate_limit=8.0):
             value = np.nan if values is None else REDUCTIONS[statistic](values)
             result[_metric_name(channel, statistic)] = float(value)
     result["overspeed_[%]"] = float(overspeed(result["RotSpeed_max_[rpm]"], rated_speed_rpm))
-    result["energy_[kWh]"] = float(np.trapezoid(kept["GenPwr_[kW]"], time) / 3600.0)
+    capped = np.minimum(kept["GenPwr_[kW]"].to_numpy(), rated_power_kW)
+    result["energy_[kWh]"] = float(np.trapezoid(capped, time) / 3600.0)
+    result["GenPwr_capped_mean_[kW]"] = float(np.mean(capped))
     blade_pitch = kept["BldPitch1_[deg]"].to_numpy()
     result["blade_pitch_travel_[deg/s]"] = float(travel(time, blade_pitch))
     result["actuator_duty_[%]"] = 100.0 * result["blade_pitch_travel_[deg/s]"] / pitch_rate_limit
@@ -167,12 +218,16 @@ def metrics(df, skip=0.0, rated_speed_rpm=12.1, pitch_rate_limit=8.0):
         value = np.nan if load is None else damage_equivalent_load(load, length, TOWER_EXPONENT)
         result[f"{name}_DEL_[kN-m]"] = value
     result |= _violations(kept, time, blade_pitch, rated_speed_rpm)
+    speed = kept["RotSpeed_[rpm]"].to_numpy()
+    result |= _settling(time, speed, blade_pitch, rated_speed_rpm, steady, gust_start)
     return {name: result[name] for name in METRICS}
 
 
-def turbine_metrics(df, turbine, skip=0.0):
-    """metrics of a run of a turbine (its description): against its rated speed and its pitch drive's rate."""
-    return metrics(df, skip, turbine.rated_rotor_speed / RPM, turbine.pitch_drive.rate_limit / DEGREE)
+def turbine_metrics(df, turbine, skip=0.0, steady=False, gust_start=None):
+    """metrics of a run of a turbine (its description), with its rated speed and power and its pitch drive."""
+    power = 1e-3 * turbine.torque_law.rated_power * turbine.drivetrain.generator_efficiency
+    rate = turbine.pitch_drive.rate_limit / DEGREE
+    return metrics(df, skip, turbine.rated_rotor_speed / RPM, rate, power, steady, gust_start)
 
 
 def _kept(df, skip):
@@ -187,6 +242,26 @@ def _kept(df, skip):
         length = time[-1] - time[0] if len(time) else 0.0
         raise InputError(f"skip = {skip} s: leaves fewer than two rows of a run of {length:g} s")
     return kept
+
+
+def _settling(time, speed, blade_pitch, rated_speed_rpm, steady, gust_start):
+    """The metrics of settling, NaN of a run that has none; not scored rows count in none of them."""
+    result = {
+        "RotSpeed_offset_[%]": np.nan,
+        "BldPitch_oscillation_[deg]": np.nan,
+        "settling_time_[s]": np.nan,
+    }
+    if steady:
+        end = time >= time[-1] - SETTLED_END - 1e-9
+        offset = 100.0 * abs(np.mean(speed[end]) / rated_speed_rpm - 1.0)
+        result["RotSpeed_offset_[%]"] = float(offset)
+        result["BldPitch_oscillation_[deg]"] = float(np.ptp(blade_pitch[time >= time[-1] - FINAL - 1e-9]))
+    if gust_start is not None and np.isfinite(speed).all():
+        final = np.mean(speed[time >= time[-1] - FINAL - 1e-9])
+        away = np.abs(speed - final) > 0.01 * SETTLED_BAND * rated_speed_rpm
+        late = time[away & (time >= gust_start - 1e-9)]
+        result["settling_time_[s]"] = float(late[-1] - gust_start) if late.size else 0.0
+    return result
 
 
 def _violations(kept, time, blade_pitch, rated_speed_rpm):

@@ -29,8 +29,9 @@ from fowt_env.files.tables import write_table
 from fowt_env.training.evaluation import provenance
 from fowt_env.training.evaluation.guard import printable
 from fowt_env.training.evaluation.locks import locked
+from fowt_env.training.evaluation.run_case import STATUSES
 
-FORMAT = 2  # of the folder; raised when files or their meaning change
+FORMAT = 3  # of the folder; raised when files or their meaning change
 MANIFEST = {  # what each key of manifest.json holds, beside its format
     "fowt_env": str, "plant": str, "versions": dict, "created": str, "suite": dict | None, "options": dict,
     "cases": dict, "seeds": list, "controllers": dict,
@@ -40,7 +41,6 @@ TABLE_EVERY = 2.0  # s between rewritings of results.csv while runs go on
 PLAIN_NAME = re.compile(r"[a-z0-9_][a-z0-9_.-]{0,99}")  # of a file that no other name's can be taken for
 LONGEST_NAME = 500
 TEXTS = ("controller", "case", "status", "reason", "events")  # of a row; its other columns are numbers
-STATUSES = ("ok", "failed")
 
 
 def run_file(folder, label, case, seed):

@@ -10,6 +10,7 @@ from fowt_env.training.evaluation.faults import PARKED
 
 KEY = ["controller", "case", "seed"]  # what tells runs apart
 WORDS = ["status", "reason", "events"]  # columns of text beside those of KEY
+WEIGHT = "weight_[-]"  # share of a run's case in the lifetime; NaN, or no such column: every case alike
 TABLES = ("results.csv", "metrics.csv")  # of a folder: the first that is there
 
 
@@ -43,6 +44,14 @@ def read_results(paths, needed=(), cases=None, parked=True):
                 raise unknown("case of the evaluation", name, known)
         table = table[table["case"].isin(cases)]
     return table.reset_index(drop=True)
+
+
+def case_shares(table, cases):
+    """(cases,) shares of the lifetime, in sum 1, of the cases of a table; alike where it does not say."""
+    if WEIGHT not in table or not np.isfinite(table[WEIGHT].to_numpy(dtype=np.float64)).all():
+        return np.full(len(cases), 1.0 / max(1, len(cases)))
+    share = table.groupby("case")[WEIGHT].first().reindex(cases).to_numpy(dtype=np.float64)
+    return share / share.sum() if share.sum() > 0.0 else np.full(len(cases), 1.0 / len(cases))
 
 
 def _table_file(path):

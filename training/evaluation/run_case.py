@@ -10,19 +10,23 @@ import pandas as pd
 import fowt_env
 from fowt_env.controllers import make
 from fowt_env.descriptions.checks import is_number
+from fowt_env.descriptions.sea_state import sea_state_of
+from fowt_env.descriptions.wind import read_wind
 from fowt_env.errors import ControllerError, ControllerInputError, InputError, PlantWarning, SimulationStopped
 from fowt_env.training.evaluation.faults import faulted, idling
 from fowt_env.training.evaluation.guard import attempt, reason_of
 from fowt_env.training.evaluation.metrics import METRICS, TIME, turbine_metrics
-from fowt_env.training.evaluation.model_mismatch import ModelMismatch
+from fowt_env.training.evaluation.model_mismatch import perturbed_sensors
 from fowt_env.training.evaluation.plant_perturbation import perturbed_parts
 from fowt_env.training.evaluation.wind_boxes import cached_box
+from fowt_env.weather.wind import GUSTS
 from fowt_env.weather.wind_field import is_field
 
+STATUSES = OK, TRIPPED, FAILED = ("ok", "tripped", "failed")
 CONTROL_DT = 0.1  # s, simulate's own
 SHORTEST_CASE_WEATHER = 700.0  # s of wind and waves: shorter runs see the start of the same realisation
 COLUMNS = (
-    *("controller", "case", "seed", "status", "reason", "events", "stopped_[s]", "scored_[s]"),
+    *("controller", "case", "seed", "status", "reason", "events", "stopped_[s]", "scored_[s]", "weight_[-]"),
     *METRICS,
 )
 
@@ -40,6 +44,7 @@ class Run:
     options: dict  # further options of simulate
     frame_path: Path | None  # where the time series goes
     time_limit: float | None = None  # s of wall clock
+    weight: float = float("nan")  # share of the case in the lifetime; NaN: every case alike
 
     @property
     def key(self):
@@ -50,6 +55,7 @@ class Run:
 def scored(run):
     """(row, time series or None) of one run; one that fails has its reason instead of metrics.
 
+    A run that the turbine's protection ended has the metrics of what it was, its time, and the reason.
     Raises: InputError for settings that no controller could use.
     """
     case = run.case
@@ -62,6 +68,8 @@ def scored(run):
         parts = perturbed_parts(case.shift, case.platform)
         scene = fowt_env.build_scene(wind=wind, sea=case.sea, seed=run.seed, **options | parts)
 
+    trip = None if case.parked else case.trip
+
     def work():
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", PlantWarning)  # the row's events say the same
@@ -70,26 +78,53 @@ def scored(run):
                 controller=run_controller(run, nominal),
                 duration=run.duration,
                 initial=case.initial,
-                stop_overspeed=case.fault is None,
+                stop_overspeed=case.fault is None and trip is None,
                 grid_loss=_grid_loss(case),
-                **run.options,
+                trip=trip,
+                nominal=nominal,
+                **{"sensors": case.sensors} | run.options | _degraded(run, nominal.turbine),
             )
-        return frame, turbine_metrics(frame, scene.turbine, run.skip)
+        return frame, run_metrics(frame, case, nominal, run.skip)
 
     # whatever a controller raises or does costs its run, not the evaluation
     outcome, error = attempt(work, run.time_limit)
     if error is None:
         frame, figures = outcome
-        return _row(run, "ok", frame) | figures, frame
+        ended = frame.attrs["tripped"]
+        if ended is None:
+            return _row(run, OK, frame) | figures, frame
+        reason = f"overspeed trip at {ended:.1f} s: rotor speed beyond {trip:g} of rated"
+        return _row(run, TRIPPED, frame) | figures | {"reason": reason, "stopped_[s]": ended}, frame
     if isinstance(error, InputError) and not isinstance(error, ControllerInputError):
         raise error  # the run's settings
     frame, stopped = _end(error)
-    return _row(run, "failed", frame) | {"reason": reason_of(error), "stopped_[s]": stopped}, frame
+    return _row(run, FAILED, frame) | {"reason": reason_of(error), "stopped_[s]": stopped}, frame
 
 
 def lost_row(run, reason):
     """Row of a run that failed without one of its own, as where its process ended."""
-    return _row(run, "failed", None) | {"reason": reason}
+    return _row(run, FAILED, None) | {"reason": reason}
+
+
+def run_metrics(frame, case, scene, skip):
+    """{metric: value} of the time series of a run of a Case in its nominal scene, scored from `skip` s on."""
+    return turbine_metrics(frame, scene.turbine, skip, _is_steady(case, scene), _gust_start(case))
+
+
+def _is_steady(case, scene):
+    """Whether a Case is steady wind above rated over still water: a controller then has to come to rest."""
+    kind = case.wind.get("kind") if isinstance(case.wind, dict) else "steady"
+    if kind != "steady" or case.wind is None or case.parked or case.fault is not None:
+        return False
+    above = scene.wind_speed > scene.turbine.rated_wind_speed
+    return above and sea_state_of(case.sea).height == 0.0
+
+
+def _gust_start(case):
+    """Time (s) at which the gust of a Case begins; None without one."""
+    if case.parked or not isinstance(case.wind, dict) or case.wind.get("kind") not in GUSTS:
+        return None
+    return read_wind(case.wind)["start"]
 
 
 def _row(run, status, frame):
@@ -98,7 +133,7 @@ def _row(run, status, frame):
     row |= {"controller": run.label, "case": run.case.name, "seed": run.seed, "status": status, "reason": ""}
     counts = {} if frame is None else frame.attrs.get("events", {})
     row["events"] = "; ".join(f"{name} {count}" for name, count in counts.items() if count)
-    row["scored_[s]"] = run.duration - run.skip
+    row["scored_[s]"], row["weight_[-]"] = run.duration - run.skip, run.weight
     return row
 
 
@@ -123,6 +158,14 @@ def _grid_loss(case):
     return None if case.fault is None else case.fault.grid_loss
 
 
+def _degraded(run, turbine):
+    """{"sensors": SensorChain} of a case that degrades them, in place of the run's own; else nothing."""
+    shift = run.case.shift
+    control_dt = run.options.get("control_dt", CONTROL_DT)
+    chain = None if shift is None else perturbed_sensors(shift, turbine, control_dt)
+    return {} if chain is None else {"sensors": chain}
+
+
 def run_controller(run, nominal):
     """What simulate is given as controller: the run's own, with its fault, or a parked turbine's.
 
@@ -137,6 +180,4 @@ def run_controller(run, nominal):
         controller = make(run.controller, nominal.turbine, control_dt)
     except InputError as error:
         raise ControllerInputError(str(error)) from error
-    if case.shift is not None:
-        controller = ModelMismatch(controller, nominal, case.shift, run.seed)
     return faulted(controller, case.fault, nominal.turbine, control_dt)

@@ -1,11 +1,13 @@
-"""How agents compare with baselines on the same runs: interquartile mean of ratios, with 95 % intervals.
+"""How agents compare with baselines on the same runs: ratios of lifetime means, with 95 % intervals.
 
     fowt evaluate --controllers policy:ppo_lqr,gspi_oc3,rosco_float --seeds 1:6:1 --out results/rl
     fowt scores baselines results/rl --against gspi_oc3,rosco_float
 
-Each ratio is of one metric of an agent over that of a baseline in the same wind and waves. Several training
-seeds of one configuration make a group, whose interval resamples training and weather seeds
-(training.evaluation.bootstrap).
+Each ratio is of one metric of an agent over that of a baseline in the same wind and waves, each of them a
+mean over the lifetime: every case by its share of it (column weight_[-] of the table; without one all
+alike). Several training seeds of one configuration make a group, whose interval resamples training and
+weather seeds (training.evaluation.bootstrap). A run that failed or tripped has the worst figures of all
+controllers on its case (training.evaluation.failures).
 """
 
 import re
@@ -21,17 +23,16 @@ from fowt_env.errors import InputError, unknown
 from fowt_env.files.atomic import replacing
 from fowt_env.files.markdown import markdown_table
 from fowt_env.files.tables import write_table
-from fowt_env.training.evaluation.bootstrap import LEAST_SEEDS, crossed_estimate
-from fowt_env.training.evaluation.metrics import METRICS, never_negative
-from fowt_env.training.evaluation.results_table import KEY
+from fowt_env.plant.measurement import SENSOR_FIELDS
+from fowt_env.training.evaluation.bootstrap import LEAST_SEEDS, LEVEL, crossed_ratio, holm
+from fowt_env.training.evaluation.failures import failures_as_worst
+from fowt_env.training.evaluation.metrics import METRICS, mean_exponent, never_negative
+from fowt_env.training.evaluation.results_table import KEY, case_shares
+from fowt_env.training.evaluation.run_case import OK, TRIPPED
 
 __all__ = ["COUNTS", "FIGURES", "Figure", "agent_counts", "agent_scores", "by_kind"]
 
 PAST_ANY = "past a constraint"
-SENSOR_FIELDS = {  # what a turbine's own sensors show
-    "time", "rotor_speed", "generator_speed", "blade_pitch", "generator_torque", "platform_pitch",
-    "platform_pitch_rate", "platform_pitch_acceleration", "nacelle_acceleration", "nacelle_velocity",
-}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -59,35 +60,40 @@ class Figure:
             return "met" if self.then is None else "first"
         return "missed"
 
-    def verdict(self, ratio, low, high, failed=0):
-        """What the ratio reaches (level), with "*" where the whole interval does; "" without a ratio.
+    @property
+    def aims(self):
+        """The aims that there are, the first one first."""
+        return tuple(aim for aim in (self.first, self.then) if aim is not None)
 
-        "then, first*": the ratio reaches the second aim, the whole interval the first. "failed" where runs
-        failed: the ratio is that of the others, which may be the easy ones.
+    def verdict(self, ratio, sure=(), failed=0):
+        """What the ratio reaches (level), with "*" where that is no chance finding; "" without a ratio.
+
+        sure: for each of the aims, whether the hypothesis that the ratio equals it is rejected, after
+        correction for all those that are tested (agent_scores). "then, first*": the ratio reaches the second
+        aim, and surely the first. "failed" where runs failed or tripped.
         """
         if self.first is None or not np.isfinite(ratio):
             return ""
         if failed:
             return "failed"
         found = self.level(ratio)
-        if not np.isfinite(high):
-            return found
-        best, worst = (self.level(end) for end in ((high, low) if self.more else (low, high)))
-        if found == "missed":
-            return "missed*" if best == "missed" else "missed"
-        if worst == found:
-            return f"{found}*"
-        return f"{found}, {worst}*" if worst != "missed" else found
+        sure = (*sure, False, False)
+        if found == "then" and not sure[1]:
+            return "then, first*" if sure[0] else "then"
+        return f"{found}*" if sure[0] else found
 
 
 FIGURES = (
     Figure("rotor-speed std", "RotSpeed_std_[rpm]", 0.8, 0.6),
     Figure("platform-pitch std", "PtfmPitch_std_[deg]", 0.8, 0.7),
     Figure("blade-pitch travel", "blade_pitch_travel_[deg/s]", 1.0),
-    Figure("mean power", "GenPwr_mean_[kW]", 0.995, more=True),
+    Figure("energy", "GenPwr_capped_mean_[kW]", 0.995, more=True),
     Figure("power std", "GenPwr_std_[kW]", 1.0),
+    Figure("largest power", "GenPwr_max_[kW]", 1.0),
     Figure("tower-base DEL", "TwrBsMyt_DEL_[kN-m]", 1.0),
     Figure("fairlead DEL", "FAIRTEN_DEL_[kN]", 1.0),
+    Figure("shaft-torque DEL", "RotTorq_DEL_[kN-m]", 1.0),
+    Figure("torque travel", "torque_travel_[kN-m/s]", 1.0),
 )
 COUNTS = {  # constraint: metric that counts how often it was passed
     "rotor past 130 %": "rotor_speed_violations_[-]",
@@ -142,60 +148,63 @@ def agent_scores(table, baselines, groups=None, agents=None, figures=FIGURES):
     """DataFrame: per agent or group, baseline and figure the ratio, its interval, and what that reaches.
 
     table: what evaluate.evaluate returns; groups, agents: as grouped takes them. Columns: agent,
-    baseline, figure, metric, ratio (interquartile mean over all runs), low, high (NaN for too few seeds:
-    training.evaluation.bootstrap.crossed_estimate), pairs (runs with a ratio), runs, training_seeds, verdict
-    (Figure.verdict). Where the baseline's figure is 0 there is no ratio.
-    Raises: InputError for labels that were not run, or where no run of both succeeded.
+    baseline, figure, metric, ratio (of the lifetime means, its mean over the training seeds), low, high (NaN
+    for too few seeds: training.evaluation.bootstrap.crossed_ratio), p_first, p_then (two-sided p-values of
+    the ratio being the aim), holm_first, holm_then (the same, corrected for all aims of all figures over this
+    baseline), pairs (runs with a ratio), runs, failed, tripped, training_seeds, verdict (Figure.verdict, sure
+    where a corrected p-value is at most 1 - LEVEL). Where the baseline's figure is 0 there is no ratio.
+    Raises: InputError for labels that were not run, or where agent and baseline have no run in common.
     """
-    return _scores(table, baselines, grouped(table, baselines, groups, agents), figures)
+    return _scores(failures_as_worst(table), baselines, grouped(table, baselines, groups, agents), figures)
 
 
 def _scores(table, baselines, chosen, figures):
-    """agent_scores of {name: labels}."""
-    good = table.set_index(KEY).sort_index()
-    made = good.index
-    good = good[good["status"] == "ok"]
+    """agent_scores of {name: labels}, of a table in which failures count as worst already."""
+    runs = table.set_index(KEY).sort_index()
     cases, seeds = list(dict.fromkeys(table["case"])), sorted(set(table["seed"]))
+    shares = case_shares(table, cases)
     rows = []
     for name, labels in chosen.items():
-        runs = int(made.get_level_values(0).isin(labels).sum())
-        failed = runs - int(good.index.get_level_values(0).isin(labels).sum())
+        made = runs.loc[list(labels)]
+        counts = {"runs": len(made), **_lost(made), "training_seeds": len(labels)}
         for baseline in baselines:
-            pairs_at_all = 0
-            for figure in figures:
-                own = _values(good, list(labels), cases, seeds, figure.metric)
-                other = _values(good, [baseline], cases, seeds, figure.metric)
-                with np.errstate(divide="ignore", invalid="ignore"):
-                    ratio = np.where(other != 0.0, own / other, np.nan)
-                pairs = int(np.isfinite(ratio).sum())
-                pairs_at_all += pairs
-                estimate, low, high = crossed_estimate(ratio, positive=never_negative(figure.metric))
-                rows.append(
-                    {
-                        "agent": name,
-                        "baseline": baseline,
-                        "figure": figure.name,
-                        "metric": figure.metric,
-                        "ratio": estimate,
-                        "low": low,
-                        "high": high,
-                        "pairs": pairs,
-                        "runs": runs,
-                        "training_seeds": len(labels),
-                        "verdict": figure.verdict(estimate, low, high, failed),
-                    }
-                )
-            if not pairs_at_all:
-                raise InputError(f"{name} and {baseline}: no run of both succeeded")
+            found = [_ratio_row(runs, labels, baseline, cases, seeds, shares, figure) for figure in figures]
+            if not any(row["pairs"] for row in found):
+                raise InputError(f"{name} and {baseline}: no run of both has a figure")
+            corrected = holm([p for row in found for p in (row["p_first"], row["p_then"])])
+            for figure, row, pair in zip(figures, found, corrected.reshape(-1, 2), strict=True):
+                sure = [p <= 1.0 - LEVEL for p in pair]
+                verdict = figure.verdict(row["ratio"], sure, counts["failed"] + counts["tripped"])
+                row |= {"holm_first": pair[0], "holm_then": pair[1], **counts, "verdict": verdict}
+                rows.append({"agent": name, "baseline": baseline} | row)
     return pd.DataFrame(rows)
+
+
+def _lost(runs):
+    """{"failed", "tripped"}: how many of some runs did."""
+    tripped = int((runs["status"] == TRIPPED).sum())
+    return {"failed": int((runs["status"] != OK).sum()) - tripped, "tripped": tripped}
+
+
+def _ratio_row(runs, labels, baseline, cases, seeds, shares, figure):
+    """{column: value} of one Figure: ratio, interval, p-values, pairs."""
+    own = _values(runs, list(labels), cases, seeds, figure.metric)
+    other = _values(runs, [baseline], cases, seeds, figure.metric)[0]
+    exponent = mean_exponent(figure.metric)
+    estimate = crossed_ratio(own, other, shares, exponent, positive=never_negative(figure.metric))
+    p = [estimate.p_value(aim) for aim in figure.aims] + [float("nan")] * 2
+    ratio = {"ratio": estimate.value, "low": estimate.low, "high": estimate.high}
+    tests = {"p_first": p[0], "p_then": p[1]}
+    pairs = int((np.isfinite(own) & np.isfinite(other)).sum()) if np.isfinite(estimate.value) else 0
+    return {"figure": figure.name, "metric": figure.metric, **ratio, **tests, "pairs": pairs}
 
 
 def agent_counts(table, baselines, groups=None, agents=None):
     """DataFrame: per agent, group and baseline its runs, those that failed, those past a constraint.
 
-    Columns: agent, inputs (as the function has them), runs, failed, the names of COUNTS (runs in which it was
-    passed at least once), past any of them, largest overspeed (%), verdict ("met" where nothing failed or was
-    passed).
+    Columns: agent, inputs (as the function has them), runs, failed, tripped, the names of COUNTS (runs in
+    which it was passed at least once), past any of them, largest overspeed (%), verdict ("met" where nothing
+    failed, tripped or was passed). The figures are the runs' own.
     """
     return _counts(table, grouped(table, baselines, groups, agents) | {name: (name,) for name in baselines})
 
@@ -206,11 +215,11 @@ def _counts(table, chosen):
     for name, labels in chosen.items():
         here = table[table["controller"].isin(labels)]
         row = {"agent": name, "inputs": "; ".join(dict.fromkeys(map(inputs, labels))), "runs": len(here)}
-        row["failed"] = int((here["status"] != "ok").sum())
+        row |= _lost(here)
         row |= {text: int((here[metric] > 0).sum()) for text, metric in COUNTS.items()}
         row[PAST_ANY] = int((here[list(COUNTS.values())] > 0).any(axis=1).sum())
         row["largest overspeed (%)"] = float(here["overspeed_[%]"].max())
-        row["verdict"] = "missed" if row["failed"] or row[PAST_ANY] else "met"
+        row["verdict"] = "missed" if row["failed"] or row["tripped"] or row[PAST_ANY] else "met"
         rows.append(row)
     return pd.DataFrame(rows)
 
@@ -227,7 +236,7 @@ def inputs(label):
         used = information(label)
     except InputError:
         return ""
-    measured = ["measured"] if set(used) & SENSOR_FIELDS else []
+    measured = ["measured"] if set(used) & set(SENSOR_FIELDS) else []
     return ", ".join(measured + [x for x in used if x not in SENSOR_FIELDS])
 
 
@@ -241,17 +250,18 @@ def by_kind(table, baseline, groups=None, agents=None, figures=FIGURES, each=Fal
 
     each: every case is a kind of its own; else the winds of a kind (kind_of) are taken together.
 
-    Both have a further first column, kind. A kind in which an agent has no run that succeeded has NaN
-    ratios there.
+    Both have a further first column, kind. A kind in which an agent has no run with a figure has NaN ratios
+    there. The correction of the p-values is for the figures of one kind.
     """
     chosen = grouped(table, [baseline], groups, agents)
-    scores, counts = [], []
+    penalised, scores, counts = failures_as_worst(table), [], []
     for kind, here in table.groupby(table["case"] if each else table["case"].map(kind_of), sort=False):
         counts.append(_counts(here, chosen | {baseline: (baseline,)}).assign(kind=kind))
         for name, labels in chosen.items():
             try:
-                scores.append(_scores(here, [baseline], {name: labels}, figures).assign(kind=kind))
-            except InputError:  # all failed or none was made, which the counts say
+                part = penalised.loc[here.index]
+                scores.append(_scores(part, [baseline], {name: labels}, figures).assign(kind=kind))
+            except (InputError, KeyError):  # none was made or nobody has a figure, which the counts say
                 blank = {"agent": name, "baseline": baseline, "kind": kind, "pairs": 0, "verdict": ""}
                 scores.append(pd.DataFrame([blank | {"figure": figure.name} for figure in figures]))
     whole = pd.concat(scores, ignore_index=True), pd.concat(counts, ignore_index=True)
@@ -313,11 +323,11 @@ def kinds_markdown(scores, counts, figures=None):
         wide.columns = [f"`{agent}`" for agent in names]
         parts.append(frame_markdown(wide))
     parts += _remark(scores)
-    columns = counts[["failed", PAST_ANY, "runs"]].to_numpy()
-    shown = counts.assign(text=[f"{failed} / {past} of {runs}" for failed, past, runs in columns])
+    columns = counts[["failed", "tripped", PAST_ANY, "runs"]].to_numpy()
+    shown = counts.assign(text=[f"{lost + trips} / {past} of {runs}" for lost, trips, past, runs in columns])
     agents = list(dict.fromkeys(counts["agent"]))
     wide = shown.pivot(index="kind", columns="agent", values="text").loc[kinds, agents]
-    wide.index.name = "failed / past a constraint"
+    wide.index.name = "failed or tripped / past a constraint"
     wide.columns = [f"`{agent}`" for agent in agents]
     parts.append(frame_markdown(wide))
     return "\n".join(parts)

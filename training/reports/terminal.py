@@ -6,7 +6,8 @@ from dataclasses import replace
 from fowt_env.descriptions.platform import Platform, read_platform
 from fowt_env.errors import unknown
 from fowt_env.files.tables import read_table
-from fowt_env.training.evaluation.cases import Score, named_cases, read_suite
+from fowt_env.training.evaluation.bootstrap import holm
+from fowt_env.training.evaluation.cases import Limits, Score, named_cases, read_suite
 from fowt_env.training.evaluation.leaderboard import leaderboard
 from fowt_env.training.evaluation.results import file_name, run_file, write_json
 from fowt_env.training.evaluation.seeds import ranges
@@ -19,13 +20,15 @@ PRINTED_METRICS = (
     ("rotor\nspeed\nmean\nrpm", "RotSpeed_mean_[rpm]", ".2f"),
     ("rotor\nspeed\nstd\nrpm", "RotSpeed_std_[rpm]", ".3f"),
     ("over-\nspeed\nmax\n%", "overspeed_[%]", ".1f"),
-    ("power\n\nmean\nkW", "GenPwr_mean_[kW]", ".0f"),
+    ("power\ncapped\nmean\nkW", "GenPwr_capped_mean_[kW]", ".0f"),
     ("power\n\nstd\nkW", "GenPwr_std_[kW]", ".0f"),
+    ("power\n\nmax\nkW", "GenPwr_max_[kW]", ".0f"),
     ("ptfm\npitch\nmean\ndeg", "PtfmPitch_mean_[deg]", ".2f"),
     ("ptfm\npitch\nstd\ndeg", "PtfmPitch_std_[deg]", ".3f"),
     ("ptfm\npitch\nmax\ndeg", "PtfmPitch_max_[deg]", ".2f"),
-    ("surge\n\nmean\nm", "PtfmSurge_mean_[m]", ".1f"),
     ("blade\npitch\ntravel\ndeg/s", "blade_pitch_travel_[deg/s]", ".3f"),
+    ("torque\n\ntravel\nkNm/s", "torque_travel_[kN-m/s]", ".3f"),
+    ("shaft\ntorque\nDEL\nkN m", "RotTorq_DEL_[kN-m]", ".0f"),
     ("nac.\nacc.\nrms\nm/s²", "NcIMUTAxs_rms_[m/s^2]", ".3f"),
     ("line\ntension\nmax\nkN", "FAIRTEN_max_[kN]", ".0f"),
 )
@@ -33,13 +36,15 @@ PRINTED_METRICS = (
 
 # dropped from the printed table, first to last, where it is wider than the terminal
 DROPPED_FIRST = (
-    "PtfmSurge_mean_[m]",
     "FAIRTEN_max_[kN]",
     "NcIMUTAxs_rms_[m/s^2]",
     "RotSpeed_mean_[rpm]",
-    "GenPwr_mean_[kW]",
     "PtfmPitch_max_[deg]",
     "PtfmPitch_mean_[deg]",
+    "GenPwr_std_[kW]",
+    "GenPwr_max_[kW]",
+    "GenPwr_capped_mean_[kW]",
+    "RotTorq_DEL_[kN-m]",
 )
 
 
@@ -48,10 +53,11 @@ def summary_rows(means, width):
 
     Columns are dropped until headings and values, two spaces between them, take at most `width` characters.
     """
+    lost = list(means["failed"] + means["tripped"])
     columns = [
         ("controller", list(means["controller"])),
         ("case", list(means["case"])),
-        ("runs", [f"{n - failed}/{n}" for n, failed in zip(means["runs"], means["failed"], strict=True)]),
+        ("runs", [f"{n - bad}/{n}" for n, bad in zip(means["runs"], lost, strict=True)]),
     ]
     optional = {}
     for heading, name, form in PRINTED_METRICS:
@@ -63,7 +69,7 @@ def summary_rows(means, width):
         if sum(2 + max(map(len, [*heading.split("\n"), *texts])) for heading, texts in shown) <= width:
             break
     headings, texts = zip(*shown, strict=True)
-    return headings, list(zip(*texts, strict=True)), list(means["failed"])
+    return headings, list(zip(*texts, strict=True)), lost
 
 
 def chosen_cases(suite, cases):
@@ -91,11 +97,16 @@ def write_leaderboard(table, folder, baseline=None):
     Raises: InputError for a baseline that was not evaluated.
     """
     manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
-    rule = (manifest["suite"] or {}).get("score")
+    suite = manifest["suite"] or {}
+    score, limits = suite.get("score"), suite.get("limits")
+    rules = {
+        "score": None if score is None else Score(**score),
+        "limits": None if limits is None else Limits(**limits),
+    }
     board = {
         key: manifest[key]
         for key in ("format", "fowt_env", "plant", "versions", "suite", "options", "created")
-    } | leaderboard(table, baseline, None if rule is None else Score(**rule))
+    } | leaderboard(table, baseline, **rules)
     write_json(board, folder / "leaderboard.json")
     return board
 
@@ -104,31 +115,36 @@ def write_leaderboard(table, folder, baseline=None):
 LEADERBOARD = (
     ("rotor speed std\nrpm", "RotSpeed_std_[rpm]", ".3f", True, True),
     ("platform pitch std\ndeg", "PtfmPitch_std_[deg]", ".3f", True, True),
-    ("pitch travel\ndeg/s", "blade_pitch_travel_[deg/s]", ".3f", True, True),
-    ("overspeed\nmax %", "overspeed_[%]", ".1f", False, False),
-    ("power mean\nkW", "GenPwr_mean_[kW]", ".0f", False, True),
+    ("pitch travel\ndeg/s", "blade_pitch_travel_[deg/s]", ".3f", False, True),
+    ("torque travel\nkN m/s", "torque_travel_[kN-m/s]", ".3f", False, True),
+    ("shaft DEL\nkN m", "RotTorq_DEL_[kN-m]", ".0f", False, True),
     ("tower DEL\nMN m", "TwrBsMyt_DEL_[kN-m]", ".1f", False, True),
-    ("fairlead DEL\nkN", "FAIRTEN_DEL_[kN]", ".1f", False, True),
+    ("capped power\nkW", "GenPwr_capped_mean_[kW]", ".0f", False, True),
+    ("power max\nMW", "GenPwr_max_[kW]", ".2f", False, False),
 )
-LEADERBOARD_SCALES = {"TwrBsMyt_DEL_[kN-m]": 1e-3}
-# left out one by one where the terminal is narrow; travel and overspeed stay beside the deviations
-LEADERBOARD_DROPS = ("FAIRTEN_DEL_[kN]", "TwrBsMyt_DEL_[kN-m]", "GenPwr_mean_[kW]")
+LEADERBOARD_SCALES = {"TwrBsMyt_DEL_[kN-m]": 1e-3, "GenPwr_max_[kW]": 1e-3}
+WORST_RUN = ("GenPwr_max_[kW]",)  # of which the table has the greatest of all runs
+# left out one by one where the terminal is narrow; what is spent stays beside the deviations
+LEADERBOARD_DROPS = ("GenPwr_max_[kW]", "TwrBsMyt_DEL_[kN-m]", "GenPwr_capped_mean_[kW]")
 
 
 def leaderboard_rows(board, width=200):
     """(title, headings, rows of texts, remarks) of a leaderboard, in `width` characters if possible.
 
-    A difference is in percent of the baseline, "*" where its interval leaves out zero. Remarks: lines on
-    what the table lacks, and why.
+    A difference is in percent of the baseline, "*" where it is no chance finding: its p-value, corrected for
+    all figures of the row (bootstrap.holm), is at most 1 less the level of the intervals. Remarks: lines on
+    what the table lacks or does not show, and why.
     """
     baseline = board["baseline"]
     name = "" if not board.get("suite") else f"suite {board['suite']['name']} {board['suite']['version']}, "
     intervals = has_intervals(board)
-    title = f"{name}{_counted(len(board['cases']), 'case')}, {_seeds(board['seeds'])}: means"
+    kind = "lifetime means" if len(set(board["shares"].values())) > 1 else "means"
+    title = f"{name}{_counted(len(board['cases']), 'case')}, {_seeds(board['seeds'])}: {kind}"
     if intervals:
         title += f" [{round(100 * board['interval']['level'])} % interval]"
     if baseline is not None:
-        title += f", paired difference from {baseline}{' (* interval without zero)' if intervals else ''}"
+        title += f", paired difference from {baseline}{' (* no chance finding)' if intervals else ''}"
+    sure = [_sure(entry, board["interval"]["level"]) for entry in board["controllers"]]
     dropped = set()
     for drop in (None, *LEADERBOARD_DROPS):
         dropped.add(drop)
@@ -145,14 +161,22 @@ def leaderboard_rows(board, width=200):
                         form,
                         with_interval,
                         with_difference and entry["controller"] != baseline,
+                        metric in stars,
                     )
-                    for entry in board["controllers"]
+                    for entry, stars in zip(board["controllers"], sure, strict=True)
                 ]
                 columns.append((heading, texts))
         if sum(2 + max(map(len, [*heading.split("\n"), *texts])) for heading, texts in columns) <= width:
             break
     headings, texts = zip(*columns, strict=True)
     return title, headings, list(zip(*texts, strict=True)), _remarks(board, intervals)
+
+
+def _sure(entry, level):
+    """Set of the printed metrics whose difference is no chance finding, all of them taken together."""
+    names = [metric for _, metric, _, _, different in LEADERBOARD if different]
+    adjusted = holm([entry["difference"][name]["p"] for name in names])
+    return {name for name, p in zip(names, adjusted, strict=True) if p <= 1.0 - level}
 
 
 def has_intervals(board):
@@ -172,17 +196,25 @@ def no_interval(board):
 def _remarks(board, intervals):
     """Lines below the leaderboard: on intervals, failed runs and the baseline."""
     lines = [] if intervals else [no_interval(board)]
-    failed = {e["controller"]: _counted(e["failed"], "run") for e in board["controllers"] if e["failed"]}
-    if failed:
-        counts = ", ".join(f"{name}: {count}" for name, count in failed.items())
-        lines.append(
-            f"failed ({counts}): no paired difference; means are of the other runs, perhaps the easy ones"
+    lost = {
+        entry["controller"]: " and ".join(
+            f"{_counted(entry[what], 'run')} {what}" for what in ("failed", "tripped") if entry[what]
         )
-    baseline = board["baseline"]
-    if baseline is None and board["controllers"]:
+        for entry in board["controllers"]
+    }
+    lost = {name: text for name, text in lost.items() if text}
+    if lost:
+        texts = "; ".join(f"{name}: {text}" for name, text in lost.items())
+        lines.append(f"{texts}: counted with the worst figures of all controllers on that case, ranked last")
+    if board["baseline"] is None and board["controllers"]:
         lines.append("no paired differences: every controller has failed runs")
-    if baseline in failed:
-        lines.append(f"baseline {baseline}: {failed[baseline]} failed; pairs are of the runs that succeeded")
+    if board["baseline"] in lost:
+        lines.append(f"baseline {board['baseline']}: {lost[board['baseline']]}, which flatters the others")
+    for entry in board["controllers"]:
+        if entry["beyond"]:
+            lines.append(f"{entry['controller']} is beyond a limit: {'; '.join(entry['beyond'])}")
+    if board["unchecked"]:
+        lines.append(f"limits of {', '.join(board['unchecked'])} not checked: their baseline was not run")
     return lines
 
 
@@ -192,9 +224,9 @@ def _counted(count, noun):
 
 
 def _runs_text(entry):
-    """ "6/6" of a controller's runs, with the number of those that failed."""
-    failed = f", {entry['failed']} failed" if entry["failed"] else ""
-    return f"{entry['runs'] - entry['failed']}/{entry['runs']}{failed}"
+    """ "6/6" of a controller's runs, with the numbers of those that failed and tripped."""
+    lost = "".join(f", {entry[what]} {what}" for what in ("failed", "tripped") if entry[what])
+    return f"{entry['runs'] - entry['failed'] - entry['tripped']}/{entry['runs']}{lost}"
 
 
 def _seeds(seeds):
@@ -207,19 +239,18 @@ def _ranges(seeds):
     return ", ".join(str(low) if low == high else f"{low}-{high}" for low, high in ranges(seeds))
 
 
-def _cell(entry, metric, form, with_interval, with_difference):
-    """Text of one figure: mean [low, high] difference %."""
+def _cell(entry, metric, form, with_interval, with_difference, sure):
+    """Text of one figure: mean [low, high] difference %, "*" where that is sure."""
     figure, gap = entry["metrics"][metric], entry["difference"][metric]
     scale = LEADERBOARD_SCALES.get(metric, 1.0)
     if figure["mean"] != figure["mean"]:
         return "-"
-    if metric == "overspeed_[%]":
-        return format(figure["worst"], form)
+    if metric in WORST_RUN:
+        return format(scale * figure["worst"], form)
     text = format(scale * figure["mean"], form)
     if with_interval and figure["low"] == figure["low"]:
         text += f" [{format(scale * figure['low'], form)}, {format(scale * figure['high'], form)}]"
     if with_difference and gap["percent"] == gap["percent"]:
-        sure = gap["low"] > 0.0 or gap["high"] < 0.0  # neither without an interval
         text += f" {gap['percent']:+.1f}%{'*' if sure else ' '}"
     return text
 

@@ -96,14 +96,14 @@ def test_the_controller_commands_what_the_environment_would_do_with_its_decision
     decisions = Decisions(1, len(observation), DecisionSettings(hold=3, smoothing=0.4, history=2), 0.1)
     agent = make(f"policy:{path}", TURBINE, 0.1)
     agent.prepare(env.scene)
-    agent.reset(env.measurement())
+    agent.reset(env.measurement(agent.preview_times))
     decisions.restart(0, observation, env._episode.action)
     for period in range(120):
         if period % 3 == 0:
             if period:
                 decisions.append(observation[None])
             decision = network(decisions.features())
-        command = agent.act(env.measurement())
+        command = agent.act(env.measurement(agent.preview_times))
         observation, _, terminated, _, _ = env.step(decisions.smooth(decision)[0])
         assert command == pytest.approx(tuple(env._episode.u), rel=1e-9, abs=1e-9)
         assert not terminated
@@ -124,7 +124,7 @@ def test_a_policy_runs_without_torch_or_stable_baselines3(tmp_path):
 def test_information_is_what_agent_and_baseline_see(tmp_path):
     path = write_random_policy(tmp_path / "a.npz", names=("rotor_speed", "wind_preview"), preview=(2.0,))
     known = make(f"policy:{path}", TURBINE, 0.1).information
-    assert known == ("generator_speed", "blade_pitch", "rotor_speed", "wind_preview")
+    assert known == ("generator_speed", "blade_pitch", "generator_torque", "rotor_speed", "wind_preview")
     assert make(f"policy:{path}", TURBINE, 0.1).name == f"policy:{path}"
     path = write_random_policy(tmp_path / "b.npz", names=("rotor_speed", "estimated_wind"))
     known = set(make(f"policy:{path}", TURBINE, 0.1).information)

@@ -80,7 +80,7 @@ def test_the_inner_controller_is_handed_the_scene():
     inner = Asking()
     controller = FaultedController(inner, Fault(kind="grid_loss", time=1.0), radians(90.0), DT)
     controller.prepare("the scene")
-    assert inner.scene == "the scene" and controller.information == ("wind_preview",)
+    assert inner.scene == "the scene" and controller.information == ("wind_preview", "blade_pitch")
     FaultedController(Ramp(), Fault(kind="grid_loss", time=1.0), radians(90.0), DT).prepare("any")
 
 

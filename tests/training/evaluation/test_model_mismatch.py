@@ -3,18 +3,20 @@
 import json
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import fowt_env
 from fowt_env.analysis.linear_model import linearize
 from fowt_env.controllers import make
+from fowt_env.envs.sensors import reading_scales
 from fowt_env.errors import InputError
 from fowt_env.plant.measurement import Measurement
 from fowt_env.training.evaluation.cases import Case, described, read_suite
 from fowt_env.training.evaluation.evaluate import evaluate, planned
-from fowt_env.training.evaluation.model_mismatch import ModelMismatch, reading_scales
+from fowt_env.training.evaluation.model_mismatch import perturbed_sensors
 from fowt_env.training.evaluation.plant_perturbation import PLANT, PlantPerturbation, perturbed_parts
-from fowt_env.training.evaluation.run_case import run_controller
+from fowt_env.training.evaluation.run_case import scored
 from fowt_env.training.rl.randomisation import SENSORS
 
 WIND = {"kind": "ntm", "speed": 18.0, "class": "B"}
@@ -29,24 +31,16 @@ def short(controllers, *cases, **options):
 
 
 class Recorder:
-    """gspi_oc3 that keeps what it was given."""
+    """A constant command that keeps what it was given, and what was true then."""
 
-    name = "recorder"
-
-    def __init__(self, turbine, control_dt):
-        self.inner = make("gspi_oc3", turbine, control_dt)
-        self.turbine, self.seen, self.scene = turbine, [], None
-
-    def prepare(self, scene):
-        self.scene = scene
+    information = Measurement._fields
 
     def reset(self, measurement):
-        self.seen = [measurement]
-        self.inner.reset(measurement)
+        self.seen = [np.array(measurement)]
 
     def act(self, measurement):
-        self.seen.append(measurement)
-        return self.inner.act(measurement)
+        self.seen.append(np.array(measurement))
+        return 43093.55, 0.26
 
 
 class Deaf:
@@ -59,15 +53,13 @@ class Deaf:
         return 43093.55, 0.26
 
 
-def measured(time, **values):
-    return Measurement(**(dict.fromkeys(Measurement._fields, 0.0) | values | {"time": time}))
-
-
-def mismatched(shift, turbine, seed=1):
-    """(ModelMismatch, its Recorder) that was prepared with nothing but a turbine."""
-    inner = Recorder(turbine, 0.1)
-    known = type("Known", (), {"turbine": turbine})()
-    return ModelMismatch(inner, known, shift, seed), inner
+def readings(shift, seed=1, duration=20.0):
+    """(calls, fields) that a controller reads in a run of the shifted case, the reset's first."""
+    recorder = Recorder()
+    scene = fowt_env.build_scene(wind=WIND, seed=seed, fidelity="standard", duration=700.0)
+    sensors = perturbed_sensors(shift, scene.turbine, 0.1)
+    fowt_env.simulate(scene, recorder, duration=duration, sensors=sensors)
+    return np.array(recorder.seen)
 
 
 def test_a_shift_has_every_quantity_that_training_randomises():
@@ -98,18 +90,18 @@ def test_more_added_mass_lengthens_the_surge_period_as_its_share_of_the_mass_say
 def test_the_run_is_on_the_shifted_plant_and_the_controller_knows_the_nominal_one():
     shift = PlantPerturbation(mooring_stiffness=1.2, actuator_lag=2.0)
     run = planned(["lqr"], [windy(shift)], seeds=[1])[0]
-    known = fowt_env.build_scene(wind=WIND, sea=run.case.sea, seed=1, fidelity="standard", duration=700.0)
-    controller = run_controller(run, known)
-    told = make("lqr", known.turbine, 0.1)
-    told.prepare(known)
-    wrong = fowt_env.build_scene(
-        wind=WIND, sea=run.case.sea, seed=1, fidelity="standard", **perturbed_parts(shift)
-    )
-    controller.prepare(wrong)
-    assert np.array_equal(controller.inner.parameters, told.parameters)
-    told.prepare(wrong)
-    assert not np.array_equal(controller.inner.parameters, told.parameters)
-    assert wrong.turbine.pitch_drive.time_constant == 2.0 * known.turbine.pitch_drive.time_constant
+    frame = scored(run)[1]
+    weather = {"wind": WIND, "sea": run.case.sea, "seed": 1, "fidelity": "standard", "duration": 700.0}
+    known = fowt_env.build_scene(**weather)
+    true = fowt_env.build_scene(**weather, **perturbed_parts(shift))
+    assert true.turbine.pitch_drive.time_constant == 2.0 * known.turbine.pitch_drive.time_constant
+    options = {"duration": run.duration, "stop_overspeed": True}
+    unaware = make("lqr", known.turbine, 0.1)
+    same = fowt_env.simulate(true, unaware, nominal=known, **options)
+    pd.testing.assert_frame_equal(frame, same, check_exact=True)
+    told = make("lqr", true.turbine, 0.1)
+    assert not frame.equals(fowt_env.simulate(true, told, **options))
+    assert not np.array_equal(unaware.parameters, told.parameters)
 
 
 def test_a_shifted_mooring_changes_the_motions_and_an_empty_shift_no_bit():
@@ -123,26 +115,24 @@ def test_a_shifted_mooring_changes_the_motions_and_an_empty_shift_no_bit():
 
 
 def test_noise_reaches_the_controller_with_its_size_and_no_delay(turbine):
-    controller, inner = mismatched(PlantPerturbation(noise=0.02), turbine)
-    controller.reset(measured(0.0))
-    for step in range(4000):
-        controller.act(measured(0.1 * step))
-    seen = np.array(inner.seen[1:])
+    seen, true = (
+        readings(shift, duration=400.0) for shift in (PlantPerturbation(noise=0.02), PlantPerturbation())
+    )
     scales = reading_scales(turbine)
-    assert np.array_equal(seen[:, 0], 0.1 * np.arange(4000))  # the clock is exact
-    np.testing.assert_allclose(seen[:, 1:].std(axis=0), 0.02 * scales[1:], rtol=0.06)
-    assert np.abs(seen[:, 1:].mean(axis=0) / (0.02 * scales[1:])).max() < 0.06
-    correlation = np.corrcoef(seen[:, 1:].T) - np.eye(seen.shape[1] - 1)
+    assert np.array_equal(seen[:, 0], true[:, 0])  # the clock is exact
+    noise = (seen - true)[1:, 1:] / (0.02 * scales[1:])
+    np.testing.assert_allclose(noise.std(axis=0), 1.0, rtol=0.06)
+    assert np.abs(noise.mean(axis=0)).max() < 0.06
+    correlation = np.corrcoef(noise.T) - np.eye(noise.shape[1])
     assert np.abs(correlation).max() < 0.08
-    assert inner.seen[0] == inner.seen[1]  # one reading per instant, also that of the start
+    assert np.array_equal(seen[0], seen[1])  # one reading per instant, also that of the start
 
 
-def test_a_delay_shows_what_was_measured_as_many_periods_ago(turbine):
-    controller, inner = mismatched(PlantPerturbation(delay=2), turbine)
-    controller.reset(measured(0.0, surge=0.0))
-    for step in range(6):
-        controller.act(measured(0.1 * step, surge=float(step)))
-    assert [reading.surge for reading in inner.seen[1:]] == [0.0, 0.0, 0.0, 1.0, 2.0, 3.0]
+def test_a_delay_shows_what_was_measured_as_many_periods_ago():
+    late, true = readings(PlantPerturbation(delay=2)), readings(PlantPerturbation())
+    assert np.array_equal(late[3:, 1:], true[1:-2, 1:])
+    assert np.array_equal(late[:3, 1:], true[[0, 0, 0], 1:])
+    assert np.array_equal(late[:, 0], true[:, 0])
 
 
 def test_noise_is_on_the_readings_and_not_in_the_metrics():
@@ -155,15 +145,11 @@ def test_noise_is_on_the_readings_and_not_in_the_metrics():
     assert felt["RotSpeed_std_[rpm]"] == pytest.approx(truth["RotSpeed_std_[rpm]"], rel=0.1)
 
 
-def test_the_same_seed_gives_the_same_bits_and_another_other_noise(turbine):
+def test_the_same_seed_gives_the_same_bits_and_another_other_noise():
     rows = [short(["gspi_oc3"], windy(PlantPerturbation(noise=0.02))).iloc[0] for _ in range(2)]
     assert rows[0].equals(rows[1])
-    readings = []
-    for seed in (1, 1, 2):
-        controller, inner = mismatched(PlantPerturbation(noise=0.02), turbine, seed)
-        controller.reset(measured(0.0))
-        readings.append(inner.seen[0])
-    assert readings[0] == readings[1] != readings[2]
+    first = [readings(PlantPerturbation(noise=0.02), seed, 1.0)[0] for seed in (1, 1, 2)]
+    assert np.array_equal(first[0], first[1]) and not np.array_equal(first[0], first[2])
 
 
 def test_a_suite_may_carry_shifts_and_names_wrong_ones(tmp_path):

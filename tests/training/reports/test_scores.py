@@ -5,9 +5,8 @@ import pandas as pd
 import pytest
 
 from fowt_env.errors import InputError
-from fowt_env.training.evaluation.bootstrap import interquartile_mean
 from fowt_env.training.evaluation.evaluate import COLUMNS
-from fowt_env.training.evaluation.metrics import METRICS
+from fowt_env.training.evaluation.metrics import METRICS, mean_exponent
 from fowt_env.training.reports.scores import (
     COUNTS,
     FIGURES,
@@ -31,7 +30,7 @@ def table(agents, cases=("ntm_18",)):
     for c, case in enumerate(cases):
         for seed in range(seeds):
             for name, ratios in {"base": [1.0] * seeds, **agents}.items():
-                row = dict.fromkeys(COLUMNS, 0.0)
+                row = dict.fromkeys(COLUMNS, 0.0) | {"weight_[-]": np.nan}
                 row |= {"controller": name, "case": case, "seed": seed, "status": "ok", "reason": ""}
                 rows.append(row | {figure.metric: ratios[seed] * (c + seed + 1.0) for figure in FIGURES})
     return pd.DataFrame(rows, columns=list(COLUMNS))
@@ -47,16 +46,20 @@ def test_identical_runs_have_ratio_one_with_an_interval_without_width():
     assert (scores[["ratio", "low", "high"]] == 1.0).all(axis=None)
     assert (scores["pairs"] == 8).all()
     verdicts = dict(zip(scores["figure"], scores["verdict"], strict=True))
-    assert verdicts["blade-pitch travel"] == "met*" and verdicts["rotor-speed std"] == "missed*"
+    assert verdicts["blade-pitch travel"] == "met" and verdicts["rotor-speed std"] == "missed*"
 
 
 def test_ratios_are_taken_run_by_run_and_the_interval_holds_the_mean():
     ratios = np.random.default_rng(1).normal(0.8, 0.05, 40)
     scores = agent_scores(table({"agent": ratios}), ["base"])
     assert list(scores["figure"]) == [figure.name for figure in FIGURES]
-    assert scores["ratio"].to_numpy() == pytest.approx(interquartile_mean(ratios))
+    weights = np.arange(1.0, 41.0)  # the baseline's figures
+    for _, row in scores.iterrows():
+        p = mean_exponent(row["metric"])
+        expected = (np.mean((ratios * weights) ** p) / np.mean(weights**p)) ** (1.0 / p)
+        assert row["ratio"] == pytest.approx(expected)
     assert (scores["low"] < scores["ratio"]).all() and (scores["ratio"] < scores["high"]).all()
-    assert (scores["high"] - scores["low"] < 0.06).all()
+    assert (scores["high"] - scores["low"] < 0.08).all()
 
 
 def test_a_group_is_scored_over_all_its_training_seeds():
@@ -67,7 +70,8 @@ def test_a_group_is_scored_over_all_its_training_seeds():
     scores = agent_scores(table(agents), ["base"], {"all": ["a", "b", "c", "e"]})
     assert set(scores["agent"]) == {"all", "d"}
     whole = scores[scores["agent"] == "all"].iloc[0]
-    assert whole["ratio"] == pytest.approx(interquartile_mean(sum((agents[k] for k in "abce"), [])))
+    singles = [agent_scores(table(agents), ["base"], agents=[k]).iloc[0]["ratio"] for k in "abce"]
+    assert whole["ratio"] == pytest.approx(np.mean(singles))
     assert (whole["runs"], whole["pairs"], whole["training_seeds"]) == (16, 16, 4)
     one = agent_scores(table(agents), ["base"], agents=["b"]).iloc[0]
     assert whole["high"] - whole["low"] > 3.0 * (one["high"] - one["low"])
@@ -89,8 +93,9 @@ def test_ratios_over_fewer_than_four_seeds_have_no_interval_and_the_text_says_so
 
 def test_ratios_of_deviations_have_intervals_above_zero_however_they_scatter():
     scores = agent_scores(table({"agent": [0.001, 0.5, 3.0, 0.01]}), ["base"]).set_index("figure")
-    assert (scores["low"].drop("mean power") > 0.0).all()
-    assert scores.loc["mean power", "low"] < 0.0  # power may be drawn from the grid
+    negative = {"energy", "largest power"}  # power may be drawn from the grid
+    assert (scores["low"].drop(list(negative)) > 0.0).all()
+    assert scores.loc["energy", "low"] < 0.0
 
 
 def test_an_agent_with_a_failed_run_reaches_no_aim():
@@ -100,16 +105,19 @@ def test_an_agent_with_a_failed_run_reaches_no_aim():
     assert set(scores["agent"]) == {"failed"} and scores["other", "rotor-speed std"] == "then*"
 
 
-def test_failed_runs_are_counted_and_left_out():
+def test_failed_runs_are_counted_and_have_the_worst_figures_of_their_case():
     runs = table({"agent": [0.5, 0.5, 0.5]})
     fail(runs, "agent", 2)
     scores, counts = agent_scores(runs, ["base"]), agent_counts(runs, ["base"])
-    assert (scores["pairs"] == 2).all() and (scores["runs"] == 3).all()
+    assert (scores["pairs"] == 3).all() and (scores["runs"] == 3).all() and (scores["failed"] == 1).all()
+    travel = scores.set_index("figure").loc["blade-pitch travel"]
+    assert travel["ratio"] == pytest.approx((0.5 + 1.0 + 3.0) / 6.0)  # not the 0.5 of those that went well
     assert list(counts["agent"]) == ["agent", "base"] and list(counts["failed"]) == [1, 0]
     assert list(counts["verdict"]) == ["missed", "met"]
-    fail(runs, "base", 0)
-    fail(runs, "base", 1)
-    with pytest.raises(InputError, match="no run of both succeeded"):
+    for name in ("agent", "base"):
+        for seed in range(3):
+            fail(runs, name, seed)
+    with pytest.raises(InputError, match="no run of both has a figure"):
         agent_scores(runs, ["base"])
 
 
@@ -132,33 +140,64 @@ def test_each_controller_stands_with_its_inputs():
 
 def test_a_baseline_at_zero_gives_no_ratio_and_the_pairs_say_so():
     runs = table({"agent": [0.5, 0.5]})
-    runs.loc[(runs["controller"] == "base") & (runs["seed"] == 1), "blade_pitch_travel_[deg/s]"] = 0.0
+    runs.loc[runs["controller"] == "base", "blade_pitch_travel_[deg/s]"] = 0.0
     scores = agent_scores(runs, ["base"]).set_index("figure")
-    assert scores.loc["blade-pitch travel", "pairs"] == 1 and scores.loc["power std", "pairs"] == 2
-    assert scores.loc["blade-pitch travel", "ratio"] == 0.5
+    assert scores.loc["blade-pitch travel", "pairs"] == 0 and scores.loc["power std", "pairs"] == 2
+    assert np.isnan(scores.loc["blade-pitch travel", "ratio"])
+    assert scores.loc["blade-pitch travel", "verdict"] == ""
 
 
-def test_verdicts_name_the_aim_that_is_reached_and_whether_all_of_the_interval_does():
+def test_verdicts_name_the_aim_that_is_reached_and_whether_that_is_sure():
     down, up = Figure("x", "x", 0.8, 0.6), Figure("p", "p", 0.995, more=True)
-    assert down.verdict(0.55, 0.5, 0.6) == "then*"
-    assert down.verdict(0.55, 0.5, 0.7) == "then, first*"
-    assert down.verdict(0.55, 0.5, 0.9) == "then"
-    assert down.verdict(0.7, 0.5, 0.79) == "first*" and down.verdict(0.7, 0.5, 0.81) == "first"
-    assert down.verdict(0.9, 0.7, 1.0) == "missed" and down.verdict(0.9, 0.81, 1.0) == "missed*"
-    assert up.verdict(1.0, 0.996, 1.1) == "met*" and up.verdict(1.0, 0.99, 1.1) == "met"
-    assert up.verdict(0.9, 0.8, 0.99) == "missed*" and up.verdict(0.9, 0.8, 1.0) == "missed"
-    assert down.verdict(0.7, np.nan, np.nan) == "first" and down.verdict(np.nan, np.nan, np.nan) == ""
+    assert down.verdict(0.55, (True, True)) == "then*"
+    assert down.verdict(0.55, (True, False)) == "then, first*"
+    assert down.verdict(0.55, (False, False)) == down.verdict(0.55) == "then"
+    assert down.verdict(0.7, (True, False)) == "first*" and down.verdict(0.7, (False, True)) == "first"
+    assert down.verdict(0.9, (False, True)) == "missed" and down.verdict(0.9, (True, True)) == "missed*"
+    assert up.verdict(1.0, (True,)) == "met*" and up.verdict(1.0, (False,)) == "met"
+    assert up.verdict(0.9, (True,)) == "missed*" and up.verdict(0.9, (False,)) == "missed"
+    assert down.verdict(np.nan, (True, True)) == "" and down.verdict(0.5, (True, True), failed=1) == "failed"
+
+
+def test_a_star_needs_a_p_value_that_stands_the_correction_for_all_aims():
+    # one figure just below its aim, sure by itself; the others are at chance level
+    runs = table({"agent": [1.0, 1.01, 0.99, 1.005, 0.995, 1.0]})
+    factors = np.array([0.975, 0.98, 0.985, 0.99, 1.0, 0.985])
+    travel = "blade_pitch_travel_[deg/s]"
+    base = runs.loc[runs["controller"] == "base", travel].to_numpy()
+    runs.loc[runs["controller"] == "agent", travel] = base * factors
+    found = agent_scores(runs, ["base"]).set_index("figure").loc["blade-pitch travel"]
+    assert 0.005 < found["p_first"] < 0.05 and found["high"] < 1.0
+    assert found["holm_first"] > 0.05 and found["verdict"] == "met"
+    only = [figure for figure in FIGURES if figure.metric == travel]
+    alone = agent_scores(runs, ["base"], figures=only).iloc[0]
+    assert alone["holm_first"] == alone["p_first"] == found["p_first"] and alone["verdict"] == "met*"
+
+
+def test_cases_count_by_their_share_of_the_lifetime():
+    runs = table({"agent": [0.5] * 4}, ("ntm_12", "ntm_24"))
+    worse = (runs["controller"] == "agent") & (runs["case"] == "ntm_24")
+    runs.loc[worse, list(METRICS)] *= 4.0  # twice the baseline's
+    base = runs[runs["controller"] == "base"].groupby("case")["blade_pitch_travel_[deg/s]"].mean()
+    for share in (0.0, 0.25, 1.0):
+        runs["weight_[-]"] = np.where(runs["case"] == "ntm_24", share, 1.0 - share)
+        ratio = agent_scores(runs, ["base"]).set_index("figure").loc["blade-pitch travel", "ratio"]
+        low, high = base["ntm_12"] * (1.0 - share), base["ntm_24"] * share
+        assert ratio == pytest.approx((0.5 * low + 2.0 * high) / (low + high))
 
 
 def test_kinds_of_cases_are_scored_apart_and_a_kind_that_failed_has_no_ratio():
     runs = table({"agent": [0.5, 0.6]}, ("soft_14", "soft_18", "stiff_14"))
-    runs.loc[(runs["controller"] == "agent") & (runs["case"] == "stiff_14"), "status"] = "failed"
+    for name in ("agent", "base"):
+        runs.loc[(runs["controller"] == name) & (runs["case"] == "stiff_14"), ["status", *METRICS]] = [
+            "failed", *[np.nan] * len(METRICS)
+        ]  # fmt: skip
     scores, counts = by_kind(runs, "base")
     soft = scores[scores["kind"] == "soft"]
-    assert (soft["pairs"] == 4).all() and soft["ratio"].to_numpy() == pytest.approx(0.55)
+    assert (soft["pairs"] == 4).all() and soft["ratio"].between(0.55, 0.6).all()
     assert scores.loc[scores["kind"] == "stiff", "ratio"].isna().all()
     text = kinds_markdown(scores, counts, ["rotor-speed std"])
-    assert "| stiff | - |" in text and "| stiff | 2 / 0 of 2 | 0 / 0 of 2 |" in text
+    assert "| stiff | - |" in text and "| stiff | 2 / 0 of 2 | 2 / 0 of 2 |" in text
     every, _ = by_kind(runs, "base", each=True)
     assert list(dict.fromkeys(every["kind"])) == ["soft_14", "soft_18", "stiff_14"]
     assert [kind_of(name) for name in ("ntm_18", "ntm_11_4", "eog_rated", "ss_5")] == [
@@ -182,7 +221,7 @@ def test_any_metric_may_be_a_figure_without_an_aim():
     runs["PtfmPitch_max_[deg]"] = runs["PtfmPitch_std_[deg]"]
     scores, _ = by_kind(runs, "base", figures=figures_named(["PtfmPitch_max_[deg]", "power std"]))
     assert list(scores["figure"]) == ["PtfmPitch_max_[deg]", "power std"]
-    assert scores["ratio"].to_numpy() == pytest.approx(0.55) and list(scores["verdict"]) == ["", "met"]
+    assert scores["ratio"].between(0.55, 0.6).all() and list(scores["verdict"]) == ["", "met"]
 
 
 def test_the_text_has_a_table_per_baseline_and_one_of_failures():

@@ -1,0 +1,75 @@
+"""Nacelle lidars: where their beams look, how they average along them, how often; by name or from a file."""
+
+import functools
+from typing import Annotated
+
+from pydantic import Field, model_validator
+
+from fowt_env.descriptions.files import DATA, locate, raise_problems, read_toml
+from fowt_env.descriptions.records import Record, bounded, validate
+
+Angle = bounded(gt=-60.0, lt=60.0)  # deg
+Distance = bounded(ge=10.0, le=1000.0)  # m
+
+
+class Lidar(Record):
+    """A lidar on the nacelle that looks upwind; keys and units as in data/lidars.toml.
+
+    Either azimuth and elevation of each beam, or beams and half_angle; either pulse_length, or lens_radius
+    and wavelength; with none of these it measures at points.
+    """
+
+    name: str = ""
+    azimuth: tuple[Angle, ...] = ()  # deg to the left, looking upwind from above: towards +y
+    elevation: tuple[Angle, ...] = ()  # deg upwards
+    beams: Annotated[int, Field(strict=True, ge=1, le=1000)] | None = None
+    half_angle: bounded(gt=0.0, lt=60.0) | None = None  # deg
+    distances: tuple[Distance, ...]  # m from the lidar along the wind, increasing
+    pulse_length: bounded(gt=0.0, le=500.0) | None = None  # m
+    lens_radius: bounded(ge=1e-3, le=1.0) | None = None  # m
+    wavelength: bounded(ge=1e-7, le=1e-4) | None = None  # m
+    scan_period: bounded(ge=0.0, le=60.0) = 0.0  # s in which every beam measures once
+    behind_rotor: bounded(ge=0.0, le=100.0) | None = None  # m downwind of the rotor plane; None: unobstructed
+    above_shaft: bounded(gt=-50.0, lt=50.0) = 0.0  # m
+    source: str = ""
+    confidence: str = ""
+
+    @model_validator(mode="after")
+    def _consistent(self):
+        cone = (self.beams is not None) + (self.half_angle is not None)
+        if cone == 1 or (cone == 2) == bool(self.azimuth) or len(self.azimuth) != len(self.elevation):
+            raise ValueError("needs azimuth and elevation, equally long, or else beams and half_angle")
+        optics = (self.lens_radius is not None) + (self.wavelength is not None)
+        if optics == 1 or (optics == 2 and self.pulse_length is not None):
+            raise ValueError("needs pulse_length, or else lens_radius and wavelength, or none of these")
+        pairs = zip(self.distances[:-1], self.distances[1:], strict=True)
+        if not self.distances or any(far <= near for near, far in pairs):
+            raise ValueError(f"distances = {self.distances}: must be at least one, increasing, m")
+        return self
+
+
+@functools.cache
+def lidars():
+    """{name: Lidar} of the built-in lidars."""
+    path = DATA / "lidars.toml"
+    found, problems = {}, []
+    for name, entry in read_toml(path, "lidar")["lidar"].items():
+        found[name], wrong = validate(Lidar, {"name": name, **entry})
+        problems += [f"lidar.{name}: {problem}" for problem in wrong]
+    raise_problems(f"lidar file {str(path)!r}", problems)
+    return found
+
+
+def read_lidar(lidar):
+    """Lidar of a built-in name (lidars()), a path to a TOML file with the keys at its top, or itself.
+
+    Raises: InputError naming the key, value and allowed range.
+    """
+    if isinstance(lidar, Lidar):
+        return lidar
+    if isinstance(lidar, str) and lidar in lidars():
+        return lidars()[lidar]
+    path = locate("lidar", lidar, lidars())
+    read, problems = validate(Lidar, {"name": path.stem, **read_toml(path, "lidar")})
+    raise_problems(f"lidar file {str(path)!r}", problems)
+    return read

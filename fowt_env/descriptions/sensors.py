@@ -1,0 +1,117 @@
+"""Sensor chains: what stands between the plant's true motions and what a controller reads."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from functools import cache
+from typing import Any
+
+from fowt_env.descriptions.checks import check_number
+from fowt_env.descriptions.files import DATA, read_toml
+from fowt_env.errors import InputError, unknown
+from fowt_env.plant.measurement import Measurement
+
+EXACT = "exact"
+LONGEST_DELAY = 100.0  # s
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """How one field of a Measurement is read: low pass, delay, noise and quantisation, in this order; SI.
+
+    Raises: InputError naming the key, value and allowed range.
+    """
+
+    noise: float = 0.0  # standard deviation of white noise on each reading
+    time_constant: float = 0.0  # s, of a first-order low pass; 0: none
+    delay: float = 0.0  # s from measurement to reading, taken as the nearest whole number of control periods
+    step: float = 0.0  # of the quantisation; 0: none
+    integral_of: str | None = (
+        None  # field whose reading is integrated instead, as an acceleration to a velocity
+    )
+    high_pass: float = 0.0  # rad/s, of the first-order high pass on such an integral
+    source: str = ""
+    confidence: str = ""
+
+    def __post_init__(self) -> None:
+        for key in ("noise", "time_constant", "step", "high_pass"):
+            check_number(key, getattr(self, key), 0.0, allowed=">= 0 and finite")
+        check_number("delay", self.delay, 0.0, LONGEST_DELAY)
+
+
+@dataclass(frozen=True)
+class SensorChain:
+    """Sensors by the field of Measurement that they show; no controller can read what a chain does not have.
+
+    The time is always read as it is. Raises: InputError naming the field, key, value and allowed range.
+    """
+
+    name: str
+    sensors: Mapping[str, Sensor] = field(default_factory=dict)
+    description: str = ""
+
+    def __post_init__(self) -> None:
+        where = f"sensor chain {self.name!r}"
+        known = [name for name in Measurement._fields if name != "time"]
+        for name, sensor in self.sensors.items():
+            if name not in known:
+                raise unknown(f"field of {where}:", name, known)
+            if not isinstance(sensor, Sensor):
+                raise InputError(f"{where}: {name} = {sensor!r}: must be a Sensor")
+            measured = sensor.integral_of
+            if measured is None:
+                continue
+            if measured not in self.sensors or self.sensors[measured].integral_of is not None:
+                raise InputError(
+                    f"{where}: {name}.integral_of = {measured!r}: must be a field that the chain measures"
+                )
+            if sensor != Sensor(
+                integral_of=measured,
+                high_pass=sensor.high_pass,
+                source=sensor.source,
+                confidence=sensor.confidence,
+            ):
+                raise InputError(
+                    f"{where}: {name}: an integral has integral_of and high_pass; noise, time_constant, delay"
+                    f" and step are those of {measured}"
+                )
+
+    @property
+    def available(self) -> tuple[str, ...]:
+        """Fields that the chain shows, in the order of Measurement."""
+        return tuple(name for name in Measurement._fields if name in self.sensors)
+
+
+@cache
+def built_in_chains() -> dict[str, SensorChain]:
+    """{name: SensorChain} of fowt_env/data/sensors.toml."""
+    table = read_toml(DATA / "sensors.toml", "sensors")["chain"]
+    return {name: _chain(name, entries) for name, entries in table.items()}
+
+
+def _chain(name: str, entries: dict[str, Any]) -> SensorChain:
+    known = [item.name for item in fields(Sensor)]
+    sensors = {}
+    for quantity, figures in entries.items():
+        if quantity == "description":
+            continue
+        for key in figures:
+            if key not in known:
+                raise unknown(f"key of sensor {name}.{quantity}:", key, known)
+        sensors[quantity] = Sensor(**figures)
+    return SensorChain(name, sensors, entries.get("description", ""))
+
+
+def sensor_chain(given: str | SensorChain | None) -> SensorChain | None:
+    """The SensorChain of what a run is given as sensors; None, as for "exact", where readings are exact.
+
+    Raises: InputError for an unknown name and for anything that is no chain.
+    """
+    if given is None or isinstance(given, SensorChain):
+        return given
+    if not isinstance(given, str):
+        raise InputError(f"sensors = {given!r}: must be the name of a sensor chain, a SensorChain or None")
+    if given == EXACT:
+        return None
+    if given not in built_in_chains():
+        raise unknown("sensor chain", given, (EXACT, *built_in_chains()))
+    return built_in_chains()[given]

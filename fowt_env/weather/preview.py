@@ -1,0 +1,121 @@
+"""The wind that is still on its way to the rotor, as a controller with a preview may see it.
+
+What a preview holds is the wind alone, as series over the run, so that a controller that declares some
+look-ahead times can be given these and nothing else of the future.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from fowt_env.descriptions.checks import is_number
+from fowt_env.errors import InputError
+from fowt_env.weather.wind_field import WindBox, rotor_average
+
+LONGEST = 600.0  # s ahead
+SAME_INSTANT = 1e-9  # s within which two instants are one
+
+
+class Motion(NamedTuple):
+    """How the fore-aft velocity of the nacelle, positive downwind, gets into the preview of a lidar on it.
+
+    With y the velocity behind a first-order low pass of the corner, dy/dt = corner (velocity - y),
+    z(t) = sum of weight_k y(t - offset_k), and the value j of the preview is changed by -z(t - delay_j).
+    """
+
+    corner: float  # rad/s; inf: no low pass
+    offset: np.ndarray  # (k,) s
+    weight: np.ndarray  # (k,) adding up to 1
+    delay: np.ndarray  # (len(times),) s
+
+
+class Preview(NamedTuple):
+    """Wind along x over the rotor some times ahead, as it is known: values[j] of t + times[j] at time t."""
+
+    time: np.ndarray  # (n,) s, increasing; the ends are held
+    values: np.ndarray  # (len(times), n) m/s
+    motion: Motion | None = None  # what the nacelle's own motion adds to it; None: nothing
+
+
+def check_times(times):
+    """(k,) look-ahead times (s), increasing, from 0 to LONGEST. Raises: InputError."""
+    if isinstance(times, (str, bytes)) or not np.iterable(times):
+        raise InputError(f"preview_times = {times!r}: must be a list of times in s")
+    times = tuple(times)
+    for time in times:
+        if not is_number(time) or not 0.0 <= time <= LONGEST:
+            raise InputError(f"preview_times = {times!r}: each must be a number in [0, {LONGEST:g}] s")
+    if any(late <= early for early, late in zip(times[:-1], times[1:], strict=True)):
+        raise InputError(f"preview_times = {times!r}: must increase")
+    return np.array(times, dtype=np.float64)
+
+
+def rotor_wind_series(scene):
+    """(time s, wind m/s, period s or None): wind along x averaged over the rotor, as the scene has it.
+
+    Raises: InputError for a scene without wind.
+    """
+    if scene.model.aero is None:
+        raise InputError("preview: needs a scene with wind to look ahead")
+    if isinstance(scene.wind, WindBox):
+        rotor, box = scene.turbine.rotor, scene.wind
+        time, value = rotor_average(box, rotor.hub_height, 2.0 * rotor.tip_radius)
+        return time, value[:, 0], len(value) * box.dt if box.periodic else None
+    series = scene.model.aero.wind
+    return series.time, series.value[:, 0], series.period if series.period > 0.0 else None
+
+
+def exact_preview(scene, times):
+    """Preview of the rotor-averaged wind at times (k,) s ahead, without error: the most that can be known.
+
+    Linear between the samples of the scene's wind, whatever the times ahead; random wind repeats with its
+    period, and of other wind the last value holds, as in the plant.
+    Raises: InputError for times that do not increase from 0 to 600 s, or a scene without wind.
+    """
+    return series_ahead(scene, *rotor_wind_series(scene), check_times(times))
+
+
+def series_ahead(scene, start, speed, period, times):
+    """Preview of a speed (n,) m/s at times start (n,) s that repeats with a period (s), or holds its ends."""
+    end = max(scene.options["duration"], start[-1])
+    knots = start
+    if period is not None:
+        first, last = np.floor(-start[0] / period), np.ceil((end + LONGEST) / period)
+        knots = (start + period * np.arange(first, last + 1.0)[:, None]).ravel()
+    # every instant at which one of the values bends
+    time = np.concatenate([[0.0, end], *(knots - ahead for ahead in times)])
+    time = np.sort(time[(time >= 0.0) & (time <= end)])
+    time = time[np.concatenate([[True], np.diff(time) > SAME_INSTANT])]
+    values = np.array([np.interp(time + ahead, start, speed, period=period) for ahead in times])
+    return Preview(time, values.reshape(len(times), time.size))
+
+
+def add_motion(preview, time, velocity):
+    """(len(times), n) values of a preview at times (n,) s, with what the nacelle's velocity (n,) m/s changes.
+
+    The reference of what a run does step by step. The velocity, positive downwind, is linear between the
+    times, which are even; before the first it stood at its first value.
+    """
+    values = np.array([np.interp(time, preview.time, value) for value in preview.values])
+    if preview.motion is None:
+        return values
+    corner, offset, weight, delay = preview.motion
+    slow = low_passed(velocity, corner * (time[1] - time[0]))
+    mixed = sum(w * np.interp(time - o, time, slow) for o, w in zip(offset, weight, strict=True))
+    return values - np.array([np.interp(time - late, time, mixed) for late in delay])
+
+
+def low_passed(value, step):
+    """(n,) a series, linear between its samples, behind a first-order low pass that starts settled.
+
+    step: time between samples times the corner, rad.
+    """
+    if np.isinf(step):
+        return np.array(value, dtype=np.float64)
+    decay = np.exp(-step)
+    new = 1.0 - (1.0 - decay) / step  # exact for a ramp from one sample to the next
+    old = 1.0 - decay - new
+    slow = np.array(value, dtype=np.float64)
+    for i in range(1, slow.size):
+        slow[i] = decay * slow[i - 1] + old * value[i - 1] + new * value[i]
+    return slow

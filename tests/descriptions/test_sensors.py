@@ -1,0 +1,57 @@
+"""Chains of sensors: what they are made of, and what is refused."""
+
+import pytest
+
+from fowt_env.descriptions.sensors import EXACT, Sensor, SensorChain, built_in_chains, sensor_chain
+from fowt_env.errors import InputError
+from fowt_env.plant.measurement import SENSOR_FIELDS
+
+
+@pytest.mark.parametrize("name", sorted(built_in_chains()))
+def test_every_figure_of_a_built_in_chain_has_a_source_and_a_mark(name):
+    chain = built_in_chains()[name]
+    assert chain.name == name and chain.description
+    for sensor in chain.sensors.values():
+        assert sensor.source and sensor.confidence in tuple("ABCD")
+
+
+def test_the_standard_chain_has_the_sensors_of_a_turbine_and_no_motion_that_none_measures():
+    available = set(built_in_chains()["standard"].available)
+    assert set(SENSOR_FIELDS) - available == {"time", "platform_pitch_acceleration"}
+    assert available - set(SENSOR_FIELDS) == {"wind_speed"}
+
+
+def test_a_name_a_chain_and_nothing_at_all_are_understood():
+    own = SensorChain("own", {"rotor_speed": Sensor(noise=0.1)})
+    assert sensor_chain(own) is own and sensor_chain("standard") is built_in_chains()["standard"]
+    assert sensor_chain(None) is None and sensor_chain(EXACT) is None
+    with pytest.raises(InputError, match="unknown sensor chain 'standart'. Did you mean 'standard'"):
+        sensor_chain("standart")
+    with pytest.raises(InputError, match="sensors = 0.02: must be the name"):
+        sensor_chain(0.02)
+
+
+@pytest.mark.parametrize(
+    "key, value", [("noise", -1.0), ("time_constant", -0.1), ("delay", 101.0), ("step", "x")]
+)
+def test_a_figure_out_of_range_is_named(key, value):
+    with pytest.raises(InputError, match=f"{key} = "):
+        Sensor(**{key: value})
+
+
+@pytest.mark.parametrize(
+    "sensors, message",
+    [
+        ({"rotor_sped": Sensor()}, "unknown field of sensor chain 'own'"),
+        ({"time": Sensor()}, "unknown field of sensor chain 'own'"),
+        ({"rotor_speed": 0.1}, "rotor_speed = 0.1: must be a Sensor"),
+        ({"nacelle_velocity": Sensor(integral_of="nacelle_acceleration")}, "must be a field that the chain"),
+        (
+            {"surge": Sensor(), "surge_rate": Sensor(integral_of="surge", noise=0.1)},
+            "surge_rate: an integral has integral_of and high_pass",
+        ),
+    ],
+)
+def test_a_chain_that_cannot_be_is_refused(sensors, message):
+    with pytest.raises(InputError, match=message):
+        SensorChain("own", sensors)

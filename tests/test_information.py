@@ -1,0 +1,392 @@
+"""What a controller is given of a run: what it declares, through its sensors, and no weather ahead."""
+
+import copy
+import pickle
+
+import numpy as np
+import pandas as pd
+import pytest
+from naive.sensors import NaiveSensors
+
+import fowt_env
+from fowt_env.control import (
+    PRIVILEGED_INPUTS,
+    CompiledController,
+    MeasurementView,
+    hidden,
+    known_scene,
+    make,
+    view_of,
+)
+from fowt_env.controllers import CONTROLLERS
+from fowt_env.descriptions.sensors import Sensor, SensorChain, built_in_chains
+from fowt_env.errors import ControllerError, InputError, SimulationStopped
+from fowt_env.plant.compile.decorators import control_kernel
+from fowt_env.plant.measurement import N_MEASUREMENTS, SENSOR_FIELDS, Measure, Measurement
+from fowt_env.weather.preview import Preview, exact_preview, rotor_wind_series
+from fowt_env.weather.sensor_noise import draw_noise
+
+GUST = {"kind": "steps", "speeds": [17.0, 19.0, 16.0], "every": 10.0, "ramp": 4.0}
+ONES = Measurement(*[1.0 + i for i in range(N_MEASUREMENTS)])
+
+
+@pytest.fixture(scope="module")
+def gust_scene():
+    return fowt_env.build_scene("oc3_hywind", wind=GUST, duration=60.0, fidelity="standard")
+
+
+def run(scene, controller, **options):
+    return fowt_env.simulate(scene, controller, **{"duration": 6.0} | options)
+
+
+@control_kernel
+def remember(parameters, memory, measurement, command):
+    """Keep each reading and the command in force, one after another, and hold a sound command."""
+    size = int(parameters[0])
+    place = 1 + int(memory[0]) * (size + 2)
+    memory[0] += 1.0
+    for i in range(size):
+        memory[place + i] = measurement[i]
+    memory[place + size], memory[place + size + 1] = command[0], command[1]
+    command[0], command[1] = 43093.55, 0.26
+
+
+class Recorder(CompiledController):
+    """A compiled law that keeps what it reads."""
+
+    kernel = staticmethod(remember)
+
+    def __init__(self, information, preview_times=(), calls=60):
+        self.information, self.preview_times = tuple(information), tuple(preview_times)
+        size = N_MEASUREMENTS + len(self.preview_times)
+        super().__init__("recorder", [float(size)], 1 + calls * (size + 2))
+        self.shape = calls, size + 2
+
+    def reset(self, measurement):
+        self.first = measurement
+
+    def seen(self):
+        """(calls, readings and the command in force)."""
+        return self.memory[1:].reshape(self.shape)[: int(self.memory[0])]
+
+
+class Watcher:
+    """The same in Python."""
+
+    def __init__(self, information=None, preview_times=None):
+        self.rows = []
+        if information is not None:
+            self.information = information
+        if preview_times is not None:
+            self.preview_times = preview_times
+
+    def reset(self, measurement):
+        self.first = np.array(measurement)
+
+    def act(self, measurement):
+        self.rows.append([*measurement, *getattr(measurement, "_ahead", ())])
+        return 43093.55, 0.26
+
+
+# Measurements
+
+
+def test_a_compiled_law_reads_nothing_but_what_it_declares_and_the_time(gust_scene):
+    declared = ("rotor_speed", "blade_pitch")
+    some, every = Recorder(declared), Recorder(Measurement._fields)
+    run(gust_scene, some)
+    run(gust_scene, every)
+    shown = [Measure[name.upper()] for name in ("time", *declared)]
+    rest = [i for i in range(N_MEASUREMENTS) if i not in shown]
+    assert np.isnan(some.seen()[:, rest]).all()
+    assert np.array_equal(some.seen()[:, shown], every.seen()[:, shown])
+    assert np.isfinite(every.seen()).all()
+
+
+def test_the_command_in_force_is_part_of_what_is_declared(gust_scene):
+    torque, pitch = Recorder(("generator_torque",)), Recorder(("blade_pitch",))
+    run(gust_scene, torque)
+    run(gust_scene, pitch)
+    assert np.isfinite(torque.seen()[:, -2]).all() and np.isnan(torque.seen()[:, -1]).all()
+    assert np.isnan(pitch.seen()[:, -2]).all() and np.isfinite(pitch.seen()[:, -1]).all()
+
+
+def test_python_and_compiled_controllers_are_given_the_same(gust_scene):
+    information, leads = ("surge", "rotor_speed", "wind_preview"), (2.0, 5.0)
+    compiled, plain = Recorder(information, leads), Watcher(information, leads)
+    one, other = run(gust_scene, compiled), run(gust_scene, plain)
+    pd.testing.assert_frame_equal(one, other, check_exact=True)
+    assert np.array_equal(compiled.seen()[:, :-2], np.array(plain.rows), equal_nan=True)
+
+
+def test_what_a_python_controller_does_not_declare_raises_by_name_and_by_index(gust_scene):
+    class Curious(Watcher):
+        name = "curious"
+
+        def act(self, measurement):
+            return self.asks(measurement)
+
+    for asks in (lambda m: m.wind_speed, lambda m: m[Measure.WIND_SPEED], lambda m: m[-2]):
+        curious = Curious(("rotor_speed",))
+        curious.asks = asks
+        with pytest.raises(
+            ControllerError, match=r"'curious' reads 'wind_speed' at t = 0.000 s.*information"
+        ):
+            run(gust_scene, curious)
+    curious = Curious(("rotor_speed",))
+    curious.asks = lambda m: m.wind_preview
+    with pytest.raises(ControllerError, match="'wind_preview'.*preview_times"):
+        run(gust_scene, curious)
+
+
+def test_a_view_is_a_measurement_with_nan_for_the_rest():
+    view = view_of(make(Watcher(("surge", "wind_preview"), (1.0,)), None, 0.1))([*ONES, 17.5])
+    assert isinstance(view, Measurement) and isinstance(view, MeasurementView)
+    assert view.surge == ONES.surge and view.time == ONES.time and view.wind_preview == (17.5,)
+    values = np.array(view)
+    shown = [Measure.TIME, Measure.SURGE]
+    assert np.array_equal(np.flatnonzero(np.isfinite(values)), shown)
+    assert view[Measure.SURGE] == ONES.surge and np.isnan(view[6:8]).all()
+    later = view._replace(time=9.0)
+    assert later.time == 9.0 and later.wind_preview == (17.5,)
+    with pytest.raises(ControllerError, match="heave"):
+        _ = later.heave
+    for same in (copy.deepcopy(view), pickle.loads(pickle.dumps(view))):
+        assert np.array_equal(np.array(same), values, equal_nan=True)
+
+
+def test_a_controller_that_declares_nothing_is_given_the_turbine_s_own_sensors(gust_scene):
+    watcher = Watcher()
+    run(gust_scene, watcher)
+    shown = np.flatnonzero(np.isfinite(watcher.rows[3]))
+    assert shown.tolist() == sorted(Measure[name.upper()] for name in SENSOR_FIELDS)
+    assert not {"wind_speed", "wave_elevation", "surge"} & set(SENSOR_FIELDS)
+
+
+def test_act_of_a_compiled_law_hides_what_the_compiled_loop_hides():
+    law = Recorder(("rotor_speed",))
+    law.act(ONES)
+    assert np.array_equal(np.flatnonzero(np.isfinite(law.seen()[0, :N_MEASUREMENTS])), [0, 1])
+    with pytest.raises(InputError, match=r"measurement has shape \(22,\): must be \(24,\)"):
+        Recorder(("wind_preview",), (1.0, 2.0)).act(ONES)
+
+
+def test_a_law_that_works_with_what_it_was_not_given_is_stopped_with_the_reason(gust_scene):
+    class Leaky(Recorder):
+        kernel = staticmethod(leak)
+
+    with pytest.raises(SimulationStopped, match="command is not finite.*declare") as caught:
+        run(gust_scene, Leaky(("rotor_speed",)))
+    assert caught.value.time == 0.0
+
+
+@control_kernel
+def leak(parameters, memory, measurement, command):
+    """Command with the wind."""
+    command[0], command[1] = 40000.0, 0.01 * measurement[20]
+
+
+@pytest.mark.parametrize("information", [("rotor_sped",), ("weather",)])
+def test_an_unknown_name_is_refused(gust_scene, information):
+    with pytest.raises(InputError, match="unknown information of controller 'Watcher'"):
+        run(gust_scene, Watcher(information))
+
+
+@pytest.mark.parametrize("name", sorted(set(CONTROLLERS) - {"rosco", "rosco_float"}))
+def test_every_built_in_controller_declares_all_that_it_uses(gust_scene, name):
+    """Its run is that of one that is given everything."""
+    honest = make(name, gust_scene.turbine, 0.1)
+    told = make(name, gust_scene.turbine, 0.1)
+    told.information = (*Measurement._fields, *(x for x in honest.information if x in PRIVILEGED_INPUTS))
+    one, other = run(gust_scene, honest, duration=20.0), run(gust_scene, told, duration=20.0)
+    pd.testing.assert_frame_equal(one, other, check_exact=True)
+    assert np.isfinite(one.to_numpy()).all()
+
+
+# The scene
+
+
+class Asking(Watcher):
+    def prepare(self, scene):
+        self.scene = scene
+
+
+def test_prepare_is_given_the_plant_without_its_weather_where_it_is_declared(storm_scene):
+    asking = Asking(("rotor_speed", "plant_model"))
+    fowt_env.simulate(storm_scene, asking, duration=0.5)
+    known = asking.scene
+    rated = storm_scene.turbine.rated_wind_speed
+    assert (known.wind, known.wind_speed, known.sea, known.seed) == (rated, rated, None, 0)
+    assert known.platform is storm_scene.platform and known.turbine is storm_scene.turbine
+    wind, waves = known.model.aero.wind, known.model.hydro.waves
+    assert wind.value.shape == (1, 5) and wind.value[0].tolist() == [rated, 0.0, 0.0, 0.0, 0.0]
+    assert not waves.amplitude.any() and len(waves.omega) == 1
+
+
+def test_prepare_is_given_the_turbine_alone_where_it_is_not(storm_scene):
+    asking = Asking(("rotor_speed",))
+    fowt_env.simulate(storm_scene, asking, duration=0.5)
+    assert asking.scene.turbine is storm_scene.turbine
+    with pytest.raises(ControllerError, match="asks prepare's scene for 'model'.*'plant_model'"):
+        _ = asking.scene.model
+
+
+def test_no_design_depends_on_the_weather_that_prepare_is_not_given(storm_scene):
+    for name in ("lqr", "preview"):
+        told, known = (make(name, storm_scene.turbine, 0.1) for _ in range(2))
+        told.prepare(storm_scene)
+        known.prepare(known_scene(storm_scene, known))
+        assert np.array_equal(told.parameters, known.parameters)
+
+
+def test_a_controller_is_prepared_for_the_nominal_scene_where_there_is_one(gust_scene, storm_scene):
+    asking = Asking(("plant_model",))
+    run(gust_scene, asking, duration=0.5, nominal=storm_scene)
+    assert asking.scene.platform is storm_scene.platform and asking.scene.sea is None
+
+
+# The wind ahead
+
+
+def test_the_preview_is_the_wind_of_then_at_every_control_instant(gust_scene):
+    leads = (0.0, 1.25, 7.0)
+    law = Recorder(("wind_preview",), leads, calls=300)
+    run(gust_scene, law, duration=30.0)
+    time, speed, _ = rotor_wind_series(gust_scene)
+    seen = law.seen()
+    wanted = [np.interp(seen[:, 0] + lead, time, speed) for lead in leads]
+    np.testing.assert_allclose(seen[:, N_MEASUREMENTS:-2].T, wanted, rtol=0.0, atol=1e-9)
+    assert np.ptp(wanted) > 2.0
+
+
+def test_a_preview_of_ones_own_or_a_function_of_the_scene_takes_the_place_of_the_exact_one(gust_scene):
+    own = Preview(np.array([0.0, 4.0]), np.array([[10.0, 14.0]]))
+    law = Recorder(("wind_preview",), (3.0,))
+    run(gust_scene, law, preview=own)
+    assert law.seen()[:, N_MEASUREMENTS] == pytest.approx(np.minimum(10.0 + law.seen()[:, 0], 14.0))
+    told = []
+
+    def made(scene, times):
+        told.append((scene, times))
+        return exact_preview(scene, times)
+
+    same = Recorder(("wind_preview",), (3.0,)), Recorder(("wind_preview",), (3.0,))
+    run(gust_scene, same[0], preview=made)
+    run(gust_scene, same[1])
+    assert told == [(gust_scene, (3.0,))]
+    assert np.array_equal(same[0].seen(), same[1].seen(), equal_nan=True)
+
+
+@pytest.mark.parametrize(
+    "preview, message",
+    [
+        ("lidar", "unknown preview 'lidar'"),
+        (7, "preview = 7: must be 'exact', a Preview"),
+        (Preview(np.zeros(2), np.zeros((1, 2))), "time must increase"),
+        (Preview(np.arange(2.0), np.zeros((2, 2))), r"must be \(n,\) and \(1, n\)"),
+        (Preview(np.arange(2.0), np.full((1, 2), np.nan)), "must be finite"),
+    ],
+)
+def test_a_preview_that_cannot_be_used_is_refused(gust_scene, preview, message):
+    with pytest.raises(InputError, match=message):
+        run(gust_scene, Recorder(("wind_preview",), (3.0,)), preview=preview)
+
+
+@pytest.mark.parametrize(
+    "information, times, message",
+    [
+        (("wind_preview",), (), "declares 'wind_preview' and has no preview_times"),
+        ((), (1.0,), "does not declare 'wind_preview'"),
+        (("wind_preview",), (2.0, 1.0), "controller 'recorder': preview_times.*must increase"),
+    ],
+)
+def test_times_and_the_declaration_of_a_preview_go_together(gust_scene, information, times, message):
+    with pytest.raises(InputError, match=message):
+        run(gust_scene, Recorder(information, times))
+
+
+def test_in_still_air_there_is_nothing_to_look_ahead_at():
+    with pytest.raises(InputError, match="needs a scene with wind"):
+        run(fowt_env.build_scene("oc3_hywind"), Recorder(("wind_preview",), (1.0,)))
+
+
+# Sensors
+
+
+def test_a_field_that_the_chain_does_not_have_is_refused_where_it_is_declared(gust_scene):
+    message = (
+        "'recorder': declares 'surge', which the sensor chain 'standard' does not have; it has rotor_speed"
+    )
+    with pytest.raises(InputError, match=message):
+        run(gust_scene, Recorder(("surge",)), sensors="standard")
+    watcher = Watcher()
+    run(gust_scene, watcher, sensors="standard")
+    shown = {Measurement._fields[i] for i in np.flatnonzero(np.isfinite(watcher.rows[3]))}
+    assert shown == set(SENSOR_FIELDS) & {"time", *built_in_chains()["standard"].available}
+    assert np.isnan(hidden(make(watcher, None, 0.1))[Measure.SURGE])
+
+
+EVERY = SensorChain(
+    "every",
+    {
+        "rotor_speed": Sensor(noise=0.01, time_constant=0.3, delay=0.2, step=0.02),
+        "generator_speed": Sensor(),
+        "blade_pitch": Sensor(delay=0.5),
+        "generator_torque": Sensor(step=1000.0),
+        "platform_pitch": Sensor(time_constant=2.0),
+        "nacelle_acceleration": Sensor(noise=0.05, delay=0.1),
+        "nacelle_velocity": Sensor(integral_of="nacelle_acceleration", high_pass=0.3),
+    },
+)
+
+
+@pytest.mark.parametrize("chain", [EVERY, built_in_chains()["standard"]], ids=["every", "standard"])
+def test_readings_are_those_of_the_chain_taken_one_by_one(gust_scene, chain):
+    true, read = Recorder(Measurement._fields, calls=200), Recorder(chain.available, calls=200)
+    run(gust_scene, true, duration=20.0)
+    frame = run(gust_scene, read, duration=20.0, sensors=chain)
+    noise = {
+        name: chain.sensors[name].noise if name in chain.sensors else 0.0 for name in Measurement._fields
+    }
+    drawn = draw_noise(np.array(list(noise.values())), gust_scene.seed, 200)
+    twin = NaiveSensors(chain, 0.1, drawn)
+    for measured, reading in zip(true.seen(), read.seen(), strict=True):
+        wanted = twin.read(Measurement(*measured[:N_MEASUREMENTS]))
+        got = dict(zip(Measurement._fields, reading[:N_MEASUREMENTS], strict=True))
+        for name in Measurement._fields:
+            assert got[name] == pytest.approx(wanted.get(name, np.nan), rel=1e-12, abs=1e-12, nan_ok=True), (
+                name
+            )
+    pd.testing.assert_frame_equal(
+        frame, run(gust_scene, Recorder((), calls=200), duration=20.0), check_exact=True
+    )
+
+
+def test_exact_sensors_change_no_bit(storm_scene):
+    frames = [run(storm_scene, "lqr", sensors=sensors) for sensors in (None, "exact", ALL_EXACT)]
+    for frame in frames[1:]:
+        pd.testing.assert_frame_equal(frames[0], frame, check_exact=True)
+
+
+ALL_EXACT = SensorChain("all", {name: Sensor() for name in Measurement._fields if name != "time"})
+
+
+def test_every_controller_and_every_length_of_run_meets_the_same_noise(gust_scene):
+    short, long, plain = Recorder(("rotor_speed",)), Recorder(("rotor_speed",), calls=200), Watcher()
+    run(gust_scene, short, sensors="standard")
+    run(gust_scene, long, sensors="standard", duration=20.0)
+    run(gust_scene, plain, sensors="standard")
+    speed = short.seen()[:, Measure.ROTOR_SPEED]
+    assert np.array_equal(speed, long.seen()[:60, Measure.ROTOR_SPEED])
+    assert np.array_equal(speed, np.array(plain.rows)[:, Measure.ROTOR_SPEED])
+    assert short.first.rotor_speed == speed[0]  # what reset is given is the first reading
+
+
+def test_another_seed_has_other_noise():
+    speeds = []
+    for seed in (1, 2):
+        scene = fowt_env.build_scene("oc3_hywind", wind=18.0, seed=seed, duration=60.0, fidelity="standard")
+        law = Recorder(("rotor_speed",))
+        run(scene, law, sensors="standard")
+        speeds.append(law.seen()[:, Measure.ROTOR_SPEED])
+    assert np.abs(speeds[0] - speeds[1]).max() > 1e-3
