@@ -1,10 +1,10 @@
 """Model predictive control of torque and blade pitch on the estimate of lqr's Kalman filter.
 
 Every period the coming half minute is predicted: platform and waves by the linear models of
-controllers/lqr/design.py, the rotor's loads by its table of coefficients, the wind as its filter expects it or, where the wind
-ahead is shown, as that. One Newton step (plan.py) improves the plan of torque and blade-pitch rates; where it
-would pass a limit OSQP takes that step instead. The rates hold until the next period. An integral of the rotor
-speed's error leaves it without offset.
+controllers/lqr/design.py, the rotor's loads by its table of coefficients, the wind as its filter expects
+it or, where the wind ahead is shown, as that. One Newton step (plan.py) improves the plan of torque and
+blade-pitch rates; where it would pass a limit OSQP takes that step instead. The rates hold until the next
+period. An integral of the rotor speed's error leaves it without offset.
 """
 
 from enum import IntEnum
@@ -19,21 +19,21 @@ from fowt_env.controllers.lqr.design import WIND as ESTIMATED_WIND
 from fowt_env.controllers.lqr.estimator import ROTOR, estimate
 from fowt_env.controllers.lqr.law import LQR, WindEstimator
 from fowt_env.controllers.mpc.model import COMMAND, INTEGRAL, SPEED, TORQUE, WindModel, cost_rows, wind_model
-from fowt_env.controllers.mpc.plan import FILTER, Limit, grid_of, newton_step, shifted, work_of
+from fowt_env.controllers.mpc.plan import FILTER, grid_of, newton_step, shifted, work_of
 from fowt_env.controllers.mpc.rotor_table import rotor_table
 from fowt_env.controllers.mpc.settings import MPCSettings
 from fowt_env.controllers.mpc.solver import Program, load
 from fowt_env.descriptions.units import DEGREE
 from fowt_env.errors import InputError
 from fowt_env.plant.compile.decorators import entry
-from fowt_env.plant.drivetrain import TorqueCurve, build_torque_curve, clamp, generator_torque, rate_limit
+from fowt_env.plant.drivetrain import build_torque_curve, clamp, generator_torque, rate_limit
 from fowt_env.plant.measurement import Measure
 
 PERIOD = 0.5  # s between plans
 RESTING = 0.01745  # rad of pitch command, up to which the integral is forgotten while the rotor is slow
 INTEGRAL_LIMIT = 1.0  # rad
 FORGETTING = 0.1  # 1/s
-CURVE_WINDS = (8.5, 9.5)  # m/s of operating wind: torque by the turbine's curve below, by the plan above
+CURVE_WINDS = (8.5, 9.5)  # m/s: the turbine's curve and resting blades below, the plan above
 
 
 class Entry(IntEnum):
@@ -80,15 +80,22 @@ def observe(estimator, estimated, measurement, command, p, memory):
 
 @entry
 def move(estimated, p, memory, curve, command):
-    """Move the command by the rates in force, within its limits; in light winds the torque follows the curve."""
+    """Move the command by the rates in force, within limits.
+
+    In light winds, of now and of late, the torque follows the turbine's curve and the blades rest.
+    """
     dt = p[Entry.CONTROL_DT]
-    pitch = command[1] + dt * memory[Memory.PITCH_RATE]
+    before = command[1]
+    pitch = before + dt * memory[Memory.PITCH_RATE]
     command[1] = clamp(pitch, p[Entry.PITCH_MINIMUM], p[Entry.PITCH_MAXIMUM])
     torque = command[0] + dt * memory[Memory.TORQUE_RATE]
     torque = clamp(torque, p[Entry.TORQUE_LOW], p[Entry.TORQUE_HIGH])
     low, high = CURVE_WINDS
-    blend = clamp((memory[Memory.OPERATING_WIND] - low) / (high - low), 0.0, 1.0)
+    wind = max(memory[Memory.OPERATING_WIND], estimated[ESTIMATED_WIND + 1])
+    blend = clamp((wind - low) / (high - low), 0.0, 1.0)
     if blend < 1.0:
+        rested = rate_limit(before, p[Entry.PITCH_MINIMUM], dt * p[Entry.PITCH_RATE_LIMIT])
+        command[1] = blend * command[1] + (1.0 - blend) * rested
         by_curve = generator_torque(p[Entry.GEAR_RATIO] * estimated[ROTOR], command[1], curve)
         torque = blend * torque + (1.0 - blend) * by_curve
     command[0] = rate_limit(command[0], torque, dt * p[Entry.TORQUE_RATE_LIMIT])
@@ -102,8 +109,8 @@ _MODELS = Cache(
 class MPC:
     """Predictive law of an MPCSettings; prepare(scene) before reset.
 
-    preview: whether it is shown the wind ahead. nonlinear: whether the rotor's loads are those of its table; else
-    they are linear in the operating wind. constrained: whether plans mind limits; what is applied does always.
+    preview: whether it is shown the wind ahead. nonlinear: whether the rotor's loads are those of its table;
+    else they are linear in the operating wind. constrained: whether plans mind limits; what is applied does.
     Attribute unsolved: plans since reset for which OSQP found no solution, and the LQ feedback acted instead.
     """
 
@@ -215,7 +222,7 @@ class MPC:
         return float(self.command[0]), float(self.command[1])
 
     def _ahead(self, measurement):
-        """Wind ahead less the operating wind, and one entry more as the wind filter expects it; else empty."""
+        """Wind ahead less the operating wind, and one entry more as its filter expects it; () without it."""
         if not self.preview_times:
             return np.zeros(0)
         seen, memory = np.array(measurement.wind_preview, dtype=np.float64), self.memory
@@ -273,8 +280,8 @@ class MPC:
         shifted(self.plan, self.grid, old)
         step = np.zeros_like(old)
         kept = newton_step(
-            model, wind, self.table, self.nonlinear, self.rows, references, end, ahead, limits, units, self.grid,
-            old, work, step,
+            model, wind, self.table, self.nonlinear, self.rows, references, end, ahead, limits, units,
+            self.grid, old, work, step,
         )  # fmt: skip
         if self.constrained and not kept:
             if self.program is None:
@@ -301,7 +308,7 @@ class MPC:
 
 
 def mpc(turbine, control_dt):
-    """Model predictive control of torque and blade pitch on lqr's estimate, limits and rotor table foreseen."""
+    """Model predictive control on lqr's estimate: limits and the rotor's nonlinear loads are foreseen."""
     return MPC(turbine, control_dt)
 
 

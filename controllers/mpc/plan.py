@@ -1,10 +1,10 @@
-"""One Newton step of the optimal control problem: prediction, its slopes over the moves, and the quadratic program.
+"""One Newton step of the optimal control problem: prediction, its slopes over the moves, quadratic program.
 
 Moves are u = -K x + c with the LQ gain K and corrections c that are constant over blocks, so that c = 0 is
-the plan where no limit is met and the rotor's loads are linear (Rossiter, Kouvaritakis and Rice, Automatica 34,
-1998). Rotor loads are those of the table: the linear model takes what they differ by as a further input. One step is
-taken per period, from the plan before (real-time iteration: Diehl, Bock and Schloeder, SIAM J. Control Optim.
-43, 2005).
+the plan where no limit is met and the rotor's loads are linear (Rossiter, Kouvaritakis and Rice, Automatica
+34, 1998). Rotor loads are those of the table: the linear model takes what they differ by as a further input.
+One step is taken per period, from the plan before (real-time iteration: Diehl, Bock and Schloeder, SIAM J.
+Control Optim. 43, 2005).
 """
 
 from enum import IntEnum
@@ -51,7 +51,7 @@ class Grid(NamedTuple):
 
 
 class Work(NamedTuple):
-    """Arrays that a step fills: trajectory, its slopes, and the program min z'Hz/2 + g'z, low <= C z <= high."""
+    """Arrays that a step fills: trajectory, its slopes, the program min z'Hz/2 + g'z, low <= C z <= high."""
 
     states: np.ndarray  # (steps + 1, n)
     slopes: np.ndarray  # (steps + 1, n, moves)
@@ -100,7 +100,10 @@ def work_of(grid):
 
 @kernel
 def _extra_loads(model, wind, table, x, loads, excess, gain):
-    """Fill excess (2,) and gain (2, 3): loads of the table beyond the linear ones, slopes over wind, speed and pitch."""
+    """Fill excess (2,), loads of the table beyond the linear ones, and gain (2, 3), their slopes.
+
+    Slopes are over the wind at the rotor, rotor speed and blade pitch.
+    """
     base = model.loads
     change = (
         x[WIND] + model.motion[0] * x[SURGE_RATE] + model.motion[1] * x[LEAN_RATE],

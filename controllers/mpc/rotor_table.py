@@ -57,7 +57,7 @@ def rotor_table(turbine, density):
 
 @kernel
 def rotor_loads(wind, rotor_speed, blade_pitch, table, loads):
-    """Fill loads (8,) with thrust (N) and its slopes over wind, rotor speed and blade pitch; torque likewise."""
+    """Fill loads (8,): thrust (N) and its slopes over wind, rotor speed and blade pitch; torque likewise."""
     v = max(wind, SLOWEST)
     ratio = rotor_speed * table.radius / v
     rows, columns = table.values.shape[1:]

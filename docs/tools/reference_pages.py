@@ -76,9 +76,7 @@ def turbine():
 def reward_formulas():
     """{term: its formula as a Python expression}."""
     values = {name: getattr(rewards, name) for name in ("POWER_MARGIN", "SPEED_MARGIN", "TILT_PERIOD")}
-    return {
-        name: text.format(**values, tilt=rewards.TILT_MARGIN / DEGREE) for name, text in FORMULAS.items()
-    }
+    return {name: text.format(**values, tilt=rewards.TILT_MARGIN / DEGREE) for name, text in FORMULAS.items()}
 
 
 def _range(value, unit=""):

@@ -14,7 +14,6 @@ from fowt_env.controllers.mpc.law import MPC, PERIOD, Memory  # noqa: E402
 from fowt_env.controllers.mpc.settings import MPCSettings  # noqa: E402
 from fowt_env.controllers.mpc.solver import Program  # noqa: E402
 from fowt_env.errors import InputError  # noqa: E402
-from fowt_env.plant.measurement import Measurement  # noqa: E402
 from fowt_env.training.evaluation.cases import named_cases  # noqa: E402
 from fowt_env.training.evaluation.metrics import metrics  # noqa: E402
 
@@ -28,12 +27,6 @@ def turbulent(wind, seed, duration):
     """The case of a suite in normal turbulence."""
     (case,) = named_cases(f"ntm_{wind}")
     return build_scene(case.platform, wind=case.wind, sea=case.sea, seed=seed, duration=duration)
-
-
-class Foreseen(Measurement):
-    """A Measurement with the wind ahead."""
-
-    wind_preview = ()
 
 
 @pytest.mark.parametrize("wind", [12.0, 14.0, 18.0, 24.0])
@@ -125,22 +118,13 @@ def test_runs_are_the_same_to_the_bit_whatever_ran_before():
 
 def test_the_wind_ahead_is_used():
     """A ramp of the wind that is foreseen moves the rotor less than one that is not."""
-    times = [0.0, 60.0, 66.0, 120.0]
-    scene = steady({"kind": "series", "time": times, "speed": [16.0, 16.0, 19.0, 19.0]})
-
-    class Seer(MPC):
-        def act(self, measurement):
-            seen = Foreseen(*measurement)
-            seen.wind_preview = np.interp(
-                measurement.time + self.preview_times, times, [16.0, 16.0, 19.0, 19.0]
-            )
-            return super().act(seen)
-
-    seer = Seer(scene.turbine, 0.1, preview=True)
-    assert seer.preview_times == tuple(PERIOD * i for i in range(21))
-    assert "wind_preview" in seer.information and "wind_preview" not in MPC(scene.turbine, 0.1).information
-    blind, seen = (simulate(scene, one, duration=110.0) for one in ("mpc", seer))
-    assert seen["RotSpeed_[rpm]"].std() < 0.6 * blind["RotSpeed_[rpm]"].std()
+    series = {"kind": "series", "time": [0.0, 60.0, 66.0, 130.0], "speed": [16.0, 16.0, 19.0, 19.0]}
+    scene = steady(series)
+    seer, blind = (make(name, scene.turbine, 0.1) for name in ("mpc_preview", "mpc"))
+    assert seer.preview_times[:3] == (0.0, PERIOD, 2.0 * PERIOD)
+    assert "wind_preview" in seer.information and "wind_preview" not in blind.information
+    seen, unseen = (simulate(scene, one, duration=110.0)["RotSpeed_[rpm]"].std() for one in (seer, blind))
+    assert seen < 0.6 * unseen
 
 
 def test_bad_settings_and_a_missing_prepare_are_named(turbine):

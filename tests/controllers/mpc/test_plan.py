@@ -1,4 +1,4 @@
-"""The plan of one period against slow twins: LQ feedback, differences of a plain simulation, another solver."""
+"""The plan of one period against slow twins: LQ feedback, differences of a plain simulation, a minimiser."""
 
 import numpy as np
 import pytest

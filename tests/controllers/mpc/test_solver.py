@@ -44,7 +44,7 @@ def newton(h, g, c, low, high):
 
 
 def test_solutions_are_those_of_newtons_method_whatever_was_solved_before():
-    """To 1e-3 of the step without limits, in units in which the cost is even; OSQP stops at 1e-5 of its own."""
+    """To 2e-3 of the step without limits, in units in which the cost is even."""
     one = Program(MOVES, ROWS)
     for seed in range(20):
         h, g, c, low, high = program(seed)
