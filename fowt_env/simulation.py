@@ -252,7 +252,7 @@ def reader_of(
     leads = preview_leads(controller)
     time, values = np.zeros(0), np.zeros((0, 0))
     if leads:
-        time, values = foreseen(scene, leads, preview, duration)
+        time, values, _ = foreseen(scene, leads, preview, duration)
     return Reader(sensors, new_past(sensors.chain), time, values, np.zeros(N_MEASUREMENTS + len(leads)))
 
 
