@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import solve_discrete_are
 
-from fowt_env.controllers.lqr.design import N_FEEDBACK, N_PLANT, PLANT, WEIGHT_WIND, feedback_plant, sampled
+from fowt_env.controllers.lqr.design import N_FEEDBACK, N_PLANT, PLANT, feedback_plant, sampled
 from fowt_env.controllers.mpc.rotor_table import rotor_loads
 from fowt_env.descriptions.units import DEGREE
 from fowt_env.plant.compile.decorators import entry
@@ -20,6 +20,7 @@ SURGE_RATE, SPEED, LEAN, LEAN_RATE, BLADE = (
 )
 TORQUE, COMMAND, INTEGRAL = N_PLANT, N_PLANT + 1, N_PLANT + 2
 FILTER, WIND = N_PLANT + 3, N_PLANT + 4
+WEIGHT_WIND = 18.0  # m/s, where the weights hold as given
 N_COST = (
     8  # squared terms: speed, platform pitch, its rate, torque, power, integral, rates of torque and pitch
 )

@@ -10,7 +10,7 @@ from fowt_env.visual.style import COLOURS, INK, new_figure, save_figure, style_a
 def plot_evaluation(table, metrics, path=None, title=None):
     """One panel per metric: each case on the x axis, one line per controller, spread over seeds.
 
-    table      the DataFrame of training.evaluation.evaluate.evaluate; runs that failed or tripped have the worst
+    table      the DataFrame of training.evaluation.evaluate.evaluate; failed and tripped runs have the worst
                figures of their case, and are counted
     metrics    column names; marks are the mean over the seeds, bars reach from least to greatest
     """
@@ -53,7 +53,7 @@ def plot_evaluation(table, metrics, path=None, title=None):
         ncols=len(controllers),
         fontsize=8,
         frameon=False,
-        title=f"{failed} of {len(table)} runs failed or tripped, drawn as the worst of their case" if failed else None,
+        title=f"{failed} of {len(table)} runs failed or tripped: the worst of their case" if failed else None,
         title_fontsize=8,
     )
     if title:
