@@ -39,34 +39,39 @@ BOUND_EXAMPLES = """[bold]Examples[/bold]
 
 [cyan]fowt design bound --wind 18[/cyan]  the performance limit of linear control, at 18 m/s
 
-[cyan]fowt design bound --out bound.csv --plot bound.png[/cyan]  12 to 24 m/s
+[cyan]fowt design bound --out bound.csv --plot bound.png[/cyan]  all winds above rated
+
+[cyan]fowt design bound --wind 18 --information measured,measured_pitch_only[/cyan]  what torque is worth
+
+[cyan]fowt design bound --wind 18 --previews 5 --information full,full_preview_5[/cyan]  5 s of wind ahead
 
 Deviations are shown over those of gspi_oc3 on the same model, at no more pitch travel and power deviation.
-The Pareto front for the measured channels is what a controller without further sensors can hope for."""
+Information: full (plant, wind and waves), measured (five sensors with their noise) or speed (rotor speed and
+blade pitch); with _preview_T where the wind is known T s ahead, with _pitch_only without torque."""
 FRONT_EXAMPLES = """[bold]Example[/bold]
 
 [cyan]fowt design front --runs sweep.csv --bound bound.csv --plot front.png[/cyan]  lqr beside the limit"""
 LQR_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt design lqr[/cyan]  the shipped weights against gspi_oc3 on training seeds
+[cyan]fowt design lqr[/cyan]  the shipped settings against gspi_oc3 on validation seeds
 
-[cyan]fowt design lqr --vary pitch_rate=3,6,12 --out sweep.csv[/cyan]  less travel, more speed error
+[cyan]fowt design lqr --vary share=0.3,0.5,0.7 --out sweep.csv[/cyan]  from rotor speed to platform pitch
 
-[cyan]fowt design lqr --weight pitch_rate=9 --out my.json[/cyan]  save one, to be run as design:my.json
+[cyan]fowt design lqr --setting travel=0.8 --out my.json[/cyan]  save one, to be run as design:my.json
 
-Raising pitch_rate saves travel, platform_pitch reduces platform motion, power smooths
-the power at the cost of rotor speed."""
+share is that of platform pitch in what is minimised, the rest is rotor speed; travel, power, torque and shaft
+are limits, see LQGSettings in controllers/lqr/design.py."""
 
 
-def save_lqr(weights, path):
-    """The path written: lqr with these weights ({name: value}) on the models of OC3-Hywind."""
+def save_lqr(settings, path):
+    """The path written: lqr with these settings ({name: value}) on the models of OC3-Hywind."""
     import fowt_env
     from fowt_env.controllers.design.saved_files import lqr_settings, save_design
-    from fowt_env.controllers.lqr.design import Weights, design_models
+    from fowt_env.controllers.lqr.design import LQGSettings, design_models
 
-    chosen = Weights().changed(**weights)
+    chosen = LQGSettings().changed(**settings)
     scene = fowt_env.build_scene("oc3_hywind", wind=18.0)
-    command = " ".join(["fowt design lqr", *(f"--weight {key}={value}" for key, value in weights.items())])
+    command = " ".join(["fowt design lqr", *(f"--setting {key}={value}" for key, value in settings.items())])
     return save_design(path, "lqr", scene, lqr_settings(chosen, design_models(scene)), command)
 
 
@@ -178,32 +183,58 @@ def pi(
 @design.command(epilog=BOUND_EXAMPLES)
 @reported
 def bound(
-    wind: Annotated[str, typer.Option(help="Winds above rated, m/s.")] = "12:24:2",
+    wind: Annotated[
+        str | None, typer.Option(help="Winds above rated, m/s: 12,18 or START:STOP:STEP; default: even ones.")
+    ] = None,
+    information: Annotated[
+        str | None, typer.Option(help="What the feedback knows, comma-separated; default: the usual (below).")
+    ] = None,
+    travel: Annotated[float, typer.Option(help="Limit of blade-pitch travel over gspi_oc3's; or inf.")] = 1.0,
+    power: Annotated[float, typer.Option(help="Limit of power deviation over gspi_oc3's; or inf.")] = 1.0,
     torque_std: Annotated[float, typer.Option(help="Limit of the torque's deviation, %; or inf.")] = 5.0,
+    previews: Annotated[str, typer.Option(help="Seconds for which the wind is known ahead.")] = "3,11",
+    sea: Annotated[
+        str | None, typer.Option(help="Sea of every wind, as fowt simulate takes it; default: the suites'.")
+    ] = None,
     platform: Annotated[str, typer.Option(help="Platform: a name or a path.")] = "oc3_hywind",
     out_path: Annotated[str | None, typer.Option("--out", help="Pareto fronts: .csv or .parquet.")] = None,
     plot: Annotated[str | None, typer.Option(help="Plot of the Pareto fronts, e.g. bound.png.")] = None,
 ):
     """Find the performance limit: least rotor-speed and platform-pitch deviations of linear feedback."""
     import fowt_env
+    from fowt_env.descriptions.sea_state import sea_state_of
     from fowt_env.files.tables import table_path, write_table
-    from fowt_env.training.design.linear_bound import INFORMATION, bound_table
+    from fowt_env.training.cli.arguments import parse_sea
+    from fowt_env.training.design.linear_bound import INFORMATION, PLOTTED, bound_table, rounded
 
     if out_path is not None:
         table_path(out_path)
-    scene = fowt_env.build_scene(platform, wind=18.0)
-    speeds = parse_numbers(wind, "wind")
-    with progress_bar("designing", len(speeds)) as update:
+    speeds = None if wind is None else parse_numbers(wind, "wind")
+    scene = fowt_env.build_scene(platform, wind=18.0 if speeds is None else speeds[0])
+    with progress_bar("designing", None) as update:
         table = bound_table(
-            scene, speeds, torque_std=0.01 * torque_std, progress=lambda done, n: update(done, total=n)
+            scene,
+            speeds,
+            None if information is None else [name.strip() for name in information.split(",")],
+            travel=travel,
+            power=power,
+            torque_std=0.01 * torque_std,
+            previews=parse_numbers(previews, "previews"),
+            sea=None if sea is None else sea_state_of(parse_sea(sea)),
+            progress=lambda done, n: update(done, total=n),
         )
-    show(table if len(speeds) == 1 else _balanced(table), f"{platform}: least deviations")
+    single = speeds is not None and len(speeds) == 1
+    show(table if single else _balanced(table), f"{platform}: least deviations")
+    if "fits" in table.attrs:
+        show(table.attrs["fits"], "weather as filters of noise: errors of the fits; linear drag of the hull")
     if out_path is not None:
-        note(f"wrote {write_table(table, out_path)}")
+        note(f"wrote {write_table(rounded(table), out_path)}")
     if plot is not None:
         from fowt_env.training.design.plots import plot_bound
 
-        plot_bound(table, INFORMATION, path=plot)
+        shown = set(table["information"])
+        names = {name: INFORMATION.get(name, name) for name in PLOTTED if name in shown}
+        plot_bound(table, names or {name: name for name in shown - {"gspi_oc3"}}, path=plot)
         note(f"wrote {plot}")
 
 
@@ -217,7 +248,7 @@ def front(
 ):
     """Simulated designs over gspi_oc3, beside the performance limit, and the fraction of it they reach."""
     from fowt_env.files.tables import read_table, write_table
-    from fowt_env.training.design.linear_bound import INFORMATION, ratio_table
+    from fowt_env.training.design.linear_bound import INFORMATION, PLOTTED, ratio_table
 
     fronts = read_table(bound_path)
     table = ratio_table(read_table(runs), fronts)
@@ -227,7 +258,7 @@ def front(
     if plot is not None:
         from fowt_env.training.design.plots import plot_bound
 
-        plot_bound(fronts, INFORMATION, table, path=plot)
+        plot_bound(fronts, {name: INFORMATION[name] for name in PLOTTED}, table, path=plot)
         note(f"wrote {plot}")
 
 
@@ -235,10 +266,10 @@ def front(
 @reported
 def lqr(
     vary: Annotated[
-        list[str] | None, typer.Option(metavar="WEIGHT=A,B,C", help="Weight and its values; repeats.")
+        list[str] | None, typer.Option(metavar="SETTING=A,B,C", help="Setting and its values; repeats.")
     ] = None,
-    weight: Annotated[
-        list[str] | None, typer.Option(metavar="WEIGHT=VALUE", help="A weight for all variants; repeats.")
+    setting: Annotated[
+        list[str] | None, typer.Option(metavar="SETTING=VALUE", help="A setting for all variants; repeats.")
     ] = None,
     cases: Annotated[str, typer.Option(help="Cases or suites.")] = "ntm_14,ntm_18,ntm_22",
     seeds: Annotated[str, typer.Option(help="Validation seeds, 1000 and above.")] = "1001,1002",
@@ -246,19 +277,19 @@ def lqr(
         str | None, typer.Option("--out", help="All runs: .csv; or, without runs, the design: .json.")
     ] = None,
 ):
-    """Sweep the weights of lqr on validation seeds, beside gspi_oc3; or save one design (--out .json)."""
+    """Sweep the settings of lqr on validation seeds, beside gspi_oc3; or save one design (--out .json)."""
     from fowt_env.training.design.sweeps import SHOWN, sweep
 
-    fixed = parse_pairs(weight, "weight")
+    fixed = parse_pairs(setting, "setting")
     if out_path is not None and out_path.lower().endswith(".json"):
         if vary:
-            raise InputError(f"--vary {vary[0]}: a design has one value per weight; use --weight")
+            raise InputError(f"--vary {vary[0]}: a design has one value per setting; use --setting")
         note(f"wrote {save_lqr(fixed, out_path)}")
         return
     variants = [fixed]
     for pair in vary or ():
         name, _, values = pair.partition("=")
-        numbers = parse_numbers(values, f"weight {name}")
+        numbers = parse_numbers(values, f"setting {name}")
         variants = [variant | {name: number} for variant in variants for number in numbers]
     numbers = parse_whole_numbers(seeds, "seeds")
     with progress_bar("simulating", None) as update:

@@ -136,6 +136,7 @@ BOUND_EXAMPLES = """[bold]Examples[/bold]
 
 [cyan]fowt scores bound results/rl --plot results/rl/bound.png --out results/rl/bound[/cyan]
 
+Limit: that for what the controller knows and moves; the names are those of fowt design bound --help.
 In brackets: more blade-pitch travel or power deviation than gspi_oc3, which the limit does not allow."""
 
 
@@ -158,8 +159,7 @@ def bound(
 
     fronts = read_bound(table_path)
     found = bound_fractions(_runs(results, cases), fronts, _groups(group), _names(agents))
-    text = "\n".join(bound_markdown(found, column) for column in ("of_bound_[-]", "of_measured_[-]"))
-    _shown(text, {"": found}, out_path)
+    _shown(bound_markdown(found), {"": found}, out_path)
     if plot is not None:
         plot_fractions(found, fronts, plot)
         note(f"wrote {plot}")

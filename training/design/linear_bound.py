@@ -1,239 +1,166 @@
 """The performance limit of linear control: Pareto fronts of rotor-speed and platform-pitch deviation.
 
-    python -m fowt_env.training.design.linear_bound      (or fowt design bound --wind 12,14,16,18,20,22,24)
+    fowt design bound --wind 12,14,16,18,20,22,24
 
-Per wind speed, on the plant of controllers/lqr/design.py (surge, platform pitch, rotor, pitch actuator; the
-rotor-averaged Kaimal wind and the site's sea as shaped white noise): standard deviations from Lyapunov
-equations, for the least weighted sum of both variances at no more blade-pitch travel and no more power
-deviation than gspi_oc3 has on the same model, and a torque deviation that the drivetrain can give (the
-torque's own maximum is 10 % above rated). The limits are met by multipliers in the quadratic cost, so
-with full information, and with the measured channels and their noise, each point is optimal among all
-linear controllers. Feedback without wind or waves among its inputs is optimal where those are white noise.
-The linear model has no limits of torque, pitch or their rates, and nothing is sampled.
+Per wind speed, on the linear plant of bound_plant.py (surge, heave, platform pitch, rotor, pitch actuator,
+hull drag linearised in the sea and the motion under gspi_oc3): the least weighted sum of both variances at no
+more blade-pitch travel and no more power deviation than gspi_oc3 has on the same model, and a torque
+deviation that the drivetrain can give (the torque's own maximum is 10 % above rated). The limits are met by
+multipliers in the quadratic cost, so that each point is optimal among all linear controllers of the same
+information, for weather of the fitted spectra; deviations are those in the whole spectra. The linear model
+has no limits of torque, pitch or their rates, and nothing is sampled. A controller that moves the platform
+less than gspi_oc3 has a little less drag than the model: the limit errs to the low side.
 """
 
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 from itertools import pairwise
-from math import pi, sqrt
+from math import ceil
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from scipy.linalg import solve_continuous_are, solve_continuous_lyapunov
 
-from fowt_env.controllers.lqr.design import (
-    MOMENT,
-    N_FEEDBACK,
-    N_PLANT,
-    PLANT,
-    SENSOR_NOISE,
-    design_model,
-    feedback_plant,
-)
-from fowt_env.controllers.pi import PISettings, schedule_gain
+from fowt_env.controllers.lqr.design import SENSORS
 from fowt_env.descriptions.checks import check_number
 from fowt_env.descriptions.units import DEGREE, RPM
-from fowt_env.errors import InputError
+from fowt_env.errors import InputError, unknown
+from fowt_env.training.design.bound_control import Information, Problem, baseline_deviations, front
+from fowt_env.training.design.bound_plant import BoundPlant
 
 BOUND = Path(__file__).parent / "data" / "linear_bound.csv"  # what fowt design bound wrote
-WINDS = (12.0, 14.0, 16.0, 18.0, 20.0, 22.0, 24.0)  # m/s
-INFORMATION = {  # what the feedback knows: what it is called in plots
-    "full": "state, wind and waves: the performance limit",
-    "wind": "state and wind",
-    "state": "state only",
-    "measured": "measured channels (Kalman)",
-}
-# of platform pitch
-FRACTIONS = (0.02, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.68, 0.75, 0.82, 0.88, 0.93, 0.97, 0.99)
+FRACTIONS = (0.05, 0.2, 0.4, 0.55, 0.68, 0.8, 0.88, 0.94, 0.98)  # of platform pitch
 TORQUE_STD = 0.05  # of rated torque: twice this is the way to the torque's maximum
+PREVIEWS = (3.0, 11.0)  # s
+KNOWN = {  # what the feedback knows: name, words, sensors
+    "full": ("plant, wind and waves", None),
+    "measured": ("five sensors", SENSORS),
+    "speed": ("rotor speed and blade pitch", SENSORS[:2]),
+}
+PITCH_ONLY = "_pitch_only"
+PLOTTED = ("full", "measured", "speed", "measured_pitch_only", "full_preview_3", "full_preview_11")
 RATIOS = {  # column of ratio_table: metric
     "speed_ratio_[-]": "RotSpeed_std_[rpm]",
     "pitch_ratio_[-]": "PtfmPitch_std_[deg]",
     "power_ratio_[-]": "GenPwr_std_[kW]",
     "travel_ratio_[-]": "blade_pitch_travel_[deg/s]",
 }
-TORQUE_RATE = 1e-3  # cost of (torque rate / 5 % of rated a second)^2: keeps the problem well posed
-COMMAND_RATE = 1e-4  # cost of (rate of the pitch command / 0.2 deg/s)^2: the same
-SAMPLE_TIME = 0.1  # s, at which SENSOR_NOISE holds per sample
-TOLERANCE = 2e-3  # of the limits, relative
-ROUNDS = 80
-STEP = 2.0  # of the multipliers' logarithms per relative excess
-LOWEST, HIGHEST = np.log(1e-6), np.log(1e6)  # of a multiplier
-GAUSSIAN_MEAN = sqrt(2.0 / pi)  # mean |x| of a Gaussian over its standard deviation
-LIMITED = ("travel", "power", "torque")  # fields of Deviations
-SPEED, LEAN, BLADE = (PLANT.index(name) for name in ("rotor_speed", "platform_pitch", "blade_pitch"))
-TORQUE, COMMAND, INTEGRAL, WIND, WAVE = N_PLANT, N_PLANT + 1, N_PLANT + 2, N_PLANT + 3, N_PLANT + 5
 
 
-@dataclass(frozen=True)
-class Deviations:
-    """Standard deviations of a closed loop: rad/s, rad, mean |rad/s|, fractions of rated power and torque."""
-
-    rotor_speed: float
-    platform_pitch: float
-    travel: float
-    power: float
-    torque: float
-
-
-class Problem:
-    """The plant of one wind with its weather, in the states of lqr/design.py's feedback_plant."""
-
-    def __init__(self, model, turbine):
-        rated = turbine.rated_rotor_speed
-        self.model, self.turbine = model, turbine
-        self.a, self.b, self.g = feedback_plant(model, rated)
-        rate, power = self.a[BLADE].copy(), np.zeros(N_FEEDBACK)
-        power[SPEED], power[TORQUE] = 1.0 / rated, 1.0
-        eye = np.eye(N_FEEDBACK)
-        self.rows = {  # output rows, each in units of which one is of order one
-            "rotor_speed": eye[SPEED] / (0.05 * rated),
-            "platform_pitch": eye[LEAN] / DEGREE,
-            "travel": rate / (0.2 * DEGREE),
-            "power": power / 0.05,
-            "torque": eye[TORQUE] / 0.05,
-        }
-        self.scales = {"rotor_speed": 0.05 * rated, "platform_pitch": DEGREE}
-        self.scales |= {"travel": GAUSSIAN_MEAN * (0.2 * DEGREE), "power": 0.05, "torque": 0.05}
-
-    def deviations(self, covariance):
-        """Deviations for a covariance (13, 13) of the states."""
-        found = {
-            name: self.scales[name] * sqrt(max(row @ covariance @ row, 0.0))
-            for name, row in self.rows.items()
-        }
-        return Deviations(**found)
-
-    def cost(self, fraction, *multipliers):
-        """(Q, R) with a fraction of platform pitch and multipliers on travel, power and torque."""
-        weights = {"rotor_speed": 1.0 - fraction, "platform_pitch": fraction}
-        weights |= dict(zip(LIMITED, multipliers, strict=True))
-        q = sum(weight * np.outer(self.rows[name], self.rows[name]) for name, weight in weights.items())
-        # the integral is not scored; a trace of it makes its mode stable
-        q[INTEGRAL, INTEGRAL] += 1e-4 / (0.5 * self.turbine.rated_rotor_speed) ** 2
-        return q, np.diag([TORQUE_RATE / 0.05**2, COMMAND_RATE / (0.2 * DEGREE) ** 2])
-
-    @cached_property
-    def kalman(self):
-        """(A, C, L, R) of the estimator of plant and weather from the channels of lqr/design.py's SENSORS.
-
-        The torque and the pitch command are known to the controller, and so is the integral.
-        """
-        a, c = self.model.A[:MOMENT, :MOMENT], self.model.C[:, :MOMENT]
-        g, r = self.model.G[:MOMENT], np.diag(np.square(SENSOR_NOISE)) * SAMPLE_TIME
-        p = solve_continuous_are(a.T, c.T, g @ g.T, r)
-        return a, c, p @ c.T @ np.linalg.inv(r), r
-
-    def closed(self, information, q, r):
-        """Covariance (13, 13) under the feedback that is best for (q, r) with this information."""
-        known = {"full": N_FEEDBACK, "wind": WAVE, "state": WIND, "measured": N_FEEDBACK}[information]
-        # what is not known is white noise to the feedback: it acts on the plant but is not fed back
-        a, b = self.a[:known, :known], self.b[:known]
-        k = np.zeros((2, N_FEEDBACK))
-        k[:, :known] = np.linalg.solve(r, b.T @ solve_continuous_are(a, b, q[:known, :known], r))
-        noise = self.g @ self.g.T
-        if information != "measured":
-            return solve_continuous_lyapunov(self.a - self.b @ k, -noise)
-        return self._estimated(k, noise)
-
-    def _estimated(self, k, noise):
-        """Covariance of the states under gain k on the Kalman filter's estimates."""
-        n, m = N_FEEDBACK, MOMENT
-        ae, ce, gain, r = self.kalman
-        places = [*range(N_PLANT), *range(WIND, N_FEEDBACK)]  # of the estimated states among all
-        both, drive = np.zeros((n + m, n + m)), np.zeros((n + m, n + m))
-        both[:n, :n] = self.a - self.b @ k
-        both[:n, n:] = self.b @ k[:, places]  # the error (state less estimate) acts against the feedback
-        both[n:, n:] = ae - gain @ ce
-        g = np.vstack([self.g, self.g[places]])
-        drive[:, :] = g @ g.T
-        drive[n:, n:] += gain @ r @ gain.T
-        return solve_continuous_lyapunov(both, -drive)[:n, :n]
-
-
-def gspi_covariance(problem, settings=None):
-    """(Deviations, closed-loop matrix) of gspi_oc3, linear, on the states and weather of a Problem.
-
-    The law in continuous time, with the slope of its schedule (theory.md, Eq. (A7)) and its speed filter.
-    """
-    settings = PISettings.published(problem.turbine) if settings is None else settings
-    model, ratio = problem.model, settings.gear_ratio
-    gain = schedule_gain(model.pitch, settings.gain_schedule_pitch)
-    gain *= ratio / (2.0 - gain)
-    # the places of torque and command now hold the filtered speed; the command follows at once
-    a = problem.a.copy()
-    a[:, [TORQUE, COMMAND]] = 0.0
-    command = np.zeros(N_FEEDBACK)
-    command[TORQUE], command[INTEGRAL] = gain * settings.KP, gain * settings.KI
-    a += np.outer(problem.a[:, COMMAND], command)
-    a[TORQUE] = 0.0
-    a[TORQUE, [SPEED, TORQUE]] = settings.speed_filter_corner, -settings.speed_filter_corner
-    a[INTEGRAL] = 0.0
-    a[INTEGRAL, TORQUE] = 1.0
-    keep = [i for i in range(N_FEEDBACK) if i != COMMAND]
-    x = solve_continuous_lyapunov(a[np.ix_(keep, keep)], -(problem.g @ problem.g.T)[np.ix_(keep, keep)])
-    rate = a[BLADE, keep]
-    rated = problem.turbine.rated_rotor_speed
-    speed = sqrt(x[SPEED, SPEED])
-    found = Deviations(
-        speed, sqrt(x[LEAN, LEAN]), GAUSSIAN_MEAN * sqrt(rate @ x @ rate), speed / rated, 0.0
-    )  # constant torque: power goes with speed
-    return found, a[np.ix_(keep, keep)]
-
-
-def front(problem, limits, information, fractions=FRACTIONS):
-    """[(fraction, Deviations)] that are best for each fraction of platform pitch, limits (Deviations) kept.
-
-    Each multiplier grows while its limit is exceeded and shrinks while it is kept. Fractions at which ROUNDS
-    rounds of that end outside the limits are left out.
-    Raises: InputError where that is all of them.
-    """
-    found, multipliers = [], np.log([1.0, 0.3, 0.1])
-    wanted = np.array([getattr(limits, name) for name in LIMITED])
-    for fraction in fractions:
-        for _ in range(ROUNDS):
-            reached = problem.deviations(
-                problem.closed(information, *problem.cost(fraction, *np.exp(multipliers)))
-            )
-            excess = np.log(np.array([getattr(reached, name) for name in LIMITED]) / wanted)
-            slack = (excess < 0.0) & (multipliers <= LOWEST)
-            if np.all((np.abs(excess) < TOLERANCE) | slack):
-                break
-            multipliers = np.clip(multipliers + STEP * excess, LOWEST, HIGHEST)
-        if excess.max() < 2.0 * TOLERANCE:
-            found.append((float(fraction), reached))
-    if not found:
-        raise InputError(f"information {information!r}: no gains meet the limits of gspi_oc3")
+def information_sets(previews=PREVIEWS):
+    """{name: Information} of KNOWN, each without and with the wind some seconds ahead, and without torque."""
+    found = {}
+    for torque in (True, False):
+        for time in (None, *previews):
+            for name, (text, sensors) in KNOWN.items():
+                ahead = "" if time is None else f"_preview_{time:g}"
+                words = text + ("" if time is None else f", wind {time:g} s ahead")
+                label = name + ahead + ("" if torque else PITCH_ONLY)
+                found[label] = Information(words + ("" if torque else "; no torque"), sensors, time, torque)
     return found
 
 
-def bound_table(scene, winds=WINDS, information=tuple(INFORMATION), torque_std=TORQUE_STD, progress=None):
+def usual(previews=PREVIEWS):
+    """Names of information_sets of which a table is made by default, {name: text}.
+
+    Where the wind is known exactly, now and ahead, sensors or all states make less than 1 % of difference:
+    of those, all states.
+    """
+    found = information_sets(previews)
+    return {
+        name: known.text for name, known in found.items() if known.preview is None or known.sensors is None
+    }
+
+
+INFORMATION = usual()  # name: what plots call it
+
+
+def winds_of(turbine):
+    """Winds above rated at which the limit is found by default: even ones up to cut-out, m/s."""
+    first = 2 * ceil(0.5 * (turbine.rated_wind_speed + 0.1))
+    return tuple(float(wind) for wind in range(first, int(turbine.cut_out_wind_speed) + 1, 2))
+
+
+def bound_table(
+    scene,
+    winds=None,
+    information=None,
+    *,
+    travel=1.0,
+    power=1.0,
+    torque_std=TORQUE_STD,
+    previews=PREVIEWS,
+    noise=None,
+    sea=None,
+    fractions=FRACTIONS,
+    progress=None,
+):
     """DataFrame: per wind and information the Pareto front, beside gspi_oc3; absolute and over gspi_oc3's.
 
-    torque_std: limit, as a fraction of rated torque; inf for none.
-    Raises: InputError for winds that are not above rated, or a torque_std that is not positive.
+    winds        m/s; None: winds_of the scene's turbine
+    information  names of information_sets(previews); None: the usual ones
+    travel       limit of the blade-pitch travel over that of gspi_oc3; power: the same of the power deviation
+    torque_std   limit of the torque deviation, as a fraction of rated torque; inf for none, as for the others
+    previews     s for which the wind is known ahead
+    noise        {sensor: standard deviation of a sample every 0.1 s, SI}; None: SENSOR_NOISE of lqr/design.py
+    sea          of every wind; None: the joint sea states of the named suites
+    fractions    of platform pitch in the sum that is made least
+
+    fit_difference_[%]: how far a deviation of rotor speed, platform pitch or travel in the fitted weather is
+    from that in the whole spectra, at most. attrs["fits"]: DataFrame of the errors of the fits, and the drag.
+    Raises: InputError for winds that are not above rated, limits that are not positive, unknown information,
+    and for a scene without the plant that this takes (BoundPlant).
     """
+    known = information_sets(previews)
+    chosen = tuple(usual(previews) if information is None else information)
+    for name in chosen:
+        if name not in known:
+            raise unknown("information", name, known)
     allowed = "positive (inf: no limit)"
-    check_number("torque_std", torque_std, 0.0, low_open=True, infinite=True, allowed=allowed)
-    rows = []
+    for key, value in (("travel", travel), ("power", power), ("torque_std", torque_std)):
+        check_number(key, value, 0.0, low_open=True, infinite=True, allowed=allowed)
     low, high = scene.turbine.rated_wind_speed, scene.turbine.cut_out_wind_speed
+    winds = winds_of(scene.turbine) if winds is None else winds
     allowed = f"above {low:g} and at most {high:g} m/s"
-    for number, wind in enumerate(winds, 1):
+    for wind in winds:
         check_number("wind", wind, low, high, low_open=True, allowed=allowed)
-        problem = Problem(design_model(scene, wind), scene.turbine)
-        base, _ = gspi_covariance(problem)
-        rows.append(_row(wind, "gspi_oc3", float("nan"), base, base))
-        limits = replace(base, torque=torque_std)
-        for name in information:
-            rows += [_row(wind, name, fraction, d, base) for fraction, d in front(problem, limits, name)]
-        if progress is not None:
-            progress(number, len(winds))
-    return pd.DataFrame(rows)
+    rows, fits, total = [], [], len(winds) * len(chosen)
+    for number, wind in enumerate(winds):
+        plant = BoundPlant(scene, wind, sea)
+        base = baseline_deviations(plant, plant.true)
+        fitted = baseline_deviations(plant, plant.fitted)
+        fits.append(_fits(plant))
+        rows.append(_row(wind, "gspi_oc3", float("nan"), base, base, fitted))
+        limits = replace(base, travel=travel * base.travel, power=power * base.power, torque=torque_std)
+        for place, name in enumerate(chosen, 1):
+            problem = Problem(plant, known[name], noise)
+            for fraction, found, q in front(problem, limits, fractions):
+                rows.append(_row(wind, name, fraction, found, base, problem.deviations(q, plant.fitted)))
+            if progress is not None:
+                progress(number * len(chosen) + place, total)
+    table = pd.DataFrame(rows)
+    table.attrs["fits"] = pd.DataFrame(fits)
+    return table
 
 
-def _row(wind, information, fraction, found, base):
+def _fits(plant):
+    """Errors of a BoundPlant's fits in percent, and the damping of its drag."""
+    surge, heave, lean = (100.0 * float(error) for error in plant.force_errors)
+    return {
+        "wind_[m/s]": plant.wind_speed,
+        "wind_error_[%]": 100.0 * plant.wind_filter.error,
+        "elevation_error_[%]": 100.0 * plant.wave_filter.error,
+        "surge_force_error_[%]": surge,
+        "heave_force_error_[%]": heave,
+        "pitch_moment_error_[%]": lean,
+        "surge_drag_[kN-s/m]": 1e-3 * float(plant.drag.damping[0, 0]),
+        "pitch_drag_[MN-m-s/rad]": 1e-6 * float(plant.drag.damping[4, 4]),
+    }
+
+
+def _row(wind, information, fraction, found, base, fitted):
     """One row of bound_table."""
+    names = ("rotor_speed", "platform_pitch", "travel")
+    difference = max(abs(getattr(fitted, name) / getattr(found, name) - 1.0) for name in names)
     return {
         "wind_[m/s]": float(wind),
         "information": information,
@@ -245,7 +172,16 @@ def _row(wind, information, fraction, found, base):
         "torque_std_[%]": 100.0 * found.torque,
         "speed_ratio_[-]": found.rotor_speed / base.rotor_speed,
         "pitch_ratio_[-]": found.platform_pitch / base.platform_pitch,
+        "fit_difference_[%]": 100.0 * difference,
     }
+
+
+def rounded(table):
+    """A bound_table with five significant digits, as it is stored."""
+    numbers = table.columns.drop("information")
+    short = table.copy()
+    short[numbers] = table[numbers].map(lambda value: float(f"{value:.5g}"))
+    return short
 
 
 def fraction_of_bound(table, wind, speed_ratio, pitch_ratio, information="full"):

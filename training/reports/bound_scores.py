@@ -2,8 +2,10 @@
 
     fowt scores bound results/rl --group agents=policy:ppo_lqr,policy:ppo_lqr_seed1 --plot front.png
 
-The limit (design/linear_bound.py) holds for linear feedback at the blade-pitch travel and power deviation
-of gspi_oc3: a controller that spends more of either is not held by it, and is marked.
+Each controller is held against the limit for what it knows and moves (training/design/linear_bound.py):
+the wind ahead or not, five sensors or fewer, the generator torque or the blade pitch alone. The limit holds
+for linear feedback at the blade-pitch travel and power deviation of gspi_oc3: a controller that spends more
+of either is not held by it, and is marked.
 """
 
 from pathlib import Path
@@ -11,14 +13,33 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from fowt_env.control import make
+from fowt_env.controllers import DESIGN, POLICY
+from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.errors import InputError
-from fowt_env.training.design.linear_bound import BOUND, RATIOS, fraction_of_bound, ratio_table
+from fowt_env.training.design.linear_bound import (
+    BOUND,
+    KNOWN,
+    PITCH_ONLY,
+    RATIOS,
+    fraction_of_bound,
+    ratio_table,
+)
 from fowt_env.training.evaluation.results_table import KEY
 from fowt_env.training.reports.scores import frame_markdown, grouped
 
 BASELINE = "gspi_oc3"  # whose travel and power the limit keeps
 WIND = "wind_[m/s]"
 MORE = 1.02  # ratios of travel and power deviation above this are more than those of gspi_oc3
+TORQUE_TRAVEL = "torque_travel_[kN-m/s]"
+MOVED = 1.5  # ratio of torque travel to that of gspi_oc3 above which a controller uses the torque
+FREE = {
+    "time",
+    "generator_torque",
+    "generator_speed",
+    "plant_model",
+}  # own commands; speed and plant are in all
+AHEAD = "_preview_"  # in the names of limits
 
 
 def read_bound(path=None):
@@ -31,14 +52,45 @@ def read_bound(path=None):
     return pd.read_csv(file)
 
 
-def bound_fractions(table, bound, groups=None, agents=None):
-    """DataFrame: per agent or group, each of its training seeds and wind: fraction of the limit reached.
+def limit_for(information, moves_torque, bound, preview_times=()):
+    """Name of the limit in a bound_table that holds a controller; None where the table has none.
+
+    information    what the controller uses: Measurement fields and PRIVILEGED_INPUTS (fowt_env.control)
+    moves_torque   whether it uses the generator torque above rated wind
+    preview_times  s for which it knows the wind ahead; none with "wind_preview": the longest of the table
+
+    Preview counts as exact, and the next longer one of the table is taken: that of the same sensors, or else
+    of all states, which is less than 1 % from it.
+    """
+    used = set(information) - FREE
+    ahead = "wind_preview" in used
+    if ahead:
+        used -= {"wind_preview", "wind_speed"}  # the wind of now is the first of what is ahead
+    known = [name for name, (_, sensors) in KNOWN.items() if sensors is None or used <= set(sensors)]
+    name, end = known[-1], "" if moves_torque else PITCH_ONLY
+    limits = set(bound["information"])
+    if ahead:
+        times = {}
+        for start in ("full", name):
+            for limit in limits:
+                kind, _, rest = limit.removesuffix(PITCH_ONLY).partition(AHEAD)
+                if rest and kind == start and limit == start + AHEAD + rest + end:
+                    times[float(rest)] = limit
+        horizon = max(preview_times, default=max(times, default=0.0))
+        return next((times[time] for time in sorted(times) if time >= horizon), None)
+    return name + end if name + end in limits else None
+
+
+def bound_fractions(table, bound, groups=None, agents=None, information=None):
+    """DataFrame: per agent or group, each of its training seeds and wind: fraction of its limit reached.
 
     table: of an evaluation with gspi_oc3, cases named kind_WIND; groups, agents as
-    scores.grouped takes them. Columns: agent, seed_of (label of the training seed; "" for the
-    agent as a whole, whose ratios are the means over its seeds), wind, ratios of linear_bound.RATIOS (mean
-    over the weather seeds on which both succeeded), of_bound_[-], of_measured_[-] (NaN: no better than
-    gspi_oc3, or none of the limit's winds), within (no more travel and power deviation than gspi_oc3's).
+    scores.grouped takes them. information: {label: (inputs, preview_times)} of controllers; others are asked
+    themselves, and those that cannot be are held against full information. Columns: agent, seed_of (label
+    of the training seed; "" for the agent as a whole, whose ratios are the means over its seeds), ratios of
+    linear_bound.RATIOS (mean over the weather seeds on which both succeeded), limit (name of limit_for),
+    of_limit_[-] (NaN: no better than gspi_oc3, or none of the limit's winds), within (no more travel and
+    power deviation than gspi_oc3's). A group is held against the limit of its first member.
     Raises: InputError without gspi_oc3, without cases at winds of the limit, or where no run succeeded.
     """
     chosen = grouped(table, [BASELINE], groups, agents)
@@ -52,19 +104,41 @@ def bound_fractions(table, bound, groups=None, agents=None):
         raise InputError(f"results: cases of several kinds ({', '.join(sorted(kinds))}): choose one's cases")
     rows = []
     for name, labels in chosen.items():
-        parts = [_ratios(good[good["controller"] == label], base, bound, label) for label in labels]
+        used, times = (information or {}).get(labels[0]) or declared(labels[0])
+        limit = limit_for(used, _moves_torque(good, base, labels), bound, times)
+        parts = [_ratios(good[good["controller"] == label], base, label) for label in labels]
         parts = [part for part in parts if len(part)]
         if not parts:
             raise InputError(f"{name}: no run at a wind of the limit succeeded")
-        if len(labels) > 1:
-            rows += [part.assign(agent=name) for part in parts]
-        whole = pd.concat(parts).groupby(WIND, as_index=False)[list(RATIOS)].mean()
-        whole = _with_fractions(whole, bound)
-        rows.append(whole.assign(agent=name, seed_of=""))
+        whole = pd.concat(parts).groupby(WIND, as_index=False)[list(RATIOS)].mean().assign(seed_of="")
+        for part in [*(parts if len(labels) > 1 else []), whole]:
+            rows.append(_with_fractions(part, bound, limit).assign(agent=name))
     found = pd.concat(rows, ignore_index=True)
     found["within"] = (found["travel_ratio_[-]"] <= MORE) & (found["power_ratio_[-]"] <= MORE)
     first = ["agent", "seed_of", WIND]
     return found[[*first, *found.columns.drop(first)]]
+
+
+def declared(label):
+    """(inputs, preview_times) that a controller declares, by its label in a table.
+
+    Code of the user's own is not run for it, and labels may name what is no longer there: such a controller
+    counts as knowing all but the wind ahead.
+    """
+    if ":" not in label or label.startswith((POLICY, DESIGN)):
+        try:
+            controller = make(label, read_turbine("nrel5mw"), 0.1)
+        except InputError:
+            return ("surge",), ()
+        return tuple(controller.information), tuple(getattr(controller, "preview_times", ()))
+    return ("surge",), ()
+
+
+def _moves_torque(good, base, labels):
+    """Whether controllers move the torque more than MOVED times as much as gspi_oc3 on the same runs."""
+    own = good[good["controller"].isin(labels)].merge(base[[*KEY[1:], TORQUE_TRAVEL]], on=KEY[1:])
+    travels = own[[f"{TORQUE_TRAVEL}_x", f"{TORQUE_TRAVEL}_y"]].mean()
+    return bool(travels.iloc[0] > MOVED * travels.iloc[1])
 
 
 def _wind(case):
@@ -75,51 +149,48 @@ def _wind(case):
         return float("nan")
 
 
-def _ratios(own, base, bound, label):
+def _ratios(own, base, label):
     """ratio_table of one label over gspi_oc3 on the runs that both have."""
     shared = own.merge(base[KEY[1:]], on=KEY[1:])[KEY[1:]]
     if shared.empty:
         return pd.DataFrame()
     pair = pd.concat([frame.merge(shared, on=KEY[1:]) for frame in (base, own)])
-    return _with_fractions(ratio_table(pair.rename(columns={"controller": "variant"})), bound).assign(
-        seed_of=label
-    )
+    ratios = ratio_table(pair.rename(columns={"controller": "variant"}))
+    return ratios.drop(columns="variant").assign(seed_of=label)
 
 
-def _with_fractions(ratios, bound):
-    """The ratios with their fractions of the limit, and of that for measured channels."""
-    result = ratios.drop(columns="variant", errors="ignore").copy()
-    for information, column in (("full", "of_bound_[-]"), ("measured", "of_measured_[-]")):
-        result[column] = [
-            fraction_of_bound(bound, wind, speed, lean, information)
-            for wind, speed, lean in result[[WIND, "speed_ratio_[-]", "pitch_ratio_[-]"]].to_numpy()
-        ]
-    return result
+def _with_fractions(ratios, bound, limit):
+    """The ratios with the name of the limit and their fractions of it."""
+    found = [
+        float("nan") if limit is None else fraction_of_bound(bound, wind, speed, lean, limit)
+        for wind, speed, lean in ratios[[WIND, "speed_ratio_[-]", "pitch_ratio_[-]"]].to_numpy()
+    ]
+    return ratios.assign(limit=limit or "none", **{"of_limit_[-]": found})
 
 
-def bound_markdown(fractions, column="of_bound_[-]"):
+def bound_markdown(fractions):
     """Markdown text of bound_fractions: agents by winds; in brackets where travel or power deviation is more.
 
     A group has the range over its training seeds behind the fraction of its mean ratios; "worse" is a
-    controller that is no better than gspi_oc3 in either deviation.
+    controller that is no better than gspi_oc3 in either deviation, "-" one without a limit of its kind.
     """
     rows = {}
     winds = sorted(fractions[WIND].unique())
     for name, here in fractions.groupby("agent", sort=False):
-        cells = {}
+        cells = {"limit": here["limit"].iloc[0]}
         for wind in winds:
             at = here[here[WIND] == wind]
-            cells[f"{wind:g} m/s"] = _cell(at[at["seed_of"] == ""], at[at["seed_of"] != ""], column)
+            cells[f"{wind:g} m/s"] = _cell(at[at["seed_of"] == ""], at[at["seed_of"] != ""])
         rows[f"`{name}`"] = cells
     wide = pd.DataFrame.from_dict(rows, orient="index")
-    full = column == "of_bound_[-]"
-    wide.index.name = "fraction of the performance limit" if full else "fraction, measured channels"
+    wide.index.name = "fraction of the performance limit"
     return frame_markdown(wide)
 
 
-def _cell(whole, seeds, column):
+def _cell(whole, seeds):
     """Text of one agent at one wind."""
-    if whole.empty:
+    column = "of_limit_[-]"
+    if whole.empty or whole["limit"].iloc[0] == "none":
         return "-"
     fraction, within = whole[column].iloc[0], whole["within"].iloc[0]
     text = "worse" if not np.isfinite(fraction) else f"{fraction:.2f}"

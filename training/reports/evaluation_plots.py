@@ -10,8 +10,8 @@ from fowt_env.visual.style import COLOURS, INK, new_figure, save_figure, style_a
 def plot_evaluation(table, metrics, path=None, title=None):
     """One panel per metric: each case on the x axis, one line per controller, spread over seeds.
 
-    table      the DataFrame of training.evaluation.evaluate.evaluate; runs that failed or tripped have the
-               worst figures of their case, and are counted
+    table      the DataFrame of training.evaluation.evaluate.evaluate; failed and tripped runs have the worst
+               figures of their case, and are counted
     metrics    column names; marks are the mean over the seeds, bars reach from least to greatest
     """
     metrics = [name for name in metrics if name in table.columns]
@@ -53,9 +53,7 @@ def plot_evaluation(table, metrics, path=None, title=None):
         ncols=len(controllers),
         fontsize=8,
         frameon=False,
-        title=f"{failed} of {len(table)} runs failed or tripped, drawn as the worst of their case"
-        if failed
-        else None,
+        title=f"{failed} of {len(table)} runs failed or tripped: the worst of their case" if failed else None,
         title_fontsize=8,
     )
     if title:

@@ -9,7 +9,11 @@ from fowt_env.visual.style import COLOURS, INK, new_figure, save_figure, style_a
 from fowt_env.visual.time_series import TIME, named_runs
 
 AGENT_MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*", "p", "h")
-FRONTS = (("full", "-", "the performance limit"), ("measured", "--", "the same, measured channels"))
+FRONTS = (
+    ("full", "-", "limit: plant, wind and waves"),
+    ("measured", "--", "limit: five sensors"),
+    ("full_preview_11", ":", "limit: wind 11 s ahead"),
+)
 FRAME = 1.3  # ends of both axes of plot_fractions
 HOLLOW = "hollow: more travel or power\ndeviation than gspi_oc3"
 GUST = (  # panels of plot_gust: label, channel

@@ -8,7 +8,13 @@ pytest.importorskip("matplotlib", reason="matplotlib is not installed: the extra
 
 from fowt_env.errors import InputError  # noqa: E402
 from fowt_env.training.evaluation.evaluate import COLUMNS  # noqa: E402
-from fowt_env.training.reports.bound_scores import bound_fractions, bound_markdown, read_bound  # noqa: E402
+from fowt_env.training.reports.bound_scores import (  # noqa: E402
+    bound_fractions,
+    bound_markdown,
+    declared,
+    limit_for,
+    read_bound,
+)
 from fowt_env.training.reports.score_plots import plot_fractions, plot_gust  # noqa: E402
 
 SPEED, LEAN, TRAVEL, POWER = (
@@ -17,12 +23,17 @@ SPEED, LEAN, TRAVEL, POWER = (
 
 
 def bound():
-    """One wind, a front of one corner at half of both deviations (0.6 of the measured channels)."""
+    """One wind, fronts of one corner: at half of both deviations with full knowledge."""
+    corners = {"full": 0.5, "measured": 0.6, "speed": 0.7, "full_pitch_only": 0.75, "speed_pitch_only": 0.8}
+    corners |= {"measured_preview_3": 0.4, "measured_preview_11": 0.25, "speed_preview_11_pitch_only": 0.3}
     rows = [
         {"wind_[m/s]": 18.0, "information": name, "speed_ratio_[-]": place, "pitch_ratio_[-]": place}
-        for name, place in (("full", 0.5), ("measured", 0.6))
+        for name, place in corners.items()
     ]
     return pd.DataFrame(rows)
+
+
+FIVE = ("generator_speed", "blade_pitch", "platform_pitch", "nacelle_acceleration", "generator_torque")
 
 
 def runs(controllers, cases=("ntm_18",), seeds=(1, 2)):
@@ -31,7 +42,11 @@ def runs(controllers, cases=("ntm_18",), seeds=(1, 2)):
     for case in cases:
         for seed in seeds:
             for name, ratios in ({"gspi_oc3": (1.0,) * 4} | controllers).items():
-                row = dict.fromkeys(COLUMNS, 0.0) | {"controller": name, "case": case, "seed": seed}
+                row = dict.fromkeys(COLUMNS, 1.0 if name == "gspi_oc3" else 5.0) | {
+                    "controller": name,
+                    "case": case,
+                    "seed": seed,
+                }
                 row |= {"status": "ok"} | dict(
                     zip((SPEED, LEAN, TRAVEL, POWER), (seed * ratio for ratio in ratios), strict=True)
                 )
@@ -41,24 +56,68 @@ def runs(controllers, cases=("ntm_18",), seeds=(1, 2)):
 
 def test_a_controller_halfway_to_the_front_reaches_half_of_the_bound():
     found = bound_fractions(runs({"x": (0.75, 0.75, 1.0, 1.0), "on": (0.5, 0.5, 0.9, 1.0)}), bound())
-    assert list(found["of_bound_[-]"]) == pytest.approx([0.5, 1.0])
-    assert found["of_measured_[-]"].iloc[0] == pytest.approx(0.25 / 0.4)
+    assert list(found["of_limit_[-]"]) == pytest.approx([0.5, 1.0])
     assert found["within"].all()
+
+
+def test_a_controller_is_held_against_the_limit_of_what_it_knows_and_moves():
+    fronts = bound()
+    assert limit_for((*FIVE, "plant_model"), True, fronts) == "measured"
+    assert limit_for(("time", "generator_speed", "blade_pitch"), True, fronts) == "speed"
+    assert limit_for(("generator_speed", "blade_pitch"), False, fronts) == "speed_pitch_only"
+    assert limit_for((*FIVE, "surge"), True, fronts) == "full"
+    assert limit_for((*FIVE, "wind_speed"), True, fronts) == "full"
+    assert limit_for(("generator_speed", "nacelle_velocity"), False, fronts) == "full_pitch_only"
+    # the wind ahead: at least as far as the controller sees, with the wind of now
+    ahead = (*FIVE, "wind_speed", "wind_preview")
+    assert limit_for(ahead, True, fronts, (1.0, 3.0)) == "measured_preview_3"
+    assert limit_for(ahead, True, fronts, (3.0, 5.0)) == "measured_preview_11"
+    assert limit_for(ahead, True, fronts) == "measured_preview_11"
+    assert (
+        limit_for(("generator_speed", "wind_preview"), False, fronts, (9.0,)) == "speed_preview_11_pitch_only"
+    )
+    # none of the table sees as far, or has its kind
+    assert limit_for(ahead, True, fronts, (20.0,)) is None
+    assert limit_for((*ahead, "surge"), True, fronts) is None
+    everything = pd.concat([fronts, fronts.assign(information="full_preview_11")])
+    assert limit_for((*ahead, "surge"), True, everything) == "full_preview_11"
+    assert limit_for(("generator_speed", "wind_preview"), True, everything, (3.0,)) == "full_preview_11"
+    assert limit_for(ahead, True, everything, (3.0,)) == "measured_preview_3"
+
+
+def test_the_share_is_of_the_own_limit_and_torque_shows_in_its_travel():
+    table = runs({"lqr": (0.8, 0.8, 1.0, 1.0), "pi": (0.9, 0.9, 1.0, 1.0), "x": (0.9, 0.9, 1.0, 1.0)})
+    table.loc[table["controller"] == "pi", "torque_travel_[kN-m/s]"] = 1.2
+    found = bound_fractions(table, bound(), information={"x": ((*FIVE, "wind_preview"), (3.0,))})
+    assert list(found["limit"]) == ["measured", "speed_pitch_only", "measured_preview_3"]
+    assert list(found["of_limit_[-]"]) == pytest.approx([0.5, 0.5, 1.0 / 6.0])
+    assert "| `lqr` | measured | 0.50 |" in bound_markdown(found)
+
+
+def test_a_controller_without_a_limit_has_no_share():
+    table = runs({"x": (0.8, 0.8, 1.0, 1.0)})
+    found = bound_fractions(table, bound(), information={"x": ((*FIVE, "wind_preview"), (30.0,))})
+    assert found["of_limit_[-]"].isna().all() and "| `x` | none | - |" in bound_markdown(found)
+
+
+def test_code_of_the_user_s_own_is_not_run_to_ask_what_it_knows():
+    assert declared("no_such_module:Law") == declared("x") == (("surge",), ())
+    assert "nacelle_acceleration" in declared("lqr")[0]
 
 
 def test_more_travel_than_the_baseline_is_marked():
     table = bound_fractions(runs({"x": (0.75, 0.75, 1.3, 1.0), "y": (0.75, 0.75, 1.0, 1.1)}), bound())
     assert not table["within"].any()
-    assert "| `x` | [0.50] |" in bound_markdown(table)
-    assert "| `x` | 0.50 |" in bound_markdown(table.assign(within=True))
+    assert "| `x` | full | [0.50] |" in bound_markdown(table)
+    assert "| `x` | full | 0.50 |" in bound_markdown(table.assign(within=True))
 
 
 def test_a_group_has_its_mean_and_the_range_of_its_training_seeds():
     agents = {"a": (0.7, 0.7, 1.0, 1.0), "b": (0.8, 0.8, 1.0, 1.0)}
     found = bound_fractions(runs(agents), bound(), {"both": ["a", "b"]})
     assert list(found["seed_of"]) == ["a", "b", ""]
-    assert list(found["of_bound_[-]"]) == pytest.approx([0.6, 0.4, 0.5])
-    assert "| `both` | 0.50 (0.40 to 0.60) |" in bound_markdown(found)
+    assert list(found["of_limit_[-]"]) == pytest.approx([0.6, 0.4, 0.5])
+    assert "| `both` | full | 0.50 (0.40 to 0.60) |" in bound_markdown(found)
 
 
 def test_a_failed_run_takes_its_pair_along():
@@ -72,7 +131,7 @@ def test_a_failed_run_takes_its_pair_along():
 
 def test_a_controller_worse_in_both_has_no_share():
     found = bound_fractions(runs({"x": (1.1, 1.2, 1.0, 1.0)}), bound())
-    assert np.isnan(found["of_bound_[-]"].iloc[0]) and "worse" in bound_markdown(found)
+    assert np.isnan(found["of_limit_[-]"].iloc[0]) and "worse" in bound_markdown(found)
 
 
 def test_cases_of_two_kinds_are_not_mixed():

@@ -1,0 +1,217 @@
+"""The drag of a hull in a random sea as a linear load: damping and wave force, by stochastic linearisation.
+
+The drag of a strip, 0.5 rho C_D D |r| r per length with r the velocity of the water relative to it across the
+axis, is replaced by the linear force with the least mean square error. For a Gaussian r its gain is the mean
+slope, 0.5 rho C_D D E[|r| I + r r'/|r|]; in one direction without current that is
+0.5 rho C_D D sqrt(8/pi) sigma_r (Borgman, 1967, J. Waterways and Harbors Division 93, 129-156; Price and Wu,
+1985). The gain depends on the motion of the hull, and the motion on the gain: callers iterate.
+"""
+
+from dataclasses import dataclass, replace
+from math import pi
+from typing import NamedTuple
+
+import numpy as np
+
+from fowt_env.errors import InputError
+from fowt_env.plant.hydro.strips import GAUSS_OFFSET
+from fowt_env.plant.state import State, pose_of
+from fowt_env.weather.waves import jonswap, wave_number
+
+SPECTRA = ("jonswap", "pierson_moskowitz", "still")  # kinds of sea that have a spectrum, or no waves
+BAND = (0.5, 5.0)  # peak frequencies between which waves are drawn
+ANGLES = 512  # of the mean over directions: 1e-5 of the gain where the water moves in one direction
+RADII, WIDEST = 64, 7.0  # nodes of the mean over sizes, and how many standard deviations they reach
+VELOCITIES = ("vx", "vy", "vz", "wx", "wy", "wz")  # of the hull, body components about the body origin
+
+
+class HullMotion(NamedTuple):
+    """Velocities of a hull (VELOCITIES) in a random sea."""
+
+    waves: object  # (n, 6) complex, per elevation at the hull, or 0.0
+    other: object  # (6, 6) covariance of what does not go with the waves, or 0.0
+
+
+AT_REST = HullMotion(0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class LinearDrag:
+    """Linear drag on a hull (SI, body components about the body origin, order of VELOCITIES).
+
+    damping (6, 6): the force is minus this times the hull's velocities; excitation (n, 6) complex: force per
+    elevation at the hull, of a hull at rest. at_rest (6, 6): the part of damping that the drag has without
+    waves and motion, from the current alone; linear models of the plant contain that. z (m,) and
+    deviation (m,): body z of the strips' nodes, and standard deviation of the relative velocity there, m/s.
+    """
+
+    damping: np.ndarray
+    excitation: np.ndarray
+    at_rest: np.ndarray
+    z: np.ndarray
+    deviation: np.ndarray
+
+
+def elevation_spectrum(sea, omega):
+    """One-sided spectrum (n,) of the elevation, m2 s/rad, at omega (n,) rad/s, rising; as waves are drawn.
+
+    sea: descriptions.SeaState or None, which is still water. The band ends where that of drawn waves does,
+    and the integral by trapezoids is Hs^2/16. Raises: InputError for a sea that has no spectrum.
+    """
+    omega = np.asarray(omega, dtype=float)
+    if sea is None or sea.kind == "still" or sea.height == 0.0:
+        return np.zeros(omega.size)
+    if sea.kind not in SPECTRA:
+        raise InputError(f"sea: kind = {sea.kind!r}: must be one with a spectrum, {', '.join(SPECTRA)}")
+    peak = 2.0 * pi / sea.Tp
+    inside = (omega >= BAND[0] * peak) & (omega <= BAND[1] * peak)
+    found = np.zeros(omega.size)
+    found[inside] = jonswap(omega[inside], sea.Hs, sea.Tp, sea.gamma if sea.kind == "jonswap" else 1.0)
+    whole = np.trapezoid(found, omega)
+    if whole <= 0.0:
+        raise InputError(f"omega: no frequency lies in the band of a sea with Tp = {sea.Tp:g} s")
+    return found * sea.Hs**2 / 16.0 / whole
+
+
+def linear_drag(scene, state, omega, sea, motion=AT_REST):
+    """LinearDrag of a scene's strips about a state, in a sea and with a motion of the hull.
+
+    omega: (n,) rad/s, rising, of the sea's spectrum, of motion.waves and of the excitation. sea: a
+    descriptions.SeaState with a spectrum, or None. Nodes are those of the exact strips below the mean water
+    surface on the axis. A current of the scene is the mean of the relative velocity; what it does to the
+    mean of the drag is left out. Zero without hydrodynamics.
+    Raises: InputError for a sea that has no spectrum.
+    """
+    omega = np.asarray(omega, dtype=float)
+    density = elevation_spectrum(sea, omega)
+    hydro = scene.model.hydro
+    if hydro is None or hydro.strips.shape is None:
+        none = np.zeros((6, 6))
+        return LinearDrag(none, np.zeros((omega.size, 6), complex), none, np.zeros(0), np.zeros(0))
+    strips, site = hydro.strips.shape, scene.platform.environment
+    rotation, height = _axes(state)
+    z, length, diameter = _nodes(strips, height, rotation)
+    heading = 0.0 if sea is None else np.radians(float(sea.heading))
+    place = np.outer(z, rotation[:, 2]) + [0.0, 0.0, height]  # (m, 3), the hull's mean place as origin
+    place = np.vstack([place, strips.keel_z * rotation[:, 2] + [0.0, 0.0, height]])
+    number = wave_number(omega, strips.depth, site.gravity)
+    water = _wave_velocity(omega, number, place, heading, strips.depth) @ rotation  # (n, m + 1, 3), body
+    flow = _current(hydro.current, place, strips.depth) @ rotation
+    # how the hull's velocities move the nodes, across the axis; the keel moves along it
+    moves = np.zeros((z.size, 2, 6))
+    moves[:, 0, 0] = moves[:, 1, 1] = 1.0
+    moves[:, 0, 4], moves[:, 1, 3] = z, -z
+    heave = np.zeros((1, 1, 6))
+    heave[0, 0, 2] = 1.0
+    across = 0.5 * strips.density * strips.drag_coefficient * diameter * length
+    along = np.array([0.5 * strips.density * strips.axial_drag_coefficient * strips.keel_area])
+    weight = density * np.gradient(omega) if omega.size > 1 else np.zeros(omega.size)
+    damping, at_rest = np.zeros((6, 6)), np.zeros((6, 6))
+    excitation = np.zeros((omega.size, 6), complex)
+    for factor, lever, moved, mean in (
+        (across, moves, water[:, :-1, :2], flow[:-1, :2]),
+        (along, heave, water[:, -1:, 2:], flow[-1:, 2:]),
+    ):
+        own = np.einsum("mij,nj->nmi", lever, np.broadcast_to(motion.waves, (omega.size, 6)))
+        relative = moved - own
+        covariance = np.einsum("n,nmi,nmj->mij", weight, relative, relative.conj()).real
+        covariance += np.einsum("mij,jk,mlk->mil", lever, np.broadcast_to(motion.other, (6, 6)), lever)
+        gain = factor[:, None, None] * mean_slope(mean, covariance)
+        damping += np.einsum("mij,mik,mkl->jl", lever, gain, lever)
+        excitation += np.einsum("mij,mik,nmk->nj", lever, gain, moved)
+        still = factor[:, None, None] * mean_slope(mean, np.zeros_like(covariance))
+        at_rest += np.einsum("mij,mik,mkl->jl", lever, still, lever)
+        if factor is across:
+            deviation = np.sqrt(np.trace(covariance, axis1=1, axis2=2))
+    return LinearDrag(damping, excitation, at_rest, z, deviation)
+
+
+def with_drag(model, drag):
+    """The LinearModel with the damping of a LinearDrag in A and C, in place of that of the current alone."""
+    columns = [model.index(name) for name in VELOCITIES]
+    change = drag.damping - drag.at_rest
+    a, c = model.A.copy(), model.C.copy()
+    a[:, columns] -= model.E @ change
+    c[:, columns] -= model.F @ change
+    return replace(model, A=a, C=c)
+
+
+def mean_slope(mean, covariance):
+    """E[|r| I + r r'/|r|] (m, k, k) of Gaussian vectors r of k = 1 or 2 components.
+
+    mean (m, k); covariance (m, k, k). The mean over directions is a sum of even steps, that over sizes exact
+    without a mean and by Gauss-Legendre nodes with one.
+    """
+    mean, covariance = np.asarray(mean, dtype=float), np.asarray(covariance, dtype=float)
+    size = mean.shape[1]
+    values, axes = np.linalg.eigh(covariance)
+    root = axes * np.sqrt(np.maximum(values, 0.0))[:, None, :]
+    if size == 1:
+        angles = np.array([0.0, pi])
+    else:
+        angles = (np.arange(ANGLES) + 0.5) * 2.0 * pi / ANGLES
+    unit = np.stack([np.cos(angles), np.sin(angles)])[:size]
+    spread = np.einsum("mij,ja->mai", root, unit)  # r at one standard deviation in each direction
+    if not np.any(mean):
+        # a mean over sizes: of the absolute value of a normal variable, or of a Rayleigh variable
+        average = np.sqrt(2.0 / pi) if size == 1 else np.sqrt(0.5 * pi)
+        return average * _slopes(spread).mean(axis=1)
+    x, weight = np.polynomial.legendre.leggauss(RADII)
+    radius = 0.5 * WIDEST * (1.0 + x)
+    weight = weight * np.exp(-0.5 * radius**2) * radius ** (size - 1)
+    weight /= weight.sum()
+    total = np.zeros_like(covariance)
+    for r, w in zip(radius, weight, strict=True):
+        total += w * _slopes(mean[:, None, :] + r * spread).mean(axis=1)
+    return total
+
+
+def _slopes(r):
+    """|r| I + r r'/|r| of vectors (..., k)."""
+    size = np.linalg.norm(r, axis=-1)[..., None, None]
+    outer = r[..., :, None] * r[..., None, :]
+    return size * np.eye(r.shape[-1]) + np.divide(outer, size, out=np.zeros_like(outer), where=size > 0.0)
+
+
+def _axes(state):
+    """(rotation (3, 3) from body to inertial components, height of the body origin, m) at a state."""
+    pose = pose_of(np.ascontiguousarray(state))
+    rows = [[getattr(pose, f"r{i}{j}") for j in (1, 2, 3)] for i in (1, 2, 3)]
+    return np.array(rows), float(state[State.HEAVE])
+
+
+def _nodes(strips, height, rotation):
+    """Body z, length and diameter (m,) of the strips' nodes below the mean surface on the axis."""
+    surface = min(max(-height / max(rotation[2, 2], 0.1), strips.keel_z), strips.top_z)
+    places, lengths, diameters = [], [], []
+    for number, cells in enumerate(strips.cells):
+        bottom = strips.section_bottom[number]
+        top = surface if number == 0 else min(surface, strips.section_top[number])
+        cell = max(top - bottom, 0.0) / cells
+        inside = np.array([GAUSS_OFFSET, 1.0 - GAUSS_OFFSET])
+        z = top - cell * (np.arange(cells)[:, None] + inside).ravel()
+        places.append(z)
+        lengths.append(np.full(z.size, 0.5 * cell))
+        diameters.append(strips.diameter_bottom[number] + strips.diameter_slope[number] * (z - bottom))
+    return np.concatenate(places), np.concatenate(lengths), np.concatenate(diameters)
+
+
+def _wave_velocity(omega, number, place, heading, depth):
+    """(n, m, 3) complex velocity of the water at places (m, 3) per elevation at the origin, linear waves."""
+    along = place[:, 0] * np.cos(heading) + place[:, 1] * np.sin(heading)
+    z = np.minimum(place[:, 2], 0.0)
+    k, w = number[:, None], omega[:, None]
+    phase = np.exp(-1j * k * along)
+    below = np.exp(-2.0 * k * (z + depth))
+    size = w * np.exp(k * z) / -np.expm1(-2.0 * k * depth) * phase
+    across = size * (1.0 + below)
+    return np.stack([across * np.cos(heading), across * np.sin(heading), 1j * size * (1.0 - below)], axis=-1)
+
+
+def _current(current, place, depth):
+    """(m, 3) velocity of the current at places (m, 3)."""
+    flow = np.zeros_like(place)
+    if current is not None:
+        fraction = np.clip((depth + place[:, 2]) / depth, 0.0, 1.0) ** current.exponent
+        flow[:, 0], flow[:, 1] = current.u * fraction, current.v * fraction
+    return flow

@@ -1,0 +1,313 @@
+"""The best linear control of a bound_plant.BoundPlant for what it knows: gains, deviations, Pareto fronts.
+
+Controls are the rates of torque and pitch command. With a quadratic cost the best of all linear feedback is
+state feedback on what is known or estimated, with a term for the wind that is to come. With P and K the
+solution of the Riccati equation of plant and controls and its gain, F = A - B K, and the wind v known for the
+time T ahead, that term is -R^-1 B^T g,
+
+    g = int_0^T exp(F^T s) P e v(t + s) ds + exp(F^T T) X w(t + T),   F^T X + X a + P e c = 0,
+
+with e what the wind does to the plant, and w, a, c the states, matrix and output of the wind's filter
+(Tomizuka, 1975, Optimal continuous finite preview problem, IEEE Trans. Automatic Control 20, 362-365). For
+T = 0 it is state feedback on plant and wind. Gains are optimal for the fitted weather. Deviations are
+integrals over the spectra of the fitted or the true weather.
+"""
+
+from dataclasses import dataclass
+from math import pi, sqrt
+
+import numpy as np
+from scipy.linalg import expm, solve_continuous_are, solve_sylvester
+
+from fowt_env.controllers.lqr.design import SENSOR_NOISE, SENSORS
+from fowt_env.descriptions.units import DEGREE
+from fowt_env.errors import InputError
+from fowt_env.training.design.bound_plant import BLADE, LEAN, OMEGA, SPEED, N
+
+SAMPLE_TIME = 0.1  # s, at which the noise of a sensor holds per sample
+TORQUE_RATE = 1e-3  # cost of (torque rate / 5 % of rated a second)^2: keeps the problem well posed
+COMMAND_RATE = 1e-4  # cost of (rate of the pitch command / 0.2 deg/s)^2: the same
+# on the plant's states per root second, so that no state is known for certain: far below the weather's effect
+LEAST_NOISE = np.diag([1e-4, 1e-4, 1e-6, 1e-4, 1e-4, 1e-6, 1e-5, 1e-6]) ** 2
+TOLERANCE = 2e-3  # of the limits, relative
+ROUNDS = 80
+STEP = 2.0  # of the multipliers' logarithms per relative excess
+LEAST_RATIO = 1e-6  # of a deviation to its limit, of which the logarithm is taken
+LOWEST, HIGHEST = np.log(1e-6), np.log(1e6)  # of a multiplier
+GAUSSIAN_MEAN = sqrt(2.0 / pi)  # mean |x| of a Gaussian over its standard deviation
+QUANTITIES = ("rotor_speed", "platform_pitch", "travel", "power", "torque")  # fields of Deviations
+LIMITED = ("travel", "power", "torque")
+TORQUE, COMMAND = N, N + 1  # states of the controls, after those of the plant
+
+
+@dataclass(frozen=True)
+class Deviations:
+    """Standard deviations of a closed loop: rad/s, rad, mean |rad/s|, fractions of rated power and torque."""
+
+    rotor_speed: float
+    platform_pitch: float
+    travel: float
+    power: float
+    torque: float
+
+
+@dataclass(frozen=True)
+class Information:
+    """What a linear controller knows and moves.
+
+    sensors: names of lqr/design.py's SENSORS, or None: all states of plant and weather. preview: s for which
+    the rotor-averaged wind is known ahead, exactly; None: not even now, unless all is known. torque: whether
+    it moves the generator torque. text: for plots.
+    """
+
+    text: str
+    sensors: tuple | None = None
+    preview: float | None = None
+    torque: bool = True
+
+
+@dataclass(frozen=True)
+class Estimates:
+    """Response of estimates to each of k inputs of a plant, over OMEGA; the gains do not matter.
+
+    plant (n, 8, k): state less estimate; weather (n, 8, k): estimates of the filters' states.
+    """
+
+    plant: np.ndarray
+    weather: np.ndarray
+
+
+class Problem:
+    """A BoundPlant with what a controller knows: the best gains for a cost, and the deviations under them.
+
+    noise: {sensor: standard deviation of a sample every SAMPLE_TIME, SI}; None: SENSOR_NOISE.
+    Raises: InputError for sensors without a positive noise.
+    """
+
+    def __init__(self, plant, information, noise=None):
+        self.plant, self.information = plant, information
+        rated = plant.turbine.rated_rotor_speed
+        self.controls = [0, 1] if information.torque else [1]
+        self.states = [*range(N), *(N + j for j in self.controls)]
+        n = N + 2
+        a, b = np.zeros((n, n)), np.zeros((n, 2))
+        a[:N, :N], a[:N, N:] = plant.A, plant.B
+        b[TORQUE, 0] = b[COMMAND, 1] = 1.0
+        self.a, self.b = a[np.ix_(self.states, self.states)], b[np.ix_(self.states, self.controls)]
+        eye = np.eye(n)
+        power = eye[SPEED] / rated + eye[TORQUE]
+        rows = {"rotor_speed": eye[SPEED], "platform_pitch": eye[LEAN], "travel": a[BLADE]}
+        rows |= {"power": power, "torque": eye[TORQUE]}
+        self.scale = {"rotor_speed": 0.05 * rated, "platform_pitch": DEGREE, "travel": 0.2 * DEGREE}
+        self.scale |= {"power": 0.05, "torque": 0.05}
+        self.rows = np.array([rows[name][self.states] / self.scale[name] for name in QUANTITIES])
+        rates = np.array([TORQUE_RATE / 0.05**2, COMMAND_RATE / (0.2 * DEGREE) ** 2])
+        self.r = np.diag(rates[self.controls])
+        self.wind = np.r_[plant.wind, np.zeros(len(self.controls))]
+        self.waves = np.vstack([plant.E, np.zeros((len(self.controls), 3))])
+        self.wind_drive = np.outer(self.wind, plant.wind_filter.output)  # from the filters' states
+        self.wave_drive = self.waves @ plant.force
+        self.knows_wind = information.sensors is None or information.preview is not None
+        # one unit of each is one of wind, of elevation and of each sensor's noise
+        self.noise = self._noise(noise)
+        self.estimates = {}
+
+    def _noise(self, noise):
+        """(k,) intensity of the noise of the sensors in use, per rad/s and both sides."""
+        if self.information.sensors is None:
+            return np.zeros(0)
+        noise = dict(zip(SENSORS, SENSOR_NOISE, strict=True)) if noise is None else dict(noise)
+        for name in self.information.sensors:
+            if not noise.get(name, 0.0) > 0.0:
+                raise InputError(f"noise: {name} = {noise.get(name)}: must be a standard deviation above 0")
+        return np.array([noise[name] ** 2 * SAMPLE_TIME for name in self.information.sensors])
+
+    def cost(self, fraction, *multipliers):
+        """Q with a fraction of platform pitch and multipliers on travel, power and torque."""
+        weights = np.array([1.0 - fraction, fraction, *multipliers])
+        return (self.rows * weights[:, None]).T @ self.rows
+
+    def parts(self, deviations):
+        """(5,) Deviations in the units of the cost's rows."""
+        found = np.array([getattr(deviations, name) / self.scale[name] for name in QUANTITIES])
+        found[QUANTITIES.index("travel")] /= GAUSSIAN_MEAN
+        return found
+
+    def gains(self, q):
+        """(P, K): solution of the Riccati equation and gain on plant and controls."""
+        p = solve_continuous_are(self.a, self.b, q, self.r)
+        return p, np.linalg.solve(self.r, self.b.T @ p)
+
+    def deviations(self, q, weather):
+        """Deviations under the best control for the cost q, in a bound_plant.Weather."""
+        return self._deviations(*self.gains(q), weather)
+
+    def _deviations(self, p, k, weather):
+        closed, n = self.a - self.b @ k, len(self.states)
+        estimate = self._estimate(weather)
+        inputs = 2 + self.noise.size
+        drive = np.zeros((OMEGA.size, n, inputs), complex)
+        drive[:, :, 0], drive[:, :, 1] = self.wind, weather.force @ self.waves.T
+        # the feedback acts on the estimate, the state less its error
+        drive += self.b @ (k[:, :N] @ estimate.plant)
+        gain = np.linalg.solve(self.r, self.b.T)
+        ahead = np.zeros((OMEGA.size, n, inputs), complex)
+        wave = solve_sylvester(closed.T, self.plant.wave_filter.a, -p @ self.wave_drive)
+        wind = solve_sylvester(closed.T, self.plant.wind_filter.a, -p @ self.wind_drive)
+        order = wind.shape[1]
+        ahead += wave @ estimate.weather[:, order:]
+        if self.knows_wind:
+            ahead[:, :, 0] += self._ahead(closed, p, wind)
+        else:
+            ahead += wind @ estimate.weather[:, :order]
+        drive -= (self.b @ gain) @ ahead
+        moved = np.linalg.solve(1j * OMEGA[:, None, None] * np.eye(n) - closed, drive)
+        density = np.column_stack(
+            [weather.wind, weather.elevation, np.broadcast_to(self.noise / pi, (OMEGA.size, self.noise.size))]
+        )
+        squares = np.einsum("nqk,nk->nq", np.abs(self.rows @ moved) ** 2, density)
+        found = np.sqrt(np.trapezoid(squares, OMEGA, axis=0)) * [self.scale[name] for name in QUANTITIES]
+        found[QUANTITIES.index("travel")] *= GAUSSIAN_MEAN
+        return Deviations(*(float(value) for value in found))
+
+    def _ahead(self, closed, p, wind):
+        """(n, states) g of the wind per wind speed, with that known for the preview's time ahead."""
+        time = self.information.preview or 0.0
+        at = self.plant.wind_filter
+        states = at.states(OMEGA)
+        states = states / (states @ at.output)[:, None]
+        shift, later = expm(closed.T * time), np.exp(1j * OMEGA * time)[:, None]
+        found = later * (states @ (shift @ wind).T)
+        if time > 0.0:
+            n = len(self.states)
+            pe = p @ self.wind
+            change = later * (shift @ pe) - pe
+            within = closed.T + 1j * OMEGA[:, None, None] * np.eye(n)
+            found = found + np.linalg.solve(within, change[:, :, None])[:, :, 0]
+        return found
+
+    def _estimate(self, weather):
+        """Estimates in a weather; kept, since it is the same for all gains."""
+        key = id(weather)
+        if key not in self.estimates:
+            self.estimates[key] = (weather, self._estimated(weather))
+        return self.estimates[key][1]
+
+    def _estimated(self, weather):
+        plant, k = self.plant, 2 + self.noise.size
+        wind, waves = plant.wind_filter, plant.wave_filter
+        order, orders = wind.b.size, wind.b.size + waves.b.size
+        found = Estimates(np.zeros((OMEGA.size, N, k), complex), np.zeros((OMEGA.size, orders, k), complex))
+        if self.information.sensors is None:
+            states = waves.states(OMEGA)
+            elevation = (states @ waves.output)[:, None]
+            found.weather[:, order:, 1] = np.divide(
+                states, elevation, out=np.zeros_like(states), where=elevation != 0.0
+            )
+            return found
+        gain, c = self.estimator()
+        used = [SENSORS.index(name) for name in self.information.sensors]
+        model = np.zeros((N + orders, N + orders))
+        model[:N, :N], model[:N, N : N + order] = plant.A, np.outer(plant.wind, wind.output)
+        model[:N, N + order :] = plant.E @ plant.force
+        model[N : N + order, N : N + order], model[N + order :, N + order :] = wind.a, waves.a
+        # state of the plant less its estimate, and estimates of the weather
+        sign = np.r_[np.ones(N), -np.ones(orders)]
+        loop = model - gain @ c
+        loop = loop * sign[:, None] * sign
+        drive = np.zeros((OMEGA.size, N + orders, k), complex)
+        drive[:, :N, 1] = weather.force @ plant.E.T
+        drive[:, :, 1] -= (weather.force @ plant.F[used].T) @ gain.T * sign
+        if not self.knows_wind:
+            drive[:, :N, 0] = plant.wind
+            drive[:, :, 0] -= gain @ plant.Dwind[used] * sign
+        drive[:, :, 2:] -= gain * sign[:, None]
+        moved = np.linalg.solve(1j * OMEGA[:, None, None] * np.eye(N + orders) - loop, drive)
+        found.plant[:], found.weather[:] = moved[:, :N], moved[:, N:]
+        return found
+
+    def estimator(self):
+        """(gain, C): Kalman gain on plant and filters' states, and what the sensors read of these.
+
+        Torque and pitch command are known. A wind that is known acts through them alike: its filter's states
+        are not estimated, and have no gain.
+        """
+        plant = self.plant
+        wind, waves = plant.wind_filter, plant.wave_filter
+        order = wind.b.size
+        used = [SENSORS.index(name) for name in self.information.sensors]
+        n = N + order + waves.b.size
+        a, q, c = np.zeros((n, n)), np.zeros((n, n)), np.zeros((len(used), n))
+        a[:N, :N] = plant.A
+        a[:N, N : N + order], a[:N, N + order :] = np.outer(plant.wind, wind.output), plant.E @ plant.force
+        a[N : N + order, N : N + order], a[N + order :, N + order :] = wind.a, waves.a
+        c[:, :N] = plant.C[used]
+        c[:, N : N + order] = np.outer(plant.Dwind[used], wind.output)
+        c[:, N + order :] = plant.F[used] @ plant.force
+        q[:N, :N] = LEAST_NOISE
+        q[N : N + order, N : N + order] = np.outer(wind.b, wind.b)
+        q[N + order :, N + order :] = np.outer(waves.b, waves.b)
+        kept = np.r_[np.arange(N), np.arange(N + (order if self.knows_wind else 0), n)]
+        a, q, read = a[np.ix_(kept, kept)], q[np.ix_(kept, kept)], c[:, kept]
+        r = np.diag(self.noise)
+        p = solve_continuous_are(a.T, read.T, q, r)
+        gain = np.zeros((n, len(used)))
+        gain[kept] = p @ read.T @ np.linalg.inv(r)
+        return gain, c
+
+
+def front(problem, limits, fractions):
+    """[(fraction, Deviations, cost)] that are best for a fraction of platform pitch; limits: Deviations.
+
+    In the plant's true weather. Each multiplier grows while its limit is exceeded and shrinks while it is
+    kept. Fractions at which ROUNDS rounds of that end outside the limits are left out.
+    Raises: InputError where that is all of them.
+    """
+    found, multipliers = [], np.log([1.0, 0.3, 0.1])
+    wanted = np.array([getattr(limits, name) for name in LIMITED])
+    for fraction in fractions:
+        step, last = np.full(len(LIMITED), STEP), np.zeros(len(LIMITED))
+        for _ in range(ROUNDS):
+            q = problem.cost(fraction, *np.exp(multipliers))
+            reached = problem.deviations(q, problem.plant.true)
+            values = np.array([getattr(reached, name) for name in LIMITED])
+            excess = np.log(np.maximum(values / wanted, LEAST_RATIO))
+            # a limit that is kept, and whose cost counts for nothing, does not hold anything
+            parts = problem.parts(reached) ** 2
+            share = np.exp(multipliers) * parts[2:] / (parts[:2] @ [1.0 - fraction, fraction])
+            slack = (excess < 0.0) & (share < TOLERANCE)
+            if np.all((np.abs(excess) < TOLERANCE) | slack):
+                break
+            # smaller steps where the last one went too far
+            step = np.where(excess * last < 0.0, 0.5 * step, np.minimum(1.2 * step, STEP))
+            last = excess
+            multipliers = np.clip(multipliers + step * excess, LOWEST, HIGHEST)
+        if excess.max() < 2.0 * TOLERANCE:
+            found.append((float(fraction), reached, q))
+    if not found:
+        raise InputError(f"{problem.information.text}: no gains meet the limits")
+    return found
+
+
+def baseline_deviations(plant, weather):
+    """Deviations under gspi_oc3 in a bound_plant.Weather; constant torque: power goes with speed."""
+    responses = plant.baseline_response(weather)
+
+    def deviation(row):
+        squares = sum(
+            np.abs(moved @ row) ** 2 * density
+            for moved, density in zip(responses, (weather.wind, weather.elevation), strict=True)
+        )
+        return sqrt(np.trapezoid(squares, OMEGA))
+
+    eye = np.eye(N)
+    speed = deviation(eye[SPEED])
+    travel = np.array(responses) @ eye[BLADE] * OMEGA
+    squares = np.abs(travel[0]) ** 2 * weather.wind + np.abs(travel[1]) ** 2 * weather.elevation
+    return Deviations(
+        speed,
+        deviation(eye[LEAN]),
+        GAUSSIAN_MEAN * sqrt(np.trapezoid(squares, OMEGA)),
+        speed / plant.turbine.rated_rotor_speed,
+        0.0,
+    )

@@ -1,0 +1,303 @@
+"""The plant and the weather of the performance limit: planar states with linear drag, and fitted filters.
+
+Per wind speed: surge, heave and platform pitch, rotor and pitch actuator, with the hull's drag linearised
+in the sea and in the motion that the plant has under gspi_oc3. The rotor-averaged Kaimal wind is white
+noise through a filter of order 3 with one zero, the elevation that through two resonators one after the
+other, and the wave force on the hull a combination of their states. FittedWeather has these spectra and
+TrueWeather those that runs are drawn from, with the hull's own force at each frequency.
+"""
+
+from dataclasses import dataclass
+from math import pi, sqrt
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from fowt_env.analysis.linear_drag import HullMotion, elevation_spectrum, linear_drag, with_drag
+from fowt_env.analysis.linear_model import linearize
+from fowt_env.analysis.wave_excitation import wave_force
+from fowt_env.controllers.lqr.design import LAST_SEA_WIND, SENSORS, SITE, TURBULENCE_CLASS, scene_at
+from fowt_env.controllers.pi import PISettings, schedule_gain
+from fowt_env.descriptions.iec import ntm_sigma
+from fowt_env.descriptions.sea_state import joint_sea_state, sea_state_of
+from fowt_env.errors import InputError
+from fowt_env.weather.turbulence import amplitudes, fft_length
+
+PLANAR = ("surge", "heave", "platform_pitch", "vx", "vz", "wy", "rotor_speed", "blade_pitch")
+IN_PLANE = (0, 2, 4)  # of forces and velocities of the hull: surge, heave, platform pitch
+N = len(PLANAR)
+LEAN, VX, VZ, WY, SPEED, BLADE = (
+    PLANAR.index(name) for name in ("platform_pitch", "vx", "vz", "wy", "rotor_speed", "blade_pitch")
+)
+RECORD = 800.0  # s, over which the wind of the named suites is drawn: it has nothing slower
+SMALLEST_ROTOR = 200.0  # m2 of swept area, above which the wind of IEC 61400-1 holds
+ORDER, ZEROS = 3, 1  # of the wind's filter, beside the one that stops what is slower than a record
+SLOWEST = pi / RECORD  # rad/s, half the lowest frequency of a record
+WIND_BAND = (1.0 / RECORD, 0.25)  # Hz, of its fit
+WAVE_BAND = (0.5, 3.0)  # peak frequencies, of the fit of the elevation
+LOWEST_FORCE = 0.1  # rad/s, from which on the fit of the force weighs it by 1 over frequency
+# rad/s: dense where platform and waves have their resonances, wide enough for the noise of sensors
+OMEGA = np.concatenate(
+    [
+        np.geomspace(1e-4, 0.999 * SLOWEST, 16),
+        SLOWEST * np.arange(1, 510),
+        np.geomspace(510 * SLOWEST, 6.0, 50, endpoint=False),
+        np.geomspace(6.0, 100.0, 60),
+    ]
+)
+ROUNDS, SETTLED = 40, 1e-4  # of the drag and the motion under gspi_oc3
+START = np.diag([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])  # m2/s2: in surge, from which that begins
+
+
+@dataclass(frozen=True)
+class Filter:
+    """White noise of unit intensity through dx = a x + b noise: its states, and what they stand for.
+
+    output (m,) gives wind speed (m/s) or elevation (m). error: integral of the absolute difference from the
+    spectrum that it was fitted to, over the variance, at the frequencies that this has.
+    """
+
+    a: np.ndarray
+    b: np.ndarray
+    output: np.ndarray
+    error: float
+
+    def states(self, omega):
+        """(n, m) complex response of the states to the noise."""
+        eye = np.eye(self.b.size)
+        return np.linalg.solve(1j * omega[:, None, None] * eye - self.a, self.b[:, None])[:, :, 0]
+
+    def density(self, omega):
+        """(n,) one-sided spectrum of the output, per rad/s."""
+        return np.abs(self.states(omega) @ self.output) ** 2 / pi
+
+
+@dataclass(frozen=True)
+class Weather:
+    """Spectra of wind and elevation (n,) over OMEGA, per rad/s; force (n, 3) in the plane per elevation."""
+
+    wind: np.ndarray
+    elevation: np.ndarray
+    force: np.ndarray
+
+
+class BoundPlant:
+    """One wind speed's plant with its weather, linear (SI, less the trim).
+
+    A (8, 8) of PLANAR, B (8, 2) of torque (in rated torques) and pitch command, wind (8,), E (8, 3) of forces
+    in the plane; C, D, Dwind, F the same of SENSORS. wind_filter and wave_filter are Filters, force (3, 4)
+    gives the wave force from the states of the latter; fitted and true are Weathers. drag is the LinearDrag.
+    Raises: InputError where the blade pitch rests on its limit, for a rotor too small for the wind of
+    IEC 61400-1, and where gspi_oc3 does not hold the plant.
+    """
+
+    def __init__(self, scene, wind, sea=None):
+        self.wind_speed, self.turbine = float(wind), scene.turbine
+        area = pi * scene.turbine.rotor.tip_radius**2
+        if area <= SMALLEST_ROTOR:
+            raise InputError(
+                f"the turbine sweeps {area:.3g} m2: the performance limit takes the turbulence of"
+                f" IEC 61400-1, which holds above {SMALLEST_ROTOR:g} m2"
+            )
+        if sea is None:
+            sea = joint_sea_state(SITE, min(self.wind_speed, LAST_SEA_WIND))
+        self.sea = sea_state_of(sea)
+        model = linearize(scene_at(scene, wind))
+        if model.pitch_rests:
+            raise InputError(
+                f"wind = {wind:g}: the blade pitch rests on its limit there, and no controller moves it"
+            )
+        self.torque, self.pitch = (float(value) for value in model.point.command)
+        elevation = elevation_spectrum(self.sea, OMEGA)
+        force = np.zeros((OMEGA.size, 3), complex)
+        here = elevation > 0.0
+        if here.any():
+            force[here] = wave_force(scene, model.point.state, OMEGA[here])[:, IN_PLANE]
+        self.true = Weather(_wind_spectrum(self.wind_speed, scene.turbine.rotor), elevation, force)
+        self._settle_drag(scene, model)
+        self.wind_filter = fit_wind(self.true.wind)
+        self.wave_filter, self.force, self.force_errors = fit_waves(self.true, self.sea)
+        states = self.wave_filter.states(OMEGA)
+        elevation = (states @ self.wave_filter.output)[:, None]
+        self.fitted = Weather(
+            self.wind_filter.density(OMEGA),
+            self.wave_filter.density(OMEGA),
+            np.divide(
+                states @ self.force.T, elevation, out=np.zeros_like(self.true.force), where=elevation != 0
+            ),
+        )
+
+    def _settle_drag(self, scene, model):
+        """Linearise the drag in the sea and in the motion under gspi_oc3, which depends on it."""
+        strips, motion, damping = self.true, HullMotion(0.0, START), np.inf
+        for _ in range(ROUNDS):
+            drag = linear_drag(scene, model.point.state, OMEGA, self.sea, motion)
+            self._take(with_drag(model, drag))
+            self.true = Weather(strips.wind, strips.elevation, strips.force + drag.excitation[:, IN_PLANE])
+            scale = np.abs(drag.damping).max()
+            if np.abs(drag.damping - damping).max() <= SETTLED * scale:
+                break
+            damping, found = drag.damping, self._motion()
+            # half way: more drag is less motion, so that whole steps would swing about what is sought
+            motion = HullMotion(0.5 * (motion.waves + found.waves), 0.5 * (motion.other + found.other))
+        self.drag = drag
+
+    def _take(self, model):
+        """Set the matrices from a LinearModel."""
+        rows = [model.index(name) for name in PLANAR]
+        sensors = [model.output_index(name) for name in SENSORS]
+        units = np.array([self.torque, 1.0])  # torque is counted in rated torques
+        self.A, self.B, self.wind = model.A[np.ix_(rows, rows)], model.B[rows, :2] * units, model.B[rows, 2]
+        self.C, self.D, self.Dwind = (
+            model.C[np.ix_(sensors, rows)],
+            model.D[sensors, :2] * units,
+            model.D[sensors, 2],
+        )
+        self.E, self.F = model.E[np.ix_(rows, IN_PLANE)], model.F[np.ix_(sensors, IN_PLANE)]
+
+    def baseline(self):
+        """(10, 10) closed loop of gspi_oc3: PLANAR, filtered rotor speed, integral of its error.
+
+        The law in continuous time, with the slope of its schedule (theory.md, Eq. (A7)) and its speed filter.
+        Raises: InputError where it is unstable.
+        """
+        settings = PISettings.published(self.turbine)
+        gain = schedule_gain(self.pitch, settings.gain_schedule_pitch)
+        gain *= settings.gear_ratio / (2.0 - gain)
+        a, n = np.zeros((N + 2, N + 2)), N
+        a[:n, :n] = self.A
+        a[:n, n], a[:n, n + 1] = self.B[:, 1] * gain * settings.KP, self.B[:, 1] * gain * settings.KI
+        corner = settings.speed_filter_corner
+        a[n, SPEED], a[n, n], a[n + 1, n] = corner, -corner, 1.0
+        if np.linalg.eigvals(a).real.max() >= 0.0:
+            raise InputError(
+                f"wind = {self.wind_speed:g}: the linear plant is unstable under gspi_oc3, whose travel and"
+                " power deviation are the limits"
+            )
+        return a
+
+    def baseline_response(self, weather):
+        """(wind (n, 8), waves (n, 8)) of PLANAR under gspi_oc3 per wind speed and elevation."""
+        drive = np.zeros((OMEGA.size, N + 2, 2), complex)
+        drive[:, :N, 0] = self.wind
+        drive[:, :N, 1] = weather.force @ self.E.T
+        found = np.linalg.solve(1j * OMEGA[:, None, None] * np.eye(N + 2) - self.baseline(), drive)
+        return found[:, :N, 0], found[:, :N, 1]
+
+    def _motion(self):
+        """HullMotion under gspi_oc3 on the true spectra."""
+        wind, waves = self.baseline_response(self.true)
+        velocities = [VX, VZ, WY]
+        per_elevation, other = np.zeros((OMEGA.size, 6), complex), np.zeros((6, 6))
+        per_elevation[:, IN_PLANE] = waves[:, velocities]
+        moved = wind[:, velocities]
+        density = moved[:, :, None] * moved[:, None, :].conj() * self.true.wind[:, None, None]
+        other[np.ix_(IN_PLANE, IN_PLANE)] = np.trapezoid(density.real, OMEGA, axis=0)
+        return HullMotion(per_elevation, other)
+
+
+def _wind_spectrum(speed, rotor):
+    """One-sided spectrum (n,) over OMEGA, per rad/s, of the rotor-averaged wind of runs of RECORD seconds."""
+    step = 0.1
+    samples = fft_length(round(RECORD / step))
+    sigma = ntm_sigma(speed, TURBULENCE_CLASS)
+    amplitude = amplitudes(speed, sigma, rotor.hub_height, 2.0 * rotor.tip_radius, samples, step, "rotor")[0]
+    spacing = 2.0 * pi / (samples * step)
+    at = spacing * np.arange(amplitude.size)
+    density = np.log(0.5 * amplitude[1:-1] ** 2 / spacing)
+    found = np.exp(np.interp(OMEGA, at[1:-1], density))
+    found[(OMEGA < 0.9995 * SLOWEST) | (OMEGA > at[-1])] = 0.0
+    return found * 0.5 * np.sum(amplitude**2) / np.trapezoid(found, OMEGA)
+
+
+def fit_wind(spectrum):
+    """Filter of order 3 with a zero, behind one that stops what is slower than a record.
+
+    Fitted to the log of a wind's spectrum over OMEGA; the variances agree. Without the second the best
+    control would spend its torque on slow changes that no run has.
+    """
+    used = (OMEGA > 2.0 * pi * WIND_BAND[0]) & (OMEGA < 2.0 * pi * WIND_BAND[1])
+    omega, target = OMEGA[used], spectrum[used]
+    slow = -np.log1p((SLOWEST / omega) ** 2)
+    weight = np.sqrt(target * np.gradient(omega))
+    weight /= np.sqrt(np.mean(weight**2))
+
+    def miss(p):
+        squares = np.log1p((np.exp(p[: ORDER + ZEROS])[:, None] * omega) ** 2)
+        return weight * (
+            p[-1] + squares[ORDER:].sum(axis=0) - squares[:ORDER].sum(axis=0) + slow - np.log(target)
+        )
+
+    start = np.r_[np.log([60.0, 8.0, 1.0, 20.0]), np.log(target[0])]
+    times = np.exp(least_squares(miss, start).x[: ORDER + ZEROS])
+    below, above = np.ones(1), np.ones(1)
+    for time in times[:ORDER]:
+        below = np.polymul(below, [time, 1.0])
+    for time in times[ORDER:]:
+        above = np.polymul(above, [time, 1.0])
+    below, above = np.polymul(below / below[0], [1.0, SLOWEST]), np.polymul(above / below[0], [1.0, 0.0])
+    a, b, c = _companion(below, above)
+    return _scaled(a, b, c, spectrum)
+
+
+def fit_waves(weather, sea):
+    """(Filter of the elevation, force (3, 4) of its states, relative rms errors (3,) of the force).
+
+    The filter is s^2 through two resonators; its variance is the sea's. The errors are those of the force at
+    the sea's frequencies; zero where there is no force.
+    """
+    peak = 2.0 * pi / sea.Tp if sea.height else 1.0
+    used = (OMEGA > WAVE_BAND[0] * peak) & (OMEGA < WAVE_BAND[1] * peak)
+    omega, target = OMEGA[used] / peak, weather.elevation[used]
+    scale = target.max() if sea.height else 1.0
+
+    def square(p, omega):
+        s = 1j * omega
+        w1, z1, w2, z2 = np.exp(p[:4])
+        return np.abs(s * s / ((s * s + 2 * z1 * w1 * s + w1**2) * (s * s + 2 * z2 * w2 * s + w2**2))) ** 2
+
+    best = None
+    for damping in (0.05, 0.1, 0.2):
+        start = np.r_[np.log([0.97, damping, 1.15, 2.0 * damping]), 0.0]
+        start[4] = -np.log(square(start, omega).max())
+        fit = least_squares(lambda p: np.exp(p[4]) * square(p, omega) - target / scale, start)
+        if best is None or fit.cost < best.cost:
+            best = fit
+    w1, z1, w2, z2 = np.exp(best.x[:4])
+    below = np.polymul([1.0, 2.0 * z1 * w1, w1**2], [1.0, 2.0 * z2 * w2, w2**2])
+    a, b, c = _companion(below, np.array([1.0, 0.0, 0.0]))  # in time of 1/peak: the states are of one size
+    a, b = a * peak, b * sqrt(peak)
+    filtered = _scaled(a, b, c, weather.elevation)
+    states = filtered.states(OMEGA)
+    elevation = states @ filtered.output
+    # per frequency, as that is how a mass moves; also where there is no sea, so that the force is small there
+    weight = np.sqrt(np.gradient(OMEGA)) / np.maximum(OMEGA, LOWEST_FORCE)
+    wanted = weather.force * elevation[:, None]
+    left, right = states * weight[:, None], wanted * weight[:, None]
+    stacked = (np.r_[left.real, left.imag], np.r_[right.real, right.imag])
+    force = np.linalg.lstsq(*stacked, rcond=None)[0].T
+    density = (np.gradient(OMEGA) * (weather.elevation > 0.0))[:, None]
+    size = np.sum(density * np.abs(wanted) ** 2, axis=0)
+    miss = np.sum(density * np.abs(states @ force.T - wanted) ** 2, axis=0)
+    return filtered, force, np.sqrt(np.divide(miss, size, out=np.zeros(3), where=size > 0.0))
+
+
+def _companion(below, above):
+    """(a, b, c) of the filter above/below, polynomials in s with the first coefficient of below 1."""
+    n = below.size - 1
+    a = np.zeros((n, n))
+    a[:-1, 1:] = np.eye(n - 1)
+    a[-1] = -below[:0:-1]
+    b, c = np.zeros(n), np.zeros(n)
+    b[-1] = 1.0
+    c[: above.size] = above[::-1]
+    return a, b, c
+
+
+def _scaled(a, b, c, spectrum):
+    """Filter whose variance is that of a spectrum over OMEGA, both where the spectrum is not zero."""
+    variance, here = np.trapezoid(spectrum, OMEGA), spectrum > 0.0
+    density = np.where(here, np.abs(Filter(a, b, c, 0.0).states(OMEGA) @ c) ** 2 / pi, 0.0)
+    ratio = variance / np.trapezoid(density, OMEGA) if variance > 0.0 else 0.0
+    error = np.trapezoid(np.abs(ratio * density - spectrum), OMEGA) / variance if variance > 0.0 else 0.0
+    return Filter(a, b, c * sqrt(ratio), float(error))
