@@ -341,7 +341,7 @@ def foreseen(scene: Any, leads: tuple[float, ...], preview: Any, duration: float
         )
     if not (np.isfinite(time).all() and np.isfinite(values).all() and (np.diff(time) > 0.0).all()):
         raise InputError("preview: time must increase, and time and values must be finite")
-    return Preview(time, values)
+    return Preview(time, values, found[2] if len(found) > 2 else None)
 
 
 class Known:
