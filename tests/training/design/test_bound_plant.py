@@ -107,7 +107,7 @@ def test_what_has_no_limit_is_named(windy, plant):
 @pytest.mark.slow
 @pytest.mark.parametrize("wind", [16, 20, 24])
 def test_the_linear_baseline_is_the_simulated_one(windy, wind):
-    """Means over six seeds of the headline suite's weather: platform pitch within 6 %, others within 5 %."""
+    """Means over six seeds of the headline suite's weather: pitch within 6 %, rotor 5 %, travel 7 %."""
     from fowt_env.descriptions.sea_state import joint_sea_state
 
     plant = BoundPlant(windy, float(wind))
@@ -119,6 +119,7 @@ def test_the_linear_baseline_is_the_simulated_one(windy, wind):
             wind={"kind": "ntm", "speed": float(wind), "class": "B"},
             sea=joint_sea_state("gulf_of_maine_normal", float(wind)),
             seed=seed,
+            fidelity="standard",
             duration=800.0,
         )
         run = simulate(scene, "gspi_oc3", duration=800.0)
@@ -128,4 +129,4 @@ def test_the_linear_baseline_is_the_simulated_one(windy, wind):
     speed, lean, travel = np.mean(found, axis=0)
     assert expected.rotor_speed * 30.0 / np.pi == pytest.approx(speed, rel=0.05)
     assert expected.platform_pitch / DEGREE == pytest.approx(lean, rel=0.06)
-    assert expected.travel / DEGREE == pytest.approx(travel, rel=0.05)
+    assert expected.travel / DEGREE == pytest.approx(travel, rel=0.07)
