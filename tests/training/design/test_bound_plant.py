@@ -90,6 +90,15 @@ def test_still_water_has_drag_of_the_platform_s_own_motion_alone(windy, plant):
     assert calm.travel < rough.travel
 
 
+def test_a_pitch_drive_without_lag_counts_as_a_quick_one(plant):
+    """OpenFAST's own turbine has none; its closed loop is nearly that of the other."""
+    quick = BoundPlant(build_scene("oc3_hywind_openfast", wind=18.0), 18.0)
+    assert quick.turbine.pitch_drive.time_constant == 0.0
+    theirs, own = (baseline_deviations(each, each.true) for each in (plant, quick))
+    assert own.platform_pitch == pytest.approx(theirs.platform_pitch, rel=0.05)
+    assert own.rotor_speed == pytest.approx(theirs.rotor_speed, rel=0.05)
+
+
 def test_what_has_no_limit_is_named(windy, plant):
     with pytest.raises(InputError, match="the turbine sweeps .* IEC 61400-1, which holds above 200 m2"):
         small = build_scene("liu_1_50", wind=2.0)
