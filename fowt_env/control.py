@@ -174,14 +174,17 @@ class MeasurementView(Measurement):
 
     _controller = ""
     _hidden: frozenset[str] = frozenset()
+    _places: tuple[int, ...] = ()  # of the hidden fields
     _foresees = False
     _ahead: tuple[float, ...] = ()
 
     @classmethod
     def take(cls, values: Sequence[float]) -> "MeasurementView":
         """The view of (N_MEASUREMENTS + leads,) values."""
-        fields = zip(Measurement._fields, values[:N_MEASUREMENTS], strict=True)
-        view = cls._make([nan if name in cls._hidden else value for name, value in fields])
+        shown = list(values[:N_MEASUREMENTS])
+        for place in cls._places:
+            shown[place] = nan
+        view = cls._make(shown)
         view._ahead = tuple(values[N_MEASUREMENTS:])
         return view
 
@@ -227,6 +230,7 @@ def _view_class(name, information):
     members = {
         "_controller": name,
         "_hidden": hidden_fields,
+        "_places": tuple(i for i, field in enumerate(Measurement._fields) if field in hidden_fields),
         "_foresees": "wind_preview" in information,
         **{field: property(lambda self, field=field: self._refuse(field)) for field in hidden_fields},
     }

@@ -31,6 +31,7 @@ from fowt_env.errors import (
 )
 from fowt_env.initial_conditions import initial_state
 from fowt_env.plant.compile.decorators import control_kernel
+from fowt_env.plant.compile.handle import Handle
 from fowt_env.plant.events import counted, harm
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
 from fowt_env.plant.rollout import (
@@ -252,7 +253,7 @@ def reader_of(
     leads = preview_leads(controller)
     time, values = np.zeros(0), np.zeros((0, 0))
     if leads:
-        time, values = foreseen(scene, leads, preview, duration)
+        time, values, _ = foreseen(scene, leads, preview, duration)
     return Reader(sensors, new_past(sensors.chain), time, values, np.zeros(N_MEASUREMENTS + len(leads)))
 
 
@@ -269,16 +270,17 @@ class _Loop:
         self.measurement = np.zeros(N_MEASUREMENTS)
         self.protection = new_protection()
         self.reader = open_reader() if reader is None else reader
+        self.given = Handle(None, self.reader)
         self.view = view_of(controller)
         self.rows = np.empty((schedule.last // schedule.per_output + 1, len(scene.channels)))
         self.filled = 0
         self.compiled = isinstance(controller, CompiledController)
         if self.compiled:
             self.law = controller.law, controller.parameters, controller.memory
-            self.read_by_law = self.reader
+            self.given_to_law = self.given
         else:
             self.law = given.compiled, np.zeros(2), np.zeros(1)
-            self.read_by_law = open_reader()  # the controller has its reading already
+            self.given_to_law = Handle(None, open_reader())  # the controller has its reading already
 
     def go(self, report):
         """Run to the end. Raises: SimulationStopped; KeyboardInterrupt with the frame so far."""
@@ -291,7 +293,7 @@ class _Loop:
                 began = perf_counter()
                 if not self.compiled:
                     self._ask(step)
-                step = self._roll(step, min(step + size, last), self.read_by_law)
+                step = self._roll(step, min(step + size, last), self.given_to_law)
                 if self.compiled and perf_counter() - began < 0.25 * CHUNK_TIME:
                     size *= 4
                 report(step / last)
@@ -299,9 +301,9 @@ class _Loop:
             interrupt.frame = self.frame()  # what is done is not lost: the caller may keep it
             raise
 
-    def _roll(self, first, end, reader):
+    def _roll(self, first, end, given):
         status, step, count = rollout(
-            self.handle, self.x, self.u, *self.law, reader, self.protection, self.measurement, self.dx,
+            self.handle, self.x, self.u, *self.law, given, self.protection, self.measurement, self.dx,
             self.schedule, first, end, self.rows[self.filled :],
         )  # fmt: skip
         self.filled += count
@@ -310,7 +312,7 @@ class _Loop:
 
     def _read(self, step):
         """What the controller is given at a step that is at hand."""
-        self._roll(step, step, self.reader)
+        self._roll(step, step, self.given)
         return self.view(self.reader.reading.tolist())
 
     def _ask(self, step):

@@ -34,14 +34,12 @@ VALIDATE = "validate --case steady --no-plot"
 TRAIN = (
     "train --algo {algo} --steps 160 --seed 3 --set environment.num_envs=2 --set environment.rotor=table"
     " --set environment.wave_components=10 --set environment.duration=12 --set decisions.history=2"
-    " --set environment.wind={{\"kind\":\"ntm\",\"speed\":18,\"class\":\"B\"}} --set validation.winds=[18]"
+    ' --set environment.wind={{"kind":"ntm","speed":18,"class":"B"}} --set validation.winds=[18]'
     " --set validation.seeds=2 --set validation.every=64 --set validation.skip=2"
     " --set checkpoint_minutes=0 --set algorithm.batch_size=16 {further}"
 )
 PPO = TRAIN.format(algo="ppo", further="--set algorithm.n_steps=16 --set algorithm.n_epochs=2")
-SAC = TRAIN.format(
-    algo="sac", further="--set algorithm.buffer_size=500 --set algorithm.learning_starts=20"
-)
+SAC = TRAIN.format(algo="sac", further="--set algorithm.buffer_size=500 --set algorithm.learning_starts=20")
 
 
 def command(study, folder):
@@ -130,9 +128,7 @@ def outcome(folder):
     for path in sorted(folder.rglob("*")):
         name = str(path.relative_to(folder))
         if path.suffix == ".csv":
-            found[name] = pd.read_csv(path).drop(
-                columns="seconds", errors="ignore"
-            ).to_csv()
+            found[name] = pd.read_csv(path).drop(columns="seconds", errors="ignore").to_csv()
         elif path.suffix == ".npz":
             with np.load(path) as file:
                 found[name] = {key: file[key].tobytes() for key in file.files}

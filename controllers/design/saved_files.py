@@ -1,8 +1,8 @@
 """Controllers saved as files: plain JSON with a version, whose every value is checked when it is read.
 
-A design of kind "pi" holds gains and schedule; one of kind "lqr" holds weights and the linear models they
-act on, so that it can be run at any control period and does not know a plant that was changed since.
-Used by name as design:FILE.
+A design of kind "pi" holds gains and schedule; one of kind "lqr" holds its settings and the linear models
+that it is made for, so that it can be run at any control period and does not know a plant that was changed
+since. Used by name as design:FILE.
 """
 
 import json
@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fowt_env.controllers.lqr.design import LOWEST_DESIGN_WIND, MODEL_SHAPES, DesignModel, Weights
+from fowt_env.controllers.lqr.design import LOWEST_DESIGN_WIND, MODEL_SHAPES, DesignModel, LQGSettings
 from fowt_env.controllers.lqr.law import LQR
 from fowt_env.controllers.pi import PI, PISettings
 from fowt_env.descriptions.checks import is_number
@@ -21,7 +21,7 @@ from fowt_env.errors import InputError, unknown
 from fowt_env.files.atomic import replacing
 
 DESIGN_PREFIX = "design:"
-FORMAT, VERSION = "fowt-design", 1
+FORMAT, VERSION = "fowt-design", 2
 KEYS = ("format", "version", "kind", "platform", "turbine", "command", "settings")
 PI_KEYS = ("KP", "KI", "gain_schedule_pitch")
 SPACING = 1.0  # m/s, between the models of a design of kind "lqr"
@@ -30,7 +30,7 @@ SPACING = 1.0  # m/s, between the models of a design of kind "lqr"
 def save_design(path, kind, scene, settings, command, **further):
     """The path written: a design for the scene's platform and turbine.
 
-    settings: PI_KEYS, or Weights and "models" for kind "lqr" (lqr_settings); command: what made it, to be
+    settings: PI_KEYS, or "lqg" and "models" for kind "lqr" (lqr_settings); command: what made it, to be
     read by people; further: tables of the design, which are not read back.
     Raises: InputError unless path ends with .json and the settings are those of the kind.
     """
@@ -54,10 +54,10 @@ def save_design(path, kind, scene, settings, command, **further):
     return path
 
 
-def lqr_settings(weights, models):
-    """Settings of kind "lqr" for save_design."""
+def lqr_settings(chosen, models):
+    """Settings of kind "lqr" for save_design, of LQGSettings and DesignModels."""
     rows = [{key: np.asarray(value).tolist() for key, value in vars(model).items()} for model in models]
-    return {"weights": asdict(weights), "models": rows}
+    return {"lqg": asdict(chosen), "models": rows}
 
 
 def load_design(path):
@@ -132,16 +132,14 @@ def _pi(settings, where):
 
 
 def _lqr(settings, where):
-    """Maker of an lqr controller from its weights and models."""
-    known = [item.name for item in fields(Weights)]
-    _check_keys(settings["weights"], known, "settings.weights", where)
-    values = {
-        key: _finite(f"{where}: settings.weights.{key}", value) for key, value in settings["weights"].items()
-    }
+    """Maker of an lqr controller from its LQGSettings and models."""
+    known = [item.name for item in fields(LQGSettings)]
+    _check_keys(settings["lqg"], known, "settings.lqg", where)
+    values = {key: _finite(f"{where}: settings.lqg.{key}", value) for key, value in settings["lqg"].items()}
     try:
-        weights = Weights(**values)
+        chosen = LQGSettings(**values)
     except InputError as error:
-        raise InputError(f"{where}: settings.weights: {error}") from None
+        raise InputError(f"{where}: settings.lqg: {error}") from None
     rows = settings["models"]
     if not isinstance(rows, list) or len(rows) < 2:
         raise InputError(f"{where}: settings.models: must list models of two winds or more")
@@ -161,7 +159,7 @@ def _lqr(settings, where):
 
     def make(turbine, control_dt, name):
         try:
-            return LQR(turbine, control_dt, weights, name, models=models)
+            return LQR(turbine, control_dt, chosen, name, models=models)
         except (np.linalg.LinAlgError, ValueError) as error:
             if isinstance(error, InputError):
                 raise
@@ -189,4 +187,4 @@ def _model(row, place, where):
 
 
 # kind: keys of settings, maker's maker
-DESIGN_KINDS = {"pi": (PI_KEYS, _pi), "lqr": (("weights", "models"), _lqr)}
+DESIGN_KINDS = {"pi": (PI_KEYS, _pi), "lqr": (("lqg", "models"), _lqr)}

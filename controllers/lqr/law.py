@@ -22,7 +22,7 @@ from fowt_env.controllers.lqr.design import (
     N_PLANT,
     WAVE,
     WIND,
-    Weights,
+    LQGSettings,
 )
 from fowt_env.controllers.lqr.estimator import (
     BLOCK,
@@ -46,6 +46,7 @@ from fowt_env.controllers.lqr.estimator import (
     estimate,
     estimator_law,
 )
+from fowt_env.controllers.lqr.optimum import optimal_gains
 from fowt_env.errors import InputError
 from fowt_env.plant.compile.decorators import control_kernel, kernel
 from fowt_env.plant.drivetrain import TorqueCurve, build_torque_curve, clamp, generator_torque, rate_limit
@@ -112,23 +113,21 @@ def lqr_law(parameters, memory, measurement, command):
     lqr_step(parameters, memory, measurement, command)
 
 
-def blocks(models, weights, rated_speed, dt):
+def blocks(models, settings, turbine, dt):
     """(n, BLOCK) trims, estimator and feedback of each wind, sampled every dt."""
-    lowest = next(m for m in models if m.wind >= design.LOWEST_DESIGN_WIND)
     rows = []
-    for model in models:
+    for model, gain in zip(models, optimal_gains(models, settings, turbine, dt), strict=True):
         a, b = design.sampled(model.A, model.B, dt)
-        gain = design.feedback_gain(model if model.wind >= lowest.wind else lowest, weights, rated_speed)
         parts = (model.trim, model.torque, model.pitch, a, b, model.C, design.estimator_gain(model, dt), gain)
         rows.append(np.concatenate([np.ravel(part) for part in parts]))
     return np.array(rows)
 
 
-_BLOCKS = Cache(32)  # (id of models, weights, control period) -> (models, their blocks)
+_BLOCKS = Cache(32)  # (id of models, settings, control period) -> (models, their blocks)
 
 
 class LQR(CompiledController):
-    """LQG law of Weights; prepare(scene) designs it on the scene's platform unless models are given."""
+    """LQG law of LQGSettings; prepare(scene) designs it on the scene's platform unless models are given."""
 
     kernel = staticmethod(lqr_law)
     information = (
@@ -141,10 +140,10 @@ class LQR(CompiledController):
         "plant_model",
     )
 
-    def __init__(self, turbine, control_dt, weights=None, name="lqr", models=None):
+    def __init__(self, turbine, control_dt, settings=None, name="lqr", models=None):
         super().__init__(name, np.zeros(BLOCKS), N_MEMORY)
         self.turbine, self.control_dt = turbine, check_control_dt(control_dt)
-        self.weights = Weights() if weights is None else weights
+        self.settings = LQGSettings() if settings is None else settings
         self.prepared = False
         self._plant = None  # the models it was designed on last, in prepare
         self.designed = models is not None
@@ -168,10 +167,11 @@ class LQR(CompiledController):
 
     def take(self, models):
         """Take the gains for DesignModels of winds 1 m/s apart."""
-        known = (id(models), self.weights, self.control_dt)
-        rated = self.turbine.rated_rotor_speed
+        known = (id(models), self.settings, self.control_dt)
         # the models are kept with what was made of them, so that their id stays theirs
-        made = _BLOCKS.get(known, lambda: (models, blocks(models, self.weights, rated, self.control_dt)))
+        made = _BLOCKS.get(
+            known, lambda: (models, blocks(models, self.settings, self.turbine, self.control_dt))
+        )
         self.install(models[0].wind, made[1])
 
     def install(self, first_wind, table):
@@ -190,7 +190,7 @@ class LQR(CompiledController):
             Head.FIRST_WIND: first_wind,
             Head.WIND_STEP: 1.0,
             Head.WINDS: len(table),
-            Head.SCHEDULE_DECAY: exp(-self.control_dt / self.weights.schedule_time),
+            Head.SCHEDULE_DECAY: exp(-self.control_dt / self.settings.schedule_time),
             Head.TORQUE_LOW: TORQUE_RANGE[0] * law.rated_torque,
             Head.TORQUE_HIGH: min(TORQUE_RANGE[1] * law.rated_torque, law.max_torque),
             Head.HANDOVER_LOW: HANDOVER[0],

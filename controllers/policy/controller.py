@@ -21,7 +21,7 @@ from fowt_env.envs.actions import (
     command_of,
     start_tracking,
 )
-from fowt_env.envs.decisions import Decisions, DecisionSettings
+from fowt_env.envs.decisions import Decisions, DecisionSettings, wind_entry
 from fowt_env.envs.observations import (
     ESTIMATE_CHANNELS,
     ESTIMATED,
@@ -84,7 +84,12 @@ class PolicyController:
             raise InputError(f"{where}: the rotor's azimuth is not among the measurements of a controller")
         observed = entries(names, turbine, preview)
         self._observation_map = build_observation_map(observed, preview)
-        self._decisions = Decisions(1, len(observed), DecisionSettings(**settings["decisions"]), control_dt)
+        chosen = DecisionSettings(**settings["decisions"])
+        try:
+            wind = wind_entry(chosen, self._mode, observed)
+        except InputError as error:
+            raise InputError(f"{where}: {error}") from None
+        self._decisions = Decisions(1, len(observed), chosen, control_dt, wind)
         if self.network.mean.shape != (self._decisions.size,):
             raise InputError(
                 f"{where}: {self.network.mean.size} inputs: its observation has {self._decisions.size}"

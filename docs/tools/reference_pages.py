@@ -76,9 +76,7 @@ def turbine():
 def reward_formulas():
     """{term: its formula as a Python expression}."""
     values = {name: getattr(rewards, name) for name in ("POWER_MARGIN", "SPEED_MARGIN", "TILT_PERIOD")}
-    return {
-        name: text.format(**values, tilt=rewards.TILT_MARGIN / DEGREE) for name, text in FORMULAS.items()
-    }
+    return {name: text.format(**values, tilt=rewards.TILT_MARGIN / DEGREE) for name, text in FORMULAS.items()}
 
 
 def _range(value, unit=""):
@@ -95,6 +93,17 @@ def _weather(spec):
     return ", ".join(f"{key} {_range(value)}" for key, value in spec.items())
 
 
+def _drawn(task, of):
+    """The wind (0) or sea (1) of a task as text; of a mixture each with its share, those alike together."""
+    if len(task.weathers) == 1:
+        return _weather(task.weathers[0][1 + of])
+    total, shares = sum(share for share, _, _ in task.weathers), {}
+    for entry in task.weathers:
+        text = _weather(entry[1 + of])
+        shares[text] = shares.get(text, 0.0) + entry[0] / total
+    return "; ".join(f"{100.0 * share:.0f} %: {text}" for text, share in shares.items())
+
+
 def environments():
     """Registered names."""
     return markdown(("name", "class"), [(f"`{name}`", f"`{at}`") for name, at in ENVIRONMENTS.items()])
@@ -105,8 +114,8 @@ def tasks():
     chosen = list(TASKS.values())
     rated = turbine().rated_rotor_speed / RPM
     rows = [
-        ("wind", *(_weather(task.wind) for task in chosen)),
-        ("sea", *(_weather(task.sea) for task in chosen)),
+        ("wind", *(_drawn(task, 0) for task in chosen)),
+        ("sea", *(_drawn(task, 1) for task in chosen)),
         ("episode", *(f"{task.duration:g} s" for task in chosen)),
         ("rotor model", *(task.rotor or "the fidelity's" for task in chosen)),
         ("reach of the blade pitch", *(_range(task.blade_pitch, " deg") for task in chosen)),

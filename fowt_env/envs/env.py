@@ -243,7 +243,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     def _build(self, mode, per_control):
         """Allocate the arrays of a run and fill what never changes."""
         scene, turbine, task = self.scene, self.scene.turbine, self.task
-        observed = entries(task.observation, turbine, task.wind_preview)
+        observed = self.observed = entries(task.observation, turbine, task.wind_preview)
         self._baseline = None
         baseline_law = None
         parameters, memory = np.zeros(1), np.zeros(1)

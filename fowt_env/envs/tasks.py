@@ -40,6 +40,9 @@ class Task:
     from which each episode draws uniformly. sea may also be {"kind": "joint", "table": name}: the
     JONSWAP state that belongs to the mean wind at a site (its first and last row hold beyond them);
     None is still water.
+
+    A mixture of weathers is a list of (share, wind, sea) in place of the wind: each episode draws one of
+    them, with a probability in proportion to its share, and then from its ranges. sea itself is then None.
     Raises: InputError naming the task, the key, the value and what is allowed.
     """
 
@@ -73,20 +76,24 @@ class Task:
         _number(f"{where}: residual_pitch", self.residual_pitch, 0.0, 90.0)
         set_field(self, "wind_preview", _check_preview(where, self.wind_preview))
         _check_seeds(where, self.weather_seeds)
-        if self.wind is None:
-            raise InputError(f"{where}: wind = None: a task needs a wind (0.0 for still air)")
-        for pick in (_lowest, _highest):
-            wind, sea = _weather(self.wind, self.sea, pick)
-            try:
-                if not isinstance(wind, WindSeries) and not is_field(wind):  # those need no reading
-                    read_wind(wind)
-                sea_state_of(sea)
-            except InputError as error:
-                raise InputError(f"{where}: {error}") from None
+        if _is_mixture(self.wind):
+            set_field(self, "wind", _check_mixture(where, self.wind, self.sea))
+        for _, wind, sea in self.weathers:
+            _check_weather(where, wind, sea)
+
+    @property
+    def weathers(self):
+        """Tuple of (share, wind, sea) that an episode draws from; one alone where wind is no mixture."""
+        return self.wind if _is_mixture(self.wind) else ((1.0, self.wind, self.sea),)
 
     def draw(self, rng):
         """Episode drawn with a numpy Generator; the same generator state gives the same episode."""
-        wind, sea = _weather(self.wind, self.sea, lambda low, high: float(rng.uniform(low, high)))
+        chosen = self.weathers
+        i = 0
+        if len(chosen) > 1:
+            shares = np.array([share for share, _, _ in chosen])
+            i = int(rng.choice(len(chosen), p=shares / shares.sum()))
+        wind, sea = _weather(*chosen[i][1:], lambda low, high: float(rng.uniform(low, high)))
         seed = int(rng.integers(*self.weather_seeds))
         offsets = {name: float(rng.uniform(*bounds)) for name, bounds in self.offsets.items()}
         return Episode(wind, sea, seed, offsets, self.fixed_wind)
@@ -94,18 +101,15 @@ class Task:
     @property
     def has_sea(self):
         """Whether an episode may have waves; the kernels then sum waves in all of them."""
-        if isinstance(self.sea, dict) and self.sea.get("kind") == "joint":
-            return True
-        return sea_state_of(_weather(self.wind, self.sea, _highest)[1]).height > 0.0
+        return any(_has_waves(wind, sea) for _, wind, sea in self.weathers)
 
     @property
     def fixed_wind(self):
         """Whether every episode has the same mean wind (a box of wind always starts from its own)."""
         if is_field(self.wind):
             return True
-        low, _ = _weather(self.wind, None, _lowest)
-        high, _ = _weather(self.wind, None, _highest)
-        return nominal_speed(low) == nominal_speed(high)
+        ends = [_weather(wind, None, pick)[0] for _, wind, _ in self.weathers for pick in (_lowest, _highest)]
+        return len({nominal_speed(wind) for wind in ends}) == 1
 
 
 def _lowest(low, high):
@@ -128,6 +132,47 @@ def _weather(wind, sea, pick):
     else:
         sea = _picked("sea", sea, pick)
     return wind, sea
+
+
+def _is_mixture(wind):
+    """Whether a wind is a list of weathers: (low, high) holds numbers, a mixture triples."""
+    return isinstance(wind, tuple | list) and any(isinstance(entry, tuple | list) for entry in wind)
+
+
+def _check_mixture(where, mixture, sea):
+    """Tuple of (share, wind, sea). Raises: InputError."""
+    if sea is not None:
+        raise InputError(f"{where}: sea = {sea!r}: must be None beside a mixture, which has its own")
+    checked = []
+    for i, entry in enumerate(mixture):
+        if not isinstance(entry, tuple | list) or len(entry) != 3:
+            raise InputError(f"{where}: wind[{i}] = {entry!r}: must be (share, wind, sea), as the others")
+        if is_field(entry[1]):
+            raise InputError(f"{where}: wind[{i}]: a box of full-field wind cannot be part of a mixture")
+        _number(f"{where}: share of wind[{i}]", entry[0], 0.0, 1e6, low_open=True)
+        checked.append((float(entry[0]), entry[1], entry[2]))
+    return tuple(checked)
+
+
+def _check_weather(where, wind, sea):
+    """Raise InputError unless wind and sea can be read at both ends of their ranges."""
+    if wind is None:
+        raise InputError(f"{where}: wind = None: a task needs a wind (0.0 for still air)")
+    for pick in (_lowest, _highest):
+        air, water = _weather(wind, sea, pick)
+        try:
+            if not isinstance(air, WindSeries) and not is_field(air):  # those need no reading
+                read_wind(air)
+            sea_state_of(water)
+        except InputError as error:
+            raise InputError(f"{where}: {error}") from None
+
+
+def _has_waves(wind, sea):
+    """Whether a weather may have waves."""
+    if isinstance(sea, dict) and sea.get("kind") == "joint":
+        return True
+    return sea_state_of(_weather(wind, sea, _highest)[1]).height > 0.0
 
 
 def _picked(where, spec, pick):
@@ -227,6 +272,23 @@ START = {  # of the order of one standard deviation in operation
     "RotSpeed": (-0.5, 0.5),
     "Azimuth": (0.0, 360.0),
 }
+JOINT = {"kind": "joint", "table": SITE}
+GUST_START = (60.0, 300.0)  # s
+
+
+def _mixture(low, high):
+    """What a controller meets at mean winds from low to high (m/s), in shares that agents can learn from."""
+    speed = (low, high)
+    return (
+        (0.65, {"kind": "ntm", "speed": speed, "class": "B", "sigma": "drawn"}, JOINT),
+        (0.05, {"kind": "steady", "speed": speed}, None),
+        (0.1, {"kind": "steady", "speed": speed}, JOINT),
+        (0.1, {"kind": "eog", "speed": speed, "start": GUST_START}, JOINT),
+        (0.05, {"kind": "edc", "speed": speed, "start": GUST_START, "sign": 1}, JOINT),
+        (0.05, {"kind": "edc", "speed": speed, "start": GUST_START, "sign": -1}, JOINT),
+    )
+
+
 TASKS = {
     task.name: task
     for task in (
@@ -242,6 +304,8 @@ TASKS = {
             sea={"kind": "joint", "table": SITE},
         ),
         Task(name="steady", wind={"kind": "steady", "speed": (4.0, 25.0)}, sea=None),
+        Task(name="above_rated_mixture", wind=_mixture(12.0, 24.0), setpoint=(0.85, 1.15)),
+        Task(name="near_rated_mixture", wind=_mixture(11.5, 17.0), setpoint=(0.85, 1.15)),
     )
 }
 

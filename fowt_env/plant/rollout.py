@@ -167,19 +167,20 @@ def stop_turbine(t, x, u, schedule, protection):
 
 @entry
 def rollout(
-    handle, x, u, law, parameters, memory, reader, protection, measurement, dx, schedule, first, end, out
+    handle, x, u, law, parameters, memory, reading, protection, measurement, dx, schedule, first, end, out
 ):
     """Closed loop over the instants first <= step < end, and at the run's last one; rows go to out.
 
-    law      compiled control law (CompiledController.law), called at every control instant
-    reader   Reader: what stands between measurement and law
+    law         compiled control law (CompiledController.law), called at every control instant
+    reading     Handle whose data is the Reader that stands between measurement and law
     protection  new_protection() of the run; once it has tripped, the law is not called again
-    first    = end: nothing moves, and measurement and the reader's reading are filled as at that instant
-    out      (k, n_channels) of the rows to come, SI
-    Returns (status, step reached, rows written). x (n_state,), u, memory, reader, protection and measurement
-    are written.
+    first       = end: nothing moves, and measurement and the reader's reading are filled as at that instant
+    out         (k, n_channels) of the rows to come, SI
+    Returns (status, step reached, rows written). x (n_state,), u, memory, the reader, protection and
+    measurement are written.
     """
     model, data = model_of(handle), data_of(handle)
+    reader = data_of(reading)
     dt, rows = schedule.dt, 0
     if first == end:
         observe_plant(model, data, x, u, first * dt, dx, measurement)

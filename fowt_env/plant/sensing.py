@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fowt_env.plant.compile.decorators import kernel
+from fowt_env.plant.compile.handle import by_reference
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measure
 
 GIVEN, HIDDEN = -0.0, np.nan  # what is added to a field; minus zero leaves every bit, the sign of zero too
@@ -30,6 +31,7 @@ class Sensors(NamedTuple):
     noise: np.ndarray  # (readings, N_MEASUREMENTS), SI; the last row goes on; no row: exact sensors
 
 
+@by_reference
 class Reader(NamedTuple):
     """Sensors of a run with their memory, and the wind ahead."""
 

@@ -320,12 +320,15 @@ def tuning(lidar, first, speed, height, radius, blocked):
 
 
 def held_noise(lidar, blocked, frequency, variance):
-    """(n,) variance in bins of what sampling folds: as much as it takes away, evenly below half its rate."""
+    """(n,) variance in bins at frequencies k/period of what sampling folds: as much as it takes away.
+
+    Spread as that of independent values, each held for a geometric number of scans.
+    """
     if lidar.scan_period == 0.0:
         return np.zeros(frequency.size)
-    lost = ((1.0 - np.abs(sampling(lidar, blocked, frequency)) ** 2) * variance).sum()
-    low = (frequency > 0.0) & (frequency < 0.5 / lidar.scan_period)
-    return np.where(low, lost / max(low.sum(), 1), 0.0)
+    passed = np.abs(sampling(lidar, blocked, frequency)) ** 2
+    spread = 2.0 * lidar.scan_period * (1.0 + blocked) / (1.0 - blocked) * passed
+    return ((1.0 - passed) * variance).sum() * spread * frequency[0]
 
 
 def lidar_horizon(scene, preset="four_beam_pulsed"):

@@ -23,7 +23,6 @@ Assumptions, stated because the standard leaves them open:
   seed, or drawn from its distribution (drawn_ntm_sigma).
 """
 
-
 import numpy as np
 
 from fowt_env.caches import cached

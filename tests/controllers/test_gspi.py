@@ -95,9 +95,7 @@ def test_on_the_deck_without_actuator_it_does_what_the_openfast_law_does():
         seed=1001, duration=100.0, fidelity="standard",
     )  # fmt: skip
     frames = {
-        name: fowt_env.simulate(
-            scene, name, duration=100.0, dt=0.0125, control_dt=0.0125, output_dt=0.1
-        )
+        name: fowt_env.simulate(scene, name, duration=100.0, dt=0.0125, control_dt=0.0125, output_dt=0.1)
         for name in ("gspi_oc3", "openfast_oc3")
     }
     for channel in ("RotSpeed_[rpm]", "BldPitch1_[deg]", "PtfmPitch_[deg]", "GenPwr_[kW]"):

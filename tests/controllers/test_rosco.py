@@ -23,7 +23,9 @@ needs_library = pytest.mark.skipif(
 RATED = Measurement(*[0.0] * len(Measurement._fields))._replace(
     rotor_speed=1.267109,
     generator_speed=122.9096,
-    generator_torque=43093.55, wind_speed=18.0, blade_pitch=0.26
+    generator_torque=43093.55,
+    wind_speed=18.0,
+    blade_pitch=0.26,
 )
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fowt_env.envs import TASKS, Task, task_tables
+from fowt_env.envs import TASKS, FowtEnv, Task, task_tables
 from fowt_env.envs.observations import DEFAULT, KNOWN, STANDARD, check_channels
 from fowt_env.envs.rewards import REWARD_TERMS
 from fowt_env.envs.tasks import task_of
@@ -68,6 +68,34 @@ def test_numbers_without_range_are_kept():
     assert task.fixed_wind and not TASKS["above_rated"].fixed_wind
 
 
+MIXED = [(3.0, WIND, None), (1.0, {"kind": "eog", "speed": 14.0, "start": (5.0, 9.0)}, {"kind": "joint"})]
+
+
+def test_a_mixture_draws_each_weather_by_its_share_and_within_its_own_ranges():
+    task = Task("mixed", wind=MIXED)
+    episodes = draws(task, 400)
+    gusts = [episode for episode in episodes if episode.wind["kind"] == "eog"]
+    assert 0.25 - 4.0 * 0.022 < len(gusts) / 400 < 0.25 + 4.0 * 0.022  # four standard deviations
+    assert all(5.0 <= episode.wind["start"] <= 9.0 and episode.sea["Hs"] == 1.34 for episode in gusts)
+    rest = [episode for episode in episodes if episode.wind["kind"] == "ntm"]
+    assert len(rest) + len(gusts) == 400 and all(episode.sea is None for episode in rest)
+    assert np.ptp([episode.wind["speed"] for episode in rest]) > 10.0
+    assert task.has_sea and not task.fixed_wind
+    assert not Task("calm", wind=[(1.0, 14.0, None), (1.0, 14.0, None)]).has_sea
+    assert Task("calm", wind=[(1.0, 14.0, None), (1.0, 14.0, None)]).fixed_wind
+    assert not Task("calm", wind=[(1.0, 14.0, None), (1.0, 15.0, None)]).fixed_wind
+
+
+def test_a_mixture_runs_all_of_its_weathers_in_one_environment():
+    env = FowtEnv(Task("mixed", wind=MIXED), rotor="table", wave_components=5, fidelity="standard")
+    kinds = set()
+    for seed in range(12):
+        _, info = env.reset(seed=seed)
+        kinds.add(info["episode"]["wind"]["kind"])
+        assert np.all(np.isfinite(env.step([0.0, 0.0])[0]))
+    assert kinds == {"ntm", "eog"}
+
+
 def test_lists_of_a_series_are_data_and_not_ranges():
     wind = {"kind": "series", "time": (0.0, 700.0), "speed": (10.0, 12.0)}
     assert Task("ramp", wind=wind).draw(np.random.default_rng(0)).wind is wind
@@ -98,6 +126,12 @@ def test_lists_of_a_series_are_data_and_not_ranges():
         ({"setpoint": (0.5, float("inf"))}, "inf"),
         ({"residual_torque": 2.0}, "residual_torque = 2.0"),
         ({"residual_pitch": -1.0}, "residual_pitch = -1.0"),
+        ({"wind": [(1.0, WIND)]}, r"wind\[0\] = .*must be \(share, wind, sea\)"),
+        ({"wind": [(1.0, WIND, None), 14.0]}, r"wind\[1\] = 14.0: must be \(share, wind, sea\)"),
+        ({"wind": [(0.0, WIND, None)]}, r"share of wind\[0\] = 0.0: must be a number in \(0, 1e\+06\]"),
+        ({"wind": [(1.0, {"kind": "ntm", "speed": 120.0}, None)]}, "speed = 120.0"),
+        ({"wind": [(1.0, WIND, None)], "sea": "paper_regular"}, "sea = 'paper_regular': must be None beside"),
+        ({"wind": [(1.0, {"kind": "box"}, None)]}, r"wind\[0\]: a box of full-field wind"),
         ({"wind_preview": (1.0, -2.0)}, "wind_preview = -2.0"),
         ({"wind_preview": 5.0}, "must be a list of times"),
     ],

@@ -14,7 +14,8 @@ LAYERS = (
     "errors", "caches", "folders", "registration", "plant", "descriptions", "weather", "scene", "files",
     "analysis",
     "control", "initial_conditions", "simulation", "visual", "envs", "controllers", "training",
-    "training.evaluation", "training.design", "training.rl", "training.reports", "training.validation",
+    "training.evaluation", "training.design", "training.rl", "training.reports", "training.board",
+    "training.validation",
     "training.benchmarks", "training.studies", "training.cli",
 )  # fmt: skip
 

@@ -5,8 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from naive.lidar import field, rotor_and_lidar
+from naive.lidar import field, last_values, rotor_and_lidar
 from naive.turbulence import disk_grid
+from scipy.signal import lfilter
 
 from fowt_env import build_scene
 from fowt_env.descriptions.iec import ntm_sigma
@@ -284,6 +285,76 @@ def test_beams_in_a_field_have_the_gain_and_the_delay_of_sampling():
             size = 2.0 / 2400.0**2 * size[:, 1:].mean(axis=0)[low:high].sum()
             wanted = wanted[low:high].sum()
             assert abs(size - wanted) < 4.0 / np.sqrt(40.0 * (high - low)) * abs(wanted)
+
+
+def test_shots_that_are_held_and_lost_keep_what_the_gain_says_and_fold_the_rest():
+    """A signal of 0.3 s of memory, sampled once a second, four shots of ten lost, far below that rate."""
+    step, count, blocked = 0.05, 400_000, 0.4
+    generator = np.random.default_rng(4)
+    decay = np.exp(-step / 0.3)
+    signal = lfilter([np.sqrt(1.0 - decay**2)], [1.0, -decay], generator.normal(size=count))
+    taken = np.where(generator.uniform(size=count // 20) < blocked, np.nan, signal[::20])
+    held = np.repeat(last_values(taken), 20)
+    frequency = np.fft.rfftfreq(count, step)[1:]
+    signal, held = np.fft.rfft(signal)[1:], np.fft.rfft(held)[1:]
+    low = frequency < 0.1
+    lidar = remade("four_beam_pulsed", scan_period=1.0)
+    gain = (
+        np.exp(-0.5j * 2.0 * np.pi * frequency * step)
+        * (np.conj(signal) * held)[low].sum()
+        / (np.abs(signal) ** 2)[low].sum()
+    )
+    expected = (sampling(lidar, blocked, frequency) * np.abs(signal) ** 2)[low].sum()
+    assert abs(gain[0] / (expected / (np.abs(signal) ** 2)[low].sum()) - 1.0) < 0.05
+    variance = 2.0 * np.abs(signal) ** 2 / count**2
+    folded = held_noise(lidar, blocked, frequency, variance)
+    expected = (np.abs(sampling(lidar, blocked, frequency)) ** 2 * variance + folded)[low].sum()
+    found = 2.0 * (np.abs(held) ** 2)[low].sum() / count**2
+    assert found == pytest.approx(expected, rel=0.07)  # of 2000 bins: 2 %, and what lies between them
+    assert folded[low].sum() > 0.2 * expected
+
+
+def test_the_estimate_is_neither_early_nor_late():
+    """Over ten seeds, by the lag at which it goes best with the rotor's wind."""
+    lags = np.arange(-30, 31)
+    for preset in PRESETS:
+        sums = np.zeros(lags.size)
+        for seed in range(1001, 1011):
+            scene = scene_in(seed=seed)
+            seen = lidar_preview(scene, (0.0,), preset)
+            seen = np.interp(0.1 * np.arange(6000), seen.time, seen.values[0])
+            rotor = scene.model.aero.wind.value[:-1, 0]
+            sums += [np.mean((np.roll(rotor, lag) - seen) ** 2) for lag in lags]
+        assert abs(lags[np.argmin(sums)]) <= 4  # tenths of a second
+
+
+def test_weights_along_the_beam_that_are_one_sided_shift_the_phase_as_in_a_box():
+    """A focus so wide that its near side is cut off, in a wave of wind that fills the disc."""
+    lidar = remade("circular_cw", half_angle=5.0, distances=(80.0,), lens_radius=0.008, **BARE)
+    assert points(lidar).weight @ points(lidar).late > 5.0
+    grid = np.linspace(-90.0, 90.0, 4)
+    wave = np.sin(2.0 * np.pi * np.arange(400) / 40.0)  # 0.05 Hz
+    box = {"kind": "box", "u": 18.0 + wave[:, None, None] + np.zeros((1, 4, 4)), "y": grid, "z": 90.0 + grid}
+    box |= {"dt": 0.5, "speed": SPEED, "periodic": True}
+    scene = build_scene("oc3_hywind", wind=box, duration=60.0, fidelity="standard")
+    p, seen = points(lidar), np.zeros(400)
+    lidar_module._look(scene.wind.field(), p.late / SPEED, p.y, 90.0 + p.z, p.weight, p.across, p.up, seen)
+    gain = np.fft.rfft(seen)[10] / np.fft.rfft(wave)[10]
+    cross = at_frequencies(shares(lidar, 0, SPEED, SIGMA, HUB, RADIUS, evolves=False).cross, np.array([0.05]))
+    assert np.angle(gain) > 0.05
+    assert np.angle(cross[0]) == pytest.approx(
+        np.angle(gain), rel=0.15
+    )  # the wave is coherent, turbulence less
+
+
+def test_the_power_law_shifts_the_estimate_by_what_the_beams_see_of_it():
+    scene = scene_in(shear_exponent=0.2)
+    lidar = remade("four_beam_pulsed", distances=(200.0,))
+    p, azimuth = points(lidar), np.radians(np.arange(360.0))
+    blades = np.outer((np.arange(200) + 0.5) / 200 * RADIUS, np.sin(azimuth))  # every length of blade alike
+    expected = p.weight @ (1.0 + p.z / 90.0) ** 0.2 - ((1.0 + blades / 90.0) ** 0.2).mean()
+    assert difference(scene, lidar).mean() == pytest.approx(SPEED * expected, abs=1e-3)
+    assert abs(SPEED * expected) > 0.02
 
 
 # ---- limits

@@ -30,7 +30,7 @@ from fowt_env.plant.aero.tower_drag import tower_load
 from fowt_env.plant.aero.wind import wind_now
 from fowt_env.plant.channels import measure, record
 from fowt_env.plant.compile.decorators import entry, kernel
-from fowt_env.plant.compile.handle import data_of, model_of
+from fowt_env.plant.compile.handle import Handle, data_of, model_of
 from fowt_env.plant.dynamics import loads_of, respond
 from fowt_env.plant.hydro.hydrostatics import hydrostatic_load
 from fowt_env.plant.hydro.load import strip_load
@@ -256,7 +256,7 @@ def loop_time(scene, kind, x, u, dt, seconds, repeats=REPEATS):
     rows = np.zeros((2, len(scene.channels)))  # of the first and the last instant
     last = round(seconds / dt)
     schedule = Schedule(float(dt), round(0.1 / dt), last + 1, last, inf, inf)
-    reader = reader_of(scene, controller, None, EXACT, schedule)
+    reader = Handle(None, reader_of(scene, controller, None, EXACT, schedule))
 
     def go():
         y, v = x.copy(), u.copy()

@@ -53,25 +53,25 @@ FRONT_EXAMPLES = """[bold]Example[/bold]
 [cyan]fowt design front --runs sweep.csv --bound bound.csv --plot front.png[/cyan]  lqr beside the limit"""
 LQR_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt design lqr[/cyan]  the shipped weights against gspi_oc3 on training seeds
+[cyan]fowt design lqr[/cyan]  the shipped settings against gspi_oc3 on validation seeds
 
-[cyan]fowt design lqr --vary pitch_rate=3,6,12 --out sweep.csv[/cyan]  less travel, more speed error
+[cyan]fowt design lqr --vary share=0.3,0.5,0.7 --out sweep.csv[/cyan]  from rotor speed to platform pitch
 
-[cyan]fowt design lqr --weight pitch_rate=9 --out my.json[/cyan]  save one, to be run as design:my.json
+[cyan]fowt design lqr --setting travel=0.8 --out my.json[/cyan]  save one, to be run as design:my.json
 
-Raising pitch_rate saves travel, platform_pitch reduces platform motion, power smooths
-the power at the cost of rotor speed."""
+share is that of platform pitch in what is minimised, the rest is rotor speed; travel, power, torque and shaft
+are limits, see LQGSettings in controllers/lqr/design.py."""
 
 
-def save_lqr(weights, path):
-    """The path written: lqr with these weights ({name: value}) on the models of OC3-Hywind."""
+def save_lqr(settings, path):
+    """The path written: lqr with these settings ({name: value}) on the models of OC3-Hywind."""
     import fowt_env
     from fowt_env.controllers.design.saved_files import lqr_settings, save_design
-    from fowt_env.controllers.lqr.design import Weights, design_models
+    from fowt_env.controllers.lqr.design import LQGSettings, design_models
 
-    chosen = Weights().changed(**weights)
+    chosen = LQGSettings().changed(**settings)
     scene = fowt_env.build_scene("oc3_hywind", wind=18.0)
-    command = " ".join(["fowt design lqr", *(f"--weight {key}={value}" for key, value in weights.items())])
+    command = " ".join(["fowt design lqr", *(f"--setting {key}={value}" for key, value in settings.items())])
     return save_design(path, "lqr", scene, lqr_settings(chosen, design_models(scene)), command)
 
 
@@ -266,10 +266,10 @@ def front(
 @reported
 def lqr(
     vary: Annotated[
-        list[str] | None, typer.Option(metavar="WEIGHT=A,B,C", help="Weight and its values; repeats.")
+        list[str] | None, typer.Option(metavar="SETTING=A,B,C", help="Setting and its values; repeats.")
     ] = None,
-    weight: Annotated[
-        list[str] | None, typer.Option(metavar="WEIGHT=VALUE", help="A weight for all variants; repeats.")
+    setting: Annotated[
+        list[str] | None, typer.Option(metavar="SETTING=VALUE", help="A setting for all variants; repeats.")
     ] = None,
     cases: Annotated[str, typer.Option(help="Cases or suites.")] = "ntm_14,ntm_18,ntm_22",
     seeds: Annotated[str, typer.Option(help="Validation seeds, 1000 and above.")] = "1001,1002",
@@ -277,19 +277,19 @@ def lqr(
         str | None, typer.Option("--out", help="All runs: .csv; or, without runs, the design: .json.")
     ] = None,
 ):
-    """Sweep the weights of lqr on validation seeds, beside gspi_oc3; or save one design (--out .json)."""
+    """Sweep the settings of lqr on validation seeds, beside gspi_oc3; or save one design (--out .json)."""
     from fowt_env.training.design.sweeps import SHOWN, sweep
 
-    fixed = parse_pairs(weight, "weight")
+    fixed = parse_pairs(setting, "setting")
     if out_path is not None and out_path.lower().endswith(".json"):
         if vary:
-            raise InputError(f"--vary {vary[0]}: a design has one value per weight; use --weight")
+            raise InputError(f"--vary {vary[0]}: a design has one value per setting; use --setting")
         note(f"wrote {save_lqr(fixed, out_path)}")
         return
     variants = [fixed]
     for pair in vary or ():
         name, _, values = pair.partition("=")
-        numbers = parse_numbers(values, f"weight {name}")
+        numbers = parse_numbers(values, f"setting {name}")
         variants = [variant | {name: number} for variant in variants for number in numbers]
     numbers = parse_whole_numbers(seeds, "seeds")
     with progress_bar("simulating", None) as update:

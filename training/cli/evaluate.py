@@ -31,7 +31,7 @@ EVALUATE_EXAMPLES = """[bold]Examples[/bold]
 
 [cyan]fowt evaluate --suite mysuite.toml --controllers pi,mymodule:Mine --baseline pi[/cyan]  your own cases
 
-[cyan]fowt evaluate --suite above_rated --sensors exact --out results/exact[/cyan]  without noise, lag and delay
+[cyan]fowt evaluate --suite above_rated --sensors exact --out results/exact[/cyan]  without noise and delay
 
 [bold]Files written[/bold]: runs/CONTROLLER/CASE_seedN.parquet, results.csv (a row per run), leaderboard.json
 (means, intervals, paired differences, versions), manifest.json (the settings), summary.csv (means by
@@ -133,13 +133,17 @@ def _print_evaluation(table, means, board):
     print_table(out, headings, rows, keys=2, left=(0, 1), red=_places(failures))
     out.print()
     title, headings, rows, remarks = leaderboard_rows(board, width)
-    print_table(out, headings, rows, title, red=_places(e["failed"] + e["tripped"] for e in board["controllers"]))
+    print_table(
+        out, headings, rows, title, red=_places(e["failed"] + e["tripped"] for e in board["controllers"])
+    )
     for remark in remarks:
         out.print(remark, markup=False, highlight=False, soft_wrap=True)
     for row in table[table["status"] != "ok"].to_dict("records"):
         run = f"{row['controller']}, {row['case']}, seed {row['seed']}"
         err.print(
-            f"[red]{row['status']}: {escape(run)}: {escape(row['reason'])}[/red]", soft_wrap=True, highlight=False
+            f"[red]{row['status']}: {escape(run)}: {escape(row['reason'])}[/red]",
+            soft_wrap=True,
+            highlight=False,
         )
     eventful = table[table["events"] != ""]
     if len(eventful):

@@ -1,4 +1,4 @@
-"""What linear models say over the wind: modes, zeros of blade pitch to rotor speed, and weight sweeps of lqr.
+"""What linear models say over the wind: modes, zeros of blade pitch to rotor speed; and sweeps of lqr.
 
 Run as fowt linearize and fowt design; every function returns a table that can be written as it is.
 """
@@ -12,7 +12,7 @@ import pandas as pd
 from scipy.linalg import eigvals
 
 from fowt_env.analysis.linear_model import FORCES, linearize
-from fowt_env.controllers.lqr.design import Weights, scene_at
+from fowt_env.controllers.lqr.design import LQGSettings, scene_at
 from fowt_env.controllers.lqr.law import LQR
 from fowt_env.errors import InputError
 from fowt_env.files.atomic import replacing
@@ -116,18 +116,18 @@ def save_study(models, folder):
 
 
 def sweep(variants, cases, seeds, out=None, progress=None, duration=660.0, skip=60.0):
-    """DataFrame of lqr with each variant of its weights ({name: value} each) and of gspi_oc3, seed by seed.
+    """DataFrame of lqr with each variant of its settings ({name: value} each) and of gspi_oc3, seed by seed.
 
     Of the metrics it has those of KEPT, NaN where a run failed. seeds must be training seeds,
     seeds.VALIDATION.start and above: the others are for scoring. out: CSV.
-    Raises: InputError for other seeds or unknown weights.
+    Raises: InputError for other seeds or unknown settings.
     """
     if min(seeds) < VALIDATION.start:
         raise InputError(f"seeds = {list(seeds)}: tune on seeds of {VALIDATION.start} and above")
     laws = {"gspi_oc3": "gspi_oc3"}
     for variant in variants:
-        weights = Weights().changed(**variant)
-        laws[str(variant or "default")] = partial(LQR, weights=weights)
+        settings = LQGSettings().changed(**variant)
+        laws[str(variant or "default")] = partial(LQR, settings=settings)
 
     def report(done, total, row):
         if progress is not None and row is not None:

@@ -59,7 +59,9 @@ def _spread(estimate, resampled, n):
     """(2, metrics): how far the ends of the interval are from the estimate, for n seeds."""
     tails = [50.0 * (1.0 - LEVEL), 50.0 * (1.0 + LEVEL)]
     away = _known(resampled - estimate)
-    percentile = np.nanpercentile if np.isnan(away).any() else np.percentile  # the slower one where it must be
+    percentile = (
+        np.nanpercentile if np.isnan(away).any() else np.percentile
+    )  # the slower one where it must be
     return percentile(away, tails, axis=0) * _widening(n, 1.0 - LEVEL)
 
 
@@ -150,7 +152,8 @@ def _quantile(ordered, q):
 def holm(p):
     """(n,) p-values adjusted for being several (Holm, Scandinavian Journal of Statistics 6(2), 1979).
 
-    Of those at most alpha none is a chance finding but with probability alpha. The k-th smallest of n times n + 1 - k, and none below a smaller one's; NaN is no test.
+    Of those at most alpha none is a chance finding but with probability alpha. The k-th smallest of n times
+    n + 1 - k, and none below a smaller one's; NaN is no test.
     """
     p = np.asarray(p, dtype=np.float64)
     adjusted = np.full(p.shape, np.nan)
@@ -176,7 +179,7 @@ class Estimate:
         """Two-sided p-value of the hypothesis that the ratio is the one tested; NaN without an interval."""
         if not np.isfinite(self.low):
             return float("nan")
-        own, other = (np.log([self.value, tested]) if self.log else (self.value, tested))
+        own, other = np.log([self.value, tested]) if self.log else (self.value, tested)
         return float(p_values(self.deviations, np.array([other - own]))[0])
 
 

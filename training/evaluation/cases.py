@@ -162,7 +162,7 @@ class ScoreTerm(Record):
 
 
 class Score(Record):
-    """One number per controller: the weighted mean of metric/baseline, over relative power; less is better."""
+    """A number per controller: the weighted mean of metric/baseline, over relative power; less is better."""
 
     baseline: str
     term: tuple[ScoreTerm, ...]
@@ -172,8 +172,8 @@ class Score(Record):
 class Limits(Record):
     """What a controller must not exceed; beyond one it ranks below those within all of them.
 
-    run: {metric: greatest value in any run}. lifetime: {metric: greatest mean over the lifetime}. relative: {metric: greatest ratio of its mean over the lifetime
-    to that of `baseline` on the same runs}.
+    run: {metric: greatest value in any run}. lifetime: {metric: greatest mean over the lifetime}. relative:
+    {metric: greatest ratio of its mean over the lifetime to that of `baseline` on the same runs}.
     """
 
     run: dict[str, NonNegative] = {}
@@ -243,7 +243,9 @@ def lifetime_weights(cases, site):
     share = {speed: site.below(high) - site.below(low)
              for speed, low, high in zip(speeds, edges, edges[1:], strict=False)}  # fmt: skip
     total = sum(share.values())
-    return {name: 0.0 if speed is None else share[speed] / count[speed] / total for name, speed in winds.items()}
+    return {
+        name: 0.0 if speed is None else share[speed] / count[speed] / total for name, speed in winds.items()
+    }
 
 
 def suite_names():

@@ -88,13 +88,13 @@ def evaluate(
     engine        "processes" or "ray" (address: of a running cluster)
     time_limit    seconds of wall clock after which a run fails; None: none. With jobs = 1 it is heard in the
                   main thread alone, and not by C code that never returns; with more, the worker is ended
-    sensors       name of the sensor chain that all cases are run with, "exact" for none; None: each case's own
+    sensors       name of the sensor chain of all cases, "exact" for none; None: each case's own
     options       further options of simulate: dt, control_dt, output_dt, start
     A run that the protection ended (the case's trip) has status "tripped", the reason, and metrics of what it
-    was. Failed runs have status "failed", the reason, and NaN metrics; so have those of a controller that cannot
-    be prepared, as where its library is missing, that calls sys.exit, or whose worker process dies three
-    times. Column events: rare numerical events of the run and how often each came. A parked turbine has no
-    controller: such a case is run once, under the name "parked".
+    was. Failed runs have status "failed", the reason, and NaN metrics; so have those of a controller that
+    cannot be prepared, as where its library is missing, that calls sys.exit, or whose worker process dies
+    three times. Column events: rare numerical events of the run and how often each came. A parked turbine has
+    no controller: such a case is run once, under the name "parked".
     Raises: InputError for settings that no run could use.
     """
     if folder is not None:
@@ -363,14 +363,19 @@ def mean_ratios(table, over, columns):
 
     NaN where a run of either failed or tripped.
     """
-    ended_well = (table["status"] == OK).to_numpy()
-    values = table.set_index(KEY)[list(columns)].where(ended_well[:, None]).sort_index()
+    ended_well = table["status"] == OK
+    values = (
+        table[list(columns)]
+        .where(ended_well, axis=0)
+        .set_index(pd.MultiIndex.from_frame(table[KEY]))
+        .sort_index()
+    )
     base, names = values.loc[over], dict.fromkeys(table["controller"])
     return pd.DataFrame({name: (values.loc[name] / base).mean(skipna=False) for name in names}).T
 
 
 def summary(table):
-    """DataFrame by controller and case: runs, those that failed or tripped, each metric's mean over the seeds.
+    """DataFrame by controller and case: runs, those that failed or tripped, metrics' means over the seeds.
 
     A run that failed or tripped has the worst figures of its case (failures.py).
     """

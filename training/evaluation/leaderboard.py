@@ -121,7 +121,7 @@ def _figures(part, resampled):
 
 
 def _differences(part, weights, own_resampled, tested):
-    """Arrays (metrics,) of the paired difference of a _Part from its base: mean, low, high, percent, pairs, p.
+    """Arrays (metrics,) of the paired difference of a _Part from its base: estimate, low, ... , p.
 
     own_resampled: resampled means of all its runs. tested: whether p is among them (NaN: too few seeds).
     """
@@ -178,10 +178,11 @@ def leaderboard(table, baseline=None, score=None, cases=None, limits=None):
     Means are lifetime means (METHOD); the shares of the cases stand in the table's column weight_[-].
     Runs that failed or tripped have the worst figures of their case (failures.py).
     Keys: baseline (None: every controller has failed runs), interval (level, method, resamples,
-    least_seeds), unchecked (metrics whose relative limits need a controller that was not run), cases, shares {case: share}, seeds, controllers: a list of mappings with rank, controller,
-    runs, failed, tripped, metrics {metric: mean, low, high, seed_low, seed_high, worst}, difference {metric:
-    mean, low, high, percent, pairs, p}, beyond (a text for each limit passed), score (mean, low, high,
-    valid, why; None without one), cases {case: runs, failed, tripped, metrics, difference}. seed_low and
+    least_seeds), unchecked (metrics whose relative limits need a controller that was not run), cases, shares
+    {case: share}, seeds, controllers: a list of mappings with rank, controller, runs, failed, tripped,
+    metrics {metric: mean, low, high, seed_low, seed_high, worst}, difference {metric: mean, low, high,
+    percent, pairs, p}, beyond (a text for each limit passed), score (mean, low, high, valid, why; None
+    without one), cases {case: runs, failed, tripped, metrics, difference}. seed_low and
     seed_high are the range over the seeds of the lifetime mean, worst the greatest over all runs; percent the
     mean difference over the baseline's mean of the same runs, p its two-sided p-value (not case by case).
     The list is in the order of the ranks: those whose runs all ended well and within the limits, those

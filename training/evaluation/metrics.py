@@ -184,8 +184,8 @@ def metrics(
     beyond: seconds past a constraint (blade-pitch rate 10 deg/s, tower-top acceleration 3.3 m/s2, rotor
     speed 1.3 times rated), violations: how often it was passed. RotSpeed_offset: size of the mean rotor
     speed's distance from rated over the last 300 s, in percent of it; BldPitch_oscillation: greatest minus
-    least blade pitch of the last 100 s. settling_time: from the gust's start to the last instant at which the rotor
-    speed is further than 5 % of rated from its mean over the last 100 s.
+    least blade pitch of the last 100 s. settling_time: from the gust's start to the last instant at which the
+    rotor speed is further than 5 % of rated from its mean over the last 100 s.
     Raises: InputError for missing columns or if skip leaves fewer than two rows.
     """
     kept = _kept(df, skip)
@@ -224,7 +224,7 @@ def metrics(
 
 
 def turbine_metrics(df, turbine, skip=0.0, steady=False, gust_start=None):
-    """metrics of a run of a turbine (its description): against its rated speed and power and its pitch drive."""
+    """metrics of a run of a turbine (its description), with its rated speed and power and its pitch drive."""
     power = 1e-3 * turbine.torque_law.rated_power * turbine.drivetrain.generator_efficiency
     rate = turbine.pitch_drive.rate_limit / DEGREE
     return metrics(df, skip, turbine.rated_rotor_speed / RPM, rate, power, steady, gust_start)
@@ -246,7 +246,11 @@ def _kept(df, skip):
 
 def _settling(time, speed, blade_pitch, rated_speed_rpm, steady, gust_start):
     """The metrics of settling, NaN of a run that has none; not scored rows count in none of them."""
-    result = {"RotSpeed_offset_[%]": np.nan, "BldPitch_oscillation_[deg]": np.nan, "settling_time_[s]": np.nan}
+    result = {
+        "RotSpeed_offset_[%]": np.nan,
+        "BldPitch_oscillation_[deg]": np.nan,
+        "settling_time_[s]": np.nan,
+    }
     if steady:
         end = time >= time[-1] - SETTLED_END - 1e-9
         offset = 100.0 * abs(np.mean(speed[end]) / rated_speed_rpm - 1.0)

@@ -84,9 +84,7 @@ def scored(run):
                 nominal=nominal,
                 **{"sensors": case.sensors} | run.options | _degraded(run, nominal.turbine),
             )
-        return frame, turbine_metrics(
-            frame, scene.turbine, run.skip, _is_steady(case, nominal), _gust_start(case)
-        )
+        return frame, run_metrics(frame, case, nominal, run.skip)
 
     # whatever a controller raises or does costs its run, not the evaluation
     outcome, error = attempt(work, run.time_limit)
@@ -106,6 +104,11 @@ def scored(run):
 def lost_row(run, reason):
     """Row of a run that failed without one of its own, as where its process ended."""
     return _row(run, FAILED, None) | {"reason": reason}
+
+
+def run_metrics(frame, case, scene, skip):
+    """{metric: value} of the time series of a run of a Case in its nominal scene, scored from `skip` s on."""
+    return turbine_metrics(frame, scene.turbine, skip, _is_steady(case, scene), _gust_start(case))
 
 
 def _is_steady(case, scene):

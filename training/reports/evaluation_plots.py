@@ -3,13 +3,15 @@
 import numpy as np
 
 from fowt_env.errors import InputError
+from fowt_env.training.evaluation.failures import failures_as_worst
 from fowt_env.visual.style import COLOURS, INK, new_figure, save_figure, style_axes
 
 
 def plot_evaluation(table, metrics, path=None, title=None):
     """One panel per metric: each case on the x axis, one line per controller, spread over seeds.
 
-    table      the DataFrame of training.evaluation.evaluate.evaluate; failed runs are left out and counted
+    table      the DataFrame of training.evaluation.evaluate.evaluate; failed and tripped runs have the worst
+               figures of their case, and are counted
     metrics    column names; marks are the mean over the seeds, bars reach from least to greatest
     """
     metrics = [name for name in metrics if name in table.columns]
@@ -21,11 +23,11 @@ def plot_evaluation(table, metrics, path=None, title=None):
     panels = list(figure.subplots(rows, columns, sharex=True, squeeze=False).flat)
     cases = list(dict.fromkeys(table["case"]))
     controllers = list(dict.fromkeys(table["controller"]))
-    good = table[table["status"] == "ok"]
+    counted = failures_as_worst(table)
     for axes, name in zip(panels, metrics, strict=False):
         style_axes(axes)
         for index, controller in enumerate(controllers):
-            groups = good[good["controller"] == controller].groupby("case")[name]
+            groups = counted[counted["controller"] == controller].groupby("case")[name]
             mean, low, high = (getattr(groups, what)().reindex(cases) for what in ("mean", "min", "max"))
             offset = 0.12 * (index - 0.5 * (len(controllers) - 1))
             axes.errorbar(
@@ -44,14 +46,14 @@ def plot_evaluation(table, metrics, path=None, title=None):
         axes.tick_params(axis="x", labelbottom=True)
     for axes in panels[len(metrics) :]:
         axes.set_visible(False)
-    failed = len(table) - len(good)
+    failed = int((table["status"] != "ok").sum())
     figure.legend(
         *panels[0].get_legend_handles_labels(),
         loc="outside lower center",
         ncols=len(controllers),
         fontsize=8,
         frameon=False,
-        title=f"{failed} of {len(table)} runs failed and are not shown" if failed else None,
+        title=f"{failed} of {len(table)} runs failed or tripped: the worst of their case" if failed else None,
         title_fontsize=8,
     )
     if title:
@@ -74,7 +76,7 @@ def plot_pareto(board, path=None, title=None):
     for entry in board["controllers"]:
         figures = [entry["metrics"][name] for name in PARETO_METRICS]
         if all(np.isfinite([figure["mean"] for figure in figures])) and figures[0]["mean"] > 0.0:
-            entries.append((entry["controller"], entry["failed"], figures))
+            entries.append((entry["controller"], entry["failed"] + entry["tripped"], figures))
     if not entries:
         raise InputError("nothing to plot: no controller has finished a run")
     figure = new_figure(9.0, 5.6)
@@ -98,7 +100,7 @@ def plot_pareto(board, path=None, title=None):
                 axes.errorbar(x, y, xerr=bars[0], yerr=bars[1], **style)
                 drawn.add(low)
                 break
-        lost = f", {failed} failed" if failed else ""
+        lost = f", {failed} lost" if failed else ""
         marks.append(
             axes.scatter(
                 [x],

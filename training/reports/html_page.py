@@ -22,25 +22,27 @@ from fowt_env.descriptions.files import parse_json
 from fowt_env.errors import InputError, unknown
 from fowt_env.files.atomic import replacing
 from fowt_env.files.tables import read_table
+from fowt_env.training.evaluation.bootstrap import lifetime_means
 from fowt_env.training.evaluation.evaluate import run_file
+from fowt_env.training.evaluation.failures import failures_as_worst
 from fowt_env.training.evaluation.leaderboard_file import check_leaderboard
-from fowt_env.training.evaluation.results_table import KEY, WORDS, read_results
+from fowt_env.training.evaluation.metrics import better, mean_exponent
+from fowt_env.training.evaluation.results_table import KEY, WEIGHT, WORDS, case_shares, read_results
+from fowt_env.training.evaluation.run_case import OK, TRIPPED
 from fowt_env.training.evaluation.seeds import ranges
 from fowt_env.visual.time_series import PANELS, SPECTRA, TIME, frequency_marks, spectrum
 
-NO_METRIC = (*KEY, *WORDS, "stopped_[s]", "scored_[s]")
+NO_METRIC = (*KEY, *WORDS, "stopped_[s]", "scored_[s]", WEIGHT)
 # columns that the leaderboard shows at once, those of them that the table has
 PAGE_METRICS = (
     "RotSpeed_std_[rpm]",
-    "overspeed_[%]",
     "PtfmPitch_std_[deg]",
-    "PtfmPitch_max_[deg]",
     "blade_pitch_travel_[deg/s]",
-    "GenPwr_mean_[kW]",
-    "GenPwr_std_[kW]",
+    "torque_travel_[kN-m/s]",
+    "RotTorq_DEL_[kN-m]",
     "TwrBsMyt_DEL_[kN-m]",
-    "FAIRTEN_DEL_[kN]",
-    "NcIMUTAxs_rms_[m/s^2]",
+    "GenPwr_capped_mean_[kW]",
+    "GenPwr_max_[kW]",
 )
 PARETO_AXES = ("PtfmPitch_std_[deg]", "RotSpeed_std_[rpm]", "blade_pitch_travel_[deg/s]")  # across, up, size
 ALL_CASES = ""
@@ -70,12 +72,6 @@ SCHEDULE = (
     ("generator torque (kN m)", "GenTq"),
     ("platform pitch (deg)", "PtfmPitch"),
 )
-LOWER_IS_BETTER = (
-    *("_std_", "_rms_", "_DEL_", "FAIRTEN_max"),
-    *("travel", "duty", "overspeed", "beyond", "violations"),
-)
-HIGHER_IS_BETTER = ("GenPwr_mean", "energy")
-WEATHER = ("Wind", "Wave")
 
 
 def write_report(
@@ -314,31 +310,28 @@ def _metric_columns(table):
                 "label": label.replace("_", " "),
                 "unit": unit.removesuffix("]"),
                 "headline": name in first or not first,
-                "better": _direction(name),
+                "better": better(name),
             }
         )
     return columns
 
 
-def _direction(name):
-    """-1 where less of a metric is better, 1 where more is, 0 where neither can be said."""
-    if name.startswith(WEATHER):
-        return 0
-    if any(part in name for part in HIGHER_IS_BETTER):
-        return 1
-    return -1 if any(part in name for part in LOWER_IS_BETTER) else 0
-
-
 def _means(table, metrics, case):
-    """Leaderboard rows from the table alone: every case counts alike, failed runs are left out."""
+    """Leaderboard rows from the table alone: lifetime means, failed and tripped runs as the worst."""
     rows = []
-    part = table if case == ALL_CASES else table[table["case"] == case]
+    part = failures_as_worst(table if case == ALL_CASES else table[table["case"] == case], metrics)
+    exponents = np.array([mean_exponent(name) for name in metrics])
     for controller, group in part.groupby("controller", sort=False):
-        good = group[group["status"] == "ok"]
-        means = good.groupby("case")[metrics].mean().mean()
+        cases = list(dict.fromkeys(group["case"]))
+        by_case = (group[metrics] ** exponents).groupby(group["case"]).mean().reindex(cases).to_numpy()
+        shares = np.ones(1) if case != ALL_CASES else case_shares(group, cases)
+        means = lifetime_means(by_case[:, None] ** (1.0 / exponents), np.ones((1, 1)), shares, exponents)[0]
+        lost = {
+            "failed": int((~group["status"].isin((OK, TRIPPED))).sum()),
+            "tripped": int((group["status"] == TRIPPED).sum()),
+        }
         values = dict(zip(metrics, _rounded(means), strict=True))
-        failed = int((group["status"] != "ok").sum())
-        rows.append({"controller": controller, "runs": len(group), "failed": failed, "values": values})
+        rows.append({"controller": controller, "runs": len(group), **lost, "values": values})
     return rows
 
 
@@ -357,6 +350,9 @@ def _board_rows(board, what, case):
                 "controller": entry.controller,
                 "runs": part.runs,
                 "failed": part.failed,
+                "tripped": part.tripped,
+                "rank": entry.rank,
+                "beyond": entry.beyond,
                 "values": {name: figure.mean for name, figure in figures.items()},
                 "intervals": {
                     name: [figure.low, figure.high]
@@ -392,7 +388,7 @@ def _remark(table, board_file, case):
     if interval is not None and len(seeds) >= interval.least_seeds:
         text += f"Small print: {100 * interval.level:g} % intervals ({interval.method}). "
     else:
-        text += "Means over seeds, every case alike; failed runs have no figures. "
+        text += "Means over the lifetime; a run that failed or tripped has the worst figures of its case. "
         why = "there is no leaderboard.json"
         if interval is not None:
             count = "a single seed" if len(seeds) == 1 else f"{len(seeds)} seeds"
@@ -426,11 +422,18 @@ def _page_data(table, board_file, runs, schedule):
     ]
     labels = {channel: label.replace("\n", " ") for label, channel in PANELS}
     cases = list(dict.fromkeys(table["case"]))
+    ranked = board_file is not None and all(entry.rank is not None for entry in board_file.controllers)
+    first = ("rank",) if ranked else ()
+    sortable = {*first, *shown, "controller"}
+    shares = dict(zip(cases, map(float, case_shares(table, cases)), strict=True))
     return {
         "controllers": list(dict.fromkeys(table["controller"])),
+        "ranked": ranked,
+        "baseline": None if board_file is None else board_file.baseline,
+        "shares": shares if len(set(shares.values())) > 1 else None,
         "cases": cases,
         "metrics": metrics,
-        "sort": next((name for name in ("score", PARETO_AXES[1]) if name in shown), "controller"),
+        "sort": next(name for name in (*first, "score", PARETO_AXES[1], "controller") if name in sortable),
         "views": titles,
         "board": views,
         "remarks": {case: _remark(table, board_file, case) for case in [ALL_CASES, *cases]},
@@ -460,12 +463,13 @@ def _page_texts(folder, table, manifest, board_file, data, runs, schedule):
     title = f"{suite or folder.resolve().name}: evaluation of controllers"
     controllers, all_cases = data["controllers"], len(data["cases"])
     lead = f"{len(controllers)} controllers on {all_cases} cases: {', '.join(controllers)}"
-    failed = table[table["status"] != "ok"]
+    failed = table[table["status"] != OK]
+    lost = failed.itertuples()
     items = "".join(
-        f"<li>{html.escape(f'{row.controller}, {row.case}, seed {row.seed}: {row.reason}')}</li>"
-        for row in failed.itertuples()
+        f"<li>{html.escape(text)}</li>"
+        for text in (f"{r.status}: {r.controller}, {r.case}, seed {r.seed}: {r.reason}" for r in lost)
     )
-    summary = f'<summary class="bad">{len(failed)} failed runs</summary>'
+    summary = f'<summary class="bad">{len(failed)} failed or tripped runs</summary>'
     failures = f"<details open>{summary}<ul>{items}</ul></details>"
     section = ""
     if schedule and "missing" in schedule:
@@ -493,7 +497,11 @@ def _page_texts(folder, table, manifest, board_file, data, runs, schedule):
         "Of the case and seed chosen above, the scored part of the run, from all samples of its file: Welch's"
         " estimate, Hann windows of a third of the record. Dashed: wave peak and 1P of the first controller."
     )
-    texts = {"title": title, "lead": lead, "series_remark": series, "spectra_remark": spectra}
+    winds = "Means over the seeds of each case; below, in small print, the ratio to the baseline's."
+    if data["shares"] is not None:
+        winds += " Below the name of a case stands its share of the lifetime."
+    remarks = {"series_remark": series, "spectra_remark": spectra, "winds_remark": winds}
+    texts = {"title": title, "lead": lead, **remarks}
     return {
         **{name: html.escape(text) for name, text in texts.items()},
         "failures": failures if len(failed) else "",
@@ -511,6 +519,7 @@ def _provenance(table, manifest, board_file):
         if isinstance(suite, dict):
             suite = " ".join(str(suite[key]) for key in ("name", "version") if key in suite)
         facts |= {"suite": suite, "created": manifest.get("created"), "plant sources": manifest.get("plant")}
+        facts |= _case_facts(manifest)
         for key in ("versions", "options", "controllers"):
             if isinstance(manifest.get(key), dict):
                 facts[key] = ", ".join(
@@ -533,6 +542,21 @@ def _provenance(table, manifest, board_file):
         for name, value in facts.items()
         if value not in (None, "")
     )
+
+
+def _case_facts(manifest):
+    """{"trip", "sensors", "site"} of a manifest's cases and suite, as texts."""
+    cases = manifest.get("cases")
+    cases = [case for case in (cases.values() if isinstance(cases, dict) else ()) if isinstance(case, dict)]
+    facts = {}
+    for key in ("trip", "sensors"):
+        found = dict.fromkeys(str(case[key]) for case in cases if case.get(key) is not None)
+        facts[key] = " or ".join(found)
+    suite = manifest.get("suite")
+    site = suite.get("site") if isinstance(suite, dict) else None
+    if isinstance(site, dict):
+        facts["site"] = f"Weibull A = {site.get('A')} m/s, k = {site.get('k')} ({site.get('source')})"
+    return facts
 
 
 def _brief(label, value):

@@ -3,11 +3,11 @@
     fowt evaluate --controllers policy:ppo_lqr,gspi_oc3,rosco_float --seeds 1:6:1 --out results/rl
     fowt scores baselines results/rl --against gspi_oc3,rosco_float
 
-Each ratio is of one metric of an agent over that of a baseline in the same wind and waves, each of them a mean
-over the lifetime: every case by its share of it (column weight_[-] of the table; without one all alike). Several
-training seeds of one configuration make a group, whose interval resamples training and weather seeds
-(training.evaluation.bootstrap). A run that failed or tripped has the worst figures of all controllers on its
-case (training.evaluation.failures).
+Each ratio is of one metric of an agent over that of a baseline in the same wind and waves, each of them a
+mean over the lifetime: every case by its share of it (column weight_[-] of the table; without one all
+alike). Several training seeds of one configuration make a group, whose interval resamples training and
+weather seeds (training.evaluation.bootstrap). A run that failed or tripped has the worst figures of all
+controllers on its case (training.evaluation.failures).
 """
 
 import re
@@ -149,8 +149,8 @@ def agent_scores(table, baselines, groups=None, agents=None, figures=FIGURES):
 
     table: what evaluate.evaluate returns; groups, agents: as grouped takes them. Columns: agent,
     baseline, figure, metric, ratio (of the lifetime means, its mean over the training seeds), low, high (NaN
-    for too few seeds: training.evaluation.bootstrap.crossed_ratio), p_first, p_then (two-sided p-values of the
-    ratio being the aim), holm_first, holm_then (the same, corrected for all aims of all figures over this
+    for too few seeds: training.evaluation.bootstrap.crossed_ratio), p_first, p_then (two-sided p-values of
+    the ratio being the aim), holm_first, holm_then (the same, corrected for all aims of all figures over this
     baseline), pairs (runs with a ratio), runs, failed, tripped, training_seeds, verdict (Figure.verdict, sure
     where a corrected p-value is at most 1 - LEVEL). Where the baseline's figure is 0 there is no ratio.
     Raises: InputError for labels that were not run, or where agent and baseline have no run in common.
@@ -168,9 +168,7 @@ def _scores(table, baselines, chosen, figures):
         made = runs.loc[list(labels)]
         counts = {"runs": len(made), **_lost(made), "training_seeds": len(labels)}
         for baseline in baselines:
-            found = [
-                _ratio_row(runs, labels, baseline, cases, seeds, shares, figure) for figure in figures
-            ]
+            found = [_ratio_row(runs, labels, baseline, cases, seeds, shares, figure) for figure in figures]
             if not any(row["pairs"] for row in found):
                 raise InputError(f"{name} and {baseline}: no run of both has a figure")
             corrected = holm([p for row in found for p in (row["p_first"], row["p_then"])])
@@ -204,9 +202,9 @@ def _ratio_row(runs, labels, baseline, cases, seeds, shares, figure):
 def agent_counts(table, baselines, groups=None, agents=None):
     """DataFrame: per agent, group and baseline its runs, those that failed, those past a constraint.
 
-    Columns: agent, inputs (as the function has them), runs, failed, tripped, the names of COUNTS (runs in which
-    it was passed at least once), past any of them, largest overspeed (%), verdict ("met" where nothing failed,
-    tripped or was passed). The figures are the runs' own.
+    Columns: agent, inputs (as the function has them), runs, failed, tripped, the names of COUNTS (runs in
+    which it was passed at least once), past any of them, largest overspeed (%), verdict ("met" where nothing
+    failed, tripped or was passed). The figures are the runs' own.
     """
     return _counts(table, grouped(table, baselines, groups, agents) | {name: (name,) for name in baselines})
 

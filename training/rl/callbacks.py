@@ -29,7 +29,9 @@ class ValidationCallback(BaseCallback):
         training, evaluation = self.training, self.parent
         figures = decision_env(evaluation.eval_env).base.figures()
         row = {"decisions": self.num_timesteps, "seconds": training.checkpoint_callback.seconds()}
-        row |= {"reward": evaluation.last_mean_reward} | validation_score(figures, training.reference)
+        row |= {"reward": evaluation.last_mean_reward} | validation_score(
+            figures, training.reference, training.kinds
+        )
         training.rows.append(row)
         for name, value in row.items():
             self.logger.record(f"validation/{name}", value)

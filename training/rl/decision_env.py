@@ -6,11 +6,14 @@ from stable_baselines3.common.vec_env import VecEnvWrapper
 
 from fowt_env.descriptions.checks import check_number
 from fowt_env.descriptions.units import DEGREE, RPM
-from fowt_env.envs.decisions import Decisions
+from fowt_env.envs.actions import ACTION_MODES
+from fowt_env.envs.decisions import Decisions, wind_entry
 from fowt_env.plant.measurement import Measure
-from fowt_env.training.evaluation.metrics import REDUCTIONS, travel
+from fowt_env.training.evaluation.metrics import REDUCTIONS, TOWER_EXPONENT, damage_equivalent_load, travel
 from fowt_env.training.rl.sb3_env import FowtSB3VecEnv
 
+SETTLED_AFTER = 300.0  # s, from which on an episode of steady wind must be at rest
+SWING_AFTER = 500.0  # s, and its blade pitch: by then surge has died down
 RECORDED_FIELDS = (Measure.ROTOR_SPEED, Measure.PLATFORM_PITCH, Measure.BLADE_PITCH, Measure.GENERATOR_TORQUE)
 
 
@@ -26,8 +29,9 @@ class DecisionVecEnv(VecEnvWrapper):
         self.base = venv
         self.settings = settings
         self.channels = venv.observation_space.shape[0]
-        control_dt = venv.env.envs[0].control_dt
-        self.decisions = Decisions(venv.num_envs, self.channels, settings, control_dt)
+        first = venv.env.envs[0]
+        wind = wind_entry(settings, ACTION_MODES[first.action_mode], first.observed)
+        self.decisions = Decisions(venv.num_envs, self.channels, settings, first.control_dt, wind)
         repeats = settings.history
         low, high = venv.observation_space.low, venv.observation_space.high
         space = Box(
@@ -68,7 +72,7 @@ class DecisionVecEnv(VecEnvWrapper):
                     last = infos[i]["terminal_observation"]
                     infos[i]["terminal_observation"] = decisions.last_features(i, last)
                 ended[i] = True
-                decisions.action[i] = self.base.env.envs[i]._episode.action
+                decisions.restart(i, observations[i], self.base.env.envs[i]._episode.action)
                 self._decision[i] = decisions.action[i]
         decisions.append(observations)
         for i in np.flatnonzero(ended):
@@ -77,14 +81,16 @@ class DecisionVecEnv(VecEnvWrapper):
 
     def get_state(self):
         """Everything that decides how the episodes go on, to be pickled: plants, histories, actions."""
-        return self.base.env.get_state(), self.decisions.observations.copy(), self.decisions.action.copy()
+        kept = (getattr(self.decisions, name).copy() for name in ("observations", "action", "memory"))
+        return self.base.env.get_state(), *kept
 
     def set_state(self, state):
         """Go on from what get_state returned; returns the features there."""
-        plants, observations, action = state
+        plants, observations, action, memory = state
         self.base.env.set_state(list(plants))
         self.decisions.observations[:] = observations
         self.decisions.action[:] = action
+        self.decisions.memory[:] = memory
         return self.decisions.features()
 
 
@@ -136,18 +142,38 @@ class ValidationVecEnv(FowtSB3VecEnv):
         """{metric: (n,)} of the recorded episodes by the formulas of evaluation.metrics; NaN for failed ones.
 
         They are of what the sensors could measure, control period by control period, and so of the shaft's
-        power, which is the generator's before its losses.
+        power, which is the generator's before its losses. Offset of the mean rotor speed from rated is of the
+        time after SETTLED_AFTER, the swing of the blade pitch, peak to peak, of that after SWING_AFTER.
         """
         record = np.where(self._failed[:, None], np.nan, self._record[self.skip : self._clock - 1])
         speed, platform_pitch, blade_pitch, torque = np.moveaxis(record, 2, 0)
         first, mean, std = self.env.envs[0], REDUCTIONS["mean"], REDUCTIONS["std"]
         time = first.control_dt * np.arange(len(record))
-        power = speed * torque * first.scene.turbine.drivetrain.gear_ratio * 1e-3
+        turbine = first.scene.turbine
+        gear, rated = turbine.drivetrain.gear_ratio, turbine.torque_law.rated_power
+        power = speed * torque * gear * 1e-3
+        # of the low-speed shaft: what the generator takes and what turns its inertia
+        acceleration = np.gradient(speed, first.control_dt, axis=0) if len(speed) > 1 else 0.0 * speed
+        shaft = gear * (torque + gear * turbine.drivetrain.generator_inertia * acceleration) * 1e-3
+        settled, still = (self._after(record, start) for start in (SETTLED_AFTER, SWING_AFTER))
+        offset = mean(settled[:, :, 0]) / turbine.rated_rotor_speed - 1.0
         return {
             "rotor_speed_std_[rpm]": std(speed / RPM),
             "platform_pitch_std_[deg]": std(platform_pitch / DEGREE),
             "blade_pitch_travel_[deg/s]": travel(time, blade_pitch / DEGREE),
             "shaft_power_mean_[kW]": mean(power),
             "shaft_power_std_[kW]": std(power),
+            "capped_power_mean_[kW]": mean(np.minimum(power, 1e-3 * rated)),
+            "torque_travel_[kN-m/s]": travel(time, 1e-3 * torque),
+            "shaft_torque_DEL_[kN-m]": np.array(
+                [damage_equivalent_load(series, time[-1], TOWER_EXPONENT) for series in shaft.T]
+            ),
+            "rotor_speed_offset_[%]": 100.0 * np.abs(offset),
+            "blade_pitch_swing_[deg]": np.ptp(still[:, :, 2], axis=0) / DEGREE,
             "failed": self._failed.astype(float),
         }
+
+    def _after(self, record, start):
+        """Rows of the record from a time (s) of the episode on; one of NaN where there are none."""
+        rows = record[max(0, round(start / self.env.envs[0].control_dt) - self.skip) :]
+        return rows if len(rows) else np.full((1, *record.shape[1:]), np.nan)

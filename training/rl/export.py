@@ -2,6 +2,7 @@
 
 import json
 import pickle
+from dataclasses import asdict
 
 import numpy as np
 
@@ -48,11 +49,7 @@ def export_policy(model, normalisation, single, decisions, path, about):
         "layers": len(linear),
         "clip_observation": float(normalisation.clip_obs),
         "control_dt": single.control_dt,
-        "decisions": {
-            "hold": decisions.hold,
-            "smoothing": decisions.smoothing,
-            "history": decisions.history,
-        },
+        "decisions": asdict(decisions),
         "action_mode": single.action_mode,
         "baseline": single.baseline,
         "observation": list(task.observation),

@@ -41,6 +41,7 @@ from fowt_env.training.evaluation.locks import locked
 from fowt_env.training.evaluation.seeds import TRAINING, seeds_for
 from fowt_env.training.rl.checkpoint_signature import is_own, seal
 from fowt_env.training.rl.settings import (
+    REFERENCE,
     SCHEDULES,
     TASK_FIELDS,
     check_algorithm,
@@ -75,11 +76,23 @@ OBSERVATIONS = {  # information sets that agents are compared with
 }  # fmt: skip
 SECTIONS = ("environment", "decisions", "algorithm", "normalise", "validation", "checkpoint_minutes", "task")
 VERSIONS = ("fowt-env", "stable-baselines3", "sb3-contrib", "torch", "numpy", "numba", "gymnasium")
-RATIOS = ("rotor_speed_std_[rpm]", "platform_pitch_std_[deg]", "blade_pitch_travel_[deg/s]")
-FAILURE_COST = 10.0  # of the validation score, per fraction of episodes that failed
-TRAVEL_COST = 2.0  # of the validation score, per unit of blade-pitch travel beyond the baseline's
-POWER_COST = 20.0  # of the validation score, per unit of mean power short of LEAST_POWER
-LEAST_POWER = 0.995  # of the reference's
+MOTIONS = ("rotor_speed_std_[rpm]", "platform_pitch_std_[deg]")
+RATIOS = (
+    *MOTIONS, "blade_pitch_travel_[deg/s]", "torque_travel_[kN-m/s]", "shaft_torque_DEL_[kN-m]",
+    "capped_power_mean_[kW]", "shaft_power_std_[kW]",
+)  # fmt: skip
+# what the validation score adds to the mean ratio of the motions
+FAILURE_COST = 10.0  # per fraction of episodes that failed
+TRAVEL_COST = 2.0  # per unit of blade-pitch travel beyond the reference's
+TORQUE_COST = 1.0  # per unit of torque travel, and of shaft-torque DEL, beyond the reference's
+POWER_COST = 20.0  # per unit of mean power, counted up to rated, short of LEAST_POWER
+LEAST_POWER = 0.999  # of the reference's
+UNREST_COST = 0.5  # per fraction of episodes of steady wind that did not come to rest
+GUST_COST = 2.0  # per unit by which the worse motion in gusts passes the reference's
+LARGEST_OFFSET = 0.5  # % of rated rotor speed: at rest in steady wind
+LARGEST_SWING = 0.05  # deg of blade pitch, peak to peak
+STEADY_KICK = {"PtfmPitch": 0.5}  # deg, as in the suite settling: from which an agent must come to rest
+GUST_START = 120.0  # s
 
 
 def resolve(algo, task, seed, steps, changes=None):
@@ -161,18 +174,34 @@ def versions():
 
 
 def validation_episodes(settings):
-    """List of reset options: each wind of the settings with each of its validation seeds, fixed."""
+    """(list of reset options, list of their kinds) of the episodes that resolved settings validate on.
+
+    turbulent: each wind with each of its validation seeds; steady: still water, from STEADY_KICK; gust: one
+    EOG and one EDC for each wind.
+    """
     chosen = settings["validation"]
     seeds = seeds_for("validation", int(chosen["first"]), int(chosen["seeds"]))
-    return [
+    sigma = chosen.get("sigma", "90%")
+    episodes = [
         {
-            "wind": {"kind": "ntm", "speed": float(speed), "class": "B"},
+            "wind": {"kind": "ntm", "speed": float(speed), "class": "B", "sigma": sigma},
             "sea": _sea_at(float(speed)),
             "weather_seed": seed,
         }
         for speed in chosen["winds"]
         for seed in seeds
     ]
+    kinds = ["turbulent"] * len(episodes)
+    for speed in chosen.get("steady", ()):
+        wind = {"kind": "steady", "speed": float(speed)}
+        episodes.append({"wind": wind, "sea": None, "weather_seed": seeds[0], "offsets": STEADY_KICK})
+        kinds.append("steady")
+    for speed in chosen.get("gusts", ()):
+        for kind in ("eog", "edc"):
+            wind = {"kind": kind, "speed": float(speed), "start": GUST_START}
+            episodes.append({"wind": wind, "sea": _sea_at(float(speed)), "weather_seed": seeds[0]})
+            kinds.append("gust")
+    return episodes, kinds
 
 
 def _sea_at(speed):
@@ -213,11 +242,16 @@ def validation_env(settings, chosen):
     from fowt_env.training.rl.decision_env import ValidationVecEnv
 
     given = settings["validation"]
-    episodes = validation_episodes(settings)
+    episodes, kinds = validation_episodes(settings)
     sensors = given.get("sensors")
     per_env = None
     if sensors:
-        per_env = [{"sensors": sensors[i % given["seeds"] % len(sensors)]} for i in range(len(episodes))]
+        turns = [i % given["seeds"] % len(sensors) for i in range(len(episodes))]
+        exact = {"noise": 0.0, "delay": 0}
+        per_env = [
+            {"sensors": exact if kind == "steady" else sensors[turn]}
+            for kind, turn in zip(kinds, turns, strict=True)
+        ]
     return ValidationVecEnv(episodes, given.get("skip", 60.0), threads=1, per_env=per_env, **chosen)
 
 
@@ -228,12 +262,15 @@ def decision_env(env):
     return env
 
 
-def baseline_figures(settings, reference="gspi_oc3"):
+def baseline_figures(settings, reference=None):
     """{metric: (n,)} of a compiled controller on the validation episodes of resolved settings.
+
+    reference: its name; None: that of the settings.
 
     It is run in the agent's own environment and not by evaluation.evaluate, so that a ratio is of the same
     weather, start, sensors and control periods.
     """
+    reference = reference or settings["validation"].get("reference", REFERENCE)
     chosen = environment_settings(settings) | {"action_mode": "residual", "baseline": reference}
     env = validation_env(settings, chosen)
     env.reset()
@@ -243,21 +280,40 @@ def baseline_figures(settings, reference="gspi_oc3"):
     return env.figures()
 
 
-def validation_score(figures, reference):
-    """{ratio or score: number}: means over episodes of figures over those of the reference; lower is better.
+def validation_score(figures, reference, kinds=None):
+    """{ratio, check or score: number} of figures over those of the reference; lower is better.
 
-    score: mean of the ratios of rotor-speed and platform-pitch standard deviation, plus what travel beyond
-    the reference's, a lack of mean power and failures cost.
+    kinds: of the episodes, as validation_episodes has them; None: all turbulent. Ratios are means over the
+    turbulent ones, that of torque travel one of sums, since a reference may keep its torque in some. score:
+    mean of the ratios of rotor-speed and platform-pitch standard deviation, and what more travel, torque
+    travel and shaft load or less power than the reference's, failures, unrest in steady wind and larger
+    motions in gusts cost.
     """
-    ratios = {name: float(np.nanmean(figures[name] / reference[name])) for name in RATIOS}
+    kinds = np.array(["turbulent"] * len(figures["failed"]) if kinds is None else kinds)
+    turbulent, steady, gust = (kinds == kind for kind in ("turbulent", "steady", "gust"))
+    ratios = {name: _mean(figures[name][turbulent] / reference[name][turbulent]) for name in RATIOS}
+    moved = "torque_travel_[kN-m/s]"
+    ratios[moved] = _mean(figures[moved][turbulent]) / _mean(reference[moved][turbulent])
+    speed, platform, travel, torque, shaft, power, _ = ratios.values()
     failed = float(figures["failed"].mean())
-    speed, platform, travel = (ratios[name] for name in RATIOS)
+    offset, swing = figures["rotor_speed_offset_[%]"][steady], figures["blade_pitch_swing_[deg]"][steady]
+    at_rest = (offset <= LARGEST_OFFSET) & (swing <= LARGEST_SWING)
+    unrest = _mean(~at_rest) if steady.any() else 0.0
+    in_gusts = [_mean(figures[name][gust] / reference[name][gust]) for name in MOTIONS]
+    gusts = max(in_gusts) if gust.any() else 1.0
     row = {f"{name.split('_[')[0]}_ratio": ratio for name, ratio in ratios.items()}
-    for name in ("shaft_power_mean_[kW]", "shaft_power_std_[kW]"):
-        row[f"{name.split('_[')[0]}_ratio"] = float(np.nanmean(figures[name] / reference[name]))
-    score = 0.5 * (speed + platform) + TRAVEL_COST * max(0.0, travel - 1.0) + FAILURE_COST * failed
-    score += POWER_COST * max(0.0, LEAST_POWER - row["shaft_power_mean_ratio"])
-    return row | {"failed": failed, "score": score if np.isfinite(score) else float("inf")}
+    row |= {"unrest": unrest, "gust_ratio": gusts, "failed": failed}
+    excess = np.maximum([travel - 1.0, torque - 1.0, shaft - 1.0, LEAST_POWER - power, gusts - 1.0], 0.0)
+    score = 0.5 * (speed + platform) + FAILURE_COST * failed + UNREST_COST * unrest
+    score += float(excess @ [TRAVEL_COST, TORQUE_COST, TORQUE_COST, POWER_COST, GUST_COST])
+    return row | {"score": score if np.isfinite(score) else float("inf")}
+
+
+def _mean(values):
+    """Mean of what is not NaN, the figures of episodes that did not fail; NaN of none."""
+    values = np.asarray(values, dtype=np.float64)
+    kept = values[np.isfinite(values)]
+    return float(kept.mean()) if len(kept) else float("nan")
 
 
 class Training:
@@ -357,6 +413,7 @@ class Training:
 
         model = self.model
         self.reference = baseline_figures(self.settings)
+        self.kinds = validation_episodes(self.settings)[1]
         model.set_logger(configure(str(self.folder / "tensorboard"), ["tensorboard"]))
         checkpoint_callback = CheckpointCallback(self, report)
         validation_callback = ValidationCallback(self)

@@ -32,7 +32,7 @@ FIGURES = {
     "blade_pitch_travel_ratio": "blade-pitch travel",
     "shaft_power_std_ratio": "power std",
 }
-COLUMNS = FIGURES | {"shaft_power_mean_ratio": "mean power"}  # of the table; the picture has FIGURES
+COLUMNS = FIGURES | {"capped_power_mean_ratio": "power up to rated"}  # of the table; the picture has FIGURES
 
 
 def read_table(path=TABLE):

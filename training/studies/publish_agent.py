@@ -19,6 +19,7 @@ from fowt_env.controllers import information
 from fowt_env.controllers.policy.controller import AGENTS, read_policy
 from fowt_env.errors import InputError
 from fowt_env.files.atomic import replacing
+from fowt_env.training.rl.settings import REFERENCE
 from fowt_env.training.rl.train import resolve
 
 LARGEST_FILE = 200_000  # bytes of a policy that is kept in the repository
@@ -64,6 +65,7 @@ def publish(folder, name, machine):
     best = rows.loc[rows["score"].idxmin()]
     versions = json.loads((folder / "versions.json").read_text(encoding="utf-8"))
     known = information(f"policy:{policy}")
+    reference = settings["validation"].get("reference", REFERENCE)
     lines = [
         f"command = {json.dumps(training_command(settings))}",
         f"seed = {settings['seed']}",
@@ -74,7 +76,7 @@ def publish(folder, name, machine):
         f"information = {json.dumps(list(known))}",
         f"history = {settings['decisions']['history']}  # earlier decision instants it remembers",
         "",
-        "[validation]  # ratios to gspi_oc3, means over the validation episodes",
+        f"[validation]  # ratios to {reference}, means over the validation episodes",
         *(f"{key} = {float(best[key]):.4f}" for key in rows.columns if key not in ("decisions", "seconds")),
         "",
         "[versions]",

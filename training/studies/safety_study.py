@@ -15,7 +15,8 @@ import pandas as pd
 from fowt_env.controllers.policy.controller import policy_path, read_policy
 from fowt_env.descriptions.units import RPM
 from fowt_env.envs import TASKS, FowtEnv, SafetyLayer
-from fowt_env.envs.decisions import Decisions, DecisionSettings
+from fowt_env.envs.actions import ACTION_MODES
+from fowt_env.envs.decisions import Decisions, DecisionSettings, wind_entry
 from fowt_env.files.tables import write_table
 from fowt_env.training.evaluation.metrics import turbine_metrics
 from fowt_env.training.rl.train import TASK_FIELDS, resolve, validation_episodes
@@ -45,7 +46,9 @@ class Trained:
     def reset(self, env, observation):
         """Start an episode."""
         settings = DecisionSettings(**self.settings["decisions"])
-        self.decisions = Decisions(1, len(observation), settings, self.settings["control_dt"])
+        mode = ACTION_MODES[self.settings["action_mode"]]
+        wind = wind_entry(settings, mode, env.unwrapped.observed)
+        self.decisions = Decisions(1, len(observation), settings, self.settings["control_dt"], wind)
         self.decisions.restart(0, observation, env.unwrapped._episode.action)
         self.periods = 0
 
@@ -106,7 +109,7 @@ def episode_figures(agent, env, options):
 
 def safety_study(agents, progress=print):
     """DataFrame: a row per agent, without and with the layer; means over episodes, largest overspeed."""
-    episodes = validation_episodes(resolve("ppo", "above_rated", 0, 1))[::2]
+    episodes = validation_episodes(resolve("ppo", "above_rated", 0, 1))[0][::2]
     rows = []
     for label, agent in [(name, Trained(name)) for name in agents] + [
         (kind, Careless(kind)) for kind in CARELESS

@@ -58,7 +58,8 @@ def _by_coefficients(t, pose, x, now, aero, rotor, dx, counters):
 
 # (t, pose, x, now, aero, rotor, dx, counters) -> RotorLoad; of dx the wake's rates alone are written
 rotor_part = chosen_by_class(
-    "rotor", {BemRotor: _solved, SectionTable: _by_sections, CoefficientTable: _by_coefficients},
+    "rotor",
+    {BemRotor: _solved, SectionTable: _by_sections, CoefficientTable: _by_coefficients},
     inlined=True,
 )
 

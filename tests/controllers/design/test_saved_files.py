@@ -10,7 +10,7 @@ from fowt_env.controllers import make
 from fowt_env.controllers.design.closed_loop import closed_loop_matrix
 from fowt_env.controllers.design.pi import design_pi
 from fowt_env.controllers.design.saved_files import load_design, lqr_settings, save_design
-from fowt_env.controllers.lqr.design import Weights, design_model, design_models
+from fowt_env.controllers.lqr.design import LQGSettings, design_model, design_models
 from fowt_env.controllers.lqr.law import LQR
 from fowt_env.controllers.pi import PI, PISettings
 from fowt_env.errors import InputError
@@ -38,7 +38,7 @@ def pi_file(tmp_path, windy):
 
 @pytest.fixture(scope="module")
 def lqr_file(tmp_path_factory, windy):
-    settings = lqr_settings(Weights(pitch_rate=9.0), [design_model(windy, wind) for wind in (12, 13)])
+    settings = lqr_settings(LQGSettings(share=0.6), [design_model(windy, wind) for wind in (12, 13)])
     return save_design(tmp_path_factory.mktemp("designs") / "lq.json", "lqr", windy, settings, "by hand")
 
 
@@ -54,7 +54,7 @@ def test_a_saved_lqr_has_the_same_bits_as_the_one_designed(lqr_file, windy, turb
     loaded = make(f"design:{lqr_file}", turbine, control_dt)
     models = [design_model(windy, wind) for wind in (12, 13)]
     np.testing.assert_array_equal(
-        loaded.parameters, LQR(turbine, control_dt, Weights(pitch_rate=9.0), models=models).parameters
+        loaded.parameters, LQR(turbine, control_dt, LQGSettings(share=0.6), models=models).parameters
     )
 
 
@@ -67,7 +67,11 @@ def test_a_saved_lqr_does_not_follow_a_changed_plant(lqr_file, turbine):
 
 def test_a_saved_default_lqr_gives_the_blocks_of_the_named_one(tmp_path, windy, turbine):
     path = save_design(
-        tmp_path / "d.json", "lqr", windy, lqr_settings(Weights(), design_models(windy)), "fowt design lqr"
+        tmp_path / "d.json",
+        "lqr",
+        windy,
+        lqr_settings(LQGSettings(), design_models(windy)),
+        "fowt design lqr",
     )
     named = make("lqr", turbine, 0.1)
     named.prepare(windy)
@@ -87,7 +91,7 @@ def test_evaluate_scores_a_design_by_its_file_and_notices_its_edit(pi_file):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"version": 2}, "version = 2: this program reads 1"),
+        ({"version": 1}, "version = 1: this program reads 2"),
         ({"format": "other"}, "no design of a controller"),
         ({"kind": "pid"}, "unknown kind 'pid'. Did you mean 'pi'"),
         ({"turbine": "iea15mw"}, "turbine = 'iea15mw': cannot control 'nrel5mw'"),
@@ -108,8 +112,8 @@ def test_a_wrong_entry_is_named_with_file_key_and_value(pi_file, turbine, change
 @pytest.mark.parametrize(
     ("edit", "message"),
     [
-        (lambda s: s["weights"].update(pitch_rate=0.0), "pitch_rate = 0.0: must be finite and positive"),
-        (lambda s: s["weights"].pop("power"), "settings.weights.power is missing"),
+        (lambda s: s["lqg"].update(pitch_rate=0.0), "pitch_rate = 0.0: must be finite and positive"),
+        (lambda s: s["lqg"].pop("power"), "settings.lqg.power is missing"),
         (lambda s: s["models"][1].update(wind=15.0), "models[1].wind = 15: must be 1 m/s above"),
         (lambda s: s["models"][0]["A"].pop(), "models[0].A: must be 11 x 11 finite numbers"),
         (lambda s: s["models"][0].update(trim=None), "models[0].trim: must be 6 finite numbers"),

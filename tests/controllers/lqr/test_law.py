@@ -5,7 +5,7 @@ import pytest
 
 from fowt_env import build_scene, simulate
 from fowt_env.caches import clear_caches
-from fowt_env.controllers.lqr.design import Weights, design_models
+from fowt_env.controllers.lqr.design import LQGSettings, design_models
 from fowt_env.controllers.lqr.law import LQR
 from fowt_env.errors import InputError
 from fowt_env.training.evaluation.cases import named_cases
@@ -28,11 +28,11 @@ def test_lqr_stays_at_the_steady_state(wind):
     assert frame["PtfmPitch_[deg]"].std() < 0.1
 
 
-def test_bad_weights_are_named(turbine):
+def test_bad_settings_are_named(turbine):
     with pytest.raises(InputError, match="pitch_rate = -1.0: must be finite and positive"):
-        Weights(pitch_rate=-1.0)
+        LQGSettings(pitch_rate=-1.0)
     with pytest.raises(InputError, match="pitch_rate"):
-        Weights().changed(pich_rate=1.0)
+        LQGSettings().changed(pich_rate=1.0)
     with pytest.raises(InputError, match="prepare"):
         LQR(turbine, 0.1).reset(None)
 

@@ -65,22 +65,25 @@ ESTIMATED = ("estimated_wind", "estimated_platform", "estimated_waves")
 
 
 @pytest.mark.parametrize(
-    ("mode", "baseline", "estimated"),
+    ("mode", "baseline", "estimated", "shaping"),
     [
-        ("residual", "gspi_oc3", ()),
-        ("residual", "lqr", ESTIMATED),
-        ("direct", "gspi_oc3", ESTIMATED),
-        ("setpoint", "gspi_oc3", ()),
+        ("residual", "gspi_oc3", (), {}),
+        ("residual", "lqr", ESTIMATED, {}),
+        ("residual", "lqr", ESTIMATED, {"washout": 5.0, "authority": (0.05, 0.4), "authority_time": 2.0}),
+        ("direct", "gspi_oc3", ESTIMATED, {}),
+        ("setpoint", "gspi_oc3", (), {}),
     ],
 )
 def test_the_controller_commands_what_the_environment_would_do_with_its_decisions(
-    mode, baseline, estimated, tmp_path
+    mode, baseline, estimated, shaping, tmp_path
 ):
-    from fowt_env.envs.decisions import Decisions, DecisionSettings
+    from fowt_env.envs.actions import ACTION_MODES
+    from fowt_env.envs.decisions import Decisions, DecisionSettings, wind_entry
 
+    chosen = {"hold": 3, "smoothing": 0.4, "history": 2} | shaping
     names = ("rotor_speed", "platform_pitch_rate", "previous_action", *estimated, "wind_preview")
     preview = (1.0, 2.5)
-    path = write_random_policy(tmp_path / "a.npz", mode, names, preview, baseline=baseline)
+    path = write_random_policy(tmp_path / "a.npz", mode, names, preview, baseline=baseline, decisions=chosen)
     task = replace(TASKS["above_rated"], residual_pitch=3.0, setpoint=(0.9, 1.1))
     env = FowtEnv(
         task,
@@ -93,7 +96,9 @@ def test_the_controller_commands_what_the_environment_would_do_with_its_decision
     )
     network = read_policy(path)[1]
     observation, _ = env.reset(seed=1)
-    decisions = Decisions(1, len(observation), DecisionSettings(hold=3, smoothing=0.4, history=2), 0.1)
+    settings = DecisionSettings(**chosen)
+    wind = wind_entry(settings, ACTION_MODES[mode], env.observed)
+    decisions = Decisions(1, len(observation), settings, 0.1, wind)
     agent = make(f"policy:{path}", TURBINE, 0.1)
     agent.prepare(env.scene)
     agent.reset(env.measurement(agent.preview_times))
@@ -107,6 +112,14 @@ def test_the_controller_commands_what_the_environment_would_do_with_its_decision
         observation, _, terminated, _, _ = env.step(decisions.smooth(decision)[0])
         assert command == pytest.approx(tuple(env._episode.u), rel=1e-9, abs=1e-9)
         assert not terminated
+    assert np.any(decisions.action != 0.0) and (not shaping or 0.0 < decisions.authority()[0])
+
+
+def test_a_policy_whose_authority_has_no_estimated_wind_is_refused(tmp_path):
+    decisions = {"hold": 3, "smoothing": 0.4, "history": 2, "authority": [0.3, 0.9]}
+    path = write_random_policy(tmp_path / "a.npz", decisions=decisions)
+    with pytest.raises(InputError, match="policy file .*a.npz': decisions.authority = .*'estimated_wind'"):
+        make(f"policy:{path}", TURBINE, 0.1)
 
 
 def test_a_policy_runs_without_torch_or_stable_baselines3(tmp_path):

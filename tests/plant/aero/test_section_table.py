@@ -375,9 +375,7 @@ def test_plain_python_gives_the_same_loads(tmp_path):
     states, winds = operating(6)
     states[5, State.ROTOR_SPEED] = 0.2
     field = rough_field(True)
-    np.savez(
-        tmp_path / "given.npz", load=TABLE.load, states=states, winds=winds, velocity=field.velocity
-    )
+    np.savez(tmp_path / "given.npz", load=TABLE.load, states=states, winds=winds, velocity=field.velocity)
     run = subprocess.run(
         [sys.executable, "-c", PLAIN, str(tmp_path / "given.npz")],
         env={**os.environ, "NUMBA_DISABLE_JIT": "1"},

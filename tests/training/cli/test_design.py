@@ -40,15 +40,15 @@ def test_a_designed_pi_is_saved_and_simulated_by_its_file(tmp_path):
     assert len(pd.read_csv(run)) > 40
 
 
-def test_a_designed_lqr_is_saved_with_its_weights(tmp_path):
+def test_a_designed_lqr_is_saved_with_its_settings(tmp_path):
     path = tmp_path / "lq.json"
-    fowt("design", "lqr", "--weight", "pitch_rate=9", "--out", str(path))
+    fowt("design", "lqr", "--setting", "share=0.6", "--out", str(path))
     saved = json.loads(path.read_text())
-    assert saved["settings"]["weights"]["pitch_rate"] == 9
-    assert saved["command"] == "fowt design lqr --weight pitch_rate=9"
+    assert saved["settings"]["lqg"]["share"] == 0.6
+    assert saved["command"] == "fowt design lqr --setting share=0.6"
     assert len(saved["settings"]["models"]) == 22
     _, stderr = fowt("design", "lqr", "--vary", "pitch_rate=1,2", "--out", str(path), code=2)
-    assert "a design has one value per weight" in " ".join(stderr.split())
+    assert "a design has one value per setting" in " ".join(stderr.split())
 
 
 def test_bound_writes_and_front_reads_its_fronts(tmp_path):
@@ -68,17 +68,17 @@ def test_bound_writes_and_front_reads_its_fronts(tmp_path):
     assert "wind = 9.0: must be above 11.4" in " ".join(stderr.split())
 
 
-def test_a_sweep_of_weights_refuses_seeds_for_scoring_and_weights_that_there_are_not():
+def test_a_sweep_of_settings_refuses_seeds_for_scoring_and_settings_that_there_are_not():
     _, stderr = fowt("design", "lqr", "--seeds", "1,2", code=2)
     assert "seeds = [1, 2]: tune on seeds of 1000 and above" in " ".join(stderr.split())
     _, stderr = fowt("design", "lqr", "--vary", "pitch_rat=1,2", code=2)
-    assert "unknown weight 'pitch_rat'. Did you mean 'pitch_rate'" in " ".join(stderr.split())
+    assert "unknown setting of lqr 'pitch_rat'. Did you mean 'pitch_rate'" in " ".join(stderr.split())
 
 
-def test_a_sweep_of_weights_shows_and_writes_every_variant_beside_gspi(tmp_path):
+def test_a_sweep_of_settings_shows_and_writes_every_variant_beside_gspi(tmp_path):
     path = tmp_path / "sweep.csv"
-    words = ("--vary", "pitch_rate=8,80", "--cases", "steady_16", "--seeds", "1001", "--out", str(path))
+    words = ("--vary", "travel=1,0.6", "--cases", "steady_16", "--seeds", "1001", "--out", str(path))
     stdout, _ = fowt("design", "lqr", *words)
     table = pd.read_csv(path)
-    assert list(table["variant"]) == ["gspi_oc3", "{'pitch_rate': 8.0}", "{'pitch_rate': 80.0}"]
+    assert list(table["variant"]) == ["gspi_oc3", "{'travel': 1.0}", "{'travel': 0.6}"]
     assert all(name in stdout for name in table["variant"])

@@ -98,7 +98,7 @@ def test_plots_show_every_mode_and_leave_out_a_pitch_that_rests(models):
             plot({})
 
 
-def test_a_sweep_refuses_scoring_seeds_and_unknown_weights():
+def test_a_sweep_refuses_scoring_seeds_and_unknown_settings():
     with pytest.raises(InputError, match=r"seeds = \[1001, 7\]: tune on seeds of 1000"):
         sweep([{}], "ntm_18", [1001, 7])
     with pytest.raises(InputError, match="Did you mean 'pitch_rate'"):
@@ -107,9 +107,9 @@ def test_a_sweep_refuses_scoring_seeds_and_unknown_weights():
 
 def test_a_sweep_scores_each_variant_beside_the_baseline(tmp_path):
     out = tmp_path / "sweep.csv"
-    variants = [{"pitch_rate": 4.0}, {"pitch_rate": 20.0}]
+    variants = [{"travel": 1.0}, {"travel": 0.6}]
     table = sweep(variants, "ntm_18", [1001], out, duration=120.0, skip=20.0)
-    assert list(table["variant"]) == ["gspi_oc3", "{'pitch_rate': 4.0}", "{'pitch_rate': 20.0}"]
+    assert list(table["variant"]) == ["gspi_oc3", "{'travel': 1.0}", "{'travel': 0.6}"]
     travel = table["blade_pitch_travel_[deg/s]"]
     assert travel[2] < 0.8 * travel[1]
     assert len(out.read_text().splitlines()) == 4

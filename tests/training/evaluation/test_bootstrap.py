@@ -13,7 +13,6 @@ from fowt_env.training.evaluation.bootstrap import (
     resample_weights,
 )
 
-
 ALIKE = np.ones(20)
 
 
@@ -86,7 +85,9 @@ def test_a_crossed_p_value_goes_with_its_interval_and_a_ratio_is_of_powers():
     assert found.value == pytest.approx(np.mean(means[:-1]) / means[-1])
     assert found.p_value(1.001 * found.high) < 0.05 < found.p_value(0.999 * found.high)
     assert found.p_value(0.999 * found.low) < 0.05 < found.p_value(1.001 * found.low)
-    assert found.p_value(found.value) == 1.0 and np.isnan(crossed_ratio(own[:1, :, :1], base[:, :1], shares).low)
+    assert found.p_value(found.value) == 1.0 and np.isnan(
+        crossed_ratio(own[:1, :, :1], base[:, :1], shares).low
+    )
 
 
 def test_equal_values_have_an_interval_without_width():

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -91,7 +93,7 @@ def test_every_controller_meets_the_same_wind_and_waves():
 
 def test_a_rotor_beyond_the_turbine_s_overspeed_has_failed_when_an_environment_would_end():
     options = {"duration": 40.0, "skip": 5.0}
-    row = evaluate({"runaway": Runaway()}, [CALM], **options).iloc[0]
+    row = evaluate({"runaway": Runaway()}, [replace(CALM, trip=None)], **options).iloc[0]
     assert row["status"] == "failed" and row["reason"].startswith("overspeed")
     assert np.isnan(row["RotSpeed_std_[rpm]"])
     env = FowtEnv(wind=16.0, duration=40.0)
@@ -100,9 +102,20 @@ def test_a_rotor_beyond_the_turbine_s_overspeed_has_failed_when_an_environment_w
     while not terminated:
         *_, terminated, _, info = env.step_physical(0.0, 0.0)
     assert info["termination"] == row["reason"] and info["time"] == pytest.approx(row["stopped_[s]"])
-    stuck = Case("stuck", 16.0, fault=Fault(kind="grid_loss", time=10.0))
+    stuck = Case("stuck", 16.0, fault=Fault(kind="grid_loss", time=10.0), trip=None)
     gone_on = evaluate({"runaway": Runaway()}, [stuck], **options).iloc[0]
     assert gone_on["status"] == "ok" and gone_on["overspeed_[%]"] > 100.0
+
+
+def test_a_rotor_beyond_the_trip_is_no_good_run_and_says_when_and_why():
+    options = {"duration": 40.0, "skip": 5.0}
+    row = evaluate({"runaway": Runaway()}, [CALM], **options).iloc[0]
+    assert row["status"] == "tripped" and 0.0 < row["stopped_[s]"] < 40.0
+    assert row["reason"] == f"overspeed trip at {row['stopped_[s]']:.1f} s: rotor speed beyond 1.3 of rated"
+    assert row["overspeed_[%]"] > 25.0  # the figures are those of what happened
+    later = evaluate({"runaway": Runaway()}, [replace(CALM, trip=1.6)], **options).iloc[0]
+    assert later["stopped_[s]"] > row["stopped_[s]"]
+    assert evaluate("pi", [CALM], **options).iloc[0]["status"] == "ok"
 
 
 def test_a_controller_that_wants_more_than_the_generator_can_give_is_seen_to():
@@ -181,7 +194,7 @@ def test_named_suites_hold_their_cases_once():
     cases = named_cases("above_rated, ntm_18,paper_18")
     assert [case.name for case in cases] == [*(c.name for c in read_suite("above_rated").cases), "paper_18"]
     assert {case.name for case in cases} <= set(all_cases())
-    assert cases[3].wind == {"kind": "ntm", "speed": 18.0, "class": "B"}
+    assert cases[3].wind == {"kind": "ntm", "speed": 18.0, "class": "B", "sigma": "drawn"}
     heights = [case.sea.Hs for case in cases[:-1]]
     assert heights == sorted(heights) and heights[0] < heights[-1]  # rougher sea in stronger wind
 
@@ -211,12 +224,13 @@ def test_settings_that_no_run_could_use_are_named(arguments, message):
 
 def test_ratios_are_means_over_the_same_runs_and_a_failed_run_leaves_none():
     rows = [
-        {"controller": name, "case": case, "seed": seed, "x": value, "y": 1.0}
+        {"controller": name, "case": case, "seed": seed, "status": "ok", "x": value, "y": 1.0}
         for name, values in {"a": (1.0, 2.0, 4.0, 8.0), "b": (2.0, 2.0, 2.0, 2.0)}.items()
         for (case, seed), value in zip([("c", 1), ("c", 2), ("d", 1), ("d", 2)], values, strict=True)
     ]
     found = mean_ratios(pd.DataFrame(rows[::-1]), "a", ["x", "y"])
     assert found.loc["b"].tolist() == [np.mean([2.0, 1.0, 0.5, 0.25]), 1.0]
     assert found.loc["a"].tolist() == [1.0, 1.0]
-    rows[-1]["x"] = np.nan
-    assert np.isnan(mean_ratios(pd.DataFrame(rows), "a", ["x"]).loc["b", "x"])
+    for lost in ({"x": np.nan}, {"status": "tripped"}):
+        part = pd.DataFrame([*rows[:-1], rows[-1] | lost])
+        assert np.isnan(mean_ratios(part, "a", ["x"]).loc["b", "x"])

@@ -125,7 +125,9 @@ def test_whatever_is_not_ok_counts_as_failed():
     frame = table({("pi", "a", 1): 1.0, ("pi", "a", 2): None})
     frame.loc[1, "status"] = "timeout"
     found = entry(leaderboard(frame), "pi")
-    assert found["failed"] == 1 and found["metrics"][TRAVEL]["mean"] == 1.0  # the worst of those that went well
+    assert (
+        found["failed"] == 1 and found["metrics"][TRAVEL]["mean"] == 1.0
+    )  # the worst of those that went well
 
 
 def test_a_count_that_is_mostly_zero_has_an_interval_from_zero_on():

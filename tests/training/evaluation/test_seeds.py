@@ -58,11 +58,14 @@ def assert_apart(settings):
     assert range(*task.weather_seeds) == TRAINING
     rng = np.random.default_rng(0)
     assert all(task.draw(rng).weather_seed in TRAINING for _ in range(200))
-    episodes = validation_episodes(settings)
+    episodes, _ = validation_episodes(settings)
     assert episodes and all(episode["weather_seed"] in VALIDATION for episode in episodes)
 
 
-@pytest.mark.parametrize(("algo", "task"), [*((algo, "above_rated") for algo in ALGORITHMS), ("ppo", ROBUST)])
+@pytest.mark.parametrize(
+    ("algo", "task"),
+    [*((algo, "above_rated") for algo in ALGORITHMS), ("ppo", ROBUST), ("ppo", "above_rated_mixture")],
+)
 def test_agents_train_on_training_seeds_and_are_chosen_on_validation_seeds(algo, task):
     assert_apart(resolve(algo, task, 0, 1))
 

@@ -10,7 +10,7 @@ from fowt_env.training.reports import evaluation_plots  # noqa: E402
 PNG = b"\x89PNG\r\n\x1a\n"
 
 
-def test_evaluation_plot_leaves_failed_runs_out_and_says_so(tmp_path):
+def test_evaluation_plot_draws_failed_runs_as_the_worst_of_their_case_and_says_so(tmp_path):
     table = pd.DataFrame(
         {
             "controller": ["a", "a", "b", "b"],
@@ -22,7 +22,7 @@ def test_evaluation_plot_leaves_failed_runs_out_and_says_so(tmp_path):
     )
     figure = evaluation_plots.plot_evaluation(table, ["PtfmPitch_std_[deg]"], tmp_path / "metrics.png")
     assert (tmp_path / "metrics.png").read_bytes().startswith(PNG)
-    assert "1 of 4 runs failed" in figure.legends[0].get_title().get_text()
+    assert "1 of 4 runs failed or tripped" in figure.legends[0].get_title().get_text()
     np.testing.assert_array_equal(figure.axes[0].containers[0].lines[0].get_ydata(), [1.0, 2.0])
 
 
@@ -32,7 +32,7 @@ def pareto_board(controllers):
     for name, (speed, pitch, travel) in controllers.items():
         values = dict(zip(evaluation_plots.PARETO_METRICS, (speed, pitch, travel, 20.0), strict=True))
         figures = {key: figure | {"mean": value, "worst": value} for key, value in values.items()}
-        entries.append({"controller": name, "failed": 0, "metrics": figures})
+        entries.append({"controller": name, "failed": 0, "tripped": 0, "metrics": figures})
     return {"controllers": entries, "cases": ["a"], "interval": {"level": 0.95}}
 
 

@@ -69,8 +69,7 @@ def board(seeds, pi="ok", x="failed", factor=1.0, lost=None, baseline=None):
 def test_the_leaderboard_says_how_many_runs_went_well_and_of_which_seeds():
     title, headings, rows, remarks = leaderboard_rows(board([1, 2, 3, 6, 8, 9]))
     assert title == (
-        "1 case, seeds 1-3, 6, 8-9: means [95 % interval],"
-        " paired difference from pi (* no chance finding)"
+        "1 case, seeds 1-3, 6, 8-9: means [95 % interval], paired difference from pi (* no chance finding)"
     )
     (pi, x) = (dict(zip(headings, row, strict=True)) for row in rows)
     assert (pi["runs"], x["runs"]) == ("6/6", "0/6, 6 failed")
@@ -88,7 +87,9 @@ def test_a_row_has_means_with_intervals_the_largest_power_and_differences_to_the
         0.5 * np.sqrt(np.mean((1.0 + 0.1 * np.arange(1, 6)) ** 2))  # of deviations the squares are averaged
     )
     assert not any("%" in text or "*" in text for text in pi)  # the baseline has none to itself
-    largest = [row[place["power max MW"]] for row in leaderboard_rows(board([1, 2, 9], x="ok", factor=1e4))[2]]
+    largest = [
+        row[place["power max MW"]] for row in leaderboard_rows(board([1, 2, 9], x="ok", factor=1e4))[2]
+    ]
     assert largest == ["0.00", "19.00"]  # of the worst run
     tower = both["controllers"][0]["metrics"]["TwrBsMyt_DEL_[kN-m]"]
     tower["mean"] = 22_700.0

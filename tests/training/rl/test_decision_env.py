@@ -10,6 +10,7 @@ from fowt_env.envs import FowtEnv
 from fowt_env.envs.decisions import Decisions, DecisionSettings
 from fowt_env.errors import InputError
 from fowt_env.training.evaluation.metrics import turbine_metrics
+from fowt_env.training.rl import decision_env
 from fowt_env.training.rl.decision_env import DecisionVecEnv, ValidationVecEnv
 from fowt_env.training.rl.sb3_env import FowtSB3VecEnv
 
@@ -73,9 +74,11 @@ def test_an_episode_that_fails_within_a_decision_is_paid_up_to_its_failure_only(
     assert base.env.envs[0]._episode.measurement[0] > 0.0  # the next episode has begun
 
 
-def test_the_state_of_a_batch_goes_on_in_another():
-    settings = DecisionSettings(hold=2, smoothing=0.5, history=2)
-    one, other = (DecisionVecEnv(FowtSB3VecEnv(2, threads=1, **QUICK), settings) for _ in range(2))
+@pytest.mark.parametrize("shaping", [{}, {"washout": 4.0, "authority": (0.01, 0.3), "authority_time": 3.0}])
+def test_the_state_of_a_batch_goes_on_in_another(shaping):
+    settings = DecisionSettings(hold=2, smoothing=0.5, history=2, **shaping)
+    given = QUICK | {"action_mode": "residual", "observation": ("rotor_speed", "estimated_wind")}
+    one, other = (DecisionVecEnv(FowtSB3VecEnv(2, threads=1, **given), settings) for _ in range(2))
     one.seed(1)
     one.reset()
     actions = np.random.default_rng(0).uniform(-0.2, 0.2, (60, 2, 2))
@@ -114,8 +117,12 @@ def test_the_figures_of_validation_are_the_metrics_of_its_episodes():
         "blade_pitch_travel_[deg/s]": "blade_pitch_travel_[deg/s]",
         "shaft_power_mean_[kW]": "GenPwr_mean_[kW]",
         "shaft_power_std_[kW]": "GenPwr_std_[kW]",
+        "torque_travel_[kN-m/s]": "torque_travel_[kN-m/s]",
     }
-    assert {*names, "failed"} == set(figures)
+    others = {"shaft_torque_DEL_[kN-m]", "capped_power_mean_[kW]", "failed"}
+    late = {"rotor_speed_offset_[%]", "blade_pitch_swing_[deg]"}  # of the time after 300 s
+    assert {*names, *others, *late} == set(figures)
+    assert all(np.all(np.isnan(figures[name])) for name in late)
     for i, one in enumerate(env.env.envs):
         columns = [channel.column for channel in one.scene.channels]
         # the first row is of the end of the first period; after the last step the next episode has begun
@@ -125,6 +132,29 @@ def test_the_figures_of_validation_are_the_metrics_of_its_episodes():
         for name, metric in names.items():
             factor = losses if name.startswith("shaft_power") else 1.0
             assert factor * figures[name][i] == pytest.approx(found[metric], rel=1e-12), name
+        # the shaft's acceleration is that between control periods, and its bearing losses are left out
+        assert figures["shaft_torque_DEL_[kN-m]"][i] == pytest.approx(found["RotTorq_DEL_[kN-m]"], rel=0.05)
+        power = frame["GenPwr_[kW]"].to_numpy() / losses
+        capped = np.minimum(power, 1e-3 * one.scene.turbine.torque_law.rated_power).mean()
+        assert figures["capped_power_mean_[kW]"][i] == pytest.approx(capped, rel=1e-12)
+
+
+def test_rest_in_steady_wind_is_judged_after_300_s(monkeypatch):
+    monkeypatch.setattr(decision_env, "SETTLED_AFTER", 5.0)
+    monkeypatch.setattr(decision_env, "SWING_AFTER", 6.0)
+    env = ValidationVecEnv([{"wind": 18.0, "weather_seed": 1001}], 1.0, threads=1, **QUICK)
+    env.reset()
+    turbine = env.env.envs[0].scene.turbine
+    env._clock = len(env._record)
+    time = 0.1 * np.arange(env._clock)
+    env._record[:] = 0.0
+    env._record[:, 0, 0] = turbine.rated_rotor_speed * np.where(
+        time < 5.0, 1.2, 0.997 + 0.01 * (-1.0) ** np.arange(80)
+    )
+    env._record[:, 0, 2] = np.where(time < 6.0, 0.1, 0.001 * np.sin(20.0 * time))
+    figures = env.figures()
+    assert figures["rotor_speed_offset_[%]"] == pytest.approx([0.3], abs=0.05)
+    assert figures["blade_pitch_swing_[deg]"] == pytest.approx([np.rad2deg(0.002)], rel=0.05)
 
 
 def test_restarting_one_row_leaves_the_others():

@@ -33,6 +33,7 @@ from fowt_env.training.rl.train import (
     decision_env,
     make_envs,
     resolve,
+    validation_episodes,
     validation_score,
 )
 from fowt_env.training.studies import publish_agent
@@ -178,9 +179,9 @@ def test_the_policy_that_is_kept_is_that_of_the_best_validation_also_in_a_resume
     scores, networks, runs = [2.0, 1.0, 3.0], [], []
     real = callbacks.validation_score
 
-    def scored_otherwise(figures, reference):
+    def scored_otherwise(figures, reference, kinds):
         networks.append(parameters(runs[-1]))
-        return real(figures, reference) | {"score": scores[len(networks) - 1]}
+        return real(figures, reference, kinds) | {"score": scores[len(networks) - 1]}
 
     monkeypatch.setattr(callbacks, "validation_score", scored_otherwise)
     monkeypatch.setattr(callbacks, "REPORT_EVERY", 0.0)
@@ -258,21 +259,63 @@ def test_validation_repeats_the_same_episodes_bit_for_bit():
         found.append(decision_env(validation).base.figures())
     assert found[0].keys() == found[1].keys()
     for name, values in found[0].items():
-        assert np.array_equal(values, found[1][name]) and np.all(np.isfinite(values))
+        assert np.array_equal(values, found[1][name], equal_nan=True)
+        assert name in ("rotor_speed_offset_[%]", "blade_pitch_swing_[deg]") or np.all(np.isfinite(values))
     assert found[0]["rotor_speed_std_[rpm]"][0] != found[0]["rotor_speed_std_[rpm]"][1]
 
 
-def test_the_baseline_scores_one_against_itself_and_more_travel_or_less_power_cost():
-    reference = baseline_figures(small("ppo"))
-    row = validation_score(reference, reference)
-    assert row["score"] == pytest.approx(1.0) and row["failed"] == 0.0
-    busy = reference | {"blade_pitch_travel_[deg/s]": 1.5 * reference["blade_pitch_travel_[deg/s]"]}
-    assert validation_score(busy, reference)["score"] == pytest.approx(2.0)
-    weak = reference | {"shaft_power_mean_[kW]": 0.99 * reference["shaft_power_mean_[kW]"]}
-    assert validation_score(weak, reference)["score"] == pytest.approx(1.1)
-    nothing = {name: np.full_like(values, np.nan) for name, values in reference.items()}
-    with pytest.warns(RuntimeWarning):
-        assert validation_score(nothing | {"failed": np.ones(2)}, reference)["score"] == np.inf
+@pytest.fixture(scope="module")
+def reference():
+    """Figures of the reference on two turbulent episodes, one of steady wind and one of each gust; kinds."""
+    changes = {"validation.steady": [18], "validation.gusts": [18], "environment.sea": {"kind": "joint"}}
+    settings = small("ppo", **changes)
+    kinds = validation_episodes(settings)[1]
+    assert kinds == ["turbulent", "turbulent", "steady", "gust", "gust"]
+    figures = baseline_figures(settings)
+    # such short episodes end before the time from which on steady wind is judged
+    assert np.all(np.isnan(figures["blade_pitch_swing_[deg]"]))
+    figures["blade_pitch_swing_[deg]"] = np.full(5, 0.01)
+    figures["rotor_speed_offset_[%]"] = np.full(5, 0.1)
+    return figures, kinds
+
+
+@pytest.mark.parametrize(
+    ("metric", "factor", "score"),
+    [
+        ("blade_pitch_travel_[deg/s]", 1.5, 2.0),
+        ("blade_pitch_travel_[deg/s]", 0.5, 1.0),
+        ("torque_travel_[kN-m/s]", 1.5, 1.5),
+        ("shaft_torque_DEL_[kN-m]", 1.2, 1.2),
+        ("capped_power_mean_[kW]", 0.989, 1.2),
+        ("capped_power_mean_[kW]", 1.2, 1.0),
+        ("shaft_power_mean_[kW]", 1.2, 1.0),  # what is made beyond rated power is not paid
+        ("blade_pitch_swing_[deg]", 4.9, 1.0),
+        ("blade_pitch_swing_[deg]", 5.1, 1.5),
+        ("rotor_speed_offset_[%]", 5.1, 1.5),
+    ],
+)
+def test_what_a_validation_score_charges_for(reference, metric, factor, score):
+    figures, kinds = reference
+    row = validation_score(figures, figures, kinds)
+    assert row["score"] == pytest.approx(1.0) and row["failed"] == row["unrest"] == 0.0
+    changed = figures | {metric: factor * figures[metric]}
+    assert validation_score(changed, figures, kinds)["score"] == pytest.approx(score)
+
+
+def test_larger_motions_in_gusts_cost_and_those_of_steady_wind_are_no_ratio(reference):
+    figures, kinds = reference
+    name = "platform_pitch_std_[deg]"
+    worse = figures | {name: figures[name] * np.where(np.array(kinds) == "gust", 1.1, 1.0)}
+    row = validation_score(worse, figures, kinds)
+    assert row["score"] == pytest.approx(1.2) and row["gust_ratio"] == pytest.approx(1.1)
+    moved = figures | {name: figures[name] * np.where(np.array(kinds) == "steady", 9.0, 1.0)}
+    assert validation_score(moved, figures, kinds)["score"] == pytest.approx(1.0)
+
+
+def test_an_agent_that_always_fails_scores_infinity(reference):
+    figures, kinds = reference
+    nothing = {name: np.full_like(values, np.nan) for name, values in figures.items()}
+    assert validation_score(nothing | {"failed": np.ones(5)}, figures, kinds)["score"] == np.inf
 
 
 def test_wrong_settings_are_named(tmp_path):

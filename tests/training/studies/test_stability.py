@@ -51,9 +51,7 @@ def oscillator(frequency):
     ],
 )
 def test_theory_has_the_limits_of_the_textbook(a, integrator, limit):
-    found = step_limits.first_unstable(
-        lambda h: step_limits.stable(a, h, integrator, duration=3000.0), 0.05
-    )
+    found = step_limits.first_unstable(lambda h: step_limits.stable(a, h, integrator, duration=3000.0), 0.05)
     assert found == pytest.approx(limit, rel=2.0 * step_limits.RESOLUTION)
 
 
@@ -212,9 +210,7 @@ def test_an_emergency_stop_feathers_at_the_actuators_rate_and_stops_the_rotor(sc
 
 
 def test_a_rotor_without_torque_and_pitch_runs_away_and_the_verdict_says_so(scene, monkeypatch):
-    case = extremes.Extreme(
-        "grid loss", 18.0, CALM, fault="grid loss, no pitch action", duration=100.0
-    )
+    case = extremes.Extreme("grid loss", 18.0, CALM, fault="grid loss, no pitch action", duration=100.0)
     monkeypatch.setitem(extremes.EXTREMES, "runaway", case)
     row = extremes.run_extreme("runaway", scene=scene)
     assert row["finite"] and "overspeed" in row["verdict"]

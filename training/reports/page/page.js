@@ -56,7 +56,7 @@ function shownColumns() {
 
 function sortedRows() {
   const rows = [...DATA.board[$("table-view").value][$("table-case").value]];
-  const value = (row) => (order.key === "controller" ? row.controller : order.key === "failed" ? row.failed : row.values[order.key]);
+  const value = (row) => (order.key === "controller" ? row.controller : order.key === "failed" ? row.failed + row.tripped : order.key === "rank" ? row.rank : row.values[order.key]);
   rows.sort((a, b) => {
     const [x, y] = [value(a), value(b)];
     if (x === null || x === undefined) return 1; // missing figures last, whichever the direction
@@ -104,7 +104,8 @@ function drawTable() {
   const columns = shownColumns();
   const rows = sortedRows();
   const head = document.createElement("tr");
-  head.append(headerCell("controller", "controller", "", "sort by name"), headerCell("failed", "failed", "runs", "failed runs of all runs"));
+  head.append(headerCell("controller", "controller", "", "sort by name"), headerCell("failed", "lost", "runs", "failed and tripped runs of all runs"));
+  if (DATA.ranked) head.append(headerCell("rank", "rank", "", "runs lost and limits passed first, then the score"));
   for (const metric of columns) head.append(headerCell(metric.name, metric.label, metric.unit, metric.name));
   $("table").tHead.replaceChildren(head);
   const best = Object.fromEntries(columns.map((metric) => [metric.name, bestOf(metric, rows)]));
@@ -116,9 +117,22 @@ function drawTable() {
     swatch.style.background = colour(DATA.controllers.indexOf(row.controller));
     name.append(swatch, row.controller);
     const failed = document.createElement("td");
-    failed.textContent = `${row.failed} of ${row.runs}`;
-    if (row.failed) failed.className = "bad";
+    failed.textContent = `${row.failed + row.tripped} of ${row.runs}`;
+    failed.title = `${row.failed} failed, ${row.tripped} tripped`;
+    if (row.failed + row.tripped) failed.className = "bad";
     line.append(name, failed);
+    if (row.beyond && row.beyond.length) {
+      const text = document.createElement("span");
+      text.className = "range bad";
+      text.textContent = "beyond a limit";
+      text.title = row.beyond.join("; ");
+      name.append(text);
+    }
+    if (DATA.ranked) {
+      const rank = document.createElement("td");
+      rank.textContent = row.rank;
+      line.append(rank);
+    }
     for (const metric of columns) {
       const cell = document.createElement("td");
       const value = row.values[metric.name];
@@ -136,6 +150,40 @@ function drawTable() {
     return line;
   }));
   $("table-remark").textContent = DATA.remarks[$("table-case").value];
+}
+
+// ---- wind by wind ------------------------------------------------------------------------------
+function drawWinds() {
+  const metric = DATA.metrics.find((each) => each.name === $("wind-what").value);
+  const value = (controller, name) => {
+    const row = DATA.board.mean[name].find((each) => each.controller === controller);
+    return row ? row.values[metric.name] : null;
+  };
+  const cell = (tag, text, lower) => {
+    const made = document.createElement(tag);
+    made.textContent = text;
+    if (lower !== undefined) {
+      const line = document.createElement("span");
+      line.className = tag === "th" ? "unit" : "range";
+      line.textContent = lower;
+      made.append(line);
+    }
+    return made;
+  };
+  const share = (name) => (DATA.shares && DATA.shares[name] !== undefined ? `${(100 * DATA.shares[name]).toFixed(1)} %` : "\u00a0");
+  const head = document.createElement("tr");
+  const columns = [[ALL, "all", "lifetime"], ...DATA.cases.map((name) => [name, name, share(name)])];
+  head.append(cell("th", "controller", metric.unit), ...columns.map(([, text, lower]) => cell("th", text, lower)));
+  $("wind-table").tHead.replaceChildren(head);
+  $("wind-table").tBodies[0].replaceChildren(...DATA.board.mean[ALL].map(({ controller }) => {
+    const line = document.createElement("tr");
+    line.append(cell("td", controller), ...columns.map(([name]) => {
+      const [own, base] = [value(controller, name), DATA.baseline === null ? null : value(DATA.baseline, name)];
+      const ratio = own != null && base && controller !== DATA.baseline ? (own / base).toFixed(3) : "\u00a0";
+      return cell("td", figure(own), ratio);
+    }));
+    return line;
+  }));
 }
 
 // ---- Pareto ------------------------------------------------------------------------------------
@@ -283,7 +331,7 @@ function chooseSeeds() {
   fill($("series-seed"), Object.keys(DATA.series[$("series-case").value] || {}));
 }
 function drawAll() {
-  drawTable(); drawPareto(); drawBoxes(); drawSeries(); drawSpectra(); drawSchedule();
+  drawTable(); drawWinds(); drawPareto(); drawBoxes(); drawSeries(); drawSpectra(); drawSchedule();
 }
 fill($("table-case"), [ALL, ...DATA.cases], ["all cases", ...DATA.cases]);
 for (const [kind, title, names] of [["samples", "samples of a channel", Object.keys(DATA.quantiles)], ["metric", "metrics of the runs", DATA.metrics.map((m) => m.name)]]) {
@@ -293,6 +341,8 @@ for (const [kind, title, names] of [["samples", "samples of a channel", Object.k
   group.append(...names.map((name) => new Option(DATA.titles[name], JSON.stringify([kind, name]))));
   $("box-what").append(group);
 }
+const compared = DATA.metrics.filter((metric) => metric.name !== "score");
+fill($("wind-what"), compared.map((metric) => metric.name), compared.map((metric) => DATA.titles[metric.name] || metric.label));
 fill($("table-view"), Object.keys(DATA.views), Object.values(DATA.views));
 $("table-view").parentElement.hidden = Object.keys(DATA.views).length < 2;
 fill($("series-case"), Object.keys(DATA.series));
@@ -302,6 +352,7 @@ $("theme").addEventListener("click", () => { document.documentElement.dataset.th
 $("table-case").addEventListener("change", () => { drawTable(); drawPareto(); });
 $("table-view").addEventListener("change", drawTable);
 $("all-columns").addEventListener("change", drawTable);
+$("wind-what").addEventListener("change", drawWinds);
 $("box-what").addEventListener("change", drawBoxes);
 $("series-case").addEventListener("change", () => { chooseSeeds(); drawSeries(); drawSpectra(); });
 $("series-seed").addEventListener("change", () => { drawSeries(); drawSpectra(); });

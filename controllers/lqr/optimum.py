@@ -1,0 +1,269 @@
+"""Feedback of lqr at one wind: the linear optimum, at the control period, under limits on what it may spend.
+
+Minimised is (1 - share) var(rotor speed) + share var(platform pitch), each over that of gspi_oc3 on the same
+linear model, with the blade-pitch travel, the deviations of power and torque and that of the shaft torque
+within limits. By duality that is a quadratic cost with a multiplier per limit, and the multipliers are found
+by iteration: each grows while its limit is exceeded and shrinks while it is kept. Deviations are those of
+the sampled loop with the Kalman filter and the noise of its sensors.
+"""
+
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+from scipy.linalg import solve_discrete_are
+
+from fowt_env.controllers.lqr.design import (
+    LOWEST_DESIGN_WIND,
+    MOMENT,
+    N_FEEDBACK,
+    N_PLANT,
+    N_STATE,
+    PLANT,
+    SENSOR_NOISE,
+    WIND,
+    estimator_gain,
+    sampled,
+    sampled_noise,
+)
+from fowt_env.controllers.pi import PISettings, schedule_gain
+from fowt_env.descriptions.units import DEGREE
+
+SPEED, LEAN, BLADE = (PLANT.index(name) for name in ("rotor_speed", "platform_pitch", "blade_pitch"))
+TORQUE, COMMAND, INTEGRAL = N_PLANT, N_PLANT + 1, N_PLANT + 2  # after the plant, in the states fed back
+ESTIMATED = [*range(N_PLANT), *range(N_PLANT + 3, N_FEEDBACK)]  # of the states fed back, by the filter
+OF_FILTER = [*range(N_PLANT), *range(WIND, MOMENT)]  # the same among the states of the filter
+GAUSSIAN_MEAN = sqrt(2.0 / np.pi)  # mean |x| of a Gaussian over its standard deviation
+LIMITED = ("travel", "power", "torque", "shaft")  # fields of Deviations
+# m/s, below which travel and shaft torque have limits of their own: lulls take the turbine out of its region
+NEAR_RATED, NO_LULLS = 14.0, 16.0
+# What gspi_oc3 is held to where its own linear model says more or, as near rated wind, is unstable
+SPEED_CEILING, POWER_CEILING, LEAN_CEILING = 0.09, 0.09, 1.2 * DEGREE  # of rated, of rated, rad
+SHAFT_CEILING = 0.018  # of rated torque, where its loop is unstable
+LOWEST, HIGHEST = np.log(1e-3), np.log(1e4)  # of a multiplier; beside aims of order one
+TOLERANCE = 5e-3  # of the limits, relative
+ROUNDS = 60
+STEP = 2.0  # of a multiplier's logarithm over the relative excess of its limit, at first
+LONGER, SHORTER = 1.2, 0.5  # factor of the step where the excess keeps its sign, and where it changes
+LARGEST = 2.0  # step of a multiplier's logarithm
+
+
+@dataclass(frozen=True)
+class Deviations:
+    """Standard deviations of a closed loop; travel is a mean absolute rate."""
+
+    speed: float  # of the rotor, rad/s
+    lean: float  # platform pitch, rad
+    travel: float  # of the blade pitch, rad/s
+    power: float  # of rated
+    torque: float  # of the generator, of rated
+    shaft: float  # torque of the shaft, of rated
+
+
+def stationary_covariance(a, q):
+    """Covariance X = A X A' + Q of a stable sampled system, by doubling."""
+    x = q
+    while True:
+        more = a @ x @ a.T
+        x = x + more
+        if np.all(np.diag(more) <= 1e-12 * np.diag(x)):
+            return x
+        a = a @ a
+
+
+class SampledLoop:
+    """One wind's plant with its weather and the filter of lqr, sampled at the control period.
+
+    States fed back: as feedback_plant of design.py; inputs: rates of torque (rated torques/s) and of the
+    pitch command (rad/s). A command changes at an instant and holds over the period, as the law's do.
+    """
+
+    def __init__(self, model, turbine, dt):
+        self.model, self.turbine, self.dt = model, turbine, dt
+        phi, gamma = sampled(model.A[:MOMENT, :MOMENT], model.B[:MOMENT] * [model.torque, 1.0], dt)
+        a, b = np.eye(N_FEEDBACK), np.zeros((N_FEEDBACK, 2))
+        a[np.ix_(ESTIMATED, ESTIMATED)] = phi
+        a[np.ix_(ESTIMATED, [TORQUE, COMMAND])] = gamma
+        b[ESTIMATED] = dt * gamma
+        b[TORQUE, 0] = b[COMMAND, 1] = dt
+        a[INTEGRAL] += dt * a[SPEED]
+        b[INTEGRAL] = dt * b[SPEED]
+        self.a, self.b = a, b
+        white = model.G[:MOMENT] @ model.G[:MOMENT].T
+        self.noise = sampled_noise(model.A[:MOMENT, :MOMENT], white, dt)
+        self.filter_gain = estimator_gain(model, dt)
+        self.rows = self._rows()
+
+    def _rows(self):
+        """{field of Deviations: (row on the states (13,), row on the inputs (2,))}."""
+        eye, none = np.eye(N_FEEDBACK), np.zeros(2)
+        rated, per_step = self.turbine.rated_rotor_speed, GAUSSIAN_MEAN / self.dt
+        acceleration = np.zeros(N_FEEDBACK)
+        acceleration[ESTIMATED] = self.model.A[SPEED, :MOMENT]
+        acceleration[[TORQUE, COMMAND]] = self.model.B[SPEED] * [self.model.torque, 1.0]
+        return {
+            "speed": (eye[SPEED], none),
+            "lean": (eye[LEAN], none),
+            "travel": (per_step * (self.a[BLADE] - eye[BLADE]), per_step * self.b[BLADE]),
+            "power": (eye[SPEED] / rated + eye[TORQUE], none),
+            "torque": (eye[TORQUE], none),
+            "shaft": (eye[TORQUE] + self._inertia * acceleration, none),
+        }
+
+    @property
+    def _inertia(self):
+        """Of the generator on the slow shaft, over rated torque there: s2."""
+        drive = self.turbine.drivetrain
+        return drive.gear_ratio * drive.generator_inertia / self.model.torque
+
+    def gain(self, weights, integral, rates):
+        """(2, N_FEEDBACK) gain K of least cost: inputs are -K x.
+
+        weights: {field of Deviations: weight of its square}; integral: of the squared speed integral; rates:
+        (2,) of the squared inputs. Raises: LinAlgError where there is none.
+        """
+        q, s, r = np.zeros_like(self.a), np.zeros_like(self.b), np.diag(rates)
+        for name, weight in weights.items():
+            on_state, on_input = self.rows[name]
+            q += weight * np.outer(on_state, on_state)
+            s += weight * np.outer(on_state, on_input)
+            r += weight * np.outer(on_input, on_input)
+        q[INTEGRAL, INTEGRAL] += integral
+        p = solve_discrete_are(self.a, self.b, q, r, s=s)
+        return np.linalg.solve(r + self.b.T @ p @ self.b, self.b.T @ p @ self.a + s.T)
+
+    def closed(self, k, noise=SENSOR_NOISE):
+        """(A, Q, u, v): the loop under gain k on the filter's estimates, as the law runs it.
+
+        States: those fed back, then the filter's prediction (N_STATE,); Q: covariance of what a period adds;
+        inputs are u x + v white, with white noise of the sensors. noise: their standard deviations.
+        """
+        n, model, correction = N_FEEDBACK, self.model, self.filter_gain
+        on_estimate, on_known = np.zeros((2, N_STATE)), np.zeros((2, n))
+        on_estimate[:, OF_FILTER] = k[:, ESTIMATED]
+        on_known[:, TORQUE : INTEGRAL + 1] = k[:, TORQUE : INTEGRAL + 1]
+        estimate = np.zeros((N_STATE, n + N_STATE))
+        estimate[:, ESTIMATED] = correction @ model.C[:, :MOMENT]
+        estimate[:, n:] = np.eye(N_STATE) - correction @ model.C
+        u, v = -on_estimate @ estimate, -on_estimate @ correction
+        u[:, :n] -= on_known
+        command, moved = self.dt * u, self.dt * v
+        command[0, TORQUE] += 1.0
+        command[1, COMMAND] += 1.0
+        a, by_noise = np.zeros((n + N_STATE, n + N_STATE)), np.zeros((n + N_STATE, len(noise)))
+        fa, fb = sampled(model.A, model.B * [model.torque, 1.0], self.dt)
+        a[:n, :n] = self.a
+        a[:n] += self.b @ u
+        a[n:] = fa @ estimate + fb @ command
+        by_noise[:n] = self.b @ v
+        by_noise[n:] = fa @ correction + fb @ moved
+        q = (by_noise * np.square(noise)) @ by_noise.T
+        q[np.ix_(ESTIMATED, ESTIMATED)] += self.noise
+        return a, q, u, v
+
+    def deviations(self, k, noise=SENSOR_NOISE):
+        """Deviations under gain k on the filter's estimates, with sensors of these standard deviations."""
+        a, q, u, v = self.closed(k, noise)
+        x = stationary_covariance(a, q)
+        found = {}
+        for name, (on_state, on_input) in self.rows.items():
+            row, white = on_input @ u, (on_input @ v) * noise
+            row[:N_FEEDBACK] += on_state
+            found[name] = sqrt(row @ x @ row + white @ white)
+        return Deviations(**found)
+
+    def baseline(self):
+        """Deviations of gspi_oc3, sampled, at no more than the ceilings; these alone where it is unstable.
+
+        The law is the published PI with the slope of its schedule (theory.md, Eq. (A7)) and its speed filter.
+        """
+        rated = self.turbine.rated_rotor_speed
+        speed, power, lean = SPEED_CEILING * rated, POWER_CEILING, LEAN_CEILING
+        settings = PISettings.published(self.turbine)
+        gain = schedule_gain(self.model.pitch, settings.gain_schedule_pitch)
+        gain *= settings.gear_ratio / (2.0 - gain)
+        n, dt = MOMENT, self.dt  # then the filtered speed and its integral, both of the last instant
+        keep = np.exp(-settings.speed_filter_corner * dt)
+        filtered, integral = np.zeros(n + 2), np.zeros(n + 2)
+        filtered[[SPEED, n]] = 1.0 - keep, keep
+        integral[n + 1] = 1.0
+        integral += dt * filtered
+        command = gain * (settings.KP * filtered + settings.KI * integral)
+        phi, gamma = sampled(self.model.A[:n, :n], self.model.B[:n, 1:], dt)
+        a, q = np.zeros((n + 2, n + 2)), np.zeros((n + 2, n + 2))
+        a[:n, :n] = phi
+        a[:n] += gamma * command
+        a[n], a[n + 1] = filtered, integral
+        q[:n, :n] = self.noise
+        if np.abs(np.linalg.eigvals(a)).max() >= 1.0:
+            return Deviations(speed, lean, float("inf"), power, 0.0, SHAFT_CEILING)
+        x = stationary_covariance(a, q)
+        eye = np.eye(n + 2)
+        acceleration = self.model.B[SPEED, 1] * command
+        acceleration[:n] += self.model.A[SPEED, :n]
+        rows = (eye[SPEED], eye[LEAN], a[BLADE] - eye[BLADE], acceleration)
+        own = [sqrt(row @ x @ row) for row in rows]
+        travel, shaft = GAUSSIAN_MEAN / dt * own[2], self._inertia * own[3]
+        return Deviations(
+            min(own[0], speed), min(own[1], lean), travel, min(own[0] / rated, power), 0.0, shaft
+        )
+
+
+def limits(settings, wind, baseline):
+    """{name of LIMITED: limit} at a wind (m/s), beside the Deviations of gspi_oc3 there."""
+    if wind < NEAR_RATED:
+        known = (settings.travel_near_rated, settings.travel_cap)
+        travel = DEGREE * np.interp(wind, (LOWEST_DESIGN_WIND, NEAR_RATED), known)
+    else:
+        travel = min(settings.travel * baseline.travel, DEGREE * settings.travel_cap)
+    lulls = np.interp(wind, (NEAR_RATED, NO_LULLS), (1.0, 0.0))
+    return {
+        "travel": float(travel),
+        "power": settings.power * baseline.power,
+        "torque": settings.torque,
+        "shaft": lulls * settings.shaft_near_rated + (1.0 - lulls) * settings.shaft * baseline.shaft,
+    }
+
+
+def optimal_gain(loop, settings, start=None):
+    """(gain (2, N_FEEDBACK), its Deviations, logarithms of the multipliers) for LQGSettings at a wind.
+
+    start: multipliers of a neighbouring wind. Where the limits cannot all be met, the gain after
+    ROUNDS rounds.
+    """
+    rated, baseline, wind = loop.turbine.rated_rotor_speed, loop.baseline(), loop.model.wind
+    limited = limits(settings, wind, baseline)
+    wanted = np.array([limited[name] for name in LIMITED])
+    share = settings.share_at(wind)
+    aims = {"speed": (1.0 - share) / baseline.speed**2, "lean": share / baseline.lean**2}
+    integral = settings.speed_integral / (0.5 * rated) ** 2
+    rates = (settings.torque_rate / 0.05**2, settings.pitch_rate / (0.2 * DEGREE) ** 2)
+    multipliers = np.zeros(len(LIMITED)) if start is None else start
+    steps, before = np.full(len(LIMITED), STEP), np.zeros(len(LIMITED))
+    for _ in range(ROUNDS):
+        prices = dict(zip(LIMITED, np.exp(multipliers) / wanted**2, strict=True))
+        gain = loop.gain(aims | prices, integral, rates)
+        reached = loop.deviations(gain)
+        excess = np.log(np.array([getattr(reached, name) for name in LIMITED]) / wanted)
+        slack = (excess < 0.0) & (multipliers <= LOWEST)
+        if np.all((np.abs(excess) < TOLERANCE) | slack):
+            break
+        steps *= np.where(excess * before < 0.0, SHORTER, LONGER)
+        before = excess
+        multipliers = np.clip(multipliers + np.clip(steps * excess, -LARGEST, LARGEST), LOWEST, HIGHEST)
+    return gain, reached, multipliers
+
+
+def optimal_gains(models, settings, turbine, dt):
+    """[(2, N_FEEDBACK)] gains of DesignModels in rising order of wind.
+
+    Below LOWEST_DESIGN_WIND, where the pitch rests, those of the first wind designed for hold.
+    """
+    gains, start = [], None
+    for model in reversed(models):  # from strong wind, where all limits are met, down to rated
+        if model.wind < LOWEST_DESIGN_WIND and gains:
+            gains.append(gains[-1])
+            continue
+        gain, _, start = optimal_gain(SampledLoop(model, turbine, dt), settings, start)
+        gains.append(gain)
+    return gains[::-1]

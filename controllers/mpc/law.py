@@ -1,0 +1,317 @@
+"""Model predictive control of torque and blade pitch on the estimate of lqr's Kalman filter.
+
+Every period the coming half minute is predicted: platform and waves by the linear models of
+controllers/lqr/design.py, the rotor's loads by its table of coefficients, the wind as its filter expects
+it or, where the wind ahead is shown, as that. One Newton step (plan.py) improves the plan of torque and
+blade-pitch rates; where it would pass a limit OSQP takes that step instead. The rates hold until the next
+period. An integral of the rotor speed's error leaves it without offset.
+"""
+
+from enum import IntEnum
+from math import exp
+
+import numpy as np
+
+from fowt_env.caches import Cache
+from fowt_env.control import check_control_dt
+from fowt_env.controllers.lqr.design import LOWEST_DESIGN_WIND, MOMENT, N_FEEDBACK, N_PLANT, design_models
+from fowt_env.controllers.lqr.design import WIND as ESTIMATED_WIND
+from fowt_env.controllers.lqr.estimator import ROTOR, estimate
+from fowt_env.controllers.lqr.law import LQR, WindEstimator
+from fowt_env.controllers.mpc.model import COMMAND, INTEGRAL, SPEED, TORQUE, WindModel, cost_rows, wind_model
+from fowt_env.controllers.mpc.plan import FILTER, grid_of, newton_step, shifted, work_of
+from fowt_env.controllers.mpc.rotor_table import rotor_table
+from fowt_env.controllers.mpc.settings import MPCSettings
+from fowt_env.controllers.mpc.solver import Program, load
+from fowt_env.descriptions.units import DEGREE
+from fowt_env.errors import InputError
+from fowt_env.plant.compile.decorators import entry
+from fowt_env.plant.drivetrain import build_torque_curve, clamp, generator_torque, rate_limit
+from fowt_env.plant.measurement import Measure
+
+PERIOD = 0.5  # s between plans
+RESTING = 0.01745  # rad of pitch command, up to which the integral is forgotten while the rotor is slow
+INTEGRAL_LIMIT = 1.0  # rad
+FORGETTING = 0.1  # 1/s
+CURVE_WINDS = (8.5, 9.5)  # m/s: the turbine's curve and resting blades below, the plan above
+
+
+class Entry(IntEnum):
+    """Entries of the parameter array."""
+
+    CONTROL_DT = 0
+    RATED_SPEED = 1
+    RATED_TORQUE = 2
+    GEAR_RATIO = 3
+    PITCH_MINIMUM = 4
+    PITCH_MAXIMUM = 5
+    PITCH_RATE_LIMIT = 6
+    TORQUE_RATE_LIMIT = 7
+    TORQUE_LOW = 8
+    TORQUE_HIGH = 9
+    DECAY = 10
+
+
+class Memory(IntEnum):
+    """Entries of the memory array."""
+
+    OPERATING_WIND = 0
+    INTEGRAL = 1
+    BIAS = 2  # of the wind ahead against the estimate, m/s
+    TORQUE_RATE = 3  # held, N m/s
+    PITCH_RATE = 4
+
+
+@entry
+def observe(estimator, estimated, measurement, command, p, memory):
+    """Bring the estimate, the operating wind and the integral to the present."""
+    estimate(estimator, estimated, measurement, command)
+    decay, dt = p[Entry.DECAY], p[Entry.CONTROL_DT]
+    wind = estimated[ESTIMATED_WIND + 1]
+    memory[Memory.OPERATING_WIND] = decay * memory[Memory.OPERATING_WIND] + (1.0 - decay) * wind
+    error = measurement[Measure.GENERATOR_SPEED] / p[Entry.GEAR_RATIO] - p[Entry.RATED_SPEED]
+    integral = memory[Memory.INTEGRAL]
+    if command[1] > RESTING or error > 0.0:
+        integral = clamp(integral + dt * error, -INTEGRAL_LIMIT, INTEGRAL_LIMIT)
+    else:
+        integral *= 1.0 - FORGETTING * dt
+    memory[Memory.INTEGRAL] = integral
+
+
+@entry
+def move(estimated, p, memory, curve, command):
+    """Move the command by the rates in force, within limits.
+
+    In light winds, of now and of late, the torque follows the turbine's curve and the blades rest.
+    """
+    dt = p[Entry.CONTROL_DT]
+    before = command[1]
+    pitch = before + dt * memory[Memory.PITCH_RATE]
+    command[1] = clamp(pitch, p[Entry.PITCH_MINIMUM], p[Entry.PITCH_MAXIMUM])
+    torque = command[0] + dt * memory[Memory.TORQUE_RATE]
+    torque = clamp(torque, p[Entry.TORQUE_LOW], p[Entry.TORQUE_HIGH])
+    low, high = CURVE_WINDS
+    wind = max(memory[Memory.OPERATING_WIND], estimated[ESTIMATED_WIND + 1])
+    blend = clamp((wind - low) / (high - low), 0.0, 1.0)
+    if blend < 1.0:
+        rested = rate_limit(before, p[Entry.PITCH_MINIMUM], dt * p[Entry.PITCH_RATE_LIMIT])
+        command[1] = blend * command[1] + (1.0 - blend) * rested
+        by_curve = generator_torque(p[Entry.GEAR_RATIO] * estimated[ROTOR], command[1], curve)
+        torque = blend * torque + (1.0 - blend) * by_curve
+    command[0] = rate_limit(command[0], torque, dt * p[Entry.TORQUE_RATE_LIMIT])
+
+
+_MODELS = Cache(
+    16
+)  # all that they are made of -> (design models, table, (first wind, WindModel of all winds))
+
+
+class MPC:
+    """Predictive law of an MPCSettings; prepare(scene) before reset.
+
+    preview: whether it is shown the wind ahead. nonlinear: whether the rotor's loads are those of its table;
+    else they are linear in the operating wind. constrained: whether plans mind limits; what is applied does.
+    Attribute unsolved: plans since reset for which OSQP found no solution, and the LQ feedback acted instead.
+    """
+
+    def __init__(
+        self, turbine, control_dt, settings=None, name="mpc", preview=False, nonlinear=True, constrained=True
+    ):
+        self.name, self.turbine, self.control_dt = name, turbine, check_control_dt(control_dt)
+        self.settings = MPCSettings() if settings is None else settings
+        self.nonlinear, self.constrained = bool(nonlinear), bool(constrained)
+        self.information = LQR.information
+        self.preview_times = ()
+        if preview:
+            self.information = (*LQR.information, "wind_preview")
+            periods = round(self.settings.preview_time / PERIOD)
+            self.preview_times = tuple(PERIOD * i for i in range(periods + 1))
+        self.estimator = WindEstimator(turbine, self.control_dt)
+        self.every = max(1, round(PERIOD / self.control_dt))
+        self.curve = build_torque_curve(turbine.torque_law)
+        self.grid = grid_of(self.settings, self.period)
+        self.rows = cost_rows(turbine.rated_rotor_speed)
+        self.parameters = self._parameters()
+        self.table = self.program = None
+        self.unsolved = 0
+
+    @property
+    def period(self):
+        """Time between plans, s: a whole number of control periods."""
+        return self.every * self.control_dt
+
+    def _parameters(self):
+        turbine, law, drive = self.turbine, self.turbine.torque_law, self.turbine.pitch_drive
+        values = {
+            Entry.CONTROL_DT: self.control_dt,
+            Entry.RATED_SPEED: turbine.rated_rotor_speed,
+            Entry.RATED_TORQUE: law.rated_torque,
+            Entry.GEAR_RATIO: turbine.drivetrain.gear_ratio,
+            Entry.PITCH_MINIMUM: drive.minimum,
+            Entry.PITCH_MAXIMUM: drive.maximum,
+            Entry.PITCH_RATE_LIMIT: drive.rate_limit,
+            Entry.TORQUE_RATE_LIMIT: law.max_torque_rate,
+            Entry.TORQUE_LOW: self.settings.torque_low * law.rated_torque,
+            Entry.TORQUE_HIGH: min(self.settings.torque_high * law.rated_torque, law.max_torque),
+            Entry.DECAY: exp(-self.control_dt / self.settings.schedule_time),
+        }
+        return np.array([values[entry] for entry in Entry], dtype=np.float64)
+
+    def prepare(self, scene):
+        """Take the models of the scene's plant over the winds (remembered per plant).
+
+        Raises: InputError for a scene without wind, and where OSQP is missing.
+        """
+        load()
+        if scene.model.aero is None:
+            raise InputError(f"controller {self.name!r}: needs a scene with wind to predict")
+        self.estimator.prepare(scene)
+        models, density = design_models(scene), scene.platform.environment.air_density
+        self.table = rotor_table(scene.turbine, density)
+        known = (id(models), id(self.table), self.turbine.torque_law.rated_torque, self.settings, self.period)
+        # kept with what they were made of, so that the ids stay theirs
+        self.first_wind, self.models = _MODELS.get(
+            known, lambda: (models, self.table, (models[0].wind, self._wind_models(models)))
+        )[2]
+
+    def _wind_models(self, models):
+        """WindModel of arrays with a row per wind."""
+        lowest = next(m for m in models if m.wind >= LOWEST_DESIGN_WIND)
+        made = [
+            wind_model(
+                m,
+                m if m.wind >= lowest.wind else lowest,
+                self.settings,
+                self.turbine,
+                self.table,
+                self.period,
+            )
+            for m in models
+        ]
+        return WindModel(*(np.array(rows) for rows in zip(*made, strict=True)))
+
+    def reset(self, measurement):
+        """Start at the trim whose pitch (or, at the pitch minimum, rotor speed) is measured, without a plan.
+
+        Raises: InputError where prepare() was not called.
+        """
+        if self.table is None:
+            raise InputError(f"controller {self.name!r}: call prepare(scene) before reset(measurement)")
+        self.estimator.reset(measurement)
+        self.memory = np.zeros(len(Memory))
+        self.memory[Memory.OPERATING_WIND] = self.estimator.memory[ESTIMATED_WIND + 1]
+        drive = self.turbine.pitch_drive
+        pitch = min(max(measurement.blade_pitch, drive.minimum), drive.maximum)
+        torque = measurement.generator_torque
+        if not np.isfinite(torque):
+            torque = self.turbine.torque_law.rated_torque
+        self.command = np.array([torque, pitch])
+        self.plan = np.zeros(2 * len(self.grid.ends))
+        self.work = work_of(self.grid)
+        self.calls = self.unsolved = 0
+
+    def act(self, measurement):
+        """(generator torque, blade pitch) for a Measurement."""
+        values = np.array(measurement, dtype=np.float64)
+        estimated = self.estimator.memory
+        observe(self.estimator.parameters, estimated, values, self.command, self.parameters, self.memory)
+        if self.calls % self.every == 0:
+            self._replan(self._ahead(measurement))
+        self.calls += 1
+        move(estimated, self.parameters, self.memory, self.curve, self.command)
+        return float(self.command[0]), float(self.command[1])
+
+    def _ahead(self, measurement):
+        """Wind ahead less the operating wind, and one entry more as its filter expects it; () without it."""
+        if not self.preview_times:
+            return np.zeros(0)
+        seen, memory = np.array(measurement.wind_preview, dtype=np.float64), self.memory
+        decay = exp(-self.period / self.settings.schedule_time)
+        error = self.estimator.memory[ESTIMATED_WIND + 1] - seen[0]
+        memory[Memory.BIAS] = decay * memory[Memory.BIAS] + (1.0 - decay) * error
+        ahead = np.empty(len(seen) + 1)
+        ahead[:-1] = seen + memory[Memory.BIAS] - memory[Memory.OPERATING_WIND]
+        a = self._model()[0].A
+        first, second = a[FILTER, FILTER], a[FILTER + 1, FILTER + 1]
+        ahead[-1] = (first + second) * ahead[-2] - first * second * ahead[-3]
+        return ahead
+
+    def _model(self):
+        """(WindModel, wind m/s) of the operating wind, within those of the models."""
+        place = self.memory[Memory.OPERATING_WIND] - self.first_wind
+        count = len(self.models.trim)
+        place = min(max(place, 0.0), count - 1.0)
+        node = min(int(place), count - 2)
+        f = place - node
+        return WindModel(*((1.0 - f) * part[node] + f * part[node + 1] for part in self.models)), (
+            self.first_wind + place
+        )
+
+    def _replan(self, ahead):
+        """Improve the plan, and take its first move."""
+        model, wind = self._model()
+        turbine, settings = self.turbine, self.settings
+        rated, torque, drive = turbine.rated_rotor_speed, turbine.torque_law.rated_torque, turbine.pitch_drive
+        estimated, work = self.estimator.memory, self.work
+        x = work.states[0]
+        x[:N_PLANT] = estimated[:N_PLANT] - model.trim[:N_PLANT]
+        x[TORQUE] = self.command[0] / torque - model.trim[TORQUE]
+        x[COMMAND] = self.command[1] - model.trim[COMMAND]
+        x[INTEGRAL] = self.memory[Memory.INTEGRAL]
+        x[FILTER:] = estimated[ESTIMATED_WIND:MOMENT]
+        x[FILTER : FILTER + 2] -= wind
+        references, end = np.zeros(len(self.rows)), np.zeros(N_FEEDBACK)
+        references[0] = end[SPEED] = rated - model.trim[SPEED]
+        rate = turbine.torque_law.max_torque_rate / torque
+        p = self.parameters
+        limits = np.array(
+            [
+                *(-rate, rate, -drive.rate_limit, drive.rate_limit),
+                *(
+                    p[Entry.TORQUE_LOW] / torque - model.trim[TORQUE],
+                    p[Entry.TORQUE_HIGH] / torque - model.trim[TORQUE],
+                ),
+                *(drive.minimum - model.trim[COMMAND], drive.maximum - model.trim[COMMAND]),
+                *(-rated, settings.speed_limit * rated - model.trim[SPEED]),
+            ]
+        )
+        units = np.array([0.05, 0.2 * DEGREE, 0.05, DEGREE, 0.05 * rated])
+        old = np.zeros_like(self.plan)
+        shifted(self.plan, self.grid, old)
+        step = np.zeros_like(old)
+        kept = newton_step(
+            model, wind, self.table, self.nonlinear, self.rows, references, end, ahead, limits, units,
+            self.grid, old, work, step,
+        )  # fmt: skip
+        if self.constrained and not kept:
+            if self.program is None:
+                self.program = Program(len(old), len(work.low))
+            step = self.program.solve(work.H, work.g, work.C, work.low, work.high, step)
+        if step is None:
+            self.unsolved += 1
+            self.plan = np.zeros_like(old)
+        else:
+            self.plan = old + step
+        u = self.plan[:2] - model.K @ x if not len(ahead) else self.plan[:2] - self._gain(model) @ x
+        self.memory[Memory.TORQUE_RATE] = min(max(u[0], -rate), rate) * torque
+        self.memory[Memory.PITCH_RATE] = min(max(u[1], -drive.rate_limit), drive.rate_limit)
+
+    @staticmethod
+    def _gain(model):
+        gain = model.K.copy()
+        gain[:, FILTER : FILTER + 2] = 0.0
+        return gain
+
+    def __getstate__(self):
+        """Without the solver, which is made anew: each solution starts from what it is given."""
+        return self.__dict__ | {"program": None}
+
+
+def mpc(turbine, control_dt):
+    """Model predictive control on lqr's estimate: limits and the rotor's nonlinear loads are foreseen."""
+    return MPC(turbine, control_dt)
+
+
+def mpc_preview(turbine, control_dt):
+    """mpc that is shown the rotor-averaged wind of the coming seconds."""
+    return MPC(turbine, control_dt, name="mpc_preview", preview=True)

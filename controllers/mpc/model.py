@@ -1,0 +1,112 @@
+"""The discrete model of each wind, the LQ feedback and the cost-to-go that end the prediction.
+
+States are those of feedback_plant in controllers/lqr/design.py, less the trim of the wind: platform, rotor
+and blades, torque (rated torques), pitch command, integral of the rotor speed's error, wind filter and waves.
+Inputs are the rates of torque and pitch command, held over a period.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import solve_discrete_are
+
+from fowt_env.controllers.lqr.design import N_FEEDBACK, N_PLANT, PLANT, feedback_plant, sampled
+from fowt_env.controllers.mpc.rotor_table import rotor_loads
+from fowt_env.descriptions.units import DEGREE
+from fowt_env.plant.compile.decorators import entry
+
+SURGE_RATE, SPEED, LEAN, LEAN_RATE, BLADE = (
+    PLANT.index(name) for name in ("vx", "rotor_speed", "platform_pitch", "wy", "blade_pitch")
+)
+TORQUE, COMMAND, INTEGRAL = N_PLANT, N_PLANT + 1, N_PLANT + 2
+FILTER, WIND = N_PLANT + 3, N_PLANT + 4
+WEIGHT_WIND = 18.0  # m/s, where the weights hold as given
+N_COST = (
+    8  # squared terms: speed, platform pitch, its rate, torque, power, integral, rates of torque and pitch
+)
+
+
+class WindModel(NamedTuple):
+    """What the prediction needs of one wind; arrays alone, so that it can be interpolated between winds."""
+
+    trim: np.ndarray  # (8,) PLANT, torque in rated torques, pitch command
+    loads: np.ndarray  # (8,) rotor_loads at the trim
+    motion: np.ndarray  # (2,) wind at the rotor per surge rate and platform pitch rate
+    A: np.ndarray  # (n, n)
+    B: np.ndarray  # (n, 2)
+    G: np.ndarray  # (n, 2) of thrust (N) and torque (N m) beyond the linear ones, held over a period
+    K: np.ndarray  # (2, n) LQ gain
+    P: np.ndarray  # (n, n) cost to go
+    weights: np.ndarray  # (N_COST,) of the squared terms over a period
+
+
+def cost_rows(rated_speed):
+    """(N_COST, n) of the states in the squared terms; those of the two rates are zero."""
+    rows = np.zeros((N_COST, N_FEEDBACK))
+    for row, state in enumerate((SPEED, LEAN, LEAN_RATE, TORQUE)):
+        rows[row, state] = 1.0
+    rows[4, SPEED], rows[4, TORQUE] = 1.0 / rated_speed, 1.0
+    rows[5, INTEGRAL] = 1.0
+    return rows
+
+
+def cost_weights(settings, wind, rated_speed, period):
+    """(N_COST,) weights of the squared terms over a period (s) at a wind speed, m/s."""
+    s, ratio = settings, wind / WEIGHT_WIND
+    below = ratio < 1.0
+    pitch_rate = s.pitch_rate * ratio ** (s.pitch_rate_growth if below else s.pitch_rate_growth_above)
+    power = s.power * ratio ** (s.power_growth if below else s.power_growth_above)
+    per_second = np.array(
+        [
+            s.speed / (0.05 * rated_speed) ** 2,
+            s.platform_pitch / DEGREE**2,
+            s.platform_pitch_rate / (0.1 * DEGREE) ** 2,
+            s.torque * ratio**s.torque_growth / 0.05**2,
+            power / 0.05**2,
+            s.speed_integral / (0.5 * rated_speed) ** 2,
+            s.torque_rate / 0.05**2,
+            pitch_rate / (0.2 * DEGREE) ** 2,
+        ]
+    )
+    return period * per_second
+
+
+@entry
+def _loads_at(wind, rotor_speed, blade_pitch, table, loads):
+    rotor_loads(wind, rotor_speed, blade_pitch, table, loads)
+
+
+def wind_model(model, feedback, settings, turbine, table, period):
+    """WindModel of a DesignModel, its feedback and cost to go designed on another (or the same)."""
+    rated, law = turbine.rated_rotor_speed, turbine.torque_law
+    a, b = _plant(model, turbine)
+    loads = np.empty(8)
+    _loads_at(model.wind, model.trim[SPEED], model.trim[BLADE], table, loads)
+    # per newton of thrust and newton metre of torque, as the linear model moves with the wind
+    g = np.zeros((N_FEEDBACK, 2))
+    moved = [SURGE_RATE, LEAN_RATE]
+    g[moved, 0] = a[moved, WIND] / loads[1]
+    g[SPEED, 1] = a[SPEED, WIND] / loads[5]
+    motion = a[SPEED, moved] / a[SPEED, WIND]
+    weights = cost_weights(settings, feedback.wind, rated, period)
+    k, p = lq(*_plant(feedback, turbine), weights, rated, period)
+    ad, bd = sampled(a, b, period)
+    _, gd = sampled(a, g, period)
+    trim = np.array([*model.trim, model.torque / law.rated_torque, model.pitch])
+    return WindModel(trim, loads, motion, ad, bd, gd, k, p, weights)
+
+
+def _plant(model, turbine):
+    """(A, B) of feedback_plant with the torque in rated torques at every wind."""
+    a, b, _ = feedback_plant(model, turbine.rated_rotor_speed)
+    a[:N_PLANT, TORQUE] *= turbine.torque_law.rated_torque / model.torque
+    return a, b
+
+
+def lq(a, b, weights, rated_speed, period):
+    """(K, P) of the discrete LQ problem with the squared terms of cost_rows at each period's start."""
+    ad, bd = sampled(a, b, period)
+    rows = cost_rows(rated_speed)
+    q, r = rows.T @ (weights[:, None] * rows), np.diag(weights[-2:])
+    p = solve_discrete_are(ad, bd, q, r)
+    return np.linalg.solve(r + bd.T @ p @ bd, bd.T @ p @ ad), p

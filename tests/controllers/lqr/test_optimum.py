@@ -1,0 +1,141 @@
+"""The linear optimum of lqr beside slow twins, the limits that it keeps, and what noise does to it."""
+
+import numpy as np
+import pytest
+from scipy.linalg import solve_discrete_lyapunov
+
+from fowt_env import build_scene
+from fowt_env.controllers.lqr.design import (
+    MOMENT,
+    N_PLANT,
+    N_STATE,
+    SENSOR_NOISE,
+    WIND,
+    LQGSettings,
+    design_model,
+    sampled,
+)
+from fowt_env.controllers.lqr.optimum import (
+    LIMITED,
+    POWER_CEILING,
+    SPEED_CEILING,
+    TOLERANCE,
+    SampledLoop,
+    limits,
+    optimal_gain,
+    optimal_gains,
+    stationary_covariance,
+)
+from fowt_env.envs.sensors import reading_scales
+from fowt_env.plant.measurement import Measure
+from fowt_env.training.design.linear_bound import Problem, gspi_covariance
+
+SETTINGS = LQGSettings()
+
+
+@pytest.fixture(scope="module")
+def loops():
+    scene = build_scene("oc3_hywind", wind=18.0)
+    return {wind: SampledLoop(design_model(scene, wind), scene.turbine, 0.1) for wind in (12, 14, 18, 24)}
+
+
+def test_the_covariance_is_that_of_scipy(loops):
+    gain, _, _ = optimal_gain(loops[18], SETTINGS)
+    a, q, _, _ = loops[18].closed(gain)
+    found = stationary_covariance(a, q)
+    scale = np.sqrt(np.diag(found))  # the states' deviations span nine decades, which scipy's method minds
+    expected = solve_discrete_lyapunov(a / scale[:, None] * scale, q / np.outer(scale, scale))
+    assert np.abs(found / np.outer(scale, scale) - expected).max() < 1e-6
+
+
+def test_the_deviations_are_those_of_a_long_run_step_by_step(loops):
+    loop, rng, runs, steps, dt = loops[18], np.random.default_rng(1), 24, 30_000, 0.1
+    k, expected, _ = optimal_gain(loop, SETTINGS)
+    model, correction = loop.model, loop.filter_gain
+    phi, gamma = sampled(model.A, model.B * [model.torque, 1.0], dt)
+    white = np.linalg.cholesky(loop.noise + 1e-20 * np.eye(MOMENT))
+    # columns are runs: plant and weather, the filter's estimate, commands less the trim, speed integral
+    z, estimate = np.zeros((MOMENT, runs)), np.zeros((N_STATE, runs))
+    command, integral = np.zeros((2, runs)), np.zeros((1, runs))
+    speed, lean, travel, used = 0.0, 0.0, 0.0, 0
+    for step in range(steps):
+        noise = np.array(SENSOR_NOISE)[:, None] * rng.normal(size=(5, runs))
+        estimate += correction @ (model.C[:, :MOMENT] @ z + noise - model.C @ estimate)
+        fed = np.vstack([estimate[:N_PLANT], command, integral, estimate[WIND:MOMENT]])
+        command = command - dt * k @ fed
+        before = z[5].copy()
+        z = phi[:MOMENT, :MOMENT] @ z + gamma[:MOMENT] @ command + white @ rng.normal(size=z.shape)
+        estimate = phi @ estimate + gamma @ command
+        integral = integral + dt * z[4]
+        if step >= 6000:
+            used += 1
+            speed, lean = speed + np.mean(z[4] ** 2), lean + np.mean(z[1] ** 2)
+            travel += np.mean(np.abs(z[5] - before)) / dt
+    # 24 runs of 2400 s hold some 2000 periods of the platform: 2 % of a deviation
+    assert np.sqrt(speed / used) == pytest.approx(expected.speed, rel=0.05)
+    assert np.sqrt(lean / used) == pytest.approx(expected.lean, rel=0.05)
+    assert travel / used == pytest.approx(expected.travel, rel=0.05)
+
+
+@pytest.mark.parametrize("wind", [14, 18, 24])
+def test_the_baseline_is_that_of_the_linear_bound_below_the_ceilings(loops, wind):
+    found, loop = loops[wind].baseline(), loops[wind]
+    twin, _ = gspi_covariance(Problem(loop.model, loop.turbine))
+    # the bound's law is in continuous time: half a period late at ten times a second is 1 % here
+    assert found.speed == pytest.approx(min(twin.rotor_speed, SPEED_CEILING * 1.2671), rel=0.02)
+    assert found.lean == pytest.approx(twin.platform_pitch, rel=0.02)
+    assert found.travel == pytest.approx(twin.travel, rel=0.02)
+
+
+def test_where_gspi_is_unstable_the_ceilings_stand_for_it(loops):
+    baseline = loops[12].baseline()
+    assert baseline.travel == float("inf") and baseline.power == POWER_CEILING
+    assert limits(SETTINGS, 12.0, baseline)["travel"] == pytest.approx(
+        SETTINGS.travel_near_rated * np.pi / 180.0
+    )
+
+
+@pytest.mark.parametrize("wind", [14, 18, 24])
+def test_no_limit_is_passed_and_travel_is_used_up(loops, wind):
+    loop = loops[wind]
+    _, reached, _ = optimal_gain(loop, SETTINGS)
+    limited = limits(SETTINGS, wind, loop.baseline())
+    for name in LIMITED:
+        assert getattr(reached, name) <= (1.0 + TOLERANCE) * limited[name]
+    assert reached.travel == pytest.approx(limited["travel"], rel=TOLERANCE)
+
+
+def test_share_trades_rotor_speed_for_platform_pitch(loops):
+    found = [optimal_gain(loops[18], SETTINGS.changed(share=share))[1] for share in (0.2, 0.5, 0.8)]
+    assert found[0].speed < found[1].speed < found[2].speed
+    assert found[0].lean > found[1].lean > found[2].lean
+
+
+def test_the_search_ends_the_same_wherever_it_starts(loops):
+    loop = loops[18]
+    alone, _, multipliers = optimal_gain(loop, SETTINGS)
+    again, _, _ = optimal_gain(loop, SETTINGS, multipliers + 1.0)
+    assert loop.deviations(again).lean == pytest.approx(loop.deviations(alone).lean, rel=0.01)
+    assert loop.deviations(again).speed == pytest.approx(loop.deviations(alone).speed, rel=0.01)
+
+
+def test_noise_of_two_percent_of_the_channels_costs_little_travel(loops):
+    for wind in (14, 18, 24):
+        loop = loops[wind]
+        gain, _, _ = optimal_gain(loop, SETTINGS)
+        scales = reading_scales(loop.turbine)
+        at = (Measure.ROTOR_SPEED, Measure.BLADE_PITCH, Measure.PLATFORM_PITCH)
+        at += (Measure.PLATFORM_PITCH_RATE, Measure.NACELLE_ACCELERATION)
+        noise = np.array([scales[i] for i in at])
+        exact = loop.deviations(gain, 0.0 * noise).travel
+        assert loop.deviations(gain, 0.02 * noise).travel < 1.08 * exact
+        assert loop.deviations(gain, 0.05 * noise).travel < 1.35 * exact
+
+
+def test_below_the_lowest_wind_its_gains_hold(loops):
+    scene = build_scene("oc3_hywind", wind=18.0)
+    models = [design_model(scene, wind) for wind in (10, 11, 12, 13)]
+    gains = optimal_gains(models, SETTINGS, scene.turbine, 0.1)
+    np.testing.assert_array_equal(gains[0], gains[2])
+    np.testing.assert_array_equal(gains[1], gains[2])
+    assert np.abs(gains[3] - gains[2]).max() > 0.0

@@ -1,0 +1,148 @@
+"""The predictive law in steady wind, turbulence and gusts; what it does where nothing is solved."""
+
+import sys
+
+import numpy as np
+import pytest
+
+pytest.importorskip("osqp", reason='OSQP is not installed: pip install "fowt-env[mpc]"')
+
+from fowt_env import build_scene, simulate  # noqa: E402
+from fowt_env.controllers import make  # noqa: E402
+from fowt_env.controllers.mpc import solver  # noqa: E402
+from fowt_env.controllers.mpc.law import MPC, PERIOD, Memory  # noqa: E402
+from fowt_env.controllers.mpc.settings import MPCSettings  # noqa: E402
+from fowt_env.controllers.mpc.solver import Program  # noqa: E402
+from fowt_env.errors import InputError  # noqa: E402
+from fowt_env.training.evaluation.cases import named_cases  # noqa: E402
+from fowt_env.training.evaluation.metrics import metrics  # noqa: E402
+
+
+def steady(wind, **options):
+    """OC3 in steady wind, m/s, or any other."""
+    return build_scene("oc3_hywind", wind=wind, fidelity="standard", **options)
+
+
+def turbulent(wind, seed, duration):
+    """The case of a suite in normal turbulence."""
+    (case,) = named_cases(f"ntm_{wind}")
+    return build_scene(case.platform, wind=case.wind, sea=case.sea, seed=seed, duration=duration)
+
+
+@pytest.mark.parametrize("wind", [12.0, 14.0, 18.0, 24.0])
+def test_in_steady_wind_the_rotor_turns_at_rated_speed_and_the_blades_rest(wind):
+    frame = simulate(steady(wind), "mpc", duration=500.0)
+    late = frame[frame["Time_[s]"] >= 300.0]
+    assert np.abs(late["RotSpeed_[rpm]"] / 12.1 - 1.0).max() < 5e-3
+    assert np.ptp(late["BldPitch1_[deg]"]) < 0.05
+    assert late["GenPwr_[kW]"].mean() == pytest.approx(5000.0, rel=2e-3)
+
+
+@pytest.mark.parametrize("wind", [6.0, 8.0])
+def test_in_light_wind_the_turbines_curve_acts(wind):
+    scene = steady(wind)
+    ours, lqr = (simulate(scene, name, duration=200.0).iloc[-1] for name in ("mpc", "lqr"))
+    assert ours["GenPwr_[kW]"] == pytest.approx(lqr["GenPwr_[kW]"], rel=1e-3)
+    assert ours["BldPitch1_[deg]"] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_it_betters_the_baseline_at_no_more_pitch_travel_on_a_validation_seed():
+    scene = turbulent(16, 1003, 660.0)
+    ours, theirs = (metrics(simulate(scene, name, duration=660.0), 60.0) for name in ("mpc", "gspi_oc3"))
+    for name in ("RotSpeed_std_[rpm]", "PtfmPitch_std_[deg]"):
+        assert ours[name] < 0.85 * theirs[name]
+    assert ours["blade_pitch_travel_[deg/s]"] <= 1.05 * theirs["blade_pitch_travel_[deg/s]"]
+
+
+def test_limits_hold_in_an_extreme_gust():
+    """Commands within range and rate, to rounding; the soft speed limit is passed by less than without it."""
+    scene = steady({"kind": "eog", "speed": 18.0, "start": 60.0})
+    settings = MPCSettings(speed_limit=1.1)
+    turbine = scene.turbine
+    found = {}
+    for constrained in (True, False):
+        controller = MPC(turbine, 0.1, settings, constrained=constrained)
+        found[constrained] = simulate(scene, controller, duration=120.0)
+        assert controller.unsolved == 0
+    frame = found[True]
+    torque, pitch = 1e3 * frame["GenTq_[kN-m]"], np.radians(frame["BldPitch1_[deg]"])
+    assert 0.5 * 43093.55 - 1e-3 <= torque.min() and torque.max() <= 47402.91 + 1e-3
+    assert torque.diff().abs().max() <= 0.1 * 15000.0 + 1e-3
+    assert pitch.min() >= -1e-9 and pitch.diff().abs().max() <= 0.1 * turbine.pitch_drive.rate_limit + 1e-9
+    fastest = {key: one["RotSpeed_[rpm]"].max() / 12.1 for key, one in found.items()}
+    assert 1.1 < fastest[True] < fastest[False] - 0.005
+    assert fastest[True] < 1.3
+
+
+def test_the_lq_feedback_acts_where_nothing_is_solved(monkeypatch):
+    scene = steady({"kind": "eog", "speed": 18.0, "start": 60.0})
+    monkeypatch.setitem(solver.SETTINGS, "max_iter", 1)
+    tried, asked = MPC(scene.turbine, 0.1), []
+    solve = Program.solve
+
+    def watched(self, *arguments):
+        outcome = solve(self, *arguments)
+        assert outcome is None
+        asked.append(tried.models is not None)
+        return outcome
+
+    monkeypatch.setattr(Program, "solve", watched)
+    replan = MPC._replan
+
+    def checked(self, ahead):
+        before = self.unsolved
+        replan(self, ahead)
+        if self.unsolved > before:
+            model, _ = self._model()
+            torque, pitch = -(model.K @ self.work.states[0])
+            drive, law = self.turbine.pitch_drive, self.turbine.torque_law
+            held = self.memory[Memory.TORQUE_RATE], self.memory[Memory.PITCH_RATE]
+            most = law.max_torque_rate
+            assert held[0] == pytest.approx(np.clip(torque * law.rated_torque, -most, most))
+            assert held[1] == pytest.approx(np.clip(pitch, -drive.rate_limit, drive.rate_limit))
+            assert not self.plan.any()
+
+    monkeypatch.setattr(MPC, "_replan", checked)
+    frame = simulate(scene, tried, duration=120.0)
+    assert 0 < tried.unsolved == len(asked)
+    assert frame["RotSpeed_[rpm]"].max() < 1.3 * 12.1
+
+
+def test_runs_are_the_same_to_the_bit_whatever_ran_before():
+    scene = turbulent(12, 1001, 120.0)
+    again = make("mpc", scene.turbine, 0.1)
+    first = simulate(scene, "mpc", duration=120.0)
+    simulate(turbulent(14, 1002, 60.0), again, duration=60.0)
+    assert simulate(scene, again, duration=120.0).equals(first)
+
+
+def test_the_wind_ahead_is_used():
+    """A ramp of the wind that is foreseen moves the rotor less than one that is not."""
+    series = {"kind": "series", "time": [0.0, 60.0, 66.0, 130.0], "speed": [16.0, 16.0, 19.0, 19.0]}
+    scene = steady(series)
+    seer, blind = (make(name, scene.turbine, 0.1) for name in ("mpc_preview", "mpc"))
+    assert seer.preview_times[:3] == (0.0, PERIOD, 2.0 * PERIOD)
+    assert "wind_preview" in seer.information and "wind_preview" not in blind.information
+    seen, unseen = (simulate(scene, one, duration=110.0)["RotSpeed_[rpm]"].std() for one in (seer, blind))
+    assert seen < 0.6 * unseen
+
+
+def test_bad_settings_and_a_missing_prepare_are_named(turbine):
+    with pytest.raises(InputError, match=r"mpc pitch_rate = 0.0: must be a number > 0"):
+        MPCSettings(pitch_rate=0.0)
+    with pytest.raises(InputError, match=r"mpc horizon = 3.0: must be a number in \[5, 120\]"):
+        MPCSettings(horizon=3.0)
+    with pytest.raises(InputError, match="pitch_rate"):
+        MPCSettings().changed(pich_rate=1.0)
+    with pytest.raises(InputError, match=r"'mpc': call prepare\(scene\)"):
+        MPC(turbine, 0.1).reset(None)
+    with pytest.raises(InputError, match="needs a scene with wind"):
+        MPC(turbine, 0.1).prepare(build_scene("oc3_hywind", fidelity="standard"))
+
+
+def test_without_osqp_the_extra_is_named(monkeypatch):
+    scene = steady(18.0)
+    monkeypatch.setitem(sys.modules, "osqp", None)
+    controller = make("mpc", scene.turbine, 0.1)  # its name can be listed
+    with pytest.raises(InputError, match=r'pip install "fowt-env\[mpc\]"'):
+        simulate(scene, controller, duration=1.0)

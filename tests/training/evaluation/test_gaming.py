@@ -1,0 +1,248 @@
+"""Ways of looking better than one is: each must end below its honest twin on the leaderboard."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from fowt_env.control import make
+from fowt_env.descriptions.turbine import read_turbine
+from fowt_env.descriptions.units import RPM
+from fowt_env.training.evaluation import bootstrap
+from fowt_env.training.evaluation import leaderboard as board_module
+from fowt_env.training.evaluation.cases import Case, Limits, read_suite
+from fowt_env.training.evaluation.evaluate import COLUMNS, evaluate
+from fowt_env.training.evaluation.failures import failures_as_worst
+from fowt_env.training.evaluation.leaderboard import leaderboard
+from fowt_env.training.evaluation.metrics import METRICS, better
+from fowt_env.training.reports.scores import agent_scores
+
+
+@pytest.fixture(autouse=True)
+def few_resamples(monkeypatch):
+    """Ranks need no intervals to three digits."""
+    for module, name in ((board_module, "resample_weights"), (bootstrap, "resample_weights")):
+        drawn = getattr(module, name)
+        few = lambda n, resamples=200, random_seed=1, drawn=drawn: drawn(n, 200, random_seed)  # noqa: E731
+        monkeypatch.setattr(module, name, few)
+
+
+HEADLINE = read_suite("above_rated")
+SPEED, LEAN, ENERGY = "RotSpeed_std_[rpm]", "PtfmPitch_std_[deg]", "GenPwr_capped_mean_[kW]"
+TRAVEL, TORQUE, SHAFT = "blade_pitch_travel_[deg/s]", "torque_travel_[kN-m/s]", "RotTorq_DEL_[kN-m]"
+TYPICAL = dict.fromkeys(METRICS, 1.0) | {
+    "GenPwr_mean_[kW]": 4900.0, ENERGY: 4800.0, "GenPwr_max_[kW]": 6000.0, "energy_[kWh]": 800.0, TORQUE: 0.1,
+}  # fmt: skip
+
+
+def table(**controllers):
+    """An evaluation of the headline suite: {name: function of (wind, seed) that changes typical figures}.
+
+    A figure "status" is that of the run; with "failed" it has none of the others.
+    """
+    rows = []
+    for case in HEADLINE.cases:
+        for seed in HEADLINE.seeds:
+            gusty = 1.0 + 0.02 * case.wind["speed"] + 0.05 * seed
+            for name, change in {"gspi_oc3": lambda wind, seed: {}, **controllers}.items():
+                row = {
+                    metric: value * (gusty if metric in (SPEED, LEAN) else 1.0)
+                    for metric, value in TYPICAL.items()
+                }
+                factors = change(case.wind["speed"], seed)
+                status = factors.pop("status", "ok")
+                row = {metric: np.nan if status == "failed" else value * factors.get(metric, 1.0)
+                       for metric, value in row.items()}  # fmt: skip
+                about = {"controller": name, "case": case.name, "seed": seed, "status": status, "reason": ""}
+                rows.append(
+                    dict.fromkeys(COLUMNS, 0.0) | row | about | {"weight_[-]": HEADLINE.weights[case.name]}
+                )
+    return pd.DataFrame(rows, columns=list(COLUMNS))
+
+
+def ranks(runs):
+    """{controller: rank} on the leaderboard of the headline suite."""
+    board = leaderboard(runs, score=HEADLINE.score, limits=HEADLINE.limits)
+    return {entry["controller"]: entry["rank"] for entry in board["controllers"]}
+
+
+def ratios(runs, agent):
+    return agent_scores(runs, ["gspi_oc3"], agents=[agent]).set_index("figure")["ratio"]
+
+
+def good(wind, seed):
+    return {SPEED: 0.8, LEAN: 0.7}
+
+
+@pytest.mark.parametrize("status", ["failed", "tripped"])
+def test_a_run_that_is_given_up_where_it_goes_badly_gains_nothing(status):
+    def gives_up(wind, seed):
+        return good(wind, seed) | ({"status": status} if seed > 3 else {})
+
+    runs = table(honest=good, gamer=gives_up)
+    assert ranks(runs)["honest"] < ranks(runs)["gspi_oc3"] < ranks(runs)["gamer"]
+    assert (ratios(runs, "gamer") >= ratios(runs, "honest") - 1e-12).drop("energy").all()
+    assert ratios(runs, "gamer")["rotor-speed std"] > 0.9  # not the 0.8 of the runs that it likes
+    verdicts = agent_scores(runs, ["gspi_oc3"], agents=["gamer"])["verdict"]
+    assert set(verdicts) == {"failed"}
+
+
+def test_power_beyond_rated_is_no_energy():
+    def overproduces(wind, seed):
+        return good(wind, seed) | {"GenPwr_mean_[kW]": 1.05, ENERGY: 0.985}
+
+    runs = table(honest=good, gamer=overproduces)
+    assert ranks(runs)["honest"] < ranks(runs)["gamer"]
+    verdicts = agent_scores(runs, ["gspi_oc3"]).set_index(["agent", "figure"])["verdict"]
+    assert verdicts["gamer", "energy"].startswith("missed") and not verdicts["honest", "energy"].startswith(
+        "mis"
+    )
+
+
+@pytest.mark.parametrize("spent", [{SHAFT: 1.4}, {TORQUE: 6.0}, {TRAVEL: 1.3}, {"GenPwr_max_[kW]": 1.2}])
+def test_rotor_speed_that_is_bought_with_torque_or_pitch_or_power_is_beyond_a_limit(spent):
+    def buys(wind, seed):
+        return {SPEED: 0.5, LEAN: 0.6} | spent
+
+    runs = table(honest=good, gamer=buys)
+    assert ranks(runs)["honest"] < ranks(runs)["gamer"]
+    board = leaderboard(runs, score=HEADLINE.score, limits=HEADLINE.limits)
+    beyond = {entry["controller"]: entry["beyond"] for entry in board["controllers"]}
+    assert len(beyond["gamer"]) == 1 and next(iter(spent)) in beyond["gamer"][0] and not beyond["honest"]
+
+
+def test_bad_winds_are_not_trimmed_away():
+    def only_calm(wind, seed):
+        return {SPEED: 3.0 if wind == 24.0 or seed == 6 else 0.8, LEAN: 0.7}
+
+    runs = table(honest=good, gamer=only_calm)
+    assert ranks(runs)["honest"] < ranks(runs)["gamer"]
+    assert ratios(runs, "gamer")["rotor-speed std"] > 1.3  # an interquartile mean of these would be 0.8
+
+
+def test_a_figure_that_only_the_gamer_lacks_is_the_worst_one():
+    runs = table(honest=good, gamer=good)
+    runs.loc[runs["controller"] == "gamer", SPEED] = np.nan
+    assert ranks(runs)["honest"] < ranks(runs)["gamer"] and ratios(runs, "gamer")["rotor-speed std"] > 1.0
+
+
+def test_a_parked_turbine_earns_its_calm_with_all_its_energy():
+    calm = dict.fromkeys((SPEED, LEAN, TRAVEL, TORQUE, SHAFT, "TwrBsMyt_DEL_[kN-m]", "FAIRTEN_DEL_[kN]"), 0.5)
+    runs = table(honest=good, parks=lambda wind, seed: calm | {ENERGY: 1e-3})
+    assert ranks(runs)["honest"] < ranks(runs)["parks"]
+    assert ratios(runs, "parks")["energy"] < 0.01
+
+
+def test_nobody_gains_by_a_baseline_that_trips_or_where_all_fail():
+    def falls(wind, seed):
+        return {"status": "tripped"} if wind == 12.0 and seed == 1 else {}
+
+    runs = table(honest=good, gamer=lambda wind, seed: good(wind, seed) | falls(wind, seed))
+    base = runs["controller"] == "gspi_oc3"
+    runs.loc[base & (runs["case"] == "ntm_12") & (runs["seed"] == 1), "status"] = "tripped"
+    assert ranks(runs) == {"honest": 1, "gamer": 2, "gspi_oc3": 3}  # by their scores, the last two
+    at = (runs["case"] == "ntm_18") & (runs["seed"] == 2)
+    runs.loc[at, ["status", *METRICS]] = ["failed", *[np.nan] * len(METRICS)]
+    counted = failures_as_worst(runs)
+    assert counted.loc[at, SPEED].nunique() == 1  # the worst of the other seeds
+    runs.loc[runs["case"] == "ntm_18", ["status", *METRICS]] = ["failed", *[np.nan] * len(METRICS)]
+    board = leaderboard(runs, baseline="gspi_oc3", score=HEADLINE.score)
+    for entry in board["controllers"]:  # a lifetime without one of its winds is none
+        assert np.isnan(entry["metrics"][SPEED]["mean"]) and np.isnan(entry["score"]["mean"])
+
+
+def test_a_single_controller_that_fails_has_the_worst_of_its_own_runs():
+    runs = table(alone=lambda wind, seed: {"status": "failed"} if seed == 6 else {})
+    runs = runs[runs["controller"] == "alone"]
+    counted = failures_as_worst(runs).set_index(["case", "seed"])
+    for name in (SPEED, ENERGY, "PtfmPitch_mean_[deg]"):
+        known = counted.loc["ntm_12"].loc[1:5, name]
+        expected = known.min() if better(name) > 0 else known.max()
+        assert counted.loc[("ntm_12", 6), name] == expected
+
+
+def test_the_worst_is_the_least_of_what_more_is_better_of():
+    assert [better(name) for name in (SPEED, SHAFT, ENERGY, "energy_[kWh]", "GenPwr_max_[kW]")] == [
+        -1,
+        -1,
+        1,
+        1,
+        -1,
+    ]
+    assert better("Wind1VelX_std_[m/s]") == better("PtfmPitch_mean_[deg]") == better("GenTq_min_[kN-m]") == 0
+    runs = table(weak=lambda wind, seed: {ENERGY: 0.9}, gamer=lambda wind, seed: {"status": "failed"})
+    counted = failures_as_worst(runs).groupby("controller")[ENERGY].mean()
+    assert counted["gamer"] == counted["weak"] < counted["gspi_oc3"]
+
+
+# ------------------------------------------------------------------ real runs
+
+
+class Quitter:
+    """gspi_oc3 that raises once the rotor is off by so many rpm."""
+
+    def __init__(self, turbine, off=0.3):
+        self.inner = make("gspi_oc3", turbine, 0.1)
+        self.information = (*self.inner.information, "rotor_speed")
+        self.off, self.rated = off * RPM, turbine.rated_rotor_speed
+
+    def reset(self, measurement):
+        self.inner.reset(measurement)
+
+    def act(self, measurement):
+        if abs(measurement.rotor_speed - self.rated) > self.off:
+            raise RuntimeError("enough of this")
+        return self.inner.act(measurement)
+
+
+class LowerSetPoint:
+    """gspi_oc3 that is told of a rotor 3 % faster than it is, and so holds one 3 % slower."""
+
+    def __init__(self, turbine):
+        self.inner = make("gspi_oc3", turbine, 0.1)
+        self.information = self.inner.information
+
+    def _told(self, measurement):
+        return measurement._replace(generator_speed=1.03 * measurement.generator_speed)
+
+    def reset(self, measurement):
+        self.inner.reset(self._told(measurement))
+
+    def act(self, measurement):
+        return self.inner.act(self._told(measurement))
+
+
+def test_a_controller_that_raises_when_the_rotor_is_off_ends_below_its_honest_twin():
+    case = Case("ntm_18", {"kind": "ntm", "speed": 18.0, "class": "B"}, None)
+    turbine = read_turbine("nrel5mw")
+    runs = evaluate(
+        {"gspi_oc3": "gspi_oc3", "quitter": Quitter(turbine)},
+        [case],
+        duration=60.0,
+        skip=10.0,
+        seeds=(1001, 1002),
+    )
+    lost = runs[runs["controller"] == "quitter"]
+    assert (lost["status"] == "failed").any() and "enough of this" in " ".join(lost["reason"])
+    board = leaderboard(runs, score=HEADLINE.score)
+    assert [entry["controller"] for entry in board["controllers"]] == ["gspi_oc3", "quitter"]
+    quitter = board["controllers"][1]
+    assert quitter["score"]["mean"] >= 1.0 and not quitter["score"]["valid"]
+
+
+def test_a_lower_set_point_loses_energy_and_is_beyond_the_limit_of_settling():
+    settling = read_suite("settling")
+    case = next(case for case in settling.cases if case.name == "settling_18")
+    turbine = read_turbine("nrel5mw")
+    runs = evaluate(
+        {"gspi_oc3": "gspi_oc3", "low": LowerSetPoint(turbine)}, [case], duration=600.0, skip=0.0
+    ).set_index("controller")
+    assert runs.loc["gspi_oc3", "RotSpeed_offset_[%]"] < 0.5 < 2.5 < runs.loc["low", "RotSpeed_offset_[%]"]
+    board = leaderboard(runs.reset_index(), limits=settling.limits)
+    assert [entry["controller"] for entry in board["controllers"]] == ["gspi_oc3", "low"]
+    assert "RotSpeed_offset" in board["controllers"][1]["beyond"][0]
+
+
+def test_limits_of_the_headline_are_of_metrics_that_there_are_and_hold_for_the_baseline():
+    assert isinstance(HEADLINE.limits, Limits) and HEADLINE.limits.baseline == HEADLINE.score.baseline
+    runs = table()
+    assert not leaderboard(runs, limits=HEADLINE.limits)["controllers"][0]["beyond"]

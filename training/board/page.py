@@ -1,0 +1,307 @@
+"""What a judged board is shown as: one HTML page that asks nothing of a network, a CSV and a history.
+
+Every text of a submission is escaped, and its address is a link only where it begins with http.
+"""
+
+import html
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from fowt_env.control import PRIVILEGED_INPUTS
+from fowt_env.errors import InputError, unknown
+from fowt_env.files.atomic import replacing
+from fowt_env.files.tables import read_table, write_table
+from fowt_env.training.board.judge import inputs_of, package_version
+from fowt_env.training.evaluation.leaderboard import leaderboard
+
+FIGURES = {  # heading: metric whose ratio to the baseline is shown
+    "rotor speed": "RotSpeed_std_[rpm]",
+    "platform pitch": "PtfmPitch_std_[deg]",
+    "travel": "blade_pitch_travel_[deg/s]",
+    "energy": "GenPwr_capped_mean_[kW]",
+    "shaft DEL": "RotTorq_DEL_[kN-m]",
+    "tower DEL": "TwrBsMyt_DEL_[kN-m]",
+}
+PER_WIND = ("rotor speed", "platform pitch", "travel")
+MODEL, PREVIEW = "plant_model", "wind_preview"
+PLANT = {"rotor_speed", "generator_speed", "blade_pitch", "generator_torque", "time"}
+CANNOT = (
+    "Whether a controller has learned the public seeds: compare its score on the secret ones.",
+    "What was tuned on which seeds and with what budget: that is the author's word.",
+    "Whether code read files or the network of the organiser's machine while it ran.",
+    "Submissions that differ in name alone.",
+)
+POLICY = "default-src 'none'; style-src 'unsafe-inline'"
+STYLE = """
+body{font:15px/1.45 system-ui,sans-serif;margin:2rem auto;max-width:75rem;padding:0 1rem;color:#1b2430}
+table{border-collapse:collapse;margin:.6rem 0 1.4rem;font-variant-numeric:tabular-nums}
+th,td{padding:.25rem .6rem;border-bottom:1px solid #d7dde4;text-align:right;white-space:nowrap}
+th{background:#f2f5f8}td.text,th.text{text-align:left;white-space:normal}
+.small{color:#5b6773;font-size:13px}.lost{color:#b3261e}h2{margin-top:2.2rem}
+"""
+
+
+def information_class(submission):
+    """What a submission is given, in one of a few words that rows are compared within."""
+    used = set(inputs_of(submission))
+    sensors = used - set(PRIVILEGED_INPUTS)
+    words = ["rotor and blades" if sensors <= PLANT else "sensors"]
+    if used & {"wind_speed", "wave_elevation"}:
+        words.append("exact weather")
+    if MODEL in used:
+        words.append("plant model")
+    if PREVIEW in used:
+        words.append(
+            "exact preview" if submission.card.preview == "exact" else f"lidar {submission.card.preview}"
+        )
+    return " + ".join(words)
+
+
+def board_frame(judged):
+    """DataFrame of a Judged: a row for each suite and submission, in the order of the ranks.
+
+    Columns: regime, suite, version, rank, name, author, licence, information, runs, failed, tripped, for
+    each of
+    FIGURES its ratio to the baseline's and p-value, score with its interval, score_secret, beyond (limits
+    passed).
+    """
+    rows = []
+    board = judged.board
+    classes = {each.name: information_class(each) for each in judged.submissions}
+    cards = {each.name: each.card for each in judged.submissions}
+    for regime in board.settings.regime:
+        for name in regime.suites:
+            suite = board.suite(name)
+            public = _compared(judged.public[name], suite, board)
+            secret = _compared(judged.secret[name], suite, board) if judged.secret else {}
+            for entry in public.values():
+                who = entry["controller"]
+                row = {"regime": regime.name, "suite": name, "version": suite.version, "rank": entry["rank"]}
+                row |= {"name": who, "author": cards[who].author, "licence": cards[who].licence}
+                row |= {"information": classes[who]}
+                row |= {key: entry[key] for key in ("runs", "failed", "tripped")}
+                for heading, metric in FIGURES.items():
+                    found = entry["difference"][metric]
+                    row[heading] = 1.0 + found["percent"] / 100.0
+                    row[f"p({heading})"] = found["p"]
+                row |= _score_columns(entry)
+                row["score_secret"] = _score_columns(secret[who])["score"] if who in secret else np.nan
+                row["beyond"] = "; ".join(entry["beyond"])
+                rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def _compared(table, suite, board):
+    """{name: entry of the leaderboard} of a suite's table, in the order of the ranks."""
+    found = leaderboard(table, board.settings.baseline, suite.score, limits=suite.limits)
+    return {entry["controller"]: entry for entry in found["controllers"]}
+
+
+def _score_columns(entry):
+    score = entry["score"]
+    if score is None or score["mean"] is None:
+        return dict.fromkeys(("score", "score_low", "score_high"), np.nan)
+    return {"score": score["mean"], "score_low": score["low"], "score_high": score["high"]}
+
+
+def write_board(judged):
+    """Paths written in the board's folder: index.html, board.csv, history.csv.
+
+    Raises: InputError where the baseline was not judged.
+    """
+    folder = judged.board.folder
+    names = [each.name for each in judged.submissions]
+    if judged.board.settings.baseline not in names:
+        raise unknown("baseline among the submissions", judged.board.settings.baseline, names)
+    frame = board_frame(judged)
+    history = _history(folder / "history.csv", frame, judged)
+    paths = folder / "index.html", folder / "board.csv", folder / "history.csv"
+    write_table(frame, paths[1])
+    write_table(history, paths[2])
+    text = _page(judged, frame, history)
+    with replacing(paths[0]) as temporary:
+        Path(temporary).write_text(text, encoding="utf-8")
+    return paths
+
+
+def _history(path, frame, judged):
+    """DataFrame of what the history holds and, in place of rows of the same day and digest, of this
+    judging."""
+    digests = {each.name: each.digest for each in judged.submissions}
+    here = frame[["suite", "version", "name", "rank", "score", "failed", "tripped"]].assign(
+        date=judged.when, package=package_version(), digest=frame["name"].map(digests)
+    )
+    if not path.is_file():
+        return here
+    key = ["date", "suite", "version", "name", "digest"]
+    both = pd.concat([read_table(path), here], ignore_index=True)
+    return both.drop_duplicates(key, keep="last", ignore_index=True)
+
+
+def board_rows(folder, regime=None):
+    """(title, headings, rows) of a judged board's CSV for one regime, for a terminal.
+
+    Raises: InputError for a board that was not judged, or an unknown regime.
+    """
+    path = Path(folder) / "board.csv"
+    if not path.is_file():
+        raise InputError(f"board {str(folder)!r}: has not been judged: fowt leaderboard run --board {folder}")
+    frame = read_table(path)
+    names = list(dict.fromkeys(frame["regime"]))
+    regime = regime or names[0]
+    if regime not in names:
+        raise unknown("regime", regime, names)
+    frame = frame[frame["regime"] == regime]
+    headings = ["suite", "rank", "name", "information", "failed or tripped", *FIGURES, "score"]
+    rows = [
+        [
+            *(row["suite"], str(row["rank"]), row["name"], row["information"]),
+            str(row["failed"] + row["tripped"]),
+            *(_number(row[figure]) for figure in (*FIGURES, "score")),
+        ]
+        for row in frame.to_dict("records")
+    ]
+    return f"{regime}: ratios to the baseline, lifetime means", headings, rows
+
+
+def _number(value, digits=3):
+    return f"{value:.{digits}f}" if np.isfinite(value) else "-"
+
+
+# ------------------------------------------------------------------------------------------- the page
+
+
+def _page(judged, frame, history):
+    """HTML text of the page."""
+    board = judged.board
+    title, baseline = html.escape(board.settings.title), html.escape(board.settings.baseline)
+    seeds = ", ".join(map(str, board.settings.seeds))
+    parts = [
+        '<!doctype html><html lang="en"><head><meta charset="utf-8">',
+        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">',
+        f"<title>{title}</title><style>{STYLE}</style></head><body><h1>{title}</h1>",
+        f"<p>Judged {judged.when} with {html.escape(package_version())}; baseline"
+        f" <b>{baseline}</b>; public seeds {seeds}. {_secret(judged)}</p>",
+        "<p class=small>Ratios are of lifetime means over the baseline's on the same wind and waves, less is"
+        " better but for energy (power up to rated). In brackets: 95 % interval of the score; * a difference"
+        " from the baseline whose p-value, after Holm's correction over the row, is at most 0.05. Ranks:"
+        " first"
+        " those within every limit, then those beyond one, then those with failed or tripped runs, which"
+        " count"
+        " as the worst of all.</p>",
+    ]
+    for regime in board.settings.regime:
+        parts.append(f"<h2>{html.escape(regime.name)}</h2>")
+        for name in regime.suites:
+            suite = board.suite(name)
+            rows = frame[frame["suite"] == name]
+            parts.append(f"<h3>{html.escape(name)}, version {suite.version}</h3>")
+            parts.append(f"<p class=small>{html.escape(suite.description)}.</p>")
+            parts.append(_ranking(rows, judged))
+            parts += [_beyond(rows), _per_wind(judged, name)]
+    parts += [_submissions(judged), _history_table(history)]
+    listed = "".join(f"<li>{line}</li>" for line in CANNOT)
+    parts.append(f"<h2>What this board cannot detect</h2><ul>{listed}</ul></body></html>")
+    return "\n".join(parts)
+
+
+def _secret(judged):
+    if not judged.secret:
+        return "No secret seeds were used."
+    count = next(iter(judged.secret.values()))["seed"].nunique()
+    return f"{count} secret seeds of a file with SHA-256 <code>{judged.seeds_hash}</code>."
+
+
+def _table(headings, rows, texts=()):
+    """HTML of a table; texts: numbers of the columns that stand left."""
+
+    def cells(row, tag):
+        marked = (' class="text"' if i in texts else "" for i in range(len(row)))
+        return "".join(f"<{tag}{mark}>{cell}</{tag}>" for mark, cell in zip(marked, row, strict=True))
+
+    lines = [f"<tr>{cells(headings, 'th')}</tr>", *(f"<tr>{cells(row, 'td')}</tr>" for row in rows)]
+    return "<table>" + "".join(lines) + "</table>"
+
+
+def _ranking(rows, judged):
+    from fowt_env.training.evaluation.bootstrap import LEVEL, holm
+
+    shown = []
+    for row in rows.to_dict("records"):
+        corrected = holm([row[f"p({figure})"] for figure in FIGURES])
+        sure = dict(zip(FIGURES, corrected, strict=True))
+        lost = int(row["failed"] + row["tripped"])
+        score = _number(row["score"])
+        if np.isfinite(row["score_low"]):
+            score += f" <span class=small>[{row['score_low']:.3f}, {row['score_high']:.3f}]</span>"
+        shown.append([
+            str(row["rank"]), html.escape(row["name"]), html.escape(row["information"]),
+            f'<span class="lost">{lost} of {row["runs"]}</span>' if lost else f"0 of {row['runs']}",
+            *(_number(row[figure]) + ("*" if sure[figure] <= 1.0 - LEVEL else "") for figure in FIGURES),
+            score, *([_number(row["score_secret"])] if judged.secret else []),
+        ])  # fmt: skip
+    last = ["score", *(["score, secret seeds"] if judged.secret else [])]
+    return _table(["rank", "controller", "is given", "failed or tripped", *FIGURES, *last], shown, (1, 2))
+
+
+def _beyond(rows):
+    """List of who passed which limit."""
+    found = [(row["name"], row["beyond"]) for row in rows.to_dict("records") if row["beyond"]]
+    if not found:
+        return ""
+    lines = "".join(f"<li><b>{html.escape(name)}</b>: {html.escape(text)}</li>" for name, text in found)
+    return f"<p class=small>Beyond a limit of the suite:</p><ul class=small>{lines}</ul>"
+
+
+def _per_wind(judged, name):
+    """A table for each of PER_WIND: ratios case by case."""
+    board = judged.board
+    entries = _compared(judged.public[name], board.suite(name), board)
+    cases = list(next(iter(entries.values()))["cases"])
+    parts = []
+    for heading in PER_WIND:
+        rows = []
+        for who, entry in entries.items():
+            found = (entry["cases"][case]["difference"][FIGURES[heading]]["percent"] for case in cases)
+            rows.append([html.escape(who), *(_number(1.0 + percent / 100.0, 2) for percent in found)])
+        parts.append(f"<details><summary>{heading}, case by case</summary>")
+        parts.append(_table(["controller", *map(html.escape, cases)], rows, (0,)) + "</details>")
+    return "".join(parts)
+
+
+def _submissions(judged):
+    """Table of the cards."""
+    rows = []
+    for each in judged.submissions:
+        card = each.card
+        name = html.escape(card.name)
+        if card.url.startswith(("https://", "http://")):
+            name = f'<a href="{html.escape(card.url)}" rel="nofollow">{name}</a>'
+        texts = (
+            card.author,
+            card.licence,
+            each.kind,
+            ", ".join(inputs_of(each)),
+            card.description,
+            card.tuning,
+        )
+        rows.append([name, *map(html.escape, texts), f"<code>{each.digest}</code>"])
+    headings = ["name", "author", "licence", "kind", "inputs", "description", "tuning", "files"]
+    return "<h2>Submissions</h2>" + _table(headings, rows, range(8))
+
+
+def _history_table(history):
+    """Table of the scores over the judgings, newest first."""
+    rows = []
+    for row in history.sort_values("date", ascending=False, kind="stable").to_dict("records"):
+        words = [row[key] for key in ("date", "suite", "version", "name", "package", "rank")]
+        lost = int(row["failed"] + row["tripped"])
+        rows.append([*(html.escape(str(word)) for word in words), _number(row["score"]), str(lost)])
+    headings = ["date", "suite", "version", "controller", "judged with", "rank", "score", "failed or tripped"]
+    return (
+        "<h2>History</h2><details><summary>all judgings</summary>"
+        + _table(headings, rows, (0, 1, 3, 4))
+        + "</details>"
+    )

@@ -1,0 +1,199 @@
+"""A submission to a standing board: a folder with a card and, unless it names a built-in controller, its
+code.
+
+    my_controller/
+        card.toml            who made it, what it is given, under what licence
+        controller.py        or a policy file (.npz); what card.toml names as its controller
+
+A policy file holds arrays and runs no code. A Python file is code: `fowt leaderboard run` runs it only where
+--trust-code is given, and then in a process of its own (training.board.isolated).
+"""
+
+import hashlib
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator
+
+from fowt_env.control import PRIVILEGED_INPUTS
+from fowt_env.controllers import CONTROLLERS
+from fowt_env.controllers.policy.network_file import read_policy
+from fowt_env.descriptions.files import raise_problems, read_toml
+from fowt_env.descriptions.records import Positive, Record, validate
+from fowt_env.errors import InputError, unknown
+from fowt_env.plant.measurement import Measurement
+
+CARD = "card.toml"
+BUILT_IN, POLICY_FILE, PYTHON_FILE = "built-in", "policy file", "Python file"
+NAME = re.compile(r"[a-z0-9][a-z0-9_-]{0,49}")
+LARGEST_FOLDER = 50e6  # bytes
+INPUTS = (*Measurement._fields, *PRIVILEGED_INPUTS)
+
+
+def _tuple(value):
+    """A tuple of a list; anything else as it is, for the validation to refuse."""
+    return tuple(value) if isinstance(value, list) else value
+
+
+class Card(Record):
+    """The text of card.toml.
+
+    controller     a name of fowt list controllers; "FILE.npz"; or "FILE.py:Name", where Name is a class or
+                   factory called with (turbine, control_dt), or with nothing
+    information    what the controller is given: fields of Measurement and PRIVILEGED_INPUTS; read from the
+                   controller itself where it is a built-in one or a policy file
+    preview_times  s ahead at which it is given the wind, rising; with "wind_preview" in information
+    preview        "exact", or the lidar preset through which it sees the wind ahead
+    tuning         what was tuned or trained, on which seeds, with which budget
+    """
+
+    name: str
+    author: str
+    licence: str
+    controller: str
+    information: Annotated[tuple[str, ...], BeforeValidator(_tuple)] | None = None
+    preview_times: Annotated[tuple[Positive, ...], BeforeValidator(_tuple)] = ()
+    preview: str = "exact"
+    description: str = ""
+    tuning: str = ""
+    url: str = ""
+
+
+@dataclass(frozen=True)
+class Submission:
+    """A checked submission. Raises (read_submission): InputError with a line per fault."""
+
+    card: Card
+    folder: Path
+    kind: str  # BUILT_IN, POLICY_FILE or PYTHON_FILE
+    digest: str  # of all its files
+
+    @property
+    def name(self) -> str:
+        """What the board calls it."""
+        return self.card.name
+
+    def controller(self, time_limits: Any) -> Any:
+        """What evaluate is given: a name, or a factory of controllers in a process of their own.
+
+        time_limits: training.board.isolated.TimeLimits of a Python file.
+        """
+        if self.kind == BUILT_IN:
+            return self.card.controller
+        if self.kind == POLICY_FILE:
+            return f"policy:{(self.folder / self.card.controller).absolute()}"
+        from fowt_env.training.board.isolated import IsolatedFactory
+
+        file, _, attribute = self.card.controller.partition(":")
+        return IsolatedFactory(
+            str(self.folder.absolute()), file, attribute, self.name, tuple(self.card.information or ()),
+            self.card.preview_times, time_limits,
+        )  # fmt: skip
+
+
+def read_submission(folder: Path | str) -> Submission:
+    """The submission in a folder; none of its code is run.
+
+    Raises: InputError for a folder without a sound card, or whose controller cannot be used.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise InputError(f"submission {str(folder)!r}: is no folder (one with {CARD} in it is needed)")
+    path = folder / CARD
+    if not path.is_file():
+        raise InputError(f"submission {str(folder)!r}: has no {CARD}")
+    where = f"submission {str(folder)!r}"
+    card, problems = validate(Card, read_toml(path, "card"))
+    raise_problems(where, problems)
+    if not NAME.fullmatch(card.name):
+        problems.append(
+            f"name = {card.name!r}: must be 1 to 50 lower-case letters, digits, '_' or '-', a letter or"
+            f" digit first"
+        )
+    for key in ("author", "licence"):
+        if not getattr(card, key).strip():
+            problems.append(f"{key} = '': must not be empty")
+    kind = _kind(card, folder, problems)
+    _check_information(card, kind, problems)
+    raise_problems(where, problems)
+    return Submission(card, folder, kind, _digest(folder))
+
+
+def _kind(card, folder, problems):
+    """BUILT_IN, POLICY_FILE or PYTHON_FILE; what is wrong with the controller goes to problems."""
+    file, colon, attribute = card.controller.partition(":")
+    if file.endswith(".py") and colon:
+        if not attribute.isidentifier():
+            problems.append(f"controller = {card.controller!r}: must be FILE.py:Name")
+        elif not _inside(folder, file):
+            problems.append(f"controller = {card.controller!r}: there is no file {file!r} in the folder")
+        return PYTHON_FILE
+    if card.controller.endswith(".npz"):
+        if not _inside(folder, card.controller):
+            problems.append(f"controller = {card.controller!r}: there is no such file in the folder")
+        else:
+            try:
+                read_policy(folder / card.controller)
+            except InputError as error:
+                problems.append(f"controller: {error}")
+        return POLICY_FILE
+    if card.controller not in CONTROLLERS:
+        problems.append(
+            f"controller: {unknown('controller', card.controller, CONTROLLERS)}; or FILE.npz, FILE.py:Name"
+        )
+    return BUILT_IN
+
+
+def _inside(folder, name):
+    """Whether a name is that of a file in the folder itself, and no link out of it."""
+    path = folder / name
+    return path.is_file() and not path.is_symlink() and path.resolve().parent == folder.resolve()
+
+
+def _check_information(card, kind, problems):
+    """What is wrong with the declared inputs goes to problems."""
+    if kind != PYTHON_FILE:
+        if card.information is not None:
+            problems.append(f"information: is read from a {kind} itself; leave it out")
+        return
+    if card.information is None:
+        problems.append("information is missing: the inputs that the controller is to be given")
+        return
+    for name in card.information:
+        if name not in INPUTS:
+            problems.append(f"information: {unknown('input', name, INPUTS)}")
+    if bool(card.preview_times) != ("wind_preview" in card.information):
+        problems.append(
+            f"preview_times = {list(card.preview_times)}: must be given with 'wind_preview' in information,"
+            f" and"
+            " only then"
+        )
+    if list(card.preview_times) != sorted(set(card.preview_times)):
+        problems.append(f"preview_times = {list(card.preview_times)}: must rise")
+
+
+def files_of(folder: Path) -> list[Path]:
+    """Sorted files of a submission's folder. Raises: InputError for links and for too large a folder."""
+    found = []
+    for path in sorted(folder.rglob("*")):
+        if path.is_symlink() or not (path.is_file() or path.is_dir()):
+            raise InputError(f"submission {str(folder)!r}: {str(path)!r} is a link or no plain file")
+        if path.is_file() and "__pycache__" not in path.parts:
+            found.append(path)
+    size = sum(path.stat().st_size for path in found)
+    if size > LARGEST_FOLDER:
+        raise InputError(
+            f"submission {str(folder)!r}: {size / 1e6:.0f} MB: at most {LARGEST_FOLDER / 1e6:.0f} MB are"
+            f" allowed"
+        )
+    return found
+
+
+def _digest(folder):
+    """Hash of the names and contents of a submission's files."""
+    digest = hashlib.sha256()
+    for path in files_of(folder):
+        digest.update(str(path.relative_to(folder)).encode() + b"\0" + path.read_bytes() + b"\0")
+    return digest.hexdigest()[:16]

@@ -1,0 +1,101 @@
+"""fowt leaderboard: a standing board of submitted controllers, judged anew by whoever holds it."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from fowt_env.training.cli.console import app, note, out, progress_bar, reported
+from fowt_env.training.cli.tables import print_table
+
+board_app = typer.Typer(
+    help="A standing board: add submissions, judge them, show what came of it.", no_args_is_help=True
+)
+app.add_typer(board_app, name="leaderboard")
+
+BoardOption = Annotated[Path, typer.Option("--board", help="Folder of the board.")]
+
+ADD_EXAMPLES = """A submission is a folder with card.toml and the controller that it names:
+
+    name = "my_controller"
+    author = "A. Researcher"
+    licence = "MIT"
+    controller = "controller.py:Mine"      # or "policy.npz"
+    information = ["generator_speed", "blade_pitch"]
+    tuning = "gains by hand, seeds 1001 to 1004"
+
+[cyan]fowt leaderboard add my_controller[/cyan]  into ./board, which is made with the package's own
+controllers if there is none"""
+
+
+@board_app.command(name="add", epilog=ADD_EXAMPLES)
+@reported
+def add_command(
+    submissions: Annotated[list[Path], typer.Argument(help="Folders, each with a card.toml.")],
+    board: BoardOption = Path("board"),
+):
+    """Check submissions and copy them into the board; none of their code is run."""
+    from fowt_env.training.board.folder import SETTINGS, Board, new_board
+    from fowt_env.training.board.submission import read_submission
+
+    for folder in submissions:
+        read_submission(folder)
+    if not (board / SETTINGS).exists():
+        first = ", ".join(each.name for each in new_board(board).submissions())
+        note(f"made the board {board} with the controllers of the package: {first}")
+    for folder in submissions:
+        name = Board(board).add(folder)
+        note(f"added {name}; judge it with: fowt leaderboard run --board {board}")
+
+
+RUN_EXAMPLES = """[cyan]fowt leaderboard run --jobs 2[/cyan]  all submissions on the public seeds
+
+[cyan]fowt leaderboard run --secret seeds.txt --private private --trust-code[/cyan]  on the organiser's
+seeds too
+
+Python files run only with [bold]--trust-code[/bold], each in a process of its own, with your user's
+rights: read
+them first, or judge in a container. The same command goes on where it was stopped. Written: index.html,
+board.csv, history.csv and runs/ in the board's folder; runs of secret seeds in the folder --private."""
+
+
+@board_app.command(name="run", epilog=RUN_EXAMPLES)
+@reported
+def run_command(
+    board: BoardOption = Path("board"),
+    jobs: Annotated[int, typer.Option(help="Worker processes.")] = 1,
+    secret: Annotated[
+        Path | None, typer.Option(help="File of the organiser's seeds, one a line, from 1000 on.")
+    ] = None,
+    private: Annotated[Path | None, typer.Option(help="Folder for the runs of the secret seeds.")] = None,
+    trust_code: Annotated[
+        bool, typer.Option("--trust-code", help="Run submissions that are Python files.")
+    ] = False,
+):
+    """Run every submission on the board's frozen suites and write its page."""
+    from fowt_env.training.board.folder import Board
+    from fowt_env.training.board.judge import judge
+    from fowt_env.training.board.page import write_board
+
+    holder = Board(board)
+    with progress_bar("judging", None) as update:
+
+        def report(done, total, text):
+            update(done, text, total)
+
+        judged = judge(holder, jobs, secret, private, trust_code, report)
+    written = write_board(judged)
+    note(f"wrote {', '.join(path.name for path in written)} in {board}")
+
+
+@board_app.command(name="show")
+@reported
+def show_command(
+    board: BoardOption = Path("board"),
+    regime: Annotated[str | None, typer.Option(help="Regime; default: the first of the board.")] = None,
+):
+    """Print the board as it was judged last."""
+    from fowt_env.training.board.page import board_rows
+
+    title, headings, rows = board_rows(board, regime)
+    print_table(out, headings, rows, title)
