@@ -158,8 +158,9 @@ def simulate(
     sensors     what the controller reads: None or "exact" for the measurements as they are, the name of a
                 built-in chain ("standard") or a SensorChain (fowt_env.descriptions.sensors). Rows are of
                 the true motions; the noise follows from the scene's seed and is the same for every controller
-    preview     where the controller has preview_times, what it is given of the wind ahead: "exact", a Preview
-                (fowt_env.weather.preview), or a function of (scene, preview_times) that returns one
+    preview     where the controller has preview_times, what it is given of the wind ahead: "exact", a lidar
+                ("four_beam_pulsed"), a Preview (fowt_env.weather.preview), or a function of (scene,
+                preview_times) that returns one
     nominal     scene whose plant the controller is designed on, where that is not the one that runs
 
     A controller is given what its `information` declares and nothing else (fowt_env.control).

@@ -313,7 +313,7 @@ def test_a_lidar_s_preview_is_given_with_its_motion(gust_scene):
     "preview, message",
     [
         ("lidar", "unknown preview 'lidar'"),
-        (7, "preview = 7: must be 'exact', a Preview"),
+        (7, "preview = 7: must be 'exact', the name of a lidar"),
         (Preview(np.zeros(2), np.zeros((1, 2))), "time must increase"),
         (Preview(np.arange(2.0), np.zeros((2, 2))), r"must be \(n,\) and \(1, n\)"),
         (Preview(np.arange(2.0), np.full((1, 2), np.nan)), "must be finite"),
