@@ -4,16 +4,15 @@ theory.md, sections 3 and 4. Above rated the torque is constant (or the power, b
 blade pitch holds the rotor speed; below rated the pitch rests on its minimum and the torque curve rules.
 """
 
-import tomllib
 from dataclasses import dataclass, fields
 from enum import IntEnum
 from math import exp, inf, isfinite, isinf
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from fowt_env.control import CompiledController, check_control_dt
+from fowt_env.controllers.tuned import tuned
 from fowt_env.descriptions.checks import check_number
 from fowt_env.errors import unknown
 from fowt_env.plant.compile.decorators import control_kernel, kernel
@@ -21,7 +20,6 @@ from fowt_env.plant.drivetrain import TorqueCurve, build_torque_curve, clamp, ge
 from fowt_env.plant.measurement import Measure
 
 SCHEDULE_ON = ("commanded", "measured")
-TUNED_FACTORS = Path(__file__).parent / "pi_tuned.toml"  # of KP, KI and beta_K; training/design/tune_pi.py
 BUMPLESS = 1e-9  # rad, largest step of the first command that still counts as none
 
 
@@ -344,7 +342,7 @@ def pi_land_power(turbine, control_dt):
 
 def pi_tuned(turbine, control_dt):
     """OC3 gains times stored factors: least deviations at no more pitch travel than `pi`, on other seeds."""
-    factors = tomllib.loads(TUNED_FACTORS.read_text(encoding="utf-8"))
+    factors = tuned("pi_tuned")
     published = PISettings.published(turbine)
     changes = {name: getattr(published, name) * factor for name, factor in factors.items()}
     return PI(PISettings.published(turbine, **changes), control_dt, "pi_tuned")

@@ -51,18 +51,25 @@ TORQUE_FREQUENCY, TORQUE_DAMPING = 0.15, 0.7  # rad/s, of the torque loop in ROS
 
 @dataclass(frozen=True)
 class RoscoSettings:
-    """Floating feedback of ROSCO (Fl_Mode). Raises: InputError naming the key, value and allowed range."""
+    """Floating feedback of ROSCO (Fl_Mode), and its pitch gains.
+
+    Raises: InputError naming the key, value and allowed range.
+    """
 
     mode: int = 0  # Fl_Mode: 0 none, 1 of the tower-top acceleration, 2 of the nacelle's pitch acceleration
     gain: float = 0.0  # Fl_Kp, rad per m/s (mode 1) or s (mode 2); negative damps the platform
     low_pass: float = 0.21  # rad/s, second-order low pass with damping ratio 1
     high_pass: float = 0.01  # rad/s, first-order high pass
+    kp: float = 1.0  # factor on the published proportional gain
+    ki: float = 1.0  # factor on the published integral gain
 
     def __post_init__(self):
         check_one_of("mode", self.mode, (0, 1, 2))
         check_number("gain", self.gain, high=0.0, allowed="finite and <= 0 (beyond it drives the platform)")
         for key in ("low_pass", "high_pass"):
             check_number(key, getattr(self, key), 0.0, low_open=True, allowed="positive and finite, rad/s")
+        for key in ("kp", "ki"):
+            check_number(key, getattr(self, key), 0.0, low_open=True, allowed="positive and finite")
 
 
 def find_library():
@@ -374,8 +381,8 @@ def deck(turbine, density, table, settings):
         "F_VSRefSpdCornerFreq": 0.20944,
         "PC_GS_n": len(SCHEDULE),
         "PC_GS_angles": SCHEDULE,
-        "PC_GS_KP": proportional,
-        "PC_GS_KI": integral,
+        "PC_GS_KP": settings.kp * proportional,
+        "PC_GS_KI": settings.ki * integral,
         "PC_GS_KD": np.zeros(len(SCHEDULE)),
         "PC_GS_TF": np.zeros(len(SCHEDULE)),
         "PC_MaxPit": drive.maximum,
@@ -450,4 +457,4 @@ def rosco(turbine, control_dt):
 
 def rosco_float(turbine, control_dt):
     """The ROSCO library with the published OC3 gains and its floating feedback, tuned on training cases."""
-    return Rosco(RoscoSettings(**tuned("rosco_float")), control_dt, "rosco_float")
+    return Rosco(RoscoSettings(mode=1, **tuned("rosco_float")), control_dt, "rosco_float")

@@ -1,4 +1,4 @@
-"""The settings in tuned.toml, which training/design/tune_feedback.py has written."""
+"""The settings in tuned.toml, which training/design/tune.py has written."""
 
 import tomllib
 from pathlib import Path
@@ -8,5 +8,5 @@ TUNED = Path(__file__).parent / "tuned.toml"
 
 
 def tuned(name: str) -> dict[str, Any]:
-    """{setting: value} of a controller that training/design/tune_feedback.py has tuned."""
+    """{setting: value} of a controller that `fowt design tune` has tuned."""
     return tomllib.loads(TUNED.read_text())[name]["settings"]

@@ -1,0 +1,255 @@
+"""One search for all baselines: the same objective, seeds, sensors, limits and number of settings tried.
+
+    fowt design tune rosco_float --budget 100 --out results/tune
+
+Every setting runs on the cases of a suite, on validation seeds (1000 and above, on which no suite is scored),
+through the suite's sensors and behind its trip. Its cost is the mean of the lifetime deviations of rotor
+speed and
+platform pitch over those of gspi_oc3 on the same runs, plus PENALTY times what it lies beyond the suite's
+limits and
+beyond LIMITS, in fractions of them, plus LOST times the fraction of failed and tripped runs. The settings
+of now come first, then half of the
+budget spread evenly (Sobol), then Nelder and Mead's method from the best. A row of OUT/tune_NAME.csv is
+written for
+each setting as soon as it is known, so that an interrupted search leaves what it tried.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from scipy.optimize import minimize
+from scipy.stats import qmc
+
+from fowt_env.controllers.floating_feedback import FeedbackSettings, FloatingFeedback
+from fowt_env.controllers.lqr.design import LQGSettings
+from fowt_env.controllers.lqr.law import LQR
+from fowt_env.controllers.mpc.law import MPC
+from fowt_env.controllers.mpc.settings import PREVIEW, MPCSettings
+from fowt_env.controllers.pi import PI, PISettings
+from fowt_env.controllers.rosco import Rosco, RoscoSettings
+from fowt_env.controllers.tuned import TUNED, tuned
+from fowt_env.descriptions.checks import check_whole_number
+from fowt_env.errors import InputError, unknown
+from fowt_env.files.atomic import replacing
+from fowt_env.files.tables import write_table
+from fowt_env.scene.build import build_scene
+from fowt_env.training.evaluation.cases import read_suite
+from fowt_env.training.evaluation.evaluate import evaluate
+from fowt_env.training.evaluation.leaderboard import leaderboard
+from fowt_env.training.evaluation.metrics import METRICS, better
+from fowt_env.training.evaluation.run_case import CONTROL_DT
+from fowt_env.training.evaluation.seeds import VALIDATION
+
+BASELINE = "gspi_oc3"
+SUITE, SEEDS, BUDGET = "above_rated", (1001, 1002), 100
+AIMS = ("RotSpeed_std_[rpm]", "PtfmPitch_std_[deg]")
+FIGURES = {
+    "rotor_speed": "RotSpeed_std_[rpm]", "platform_pitch": "PtfmPitch_std_[deg]",
+    "travel": "blade_pitch_travel_[deg/s]", "shaft": "RotTorq_DEL_[kN-m]", "power": "GenPwr_capped_mean_[kW]",
+    "power_std": "GenPwr_std_[kW]",
+}  # fmt: skip
+# Over the baseline, beside the suite's: a search goes as far as it may, and other seeds then go beyond
+LIMITS = {"blade_pitch_travel_[deg/s]": 0.98, "RotTorq_DEL_[kN-m]": 1.0, "GenPwr_capped_mean_[kW]": 0.995}
+PENALTY = 10.0  # 1 % beyond a limit has to be worth 10 % of the deviations
+LOST = 5.0
+FIRST_STEP = 0.12  # of the simplex, in the unit cube
+
+
+@dataclass(frozen=True)
+class Space:
+    """What is searched of a controller: {setting: (low, high)}, by logarithm where low is positive.
+
+    start: the settings of now. make(settings, turbine, control_dt): the controller.
+    """
+
+    ranges: Mapping[str, tuple[float, float]]
+    start: Mapping[str, float]
+    make: Callable[..., Any]
+
+    def settings(self, place):
+        """{setting: value} of a place (n,) in the unit cube."""
+        found = {}
+        for (key, (low, high)), x in zip(self.ranges.items(), np.clip(place, 0.0, 1.0), strict=True):
+            value = low * (high / low) ** x if low > 0.0 else low + (high - low) * x
+            found[key] = float(value)
+        return found
+
+    def place(self, settings):
+        """(n,) place in the unit cube of settings, at its walls where they lie outside."""
+        place = []
+        for key, (low, high) in self.ranges.items():
+            value = min(max(settings[key], low), high)
+            x = np.log(value / low) / np.log(high / low) if low > 0.0 else (value - low) / (high - low)
+            place.append(x)
+        return np.array(place)
+
+
+def _pi(settings, turbine, control_dt):
+    published = PISettings.published(turbine)
+    changes = {name: getattr(published, name) * factor for name, factor in settings.items()}
+    return PI(PISettings.published(turbine, **changes), control_dt, "pi_tuned")
+
+
+def _feedback(settings, turbine, control_dt):
+    return FloatingFeedback(PISettings.published(turbine), FeedbackSettings(**settings), control_dt)
+
+
+def _rosco(settings, turbine, control_dt):
+    return Rosco(RoscoSettings(mode=1, **settings), control_dt, "rosco_float")
+
+
+def _lqr(settings, turbine, control_dt):
+    return LQR(turbine, control_dt, LQGSettings(**settings))
+
+
+def _mpc(settings, turbine, control_dt):
+    return MPC(turbine, control_dt, MPCSettings(**settings))
+
+
+def _mpc_preview(settings, turbine, control_dt):
+    return MPC(turbine, control_dt, PREVIEW.changed(**settings), "mpc_preview", preview=True)
+
+
+def _of(record, ranges):
+    """Start of a Space: the fields of a settings record."""
+    return {key: getattr(record, key) for key in ranges}
+
+
+_LQR = {
+    "share": (0.0, 0.9), "share_growth": (-0.04, 0.04), "travel": (0.85, 1.05), "travel_cap": (0.11, 0.18),
+    "travel_near_rated": (0.15, 0.35), "shaft": (0.7, 1.5), "shaft_near_rated": (0.03, 0.12),
+    "pitch_rate": (0.03, 0.6), "schedule_time": (60.0, 250.0),
+}  # fmt: skip
+_MPC = {
+    "platform_pitch": (0.5, 6.0), "platform_pitch_rate": (0.05, 1.0), "power": (0.05, 1.5), "torque": (0.03, 1.0),
+    "pitch_rate": (2.0, 20.0), "pitch_rate_growth": (0.0, 6.0), "pitch_rate_growth_above": (-3.0, 2.0),
+    "torque_rate": (0.2, 5.0), "schedule_time": (60.0, 250.0),
+}  # fmt: skip
+
+
+def spaces():
+    """{name of a baseline: its Space}."""
+    feedback = {
+        "pitch_gain": (0.01, 0.3),
+        "low_pass": (0.05, 0.6),
+        "high_pass": (0.005, 0.04),
+        "torque_gain": (-400.0, 400.0),
+    }
+    rosco = {
+        "kp": (0.3, 3.0),
+        "ki": (0.1, 2.0),
+        "gain": (-0.3, 0.0),
+        "low_pass": (0.05, 0.6),
+        "high_pass": (0.003, 0.04),
+    }
+    factors = {"KP": (0.3, 4.0), "KI": (0.05, 3.0), "gain_schedule_pitch": (0.3, 4.0)}
+    return {
+        "floating_feedback": Space(feedback, tuned("floating_feedback"), _feedback),
+        "lqr": Space(_LQR, _of(LQGSettings(), _LQR), _lqr),
+        "mpc": Space(_MPC, _of(MPCSettings(), _MPC), _mpc),
+        "mpc_preview": Space(_MPC, _of(PREVIEW, _MPC), _mpc_preview),
+        "pi_tuned": Space(factors, tuned("pi_tuned"), _pi),
+        "rosco_float": Space(rosco, tuned("rosco_float"), _rosco),
+    }
+
+
+class Objective:
+    """Cost of controllers on a suite's cases and some validation seeds."""
+
+    def __init__(self, suite=SUITE, seeds=SEEDS, **engine):
+        if any(seed < VALIDATION.start for seed in seeds):
+            raise InputError(
+                f"seeds = {list(seeds)}: must be {VALIDATION.start} or more: no suite is scored on those"
+            )
+        self.suite, self.seeds, self.engine = read_suite(suite), tuple(seeds), engine
+        self.turbine = build_scene(self.suite.cases[0].platform).turbine
+        self.base = evaluate(BASELINE, self.suite, seeds=self.seeds, **engine)
+
+    def __call__(self, controller):
+        """{"cost", ..., FIGURES over the baseline's, "lost", "beyond"} of a controller."""
+        table = evaluate({"candidate": controller}, self.suite, seeds=self.seeds, **self.engine)
+        board = leaderboard(
+            pd.concat([self.base, table], ignore_index=True), BASELINE, limits=self.suite.limits
+        )
+        (entry,) = (one for one in board["controllers"] if one["controller"] == "candidate")
+        ratio = {name: 1.0 + entry["difference"][name]["percent"] / 100.0 for name in METRICS}
+        lost = (entry["failed"] + entry["tripped"]) / entry["runs"]
+        excess = 0.0
+        for name, limit in {**self.suite.limits.relative, **LIMITS}.items():
+            excess += max(0.0, -better(name) * (ratio[name] / limit - 1.0))
+        for name, limit in self.suite.limits.lifetime.items():
+            excess += max(0.0, entry["metrics"][name]["mean"] / limit - 1.0)
+        for name, limit in self.suite.limits.run.items():
+            excess += max(0.0, entry["metrics"][name]["worst"] / limit - 1.0)
+        cost = float(np.mean([ratio[name] for name in AIMS])) + PENALTY * excess + LOST * lost
+        found = {"cost": cost if np.isfinite(cost) else 2.0 * LOST}
+        found |= {key: ratio[name] for key, name in FIGURES.items()}
+        return found | {"lost": lost, "beyond": excess}
+
+
+def tune(name, budget=BUDGET, out=None, report=None, **objective):
+    """(best settings, its figures, DataFrame of all that were tried, in order) of a baseline.
+
+    budget     settings that are tried
+    out        folder of tune_NAME.csv; None: none is written
+    report     called as report(number, row) after each
+    objective  arguments of Objective
+    Raises: InputError for an unknown name, seeds of the suites, or a budget below 4.
+    """
+    known = spaces()
+    if name not in known:
+        raise unknown("controller to tune", name, known)
+    check_whole_number("budget", budget, 4)
+    space, judge, rows = known[name], Objective(**objective), []
+
+    def cost(place):
+        settings = space.settings(place)
+        row = settings | judge(space.make(settings, judge.turbine, CONTROL_DT))
+        # beyond the walls of the search the nearest setting inside counts, and a little more
+        row["cost"] += float(np.sum(np.abs(place - np.clip(place, 0.0, 1.0))))
+        rows.append(row)
+        if out is not None:
+            write_table(pd.DataFrame(rows), Path(out) / f"tune_{name}.csv")
+        if report is not None:
+            report(len(rows), row)
+        return row["cost"]
+
+    start = space.place(space.start)
+    spread = qmc.Sobol(len(start), seed=0).random(budget // 2 - 1)
+    tried = [start, *spread]
+    costs = [cost(place) for place in tried]
+    best = tried[int(np.argmin(costs))]
+    steps = FIRST_STEP * np.diag(np.where(best > 1.0 - FIRST_STEP, -1.0, 1.0))
+    simplex = np.vstack([best, best + steps])
+    options = {"maxfev": budget - len(tried), "initial_simplex": simplex, "xatol": 1e-3, "fatol": 1e-4}
+    minimize(cost, best, method="Nelder-Mead", options=options)
+    table = pd.DataFrame(rows)
+    chosen = table.loc[table["cost"].idxmin()]
+    figures = {key: float(chosen[key]) for key in ("cost", *FIGURES, "lost", "beyond")}
+    return {key: float(chosen[key]) for key in space.ranges}, figures, table
+
+
+def write_tuned(name, settings, figures, budget, objective, path=TUNED):
+    """Put settings into tuned.toml, in place of those of the same controller."""
+    import tomllib
+
+    held = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    seeds = list(objective.get("seeds", SEEDS))
+    held[name] = {
+        "settings": {key: float(f"{value:.4g}") for key, value in settings.items()},
+        "figures": {key: round(value, 4) for key, value in figures.items()},
+        "search": {"suite": objective.get("suite", SUITE), "seeds": seeds, "budget": budget},
+    }
+    lines = [
+        "# Settings found by `fowt design tune NAME`. Figures are over gspi_oc3 on the seeds of the search.",
+    ]
+    for controller in sorted(held):
+        for section, values in held[controller].items():
+            lines += ["", f"[{controller}.{section}]"]
+            lines += [f"{key} = {value!r}".replace("'", '"') for key, value in values.items()]
+    with replacing(path) as temporary:
+        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
