@@ -35,11 +35,13 @@ import numpy.typing as npt
 
 from fowt_env.analysis.trim import without_fluctuations
 from fowt_env.descriptions.checks import check_number
+from fowt_env.descriptions.lidar import lidars
 from fowt_env.errors import ControllerError, InputError, unknown
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.measurement import N_MEASUREMENTS, SENSOR_FIELDS, Measurement
 from fowt_env.plant.sensing import GIVEN, HIDDEN
 from fowt_env.plant.state import N_COMMANDS
+from fowt_env.weather.lidar import lidar_preview
 from fowt_env.weather.preview import Preview, check_times, exact_preview
 
 CATALOGUE = "fowt_env.controllers"
@@ -315,13 +317,15 @@ def preview_leads(controller: Any) -> tuple[float, ...]:
 
 
 def foreseen(scene: Any, leads: tuple[float, ...], preview: Any, duration: float) -> Preview:
-    """Preview of a run of `duration` (s) from what simulate is given: "exact", a Preview or a function.
+    """Preview of a run of `duration` (s) from what simulate is given: "exact", a lidar, a Preview, ...
 
     Raises: InputError for anything else, and for a Preview of other leads or shapes.
     """
-    if isinstance(preview, str):
-        if preview != EXACT:
-            raise unknown("preview", preview, (EXACT,))
+    if isinstance(preview, str) and preview != EXACT:
+        if preview not in lidars():
+            raise unknown("preview", preview, (EXACT, *lidars()))
+        found = lidar_preview(scene, leads, preview)
+    elif isinstance(preview, str):
         if duration > scene.options["duration"]:  # of a box of wind that repeats
             scene = replace(scene, options=scene.options | {"duration": duration})
         found = exact_preview(scene, leads)
@@ -331,8 +335,8 @@ def foreseen(scene: Any, leads: tuple[float, ...], preview: Any, duration: float
         time, values = (np.ascontiguousarray(part, dtype=np.float64) for part in found[:2])
     except (TypeError, ValueError, IndexError):
         raise InputError(
-            f"preview = {preview!r}: must be {EXACT!r}, a Preview (time, values), or a function of (scene,"
-            " times) that returns one"
+            f"preview = {preview!r}: must be {EXACT!r}, the name of a lidar, a Preview (time, values), or a"
+            " function of (scene, times) that returns one"
         ) from None
     if time.ndim != 1 or not len(time) or values.shape != (len(leads), len(time)):
         raise InputError(
@@ -341,7 +345,7 @@ def foreseen(scene: Any, leads: tuple[float, ...], preview: Any, duration: float
         )
     if not (np.isfinite(time).all() and np.isfinite(values).all() and (np.diff(time) > 0.0).all()):
         raise InputError("preview: time must increase, and time and values must be finite")
-    return Preview(time, values)
+    return Preview(time, values, found[2] if len(found) > 2 else None)
 
 
 class Known:

@@ -3,7 +3,7 @@
 import warnings
 from collections.abc import Callable
 from contextlib import contextmanager
-from math import inf, isinf, radians
+from math import exp, inf, isfinite, isinf, radians
 from time import perf_counter
 from typing import Any
 
@@ -43,10 +43,10 @@ from fowt_env.plant.rollout import (
     new_protection,
     rollout,
 )
-from fowt_env.plant.sensing import Reader, Setting, new_past, open_reader
+from fowt_env.plant.sensing import NacelleMotion, Reader, Setting, new_past, no_motion, open_reader
 from fowt_env.plant.state import State
 from fowt_env.scene.scene import Scene
-from fowt_env.weather.preview import Preview
+from fowt_env.weather.preview import Motion, Preview
 from fowt_env.weather.sensor_noise import draw_sensors
 from fowt_env.weather.wind_field import WindBox
 
@@ -158,8 +158,9 @@ def simulate(
     sensors     what the controller reads: None or "exact" for the measurements as they are, the name of a
                 built-in chain ("standard") or a SensorChain (fowt_env.descriptions.sensors). Rows are of
                 the true motions; the noise follows from the scene's seed and is the same for every controller
-    preview     where the controller has preview_times, what it is given of the wind ahead: "exact", a Preview
-                (fowt_env.weather.preview), or a function of (scene, preview_times) that returns one
+    preview     where the controller has preview_times, what it is given of the wind ahead: "exact", a lidar
+                ("four_beam_pulsed"), a Preview (fowt_env.weather.preview), or a function of (scene,
+                preview_times) that returns one
     nominal     scene whose plant the controller is designed on, where that is not the one that runs
 
     A controller is given what its `information` declares and nothing else (fowt_env.control).
@@ -251,10 +252,38 @@ def reader_of(
     available = None if chain is None else (chain.name, chain.available)
     sensors.chain[Setting.HIDDEN] = hidden(controller, available)
     leads = preview_leads(controller)
-    time, values = np.zeros(0), np.zeros((0, 0))
+    time, values, motion = np.zeros(0), np.zeros((0, 0)), None
     if leads:
-        time, values, _ = foreseen(scene, leads, preview, duration)
-    return Reader(sensors, new_past(sensors.chain), time, values, np.zeros(N_MEASUREMENTS + len(leads)))
+        time, values, motion = foreseen(scene, leads, preview, duration)
+    moving = no_motion() if motion is None else nacelle_motion(motion, control_dt)
+    reading = np.zeros(N_MEASUREMENTS + len(leads))
+    return Reader(sensors, new_past(sensors.chain), time, values, moving, reading)
+
+
+def nacelle_motion(motion: Motion, control_dt: float) -> NacelleMotion:
+    """The Motion of a preview at the control instants, between which the velocity is linear."""
+    step = motion.corner * control_dt
+    weight = np.array([0.0, 0.0, 1.0])
+    if isfinite(step):
+        decay = exp(-step)
+        new = 1.0 - (1.0 - decay) / step  # exact for a ramp from one instant to the next
+        weight = np.array([decay, 1.0 - decay - new, new])
+    offsets, delays = (np.asarray(lag, dtype=float) / control_dt for lag in (motion.offset, motion.delay))
+    size = int(max(offsets.max(), 0.0)) + int(max(delays.max(), 0.0)) + 3
+    taps = np.zeros((len(delays), size))
+    for j, delay in enumerate(delays):
+        for offset, share in zip(offsets, motion.weight, strict=True):
+            for late, part in _linear(delay):
+                for later, piece in _linear(offset):
+                    taps[j, late + later] += share * part * piece
+    return NacelleMotion(taps, weight, np.zeros(size + 1))
+
+
+def _linear(lag):
+    """((instants ago, weight), ...) of a lag in control periods, linear between two of them; not ahead."""
+    whole = int(max(lag, 0.0))
+    part = max(lag, 0.0) - whole
+    return (whole, 1.0 - part), (whole + 1, part)
 
 
 class _Loop:

@@ -33,7 +33,8 @@ CHANNELS = {  # channel: (mean, amplitude)
 
 def build_scene(platform="oc3_hywind", wind=None, **options):
     """What an evaluation asks of a scene: its turbine and whether there is wind."""
-    return SimpleNamespace(turbine=read_turbine(read_platform(platform).turbine), wind_speed=wind, **options)
+    speed = wind["speed"] if isinstance(wind, dict) else wind
+    return SimpleNamespace(turbine=read_turbine(read_platform(platform).turbine), wind_speed=speed, **options)
 
 
 def simulate(scene, controller=None, duration=10.0, initial=None, **options):
@@ -53,6 +54,7 @@ def simulate(scene, controller=None, duration=10.0, initial=None, **options):
             raise
     frame = pd.DataFrame({"Time_[s]": times, **series})
     frame.attrs["events"] = {"BEM_FALLBACK": 0, "MOORING_UNCONVERGED": 3} if scene.seed == 2 else {}
+    frame.attrs["tripped"] = None
     if scene.seed == 2:  # as simulate does, for the line that called it
         warnings.warn("MOORING_UNCONVERGED 3", fowt_env.PlantWarning, stacklevel=2)
     return frame

@@ -23,7 +23,8 @@ from fowt_env.descriptions.sensors import Sensor, SensorChain, built_in_chains
 from fowt_env.errors import ControllerError, InputError, SimulationStopped
 from fowt_env.plant.compile.decorators import control_kernel
 from fowt_env.plant.measurement import N_MEASUREMENTS, SENSOR_FIELDS, Measure, Measurement
-from fowt_env.weather.preview import Preview, exact_preview, rotor_wind_series
+from fowt_env.weather.lidar import lidar_preview
+from fowt_env.weather.preview import Motion, Preview, add_motion, exact_preview, rotor_wind_series
 from fowt_env.weather.sensor_noise import draw_noise
 
 GUST = {"kind": "steps", "speeds": [17.0, 19.0, 16.0], "every": 10.0, "ramp": 4.0}
@@ -277,11 +278,42 @@ def test_a_preview_of_ones_own_or_a_function_of_the_scene_takes_the_place_of_the
     assert np.array_equal(same[0].seen(), same[1].seen(), equal_nan=True)
 
 
+def moving(corner):
+    """A Preview of 15 m/s at two leads that the nacelle's motion gets into."""
+    motion = Motion(corner, np.array([0.0, 0.37, 1.0]), np.array([0.5, 0.3, 0.2]), np.array([2.45, 0.0]))
+    return Preview(np.array([0.0, 60.0]), np.full((2, 2), 15.0), motion)
+
+
+@pytest.mark.parametrize("corner", [0.8, np.inf])
+def test_the_nacelle_s_own_motion_gets_into_the_preview_of_a_lidar_on_it(gust_scene, corner):
+    law = Recorder(("nacelle_velocity", "wind_preview"), (1.0, 4.0), calls=400)
+    plain = Watcher(law.information, law.preview_times)
+    for controller in (law, plain):
+        run(gust_scene, controller, preview=moving(corner), duration=40.0)
+    seen = law.seen()[:, :-2]
+    wanted = add_motion(moving(corner), seen[:, 0], seen[:, Measure.NACELLE_VELOCITY])
+    np.testing.assert_allclose(seen[:, N_MEASUREMENTS:].T, wanted, rtol=0.0, atol=1e-12)
+    assert np.ptp(wanted) > 0.1
+    assert np.array_equal(np.array(plain.rows), seen, equal_nan=True)
+
+
+def test_a_lidar_s_preview_is_given_with_its_motion(gust_scene):
+    scene = fowt_env.build_scene(
+        "oc3_hywind", wind={"kind": "ntm", "speed": 16.0, "class": "B"}, seed=1001, duration=60.0,
+        fidelity="standard",
+    )  # fmt: skip
+    law = Recorder(("nacelle_velocity", "wind_preview"), (2.0,), calls=300)
+    run(scene, law, preview=lidar_preview, duration=30.0)
+    seen = law.seen()
+    wanted = add_motion(lidar_preview(scene, (2.0,)), seen[:, 0], seen[:, Measure.NACELLE_VELOCITY])
+    np.testing.assert_allclose(seen[:, N_MEASUREMENTS], wanted[0], rtol=0.0, atol=1e-9)
+
+
 @pytest.mark.parametrize(
     "preview, message",
     [
         ("lidar", "unknown preview 'lidar'"),
-        (7, "preview = 7: must be 'exact', a Preview"),
+        (7, "preview = 7: must be 'exact', the name of a lidar"),
         (Preview(np.zeros(2), np.zeros((1, 2))), "time must increase"),
         (Preview(np.arange(2.0), np.zeros((2, 2))), r"must be \(n,\) and \(1, n\)"),
         (Preview(np.arange(2.0), np.full((1, 2), np.nan)), "must be finite"),

@@ -21,7 +21,7 @@ from fowt_env.controllers.lqr.law import LQR, WindEstimator
 from fowt_env.controllers.mpc.model import COMMAND, INTEGRAL, SPEED, TORQUE, WindModel, cost_rows, wind_model
 from fowt_env.controllers.mpc.plan import FILTER, grid_of, newton_step, shifted, work_of
 from fowt_env.controllers.mpc.rotor_table import rotor_table
-from fowt_env.controllers.mpc.settings import MPCSettings
+from fowt_env.controllers.mpc.settings import PREVIEW, MPCSettings
 from fowt_env.controllers.mpc.solver import Program, load
 from fowt_env.descriptions.units import DEGREE
 from fowt_env.errors import InputError
@@ -314,4 +314,4 @@ def mpc(turbine, control_dt):
 
 def mpc_preview(turbine, control_dt):
     """mpc that is shown the rotor-averaged wind of the coming seconds."""
-    return MPC(turbine, control_dt, name="mpc_preview", preview=True)
+    return MPC(turbine, control_dt, PREVIEW, "mpc_preview", preview=True)

@@ -93,7 +93,8 @@ def wind_model(model, feedback, settings, turbine, table, period):
     ad, bd = sampled(a, b, period)
     _, gd = sampled(a, g, period)
     trim = np.array([*model.trim, model.torque / law.rated_torque, model.pitch])
-    return WindModel(trim, loads, motion, ad, bd, gd, k, p, weights)
+    parts = (trim, loads, motion, ad, bd, gd, k, p, weights)
+    return WindModel(*(np.ascontiguousarray(part) for part in parts))
 
 
 def _plant(model, turbine):

@@ -60,3 +60,6 @@ class MPCSettings:
             if key not in asdict(self):
                 raise unknown("mpc setting", key, asdict(self))
         return replace(self, **changes)
+
+
+PREVIEW = MPCSettings(power=0.1, torque=0.1)  # with the wind ahead torque has less to make up for

@@ -493,7 +493,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     @staticmethod
     def _foresee(scene, leads):
         """(time (k,), wind (leads, k)) of a scene as a controller of these leads (s) is given it."""
-        return exact_preview(scene, leads) if leads else (np.zeros(0), np.zeros((0, 0)))
+        return exact_preview(scene, leads)[:2] if leads else (np.zeros(0), np.zeros((0, 0)))
 
     def measurement(self, preview_times: Sequence[float] = ()) -> Measurement:
         """Measurement of all fields now (SI), as the sensors read them.

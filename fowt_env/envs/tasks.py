@@ -305,7 +305,6 @@ TASKS = {
         ),
         Task(name="steady", wind={"kind": "steady", "speed": (4.0, 25.0)}, sea=None),
         Task(name="above_rated_mixture", wind=_mixture(12.0, 24.0), setpoint=(0.85, 1.15)),
-        Task(name="near_rated_mixture", wind=_mixture(11.5, 17.0), setpoint=(0.85, 1.15)),
     )
 }
 

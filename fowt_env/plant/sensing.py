@@ -31,6 +31,19 @@ class Sensors(NamedTuple):
     noise: np.ndarray  # (readings, N_MEASUREMENTS), SI; the last row goes on; no row: exact sensors
 
 
+class NacelleMotion(NamedTuple):
+    """What the nacelle's fore-aft velocity adds to the wind ahead of a lidar on it, at the control period.
+
+    taps of no column: nothing. weight (3,): y = weight[0] y before + weight[1] velocity before + weight[2]
+    velocity is a low pass of the velocity between two control instants; the preview j is changed by
+    -sum(taps[j, m] y) of m control periods ago.
+    """
+
+    taps: np.ndarray  # (leads, m)
+    weight: np.ndarray
+    past: np.ndarray  # (m + 1,) ring of y, then the last velocity
+
+
 @by_reference
 class Reader(NamedTuple):
     """Sensors of a run with their memory, and the wind ahead."""
@@ -39,6 +52,7 @@ class Reader(NamedTuple):
     past: np.ndarray  # see new_past
     preview_time: np.ndarray  # (k,) s, increasing
     preview: np.ndarray  # (leads, k) rotor-averaged wind read at these times, m/s
+    motion: NacelleMotion
     reading: np.ndarray  # (N_MEASUREMENTS + leads,) of the present control instant
 
 
@@ -59,7 +73,14 @@ def open_reader() -> Reader:
     """Reader of everything that is measured, as it is, and of no wind ahead."""
     chain = open_chain()
     sensors = Sensors(chain, np.zeros((0, N_MEASUREMENTS)))
-    return Reader(sensors, new_past(chain), np.zeros(0), np.zeros((0, 0)), np.zeros(N_MEASUREMENTS))
+    return Reader(
+        sensors, new_past(chain), np.zeros(0), np.zeros((0, 0)), no_motion(), np.zeros(N_MEASUREMENTS)
+    )
+
+
+def no_motion() -> NacelleMotion:
+    """NacelleMotion of a preview that it does not get into."""
+    return NacelleMotion(np.zeros((0, 0)), np.zeros(3), np.zeros(1))
 
 
 @kernel
@@ -132,7 +153,32 @@ def read_preview(t, time, preview, reading):
 
 
 @kernel
+def add_motion(motion, period, velocity, reading):
+    """Change the wind ahead in a reading by the nacelle's velocity (m/s), up to this control period.
+
+    Before period 0 it is what it is then.
+    """
+    size = motion.taps.shape[1]
+    if size == 0:
+        return
+    past, weight = motion.past, motion.weight
+    if period == 0:
+        for m in range(size):
+            past[m] = velocity
+    else:
+        before = past[(period - 1) % size]
+        past[period % size] = weight[0] * before + weight[1] * past[size] + weight[2] * velocity
+    past[size] = velocity
+    for j in range(motion.taps.shape[0]):
+        total = 0.0
+        for m in range(size):
+            total += motion.taps[j, m] * past[(period - m) % size]
+        reading[N_MEASUREMENTS + j] -= total
+
+
+@kernel
 def read(reader, period, t, measurement):
     """Fill the reader's reading of a control period, which begins at time t (s)."""
     take_reading(reader.sensors, period, measurement, reader.past, reader.reading)
     read_preview(t, reader.preview_time, reader.preview, reader.reading)
+    add_motion(reader.motion, period, measurement[Measure.NACELLE_VELOCITY], reader.reading)

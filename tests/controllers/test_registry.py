@@ -25,6 +25,7 @@ RATED = QUIET._replace(
 
 
 ROSCO = {"rosco", "rosco_float"}  # not part of the package: tests of them are skipped without the library
+OSQP = {"mpc", "mpc_preview"}  # the same
 
 
 class Steady:
@@ -64,6 +65,8 @@ def prepared(name, scene):
     """A controller by name, told of a scene."""
     if name in ROSCO:
         pytest.importorskip("rosco", reason="needs the ROSCO library: pip install --no-deps rosco")
+    if name in OSQP:
+        pytest.importorskip("osqp", reason='OSQP is not installed: pip install "fowt-env[mpc]"')
     controller = make(name, turbine(), 0.1)
     controller.prepare(scene)
     return controller

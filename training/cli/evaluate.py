@@ -64,6 +64,9 @@ def evaluate_command(
     skip: Annotated[
         float | None, typer.Option(help="Seconds at the start not scored. Default: the suite's, else 60.")
     ] = None,
+    preview: Annotated[
+        str, typer.Option(help="Wind ahead: exact, or seen by four_beam_pulsed or circular_cw.")
+    ] = "exact",
     sensors: Annotated[
         str | None, typer.Option(help="exact, or the name of a sensor chain. Default: each case's own.")
     ] = None,
@@ -112,6 +115,7 @@ def evaluate_command(
                 address=address,
                 time_limit=time_limit or None,
                 sensors=sensors,
+                **({} if preview == "exact" else {"preview": preview}),
             )
         except KeyboardInterrupt:
             place = f"in {folder / 'results.csv'}; the same command continues with the others"

@@ -45,6 +45,7 @@ OMEGA = np.concatenate(
         np.geomspace(6.0, 100.0, 60),
     ]
 )
+LEAST_LAG = 0.05  # s, of a pitch drive that has none
 ROUNDS, SETTLED = 40, 1e-4  # of the drag and the motion under gspi_oc3
 START = np.diag([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])  # m2/s2: in surge, from which that begins
 
@@ -153,6 +154,10 @@ class BoundPlant:
             model.D[sensors, :2] * units,
             model.D[sensors, 2],
         )
+        if self.turbine.pitch_drive.time_constant == 0.0:
+            # a drive that follows at once is no state of the plant: one that follows nearly so
+            self.A[BLADE], self.B[BLADE], self.wind[BLADE] = 0.0, 0.0, 0.0
+            self.A[BLADE, BLADE], self.B[BLADE, 1] = -1.0 / LEAST_LAG, 1.0 / LEAST_LAG
         self.E, self.F = model.E[np.ix_(rows, IN_PLANE)], model.F[np.ix_(sensors, IN_PLANE)]
 
     def baseline(self):

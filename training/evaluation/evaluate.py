@@ -89,7 +89,7 @@ def evaluate(
     time_limit    seconds of wall clock after which a run fails; None: none. With jobs = 1 it is heard in the
                   main thread alone, and not by C code that never returns; with more, the worker is ended
     sensors       name of the sensor chain of all cases, "exact" for none; None: each case's own
-    options       further options of simulate: dt, control_dt, output_dt, start
+    options       further options of simulate: dt, control_dt, output_dt, start, preview
     A run that the protection ended (the case's trip) has status "tripped", the reason, and metrics of what it
     was. Failed runs have status "failed", the reason, and NaN metrics; so have those of a controller that
     cannot be prepared, as where its library is missing, that calls sys.exit, or whose worker process dies

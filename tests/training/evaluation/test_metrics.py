@@ -130,6 +130,41 @@ def test_wrong_input_is_named():
             metrics(synthetic_run(), skip=skip)
 
 
+def test_power_beyond_rated_is_no_energy_and_a_lull_is_not_made_up_for():
+    swing = synthetic_run(**{"GenPwr_[kW]": lambda t: 5000.0 + 1000.0 * np.where(t % 2.0 < 0.95, 1.0, -1.0)})
+    result = metrics(swing)
+    share = np.mean(swing["GenPwr_[kW]"] > 5000.0)
+    assert result["GenPwr_mean_[kW]"] == pytest.approx(4000.0 + 2000.0 * share)
+    assert result["GenPwr_capped_mean_[kW]"] == pytest.approx(4000.0 + 1000.0 * share)
+    assert result["energy_[kWh]"] == pytest.approx(
+        result["GenPwr_capped_mean_[kW]"] * 100.0 / 3600.0, rel=1e-2
+    )
+    assert metrics(swing, rated_power_kW=7000.0)["GenPwr_capped_mean_[kW]"] == result["GenPwr_mean_[kW]"]
+    turbine = read_turbine("nrel5mw")  # 5.29661 MW of the shaft make 5 MW
+    above = turbine_metrics(synthetic_run(**{"GenPwr_[kW]": 9000.0}), turbine)
+    assert above["GenPwr_capped_mean_[kW]"] == pytest.approx(5000.0, rel=1e-6)
+
+
+def test_offset_and_oscillation_are_those_of_the_end_of_a_steady_run_alone():
+    columns = {
+        "RotSpeed_[rpm]": lambda t: np.where(t < 300.0, 20.0, 0.98 * 12.1),
+        "BldPitch1_[deg]": lambda t: 10.0 + np.where(t < 500.0, 3.0, 0.1) * np.sin(2.0 * np.pi * t / 40.0),
+    }
+    run = synthetic_run(duration=600.0, **columns)
+    result = metrics(run, steady=True)
+    assert result["RotSpeed_offset_[%]"] == pytest.approx(2.0, rel=1e-2)  # either way counts
+    assert result["BldPitch_oscillation_[deg]"] == pytest.approx(0.2, rel=1e-2)
+    assert np.isnan(metrics(run)["RotSpeed_offset_[%]"]) and np.isnan(result["settling_time_[s]"])
+
+
+def test_a_gust_is_over_where_the_rotor_stays_within_5_percent_of_where_it_ends():
+    speed = {"RotSpeed_[rpm]": lambda t: 12.1 + 2.42 * np.exp(-(t - 200.0) / 50.0) * (t >= 200.0)}
+    run = synthetic_run(duration=600.0, **speed)
+    expected = 50.0 * np.log(2.42 / 0.605)  # the end is at 12.1 within 0.01 rpm
+    assert metrics(run, skip=150.0, gust_start=200.0)["settling_time_[s]"] == pytest.approx(expected, abs=1.0)
+    assert metrics(synthetic_run(duration=300.0), gust_start=200.0)["settling_time_[s]"] == 0.0
+
+
 # ------------------------------------------------------------------ fatigue and constraints
 
 

@@ -114,6 +114,7 @@ def test_other_settings_and_versions_are_refused_with_what_to_do(tmp_path, monke
     for arguments, message in (
         ({"cases": suite(version=2)}, "'mine' version 1"),
         ({"cases": [CALM], **SHORT}, "suite"),
+        ({"cases": suite(), "sensors": "standard"}, "sensors = exact, now standard"),
         ({"cases": suite(wind=17.0)}, "wind = 16.0, now 17.0"),
         ({"cases": suite(), "duration": 30.0}, "duration = 20.0, now 30.0"),
         ({"cases": suite(), "control_dt": 0.2}, "options"),
