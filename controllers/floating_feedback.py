@@ -44,8 +44,8 @@ SIGNALS = {"nacelle_velocity": Measure.NACELLE_VELOCITY, "platform_pitch_rate": 
 class FeedbackSettings:
     """What is fed back and how. Raises: InputError naming the key, value and allowed range.
 
-    The controller of that name takes the best of the grid of training/design/tune_feedback.py on its training
-    cases; controllers/tuned.toml has them with their figures.
+    The controller of that name takes what `fowt design tune` found; controllers/tuned.toml has it with its
+    figures.
     """
 
     signal: str = "nacelle_velocity"

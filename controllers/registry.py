@@ -4,7 +4,7 @@ from fowt_env.controllers.constant import constant
 from fowt_env.controllers.floating_feedback import floating_feedback
 from fowt_env.controllers.gspi import gspi_land, gspi_oc3
 from fowt_env.controllers.lqr.law import lqr
-from fowt_env.controllers.mpc.law import mpc, mpc_preview
+from fowt_env.controllers.mpc.law import lq_preview, mpc, mpc_lidar, mpc_preview
 from fowt_env.controllers.openfast_baseline import openfast_oc3
 from fowt_env.controllers.pi import pi, pi_land, pi_land_power, pi_tuned, pi_unscheduled
 from fowt_env.controllers.preview import preview
@@ -17,8 +17,10 @@ CONTROLLERS = {  # name -> factory(turbine: descriptions.turbine.Turbine, contro
     "floating_feedback": floating_feedback,
     "gspi_land": gspi_land,
     "gspi_oc3": gspi_oc3,
+    "lq_preview": lq_preview,
     "lqr": lqr,
     "mpc": mpc,
+    "mpc_lidar": mpc_lidar,
     "mpc_preview": mpc_preview,
     "openfast_oc3": openfast_oc3,
     "pi": pi,

@@ -101,6 +101,7 @@ def move(estimated, p, memory, curve, command):
     command[0] = rate_limit(command[0], torque, dt * p[Entry.TORQUE_RATE_LIMIT])
 
 
+LIDAR_HORIZON = 3.0  # s: what four beams 160 m ahead of the rotor leave at 24 m/s
 _MODELS = Cache(
     16
 )  # all that they are made of -> (design models, table, (first wind, WindModel of all winds))
@@ -315,3 +316,13 @@ def mpc(turbine, control_dt):
 def mpc_preview(turbine, control_dt):
     """mpc that is shown the rotor-averaged wind of the coming seconds."""
     return MPC(turbine, control_dt, PREVIEW, "mpc_preview", preview=True)
+
+
+def mpc_lidar(turbine, control_dt):
+    """mpc_preview with a look-ahead of 3 s, which lidars on the nacelle give up to cut-out wind."""
+    return MPC(turbine, control_dt, PREVIEW.changed(preview_time=LIDAR_HORIZON), "mpc_lidar", preview=True)
+
+
+def lq_preview(turbine, control_dt):
+    """Linear-quadratic preview: mpc_preview with linear loads and no limits in its plan."""
+    return MPC(turbine, control_dt, PREVIEW, "lq_preview", preview=True, nonlinear=False, constrained=False)

@@ -25,7 +25,7 @@ RATED = QUIET._replace(
 
 
 ROSCO = {"rosco", "rosco_float"}  # not part of the package: tests of them are skipped without the library
-OSQP = {"mpc", "mpc_preview"}  # the same
+OSQP = {"lq_preview", "mpc", "mpc_lidar", "mpc_preview"}  # the same
 
 
 class Steady:

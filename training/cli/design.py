@@ -48,6 +48,15 @@ BOUND_EXAMPLES = """[bold]Examples[/bold]
 Deviations are shown over those of gspi_oc3 on the same model, at no more pitch travel and power deviation.
 Information: full (plant, wind and waves), measured (five sensors with their noise) or speed (rotor speed and
 blade pitch); with _preview_T where the wind is known T s ahead, with _pitch_only without torque."""
+TUNE_EXAMPLES = """[bold]Examples[/bold]
+
+[cyan]fowt design tune pi_tuned[/cyan]  three factors on the published gains, 40 settings tried
+
+[cyan]fowt design tune rosco_float --jobs 2 --keep[/cyan]  and put what it finds into controllers/tuned.toml
+
+Cost: mean of rotor-speed and platform-pitch deviation over gspi_oc3's, over the lifetime, and penalties
+beyond the limits of the suite, for energy below 99.5 % and for failed or tripped runs. Written:
+OUT/tune_NAME.csv, a row per setting as soon as it has run."""
 FRONT_EXAMPLES = """[bold]Example[/bold]
 
 [cyan]fowt design front --runs sweep.csv --bound bound.csv --plot front.png[/cyan]  lqr beside the limit"""
@@ -303,3 +312,41 @@ def lqr(
     show(means, f"means over seeds {json.dumps(numbers)}")
     if out_path is not None:
         note(f"wrote {out_path}")
+
+
+@design.command(name="tune", epilog=TUNE_EXAMPLES)
+@reported
+def tune_command(
+    name: Annotated[
+        str, typer.Argument(help="pi_tuned, floating_feedback, rosco_float, lqr, mpc, mpc_preview, ...")
+    ],
+    budget: Annotated[int, typer.Option(help="Settings that are tried.")] = 40,
+    suite: Annotated[str, typer.Option(help="Suite whose cases are run.")] = "above_rated",
+    seeds: Annotated[str, typer.Option(help="Validation seeds, 1000 or more.")] = "1001,1002",
+    preview: Annotated[str, typer.Option(help="Wind ahead: exact, or a lidar by its name.")] = "exact",
+    jobs: Annotated[int, typer.Option(help="Worker processes.")] = 1,
+    engine: Annotated[str, typer.Option(help="Where the runs go: processes or ray.")] = "processes",
+    address: Annotated[str | None, typer.Option(help="Of a Ray cluster that is running.")] = None,
+    keep: Annotated[
+        bool, typer.Option("--keep", help="Write what is found to controllers/tuned.toml.")
+    ] = False,
+    out_folder: Annotated[str, typer.Option("--out", help="Folder of the table.")] = "results/tune",
+):
+    """Search the settings of a baseline: one objective, one set of seeds and limits for all of them."""
+    from fowt_env.training.design.tune import tune, write_tuned
+    from fowt_env.training.evaluation.engines import session
+
+    numbers = tuple(int(seed) for seed in parse_whole_numbers(seeds, "seeds"))
+    asked = {"suite": suite, "seeds": numbers, "jobs": jobs, "engine": engine, "address": address}
+    asked |= {} if preview == "exact" else {"preview": preview}
+    with progress_bar(f"tuning {name}", budget) as update, session(engine, jobs, address):
+
+        def report(number, row):
+            update(number, f"tuning {name}, cost {row['cost']:.3f}", budget)
+
+        settings, figures, table = tune(name, budget, out_folder, report, **asked)
+    show(table.nsmallest(10, "cost"), f"{name}: the best of {len(table)}")
+    if keep:
+        write_tuned(name, settings, figures, budget, asked)
+        note("wrote controllers/tuned.toml")
+    note(f"wrote tune_{name}.csv in {out_folder}")

@@ -4,7 +4,7 @@
 
 From the published law towards ROSCO: its periods, the place of the gain schedule, the pitch that sets it.
 From ROSCO towards the published law: the set-point smoother, the torque law, and gains that undo the place of
-the schedule. The training cases of training/design/tune_feedback.py; docs/controllers.md has the outcome.
+the schedule. Cases of normal turbulence at WINDS on validation seeds; docs/controllers.md has the outcome.
 """
 
 import argparse
@@ -24,9 +24,15 @@ from fowt_env.controllers.pi import (
     write_commands,
 )
 from fowt_env.controllers.rosco import SCHEDULE, Rosco, RoscoSettings, pitch_gains
+from fowt_env.descriptions.sea_state import joint_sea_state
 from fowt_env.descriptions.turbine import read_turbine
-from fowt_env.training.design.tune_feedback import BASELINE, CONTROL_DT, SEEDS, WINDS, training_case
+from fowt_env.training.design.tune import BASELINE, SEEDS
+from fowt_env.training.evaluation.cases import Case
 from fowt_env.training.evaluation.evaluate import evaluate, mean_ratios
+from fowt_env.training.evaluation.run_case import CONTROL_DT
+
+WINDS = (13.0, 17.0, 21.0)  # m/s
+SITE = "gulf_of_maine_normal"
 
 SHOWN = {
     "rotor speed std": "RotSpeed_std_[rpm]",
@@ -108,6 +114,12 @@ def variants(turbine):
     }
 
 
+def case_at(wind):
+    """Case of normal operation at a wind, m/s."""
+    turbulent = {"kind": "ntm", "speed": wind, "class": "B"}
+    return Case(f"ntm_{wind:g}", turbulent, joint_sea_state(SITE, wind))
+
+
 def differences(winds=WINDS, seeds=SEEDS, duration=660.0, names=None, jobs=1):
     """DataFrame of the variants: SHOWN over those of gspi_oc3, means over the cases.
 
@@ -116,7 +128,7 @@ def differences(winds=WINDS, seeds=SEEDS, duration=660.0, names=None, jobs=1):
     laws = variants(read_turbine("nrel5mw"))
     if names is not None:
         laws = {name: laws[name] for name in (BASELINE, *names)}
-    cases = [training_case(wind) for wind in winds]
+    cases = [case_at(wind) for wind in winds]
     table = evaluate(laws, cases, duration=duration, seeds=seeds, jobs=jobs, control_dt=CONTROL_DT)
     return mean_ratios(table, BASELINE, SHOWN.values()).set_axis(list(SHOWN), axis=1)
 

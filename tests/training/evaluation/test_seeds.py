@@ -13,7 +13,7 @@ from fowt_env.controllers.policy.controller import AGENTS
 from fowt_env.envs import FowtEnv
 from fowt_env.envs.tasks import LARGEST_SEED, TASKS
 from fowt_env.errors import InputError
-from fowt_env.training.design import sweeps, tune_feedback, tune_pi
+from fowt_env.training.design import sweeps, tune
 from fowt_env.training.evaluation.cases import FOLDER, read_suite, suite_names
 from fowt_env.training.evaluation.seeds import PURPOSES, TEST, TRAINING, VALIDATION, ranges, seeds_for
 from fowt_env.training.rl.train import ALGORITHMS, environment_settings, resolve, validation_episodes
@@ -42,11 +42,11 @@ def test_every_seed_that_a_shipped_suite_names_is_for_test(name):
 
 def test_gains_are_tuned_on_validation_seeds_alone():
     assert len(suite_names()) == len(list(FOLDER.glob("*.toml"))) > 5
-    assert tune_feedback.SEEDS and set(tune_feedback.SEEDS) <= set(VALIDATION)
+    assert tune.SEEDS and set(tune.SEEDS) <= set(VALIDATION)
     assert VALIDATION.start == TEST.stop
     for search in (
         lambda seed: sweeps.sweep([{}], "steady_16", [seed]),
-        lambda s: tune_pi.search([s]),
+        lambda seed: tune.Objective(seeds=[seed]),
     ):
         with pytest.raises(InputError, match="seeds"):
             search(TEST.stop - 1)
