@@ -116,14 +116,18 @@ class SampledLoop:
         drive = self.turbine.drivetrain
         return drive.gear_ratio * drive.generator_inertia / self.model.torque
 
-    def gain(self, weights, integral, rates):
+    def gain(self, weights, integral, torque_rate):
         """(2, N_FEEDBACK) gain K of least cost: inputs are -K x.
 
-        weights: {field of Deviations: weight of its square}; integral: of the squared speed integral; rates:
-        (2,) of the squared inputs. Raises: LinAlgError where there is none.
+        weights: {field of Deviations: weight of its square}; integral, torque_rate: of the squared speed
+        integral and torque input. Travel is paid for at the command: a price on the blades' own rate would
+        make the command jump ahead of them. Raises: LinAlgError where there is no gain.
         """
-        q, s, r = np.zeros_like(self.a), np.zeros_like(self.b), np.diag(rates)
+        q, s = np.zeros_like(self.a), np.zeros_like(self.b)
+        r = np.diag([torque_rate, GAUSSIAN_MEAN**2 * weights["travel"]])
         for name, weight in weights.items():
+            if name == "travel":
+                continue
             on_state, on_input = self.rows[name]
             q += weight * np.outer(on_state, on_state)
             s += weight * np.outer(on_state, on_input)
@@ -237,12 +241,11 @@ def optimal_gain(loop, settings, start=None):
     share = settings.share_at(wind)
     aims = {"speed": (1.0 - share) / baseline.speed**2, "lean": share / baseline.lean**2}
     integral = settings.speed_integral / (0.5 * rated) ** 2
-    rates = (settings.torque_rate / 0.05**2, settings.pitch_rate / (0.2 * DEGREE) ** 2)
     multipliers = np.zeros(len(LIMITED)) if start is None else start
     steps, before = np.full(len(LIMITED), STEP), np.zeros(len(LIMITED))
     for _ in range(ROUNDS):
         prices = dict(zip(LIMITED, np.exp(multipliers) / wanted**2, strict=True))
-        gain = loop.gain(aims | prices, integral, rates)
+        gain = loop.gain(aims | prices, integral, settings.torque_rate / 0.05**2)
         reached = loop.deviations(gain)
         excess = np.log(np.array([getattr(reached, name) for name in LIMITED]) / wanted)
         slack = (excess < 0.0) & (multipliers <= LOWEST)

@@ -193,6 +193,9 @@ def bound(
     power: Annotated[float, typer.Option(help="Limit of power deviation over gspi_oc3's; or inf.")] = 1.0,
     torque_std: Annotated[float, typer.Option(help="Limit of the torque's deviation, %; or inf.")] = 5.0,
     previews: Annotated[str, typer.Option(help="Seconds for which the wind is known ahead.")] = "3,11",
+    sensors: Annotated[
+        str, typer.Option(help="Chain of sensors, whose noise the feedback has.")
+    ] = "standard",
     sea: Annotated[
         str | None, typer.Option(help="Sea of every wind, as fowt simulate takes it; default: the suites'.")
     ] = None,
@@ -205,6 +208,7 @@ def bound(
     from fowt_env.descriptions.sea_state import sea_state_of
     from fowt_env.files.tables import table_path, write_table
     from fowt_env.training.cli.arguments import parse_sea
+    from fowt_env.training.design.bound_control import noise_of
     from fowt_env.training.design.linear_bound import INFORMATION, PLOTTED, bound_table, rounded
 
     if out_path is not None:
@@ -220,6 +224,7 @@ def bound(
             power=power,
             torque_std=0.01 * torque_std,
             previews=parse_numbers(previews, "previews"),
+            noise=noise_of(sensors),
             sea=None if sea is None else sea_state_of(parse_sea(sea)),
             progress=lambda done, n: update(done, total=n),
         )

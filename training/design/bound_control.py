@@ -19,7 +19,8 @@ from math import pi, sqrt
 import numpy as np
 from scipy.linalg import expm, solve_continuous_are, solve_sylvester
 
-from fowt_env.controllers.lqr.design import SENSOR_NOISE, SENSORS
+from fowt_env.controllers.lqr.design import SENSORS
+from fowt_env.descriptions.sensors import sensor_chain
 from fowt_env.descriptions.units import DEGREE
 from fowt_env.errors import InputError
 from fowt_env.training.design.bound_plant import BLADE, LEAN, OMEGA, SPEED, N
@@ -80,7 +81,7 @@ class Estimates:
 class Problem:
     """A BoundPlant with what a controller knows: the best gains for a cost, and the deviations under them.
 
-    noise: {sensor: standard deviation of a sample every SAMPLE_TIME, SI}; None: SENSOR_NOISE.
+    noise: {sensor: standard deviation of a sample every SAMPLE_TIME, SI}; None: noise_of().
     Raises: InputError for sensors without a positive noise.
     """
 
@@ -116,7 +117,7 @@ class Problem:
         """(k,) intensity of the noise of the sensors in use, per rad/s and both sides."""
         if self.information.sensors is None:
             return np.zeros(0)
-        noise = dict(zip(SENSORS, SENSOR_NOISE, strict=True)) if noise is None else dict(noise)
+        noise = noise_of() if noise is None else dict(noise)
         for name in self.information.sensors:
             if not noise.get(name, 0.0) > 0.0:
                 raise InputError(f"noise: {name} = {noise.get(name)}: must be a standard deviation above 0")
@@ -254,6 +255,23 @@ class Problem:
         gain = np.zeros((n, len(used)))
         gain[kept] = p @ read.T @ np.linalg.inv(r)
         return gain, c
+
+
+def noise_of(chain="standard"):
+    """{sensor: standard deviation of a reading} of SENSORS through a sensor chain, its name or a SensorChain.
+
+    Noise and quantisation together; low pass and delay, small beside the plant's times, are left out.
+    Raises: InputError for an unknown name, and for a chain without one of SENSORS or that is exact.
+    """
+    found = sensor_chain(chain)
+    for name in SENSORS:
+        if found is None or name not in found.sensors:
+            raise InputError(
+                f"sensors = {chain!r}: must be a chain with noise on each of {', '.join(SENSORS)}"
+            )
+    return {
+        name: sqrt(found.sensors[name].noise ** 2 + found.sensors[name].step ** 2 / 12.0) for name in SENSORS
+    }
 
 
 def front(problem, limits, fractions):

@@ -101,7 +101,7 @@ def bound_table(
     travel       limit of the blade-pitch travel over that of gspi_oc3; power: the same of the power deviation
     torque_std   limit of the torque deviation, as a fraction of rated torque; inf for none, as for the others
     previews     s for which the wind is known ahead
-    noise        {sensor: standard deviation of a sample every 0.1 s, SI}; None: SENSOR_NOISE of lqr/design.py
+    noise        {sensor: standard deviation of a sample every 0.1 s, SI}; None: noise_of() the standard chain
     sea          of every wind; None: the joint sea states of the named suites
     fractions    of platform pitch in the sum that is made least
 

@@ -112,7 +112,7 @@ def test_a_wrong_entry_is_named_with_file_key_and_value(pi_file, turbine, change
 @pytest.mark.parametrize(
     ("edit", "message"),
     [
-        (lambda s: s["lqg"].update(pitch_rate=0.0), "pitch_rate = 0.0: must be finite and positive"),
+        (lambda s: s["lqg"].update(torque_rate=0.0), "torque_rate = 0.0: must be finite and positive"),
         (lambda s: s["lqg"].pop("power"), "settings.lqg.power is missing"),
         (lambda s: s["models"][1].update(wind=15.0), "models[1].wind = 15: must be 1 m/s above"),
         (lambda s: s["models"][0]["A"].pop(), "models[0].A: must be 11 x 11 finite numbers"),

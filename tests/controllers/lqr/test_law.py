@@ -29,10 +29,10 @@ def test_lqr_stays_at_the_steady_state(wind):
 
 
 def test_bad_settings_are_named(turbine):
-    with pytest.raises(InputError, match="pitch_rate = -1.0: must be finite and positive"):
-        LQGSettings(pitch_rate=-1.0)
-    with pytest.raises(InputError, match="pitch_rate"):
-        LQGSettings().changed(pich_rate=1.0)
+    with pytest.raises(InputError, match="torque_rate = -1.0: must be finite and positive"):
+        LQGSettings(torque_rate=-1.0)
+    with pytest.raises(InputError, match="torque_rate"):
+        LQGSettings().changed(torqe_rate=1.0)
     with pytest.raises(InputError, match="prepare"):
         LQR(turbine, 0.1).reset(None)
 

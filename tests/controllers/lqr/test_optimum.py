@@ -16,6 +16,7 @@ from fowt_env.controllers.lqr.design import (
     sampled,
 )
 from fowt_env.controllers.lqr.optimum import (
+    COMMAND,
     LIMITED,
     POWER_CEILING,
     TOLERANCE,
@@ -151,3 +152,10 @@ def test_below_the_lowest_wind_its_gains_hold(loops):
     np.testing.assert_array_equal(gains[0], gains[2])
     np.testing.assert_array_equal(gains[1], gains[2])
     assert np.abs(gains[3] - gains[2]).max() > 0.0
+
+
+def test_what_is_added_to_the_pitch_command_is_forgotten_slowly(loops):
+    """A residual on top of lqr acts through the command, and a gain on it would take it back at once."""
+    for loop in loops.values():
+        gain, _, _ = optimal_gain(loop, SETTINGS)
+        assert 0.0 < gain[1, COMMAND] < 0.5  # 1/s

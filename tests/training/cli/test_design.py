@@ -71,8 +71,8 @@ def test_bound_writes_and_front_reads_its_fronts(tmp_path):
 def test_a_sweep_of_settings_refuses_seeds_for_scoring_and_settings_that_there_are_not():
     _, stderr = fowt("design", "lqr", "--seeds", "1,2", code=2)
     assert "seeds = [1, 2]: tune on seeds of 1000 and above" in " ".join(stderr.split())
-    _, stderr = fowt("design", "lqr", "--vary", "pitch_rat=1,2", code=2)
-    assert "unknown setting of lqr 'pitch_rat'. Did you mean 'pitch_rate'" in " ".join(stderr.split())
+    _, stderr = fowt("design", "lqr", "--vary", "torque_rat=1,2", code=2)
+    assert "unknown setting of lqr 'torque_rat'. Did you mean 'torque_rate'" in " ".join(stderr.split())
 
 
 def test_a_sweep_of_settings_shows_and_writes_every_variant_beside_gspi(tmp_path):

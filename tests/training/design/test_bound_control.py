@@ -23,6 +23,7 @@ from fowt_env.training.design.bound_control import (
     Problem,
     baseline_deviations,
     front,
+    noise_of,
 )
 from fowt_env.training.design.bound_plant import BoundPlant, N
 
@@ -241,7 +242,7 @@ def test_more_knowledge_costs_less(plant):
 
 def test_more_noise_costs_more_and_none_is_full_knowledge(plant):
     q = Problem(plant, FULL).cost(*WEIGHTS)
-    noise = np.array([2e-3, 1e-3, 2e-4, 1e-4, 2e-2])
+    noise = np.array(list(noise_of().values()))
 
     def cost(factor):
         problem = Problem(plant, MEASURED, dict(zip(SENSORS, factor * noise, strict=True)))
@@ -252,6 +253,21 @@ def test_more_noise_costs_more_and_none_is_full_knowledge(plant):
     assert costs[0] == pytest.approx(total(plant, FULL, q), rel=0.05)
     with pytest.raises(InputError, match="noise: blade_pitch = 0.0: must be a standard deviation above 0"):
         Problem(plant, MEASURED, dict.fromkeys(SENSORS, 0.0) | {"rotor_speed": 1.0})
+
+
+def test_the_noise_is_that_of_the_readings_of_a_chain():
+    from fowt_env.descriptions.sensors import Sensor, SensorChain, sensor_chain
+
+    found, chain = noise_of(), sensor_chain("standard").sensors
+    assert list(found) == list(SENSORS)
+    for name in SENSORS:
+        assert chain[name].noise <= found[name] < 1.1 * chain[name].noise
+    coarse = SensorChain("coarse", {name: Sensor(noise=0.3, step=0.4 * np.sqrt(12.0)) for name in SENSORS})
+    assert list(noise_of(coarse).values()) == pytest.approx([0.5] * len(SENSORS))
+    with pytest.raises(
+        InputError, match="sensors = 'exact': must be a chain with noise on each of rotor_speed"
+    ):
+        noise_of("exact")
 
 
 def test_the_fronts_keep_the_limits_and_better_information_betters_them(plant, base):

@@ -41,7 +41,7 @@ def table(**controllers):
     """
     rows = []
     for case in HEADLINE.cases:
-        for seed in HEADLINE.seeds:
+        for seed in range(1, 7):
             gusty = 1.0 + 0.02 * case.wind["speed"] + 0.05 * seed
             for name, change in {"gspi_oc3": lambda wind, seed: {}, **controllers}.items():
                 row = {
