@@ -32,7 +32,7 @@ def main(arguments=None):
         sys.exit("stopped; a checkpoint is in " + given.out)
     baseline = validation_score(baseline_figures(settings, "pi_unscheduled"), run.reference)
     best = min(run.rows, key=lambda row: row["score"])
-    print("\nratios to gspi_oc3, means over the validation episodes; lower is better")
+    print("\nratios to lqr, means over the validation episodes; lower is better")
     print(f"{'':28}{'agent':>10}{'pi_unscheduled':>18}")
     for name in (*RATIOS, "score"):
         print(f"{name:28}{best[name]:10.3f}{baseline[name]:18.3f}")

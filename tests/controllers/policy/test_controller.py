@@ -229,3 +229,18 @@ def test_an_array_of_a_later_version_of_its_format_is_refused(tmp_path):
         file.writestr("more.npy", b"\x93NUMPY\x09\x00")
     with pytest.raises(InputError, match=r"array 'more.npy' has the version \(9, 0\)"):
         read_policy(path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", shipped_agents())
+@pytest.mark.parametrize("speed", [14.0, 20.0])
+def test_a_shipped_agent_comes_to_rest_in_steady_wind(name, speed):
+    """From half a degree of platform pitch beyond rest, as the suite settling has it."""
+    scene = fowt_env.build_scene("oc3_hywind", wind=speed, fidelity="standard")
+    rest = fowt_env.trim(scene)["PtfmPitch"]
+    run = fowt_env.simulate(
+        scene, controller=f"policy:{name}", duration=600.0, initial={"PtfmPitch": rest + 0.5}
+    )
+    late = run[run["Time_[s]"] >= 300.0]
+    assert late["RotSpeed_[rpm]"].to_numpy() == pytest.approx(12.1, rel=0.005)
+    assert np.ptp(run[run["Time_[s]"] >= 500.0]["BldPitch1_[deg]"].to_numpy()) < 0.05
