@@ -48,21 +48,22 @@ MOMENT_NOISE = 2e5  # N m per root second: random walk of what no other state ex
 class LQGSettings:
     """What the feedback of lqr aims at and may spend, see controllers/lqr/optimum.py.
 
-    The limits are on deviations of the linear loop; those near rated wind hold at LOWEST_DESIGN_WIND.
+    The limits are on deviations of the linear loop; those near rated wind hold at LOWEST_DESIGN_WIND. The
+    defaults are what `fowt design tune lqr` found.
     """
 
-    share: float = 0.55  # of platform pitch in the aim, at SHARE_WIND; the rest is rotor speed
-    share_growth: float = 0.0  # of the share, per m/s
-    travel: float = 0.96  # blade-pitch travel, over that of gspi_oc3
-    travel_cap: float = 0.132  # deg/s, of the same
-    travel_near_rated: float = 0.23  # deg/s
+    share: float = 0.577  # of platform pitch in the aim, at SHARE_WIND; the rest is rotor speed
+    share_growth: float = -0.00345  # of the share, per m/s
+    travel: float = 0.9843  # blade-pitch travel, over that of gspi_oc3
+    travel_cap: float = 0.1399  # deg/s, of the same
+    travel_near_rated: float = 0.2418  # deg/s
     power: float = 1.0  # deviation of power, over that of gspi_oc3
     torque: float = 0.08  # deviation of generator torque, of rated
-    shaft: float = 1.3  # deviation of shaft torque, over that of gspi_oc3
-    shaft_near_rated: float = 0.08  # of rated torque
+    shaft: float = 1.346  # deviation of shaft torque, over that of gspi_oc3
+    shaft_near_rated: float = 0.07849  # of rated torque
     speed_integral: float = 0.001  # cost of (speed integral / 5 % of rated times 10 s)^2
-    torque_rate: float = 0.1  # cost of (torque rate / 5 % of rated a second)^2
-    schedule_time: float = 150.0  # s, over which the operating wind follows the estimate
+    torque_rate: float = 0.0474  # cost of (torque rate / 5 % of rated a second)^2
+    schedule_time: float = 144.1  # s, over which the operating wind follows the estimate
 
     def __post_init__(self):
         for item in fields(self):
