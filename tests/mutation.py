@@ -172,7 +172,7 @@ class Samples:
         reader = read_turbine(read_platform("oc3_hywind").turbine)
         design = folder / "design.json"
         design.write_text(json.dumps({
-            "format": "fowt-design", "version": 1, "kind": "pi", "platform": "oc3_hywind", "command": "",
+            "format": "fowt-design", "version": 2, "kind": "pi", "platform": "oc3_hywind", "command": "",
             "turbine": reader.name, "settings": {"KP": 0.006, "KI": 0.0009, "gain_schedule_pitch": 0.11},
         }, indent=1))  # fmt: skip
         self.add("design", design, TEXT, lambda: load_design(design)(reader, 0.1))

@@ -22,23 +22,25 @@ RANGES = {  # of what is not simply 0 or more: (low, high, low left out)
 class MPCSettings:
     """Cost of each squared term in units of the scale in its comment, and what bounds the moves.
 
+    The weights of defaults are what `fowt design tune mpc` found.
+
     Raises: InputError naming the key, value and allowed range.
     """
 
     speed: float = 1.0  # rotor speed, over 5 % of rated
-    platform_pitch: float = 2.4  # over 1 deg
-    platform_pitch_rate: float = 0.22  # over 0.1 deg/s
-    power: float = 0.39  # over 5 % of rated
-    torque: float = 0.18  # over 5 % of rated
+    platform_pitch: float = 1.215  # over 1 deg
+    platform_pitch_rate: float = 0.2613  # over 0.1 deg/s
+    power: float = 0.1423  # over 5 % of rated
+    torque: float = 0.2046  # over 5 % of rated
     speed_integral: float = 0.0045  # over 5 % of rated times 10 s
-    pitch_rate: float = 6.5  # blade-pitch command, over 0.2 deg/s
-    torque_rate: float = 1.2  # over 5 % of rated torque a second
-    pitch_rate_growth: float = 4.1  # pitch_rate holds at 18 m/s and below goes with this power of the wind
-    pitch_rate_growth_above: float = -1.3  # the same above 18 m/s
+    pitch_rate: float = 2.342  # blade-pitch command, over 0.2 deg/s
+    torque_rate: float = 1.049  # over 5 % of rated torque a second
+    pitch_rate_growth: float = 1.738  # pitch_rate holds at 18 m/s and below goes with this power of the wind
+    pitch_rate_growth_above: float = -2.617  # the same above 18 m/s
     power_growth: float = -1.0  # the same for power, below 18 m/s
     power_growth_above: float = -1.1  # the same above 18 m/s
     torque_growth: float = 2.1  # the same for torque, below and above
-    schedule_time: float = 120.0  # s, over which the operating wind follows the estimate; no cost
+    schedule_time: float = 240.7  # s, over which the operating wind follows the estimate; no cost
     horizon: float = 30.0  # s
     preview_time: float = 10.0  # s that the wind is known ahead, for the law that is shown it
     speed_limit: float = 1.15  # of rated, soft

@@ -180,13 +180,13 @@ FIGURES = {  # what several pages say: {page: pattern with the figure as its gro
         README: r"is (\S+) deg of platform pitch",
         VALIDATION: r"the error is (\S+) deg",
     },
-    "rotor speed of the preview agents": {
-        README: r"the preview agent is at\s(\S+) % in rotor speed",
-        "docs/rl.md": r"`ppo_lqr_preview` reaches every aim: (\S+) % in rotor speed",
+    "rotor speed of mpc": {
+        README: r"\| `mpc` \| [^|]+ \| \S+ (\S+) %",
+        "docs/rl.md": r"`mpc` alone is at (\S+) % in rotor speed",
     },
-    "agent in the gust": {
-        README: r"gust at 18 m/s under `pi` and `policy:(\w+)`",
-        "docs/index.md": r"under the agent (\w+)\]\(figures/gust.gif\)",
+    "controller in the gust": {
+        README: r"gust at 18 m/s under `pi` and `(\w+)`",
+        "docs/index.md": r"gust, under pi and under (\w+)\]\(figures/gust.gif\)",
     },
 }
 

@@ -296,7 +296,7 @@ def test_settings_that_name_python_objects_are_not_loaded(tag, trapped):
 def test_no_text_in_a_design_is_looked_up_as_code_or_as_a_file(text, trapped):
     turbine = read_turbine("nrel5mw")
     sound = {
-        "format": "fowt-design", "version": 1, "kind": "pi", "platform": "", "turbine": turbine.name,
+        "format": "fowt-design", "version": 2, "kind": "pi", "platform": "", "turbine": turbine.name,
         "command": "fowt", "settings": {"KP": 0.006, "KI": 0.0009, "gain_schedule_pitch": 0.11},
     }  # fmt: skip
     for path in places(sound):

@@ -57,7 +57,7 @@ def test_the_controllers_have_what_the_file_holds(turbine):
         np.testing.assert_array_equal(mine.parameters, make(turbine, 0.1).parameters)
     mine = spaces()["rosco_float"].make(tuned("rosco_float"), turbine, 0.1)
     assert mine.settings == rosco_float(turbine, 0.1).settings
-    for name in ("lqr", "mpc", "mpc_lidar"):
+    for name in ("lqr", "mpc"):
         assert dict(spaces()[name].start) == pytest.approx(tuned(name), rel=1e-3), name
 
 

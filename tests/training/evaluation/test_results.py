@@ -142,7 +142,7 @@ def test_a_controllers_code_is_its_module_and_what_that_imports():
         paths = provenance._package_files(factory)
         return {path.name for path in paths if path.parent == provenance.CONTROLLERS}
 
-    assert {"printed_eq8.py", "pi.py", "pi_tuned.toml", "tuned.toml"} <= names(CONTROLLERS["eq8_literal"])
+    assert {"printed_eq8.py", "pi.py", "tuned.toml"} <= names(CONTROLLERS["eq8_literal"])
     assert not {"constant.py", "__init__.py"} & names(CONTROLLERS["eq8_literal"])
     assert {"constant.py", "__init__.py"} <= names(print)
     codes = [provenance.controller_code(name)["code"] for name in ("pi", "pi_land", "constant")]
