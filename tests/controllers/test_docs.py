@@ -1,13 +1,14 @@
 """docs/controllers.md against the controllers that there are."""
 
 import re
+import tomllib
 from pathlib import Path
 
 import pytest
 
 from fowt_env import build_scene, simulate
 from fowt_env.controllers import CONTROLLERS, make
-from fowt_env.controllers.tuned import tuned
+from fowt_env.controllers.tuned import TUNED
 
 TEXT = (Path(__file__).resolve().parents[2] / "docs" / "controllers.md").read_text(encoding="utf-8")
 
@@ -23,12 +24,14 @@ def test_every_controller_is_documented_and_no_other():
     assert set(rows("The built-in ones")) == set(CONTROLLERS)
 
 
-@pytest.mark.parametrize("name", ["floating_feedback", "rosco_float"])
-def test_the_documented_tuning_is_the_stored_one(name):
-    stored = tuned(name)
-    gain = stored["pitch_gain" if name == "floating_feedback" else "gain"]
-    cells = rows("Feedback of the platform's motion")[name]
-    assert [float(cell.split()[0]) for cell in cells[1:3]] == [gain, stored["low_pass"]]
+def test_the_documented_tuning_is_the_stored_one():
+    held = tomllib.loads(TUNED.read_text(encoding="utf-8"))
+    told = rows("One search for all of them")
+    assert set(told) == set(held)
+    keys = ("rotor_speed_ratio", "platform_pitch_ratio", "travel_ratio", "shaft_ratio", "cost")
+    for name, cells in told.items():
+        figures = [held[name]["figures"][key] for key in keys]
+        assert [float(cell) for cell in cells[2:]] == pytest.approx(figures, abs=6e-4), name
 
 
 def test_the_example_of_ones_own_controller_runs():
