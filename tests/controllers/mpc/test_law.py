@@ -47,11 +47,11 @@ def test_in_light_wind_the_turbines_curve_acts(wind):
 
 
 def test_it_betters_the_baseline_at_no_more_pitch_travel_on_a_validation_seed():
-    scene = turbulent(16, 1003, 660.0)
+    scene = turbulent(14, 1003, 660.0)
     ours, theirs = (metrics(simulate(scene, name, duration=660.0), 60.0) for name in ("mpc", "gspi_oc3"))
     for name in ("RotSpeed_std_[rpm]", "PtfmPitch_std_[deg]"):
         assert ours[name] < 0.85 * theirs[name]
-    assert ours["blade_pitch_travel_[deg/s]"] <= 1.05 * theirs["blade_pitch_travel_[deg/s]"]
+    assert ours["blade_pitch_travel_[deg/s]"] <= theirs["blade_pitch_travel_[deg/s]"]
 
 
 def test_limits_hold_in_an_extreme_gust():
