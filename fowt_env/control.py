@@ -26,7 +26,6 @@ import reprlib
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import lru_cache
 from math import isfinite, nan
 from typing import Any, Protocol, runtime_checkable
 
@@ -34,6 +33,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fowt_env.analysis.trim import without_fluctuations
+from fowt_env.caches import cached
 from fowt_env.descriptions.checks import check_number
 from fowt_env.descriptions.lidar import lidars
 from fowt_env.errors import ControllerError, InputError, unknown
@@ -225,7 +225,7 @@ class MeasurementView(Measurement):
         )
 
 
-@lru_cache(maxsize=256)
+@cached(256)
 def _view_class(name, information):
     """MeasurementView of a controller's name and information."""
     hidden_fields = frozenset(Measurement._fields) - {"time", *information}
@@ -254,7 +254,7 @@ def wind_ahead(measurement: Any) -> tuple[float, ...]:
     return getattr(measurement, "_ahead", ())
 
 
-@lru_cache(maxsize=256)
+@cached(256)
 def mask(name: str, information: tuple[str, ...]) -> np.ndarray:
     """(N_MEASUREMENTS,) GIVEN for what is declared, and the time, HIDDEN for the rest; read only.
 

@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from functools import cache
 from typing import Any
 
+from fowt_env.caches import cached
 from fowt_env.descriptions.checks import check_number
 from fowt_env.descriptions.files import DATA, read_toml
 from fowt_env.errors import InputError, unknown
@@ -81,7 +81,7 @@ class SensorChain:
         return tuple(name for name in Measurement._fields if name in self.sensors)
 
 
-@cache
+@cached(1)
 def built_in_chains() -> dict[str, SensorChain]:
     """{name: SensorChain} of fowt_env/data/sensors.toml."""
     table = read_toml(DATA / "sensors.toml", "sensors")["chain"]

@@ -126,6 +126,7 @@ def test_lqr_alone_reads_the_command_in_force_as_its_own_last_one():
     class Wrapped:
         def __init__(self, turbine, control_dt):
             self.law = make("lqr", turbine, control_dt)
+            self.information = self.law.information
             self.prepare, self.reset = self.law.prepare, self.law.reset
 
         def act(self, measurement):
