@@ -305,6 +305,12 @@ def attack(env, policy, seed, steps=HOSTILE_STEPS):
     return {"policy": policy.name, "steps": steps, "ends": reasons, "finite": finite}
 
 
+def _alike(a, b):
+    """Whether two arrays of snapshots, or None, are equal; NaN, which a baseline is not given, equals NaN."""
+    floats = a is not None and a.dtype.kind == "f"
+    return np.array_equal(a, b, equal_nan=floats)
+
+
 def refused_alike(env, seed):
     """Number of unusable actions that were refused with the state left as it was, of len(REFUSED)."""
     env.reset(seed=seed)
@@ -316,8 +322,7 @@ def refused_alike(env, seed):
             env.step(np.array(action))
         except InputError:
             after = env.get_state()
-            pairs = zip(before.arrays, after.arrays, strict=True)  # what a baseline is not given is NaN
-            count += all(np.array_equal(a, b, equal_nan=a.dtype.kind == "f") for a, b in pairs)
+            count += all(_alike(a, b) for a, b in zip(before.arrays, after.arrays, strict=True))
     return count
 
 
