@@ -55,6 +55,7 @@ from fowt_env.plant.measurement import Measure
 HANDOVER = (0.01745, 0.05236)  # rad of pitch command: torque by the curve below, by feedback above
 TORQUE_RANGE = (0.5, 1.1)  # of rated, for the feedback's torque
 INTEGRAL_LIMIT = 1.0  # rad, of the speed integral
+FORGETTING = 0.1  # 1/s, of the same while the blades rest
 
 
 @kernel
@@ -67,6 +68,14 @@ def feed_back(p, low, fraction, memory, row):
 
 
 @kernel
+def speed_integral(integral, error, turning, dt):
+    """Integral of the speed error (rad/s) after a period dt (s); forgotten while slow with resting blades."""
+    if turning or error > 0.0:
+        return clamp(integral + dt * error, -INTEGRAL_LIMIT, INTEGRAL_LIMIT)
+    return integral * (1.0 - FORGETTING * dt)
+
+
+@kernel
 def lqr_step(p, memory, measurement, command):
     """One period of the sampled law."""
     dt, rated = p[Head.CONTROL_DT], p[Head.RATED_SPEED]
@@ -75,10 +84,7 @@ def lqr_step(p, memory, measurement, command):
 
     speed_error = measurement[Measure.GENERATOR_SPEED] / p[Head.GEAR_RATIO] - rated
     pitch, torque = memory[PITCH_COMMAND], memory[TORQUE_COMMAND]
-    if pitch > p[Head.HANDOVER_LOW] or speed_error > 0.0:
-        memory[INTEGRAL] = clamp(memory[INTEGRAL] + dt * speed_error, -INTEGRAL_LIMIT, INTEGRAL_LIMIT)
-    else:
-        memory[INTEGRAL] *= 1.0 - 0.1 * dt  # forgotten in 10 s while the pitch rests
+    memory[INTEGRAL] = speed_integral(memory[INTEGRAL], speed_error, pitch > p[Head.HANDOVER_LOW], dt)
 
     deviate(p, low, fraction, memory)
     for i in range(N_PLANT):

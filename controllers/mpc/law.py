@@ -17,7 +17,7 @@ from fowt_env.control import check_control_dt
 from fowt_env.controllers.lqr.design import LOWEST_DESIGN_WIND, MOMENT, N_FEEDBACK, N_PLANT, design_models
 from fowt_env.controllers.lqr.design import WIND as ESTIMATED_WIND
 from fowt_env.controllers.lqr.estimator import ROTOR, estimate
-from fowt_env.controllers.lqr.law import LQR, WindEstimator
+from fowt_env.controllers.lqr.law import LQR, WindEstimator, speed_integral
 from fowt_env.controllers.mpc.model import COMMAND, INTEGRAL, SPEED, TORQUE, WindModel, cost_rows, wind_model
 from fowt_env.controllers.mpc.plan import FILTER, grid_of, newton_step, shifted, work_of
 from fowt_env.controllers.mpc.rotor_table import rotor_table
@@ -31,8 +31,6 @@ from fowt_env.plant.measurement import Measure
 
 PERIOD = 0.5  # s between plans
 RESTING = 0.01745  # rad of pitch command, up to which the integral is forgotten while the rotor is slow
-INTEGRAL_LIMIT = 1.0  # rad
-FORGETTING = 0.1  # 1/s
 CURVE_WINDS = (8.5, 9.5)  # m/s: the turbine's curve and resting blades below, the plan above
 
 
@@ -70,12 +68,7 @@ def observe(estimator, estimated, measurement, command, p, memory):
     wind = estimated[ESTIMATED_WIND + 1]
     memory[Memory.OPERATING_WIND] = decay * memory[Memory.OPERATING_WIND] + (1.0 - decay) * wind
     error = measurement[Measure.GENERATOR_SPEED] / p[Entry.GEAR_RATIO] - p[Entry.RATED_SPEED]
-    integral = memory[Memory.INTEGRAL]
-    if command[1] > RESTING or error > 0.0:
-        integral = clamp(integral + dt * error, -INTEGRAL_LIMIT, INTEGRAL_LIMIT)
-    else:
-        integral *= 1.0 - FORGETTING * dt
-    memory[Memory.INTEGRAL] = integral
+    memory[Memory.INTEGRAL] = speed_integral(memory[Memory.INTEGRAL], error, command[1] > RESTING, dt)
 
 
 @entry
