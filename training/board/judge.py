@@ -22,7 +22,7 @@ from fowt_env.errors import InputError
 from fowt_env.files.tables import read_table
 from fowt_env.scene.build import build_scene
 from fowt_env.training.board.folder import Board, read_seeds
-from fowt_env.training.board.submission import BUILT_IN, POLICY_FILE, PYTHON_FILE
+from fowt_env.training.board.submission import PYTHON_FILE
 from fowt_env.training.evaluation.evaluate import evaluate
 from fowt_env.training.evaluation.metrics import METRICS
 from fowt_env.training.evaluation.results import run_file
@@ -39,7 +39,7 @@ class Judged:
 
     board: Board
     submissions: list
-    public: dict[str, pd.DataFrame]  # suite -> table of evaluate, its figures computed anew
+    public: dict[str, pd.DataFrame]  # suite -> table of evaluate, whose figures are those of the series
     secret: dict[str, pd.DataFrame] = field(default_factory=dict)
     seeds_hash: str = ""  # of the file of secret seeds
     when: str = ""
@@ -59,9 +59,8 @@ def judge(board, jobs=1, secret=None, private=None, trust_code=False, progress=N
     code = [each.name for each in submissions if each.kind == PYTHON_FILE]
     if code and not trust_code:
         raise InputError(
-            f"submissions {', '.join(code)}: hold Python code of their authors, which judging runs: read"
-            f" it, then give"
-            " --trust-code (each runs in a process of its own, with this user's rights)"
+            f"submissions {', '.join(code)}: hold Python code of their authors, which judging runs: read it,"
+            " then give --trust-code (each runs in a process of its own, with this user's rights)"
         )
     if (secret is None) != (private is None):
         raise InputError("secret seeds: need a folder for their runs (--private), which is not the board's")
@@ -96,34 +95,32 @@ def _suite_table(board, submissions, name, seeds, folder, jobs, progress):
         options = {} if preview == "exact" else {"preview": preview}
         table = evaluate(controllers, suite, seeds=seeds, jobs=jobs, folder=place, progress=say, **options)
         table = table[table["controller"].isin(controllers)]
-        parts.append(computed_anew(table, place, suite))
+        check_figures(table, place, suite)
+        parts.append(table)
     return pd.concat(parts, ignore_index=True)
 
 
-def computed_anew(table, folder, suite):
-    """The table with its figures computed from the time series of its runs.
-
-    Raises: InputError where they are not those that the table has.
-    """
+def check_figures(table, folder, suite):
+    """Raises: InputError where figures of a table are not those of the time series of its runs."""
     cases = {case.name: case for case in suite.cases}
-    table = table.copy()
+    scenes = {}  # what the metrics take of one, turbine and mean wind, is the same for all runs of a case
     for place in np.flatnonzero(table["status"] != "failed"):
         row = table.iloc[place]
         case = cases[row["case"]]
+        if case.name not in scenes:
+            wind = None if is_field(case.wind) else case.wind  # a box takes minutes and rests nowhere
+            scenes[case.name] = build_scene(case.platform, wind=wind, sea=case.sea, **case.options)
         frame = read_table(run_file(Path(folder) / "runs", *row[list(KEY)]))
         skip = suite.skip if case.skip is None else case.skip
-        wind = None if is_field(case.wind) else case.wind  # a box takes minutes and rests nowhere
-        scene = build_scene(case.platform, wind=wind, sea=case.sea, seed=int(row["seed"]), **case.options)
-        figures = run_metrics(frame, case, scene, skip)
+        figures = run_metrics(frame, case, scenes[case.name], skip)
         for metric in METRICS:
             old, new = float(row[metric]), float(figures[metric])
             if not np.isclose(old, new, rtol=RELATIVE, atol=1e-12, equal_nan=True):
                 raise InputError(
                     f"results {str(folder)!r}: {metric} of {', '.join(map(str, row[list(KEY)]))} is"
-                    f" {old:.10g} in the"
-                    f" table and {new:.10g} from its series: remove the folder and judge again"
+                    f" {old:.10g} in the table and {new:.10g} from its series: remove the folder and judge"
+                    " again"
                 )
-    return table
 
 
 def inputs_of(submission):
@@ -131,11 +128,6 @@ def inputs_of(submission):
     if submission.kind == PYTHON_FILE:
         return tuple(submission.card.information)
     return tuple(make(submission.controller(None), read_turbine("nrel5mw"), 0.1).information)
-
-
-def is_code_of_others(submission):
-    """Whether a submission runs code that is not of this package."""
-    return submission.kind not in (BUILT_IN, POLICY_FILE)
 
 
 def package_version():

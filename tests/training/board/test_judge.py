@@ -5,7 +5,7 @@ import pytest
 
 from fowt_env.errors import InputError
 from fowt_env.training.board.folder import Board
-from fowt_env.training.board.judge import computed_anew, judge
+from fowt_env.training.board.judge import check_figures, judge
 from fowt_env.training.board.page import board_rows, write_board
 from fowt_env.training.evaluation.results import read_row, run_file, write_run
 
@@ -123,13 +123,13 @@ def test_figures_that_are_not_those_of_the_series_are_refused(board, judged):
     path = run_file(folder / "runs", "mine", "ntm_14", 2)
     row = read_row(path)
     table = pd.DataFrame([row])
-    computed_anew(table, folder, board.suite("short"))
+    check_figures(table, folder, board.suite("short"))
     shown = pd.read_parquet(path)
     shown["RotSpeed_[rpm]"] *= 1.001
     try:
         write_run(shown, row, path)
         with pytest.raises(InputError, match="from its series"):
-            computed_anew(table, folder, board.suite("short"))
+            check_figures(table, folder, board.suite("short"))
     finally:
         shown["RotSpeed_[rpm]"] /= 1.001
         write_run(shown, row, path)
