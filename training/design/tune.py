@@ -38,7 +38,8 @@ from fowt_env.training.evaluation.bootstrap import lifetime_means
 from fowt_env.training.evaluation.cases import read_suite
 from fowt_env.training.evaluation.evaluate import evaluate
 from fowt_env.training.evaluation.failures import failures_as_worst
-from fowt_env.training.evaluation.metrics import METRICS, better, mean_exponent
+from fowt_env.training.evaluation.leaderboard import EXPONENTS
+from fowt_env.training.evaluation.metrics import METRICS, better
 from fowt_env.training.evaluation.results_table import case_shares
 from fowt_env.training.evaluation.run_case import CONTROL_DT, OK
 from fowt_env.training.evaluation.seeds import VALIDATION
@@ -190,7 +191,7 @@ class Objective:
         for name, limit in self.suite.limits.run.items():
             excess += max(0.0, runs[name].max() / limit - 1.0)
         cost = float(np.mean([ratio[name] for name in AIMS])) + PENALTY * excess + LOST * lost
-        found = {"cost": float(cost) if np.isfinite(cost) else 2.0 * LOST}
+        found = {"cost": cost if np.isfinite(cost) else 2.0 * LOST}
         found |= {key: float(ratio[name]) for key, name in FIGURES.items()}
         return found | {"lost": lost, "beyond": float(excess)}
 
@@ -200,9 +201,8 @@ class Objective:
         index = pd.MultiIndex.from_product([cases, self.seeds], names=["case", "seed"])
         values = runs.set_index(["case", "seed"])[list(METRICS)].reindex(index).to_numpy(dtype=np.float64)
         values = values.reshape(len(cases), len(self.seeds), len(METRICS))
-        exponents = np.array([mean_exponent(name) for name in METRICS])
         weights = np.ones((1, len(self.seeds)))
-        means = lifetime_means(values, weights, case_shares(self.base, cases), exponents)[0]
+        means = lifetime_means(values, weights, case_shares(self.base, cases), EXPONENTS)[0]
         return pd.Series(means, index=list(METRICS))
 
 
