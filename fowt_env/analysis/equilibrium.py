@@ -63,7 +63,7 @@ def check_equilibrium(scene, rest, start, slope, fresh_slope):
             f" {_sentences(_causes(scene, start))}".rstrip()
         )
     odd = {}
-    draft = -scene.platform.hull.z[0]
+    draft = scene.platform.draft
     if abs(heave) > HEAVE * draft:
         odd["heave"] = f"heave of {heave:.3g} m, {abs(heave) / draft:.0%} of the draft of {draft:g} m"
     if tilt > TILT:
@@ -81,7 +81,7 @@ def check_equilibrium(scene, rest, start, slope, fresh_slope):
         return
     _warned.add(key)
     if "tilt" in odd or "unstable" in odd:
-        causes["upright"] = _metacentre(scene)
+        causes |= {"upright": text} if (text := _metacentre(scene)) else {}
     text = f"{label(scene)}: {'; '.join(odd.values())} ({_place(rest)}). {_sentences(causes)}"
     warnings.warn(text.rstrip(), stacklevel=level_outside())
 
@@ -111,7 +111,8 @@ def _impossible(scene, heave, upright, tilt):
     """List of what cannot be where the platform rests, in words."""
     hull, depth = scene.platform.hull, scene.platform.environment.water_depth
     across = sqrt(max(1.0 - upright * upright, 0.0))
-    keel = heave + upright * hull.z[0] - 0.5 * across * hull.diameter[0]
+    width = 0.0 if hull is None else hull.diameter[0]
+    keel = heave - upright * scene.platform.draft - 0.5 * across * width
     base_height = scene.platform.tower.base_height
     base = heave + upright * base_height
     found = []
@@ -139,11 +140,12 @@ def _causes(scene, start):
     if model.hydro is None:
         found["vertical"] = f"its weight of {_kilo(weight)} kN has no buoyancy: hydrodynamics = False"
         return found
+    specific_weight = platform.environment.water_density * model.rigid_body.gravity
     buoyancy, pull = start.cache[LoadCache.HYDRO + 2], -start.cache[LoadCache.MOORING + 2]
     lines = f" and its lines pull down with {_kilo(pull)} kN" if model.mooring is not None else ""
     found["vertical"] = (
         f"undisplaced it weighs {_kilo(weight)} kN{lines}, against a buoyancy of {_kilo(buoyancy)} kN"
-        f" ({_shown(buoyancy / model.hydro.hull.specific_weight)} m3): {_kilo(abs(net))} kN"
+        f" ({_shown(buoyancy / specific_weight)} m3): {_kilo(abs(net))} kN"
         f" ({_shown(abs(net) / model.rigid_body.gravity / 1e3)} t) too {'light' if net > 0.0 else 'heavy'}"
     )
     ballast = platform.ballast.mass
@@ -192,6 +194,8 @@ def _mooring_causes(mooring, start, weight, net):
 def _metacentre(scene):
     """Sentence on the stability of the undisplaced platform as a floating body."""
     hull, body, depth = scene.model.hydro.hull, scene.model.rigid_body, scene.platform.ballast.cm_depth
+    if hull is None:
+        return ""
     area = pi * hull.radius**2
     volume = hull.volume_below - area * hull.z_join
     centre = (hull.moment_below - 0.5 * area * hull.z_join**2) / volume
@@ -205,7 +209,7 @@ def _metacentre(scene):
 
 def _growing(scene, slope):
     """{motion: s in which it grows by a factor e} of what leaves an equilibrium with this slope by itself."""
-    draft = -scene.platform.hull.z[0]
+    draft = scene.platform.draft
     limit = GROWTH * scene.model.rigid_body.gravity / draft
     if np.max(np.linalg.eigvals(slope).real) <= limit:
         return {}
@@ -223,7 +227,7 @@ def _left(scene, end):
     """What is left of the balance at a state, in words: the largest force or moment, and of which loads."""
     loads = _by_load(scene, end)
     total = sum(loads.values())
-    arm = -0.5 * scene.platform.hull.z[0]
+    arm = 0.5 * scene.platform.draft
     motion = int(np.argmax(np.abs(total) / [1.0, 1.0, 1.0, arm, arm, arm]))
     parts = {name: load[motion] for name, load in loads.items()}
     most = max(abs(part) for part in parts.values())

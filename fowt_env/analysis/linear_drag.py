@@ -85,7 +85,7 @@ def linear_drag(scene, state, omega, sea, motion=AT_REST):
     omega = np.asarray(omega, dtype=float)
     density = elevation_spectrum(sea, omega)
     hydro = scene.model.hydro
-    if hydro is None or hydro.strips.shape is None:
+    if hydro is None or hydro.strips is None or hydro.strips.shape is None:
         none = np.zeros((6, 6))
         return LinearDrag(none, np.zeros((omega.size, 6), complex), none, np.zeros(0), np.zeros(0))
     strips, site = hydro.strips.shape, scene.platform.environment

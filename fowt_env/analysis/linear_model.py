@@ -265,7 +265,7 @@ def linearize(scene, operating_point=None):
     return LinearModel(
         of_states[:n], of_inputs[:n], of_states[n:], of_inputs[n:], of_forces[:n], of_forces[n:],
         STATES, INPUTS, (*MEASURED, *RECORDED, *tensions),
-        point, body.s_z / body.mass, -0.5 * scene.platform.hull.z[0], scene,
+        point, body.s_z / body.mass, 0.5 * scene.platform.draft, scene,
     )  # fmt: skip
 
 

@@ -70,8 +70,10 @@ def _finite(text):
     return value
 
 
-def read_table(path, kind, columns):
-    """Rows of a CSV file with exactly these columns, in any order: a list of (line number, dict of strings).
+def read_table(path, kind, columns, optional=()):
+    """Rows of a CSV file with these columns, in any order: a list of (line number, dict of strings).
+
+    optional: columns that it may have beside them.
 
     Lines starting with # and empty lines are skipped. Wrong columns, ragged or missing rows are errors.
     """
@@ -88,7 +90,7 @@ def read_table(path, kind, columns):
     expected = ", ".join(columns)
     if not cells:
         raise InputError(f"{where} is empty; expected the columns {expected} and at least one row")
-    if sorted(cells[0]) != sorted(columns):
+    if len(set(cells[0])) < len(cells[0]) or set(cells[0]) - set(optional) != set(columns) - set(optional):
         raise InputError(f"{where}: columns are {', '.join(cells[0])[:200]}; expected {expected}")
     if len(cells) == 1:
         raise InputError(f"{where} has no rows below its header; expected the columns {expected}")
@@ -96,8 +98,8 @@ def read_table(path, kind, columns):
         raise InputError(f"{where}: a quoted cell runs over several lines; allowed: one row per line")
     rows = []
     for (number, _), row in zip(lines[1:], cells[1:], strict=True):
-        if len(row) != len(columns):
-            raise InputError(f"{where}: line {number} has {len(row)} cells; expected {expected}")
+        if len(row) != len(cells[0]):
+            raise InputError(f"{where}: line {number} has {len(row)} cells; expected {', '.join(cells[0])}")
         rows.append((number, dict(zip(cells[0], row, strict=True))))
     return rows
 

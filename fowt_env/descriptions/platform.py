@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from fowt_env.descriptions.files import DATA, locate, raise_problems, read_toml
+from fowt_env.descriptions.potential_flow import PotentialFlow, read_potential_flow
 from fowt_env.descriptions.records import (
     Finite,
     NonNegative,
@@ -44,6 +45,8 @@ class Ballast(Record):
     mass: Positive
     cm_depth: Finite  # below still water, positive downwards, m
     inertia: Inertia  # about its own centre of mass, kg m2
+    cm_downwind: Finite = 0.0  # of the tower axis, m
+    cm_left: Finite = 0.0  # looking downwind, m
 
 
 class Hull(Record):
@@ -93,6 +96,53 @@ class HydroCoefficients(Record):
         return self
 
 
+class AdditionalLoads(Record):
+    """Constant and linear terms about the body origin in inertial axes, and quadratic damping.
+
+    Load = preload - stiffness q - linear_damping q' - quadratic_damping |q'| q', with q surge to yaw: what
+    HydroDyn's AddF0, AddCLin, AddBLin and AddBQuad are.
+    """
+
+    preload: SixNumbers = (0.0,) * 6  # N, N m
+    stiffness: SixBySix | None = None  # N/m, N/rad, N m/m, N m/rad
+    linear_damping: SixBySix | None = None  # N/(m/s) ...
+    quadratic_damping: SixBySix | None = None  # N/(m/s)^2 ...
+
+    @model_validator(mode="after")
+    def _damping(self):
+        for name in ("linear_damping", "quadratic_damping"):
+            rows = getattr(self, name)
+            for i, row in enumerate(rows or ()):
+                if row[i] < 0.0:
+                    raise ValueError(f"{name}.{i + 1}.{i + 1} = {row[i]:g}: must be >= 0: it damps")
+        return self
+
+
+class Member(Record):
+    """A straight cylinder of the hull, of any direction and taper, for strip (Morison) loads.
+
+    start, end in body axes; end 1 is the start. The coefficients multiply 1/2 rho D |v| v, rho A a and, on
+    an end that is an outer face of the hull, 1/2 rho A |v| v and the added mass of a half sphere.
+    """
+
+    start: Vector3  # m
+    end: Vector3
+    diameter: tuple[Positive, Positive]  # m, at start and end
+    drag_coefficient: tuple[NonNegative, NonNegative]
+    added_mass_coefficient: tuple[NonNegative, NonNegative] = (0.0, 0.0)
+    pressure_coefficient: tuple[NonNegative, NonNegative] = (1.0, 1.0)  # of the undisturbed wave's
+    axial_drag_coefficient: tuple[NonNegative, NonNegative] = (0.0, 0.0)  # of the ends
+    axial_added_mass_coefficient: tuple[NonNegative, NonNegative] = (0.0, 0.0)
+    axial_pressure_coefficient: tuple[NonNegative, NonNegative] = (1.0, 1.0)
+    potential_flow: bool = False  # in the potential-flow body: drag alone, no inertia and no buoyancy
+
+    @model_validator(mode="after")
+    def _length(self):
+        if math.dist(self.start, self.end) < 1e-6:
+            raise ValueError(f"start = {list(self.start)}: must not be end")
+        return self
+
+
 class Tower(Record):
     """Rigid tower, with the taper that its drag needs."""
 
@@ -130,13 +180,39 @@ class Platform(Record):
     turbine: str
     environment: Environment
     ballast: Ballast
-    hull: Hull
-    hydro: HydroCoefficients
     tower: Tower
+    hull: Hull | None = None  # a slender spar, with the coefficients of its strips in hydro
+    hydro: HydroCoefficients | None = None
+    potential_flow: PotentialFlow | None = None
+    additional: AdditionalLoads | None = None
+    members: tuple[Member, ...] = ()
     lines: tuple[Line, ...] = ()
     options: dict = Field(default_factory=dict)  # defaults of build_scene's options
     published: dict = Field(default_factory=dict)  # figures that tests compare with
     source: str = ""
+
+    @property
+    def draft(self) -> float:
+        """Depth of the lowest part of the hull below still water, m; where no file says it, an estimate."""
+        if self.hull is not None:
+            return -self.hull.z[0]
+        if self.potential_flow is not None and self.potential_flow.draft is not None:
+            return self.potential_flow.draft
+        depths = [-point[2] for member in self.members for point in (member.start, member.end)]
+        depths += [-line.fairlead[2] for line in self.lines]
+        if self.potential_flow is not None:
+            depths.append(self.potential_flow.volume ** (1.0 / 3.0) / 3.0)
+        return max(depths)
+
+    @model_validator(mode="after")
+    def _floats(self):
+        if (self.hull is None) != (self.hydro is None):
+            raise ValueError(_missing_half("hydro" if self.hydro is None else "hull"))
+        if self.hull is not None and self.potential_flow is not None:
+            raise ValueError("potential_flow: a platform has it or hull, not both")
+        if self.hull is None and self.potential_flow is None and not self.members:
+            raise ValueError("hull is missing: a platform needs hull and hydro, potential_flow or members")
+        return self
 
     @model_validator(mode="after")
     def _depths(self):
@@ -148,11 +224,16 @@ class Platform(Record):
                 problems.append(f"{key}: must be between -water_depth = {-depth} and 0 m")
             if line.anchor[2] >= line.fairlead[2]:
                 problems.append(f"{key}: must be below its fairlead at {line.fairlead[2]} m")
-        if self.hull.z[0] < -depth:
+        if self.hull is not None and self.hull.z[0] < -depth:
             problems.append(f"hull.z.1 = {self.hull.z[0]}: must be >= -water_depth = {-depth} m")
         if problems:
             raise ValueError("\n".join(problems))
         return self
+
+
+def _missing_half(name):
+    """Problem line for a hull without the coefficients of its strips, or the other way round."""
+    return f"{name} is missing: must be a table; a platform has hull and hydro, or neither"
 
 
 class MooringSpread(Record):
@@ -212,8 +293,18 @@ def read_platform(name_or_path: str | Path) -> Platform:
         group, found = validate(_MooringFile, {"mooring": data.pop("mooring")}, origin)
         problems += found
         data["lines"] = group.mooring.lines() if group else ()
-    if isinstance(data.get("lines"), list):
-        data["lines"] = tuple(data["lines"])
+    for key in ("lines", "members"):
+        if isinstance(data.get(key), list):
+            data[key] = tuple(data[key])
+    if "potential_flow" in data:
+        try:
+            site, _ = validate(Environment, data.get("environment"))
+            gravity, density = (9.80665, 1025.0) if site is None else (site.gravity, site.water_density)
+            table = data["potential_flow"]
+            data["potential_flow"] = read_potential_flow(table, path.parent, gravity, density)
+        except InputError as error:
+            problems.append(f"potential_flow: {error}")
+            del data["potential_flow"]
     if isinstance(data.get("turbine"), str):
         try:
             turbine = locate("turbine", data["turbine"], turbine_names(), turbine_file, path.parent)
@@ -221,8 +312,10 @@ def read_platform(name_or_path: str | Path) -> Platform:
                 data["turbine"] = str(turbine.resolve())
         except InputError as error:
             problems.append(f"turbine: {error}")
+    if ("hull" in data) != ("hydro" in data):
+        problems.append(_missing_half("hydro" if "hull" in data else "hull"))
     platform, found = validate(Platform, {**data, **free}, origin)
-    raise_problems(f"platform file {str(path)!r}", problems + found)
+    raise_problems(f"platform file {str(path)!r}", list(dict.fromkeys(problems + found)))
     return platform
 
 

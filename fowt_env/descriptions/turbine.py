@@ -14,6 +14,7 @@ from fowt_env.descriptions.records import (
     NonNegative,
     Positive,
     Record,
+    bounded,
     to_si,
     validate,
 )
@@ -30,10 +31,11 @@ class Nacelle(Record):
     cm_downwind: Finite
     cm_height: Finite
     inertia: Inertia  # about its own centre of mass
+    cm_left: Finite = 0.0
 
 
 class Rotor(Record):
-    """Rotor masses and geometry at zero tilt and cone."""
+    """Rotor masses and geometry. The rotor centre is where the blades' pitch axes meet."""
 
     blades: Annotated[int, Field(strict=True, ge=1, le=6)] = 3
     mass: Positive
@@ -42,7 +44,10 @@ class Rotor(Record):
     hub_radius: Positive
     tip_radius: Positive
     inertia: Positive  # about the shaft
-    inertia_diameter: Positive  # about a diameter
+    inertia_diameter: Positive  # about a diameter through the rotor's centre of mass
+    shaft_tilt: bounded(gt=-0.5, lt=0.5) = 0.0  # rad, positive: the upwind end points up
+    cone: bounded(gt=-0.5, lt=0.5) = 0.0  # rad, positive: blades lean upwind, away from the tower
+    cm_offset: Finite = 0.0  # of its centre of mass from the rotor centre along the shaft, downwind, m
 
     @model_validator(mode="after")
     def _radii(self):
@@ -120,15 +125,18 @@ class Blade(Record):
     tip radius of the Rotor, which are not stations.
     """
 
-    radius: FloatArray  # (n,) m from the rotor axis
+    radius: FloatArray  # (n,) m from the rotor centre along the pitch axis
     chord: FloatArray  # (n,) m
     twist: FloatArray  # (n,) rad, positive towards feather
     airfoil: tuple[str, ...]  # (n,)
     polars: dict[str, np.ndarray]  # name -> (m, 4): alpha rad from -pi to pi, cl, cd, cm
+    prebend: FloatArray | None = None  # (n,) m, blade axis downwind of the pitch axis at zero pitch
+    sweep: FloatArray | None = None  # (n,) m, blade axis from the pitch axis in the rotor plane, as BlSwpAC
 
     @model_validator(mode="after")
     def _stations(self):
         sizes = [len(values) for values in (self.radius, self.chord, self.twist, self.airfoil)]
+        sizes += [len(values) for values in (self.prebend, self.sweep) if values is not None]
         if len(set(sizes)) != 1 or sizes[0] < 2:
             raise ValueError(f"radius, chord, twist, airfoil need the same length, at least 2; got {sizes}")
         for name, bad, rule in (
@@ -257,7 +265,9 @@ def _beside(folder, text):
 def _read_blade(table, folder):
     """Blade from the station file and polar folder that a turbine file names."""
     path = _beside(folder, table.stations)
-    rows = read_table(path, "blade", ("radius_m", "chord_m", "twist_deg", "airfoil"))
+    rows = read_table(
+        path, "blade", ("radius_m", "chord_m", "twist_deg", "airfoil"), optional=("prebend_m", "sweep_m")
+    )
     problems = []
     radius = column(rows, "radius_m", problems, 0.0)
     chord = column(rows, "chord_m", problems, 0.0)
@@ -274,6 +284,11 @@ def _read_blade(table, folder):
         raise InputError(f"polars folder {str(polar_folder)!r} cannot be read: {error}") from None
     if not files:
         raise InputError(f"blade.polars = {table.polars!r}: no CSV files in a folder {str(polar_folder)!r}")
+    shape = {
+        name: column(rows, f"{name}_m", problems)
+        for name in ("prebend", "sweep")
+        if f"{name}_m" in rows[0][1]
+    }
     airfoils = tuple(row["airfoil"] for _, row in rows)
     polars = {}
     for (number, _), name in zip(rows, airfoils, strict=True):
@@ -282,7 +297,7 @@ def _read_blade(table, folder):
         elif name not in polars:
             polars[name] = _read_polar(files[name])
     raise_problems(f"blade file {str(path)!r}", problems)
-    return Blade(radius=radius, chord=chord, twist=twist, airfoil=airfoils, polars=polars)
+    return Blade(radius=radius, chord=chord, twist=twist, airfoil=airfoils, polars=polars, **shape)
 
 
 def _read_polar(path):

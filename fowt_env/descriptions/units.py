@@ -13,6 +13,8 @@ FILE_UNITS = {
     "minimum_deg": ("minimum", DEGREE),
     "maximum_deg": ("maximum", DEGREE),
     "azimuth_deg": ("azimuth", DEGREE),
+    "shaft_tilt_deg": ("shaft_tilt", DEGREE),
+    "cone_deg": ("cone", DEGREE),
     "region3_min_pitch_deg": ("region3_min_pitch", DEGREE),
     "gain_schedule_pitch_deg": ("gain_schedule_pitch", DEGREE),
 }

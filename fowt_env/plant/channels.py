@@ -13,8 +13,8 @@ from fowt_env.plant.hydro.load import surface_at_origin
 from fowt_env.plant.measurement import Measure
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rigid_body import momentum_rate
-from fowt_env.plant.state import Command, State, pose_of
-from fowt_env.plant.user_loads import record_user_loads, to_inertial
+from fowt_env.plant.state import Command, State, pose_of, to_inertial
+from fowt_env.plant.user_loads import record_user_loads
 
 DEG_PER_RAD = 180.0 / pi
 RPM_PER_RAD_S = 30.0 / pi

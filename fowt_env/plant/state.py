@@ -167,6 +167,26 @@ def pose_of(x):
     )
 
 
+@kernel
+def to_body(pose, a, b, c):
+    """R^T (a, b, c)."""
+    return (
+        pose.r11 * a + pose.r21 * b + pose.r31 * c,
+        pose.r12 * a + pose.r22 * b + pose.r32 * c,
+        pose.r13 * a + pose.r23 * b + pose.r33 * c,
+    )
+
+
+@kernel
+def to_inertial(pose, a, b, c):
+    """R (a, b, c)."""
+    return (
+        pose.r11 * a + pose.r12 * b + pose.r13 * c,
+        pose.r21 * a + pose.r22 * b + pose.r23 * c,
+        pose.r31 * a + pose.r32 * b + pose.r33 * c,
+    )
+
+
 STATES = (
     "surge", "sway", "heave", "roll", "platform_pitch", "yaw",
     "vx", "vy", "vz", "wx", "wy", "wz", "rotor_speed", "blade_pitch",

@@ -13,7 +13,7 @@ import numpy as np
 from fowt_env.plant.aero.load import wind_of
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.hydro.load import surface_at_origin, water_at
-from fowt_env.plant.state import State, Wrench, add
+from fowt_env.plant.state import State, Wrench, add, to_body, to_inertial
 
 MOST_LOADS = 8
 
@@ -127,26 +127,6 @@ def call_kernel(i, user, parameters, motion, force):
         user.kernel6(parameters, motion, force)
     else:
         user.kernel7(parameters, motion, force)
-
-
-@kernel
-def to_body(pose, a, b, c):
-    """R^T (a, b, c)."""
-    return (
-        pose.r11 * a + pose.r21 * b + pose.r31 * c,
-        pose.r12 * a + pose.r22 * b + pose.r32 * c,
-        pose.r13 * a + pose.r23 * b + pose.r33 * c,
-    )
-
-
-@kernel
-def to_inertial(pose, a, b, c):
-    """R (a, b, c)."""
-    return (
-        pose.r11 * a + pose.r12 * b + pose.r13 * c,
-        pose.r21 * a + pose.r22 * b + pose.r23 * c,
-        pose.r31 * a + pose.r32 * b + pose.r33 * c,
-    )
 
 
 @kernel

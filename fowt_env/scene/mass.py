@@ -39,9 +39,8 @@ def _upper_bodies(platform, turbine):
 def build_rigid_body(platform, turbine, platform_fixed=False, rotor_fixed=False, plane=None):
     """RigidBody part: Eq. (10) from the four rigid bodies. plane: True holds sway, roll and yaw at zero."""
     ballast = platform.ballast
-    matrix = assemble(
-        [(ballast.mass, (0.0, 0.0, -ballast.cm_depth), ballast.inertia), *_upper_bodies(platform, turbine)]
-    )
+    place = (ballast.cm_downwind, ballast.cm_left, -ballast.cm_depth)
+    matrix = assemble([(ballast.mass, place, ballast.inertia), *_upper_bodies(platform, turbine)])
     drivetrain = build_drivetrain(turbine)
     return RigidBody(
         np.ascontiguousarray(matrix),

@@ -11,6 +11,7 @@ from fowt_env.plant.aero.load import Aero, BemRotor
 from fowt_env.plant.aero.tower_drag import build_tower_drag
 from fowt_env.plant.aero.wake import n_wake_states
 from fowt_env.plant.hydro.added_inertia import build_added_inertia
+from fowt_env.plant.hydro.body_matrices import build_body_matrices
 from fowt_env.plant.hydro.diffraction import build_strip_diffraction
 from fowt_env.plant.hydro.hydrostatics import build_hull
 from fowt_env.plant.hydro.linear_damping import build_damping
@@ -42,19 +43,25 @@ def build_aero(platform, turbine, air, rotor, options):
 
 def build_hydro(platform, waves, current, options):
     """Hydro part of a scene in water."""
-    site = platform.environment
-    shape = _strips(platform, options)
-    strips = ExactStrips(shape, None)
-    if takes_wave_bands(options, waves, shape):
-        quadrature = build_quadrature(platform.hull, shape, _refinement(waves))
-        strips = BandedStrips(shape, quadrature, None, None)
+    site, spar = platform.environment, platform.hull is not None
+    strips = None
+    if spar:
+        shape = _strips(platform, options)
+        strips = ExactStrips(shape, None)
+        if takes_wave_bands(options, waves, shape):
+            quadrature = build_quadrature(platform.hull, shape, _refinement(waves))
+            strips = BandedStrips(shape, quadrature, None, None)
     return Hydro(
-        hull=build_hull(platform.hull, site.water_density, site.gravity),
+        hull=build_hull(platform.hull, site.water_density, site.gravity) if spar else None,
         strips=strips_in_waves(strips, waves, options),
         waves=waves,
         current=current,
-        damping=build_damping(platform.hydro),
-        added_inertia=build_added_inertia(platform.hydro.added_mass),
+        damping=build_damping(platform.hydro) if spar else None,
+        added_inertia=build_added_inertia(platform.hydro.added_mass) if spar else None,
+        matrices=build_body_matrices(
+            platform.potential_flow, platform.additional, site.water_density, site.gravity
+        ),
+        depth=float(site.water_depth),
     )
 
 
@@ -81,6 +88,8 @@ def _refinement(waves):
 
 def strips_in_waves(strips, waves, options):
     """Strips in waves (None: still water). Raises: InputError for a sea beyond the fast path."""
+    if strips is None:
+        return None
     diffracting = options["diffraction"] == "maccamy_fuchs" and waves is not None
     if isinstance(strips, ExactStrips):
         return strips._replace(

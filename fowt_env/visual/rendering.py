@@ -136,7 +136,7 @@ class TurbinePanel:
         width, height = self.inner = (SAMPLING * size[0], SAMPLING * size[1])
         platform, turbine = scene.platform, scene.turbine
         radius = turbine.rotor.tip_radius
-        top, bottom = turbine.rotor.hub_height + 1.16 * radius, min(platform.hull.z) * 1.18
+        top, bottom = turbine.rotor.hub_height + 1.16 * radius, -1.18 * platform.draft
         self.scale = height / (top - bottom)
         self.left = -0.5 * width / self.scale + 0.12 * radius
         self.top = top
@@ -319,7 +319,7 @@ class MooringPanel:
             pygame.draw.aalines(picture, colour, False, self.pixels(points))
             pygame.draw.aalines(picture, colour, False, self.pixels(points) + (0, 1))
             texts.append(f"{1e-3 * tension:.0f}")
-        keel, hub = scene.platform.hull.z[0], scene.turbine.rotor.hub_height
+        keel, hub = -scene.platform.draft, scene.turbine.rotor.hub_height
         spar = self.pixels(pose.inertial([(0.0, 0.0, keel), (0.0, 0.0, 0.0), (0.0, 0.0, hub)]))
         pygame.draw.line(picture, YELLOW, spar[0], spar[1], 3)
         pygame.draw.line(picture, SOFT, spar[1], spar[2], 2)

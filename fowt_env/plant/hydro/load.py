@@ -6,9 +6,10 @@ from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.hydro.added_inertia import added_inertia_load
 from fowt_env.plant.hydro.banded_strips import banded_strip_load
+from fowt_env.plant.hydro.body_matrices import add_body_matrices
 from fowt_env.plant.hydro.hydrostatics import hydrostatic_load
 from fowt_env.plant.hydro.linear_damping import damping_load
-from fowt_env.plant.hydro.morison import current_at, morison_load
+from fowt_env.plant.hydro.morison import NO_STRIP_LOAD, current_at, morison_load
 from fowt_env.plant.hydro.strips import Strips
 from fowt_env.plant.hydro.wave_bands import surface_elevation
 from fowt_env.plant.hydro.waves import elevation, wave_kinematics
@@ -34,19 +35,21 @@ class BandedStrips(NamedTuple):
 class Hydro(NamedTuple):
     """The floater in the water."""
 
-    hull: object  # hydrostatics.BuoyantHull
-    strips: object  # ExactStrips or BandedStrips
+    hull: object  # hydrostatics.BuoyantHull or None
+    strips: object  # ExactStrips, BandedStrips or None
     waves: object  # waves.Waves or None
     current: object  # morison.Current or None
     damping: object  # linear_damping.LinearDamping or None
     added_inertia: object  # added_inertia.AddedInertia or None
+    matrices: object  # body_matrices.BodyMatrices or None
+    depth: float  # of the water, m
 
 
 class HydroLoad(NamedTuple):
     """Loads of the water but for the added mass times acceleration, body components about the body origin."""
 
     buoyancy: Wrench
-    strips: Wrench  # with the velocity-dependent terms of a constant added mass
+    strips: Wrench  # with those of a linear body and the velocity-dependent terms of a constant added mass
     damping: Wrench
 
 
@@ -67,8 +70,15 @@ def _banded(t, pose, hydro, strips, data):
     )
 
 
+@inlined_kernel
+def _without(t, pose, hydro, strips, data):
+    return NO_STRIP_LOAD
+
+
 # (t, pose, hydro, strips, data) -> morison.StripLoad
-strip_load = chosen_by_class("strips", {ExactStrips: _exact, BandedStrips: _banded}, inlined=True)
+strip_load = chosen_by_class(
+    "strips", {ExactStrips: _exact, BandedStrips: _banded, type(None): _without}, inlined=True
+)
 
 
 @kernel
@@ -81,7 +91,10 @@ def _banded_elevation(t, waves, strips, data):
     return surface_elevation(t, waves, strips.bands, data.bands)
 
 
-_elevation = chosen_by_class("strips", {ExactStrips: _plain_elevation, BandedStrips: _banded_elevation})
+_elevation = chosen_by_class(
+    "strips",
+    {ExactStrips: _plain_elevation, BandedStrips: _banded_elevation, type(None): _plain_elevation},
+)
 
 
 @kernel
@@ -97,7 +110,7 @@ def water_at(t, X, Y, Z, hydro):
     """(u, v, w, du, dv, dw), m/s and m/s2, of waves and current at an inertial point (m)."""
     if hydro is None:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    return _water(t, X, Y, Z, hydro.waves, hydro.current, hydro.strips.shape.depth)
+    return _water(t, X, Y, Z, hydro.waves, hydro.current, hydro.depth)
 
 
 @kernel
@@ -118,6 +131,7 @@ def hydro_load(t, pose, x, hydro, data):
     strips = strip_load(t, pose, hydro, hydro.strips, data)
     fill_added_mass(strips, data.added_mass)
     wrench = add_inertia(pose, strips.wrench, hydro.added_inertia, data.added_mass)
+    wrench = add_body_matrices(pose, x, wrench, hydro.matrices, data.added_mass)
     return HydroLoad(buoyancy, wrench, damping_load(pose, x, hydro.damping))
 
 

@@ -12,7 +12,7 @@ from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.hydro.strip_kinematics import DU, DV, DW, P, U, V, W, strip_kinematics
 from fowt_env.plant.hydro.strips import GAUSS_OFFSET, axis_surface, wet_cell
 from fowt_env.plant.hydro.waves import Kinematics
-from fowt_env.plant.state import Wrench
+from fowt_env.plant.state import NO_LOAD, Wrench
 
 
 class Current(NamedTuple):
@@ -33,6 +33,9 @@ class StripLoad(NamedTuple):
     a33: float
 
 
+NO_STRIP_LOAD = StripLoad(NO_LOAD, 0.0, 0.0, 0.0, 0.0)
+
+
 @kernel
 def current_at(z, depth, current):
     """(u, v) of the current at inertial height z."""
@@ -50,7 +53,7 @@ def morison_load(t, pose, strips, waves, current, kin, diffraction=None):
     The section-acceleration term is returned as S_k for the left-hand side.
     """
     if strips is None:
-        return StripLoad(Wrench(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0, 0.0)
+        return NO_STRIP_LOAD
     rho, ca = strips.density, strips.added_mass_coefficient
     z_surf, eta = axis_surface(t, pose, strips, waves)
     keel = Kinematics(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

@@ -1,0 +1,184 @@
+"""Potential-flow coefficients of a floating body: the record, and its reading from files.
+
+Everything is dimensional, in SI units, about the body origin and in inertial axes, for small motions about
+the undisplaced pose.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+from zipfile import BadZipFile
+
+import numpy as np
+
+from fowt_env.descriptions.files import raise_problems
+from fowt_env.descriptions.records import Finite, Positive, Record, validate
+from fowt_env.errors import InputError
+
+MAX_BYTES = 200_000_000  # of a file of coefficients: a full difference-frequency QTF has some 10 MB
+
+
+@dataclass(frozen=True, eq=False)
+class DifferenceQtf:
+    """Quadratic transfer function of difference-frequency forces, Re(sum a_i a_j* Q_ij exp(i (w_i-w_j) t)).
+
+    On a grid of frequency pairs and of pairs of headings; N/m2 and N m/m2.
+    """
+
+    omega: np.ndarray  # (k,) rad/s, increasing
+    heading: np.ndarray  # (p, 2) rad, of the two waves
+    value: np.ndarray  # (p, k, k, 6) complex, Q(w_i, w_j); nan where the file has none
+
+
+@dataclass(frozen=True, eq=False)
+class PotentialFlow:
+    """First- and second-order coefficients of one body, about the body origin, in inertial axes.
+
+    The excitation per metre of amplitude is the force Re(X a exp(i omega t)) in the wave
+    a cos(omega t - k x cos(heading) - k y sin(heading)).
+    """
+
+    omega: np.ndarray  # (n,) rad/s, increasing, 0 < omega < infinity
+    added_mass: np.ndarray  # (n, 6, 6) kg, kg m, kg m2
+    damping: np.ndarray  # (n, 6, 6) N/(m/s) ...
+    added_mass_infinite: np.ndarray  # (6, 6)
+    excitation_omega: np.ndarray  # (k,) rad/s, increasing
+    heading: np.ndarray  # (m,) rad, increasing
+    excitation: np.ndarray  # (k, m, 6) complex N/m, N m/m
+    stiffness: np.ndarray  # (6, 6) hydrostatic, without weight, N/m ...
+    volume: float  # displaced, m3
+    centre_of_buoyancy: tuple[float, float]  # x, y, m
+    added_mass_zero: np.ndarray | None = None  # (6, 6) at zero frequency, where it is known
+    difference_qtf: DifferenceQtf | None = None
+    draft: float | None = None  # m, where it is known
+    source: str = ""
+
+
+class _PotentialFlowTable(Record):
+    """The table [potential_flow] of a platform file."""
+
+    coefficients: str  # a .npz, or the root of WAMIT's .1, .3 and .hst; relative to the file
+    displaced_volume: Positive
+    centre_of_buoyancy: tuple[Finite, Finite] = (0.0, 0.0)
+    length_scale: Positive = 1.0  # of WAMIT's dimensionless figures, m
+    draft: Positive | None = None
+
+
+ARRAYS = (
+    "omega", "added_mass", "damping", "added_mass_infinite", "excitation_omega", "heading", "excitation",
+    "stiffness", "added_mass_zero",
+)  # fmt: skip
+QTF_ARRAYS = ("qtf_omega", "qtf_heading", "qtf_value")
+OPTIONAL = ("added_mass_zero", *QTF_ARRAYS)
+
+
+def read_potential_flow(table, folder, gravity, density):
+    """PotentialFlow of the table [potential_flow] of a platform file in this folder.
+
+    gravity, density  of the water, which WAMIT's dimensionless figures need
+    Raises: InputError naming the file, the key or the array and what is allowed.
+    """
+    record, problems = validate(_PotentialFlowTable, table)
+    raise_problems("[potential_flow]", problems)
+    path = folder / Path(record.coefficients).expanduser()
+    if path.suffix == ".npz":
+        found = read_coefficients(path)
+    else:
+        from fowt_env.descriptions.wamit import read_wamit
+
+        found = read_wamit(path, length_scale=record.length_scale, gravity=gravity, density=density)
+    return replace(
+        found,
+        volume=record.displaced_volume,
+        centre_of_buoyancy=record.centre_of_buoyancy,
+        draft=record.draft,
+    )
+
+
+def read_coefficients(path):
+    """PotentialFlow of a .npz file as coefficient_arrays makes it, without volume, place and draft.
+
+    Nothing in the file is executed: arrays of numbers alone are read.
+    """
+    where = f"coefficients file {str(path)!r}"
+    try:
+        if not path.is_file():
+            raise InputError(f"{where} does not exist")
+        if path.stat().st_size > MAX_BYTES:
+            raise InputError(f"{where} has {path.stat().st_size} bytes; allowed: at most {MAX_BYTES}")
+        with np.load(path, allow_pickle=False) as file:
+            arrays = {name: file[name] for name in file.files if name in (*ARRAYS, *QTF_ARRAYS, "source")}
+    except (OSError, ValueError, BadZipFile, EOFError, KeyError, MemoryError, NotImplementedError) as error:
+        raise InputError(f"{where} cannot be read: {error}") from None
+    missing = [name for name in ARRAYS if name not in arrays and name not in OPTIONAL]
+    if missing:
+        raise InputError(f"{where}: arrays {', '.join(missing)} are missing")
+    problems = _array_problems(arrays)
+    raise_problems(where, problems)
+    qtf = None
+    if all(name in arrays for name in QTF_ARRAYS):
+        qtf = DifferenceQtf(
+            *(np.ascontiguousarray(arrays[name], dtype=kind) for name, kind in
+              zip(QTF_ARRAYS, (float, float, complex), strict=True))
+        )  # fmt: skip
+    values = {
+        name: np.ascontiguousarray(arrays[name], dtype=complex if name == "excitation" else float)
+        for name in ARRAYS
+        if name in arrays
+    }
+    source = str(arrays["source"]) if "source" in arrays else ""
+    return PotentialFlow(
+        **values, volume=math.nan, centre_of_buoyancy=(0.0, 0.0), difference_qtf=qtf, source=source[:2000]
+    )
+
+
+def coefficient_arrays(body):
+    """{name: array} of a PotentialFlow for numpy.savez_compressed, single precision but for frequencies."""
+    arrays = {}
+    for name in ARRAYS:
+        value = getattr(body, name)
+        if value is not None:
+            small = np.complex64 if name == "excitation" else np.float32
+            arrays[name] = np.asarray(value) if name in ("omega", "excitation_omega", "heading") else (
+                np.asarray(value).astype(small)
+            )  # fmt: skip
+    if body.difference_qtf is not None:
+        qtf = body.difference_qtf
+        arrays |= {
+            "qtf_omega": qtf.omega,
+            "qtf_heading": qtf.heading,
+            "qtf_value": qtf.value.astype(np.complex64),
+        }
+    return arrays | {"source": np.array(body.source)}
+
+
+def _array_problems(arrays):
+    """What is wrong with the arrays of a file, one line each."""
+    problems = []
+    for name, value in arrays.items():
+        if name == "source":
+            continue
+        if value.dtype.kind not in ("fiuc" if name in ("excitation", "qtf_value") else "fiu"):
+            problems.append(f"{name}: must be numbers, is {value.dtype}")
+        elif name != "qtf_value" and not np.isfinite(value).all():
+            problems.append(f"{name}: must be finite numbers")
+    if problems:
+        return problems
+    n, k, m = (arrays[name].size for name in ("omega", "excitation_omega", "heading"))
+    shapes = {
+        "omega": (n,), "added_mass": (n, 6, 6), "damping": (n, 6, 6), "added_mass_infinite": (6, 6),
+        "excitation_omega": (k,), "heading": (m,), "excitation": (k, m, 6), "stiffness": (6, 6),
+        "added_mass_zero": (6, 6),
+    }  # fmt: skip
+    if all(name in arrays for name in QTF_ARRAYS):
+        q, p = arrays["qtf_omega"].size, arrays["qtf_heading"].shape[0] if arrays["qtf_heading"].ndim else 0
+        shapes |= {"qtf_omega": (q,), "qtf_heading": (p, 2), "qtf_value": (p, q, q, 6)}
+    for name, shape in shapes.items():
+        if name in arrays and arrays[name].shape != shape:
+            problems.append(f"{name}: has the shape {arrays[name].shape}; must be {shape}")
+    for name in ("omega", "excitation_omega", "heading", "qtf_omega"):
+        if name in arrays and not problems:
+            low = -math.inf if name == "heading" else 0.0
+            if not (arrays[name].size > 0 and arrays[name][0] > low and (np.diff(arrays[name]) > 0).all()):
+                problems.append(f"{name}: must increase{'' if name == 'heading' else ' and be > 0'}")
+    return problems

@@ -1,0 +1,142 @@
+"""Constant matrices of a floating body about its undisplaced pose (theory.md, 5.7).
+
+Potential-flow hydrostatics and the added mass at infinite frequency, with the additional preload, stiffness
+and damping of the platform file. Linear theory knows the body in its undisplaced pose alone, so all of it is
+in inertial axes about the body origin, as in HydroDyn:
+
+    F = constant - stiffness q - linear_damping q' - quadratic_damping |q'| q' - added_mass q''
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from fowt_env.plant.compile.decorators import kernel
+from fowt_env.plant.state import State, Wrench, add, to_body, to_inertial
+
+
+class BodyMatrices(NamedTuple):
+    """Matrices in inertial axes about the body origin; q is surge, sway, heave, roll, platform pitch, yaw."""
+
+    constant: np.ndarray  # (6,) buoyancy of the undisplaced body and preload, N, N m
+    stiffness: np.ndarray  # (6, 6)
+    linear_damping: np.ndarray  # (6, 6)
+    quadratic_damping: np.ndarray  # (6, 6), on |q'| q' of each motion
+    added_mass: np.ndarray  # (6, 6) at infinite frequency, symmetric
+
+
+def build_body_matrices(potential, additional, density, gravity):
+    """BodyMatrices of a PotentialFlow and AdditionalLoads, either or both None; None without both."""
+    if potential is None and additional is None:
+        return None
+    constant, stiffness, added = np.zeros(6), np.zeros((6, 6)), np.zeros((6, 6))
+    linear, quadratic = np.zeros((6, 6)), np.zeros((6, 6))
+    if potential is not None:
+        weight = density * gravity * potential.volume
+        x, y = potential.centre_of_buoyancy
+        constant += [0.0, 0.0, weight, weight * y, -weight * x, 0.0]
+        stiffness += potential.stiffness
+        added += 0.5 * (potential.added_mass_infinite + potential.added_mass_infinite.T)
+    if additional is not None:
+        constant += additional.preload
+        for matrix, rows in (
+            (stiffness, additional.stiffness),
+            (linear, additional.linear_damping),
+            (quadratic, additional.quadratic_damping),
+        ):
+            if rows is not None:
+                matrix += np.array(rows)
+    return BodyMatrices(constant, stiffness, linear, quadratic, added)
+
+
+@kernel
+def add_body_matrices(pose, x, load, part, added):
+    """The load with that of BodyMatrices but for added mass times acceleration; adds to added (6, 6).
+
+    As it is without the part. Velocities and accelerations are those of the body origin: R v and R w, and
+    R (v' + w x v) and R w'.
+    """
+    if part is None:
+        return load
+    u = to_inertial(pose, pose.vx, pose.vy, pose.vz)
+    w = to_inertial(pose, pose.wx, pose.wy, pose.wz)
+    fx = _matrix_force(0, x, u, w, part)
+    fy = _matrix_force(1, x, u, w, part)
+    fz = _matrix_force(2, x, u, w, part)
+    mx = _matrix_force(3, x, u, w, part)
+    my = _matrix_force(4, x, u, w, part)
+    mz = _matrix_force(5, x, u, w, part)
+    force, moment = to_body(pose, fx, fy, fz), to_body(pose, mx, my, mz)
+    turned = Wrench(force[0], force[1], force[2], moment[0], moment[1], moment[2])
+    return add(add(load, turned), _add_turned_mass(pose, part.added_mass, added))
+
+
+@kernel
+def _matrix_force(i, x, u, w, part):
+    """Component i of the load in inertial axes."""
+    total = part.constant[i]
+    for j in range(6):
+        total -= part.stiffness[i, j] * x[State.SURGE + j]
+    for j in range(3):
+        total -= (part.linear_damping[i, j] + part.quadratic_damping[i, j] * abs(u[j])) * u[j]
+        total -= (part.linear_damping[i, 3 + j] + part.quadratic_damping[i, 3 + j] * abs(w[j])) * w[j]
+    return total
+
+
+@kernel
+def _add_turned_mass(pose, mass, added):
+    """Add the added mass in body axes to `added`; returns its load by the turning velocity, -A (w x v, 0)."""
+    cx = pose.wy * pose.vz - pose.wz * pose.vy
+    cy = pose.wz * pose.vx - pose.wx * pose.vz
+    cz = pose.wx * pose.vy - pose.wy * pose.vx
+    fx = fy = fz = mx = my = mz = 0.0
+    for j in range(3):  # columns of R, the body axes, and what the mass makes of each
+        a, b, c = _axis(j, pose)
+        p0 = _product(0, mass, a, b, c, 0)
+        p1 = _product(1, mass, a, b, c, 0)
+        p2 = _product(2, mass, a, b, c, 0)
+        k0 = _product(3, mass, a, b, c, 0)
+        k1 = _product(4, mass, a, b, c, 0)
+        k2 = _product(5, mass, a, b, c, 0)
+        r0, r1, r2 = to_body(pose, p0, p1, p2)
+        s0, s1, s2 = to_body(pose, k0, k1, k2)
+        added[0, j] += r0
+        added[1, j] += r1
+        added[2, j] += r2
+        added[3, j] += s0
+        added[4, j] += s1
+        added[5, j] += s2
+        added[j, 3] += s0
+        added[j, 4] += s1
+        added[j, 5] += s2
+        turn = cx if j == 0 else (cy if j == 1 else cz)
+        fx -= r0 * turn
+        fy -= r1 * turn
+        fz -= r2 * turn
+        mx -= s0 * turn
+        my -= s1 * turn
+        mz -= s2 * turn
+        k0 = _product(3, mass, a, b, c, 3)
+        k1 = _product(4, mass, a, b, c, 3)
+        k2 = _product(5, mass, a, b, c, 3)
+        s0, s1, s2 = to_body(pose, k0, k1, k2)
+        added[3, 3 + j] += s0
+        added[4, 3 + j] += s1
+        added[5, 3 + j] += s2
+    return Wrench(fx, fy, fz, mx, my, mz)
+
+
+@kernel
+def _axis(j, pose):
+    """Body axis j in inertial components."""
+    if j == 0:
+        return pose.r11, pose.r21, pose.r31
+    if j == 1:
+        return pose.r12, pose.r22, pose.r32
+    return pose.r13, pose.r23, pose.r33
+
+
+@kernel
+def _product(i, mass, a, b, c, start):
+    """Row i of three columns of the mass from `start` on, times a vector."""
+    return mass[i, start] * a + mass[i, start + 1] * b + mass[i, start + 2] * c
