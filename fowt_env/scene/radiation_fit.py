@@ -23,7 +23,7 @@ from fowt_env.plant.hydro.radiation import ConvolutionMemory, StateSpaceMemory, 
 from fowt_env.plant.state import MOTIONS
 
 BAND = (0.15, 2.5)  # rad/s, in which errors are counted: periods of 2.5 to 42 s
-OUTSIDE = 0.1  # weight of other frequencies
+OUTSIDE, BELOW = 0.1, 0.6  # weight of higher frequencies, and times frequency (rad/s) of lower ones
 FEWEST_KNOWN = 8  # frequencies of a file within BAND
 NEGLIGIBLE = 1e-3  # of the geometric mean of the diagonals: weaker coupling is left out
 FEWEST, MOST = 2, 10  # pairs of poles of an entry
@@ -36,6 +36,7 @@ PASSIVE_MARGIN = 1e-5  # least Re K at which residues are held, of its size ther
 PASSIVE_ROUNDS = 60
 NOT_PASSIVE = 1e-4  # of an entry's largest value: beyond it a fit is refused
 SPAN = 60.0  # s of past velocities in a convolution
+FADE = 15.0  # s at its end in which K goes to zero: cut off, it would damp slow motions, or drive them
 SPACING = 0.005  # rad/s, of the cosine transform: its period of 1257 s is far beyond SPAN
 TRANSFORMED = 120.0  # s of K behind the target of a fit
 GRID = 0.025  # rad/s, of that target
@@ -364,7 +365,8 @@ def _fit(body, asked):
     k = causal_retardation(body, omega)
     band = _in_band(omega)
     size = np.sqrt((np.abs(k[band]) ** 2).mean(axis=0))
-    w = np.where(band, 1.0, OUTSIDE)
+    # below the band by what an error is in added mass, which sets the periods of surge, sway and yaw
+    w = np.where(band, 1.0, np.where(omega < BAND[0], BELOW / omega, OUTSIDE))
     blocks, coupled = _blocks(size)
     poles, residues = {}, {}
     for block in blocks:
@@ -488,7 +490,8 @@ def build_convolution(body, dt, motions=range(6)):
     steps = max(1, round(SPAN / dt))
     n = whole_groups(steps, SUM_LANES)
     time = 0.5 * dt * np.arange(2 * n + 1)
-    kernel = retardation_kernel(body, time)
+    share = np.clip((time - SPAN + FADE) / FADE, 0.0, 1.0)
+    kernel = retardation_kernel(body, time) * (0.5 + 0.5 * np.cos(np.pi * share))[:, None, None]
     now = np.zeros((6, 6))
     half, whole = np.zeros((len(places), n)), np.zeros((len(places), n))
     for e, (i, j) in enumerate(places):
