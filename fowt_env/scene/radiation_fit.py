@@ -1,8 +1,9 @@
-"""Radiation memory from potential-flow coefficients: rational approximation by vector fitting, or convolution.
+"""Radiation memory from potential-flow coefficients: a rational approximation, or convolution.
 
-The retardation of a body is K(i w) = B(w) + i w (A(w) - A_inf), and follows from B alone, since it is causal. So
-both forms have the K of B: files give an A that agrees with their B to some per cent, where panels are coarse or
-inner waves resonate, and by far more than the fit is in error. The rational approximation has real coefficients, stable poles, K(0) = 0 and no direct term, and the poles of motions that are coupled are common
+The retardation of a body is K(i w) = B(w) + i w (A(w) - A_inf), and follows from B alone, since it is causal.
+So both forms have the K of B: files give an A that agrees with their B to some per cent, where panels are
+coarse or inner waves resonate, and by far more than the fit is in error. The rational approximation has real
+coefficients, stable poles, K(0) = 0 and no direct term, and the poles of motions that are coupled are common
 to all entries between them. Poles are found by vector fitting (Gustavsen and Semlyen, IEEE Trans. Power
 Delivery 14(3), 1999; relaxed as in 21(3), 2006) and then by nonlinear least squares; residues by linear least
 squares under the condition that Re K is positive semidefinite (theory.md, 5.8).
@@ -251,8 +252,9 @@ def _constrained(left, right, rows, least):
 
 
 def _passive_grid():
-    """Frequencies (rad/s) at which Re K is held positive, and its size there: K goes with w^2 at both ends."""
-    omega = np.unique(np.r_[np.geomspace(1e-3, 0.05, 10), np.arange(0.05, PASSIVE_UP_TO + 0.01, 0.025), 20.0, 50.0])
+    """Frequencies (rad/s) at which Re K is held positive, and its size there, which goes with w^2 and 1/w^2."""
+    middle = np.arange(0.05, PASSIVE_UP_TO + 0.01, 0.025)
+    omega = np.unique(np.r_[np.geomspace(1e-3, 0.05, 10), middle, 20.0, 50.0])
     return omega, omega**2 / (omega**2 + 0.3**2) / (1.0 + (omega / 3.0) ** 2)
 
 
@@ -360,11 +362,11 @@ _FITS = Cache(16)  # (hash of the coefficients, error) -> RadiationFit
 
 
 def fit_radiation(body, error=0.02):
-    """RadiationFit of a PotentialFlow: as many poles as an rms error of each entry asks for, MOST pairs at most.
+    """RadiationFit of a PotentialFlow: as many poles as the error asks for, MOST pairs at most.
 
     error  rms over BAND of an entry, of the entry's rms there
-    Warns (PlantWarning) where an entry is left with more than twice that. Raises: InputError where Re K of the
-    fit cannot be held positive, or where the coefficients have fewer than FEWEST_KNOWN frequencies within BAND.
+    Warns (PlantWarning) where an entry is left with more than twice that. Raises: InputError where Re K of
+    the fit cannot be held positive, or with fewer than FEWEST_KNOWN frequencies within BAND.
     """
     digest = hashlib.sha256()
     for part in (body.omega, body.added_mass, body.damping, body.added_mass_infinite):
@@ -395,7 +397,8 @@ def _fit(body, asked):
     fit = RadiationFit(poles, residues, {}, 0.0, asked)
     grid = _passive_grid()[0]
     far = fit.response(grid[grid <= PASSIVE_UP_TO])
-    own, of_file = _misses(fit, omega[band], k[band]), _misses(fit, body.omega[known], retardation(body)[known])
+    own = _misses(fit, omega[band], k[band])
+    of_file = _misses(fit, body.omega[known], retardation(body)[known])
     entries = {}
     for i, j in residues:
         if i <= j:
@@ -425,8 +428,8 @@ def _check(fit):
     for (i, j), entry in fit.entries.items():
         if i == j and entry.passivity < -NOT_PASSIVE:
             raise InputError(
-                f"potential_flow: the radiation memory of {MOTIONS[i]} cannot be fitted without making energy:"
-                f" the least Re K is {entry.passivity:.2g} of the largest; use radiation = 'convolution'"
+                f"potential_flow: the radiation memory of {MOTIONS[i]} cannot be fitted without making"
+                f" energy: the least Re K is {entry.passivity:.2g} of the largest; use radiation = 'convolution'"
             )
     coarse = {
         f"{MOTIONS[i]}" if i == j else f"{MOTIONS[i]}-{MOTIONS[j]}": entry.error
@@ -468,9 +471,8 @@ def memory_for_step(memory, body, dt, planar):
 
 def build_state_space(fit, first, motions=range(6)):
     """StateSpaceMemory of a RadiationFit, for these motions; None where none of them has a memory."""
-    groups = [
-        whole_groups(fit.poles[j].size, PAIR_LANES) if j in motions and j in fit.poles else 0 for j in range(6)
-    ]
+    counts = [fit.poles[j].size if j in motions and j in fit.poles else 0 for j in range(6)]
+    groups = [whole_groups(count, PAIR_LANES) for count in counts]
     begin = np.concatenate([[0], np.cumsum(groups)]).astype(np.int64)
     if begin[-1] == 0:
         return None
@@ -537,7 +539,7 @@ class LinearMemory(NamedTuple):
 
 
 def linear_memory(scene):
-    """LinearMemory of a scene, None without a memory; for a convolution that of the fit that state_space has."""
+    """LinearMemory of a scene, None without a memory; for a convolution that of the fit of state_space."""
     hydro = scene.model.hydro
     if hydro is None or hydro.radiation is None:
         return None
