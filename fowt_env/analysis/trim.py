@@ -19,6 +19,7 @@ from fowt_env.plant.dynamics import derivative
 from fowt_env.plant.hydro.load import BandedStrips
 from fowt_env.plant.rollout import output_row
 from fowt_env.plant.state import N_COMMANDS, Command, State, pose_of
+from fowt_env.plant.tilt import rotor_pose
 from fowt_env.scene.scene import Scene
 from fowt_env.weather.wind import make_series
 from fowt_env.weather.wind_field import steady_field
@@ -129,8 +130,8 @@ def settle_wake(handle, x, dx):
     aero = model_of(handle).aero
     rotor = aero.rotor
     wake_equilibrium(
-        0.0, pose_of(x), x, wind_now(0.0, aero.wind), aero.wind, aero.field, rotor.elements, rotor.skew,
-        rotor.wake, dx, data_of(handle).counters,
+        0.0, rotor_pose(pose_of(x), aero.tilt), x, wind_now(0.0, aero.wind), aero.wind, aero.field,
+        rotor.elements, rotor.skew, rotor.wake, dx, data_of(handle).counters,
     )  # fmt: skip
 
 

@@ -21,6 +21,7 @@ from fowt_env.plant.hydro.strip_quadrature import STILL_REFINEMENT, build_quadra
 from fowt_env.plant.hydro.strips import build_strips
 from fowt_env.plant.hydro.wave_bands import build_band_diffraction, build_wave_bands, can_use_bands
 from fowt_env.plant.mooring import build_mooring
+from fowt_env.plant.tilt import build_tilt
 from fowt_env.scene.options import ROTORS, chosen_stations
 from fowt_env.scene.weather import IN_PLANE
 from fowt_env.weather.waves import flat_waves, is_flat
@@ -38,7 +39,7 @@ def build_aero(platform, turbine, air, rotor, options):
     elements = build_blade_elements(turbine, density, chosen_stations(options["blade_stations"], turbine))
     model = ROTORS[rotor].build(elements, options)
     tower = build_tower_drag(platform.tower, density) if options["tower_drag"] else None
-    return Aero(air.series, air.field, model, tower)
+    return Aero(air.series, air.field, model, build_tilt(turbine.rotor.shaft_tilt), tower)
 
 
 def build_hydro(platform, waves, current, options):
