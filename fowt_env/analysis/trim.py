@@ -17,6 +17,7 @@ from fowt_env.plant.compile.handle import data_of, model_of
 from fowt_env.plant.drivetrain import build_torque_curve, generator_torque
 from fowt_env.plant.dynamics import derivative
 from fowt_env.plant.hydro.load import BandedStrips
+from fowt_env.plant.hydro.member_series import no_series
 from fowt_env.plant.rollout import output_row
 from fowt_env.plant.state import N_COMMANDS, Command, State, pose_of
 from fowt_env.plant.tilt import rotor_pose
@@ -93,6 +94,8 @@ def without_fluctuations(scene, wind_speed=None):
             name: getattr(waves, name)[:1].copy() for name in waves._fields if np.ndim(getattr(waves, name))
         }
         parts["hydro.waves"] = waves._replace(**one | {"amplitude": np.zeros(1), "velocity": np.zeros(1)})
+        if hydro.members is not None:
+            parts["hydro.members.series"] = no_series()
         if isinstance(hydro.strips, BandedStrips):
             bands = hydro.strips.bands
             parts["hydro.strips.bands"] = bands._replace(weight=np.zeros_like(bands.weight))

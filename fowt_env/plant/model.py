@@ -78,6 +78,8 @@ class Data(NamedTuple):
     counters: np.ndarray  # (N_COUNTERS,)
     kinematics: np.ndarray  # (7, n_nodes) water kinematics at the strip nodes
     bands: object  # hydro.wave_bands.BandScratch, the same for strips with wave bands
+    member_nodes: np.ndarray  # (n, hydro.members.N_NODE) nodes of members that are laid at each evaluation
+    member_water: np.ndarray  # (n * N_WATER,) the water's motion at the members' nodes
     added_mass: np.ndarray  # (6, 6) of the last evaluation, symmetric, about the body origin
     matrix: np.ndarray  # (6, 6) mass with added mass, solved in place
     stages: np.ndarray  # (5, n_state) derivatives and states within a step
