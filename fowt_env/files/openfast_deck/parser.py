@@ -93,8 +93,8 @@ class PartFile:
         return self.refusal(f"{key} = {str(value)[:60]}: must be {allowed}", None if found is None else found[0])
 
     def source(self, *keys):
-        """"file: keys", the comment beside a figure that was worked out of them."""
-        return f"{self.path.name}: {', '.join(keys)}"
+        """"ElastoDyn: keys", the comment beside a figure that was worked out of them."""
+        return f"{self.kind}: {', '.join(keys)}"
 
     # ------------------------------------------------------------------ values
 
