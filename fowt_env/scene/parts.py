@@ -21,7 +21,9 @@ from fowt_env.plant.hydro.strip_quadrature import STILL_REFINEMENT, build_quadra
 from fowt_env.plant.hydro.strips import build_strips
 from fowt_env.plant.hydro.wave_bands import build_band_diffraction, build_wave_bands, can_use_bands
 from fowt_env.plant.mooring import build_mooring
-from fowt_env.scene.options import ROTORS, chosen_stations
+from fowt_env.plant.state import N_RIGID
+from fowt_env.scene.options import ROTORS, chosen_stations, default_step
+from fowt_env.scene.radiation_fit import build_radiation
 from fowt_env.scene.weather import IN_PLANE
 from fowt_env.weather.waves import flat_waves, is_flat
 
@@ -41,8 +43,8 @@ def build_aero(platform, turbine, air, rotor, options):
     return Aero(air.series, air.field, model, tower)
 
 
-def build_hydro(platform, waves, current, options):
-    """Hydro part of a scene in water."""
+def build_hydro(platform, waves, current, options, first_state=N_RIGID):
+    """Hydro part of a scene in water; the states of its memory begin at first_state."""
     site, spar = platform.environment, platform.hull is not None
     strips = None
     if spar:
@@ -61,6 +63,7 @@ def build_hydro(platform, waves, current, options):
         matrices=build_body_matrices(
             platform.potential_flow, platform.additional, site.water_density, site.gravity
         ),
+        radiation=build_radiation(platform.potential_flow, options, default_step(options), first_state),
         depth=float(site.water_depth),
     )
 

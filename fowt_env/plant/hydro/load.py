@@ -10,6 +10,7 @@ from fowt_env.plant.hydro.body_matrices import add_body_matrices
 from fowt_env.plant.hydro.hydrostatics import hydrostatic_load
 from fowt_env.plant.hydro.linear_damping import damping_load
 from fowt_env.plant.hydro.morison import NO_STRIP_LOAD, current_at, morison_load
+from fowt_env.plant.hydro.radiation import add_radiation
 from fowt_env.plant.hydro.strips import Strips
 from fowt_env.plant.hydro.wave_bands import surface_elevation
 from fowt_env.plant.hydro.waves import elevation, wave_kinematics
@@ -42,6 +43,7 @@ class Hydro(NamedTuple):
     damping: object  # linear_damping.LinearDamping or None
     added_inertia: object  # added_inertia.AddedInertia or None
     matrices: object  # body_matrices.BodyMatrices or None
+    radiation: object  # radiation.StateSpaceMemory, ConvolutionMemory or None
     depth: float  # of the water, m
 
 
@@ -132,6 +134,7 @@ def hydro_load(t, pose, x, hydro, data):
     fill_added_mass(strips, data.added_mass)
     wrench = add_inertia(pose, strips.wrench, hydro.added_inertia, data.added_mass)
     wrench = add_body_matrices(pose, x, wrench, hydro.matrices, data.added_mass)
+    wrench = add_radiation(pose, x, wrench, hydro.radiation, data.radiation)
     return HydroLoad(buoyancy, wrench, damping_load(pose, x, hydro.damping))
 
 
