@@ -69,7 +69,8 @@ def build_scene(
     air, waves = build_weather(wind, sea, seed, platform, turbine, rotor, options)
     current = build_current(options["current"]) if options["hydrodynamics"] else None
     if options["planar"]:
-        check_symmetry(platform.lines if options["mooring"] else (), current)
+        members = platform.members if options["hydrodynamics"] else ()
+        check_symmetry(platform.lines if options["mooring"] else (), current, members)
     mooring = build_moorings(platform.lines, options["mooring"])
     user = checked_loads(loads, 0 if mooring is None else mooring.length.shape[0], options["planar"])
     aero = None if air.series is None else build_aero(platform, turbine, air, rotor, options)

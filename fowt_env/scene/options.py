@@ -105,6 +105,8 @@ OPTIONS = {
     "shear_exponent": (None, "None (the platform file's) or 0 to 1"),
     "turbine": (None, "None (the platform file's), a name, a path or a descriptions.turbine.Turbine"),
 }
+# defaults of a floater that is no slender spar: linear theory knows it in its undisplaced pose alone
+UNDISPLACED = {"kinematics_position": "fixed", "surface": "swl", "stretching": "none"}
 ARGUMENTS = ("platform", "wind", "sea", "seed", "rotor", "fidelity", "loads")  # of build_scene beside OPTIONS
 
 
@@ -144,6 +146,8 @@ def default_step(options):
 def checked_options(given, platform):
     """Options with defaults, the platform file's own ones and the caller's, checked."""
     options = {name: default for name, (default, _) in OPTIONS.items()}
+    if platform.hull is None:
+        options |= UNDISPLACED
     for source, values in (
         (f"platform {platform.name!r}, options", platform.options),
         ("build_scene", given),

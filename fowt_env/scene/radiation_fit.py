@@ -248,7 +248,9 @@ def _constrained(left, right, rows, least):
 
 def _passive_grid():
     """Frequencies (rad/s) at which Re K is held positive, and its size there: K goes with w^2 at both ends."""
-    omega = np.unique(np.r_[np.geomspace(1e-3, 0.05, 10), np.arange(0.05, PASSIVE_UP_TO + 0.01, 0.025), 20.0, 50.0])
+    omega = np.unique(
+        np.r_[np.geomspace(1e-3, 0.05, 10), np.arange(0.05, PASSIVE_UP_TO + 0.01, 0.025), 20.0, 50.0]
+    )
     return omega, omega**2 / (omega**2 + 0.3**2) / (1.0 + (omega / 3.0) ** 2)
 
 
@@ -368,7 +370,10 @@ def _fit(body, asked):
     fit = RadiationFit(poles, residues, {}, 0.0, asked)
     grid = _passive_grid()[0]
     far = fit.response(grid[grid <= PASSIVE_UP_TO])
-    own, of_file = _misses(fit, omega[band], k[band]), _misses(fit, body.omega[known], retardation(body)[known])
+    own, of_file = (
+        _misses(fit, omega[band], k[band]),
+        _misses(fit, body.omega[known], retardation(body)[known]),
+    )
     entries = {}
     for i, j in residues:
         if i <= j:
@@ -441,7 +446,9 @@ def memory_for_step(memory, body, dt, planar):
 
 def build_state_space(fit, first, motions=range(6)):
     """StateSpaceMemory of a RadiationFit, for these motions; None where none of them has a memory."""
-    groups = [-(-fit.poles[j].size // GROUP) * GROUP if j in motions and j in fit.poles else 0 for j in range(6)]
+    groups = [
+        -(-fit.poles[j].size // GROUP) * GROUP if j in motions and j in fit.poles else 0 for j in range(6)
+    ]
     begin = np.concatenate([[0], np.cumsum(groups)]).astype(np.int64)
     if begin[-1] == 0:
         return None

@@ -9,6 +9,8 @@ from fowt_env.plant.hydro.banded_strips import banded_strip_load
 from fowt_env.plant.hydro.body_matrices import add_body_matrices
 from fowt_env.plant.hydro.hydrostatics import hydrostatic_load
 from fowt_env.plant.hydro.linear_damping import damping_load
+from fowt_env.plant.hydro.member_buoyancy import add_member_buoyancy
+from fowt_env.plant.hydro.members import add_member_loads
 from fowt_env.plant.hydro.morison import NO_STRIP_LOAD, current_at, morison_load
 from fowt_env.plant.hydro.radiation import add_radiation
 from fowt_env.plant.hydro.strips import Strips
@@ -44,6 +46,7 @@ class Hydro(NamedTuple):
     added_inertia: object  # added_inertia.AddedInertia or None
     matrices: object  # body_matrices.BodyMatrices or None
     radiation: object  # radiation.StateSpaceMemory, ConvolutionMemory or None
+    members: object  # members.Members or None
     depth: float  # of the water, m
 
 
@@ -51,7 +54,7 @@ class HydroLoad(NamedTuple):
     """Loads of the water but for the added mass times acceleration, body components about the body origin."""
 
     buoyancy: Wrench
-    strips: Wrench  # with those of a linear body and the velocity-dependent terms of a constant added mass
+    strips: Wrench  # with those of members, a linear body and the velocity terms of a constant added mass
     damping: Wrench
 
 
@@ -130,11 +133,13 @@ def hydro_load(t, pose, x, hydro, data):
     if hydro is None:
         return NO_HYDRO_LOAD
     buoyancy = hydrostatic_load(pose, hydro.hull, data.counters)
+    buoyancy = add_member_buoyancy(pose, buoyancy, hydro.members)
     strips = strip_load(t, pose, hydro, hydro.strips, data)
     fill_added_mass(strips, data.added_mass)
     wrench = add_inertia(pose, strips.wrench, hydro.added_inertia, data.added_mass)
     wrench = add_body_matrices(pose, x, wrench, hydro.matrices, data.added_mass)
     wrench = add_radiation(pose, x, wrench, hydro.radiation, data.radiation)
+    wrench = add_member_loads(t, pose, wrench, hydro.members, hydro.waves, hydro.current, data)
     return HydroLoad(buoyancy, wrench, damping_load(pose, x, hydro.damping))
 
 
