@@ -20,6 +20,7 @@ from fowt_env.plant.hydro.load import BandedStrips
 from fowt_env.plant.rollout import output_row
 from fowt_env.plant.state import N_COMMANDS, Command, State, pose_of
 from fowt_env.scene.scene import Scene
+from fowt_env.weather.excitation import still_excitation
 from fowt_env.weather.wind import make_series
 from fowt_env.weather.wind_field import steady_field
 
@@ -92,6 +93,7 @@ def without_fluctuations(scene, wind_speed=None):
             name: getattr(waves, name)[:1].copy() for name in waves._fields if np.ndim(getattr(waves, name))
         }
         parts["hydro.waves"] = waves._replace(**one | {"amplitude": np.zeros(1), "velocity": np.zeros(1)})
+        parts["hydro.excitation"] = still_excitation(hydro.excitation)
         if isinstance(hydro.strips, BandedStrips):
             bands = hydro.strips.bands
             parts["hydro.strips.bands"] = bands._replace(weight=np.zeros_like(bands.weight))

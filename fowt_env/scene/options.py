@@ -13,6 +13,7 @@ from fowt_env.plant.aero.load import BemRotor
 from fowt_env.plant.aero.section_table import build_section_table
 from fowt_env.plant.aero.wake import build_dynamic_inflow, build_skewed_wake
 from fowt_env.plant.integrators import INTEGRATORS
+from fowt_env.weather.second_order import METHODS
 
 
 class RotorModel(NamedTuple):
@@ -92,6 +93,9 @@ OPTIONS = {
     "rotor_samples": (None, "None or a number of samples, 1 to 10"),
     "wave_loads": (None, (None, "exact", "fast")),  # None: the fidelity's
     "current": (None, "None, a speed (m/s) or {'speed', 'heading' (deg), 'exponent'}"),
+    # of a potential-flow body with a difference-frequency QTF; cutoff: differences above it make no force
+    "second_order": (None, (None, "none", *METHODS)),
+    "second_order_cutoff": (None, "None or rad/s, > 0"),
     "duration": (700.0, "seconds of random wind and sea, > 0"),
     "wave_components": (None, "None or a number of components, 1 to 10000"),
     "blade_stations": (None, "None (the turbine file's) or a number of them, 3 up to the file's"),
@@ -155,6 +159,10 @@ def checked_options(given, platform):
         options["shear_exponent"] = check_number("shear_exponent", options["shear_exponent"], 0.0, 1.0)
     if options["strip_length"] is not None:
         options["strip_length"] = check_number("strip_length", options["strip_length"], 0.01, 1e3)
+    if options["second_order_cutoff"] is not None:
+        options["second_order_cutoff"] = check_number(
+            "second_order_cutoff", options["second_order_cutoff"], 0.0, 100.0, low_open=True
+        )
     for name, most in (("wave_components", 10000), ("rotor_samples", 10)):
         if options[name] is not None:
             options[name] = check_whole_number(name, options[name], 1, most)
