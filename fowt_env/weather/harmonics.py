@@ -11,6 +11,9 @@ from fowt_env.plant.hydro.excitation import COLUMNS, TimeTable
 EVEN = 1e-6  # of a spacing: what frequencies may miss a harmonic by, a phase of 6e-6 rad after one period
 SPLINE_ERROR = 1.3e-3  # of an interpolated exponential, times (omega step)^4: rms over places and phases
 TOLERANCE = 5e-6  # rms error of a table over its standard deviation
+ROUNDED = 1e-4  # of a gap: what figures of files may miss a multiple by
+MOST_HARMONICS = 20_000  # from the lowest to the highest frequency, where they are not that many themselves
+LONG_PERIOD = 3600.0  # s, beyond which a table does not cover a period but the duration
 LONGEST = 1.2  # omega times step of the highest frequency
 MARGIN = 5.0  # s of table beyond the time that was asked for
 MOST_ROWS = 2_000_000  # 128 MB
@@ -40,18 +43,29 @@ def harmonics_of(omega):
     """Harmonics of frequencies (n,) rad/s in any order, or None where they are not evenly spaced."""
     start = float(omega.min())
     gaps = np.diff(np.unique(omega))
-    gaps = gaps[gaps > EVEN * start]
-    spacing = float(gaps.min()) if gaps.size else start
-    ratio = (omega - start) / spacing
-    if gaps.size and np.abs(ratio - np.round(ratio)).max() < 0.05:
-        # the least gap carries the rounding of two figures; all of them together carry less
-        index = np.round(ratio)
+    spacing = _common_part(gaps[gaps > EVEN * start], start)
+    if float(omega.max()) - start > max(MOST_HARMONICS, 2 * omega.size) * spacing:
+        return None
+    index = np.round((omega - start) / spacing)
+    if index.any():  # one gap carries the rounding of two figures; all of them together carry less
         spacing = float((omega - start) @ index / (index @ index))
-        ratio = (omega - start) / spacing
-    index = np.round(ratio)
-    if np.abs(ratio - index).max() > EVEN:
+    if np.abs((omega - start) / spacing - index).max() > EVEN:
         return None
     return Harmonics(start, spacing, index.astype(int))
+
+
+def _common_part(gaps, without):
+    """What gaps (n,) are multiples of, by Euclid's rule with room for rounded figures; of none `without`."""
+    if gaps.size == 0:
+        return without
+    common = float(gaps.min())
+    least = 0.01 * common / gaps.size
+    for gap in gaps:
+        one, rest = common, abs(gap - common * round(gap / common))
+        while rest > ROUNDED * one and rest > least:
+            one, rest = rest, abs(one - rest * round(one / rest))
+        common = one
+    return common
 
 
 def step_for(omega, coefficient):
@@ -69,12 +83,12 @@ def step_for(omega, coefficient):
 def table_of(omega, coefficient, duration):
     """TimeTable of Re(sum of coefficient (n, m) exp(i omega t)), m up to COLUMNS.
 
-    It covers a period and repeats where the frequencies are multiples of one, else duration seconds or, of
-    evenly spaced frequencies, their period if it is longer.
+    It covers a period and repeats where the frequencies are multiples of one; else it covers the duration
+    (s) or, of evenly spaced frequencies, the period of their differences if it is somewhat longer.
     """
     step = step_for(omega, coefficient)
     found = harmonics_of(omega)
-    if found is None:
+    if found is None or found.period > max(2.0 * duration, LONG_PERIOD):
         rows = min(ceil((duration + MARGIN) / step), MOST_ROWS)
         values = direct_sum(omega, _prefiltered(omega, coefficient, step), step, rows + 3).real
         return pack_table(values, step, rows * step, False)
