@@ -22,6 +22,7 @@ from fowt_env.plant.rollout import output_row
 from fowt_env.plant.state import N_COMMANDS, Command, State, pose_of
 from fowt_env.plant.tilt import rotor_pose
 from fowt_env.scene.scene import Scene
+from fowt_env.weather.excitation import still_excitation
 from fowt_env.weather.wind import make_series
 from fowt_env.weather.wind_field import steady_field
 
@@ -96,6 +97,7 @@ def without_fluctuations(scene, wind_speed=None):
         parts["hydro.waves"] = waves._replace(**one | {"amplitude": np.zeros(1), "velocity": np.zeros(1)})
         if hydro.members is not None:
             parts["hydro.members.series"] = no_series()
+        parts["hydro.excitation"] = still_excitation(hydro.excitation)
         if isinstance(hydro.strips, BandedStrips):
             bands = hydro.strips.bands
             parts["hydro.strips.bands"] = bands._replace(weight=np.zeros_like(bands.weight))

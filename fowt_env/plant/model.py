@@ -72,7 +72,10 @@ N_CACHE = 38
 
 @by_reference
 class Data(NamedTuple):
-    """What changes: scratch of one plant. lines, counters, cache, history and samples last between calls."""
+    """What changes: scratch of one plant.
+
+    lines, counters, cache, history, samples and radiation last between calls.
+    """
 
     lines: np.ndarray  # (n_lines, 6) mooring warm start and results
     counters: np.ndarray  # (N_COUNTERS,)
@@ -87,3 +90,4 @@ class Data(NamedTuple):
     user: np.ndarray  # (user_loads.user_data_size(n),) wrench of each user load, and its inputs
     history: np.ndarray  # (4, n_state) derivatives of past steps, latest first
     samples: np.ndarray  # (4 samples, 7) rotor loads within past steps, latest first
+    radiation: np.ndarray  # hydro.radiation.memory_data: of the memory, empty without one

@@ -23,9 +23,12 @@ from fowt_env.plant.hydro.strip_quadrature import STILL_REFINEMENT, build_quadra
 from fowt_env.plant.hydro.strips import build_strips
 from fowt_env.plant.hydro.wave_bands import build_band_diffraction, build_wave_bands, can_use_bands
 from fowt_env.plant.mooring import build_mooring
+from fowt_env.plant.state import N_RIGID
 from fowt_env.plant.tilt import build_tilt
-from fowt_env.scene.options import ROTORS, chosen_stations
+from fowt_env.scene.options import ROTORS, chosen_stations, default_step
+from fowt_env.scene.radiation_fit import build_radiation
 from fowt_env.scene.weather import IN_PLANE
+from fowt_env.weather.excitation import build_excitation, still_excitation
 from fowt_env.weather.waves import flat_waves, is_flat
 
 
@@ -44,8 +47,8 @@ def build_aero(platform, turbine, air, rotor, options):
     return Aero(air.series, air.field, model, build_tilt(turbine.rotor.shaft_tilt), tower)
 
 
-def build_hydro(platform, waves, current, options):
-    """Hydro part of a scene in water."""
+def build_hydro(platform, waves, current, options, first_state=N_RIGID):
+    """Hydro part of a scene in water; the states of its memory begin at first_state."""
     site, spar = platform.environment, platform.hull is not None
     strips = None
     if spar:
@@ -64,7 +67,9 @@ def build_hydro(platform, waves, current, options):
         matrices=build_body_matrices(
             platform.potential_flow, platform.additional, site.water_density, site.gravity
         ),
+        radiation=build_radiation(platform.potential_flow, options, default_step(options), first_state),
         members=members_in_waves(_members(platform, options), waves, options),
+        excitation=excitation_in_waves(platform, waves, options),
         depth=float(site.water_depth),
     )
 
@@ -77,7 +82,9 @@ def hydro_in_waves(hydro, waves, platform, options):
     if waves is None:
         site = platform.environment
         waves = flat_waves(depth=site.water_depth, density=site.water_density, gravity=site.gravity)
-    strips = hydro.strips
+    strips, excitation = hydro.strips, still_excitation(hydro.excitation)
+    if not is_flat(waves):
+        excitation = excitation_in_waves(platform, waves, options)
     if isinstance(strips, BandedStrips) and (is_flat(waves) or is_flat(hydro.waves)):
         nodes = build_quadrature(platform.hull, strips.shape, _refinement(waves))
         quadrature = strips.quadrature._replace(table=nodes.table, keel=nodes.keel)
@@ -86,6 +93,29 @@ def hydro_in_waves(hydro, waves, platform, options):
         waves=waves,
         strips=strips_in_waves(strips, waves, options),
         members=members_in_waves(hydro.members, waves, options),
+        excitation=excitation,
+    )
+
+
+def excitation_in_waves(platform, waves, options):
+    """Excitation of a potential-flow body in waves; None without either.
+
+    Raises: InputError for a sea beyond the body's coefficients, or second order without a QTF.
+    """
+    body, second = platform.potential_flow, options["second_order"]
+    if second not in (None, "none") and (body is None or body.difference_qtf is None):
+        raise InputError(
+            f"second_order = {second!r}: the platform {platform.name!r} has no difference-frequency QTF;"
+            " allowed without one: None or 'none'"
+        )
+    return build_excitation(
+        body,
+        waves,
+        duration=options["duration"],
+        fast=options["wave_loads"] == "fast",
+        planar=options["planar"],
+        second_order=second,
+        cutoff=options["second_order_cutoff"],
     )
 
 

@@ -172,7 +172,9 @@ def _polar(file, columns, moment, mode):
         try:
             values = [float(words[i - 1].replace("D", "e").replace("d", "e")) if i else 0.0 for i in columns]
         except (ValueError, IndexError):
-            raise file.refusal(f"{text.strip()[:60]!r}: must be numbers in columns {columns}", number) from None
+            raise file.refusal(
+                f"{text.strip()[:60]!r}: must be numbers in columns {columns}", number
+            ) from None
         if not np.isfinite(values).all() or max(map(abs, values)) > 1e4:
             raise file.refusal(f"{text.strip()[:60]!r}: must be finite numbers", number)
         if not moment:
@@ -204,12 +206,18 @@ def _notes(file):
         yield "free vortex wake (OLAF)", "blade-element momentum theory"
     if wake == 2 or (wake == 1 and file.whole("DBEMT_Mod", default=0) > 0 and file.has("Wake_Mod")):
         yield "dynamic wake (DBEMT)", "quasi-steady induction; the option dynamic_inflow has a dynamic one"
-    unsteady = file.whole("UA_Mod", default=0) if file.has("UA_Mod") else file.whole("AFAeroMod", default=1) - 1
+    unsteady = (
+        file.whole("UA_Mod", default=0) if file.has("UA_Mod") else file.whole("AFAeroMod", default=1) - 1
+    )
     if unsteady > 0:
         yield "unsteady airfoil aerodynamics", "quasi-steady polars"
     if file.whole("TwrPotent", default=0) != 0:
         yield "potential flow around the tower", "no influence of the tower on the wind"
-    if file.whole("TwrShadow", default=0, high=9) != 0 if not _is_flag(file, "TwrShadow") else file.flag("TwrShadow"):
+    if (
+        file.whole("TwrShadow", default=0, high=9) != 0
+        if not _is_flag(file, "TwrShadow")
+        else file.flag("TwrShadow")
+    ):
         yield "tower shadow", "no influence of the tower on the wind"
     if file.flag("Buoyancy", default=False):
         yield "buoyancy of blades and tower", "none"

@@ -271,7 +271,9 @@ def _member_rows(member):
         ("axial_pressure_coefficient", axial[2], None),
     ):
         if tuple(value) != usual and not (usual is None and member.potential_flow):
-            comment = "half of AxCd: HydroDyn's is on rho A |v| v / 4" if key == "axial_drag_coefficient" else ""
+            comment = (
+                "half of AxCd: HydroDyn's is on rho A |v| v / 4" if key == "axial_drag_coefficient" else ""
+            )
             rows.append(Row(key, list(value), comment))
     return rows
 
@@ -286,7 +288,9 @@ def turbine_rows(deck, name):
     nacelle = values["NacYIner"] - values["NacMass"] * (values["NacCMxn"] ** 2 + values["NacCMyn"] ** 2)
     if nacelle < 0.0:
         raise values.file.wrong(
-            "NacYIner", values["NacYIner"], f">= {values['NacYIner'] - nacelle:g}, NacMass at NacCMxn and NacCMyn alone"
+            "NacYIner",
+            values["NacYIner"],
+            f">= {values['NacYIner'] - nacelle:g}, NacMass at NacCMxn and NacCMyn alone",
         )
     law = {"rated_torque": control.rated_torque, "rated_power": control.rated_power,
            "rated_speed": control.rated_speed} | control.law  # fmt: skip

@@ -81,7 +81,9 @@ def read_deck(fst=None, parts=None, folders=(), discon=None):
     folders = (*folders, *({main.path.parent} if main is not None else ()))
     elastodyn = read_elastodyn(parts["elastodyn"], folders)
     aerodyn = read_aerodyn(parts["aerodyn"], folders)
-    water = PartFile(parts.get("seastate", parts["hydrodyn"]), "SeaState" if "seastate" in parts else "HydroDyn")
+    water = PartFile(
+        parts.get("seastate", parts["hydrodyn"]), "SeaState" if "seastate" in parts else "HydroDyn"
+    )
     site = _site(main, elastodyn, aerodyn, water)
     hydrodyn = read_hydrodyn(parts["hydrodyn"], (site.water_density, site.water_depth, 0.0), folders)
     mooring, lines, notes = None, [], []
@@ -103,7 +105,9 @@ def read_deck(fst=None, parts=None, folders=(), discon=None):
     )
     reference = elastodyn["PtfmRefzt"]
     if reference != 0.0 and hydrodyn.potential is not None:
-        raise elastodyn.file.wrong("PtfmRefzt", reference, "0 with potential flow: WAMIT's origin at still water")
+        raise elastodyn.file.wrong(
+            "PtfmRefzt", reference, "0 with potential flow: WAMIT's origin at still water"
+        )
     return Deck(
         name=(main.path if main is not None else parts["elastodyn"]).stem,
         fst=main,

@@ -113,9 +113,7 @@ def read_elastodyn(path, folders=()):
         blades=blades,
         blade=_blade(file, folders, values),
         tower=_tower(file, folders, values["towerht"] - values["towerbsht"]),
-        platform_products=tuple(
-            file.number(f"Ptfm{name}Iner", default=0.0) for name in ("XY", "YZ", "XZ")
-        ),
+        platform_products=tuple(file.number(f"Ptfm{name}Iner", default=0.0) for name in ("XY", "YZ", "XZ")),
         gravity=file.number("Gravity", default=None, low=0.0, open_low=True),
         flexible=tuple(what for key, what in FLEXIBLE.items() if file.flag(key, default=False)),
     )

@@ -73,7 +73,9 @@ def read_inflow(path, folders=()):
         speed = file.number("HWindSpeed", low=0.0, high=100.0)
         exponent = file.number("PLexp", "PLExp", default=None, low=0.0, high=1.0)
         height = file.number("RefHt", default=0.0)
-        return Inflow(speed, exponent, f"steady, {speed:g} m/s at {height:g} m, power law {exponent or 0.0:g}")
+        return Inflow(
+            speed, exponent, f"steady, {speed:g} m/s at {height:g} m, power law {exponent or 0.0:g}"
+        )
     if kind == 2:
         from fowt_env.files.openfast import read_uniform_wind
 
@@ -81,6 +83,8 @@ def read_inflow(path, folders=()):
         if name is None:
             return Inflow(None, None, "uniform wind, its file is not named")
         wind = read_uniform_wind(name)
-        return Inflow(None, wind["shear_exponent"], f"uniform wind of {name.name}, which --wind takes as it is")
+        return Inflow(
+            None, wind["shear_exponent"], f"uniform wind of {name.name}, which --wind takes as it is"
+        )
     names = {3: "TurbSim", 4: "Bladed", 5: "HAWC", 6: "user-defined", 7: "Bladed"}
     return Inflow(None, None, f"{names.get(kind, 'unknown')} (WindType {kind}): give the wind with --wind")

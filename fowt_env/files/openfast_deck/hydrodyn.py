@@ -78,8 +78,13 @@ def read_hydrodyn(path, site, folders=()):
     potential = _potential(file, folders, notes) if mode == 1 else None
     growth = file.table("NMGDepths", high=MOST)
     if any(cells.get("mgthck", 0.0) != 0.0 for _, cells in growth):
-        raise file.refusal("marine growth cannot be represented: NMGDepths must be 0", growth[0][0], "NMGDepths")
-    for key, what in (("NPropSetsRec", "rectangular cross-sections"), ("NCoefMembersRec", "rectangular members")):
+        raise file.refusal(
+            "marine growth cannot be represented: NMGDepths must be 0", growth[0][0], "NMGDepths"
+        )
+    for key, what in (
+        ("NPropSetsRec", "rectangular cross-sections"),
+        ("NCoefMembersRec", "rectangular members"),
+    ):
         if file.whole(key, default=0) != 0:
             raise file.wrong(key, file.whole(key), f"0: {what} cannot be represented")
     second = {key: file.whole(key, default=0) for key in SECOND_ORDER}
@@ -156,7 +161,9 @@ def _members(file, site, notes):
             raise file.refusal(f"joint {cells['jointid']:g}: must be within 10 km of the body", line)
         joints[int(cells["jointid"])] = (place, int(cells["jointaxid"]))
         if cells.get("jointovrlp", 0.0) != 0.0:
-            notes.append((f"overlap removed at joint {cells['jointid']:g} (JointOvrlp)", "members overlap there"))
+            notes.append(
+                (f"overlap removed at joint {cells['jointid']:g} (JointOvrlp)", "members overlap there")
+            )
     sections = {}
     for line, cells in file.table("NPropSets", "NPropSetsCyl", high=MOST):
         _need(file, line, cells, ("propsetid", "propd", "propthck"))
@@ -168,11 +175,18 @@ def _members(file, site, notes):
         _need(file, line, cells, ("axcoefid", "axcd", "axca", "axcp"))
         axial[int(cells["axcoefid"])] = tuple(cells[name] for name in ("axcd", "axca", "axcp"))
         if cells.get("axfdmod", 0.0) != 0.0:
-            notes.append(("low-passed or one-sided axial drag (AxFDMod)", "axial drag of the present velocity"))
+            notes.append(
+                ("low-passed or one-sided axial drag (AxFDMod)", "axial drag of the present velocity")
+            )
     coefficients = _Coefficients(file)
     bare_members = []
     for line, cells in rows:
-        _need(file, line, cells, ("memberid", "mjointid1", "mjointid2", "mpropsetid1", "mpropsetid2", "mcoefmod"))
+        _need(
+            file,
+            line,
+            cells,
+            ("memberid", "mjointid1", "mjointid2", "mpropsetid1", "mpropsetid2", "mcoefmod"),
+        )
         number = int(cells["memberid"])
         if cells.get("msecgeom", 1.0) not in (0.0, 1.0):
             raise file.refusal(f"member {number}: MSecGeom must be 1, a circular section", line)
@@ -192,11 +206,10 @@ def _members(file, site, notes):
         low, high = (np.array(end[0]) for end in ends)
         for a, b in zip(starts[:-1], starts[1:], strict=True):
             values = [
-                coefficients.at(line, number, model, (1.0 - t) * low[2] + t * high[2] - level, t) for t in (a, b)
+                coefficients.at(line, number, model, (1.0 - t) * low[2] + t * high[2] - level, t)
+                for t in (a, b)
             ]
-            size = [
-                tuple((1.0 - t) * props[0][i] + t * props[1][i] for t in (a, b)) for i in (0, 1)
-            ]
+            size = [tuple((1.0 - t) * props[0][i] + t * props[1][i] for t in (a, b)) for i in (0, 1)]
             place = [tuple(float(x) for x in low + t * (high - low)) for t in (a, b)]
             none = (0.0, 0.0, 0.0)
             found.append(Cylinder(
@@ -252,7 +265,11 @@ def _faces(members, axial, notes):
                 f"axial loads of joint at {place} across the axis of member {number}",
                 f"left out: {aside:.2g} of the area of the member's end",
             ))  # fmt: skip
-        result[number][end] = (0.5 * drag * max(part, 0.0), mass * max(part3, 0.0), pressure if part > 1e-6 else 0.0)
+        result[number][end] = (
+            0.5 * drag * max(part, 0.0),
+            mass * max(part3, 0.0),
+            pressure if part > 1e-6 else 0.0,
+        )
     return result
 
 
@@ -299,7 +316,9 @@ class _Coefficients:
             raise self.file.refusal(f"member {number}: MCoefMod = {model}: must be 1, 2 or 3", line)
         for name, value in values.items():
             if value is None or not 0.0 <= value <= 1e4:
-                raise self.file.refusal(f"member {number}: its coefficient {name} = {value}: must be >= 0", line)
+                raise self.file.refusal(
+                    f"member {number}: its coefficient {name} = {value}: must be >= 0", line
+                )
         return values
 
     def _of_depth(self, name, depth):

@@ -24,7 +24,16 @@ COEFFICIENTS = "hydro.npz"
 
 
 def import_deck(
-    fst, folder, *, parts=None, search=(), discon=None, excitation=None, name=None, replace_files=False, head=()
+    fst,
+    folder,
+    *,
+    parts=None,
+    search=(),
+    discon=None,
+    excitation=None,
+    name=None,
+    replace_files=False,
+    head=(),
 ):
     """Report of a deck written as platform.toml, turbine/, hydro.npz and report.md into a folder.
 
@@ -43,7 +52,9 @@ def import_deck(
     if folder.exists() and not folder.is_dir():
         raise InputError(f"folder {str(folder)!r} is a file; must be a folder, or not there yet")
     if (folder / "platform.toml").exists() and not replace_files:
-        raise InputError(f"folder {str(folder)!r} has a platform.toml already; give another, or replace its files")
+        raise InputError(
+            f"folder {str(folder)!r} has a platform.toml already; give another, or replace its files"
+        )
     deck = read_deck(fst, parts, search, discon)
     body = _coefficients(deck, excitation)
     report = make_report(deck, name, body)

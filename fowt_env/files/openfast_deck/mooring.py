@@ -120,7 +120,9 @@ def _line(file, number, name, ends, length, kind, type_name):
             number,
         )
     if kinds[0] == kinds[1]:
-        raise file.refusal(f"line {name}: must go from an anchor to the vessel, both its ends are {kinds[0]}s", number)
+        raise file.refusal(
+            f"line {name}: must go from an anchor to the vessel, both its ends are {kinds[0]}s", number
+        )
     anchor, fairlead = ends if kinds[0] == "anchor" else ends[::-1]
     wet, stiffness, friction = kind
     return MooringLine(anchor[2], fairlead[2], length, wet, stiffness, friction, type_name)
@@ -160,7 +162,19 @@ def read_moordyn(path, depth, density, gravity):
             section = text.lower()
             continue
         head = words[0].lower()
-        if head in ("name", "linetype", "type", "node", "id", "point", "line", "typename", "rodid", "bodyid", "key"):
+        if head in (
+            "name",
+            "linetype",
+            "type",
+            "node",
+            "id",
+            "point",
+            "line",
+            "typename",
+            "rodid",
+            "bodyid",
+            "key",
+        ):
             continue
         if len(words) > 1 and words[1].lower() in ("ntypes", "nconnects", "nlines", "npoints", "nconns"):
             continue
@@ -168,7 +182,9 @@ def read_moordyn(path, depth, density, gravity):
             types[head] = _moordyn_type(file, number, words, density, gravity)
         elif any(name in section for name in ("rod", "bodies", "body")) and "output" not in section:
             if "type" not in section and "dict" not in section:
-                raise file.refusal("bodies and rods cannot be represented: this section must be empty", number)
+                raise file.refusal(
+                    "bodies and rods cannot be represented: this section must be empty", number
+                )
         elif "point" in section or "connection" in section or "node" in section:
             points[bare(words[0]).lower()] = (number, *_node(file, number, _without_attachment(words), depth))
         elif "line" in section and "option" not in section and "need" not in section:
@@ -189,20 +205,29 @@ def read_moordyn(path, depth, density, gravity):
         for name in (words[places[1]], words[places[2]]):
             if name.lower() not in points:
                 raise file.refusal(
-                    f"line {words[0]}: point {name!r} is not there (rods and bodies cannot be represented)", number
+                    f"line {words[0]}: point {name!r} is not there (rods and bodies cannot be represented)",
+                    number,
                 )
             ends.append(points[name.lower()])
         lines.append(_line(file, number, words[0], ends, length, types[words[1].lower()], words[1]))
     _check_count(file, lines)
-    notes = [("dynamic lines (MoorDyn): drag, added mass and inertia of the lines", "quasi-static catenaries")]
+    notes = [
+        ("dynamic lines (MoorDyn): drag, added mass and inertia of the lines", "quasi-static catenaries")
+    ]
     return file, lines, notes
 
 
 def _without_attachment(words):
     """The words of a point: some files have "Vessel1" or "Coupled 0 ..." alike."""
-    return [words[0], words[1].rstrip("0123456789") if words[1].lower() not in FAIRLEADS else words[1], *words[2:]] if (
-        len(words) > 1
-    ) else words
+    return (
+        [
+            words[0],
+            words[1].rstrip("0123456789") if words[1].lower() not in FAIRLEADS else words[1],
+            *words[2:],
+        ]
+        if (len(words) > 1)
+        else words
+    )
 
 
 def _moordyn_type(file, number, words, density, gravity):

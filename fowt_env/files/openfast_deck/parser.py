@@ -90,10 +90,12 @@ class PartFile:
     def wrong(self, key, value, allowed, *also):
         """InputError for a value that is not allowed."""
         found = self.find(key, *also)
-        return self.refusal(f"{key} = {str(value)[:60]}: must be {allowed}", None if found is None else found[0])
+        return self.refusal(
+            f"{key} = {str(value)[:60]}: must be {allowed}", None if found is None else found[0]
+        )
 
     def source(self, *keys):
-        """"ElastoDyn: keys", the comment beside a figure that was worked out of them."""
+        """ "ElastoDyn: keys", the comment beside a figure that was worked out of them."""
         return f"{self.kind}: {', '.join(keys)}"
 
     # ------------------------------------------------------------------ values
@@ -237,7 +239,9 @@ class PartFile:
         rows = []
         for number in range(line + 1, len(self.lines)):
             words = words_of(self.lines[number][:2000])
-            if not words or (not rows and words[0].startswith(("(", "[", "-")) and number_of(words[0]) is None):
+            if not words or (
+                not rows and words[0].startswith(("(", "[", "-")) and number_of(words[0]) is None
+            ):
                 continue
             rows.append((number, self._cells(number, words, columns, texts, key)))
             if len(rows) == count:
@@ -269,9 +273,7 @@ class PartFile:
         path = locate(name, (self.path.parent, *folders))
         if path is None:
             found = self.find(key, *also)
-            raise self.refusal(
-                f"{key} = {name[:200]!r}: no such file", None if found is None else found[0]
-            )
+            raise self.refusal(f"{key} = {name[:200]!r}: no such file", None if found is None else found[0])
         return path
 
 

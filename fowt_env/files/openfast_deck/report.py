@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from fowt_env.files.markdown import markdown_table
-from fowt_env.files.openfast_deck.hydrodyn import is_old
 from fowt_env.files.openfast_deck.conversion import ballast, hub_place, mass_properties, rotor_mass
+from fowt_env.files.openfast_deck.hydrodyn import is_old
 
 
 class Report(NamedTuple):
@@ -74,7 +74,10 @@ def _differences(deck):
     _, _, inertia = ballast(deck)
     across = np.abs(inertia - np.diag(np.diag(inertia))).max()
     if deck.hydrodyn.fills and across > 1e-3 * np.diag(inertia).min():
-        yield "ballast water whose principal axes are not the body's", f"products of inertia of {across:.3g} kg m2 left out"
+        yield (
+            "ballast water whose principal axes are not the body's",
+            f"products of inertia of {across:.3g} kg m2 left out",
+        )
     yield from deck.aerodyn.notes
     many = [name for name, (_, tables, _) in deck.aerodyn.tables.items() if tables > 1]
     if many:
@@ -88,7 +91,10 @@ def _differences(deck):
         "a straight taper and one drag coefficient of the same load in even wind",
     )
     if deck.elastodyn["GBoxEff"] != 100.0:
-        yield f"gearbox efficiency {deck.elastodyn['GBoxEff']:g} % (GBoxEff)", "mesh_loss, the same part of the torque"
+        yield (
+            f"gearbox efficiency {deck.elastodyn['GBoxEff']:g} % (GBoxEff)",
+            "mesh_loss, the same part of the torque",
+        )
     yield from deck.hydrodyn.notes
     if deck.hydrodyn.fills and is_old(deck.hydrodyn.file):
         yield (

@@ -12,7 +12,6 @@ from fowt_env.errors import InputError
 from fowt_env.files.openfast_deck.parser import PartFile, bare, locate, number_of, words_of
 
 
-
 @dataclass(frozen=True)
 class Control:
     """Figures of the controller; sources: a comment for each name."""
@@ -95,7 +94,12 @@ def _optional(file, key, folders):
 
 def _left_out(file):
     """What ServoDyn has and the plant does not."""
-    for key, what in (("NumBStC", "blades"), ("NumNStC", "nacelle"), ("NumTStC", "tower"), ("NumSStC", "platform")):
+    for key, what in (
+        ("NumBStC", "blades"),
+        ("NumNStC", "nacelle"),
+        ("NumTStC", "tower"),
+        ("NumSStC", "platform"),
+    ):
         if file.whole(key, default=0):
             yield f"structural controllers (tuned mass dampers) of the {what} ({key})", "none"
     for key, what in (("CompNTMD", "nacelle"), ("CompTTMD", "tower")):
@@ -176,7 +180,9 @@ def _rosco(path, efficiency, air_density, radius, folders):
         "region3_min_pitch": file.number("PC_Switch", default=0.01745, low=0.0, high=1.0),
         "max_torque": max(file.number("VS_MaxTq", default=1.1 * torque, low=0.0, open_low=True), torque),
         "max_torque_rate": file.number("VS_MaxRat", default=0.348 * torque, low=0.0, open_low=True),
-        "speed_filter_corner": file.number("F_LPFCornerFreq", default=1.5708, low=0.0, high=1e3, open_low=True),
+        "speed_filter_corner": file.number(
+            "F_LPFCornerFreq", default=1.5708, low=0.0, high=1e3, open_low=True
+        ),
     }
     notes = list(_rosco_notes(file))
     winds = _values(file, "WE_FOPoles_v") or _values(file, "PS_WindSpeeds") or []
@@ -224,7 +230,10 @@ def _rosco_notes(file):
     if file.whole("PS_Mode", default=0):
         yield "peak shaving (PS_Mode)", "in the controller rosco alone, which runs the DISCON.IN"
     if file.whole("PA_Mode", default=0):
-        yield "pitch actuator within ROSCO (PA_Mode)", "pitch_drive.time_constant 0: set it for other controllers"
+        yield (
+            "pitch actuator within ROSCO (PA_Mode)",
+            "pitch_drive.time_constant 0: set it for other controllers",
+        )
     if file.whole("IPC_ControlMode", default=0):
         yield "individual pitch control (IPC_ControlMode)", "collective pitch"
 
