@@ -99,7 +99,9 @@ def additional_stiffness(deck):
         own[4, 4] -= z
         own[3, 5] += x
         own[4, 5] += y
-    return stiffness - own, f"{source}, less what the weight of the water in members restores"
+    rest = stiffness - own
+    rest[np.abs(rest) < 1e-6 * np.abs(own).max()] = 0.0
+    return rest, f"{source}, less what the weight of the water in members restores"
 
 
 def tower_mass(deck):
