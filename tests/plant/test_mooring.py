@@ -604,7 +604,7 @@ def test_the_tabulated_pull_has_no_steps():
     assert np.abs(np.diff(slope)).max() < 0.01 * np.abs(slope).mean()
 
 
-# Tendons of a tension-leg platform: eight in four pairs, of the MIT/NREL TLP as OpenFAST's regression test has it
+# Tendons of a tension-leg platform, eight in four pairs: the MIT/NREL TLP of OpenFAST's regression tests
 
 TENDON = (151.73, 1010.5, 1.5e9)  # unstretched length m, weight in water N/m, EA N
 
@@ -645,7 +645,7 @@ def test_a_vertical_tendon_is_a_spring():
 
 
 def test_taut_and_steep_lines_match_moorpy():
-    """To 1e-7 of the tension. Of a very taut line MoorPy may find both tensions negative, the same in size."""
+    """To 1e-7 of the tension. Of a very taut line MoorPy may find both tensions negative, equal in size."""
     moorpy = pytest.importorskip("moorpy.Catenary")
     rng = np.random.default_rng(21)
     length, weight, stiffness = TENDON
