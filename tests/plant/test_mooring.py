@@ -6,6 +6,7 @@ import io
 import naive.mooring as naive
 import numpy as np
 import pytest
+from floaters import TENDON, tendons
 
 from fowt_env.descriptions.platform import Line
 from fowt_env.plant.events import N_COUNTERS, Counter
@@ -605,19 +606,6 @@ def test_the_tabulated_pull_has_no_steps():
 
 
 # Tendons of a tension-leg platform, eight in four pairs: the MIT/NREL TLP of OpenFAST's regression tests
-
-TENDON = (151.73, 1010.5, 1.5e9)  # unstretched length m, weight in water N/m, EA N
-
-
-def tendons():
-    """Line records of the eight, of which two share each fairlead."""
-    places = [(27.0, 0.0), (0.0, 27.0), (-27.0, 0.0), (0.0, -27.0)]
-    length, weight, stiffness = TENDON
-    return tuple(
-        Line(anchor=(x, y, -200.0), fairlead=(x, y, -47.89), length=length, wet_weight=weight, EA=stiffness)
-        for x, y in places
-        for _ in range(2)
-    )
 
 
 def test_tendons_have_the_tensions_of_map():
