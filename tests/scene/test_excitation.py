@@ -14,7 +14,7 @@ from fowt_env.descriptions.platform import read_platform
 from fowt_env.errors import InputError
 from fowt_env.plant.compile.decorators import entry
 from fowt_env.plant.compile.handle import data_of, model_of
-from fowt_env.plant.hydro.excitation import ExactExcitation, ExcitationSeries, add_excitation
+from fowt_env.plant.hydro.excitation import ExactExcitation, ExcitationSeries, FastExcitation, add_excitation
 from fowt_env.plant.hydro.load import hydro_load, surface_at_origin
 from fowt_env.plant.state import NO_LOAD, pose_of
 
@@ -62,7 +62,7 @@ def test_the_load_of_the_water_has_the_excitation_of_the_sea_and_still_water_non
     x = np.zeros(scene.n_state)
     x[:6] = 3.0, -2.0, 0.5, 0.05, -0.04, 0.3
     part = scene.model.hydro.excitation
-    expected = np.array(add_excitation(7.7, pose_of(x), NO_LOAD, part))
+    expected = np.array(add_excitation(7.7, pose_of(x), x, NO_LOAD, part, np.zeros((5, 0))))
     for quiet in (without_fluctuations(scene), scene.with_weather(None, None, 0)):
         still = water(quiet, 7.7, x)
         assert np.allclose(water(scene, 7.7, x)[:6] - still[:6], expected, rtol=1e-9, atol=1.0)
@@ -80,6 +80,31 @@ def test_other_weather_has_the_same_types_and_the_forces_of_a_scene_built_in_it(
         built = scene_of(sea, form, second_order="full", seed=3)
         x = np.zeros(scene.n_state)
         assert np.array_equal(water(moved, 20.0, x), water(built, 20.0, x))
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_filtered_position_has_two_states_and_keeps_its_types(form):
+    memory = {"exact": "none", "fast": "state_space"}[form]
+    scene = scene_of(form=form, excitation_position="filtered", excitation_cutoff=0.02, radiation=memory)
+    blocks = {block.name: block for block in scene.blocks}
+    part = scene.model.hydro.excitation
+    assert (blocks["slow place"].offset, blocks["slow place"].size) == (part.place.first, 2)
+    assert part.place.rate == pytest.approx(2.0 * np.pi * 0.02)
+    if form == "fast":
+        assert type(part.first) is FastExcitation
+        assert blocks["radiation"].offset == scene.model.hydro.radiation.first == part.place.first + 2
+    x = np.zeros(scene.n_state)
+    x[part.place.first] = 30.0
+    for sea in (None, JONSWAP | {"heading": 60.0}, {"kind": "regular", "H": 2, "T": 7}):
+        moved = scene.with_weather(None, sea, 1)
+        assert numba.typeof(tuple(moved.model)) == numba.typeof(tuple(scene.model))
+        assert moved.n_state == scene.n_state
+    at_rest, displaced = water(moved, 5.0, np.zeros(scene.n_state)), water(moved, 5.0, x)
+    shift = moved.model.hydro.waves.wave_number[0] * 30.0 / moved.model.hydro.waves.omega[0]
+    assert np.allclose(displaced[:6], water(moved, 5.0 - shift, 0.0 * x)[:6], rtol=1e-5, atol=1e-3)
+    assert not np.allclose(displaced[:6], at_rest[:6], rtol=1e-3) and displaced[6] == at_rest[6]
+    with pytest.raises(InputError, match="excitation_cutoff = 10: must be a number in"):
+        scene_of(excitation_position="filtered", excitation_cutoff=10)
 
 
 def test_second_order_needs_a_qtf():
@@ -111,7 +136,8 @@ def test_the_linear_wave_force_is_the_excitation_turned_into_body_axes():
     regular = scene.with_weather(None, {"kind": "regular", "H": 2.0, "T": 2.0 * np.pi / omega}, 0)
     part = regular.model.hydro.excitation.first.exact
     for t in (0.0, 1.3):
-        expected = add_excitation(t, pose_of(x), NO_LOAD, regular.model.hydro.excitation._replace(first=part))
+        exact = regular.model.hydro.excitation._replace(first=part)
+        expected = add_excitation(t, pose_of(x), x, NO_LOAD, exact, np.zeros((5, 0)))
         assert np.allclose((force * np.exp(1j * omega * t)).real, np.array(expected), rtol=1e-9)
     assert not wave_force(build_scene(hydrodynamics=False), x, [omega]).any()
     planar = wave_force(build_scene(platform_of(), planar=True, mooring=False), np.zeros(15), [omega])
