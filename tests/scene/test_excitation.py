@@ -12,8 +12,6 @@ from fowt_env.analysis.trim import without_fluctuations
 from fowt_env.analysis.wave_excitation import fit_wave_filter, wave_force
 from fowt_env.descriptions.platform import read_platform
 from fowt_env.errors import InputError
-from fowt_env.plant.compile.decorators import entry
-from fowt_env.plant.compile.handle import data_of, model_of
 from fowt_env.plant.hydro.excitation import ExactExcitation, ExcitationSeries, FastExcitation, add_excitation
 from fowt_env.plant.hydro.load import hydro_load, surface_at_origin
 from fowt_env.plant.state import NO_LOAD, pose_of
@@ -37,22 +35,15 @@ def platform_of(body=BODY):
 
 
 def scene_of(sea=JONSWAP, form="fast", body=BODY, **given):
+    given = {"radiation": "none"} | given
     return build_scene(platform_of(body), sea=sea, wave_loads=form, mooring=False, duration=100.0, **given)
 
 
-@entry
-def _water(handle, t, x, out):
-    """Wrench of the strips' slot, and the elevation, into out (7,)."""
-    model, data = model_of(handle), data_of(handle)
-    load = hydro_load(t, pose_of(x), x, model.hydro, data).strips
-    out[0], out[1], out[2], out[3], out[4], out[5] = load.fx, load.fy, load.fz, load.mx, load.my, load.mz
-    out[6] = surface_at_origin(t, model.hydro, data)
-
-
 def water(scene, t, x):
-    out = np.zeros(7)
-    _water(scene.handle(), t, x, out)
-    return out
+    """(7,) wrench of the strips' slot, and the elevation."""
+    hydro, data = scene.model.hydro, scene.data()
+    load = hydro_load(t, pose_of(x), x, hydro, data).strips
+    return np.array([*load, surface_at_origin(t, hydro, data)])
 
 
 @pytest.mark.parametrize("form", FORMS)
