@@ -328,8 +328,8 @@ def scaled_task(task: Task, turbine: Turbine) -> Task:
     """A task of the NREL 5 MW turbine for another: itself where winds, speed and pitch drive are the same.
 
     Winds above rated are as far from rated, others the same share of the way from cut-in to rated, none
-    beyond cut-out; the offset of the rotor speed goes with the rated one. The weight of pitch travel makes a degree
-    per turn of the rotor as dear, whatever the drive can do. Seas are those of the site at the wind.
+    beyond cut-out; the offset of the rotor speed goes with the rated one. The weight of pitch travel makes a
+    degree per turn of the rotor as dear, whatever the drive can do. Seas are those of the site at the wind.
     """
     winds = (turbine.cut_in_wind_speed, turbine.rated_wind_speed, turbine.cut_out_wind_speed)
     drive = turbine.pitch_drive
