@@ -252,7 +252,7 @@ def _constrained(left, right, rows, least):
 
 
 def _passive_grid():
-    """Frequencies (rad/s) at which Re K is held positive, and its size there, which goes with w^2 and 1/w^2."""
+    """Frequencies (rad/s) at which Re K is held positive, and its size there: w^2, and 1/w^2 far up."""
     middle = np.arange(0.05, PASSIVE_UP_TO + 0.01, 0.025)
     omega = np.unique(np.r_[np.geomspace(1e-3, 0.05, 10), middle, 20.0, 50.0])
     return omega, omega**2 / (omega**2 + 0.3**2) / (1.0 + (omega / 3.0) ** 2)
@@ -429,7 +429,8 @@ def _check(fit):
         if i == j and entry.passivity < -NOT_PASSIVE:
             raise InputError(
                 f"potential_flow: the radiation memory of {MOTIONS[i]} cannot be fitted without making"
-                f" energy: the least Re K is {entry.passivity:.2g} of the largest; use radiation = 'convolution'"
+                f" energy: the least Re K is {entry.passivity:.2g} of the largest;"
+                " use radiation = 'convolution'"
             )
     coarse = {
         f"{MOTIONS[i]}" if i == j else f"{MOTIONS[i]}-{MOTIONS[j]}": entry.error
