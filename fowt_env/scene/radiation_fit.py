@@ -30,8 +30,9 @@ FEWEST_KNOWN = 8  # frequencies of a file within BAND
 NEGLIGIBLE = 1e-3  # of the geometric mean of the diagonals: weaker coupling is left out
 FEWEST, MOST = 2, 10  # pairs of poles of an entry
 ALIKE = 2e-3  # rms in BAND by which the normal K of two blocks may differ to share a fit
-ROUNDS = 20  # of relocating poles
-EVALUATIONS = 40  # of the nonlinear least squares
+ROUNDS = 12  # of relocating poles
+EVALUATIONS = 20  # of the nonlinear least squares
+POLISHED = 2.0  # times the error that is asked for, below which poles are worth them
 DECAY = (0.05, 8.0)  # 1/s, of a pole: one of less would outlast SPAN, and is narrower than files resolve
 FREQUENCY = (0.01, 8.0)  # rad/s, of a pole
 PASSIVE_UP_TO = 10.0  # rad/s
@@ -42,7 +43,7 @@ SPAN = 60.0  # s of past velocities in a convolution
 FADE = 15.0  # s at its end in which K goes to zero: cut off, it would damp slow motions, or drive them
 SPACING = 0.005  # rad/s, of the cosine transform: its period of 1257 s is far beyond SPAN
 TRANSFORMED = 120.0  # s of K behind the target of a fit
-GRID = 0.025  # rad/s, of that target
+GRID = 0.04  # rad/s, of that target
 TAPER = 1.5  # times the last frequency, where the damping has gone to zero
 IN_PLANE = (0, 2, 4)
 
@@ -195,8 +196,11 @@ def _bounded(poles):
     return -decay + 1j * np.clip(poles.imag, 1.001 * FREQUENCY[0], 0.999 * FREQUENCY[1])
 
 
-def _fit_poles(omega, f, w, count, starts=()):
-    """(largest error, poles) of the best of `count` pairs that vector fitting and least squares find."""
+def _fit_poles(omega, f, w, count, starts, wanted):
+    """(largest error, poles) of the best of `count` pairs that vector fitting finds.
+
+    What is below `wanted` is polished by nonlinear least squares.
+    """
     s, band = 1j * omega, _in_band(omega)
 
     def error(poles):
@@ -211,19 +215,20 @@ def _fit_poles(omega, f, w, count, starts=()):
 
     middle = np.linspace(BAND[0], BAND[1] + 0.1, count)
     best = (np.inf, None)
-    bounds = np.log(np.repeat([DECAY, FREQUENCY], count, axis=0)).T
     for start in (-0.1 * middle + 1j * middle, *starts):
         poles = _bounded(start)
-        found = (error(poles), poles)
+        best = min(best, (error(poles), poles), key=lambda each: each[0])
         for _ in range(ROUNDS):
             poles = _relocated(s, f, w, poles)
             if poles.size < count:
                 break
-            found = min(found, (error(poles), poles), key=lambda each: each[0])
-        x = np.log(np.r_[-found[1].real, found[1].imag])
-        polished = unpacked(least_squares(residuals, x, bounds=bounds, max_nfev=EVALUATIONS).x)
-        best = min(best, found, (error(polished), polished), key=lambda each: each[0])
-    return best
+            best = min(best, (error(poles), poles), key=lambda each: each[0])
+    if best[0] > wanted:
+        return best
+    bounds = np.log(np.repeat([DECAY, FREQUENCY], count, axis=0)).T
+    x = np.log(np.r_[-best[1].real, best[1].imag])
+    polished = unpacked(least_squares(residuals, x, bounds=bounds, max_nfev=EVALUATIONS).x)
+    return min(best, (error(polished), polished), key=lambda each: each[0])
 
 
 # ---------------------------------------------------------------- passivity
@@ -334,7 +339,8 @@ def _fit_block(omega, k, block, coupled, w, asked, known):
     best, last = (np.inf, None, None), None
     for count in range(FEWEST, MOST + 1):
         starts = () if last is None else (np.append(last, complex(-0.5, 1.0 + 0.2 * (count % 3))),)
-        error, last = _fit_poles(omega, f / own, w, count, starts)
+        wanted = np.inf if count == MOST else POLISHED * asked
+        error, last = _fit_poles(omega, f / own, w, count, starts, wanted)
         if error > best[0]:
             continue  # positive Re K only adds to it
         found = _passive_residues(omega, f / units, w, last, places, len(block), units / own)
