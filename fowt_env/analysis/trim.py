@@ -8,6 +8,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from fowt_env.analysis.equilibrium import check_equilibrium, evaluated, label, unbalanced
+from fowt_env.analysis.statics import mean_derivative
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.aero.bem_rotor import wake_equilibrium
 from fowt_env.plant.aero.wind import wind_now
@@ -15,12 +16,13 @@ from fowt_env.plant.channels import to_units
 from fowt_env.plant.compile.decorators import entry
 from fowt_env.plant.compile.handle import data_of, model_of
 from fowt_env.plant.drivetrain import build_torque_curve, generator_torque
-from fowt_env.plant.dynamics import derivative
 from fowt_env.plant.hydro.load import BandedStrips
+from fowt_env.plant.hydro.member_series import no_series
 from fowt_env.plant.rollout import output_row
 from fowt_env.plant.state import N_COMMANDS, Command, State, pose_of
 from fowt_env.plant.tilt import rotor_pose
 from fowt_env.scene.scene import Scene
+from fowt_env.weather.excitation import still_excitation
 from fowt_env.weather.wind import make_series
 from fowt_env.weather.wind_field import steady_field
 
@@ -93,6 +95,9 @@ def without_fluctuations(scene, wind_speed=None):
             name: getattr(waves, name)[:1].copy() for name in waves._fields if np.ndim(getattr(waves, name))
         }
         parts["hydro.waves"] = waves._replace(**one | {"amplitude": np.zeros(1), "velocity": np.zeros(1)})
+        if hydro.members is not None:
+            parts["hydro.members.series"] = no_series()
+        parts["hydro.excitation"] = still_excitation(hydro.excitation)
         if isinstance(hydro.strips, BandedStrips):
             bands = hydro.strips.bands
             parts["hydro.strips.bands"] = bands._replace(weight=np.zeros_like(bands.weight))
@@ -109,19 +114,6 @@ def without_fluctuations(scene, wind_speed=None):
             shear_exponent=aero.wind.shear_exponent,
         )
     return scene.with_model(parts)
-
-
-@entry
-def mean_derivative(handle, x, u, azimuths, dx, mean):
-    """Mean of dx over the azimuths, into mean (n_state,)."""
-    start = x[State.AZIMUTH]
-    mean[:] = 0.0
-    for i in range(azimuths):
-        x[State.AZIMUTH] = start + i * (2.0 * pi / 3.0) / azimuths
-        derivative(0.0, x, u, model_of(handle), data_of(handle), dx)
-        for j in range(x.shape[0]):
-            mean[j] += dx[j] / azimuths
-    x[State.AZIMUTH] = start
 
 
 @entry
@@ -174,6 +166,9 @@ class _Steady:
             settle_wake(self.handle, self.x, self.dx)
             return
         rows = slice(block.offset, block.offset + block.size)
+        if block.name == "radiation":  # of a platform at rest
+            self.x[rows] = 0.0
+            return
 
         def rates_at(values):
             self.x[rows] = values

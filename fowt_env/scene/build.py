@@ -11,6 +11,7 @@ from fowt_env.plant.drivetrain import build_drivetrain, build_pitch_actuator, bu
 from fowt_env.plant.integrators import build_integrator
 from fowt_env.plant.model import Model
 from fowt_env.plant.state import N_RIGID
+from fowt_env.scene.geometry import warn_of_geometry
 from fowt_env.scene.mass import build_layout, build_rigid_body
 from fowt_env.scene.options import checked_options, choose_parts, samples_per_step
 from fowt_env.scene.parts import (
@@ -55,7 +56,8 @@ def build_scene(
     options   see OPTIONS; a platform file may set other defaults. planar: surge, heave and platform pitch
               alone move; of ntm and etm turbulence the part in the plane is kept
 
-    Raises: InputError naming the key, the value and what is allowed.
+    Raises: InputError naming the key, the value and what is allowed. A PlantWarning, once per platform, says
+    which of its places can hardly be meant; `fowt check` says more.
     """
     label = platform.name if isinstance(platform, Platform) else str(platform)
     if not isinstance(platform, Platform):
@@ -66,23 +68,28 @@ def build_scene(
         turbine = read_turbine(turbine)
     rotor = choose_parts(fidelity, rotor, options)
     seed = check_whole_number("seed", seed, 0)
+    warn_of_geometry(platform, label)
     air, waves = build_weather(wind, sea, seed, platform, turbine, rotor, options)
     current = build_current(options["current"]) if options["hydrodynamics"] else None
     if options["planar"]:
-        check_symmetry(platform.lines if options["mooring"] else (), current)
+        members = platform.members if options["hydrodynamics"] else ()
+        check_symmetry(platform.lines if options["mooring"] else (), current, members)
     mooring = build_moorings(platform.lines, options["mooring"])
     user = checked_loads(loads, 0 if mooring is None else mooring.length.shape[0], options["planar"])
     aero = None if air.series is None else build_aero(platform, turbine, air, rotor, options)
+    first_state = N_RIGID + wake_states(aero)
+    memory_state = first_state + sum(load.states for load in user)
+    water = options["hydrodynamics"]
     model = Model(
         rigid_body=build_rigid_body(platform, turbine, plane=True if options["planar"] else None),
         layout=build_layout(platform, turbine),
         drivetrain=build_drivetrain(turbine),
         actuator=build_pitch_actuator(turbine.pitch_drive),
         generator=build_torque_limits(turbine.torque_law),
-        hydro=build_hydro(platform, waves, current, options) if options["hydrodynamics"] else None,
+        hydro=build_hydro(platform, waves, current, options, memory_state) if water else None,
         mooring=mooring,
         aero=aero,
         integrator=build_integrator(options["integrator"], samples_per_step(options, air.field)),
-        user=build_user_loads(user, platform.tower.base_height, N_RIGID + wake_states(aero)),
+        user=build_user_loads(user, platform.tower.base_height, first_state),
     )
     return Scene(model, platform, turbine, air.spec, sea, seed, rotor, options, air.speed, user, label)
