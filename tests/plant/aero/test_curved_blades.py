@@ -244,3 +244,54 @@ def test_rotor_loads_of_a_curved_rotor_are_those_of_its_plant():
     turn = curved_rotor.about_y(TILT)
     assert found.force == pytest.approx(load[:3] @ turn, rel=1e-9)
     assert found.moment == pytest.approx((load[3:6] - np.cross(hub, load[:3])) @ turn, rel=1e-9)
+
+
+# OpenFAST v5.0.0 (AeroDyn, BEM_Mod 1, skewed wake), rigid IEA 15 MW on a fixed platform, uniform steady wind,
+# means over whole turns: wind m/s, rpm, blade pitch deg, aerodynamic thrust N along the shaft, torque N m
+OPENFAST = [
+    (6.0, 5.0, 0.0, 901_690.0, 5_198_400.0),
+    (10.0, 7.05, 0.0, 2_193_600.0, 18_149_000.0),
+    (12.0, 7.56, 6.3, 1_690_800.0, 20_076_000.0),
+    (14.0, 7.56, 10.0, 1_370_600.0, 20_131_000.0),
+    (18.0, 7.56, 15.4, 1_047_200.0, 20_041_000.0),
+    (24.0, 7.56, 21.8, 817_060.0, 19_825_000.0),
+]
+
+
+@compiled
+@pytest.mark.parametrize("stations", [50, 18])
+def test_thrust_and_torque_of_a_tilted_coned_and_prebent_rotor_are_those_of_aerodyn(stations):
+    for speed, rpm, pitch, thrust, torque in OPENFAST:
+        scene = build_scene(
+            "iea15_volturnus_s", wind=speed, shear_exponent=0.0, blade_stations=stations,
+            hydrodynamics=False, mooring=False,
+        )  # fmt: skip
+        turns = np.linspace(0.0, 2.0 * np.pi / 3.0, 4, endpoint=False)
+        found = [rotor_loads(scene, rpm * np.pi / 30.0, np.radians(pitch), turn) for turn in turns]
+        assert np.mean([f.force[0] for f in found]) == pytest.approx(thrust, rel=1e-3)
+        assert np.mean([f.moment[0] for f in found]) == pytest.approx(torque, rel=1e-3)
+
+
+# the same at 12 m/s with a power law of 0.14 over the height: azimuth deg, thrust N, torque N m, and the moments
+# across the shaft about the hub in axes that turn with the rotor, N m
+SHEARED = [
+    (0.0900, 1_674_410.0, 19_806_500.0, 7_521_610.0, 594_963.0),
+    (39.8700, 1_666_340.0, 19_687_000.0, 7_088_780.0, -6_136_730.0),
+    (89.7660, 1_669_490.0, 19_725_600.0, 1_814_800.0, -8_572_100.0),
+    (199.7640, 1_666_750.0, 19_684_300.0, -9_238_030.0, 1_510_390.0),
+    (300.0780, 1_663_670.0, 19_641_900.0, 4_254_380.0, 9_006_720.0),
+]
+
+
+@compiled
+def test_loads_in_shear_are_those_of_aerodyn_at_each_azimuth():
+    scene = build_scene(
+        "iea15_volturnus_s", wind=12.0, shear_exponent=0.14, skewed_wake=True, blade_stations=50,
+        hydrodynamics=False, mooring=False,
+    )  # fmt: skip
+    for degrees, thrust, torque, my, mz in SHEARED:
+        azimuth = np.radians(degrees)
+        found = rotor_loads(scene, 7.56 * np.pi / 30.0, np.radians(6.3), azimuth)
+        turned = curved_rotor.rotation(azimuth, 0.0, 0.0).T @ found.moment
+        assert found.force[0] == pytest.approx(thrust, rel=5e-4)
+        assert turned == pytest.approx([torque, my, mz], rel=5e-4, abs=4e3)
