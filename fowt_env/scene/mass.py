@@ -57,8 +57,8 @@ def build_rigid_body(platform, turbine, platform_fixed=False, rotor_fixed=False,
     if plane is not None and matrix[0, 5] != 0.0:
         left = -matrix[0, 5] / matrix[0, 0]
         raise InputError(
-            f"cm_left of ballast or nacelle: the centre of mass lies {left:g} m to the left; a planar scene needs"
-            " 0 (planar = False)"
+            f"cm_left of ballast or nacelle: the centre of mass lies {left:g} m to the left; a planar scene"
+            " needs 0 (planar = False)"
         )
     drivetrain = build_drivetrain(turbine)
     return RigidBody(

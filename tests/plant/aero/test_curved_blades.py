@@ -272,8 +272,8 @@ def test_thrust_and_torque_of_a_tilted_coned_and_prebent_rotor_are_those_of_aero
         assert np.mean([f.moment[0] for f in found]) == pytest.approx(torque, rel=1e-3)
 
 
-# the same at 12 m/s with a power law of 0.14 over the height: azimuth deg, thrust N, torque N m, and the moments
-# across the shaft about the hub in axes that turn with the rotor, N m
+# the same at 12 m/s with a power law of 0.14 over the height: azimuth deg, thrust N, torque N m, and the
+# moments across the shaft about the hub in axes that turn with the rotor, N m
 SHEARED = [
     (0.0900, 1_674_410.0, 19_806_500.0, 7_521_610.0, 594_963.0),
     (39.8700, 1_666_340.0, 19_687_000.0, 7_088_780.0, -6_136_730.0),
