@@ -1,4 +1,4 @@
-"""HydroDyn's file: potential flow, additional matrices, members with their coefficients, and ballast water."""
+"""HydroDyn's file: potential flow, additional matrices, members with coefficients, and ballast water."""
 
 import math
 from dataclasses import dataclass
@@ -74,7 +74,7 @@ def read_hydrodyn(path, site, folders=()):
     """
     file = PartFile(path, "HydroDyn")
     notes = []
-    mode = file.one_of("PotMod", (0, 1), why="2, fluid impulse theory, cannot be represented", default=0)
+    mode = file.one_of("PotMod", (0, 1), why="2, fluid impulse theory, cannot be represented")
     potential = _potential(file, folders, notes) if mode == 1 else None
     growth = file.table("NMGDepths", high=MOST)
     if any(cells.get("mgthck", 0.0) != 0.0 for _, cells in growth):
@@ -88,7 +88,9 @@ def read_hydrodyn(path, site, folders=()):
         if file.whole(key, default=0) != 0:
             raise file.wrong(key, file.whole(key), f"0: {what} cannot be represented")
     second = {key: file.whole(key, default=0) for key in SECOND_ORDER}
-    rows = _members(file, site, notes)
+    rows = _members(file, site, notes, mode == 1)
+    if mode == 0 and not rows:
+        raise file.wrong("PotMod", 0, "1, or there must be members: nothing makes the platform float")
     return HydroDyn(
         file=file,
         potential=potential,
@@ -110,6 +112,10 @@ def _potential(file, folders, notes):
     bodies = file.whole("NBody", default=1, low=1)
     if bodies != 1:
         raise file.wrong("NBody", bodies, "1: floaters of several bodies cannot be represented")
+    if file.whole("NAddDOF", default=0) != 0:
+        raise file.wrong(
+            "NAddDOF", file.whole("NAddDOF"), "0: further degrees of freedom cannot be represented"
+        )
     for key in ("PtfmRefxt", "PtfmRefyt", "PtfmRefzt", "PtfmRefztRot", "PtfmRefY"):
         if file.number(key, default=0.0) != 0.0:
             raise file.wrong(
@@ -147,8 +153,8 @@ def _wamit_root(name, folders):
 # --------------------------------------------------------------------------- members
 
 
-def _members(file, site, notes):
-    """List of Cylinder."""
+def _members(file, site, notes, potential):
+    """List of Cylinder; potential: whether there is a body that members may be inside of (PropPot)."""
     rows = file.table("NMembers", texts=("proppot",), high=MOST)
     if not rows:
         return []
@@ -192,16 +198,16 @@ def _members(file, site, notes):
             raise file.refusal(f"member {number}: MSecGeom must be 1, a circular section", line)
         ends = [_looked_up(file, line, joints, cells[f"mjointid{i}"], "joint") for i in (1, 2)]
         props = [_looked_up(file, line, sections, cells[f"mpropsetid{i}"], "property set") for i in (1, 2)]
-        for place, coefficient in ends:
+        for _, coefficient in ends:
             _looked_up(file, line, axial, coefficient, "axial coefficient")
         if math.dist(ends[0][0], ends[1][0]) < 1e-6:
             raise file.refusal(f"member {number}: its joints are at one place", line)
         text = cells.get("proppot", "False").lower()
-        inside = text[:1] == "t" or text.startswith(".t") or text == "1"
-        bare_members.append((line, number, ends, props, int(cells["mcoefmod"]), inside, cells))
+        inside = potential and (text[:1] == "t" or text.startswith(".t") or text == "1")
+        bare_members.append((line, number, ends, props, int(cells["mcoefmod"]), inside))
     faces = _faces(bare_members, axial, notes)
     found = []
-    for line, number, ends, props, model, inside, cells in bare_members:
+    for line, number, ends, props, model, inside in bare_members:
         starts = [0.0, *coefficients.breaks(model, ends[0][0][2] - level, ends[1][0][2] - level), 1.0]
         low, high = (np.array(end[0]) for end in ends)
         for a, b in zip(starts[:-1], starts[1:], strict=True):
@@ -243,7 +249,7 @@ def _faces(members, axial, notes):
     joint multiplies rho A |v| v / 4 in HydroDyn, and rho A |v| v / 2 here.
     """
     at = {}
-    for _, number, ends, props, _, _, _ in members:
+    for _, number, ends, props, _, _ in members:
         along = np.subtract(ends[1][0], ends[0][0])
         along /= np.linalg.norm(along)
         for end in (0, 1):
