@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -244,39 +245,51 @@ def _looked_up(file, line, known, number, what):
 def _faces(members, axial, notes):
     """{member: [(drag, added mass, pressure) of each end]}, as coefficients on the area of that end alone.
 
-    HydroDyn loads a joint by the vector sum of the areas of the members that end there. Here the largest of
-    them carries it, its coefficients scaled by the sum's part along its own axis. The drag coefficient of a
-    joint multiplies rho A |v| v / 4 in HydroDyn, and rho A |v| v / 2 here.
+    HydroDyn loads a joint by the vector sum of the areas of the members that end there, for all but drag of
+    those outside the potential-flow body. Here the largest of them carries it, its coefficients scaled by
+    the sum's part along its own axis. The drag coefficient of a joint multiplies rho A |v| v / 4 in HydroDyn,
+    and rho A |v| v / 2 here.
     """
     at = {}
-    for _, number, ends, props, _, _ in members:
+    for _, number, ends, props, _, inside in members:
         along = np.subtract(ends[1][0], ends[0][0])
         along /= np.linalg.norm(along)
         for end in (0, 1):
-            outward = along if end else -along
-            place = tuple(np.round(ends[end][0], 6))
-            area = 0.25 * math.pi * props[end][0] ** 2
-            at.setdefault(place, []).append((number, end, area, outward, ends[end][1], props[end][0]))
-    result = {number: [(0.0, 0.0, 0.0), (0.0, 0.0, 0.0)] for _, number, *_ in members}
-    for place, meeting in at.items():
-        drag, mass, pressure = axial[meeting[0][4]]
-        biggest = max(meeting, key=lambda item: item[2])
-        number, end, area, outward, _, diameter = biggest
-        total = sum((item[2] * item[3] for item in meeting), np.zeros(3))
-        cubes = sum((item[5] ** 3 * item[3] for item in meeting), np.zeros(3))
-        part, part3 = float(total @ outward) / area, float(cubes @ outward) / diameter**3
-        aside = np.linalg.norm(total - (total @ outward) * outward) / area
-        if (drag or mass) and aside > 1e-3:
-            notes.append((
-                f"axial loads of joint at {place} across the axis of member {number}",
-                f"left out: {aside:.2g} of the area of the member's end",
-            ))  # fmt: skip
-        result[number][end] = (
-            0.5 * drag * max(part, 0.0),
-            mass * max(part3, 0.0),
-            pressure if part > 1e-6 else 0.0,
-        )
-    return result
+            face = _Face(number, end, props[end][0], along if end else -along, ends[end][1], inside)
+            at.setdefault(tuple(np.round(ends[end][0], 6)), []).append(face)
+    result = {number: np.zeros((2, 3)) for _, number, *_ in members}
+    for place, faces in at.items():
+        drag, mass, pressure = axial[faces[0].axial]
+        wet = [face for face in faces if not face.inside]
+        for meeting, power, coefficients in (
+            (faces, 2, (0.5 * drag, 0.0, 0.0)), (wet, 3, (0.0, mass, 0.0)), (wet, 2, (0.0, 0.0, pressure)),
+        ):  # fmt: skip
+            if not meeting or not any(coefficients):
+                continue
+            biggest = max(meeting, key=lambda face: face.diameter)
+            total = sum((face.diameter**power * face.outward for face in meeting), np.zeros(3))
+            total /= biggest.diameter**power
+            part = float(total @ biggest.outward)
+            aside = float(np.linalg.norm(total - part * biggest.outward))
+            if aside > 1e-3 and (coefficients[0] or coefficients[1]):
+                notes.append((
+                    f"axial loads of the joint at {place} across member {biggest.member}",
+                    f"left out: {aside:.2g} of those along it",
+                ))  # fmt: skip
+            if part > 1e-6:
+                result[biggest.member][biggest.end] += part * np.array(coefficients)
+    return {number: tuple(map(tuple, ends.tolist())) for number, ends in result.items()}
+
+
+class _Face(NamedTuple):
+    """End of a member at a joint."""
+
+    member: int
+    end: int  # 0 or 1
+    diameter: float
+    outward: np.ndarray  # (3,)
+    axial: int  # number of the joint's axial coefficients
+    inside: bool  # of the potential-flow body
 
 
 class _Coefficients:
@@ -299,8 +312,9 @@ class _Coefficients:
         """Fractions of a member's length where depth-dependent coefficients bend."""
         if model != 2 or z1 == z2:
             return []
-        at = [(-cells.get("dpth", 0.0) - z1) / (z2 - z1) for cells in self.depth]
-        return sorted({round(t, 9) for t in at if 1e-6 < t < 1.0 - 1e-6})
+        at = sorted((-cells.get("dpth", 0.0) - z1) / (z2 - z1) for cells in self.depth)
+        inner = [t for t in at if 1e-6 < t < 1.0 - 1e-6]
+        return [t for t, before in zip(inner, [0.0, *inner], strict=False) if t - before > 1e-6]
 
     def at(self, line, number, model, z, t):
         """{cd, ca, cp} at height z and fraction t of the member's length."""
