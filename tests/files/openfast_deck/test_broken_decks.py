@@ -41,9 +41,8 @@ def mutated(text, rng):
 @pytest.mark.parametrize("part", sorted(TEXTS))
 def test_a_broken_file_is_an_input_error(tmp_path, part):
     rng = random.Random(part)
-    path = write_deck(tmp_path, OpenFAST=[("1    CompMooring", "3    CompMooring"), ("map.dat", "moor.dat")]) if (
-        part == "MoorDyn"
-    ) else write_deck(tmp_path)  # fmt: skip
+    moored = [("1    CompMooring", "3    CompMooring"), ("map.dat", "moor.dat")] if part == "MoorDyn" else []
+    path = write_deck(tmp_path, OpenFAST=moored)
     whole = (tmp_path / NAMES[part]).read_text()
     read = 0
     for _ in range(60):

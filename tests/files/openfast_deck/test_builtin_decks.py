@@ -1,4 +1,4 @@
-"""The built-in platforms that were converted from decks, against what other programs and reports say of them."""
+"""The built-in platforms that were converted from decks, against other programs and reports."""
 
 import numpy as np
 import pytest
@@ -32,7 +32,7 @@ def test_oc4_with_its_ballast_water_is_the_platform_of_the_definition():
 
 
 def test_oc4_s_excitation_and_damping_obey_haskind_s_relation():
-    """B = k/(8 pi rho g c_g) times the integral of |X|^2 over the headings, in deep water: two sources in one."""
+    """B = k/(8 pi rho g c_g) times the integral of |X|^2 over the headings, in deep water; of two sources."""
     platform = read_platform("nrel5mw_oc4_semi")
     body, site = platform.potential_flow, platform.environment
     assert len(body.heading) == 37
