@@ -4,7 +4,9 @@ The drag of a strip, 0.5 rho C_D D |r| r per length with r the velocity of the w
 axis, is replaced by the linear force with the least mean square error. For a Gaussian r its gain is the mean
 slope, 0.5 rho C_D D E[|r| I + r r'/|r|]; in one direction without current that is
 0.5 rho C_D D sqrt(8/pi) sigma_r (Borgman, 1967, J. Waterways and Harbors Division 93, 129-156; Price and Wu,
-1985). The gain depends on the motion of the hull, and the motion on the gain: callers iterate.
+1985). The gain depends on the motion of the hull, and the motion on the gain: callers iterate. So is the
+quadratic damping matrix of a body: column j times sqrt(8/pi) sigma_j of the hull's velocity j alone, since
+the matrix knows no water.
 """
 
 from dataclasses import dataclass, replace

@@ -20,7 +20,9 @@ from fowt_env.plant.hydro.load import BandedStrips
 from fowt_env.plant.hydro.member_series import no_series
 from fowt_env.plant.rollout import output_row
 from fowt_env.plant.state import N_COMMANDS, Command, State, pose_of
+from fowt_env.plant.tilt import rotor_pose
 from fowt_env.scene.scene import Scene
+from fowt_env.weather.excitation import still_excitation
 from fowt_env.weather.wind import make_series
 from fowt_env.weather.wind_field import steady_field
 
@@ -95,6 +97,7 @@ def without_fluctuations(scene, wind_speed=None):
         parts["hydro.waves"] = waves._replace(**one | {"amplitude": np.zeros(1), "velocity": np.zeros(1)})
         if hydro.members is not None:
             parts["hydro.members.series"] = no_series()
+        parts["hydro.excitation"] = still_excitation(hydro.excitation)
         if isinstance(hydro.strips, BandedStrips):
             bands = hydro.strips.bands
             parts["hydro.strips.bands"] = bands._replace(weight=np.zeros_like(bands.weight))
@@ -119,8 +122,8 @@ def settle_wake(handle, x, dx):
     aero = model_of(handle).aero
     rotor = aero.rotor
     wake_equilibrium(
-        0.0, pose_of(x), x, wind_now(0.0, aero.wind), aero.wind, aero.field, rotor.elements, rotor.skew,
-        rotor.wake, dx, data_of(handle).counters,
+        0.0, rotor_pose(pose_of(x), aero.tilt), x, wind_now(0.0, aero.wind), aero.wind, aero.field,
+        rotor.elements, rotor.skew, rotor.wake, dx, data_of(handle).counters,
     )  # fmt: skip
 
 
@@ -163,6 +166,9 @@ class _Steady:
             settle_wake(self.handle, self.x, self.dx)
             return
         rows = slice(block.offset, block.offset + block.size)
+        if block.name == "radiation":  # of a platform at rest
+            self.x[rows] = 0.0
+            return
 
         def rates_at(values):
             self.x[rows] = values

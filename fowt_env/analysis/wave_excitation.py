@@ -3,7 +3,8 @@
 The force of a wave on the strips is not a causal function of the elevation at the hull: water deep down is
 moved by an average over elevations before and after. So the state-space model takes the elevation some
 seconds ahead (its lead), and says how well it fits in which band. The elevation is that at the hull's
-mean place, not at the origin: the way between is dispersive, and no low-order model fits that.
+mean place, not at the origin: the way between is dispersive, and no low-order model fits that. (The
+excitation of a potential-flow body is that of its undisplaced position: there the hull stands at the origin.)
 """
 
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ from fowt_env.descriptions.sea_state import sea_state_of
 from fowt_env.plant.compile.decorators import entry
 from fowt_env.plant.hydro.morison import morison_load
 from fowt_env.plant.state import State, pose_of
+from fowt_env.weather.excitation import OUT_OF_PLANE, excitation_at
 from fowt_env.weather.waves import build_waves
 
 BAND = (0.15, 2.0)  # rad/s, of the fit: periods of 3.1 to 42 s
@@ -23,6 +25,9 @@ AMPLITUDE = 1e-3  # m; the force is odd in it but for drag, which is left out: f
 PAIRS = 8  # pairs of poles: 16 states
 POLE_DAMPING = 0.5  # neighbours then overlap
 LEADS = np.arange(0.0, 12.01, 0.5)  # s, of which the best fit is taken
+# of a potential-flow body, between whose columns waves interfere
+BODY_PAIRS, BODY_POLE_DAMPING, BODY_LEADS = 24, 0.25, np.arange(0.0, 18.01, 0.5)
+NOISE = 1e-6  # of the largest force, or moment: what a symmetric body has of the others in its file
 WEIGHT_FLOOR = 0.1  # fraction of a component's largest force below which errors count as absolute
 BANDS = ((0.2, 0.4), (0.4, 0.8), (0.8, 1.2), (1.2, 1.8))  # rad/s, for the report of the fit
 
@@ -40,13 +45,32 @@ def wave_force(scene, state, omega):
 
     Force and elevation are the real parts of these times exp(i omega t), for waves travelling along x
     past the hull at rest in `state`. Computed by the scene's own strip load for a small regular wave,
-    without drag, which is quadratic. omega: (n,) rad/s. Zero without hydrodynamics.
+    without drag, which is quadratic; of a potential-flow body the excitation of its table, as the plant
+    interpolates it. omega: (n,) rad/s. Zero without hydrodynamics.
     """
     omega = np.atleast_1d(np.asarray(omega, dtype=float))
     result = np.zeros((omega.size, 6), dtype=complex)
-    strips = scene.model.hydro.strips.shape
-    if strips is None:
+    hydro, body = scene.model.hydro, scene.platform.potential_flow
+    if hydro is None:
         return result
+    if hydro.strips is not None:
+        result += _strip_forces(scene, state, omega, hydro.strips.shape)
+    if body is not None:
+        force = excitation_at(body, omega, 0.0)
+        if scene.options["planar"]:
+            force[:, OUT_OF_PLANE] = 0.0
+        pose = pose_of(state)
+        rotation = np.array(
+            [[getattr(pose, f"r{i}{j}") for j in (1, 2, 3)] for i in (1, 2, 3)]
+        )  # body to inertial
+        result[:, :3] += force[:, :3] @ rotation
+        result[:, 3:] += force[:, 3:] @ rotation
+    return result
+
+
+def _strip_forces(scene, state, omega, strips):
+    """(n, 6) complex force of the strips."""
+    result = np.zeros((omega.size, 6), dtype=complex)
     strips = strips._replace(drag_coefficient=0.0, axial_drag_coefficient=0.0)
     x = np.zeros_like(state)
     x[: State.AZIMUTH] = state[: State.AZIMUTH]
@@ -95,19 +119,26 @@ class WaveFilter:
 
 
 def fit_wave_filter(scene, state):
-    """WaveFilter fitted to wave_force over BAND, with the lead of LEADS that fits best.
+    """WaveFilter fitted to wave_force over BAND, with the lead that fits best.
 
-    Poles are fixed, evenly spread over the band, so the fit is linear least squares and the model stable.
+    Poles are fixed, evenly spread over the band, so the fit is linear least squares and the model stable:
+    PAIRS of them for strips, BODY_PAIRS for a potential-flow body.
     """
     omega = np.linspace(*BAND, GRID)
     force = wave_force(scene, state, omega)
-    a, b = _resonators(np.linspace(BAND[0], 1.15 * BAND[1], PAIRS))
+    for kind in (slice(0, 3), slice(3, 6)):
+        size = np.abs(force[:, kind]).max(axis=0)
+        force[:, kind] *= size > NOISE * size.max()
+    pairs, damping, leads = PAIRS, POLE_DAMPING, LEADS
+    if scene.platform.potential_flow is not None:
+        pairs, damping, leads = BODY_PAIRS, BODY_POLE_DAMPING, BODY_LEADS
+    a, b = _resonators(np.linspace(BAND[0], 1.15 * BAND[1], pairs), damping)
     eye = np.eye(a.shape[0])
     basis = np.array([np.linalg.solve(1j * w * eye - a, b) for w in omega])
     size = np.abs(force)
     weight = 1.0 / (size + WEIGHT_FLOOR * size.max(axis=0) + (size.max(axis=0) == 0.0))
     best = None
-    for lead in LEADS:
+    for lead in leads:
         target = force * np.exp(-1j * omega * lead)[:, None]
         c = np.zeros((6, b.size))
         for row in range(6):
@@ -123,13 +154,13 @@ def fit_wave_filter(scene, state):
     return model
 
 
-def _resonators(frequencies):
+def _resonators(frequencies, damping):
     """(A, B) of second-order resonators side by side, all driven by the input."""
     n = len(frequencies)
     a, b = np.zeros((2 * n, 2 * n)), np.zeros(2 * n)
     for i, frequency in enumerate(frequencies):
         block = slice(2 * i, 2 * i + 2)
-        a[block, block] = [[0.0, frequency], [-frequency, -2.0 * POLE_DAMPING * frequency]]
+        a[block, block] = [[0.0, frequency], [-frequency, -2.0 * damping * frequency]]
         b[2 * i + 1] = frequency
     return a, b
 
