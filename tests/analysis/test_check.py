@@ -12,8 +12,10 @@ from typer.testing import CliRunner
 import fowt_env
 from fowt_env.analysis.check import _at_own_frequency, check_platform
 from fowt_env.analysis.linear_model import natural_periods
+from fowt_env.descriptions.builtin import names
 from fowt_env.descriptions.files import DATA
 from fowt_env.descriptions.platform import Line, read_platform
+from fowt_env.scene.geometry import geometry_faults
 from fowt_env.training import cli
 from fowt_env.training.cli import app  # noqa: F401
 
@@ -204,8 +206,11 @@ def test_the_command_refuses_a_file_that_cannot_be_read(tmp_path):
 
 
 def test_built_in_platforms_have_no_fault_of_geometry():
-    from fowt_env.descriptions.builtin import names
-    from fowt_env.scene.geometry import geometry_faults
-
     for name in names("platforms"):
         assert geometry_faults(read_platform(name)) == {}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", names("platforms"))
+def test_built_in_platforms_fit(name):
+    assert check_platform(name).faults == ()
