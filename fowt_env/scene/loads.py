@@ -73,6 +73,14 @@ LOADS = {
         "hydro/added_inertia.py", "5.6", "hydro.added_inertia", "HYDRO",
         keys=("hydro.added_mass",), strength=("hydro.added_inertia.matrix",),
     ),
+    "members": LoadFacts(
+        "buoyancy, fluid inertia, wave pressure and drag on cylinders of any place and direction",
+        "hydro/members.py, hydro/member_buoyancy.py", "5.10", "hydro.members", "HYDRO", keys=("members",),
+        strength=(
+            *(f"hydro.members.{name}" for name in ("table", "nodes", "added_mass")),
+            "hydro.members.bodies.specific_weight",
+        ),
+    ),
     "body matrices": LoadFacts(
         "hydrostatics and added mass of a potential-flow body; additional preload, stiffness and damping",
         "hydro/body_matrices.py", "5.7", "hydro.matrices", "HYDRO", keys=("additional",),

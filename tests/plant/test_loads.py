@@ -18,7 +18,7 @@ from plant_helpers import random_state
 
 import fowt_env
 from fowt_env import Force, Load, build_scene, load_kernel
-from fowt_env.descriptions.platform import AdditionalLoads, read_platform
+from fowt_env.descriptions.platform import AdditionalLoads, Member, read_platform
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rollout import forget, observe
 from fowt_env.plant.state import State
@@ -49,7 +49,16 @@ NOTHING = {
     "hydro.yaw_stiffness": 0.0,
     "hydro.added_mass": None,
     "additional": None,
+    "members": (),
 }
+MEMBERS = tuple(
+    Member(
+        start=(4.0, 3.0 * side, -30.0), end=(15.0, 12.0 * side, 8.0), diameter=(5.0, 3.0),
+        drag_coefficient=(0.6, 0.7), added_mass_coefficient=(0.9, 0.8), axial_drag_coefficient=(4.8, 1.0),
+        axial_added_mass_coefficient=(1.0, 0.5),
+    )
+    for side in (1.0, -1.0)
+)  # fmt: skip
 ALL = {
     "wind": 12.0,
     "sea": {"kind": "regular", "H": 4.0, "T": 9.0},
@@ -76,16 +85,14 @@ def scene_of(form):
 def scene_less(form, name):
     """Scene with every load but this one, which is left out as a user does."""
     arguments = ALL | {"loads": [Load("Push", push, [1e5, 2e5])]}
-    hydro = {"hydro.added_mass": ADDED_MASS, "additional": ADDITIONAL}
+    hydro = {"hydro.added_mass": ADDED_MASS, "additional": ADDITIONAL, "members": MEMBERS}
     if name:
         arguments |= LOADS[name].without
         hydro |= {key: NOTHING[key] for key in LOADS[name].keys}
-    additional = hydro.pop("additional")
+    beside = {key: hydro.pop(key) for key in ("additional", "members")}
     given = {key.removeprefix("hydro."): value for key, value in hydro.items()}
     platform = read_platform("oc3_hywind")
-    platform = platform.model_copy(
-        update={"hydro": platform.hydro.model_copy(update=given), "additional": additional}
-    )
+    platform = platform.model_copy(update={"hydro": platform.hydro.model_copy(update=given), **beside})
     return build_scene(platform, rotor="bem", wave_loads=form, **arguments)
 
 
