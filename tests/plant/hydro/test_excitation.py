@@ -84,7 +84,7 @@ def test_a_table_repeats_or_gives_way_to_the_sum(sea):
         assert table.span == pytest.approx({"regular": 7.0, "harmonic": 20.0 * np.pi}[sea], rel=1e-9)
     else:
         assert table.span >= 105.0
-    for t in (-1.0, table.span + 1e-6, 5.3 * table.span):
+    for t in (-0.02, table.span + 1e-6, 5.3 * table.span):
         close = forces([t], part.first)[0]
         expected = np.array(exact_force(t, 0.0, 0.0, part.first.exact, SCRATCH))
         if table.periodic:
