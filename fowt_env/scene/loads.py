@@ -21,6 +21,10 @@ class LoadFacts(NamedTuple):
     mirrored: bool = True  # whether a mirrored state and weather give the mirrored load
 
 
+EXCITATION = (
+    *(f"hydro.excitation.first.{name}" for name in ("force", "table.value", "exact.force")),
+    *(f"hydro.excitation.second.{name}" for name in ("table.value", "mean")),
+)
 STRIPS = ("hydro.strips.shape.", "hydro.strips.quadrature.")
 LOADS = {
     "weight": LoadFacts(
@@ -48,7 +52,9 @@ LOADS = {
     "waves": LoadFacts(
         "motion and pressure of the water that strips and keel meet; without it the water is still",
         "hydro/waves.py", "5.4", "hydro.waves", "HYDRO", {"sea": None},
-        strength=("hydro.waves.amplitude", "hydro.waves.velocity", "hydro.strips.bands.weight"),
+        strength=(
+            "hydro.waves.amplitude", "hydro.waves.velocity", "hydro.strips.bands.weight", *EXCITATION,
+        ),
     ),
     "diffraction": LoadFacts(
         "MacCamy and Fuchs' coefficient of fluid inertia in waves; without it 1 + C_A",
@@ -88,6 +94,11 @@ LOADS = {
             f"hydro.matrices.{name}"
             for name in ("constant", "stiffness", "linear_damping", "quadratic_damping", "added_mass")
         ),
+    ),
+    "excitation": LoadFacts(
+        "force of the waves on a potential-flow body, first and second order",
+        "hydro/excitation.py", "5.9", "hydro.excitation", "HYDRO", keys=("potential_flow",),
+        strength=EXCITATION,
     ),
     "moorings": LoadFacts(
         "elastic catenaries on the seabed, at rest in the present place",
