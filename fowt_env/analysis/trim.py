@@ -8,6 +8,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from fowt_env.analysis.equilibrium import check_equilibrium, evaluated, label, unbalanced
+from fowt_env.analysis.statics import mean_derivative
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.aero.bem_rotor import wake_equilibrium
 from fowt_env.plant.aero.wind import wind_now
@@ -15,7 +16,6 @@ from fowt_env.plant.channels import to_units
 from fowt_env.plant.compile.decorators import entry
 from fowt_env.plant.compile.handle import data_of, model_of
 from fowt_env.plant.drivetrain import build_torque_curve, generator_torque
-from fowt_env.plant.dynamics import derivative
 from fowt_env.plant.hydro.load import BandedStrips
 from fowt_env.plant.hydro.member_series import no_series
 from fowt_env.plant.rollout import output_row
@@ -117,19 +117,6 @@ def without_fluctuations(scene, wind_speed=None):
 
 
 @entry
-def mean_derivative(handle, x, u, azimuths, dx, mean):
-    """Mean of dx over the azimuths, into mean (n_state,)."""
-    start = x[State.AZIMUTH]
-    mean[:] = 0.0
-    for i in range(azimuths):
-        x[State.AZIMUTH] = start + i * (2.0 * pi / 3.0) / azimuths
-        derivative(0.0, x, u, model_of(handle), data_of(handle), dx)
-        for j in range(x.shape[0]):
-            mean[j] += dx[j] / azimuths
-    x[State.AZIMUTH] = start
-
-
-@entry
 def settle_wake(handle, x, dx):
     """Set the wake states of x to their steady values for the rest of it; the rotor must be a BemRotor."""
     aero = model_of(handle).aero
@@ -179,6 +166,9 @@ class _Steady:
             settle_wake(self.handle, self.x, self.dx)
             return
         rows = slice(block.offset, block.offset + block.size)
+        if block.name == "radiation":  # of a platform at rest
+            self.x[rows] = 0.0
+            return
 
         def rates_at(values):
             self.x[rows] = values
