@@ -11,6 +11,7 @@ squares under the condition that Re K is positive semidefinite (theory.md, 5.8).
 import hashlib
 import warnings
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -23,10 +24,11 @@ from fowt_env.plant.hydro.radiation import ConvolutionMemory, StateSpaceMemory, 
 from fowt_env.plant.state import MOTIONS
 
 BAND = (0.15, 2.5)  # rad/s, in which errors are counted: periods of 2.5 to 42 s
-OUTSIDE = 0.1  # weight of other frequencies
+OUTSIDE, BELOW = 0.1, 0.6  # weight of higher frequencies, and times frequency (rad/s) of lower ones
 FEWEST_KNOWN = 8  # frequencies of a file within BAND
 NEGLIGIBLE = 1e-3  # of the geometric mean of the diagonals: weaker coupling is left out
 FEWEST, MOST = 2, 10  # pairs of poles of an entry
+ALIKE = 2e-3  # rms in BAND by which the normal K of two blocks may differ to share a fit
 ROUNDS = 20  # of relocating poles
 EVALUATIONS = 40  # of the nonlinear least squares
 DECAY = (0.05, 8.0)  # 1/s, of a pole: one of less would outlast SPAN, and is narrower than files resolve
@@ -36,6 +38,7 @@ PASSIVE_MARGIN = 1e-5  # least Re K at which residues are held, of its size ther
 PASSIVE_ROUNDS = 60
 NOT_PASSIVE = 1e-4  # of an entry's largest value: beyond it a fit is refused
 SPAN = 60.0  # s of past velocities in a convolution
+FADE = 15.0  # s at its end in which K goes to zero: cut off, it would damp slow motions, or drive them
 SPACING = 0.005  # rad/s, of the cosine transform: its period of 1257 s is far beyond SPAN
 TRANSFORMED = 120.0  # s of K behind the target of a fit
 GRID = 0.025  # rad/s, of that target
@@ -310,8 +313,12 @@ def _blocks(size):
     return blocks, coupled
 
 
-def _fit_block(omega, k, block, coupled, w, asked):
-    """(poles, {entry: residues}, scaled passivity) of motions that share poles."""
+def _fit_block(omega, k, block, coupled, w, asked, known):
+    """(poles, {entry: residues}) of motions that share poles.
+
+    known: [(normal K, poles, normal residues)] of earlier blocks, to which this one is added; a block that is
+    one of them but for scales and signs, as sway and roll are of many floaters, has its fit.
+    """
     band = _in_band(omega)
     pairs = [(i, j) for a, i in enumerate(block) for j in block[a:] if i == j or coupled[i, j]]
     scale = {i: np.sqrt(np.sqrt((np.abs(k[band, i, i]) ** 2).mean())) for i in block}
@@ -319,6 +326,11 @@ def _fit_block(omega, k, block, coupled, w, asked):
     f = np.array([k[:, i, j] for i, j in pairs]).T
     units = np.array([scale[i] * scale[j] for i, j in pairs])
     places = [(block.index(i), block.index(j)) for i, j in pairs]
+    for normal, poles, found in known:
+        if normal.shape == f.shape and len(block) < 3:
+            signs = np.where((normal.conj() * f)[band].real.sum(axis=0) < 0.0, -1.0, 1.0)
+            if np.sqrt((np.abs(signs * f / own - normal)[band] ** 2).mean(axis=0)).max() < ALIKE:
+                return poles, _residues_by_entry(pairs, found, signs * own)
     best, last = (np.inf, None, None), None
     for count in range(FEWEST, MOST + 1):
         starts = () if last is None else (np.append(last, complex(-0.5, 1.0 + 0.2 * (count % 3))),)
@@ -332,10 +344,18 @@ def _fit_block(omega, k, block, coupled, w, asked):
         if best[0] <= asked:
             break
     _, poles, found = best
-    half, residues = poles.size, {}
-    for (i, j), row, unit in zip(pairs, found, units, strict=True):
+    found = found * (units / own)[:, None]
+    known.append((f / own, poles, found))
+    return poles, _residues_by_entry(pairs, found, own)
+
+
+def _residues_by_entry(pairs, rows, units):
+    """{entry: complex residues}, both ways, of rows of their real and imaginary parts."""
+    residues = {}
+    for (i, j), row, unit in zip(pairs, rows, units, strict=True):
+        half = row.size // 2
         residues[i, j] = residues[j, i] = unit * (row[:half] + 1j * row[half:])
-    return poles, residues
+    return residues
 
 
 _FITS = Cache(16)  # (hash of the coefficients, error) -> RadiationFit
@@ -366,11 +386,12 @@ def _fit(body, asked):
     k = causal_retardation(body, omega)
     band = _in_band(omega)
     size = np.sqrt((np.abs(k[band]) ** 2).mean(axis=0))
-    w = np.where(band, 1.0, OUTSIDE)
+    # below the band by what an error is in added mass, which sets the periods of surge, sway and yaw
+    w = np.where(band, 1.0, np.where(omega < BAND[0], BELOW / omega, OUTSIDE))
     blocks, coupled = _blocks(size)
-    poles, residues = {}, {}
+    poles, residues, earlier = {}, {}, []
     for block in blocks:
-        own, found = _fit_block(omega, k, block, coupled, w, asked)
+        own, found = _fit_block(omega, k, block, coupled, w, asked, earlier)
         poles |= dict.fromkeys(block, own)
         residues |= found
     fit = RadiationFit(poles, residues, {}, 0.0, asked)
@@ -493,7 +514,8 @@ def build_convolution(body, dt, motions=range(6)):
     steps = max(1, round(SPAN / dt))
     n = whole_groups(steps, SUM_LANES)
     time = 0.5 * dt * np.arange(2 * n + 1)
-    kernel = retardation_kernel(body, time)
+    share = np.clip((time - SPAN + FADE) / FADE, 0.0, 1.0)
+    kernel = retardation_kernel(body, time) * (0.5 + 0.5 * np.cos(np.pi * share))[:, None, None]
     now = np.zeros((6, 6))
     half, whole = np.zeros((len(places), n)), np.zeros((len(places), n))
     for e, (i, j) in enumerate(places):
@@ -509,3 +531,34 @@ def build_convolution(body, dt, motions=range(6)):
         half,
         whole,
     )
+
+
+class LinearMemory(NamedTuple):
+    """z' = A z + B q', F = -C z: the memory of a scene in inertial axes, q' (6,)."""
+
+    A: np.ndarray  # (m, m)
+    B: np.ndarray  # (m, 6)
+    C: np.ndarray  # (6, m)
+
+
+def linear_memory(scene):
+    """LinearMemory of a scene, None without a memory; for a convolution that of the fit that state_space has."""
+    hydro = scene.model.hydro
+    if hydro is None or hydro.radiation is None:
+        return None
+    fit = fit_radiation(scene.platform.potential_flow, scene.options["radiation_error"])
+    motions = [j for j in (IN_PLANE if scene.options["planar"] else range(6)) if j in fit.poles]
+    size = 2 * sum(fit.poles[j].size for j in motions)
+    a, b, c = np.zeros((size, size)), np.zeros((size, 6)), np.zeros((6, size))
+    start = 0
+    for j in motions:
+        for k, pole in enumerate(fit.poles[j]):
+            at = slice(start, start + 2)
+            a[at, at] = [[pole.real, -pole.imag], [pole.imag, pole.real]]
+            b[start, j] = 1.0
+            for i in motions:
+                if (i, j) in fit.residues:
+                    residue = fit.residues[i, j][k]
+                    c[i, at] = 2.0 * residue.real, -2.0 * residue.imag
+            start += 2
+    return LinearMemory(a, b, c)
