@@ -12,6 +12,7 @@ import pandas as pd
 from scipy.linalg import eigvals
 
 from fowt_env.analysis.linear_model import FORCES, linearize, modes
+from fowt_env.analysis.reduced_model import with_pitch_lag
 from fowt_env.controllers.design.closed_loop import closed_loop_matrix
 from fowt_env.controllers.gains import with_gains
 from fowt_env.controllers.lqr.design import LQGSettings, scene_at, winds_above_rated
@@ -32,10 +33,10 @@ KEPT = (*SHOWN, "RotSpeed_max_[rpm]", "GenPwr_mean_[kW]", "TwrBsMyt_DEL_[kN-m]")
 
 
 def models_over(scene, winds, progress=None):
-    """{wind m/s: LinearModel} of a scene in steady winds."""
+    """{wind m/s: LinearModel} of a scene in steady winds; blades that follow at once lag by LEAST_LAG."""
     models = {}
     for number, wind in enumerate(winds, 1):
-        models[float(wind)] = linearize(scene_at(scene, wind))
+        models[float(wind)] = with_pitch_lag(linearize(scene_at(scene, wind)))
         if progress is not None:
             progress(number, len(winds))
     return models

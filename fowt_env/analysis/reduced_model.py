@@ -1,18 +1,32 @@
-"""Linear models without the memory of radiated waves: what it does at one frequency, as mass and damping.
+"""Linear models as designs of controllers take them: no memory of radiated waves, blades that lag.
 
 The states of the memory, z, follow the motion x by z' = A_zz z + A_zx x + B_z u + E_z f. At a frequency w
 they are a complex gain times x, u and f, whose real part acts with x and whose imaginary part, over w, with
 dx/dt.
 So the force of the memory becomes the added mass and the damping of that frequency, exactly there and nearly
 about it, and the model has the rigid body's states alone.
+
+Blades that follow their command at once are no state: designs give them LEAST_LAG.
 """
 
 from dataclasses import replace
 
 import numpy as np
 
-MEMORY = "radiation_"  # with which the names of the memory's states begin
+from fowt_env.analysis.linear_model import MEMORY
+
+LEAST_LAG = 0.05  # s, of a pitch drive that has none
 NO_PLATFORM_MODE = 2.0 * np.pi / 30.0  # rad/s, of a model that has no mode of platform pitch
+
+
+def with_pitch_lag(model):
+    """The LinearModel with blades that lag; itself where its pitch drive has a time constant."""
+    if model.scene.turbine.pitch_drive.time_constant > 0.0:
+        return model
+    a, b, blade = model.A.copy(), model.B.copy(), model.index("blade_pitch")
+    a[blade], b[blade] = 0.0, 0.0
+    a[blade, blade], b[blade, model.inputs.index("blade_pitch_command")] = -1.0 / LEAST_LAG, 1.0 / LEAST_LAG
+    return replace(model, A=a, B=b)
 
 
 def memory_states(model):
