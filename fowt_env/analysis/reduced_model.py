@@ -13,10 +13,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from fowt_env.analysis.linear_model import MEMORY
+from fowt_env.analysis.linear_model import MEMORY, VELOCITIES
+from fowt_env.plant.state import MOTIONS
 
 LEAST_LAG = 0.05  # s, of a pitch drive that has none
-NO_PLATFORM_MODE = 2.0 * np.pi / 30.0  # rad/s, of a model that has no mode of platform pitch
+IN_PLANE = ("surge", "heave", "platform_pitch")  # names of modes that may be the platform's pitch
 
 
 def with_pitch_lag(model):
@@ -35,9 +36,21 @@ def memory_states(model):
 
 
 def platform_frequency(model):
-    """Frequency (rad/s) of the slowest mode of a LinearModel that is named platform pitch."""
-    found = [mode.frequency for mode in model.modes() if mode.name == "platform_pitch"]
-    return min(found) if found else NO_PLATFORM_MODE
+    """Frequency (rad/s) of the mode of a LinearModel that is the platform's pitch.
+
+    That in the plane nearest to the undamped one, of restoring and mass alone, in which the pitch has its
+    largest share: a hull that pitches about a point far off has a mode that is named after surge.
+    """
+    positions = [model.index(name) for name in MOTIONS]
+    speeds = [model.index(name) for name in VELOCITIES]
+    kinematics, stiffness = model.A[np.ix_(positions, speeds)], model.A[np.ix_(speeds, positions)]
+    values, vectors = np.linalg.eig(kinematics @ stiffness)
+    arm = model.arm
+    size = np.abs(vectors) * np.array([1.0, 1.0, 1.0, arm, arm, arm])[:, None]
+    chosen = np.argmax(size[MOTIONS.index("platform_pitch")] / size.sum(axis=0))
+    undamped = float(np.sqrt(max(-values[chosen].real, 1e-6)))
+    found = [mode.frequency for mode in model.modes() if mode.name in IN_PLANE]
+    return min(found, key=lambda frequency: abs(frequency - undamped), default=undamped)
 
 
 def without_memory(model, omega=None):

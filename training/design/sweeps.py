@@ -12,7 +12,7 @@ import pandas as pd
 from scipy.linalg import eigvals
 
 from fowt_env.analysis.linear_model import FORCES, linearize, modes
-from fowt_env.analysis.reduced_model import with_pitch_lag
+from fowt_env.analysis.reduced_model import platform_frequency, with_pitch_lag
 from fowt_env.controllers.design.closed_loop import closed_loop_matrix
 from fowt_env.controllers.gains import with_gains
 from fowt_env.controllers.lqr.design import LQGSettings, scene_at, winds_above_rated
@@ -96,7 +96,8 @@ def zeros_over(scene, winds=None, progress=None):
             raise InputError(f"wind = {wind:g}: the blade pitch rests on its limit there")
         zeros = [z for z in transmission_zeros(model) if z.real > 1e-6 and z.imag >= 0.0]
         zero = max(zeros, key=lambda z: z.real, default=0.0j)
-        own = [mode for mode in model.modes() if mode.name == "platform_pitch"]
+        frequency = platform_frequency(model)
+        own = min(model.modes(), key=lambda mode: abs(mode.frequency - frequency))
         a, names = closed_loop_matrix(model, settings)
         poles = np.linalg.eigvals(a)
         # what oscillates as the platform and the rotor do: yaw, sway and the lines' modes are not the loop's
@@ -112,8 +113,8 @@ def zeros_over(scene, winds=None, progress=None):
                 "zero_real_[rad/s]": float(zero.real),
                 "zero_imag_[rad/s]": float(zero.imag),
                 "zero_period_[s]": float(2.0 * np.pi / size) if size else np.nan,
-                "platform_period_[s]": float(max((m.period for m in own), default=np.nan)),
-                "platform_damping_[-]": float(min((m.damping_ratio for m in own), default=np.nan)),
+                "platform_period_[s]": own.period,
+                "platform_damping_[-]": own.damping_ratio,
                 "pi_damping_[-]": float(min(moving, default=np.nan)),
                 "pi_stable": bool(poles.real.max() < STABLE),
             }
