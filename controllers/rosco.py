@@ -197,7 +197,9 @@ class Rosco:
         self.changes = dict(changes or {})
         self.control_dt = check_control_dt(control_dt)
         self.name = str(name)
-        felt = {0: (), 1: ("nacelle_acceleration",), 2: ("platform_pitch_acceleration",)}[settings.mode]
+        # a turbine measures the rate of its pitching: its own DISCON.IN is given the change of that
+        turning = "platform_pitch_rate" if isinstance(settings, Discon) else "platform_pitch_acceleration"
+        felt = {0: (), 1: ("nacelle_acceleration",), 2: (turning,)}[settings.mode]
         used = ("time", "rotor_speed", "generator_speed", "generator_torque", "blade_pitch", "wind_speed")
         self.information = (*used, *felt, "plant_model")
         self._felt = felt
@@ -249,6 +251,7 @@ class Rosco:
         self._library = _Copy(self._source, self._files.path)
         self._swap = np.zeros(SWAP_SIZE, dtype=np.float32)
         self._deck = str(self._files.path / "DISCON.IN").encode()
+        self._rate = None
         self._first = (measurement.time, self._call(0, measurement))
 
     def act(self, measurement):
@@ -270,6 +273,10 @@ class Rosco:
         s[48], s[49], s[50] = TEXT_SIZE, len(self._deck), len(OUT_NAME)
         for entry, name in ((52, "nacelle_acceleration"), (82, "platform_pitch_acceleration")):
             s[entry] = getattr(m, name) if name in self._felt else 0.0
+        if "platform_pitch_rate" in self._felt:
+            rate = m.platform_pitch_rate
+            s[82] = 0.0 if self._rate is None else (rate - self._rate) / self.control_dt
+            self._rate = rate
         s[60] = 3.0
         failed = self._library.call(s, self._deck)
         if failed is not None:

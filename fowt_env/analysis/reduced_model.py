@@ -17,7 +17,8 @@ from fowt_env.analysis.linear_model import MEMORY, VELOCITIES
 from fowt_env.plant.state import MOTIONS
 
 LEAST_LAG = 0.05  # s, of a pitch drive that has none
-IN_PLANE = ("surge", "heave", "platform_pitch")  # names of modes that may be the platform's pitch
+NAMES = ("platform_pitch", "surge", "heave")  # of modes that may be the platform's pitch, the likeliest first
+FAR = 0.3  # of the undamped frequency, within which its mode is
 
 
 def with_pitch_lag(model):
@@ -36,11 +37,27 @@ def memory_states(model):
 
 
 def platform_frequency(model):
-    """Frequency (rad/s) of the mode of a LinearModel that is the platform's pitch.
+    """Frequency (rad/s) of platform_mode, or the undamped one where no mode oscillates near it."""
+    found = platform_mode(model)
+    return _undamped(model) if found is None else found.frequency
 
-    That in the plane nearest to the undamped one, of restoring and mass alone, in which the pitch has its
-    largest share: a hull that pitches about a point far off has a mode that is named after surge.
+
+def platform_mode(model):
+    """The Mode of a LinearModel that is the platform's pitch; None where none is near the undamped frequency.
+
+    A hull that pitches about a point far off has one that is named after surge or heave.
     """
+    undamped = _undamped(model)
+    modes = model.modes()
+    for name in NAMES:
+        near = [m for m in modes if m.name == name and abs(m.frequency / undamped - 1.0) < FAR]
+        if near:
+            return min(near, key=lambda mode: abs(mode.frequency - undamped))
+    return None
+
+
+def _undamped(model):
+    """Frequency (rad/s) of restoring and mass alone in which the pitch has its largest share."""
     positions = [model.index(name) for name in MOTIONS]
     speeds = [model.index(name) for name in VELOCITIES]
     kinematics, stiffness = model.A[np.ix_(positions, speeds)], model.A[np.ix_(speeds, positions)]
@@ -48,9 +65,7 @@ def platform_frequency(model):
     arm = model.arm
     size = np.abs(vectors) * np.array([1.0, 1.0, 1.0, arm, arm, arm])[:, None]
     chosen = np.argmax(size[MOTIONS.index("platform_pitch")] / size.sum(axis=0))
-    undamped = float(np.sqrt(max(-values[chosen].real, 1e-6)))
-    found = [mode.frequency for mode in model.modes() if mode.name in IN_PLANE]
-    return min(found, key=lambda frequency: abs(frequency - undamped), default=undamped)
+    return float(np.sqrt(max(-values[chosen].real, 1e-6)))
 
 
 def without_memory(model, omega=None):

@@ -55,8 +55,8 @@ ZEROS_EXAMPLES = """[bold]Examples[/bold]
 [cyan]fowt design zeros --platform nrel5mw_oc4_semi --out zeros.csv[/cyan]  another platform, as a table
 
 A zero in the right half plane, near the platform's own pitch, is where holding the rotor speed with the
-blades takes the thrust that damps the platform: no feedback of rotor speed alone can be faster. pi_damping:
-least damping ratio of surge, platform pitch and rotor speed under pi; drag is left out."""
+blades takes the thrust that damps the platform: no feedback of rotor speed alone can be faster. pi: damping
+ratios of platform pitch (or of the rotor, where that is less) and of surge under pi; drag is left out."""
 TUNE_EXAMPLES = """[bold]Examples[/bold]
 
 [cyan]fowt design tune pi_tuned[/cyan]  three factors on the published gains, 40 settings tried
