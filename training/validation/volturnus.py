@@ -1,0 +1,174 @@
+"""The IEA 15 MW on VolturnUS-S against OpenFAST: cases, and groups of figures with what is allowed.
+
+Rigid OpenFAST v5 runs of the public deck (their settings are in the heads of the series), and the linear models
+that ROSCO's repository holds of the same turbine. Nothing here is adjusted to fit.
+"""
+
+from dataclasses import replace
+from math import pi
+
+import numpy as np
+import pandas as pd
+
+from fowt_env.training.validation.openfast_cases import ReferenceRun, _path, hub_wind, wave_components
+from fowt_env.training.validation.signal_errors import harmonics, normalised_rms
+from fowt_env.training.validation.validate import (
+    BLADE,
+    PITCH,
+    POWER,
+    SETTLED,
+    SPEED,
+    SURGE,
+    THRUST,
+    TIME,
+    _name,
+    _since,
+    add_decay,
+)
+
+PLATFORM = "iea15_volturnus_s"
+HEAVE, YAW = "PtfmHeave_[m]", "PtfmYaw_[deg]"
+PLANE = (SURGE, HEAVE, PITCH)
+DT = 0.025  # s, as OpenFAST's
+# as those runs had it: the wake skewed by the tilt of the shaft, loads of the undisturbed air
+OPTIONS = {"skewed_wake": True}
+DECAYS = {  # case: (channel, start value, seconds, step of the reference)
+    "decay_surge": (SURGE, 10.0, 600.0, 0.2),
+    "decay_heave": (HEAVE, 3.0, 200.0, 0.1),
+    "decay_pitch": (PITCH, 5.0, 300.0, 0.1),
+    "decay_yaw": (YAW, 8.0, 500.0, 0.2),
+}
+WAVE = {"kind": "regular", "H": 4.0, "T": 9.0}
+WAVE_WINDOW = (302.0, 500.0)  # s, twenty-two periods
+HARMONICS = (SURGE, HEAVE, PITCH)
+CONTROLLED = ("float_steady_12mps", "float_steady_18mps", "turb_18mps_Hs7.5_uniform")
+
+
+def _run(case, duration, **settings):
+    """ReferenceRun of this platform."""
+    settings = {"platform": PLATFORM, "place": PLATFORM, "options": OPTIONS, **settings}
+    return ReferenceRun(case, duration, DT, **settings)
+
+
+def _start(blade_pitch):
+    return {"RotSpeed": 7.56, "BldPitch1": blade_pitch}
+
+
+def rosco(folder):
+    """ROSCO's library with the deck's settings. Raises: InputError where the library is missing."""
+    from fowt_env.controllers import CONTROLLERS
+
+    return "rosco" if "rosco" in CONTROLLERS else None
+
+
+RUNS = {
+    "static": _run("static", 600.0, output_dt=0.2),
+    **{
+        case: _run(case, seconds, initial={channel.split("_[")[0]: start}, output_dt=step)
+        for case, (channel, start, seconds, step) in DECAYS.items()
+    },
+    "regwave_H4T9": _run("regwave_H4T9", 500.0, sea=WAVE),
+    "waves_Hs7.5": _run("waves_Hs7.5", 600.0, sea=wave_components, output_dt=0.2),
+    "waves_Hs7.5_qtf": _run(
+        "waves_Hs7.5_qtf", 600.0, sea=wave_components, output_dt=0.2,
+        options={**OPTIONS, "second_order": "full"},
+    ),
+    "float_steady_12mps": _run(
+        "float_steady_12mps", 600.0, wind=12.0, controlled=True, initial=_start(6.3), controller=rosco
+    ),
+    "float_steady_18mps": _run(
+        "float_steady_18mps", 600.0, wind=18.0, controlled=True, initial=_start(15.4), controller=rosco
+    ),
+    "turb_18mps_Hs7.5_uniform": _run(
+        "turb_18mps_Hs7.5_uniform", 600.0, wind=lambda folder, bts: hub_wind(folder), sea=wave_components,
+        controlled=True, initial=_start(15.4), controller=rosco,
+    ),
+}  # fmt: skip
+
+
+def rest(study):
+    """Where the platform rests in still water: surge and heave within 0.02 m, platform pitch within 0.02 deg."""
+    case = "static"
+    ours, theirs = _since(study.pair(case), 550.0)
+    for channel in PLANE:
+        name, unit = _name(channel)
+        here, there = ours[channel].mean(), theirs[channel].mean()
+        quantity = f"{name} at rest, mean of the last 50 s"
+        apart = f"{here - there:+.4f} {unit}; allowed 0.02 {unit}"
+        study.add(case, quantity, unit, there, here, allowed=100.0 * 0.02 / abs(there), note=apart)
+
+
+def decays(study):
+    """Free decays: period 0.5 %, logarithmic decrement 5 %, rms error of the whole record 4 %."""
+    for case, (channel, _, seconds, _) in DECAYS.items():
+        add_decay(study, case, channel, seconds, period=0.5, decrement=5.0, rms=4.0)
+
+
+def regular(study):
+    """Regular wave H 4 m T 9 s: first harmonics of surge, heave and platform pitch within 1 %."""
+    case, omega = "regwave_H4T9", 2.0 * pi / WAVE["T"]
+    ours, theirs = _since(study.pair(case), *WAVE_WINDOW)
+    for channel in HARMONICS:
+        name, unit = _name(channel)
+        there, here = (
+            harmonics(f[TIME].to_numpy()[:-1], f[channel].to_numpy()[:-1], omega)[0] for f in (theirs, ours)
+        )
+        turned = f"phase {np.degrees(np.angle(here / there)):+.2f} deg"
+        study.add(case, f"{name}, first harmonic", unit, abs(there), abs(here), allowed=1.0, note=turned)
+
+
+def waves(study):
+    """Irregular waves Hs 7.5 m: deviations after 100 s within 2 %, with difference-frequency forces 5 %."""
+    for case, allowed in (("waves_Hs7.5", 2.0), ("waves_Hs7.5_qtf", 5.0)):
+        ours, theirs = _since(study.pair(case), SETTLED)
+        for channel in PLANE:
+            name, unit = _name(channel)
+            both = [frame[channel].std() for frame in (theirs, ours)]
+            study.add(case, f"{name}, standard deviation", unit, *both, allowed=allowed)
+            means = [frame[channel].mean() for frame in (theirs, ours)]
+            study.add(case, f"{name}, mean", unit, *means)
+            error = 100.0 * normalised_rms(ours[channel], theirs[channel])
+            study.add(case, f"{name}, normalised rms error", unit, *both, error)
+
+
+def floating(study):
+    """Floating with ROSCO, 12 and 18 m/s and turbulence with Hs 7.5 m: deviations after 100 s within 3 %."""
+    for case in CONTROLLED:
+        words = "with ROSCO"
+        ours, theirs = _since(study.pair(case), SETTLED)
+        for channel in (*PLANE, SPEED, BLADE, POWER, THRUST):
+            name, unit = _name(channel)
+            both = [frame[channel].std() for frame in (theirs, ours)]
+            study.add(case, f"{name}, standard deviation", unit, *both, allowed=3.0, note=words)
+            means = [frame[channel].mean() for frame in (theirs, ours)]
+            study.add(case, f"{name}, mean", unit, *means, note=words)
+            error = 100.0 * normalised_rms(ours[channel], theirs[channel])
+            study.add(case, f"{name}, normalised rms error", unit, *both, error, note=words)
+
+
+def memory(study):
+    """States of the radiation memory against convolution, on decays and an irregular sea: 1 % of the deviation."""
+    for case in ("decay_surge", "decay_heave", "decay_pitch", "waves_Hs7.5"):
+        run = RUNS[case]
+        frames = []
+        for kind in ("convolution", "states"):
+            study.say(f"{case}, radiation by {kind}")
+            frames.append(run.frame(study.folder, radiation=kind))
+        dear, cheap = frames
+        channels = PLANE if case.startswith("waves") else (DECAYS[case][0],)
+        for channel in channels:
+            name, unit = _name(channel)
+            error = 100.0 * normalised_rms(cheap[channel], dear[channel])
+            quantity = f"{name}, rms error over the deviation, {case}"
+            both = dear[channel].std(), cheap[channel].std()
+            study.add("radiation memory as states (against convolution)", quantity, unit, *both, error, 1.0)
+
+
+GROUPS = {  # name -> (function, runs that it takes)
+    "rest": (rest, 1),
+    "decays": (decays, 4),
+    "regular": (regular, 1),
+    "waves": (waves, 2),
+    "floating": (floating, 3),
+    "memory": (memory, 8),
+}
