@@ -123,7 +123,7 @@ class FloatingFeedback(PI):
         control_dt = check_control_dt(control_dt)
         super().__init__(settings, control_dt, name)
         self.feedback = feedback
-        self.information = (*PI.information, feedback.signal)
+        self.inputs = (*PI.inputs, feedback.signal)
         low = feedback.low_pass
         own = {
             FeedbackParameter.SIGNAL: SIGNALS[feedback.signal],

@@ -15,8 +15,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from fowt_env.control import CompiledController, check_control_dt
-from fowt_env.controllers.pi import Parameter, PISettings, curve_of, schedule_gain
+from fowt_env.controllers.pi import GainScheduled, Parameter, PISettings, curve_of, schedule_gain
 from fowt_env.plant.compile.decorators import control_kernel, kernel
 from fowt_env.plant.drivetrain import clamp, generator_torque, rate_limit
 from fowt_env.plant.measurement import Measure
@@ -73,15 +72,14 @@ def discon_law(parameters, memory, measurement, command):
     discon_step(parameters, memory, measurement, command)
 
 
-class Discon(CompiledController):
+class Discon(GainScheduled):
     """OC3-Hywind DISCON law as OpenFAST calls it, every control_dt."""
 
     kernel = staticmethod(discon_law)
-    information = ("generator_speed", "blade_pitch")
+    inputs = ("generator_speed", "blade_pitch")
 
     def __init__(self, settings, control_dt, name="openfast_oc3"):
-        super().__init__(name, settings.parameters(check_control_dt(control_dt)), len(Memory))
-        self.settings = settings
+        super().__init__(settings, control_dt, name, len(Memory))
 
     def reset(self, measurement):
         """Start at the measured speed and blade pitch, the integral holding that pitch at no speed error."""

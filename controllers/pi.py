@@ -4,14 +4,14 @@ theory.md, sections 3 and 4. Above rated the torque is constant (or the power, b
 blade pitch holds the rotor speed; below rated the pitch rests on its minimum and the torque curve rules.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from enum import IntEnum
 from math import exp, inf, isfinite, isinf
-from typing import NamedTuple
 
 import numpy as np
 
 from fowt_env.control import CompiledController, check_control_dt
+from fowt_env.controllers.gains import gains_of_turbine, published_set, with_gains
 from fowt_env.controllers.tuned import tuned
 from fowt_env.descriptions.checks import check_number
 from fowt_env.errors import unknown
@@ -21,13 +21,6 @@ from fowt_env.plant.measurement import Measure
 
 SCHEDULE_ON = ("commanded", "measured")
 BUMPLESS = 1e-9  # rad, largest step of the first command that still counts as none
-
-
-class Gains(NamedTuple):
-    """Published form of the PI gains: blade pitch over generator-speed error and its integral."""
-
-    KP: float  # s
-    KI: float  # -
 
 
 class Parameter(IntEnum):
@@ -57,27 +50,6 @@ class Memory(IntEnum):
     INTEGRAL = 3  # I_e, rad
 
 
-def gains(design_frequency, damping, inertia, rated_speed, gear_ratio, dP_dpitch):
-    """Gains that give the rotor-speed loop this frequency (rad/s) and damping ratio at zero pitch.
-
-    inertia: I_D about the low-speed shaft, kg m2; rated_speed: w_b0 of the rotor, rad/s; dP_dpitch:
-    slope of the aerodynamic power at rated speed, W/rad, negative. theory.md, section 4.
-    Raises: InputError unless all are finite, dP_dpitch < 0 and the others > 0.
-    """
-    given = {
-        "design_frequency": design_frequency,
-        "damping": damping,
-        "inertia": inertia,
-        "rated_speed": rated_speed,
-        "gear_ratio": gear_ratio,
-    }
-    for key, value in given.items():
-        check_number(key, value, 0.0, low_open=True, allowed="positive and finite")
-    check_number("dP_dpitch", dP_dpitch, high=0.0, high_open=True, allowed="negative and finite, W/rad")
-    scale = inertia * rated_speed / (gear_ratio * -dP_dpitch)
-    return Gains(KP=2.0 * damping * design_frequency * scale, KI=design_frequency**2 * scale)
-
-
 @dataclass(frozen=True)
 class PISettings:
     """Everything that shapes the PI law. Raises: InputError naming the key, value and allowed range."""
@@ -94,6 +66,7 @@ class PISettings:
     speed_filter_corner: float = inf  # rad/s; inf: no filter
     gain_schedule_pitch: float = inf  # beta_K, rad; inf: no schedule
     schedule_on: str = "commanded"  # which blade pitch sets the gain and forces region 3
+    derived: str = ""  # gain set that stands for a platform's own, until for_scene; "": gains as given
 
     def __post_init__(self):
         for key in ("KI", "rated_speed", "gear_ratio", "pitch_rate_limit", "torque_rate_limit"):
@@ -111,17 +84,16 @@ class PISettings:
 
     @classmethod
     def published(cls, turbine, gain_set="oc3", region3="constant_torque", scheduled=True, **changes):
-        """Settings of a descriptions.turbine.Turbine with one of its published gain sets, "oc3" or "land".
+        """Settings of a descriptions.turbine.Turbine with one of its gain sets, "oc3" ("floating") or "land".
 
-        changes: fields of PISettings that replace the published ones.
+        changes: fields of PISettings that replace the published ones. A turbine without published gains has
+        those of controllers/gains.py, which for_scene makes the platform's own.
         """
-        if gain_set not in turbine.gains:
-            raise unknown("gain set", gain_set, turbine.gains)
         known = {field.name for field in fields(cls)}
         for key in changes:
             if key not in known:
                 raise unknown("PI setting", key, known)
-        published, law, drive = turbine.gains[gain_set], turbine.torque_law, turbine.pitch_drive
+        published, law, drive = gains_of_turbine(turbine, gain_set), turbine.torque_law, turbine.pitch_drive
         settings = {
             "KP": published.KP,
             "KI": published.KI,
@@ -134,8 +106,22 @@ class PISettings:
             "curve": build_torque_curve(law, region3),
             "speed_filter_corner": law.speed_filter_corner,
             "gain_schedule_pitch": published.gain_schedule_pitch if scheduled else inf,
+            "derived": gain_set if published_set(turbine, gain_set) is None else "",
         }
         return cls(**(settings | changes))
+
+    def for_scene(self, scene):
+        """These settings with the gains of a scene's platform, where none are published; else as they are.
+
+        Factors on the gains and on their schedule stay.
+        """
+        if not self.derived:
+            return self
+        alone = gains_of_turbine(scene.turbine, self.derived)
+        here = published_set(with_gains(scene), self.derived)
+        keys = ("KP", "KI", "gain_schedule_pitch")
+        changes = {key: getattr(self, key) * (getattr(here, key) / getattr(alone, key)) for key in keys}
+        return replace(self, derived="", **changes)
 
     def parameters(self, control_dt):
         """(n,) parameter array of the law at this control period, in the order of Parameter."""
@@ -266,7 +252,28 @@ def pi_law(parameters, memory, measurement, command):
     pi_step(parameters, memory, speed, pitch, command)
 
 
-class PI(CompiledController):
+class GainScheduled(CompiledController):
+    """Base of the laws of a PISettings; prepare(scene) takes a platform's gains where none are published."""
+
+    def __init__(self, settings, control_dt, name, n_memory):
+        self.settings, self.law_dt = settings, check_control_dt(control_dt)
+        super().__init__(name, settings.parameters(self.law_dt), n_memory)
+
+    @property
+    def information(self):
+        """What the law is given; the plant's equations too, where its gains are derived from them."""
+        if self.settings.derived and "plant_model" not in self.inputs:
+            return (*self.inputs, "plant_model")
+        return self.inputs
+
+    def prepare(self, scene):
+        """Take the gains of the scene's platform where the turbine has no published ones."""
+        if self.settings.derived:
+            own = self.settings.for_scene(scene).parameters(self.law_dt)
+            self.parameters[: len(own)] = own
+
+
+class PI(GainScheduled):
     """PI law of theory.md Eq. (8) and torque law, sampled every control_dt.
 
     bumpless, set by reset(): False where no integral within the anti-windup limits gives the
@@ -274,11 +281,10 @@ class PI(CompiledController):
     """
 
     kernel = staticmethod(pi_law)
-    information = ("generator_speed", "blade_pitch", "generator_torque")
+    inputs = ("generator_speed", "blade_pitch", "generator_torque")
 
     def __init__(self, settings, control_dt, name="pi"):
-        super().__init__(name, settings.parameters(check_control_dt(control_dt)), len(Memory))
-        self.settings = settings
+        super().__init__(settings, control_dt, name, len(Memory))
         self.bumpless = True
 
     def reset(self, measurement):

@@ -111,7 +111,7 @@ class Preview(PI):
     """PI of a PISettings with the feedforward of a PreviewSettings; needs prepare(scene) before reset."""
 
     kernel = staticmethod(preview_law)
-    information = (*PI.information, "wind_preview", "plant_model")
+    inputs = (*PI.inputs, "wind_preview", "plant_model")
 
     def __init__(self, settings, preview, control_dt, name="preview"):
         super().__init__(settings, control_dt, name)
@@ -129,6 +129,7 @@ class Preview(PI):
         """
         if scene.model.aero is None:
             raise InputError(f"controller {self.name!r}: needs a scene with wind to look ahead")
+        super().prepare(scene)
         step = self.control_dt
         delay = self.preview.preview_time - scene.turbine.pitch_drive.time_constant - 0.5 * step
         if delay <= 0.0:

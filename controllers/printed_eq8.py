@@ -7,8 +7,8 @@ that fades only like 1/t, depends on the choice of t = 0, and ends unstable. Do 
 
 from enum import IntEnum
 
-from fowt_env.control import CompiledController, check_control_dt
 from fowt_env.controllers.pi import (
+    GainScheduled,
     Memory,
     Parameter,
     PISettings,
@@ -51,19 +51,17 @@ def literal_law(parameters, memory, measurement, command):
     literal_step(parameters, memory, measurement, command)
 
 
-class Eq8Literal(CompiledController):
+class Eq8Literal(GainScheduled):
     """The printed Eq. (8), as a demonstration: t = 0 and the blade pitch of zero error are those at reset.
 
     Without that pitch the printed law would have no operating point above rated at all.
     """
 
     kernel = staticmethod(literal_law)
-    information = ("time", "generator_speed", "blade_pitch", "generator_torque")
+    inputs = ("time", "generator_speed", "blade_pitch", "generator_torque")
 
     def __init__(self, settings, control_dt, name="eq8_literal"):
-        parameters = settings.parameters(check_control_dt(control_dt))
-        super().__init__(name, parameters, LiteralMemory.START_PITCH + 1)
-        self.settings = settings
+        super().__init__(settings, control_dt, name, LiteralMemory.START_PITCH + 1)
 
     def reset(self, measurement):
         """Start the clock of the printed law here, from the measured speed, blade pitch and torque."""

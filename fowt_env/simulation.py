@@ -186,6 +186,7 @@ def simulate(
     last = steps_in("duration", duration, dt)
     steps_in("duration", duration, output_dt, "output_dt")
     check_duration(scene, duration)
+    scene = scene.with_step(dt)
     if grid_loss is not None:
         check_number("grid_loss", grid_loss, allowed="a time in s, or None")
     if trip is not None:

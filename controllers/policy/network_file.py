@@ -1,12 +1,10 @@
 """Files of policies: arrays and one JSON text in a .npz, read without pickle and checked to the last value.
 
 Loading one runs no code of its author: what it names is looked up among names that are known, its baseline
-among CONTROLLERS. No count in it is believed: an array takes the memory that the file's table of contents
-gives it, and all of them at most MAX_BYTES. training/rl/export.py writes such files.
+among CONTROLLERS; descriptions/array_files.py reads its arrays, MAX_BYTES of them at most.
+training/rl/export.py writes such files.
 """
 
-import math
-import zipfile
 from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -15,6 +13,7 @@ import numpy as np
 from pydantic import Field
 
 from fowt_env.controllers.registry import CONTROLLERS
+from fowt_env.descriptions.array_files import read_arrays
 from fowt_env.descriptions.files import parse_json, raise_problems
 from fowt_env.descriptions.records import Finite, NonNegative, Positive, Record, unknown_key, validate
 from fowt_env.envs.actions import ACTION_MODES
@@ -27,7 +26,6 @@ ACTIVATIONS = {"tanh": np.tanh, "relu": lambda x: np.maximum(x, 0.0)}
 SQUASHES = {"clip": lambda x: np.clip(x, -1.0, 1.0), "tanh": np.tanh}
 MAX_BYTES = 100_000_000  # of all arrays; the largest policy made so far has 200 kB
 MAX_LAYERS = 100
-HEADERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
 PAIR = Annotated[list[Finite], Field(min_length=2, max_length=2)]
 
 
@@ -83,7 +81,7 @@ def read_policy(path):
     path = Path(path)
     where = f"policy file {str(path)!r}"
     try:
-        arrays = _arrays(path)
+        arrays = read_arrays(path, MAX_BYTES)
         settings = parse_json(str(arrays["settings"]))
     except Exception as error:  # whatever a broken file makes zipfile, zlib, numpy and json raise
         raise InputError(f"{where}: cannot be read: {error!s:.300}") from error
@@ -99,32 +97,6 @@ def read_policy(path):
         weights, biases, settings["activation"], settings["squash"], mean, scale, settings["clip_observation"]
     )
     return settings, network
-
-
-def _arrays(path):
-    """{name: array} of a .npz file, each once its size is known to be that of its place in the file."""
-    arrays = {}
-    with zipfile.ZipFile(path) as archive:
-        members = archive.infolist()
-        total = sum(member.file_size for member in members)
-        if total > MAX_BYTES:
-            raise ValueError(f"it holds {total} bytes; allowed: at most {MAX_BYTES}")
-        for member in members:
-            with archive.open(member) as file:
-                version = np.lib.format.read_magic(file)
-                if version not in HEADERS:
-                    raise ValueError(f"array {member.filename!r} has the version {version}")
-                shape, by_columns, kind = HEADERS[version](file)
-                size = math.prod(shape) * kind.itemsize
-                if kind.hasobject:
-                    raise ValueError(f"array {member.filename!r} holds pickled objects, which are not loaded")
-                if size != member.file_size - file.tell():
-                    raise ValueError(f"array {member.filename!r}: {shape} of {kind} is not its size")
-                content = np.frombuffer(file.read(), dtype=kind)
-                arrays[member.filename.removesuffix(".npy")] = content.reshape(
-                    shape, order="F" if by_columns else "C"
-                )
-    return arrays
 
 
 def _numbers(array):

@@ -242,7 +242,7 @@ def _by_load(scene, end):
     to_inertial = np.array(
         [[pose.r11, pose.r12, pose.r13], [pose.r21, pose.r22, pose.r23], [pose.r31, pose.r32, pose.r33]]
     )
-    centre = np.array([body.s_x, 0.0, body.s_z]) / body.mass
+    centre = np.array([body.s_x, body.s_y or 0.0, body.s_z]) / body.mass
     weight = -body.mass * body.gravity * to_inertial[2]
     wrenches = {name: end.cache[first : first + 6] for name, first in LOADS.items()}
     wrenches["weight"] = np.concatenate([weight, np.cross(centre, weight)])

@@ -17,9 +17,12 @@ from fowt_env.plant.compile.handle import data_of, model_of
 from fowt_env.plant.drivetrain import build_torque_curve, generator_torque
 from fowt_env.plant.dynamics import derivative
 from fowt_env.plant.hydro.load import BandedStrips
+from fowt_env.plant.hydro.member_series import no_series
 from fowt_env.plant.rollout import output_row
 from fowt_env.plant.state import N_COMMANDS, Command, State, pose_of
+from fowt_env.plant.tilt import rotor_pose
 from fowt_env.scene.scene import Scene
+from fowt_env.weather.excitation import still_excitation
 from fowt_env.weather.wind import make_series
 from fowt_env.weather.wind_field import steady_field
 
@@ -92,6 +95,9 @@ def without_fluctuations(scene, wind_speed=None):
             name: getattr(waves, name)[:1].copy() for name in waves._fields if np.ndim(getattr(waves, name))
         }
         parts["hydro.waves"] = waves._replace(**one | {"amplitude": np.zeros(1), "velocity": np.zeros(1)})
+        if hydro.members is not None:
+            parts["hydro.members.series"] = no_series()
+        parts["hydro.excitation"] = still_excitation(hydro.excitation)
         if isinstance(hydro.strips, BandedStrips):
             bands = hydro.strips.bands
             parts["hydro.strips.bands"] = bands._replace(weight=np.zeros_like(bands.weight))
@@ -129,8 +135,8 @@ def settle_wake(handle, x, dx):
     aero = model_of(handle).aero
     rotor = aero.rotor
     wake_equilibrium(
-        0.0, pose_of(x), x, wind_now(0.0, aero.wind), aero.wind, aero.field, rotor.elements, rotor.skew,
-        rotor.wake, dx, data_of(handle).counters,
+        0.0, rotor_pose(pose_of(x), aero.tilt), x, wind_now(0.0, aero.wind), aero.wind, aero.field,
+        rotor.elements, rotor.skew, rotor.wake, dx, data_of(handle).counters,
     )  # fmt: skip
 
 

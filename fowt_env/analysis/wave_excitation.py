@@ -3,7 +3,8 @@
 The force of a wave on the strips is not a causal function of the elevation at the hull: water deep down is
 moved by an average over elevations before and after. So the state-space model takes the elevation some
 seconds ahead (its lead), and says how well it fits in which band. The elevation is that at the hull's
-mean place, not at the origin: the way between is dispersive, and no low-order model fits that.
+mean place, not at the origin: the way between is dispersive, and no low-order model fits that. (The
+excitation of a potential-flow body is that of its undisplaced position: there the hull stands at the origin.)
 """
 
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ from fowt_env.descriptions.sea_state import sea_state_of
 from fowt_env.plant.compile.decorators import entry
 from fowt_env.plant.hydro.morison import morison_load
 from fowt_env.plant.state import State, pose_of
+from fowt_env.weather.excitation import OUT_OF_PLANE, excitation_at
 from fowt_env.weather.waves import build_waves
 
 BAND = (0.15, 2.0)  # rad/s, of the fit: periods of 3.1 to 42 s
@@ -40,13 +42,32 @@ def wave_force(scene, state, omega):
 
     Force and elevation are the real parts of these times exp(i omega t), for waves travelling along x
     past the hull at rest in `state`. Computed by the scene's own strip load for a small regular wave,
-    without drag, which is quadratic. omega: (n,) rad/s. Zero without hydrodynamics.
+    without drag, which is quadratic; of a potential-flow body the excitation of its table, as the plant
+    interpolates it. omega: (n,) rad/s. Zero without hydrodynamics.
     """
     omega = np.atleast_1d(np.asarray(omega, dtype=float))
     result = np.zeros((omega.size, 6), dtype=complex)
-    strips = scene.model.hydro.strips.shape
-    if strips is None:
+    hydro, body = scene.model.hydro, scene.platform.potential_flow
+    if hydro is None:
         return result
+    if hydro.strips is not None:
+        result += _strip_forces(scene, state, omega, hydro.strips.shape)
+    if body is not None:
+        force = excitation_at(body, omega, 0.0)
+        if scene.options["planar"]:
+            force[:, OUT_OF_PLANE] = 0.0
+        pose = pose_of(state)
+        rotation = np.array(
+            [[getattr(pose, f"r{i}{j}") for j in (1, 2, 3)] for i in (1, 2, 3)]
+        )  # body to inertial
+        result[:, :3] += force[:, :3] @ rotation
+        result[:, 3:] += force[:, 3:] @ rotation
+    return result
+
+
+def _strip_forces(scene, state, omega, strips):
+    """(n, 6) complex force of the strips."""
+    result = np.zeros((omega.size, 6), dtype=complex)
     strips = strips._replace(drag_coefficient=0.0, axial_drag_coefficient=0.0)
     x = np.zeros_like(state)
     x[: State.AZIMUTH] = state[: State.AZIMUTH]

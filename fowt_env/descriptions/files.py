@@ -22,16 +22,16 @@ _KEY_PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""
 _DEEP_KEY = re.compile(rf"(?m)(?:^|[\[{{,])[ \t]*{_KEY_PART}(?:[ \t]*\.[ \t]*{_KEY_PART}){{{MAX_DEPTH}}}")
 
 
-def read_text(path, kind):
-    """Text of a file of at most MAX_BYTES; kind ("platform", "blade" ...) is for the messages."""
+def read_text(path, kind, largest=MAX_BYTES):
+    """Text of a file of at most `largest` bytes; kind ("platform", "blade" ...) is for the messages."""
     try:
         if not path.exists():
             raise InputError(f"{kind} file {str(path)!r} does not exist")
         if not path.is_file():
             raise InputError(f"{kind} file {str(path)!r} is not a regular file")
         size = path.stat().st_size
-        if size > MAX_BYTES:
-            raise InputError(f"{kind} file {str(path)!r} has {size} bytes; allowed: at most {MAX_BYTES}")
+        if size > largest:
+            raise InputError(f"{kind} file {str(path)!r} has {size} bytes; allowed: at most {largest}")
         return path.read_bytes().decode("utf-8-sig")
     except UnicodeDecodeError as error:
         where = f"{error.reason} at byte {error.start}"

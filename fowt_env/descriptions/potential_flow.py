@@ -7,10 +7,10 @@ the undisplaced pose.
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 
+from fowt_env.descriptions.array_files import read_arrays
 from fowt_env.descriptions.files import raise_problems
 from fowt_env.descriptions.records import Finite, Positive, Record, validate
 from fowt_env.errors import InputError
@@ -106,10 +106,12 @@ def read_coefficients(path):
             raise InputError(f"{where} does not exist")
         if path.stat().st_size > MAX_BYTES:
             raise InputError(f"{where} has {path.stat().st_size} bytes; allowed: at most {MAX_BYTES}")
-        with np.load(path, allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files if name in (*ARRAYS, *QTF_ARRAYS, "source")}
-    except (OSError, ValueError, BadZipFile, EOFError, KeyError, MemoryError, NotImplementedError) as error:
-        raise InputError(f"{where} cannot be read: {error}") from None
+        arrays = read_arrays(path, MAX_BYTES)
+    except InputError:
+        raise
+    except Exception as error:  # whatever a broken file makes zipfile, zlib and numpy raise
+        raise InputError(f"{where} cannot be read: {error!s:.300}") from None
+    arrays = {name: value for name, value in arrays.items() if name in (*ARRAYS, *QTF_ARRAYS, "source")}
     missing = [name for name in ARRAYS if name not in arrays and name not in OPTIONAL]
     if missing:
         raise InputError(f"{where}: arrays {', '.join(missing)} are missing")

@@ -1,11 +1,12 @@
 """Descriptions of turbines: nacelle, rotor, drivetrain, blade with polars, and the reader of their files."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field, model_validator
 
+from fowt_env.descriptions.checks import is_number
 from fowt_env.descriptions.files import DATA, column, locate, raise_problems, read_table, read_toml
 from fowt_env.descriptions.records import (
     Finite,
@@ -82,7 +83,12 @@ class PitchDrive(Record):
 
 
 class TorqueLaw(Record):
-    """Generator torque against filtered high-speed-shaft speed (theory.md, section 3)."""
+    """Generator torque against filtered high-speed-shaft speed (theory.md, section 3).
+
+    A turbine file may leave out what follows from the rest (with_torque_defaults), and may give
+    minimum_speed, that of VS_MinOMSpd in a DISCON.IN of ROSCO, in place of cut_in_speed and
+    region2_start_speed.
+    """
 
     rated_torque: Positive  # N m, high-speed shaft
     rated_power: Positive  # mechanical, W
@@ -108,6 +114,69 @@ class TorqueLaw(Record):
         if self.max_torque < self.rated_torque:
             raise ValueError(f"max_torque = {self.max_torque}: must be >= rated_torque = {self.rated_torque}")
         return self
+
+
+# What a torque law is given where its file says nothing, as fractions of its own figures: those of the NREL
+# 5 MW turbine (NREL/TP-500-38060), whose speed filter, 0.25 Hz, follows the rated rotor speed.
+TRANSITION = 0.99  # of rated speed: region 3
+SLIP = 10.0  # percent
+REGION3_PITCH = 0.01745329  # rad, 1 deg
+REGION15 = 0.05  # of the minimum speed, over which the torque rises to that of region 2
+MOST_TORQUE = 1.1  # of rated
+TORQUE_RATE = 0.348  # of rated a second
+FILTER_CORNER = 1.24  # rad/s per rad/s of rated rotor speed
+BELOW_MEETING = 0.999  # of the speed at which region 2 reaches rated torque, where that is the lower one
+
+
+def with_torque_defaults(data):
+    """The entries of a turbine (SI) with those of torque_law that follow from others.
+
+    rated_torque and rated_power follow from each other by rated_speed, and this from the rotor's and the
+    gearbox; cut_in_speed and region2_start_speed from minimum_speed. Region 3 starts at 99 % of rated speed,
+    or where the torque of region 2 reaches the rated one before. Whatever is no positive number stays as it
+    is.
+    Raises: ValueError where minimum_speed is given with one of the speeds that it stands for.
+    """
+    law, drive = data.get("torque_law"), data.get("drivetrain")
+    if not isinstance(law, dict):
+        return data
+    law = dict(law)
+
+    def known(table, *keys):
+        values = [table.get(key) if isinstance(table, dict) else getattr(table, key, None) for key in keys]
+        return values if all(is_number(value) and value > 0.0 for value in values) else None
+
+    def default(key, value):
+        if key not in law:
+            law[key] = value
+
+    rotor, ratio = known(data, "rated_rotor_speed"), known(drive, "gear_ratio")
+    if rotor and ratio:
+        default("rated_speed", rotor[0] * ratio[0])
+    if found := known(law, "rated_power", "rated_speed"):
+        default("rated_torque", found[0] / found[1])
+    if found := known(law, "rated_torque", "rated_speed"):
+        default("rated_power", found[0] * found[1])
+    if "minimum_speed" in law:
+        given = [key for key in ("cut_in_speed", "region2_start_speed") if key in law]
+        if given:
+            raise ValueError(f"torque_law.{given[0]}: given beside minimum_speed, which stands for it")
+        found = known(law, "minimum_speed")
+        if not found:
+            raise ValueError(f"torque_law.minimum_speed = {law['minimum_speed']!r}: must be a number > 0")
+        del law["minimum_speed"]
+        law["cut_in_speed"], law["region2_start_speed"] = found[0], (1.0 + REGION15) * found[0]
+    if found := known(law, "rated_speed", "rated_torque", "region2_constant"):
+        meeting = BELOW_MEETING * (found[1] / found[2]) ** 0.5
+        default("transition_speed", min(TRANSITION * found[0], meeting))
+    default("slip_percent", SLIP)
+    default("region3_min_pitch", REGION3_PITCH)
+    if found := known(law, "rated_torque"):
+        default("max_torque", MOST_TORQUE * found[0])
+        default("max_torque_rate", TORQUE_RATE * found[0])
+    if rotor:
+        default("speed_filter_corner", FILTER_CORNER * rotor[0])
+    return data | {"torque_law": law}
 
 
 class PitchGains(Record):
@@ -184,9 +253,17 @@ class Turbine(Record):
     drivetrain: Drivetrain
     pitch_drive: PitchDrive
     torque_law: TorqueLaw
-    gains: dict[Literal["oc3", "land"], PitchGains]
+    gains: dict[
+        str, PitchGains
+    ] = {}  # published ones by name; without any they are derived (controllers/gains.py)
     blade: Blade
+    discon: str | None = None  # path of a DISCON.IN of ROSCO for this turbine
     source: str = ""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _torque_defaults(cls, data):
+        return with_torque_defaults(data) if isinstance(data, dict) else data
 
     @model_validator(mode="after")
     def _consistent(self):
@@ -225,7 +302,7 @@ def read_turbine(name_or_path: str | Path) -> Turbine:
     """Turbine from a built-in name (turbine_names()) or a user's TOML file.
 
     blade.stations and blade.polars are paths relative to the file or, if not there, to the folder of the
-    built-in turbines ("nrel5mw/blade.csv", "nrel5mw/polars").
+    built-in turbines ("nrel5mw/blade.csv", "nrel5mw/polars"); so is discon.
     """
     path = locate("turbine", name_or_path, turbine_names(), turbine_file)
     problems = []
@@ -236,6 +313,11 @@ def read_turbine(name_or_path: str | Path) -> Turbine:
             data["blade"] = _read_blade(blade.blade, path.parent)
         except InputError as error:
             blade_problems.append(str(error))
+    if isinstance(data.get("discon"), str):
+        try:
+            data["discon"] = str(_discon(data["discon"], path.parent))
+        except InputError as error:
+            problems.append(str(error))
     turbine, found = validate(Turbine, data, origin)
     if blade_problems:  # which say why the record has no blade
         found = [problem for problem in found if not problem.startswith("blade is missing")]
@@ -260,6 +342,14 @@ def _beside(folder, text):
         return builtin if builtin.exists() and not mine.exists() else mine
     except (OSError, ValueError, RuntimeError) as error:
         raise InputError(f"path {text[:60]!r} cannot be used: {error}") from None
+
+
+def _discon(text, folder):
+    """Path of the DISCON.IN that a turbine file names. Raises: InputError where there is none."""
+    path = _beside(folder, text)
+    if not path.is_file():
+        raise InputError(f"discon = {text[:60]!r}: must be a file, relative to the turbine file's folder")
+    return path.absolute()
 
 
 def _read_blade(table, folder):

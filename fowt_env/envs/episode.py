@@ -15,6 +15,7 @@ from fowt_env.envs.rewards import Scales, fill_terms, weighted_sum
 from fowt_env.plant.compile.decorators import entry, kernel
 from fowt_env.plant.compile.handle import by_reference, data_of, model_of
 from fowt_env.plant.drivetrain import followed_torque, torque_was_limited
+from fowt_env.plant.hydro.radiation import forget_memory
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measure
 from fowt_env.plant.model import Data, LoadCache, Model
 from fowt_env.plant.rollout import NON_FINITE, OVERSPEED, RUNNING, advance_plant, observe_plant
@@ -134,6 +135,7 @@ def start_episode(handle):
     episode.data.cache[LoadCache.TORQUE_LIMITED] = 0.0
     episode.data.cache[LoadCache.VALID] = 0.0
     episode.data.cache[LoadCache.STEPS] = 0.0
+    forget_memory(episode.data.radiation)
     status = measure_and_sense(config, episode)
     copy_into(episode.previous_measurement, episode.measurement)
     action_of(episode.u, episode.x[State.ROTOR_SPEED], config.actions, episode.action)

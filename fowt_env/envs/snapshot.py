@@ -9,7 +9,9 @@ CARRIED = (
     "x", "u", "memory", "estimate", "action", "measurement", "reading", "baseline_reading", "past",
     "observation", "counts", "reference", "terms",
 )  # fmt: skip
-DATA_CARRIED = ("lines", "counters", "stages", "cache", "added_mass", "user", "history", "samples")
+DATA_CARRIED = (
+    "lines", "counters", "stages", "cache", "added_mass", "user", "history", "samples", "radiation",
+)  # fmt: skip
 
 
 class Snapshot(NamedTuple):

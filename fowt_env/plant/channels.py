@@ -14,6 +14,7 @@ from fowt_env.plant.measurement import Measure
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rigid_body import momentum_rate
 from fowt_env.plant.state import Command, State, pose_of, to_inertial
+from fowt_env.plant.tilt import across_shaft, along_shaft, rotor_pose
 from fowt_env.plant.user_loads import record_user_loads
 
 DEG_PER_RAD = 180.0 / pi
@@ -118,7 +119,12 @@ class Layout(NamedTuple):
     gear_ratio: float
     generator_efficiency: float
     blades: int
-    span: np.ndarray  # (n,) radii along a blade at which the rotor's mean wind is read, m
+    span: np.ndarray  # (n,) distances along a blade at which the rotor's mean wind is read, m
+    tilt: object  # tilt.Tilt of the shaft or None
+    shaft_hub: np.ndarray  # (3,) hub in rotor axes, whose x axis is the shaft, m
+    lean: float  # m upwind per metre along a blade, sine of the cone
+    reach: float  # m from the shaft per metre along a blade, cosine of the cone
+    rotor_cm: np.ndarray  # (3,) centre of mass of the rotor, m
 
 
 @kernel
@@ -130,12 +136,14 @@ def rotor_wind(t, pose, azimuth, aero, layout):
     """
     if aero is None:
         return 0.0
-    return _rotor_wind(t, pose, azimuth, wind_now(t, aero.wind), aero.wind, aero.field, layout)
+    turned = rotor_pose(pose, layout.tilt)
+    return _rotor_wind(t, turned, azimuth, wind_now(t, aero.wind), aero.wind, aero.field, layout)
 
 
 @kernel
 def _rotor_wind(t, pose, azimuth, now, series, field, layout):
-    hub = layout.hub
+    """rotor_wind with the pose in rotor axes."""
+    hub = layout.shaft_hub
     if field is None:
         u, v, w = now.u * series.rotor_factor, now.v * series.rotor_factor, now.w
     else:
@@ -143,8 +151,9 @@ def _rotor_wind(t, pose, azimuth, now, series, field, layout):
         for blade in range(layout.blades):
             psi = azimuth + 2.0 * pi * blade / layout.blades
             ey, ez = -sin(psi), cos(psi)
-            for radius in layout.span:
-                X, Y, Z = to_inertial(pose, hub[0], hub[1] + radius * ey, hub[2] + radius * ez)
+            for distance in layout.span:
+                radius, ahead = layout.reach * distance, layout.lean * distance
+                X, Y, Z = to_inertial(pose, hub[0] - ahead, hub[1] + radius * ey, hub[2] + radius * ez)
                 a, b, c = wind_at(t, pose.x + X, pose.y + Y, pose.z + Z, now, series, field)
                 u += a
                 v += b
@@ -232,10 +241,12 @@ def record(model, data, x, dx, u, t, loads, row):
     row[Out.GENPWR] = layout.generator_efficiency * layout.gear_ratio * speed * u[Command.GENERATOR_TORQUE]
     row[Out.GENTQLIM] = data.cache[LoadCache.TORQUE_LIMITED]
     # shaft loads: aerodynamics less the rotor's own inertia and weight
-    hub = layout.hub
-    hx, _, _ = point_acceleration(pose, dx, hub[0], hub[1], hub[2])
-    row[Out.ROTTHRUST] = loads.rotor.thrust - layout.rotor_mass * (hx + body.gravity * pose.r31)
-    row[Out.ROTTORQ] = loads.rotor.torque - layout.rotor_inertia * (dx[State.ROTOR_SPEED] + dx[State.WX])
+    hub, cm, tilt = layout.hub, layout.rotor_cm, layout.tilt
+    cx, _, cz = point_acceleration(pose, dx, cm[0], cm[1], cm[2])
+    push = along_shaft(cx + body.gravity * pose.r31, cz + body.gravity * pose.r33, tilt)
+    row[Out.ROTTHRUST] = loads.rotor.thrust - layout.rotor_mass * push
+    turning = dx[State.ROTOR_SPEED] + along_shaft(dx[State.WX], dx[State.WZ], tilt)
+    row[Out.ROTTORQ] = loads.rotor.torque - layout.rotor_inertia * turning
     row[Out.RTFLDFXH] = loads.rotor.thrust
     row[Out.RTFLDMXH] = loads.rotor.torque
     tower_base(pose, x, dx, loads, body, layout, row)
@@ -262,8 +273,8 @@ def tower_base(pose, x, dx, loads, body, layout, row):
     on the lower one).
     """
     m = layout.upper_matrix
-    c = momentum_rate(pose, x[State.ROTOR_SPEED], m, body.coupling)
-    mass, sx, sz = m[0, 0], m[1, 5], m[0, 4]
+    c = momentum_rate(pose, x[State.ROTOR_SPEED], m, body.coupling, body.tilt)
+    mass, sx, sy, sz = m[0, 0], m[1, 5], -m[0, 5], m[0, 4]
     nx, ny, nz = pose.r31, pose.r32, pose.r33
     g = body.gravity
     f = loads.rotor.wrench
@@ -271,9 +282,10 @@ def tower_base(pose, x, dx, loads, body, layout, row):
     fx = f.fx + w.fx - mass * g * nx - c.fx
     fy = f.fy + w.fy - mass * g * ny - c.fy
     fz = f.fz + w.fz - mass * g * nz - c.fz
-    mx = f.mx + w.mx + g * sz * ny - c.mx - body.coupling * dx[State.ROTOR_SPEED]
+    spun = body.coupling * dx[State.ROTOR_SPEED]
+    mx = f.mx + w.mx + g * sz * ny - g * sy * nz - c.mx - along_shaft(spun, 0.0, body.tilt)
     my = f.my + w.my - g * (sz * nx - sx * nz) - c.my
-    mz = f.mz + w.mz - g * sx * ny - c.mz
+    mz = f.mz + w.mz - g * sx * ny + g * sy * nx - c.mz + across_shaft(spun, body.tilt)
     for j in range(6):
         a = dx[State.VX + j]
         fx -= m[0, j] * a

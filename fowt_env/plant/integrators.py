@@ -3,7 +3,8 @@
 The blade pitch follows its own first-order law exactly within a step (constant command), so the stiffest
 part of the plant does not limit the multistep methods. Nor does the rotor in a box of wind, whose blades pass
 a cell of the grid in a tenth of a second: its load alone is evaluated several times a step
-(rotor_substeps.py).
+(rotor_substeps.py). The states of radiation memory, the last of the vector, have no rates: they follow exactly
+from velocities that are linear over the step (hydro/radiation.py).
 """
 
 from typing import NamedTuple
@@ -13,6 +14,7 @@ from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.drivetrain import followed_pitch, pitch_after
 from fowt_env.plant.dynamics import derivative, evaluate_loads, respond
+from fowt_env.plant.hydro.radiation import begin_memory, end_memory, integrated_states, memory_after
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rigid_body import attitude_rate
 from fowt_env.plant.rotor_substeps import build_substeps, follow_rotor, sample_rotor
@@ -63,37 +65,47 @@ def rk4(t, x, u, dt, model, method, data):
     k1, k2, k3, k4, y = data.stages[0], data.stages[1], data.stages[2], data.stages[3], data.stages[4]
     half = pitch_after(x[State.BLADE_PITCH], u[Command.BLADE_PITCH], 0.5 * dt, model.actuator)
     whole = pitch_after(x[State.BLADE_PITCH], u[Command.BLADE_PITCH], dt, model.actuator)
+    n, plane, memory = integrated_states(x, model.hydro), model.rigid_body.plane, data.radiation
     rates(t, x, u, model, data, k1)
-    for i in range(x.shape[0]):
+    begin_memory(x, dt, True, plane, model.hydro, memory)
+    for i in range(n):
         y[i] = x[i] + 0.5 * dt * k1[i]
     y[State.BLADE_PITCH] = half
+    memory_after(x, y, True, plane, model.hydro, memory)
     derivative(t + 0.5 * dt, y, u, model, data, k2)
-    for i in range(x.shape[0]):
+    for i in range(n):
         y[i] = x[i] + 0.5 * dt * k2[i]
     y[State.BLADE_PITCH] = half
+    memory_after(x, y, True, plane, model.hydro, memory)
     derivative(t + 0.5 * dt, y, u, model, data, k3)
-    for i in range(x.shape[0]):
+    for i in range(n):
         y[i] = x[i] + dt * k3[i]
     y[State.BLADE_PITCH] = whole
+    memory_after(x, y, False, plane, model.hydro, memory)
     derivative(t + dt, y, u, model, data, k4)
-    for i in range(x.shape[0]):
+    for i in range(n):
         x[i] += dt / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i])
     x[State.BLADE_PITCH] = whole
+    end_memory(x, plane, model.hydro, memory)
 
 
 @inlined_kernel
 def heun(t, x, u, dt, model, method, data):
     """One step of the explicit trapezoidal rule, blade pitch exact."""
     k1, k2, y = data.stages[0], data.stages[1], data.stages[4]
+    n, plane, memory = integrated_states(x, model.hydro), model.rigid_body.plane, data.radiation
     rates(t, x, u, model, data, k1)
+    begin_memory(x, dt, False, plane, model.hydro, memory)
     pitch = pitch_after(x[State.BLADE_PITCH], u[Command.BLADE_PITCH], dt, model.actuator)
-    for i in range(x.shape[0]):
+    for i in range(n):
         y[i] = x[i] + dt * k1[i]
     y[State.BLADE_PITCH] = pitch
+    memory_after(x, y, False, plane, model.hydro, memory)
     derivative(t + dt, y, u, model, data, k2)
-    for i in range(x.shape[0]):
+    for i in range(n):
         x[i] += 0.5 * dt * (k1[i] + k2[i])
     x[State.BLADE_PITCH] = pitch
+    end_memory(x, plane, model.hydro, memory)
 
 
 @kernel
@@ -134,20 +146,23 @@ def adams(t, x, u, dt, model, method, data):
     """
     history, new, y = data.history, data.stages[1], data.stages[4]
     cache = data.cache
+    n, plane, memory = integrated_states(x, model.hydro), model.rigid_body.plane, data.radiation
     steps = int(cache[LoadCache.STEPS])
     order = min(steps + 1, START_STEPS + 1)
     for k in range(START_STEPS, 0, -1):
-        for i in range(x.shape[0]):
+        for i in range(n):
             history[k, i] = history[k - 1, i]
     rates(t, x, u, model, data, history[0])
+    begin_memory(x, dt, False, plane, model.hydro, memory)
     pitch = pitch_after(x[State.BLADE_PITCH], u[Command.BLADE_PITCH], dt, model.actuator)
-    for i in range(x.shape[0]):
+    for i in range(n):
         y[i] = x[i] + dt * bashforth(order, i, history)
     y[State.BLADE_PITCH] = pitch
     sample_rotor(t, x, u, dt, model, method.substeps, data)
     if method.corrector or steps < START_STEPS or feathering(x, model):
+        memory_after(x, y, False, plane, model.hydro, memory)
         derivative(t + dt, y, u, model, data, new)
-        for i in range(State.VX, x.shape[0]):
+        for i in range(State.VX, n):
             y[i] = x[i] + dt * moulton(order, new[i], i, history)
         y[State.BLADE_PITCH] = pitch
     else:
@@ -156,8 +171,9 @@ def adams(t, x, u, dt, model, method, data):
     new[State.AZIMUTH] = y[State.ROTOR_SPEED]
     for i in range(State.VX):
         x[i] += dt * moulton(order, new[i], i, history)
-    for i in range(State.VX, x.shape[0]):
+    for i in range(State.VX, n):
         x[i] = y[i]
+    end_memory(x, plane, model.hydro, memory)
     cache[LoadCache.STEPS] = steps + 1.0
 
 

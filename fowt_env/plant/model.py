@@ -17,11 +17,13 @@ class RigidBody(NamedTuple):
 
     mass_matrix: np.ndarray  # (6, 6) M1
     mass: float
-    s_x: float  # first moments: S = (s_x, 0, s_z), kg m
+    s_x: float  # first moments: S = (s_x, s_y, s_z), kg m
+    s_y: object  # float, or None where the centre of mass lies in the plane of symmetry
     s_z: float
     gravity: float
     coupling: float  # H = I_rotor + N_g I_g
     rotor_row: float  # I_rx = I_rotor + N_g^2 I_g
+    tilt: object  # tilt.Tilt of the shaft, or None where it lies along x
     platform_fixed: bool
     rotor_fixed: bool
     plane: object = None  # True: surge, heave and platform pitch alone move; None: all six motions
@@ -70,12 +72,17 @@ N_CACHE = 38
 
 @by_reference
 class Data(NamedTuple):
-    """What changes: scratch of one plant. lines, counters, cache, history and samples last between calls."""
+    """What changes: scratch of one plant.
+
+    lines, counters, cache, history, samples and radiation last between calls.
+    """
 
     lines: np.ndarray  # (n_lines, 6) mooring warm start and results
     counters: np.ndarray  # (N_COUNTERS,)
     kinematics: np.ndarray  # (7, n_nodes) water kinematics at the strip nodes
     bands: object  # hydro.wave_bands.BandScratch, the same for strips with wave bands
+    member_nodes: np.ndarray  # (n, hydro.members.N_NODE) nodes of members that are laid at each evaluation
+    member_water: np.ndarray  # (n * N_WATER,) the water's motion at the members' nodes
     added_mass: np.ndarray  # (6, 6) of the last evaluation, symmetric, about the body origin
     matrix: np.ndarray  # (6, 6) mass with added mass, solved in place
     stages: np.ndarray  # (5, n_state) derivatives and states within a step
@@ -83,3 +90,4 @@ class Data(NamedTuple):
     user: np.ndarray  # (user_loads.user_data_size(n),) wrench of each user load, and its inputs
     history: np.ndarray  # (4, n_state) derivatives of past steps, latest first
     samples: np.ndarray  # (4 samples, 7) rotor loads within past steps, latest first
+    radiation: np.ndarray  # hydro.radiation.memory_data: of the memory, empty without one

@@ -8,6 +8,7 @@ from math import cos, sin, sqrt
 
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.state import State, Wrench, pose_in, pose_of
+from fowt_env.plant.tilt import across_shaft, along_shaft
 
 
 @kernel
@@ -16,7 +17,7 @@ def gravity_load(pose, body):
     nx, ny, nz = pose.r31, pose.r32, pose.r33
     mg = -body.mass * body.gravity
     g = body.gravity
-    return Wrench(
+    weight = Wrench(
         mg * nx,
         mg * ny,
         mg * nz,
@@ -24,11 +25,31 @@ def gravity_load(pose, body):
         -g * (body.s_z * nx - body.s_x * nz),
         -g * body.s_x * ny,
     )
+    return _off_centre(weight, pose, g, body.s_y)
 
 
 @kernel
-def momentum_rate(pose, rotor_speed, mass_matrix, coupling):
-    """C1 nu + C2 w_b: velocity-dependent part of the momentum rate, Eqs (9)-(10)."""
+def _off_centre(weight, pose, gravity, s_y):
+    """The weight with the moment of a centre of mass beside the plane of symmetry."""
+    if s_y is None:
+        return weight
+    moment = gravity * s_y
+    return Wrench(
+        weight.fx,
+        weight.fy,
+        weight.fz,
+        weight.mx - moment * pose.r33,
+        weight.my,
+        weight.mz + moment * pose.r31,
+    )
+
+
+@kernel
+def momentum_rate(pose, rotor_speed, mass_matrix, coupling, tilt):
+    """C1 nu + C2 w_b: velocity-dependent part of the momentum rate, Eqs (9)-(10).
+
+    coupling: H of the rotor, whose angular momentum lies along the shaft; tilt of the shaft, or None.
+    """
     m = mass_matrix
     vx, vy, vz, wx, wy, wz = pose.vx, pose.vy, pose.vz, pose.wx, pose.wy, pose.wz
     px = m[0, 0] * vx + m[0, 1] * vy + m[0, 2] * vz + m[0, 3] * wx + m[0, 4] * wy + m[0, 5] * wz
@@ -37,7 +58,9 @@ def momentum_rate(pose, rotor_speed, mass_matrix, coupling):
     kx = m[3, 0] * vx + m[3, 1] * vy + m[3, 2] * vz + m[3, 3] * wx + m[3, 4] * wy + m[3, 5] * wz
     ky = m[4, 0] * vx + m[4, 1] * vy + m[4, 2] * vz + m[4, 3] * wx + m[4, 4] * wy + m[4, 5] * wz
     kz = m[5, 0] * vx + m[5, 1] * vy + m[5, 2] * vz + m[5, 3] * wx + m[5, 4] * wy + m[5, 5] * wz
-    kx += coupling * rotor_speed
+    spin = coupling * rotor_speed
+    kx += along_shaft(spin, 0.0, tilt)
+    kz -= across_shaft(spin, tilt)
     return Wrench(
         wy * pz - wz * py,
         wz * px - wx * pz,
@@ -135,7 +158,7 @@ def accelerate(pose, x, load, torque, added, body, matrix, dx):
     if body.plane is not None:
         accelerate_in_plane(pose, load, torque, added, body, dx)
         return
-    c = momentum_rate(pose, x[State.ROTOR_SPEED], body.mass_matrix, body.coupling)
+    c = momentum_rate(pose, x[State.ROTOR_SPEED], body.mass_matrix, body.coupling, body.tilt)
     b[0] = load.fx - c.fx
     b[1] = load.fy - c.fy
     b[2] = load.fz - c.fz
@@ -150,7 +173,23 @@ def accelerate(pose, x, load, torque, added, body, matrix, dx):
         dx[State.ROTOR_SPEED] = 0.0
         return
     ratio = body.coupling / body.rotor_row
-    matrix[3, 3] -= ratio * body.coupling
-    b[3] -= ratio * torque
+    _eliminate(ratio * body.coupling, ratio * torque, matrix, b, body.tilt)
     solve_spd(matrix, b)
-    dx[State.ROTOR_SPEED] = (torque - body.coupling * b[3]) / body.rotor_row
+    turning = along_shaft(b[3], b[5], body.tilt)
+    dx[State.ROTOR_SPEED] = (torque - body.coupling * turning) / body.rotor_row
+
+
+@kernel
+def _eliminate(inertia, moment, matrix, b, tilt):
+    """Take the rotor row out of the matrix and the right-hand side: both lie along the shaft."""
+    if tilt is None:
+        matrix[3, 3] -= inertia
+        b[3] -= moment
+        return
+    c, s = tilt.cosine, tilt.sine
+    matrix[3, 3] -= c * c * inertia
+    matrix[3, 5] += c * s * inertia
+    matrix[5, 3] += c * s * inertia
+    matrix[5, 5] -= s * s * inertia
+    b[3] -= c * moment
+    b[5] += s * moment

@@ -11,6 +11,7 @@ from fowt_env.plant.compile.decorators import entry, inlined_kernel, kernel
 from fowt_env.plant.compile.handle import data_of, model_of
 from fowt_env.plant.drivetrain import followed_torque, torque_was_limited
 from fowt_env.plant.dynamics import loads_of
+from fowt_env.plant.hydro.radiation import forget_memory
 from fowt_env.plant.integrators import rates, take_step
 from fowt_env.plant.measurement import Measure
 from fowt_env.plant.model import LoadCache
@@ -96,9 +97,10 @@ def output(handle, x, u, t, dx, row):
 
 @entry
 def forget(handle):
-    """Drop cached loads and past derivatives: the state was changed from outside."""
+    """Drop cached loads, past derivatives and past velocities: the state was changed from outside."""
     data_of(handle).cache[LoadCache.VALID] = 0.0
     data_of(handle).cache[LoadCache.STEPS] = 0.0
+    forget_memory(data_of(handle).radiation)
 
 
 def output_row(handle, x, u, t, size):

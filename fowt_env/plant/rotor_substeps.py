@@ -8,6 +8,7 @@ from fowt_env.plant.aero.load import rotor_part
 from fowt_env.plant.aero.wind import wind_now
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.drivetrain import pitch_after
+from fowt_env.plant.hydro.radiation import integrated_states
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rigid_body import accelerate
 from fowt_env.plant.state import Command, State, Wrench, pose_in
@@ -59,7 +60,7 @@ def sample_rotor(t, x, u, dt, model, substeps, data):
     for part in range(1, n):
         after = part * dt / n
         bend = 0.5 * after * after / dt
-        for i in range(x.shape[0]):
+        for i in range(integrated_states(x, model.hydro)):
             between[i] = x[i] + after * history[0, i] + bend * (history[0, i] - history[past, i])
         between[State.BLADE_PITCH] = pitch_after(
             x[State.BLADE_PITCH], u[Command.BLADE_PITCH], after, model.actuator

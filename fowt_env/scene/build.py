@@ -69,20 +69,24 @@ def build_scene(
     air, waves = build_weather(wind, sea, seed, platform, turbine, rotor, options)
     current = build_current(options["current"]) if options["hydrodynamics"] else None
     if options["planar"]:
-        check_symmetry(platform.lines if options["mooring"] else (), current)
+        members = platform.members if options["hydrodynamics"] else ()
+        check_symmetry(platform.lines if options["mooring"] else (), current, members)
     mooring = build_moorings(platform.lines, options["mooring"])
     user = checked_loads(loads, 0 if mooring is None else mooring.length.shape[0], options["planar"])
     aero = None if air.series is None else build_aero(platform, turbine, air, rotor, options)
+    first_state = N_RIGID + wake_states(aero)
+    memory_state = first_state + sum(load.states for load in user)
+    water = options["hydrodynamics"]
     model = Model(
         rigid_body=build_rigid_body(platform, turbine, plane=True if options["planar"] else None),
         layout=build_layout(platform, turbine),
         drivetrain=build_drivetrain(turbine),
         actuator=build_pitch_actuator(turbine.pitch_drive),
         generator=build_torque_limits(turbine.torque_law),
-        hydro=build_hydro(platform, waves, current, options) if options["hydrodynamics"] else None,
+        hydro=build_hydro(platform, waves, current, options, memory_state) if water else None,
         mooring=mooring,
         aero=aero,
         integrator=build_integrator(options["integrator"], samples_per_step(options, air.field)),
-        user=build_user_loads(user, platform.tower.base_height, N_RIGID + wake_states(aero)),
+        user=build_user_loads(user, platform.tower.base_height, first_state),
     )
     return Scene(model, platform, turbine, air.spec, sea, seed, rotor, options, air.speed, user, label)

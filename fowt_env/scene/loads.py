@@ -73,6 +73,14 @@ LOADS = {
         "hydro/added_inertia.py", "5.6", "hydro.added_inertia", "HYDRO",
         keys=("hydro.added_mass",), strength=("hydro.added_inertia.matrix",),
     ),
+    "body matrices": LoadFacts(
+        "hydrostatics and added mass of a potential-flow body; additional preload, stiffness and damping",
+        "hydro/body_matrices.py", "5.7", "hydro.matrices", "HYDRO", keys=("additional",),
+        strength=tuple(
+            f"hydro.matrices.{name}"
+            for name in ("constant", "stiffness", "linear_damping", "quadratic_damping", "added_mass")
+        ),
+    ),
     "moorings": LoadFacts(
         "elastic catenaries on the seabed, at rest in the present place",
         "mooring.py", "5.5", "mooring", "MOORING", {"mooring": False},

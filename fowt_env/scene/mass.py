@@ -5,12 +5,16 @@ import numpy as np
 from fowt_env.plant.channels import Layout
 from fowt_env.plant.drivetrain import build_drivetrain
 from fowt_env.plant.model import RigidBody
+from fowt_env.plant.tilt import build_tilt, rotor_axes
 
 SPAN_POINTS = 8  # along a blade, for the mean wind over the blades in the outputs
 
 
 def assemble(bodies):
-    """(6, 6) mass matrix about the body origin of rigid bodies (mass, centre (3,), inertia (3,) about it)."""
+    """(6, 6) mass matrix about the body origin of rigid bodies (mass, centre (3,), inertia about it).
+
+    inertia: (3,) about the body axes, or a (3, 3) tensor.
+    """
     matrix = np.zeros((6, 6))
     for mass, centre, inertia in bodies:
         x, y, z = centre
@@ -18,21 +22,29 @@ def assemble(bodies):
         matrix[:3, :3] += mass * np.eye(3)
         matrix[:3, 3:] -= mass * cross
         matrix[3:, :3] += mass * cross
-        matrix[3:, 3:] += np.diag(inertia) - mass * cross @ cross
+        tensor = np.diag(inertia) if np.ndim(inertia) == 1 else inertia
+        matrix[3:, 3:] += tensor - mass * cross @ cross
     return matrix
+
+
+def _rotor_body(rotor):
+    """Rotor as (mass, centre, inertia): its centre of mass lies on the shaft, which is a principal axis."""
+    shaft = np.array([np.cos(rotor.shaft_tilt), 0.0, -np.sin(rotor.shaft_tilt)])  # downwind
+    centre = np.array([-rotor.overhang, 0.0, rotor.hub_height]) + rotor.cm_offset * shaft
+    inertia = np.array([rotor.inertia, rotor.inertia_diameter, rotor.inertia_diameter])
+    if rotor.shaft_tilt != 0.0:
+        along = np.outer(shaft, shaft)
+        inertia = rotor.inertia * along + rotor.inertia_diameter * (np.eye(3) - along)
+    return rotor.mass, centre, inertia
 
 
 def _upper_bodies(platform, turbine):
     """Tower, nacelle and rotor as (mass, centre, inertia)."""
-    tower, nacelle, rotor = platform.tower, turbine.nacelle, turbine.rotor
+    tower, nacelle = platform.tower, turbine.nacelle
     return [
         (tower.mass, (0.0, 0.0, tower.cm_height), tower.inertia),
-        (nacelle.mass, (nacelle.cm_downwind, 0.0, nacelle.cm_height), nacelle.inertia),
-        (
-            rotor.mass,
-            (-rotor.overhang, 0.0, rotor.hub_height),
-            (rotor.inertia, rotor.inertia_diameter, rotor.inertia_diameter),
-        ),
+        (nacelle.mass, (nacelle.cm_downwind, nacelle.cm_left, nacelle.cm_height), nacelle.inertia),
+        _rotor_body(turbine.rotor),
     ]
 
 
@@ -46,10 +58,12 @@ def build_rigid_body(platform, turbine, platform_fixed=False, rotor_fixed=False,
         np.ascontiguousarray(matrix),
         float(matrix[0, 0]),
         float(matrix[1, 5]),
+        float(-matrix[0, 5]) if matrix[0, 5] != 0.0 else None,
         float(matrix[0, 4]),
         float(platform.environment.gravity),
         drivetrain.coupling,
         drivetrain.inertia_row,
+        build_tilt(turbine.rotor.shaft_tilt),
         platform_fixed,
         rotor_fixed,
         plane,
@@ -59,6 +73,7 @@ def build_rigid_body(platform, turbine, platform_fixed=False, rotor_fixed=False,
 def build_layout(platform, turbine):
     """Layout part: points and masses that outputs need."""
     rotor = turbine.rotor
+    hub_x, hub_z = rotor_axes(-rotor.overhang, rotor.hub_height, rotor.shaft_tilt)
     return Layout(
         np.array([-rotor.overhang, 0.0, rotor.hub_height]),
         np.array([0.0, 0.0, platform.tower.top_height]),
@@ -70,4 +85,9 @@ def build_layout(platform, turbine):
         float(turbine.drivetrain.generator_efficiency),
         int(rotor.blades),
         np.linspace(rotor.hub_radius, rotor.tip_radius, 2 * SPAN_POINTS + 1)[1::2].copy(),
+        build_tilt(rotor.shaft_tilt),
+        np.array([hub_x, 0.0, hub_z]),
+        float(np.sin(rotor.cone)),
+        float(np.cos(rotor.cone)),
+        np.ascontiguousarray(_rotor_body(rotor)[1]),
     )

@@ -13,6 +13,7 @@ from fowt_env.plant.aero.load import BemRotor
 from fowt_env.plant.aero.section_table import build_section_table
 from fowt_env.plant.aero.wake import build_dynamic_inflow, build_skewed_wake
 from fowt_env.plant.integrators import INTEGRATORS
+from fowt_env.weather.second_order import METHODS
 
 
 class RotorModel(NamedTuple):
@@ -33,6 +34,7 @@ class Fidelity(NamedTuple):
     wave_loads: str
     integrator: str
     mooring: str
+    radiation: str
     error: float  # of a motion or tension at most, rms over its standard deviation: docs/performance.md
     dt: float | None = None  # s, default step with its own integrator; None: that of the integrator
 
@@ -61,16 +63,18 @@ ROTORS = {
 FIDELITIES = {
     "reference": Fidelity(
         "everything solved exactly, Runge-Kutta 4",
-        rotor="bem", wave_loads="exact", integrator="rk4", mooring="catenary", error=3e-6,
-        dt=0.0125,
+        rotor="bem", wave_loads="exact", integrator="rk4", mooring="catenary",
+        radiation="convolution", error=3e-6, dt=0.0125,
     ),
     "standard": Fidelity(
         "every blade and station by look-up, fast wave sums, Adams-Bashforth 4",
-        rotor="lookup", wave_loads="fast", integrator="ab4", mooring="catenary", error=5e-4,
+        rotor="lookup", wave_loads="fast", integrator="ab4", mooring="catenary",
+        radiation="state_space", error=5e-4,
     ),
     "fast": Fidelity(
         "the rotor and the tensions of the lines as tables",
-        rotor="table", wave_loads="fast", integrator="ab4", mooring="table", error=2e-2,
+        rotor="table", wave_loads="fast", integrator="ab4", mooring="table", radiation="state_space",
+        error=2e-2,
     ),
 }  # fmt: skip
 FIELD_SAMPLES = 3  # rotor loads per step in a box of wind, whose cells the blades cross in 0.1 s
@@ -91,7 +95,13 @@ OPTIONS = {
     # of the rotor's load per step, of an integrator that samples it; None: FIELD_SAMPLES in a box, else 1
     "rotor_samples": (None, "None or a number of samples, 1 to 10"),
     "wave_loads": (None, (None, "exact", "fast")),  # None: the fidelity's
+    # of a potential-flow body; None: the fidelity's
+    "radiation": (None, (None, "state_space", "convolution", "none")),
+    "radiation_error": (0.02, "rms error of each entry of the state space over its rms, 0.001 to 0.5"),
     "current": (None, "None, a speed (m/s) or {'speed', 'heading' (deg), 'exponent'}"),
+    # of a potential-flow body with a difference-frequency QTF; cutoff: differences above it make no force
+    "second_order": (None, (None, "none", *METHODS)),
+    "second_order_cutoff": (None, "None or rad/s, > 0"),
     "duration": (700.0, "seconds of random wind and sea, > 0"),
     "wave_components": (None, "None or a number of components, 1 to 10000"),
     "blade_stations": (None, "None (the turbine file's) or a number of them, 3 up to the file's"),
@@ -99,6 +109,8 @@ OPTIONS = {
     "shear_exponent": (None, "None (the platform file's) or 0 to 1"),
     "turbine": (None, "None (the platform file's), a name, a path or a descriptions.turbine.Turbine"),
 }
+# defaults of a floater that is no slender spar: linear theory knows it in its undisplaced pose alone
+UNDISPLACED = {"kinematics_position": "fixed", "surface": "swl", "stretching": "none"}
 ARGUMENTS = ("platform", "wind", "sea", "seed", "rotor", "fidelity", "loads")  # of build_scene beside OPTIONS
 
 
@@ -117,7 +129,7 @@ def choose_parts(fidelity, rotor, options):
         raise InputError(f"rotor = {rotor!r}: skewed_wake and dynamic_inflow need rotor = {need}")
     options["fidelity"] = fidelity
     options["explicit_wave_loads"] = options["wave_loads"] is not None
-    for part in ("wave_loads", "integrator"):
+    for part in ("wave_loads", "integrator", "radiation"):
         if options[part] is None:
             options[part] = getattr(level, part)
     if options["mooring"] is True:
@@ -138,6 +150,8 @@ def default_step(options):
 def checked_options(given, platform):
     """Options with defaults, the platform file's own ones and the caller's, checked."""
     options = {name: default for name, (default, _) in OPTIONS.items()}
+    if platform.hull is None:
+        options |= UNDISPLACED
     for source, values in (
         (f"platform {platform.name!r}, options", platform.options),
         ("build_scene", given),
@@ -155,6 +169,11 @@ def checked_options(given, platform):
         options["shear_exponent"] = check_number("shear_exponent", options["shear_exponent"], 0.0, 1.0)
     if options["strip_length"] is not None:
         options["strip_length"] = check_number("strip_length", options["strip_length"], 0.01, 1e3)
+    options["radiation_error"] = check_number("radiation_error", options["radiation_error"], 0.001, 0.5)
+    if options["second_order_cutoff"] is not None:
+        options["second_order_cutoff"] = check_number(
+            "second_order_cutoff", options["second_order_cutoff"], 0.0, 100.0, low_open=True
+        )
     for name, most in (("wave_components", 10000), ("rotor_samples", 10)):
         if options[name] is not None:
             options[name] = check_whole_number(name, options[name], 1, most)

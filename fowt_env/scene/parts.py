@@ -16,13 +16,19 @@ from fowt_env.plant.hydro.diffraction import build_strip_diffraction
 from fowt_env.plant.hydro.hydrostatics import build_hull
 from fowt_env.plant.hydro.linear_damping import build_damping
 from fowt_env.plant.hydro.load import BandedStrips, ExactStrips, Hydro
+from fowt_env.plant.hydro.member_series import N_WATER, VELOCITIES, build_water_series, no_series
+from fowt_env.plant.hydro.members import build_members
 from fowt_env.plant.hydro.morison import Current
 from fowt_env.plant.hydro.strip_quadrature import STILL_REFINEMENT, build_quadrature
 from fowt_env.plant.hydro.strips import build_strips
 from fowt_env.plant.hydro.wave_bands import build_band_diffraction, build_wave_bands, can_use_bands
 from fowt_env.plant.mooring import build_mooring
-from fowt_env.scene.options import ROTORS, chosen_stations
+from fowt_env.plant.state import N_RIGID
+from fowt_env.plant.tilt import build_tilt
+from fowt_env.scene.options import ROTORS, chosen_stations, default_step
+from fowt_env.scene.radiation_fit import build_radiation
 from fowt_env.scene.weather import IN_PLANE
+from fowt_env.weather.excitation import build_excitation, still_excitation
 from fowt_env.weather.waves import flat_waves, is_flat
 
 
@@ -38,11 +44,11 @@ def build_aero(platform, turbine, air, rotor, options):
     elements = build_blade_elements(turbine, density, chosen_stations(options["blade_stations"], turbine))
     model = ROTORS[rotor].build(elements, options)
     tower = build_tower_drag(platform.tower, density) if options["tower_drag"] else None
-    return Aero(air.series, air.field, model, tower)
+    return Aero(air.series, air.field, model, build_tilt(turbine.rotor.shaft_tilt), tower)
 
 
-def build_hydro(platform, waves, current, options):
-    """Hydro part of a scene in water."""
+def build_hydro(platform, waves, current, options, first_state=N_RIGID):
+    """Hydro part of a scene in water; the states of its memory begin at first_state."""
     site, spar = platform.environment, platform.hull is not None
     strips = None
     if spar:
@@ -61,6 +67,9 @@ def build_hydro(platform, waves, current, options):
         matrices=build_body_matrices(
             platform.potential_flow, platform.additional, site.water_density, site.gravity
         ),
+        radiation=build_radiation(platform.potential_flow, options, default_step(options), first_state),
+        members=members_in_waves(_members(platform, options), waves, options),
+        excitation=excitation_in_waves(platform, waves, options),
         depth=float(site.water_depth),
     )
 
@@ -73,12 +82,41 @@ def hydro_in_waves(hydro, waves, platform, options):
     if waves is None:
         site = platform.environment
         waves = flat_waves(depth=site.water_depth, density=site.water_density, gravity=site.gravity)
-    strips = hydro.strips
+    strips, excitation = hydro.strips, still_excitation(hydro.excitation)
+    if not is_flat(waves):
+        excitation = excitation_in_waves(platform, waves, options)
     if isinstance(strips, BandedStrips) and (is_flat(waves) or is_flat(hydro.waves)):
         nodes = build_quadrature(platform.hull, strips.shape, _refinement(waves))
         quadrature = strips.quadrature._replace(table=nodes.table, keel=nodes.keel)
         strips = strips._replace(quadrature=quadrature)
-    return hydro._replace(waves=waves, strips=strips_in_waves(strips, waves, options))
+    return hydro._replace(
+        waves=waves,
+        strips=strips_in_waves(strips, waves, options),
+        members=members_in_waves(hydro.members, waves, options),
+        excitation=excitation,
+    )
+
+
+def excitation_in_waves(platform, waves, options):
+    """Excitation of a potential-flow body in waves; None without either.
+
+    Raises: InputError for a sea beyond the body's coefficients, or second order without a QTF.
+    """
+    body, second = platform.potential_flow, options["second_order"]
+    if second not in (None, "none") and (body is None or body.difference_qtf is None):
+        raise InputError(
+            f"second_order = {second!r}: the platform {platform.name!r} has no difference-frequency QTF;"
+            " allowed without one: None or 'none'"
+        )
+    return build_excitation(
+        body,
+        waves,
+        duration=options["duration"],
+        fast=options["wave_loads"] == "fast",
+        planar=options["planar"],
+        second_order=second,
+        cutoff=options["second_order_cutoff"],
+    )
 
 
 def _refinement(waves):
@@ -126,7 +164,7 @@ def wave_bands_of(waves, strips):
     return build_wave_bands(waves, strips)
 
 
-def check_symmetry(lines, current):
+def check_symmetry(lines, current, members=()):
     """Refuse what pulls a planar scene out of its plane."""
     if current is not None and abs(current.v) > IN_PLANE * abs(current.u):
         raise InputError("current.heading: must be 0 or 180 deg in a planar scene")
@@ -141,6 +179,27 @@ def check_symmetry(lines, current):
                 f"mooring line anchored at y = {row[1]:g} m has no mirror image at {-row[1]:g} m; a planar"
                 " scene needs one (planar = False)"
             )
+    shapes = [_shape_of(member) for member in members]
+    for member, shape in zip(members, shapes, strict=True):
+        image = shape.copy()
+        image[:, 1] *= -1.0
+        if not any(
+            np.allclose(other, seen, rtol=1e-6, atol=1e-3)
+            for other in shapes
+            for seen in (image, image[::-1])
+        ):
+            raise InputError(
+                f"member from {list(member.start)} to {list(member.end)} has no mirror image across y = 0; a"
+                " planar scene needs one (planar = False)"
+            )
+
+
+def _shape_of(member):
+    """(2, n) of a Member: what each of its ends has."""
+    flow = float(member.potential_flow)
+    ends = (member.start, member.end)
+    pairs = (value for name, value in member if name not in ("start", "end", "potential_flow"))
+    return np.column_stack([ends, *(np.array(pair) for pair in pairs), (flow, flow)])
 
 
 def _strips(platform, options):
@@ -155,6 +214,32 @@ def _strips(platform, options):
         stretching=options["stretching"],
         cell=options["strip_length"],
     )
+
+
+def _members(platform, options):
+    site = platform.environment
+    return build_members(
+        platform.members,
+        density=site.water_density,
+        gravity=site.gravity,
+        depth=site.water_depth,
+        position=options["kinematics_position"],
+        surface=options["surface"],
+        stretching=options["stretching"],
+        cell=options["strip_length"],
+    )
+
+
+def members_in_waves(members, waves, options):
+    """Members in waves (None: still water), with a table of the water's motion on the fast path."""
+    if members is None:
+        return None
+    still = members.scratch_nodes == 0 and not members.wheeler
+    if waves is None or options["wave_loads"] != "fast" or not still:
+        return members._replace(series=no_series())
+    channels = N_WATER if members.inertial else VELOCITIES
+    place = members.nodes[:, :3]
+    return members._replace(series=build_water_series(waves, place, channels, options["duration"]))
 
 
 def build_current(spec):

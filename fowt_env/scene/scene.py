@@ -14,6 +14,9 @@ from fowt_env.errors import InputError
 from fowt_env.plant.channels import Channel, channels, put_hub_wind, scales
 from fowt_env.plant.compile.handle import Handle
 from fowt_env.plant.events import N_COUNTERS
+from fowt_env.plant.hydro.member_series import N_WATER
+from fowt_env.plant.hydro.members import N_NODE
+from fowt_env.plant.hydro.radiation import memory_data, memory_states
 from fowt_env.plant.hydro.wave_bands import band_scratch
 from fowt_env.plant.integrators import rotor_samples
 from fowt_env.plant.model import N_CACHE, Data
@@ -22,6 +25,7 @@ from fowt_env.plant.state import Block, state_blocks
 from fowt_env.plant.user_loads import user_data_size
 from fowt_env.scene.options import default_step
 from fowt_env.scene.parts import hydro_in_waves, wake_states
+from fowt_env.scene.radiation_fit import memory_for_step
 from fowt_env.scene.user_loads import Load, first_nonfinite_load
 from fowt_env.scene.weather import Sea, Wind, build_weather
 from fowt_env.weather.wind import hub_series
@@ -61,7 +65,8 @@ class Scene:
     def blocks(self) -> tuple[Block, ...]:
         """What the entries of this scene's state vector are, in order."""
         internal = {"wake": wake_states(self.model.aero)}
-        return state_blocks(internal | {f"load {load.name}": load.states for load in self.loads})
+        internal |= {f"load {load.name}": load.states for load in self.loads}
+        return state_blocks(internal | {"radiation": memory_states(self.model.hydro)})
 
     @property
     def n_state(self) -> int:
@@ -113,11 +118,16 @@ class Scene:
         """Fresh scratch arrays for one plant of this scene."""
         hydro = self.model.hydro
         strips = None if hydro is None else hydro.strips
+        members = None if hydro is None else hydro.members
+        laid = 0 if members is None else members.scratch_nodes
+        nodes = 0 if members is None else laid or len(members.nodes)
         return Data(
             lines=np.zeros((self.n_lines, 6)),
             counters=np.zeros(N_COUNTERS),
             kinematics=np.zeros((7, 0 if strips is None else strips.shape.nodes)),
             bands=band_scratch(getattr(strips, "bands", None), getattr(strips, "quadrature", None)),
+            member_nodes=np.zeros((laid, N_NODE)),
+            member_water=np.zeros(N_WATER * nodes),
             added_mass=np.zeros((6, 6)),
             matrix=np.zeros((6, 6)),
             stages=np.zeros((5, self.n_state)),
@@ -127,6 +137,7 @@ class Scene:
             ),
             history=np.zeros((4, self.n_state)),
             samples=np.zeros((4 * rotor_samples(self.model.integrator), N_SAMPLE)),
+            radiation=memory_data(hydro),
         )
 
     def handle(self, data: Data | None = None) -> Handle:
@@ -173,6 +184,13 @@ class Scene:
     def dt(self) -> float:
         """Default physics step, s: that of the scene's integrator, or a finer one of its fidelity."""
         return default_step(self.options)
+
+    def with_step(self, dt: float) -> "Scene":
+        """This scene, made to be stepped by dt (s): a convolution of radiation is of one step alone."""
+        hydro = self.model.hydro
+        memory = None if hydro is None else hydro.radiation
+        fitting = memory_for_step(memory, self.platform.potential_flow, dt, self.options["planar"])
+        return self if fitting is memory else self.with_model({"hydro.radiation": fitting})
 
     def with_model(self, parts: Mapping[str, Any] | None = None, **slots: Any) -> "Scene":
         """A copy with some parts of the model replaced (same types: no recompilation).

@@ -7,7 +7,8 @@ import pytest
 from naive.pi import NaivePI
 from naive.turbine import turbine
 
-from fowt_env.controllers.pi import PI, Memory, PISettings, gains, schedule_gain
+from fowt_env.controllers.gains import gains
+from fowt_env.controllers.pi import PI, Memory, PISettings, schedule_gain
 from fowt_env.controllers.printed_eq8 import Eq8Literal, literal_gain
 from fowt_env.errors import InputError
 from fowt_env.plant.drivetrain import generator_torque

@@ -147,7 +147,7 @@ def test_gyroscopic_terms_do_no_work(platform, turbine):
     rng = np.random.default_rng(5)
     for _ in range(100):
         x = random_state(rng, speed=3.0, turning=0.3)
-        c = np.array(momentum_rate(pose_of(x), x[State.ROTOR_SPEED], body.mass_matrix, body.coupling))
+        c = np.array(momentum_rate(pose_of(x), x[State.ROTOR_SPEED], body.mass_matrix, body.coupling, None))
         nu = x[State.VX : State.WZ + 1]
         assert abs(c @ nu) < 1e-12 * np.abs(c * nu).max()
 
@@ -155,7 +155,7 @@ def test_gyroscopic_terms_do_no_work(platform, turbine):
 def test_downwind_pitching_turns_the_nacelle_left(platform, turbine):
     body = build_rigid_body(platform, turbine)
     x = state(wy=0.01, rotor_speed=1.2671)
-    c = momentum_rate(pose_of(x), 1.2671, body.mass_matrix, body.coupling)
+    c = momentum_rate(pose_of(x), 1.2671, body.mass_matrix, body.coupling, None)
     assert -c.mz == pytest.approx(body.coupling * 1.2671 * 0.01, rel=1e-12)
 
 

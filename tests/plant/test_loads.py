@@ -18,7 +18,7 @@ from plant_helpers import random_state
 
 import fowt_env
 from fowt_env import Force, Load, build_scene, load_kernel
-from fowt_env.descriptions.platform import read_platform
+from fowt_env.descriptions.platform import AdditionalLoads, read_platform
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rollout import forget, observe
 from fowt_env.plant.state import State
@@ -31,7 +31,25 @@ TIME = 3.0
 BLOCKS = ("TOTAL", "ROTOR", "TOWER", "HYDRO", "MOORING")  # of LoadCache, six entries each
 MIRROR = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])  # of a wrench
 ADDED_MASS = tuple(map(tuple, np.diag([8e6, 8e6, 9e6, 6e10, 6e10, 9e9]).tolist()))
-NOTHING = {"hydro.linear_damping": (0.0,) * 6, "hydro.yaw_stiffness": 0.0, "hydro.added_mass": None}
+ADDITIONAL = AdditionalLoads(
+    preload=(1e5, 0.0, -2e5, 0.0, 3e6, 0.0),
+    stiffness=tuple(map(tuple, np.diag([1e4, 1e4, 3e4, 5e7, 5e7, 2e7]).tolist())),
+    linear_damping=tuple(map(tuple, np.diag([2e4, 2e4, 1e4, 4e7, 4e7, 1e7]).tolist())),
+    quadratic_damping=(
+        (9e5, 0.0, 0.0, 0.0, -8e6, 0.0),
+        (0.0, 9e5, 0.0, 8e6, 0.0, 0.0),
+        (0.0, 0.0, 2e6, 0.0, 0.0, 0.0),
+        (0.0, 8e6, 0.0, 1e10, 0.0, 0.0),
+        (-8e6, 0.0, 0.0, 0.0, 1e10, 0.0),
+        (0.0, 0.0, 0.0, 0.0, 0.0, 4e10),
+    ),
+)
+NOTHING = {
+    "hydro.linear_damping": (0.0,) * 6,
+    "hydro.yaw_stiffness": 0.0,
+    "hydro.added_mass": None,
+    "additional": None,
+}
 ALL = {
     "wind": 12.0,
     "sea": {"kind": "regular", "H": 4.0, "T": 9.0},
@@ -58,13 +76,16 @@ def scene_of(form):
 def scene_less(form, name):
     """Scene with every load but this one, which is left out as a user does."""
     arguments = ALL | {"loads": [Load("Push", push, [1e5, 2e5])]}
-    hydro = {"hydro.added_mass": ADDED_MASS}
+    hydro = {"hydro.added_mass": ADDED_MASS, "additional": ADDITIONAL}
     if name:
         arguments |= LOADS[name].without
         hydro |= {key: NOTHING[key] for key in LOADS[name].keys}
+    additional = hydro.pop("additional")
     given = {key.removeprefix("hydro."): value for key, value in hydro.items()}
     platform = read_platform("oc3_hywind")
-    platform = platform.model_copy(update={"hydro": platform.hydro.model_copy(update=given)})
+    platform = platform.model_copy(
+        update={"hydro": platform.hydro.model_copy(update=given), "additional": additional}
+    )
     return build_scene(platform, rotor="bem", wave_loads=form, **arguments)
 
 

@@ -8,10 +8,28 @@ wind alone, at any angle of attack.
 from math import cos, pi, sin, sqrt
 from typing import NamedTuple
 
-from fowt_env.plant.aero.blade_elements import airload, element_of, first_guess, smoothstep, solve_section
+from fowt_env.plant.aero.blade_elements import (
+    airload,
+    element_of,
+    first_guess,
+    pitching_moment,
+    smoothstep,
+    solve_section,
+)
+from fowt_env.plant.aero.blade_shape import (
+    NO_BLADE_LOAD,
+    BladeShape,
+    arm_of,
+    blade_wind,
+    effective_pitch,
+    station_at,
+    station_inflow,
+    with_station,
+)
 from fowt_env.plant.aero.wake import PER_ELEMENT, filtered_induction, skew_factor, skew_of
 from fowt_env.plant.aero.wind import wind_at
-from fowt_env.plant.compile.decorators import kernel
+from fowt_env.plant.compile.decorators import inlined_kernel, kernel
+from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.events import Counter
 from fowt_env.plant.state import NO_LOAD, State, Wrench
 
@@ -69,19 +87,8 @@ def hub_flow(t, pose, now, series, field, overhang, hub_height):
     return HubFlow(X, Y, Z, vx, vy, vz, wx, wy, wz, sqrt(wx * wx + wy * wy + wz * wz))
 
 
-@kernel
-def rotor_load(t, pose, x, now, series, field, rotor, skew, wake, dx, counters):
-    """RotorLoad of the state x at time t; theory.md, 5.1. No rotor or no wind series: zero.
-
-    now, series, field  wind (weather/wind.py); every station samples it where it is at this instant
-    skew, wake          optional SkewedWake and DynamicInflow (wake.py)
-    dx                  derivative of the state: only the wake states are written
-    counters            counters[Counter.BEM_FALLBACK] grows by one per station without a bracket
-    """
-    if rotor is None:
-        return NO_ROTOR_LOAD
-    if series is None:
-        return NO_ROTOR_LOAD
+@inlined_kernel
+def _straight_load(t, pose, x, now, series, field, rotor, shape, skew, wake, dx, counters):
     hub = hub_flow(t, pose, now, series, field, rotor.overhang, rotor.hub_height)
     speed, azimuth, blade_pitch = x[State.ROTOR_SPEED], x[State.AZIMUTH], x[State.BLADE_PITCH]
     induction = smoothstep(speed * rotor.tip_radius, SLOW_ROTOR * hub.speed, FAST_ROTOR * hub.speed)
@@ -144,6 +151,124 @@ def rotor_load(t, pose, x, now, series, field, rotor, skew, wake, dx, counters):
 
 
 @kernel
+def rotor_axes_load(force_x, force_y, force_z, moment_x, moment_y, moment_z, rotor):
+    """RotorLoad of a force and moment about the rotor centre, in rotor axes."""
+    height, overhang = rotor.hub_height, rotor.overhang
+    return RotorLoad(
+        Wrench(
+            force_x,
+            force_y,
+            force_z,
+            moment_x - height * force_y,
+            moment_y + height * force_x + overhang * force_z,
+            moment_z - overhang * force_y,
+        ),
+        force_x,
+        moment_x,
+    )
+
+
+@kernel
+def curved_blade_load(
+    number, t, pose, hub, induction, x, now, series, field, rotor, shape, skewed, skew, wake, dx, counters
+):
+    """BladeLoad of a blade of BladeShape shape; pose in rotor axes."""
+    blade_pitch = x[State.BLADE_PITCH]
+    cosine, sine = cos(blade_pitch), sin(blade_pitch)
+    psi = x[State.AZIMUTH] + 2.0 * pi * number / rotor.blades
+    blade = blade_wind(psi, x[State.ROTOR_SPEED], pose, hub)
+    load = NO_BLADE_LOAD
+    for j in range(rotor.radius.shape[0]):
+        at = station_at(j, cosine, sine, shape)
+        u, v, w = wind_at(
+            t,
+            hub.X + at.x * pose.r11 + at.r * blade.rx + at.t * blade.tx,
+            hub.Y + at.x * pose.r21 + at.r * blade.ry + at.t * blade.ty,
+            hub.Z + at.x * pose.r31 + at.r * blade.rz + at.t * blade.tz,
+            now,
+            series,
+            field,
+        )
+        v_normal, v_tangential = station_inflow(u, v, w, at, pose, blade)
+        turned = effective_pitch(j, blade_pitch, shape)
+        element = element_of(j, turned, rotor)
+        guess = first_guess(v_normal, v_tangential, turned, j, rotor)
+        section = solve_section(v_normal, v_tangential, induction, guess, element, rotor.polars)
+        if not section.solved:
+            counters[Counter.BEM_FALLBACK] += 1.0
+        flow = SectionInflow(v_normal, v_tangential, blade.ey, blade.ez)
+        normal, tangential = _induced(section, flow, number, j, hub, skewed, skew, wake, x, dx, rotor)
+        fn, ft = _induced_load(section, flow, element, normal, tangential, skew, wake, rotor)
+        moment = pitching_moment(
+            v_normal + normal, v_tangential + tangential, j, element, shape, rotor.polars
+        )
+        weight = rotor.weight[j]
+        load = with_station(
+            load, weight * fn, weight * ft, weight * moment, at, arm_of(j, cosine, sine, shape)
+        )
+    return load
+
+
+@inlined_kernel
+def _curved_load(t, pose, x, now, series, field, rotor, shape, skew, wake, dx, counters):
+    hub = hub_flow(t, pose, now, series, field, rotor.overhang, rotor.hub_height)
+    induction = smoothstep(
+        x[State.ROTOR_SPEED] * rotor.tip_radius, SLOW_ROTOR * hub.speed, FAST_ROTOR * hub.speed
+    )
+    skewed = skew_of(hub, skew)
+    fx = fy = fz = mx = my = mz = 0.0
+    for number in range(rotor.blades):
+        psi = x[State.AZIMUTH] + 2.0 * pi * number / rotor.blades
+        ey, ez = -sin(psi), cos(psi)
+        load = curved_blade_load(
+            number,
+            t,
+            pose,
+            hub,
+            induction,
+            x,
+            now,
+            series,
+            field,
+            rotor,
+            shape,
+            skewed,
+            skew,
+            wake,
+            dx,
+            counters,
+        )
+        fx += load.fx
+        fy += load.fr * ey - load.ft * ez
+        fz += load.fr * ez + load.ft * ey
+        mx += load.mx
+        my += load.mr * ey - load.mt * ez
+        mz += load.mr * ez + load.mt * ey
+    return rotor_axes_load(fx, fy, fz, mx, my, mz, rotor)
+
+
+# the sweep over straight blades in the rotor plane, or over curved ones
+_sweep = chosen_by_class("shape", {type(None): _straight_load, BladeShape: _curved_load}, inlined=True)
+
+
+@kernel
+def rotor_load(t, pose, x, now, series, field, rotor, skew, wake, dx, counters):
+    """RotorLoad of the state x at time t in rotor axes; theory.md, 5.1. No rotor or no wind series: zero.
+
+    pose                in rotor axes (tilt.py)
+    now, series, field  wind (weather/wind.py); every station samples it where it is at this instant
+    skew, wake          optional SkewedWake and DynamicInflow (wake.py)
+    dx                  derivative of the state: only the wake states are written
+    counters            counters[Counter.BEM_FALLBACK] grows by one per station without a bracket
+    """
+    if rotor is None:
+        return NO_ROTOR_LOAD
+    if series is None:
+        return NO_ROTOR_LOAD
+    return _sweep(t, pose, x, now, series, field, rotor, rotor.shape, skew, wake, dx, counters)
+
+
+@kernel
 def wake_equilibrium(t, pose, x, now, series, field, rotor, skew, wake, dx, counters):
     """Number of wake states, set in x to their steady values for the rest of x held as it is.
 
@@ -174,12 +299,25 @@ def _wake_load(section, flow, element, blade, j, hub, skewed, skew, wake, x, dx,
     """(fn, ft) of a section with the optional wake models; its own loads if there are none."""
     if wake is None and skew is None:
         return section.fn, section.ft
-    induced_normal, induced_tangential = filtered_induction(
+    normal, tangential = _induced(section, flow, blade, j, hub, skewed, skew, wake, x, dx, rotor)
+    return _induced_load(section, flow, element, normal, tangential, skew, wake, rotor)
+
+
+@kernel
+def _induced(section, flow, blade, j, hub, skewed, skew, wake, x, dx, rotor):
+    """(normal, tangential) induced velocity of a section with the optional wake models, m/s."""
+    normal, tangential = filtered_induction(
         section, flow.v_normal, blade, j, hub.speed, wake, x, dx, rotor.radius, rotor.tip_radius
     )
     span = rotor.radius[j] / rotor.tip_radius
-    induced_normal *= skew_factor(induced_normal, flow.v_normal, flow.ey, flow.ez, span, skewed, skew)
-    cn, ct, square = airload(
-        flow.v_normal + induced_normal, flow.v_tangential + induced_tangential, element, rotor.polars
-    )
+    normal *= skew_factor(normal, flow.v_normal, flow.ey, flow.ez, span, skewed, skew)
+    return normal, tangential
+
+
+@kernel
+def _induced_load(section, flow, element, normal, tangential, skew, wake, rotor):
+    """(fn, ft) of a section under these induced velocities; its own loads without wake models."""
+    if wake is None and skew is None:
+        return section.fn, section.ft
+    cn, ct, square = airload(flow.v_normal + normal, flow.v_tangential + tangential, element, rotor.polars)
     return element.half_density_chord * square * cn, element.half_density_chord * square * ct

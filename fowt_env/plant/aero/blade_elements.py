@@ -21,7 +21,8 @@ Degenerate inflows, by name:
 * reversed flow (v_normal < 0): the mirrored problem, solved by the same equations;
 * no root (never met with a finite polar): no induction at that station, and the event is counted.
 
-The blade pitching moment (cm) is not included.
+The blade pitching moment (cm) is included for curved blades alone (blade_shape.py): on straight blades in the
+rotor plane it does next to nothing.
 """
 
 from math import acos, atan2, cos, exp, floor, nan, pi, sin, sqrt
@@ -32,7 +33,9 @@ import numpy as np
 
 from fowt_env.caches import Cache
 from fowt_env.errors import InputError
+from fowt_env.plant.aero.blade_shape import blade_line, build_blade_shape, is_curved
 from fowt_env.plant.compile.decorators import entry, kernel
+from fowt_env.plant.tilt import rotor_axes
 
 TOLERANCE = 1e-8  # of the residual before the last step of Newton's method; after it, about its square
 LAST_STEP = 1e-6  # largest last step, times Momentum.scale: the second-order error of loads is then 1e-12
@@ -65,20 +68,21 @@ class BladeElements(NamedTuple):
     blades: int
     hub_radius: float  # m
     tip_radius: float  # m
-    overhang: float  # m, hub upwind of the tower axis
-    hub_height: float  # m
+    overhang: float  # m, hub upwind of the tower axis, in rotor axes (tilt.py)
+    hub_height: float  # m, in rotor axes
     air_density: float  # kg/m3
-    radius: np.ndarray  # (n,) m
+    radius: np.ndarray  # (n,) m, distance from the shaft
     chord: np.ndarray  # (n,) m
     twist: np.ndarray  # (n,) rad
     solidity: np.ndarray  # (n,) blades * chord / (2 pi radius)
-    tip_exponent: np.ndarray  # (n,) Prandtl: blades (tip - radius) / (2 radius)
-    hub_exponent: np.ndarray  # (n,) blades (radius - hub) / (2 hub)
+    tip_exponent: np.ndarray  # (n,) Prandtl: blades (tip - radius) / (2 radius), lengths along the blade
+    hub_exponent: np.ndarray  # (n,) blades (radius - hub) / (2 hub), the same
     zero_lift: np.ndarray  # (n,) rad, of the first guess only
     weight: np.ndarray  # (n,) m, integral of the station's hat function
     moment_weight: np.ndarray  # (n,) m2, integral of radius times the hat function
     foil: np.ndarray  # (n,) int64, row of polars.cell
     polars: Polars
+    shape: object  # blade_shape.BladeShape, or None: straight blades in the rotor plane
     guess: np.ndarray  # (n, GUESSES, GUESSES) float32 rad, inflow angles to start from; see first_guess
 
 
@@ -144,12 +148,8 @@ def element_of(j, blade_pitch, rotor):
 
 
 @kernel
-def lift_drag(alpha, foil, polars):
-    """(cl, cd, dcl/dalpha, dcd/dalpha) of a foil at alpha (rad, wrapped to +-pi).
-
-    Linear between the published points, which are not evenly spaced: a table gives the first segment
-    of each half degree, at most a few steps before the right one.
-    """
+def segment_of(alpha, foil, polars):
+    """(row of polars.segment, alpha beyond its start) of a foil at alpha (rad, wrapped to +-pi)."""
     if alpha > pi or alpha < -pi:
         alpha -= 2.0 * pi * floor((alpha + pi) / (2.0 * pi))
     cell = int((alpha + pi) * (CELLS / (2.0 * pi)))
@@ -157,7 +157,18 @@ def lift_drag(alpha, foil, polars):
     segment = polars.segment
     while alpha >= segment[i + 1, 0]:  # ends at the latest on the row of infinity behind each polar
         i += 1
-    x = alpha - segment[i, 0]
+    return i, alpha - segment[i, 0]
+
+
+@kernel
+def lift_drag(alpha, foil, polars):
+    """(cl, cd, dcl/dalpha, dcd/dalpha) of a foil at alpha (rad, wrapped to +-pi).
+
+    Linear between the published points, which are not evenly spaced: a table gives the first segment
+    of each half degree, at most a few steps before the right one.
+    """
+    i, x = segment_of(alpha, foil, polars)
+    segment = polars.segment
     return (
         segment[i, 1] + x * segment[i, 3],
         segment[i, 2] + x * segment[i, 4],
@@ -412,6 +423,18 @@ def airload(v_normal, v_tangential, element, polars):
 
 
 @kernel
+def pitching_moment(v_normal, v_tangential, j, element, shape, polars):
+    """Pitching moment per length of station j in the given local flow, N m/m: nose up, about the blade axis."""
+    square = v_normal * v_normal + v_tangential * v_tangential
+    if square == 0.0:
+        return 0.0
+    i, x = segment_of(atan2(v_normal, v_tangential) - element.theta, element.foil, polars)
+    return (
+        element.half_density_chord * shape.chord[j] * square * (shape.moment[i, 0] + x * shape.moment[i, 1])
+    )
+
+
+@kernel
 def blade_section(v_normal, v_tangential, blade_pitch, station, induction, rotor):
     """Section: loads and induced flow of one station.
 
@@ -491,7 +514,7 @@ _guesses = Cache(32)  # one table per blade: filling one takes a fifth of a seco
 
 def elements_key(elements):
     """What identifies the aerodynamics of BladeElements, hashable."""
-    parts = (*elements[: elements._fields.index("polars")], *elements.polars)
+    parts = (*elements[: elements._fields.index("polars")], *elements.polars, *(elements.shape or ()))
     return tuple(part.tobytes() if isinstance(part, np.ndarray) else part for part in parts)
 
 
@@ -519,6 +542,23 @@ def _hat_weights(radius, hub_radius, tip_radius):
     return area, area * (left + middle + right) / 3.0
 
 
+def station_weights(length, chosen):
+    """(n chosen, n + 2): the line load at all points of a blade per unit of that at each chosen station.
+
+    length (n + 2,) of hub, stations and tip along the blade. The load is linear between the chosen ones, and
+    zero at hub and tip.
+    """
+    nodes = np.concatenate(([length[0]], length[1:-1][chosen], [length[-1]]))
+    unit = np.eye(len(nodes))[1:-1]
+    return np.array([np.interp(length, nodes, row) for row in unit])
+
+
+def _cm_segments(polar):
+    """(m+1, 2): cm at the start of each segment of a polar, and its slope."""
+    step, moment = np.diff(polar[:, 0]), polar[:, 3]
+    return np.column_stack([moment, np.append(np.diff(moment) / step, 0.0)])
+
+
 def _polar_segments(polar):
     """((m+1, 5), (CELLS,)): segments of one polar, and the first segment of each half degree."""
     alpha, lift, drag = polar[:, 0], polar[:, 1], polar[:, 2]
@@ -539,8 +579,10 @@ def _zero_lift(polar):
     return high / rise - np.radians(6.0) if rise > 1.0 else 0.0
 
 
-def build_blade_elements(turbine, air_density, stations=None):
+def build_blade_elements(turbine, air_density, stations=None, shaped=False):
     """BladeElements of a turbine description; stations: indices of a subset, default all.
+
+    shaped: with a BladeShape even where blades are straight and lie in the rotor plane.
 
     Raises: InputError if a station lies outside the blade or a polar does not span -180 to 180 deg.
     """
@@ -555,7 +597,7 @@ def build_blade_elements(turbine, air_density, stations=None):
             f"and tip_radius = {rotor.tip_radius} m"
         )
     names = sorted({blade.airfoil[i] for i in chosen})
-    segments, cells, start = [], [], 0
+    segments, cells, moments, start = [], [], [], 0
     for name in names:
         polar = np.asarray(blade.polars[name], dtype=float)
         if not np.all(np.isfinite(polar)):
@@ -565,16 +607,26 @@ def build_blade_elements(turbine, air_density, stations=None):
         part, first = _polar_segments(polar)
         segments.append(part)
         cells.append(first + start)
+        moments.append(_cm_segments(polar))
         start += len(part)
     area, moment = _hat_weights(radius, rotor.hub_radius, rotor.tip_radius)
-    blades = rotor.blades
+    blades, shape = rotor.blades, None
+    along, end, apart = radius, rotor.tip_radius, radius  # lengths along the blade, distance from the shaft
+    if shaped or is_curved(turbine):
+        line = blade_line(blade, rotor.hub_radius, rotor.tip_radius)
+        weights = station_weights(line.length, chosen)
+        shape, area = build_blade_shape(turbine, line, chosen, weights, np.concatenate(moments))
+        along, end = line.length[1:-1][chosen], line.length[-1]
+        apart = np.hypot(shape.cone_cosine * radius + shape.cone_sine * shape.prebend, shape.sweep)
+        moment = area * shape.arm_distance
+    hub_x, hub_z = rotor_axes(-rotor.overhang, rotor.hub_height, rotor.shaft_tilt)
     arrays = (
-        radius,
+        apart,
         chord,
         np.asarray(blade.twist)[chosen],
-        blades * chord / (2.0 * pi * radius),
-        0.5 * blades * (rotor.tip_radius - radius) / radius,
-        0.5 * blades * (radius - rotor.hub_radius) / rotor.hub_radius,
+        blades * chord / (2.0 * pi * apart),
+        0.5 * blades * (end - along) / along,
+        0.5 * blades * (along - rotor.hub_radius) / rotor.hub_radius,
         np.array([_zero_lift(np.asarray(blade.polars[blade.airfoil[i]])) for i in chosen]),
         area,
         moment,
@@ -583,8 +635,8 @@ def build_blade_elements(turbine, air_density, stations=None):
         int(blades),
         float(rotor.hub_radius),
         float(rotor.tip_radius),
-        float(rotor.overhang),
-        float(rotor.hub_height),
+        float(-hub_x),
+        float(hub_z),
         float(air_density),
         *(np.ascontiguousarray(a, dtype=np.float64) for a in arrays),
         np.array([names.index(blade.airfoil[i]) for i in chosen], dtype=np.int64),
@@ -592,6 +644,7 @@ def build_blade_elements(turbine, air_density, stations=None):
             np.ascontiguousarray(cells, dtype=np.int64),
             np.ascontiguousarray(np.concatenate(segments), dtype=np.float64),
         ),
+        shape,
         np.zeros((len(radius), GUESSES, GUESSES), dtype=np.float32),
     )
     return elements._replace(guess=_guess_table(elements))

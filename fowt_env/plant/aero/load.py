@@ -10,6 +10,7 @@ from fowt_env.plant.aero.wind import WindSeries, wind_at, wind_now
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.state import NO_LOAD, Wrench
+from fowt_env.plant.tilt import rotor_pose, to_body_axes
 
 
 class BemRotor(NamedTuple):
@@ -26,6 +27,7 @@ class Aero(NamedTuple):
     wind: WindSeries
     field: object  # wind_field.WindField, which replaces the series, or None
     rotor: object  # BemRotor, SectionTable or CoefficientTable
+    tilt: object  # tilt.Tilt of the shaft or None
     tower: object  # tower_drag.TowerDrag or None
 
 
@@ -56,12 +58,19 @@ def _by_coefficients(t, pose, x, now, aero, rotor, dx, counters):
     return coefficient_table_load(pose, x, now, aero.wind, rotor, counters)
 
 
-# (t, pose, x, now, aero, rotor, dx, counters) -> RotorLoad; of dx the wake's rates alone are written
-rotor_part = chosen_by_class(
+# (t, pose, x, now, aero, rotor, dx, counters) -> RotorLoad, both pose and load in rotor axes
+_rotor_model = chosen_by_class(
     "rotor",
     {BemRotor: _solved, SectionTable: _by_sections, CoefficientTable: _by_coefficients},
     inlined=True,
 )
+
+
+@inlined_kernel
+def rotor_part(t, pose, x, now, aero, rotor, dx, counters):
+    """RotorLoad by the rotor model that rotor is, body axes; of dx the wake's rates alone are written."""
+    load = _rotor_model(t, rotor_pose(pose, aero.tilt), x, now, aero, rotor, dx, counters)
+    return RotorLoad(to_body_axes(load.wrench, aero.tilt), load.thrust, load.torque)
 
 
 @inlined_kernel

@@ -27,18 +27,33 @@ from fowt_env.plant.aero.bem_rotor import (
     SLOW_ROTOR,
     RotorLoad,
     hub_flow,
+    rotor_axes_load,
     rotor_load,
 )
 from fowt_env.plant.aero.blade_elements import (
     LARGEST_SPEED,
     BladeElements,
     blade_section,
+    element_of,
     elements_key,
+    pitching_moment,
     smoothstep,
 )
+from fowt_env.plant.aero.blade_shape import (
+    NO_BLADE_LOAD,
+    BladeLoad,
+    BladeShape,
+    arm_of,
+    blade_wind,
+    effective_pitch,
+    station_at,
+    station_inflow,
+    with_station,
+)
 from fowt_env.plant.aero.wind import LOWEST_HEIGHT, wind_at
-from fowt_env.plant.compile.decorators import entry, kernel
+from fowt_env.plant.compile.decorators import entry, inlined_kernel, kernel
 from fowt_env.plant.compile.prefetch import prefetch
+from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.events import Counter
 from fowt_env.plant.state import State, Wrench
 
@@ -49,13 +64,14 @@ AHEAD, BEHIND = 512, 64
 DENSE_START, DENSE_END, DENSE_ROWS = -5.0, 30.0, 140  # deg, blade pitches where turbines operate
 COARSE_END, COARSE_ROWS = 90.0, 60  # deg, on to feather
 LEAST_NORMAL = 1e-9  # v_normal of the first direction: the limit from upwind, as the load jumps at zero
+CURVED_REACH = 1.1  # of the tip radius: how far curved blades on a tilted shaft reach up and down at most
 LARGEST_RATIO = 12.0  # highest over lowest point of the rotor, else wind_at: see _profile
 
 
 class SectionTable(NamedTuple):
     """Loads of the n stations of a blade over blade pitch and inflow direction."""
 
-    load: np.ndarray  # (blade pitches, n, directions, 2) float32, m2; see _fill
+    load: np.ndarray  # (blade pitches, n, directions, 2, or 3 of curved blades) float32; see _fill
     radius: np.ndarray  # (n,) m
     arm: np.ndarray  # (n,) m, radius at which the station's part of the blade's force acts
     elements: BladeElements  # of the exact solution
@@ -119,6 +135,27 @@ def _fill(load, blade_pitch, elements):
                 load[i, j, k, 1] = weight * section.ft
 
 
+@entry
+def _fill_curved(load, blade_pitch, elements, shape):
+    """As _fill with the pitching moment as the third."""
+    for i in range(load.shape[0]):
+        for j in range(load.shape[1]):
+            weight = elements.weight[j] / elements.air_density
+            turned = effective_pitch(j, blade_pitch[i], shape)
+            element = element_of(j, turned, elements)
+            for k in range(load.shape[2]):
+                v_tangential = 1.0 - k / AHEAD if k <= AHEAD else -(k - AHEAD) / BEHIND
+                v_normal = max(1.0 - abs(v_tangential), LEAST_NORMAL)
+                section = blade_section(v_normal, v_tangential, turned, j, 1.0, elements)
+                moment = pitching_moment(
+                    v_normal + section.induced_normal, v_tangential + section.induced_tangential, j, element,
+                    shape, elements.polars,
+                )  # fmt: skip
+                load[i, j, k, 0] = weight * section.fn
+                load[i, j, k, 1] = weight * section.ft
+                load[i, j, k, 2] = weight * moment
+
+
 _tables = Cache(8)  # one per blade, 18 MB each: building takes about a second
 
 
@@ -139,8 +176,13 @@ def _filled_table(elements):
     dense = np.linspace(DENSE_START, DENSE_END, DENSE_ROWS, endpoint=False)
     coarse = np.linspace(DENSE_END, COARSE_END, COARSE_ROWS + 1)
     blade_pitch = np.radians(np.concatenate((dense, coarse)))
-    load = np.zeros((len(blade_pitch), len(elements.radius), AHEAD + BEHIND + 1, 2), dtype=np.float32)
-    _fill(load, blade_pitch, elements)
+    size = (len(blade_pitch), len(elements.radius), AHEAD + BEHIND + 1)
+    if elements.shape is None:
+        load = np.zeros((*size, 2), dtype=np.float32)
+        _fill(load, blade_pitch, elements)
+    else:
+        load = np.zeros((*size, 3), dtype=np.float32)
+        _fill_curved(load, blade_pitch, elements, elements.shape)
     return load
 
 
@@ -360,19 +402,8 @@ def _sampled_force(
     return BladeForce(force_n, force_t, moment_n, moment_t, True)
 
 
-@kernel
-def section_table_load(t, pose, x, now, series, field, table, counters):
-    """RotorLoad of the state x at time t from the tables of the stations. No table or no wind series: zero.
-
-    now, series, field  wind (weather/wind.py); every station has the wind of where it is at this instant
-    counters            as in rotor_load, for the exact solutions outside the table
-    Against rotor_load: rms 1e-4 of the load's standard deviation over all operating states, for thrust and
-    torque; tests/plant/aero/test_section_table.py has the figures.
-    """
-    if table is None:
-        return NO_ROTOR_LOAD
-    if series is None:
-        return NO_ROTOR_LOAD
+@inlined_kernel
+def _straight_table_load(t, pose, x, now, series, field, table, shape, counters):
     elements = table.elements
     hub = hub_flow(t, pose, now, series, field, elements.overhang, elements.hub_height)
     speed, azimuth, blade_pitch = x[State.ROTOR_SPEED], x[State.AZIMUTH], x[State.BLADE_PITCH]
@@ -424,3 +455,200 @@ def section_table_load(t, pose, x, now, series, field, table, counters):
         thrust,
         torque,
     )
+
+
+class CurvedForce(NamedTuple):
+    """Sum over a curved blade over the air density."""
+
+    load: BladeLoad
+    valid: bool  # False: some station lies outside the table or the box
+
+
+NOT_VALID = CurvedForce(NO_BLADE_LOAD, False)
+
+
+@kernel
+def _curved_station(load, v_normal, v_tangential, j, at, arm, low, high, fraction):
+    """The BladeLoad with station j, bilinear between two rows of the table, as _station_force."""
+    total = abs(v_normal) + abs(v_tangential)
+    ahead = AHEAD * v_normal
+    place = (ahead if v_tangential >= 0.0 else AHEAD * total - BEHIND * v_tangential) / total
+    place = place if place > 0.0 else 0.0  # not a number too
+    k = min(int(place), AHEAD + BEHIND - 1)
+    part = place - k
+    square = total * total
+    a = square * (1.0 - fraction) * (1.0 - part)
+    b = square * (1.0 - fraction) * part
+    c = square * fraction * (1.0 - part)
+    d = square * fraction * part
+    fn = a * low[j, k, 0] + b * low[j, k + 1, 0] + c * high[j, k, 0] + d * high[j, k + 1, 0]
+    ft = a * low[j, k, 1] + b * low[j, k + 1, 1] + c * high[j, k, 1] + d * high[j, k + 1, 1]
+    moment = a * low[j, k, 2] + b * low[j, k + 1, 2] + c * high[j, k, 2] + d * high[j, k + 1, 2]
+    return with_station(load, fn, ft, moment, at, arm)
+
+
+@kernel
+def _curved_sheared(pose, hub, blade, now, series, profile, low, high, fraction, cosine, sine, shape):
+    """CurvedForce in a wind uniform apart from its shears."""
+    inverse = 1.0 / series.reference_length
+    vertical, horizontal = inverse * now.vertical_shear, inverse * now.horizontal_shear
+    centre = 1.0 / profile.centre
+    load, outside = NO_BLADE_LOAD, 0
+    for j in range(shape.distance.shape[0]):
+        at = station_at(j, cosine, sine, shape)
+        left = hub.Y + at.x * pose.r21 + at.r * blade.ry + at.t * blade.ty
+        height = hub.Z + at.x * pose.r31 + at.r * blade.rz + at.t * blade.tz
+        shear = profile.scale * _shear(height * centre - 1.0, profile)
+        linear = vertical * (height - series.reference_height) + horizontal * left
+        v_normal, v_tangential = station_inflow(now.u * shear + linear, now.v * shear, now.w, at, pose, blade)
+        outside += 0 if v_normal > 0.0 and v_normal + abs(v_tangential) < LARGEST_SPEED else 1
+        arm = arm_of(j, cosine, sine, shape)
+        load = _curved_station(load, v_normal, v_tangential, j, at, arm, low, high, fraction)
+    return CurvedForce(load, outside == 0)
+
+
+@kernel
+def _curved_in_field(t, pose, hub, blade, field, low, high, fraction, cosine, sine, shape):
+    """CurvedForce in a box of wind; not valid where a station leaves the box or the table."""
+    velocity = field.velocity
+    start = (t + field.shift) * field.rate
+    pace = field.slowness * field.rate
+    last_s, last_y, last_z = velocity.shape[0] - 1.0, velocity.shape[2] - 1.0, velocity.shape[1] - 1.0
+    if field.periodic:
+        s0 = (start - hub.X * pace) % velocity.shape[0]
+    else:
+        s0 = start - hub.X * pace
+    one = np.uintp(1)  # indices without sign are not tested for counting from the end
+    load, outside = NO_BLADE_LOAD, 0
+    for j in range(shape.distance.shape[0]):
+        at = station_at(j, cosine, sine, shape)
+        s = s0 - pace * (at.x * pose.r11 + at.r * blade.rx + at.t * blade.tx)
+        y = hub.Y + at.x * pose.r21 + at.r * blade.ry + at.t * blade.ty
+        z = hub.Z + at.x * pose.r31 + at.r * blade.rz + at.t * blade.tz
+        y, z = (y - field.low_y) * field.inverse_dy, (z - field.low_z) * field.inverse_dz
+        inside = 0.0 <= s < last_s and 0.0 <= y < last_y and 0.0 <= z < last_z
+        s, y, z = (s, y, z) if inside else (0.0, 0.0, 0.0)
+        slice_now, row, column = np.uintp(s), np.uintp(z), np.uintp(y)
+        late, up, across = s - float(slice_now), z - float(row), y - float(column)
+        slice_next = slice_now + one
+        prefetch(velocity, slice_next + one, row, column)
+        prefetch(velocity, slice_next + one, row + one, column)
+        p, q = (1.0 - up) * (1.0 - across), (1.0 - up) * across
+        r, d = up * (1.0 - across), up * across
+        rest = 1.0 - late
+        u = rest * _across(velocity, slice_now, row, column, 0, p, q, r, d)
+        v = rest * _across(velocity, slice_now, row, column, 1, p, q, r, d)
+        w = rest * _across(velocity, slice_now, row, column, 2, p, q, r, d)
+        u += late * _across(velocity, slice_next, row, column, 0, p, q, r, d)
+        v += late * _across(velocity, slice_next, row, column, 1, p, q, r, d)
+        w += late * _across(velocity, slice_next, row, column, 2, p, q, r, d)
+        v_normal, v_tangential = station_inflow(u, v, w, at, pose, blade)
+        ahead = v_normal > 0.0 and v_normal + abs(v_tangential) < LARGEST_SPEED
+        outside += 0 if inside and ahead else 1
+        arm = arm_of(j, cosine, sine, shape)
+        load = _curved_station(load, v_normal, v_tangential, j, at, arm, low, high, fraction)
+    return CurvedForce(load, outside == 0)
+
+
+@kernel
+def _curved_sampled(
+    t, pose, hub, blade, now, series, field, blade_pitch, low, high, fraction, elements, shape, counters
+):
+    """BladeLoad with the wind sampled station by station, and the exact solution outside the table."""
+    cosine, sine = cos(blade_pitch), sin(blade_pitch)
+    load = NO_BLADE_LOAD
+    for j in range(shape.distance.shape[0]):
+        at, arm = station_at(j, cosine, sine, shape), arm_of(j, cosine, sine, shape)
+        u, v, w = wind_at(
+            t,
+            hub.X + at.x * pose.r11 + at.r * blade.rx + at.t * blade.tx,
+            hub.Y + at.x * pose.r21 + at.r * blade.ry + at.t * blade.ty,
+            hub.Z + at.x * pose.r31 + at.r * blade.rz + at.t * blade.tz,
+            now,
+            series,
+            field,
+        )
+        v_normal, v_tangential = station_inflow(u, v, w, at, pose, blade)
+        if v_normal > 0.0 and v_normal + abs(v_tangential) < LARGEST_SPEED:
+            load = _curved_station(load, v_normal, v_tangential, j, at, arm, low, high, fraction)
+        else:
+            turned = effective_pitch(j, blade_pitch, shape)
+            section = blade_section(v_normal, v_tangential, turned, j, 1.0, elements)
+            if not section.solved:
+                counters[Counter.BEM_FALLBACK] += 1.0
+            weight = elements.weight[j] / elements.air_density if elements.air_density > 0.0 else 0.0
+            moment = pitching_moment(
+                v_normal + section.induced_normal, v_tangential + section.induced_tangential, j,
+                element_of(j, turned, elements), shape, elements.polars,
+            )  # fmt: skip
+            load = with_station(load, weight * section.fn, weight * section.ft, weight * moment, at, arm)
+    return load
+
+
+@inlined_kernel
+def _curved_table_load(t, pose, x, now, series, field, table, shape, counters):
+    elements = table.elements
+    hub = hub_flow(t, pose, now, series, field, elements.overhang, elements.hub_height)
+    speed, azimuth, blade_pitch = x[State.ROTOR_SPEED], x[State.AZIMUTH], x[State.BLADE_PITCH]
+    induction = smoothstep(speed * elements.tip_radius, SLOW_ROTOR * hub.speed, FAST_ROTOR * hub.speed)
+    row = _pitch_row(blade_pitch)
+    if not (induction == 1.0 and row >= 0.0):
+        return rotor_load(t, pose, x, now, series, field, elements, None, None, x, counters)
+    i = int(row)
+    fraction = row - i
+    low, high = table.load[i], table.load[i + 1]
+    cosine, sine = cos(blade_pitch), sin(blade_pitch)
+    bottom, top = hub.Z - CURVED_REACH * elements.tip_radius, hub.Z + CURVED_REACH * elements.tip_radius
+    sheared = field is None and bottom > LOWEST_HEIGHT and top < LARGEST_RATIO * bottom
+    if sheared:
+        profile = _profile(bottom, top, series)
+    else:
+        profile = _profile(1.0, 1.0, series)
+    fx = fy = fz = mx = my = mz = 0.0
+    for number in range(elements.blades):
+        blade = blade_wind(azimuth + 2.0 * pi * number / elements.blades, speed, pose, hub)
+        force = NOT_VALID
+        if sheared:
+            force = _curved_sheared(
+                pose, hub, blade, now, series, profile, low, high, fraction, cosine, sine, shape
+            )
+        elif field is not None:
+            force = _curved_in_field(t, pose, hub, blade, field, low, high, fraction, cosine, sine, shape)
+        load = force.load
+        if not force.valid:
+            load = _curved_sampled(
+                t, pose, hub, blade, now, series, field, blade_pitch, low, high, fraction, elements, shape,
+                counters,
+            )  # fmt: skip
+        fx += load.fx
+        fy += load.fr * blade.ey - load.ft * blade.ez
+        fz += load.fr * blade.ez + load.ft * blade.ey
+        mx += load.mx
+        my += load.mr * blade.ey - load.mt * blade.ez
+        mz += load.mr * blade.ez + load.mt * blade.ey
+    rho = elements.air_density
+    return rotor_axes_load(rho * fx, rho * fy, rho * fz, rho * mx, rho * my, rho * mz, elements)
+
+
+# the sweep over straight blades in the rotor plane, or over curved ones
+_table_sweep = chosen_by_class(
+    "shape", {type(None): _straight_table_load, BladeShape: _curved_table_load}, inlined=True
+)
+
+
+@kernel
+def section_table_load(t, pose, x, now, series, field, table, counters):
+    """RotorLoad of the state x at time t from the tables of the stations, in rotor axes. No table or no wind
+    series: zero.
+
+    pose                in rotor axes (tilt.py)
+    now, series, field  wind (weather/wind.py); every station has the wind of where it is at this instant
+    counters            as in rotor_load, for the exact solutions outside the table
+    Against rotor_load: rms 1e-4 of the load's standard deviation over all operating states, for thrust and
+    torque; tests/plant/aero/test_section_table.py has the figures.
+    """
+    if table is None:
+        return NO_ROTOR_LOAD
+    if series is None:
+        return NO_ROTOR_LOAD
+    return _table_sweep(t, pose, x, now, series, field, table, table.elements.shape, counters)

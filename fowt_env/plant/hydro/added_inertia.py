@@ -24,5 +24,5 @@ def build_added_inertia(matrix):
 @kernel
 def added_inertia_load(pose, inertia):
     """Velocity-dependent part of its load, Kirchhoff's equations: -(w x p, v x p + w x k), (p, k) = A nu."""
-    rate = momentum_rate(pose, 0.0, inertia.matrix, 0.0)
+    rate = momentum_rate(pose, 0.0, inertia.matrix, 0.0, None)
     return Wrench(-rate.fx, -rate.fy, -rate.fz, -rate.mx, -rate.my, -rate.mz)

@@ -7,9 +7,13 @@ from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.hydro.added_inertia import added_inertia_load
 from fowt_env.plant.hydro.banded_strips import banded_strip_load
 from fowt_env.plant.hydro.body_matrices import add_body_matrices
+from fowt_env.plant.hydro.excitation import add_excitation, elevation_beside
 from fowt_env.plant.hydro.hydrostatics import hydrostatic_load
 from fowt_env.plant.hydro.linear_damping import damping_load
+from fowt_env.plant.hydro.member_buoyancy import add_member_buoyancy
+from fowt_env.plant.hydro.members import add_member_loads
 from fowt_env.plant.hydro.morison import NO_STRIP_LOAD, current_at, morison_load
+from fowt_env.plant.hydro.radiation import add_radiation
 from fowt_env.plant.hydro.strips import Strips
 from fowt_env.plant.hydro.wave_bands import surface_elevation
 from fowt_env.plant.hydro.waves import elevation, wave_kinematics
@@ -42,6 +46,9 @@ class Hydro(NamedTuple):
     damping: object  # linear_damping.LinearDamping or None
     added_inertia: object  # added_inertia.AddedInertia or None
     matrices: object  # body_matrices.BodyMatrices or None
+    radiation: object  # radiation.StateSpaceMemory, ConvolutionMemory or None
+    members: object  # members.Members or None
+    excitation: object  # excitation.Excitation or None
     depth: float  # of the water, m
 
 
@@ -49,7 +56,8 @@ class HydroLoad(NamedTuple):
     """Loads of the water but for the added mass times acceleration, body components about the body origin."""
 
     buoyancy: Wrench
-    strips: Wrench  # with those of a linear body and the velocity-dependent terms of a constant added mass
+    # with those of members, of a linear body with its waves and memory, and of a constant added mass
+    strips: Wrench
     damping: Wrench
 
 
@@ -82,18 +90,23 @@ strip_load = chosen_by_class(
 
 
 @kernel
-def _plain_elevation(t, waves, strips, data):
+def _plain_elevation(t, waves, strips, excitation, data):
     return elevation(t, 0.0, 0.0, waves)
 
 
 @kernel
-def _banded_elevation(t, waves, strips, data):
+def _banded_elevation(t, waves, strips, excitation, data):
     return surface_elevation(t, waves, strips.bands, data.bands)
+
+
+@kernel
+def _free_elevation(t, waves, strips, excitation, data):
+    return elevation_beside(t, waves, excitation)
 
 
 _elevation = chosen_by_class(
     "strips",
-    {ExactStrips: _plain_elevation, BandedStrips: _banded_elevation, type(None): _plain_elevation},
+    {ExactStrips: _plain_elevation, BandedStrips: _banded_elevation, type(None): _free_elevation},
 )
 
 
@@ -102,7 +115,7 @@ def surface_at_origin(t, hydro, data):
     """Surface elevation at the inertial origin, m."""
     if hydro is None:
         return 0.0
-    return _elevation(t, hydro.waves, hydro.strips, data)
+    return _elevation(t, hydro.waves, hydro.strips, hydro.excitation, data)
 
 
 @kernel
@@ -128,10 +141,14 @@ def hydro_load(t, pose, x, hydro, data):
     if hydro is None:
         return NO_HYDRO_LOAD
     buoyancy = hydrostatic_load(pose, hydro.hull, data.counters)
+    buoyancy = add_member_buoyancy(pose, buoyancy, hydro.members)
     strips = strip_load(t, pose, hydro, hydro.strips, data)
     fill_added_mass(strips, data.added_mass)
     wrench = add_inertia(pose, strips.wrench, hydro.added_inertia, data.added_mass)
     wrench = add_body_matrices(pose, x, wrench, hydro.matrices, data.added_mass)
+    wrench = add_radiation(pose, x, wrench, hydro.radiation, data.radiation)
+    wrench = add_member_loads(t, pose, wrench, hydro.members, hydro.waves, hydro.current, data)
+    wrench = add_excitation(t, pose, wrench, hydro.excitation)
     return HydroLoad(buoyancy, wrench, damping_load(pose, x, hydro.damping))
 
 

@@ -1,0 +1,254 @@
+"""Gains of the scheduled PI law: the published formula, and what it gives a turbine without published gains.
+
+Jonkman's design (NREL/TP-500-38060, section 7.4; theory.md, section 4) holds the rotor speed alone, with the
+slope dP/d theta of the aerodynamic power over the blade pitch at rated speed, the induced flow held, along
+the steady curve:
+K_P = 2 I w0 zeta w_r/(N (-dP/d theta)), K_I = I w0^2 w_r/(N (-dP/d theta)), both at zero pitch, and the
+schedule 1/(1 + theta/theta_K), with theta_K from a straight line through the slopes over the pitch.
+
+A floating turbine's rotor loop is slower than its platform pitches (NREL/TP-500-47535; Larsen and Hanson,
+2007): w0 is DETUNED times the platform's own pitch frequency, and never above that of the land set, LAND
+times the rated rotor speed over that of the NREL 5 MW turbine.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import brentq
+
+from fowt_env.analysis.trim import AZIMUTHS, mean_derivative, trim, without_fluctuations
+from fowt_env.analysis.trim_cache import plant_key, water_key
+from fowt_env.caches import Cache
+from fowt_env.descriptions.checks import check_number
+from fowt_env.descriptions.turbine import PitchGains
+from fowt_env.descriptions.units import DEGREE
+from fowt_env.errors import InputError, unknown
+from fowt_env.plant.aero.blade_elements import airload, blade_section, build_blade_elements, element_of
+from fowt_env.plant.compile.decorators import entry
+from fowt_env.plant.state import State
+
+DAMPING = 0.7  # of the rotor loop, floating and on land
+DETUNED = 0.915  # w0 over the platform's pitch frequency: 0.2 over 0.2185 rad/s of OC3-Hywind
+LAND = 0.6  # rad/s, of the NREL 5 MW turbine on land
+FLOATING = 0.2  # rad/s, of OC3-Hywind: scaled alike where no platform is known
+REFERENCE_SPEED = 1.267109  # rad/s, rated rotor speed of that turbine
+SETS = ("floating", "land")
+OTHER_NAMES = {"oc3": "floating"}  # of the sets: what the NREL 5 MW turbine's file calls its floating one
+AIR = 1.225  # kg/m3, where no scene is known
+STEEPEST_PITCH = 45.0 * DEGREE
+PITCH_STEP = 0.1 * DEGREE  # of the differences
+SPEEDS = 14  # winds of the steady curve, from that of rated torque to cut-out
+POSITION_STEPS = (1e-3, 1e-3, 1e-3, 1e-5, 1e-5, 1e-5)  # m, rad
+
+
+class Gains(NamedTuple):
+    """Published form of the PI gains: blade pitch over generator-speed error and its integral."""
+
+    KP: float  # s
+    KI: float  # -
+
+
+class PowerSlope(NamedTuple):
+    """dP/d theta (W/rad) at rated speed along the steady curve, at_zero (1 + theta/doubling)."""
+
+    at_zero: float
+    doubling: float  # rad, the blade pitch at which it has doubled
+    blade_pitch: np.ndarray  # (n,) rad, and the slopes that the line is fitted to
+    slope: np.ndarray  # (n,) W/rad
+
+
+def gains(design_frequency, damping, inertia, rated_speed, gear_ratio, dP_dpitch):
+    """Gains that give the rotor-speed loop this frequency (rad/s) and damping ratio at zero pitch.
+
+    inertia: I_D about the low-speed shaft, kg m2; rated_speed: w_b0 of the rotor, rad/s; dP_dpitch:
+    slope of the aerodynamic power at rated speed, W/rad, negative. theory.md, section 4.
+    Raises: InputError unless all are finite, dP_dpitch < 0 and the others > 0.
+    """
+    given = {
+        "design_frequency": design_frequency,
+        "damping": damping,
+        "inertia": inertia,
+        "rated_speed": rated_speed,
+        "gear_ratio": gear_ratio,
+    }
+    for key, value in given.items():
+        check_number(key, value, 0.0, low_open=True, allowed="positive and finite")
+    check_number("dP_dpitch", dP_dpitch, high=0.0, high_open=True, allowed="negative and finite, W/rad")
+    scale = inertia * rated_speed / (gear_ratio * -dP_dpitch)
+    return Gains(KP=2.0 * damping * design_frequency * scale, KI=design_frequency**2 * scale)
+
+
+_SLOPES = Cache(16)  # (id of the turbine, density) -> (turbine, PowerSlope)
+
+
+def power_slope(turbine, density=AIR):
+    """PowerSlope of a turbine's rotor in uniform steady wind, from its blade elements.
+
+    Raises: InputError where the rotor cannot reach rated torque below cut-out, or does not lose power by
+    pitching there.
+    """
+    found = _SLOPES.get((id(turbine), float(density)), lambda: (turbine, _power_slope(turbine, density)))
+    return found[1]
+
+
+@entry
+def _rotor_torque(wind, rotor_speed, blade_pitch, step, rotor, found):
+    """Fill found (2,): torque (N m) of a rotor in uniform wind, its slope over blade pitch, wake held."""
+    found[0] = found[1] = 0.0
+    for j in range(rotor.radius.shape[0]):
+        tangential = rotor_speed * rotor.radius[j]
+        here = blade_section(wind, tangential, blade_pitch, j, 1.0, rotor)
+        arm = rotor.blades * rotor.moment_weight[j]
+        found[0] += arm * here.ft
+        for side in range(2):
+            sign = 1.0 - 2.0 * side
+            element = element_of(j, blade_pitch + sign * step, rotor)
+            _, ct, square = airload(
+                wind + here.induced_normal, tangential + here.induced_tangential, element, rotor.polars
+            )
+            found[1] += arm * sign * element.half_density_chord * square * ct / (2.0 * step)
+
+
+def _power_slope(turbine, density):
+    elements = build_blade_elements(turbine, density)
+    rated, fastest = turbine.rated_rotor_speed, turbine.cut_out_wind_speed
+    wanted = turbine.torque_law.rated_torque * turbine.drivetrain.gear_ratio
+    finest, found = turbine.pitch_drive.minimum, np.zeros(2)
+
+    def surplus(pitch, wind):
+        _rotor_torque(float(wind), rated, float(pitch), PITCH_STEP, elements, found)
+        return found[0] - wanted
+
+    where, slowest = f"turbine {turbine.name!r}", turbine.cut_in_wind_speed
+    if not surplus(finest, slowest) < 0.0 < surplus(finest, fastest):
+        raise InputError(f"{where}: its rotor does not reach rated torque at rated speed below cut-out")
+    reached = brentq(lambda wind: surplus(finest, wind), slowest, fastest)
+    pitches, slopes = [], []
+    for wind in np.linspace(reached, fastest, SPEEDS):
+        if surplus(STEEPEST_PITCH, wind) > 0.0:
+            raise InputError(
+                f"{where}: its rotor is beyond rated torque at {wind:.3g} m/s at any blade pitch"
+            )
+        # at the first wind the finest pitch itself balances, but for rounding
+        low = surplus(finest, wind)
+        pitch = finest if low <= 0.0 else brentq(lambda b, w=wind: surplus(b, w), finest, STEEPEST_PITCH)
+        surplus(pitch, wind)
+        pitches.append(pitch)
+        slopes.append(rated * found[1])
+    growth, at_zero = np.polyfit(pitches, slopes, 1)
+    if not (at_zero < 0.0 and growth < 0.0):
+        raise InputError(f"{where}: its power does not fall faster the more the blades are pitched")
+    return PowerSlope(float(at_zero), float(at_zero / growth), np.array(pitches), np.array(slopes))
+
+
+def land_frequency(turbine):
+    """w0 (rad/s) of the land set of a turbine without published gains."""
+    return LAND * turbine.rated_rotor_speed / REFERENCE_SPEED
+
+
+def derived_gains(turbine, frequency, damping=DAMPING, density=AIR):
+    """PitchGains of the published formula for a rotor loop of a frequency (rad/s) and damping ratio."""
+    slope, drive = power_slope(turbine, density), turbine.drivetrain
+    inertia = turbine.rotor.inertia + drive.gear_ratio**2 * drive.generator_inertia
+    rated = turbine.rated_rotor_speed
+    found = gains(frequency, damping, inertia, rated, drive.gear_ratio, slope.at_zero)
+    return PitchGains(KP=found.KP, KI=found.KI, gain_schedule_pitch=slope.doubling)
+
+
+def published_set(turbine, gain_set):
+    """PitchGains of a turbine's file by name; None where it has none, and they are to be derived.
+
+    gain_set: a name in the file, or one of SETS or OTHER_NAMES, of which "floating" and "oc3" are the same.
+    Raises: InputError for any other name.
+    """
+    if gain_set in turbine.gains:
+        return turbine.gains[gain_set]
+    meaning = OTHER_NAMES.get(gain_set, gain_set)
+    if meaning not in SETS:
+        raise unknown("gain set", gain_set, sorted({*turbine.gains, *SETS, *OTHER_NAMES}))
+    names = (meaning, *(name for name, other in OTHER_NAMES.items() if other == meaning))
+    return next((turbine.gains[name] for name in names if name in turbine.gains), None)
+
+
+def gains_of_turbine(turbine, gain_set="oc3"):
+    """PitchGains of a set: the published ones, else those of the rotor with no platform known.
+
+    Of a floating set without published gains the frequency is FLOATING over the rated rotor speeds; of_scene
+    gives that of a platform.
+    """
+    found = published_set(turbine, gain_set)
+    if found is not None:
+        return found
+    speed = turbine.rated_rotor_speed / REFERENCE_SPEED
+    return derived_gains(turbine, (LAND if gain_set == "land" else FLOATING) * speed)
+
+
+_FREQUENCIES = Cache(64)  # (plant, water) -> rad/s
+
+
+def platform_pitch_frequency(scene):
+    """Undamped natural frequency (rad/s) of the platform's pitch about the trim of a scene.
+
+    From the accelerations that small displacements give; whatever has states of its own (a wake, the memory
+    of radiated waves) is held. Remembered per plant.
+    Raises: InputError as trim, and where nothing restores the pitch.
+    """
+    return _FREQUENCIES.get((plant_key(scene), water_key(scene)), lambda: _pitch_frequency(scene))
+
+
+def _pitch_frequency(scene):
+    point = trim(scene)
+    x, u = point.state.copy(), point.command.copy()
+    body = scene.model.rigid_body._replace(platform_fixed=False, rotor_fixed=False)
+    handle = without_fluctuations(scene, point.wind_speed).with_model(rigid_body=body).handle()
+    dx, mean = np.zeros_like(x), np.zeros_like(x)
+
+    def rates(entry, step):
+        found = []
+        keep = x[entry]
+        for sign in (1.0, -1.0):
+            x[entry] = keep + sign * step
+            mean_derivative(handle, x, u, AZIMUTHS, dx, mean)
+            found.append(mean.copy())
+        x[entry] = keep
+        return (found[0] - found[1]) / (2.0 * step)
+
+    stiffness = np.array([rates(i, step)[State.VX : State.VX + 6] for i, step in enumerate(POSITION_STEPS)]).T
+    kinematics = np.array([rates(State.VX + i, 1e-5)[:6] for i in range(6)]).T
+    values, vectors = np.linalg.eig(kinematics @ stiffness)
+    arm = 0.5 * scene.platform.draft
+    size = np.abs(vectors) * np.array([1.0, 1.0, 1.0, arm, arm, arm])[:, None]
+    share = size[State.PLATFORM_PITCH] / size.sum(axis=0)
+    square = -float(values[np.argmax(share)].real)
+    if not square > 0.0:
+        raise InputError(
+            f"platform {scene.platform.name!r}: nothing restores its pitch: no gains are derived"
+        )
+    return square**0.5
+
+
+def floating_frequency(scene):
+    """w0 (rad/s) of the floating set for the platform of a scene."""
+    return min(DETUNED * platform_pitch_frequency(scene), land_frequency(scene.turbine))
+
+
+_TURBINES = Cache(64)  # (id of the turbine, plant, water) -> (turbine, the one with gains)
+
+
+def with_gains(scene):
+    """The scene's turbine with gains for its platform: itself where its file has both sets.
+
+    What the file lacks of SETS is added: "floating" and "land" of the published formula.
+    """
+    turbine = scene.turbine
+    missing = [name for name in SETS if published_set(turbine, name) is None]
+    if not missing:
+        return turbine
+
+    def make():
+        density = scene.platform.environment.air_density
+        frequency = {"floating": floating_frequency, "land": lambda s: land_frequency(s.turbine)}
+        added = {name: derived_gains(turbine, frequency[name](scene), density=density) for name in missing}
+        return turbine, turbine.model_copy(update={"gains": {**turbine.gains, **added}})
+
+    return _TURBINES.get((id(turbine), plant_key(scene), water_key(scene)), make)[1]

@@ -1,0 +1,338 @@
+"""Values of OpenFAST's part files by their keys: "value key - comment", whatever the order and the comments.
+
+A key is the first word of a line that is not a value, after at least one that is. Letters of either case;
+`BldFile(1)` and `BldFile1` are the same key. Every error names the file, the line, the key and what is allowed.
+"""
+
+import math
+import re
+from pathlib import Path
+
+from fowt_env.errors import InputError
+
+MAX_BYTES = 5_000_000  # of a part file; the largest that are in use have some 100 kB
+MAX_ROWS = 100_000  # of a table
+_WORD = re.compile(r"""@?"[^"]*"?|@?'[^']*'?|[^\s,;]+""")
+_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eEdD][-+]?\d+)?")
+_KEY = re.compile(r"[A-Za-z_]\w*(\(\d+\))?")
+_TRUE, _FALSE = ("true", "t", ".true.", ".t."), ("false", "f", ".false.", ".f.")
+REQUIRED = object()  # mark of a key that a file must have
+
+
+def number_of(word):
+    """The finite number that a Fortran word means, or None."""
+    if _NUMBER.fullmatch(word) is None:
+        return None
+    value = float(word.replace("d", "e").replace("D", "e"))
+    return value if math.isfinite(value) else None
+
+
+def bare(word):
+    """A word without its quotes."""
+    word = word.lstrip("@")
+    return word.strip("\"'").strip() if word[:1] in "\"'" else word
+
+
+def _same(key):
+    """A key as it is looked up."""
+    return key.lower().replace("(", "").replace(")", "")
+
+
+def _is_value(word):
+    return word[:1] in "\"'@" or number_of(word) is not None or word.lower() in (*_TRUE, *_FALSE, "default")
+
+
+def words_of(line):
+    """Words of a line: split at blanks and commas, quoted ones whole."""
+    return _WORD.findall(line)
+
+
+def _key_of(words):
+    """Position of the key in the words of a line, or None.
+
+    The first word is a value whatever it looks like: a file name need not be quoted.
+    """
+    if not words or words[0].startswith(("---", "===", "!", "#")):
+        return None
+    for i, word in enumerate(words[1:], 1):
+        if word in ("!", "-"):
+            continue
+        if not _is_value(word):
+            return i if _KEY.fullmatch(word) else None
+    return None
+
+
+class PartFile:
+    """A part file: its lines, and the place of every key."""
+
+    def __init__(self, path, kind):
+        """path: the file. kind: "ElastoDyn" ..., for messages. Raises: InputError if it cannot be read."""
+        self.path, self.kind = Path(path), kind
+        self.lines = _text(self.path, kind).splitlines()
+        if len(self.lines) > MAX_ROWS:
+            raise self.refusal(f"has {len(self.lines)} lines; allowed: at most {MAX_ROWS}")
+        self.places = {}
+        for number, line in enumerate(self.lines):
+            words = words_of(line[:2000])
+            place = _key_of(words)
+            if place is not None:
+                values = [word for word in words[:place] if word not in ("!", "-")]
+                self.places.setdefault(_same(words[place]), (number, values))
+
+    # ------------------------------------------------------------------ messages
+
+    def refusal(self, what, line=None, key=None):
+        """InputError about this file, the line (from 0) and the key."""
+        at = "" if line is None else f", line {line + 1}"
+        named = "" if key is None else f"{key}: "
+        return InputError(f"{self.kind} file {str(self.path)!r}{at}: {named}{what}")
+
+    def wrong(self, key, value, allowed, *also):
+        """InputError for a value that is not allowed."""
+        found = self.find(key, *also)
+        return self.refusal(
+            f"{key} = {str(value)[:60]}: must be {allowed}", None if found is None else found[0]
+        )
+
+    def source(self, *keys):
+        """ "file: keys", the comment beside a figure that was worked out of them."""
+        return f"{self.path.name}: {', '.join(keys)}"
+
+    # ------------------------------------------------------------------ values
+
+    def find(self, key, *also):
+        """(line from 0, values) of the first of some names of a key, or None."""
+        for name in (key, *also):
+            if _same(name) in self.places:
+                return self.places[_same(name)]
+        return None
+
+    def has(self, key, *also):
+        """Whether the file has the key."""
+        return self.find(key, *also) is not None
+
+    def _one(self, key, also, default):
+        found = self.find(key, *also)
+        if found is None:
+            if default is REQUIRED:
+                raise self.refusal(f"{key} is missing: there must be a line 'value  {key}'")
+            return None, default
+        return found[0], found[1][0]
+
+    def number(self, key, *also, default=REQUIRED, low=-math.inf, high=math.inf, open_low=False):
+        """Number of a key; default also where the file says DEFAULT. also: other names of the key."""
+        line, word = self._one(key, also, default)
+        if line is None:
+            return word
+        if bare(word).lower() == "default" and default is not REQUIRED:
+            return default
+        value = number_of(bare(word))
+        if value is None or not low <= value <= high or (open_low and value <= low):
+            ends = [f"{'>' if open_low else '>='} {low:g}"] * (low > -math.inf)
+            ends += [f"<= {high:g}"] * (high < math.inf)
+            allowed = " ".join(["a number", " and ".join(ends)]).strip()
+            raise self.refusal(f"{key} = {word[:60]}: must be {allowed}", line)
+        return value
+
+    def whole(self, key, *also, default=REQUIRED, low=None, high=None):
+        """Whole number of a key."""
+        value = self.number(key, *also, default=default)
+        if not isinstance(value, float):
+            return value
+        if value != int(value) or (low is not None and value < low) or (high is not None and value > high):
+            limits = [f"from {low}"] * (low is not None) + [f"to {high}"] * (high is not None)
+            raise self.wrong(key, f"{value:g}", " ".join(["a whole number", *limits]), *also)
+        return int(value)
+
+    def one_of(self, key, choices, *also, default=REQUIRED, why=""):
+        """Whole number of a key, one of a few. why: what the others would be, for the message."""
+        value = self.whole(key, *also, default=default)
+        if value not in choices:
+            allowed = " or ".join(str(choice) for choice in choices)
+            raise self.wrong(key, value, allowed + (f" ({why})" if why else ""), *also)
+        return value
+
+    def flag(self, key, *also, default=REQUIRED):
+        """Truth value of a key; a number is true unless zero, as some versions write switches."""
+        line, word = self._one(key, also, default)
+        if line is None:
+            return word
+        text = bare(word).lower()
+        if text == "default" and default is not REQUIRED:
+            return default
+        if text in _TRUE or text in _FALSE:
+            return text in _TRUE
+        if number_of(text) is not None:
+            return number_of(text) != 0.0
+        raise self.refusal(f"{key} = {word[:60]}: must be True or False", line)
+
+    def text(self, key, *also, default=REQUIRED):
+        """Text of a key, without quotes."""
+        line, word = self._one(key, also, default)
+        return word if line is None else bare(word)
+
+    def numbers(self, key, *also, count=None, default=REQUIRED):
+        """List of the numbers before a key; count: how many it must be."""
+        found = self.find(key, *also)
+        if found is None:
+            if default is REQUIRED:
+                raise self.refusal(f"{key} is missing: there must be a line 'values  {key}'")
+            return default
+        values = [number_of(bare(word)) for word in found[1]]
+        if None in values or (count is not None and len(values) != count):
+            wanted = "numbers" if count is None else f"{count} numbers"
+            raise self.refusal(f"{key} = {' '.join(found[1])[:60]}: must be {wanted}", found[0])
+        return values
+
+    def matrix(self, key, size=6):
+        """size x size numbers: the row of a key and those below it; zeros where the file lacks the key."""
+        found = self.find(key)
+        if found is None:
+            return [[0.0] * size for _ in range(size)]
+        return [self._row(found[0] + i, size, key) for i in range(size)]
+
+    def vector(self, key, size=6):
+        """size numbers: before a key, or one of them and the others in the lines below; zeros without the key."""
+        found = self.find(key)
+        if found is None:
+            return [0.0] * size
+        if len(found[1]) > 1:
+            return self._row(found[0], size, key)
+        return [self._row(found[0] + i, 1, key)[0] for i in range(size)]
+
+    def _row(self, line, size, key):
+        words = words_of(self.lines[line][:2000])[:size] if line < len(self.lines) else []
+        values = [number_of(word) for word in words]
+        if len(values) < size or None in values:
+            raise self.refusal(f"{' '.join(words)[:60]!r}: must be {size} numbers", line, key)
+        return values
+
+    # ------------------------------------------------------------------ tables
+
+    def table(self, key, *also, default=0, texts=(), high=MAX_ROWS):
+        """Rows of the table below a count: a list of (line from 0, {column in small letters: number}).
+
+        The line after the count names the columns. texts: columns that hold texts, in small letters. A row
+        may be followed by a comment; it must have a value of every column but the last texts.
+        """
+        count = self.whole(key, *also, default=default, low=0, high=high)
+        if not count:
+            return []
+        line = self.find(key, *also)[0] + 1
+        return self.rows_below(line, count, key, texts)
+
+    def headed(self, column, count, texts=()):
+        """The same, of the table whose first column has this name."""
+        for line, text in enumerate(self.lines):
+            if text.split()[:1] and text.split()[0].lower() == column.lower():
+                return self.rows_below(line, count, column, texts)
+        raise self.refusal(f"the table with the first column {column} is missing")
+
+    def rows_below(self, line, count, key, texts=()):
+        """The same, of a table whose names of columns stand in this line."""
+        while line < len(self.lines) and not self.lines[line].strip():
+            line += 1
+        head = self.lines[line] if line < len(self.lines) else ""
+        columns = [word.lower() for word in words_of(re.split(r"[\[!]", head)[0])]
+        if not columns or number_of(columns[0]) is not None:
+            raise self.refusal("the line below must name the columns of the table", line - 1, key)
+        rows = []
+        for number in range(line + 1, len(self.lines)):
+            words = words_of(self.lines[number][:2000])
+            if not words or (
+                not rows and words[0].startswith(("(", "[", "-")) and number_of(words[0]) is None
+            ):
+                continue
+            rows.append((number, self._cells(number, words, columns, texts, key)))
+            if len(rows) == count:
+                return rows
+        raise self.refusal(f"{count} rows are announced, {len(rows)} are there", line - 1, key)
+
+    def _cells(self, number, words, columns, texts, key):
+        cells = {}
+        for i, name in enumerate(columns):
+            word = bare(words[i]) if i < len(words) else ""
+            if name in texts:
+                cells[name] = word
+                continue
+            value = number_of(word)
+            if value is None and name in OPTIONAL_COLUMNS:
+                break  # the rest is a comment
+            if value is None:
+                raise self.refusal(f"{name} = {word[:40]!r}: must be a number", number, key)
+            cells[name] = value
+        return cells
+
+    # ------------------------------------------------------------------ other files
+
+    def other(self, key, *also, folders=(), default=REQUIRED):
+        """Path of the file that a key names, or None where it names none ("unused", "none", empty)."""
+        name = self.text(key, *also, default=default)
+        if not isinstance(name, str) or name.lower() in ("", "none", "unused", "default"):
+            return None
+        path = locate(name, (self.path.parent, *folders))
+        if path is None:
+            found = self.find(key, *also)
+            raise self.refusal(f"{key} = {name[:200]!r}: no such file", None if found is None else found[0])
+        return path
+
+
+# columns that only newer versions have, behind those that every version has
+OPTIONAL_COLUMNS = ("axfdmod", "axvncoff", "axfdlofsc", "t_pot", "blcb", "blcenbn", "blcenbt", "blcpn", "blcpt",
+                    "blcan", "blcat", "blcam", "t_wr", "twrti", "twrcb", "twrcp", "twrca")  # fmt: skip
+
+
+def _text(path, kind):
+    """Text of a part file."""
+    try:
+        if not path.is_file():
+            raise InputError(f"{kind} file {str(path)[:300]!r} does not exist")
+        size = path.stat().st_size
+        if size > MAX_BYTES:
+            raise InputError(f"{kind} file {str(path)!r} has {size} bytes; allowed: at most {MAX_BYTES}")
+        content = path.read_bytes()
+    except (OSError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"{kind} file {str(path)[:200]!r} cannot be read: {error}") from None
+    if b"\0" in content:
+        raise InputError(f"{kind} file {str(path)!r} is not a text file: it has a zero byte")
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return content.decode("latin-1")  # old files have degree signs and superscripts of Windows
+
+
+def locate(name, folders):
+    """Path of a file named in a deck: relative to a folder, either slash, letters of either case; or None.
+
+    In the second and further folders a file is also found by its bare name.
+    """
+    text = name.replace("\\", "/").strip()
+    try:
+        for place, folder in enumerate(folders):
+            for candidate in (text, text.rsplit("/", 1)[-1])[: 1 + (place > 0)]:
+                path = Path(folder) / Path(candidate)
+                found = path if path.is_file() else _either_case(path)
+                if found is not None:
+                    return found
+    except (OSError, ValueError):
+        return None
+    return None
+
+
+def _either_case(path):
+    """The file that differs from a path in the case of letters alone, or None."""
+    here = Path(path.anchor) if path.is_absolute() else Path()
+    for part in path.parts[1 if path.is_absolute() else 0 :]:
+        exact = here / part
+        if part == ".." or exact.exists():
+            here = exact
+            continue
+        if not here.is_dir():
+            return None
+        same = sorted(entry for entry in here.iterdir() if entry.name.lower() == part.lower())
+        if not same:
+            return None
+        here = same[0]
+    return here if here.is_file() else None

@@ -1,0 +1,226 @@
+"""Blades that do not lie in the rotor plane: cone, prebend and sweep, and loads summed along them.
+
+Directions of a blade: x along the shaft, downwind; r outwards, in the plane through shaft and pitch axis; t in
+the direction of rotation, r x t = x. The momentum balance of a station is that of blade_elements.py, for the
+wind normal to the blade axis (turned by cone and slope in the plane of x and r) and along t, at the distance
+from the shaft; loads are per length of the blade axis. The slope that sweep and blade pitch add in the plane of
+r and t is left out, as AeroDyn (BEM_Mod 1) does. Blade pitch turns prebend and sweep about the pitch axis, so
+places and slopes depend on it. The pitching moment (cm) acts about the blade axis.
+"""
+
+from math import atan2, cos, sin, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from fowt_env.plant.compile.decorators import kernel
+
+
+class BladeShape(NamedTuple):
+    """Where a blade's stations are at zero blade pitch, about its pitch axis. n stations, k polar segments."""
+
+    prebend: np.ndarray  # (n,) m, downwind of the pitch axis
+    sweep: np.ndarray  # (n,) m, against the direction of rotation
+    distance: np.ndarray  # (n,) m, from the rotor centre along the pitch axis
+    slope: np.ndarray  # (n,) sine of the angle between blade axis and pitch axis, of prebend
+    arm_prebend: np.ndarray  # (n,) m, the same three of the point where the station's part of the load acts
+    arm_sweep: np.ndarray
+    arm_distance: np.ndarray
+    chord: np.ndarray  # (n,) m
+    moment: np.ndarray  # (k, 2) cm at the start of each segment of the polars and its slope, 1/rad
+    cone_cosine: float
+    cone_sine: float  # positive: blades lean upwind
+
+
+class Station(NamedTuple):
+    """Place and direction of a station at a blade pitch, directions of the blade."""
+
+    x: float  # m
+    r: float
+    t: float
+    nx: float  # normal of the blade axis, downwind; the axis itself is (-nr, nx, 0)
+    nr: float
+
+
+class Arm(NamedTuple):
+    """Point where a station's part of the load acts, m."""
+
+    x: float
+    r: float
+    t: float
+
+
+class BladeWind(NamedTuple):
+    """Directions of a blade in inertial components, and its motion in its own directions."""
+
+    ey: float  # e_r = (0, ey, ez) in rotor axes, e_t = (0, -ez, ey)
+    ez: float
+    rx: float  # e_r in inertial components
+    ry: float
+    rz: float
+    tx: float  # e_t
+    ty: float
+    tz: float
+    vx: float  # of the hub, m/s
+    vr: float
+    vt: float
+    wx: float  # angular velocity with the rotor's, rad/s
+    wr: float
+    wt: float
+
+
+class BladeLoad(NamedTuple):
+    """Load of one blade about the rotor centre in its own directions."""
+
+    fx: float
+    fr: float
+    ft: float
+    mx: float
+    mr: float
+    mt: float
+
+
+NO_BLADE_LOAD = BladeLoad(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@kernel
+def effective_pitch(j, blade_pitch, shape):
+    """Angle by which the blade pitch turns the section of station j about its own axis, rad."""
+    if shape is None:
+        return blade_pitch
+    s = shape.slope[j]
+    return atan2(sin(blade_pitch), sqrt(1.0 - s * s) * cos(blade_pitch))
+
+
+@kernel
+def station_at(j, cosine, sine, shape):
+    """Station j; cosine and sine of the blade pitch."""
+    out = cosine * shape.prebend[j] + sine * shape.sweep[j]
+    z, s = shape.distance[j], shape.slope[j] * cosine
+    c = sqrt(1.0 - s * s)
+    return Station(
+        shape.cone_cosine * out - shape.cone_sine * z,
+        shape.cone_cosine * z + shape.cone_sine * out,
+        sine * shape.prebend[j] - cosine * shape.sweep[j],
+        c * shape.cone_cosine + s * shape.cone_sine,
+        c * shape.cone_sine - s * shape.cone_cosine,
+    )
+
+
+@kernel
+def arm_of(j, cosine, sine, shape):
+    """Arm of station j; cosine and sine of the blade pitch."""
+    out = cosine * shape.arm_prebend[j] + sine * shape.arm_sweep[j]
+    z = shape.arm_distance[j]
+    return Arm(
+        shape.cone_cosine * out - shape.cone_sine * z,
+        shape.cone_cosine * z + shape.cone_sine * out,
+        sine * shape.arm_prebend[j] - cosine * shape.arm_sweep[j],
+    )
+
+
+@kernel
+def blade_wind(psi, rotor_speed, pose, hub):
+    """BladeWind of the blade at the azimuth psi; pose and hub in rotor axes."""
+    ey, ez = -sin(psi), cos(psi)
+    return BladeWind(
+        ey,
+        ez,
+        pose.r12 * ey + pose.r13 * ez,
+        pose.r22 * ey + pose.r23 * ez,
+        pose.r32 * ey + pose.r33 * ez,
+        pose.r13 * ey - pose.r12 * ez,
+        pose.r23 * ey - pose.r22 * ez,
+        pose.r33 * ey - pose.r32 * ez,
+        hub.vx,
+        hub.vy * ey + hub.vz * ez,
+        hub.vz * ey - hub.vy * ez,
+        rotor_speed + pose.wx,
+        pose.wy * ey + pose.wz * ez,
+        pose.wz * ey - pose.wy * ez,
+    )
+
+
+@kernel
+def station_inflow(u, v, w, at, pose, blade):
+    """(v_normal, v_tangential) m/s of a station in the wind (u, v, w), inertial components."""
+    wind_x = pose.r11 * u + pose.r21 * v + pose.r31 * w
+    wind_r = blade.rx * u + blade.ry * v + blade.rz * w
+    wind_t = blade.tx * u + blade.ty * v + blade.tz * w
+    own_x = blade.vx + blade.wr * at.t - blade.wt * at.r
+    own_r = blade.vr + blade.wt * at.x - blade.wx * at.t
+    own_t = blade.vt + blade.wx * at.r - blade.wr * at.x
+    return at.nx * (wind_x - own_x) + at.nr * (wind_r - own_r), own_t - wind_t
+
+
+@kernel
+def with_station(load, fn, ft, moment, at, arm):
+    """The BladeLoad with that of a station: its force normal to the axis and along t, its pitching moment."""
+    fx, fr = fn * at.nx, fn * at.nr
+    return BladeLoad(
+        load.fx + fx,
+        load.fr + fr,
+        load.ft + ft,
+        load.mx + arm.r * ft - arm.t * fr - moment * at.nr,
+        load.mr + arm.t * fx - arm.x * ft + moment * at.nx,
+        load.mt + arm.x * fr - arm.r * fx,
+    )
+
+
+def _ends(values, distance, low, high):
+    """values (n,) at the stations, with those at the hub and the tip on the lines through the last two."""
+    first = values[0] + (low - distance[0]) * (values[1] - values[0]) / (distance[1] - distance[0])
+    last = values[-1] + (high - distance[-1]) * (values[-1] - values[-2]) / (distance[-1] - distance[-2])
+    return np.concatenate(([first], values, [last]))
+
+
+class BladeLine(NamedTuple):
+    """A blade's axis from hub to tip, the stations in between: n stations."""
+
+    points: np.ndarray  # (n + 2, 3) m: prebend, sweep, distance along the pitch axis
+    length: np.ndarray  # (n + 2,) m from the rotor centre along the pitch axis and then along the blade axis
+
+
+def blade_line(blade, hub_radius, tip_radius):
+    """BladeLine of a descriptions.turbine.Blade."""
+    distance = np.asarray(blade.radius, dtype=float)
+    offsets = [
+        np.zeros_like(distance) if values is None else np.asarray(values, dtype=float)
+        for values in (blade.prebend, blade.sweep)
+    ]
+    points = np.column_stack(
+        [_ends(values, distance, hub_radius, tip_radius) for values in (*offsets, distance)]
+    )
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    return BladeLine(points, hub_radius + np.concatenate(([0.0], np.cumsum(steps))))
+
+
+def is_curved(turbine):
+    """Whether blades leave the plane through their pitch axes' foot points, or bend."""
+    offsets = (turbine.blade.prebend, turbine.blade.sweep)
+    return turbine.rotor.cone != 0.0 or any(v is not None and np.any(np.asarray(v) != 0.0) for v in offsets)
+
+
+def build_blade_shape(turbine, line, chosen, weights, moment):
+    """BladeShape of the stations chosen of a BladeLine.
+
+    weights (n chosen, n + 2): of a line load linear between all points, at each of them, per unit of that at
+    a chosen station; moment: see BladeShape.
+    """
+    inner = line.points[1:-1]
+    slope = np.gradient(inner[:, 0], inner[:, 2], edge_order=2 if len(inner) > 2 else 1)
+    steps = np.diff(line.length)[:, None]
+    # of the whole line load, force and first moments; each piece is linear times linear
+    low, high = weights[:, :-1], weights[:, 1:]
+    force = 0.5 * (low + high) @ steps
+    first = (low @ (steps * (2.0 * line.points[:-1] + line.points[1:]))) / 6.0
+    first += (high @ (steps * (line.points[:-1] + 2.0 * line.points[1:]))) / 6.0
+    arm = first / force
+    place = inner[chosen]
+    columns = (*place.T, np.sin(np.arctan(slope))[chosen], *arm.T, np.asarray(turbine.blade.chord)[chosen])
+    return BladeShape(
+        *(np.ascontiguousarray(column, dtype=np.float64) for column in columns),
+        np.ascontiguousarray(moment, dtype=np.float64),
+        float(np.cos(turbine.rotor.cone)),
+        float(np.sin(turbine.rotor.cone)),
+    ), force[:, 0]

@@ -1,0 +1,505 @@
+"""Radiation memory from potential-flow coefficients: rational approximation by vector fitting, or convolution.
+
+The retardation of a body is K(i w) = B(w) + i w (A(w) - A_inf), and follows from B alone, since it is causal. So
+both forms have the K of B: files give an A that agrees with their B to some per cent, where panels are coarse or
+inner waves resonate, and by far more than the fit is in error. The rational approximation has real coefficients, stable poles, K(0) = 0 and no direct term, and the poles of motions that are coupled are common
+to all entries between them. Poles are found by vector fitting (Gustavsen and Semlyen, IEEE Trans. Power
+Delivery 14(3), 1999; relaxed as in 21(3), 2006) and then by nonlinear least squares; residues by linear least
+squares under the condition that Re K is positive semidefinite (theory.md, 5.8).
+"""
+
+import hashlib
+import warnings
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+from scipy.optimize import least_squares, nnls
+
+from fowt_env.caches import Cache
+from fowt_env.errors import InputError, PlantWarning, level_outside
+from fowt_env.plant.hydro.radiation import GROUP, ConvolutionMemory, StateSpaceMemory
+from fowt_env.plant.state import MOTIONS
+
+BAND = (0.15, 2.5)  # rad/s, in which errors are counted: periods of 2.5 to 42 s
+OUTSIDE = 0.1  # weight of other frequencies
+FEWEST_KNOWN = 8  # frequencies of a file within BAND
+NEGLIGIBLE = 1e-3  # of the geometric mean of the diagonals: weaker coupling is left out
+FEWEST, MOST = 2, 8  # pairs of poles of an entry
+ROUNDS = 20  # of relocating poles
+EVALUATIONS = 40  # of the nonlinear least squares
+DECAY = (0.05, 8.0)  # 1/s, of a pole: one of less would outlast SPAN, and is narrower than files resolve
+FREQUENCY = (0.01, 8.0)  # rad/s, of a pole
+PASSIVE_UP_TO = 10.0  # rad/s
+PASSIVE_MARGIN = 1e-5  # least Re K at which residues are held, of its size there
+PASSIVE_ROUNDS = 60
+NOT_PASSIVE = 1e-4  # of an entry's largest value: beyond it a fit is refused
+SPAN = 60.0  # s of past velocities in a convolution
+SPACING = 0.005  # rad/s, of the cosine transform: its period of 1257 s is far beyond SPAN
+TRANSFORMED = 120.0  # s of K behind the target of a fit
+GRID = 0.025  # rad/s, of that target
+TAPER = 1.5  # times the last frequency, where the damping has gone to zero
+IN_PLANE = (0, 2, 4)
+
+
+@dataclass(frozen=True)
+class EntryFit:
+    """How well one entry of K is fitted."""
+
+    order: int  # of its denominator
+    error: float  # rms over BAND against the causal K, of its rms there
+    file_error: float  # the same against B + i w (A - A_inf) of the file
+    passivity: float | None  # least Re K up to PASSIVE_UP_TO over the largest |K|; None off the diagonal
+
+
+@dataclass(frozen=True, eq=False)
+class RadiationFit:
+    """K(s) = sum over poles p of r / (s - p) + conj(r) / (s - conj(p)), by entries of K."""
+
+    poles: dict  # {motion: (m,) complex, the upper of each pair}
+    residues: dict  # {(motion, motion): (m,) complex, for the poles of the second; symmetric}
+    entries: dict  # {(motion, motion): EntryFit}, first <= second
+    passivity: float  # least eigenvalue of Re K, scaled to a diagonal of rms 1 in BAND
+    asked: float  # error
+
+    def response(self, omega):
+        """(n, 6, 6) complex K(i omega), omega (n,) rad/s."""
+        s = 1j * np.asarray(omega, dtype=float)[:, None]
+        result = np.zeros((s.size, 6, 6), dtype=complex)
+        for (i, j), residue in self.residues.items():
+            pole = self.poles[j]
+            result[:, i, j] = (residue / (s - pole) + residue.conj() / (s - pole.conj())).sum(axis=1)
+        return result
+
+    @property
+    def states(self):
+        """Number of states: two for each pair of poles of each motion."""
+        return 2 * sum(pole.size for pole in self.poles.values())
+
+    def table(self):
+        """Text, a line for each entry: order, rms errors in BAND, passivity."""
+        lines = [f"{'entry':<24}{'order':>6}{'rms error':>11}{'of A and B':>12}{'least Re K':>12}"]
+        for (i, j), entry in sorted(self.entries.items()):
+            name = MOTIONS[i] if i == j else f"{MOTIONS[i]}, {MOTIONS[j]}"
+            passive = "" if entry.passivity is None else f"{entry.passivity:12.1e}"
+            lines.append(f"{name:<24}{entry.order:>6}{entry.error:>11.2%}{entry.file_error:>12.2%}{passive}")
+        return "\n".join(lines)
+
+
+def retardation(body):
+    """(n, 6, 6) complex B + i w (A - A_inf) of a PotentialFlow at its frequencies, made symmetric."""
+    change = body.added_mass - body.added_mass_infinite
+    k = body.damping + 1j * body.omega[:, None, None] * change
+    return 0.5 * (k + k.transpose(0, 2, 1))
+
+
+def retardation_kernel(body, time):
+    """(n, 6, 6) K(t) of a PotentialFlow, 2/pi integral of B(w) cos(w t) dw, N/m ...; time (n,) s.
+
+    B goes from B(0) = 0 through the file's values by monotone cubics, and to zero within TAPER times the last
+    frequency.
+    """
+    last = body.omega[-1]
+    omega = np.arange(0.0, TAPER * last, SPACING)
+    damping = 0.5 * (body.damping + body.damping.transpose(0, 2, 1)).reshape(-1, 36)
+    known = PchipInterpolator(np.r_[0.0, body.omega], np.vstack([np.zeros(36), damping]))
+    share = np.clip((omega - last) / ((TAPER - 1.0) * last), 0.0, 1.0)
+    b = known(np.minimum(omega, last)) * (0.5 + 0.5 * np.cos(np.pi * share))[:, None]
+    b[0] *= 0.5
+    kernel = np.cos(np.outer(np.asarray(time, dtype=float), omega)) @ b * (2.0 / np.pi * SPACING)
+    return kernel.reshape(-1, 6, 6)
+
+
+def causal_retardation(body, omega):
+    """(n, 6, 6) complex K(i omega) of retardation_kernel over TRANSFORMED s; omega (n,) rad/s."""
+    step = 0.1 / (TAPER * body.omega[-1])
+    time = np.arange(0.0, TRANSFORMED, step)
+    kernel = retardation_kernel(body, time).reshape(time.size, 36) * step
+    kernel[0] *= 0.5
+    used = np.abs(kernel).max(axis=0) > 0.0
+    result = np.zeros((omega.size, 36), dtype=complex)
+    result[:, used] = np.exp(-1j * np.outer(omega, time)) @ kernel[:, used]
+    return result.reshape(-1, 6, 6)
+
+
+# ---------------------------------------------------------------- vector fitting
+
+
+def _columns(s, poles):
+    """(n, 2 m) response at s of the real residues: first those of the real parts, then of the imaginary."""
+    first, second = 1.0 / (s[:, None] - poles), 1.0 / (s[:, None] - poles.conj())
+    return np.hstack([first + second, 1j * (first - second)])
+
+
+def _free(poles):
+    """(2 m, 2 m - 1) residues that keep K(0) = 0."""
+    at_zero = _columns(np.zeros(1, complex), poles).real
+    return np.linalg.svd(at_zero)[2][1:].T
+
+
+def _real(a):
+    """Real and imaginary rows one above the other."""
+    return np.concatenate([a.real, a.imag])
+
+
+def _residues(s, f, w, poles):
+    """(fit (n, e), [residues]) of least squares with K(0) = 0."""
+    columns, free = _columns(s, poles), _free(poles)
+    base = columns @ free
+    left = _real(base * w[:, None])
+    x = np.linalg.lstsq(left, _real(f * w[:, None]), rcond=1e-12)[0]
+    return base @ x
+
+
+def _relocated(s, f, w, poles):
+    """Poles after one round of relaxed vector fitting, in pairs; all stable."""
+    columns, free = _columns(s, poles), _free(poles)
+    n, m = free.shape
+    base, rows = columns @ free, []
+    for k in range(f.shape[1]):
+        scaled = f[:, k, None] * np.hstack([columns, np.ones((s.size, 1))])
+        left = _real(np.hstack([base, -scaled]) * w[:, None])
+        rows.append(np.linalg.qr(left, mode="r")[m:, m:])
+    size = np.linalg.norm(w[:, None] * f) / s.size
+    rows.append(size * np.r_[columns.real.sum(axis=0), s.size][None])
+    left = np.vstack(rows)
+    right = np.zeros(left.shape[0])
+    right[-1] = size * s.size
+    x = np.linalg.lstsq(left, right, rcond=1e-12)[0]
+    half = poles.size
+    a = np.block([
+        [np.diag(poles.real), np.diag(poles.imag)],
+        [-np.diag(poles.imag), np.diag(poles.real)],
+    ])  # fmt: skip
+    zeros = np.linalg.eigvals(a - np.outer(np.r_[np.full(half, 2.0), np.zeros(half)], x[:-1]) / x[-1])
+    return _pairs(zeros, half)
+
+
+def _pairs(poles, count):
+    """That many upper poles of pairs within DECAY and FREQUENCY; two real ones become a pair."""
+    upper = list(poles[poles.imag > 1e-9])
+    real = np.sort(np.abs(poles[np.abs(poles.imag) <= 1e-9].real))
+    upper += [complex(-np.sqrt(a * b), 0.5 * (b - a)) for a, b in zip(real[::2], real[1::2], strict=False)]
+    upper += [complex(-a, 0.3 * a) for a in real[len(real) // 2 * 2 :]]
+    return _bounded(np.array(upper[:count]))
+
+
+def _bounded(poles):
+    """Poles moved into DECAY and FREQUENCY, with room for differences."""
+    decay = np.clip(np.abs(poles.real), 1.001 * DECAY[0], 0.999 * DECAY[1])
+    return -decay + 1j * np.clip(poles.imag, 1.001 * FREQUENCY[0], 0.999 * FREQUENCY[1])
+
+
+def _fit_poles(omega, f, w, count, starts=()):
+    """(largest error, poles) of the best of `count` pairs that vector fitting and least squares find."""
+    s, band = 1j * omega, _in_band(omega)
+
+    def error(poles):
+        miss = _residues(s, f, w, poles) - f
+        return float(np.sqrt((np.abs(miss[band]) ** 2).mean(axis=0)).max())
+
+    def unpacked(x):
+        return -np.exp(x[:count]) + 1j * np.exp(x[count:])
+
+    def residuals(x):
+        return _real((_residues(s, f, w, unpacked(x)) - f) * w[:, None]).ravel()
+
+    middle = np.linspace(BAND[0], BAND[1] + 0.1, count)
+    best = (np.inf, None)
+    bounds = np.log(np.repeat([DECAY, FREQUENCY], count, axis=0)).T
+    for start in (-0.1 * middle + 1j * middle, *starts):
+        poles = _bounded(start)
+        found = (error(poles), poles)
+        for _ in range(ROUNDS):
+            poles = _relocated(s, f, w, poles)
+            if poles.size < count:
+                break
+            found = min(found, (error(poles), poles), key=lambda each: each[0])
+        x = np.log(np.r_[-found[1].real, found[1].imag])
+        polished = unpacked(least_squares(residuals, x, bounds=bounds, max_nfev=EVALUATIONS).x)
+        best = min(best, found, (error(polished), polished), key=lambda each: each[0])
+    return best
+
+
+# ---------------------------------------------------------------- passivity
+
+
+def _constrained(left, right, rows, least):
+    """x of least |left x - right| with rows x >= least, by Lawson and Hanson's least-distance programming.
+
+    None where no x fulfils it.
+    """
+    q, r = np.linalg.qr(left)
+    free = q.T @ right
+    if not len(rows):
+        return np.linalg.solve(r, free)
+    turned = np.linalg.solve(r.T, np.asarray(rows).T).T
+    short = np.asarray(least) - turned @ free
+    scale = np.linalg.norm(turned, axis=1)
+    matrix = np.vstack([(turned / scale[:, None]).T, short / scale])
+    target = np.zeros(matrix.shape[0])
+    target[-1] = 1.0
+    u, _ = nnls(matrix, target, maxiter=50 * matrix.shape[1] + 1000)
+    miss = matrix @ u - target
+    if abs(miss[-1]) < 1e-12:
+        return None
+    return np.linalg.solve(r, free - miss[:-1] / miss[-1])
+
+
+def _passive_grid():
+    """Frequencies (rad/s) at which Re K is held positive, and its size there: K goes with w^2 at both ends."""
+    omega = np.unique(
+        np.r_[np.geomspace(1e-3, 0.05, 10), np.arange(0.05, PASSIVE_UP_TO + 0.01, 0.025), 20.0, 50.0]
+    )
+    return omega, omega**2 / (omega**2 + 0.3**2) / (1.0 + (omega / 3.0) ** 2)
+
+
+def _passive_residues(omega, f, w, poles, places, size):
+    """(e, 2 m) residues of the entries at `places` of a (size, size) block with Re K >= 0, least squares."""
+    s, free = 1j * omega, _free(poles)
+    base = _columns(s, poles) @ free
+    left, m = _real(base * w[:, None]), free.shape[1]
+    rights = _real(f * w[:, None])
+    whole = np.zeros((len(places) * left.shape[0], len(places) * m))
+    for k in range(len(places)):
+        whole[k * left.shape[0] : (k + 1) * left.shape[0], k * m : (k + 1) * m] = left
+    right = rights.T.ravel()
+    grid, shape = _passive_grid()
+    real = (_columns(1j * grid, poles) @ free).real / shape[:, None]
+    rows, least, x = [], [], None
+    for _ in range(PASSIVE_ROUNDS):
+        new = _constrained(whole, right, rows, least)
+        if new is None:
+            break
+        x = new
+        matrix = np.zeros((grid.size, size, size))
+        for k, (i, j) in enumerate(places):
+            matrix[:, i, j] = matrix[:, j, i] = real @ x[k * m : (k + 1) * m]
+        values, vectors = np.linalg.eigh(matrix)
+        low = values[:, 0]
+        if low.min() >= 0.0:
+            break
+        padded = np.r_[np.inf, low, np.inf]
+        dips = np.flatnonzero((low < 0.0) & (low <= padded[:-2]) & (low <= padded[2:]))
+        for at in dips:
+            v = vectors[at, :, 0]
+            factors = [v[i] * v[j] * (1.0 if i == j else 2.0) for i, j in places]
+            rows.append(np.concatenate([factor * real[at] for factor in factors]))
+            least.append(PASSIVE_MARGIN)
+    return np.array([free @ x[k * m : (k + 1) * m] for k in range(len(places))])
+
+
+# ---------------------------------------------------------------- the whole body
+
+
+def _blocks(size):
+    """[motions that are coupled] of the (6, 6) rms of K, those without any left out."""
+    scale = np.sqrt(np.diag(size))
+    coupled = size > NEGLIGIBLE * np.outer(scale, scale)
+    left, blocks = [i for i in range(6) if size[i, i] > 0.0], []
+    while left:
+        block, last = [left[0]], []
+        while block != last:
+            last, block = block, [j for j in left if any(coupled[i, j] or i == j for i in block)]
+        blocks.append(block)
+        left = [i for i in left if i not in block]
+    return blocks, coupled
+
+
+def _fit_block(omega, k, block, coupled, w, asked):
+    """(poles, {entry: residues}, scaled passivity) of motions that share poles."""
+    band = _in_band(omega)
+    pairs = [(i, j) for a, i in enumerate(block) for j in block[a:] if i == j or coupled[i, j]]
+    scale = {i: np.sqrt(np.sqrt((np.abs(k[band, i, i]) ** 2).mean())) for i in block}
+    own = np.array([np.sqrt((np.abs(k[band, i, j]) ** 2).mean()) for i, j in pairs])
+    f = np.array([k[:, i, j] for i, j in pairs]).T
+    best, last = (np.inf, None), None
+    for count in range(FEWEST, MOST + 1):
+        starts = () if last is None else (np.append(last, complex(-0.5, 1.0 + 0.2 * (count % 3))),)
+        found = _fit_poles(omega, f / own, w, count, starts)
+        last = found[1]
+        best = min(best, found, key=lambda each: each[0])
+        if found[0] <= 0.9 * asked:  # passivity will cost some of it
+            break
+    poles = best[1]
+    units = np.array([scale[i] * scale[j] for i, j in pairs])
+    places = [(block.index(i), block.index(j)) for i, j in pairs]
+    found = _passive_residues(omega, f / units, w, poles, places, len(block)) * units[:, None]
+    half = poles.size
+    residues = {}
+    for (i, j), row in zip(pairs, found, strict=True):
+        residues[i, j] = residues[j, i] = row[:half] + 1j * row[half:]
+    return poles, residues
+
+
+_FITS = Cache(16)  # (hash of the coefficients, error) -> RadiationFit
+
+
+def fit_radiation(body, error=0.02):
+    """RadiationFit of a PotentialFlow: as many poles as an rms error of each entry asks for, MOST pairs at most.
+
+    error  rms over BAND of an entry, of the entry's rms there
+    Warns (PlantWarning) where an entry is left with more than twice that. Raises: InputError where Re K of the
+    fit cannot be held positive, or where the coefficients have fewer than FEWEST_KNOWN frequencies within BAND.
+    """
+    digest = hashlib.sha256()
+    for part in (body.omega, body.added_mass, body.damping, body.added_mass_infinite):
+        digest.update(np.ascontiguousarray(part).tobytes())
+    return _FITS.get((digest.hexdigest(), float(error)), lambda: _fit(body, error))
+
+
+def _fit(body, asked):
+    """What fit_radiation gives, found anew."""
+    known = _in_band(body.omega)
+    if known.sum() < FEWEST_KNOWN:
+        raise InputError(
+            f"potential_flow: {known.sum()} frequencies from {BAND[0]} to {BAND[1]} rad/s; the fit of the"
+            f" radiation memory needs {FEWEST_KNOWN}; use radiation = 'none' without them"
+        )
+    omega = np.arange(GRID, TAPER * body.omega[-1], GRID)
+    k = causal_retardation(body, omega)
+    band = _in_band(omega)
+    size = np.sqrt((np.abs(k[band]) ** 2).mean(axis=0))
+    w = np.where(band, 1.0, OUTSIDE)
+    blocks, coupled = _blocks(size)
+    poles, residues = {}, {}
+    for block in blocks:
+        own, found = _fit_block(omega, k, block, coupled, w, asked)
+        poles |= dict.fromkeys(block, own)
+        residues |= found
+    fit = RadiationFit(poles, residues, {}, 0.0, asked)
+    grid = _passive_grid()[0]
+    far = fit.response(grid[grid <= PASSIVE_UP_TO])
+    own, of_file = (
+        _misses(fit, omega[band], k[band]),
+        _misses(fit, body.omega[known], retardation(body)[known]),
+    )
+    entries = {}
+    for i, j in residues:
+        if i <= j:
+            margin = float(far[:, i, i].real.min() / np.abs(far[:, i, i]).max()) if i == j else None
+            entries[i, j] = EntryFit(2 * poles[j].size, float(own[i, j]), float(of_file[i, j]), margin)
+    scale = np.sqrt(np.where(np.diag(size) > 0.0, np.diag(size), 1.0))
+    passivity = float(np.linalg.eigvalsh(far.real / np.outer(scale, scale))[:, 0].min())
+    fit = RadiationFit(poles, residues, entries, passivity, asked)
+    _check(fit)
+    return fit
+
+
+def _in_band(omega):
+    """Whether frequencies are in BAND."""
+    return (omega >= BAND[0] - 1e-6) & (omega <= BAND[1] + 1e-6)
+
+
+def _misses(fit, omega, k):
+    """(6, 6) rms error of a fit to K at omega, of the rms of K; 0 where there is none."""
+    size = np.sqrt((np.abs(k) ** 2).mean(axis=0))
+    miss = np.sqrt((np.abs(fit.response(omega) - k) ** 2).mean(axis=0))
+    return np.divide(miss, size, out=np.zeros((6, 6)), where=size > 0.0)
+
+
+def _check(fit):
+    """Refuse a fit that makes energy, and warn of one that is coarse."""
+    for (i, j), entry in fit.entries.items():
+        if i == j and entry.passivity < -NOT_PASSIVE:
+            raise InputError(
+                f"potential_flow: the radiation memory of {MOTIONS[i]} cannot be fitted without making energy:"
+                f" the least Re K is {entry.passivity:.2g} of the largest; use radiation = 'convolution'"
+            )
+    coarse = {
+        f"{MOTIONS[i]}" if i == j else f"{MOTIONS[i]}-{MOTIONS[j]}": entry.error
+        for (i, j), entry in fit.entries.items()
+        if entry.error > 2.0 * fit.asked
+    }
+    if coarse:
+        text = ", ".join(f"{name} {error:.1%}" for name, error in coarse.items())
+        warnings.warn(
+            f"radiation_error = {fit.asked:g}: {2 * MOST} poles an entry leave {text}",
+            PlantWarning,
+            stacklevel=level_outside(),
+        )
+
+
+# ---------------------------------------------------------------- parts of the model
+
+
+def build_radiation(body, options, dt, first):
+    """The memory part of a PotentialFlow or None, as the options have it.
+
+    dt     s, of the steps of a convolution
+    first  of the states of a state space in the state vector
+    """
+    if body is None or options["radiation"] == "none":
+        return None
+    motions = IN_PLANE if options["planar"] else range(6)
+    if options["radiation"] == "convolution":
+        return build_convolution(body, dt, motions)
+    return build_state_space(fit_radiation(body, options["radiation_error"]), first, motions)
+
+
+def memory_for_step(memory, body, dt, planar):
+    """The memory part for steps of dt (s): itself, but for a convolution of another step."""
+    if not isinstance(memory, ConvolutionMemory) or abs(memory.dt - dt) <= 1e-9 * dt:
+        return memory
+    return build_convolution(body, dt, IN_PLANE if planar else range(6))
+
+
+def build_state_space(fit, first, motions=range(6)):
+    """StateSpaceMemory of a RadiationFit, for these motions; None where none of them has a memory."""
+    groups = [
+        -(-fit.poles[j].size // GROUP) * GROUP if j in motions and j in fit.poles else 0 for j in range(6)
+    ]
+    begin = np.concatenate([[0], np.cumsum(groups)]).astype(np.int64)
+    if begin[-1] == 0:
+        return None
+    pole = np.zeros((2, begin[-1]))
+    pole[0] = -1.0  # of those that fill a group, which nothing takes
+    for j in range(6):
+        if groups[j]:
+            own = fit.poles[j]
+            pole[:, begin[j] : begin[j] + own.size] = own.real, own.imag
+    places = [(i, j) for i, j in sorted(fit.residues) if i in motions and j in motions]
+    weight = np.zeros((len(places), 2 * max(groups)))
+    for e, (i, j) in enumerate(places):
+        residue = fit.residues[i, j]
+        weight[e, : residue.size] = 2.0 * residue.real
+        weight[e, groups[j] : groups[j] + residue.size] = -2.0 * residue.imag
+    return StateSpaceMemory(
+        int(first),
+        begin,
+        pole,
+        np.array([i for i, _ in places], dtype=np.int64),
+        np.array([j for _, j in places], dtype=np.int64),
+        weight,
+    )
+
+
+def build_convolution(body, dt, motions=range(6)):
+    """ConvolutionMemory of a PotentialFlow over SPAN for steps of dt (s); None without any damping."""
+    k = retardation(body)
+    size = np.sqrt((np.abs(k) ** 2).mean(axis=0))
+    _, coupled = _blocks(size)
+    places = [
+        (i, j) for i in motions for j in motions if size[i, i] > 0.0 and (i == j or coupled[i, j])
+    ]  # fmt: skip
+    if not places:
+        return None
+    steps = max(1, round(SPAN / dt))
+    n = -(-steps // (2 * GROUP)) * 2 * GROUP
+    time = 0.5 * dt * np.arange(2 * n + 1)
+    kernel = retardation_kernel(body, time)
+    now = np.zeros((6, 6))
+    half, whole = np.zeros((len(places), n)), np.zeros((len(places), n))
+    for e, (i, j) in enumerate(places):
+        now[i, j] = kernel[0, i, j]
+        half[e, :steps] = dt * kernel[1 : 2 * steps : 2, i, j]
+        half[e, 0] *= 0.75
+        whole[e, :steps] = dt * kernel[2 : 2 * steps + 2 : 2, i, j]
+    return ConvolutionMemory(
+        float(dt),
+        now,
+        np.array([i for i, _ in places], dtype=np.int64),
+        np.array([j for _, j in places], dtype=np.int64),
+        half,
+        whole,
+    )

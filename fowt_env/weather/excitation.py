@@ -1,0 +1,150 @@
+"""Wave force on a potential-flow body in a sea: from its coefficients to the parts that the plant reads.
+
+The excitation of each component is interpolated linearly in frequency and heading, its real and imaginary
+parts one by one, as HydroDyn does.
+"""
+
+import warnings
+from math import pi
+
+import numpy as np
+
+from fowt_env.errors import InputError, PlantWarning, level_outside
+from fowt_env.plant.hydro.excitation import COLUMNS, ELEVATION, ExactExcitation, Excitation, ExcitationSeries
+from fowt_env.weather.harmonics import pack_table, table_of
+from fowt_env.weather.second_order import build_second_order
+
+QUIET, MOST = 1e-3, 0.5  # share of a sea's energy beyond the table that is passed over, and that is refused
+SAME_HEADING = 1e-4  # rad, of headings that the figures of files cannot tell apart
+OUT_OF_PLANE = (1, 3, 5)  # sway, roll, yaw
+
+
+def build_excitation(body, waves, *, duration, fast, planar, second_order=None, cutoff=None):
+    """Excitation of a PotentialFlow in Waves; None without either.
+
+    duration      s that the table of a sea that does not repeat has to cover
+    fast          first order from a table; else by the sum over components
+    planar        forces in the plane alone
+    second_order  None, "none", "mean_drift", "newman" or "full"; cutoff: rad/s, of the differences, or None
+
+    Raises: InputError for a sea beyond the body's headings or frequencies. Warns: PlantWarning where
+    frequencies of some energy lie beyond them.
+    """
+    if body is None or waves is None:
+        return None
+    check_frequencies(body, waves)
+    force = excitation_at(body, waves.omega, np.arctan2(waves.sin_heading, waves.cos_heading))
+    force *= waves.amplitude[:, None]
+    if planar:
+        force[:, OUT_OF_PLANE] = 0.0
+    first = ExactExcitation(
+        waves.omega,
+        waves.phase,
+        np.ascontiguousarray(np.concatenate([force.real, force.imag], axis=1)),
+        float(waves.ramp),
+    )
+    if fast:
+        first = ExcitationSeries(_first_order_table(waves, force, duration), first)
+    second = build_second_order(body, waves, second_order, duration=duration, cutoff=cutoff)
+    if second is not None and planar:
+        second.table.value[:, OUT_OF_PLANE] = 0.0
+        second.mean[list(OUT_OF_PLANE)] = 0.0
+    return Excitation(first, second)
+
+
+def _first_order_table(waves, force, duration):
+    """TimeTable of the force (n, 6) and the elevation."""
+    coefficient = np.zeros((waves.omega.size, COLUMNS - 1), dtype=complex)
+    coefficient[:, :6], coefficient[:, ELEVATION] = force, waves.amplitude
+    coefficient *= np.exp(-1j * waves.phase)[:, None]
+    return table_of(waves.omega, coefficient, duration)
+
+
+def still_excitation(part):
+    """An Excitation of the same types without force: no first order, and no mean drift; None of None."""
+    if part is None:
+        return None
+    one = np.ones(1)
+    first = ExactExcitation(one, np.zeros(1), np.zeros((1, 12)), 0.0)
+    flat = pack_table(np.zeros((11, COLUMNS)), 1.0, 8.0, True)
+    if isinstance(part.first, ExcitationSeries):
+        first = ExcitationSeries(flat, first)
+    second = None if part.second is None else part.second._replace(table=flat, mean=np.zeros(6), ramp=0.0)
+    return Excitation(first, second)
+
+
+def excitation_at(body, omega, heading):
+    """(n, 6) complex force per metre of amplitude, N/m and N m/m, of waves of omega (n,) and heading, rad.
+
+    heading: a number or (n,). Below the table's frequencies it goes to the limit of long waves, in which the
+    water rises and falls around the body, above them it is zero.
+    Raises: InputError for a heading between which the table has none.
+    """
+    omega = np.asarray(omega, dtype=float)
+    known = np.concatenate([[0.0], body.excitation_omega])
+    limit = np.zeros((1, body.heading.size, 6), dtype=complex)
+    limit[0, :, 2:5] = body.stiffness[2:5, 2]
+    table = np.concatenate([limit, body.excitation])
+    left, right, share = _headings(body, np.broadcast_to(np.asarray(heading, dtype=float), omega.shape))
+    row = np.clip(np.searchsorted(known, omega, side="right") - 1, 0, known.size - 2)
+    above = (omega - known[row]) / (known[row + 1] - known[row])
+    # the last figure of a frequency must not decide between the table's end and nothing
+    beyond = above > 1.0 + 1e-6 * known[row + 1] / (known[row + 1] - known[row])
+    above = np.minimum(above, 1.0)
+    share, above = share[:, None], above[:, None]
+    lower = (1.0 - share) * table[row, left] + share * table[row, right]
+    upper = (1.0 - share) * table[row + 1, left] + share * table[row + 1, right]
+    return np.where(beyond[:, None], 0.0, (1.0 - above) * lower + above * upper)
+
+
+def _headings(body, heading):
+    """(left, right, share): columns of the table beside headings (n,), and the right one's share."""
+    known = body.heading
+    turned = known[0] + np.mod(heading - known[0] + SAME_HEADING, 2.0 * pi) - SAME_HEADING
+    gap = float(np.diff(known).max()) if known.size > 1 else 0.0
+    closing = known[0] + 2.0 * pi - known[-1]
+    around = known.size > 1 and closing <= gap * (1.0 + 1e-6) + SAME_HEADING
+    beyond = turned > known[-1] + SAME_HEADING
+    if beyond.any() and not around:
+        low, high = np.degrees(known[[0, -1]])
+        raise InputError(
+            f"sea: heading {np.degrees(heading[np.argmax(beyond)]):g} deg lies outside the excitation table"
+            f" of {_name(body)}, which has {low:g} to {high:g} deg"
+        )
+    if known.size == 1:
+        none = np.zeros(heading.shape, dtype=int)
+        return none, none, np.zeros(heading.shape)
+    left = np.clip(np.searchsorted(known, turned, side="right") - 1, 0, known.size - 1)
+    right = np.where(left == known.size - 1, 0, left + 1)
+    width = np.where(left == known.size - 1, closing, np.take(known, right) - known[left])
+    share = np.where(width > SAME_HEADING, (turned - known[left]) / np.maximum(width, SAME_HEADING), 0.0)
+    return left, right, np.clip(share, 0.0, 1.0)
+
+
+def check_frequencies(body, waves):
+    """Refuse a sea that mostly lies outside the frequencies of the table; warn of one that partly does."""
+    energy = waves.amplitude**2
+    total = float(energy.sum())
+    if total == 0.0:
+        return
+    low, high = body.excitation_omega[[0, -1]]
+    below = float(energy[waves.omega < low * (1.0 - 1e-6)].sum()) / total
+    above = float(energy[waves.omega > high * (1.0 + 1e-6)].sum()) / total
+    if below + above <= QUIET:
+        return
+    said = (
+        f"sea: {100.0 * (below + above):.3g} % of its energy lies outside the excitation table of"
+        f" {_name(body)}, which has {low:.4g} to {high:.4g} rad/s"
+    )
+    if below + above > MOST:
+        raise InputError(said)
+    warnings.warn(
+        f"{said}: interpolated to the limit of long waves below ({100.0 * below:.3g} %), without force above"
+        f" ({100.0 * above:.3g} %)",
+        PlantWarning,
+        stacklevel=level_outside(),
+    )
+
+
+def _name(body):
+    return body.source or "the potential-flow body"

@@ -1,0 +1,141 @@
+"""Sums of complex exponentials over evenly spaced times, and the cubic B-splines that stand for them."""
+
+from math import ceil, pi
+from typing import NamedTuple
+
+import numpy as np
+from scipy.fft import ifft, next_fast_len
+
+from fowt_env.plant.hydro.excitation import COLUMNS, TimeTable
+
+EVEN = 1e-6  # of a spacing: what frequencies may miss a harmonic by, a phase of 6e-6 rad after one period
+SPLINE_ERROR = 1.3e-3  # of an interpolated exponential, times (omega step)^4: rms over places and phases
+TOLERANCE = 5e-6  # rms error of a table over its standard deviation
+ROUNDED = 1e-4  # of a gap: what figures of files may miss a multiple by
+MOST_HARMONICS = 20_000  # from the lowest to the highest frequency, where they are not that many themselves
+LONG_PERIOD = 3600.0  # s, beyond which a table does not cover a period but the duration
+LONGEST = 1.2  # omega times step of the highest frequency
+MARGIN = 5.0  # s of table beyond the time that was asked for
+MOST_ROWS = 2_000_000  # 128 MB
+BLOCK_NUMBERS = 4_000_000  # complex numbers of a block of a direct sum at most: 64 MB
+
+
+class Harmonics(NamedTuple):
+    """Frequencies start + index * spacing, rad/s."""
+
+    start: float
+    spacing: float
+    index: np.ndarray  # (n,) whole numbers from 0
+
+    @property
+    def period(self):
+        """s after which the differences of the frequencies repeat."""
+        return 2.0 * pi / self.spacing
+
+    @property
+    def periodic(self):
+        """Whether the frequencies themselves are multiples of the spacing."""
+        ratio = self.start / self.spacing
+        return abs(ratio - round(ratio)) < EVEN
+
+
+def harmonics_of(omega):
+    """Harmonics of frequencies (n,) rad/s in any order, or None where they are not evenly spaced."""
+    start = float(omega.min())
+    gaps = np.diff(np.unique(omega))
+    spacing = _common_part(gaps[gaps > EVEN * start], start)
+    if float(omega.max()) - start > max(MOST_HARMONICS, 2 * omega.size) * spacing:
+        return None
+    index = np.round((omega - start) / spacing)
+    if index.any():  # one gap carries the rounding of two figures; all of them together carry less
+        spacing = float((omega - start) @ index / (index @ index))
+    if np.abs((omega - start) / spacing - index).max() > EVEN:
+        return None
+    return Harmonics(start, spacing, index.astype(int))
+
+
+def _common_part(gaps, without):
+    """What gaps (n,) are multiples of, by Euclid's rule with room for rounded figures; of none `without`."""
+    if gaps.size == 0:
+        return without
+    common = float(gaps.min())
+    least = 0.01 * common / gaps.size
+    for gap in gaps:
+        one, rest = common, abs(gap - common * round(gap / common))
+        while rest > ROUNDED * one and rest > least:
+            one, rest = rest, abs(one - rest * round(one / rest))
+        common = one
+    return common
+
+
+def step_for(omega, coefficient):
+    """Step (s) at which a cubic spline of sums of (n, m) exponentials errs by TOLERANCE of each deviation."""
+    step = LONGEST / omega.max()
+    power = np.abs(coefficient) ** 2
+    total = power.sum(axis=0)
+    for column in np.flatnonzero(total > 0.0):
+        curved = np.sqrt(omega**8 @ power[:, column] / total[column])
+        if curved > 0.0:
+            step = min(step, (TOLERANCE / (SPLINE_ERROR * curved)) ** 0.25)
+    return step
+
+
+def table_of(omega, coefficient, duration):
+    """TimeTable of Re(sum of coefficient (n, m) exp(i omega t)), m up to COLUMNS.
+
+    It covers a period and repeats where the frequencies are multiples of one; else it covers the duration
+    (s) or, of evenly spaced frequencies, the period of their differences if it is somewhat longer.
+    """
+    step = step_for(omega, coefficient)
+    found = harmonics_of(omega)
+    if found is None or found.period > max(2.0 * duration, LONG_PERIOD):
+        rows = min(ceil((duration + MARGIN) / step), MOST_ROWS)
+        values = direct_sum(omega, _prefiltered(omega, coefficient, step), step, rows + 3).real
+        return pack_table(values, step, rows * step, False)
+    within = next_fast_len(max(8, ceil(found.period / step)))
+    step = found.period / within
+    periodic = found.periodic and within <= MOST_ROWS
+    length = max(found.period, duration) if not periodic else found.period
+    rows = within if periodic else min(ceil((length + MARGIN) / step), MOST_ROWS)
+    spectrum = np.zeros((within, coefficient.shape[1]), dtype=complex)
+    np.add.at(spectrum, found.index, _prefiltered(omega, coefficient, step))
+    envelope = ifft(spectrum, axis=0, norm="forward", overwrite_x=True)
+    at = np.arange(-1, rows + 2)
+    turn = np.exp(1j * found.start * step * at)
+    values = (envelope[at % within] * turn[:, None]).real
+    return pack_table(values, step, found.period if periodic else rows * step, periodic)
+
+
+def pack_table(values, step, span, periodic):
+    """TimeTable of B-spline coefficients (rows + 3, m) at times -step, 0, ..."""
+    table = np.zeros((values.shape[0], COLUMNS))
+    table[:, : values.shape[1]] = values
+    return TimeTable(table, float(1.0 / step), float(span), bool(periodic))
+
+
+def response_of_spline(omega, step):
+    """What a cubic B-spline makes of exponentials sampled as its coefficients."""
+    return (4.0 + 2.0 * np.cos(omega * step)) / 6.0
+
+
+def _prefiltered(omega, coefficient, step):
+    return coefficient / response_of_spline(omega, step)[:, None]
+
+
+def direct_sum(omega, coefficient, step, rows):
+    """(rows, m) complex sums of coefficient (n, m) exp(i omega t) at t = -step, 0, step, ...
+
+    exp(i omega (t1 + t2)) is a product, so a block of times takes two short tables of exponentials.
+    """
+    n, m = coefficient.shape
+    block = max(1, min(ceil(rows**0.5), BLOCK_NUMBERS // (n * m)))
+    coarse = np.arange(0, rows, block)
+    fine = np.exp(1j * np.outer(omega, np.arange(block) * step))
+    inner = (fine[:, :, None] * coefficient[:, None, :]).reshape(n, -1)
+    result = np.empty((coarse.size * block, m), dtype=complex)
+    at_once = max(1, BLOCK_NUMBERS // max(n, block * m))
+    for first in range(0, coarse.size, at_once):
+        start = (coarse[first : first + at_once] - 1) * step
+        outer = np.exp(1j * np.outer(start, omega))
+        result[first * block : (first + start.size) * block] = (outer @ inner).reshape(-1, m)
+    return result[:rows]

@@ -1,0 +1,252 @@
+"""Difference-frequency wave forces of a sea on a potential-flow body, from its quadratic transfer function.
+
+The force is F(t) = Re sum_i sum_j a_i a_j* Q(w_i, w_j) exp(i (w_i - w_j) t) over all pairs, Q interpolated
+bilinearly between the pairs of the file. With the hat functions u_p of its frequencies that is a
+quadratic form at each time, Re sum_p sum_q Q_pq A_p(t) A_q*(t) with A_p(t) = sum_i a_i u_p(w_i) exp(i w_i t),
+which takes a transform per frequency of the file instead of a loop over pairs of components.
+"""
+
+import warnings
+from math import ceil, pi
+
+import numpy as np
+from scipy.fft import ifft, irfft, next_fast_len, rfft
+from scipy.ndimage import spline_filter1d
+
+from fowt_env.errors import InputError, PlantWarning, level_outside
+from fowt_env.plant.hydro.excitation import SecondOrder
+from fowt_env.weather.harmonics import (
+    MARGIN,
+    MOST_ROWS,
+    direct_sum,
+    harmonics_of,
+    pack_table,
+    response_of_spline,
+    step_for,
+)
+
+METHODS = ("mean_drift", "newman", "full")
+QUIET = 1e-2  # share of the sea's energy beyond the QTF's frequencies that is passed over
+SAME_HEADING = 1e-4  # rad
+EDGE = 24  # rows beyond both ends of a table whose spline is fitted: an end's influence falls by 3.7 per row
+SAMPLES = 12  # per shortest period of a difference, of a sea whose frequencies are not evenly spaced
+
+
+def build_second_order(body, waves, method, *, duration, cutoff=None):
+    """SecondOrder of a PotentialFlow with a QTF, in Waves, by one of METHODS; None for None or "none".
+
+    mean_drift  the mean force alone
+    newman      the diagonal of the QTF alone: |sum a_i sqrt(Q_ii) exp(i w_i t)|^2 of the positive Q_ii, less
+                the same of the negative ones
+    full        all pairs
+    cutoff      rad/s: forces of differences above it are left out; None: of none
+
+    Raises: InputError for a sea whose headings or pairs of frequencies the QTF lacks.
+    """
+    if method in (None, "none"):
+        return None
+    qtf = body.difference_qtf
+    ramp = float(waves.ramp)
+    used = _inside(qtf, waves)
+    if not waves.amplitude[used].any():
+        flat = pack_table(np.zeros((11, 6)), 1.0, 8.0, True)
+        return SecondOrder(flat, np.zeros(6), ramp)
+    wave = waves.amplitude[used] * np.exp(-1j * waves.phase[used])
+    omega = waves.omega[used]
+    groups = _heading_groups(qtf, np.arctan2(waves.sin_heading, waves.cos_heading)[used])
+    mean = _mean(qtf, omega, wave, groups)
+    if method == "mean_drift":
+        flat = pack_table(np.tile(mean, (11, 1)), 1.0, 8.0, True)
+        return SecondOrder(flat, mean, ramp)
+    form = (_full if method == "full" else _newman)(qtf, omega, wave, groups)
+    found = harmonics_of(omega)
+    if found is None:
+        return SecondOrder(_uneven_table(omega, form, duration, cutoff), mean, ramp)
+    return SecondOrder(_even_table(found, form, cutoff), mean, ramp)
+
+
+def _inside(qtf, waves):
+    """Components (n,) that the QTF covers. Warns: PlantWarning where the others have some energy."""
+    low, high = qtf.omega[0] * (1.0 - 1e-6), qtf.omega[-1] * (1.0 + 1e-6)
+    used = (waves.omega >= low) & (waves.omega <= high)
+    energy = waves.amplitude**2
+    left_out = float(energy[~used].sum()) / max(float(energy.sum()), 1e-300)
+    if left_out > QUIET:
+        warnings.warn(
+            f"sea: {100.0 * left_out:.3g} % of its energy lies outside the difference-frequency QTF, which"
+            f" has {qtf.omega[0]:.4g} to {qtf.omega[-1]:.4g} rad/s, and makes no second-order force",
+            PlantWarning,
+            stacklevel=level_outside(),
+        )
+    return used
+
+
+def _heading_groups(qtf, heading):
+    """[(components, {other group: row of the QTF, whether turned around})] for each heading of the sea."""
+    values = []
+    for angle in heading:
+        if not any(_same(angle, other) for other in values):
+            values.append(angle)
+    groups = []
+    for angle in values:
+        pairs = {}
+        for other, second in enumerate(values):
+            pairs[other] = _pair(qtf, angle, second)
+        own = np.array([_same(angle, one) for one in heading])
+        groups.append((np.flatnonzero(own), pairs))
+    return groups
+
+
+def _pair(qtf, first, second):
+    """(row of the QTF, whether its two waves are exchanged) for a pair of headings."""
+    for row, (one, other) in enumerate(qtf.heading):
+        if _same(first, one) and _same(second, other):
+            return row, False
+    for row, (one, other) in enumerate(qtf.heading):
+        if _same(first, other) and _same(second, one):
+            return row, True
+    known = ", ".join(f"({one:g}, {other:g})" for one, other in np.degrees(qtf.heading)[:12])
+    raise InputError(
+        f"sea: the difference-frequency QTF has no pair of headings ({np.degrees(first):.4g},"
+        f" {np.degrees(second):.4g}) deg; it has {known} deg"
+    )
+
+
+def _same(a, b):
+    return abs((a - b + pi) % (2.0 * pi) - pi) < SAME_HEADING
+
+
+def _table(qtf, row, turned):
+    """(k, k, 6) of a pair of headings. What the file leaves out is the conjugate of the exchanged pair."""
+    value = qtf.value[row]
+    if turned:
+        return np.conj(value.transpose(1, 0, 2))
+    one, other = qtf.heading[row]
+    if _same(one, other):
+        return np.where(np.isnan(value), np.conj(value.transpose(1, 0, 2)), value)
+    return value
+
+
+def _hats(qtf, omega):
+    """(low, share): the file's frequency below each of omega (n,), and the share of the next one."""
+    if qtf.omega.size == 1:
+        return np.zeros(omega.size, dtype=int), np.zeros(omega.size)
+    low = np.clip(np.searchsorted(qtf.omega, omega, side="right") - 1, 0, qtf.omega.size - 2)
+    share = (omega - qtf.omega[low]) / (qtf.omega[low + 1] - qtf.omega[low])
+    return low, np.clip(share, 0.0, 1.0)
+
+
+def _diagonal(qtf, omega, row):
+    """(n, 6) real Q(w, w) of one heading; linear along the diagonal where the file has nothing beside it."""
+    table = _table(qtf, row, False)
+    low, share = _hats(qtf, omega)
+    high, share = np.minimum(low + 1, qtf.omega.size - 1), share[:, None]
+    lower, upper = table[low, low].real, table[high, high].real
+    beside = table[high, low].real
+    beside = np.where(np.isnan(beside), 0.5 * (lower + upper), beside)
+    found = (1.0 - share) ** 2 * lower + 2.0 * share * (1.0 - share) * beside + share**2 * upper
+    if np.isnan(found).any():
+        raise InputError("the difference-frequency QTF lacks pairs of equal frequencies that the sea needs")
+    return found
+
+
+def _mean(qtf, omega, wave, groups):
+    """(6,) mean force: of each component with itself."""
+    total = np.zeros(6)
+    for number, (own, pairs) in enumerate(groups):
+        total += np.abs(wave[own]) ** 2 @ _diagonal(qtf, omega[own], pairs[number][0])
+    return total
+
+
+class _Form:
+    """Forces from sums of components: coefficient (n, m), whose sums at some times make the forces."""
+
+    def __init__(self, coefficient, force):
+        self.coefficient = coefficient
+        self.force = force  # (rows, m) complex sums -> (rows, 6)
+
+
+def _newman(qtf, omega, wave, groups):
+    """_Form of Newman's approximation: |positive|^2 - |negative|^2 of each force and heading."""
+    columns = np.zeros((omega.size, 2, 6, len(groups)), dtype=complex)
+    for number, (own, pairs) in enumerate(groups):
+        diagonal = _diagonal(qtf, omega[own], pairs[number][0])
+        columns[own, 0, :, number] = wave[own, None] * np.sqrt(np.maximum(diagonal, 0.0))
+        columns[own, 1, :, number] = wave[own, None] * np.sqrt(np.maximum(-diagonal, 0.0))
+    shape = columns.shape[1:]
+
+    def force(sums):
+        power = (np.abs(sums.reshape(-1, *shape)) ** 2).sum(axis=-1)
+        return power[:, 0] - power[:, 1]
+
+    return _Form(columns.reshape(omega.size, -1), force)
+
+
+def _full(qtf, omega, wave, groups):
+    """_Form of the full QTF: hat functions of its frequencies for each heading."""
+    low, share = _hats(qtf, omega)
+    high = np.minimum(low + 1, qtf.omega.size - 1)
+    nodes = np.unique(np.concatenate([low, high[share > 0.0]]))
+    size = nodes.size
+    columns = np.zeros((omega.size, len(groups) * size), dtype=complex)
+    matrix = np.zeros((6, columns.shape[1], columns.shape[1]), dtype=complex)
+    for number, (own, pairs) in enumerate(groups):
+        at = number * size + np.searchsorted(nodes, low[own])
+        np.add.at(columns, (own, at), wave[own] * (1.0 - share[own]))
+        upper = own[share[own] > 0.0]
+        at = number * size + np.searchsorted(nodes, high[upper])
+        np.add.at(columns, (upper, at), wave[upper] * share[upper])
+        for other, (row, turned) in pairs.items():
+            block = _table(qtf, row, turned)[np.ix_(nodes, nodes)].transpose(2, 0, 1)
+            place = slice(number * size, (number + 1) * size), slice(other * size, (other + 1) * size)
+            matrix[:, *place] = block
+    if np.isnan(matrix).any():
+        raise InputError(
+            "the difference-frequency QTF lacks pairs of frequencies that the sea needs"
+            f" (between {qtf.omega[nodes[0]]:.4g} and {qtf.omega[nodes[-1]]:.4g} rad/s)"
+        )
+    # the real part of the form is that of the Hermitian part of its matrix
+    matrix = 0.5 * (matrix + np.conj(matrix.transpose(0, 2, 1)))
+
+    def force(sums):
+        return np.column_stack([np.einsum("kp,kp->k", sums @ one, np.conj(sums)).real for one in matrix])
+
+    return _Form(columns, force)
+
+
+def _even_table(found, form, cutoff):
+    """TimeTable of a sea of Harmonics: it repeats with the period of the differences."""
+    highest = int(found.index.max())
+    size = next_fast_len(2 * highest + 2)
+    spectrum = np.zeros((size, form.coefficient.shape[1]), dtype=complex)
+    np.add.at(spectrum, found.index, form.coefficient)
+    force = form.force(ifft(spectrum, axis=0, norm="forward", overwrite_x=True))
+    change = rfft(force, axis=0, norm="forward")[: highest + 1]
+    omega = found.spacing * np.arange(highest + 1)
+    if cutoff is not None:
+        change[omega > cutoff * (1.0 + 1e-9)] = 0.0
+    rows = max(8, size)
+    if highest > 0 and np.abs(change[1:]).any():
+        rows = next_fast_len(max(rows, ceil(found.period / step_for(omega[1:], change[1:]))), real=True)
+    rows = min(rows, MOST_ROWS)
+    step = found.period / rows
+    change = change / response_of_spline(omega, step)[:, None]
+    values = irfft(change, n=rows, axis=0, norm="forward")
+    return pack_table(values[np.arange(-1, rows + 2) % rows], step, found.period, True)
+
+
+def _uneven_table(omega, form, duration, cutoff):
+    """TimeTable of a sea whose frequencies are not evenly spaced, over the duration."""
+    spread = float(np.ptp(omega))
+    if cutoff is not None and cutoff < spread:
+        raise InputError(
+            f"second_order_cutoff = {cutoff:g} rad/s: needs a sea of evenly spaced frequencies, of a spectrum"
+            " or of harmonics of one period"
+        )
+    step = 2.0 * pi / (SAMPLES * spread)
+    rows = min(ceil((duration + MARGIN) / step), MOST_ROWS)
+    # rows from -step on, and EDGE more on both sides, where the fit of the spline is not yet its own
+    turned = form.coefficient * np.exp(-1j * omega * EDGE * step)[:, None]
+    sums = direct_sum(omega, turned, step, rows + 3 + 2 * EDGE)
+    values = spline_filter1d(form.force(sums), order=3, axis=0, mode="mirror")
+    return pack_table(values[EDGE : EDGE + rows + 3], step, rows * step, False)

@@ -1,0 +1,70 @@
+"""Constant matrices of a linear body: in inertial axes about the undisplaced pose."""
+
+import numpy as np
+import pytest
+from plant_helpers import random_state, rates
+
+from fowt_env import build_scene
+from fowt_env.descriptions.platform import AdditionalLoads, read_platform
+from fowt_env.plant.hydro.body_matrices import BodyMatrices, build_body_matrices
+from fowt_env.plant.state import State, pose_of
+
+RNG = np.random.default_rng(5)
+SCALE = np.outer([1e6, 1e6, 1e6, 3e7, 3e7, 3e7], [1.0, 1.0, 1.0, 30.0, 30.0, 30.0])
+VELOCITY = slice(State.VX, State.WZ + 1)
+
+
+def matrix():
+    return RNG.normal(size=(6, 6)) * SCALE
+
+
+def mass_like():
+    a = RNG.normal(size=(6, 6)) / 6.0 + np.eye(6)
+    s = np.diag([3e3, 3e3, 3e3, 1e5, 1e5, 1e5])
+    return s @ a @ a.T @ s
+
+
+PART = BodyMatrices(RNG.normal(size=6) * 1e6, matrix(), matrix(), matrix(), mass_like())
+
+
+def rotation(x):
+    p = pose_of(x)
+    return np.array([[p.r11, p.r12, p.r13], [p.r21, p.r22, p.r23], [p.r31, p.r32, p.r33]])
+
+
+def test_accelerations_are_those_of_the_matrices_turned_from_inertial_axes():
+    """Twin in plain numpy: force of (q, R v, R w), mass on the accelerations R (v' + w x v) and R w'."""
+    scene = build_scene("oc3_hywind")
+    base = read_platform("oc3_hywind").model_copy(update={"additional": AdditionalLoads(preload=(1.0,) * 6)})
+    linear = build_scene(base).with_model({"hydro.matrices": PART})
+    x = random_state(np.random.default_rng(2), 15, speed=2.0, turning=0.2)
+    handle = scene.handle(data := scene.data())
+    plain, other = rates(scene, x, handle=handle)[VELOCITY], rates(linear, x)[VELOCITY]
+    body = scene.model.rigid_body
+    mass = body.mass_matrix + data.added_mass
+    mass[3, 3] -= body.coupling**2 / body.rotor_row
+    turn = rotation(x)
+    both = np.kron(np.eye(2), turn)
+    v, w = x[State.VX : State.VZ + 1], x[State.WX : State.WZ + 1]
+    q, rate = x[:6], both @ np.r_[v, w]
+    force = PART.constant - PART.stiffness @ q - PART.linear_damping @ rate
+    force -= PART.quadratic_damping @ (np.abs(rate) * rate)
+    force -= PART.added_mass @ np.r_[turn @ np.cross(w, v), np.zeros(3)]
+    turned = both.T @ PART.added_mass @ both
+    expected = np.linalg.solve(mass + turned, mass @ plain + both.T @ force)
+    assert other == pytest.approx(expected, rel=1e-9, abs=1e-12)
+
+
+def test_buoyancy_acts_at_the_centre_of_buoyancy_of_the_undisplaced_body():
+    class Body:
+        volume, centre_of_buoyancy = 2.0, (3.0, 5.0)
+        stiffness, added_mass_infinite = np.zeros((6, 6)), np.eye(6)
+
+    part = build_body_matrices(Body, None, density=1000.0, gravity=10.0)
+    force = np.array([0.0, 0.0, 2e4])
+    assert part.constant == pytest.approx(np.r_[force, np.cross([3.0, 5.0, 0.0], force)])
+
+
+def test_a_platform_without_them_has_no_such_part():
+    assert build_body_matrices(None, None, 1025.0, 9.81) is None
+    assert build_scene("oc3_hywind").model.hydro.matrices is None

@@ -1,0 +1,90 @@
+"""A potential-flow body of made-up smooth coefficients, and seas, for tests."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from fowt_env.descriptions.potential_flow import DifferenceQtf, PotentialFlow
+from fowt_env.descriptions.sea_state import sea_state_of
+from fowt_env.weather.waves import build_waves
+
+SITE = dict(depth=200.0, density=1025.0, gravity=9.81)
+REFERENCE = Path(__file__).parent / "reference" / "volturnus_waves.npz"
+SIZE = np.array([3e6, 3e6, 5e6, 4e7, 4e7, 6e6])
+
+
+def made_up_body(headings=tuple(range(-180, 181, 30)), qtf_headings=((0, 0), (0, 60), (60, 60)), seed=0):
+    """PotentialFlow with 40 frequencies from 0.1 to 4 rad/s, and a QTF with 24 from 0.2 to 2.5 rad/s."""
+    rng = np.random.default_rng(seed)
+    omega = np.linspace(0.1, 4.0, 40)
+    heading = np.radians(np.array(headings, dtype=float))
+    delay, turn = rng.uniform(-4.0, 4.0, (2, 6))
+    shape = omega / (0.2 + omega**2)
+    phase = omega[:, None, None] * delay + 1.0 + turn
+    excitation = SIZE * shape[:, None, None] * np.exp(1j * phase)
+    excitation = excitation * (1.0 + 0.5 * np.cos(heading[:, None] - turn))[None]
+    stiffness = np.zeros((6, 6))
+    stiffness[2:5, 2:5] = [[4.4e6, 1e5, -2e5], [1e5, 2e9, 0.0], [-2e5, 0.0, 2e9]]
+    second = np.linspace(0.2, 2.5, 24)
+    pairs = np.radians(np.array(qtf_headings, dtype=float))
+    value = np.zeros((len(pairs), 24, 24, 6), dtype=complex)
+    lag, lead = rng.uniform(-3.0, 3.0, (2, 6))
+    one, other = second[:, None, None], second[None, :, None]
+    for row, (first, last) in enumerate(pairs):
+        smooth = 0.8 * (one + other - 1.8) + 0.3 * np.cos(first) * np.cos(last)
+        value[row] = 0.02 * SIZE * smooth * np.exp(1j * (one - other) * lag + 1j * lead * (first - last))
+    return PotentialFlow(
+        omega=omega,
+        added_mass=np.tile(np.eye(6) * 1e7, (40, 1, 1)),
+        damping=np.tile(np.eye(6) * 1e5, (40, 1, 1)),
+        added_mass_infinite=np.eye(6) * 1e7,
+        excitation_omega=omega,
+        heading=heading,
+        excitation=excitation,
+        stiffness=stiffness,
+        volume=8029.0,
+        centre_of_buoyancy=(0.0, 0.0),
+        difference_qtf=DifferenceQtf(second, pairs, value),
+        draft=20.0,
+        source="a made-up body",
+    )
+
+
+def sea_of(spec, duration=100.0, seed=0):
+    """Waves of a sea at SITE."""
+    return build_waves(sea_state_of(spec), **SITE, seed=seed, duration=duration)
+
+
+def reference():
+    """{name: array} of an OpenFAST run in waves and of its body; `source` says what they are."""
+    with np.load(REFERENCE, allow_pickle=False) as file:
+        return {name: file[name] for name in file.files}
+
+
+def volturnus(found):
+    """PotentialFlow of the reference file: heading 0, and the motions that it has."""
+    excitation = np.zeros((found["body_omega"].size, 1, 6), dtype=complex)
+    excitation[:, 0, [0, 2, 4]] = found["body_excitation"]
+    value = np.zeros((1, *found["qtf_value"].shape[:2], 6), dtype=complex)
+    value[0, :, :, [0, 4]] = np.moveaxis(found["qtf_value"], -1, 0)
+    return replace(
+        made_up_body(),
+        excitation_omega=found["body_omega"],
+        heading=np.zeros(1),
+        excitation=excitation,
+        difference_qtf=replace(
+            made_up_body().difference_qtf, omega=found["qtf_omega"], heading=np.zeros((1, 2)), value=value
+        ),
+    )
+
+
+def reference_sea(found):
+    """Its sea as users give it."""
+    omega, amplitude, phase = found["components"].T
+    return {
+        "kind": "components",
+        "omega": omega,
+        "amplitude": amplitude,
+        "phase": -np.radians(phase),  # the components' phase is of a cos(w t + phase)
+    }
