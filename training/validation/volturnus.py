@@ -64,7 +64,7 @@ def rosco(folder):
 RUNS = {
     "static": _run("static", 600.0, output_dt=0.2),
     **{
-        case: _run(case, seconds, initial={channel.split("_[")[0]: start}, output_dt=step)
+        case: _run(case, seconds, initial={channel: start}, output_dt=step)
         for case, (channel, start, seconds, step) in DECAYS.items()
     },
     "regwave_H4T9": _run("regwave_H4T9", 500.0, sea=WAVE),
@@ -102,6 +102,100 @@ def decays(study):
     """Free decays: period 0.5 %, logarithmic decrement 5 %, rms error of the whole record 4 %."""
     for case, (channel, _, seconds, _) in DECAYS.items():
         add_decay(study, case, channel, seconds, period=0.5, decrement=5.0, rms=4.0)
+
+
+# of a straight blade as ElastoDyn has it (its summary): kg, m from the root, kg m2 about the root
+BLADE_MASS, BLADE_CENTRE, BLADE_SQUARE = 68507.6, 27.601, 101086645.0
+GRAVITY = 9.81
+AZIMUTHS = 24
+
+
+def _rotor_means(scene, rotor_speed, pitch):
+    """(force, moment, out-of-plane root moment of blade 1 with its cos and sin parts) over a turn, N and N m."""
+    from fowt_env.analysis.rotor_loads import rotor_loads
+
+    angles = 2.0 * pi * np.arange(AZIMUTHS) / AZIMUTHS
+    loads = [rotor_loads(scene, rotor_speed, pitch, azimuth) for azimuth in angles]
+    flap = np.array([load.root_out_of_plane[0] for load in loads])
+    waves = [np.ones(AZIMUTHS), 2.0 * np.cos(angles), 2.0 * np.sin(angles)]
+    return (
+        np.mean([load.force for load in loads], axis=0),
+        np.mean([load.moment for load in loads], axis=0),
+        np.array([np.mean(flap * wave) for wave in waves]),
+    )
+
+
+def _structural_flap(rotor, rotor_speed):
+    """(mean, cos part) of the out-of-plane root moment by weight and rotation of a rigid, straight blade, N m."""
+    tilt, cone = rotor.shaft_tilt, rotor.cone
+    first = BLADE_MASS * BLADE_CENTRE
+    # weight: down-shaft part g sin(tilt), and g cos(tilt) cos(azimuth) along the blade's radius
+    mean = first * GRAVITY * np.sin(tilt) * np.cos(cone)
+    cosine = -first * GRAVITY * np.cos(tilt) * np.sin(cone)
+    turning = rotor_speed**2 * np.sin(cone) * np.cos(cone) * (BLADE_SQUARE + rotor.hub_radius * first)
+    return mean + turning, cosine
+
+
+def rotor(study):
+    """Steady wind, platform held: rotor loads 0.5 %, in sheared wind 2 %; root moments 0.5 % of the mean one."""
+    from fowt_env.scene.build import build_scene
+
+    table = pd.read_csv(_path(study.folder, f"{PLATFORM}/steady.csv.gz"), comment="#")
+    for row in table.to_dict("records"):
+        study.say(f"rotor, {row['case']}")
+        scene = build_scene(
+            PLATFORM, wind={"kind": "steady", "speed": row["wind_mps"]}, rotor="bem",
+            shear_exponent=row["shear_exponent"], **OPTIONS,
+        )  # fmt: skip
+        speed = row["rotor_speed_rpm"] * pi / 30.0
+        pitches = [np.radians(row[f"blade_pitch{k}_deg"]) for k in (1, 2, 3)]
+        means = {pitch: _rotor_means(scene, speed, pitch) for pitch in dict.fromkeys(pitches)}
+        force, moment = (np.mean([means[pitch][k] for pitch in pitches], axis=0) for k in (0, 1))
+        _hub_rows(study, row, force, moment)
+        if np.isfinite(row["root1_My_kNm"]):
+            _root_rows(study, row, [means[pitch][2] for pitch in pitches], scene.turbine.rotor, speed)
+
+
+def _case(row):
+    plain = row["shear_exponent"] == 0.0 and row["blade_pitch1_deg"] == row["blade_pitch3_deg"]
+    return f"steady_{row['wind_mps']:g}mps" if plain else f"rotor, {row['case']}"
+
+
+def _hub_rows(study, row, force, moment):
+    """Rows of thrust, torque and the moments about the rotor centre; these are judged by their size together."""
+    case, allowed = _case(row), 2.0 if row["shear_exponent"] else 0.5
+    study.add(case, "aerodynamic thrust", "kN", 1e-3 * row["aero_thrust_N"], 1e-3 * force[0], allowed=allowed)
+    study.add(case, "aerodynamic torque", "kN-m", 1e-3 * row["aero_torque_Nm"], 1e-3 * moment[0], allowed=allowed)
+    size = np.hypot(row["aero_My_Nm"], row["aero_Mz_Nm"])
+    lever = row["aero_torque_Nm"]  # moments may pass zero: one percent of the torque is the other yardstick
+    for name, here, there in (
+        ("tilting moment at the hub", moment[1], row["aero_My_Nm"]),
+        ("yawing moment at the hub", moment[2], row["aero_Mz_Nm"]),
+    ):
+        error = 100.0 * (here - there) / size
+        note = f"{100.0 * (here - there) / lever:+.3f} % of the torque"
+        study.add(case, f"{name}, of both moments", "kN-m", 1e-3 * there, 1e-3 * here, error, allowed, note)
+    for name, here, there in (
+        ("side force at the hub", force[1], row["aero_Fy_N"]),
+        ("upward force at the hub", force[2], row["aero_Fz_N"]),
+    ):
+        error = 100.0 * (here - there) / row["aero_thrust_N"]
+        study.add(case, f"{name}, of the thrust", "kN", 1e-3 * there, 1e-3 * here, error, allowed)
+
+
+def _root_rows(study, row, flaps, rotor, speed):
+    """Rows of the out-of-plane root moments, with weight and rotation of a rigid blade added to the air's."""
+    case, allowed = _case(row), 2.0 if row["shear_exponent"] else 0.5
+    mean, cosine = _structural_flap(rotor, speed)
+    for number, flap in enumerate(flaps, 1):
+        there, here = row[f"root{number}_My_kNm"], 1e-3 * (flap[0] + mean)
+        study.add(case, f"RootMyc{number}, mean over a turn", "kN-m", there, here, allowed=allowed)
+    whole = row["root1_My_kNm"]
+    for part, here in (("cos", 1e-3 * (flaps[0][1] + cosine)), ("sin", 1e-3 * flaps[0][2])):
+        there = row[f"root1_My_kNm_{part}"]
+        error = 100.0 * (here - there) / whole
+        quantity = f"RootMyc1, {part} over the azimuth, of the mean"
+        study.add(case, quantity, "kN-m", there, here, error, allowed)
 
 
 def regular(study):
@@ -169,6 +263,7 @@ GROUPS = {  # name -> (function, runs that it takes)
     "decays": (decays, 4),
     "regular": (regular, 1),
     "waves": (waves, 2),
+    "rotor": (rotor, 8),
     "floating": (floating, 3),
     "memory": (memory, 8),
 }
