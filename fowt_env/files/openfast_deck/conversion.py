@@ -8,7 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fowt_env.files.openfast_deck.servodyn import RPM
+from fowt_env.descriptions.rotor_mass import rotor_mass_properties
+from fowt_env.descriptions.units import RPM
+from fowt_env.files.openfast_deck.hydrodyn import is_old
 
 NEAR = 0.05  # m, of the outermost blade stations from hub and tip: line loads fall to zero there
 OVERSPEED = 1.3  # of the rated speed: failure threshold of the environment, a choice of this project
@@ -25,12 +27,13 @@ class Row(NamedTuple):
 
 def mass_properties(deck):
     """{name: figure} of the parts and their sum, kg and m: what ElastoDyn's summary lists too."""
-    values, blade, blades = deck.elastodyn, deck.elastodyn.blade, deck.elastodyn.blades
-    rotor = values["HubMass"] + blades * blade.mass
+    values = deck.elastodyn
+    blade = float(values.blade.mass.sum())
+    rotor = values["HubMass"] + values.blades * blade
     water = sum(fill.mass for fill in deck.hydrodyn.fills)
     top = rotor + values["NacMass"] + values["YawBrMass"]
     return {
-        "blade": blade.mass,
+        "blade": blade,
         "rotor": rotor,
         "nacelle": values["NacMass"],
         "yaw bearing": values["YawBrMass"],
@@ -43,22 +46,18 @@ def mass_properties(deck):
 
 
 def rotor_mass(deck):
-    """(mass, inertia about the shaft, about a diameter, offset of the centre of mass downwind along the shaft).
-
-    Blades straight along the coned pitch axis, as ElastoDyn has them; a hub without inertia about diameters.
-    """
-    values, blade, blades = deck.elastodyn, deck.elastodyn.blade, deck.elastodyn.blades
-    root, cone = values["HubRad"], values["PreCone"]  # positive PreCone leans downwind
-    first = blade.first + blade.mass * root
-    second = blade.second + 2.0 * root * blade.first + blade.mass * root**2
-    mass = values["HubMass"] + blades * blade.mass
-    if mass <= 0.0:
+    """RotorMass of straight blades along the coned pitch axis, as ElastoDyn has them."""
+    values = deck.elastodyn
+    if values["HubMass"] + values.blade.mass.sum() <= 0.0:
         raise values.file.wrong("HubMass", values["HubMass"], "> 0 with massless blades")
-    offset = (values["HubMass"] * values["HubCM"] + blades * first * math.sin(cone)) / mass
-    shaft = values["HubIner"] + blades * second * math.cos(cone) ** 2
-    along = blades * second * math.sin(cone) ** 2 + values["HubMass"] * values["HubCM"] ** 2
-    across = 0.5 * blades * second * math.cos(cone) ** 2 + along - mass * offset**2
-    return mass, shaft, across, offset
+    return rotor_mass_properties(
+        values.blade,
+        blades=values.blades,
+        cone=-values["PreCone"],
+        hub_mass=values["HubMass"],
+        hub_inertia=values["HubIner"],
+        hub_cm=values["HubCM"],
+    )
 
 
 def ballast(deck):
@@ -82,6 +81,27 @@ def ballast(deck):
         d = at - centre
         total += own + part * (d @ d * np.eye(3) - np.outer(d, d))
     return mass, centre, total
+
+
+def additional_stiffness(deck):
+    """((6, 6) additional stiffness, comment): AddCLin, less what the weight of water in members has by itself.
+
+    Of old files alone (hydrodyn.is_old); in all others the weight moves with the members.
+    """
+    hydro, source = deck.hydrodyn, deck.hydrodyn.file.source("AddCLin")
+    stiffness = np.array(hydro.stiffness)
+    if not hydro.fills or not is_old(hydro.file):
+        return stiffness, source
+    own = np.zeros((6, 6))
+    for fill in hydro.fills:
+        x, y, z = np.array(fill.centre) * fill.mass * deck.site.gravity
+        own[3, 3] -= z
+        own[4, 4] -= z
+        own[3, 5] += x
+        own[4, 5] += y
+    rest = stiffness - own
+    rest[np.abs(rest) < 1e-6 * np.abs(own).max()] = 0.0
+    return rest, f"{source}, less what the weight of the water in members restores"
 
 
 def tower_mass(deck):
@@ -192,12 +212,12 @@ def platform_rows(deck, name, turbine, coefficients, options=None):
         if (depth := draft(deck)) is not None:
             tables["potential_flow"].append(Row("draft", depth, hydro.file.source("Jointzi")))
     added = [
-        Row(key, value, hydro.file.source(name))
-        for key, name, value in (
-            ("preload", "AddF0", hydro.preload),
-            ("stiffness", "AddCLin", hydro.stiffness),
-            ("linear_damping", "AddBLin", hydro.linear_damping),
-            ("quadratic_damping", "AddBQuad", hydro.quadratic_damping),
+        Row(key, value, comment)
+        for key, value, comment in (
+            ("preload", hydro.preload, hydro.file.source("AddF0")),
+            ("stiffness", *additional_stiffness(deck)),
+            ("linear_damping", hydro.linear_damping, hydro.file.source("AddBLin")),
+            ("quadratic_damping", hydro.quadratic_damping, hydro.file.source("AddBQuad")),
         )
         if np.any(value)
     ]
@@ -264,7 +284,7 @@ def turbine_rows(deck, name):
     """{table: rows} of turbine.toml."""
     values, control = deck.elastodyn, deck.control
     source, why = values.file.source, control.sources
-    mass, shaft, across, offset = rotor_mass(deck)
+    rotor = rotor_mass(deck)
     overhang, height = hub_place(deck)
     rated = control.rated_speed / values["GBRatio"]
     nacelle = values["NacYIner"] - values["NacMass"] * (values["NacCMxn"] ** 2 + values["NacCMyn"] ** 2)
@@ -274,18 +294,16 @@ def turbine_rows(deck, name):
             values["NacYIner"],
             f">= {values['NacYIner'] - nacelle:g}, NacMass at NacCMxn and NacCMyn alone",
         )
-    law = [
-        "rated_torque", "rated_speed", "cut_in_speed", "region2_start_speed", "region2_constant",
-        "transition_speed", "slip_percent", "region3_min_pitch", "max_torque", "max_torque_rate",
-        "speed_filter_corner",
-    ]  # fmt: skip
-    law_rows = [Row(key, getattr(control, key), why.get(key, "")) for key in law]
-    law_rows.insert(1, Row("rated_power", control.rated_power, "rated_torque times rated_speed, mechanical"))
+    law = {"rated_torque": control.rated_torque, "rated_power": control.rated_power,
+           "rated_speed": control.rated_speed} | control.law  # fmt: skip
+    why = {"rated_power": "rated_torque times rated_speed, mechanical"} | why
+    law_rows = [Row(key, value, why.get(key, "")) for key, value in law.items()]
     blades = source("BldFile(1)", "HubMass", "HubIner")
     tables = {
         "": [
             Row("name", name),
             Row("source", f"imported from {deck.name}"),
+            *([Row("discon", control.discon.name, "controller of the deck, which rosco runs")] if control.discon else []),
             Row("rated_rotor_speed_rpm", rated / RPM, f"{why.get('rated_speed', '')} over GBRatio"),
             Row("rated_wind_speed", control.rated_wind_speed or 11.4, why.get("rated_wind_speed", "a guess")),
             Row("cut_in_wind_speed", control.cut_in_wind_speed, why.get("cut_in_wind_speed", "usual value")),
@@ -295,16 +313,16 @@ def turbine_rows(deck, name):
         ],
         "rotor": [
             Row("blades", values.blades, source("NumBl")),
-            Row("mass", mass, blades + ", BldNodes elements"),
+            Row("mass", rotor.mass, blades + ", BldNodes elements"),
             Row("overhang", overhang, source("OverHang", "ShftTilt")),
             Row("hub_height", height, source("TowerHt", "Twr2Shft", "OverHang", "ShftTilt")),
             Row("hub_radius", values["HubRad"], source("HubRad")),
             Row("tip_radius", values["TipRad"], source("TipRad")),
-            Row("inertia", shaft, blades + ", PreCone"),
-            Row("inertia_diameter", across, blades + ", PreCone; no hub inertia about diameters in ElastoDyn"),
+            Row("inertia", rotor.inertia, blades + ", PreCone"),
+            Row("inertia_diameter", rotor.inertia_diameter, blades + ", PreCone; no hub inertia about diameters in ElastoDyn"),
             Row("shaft_tilt_deg", -math.degrees(values["ShftTilt"]) + 0.0, "minus " + source("ShftTilt")),
             Row("cone_deg", -math.degrees(values["PreCone"]) + 0.0, "minus " + source("PreCone(1)")),
-            Row("cm_offset", offset, blades + ", HubCM, PreCone"),
+            Row("cm_offset", rotor.cm_offset, blades + ", HubCM, PreCone"),
         ],
         "nacelle": [
             Row("mass", values["NacMass"], source("NacMass")),
@@ -328,14 +346,11 @@ def turbine_rows(deck, name):
         ],
         "torque_law": law_rows,
     }  # fmt: skip
-    if control.gains is not None:
-        gains = why.get("gains", "")
-        tables["gains.oc3"] = [
-            Row("KP", control.gains[0], gains),
-            Row("KI", control.gains[1], gains),
-            Row("gain_schedule_pitch", control.gains[2], "rad, at which the gains are half"),
+    for gain_set, (proportional, integral, half) in control.gains.items():
+        tables[f"gains.{gain_set}"] = [
+            Row("KP", proportional, why.get("gains", "")),
+            Row("KI", integral, why.get("gains", "")),
+            Row("gain_schedule_pitch", half, "rad, at which the gains are half"),
         ]
-    else:
-        tables["gains"] = []
     tables["blade"] = [Row("stations", "blade.csv"), Row("polars", "polars")]
     return tables

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fowt_env.descriptions.rotor_mass import BladeMass, blade_mass
 from fowt_env.files.openfast_deck.parser import PartFile
 
 MASS = {"low": 0.0, "high": 1e12}  # kg
@@ -19,7 +20,7 @@ NODES = {"low": 1, "high": 999}
 
 @dataclass(frozen=True)
 class Span:
-    """A blade along its own axis, or a tower above its base: moments of its mass about the root."""
+    """A tower above its base: moments of its mass about the base."""
 
     length: float  # m
     mass: float  # kg
@@ -34,7 +35,7 @@ class ElastoDyn:
     file: PartFile
     values: dict  # key of ElastoDyn in small letters: number in SI
     blades: int
-    blade: Span
+    blade: BladeMass
     tower: Span
     platform_products: tuple  # PtfmXYIner, PtfmYZIner, PtfmXZIner, kg m2
     gravity: float | None  # of FAST 8, where it stands here
@@ -110,7 +111,7 @@ def read_elastodyn(path, folders=()):
         file=file,
         values=values,
         blades=blades,
-        blade=_blade(file, folders, values["tiprad"] - values["hubrad"], values["tipmass"]),
+        blade=_blade(file, folders, values),
         tower=_tower(file, folders, values["towerht"] - values["towerbsht"]),
         platform_products=tuple(file.number(f"Ptfm{name}Iner", default=0.0) for name in ("XY", "YZ", "XZ")),
         gravity=file.number("Gravity", default=None, low=0.0, open_low=True),
@@ -145,7 +146,8 @@ def _span(length, nodes, place, density):
     return Span(length, float(mass.sum()), float(mass @ s), float(mass @ s**2))
 
 
-def _blade(file, folders, length, tip_mass):
+def _blade(file, folders, values):
+    """BladeMass of the blade file, with the mass at the tip."""
     path = file.other("BldFile(1)", "BldFile", folders=folders)
     if path is None:
         raise file.wrong("BldFile(1)", "unused", "the blade file: the masses of the rotor are in it")
@@ -156,10 +158,9 @@ def _blade(file, folders, length, tip_mass):
             raise file.wrong(f"BldFile({i})", name, "the file of blade 1: blades are alike")
     nodes = file.whole("BldNodes", default=50, **NODES)
     place, density = _distributed(path, "blade", "NBlInpSt", "BlFract", "BMassDen", "AdjBlMs")
-    span = _span(length, nodes, place, density)
-    return Span(
-        length, span.mass + tip_mass, span.first + tip_mass * length, span.second + tip_mass * length**2
-    )
+    tip = values["tiprad"]
+    blade = blade_mass(place, density, values["hubrad"], tip, nodes)
+    return BladeMass(np.append(blade.radius, tip), np.append(blade.mass, values["tipmass"]))
 
 
 def _tower(file, folders, length):

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fowt_env.files.openfast_deck.parser import PartFile, bare, number_of, words_of
+from fowt_env.files.openfast_deck.parser import PartFile, bare, locate, number_of, words_of
 
 MOST = 10_000  # joints, members
 ENDS = ("cd", "ca", "cp", "axcd")  # coefficients along a member
@@ -137,8 +137,6 @@ def _potential(file, folders, notes):
 
 def _wamit_root(name, folders):
     """Path without ending of WAMIT's files, letters of either case; or None."""
-    from fowt_env.files.openfast_deck.parser import locate
-
     for ending in (".1", ".hst"):
         path = locate(name + ending, folders)
         if path is not None:
@@ -363,12 +361,22 @@ def _fills(file, members, site):
             parts = [member for member in members if member.number == number]
             if not parts:
                 raise file.refusal(f"FillMList: member {number:g} is not there", line)
-            found += [fill for part in parts if (fill := _fill(part, numbers[-1], density)) is not None]
+            fills = [_fill(part, numbers[-1], density, not is_old(file)) for part in parts]
+            found += [fill for fill in fills if fill is not None]
     return found
 
 
-def _fill(member, level, density):
-    """Fill of a member up to a height, or None where there is none."""
+def is_old(file):
+    """Whether a file is of HydroDyn before OpenFAST 3, which had members' loads of another kind.
+
+    There the water in members was lumped on their axes, and its weight restored nothing: decks gave the
+    moment that it has as additional stiffness (OpenFAST/r-test 5MW_OC4Semi, before and after).
+    """
+    return not file.has("NBody")
+
+
+def _fill(member, level, density, solid):
+    """Fill of a member up to a height, or None where there is none. solid: not on the member's axis alone."""
     low, high = np.array(member.start), np.array(member.end)
     inner = [0.5 * d - t for d, t in zip(member.diameter, member.thickness, strict=True)]
     if low[2] > high[2]:
@@ -387,7 +395,7 @@ def _fill(member, level, density):
         return None
     s = t * length
     centre = density * float(w @ (area * s)) / mass
-    own = 0.5 * density * float(w @ (area * radius**2))
+    own = 0.5 * density * float(w @ (area * radius**2)) if solid else 0.0
     across = density * float(w @ (area * (s - centre) ** 2)) + 0.5 * own
     inertia = across * np.eye(3) + (own - across) * np.outer(axis, axis)
     return Fill(member.number, mass, tuple(float(x) for x in low + centre * axis), inertia)

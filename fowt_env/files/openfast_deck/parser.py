@@ -95,8 +95,8 @@ class PartFile:
         )
 
     def source(self, *keys):
-        """ "file: keys", the comment beside a figure that was worked out of them."""
-        return f"{self.path.name}: {', '.join(keys)}"
+        """ "ElastoDyn: keys", the comment beside a figure that was worked out of them."""
+        return f"{self.kind}: {', '.join(keys)}"
 
     # ------------------------------------------------------------------ values
 

@@ -7,12 +7,9 @@ import math
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-import numpy as np
-
-from fowt_env.files.openfast_deck.parser import PartFile, bare, number_of, words_of
-
-RPM = math.pi / 30.0
-MOST_SCHEDULE = 1000
+from fowt_env.descriptions.units import RPM
+from fowt_env.errors import InputError
+from fowt_env.files.openfast_deck.parser import PartFile, bare, locate, number_of, words_of
 
 
 @dataclass(frozen=True)
@@ -22,15 +19,7 @@ class Control:
     generator_efficiency: float
     rated_torque: float  # N m
     rated_speed: float  # rad/s
-    cut_in_speed: float
-    region2_start_speed: float
-    region2_constant: float  # N m/(rad/s)^2
-    transition_speed: float
-    slip_percent: float
-    region3_min_pitch: float  # rad
-    max_torque: float
-    max_torque_rate: float
-    speed_filter_corner: float  # rad/s
+    law: dict  # further entries of the torque law by their names in turbine files
     minimum_pitch: float  # rad
     maximum_pitch: float
     pitch_rate: float  # rad/s
@@ -38,10 +27,11 @@ class Control:
     rated_wind_speed: float | None = None
     cut_in_wind_speed: float = 3.0
     cut_out_wind_speed: float = 25.0
-    gains: tuple | None = None  # KP (s), KI (-), pitch at which they are halved (rad)
+    gains: dict = field(default_factory=dict)  # set: (KP in s, KI, pitch in rad at which they are halved)
     sources: dict = field(default_factory=dict)
     notes: tuple = ()
-    discon: Path | None = None  # copied beside the turbine
+    discon: Path | None = None  # copied beside the turbine, with the table that it names
+    performance: Path | None = None
 
     @property
     def rated_power(self):
@@ -50,15 +40,16 @@ class Control:
 
 
 # NREL 5 MW: constants of its DISCON source (OpenFAST/r-test), which reads no file
-LEGACY_RATED_SPEED = 122.9096
-LEGACY = {
-    "rated_torque": 43093.55, "rated_speed": LEGACY_RATED_SPEED, "cut_in_speed": 70.16224,
-    "region2_start_speed": 91.21091, "region2_constant": 2.332287, "transition_speed": 121.6805,
-    "slip_percent": 10.0, "region3_min_pitch": 0.01745329, "max_torque": 47402.91,
-    "max_torque_rate": 15000.0, "speed_filter_corner": 1.570796, "minimum_pitch": 0.0,
-    "maximum_pitch": math.pi / 2.0, "pitch_rate": math.radians(8.0), "rated_wind_speed": 11.4,
+LEGACY_LAW = {
+    "cut_in_speed": 70.16224, "region2_start_speed": 91.21091, "region2_constant": 2.332287,
+    "transition_speed": 121.6805, "slip_percent": 10.0, "region3_min_pitch": 0.01745329,
+    "max_torque": 47402.91, "max_torque_rate": 15000.0, "speed_filter_corner": 1.570796,
 }  # fmt: skip
-LEGACY_GAINS = {True: (0.006275604, 0.0008965149, 0.1099965), False: (0.01882681, 0.008068634, 0.1099965)}
+LEGACY = {
+    "rated_torque": 43093.55, "rated_speed": 122.9096, "minimum_pitch": 0.0, "maximum_pitch": math.pi / 2.0,
+    "pitch_rate": math.radians(8.0), "rated_wind_speed": 11.4,
+}  # fmt: skip
+LEGACY_GAINS = {"oc3": (0.006275604, 0.0008965149, 0.1099965), "land": (0.01882681, 0.008068634, 0.1099965)}
 
 
 def read_control(path, gear_ratio, discon=None, folders=(), air_density=1.225, radius=None):
@@ -75,9 +66,7 @@ def read_control(path, gear_ratio, discon=None, folders=(), air_density=1.225, r
         notes += list(_left_out(servo))
     chosen = Path(discon) if discon is not None else None
     if chosen is None and servo is not None and servo.whole("VSContrl", default=0) != 1:
-        chosen = (
-            servo.other("DLL_InFile", folders=folders, default=None) if _has_file(servo, folders) else None
-        )
+        chosen = None if _is_legacy(servo) else _optional(servo, "DLL_InFile", folders)
     if chosen is not None:
         control = _rosco(chosen, efficiency, air_density, radius, folders)
     elif servo is None:
@@ -89,16 +78,18 @@ def read_control(path, gear_ratio, discon=None, folders=(), air_density=1.225, r
     return replace(control, sources=sources | control.sources, notes=(*notes, *control.notes))
 
 
-def _has_file(servo, folders):
-    """Whether the file that DLL_InFile names is there: the legacy controllers name one that is not."""
-    from fowt_env.files.openfast_deck.parser import locate
+def _is_legacy(servo):
+    """Whether the library is one of those of the NREL 5 MW turbine that read no file, by its name."""
+    library = servo.text("DLL_FileName", default="").lower()
+    return "discon_oc3" in library or "discon_iti" in library
 
-    name = servo.text("DLL_InFile", default="unused")
-    return (
-        locate(name, (servo.path.parent, *folders)) is not None
-        if name.lower() not in ("", "unused")
-        else False
-    )
+
+def _optional(file, key, folders):
+    """Path of the file that a key names, or None where it is not there."""
+    name = file.text(key, default="unused")
+    if name.lower() in ("", "none", "unused"):
+        return None
+    return locate(name, (file.path.parent, *folders))
 
 
 def _left_out(file):
@@ -127,19 +118,16 @@ def _legacy(servo, efficiency, gear_ratio):
     library = "" if servo is None else servo.text("DLL_FileName", default="").lower()
     if not 96.0 <= gear_ratio <= 98.0 or (library and "discon" not in library):
         where = "the deck" if servo is None else f"ServoDyn file {str(servo.path)!r}"
-        from fowt_env.errors import InputError
-
         raise InputError(
             f"{where}: DLL_InFile names no DISCON.IN that is there, and the torque law is not of VSContrl 1:"
             " give the DISCON.IN with --discon"
         )
-    floating = "hywind" in library or "barge" in library or "tlp" not in library and "semi" in library
     text = "legacy controller of the NREL 5 MW turbine (source of its library)"
-    names = {name: text for name in (*LEGACY, "gains")}
+    names = {name: text for name in (*LEGACY, *LEGACY_LAW, "gains")}
     notes = () if servo is not None else (
         ("no ServoDyn file", "torque law and limits of the NREL 5 MW turbine, by the gear ratio"),
     )  # fmt: skip
-    return Control(efficiency, **LEGACY, gains=LEGACY_GAINS[floating], sources=names, notes=notes)
+    return Control(efficiency, law=LEGACY_LAW, **LEGACY, gains=LEGACY_GAINS, sources=names, notes=notes)
 
 
 def _simple(servo, efficiency):
@@ -148,33 +136,16 @@ def _simple(servo, efficiency):
     torque = servo.number("VS_RtTq", low=0.0, high=1e12, open_low=True)
     constant = servo.number("VS_Rgn2K", low=0.0, high=1e14, open_low=True) / RPM**2
     slip = servo.number("VS_SlPc", low=0.0, high=100.0, open_low=True)
-    law = _law(torque, speed, constant, 0.3 * speed, servo, slip)
+    law = {"minimum_speed": 0.3 * speed, "region2_constant": constant, "slip_percent": slip}
     source = servo.source("VS_RtGnSp", "VS_RtTq", "VS_Rgn2K", "VS_SlPc")
     rate = servo.number("PitManRat(1)", default=8.0, low=0.0, high=90.0, open_low=True)
+    sources = {name: source for name in ("rated_torque", "rated_speed", "region2_constant", "slip_percent")}
     return Control(
-        efficiency, **law, region3_min_pitch=math.radians(1.0), max_torque=1.1 * torque,
-        max_torque_rate=0.35 * torque, speed_filter_corner=0.25 * 2.0 * math.pi, minimum_pitch=0.0,
-        maximum_pitch=0.5 * math.pi, pitch_rate=math.radians(rate),
-        sources={name: source for name in (*law, "max_torque")} | {"pitch_rate": servo.source("PitManRat(1)")},
-        notes=(("no limits of torque and pitch, no filter", "those of the NREL 5 MW turbine, scaled"),),
+        efficiency, torque, speed, law, 0.0, 0.5 * math.pi, math.radians(rate),
+        sources=sources | {"minimum_speed": "30 % of rated speed: not in the deck",
+                           "pitch_rate": servo.source("PitManRat(1)")},
+        notes=(("no limits of torque and pitch, no filter of the speed", "those of the NREL 5 MW turbine, scaled"),),
     )  # fmt: skip
-
-
-def _law(torque, speed, constant, slowest, file, slip=10.0):
-    """Speeds of the torque law: steep to the parabola about the slowest speed, and steep to the rated torque."""
-    # the slip line of region 2.5 needs a parabola below the rated torque where it ends
-    transition = min(0.99 * speed, 0.99 * math.sqrt(torque / constant))
-    if not 0.0 < slowest < 0.85 * transition:
-        slowest = 0.5 * transition
-    return {
-        "rated_torque": torque,
-        "rated_speed": speed,
-        "cut_in_speed": 0.9 * slowest,
-        "region2_start_speed": 1.1 * slowest,
-        "region2_constant": constant,
-        "transition_speed": transition,
-        "slip_percent": slip,
-    }
 
 
 def _values(file, key, default=None):
@@ -200,25 +171,30 @@ def _rosco(path, efficiency, air_density, radius, folders):
     torque = file.number("VS_RtTq", low=0.0, high=1e12, open_low=True)
     speed = file.number("PC_RefSpd", "VS_RefSpd", low=0.0, high=1e5, open_low=True)
     constant = file.number("VS_Rgn2K", low=0.0, high=1e14, open_low=True)
-    slowest = file.number("VS_MinOMSpd", default=0.0, low=0.0)
-    law = _law(torque, speed, constant, slowest, file)
-    notes = list(_rosco_notes(file, law))
-    largest = file.number("VS_MaxTq", default=1.1 * torque, low=0.0, open_low=True)
+    slowest = file.number("VS_MinOMSpd", default=0.0, low=0.0, high=1e5)
+    # the law of a turbine file needs some region 1 1/2, which ROSCO may have at standstill
+    known = 0.0 < slowest < 0.85 * speed
+    law = {
+        "minimum_speed": slowest if known else 0.3 * speed,
+        "region2_constant": constant,
+        "region3_min_pitch": file.number("PC_Switch", default=0.01745, low=0.0, high=1.0),
+        "max_torque": max(file.number("VS_MaxTq", default=1.1 * torque, low=0.0, open_low=True), torque),
+        "max_torque_rate": file.number("VS_MaxRat", default=0.348 * torque, low=0.0, open_low=True),
+        "speed_filter_corner": file.number(
+            "F_LPFCornerFreq", default=1.5708, low=0.0, high=1e3, open_low=True
+        ),
+    }
+    notes = list(_rosco_notes(file))
     winds = _values(file, "WE_FOPoles_v") or _values(file, "PS_WindSpeeds") or []
-    wind, how = _rated_wind(file, law, air_density, radius, folders)
-    gains, words = _gains(file)
-    notes += words
+    wind, how = _rated_wind(file, torque * speed, air_density, radius, folders)
     sources = {
         "rated_torque": source("VS_RtTq"), "rated_speed": source("PC_RefSpd"),
         "region2_constant": source("VS_Rgn2K"),
-        "cut_in_speed": f"0.9 of {source('VS_MinOMSpd')}", "region2_start_speed": f"1.1 of {source('VS_MinOMSpd')}",
-        "transition_speed": f"{law['transition_speed'] / speed:.3f} of {source('PC_RefSpd')}: below"
-        " where the parabola has the rated torque",
-        "slip_percent": "a choice: region 2.5 is no part of ROSCO's law",
+        "minimum_speed": source("VS_MinOMSpd") if known else "30 % of rated speed: not in the deck",
         "region3_min_pitch": source("PC_Switch"), "max_torque": source("VS_MaxTq"),
         "max_torque_rate": source("VS_MaxRat"), "speed_filter_corner": source("F_LPFCornerFreq"),
         "minimum_pitch": source("PC_MinPit"), "maximum_pitch": source("PC_MaxPit"),
-        "pitch_rate": source("PC_MaxRat"), "rated_wind_speed": how, "gains": source("PC_GS_angles", "PC_GS_KP", "PC_GS_KI"),
+        "pitch_rate": source("PC_MaxRat"), "rated_wind_speed": how,
         "time_constant": "followed at once: " + ("PA_Mode of " + path.name + " acts inside ROSCO"
                           if file.whole("PA_Mode", default=0) else "the deck has no actuator"),
         "generator_efficiency": source(efficiency_key),
@@ -229,28 +205,27 @@ def _rosco(path, efficiency, air_density, radius, folders):
     if high <= low:
         raise file.wrong("PC_MaxPit", high, f"> PC_MinPit = {low:g}")
     control = Control(
-        efficiency, **law,
-        region3_min_pitch=file.number("PC_Switch", default=0.01745, low=0.0, high=1.0),
-        max_torque=max(largest, torque),
-        max_torque_rate=file.number("VS_MaxRat", default=0.3 * torque, low=0.0, open_low=True),
-        speed_filter_corner=file.number("F_LPFCornerFreq", default=1.5708, low=0.0, high=1e3, open_low=True),
-        minimum_pitch=low, maximum_pitch=high,
-        pitch_rate=abs(file.number("PC_MaxRat", low=0.0, high=10.0, open_low=True)),
-        rated_wind_speed=wind, gains=gains, sources=sources, notes=tuple(notes), discon=file.path,
+        efficiency, torque, speed, law, low, high, file.number("PC_MaxRat", low=0.0, high=10.0, open_low=True),
+        rated_wind_speed=wind, sources=sources, notes=tuple(notes), discon=file.path,
+        performance=_optional(file, "PerfFileName", folders),
     )  # fmt: skip
     if len(winds) > 1 and 0.0 < winds[0] < wind < winds[-1]:
         control = replace(control, cut_in_wind_speed=winds[0], cut_out_wind_speed=winds[-1])
     return control
 
 
-def _rosco_notes(file, law):
+def _rosco_notes(file):
     """What the plain torque law of the turbine file has not, of ROSCO's."""
     yield (
         "ROSCO's torque law (VS_ControlMode {:g}, minimum speed VS_MinOMSpd)".format(
             file.whole("VS_ControlMode", default=2)
         ),
-        "for the built-in controllers, the law of regions 1 to 3: parabola VS_Rgn2K from 1.1 VS_MinOMSpd, steep"
-        f" lines to zero at 0.9 VS_MinOMSpd and to VS_RtTq at {law['transition_speed']:.4g} rad/s",
+        "for the built-in controllers the law of regions 1 to 3: a parabola VS_Rgn2K from VS_MinOMSpd on, a steep"
+        " line below and one to VS_RtTq above it",
+    )
+    yield (
+        "pitch gains of a table (PC_GS_angles, PC_GS_KP, PC_GS_KI)",
+        "in the controller rosco, which runs the DISCON.IN; those of the others are derived from the rotor",
     )
     if file.whole("PS_Mode", default=0):
         yield "peak shaving (PS_Mode)", "in the controller rosco alone, which runs the DISCON.IN"
@@ -263,34 +238,22 @@ def _rosco_notes(file, law):
         yield "individual pitch control (IPC_ControlMode)", "collective pitch"
 
 
-def _rated_wind(file, law, air_density, radius, folders):
+def _rated_wind(file, power, air_density, radius, folders):
     """(m/s, where it is from): of ROSCO's own tables, or of power and the largest power coefficient."""
     ramp = _values(file, "IPC_Vramp")
     if ramp and len(ramp) > 1 and 5.0 < ramp[1] < 30.0:
         return ramp[1], file.source("IPC_Vramp, its second value")
     largest, name = 0.45, "a power coefficient of 0.45"
-    table = file.other("PerfFileName", folders=folders, default=None) if _there(file, folders) else None
+    table = _optional(file, "PerfFileName", folders)
     if table is not None:
         found = _largest_power_coefficient(table)
         if found is not None:
             largest, name = found, f"the largest power coefficient {found:.3f} of {table.name}"
-    power = law["rated_torque"] * law["rated_speed"]
     reach = file.number("WE_BladeRadius", default=radius, low=0.0, open_low=True)
     if reach is None:
         return 11.4, "a guess: no radius is known"
     speed = (power / (0.5 * air_density * math.pi * reach**2 * largest)) ** (1.0 / 3.0)
     return min(max(speed, 5.0), 20.0), f"rated power at {name}"
-
-
-def _there(file, folders):
-    from fowt_env.files.openfast_deck.parser import locate
-
-    name = file.text("PerfFileName", default="unused")
-    return (
-        locate(name, (file.path.parent, *folders)) is not None
-        if name.lower() not in ("", "unused")
-        else False
-    )
 
 
 def _largest_power_coefficient(path):
@@ -307,30 +270,3 @@ def _largest_power_coefficient(path):
             good = [value for value in values if value is not None and value < 0.6]
             best = max([*good, best or 0.0])
     return best if best and best > 0.2 else None
-
-
-def _gains(file):
-    """((KP, KI, pitch of half gain) or None, notes): one schedule 1/(1 + pitch/that) through ROSCO's table."""
-    names = ("PC_GS_angles", "PC_GS_KP", "PC_GS_KI")
-    angle, kp, ki = (np.array(_values(file, name) or []) for name in names)
-    if not (1 <= len(angle) <= MOST_SCHEDULE) or len(angle) != len(kp) or len(angle) != len(ki):
-        return None, [("no schedule of pitch gains (PC_GS_KP)", "no gains: give them, or tune a controller")]
-    if not (ki < 0.0).all() or kp[0] >= 0.0:
-        return None, [("pitch gains of another sign (PC_GS_KP)", "no gains: give them, or tune a controller")]
-    if len(angle) == 1:
-        return (float(-kp[0]), float(-ki[0]), 10.0), []
-    slope, start = np.polyfit(angle, -1.0 / ki, 1)
-    if slope <= 0.0 or start <= 0.0:
-        return (float(-kp.mean()), float(-ki.mean()), 10.0), []
-    half = start / slope
-    shape = 1.0 / (1.0 + angle / half)
-    proportional = float((shape @ -kp) / (shape @ shape))
-    if proportional <= 0.0:
-        return None, [("pitch gains of another sign (PC_GS_KP)", "no gains: give them, or tune a controller")]
-    worst = float(np.abs(shape * proportional + kp).max() / np.abs(kp).max())
-    words = (
-        f"pitch gains from a table (PC_GS_angles, {len(angle)} rows)",
-        f"one schedule KP/(1 + pitch/{half:.4g}): KP within {100.0 * worst:.0f} % of its largest; the table is"
-        " in the DISCON.IN, which the controller rosco runs",
-    )
-    return (proportional, 1.0 / float(start), float(half)), [words]

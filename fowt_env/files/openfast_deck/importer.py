@@ -1,0 +1,135 @@
+"""A deck turned into a folder of this project's files, checked by reading them back."""
+
+import re
+import shutil
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from fowt_env.descriptions.platform import read_platform
+from fowt_env.descriptions.potential_flow import coefficient_arrays
+from fowt_env.descriptions.turbine import read_turbine
+from fowt_env.descriptions.wamit import read_wamit
+from fowt_env.errors import InputError
+from fowt_env.files.atomic import replacing
+from fowt_env.files.openfast_deck.conversion import platform_rows, stations, turbine_rows
+from fowt_env.files.openfast_deck.deck import read_deck
+from fowt_env.files.openfast_deck.output import blade_text, polar_text, toml_text
+from fowt_env.files.openfast_deck.report import make_report, markdown
+
+UNITS = "SI units (kg, m, s, N, rad) unless a key says otherwise (_deg, _rpm, _deg_per_s)."
+COEFFICIENTS = "hydro.npz"
+
+
+def import_deck(
+    fst,
+    folder,
+    *,
+    parts=None,
+    search=(),
+    discon=None,
+    excitation=None,
+    name=None,
+    replace_files=False,
+    head=(),
+):
+    """Report of a deck written as platform.toml, turbine/, hydro.npz and report.md into a folder.
+
+    fst            the .fst file, or None with parts
+    folder         made if need be; its files are left alone unless replace_files
+    parts          {"elastodyn": path ...} (deck.PARTS), in place of what the .fst names
+    search         further folders in which files that the deck names are looked for
+    discon         a DISCON.IN of ROSCO in place of the deck's
+    excitation     (omega, heading, force) in place of WAMIT's .3, as descriptions.wamit.read_wamit takes it
+    name           of platform and turbine; default: the folder's
+    head           further lines of comment in the files: sources, licence
+    Raises: InputError naming file, line, key, value and what is allowed; the folder then is as before.
+    """
+    folder = Path(folder)
+    name = name or folder.resolve().name
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"folder {str(folder)!r} is a file; must be a folder, or not there yet")
+    if (folder / "platform.toml").exists() and not replace_files:
+        raise InputError(
+            f"folder {str(folder)!r} has a platform.toml already; give another, or replace its files"
+        )
+    deck = read_deck(fst, parts, search, discon)
+    body = _coefficients(deck, excitation)
+    report = make_report(deck, name, body)
+    texts = _texts(deck, name, head)
+    with tempfile.TemporaryDirectory(prefix="fowt-import-") as temporary:
+        trial = Path(temporary)
+        _write(trial, deck, texts, body, markdown(report))
+        platform = read_platform(trial / "platform.toml")
+        read_turbine(platform.turbine)
+        _write(folder, deck, texts, body, markdown(report))
+    return report
+
+
+def _coefficients(deck, excitation):
+    """PotentialFlow of a deck, or None."""
+    potential, site = deck.hydrodyn.potential, deck.site
+    if potential is None:
+        return None
+    body = read_wamit(
+        potential.root, length_scale=potential.length_scale, gravity=site.gravity, density=site.water_density,
+        excitation=excitation,
+    )  # fmt: skip
+    return replace(body, source=f"WAMIT files {potential.root.name} of {deck.name}")
+
+
+def _texts(deck, name, head):
+    """{path in the folder: text} of all text files but the report."""
+    files = [("OpenFAST", deck.fst), ("ElastoDyn", deck.elastodyn.file), ("AeroDyn", deck.aerodyn.file),
+             ("HydroDyn", deck.hydrodyn.file)]  # fmt: skip
+    named = [f"{kind} {file.path.name}" for kind, file in files if file is not None]
+    if deck.control.discon is not None:
+        named.append(f"DISCON.IN {deck.control.discon.name}")
+    title = [f"Imported from the OpenFAST deck {deck.name} by fowt import. {UNITS}",
+             "Origin on the tower axis at still water; x downwind, z up, y to the left looking downwind.",
+             "Beside each figure: the file and the keys that it is from. Files: " + ", ".join(named) + ".",
+             *head]  # fmt: skip
+    columns, airfoils = stations(deck)
+    source = deck.aerodyn.blade_file.path.name
+    texts = {
+        "platform.toml": toml_text(platform_rows(deck, name, "turbine/turbine.toml", COEFFICIENTS), title),
+        "turbine/turbine.toml": toml_text(turbine_rows(deck, name), title),
+        "turbine/blade.csv": blade_text(columns, airfoils, [
+            f"Blade of {source}: its nodes, HubRad added; end nodes 0.05 m inside root and tip, where loads are zero.",
+            "radius along the pitch axis, m; twist in degrees, positive towards feather; prebend downwind, sweep, m.",
+            *head,
+        ]),
+    }  # fmt: skip
+    for airfoil, polar in deck.aerodyn.polars.items():
+        texts[f"turbine/polars/{airfoil}.csv"] = polar_text(
+            polar, [f"{airfoil} of {deck.aerodyn.file.path.name}; alpha in degrees.", *head]
+        )
+    return texts
+
+
+def _discon(control):
+    """Content of the deck's DISCON.IN, its table of the rotor named as it lies beside the copy."""
+    content = control.discon.read_bytes()
+    if control.performance is None:
+        return content
+    beside = b'"' + control.performance.name.encode() + b'"'
+    return re.sub(rb"(?m)^[^!\n]*(?=!\s*PerfFileName)", lambda _: beside + b"      ", content)
+
+
+def _write(folder, deck, texts, body, report):
+    """All files of an import, each whole or not at all; the platform's last, which makes them one."""
+    (folder / "turbine" / "polars").mkdir(parents=True, exist_ok=True)
+    if body is not None:
+        with replacing(folder / COEFFICIENTS) as path, path.open("wb") as file:
+            np.savez_compressed(file, **coefficient_arrays(body))
+    if deck.control.discon is not None:
+        with replacing(folder / "turbine" / deck.control.discon.name) as path:
+            path.write_bytes(_discon(deck.control))
+    if deck.control.performance is not None:
+        with replacing(folder / "turbine" / deck.control.performance.name) as path:
+            shutil.copyfile(deck.control.performance, path)
+    for name, text in {"report.md": report, **dict(reversed(texts.items()))}.items():
+        with replacing(folder / name) as path:
+            path.write_text(text, encoding="utf-8")

@@ -1,0 +1,146 @@
+"""What became of a deck: figures, what is approximated, what is left out, how to go on."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from fowt_env.files.markdown import markdown_table
+from fowt_env.files.openfast_deck.conversion import ballast, hub_place, mass_properties, rotor_mass
+from fowt_env.files.openfast_deck.hydrodyn import is_old
+
+
+class Report(NamedTuple):
+    """Rows of three tables: figures (name, value), differences (deck, here), sources (part, file)."""
+
+    title: str
+    figures: list
+    differences: list
+    files: list
+    suggestions: list
+
+
+def make_report(deck, name, body=None):
+    """Report of a deck imported under a name; body: its PotentialFlow, or None."""
+    return Report(
+        title=f"{name}: imported from {deck.name}",
+        figures=list(_figures(deck, body)),
+        differences=list(dict.fromkeys(_differences(deck))),
+        files=[(path.name,) for path in deck.files],
+        suggestions=[f"Sea of the deck: {deck.sea.words}.", f"Wind of the deck: {deck.inflow.words}."],
+    )
+
+
+def _figures(deck, body):
+    masses = mass_properties(deck)
+    for part, value in masses.items():
+        if value or part == "total":
+            yield f"mass, {part}", f"{value:,.1f} kg".replace(",", " ")
+    rotor = rotor_mass(deck)
+    overhang, height = hub_place(deck)
+    mass, centre, inertia = ballast(deck)
+    yield "rotor inertia about the shaft", f"{rotor.inertia:.6g} kg m2"
+    yield "hub height, overhang", f"{height:.3f} m, {overhang:.3f} m"
+    yield "platform centre of mass", ", ".join(f"{x:.4g}" for x in centre) + " m"
+    yield "platform inertia about it", ", ".join(f"{x:.5g}" for x in np.diag(inertia)) + " kg m2"
+    potential = deck.hydrodyn.potential
+    if potential is not None:
+        volume = potential.volume
+        yield "displaced volume", f"{volume:.6g} m3"
+        lift = deck.site.water_density * volume - masses["total"]
+        yield "buoyancy less weight, which lines and members hold", f"{lift / 1e3:,.1f} t".replace(",", " ")
+    if body is not None:
+        low, high = body.omega[0], body.omega[-1]
+        yield "radiation coefficients", f"{len(body.omega)} frequencies, {low:.3g} to {high:.3g} rad/s"
+        yield "wave excitation", f"{len(body.excitation_omega)} frequencies, {len(body.heading)} headings"
+        if body.difference_qtf is not None:
+            shape = body.difference_qtf.value.shape
+            yield "difference-frequency QTF", f"{shape[1]} frequencies, {shape[0]} pairs of headings"
+    inside = sum(member.potential_flow for member in deck.hydrodyn.members)
+    if deck.hydrodyn.members:
+        yield "members", f"{len(deck.hydrodyn.members)}, {inside} of them in the potential-flow body"
+    yield "mooring lines", str(len(deck.lines))
+    control = deck.control
+    yield "rated torque, speed", f"{control.rated_torque:.6g} N m, {control.rated_speed:.6g} rad/s"
+    yield "rated wind speed", f"{control.rated_wind_speed or 11.4:.4g} m/s"
+
+
+def _differences(deck):
+    """(what the deck has, what the plant has) of everything that is not alike."""
+    for what in deck.elastodyn.flexible:
+        yield what, "rigid"
+    if any(deck.elastodyn.platform_products):
+        names = "PtfmXYIner, PtfmYZIner, PtfmXZIner"
+        yield f"products of inertia of the platform ({names})", "left out: its principal axes are the body's"
+    _, _, inertia = ballast(deck)
+    across = np.abs(inertia - np.diag(np.diag(inertia))).max()
+    if deck.hydrodyn.fills and across > 1e-3 * np.diag(inertia).min():
+        yield (
+            "ballast water whose principal axes are not the body's",
+            f"products of inertia of {across:.3g} kg m2 left out",
+        )
+    yield from deck.aerodyn.notes
+    many = [name for name, (_, tables, _) in deck.aerodyn.tables.items() if tables > 1]
+    if many:
+        taken, tables, reynolds = deck.aerodyn.tables[many[0]]
+        yield (
+            f"{len(many)} polars of several tables, such as {tables} of {many[0]}",
+            f"one table each: number {taken} (Reynolds number {reynolds} million)",
+        )
+    yield (
+        "tower drag of a table over height (TwrDiam, TwrCd)",
+        "a straight taper and one drag coefficient of the same load in even wind",
+    )
+    if deck.elastodyn["GBoxEff"] != 100.0:
+        yield (
+            f"gearbox efficiency {deck.elastodyn['GBoxEff']:g} % (GBoxEff)",
+            "mesh_loss, the same part of the torque",
+        )
+    yield from deck.hydrodyn.notes
+    if deck.hydrodyn.fills and is_old(deck.hydrodyn.file):
+        yield (
+            "water in members that restores nothing, its moment in AddCLin (HydroDyn before OpenFAST 3)",
+            "water whose weight turns with the platform; AddCLin less that moment",
+        )
+    if deck.hydrodyn.memory == 0 and deck.hydrodyn.potential is not None:
+        yield "no memory of radiated waves (RdtnMod 0)", "radiation with its memory"
+    if deck.hydrodyn.memory == 2:
+        yield "state-space fit of the radiation in a file (.ss)", "from the coefficients themselves"
+    for key, value in deck.hydrodyn.second_order.items():
+        if key == "DiffQTF" and value == 12:
+            yield f"difference-frequency forces (DiffQTF {value})", "with the option second_order"
+        else:
+            yield f"second-order forces ({key} {value})", "left out"
+    if any(end[0] for member in deck.hydrodyn.members for end in member.axial):
+        yield (
+            "axial drag of joints, which HydroDyn has on rho A |v| v / 4",
+            "axial_drag_coefficient, on rho A |v| v / 2: half of AxCd",
+        )
+    yield from deck.notes
+    yield from deck.control.notes
+
+
+def markdown(report):
+    """Text of report.md."""
+    parts = [
+        f"# {report.title}",
+        "",
+        "Each figure of `platform.toml` and `turbine/turbine.toml` names the file and the keys that it is from.",
+        "",
+        "## Key figures",
+        "",
+        markdown_table(("figure", "value"), report.figures),
+        "",
+        "## What is not as in the deck",
+        "",
+        markdown_table(("in the deck", "here"), report.differences),
+        "",
+        "## Wind and sea",
+        "",
+        *(f"- {line}" for line in report.suggestions),
+        "",
+        "## Files read",
+        "",
+        *(f"- `{row[0]}` and what it names" for row in report.files),
+        "",
+    ]
+    return "\n".join(parts)
