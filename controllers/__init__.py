@@ -42,9 +42,10 @@ def named(name):
     return CONTROLLERS[name]
 
 
-def information(name):
+def information(name, turbine=None):
     """What a controller of CONTROLLERS or an agent uses: Measurement fields and PRIVILEGED_INPUTS.
 
-    Raises: InputError for an unknown name.
+    turbine: a descriptions.turbine.Turbine; None: the NREL 5 MW one. Without published gains a law also uses
+    the plant's equations. Raises: InputError for an unknown name.
     """
-    return make(name, read_turbine("nrel5mw"), 0.1).information
+    return make(name, read_turbine("nrel5mw") if turbine is None else turbine, 0.1).information

@@ -3,6 +3,12 @@
 from gymnasium.envs.registration import register, registry
 
 ENVIRONMENTS = {"fowt_env/OC3Hywind-v1": "fowt_env.envs:FowtEnv"}
+OTHER_PLATFORMS = {  # name: platform; FowtEnv takes any platform, these have a name that results can cite
+    "fowt_env/VolturnUS15MW-v0": "iea15_volturnus_s",
+    "fowt_env/ITIBarge-v0": "nrel5mw_iti_barge",
+    "fowt_env/OC4Semi-v0": "nrel5mw_oc4_semi",
+}
+ENTRY_POINT = "fowt_env.envs:FowtEnv"
 VECTOR_ENTRY_POINT = "fowt_env.envs:FowtVectorEnv"  # of each of them
 
 
@@ -11,3 +17,11 @@ def register_environments():
     for name, entry_point in ENVIRONMENTS.items():
         if name not in registry:
             register(id=name, entry_point=entry_point, vector_entry_point=VECTOR_ENTRY_POINT)
+    for name, platform in OTHER_PLATFORMS.items():
+        if name not in registry:
+            register(
+                id=name,
+                entry_point=ENTRY_POINT,
+                vector_entry_point=VECTOR_ENTRY_POINT,
+                kwargs={"platform": platform},
+            )

@@ -1,11 +1,13 @@
 """Linear closed loop of a plant and the PI law: what its gains do to every mode, theory.md, section 4."""
 
-from math import isinf
+from math import isinf, pi
 
 import numpy as np
 
 from fowt_env.analysis.linear_model import LinearModel, linearize, modes
+from fowt_env.analysis.memory_free import platform_frequency
 from fowt_env.analysis.trim import trim
+from fowt_env.controllers.gains import with_gains
 from fowt_env.controllers.pi import PISettings, schedule_gain
 from fowt_env.descriptions.units import DEGREE
 from fowt_env.errors import InputError
@@ -13,7 +15,6 @@ from fowt_env.plant.drivetrain import generator_torque
 from fowt_env.plant.state import State
 from fowt_env.scene.build import build_scene
 
-PLATFORM_PERIOD = 30.0  # s
 TORQUE_STEP = 1e-4  # rad/s of rotor speed, for the slope of the torque curve
 
 
@@ -65,6 +66,12 @@ def closed_loop_matrix(model: LinearModel, settings: PISettings):
     return a, (*model.states, "filtered_speed", "speed_integral")
 
 
+def nearest_to_platform(found, model):
+    """That of some Modes whose period is nearest to the platform's own, with blades and torque held."""
+    period = 2.0 * pi / platform_frequency(model)
+    return min(found, key=lambda mode: abs(mode.period - period))
+
+
 def platform_pitch_damping(winds, gain_sets, platform="oc3_hywind", **options):
     """{gain set: [damping ratio of the platform-pitch mode at each wind]} on the floating platform.
 
@@ -77,8 +84,9 @@ def platform_pitch_damping(winds, gain_sets, platform="oc3_hywind", **options):
         scene = build_scene(platform, wind=float(wind), **options)
         model = linearize(scene, trim(scene))
         for name, changes in gain_sets.items():
-            a, names = closed_loop_matrix(model, PISettings.published(scene.turbine, **changes))
+            settings = PISettings.published(with_gains(scene), **changes)
+            a, names = closed_loop_matrix(model, settings)
             pitching = [m for m in modes(a, names, model.cm_height, model.arm) if m.name == "platform_pitch"]
             # the rotor loop may come near; the platform's own period tells them apart
-            table[name].append(min(pitching, key=lambda m: abs(m.period - PLATFORM_PERIOD)).damping_ratio)
+            table[name].append(nearest_to_platform(pitching, model).damping_ratio)
     return table

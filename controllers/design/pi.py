@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fowt_env.analysis.linear_model import modes
-from fowt_env.controllers.design.closed_loop import PLATFORM_PERIOD, closed_loop_matrix
+from fowt_env.controllers.design.closed_loop import closed_loop_matrix, nearest_to_platform
 from fowt_env.controllers.pi import PISettings, schedule_gain
 from fowt_env.descriptions.checks import check_number
 from fowt_env.descriptions.units import DEGREE
@@ -84,4 +84,4 @@ def _platform_damping(model, settings):
     a, names = closed_loop_matrix(model, settings)
     found = modes(a, names, model.cm_height, model.arm)
     pitching = [mode for mode in found if mode.name == "platform_pitch"]
-    return min(pitching or found, key=lambda mode: abs(mode.period - PLATFORM_PERIOD)).damping_ratio
+    return nearest_to_platform(pitching or found, model).damping_ratio

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fowt_env.controllers.lqr.design import LOWEST_DESIGN_WIND, MODEL_SHAPES, DesignModel, LQGSettings
+from fowt_env.controllers.lqr.design import MODEL_SHAPES, DesignModel, LQGSettings, lowest_design_wind
 from fowt_env.controllers.lqr.law import LQR
 from fowt_env.controllers.pi import PI, PISettings
 from fowt_env.descriptions.checks import is_number
@@ -151,13 +151,14 @@ def _lqr(settings, where):
                 f"{where}: settings.models[{i}].wind = {models[i].wind:g}: must be {SPACING:g} m/s above"
                 " the last"
             )
-    if models[-1].wind < LOWEST_DESIGN_WIND:
-        raise InputError(
-            f"{where}: settings.models: the last wind is {models[-1].wind:g} m/s; one of"
-            f" {LOWEST_DESIGN_WIND} m/s or more is needed"
-        )
 
     def make(turbine, control_dt, name):
+        lowest = lowest_design_wind(turbine)
+        if models[-1].wind < lowest:
+            raise InputError(
+                f"settings.models: the last wind is {models[-1].wind:g} m/s; one of {lowest} m/s or more is"
+                " needed"
+            )
         try:
             return LQR(turbine, control_dt, chosen, name, models=models)
         except (np.linalg.LinAlgError, ValueError) as error:

@@ -2,17 +2,24 @@
 
 Per wind speed: surge, platform pitch, rotor and pitch actuator in the plane, the rotor-averaged wind as a
 second-order filter fitted to its Kaimal spectrum, the waves of the site's sea as one resonance acting with
-the hull's force at the spectrum's peak. The controls are the rates of torque and blade-pitch command.
+the hull's force at the spectrum's peak. The controls are the rates of torque and blade-pitch command. The
+memory of radiated waves acts as the added mass and the damping of the platform's pitch
+(analysis/memory_free.py); what that leaves out, the estimator takes as a moment on the platform.
+
+Winds, travels and moments that were found for the NREL 5 MW turbine are scaled to others: winds by the
+difference of the rated ones, blade-pitch travel by the rated rotor speed, moments by swept area and hub
+height.
 """
 
 from dataclasses import asdict, dataclass, fields, replace
-from math import pi, sqrt
+from math import ceil, floor, pi, sqrt
 
 import numpy as np
 from scipy.linalg import expm, solve_discrete_are
 from scipy.optimize import least_squares
 
 from fowt_env.analysis.linear_model import linearize
+from fowt_env.analysis.memory_free import without_memory
 from fowt_env.analysis.trim import without_fluctuations
 from fowt_env.analysis.trim_cache import plant_key, water_key
 from fowt_env.analysis.wave_excitation import wave_force
@@ -20,14 +27,16 @@ from fowt_env.caches import Cache, cached
 from fowt_env.descriptions.checks import check_number
 from fowt_env.descriptions.iec import ntm_sigma
 from fowt_env.descriptions.sea_state import joint_sea_state, sea_state_of
+from fowt_env.descriptions.units import RPM
 from fowt_env.errors import unknown
 from fowt_env.weather.turbulence import amplitudes
 
 SITE = "gulf_of_maine_normal"  # joint sea states, as in the named suites
 LAST_SEA_WIND = 24.0  # m/s, where the table ends: the sea beyond is designed for as there
 TURBULENCE_CLASS = "B"
-WINDS = tuple(range(4, 26))  # m/s
-LOWEST_DESIGN_WIND = 12  # m/s; below, the gains of this wind act and the pitch rests on its minimum
+RATED_WIND, ROTOR_SPEED = 11.4, 12.1 * RPM  # of the NREL 5 MW turbine, m/s and rad/s
+TIP_RADIUS, HUB_HEIGHT = 63.0, 90.0  # of the same, m
+ABOVE_RATED = 0.1  # m/s, least distance of the lowest wind that is designed for from the rated one
 PLANT = ("surge", "platform_pitch", "vx", "wy", "rotor_speed", "blade_pitch")
 SENSORS = ("rotor_speed", "blade_pitch", "platform_pitch", "platform_pitch_rate", "nacelle_acceleration")
 N_PLANT, N_SENSORS = len(PLANT), len(SENSORS)
@@ -48,8 +57,9 @@ MOMENT_NOISE = 2e5  # N m per root second: random walk of what no other state ex
 class LQGSettings:
     """What the feedback of lqr aims at and may spend, see controllers/lqr/optimum.py.
 
-    The limits are on deviations of the linear loop; those near rated wind hold at LOWEST_DESIGN_WIND. The
-    defaults are what `fowt design tune lqr` found.
+    The limits are on deviations of the linear loop; those near rated wind hold at lowest_design_wind. The
+    defaults are what `fowt design tune lqr` found on OC3-Hywind; winds and travels in them are those of the
+    NREL 5 MW turbine and are scaled to others.
     """
 
     share: float = 0.577  # of platform pitch in the aim, at SHARE_WIND; the rest is rotor speed
@@ -85,7 +95,7 @@ class LQGSettings:
         return replace(self, **changes)
 
     def share_at(self, wind):
-        """Share of platform pitch at a wind, m/s."""
+        """Share of platform pitch at a wind (m/s) of the NREL 5 MW turbine (equivalent_wind)."""
         low, high = SHARE_RANGE
         return min(max(self.share + self.share_growth * (wind - SHARE_WIND), low), high)
 
@@ -117,6 +127,36 @@ MODEL_SHAPES = {  # of the fields of DesignModel
     "torque": (),
     "pitch": (),
 }
+
+
+def design_winds(turbine):
+    """Winds (m/s, 1 apart) of the models of a turbine, above cut-in and up to cut-out."""
+    return tuple(range(floor(turbine.cut_in_wind_speed) + 1, floor(turbine.cut_out_wind_speed) + 1))
+
+
+def lowest_design_wind(turbine):
+    """Lowest wind (m/s) that is designed for; below, its gains act and the pitch rests on its minimum."""
+    return ceil(turbine.rated_wind_speed + ABOVE_RATED)
+
+
+def winds_above_rated(turbine):
+    """Whole winds (m/s) at which the blades of a turbine are pitched, up to cut-out."""
+    return tuple(range(lowest_design_wind(turbine), floor(turbine.cut_out_wind_speed) + 1))
+
+
+def equivalent_wind(turbine, wind):
+    """The wind of the NREL 5 MW turbine that is as far from rated wind, m/s."""
+    return wind - (turbine.rated_wind_speed - RATED_WIND)
+
+
+def travel_scale(turbine):
+    """Blade-pitch travel of a turbine over that of the NREL 5 MW turbine: as much in as many turns."""
+    return turbine.rated_rotor_speed / ROTOR_SPEED
+
+
+def moment_scale(turbine):
+    """Moments on a turbine's platform over those on the NREL 5 MW turbine's."""
+    return (turbine.rotor.tip_radius / TIP_RADIUS) ** 2 * (turbine.rotor.hub_height / HUB_HEIGHT)
 
 
 @cached(64)
@@ -151,7 +191,7 @@ def scene_at(scene, speed):
 
 def design_model(scene, speed):
     """DesignModel of a scene's plant at a wind speed, m/s."""
-    model = linearize(scene_at(scene, speed))
+    model = without_memory(linearize(scene_at(scene, speed)))
     rows = [model.index(name) for name in PLANT]
     sensors = [model.output_index(name) for name in SENSORS]
     sea = sea_state_of(joint_sea_state(SITE, min(float(speed), LAST_SEA_WIND)))
@@ -196,10 +236,12 @@ _MODELS = Cache(16)  # all that a design depends on -> DesignModels
 
 
 def design_models(scene):
-    """DesignModels of the scene's plant over WINDS; remembered per plant, whatever its weather."""
+    """DesignModels of the scene's plant over design_winds; remembered per plant, whatever its weather."""
     aero = scene.model.aero
     key = (plant_key(scene), water_key(scene), aero.wind.shear_exponent, aero.field is None)
-    return _MODELS.get(key, lambda: tuple(design_model(scene, speed) for speed in WINDS))
+    return _MODELS.get(
+        key, lambda: tuple(design_model(scene, speed) for speed in design_winds(scene.turbine))
+    )
 
 
 def sampled(a, b, dt):
@@ -220,15 +262,15 @@ def sampled_noise(a, q, dt):
     return both[n:, n:].T @ both[:n, n:]
 
 
-def estimator_gain(model, dt):
-    """(N_STATE, N_SENSORS) steady Kalman gain of the correction at each sample."""
+def estimator_gain(model, dt, moments=1.0):
+    """(N_STATE, N_SENSORS) steady Kalman gain of the correction at each sample; moments: moment_scale."""
     intensity = model.G @ model.G.T
     intensity[:N_PLANT, :N_PLANT] += np.diag(np.square(MODEL_NOISE))
-    intensity[MOMENT, MOMENT] += MOMENT_NOISE**2
+    intensity[MOMENT, MOMENT] += (MOMENT_NOISE * moments) ** 2
     a, _ = sampled(model.A, model.B, dt)
     q = sampled_noise(model.A, intensity, dt)
     scale = np.ones(N_STATE)
-    scale[MOMENT] = 1e7  # N m: the other states are of order one
+    scale[MOMENT] = 1e7 * moments  # N m: the other states are of order one
     r = np.diag(np.square(SENSOR_NOISE))
     a = a / scale[:, None] * scale
     c = model.C * scale

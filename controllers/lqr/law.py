@@ -15,6 +15,7 @@ import numpy as np
 
 from fowt_env.caches import Cache
 from fowt_env.control import CompiledController, check_control_dt
+from fowt_env.controllers.gains import with_gains
 from fowt_env.controllers.lqr import design
 from fowt_env.controllers.lqr.design import (
     MOMENT,
@@ -124,7 +125,8 @@ def blocks(models, settings, turbine, dt):
     rows = []
     for model, gain in zip(models, optimal_gains(models, settings, turbine, dt), strict=True):
         a, b = design.sampled(model.A, model.B, dt)
-        parts = (model.trim, model.torque, model.pitch, a, b, model.C, design.estimator_gain(model, dt), gain)
+        estimator = design.estimator_gain(model, dt, design.moment_scale(turbine))
+        parts = (model.trim, model.torque, model.pitch, a, b, model.C, estimator, gain)
         rows.append(np.concatenate([np.ravel(part) for part in parts]))
     return np.array(rows)
 
@@ -168,6 +170,7 @@ class LQR(CompiledController):
             return
         models = design.design_models(scene)
         if models is not self._plant:
+            self.turbine = with_gains(scene)  # of the law that the design is compared with
             self._plant = models
             self.take(models)
 

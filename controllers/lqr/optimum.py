@@ -14,7 +14,6 @@ import numpy as np
 from scipy.linalg import solve_discrete_are
 
 from fowt_env.controllers.lqr.design import (
-    LOWEST_DESIGN_WIND,
     MOMENT,
     N_FEEDBACK,
     N_PLANT,
@@ -22,9 +21,13 @@ from fowt_env.controllers.lqr.design import (
     PLANT,
     SENSOR_NOISE,
     WIND,
+    equivalent_wind,
     estimator_gain,
+    lowest_design_wind,
+    moment_scale,
     sampled,
     sampled_noise,
+    travel_scale,
 )
 from fowt_env.controllers.pi import PISettings, schedule_gain
 from fowt_env.descriptions.units import DEGREE
@@ -36,7 +39,7 @@ OF_FILTER = [*range(N_PLANT), *range(WIND, MOMENT)]  # the same among the states
 GAUSSIAN_MEAN = sqrt(2.0 / np.pi)  # mean |x| of a Gaussian over its standard deviation
 LIMITED = ("travel", "power", "torque", "shaft")  # fields of Deviations
 # m/s, below which travel and shaft torque have limits of their own: lulls take the turbine out of its region
-NEAR_RATED, NO_LULLS = 14.0, 16.0
+NEAR_RATED, NO_LULLS = 14.0, 16.0  # of the NREL 5 MW turbine
 # What gspi_oc3 is held to where its own linear model says more or, as near rated wind, is unstable
 SPEED_CEILING, POWER_CEILING, LEAN_CEILING = 0.09, 0.09, 1.2 * DEGREE  # of rated, of rated, rad
 SHAFT_CEILING = 0.018  # of rated torque, where its loop is unstable
@@ -91,7 +94,7 @@ class SampledLoop:
         self.a, self.b = a, b
         white = model.G[:MOMENT] @ model.G[:MOMENT].T
         self.noise = sampled_noise(model.A[:MOMENT, :MOMENT], white, dt)
-        self.filter_gain = estimator_gain(model, dt)
+        self.filter_gain = estimator_gain(model, dt, moment_scale(turbine))
         self.rows = self._rows()
 
     def _rows(self):
@@ -213,13 +216,15 @@ class SampledLoop:
         )
 
 
-def limits(settings, wind, baseline):
-    """{name of LIMITED: limit} at a wind (m/s), beside the Deviations of gspi_oc3 there."""
+def limits(settings, wind, baseline, turbine):
+    """{name of LIMITED: limit} of a turbine at a wind (m/s), beside the Deviations of gspi_oc3 there."""
+    lowest = equivalent_wind(turbine, lowest_design_wind(turbine))
+    wind, degree = equivalent_wind(turbine, wind), DEGREE * travel_scale(turbine)
     if wind < NEAR_RATED:
         known = (settings.travel_near_rated, settings.travel_cap)
-        travel = DEGREE * np.interp(wind, (LOWEST_DESIGN_WIND, NEAR_RATED), known)
+        travel = degree * np.interp(wind, (lowest, NEAR_RATED), known)
     else:
-        travel = min(settings.travel * baseline.travel, DEGREE * settings.travel_cap)
+        travel = min(settings.travel * baseline.travel, degree * settings.travel_cap)
     lulls = np.interp(wind, (NEAR_RATED, NO_LULLS), (1.0, 0.0))
     return {
         "travel": float(travel),
@@ -236,9 +241,9 @@ def optimal_gain(loop, settings, start=None):
     ROUNDS rounds.
     """
     rated, baseline, wind = loop.turbine.rated_rotor_speed, loop.baseline(), loop.model.wind
-    limited = limits(settings, wind, baseline)
+    limited = limits(settings, wind, baseline, loop.turbine)
     wanted = np.array([limited[name] for name in LIMITED])
-    share = settings.share_at(wind)
+    share = settings.share_at(equivalent_wind(loop.turbine, wind))
     aims = {"speed": (1.0 - share) / baseline.speed**2, "lean": share / baseline.lean**2}
     integral = settings.speed_integral / (0.5 * rated) ** 2
     multipliers = np.zeros(len(LIMITED)) if start is None else start
@@ -260,11 +265,11 @@ def optimal_gain(loop, settings, start=None):
 def optimal_gains(models, settings, turbine, dt):
     """[(2, N_FEEDBACK)] gains of DesignModels in rising order of wind.
 
-    Below LOWEST_DESIGN_WIND, where the pitch rests, those of the first wind designed for hold.
+    Below lowest_design_wind, where the pitch rests, those of the first wind designed for hold.
     """
-    gains, start = [], None
+    gains, start, lowest = [], None, lowest_design_wind(turbine)
     for model in reversed(models):  # from strong wind, where all limits are met, down to rated
-        if model.wind < LOWEST_DESIGN_WIND and gains:
+        if model.wind < lowest and gains:
             gains.append(gains[-1])
             continue
         gain, _, start = optimal_gain(SampledLoop(model, turbine, dt), settings, start)

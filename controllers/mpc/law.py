@@ -14,7 +14,14 @@ import numpy as np
 
 from fowt_env.caches import Cache
 from fowt_env.control import check_control_dt
-from fowt_env.controllers.lqr.design import LOWEST_DESIGN_WIND, MOMENT, N_FEEDBACK, N_PLANT, design_models
+from fowt_env.controllers.lqr.design import (
+    MOMENT,
+    N_FEEDBACK,
+    N_PLANT,
+    RATED_WIND,
+    design_models,
+    lowest_design_wind,
+)
 from fowt_env.controllers.lqr.design import WIND as ESTIMATED_WIND
 from fowt_env.controllers.lqr.estimator import ROTOR, estimate
 from fowt_env.controllers.lqr.law import LQR, WindEstimator, speed_integral
@@ -31,7 +38,7 @@ from fowt_env.plant.measurement import Measure
 
 PERIOD = 0.5  # s between plans
 RESTING = 0.01745  # rad of pitch command, up to which the integral is forgotten while the rotor is slow
-CURVE_WINDS = (8.5, 9.5)  # m/s: the turbine's curve and resting blades below, the plan above
+CURVE_WINDS = (8.5, 9.5)  # m/s, of the NREL 5 MW turbine: curve and resting blades below, plan above
 
 
 class Entry(IntEnum):
@@ -48,6 +55,8 @@ class Entry(IntEnum):
     TORQUE_LOW = 8
     TORQUE_HIGH = 9
     DECAY = 10
+    CURVE_BELOW = 11  # m/s
+    PLAN_ABOVE = 12
 
 
 class Memory(IntEnum):
@@ -83,7 +92,7 @@ def move(estimated, p, memory, curve, command):
     command[1] = clamp(pitch, p[Entry.PITCH_MINIMUM], p[Entry.PITCH_MAXIMUM])
     torque = command[0] + dt * memory[Memory.TORQUE_RATE]
     torque = clamp(torque, p[Entry.TORQUE_LOW], p[Entry.TORQUE_HIGH])
-    low, high = CURVE_WINDS
+    low, high = p[Entry.CURVE_BELOW], p[Entry.PLAN_ABOVE]
     wind = max(memory[Memory.OPERATING_WIND], estimated[ESTIMATED_WIND + 1])
     blend = clamp((wind - low) / (high - low), 0.0, 1.0)
     if blend < 1.0:
@@ -148,6 +157,8 @@ class MPC:
             Entry.TORQUE_LOW: self.settings.torque_low * law.rated_torque,
             Entry.TORQUE_HIGH: min(self.settings.torque_high * law.rated_torque, law.max_torque),
             Entry.DECAY: exp(-self.control_dt / self.settings.schedule_time),
+            Entry.CURVE_BELOW: CURVE_WINDS[0] + (turbine.rated_wind_speed - RATED_WIND),
+            Entry.PLAN_ABOVE: CURVE_WINDS[1] + (turbine.rated_wind_speed - RATED_WIND),
         }
         return np.array([values[entry] for entry in Entry], dtype=np.float64)
 
@@ -170,7 +181,7 @@ class MPC:
 
     def _wind_models(self, models):
         """WindModel of arrays with a row per wind."""
-        lowest = next(m for m in models if m.wind >= LOWEST_DESIGN_WIND)
+        lowest = next(m for m in models if m.wind >= lowest_design_wind(self.turbine))
         made = [
             wind_model(
                 m,

@@ -10,7 +10,14 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import solve_discrete_are
 
-from fowt_env.controllers.lqr.design import N_FEEDBACK, N_PLANT, PLANT, feedback_plant, sampled
+from fowt_env.controllers.lqr.design import (
+    N_FEEDBACK,
+    N_PLANT,
+    PLANT,
+    equivalent_wind,
+    feedback_plant,
+    sampled,
+)
 from fowt_env.controllers.mpc.rotor_table import rotor_loads
 from fowt_env.descriptions.units import DEGREE
 from fowt_env.plant.compile.decorators import entry
@@ -20,7 +27,7 @@ SURGE_RATE, SPEED, LEAN, LEAN_RATE, BLADE = (
 )
 TORQUE, COMMAND, INTEGRAL = N_PLANT, N_PLANT + 1, N_PLANT + 2
 FILTER, WIND = N_PLANT + 3, N_PLANT + 4
-WEIGHT_WIND = 18.0  # m/s, where the weights hold as given
+WEIGHT_WIND = 18.0  # m/s of the NREL 5 MW turbine, where the weights hold as given
 N_COST = (
     8  # squared terms: speed, platform pitch, its rate, torque, power, integral, rates of torque and pitch
 )
@@ -51,7 +58,7 @@ def cost_rows(rated_speed):
 
 
 def cost_weights(settings, wind, rated_speed, period):
-    """(N_COST,) weights of the squared terms over a period (s) at a wind speed, m/s."""
+    """(N_COST,) weights of the squared terms over a period (s) at an equivalent_wind, m/s."""
     s, ratio = settings, wind / WEIGHT_WIND
     below = ratio < 1.0
     pitch_rate = s.pitch_rate * ratio ** (s.pitch_rate_growth if below else s.pitch_rate_growth_above)
@@ -88,7 +95,7 @@ def wind_model(model, feedback, settings, turbine, table, period):
     g[moved, 0] = a[moved, WIND] / loads[1]
     g[SPEED, 1] = a[SPEED, WIND] / loads[5]
     motion = a[SPEED, moved] / a[SPEED, WIND]
-    weights = cost_weights(settings, feedback.wind, rated, period)
+    weights = cost_weights(settings, equivalent_wind(turbine, feedback.wind), rated, period)
     k, p = lq(*_plant(feedback, turbine), weights, rated, period)
     ad, bd = sampled(a, b, period)
     _, gd = sampled(a, g, period)

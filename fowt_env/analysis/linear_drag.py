@@ -4,7 +4,9 @@ The drag of a strip, 0.5 rho C_D D |r| r per length with r the velocity of the w
 axis, is replaced by the linear force with the least mean square error. For a Gaussian r its gain is the mean
 slope, 0.5 rho C_D D E[|r| I + r r'/|r|]; in one direction without current that is
 0.5 rho C_D D sqrt(8/pi) sigma_r (Borgman, 1967, J. Waterways and Harbors Division 93, 129-156; Price and Wu,
-1985). The gain depends on the motion of the hull, and the motion on the gain: callers iterate.
+1985). The gain depends on the motion of the hull, and the motion on the gain: callers iterate. So is the
+quadratic damping matrix of a body: column j times sqrt(8/pi) sigma_j of the hull's velocity j alone, since
+the matrix knows no water.
 """
 
 from dataclasses import dataclass, replace
@@ -86,8 +88,9 @@ def linear_drag(scene, state, omega, sea, motion=AT_REST):
     density = elevation_spectrum(sea, omega)
     hydro = scene.model.hydro
     if hydro is None or hydro.strips is None or hydro.strips.shape is None:
-        none = np.zeros((6, 6))
-        return LinearDrag(none, np.zeros((omega.size, 6), complex), none, np.zeros(0), np.zeros(0))
+        none, excitation = np.zeros((6, 6)), np.zeros((omega.size, 6), complex)
+        damping = none + _matrix_damping(hydro, omega, density, motion)
+        return LinearDrag(damping, excitation, none, np.zeros(0), np.zeros(0))
     strips, site = hydro.strips.shape, scene.platform.environment
     rotation, height = _axes(state)
     z, length, diameter = _nodes(strips, height, rotation)
@@ -107,6 +110,8 @@ def linear_drag(scene, state, omega, sea, motion=AT_REST):
     along = np.array([0.5 * strips.density * strips.axial_drag_coefficient * strips.keel_area])
     weight = density * np.gradient(omega) if omega.size > 1 else np.zeros(omega.size)
     damping, at_rest = np.zeros((6, 6)), np.zeros((6, 6))
+    if hydro.matrices is not None:
+        damping += _matrix_damping(hydro, omega, density, motion)
     excitation = np.zeros((omega.size, 6), complex)
     for factor, lever, moved, mean in (
         (across, moves, water[:, :-1, :2], flow[:-1, :2]),
@@ -124,6 +129,20 @@ def linear_drag(scene, state, omega, sea, motion=AT_REST):
         if factor is across:
             deviation = np.sqrt(np.trace(covariance, axis1=1, axis2=2))
     return LinearDrag(damping, excitation, at_rest, z, deviation)
+
+
+def _matrix_damping(hydro, omega, density, motion):
+    """(6, 6) damping for the quadratic damping matrix of a body, by the deviations of its velocities.
+
+    The matrix is in inertial axes; those of the hull, which leans by a few degrees, are taken for them.
+    """
+    matrices = None if hydro is None else hydro.matrices
+    if matrices is None:
+        return np.zeros((6, 6))
+    weight = density * np.gradient(omega) if omega.size > 1 else np.zeros(omega.size)
+    waves = np.broadcast_to(motion.waves, (omega.size, 6))
+    variance = weight @ np.abs(waves) ** 2 + np.diag(np.broadcast_to(motion.other, (6, 6)))
+    return matrices.quadratic_damping * np.sqrt(8.0 / pi * variance)
 
 
 def with_drag(model, drag):

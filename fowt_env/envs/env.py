@@ -25,10 +25,11 @@ from fowt_env.control import (
     view_of,
     with_wind_ahead,
 )
-from fowt_env.descriptions.platform import Platform
+from fowt_env.descriptions.platform import Platform, read_platform
 from fowt_env.descriptions.records import RENAMED
 from fowt_env.descriptions.sea_state import sea_state_of
 from fowt_env.descriptions.sensors import SensorChain
+from fowt_env.descriptions.turbine import Turbine, read_turbine
 from fowt_env.envs.actions import ACTION_MODES, ActionMode, build_action_map, start_tracking
 from fowt_env.envs.episode import (
     BAD_ACTION,
@@ -88,7 +89,8 @@ REWARD_KEYS = tuple(f"reward/{name}" for name in REWARD_TERMS)
 class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     """Floating wind turbine whose generator torque and blade pitch are commanded.
 
-    task          name in TASKS ("above_rated", "full_range", "steady") or a Task
+    task          name in TASKS ("above_rated", "full_range", "steady"), scaled to the platform's turbine, or
+                  a Task, which is taken as it is
     platform      built-in name, path or descriptions.platform.Platform
     rotor         "bem", "lookup" or "table"; None: the task's, or else that of the fidelity
     action_mode   "direct", "setpoint" or "residual", see the table of actions
@@ -180,7 +182,9 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
                 raise unknown("setting of FowtEnv", key, {*OPTIONS, "loads", *SETTINGS})
         self.render_mode = render_mode
         self._view: Any = None
-        task = _adapted(task_of(task), rotor, observation, reward, duration, wind, sea, wind_preview)
+        turbine = _turbine_of(platform, options.get("turbine"))
+        task = task_of(task, turbine)
+        task = _adapted(task, rotor, observation, reward, duration, wind, sea, wind_preview)
         self.task = task
         self.action_mode = action_mode
         self.baseline = baseline
@@ -610,6 +614,13 @@ def _adapted(
 
 # settings of FowtEnv by name, those of build_scene apart
 SETTINGS = tuple(name for name in inspect.signature(FowtEnv).parameters if name != "options")
+
+
+def _turbine_of(platform, turbine):
+    """Turbine of a platform, or the one given in its place; each a name, a path or a description."""
+    if turbine is None:
+        turbine = (platform if isinstance(platform, Platform) else read_platform(platform)).turbine
+    return turbine if isinstance(turbine, Turbine) else read_turbine(turbine)
 
 
 def _check_shown(names, chain):

@@ -1,11 +1,13 @@
 """Tasks: what an episode is drawn from, what is observed and rewarded, and how long it lasts."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from fowt_env.descriptions.sea_state import joint_sea_state, joint_tables, sea_state_of
+from fowt_env.descriptions.turbine import Turbine
+from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.descriptions.wind import read_wind
 from fowt_env.envs.observations import STANDARD, check_channels
 from fowt_env.envs.rewards import check_weights
@@ -309,10 +311,57 @@ TASKS = {
 }
 
 
-def task_of(task: str | Task) -> Task:
-    """Task from a name or a Task. Raises: InputError for anything else."""
+def task_of(task: str | Task, turbine: Turbine | None = None) -> Task:
+    """Task from a name, scaled to a turbine where one is given, or a Task. Raises: InputError for others."""
     if isinstance(task, Task):
         return task
     if not isinstance(task, str) or task not in TASKS:
         raise unknown("task", task, TASKS)
-    return TASKS[task]
+    return TASKS[task] if turbine is None else scaled_task(TASKS[task], turbine)
+
+
+RATED, CUT_IN, CUT_OUT = 11.4, 3.0, 25.0  # m/s, of the NREL 5 MW turbine, whose the TASKS are
+ROTOR_SPEED, PITCH_RATE = 12.1 * RPM, 8.0 * DEGREE  # the same: rated, rad/s, and of its pitch drive, rad/s
+
+
+def scaled_task(task: Task, turbine: Turbine) -> Task:
+    """A task of the NREL 5 MW turbine for another: itself where winds, speed and pitch drive are the same.
+
+    Winds above rated are as far from rated, others the same share of the way from cut-in to rated, none
+    beyond cut-out; the offset of the rotor speed goes with the rated one. The weight of pitch travel makes a
+    degree per turn of the rotor as dear, whatever the drive can do. Seas are those of the site at the wind.
+    """
+    winds = (turbine.cut_in_wind_speed, turbine.rated_wind_speed, turbine.cut_out_wind_speed)
+    drive = turbine.pitch_drive
+    same = (*winds, turbine.rated_rotor_speed, drive.rate_limit) == (
+        CUT_IN, RATED, CUT_OUT, ROTOR_SPEED, PITCH_RATE,
+    )  # fmt: skip
+    if not same:
+        speed = turbine.rated_rotor_speed / ROTOR_SPEED
+        travel = drive.rate_limit / PITCH_RATE / speed
+        if _is_mixture(task.wind):
+            wind = tuple((share, _scaled_wind(air, winds), sea) for share, air, sea in task.wind)
+        else:
+            wind = _scaled_wind(task.wind, winds)
+        offsets = dict(task.offsets)
+        if "RotSpeed" in offsets:
+            offsets["RotSpeed"] = tuple(speed * value for value in offsets["RotSpeed"])
+        weights = task.weights | {"pitch_travel": travel * task.weights["pitch_travel"]}
+        task = replace(task, wind=wind, offsets=offsets, weights=weights)
+    low, high = task.blade_pitch
+    reach = max(low, drive.minimum / DEGREE), min(high, drive.maximum / DEGREE)
+    return task if reach == (low, high) else replace(task, blade_pitch=reach)
+
+
+def _scaled_wind(wind, winds):
+    """A wind of TASKS with its speeds among the cut-in, rated and cut-out winds of another turbine."""
+    cut_in, rated, cut_out = winds
+
+    def moved(speed):
+        if speed == CUT_OUT:
+            return cut_out
+        if speed > RATED:
+            return min(rated + (speed - RATED), cut_out)
+        return cut_in + (speed - CUT_IN) / (RATED - CUT_IN) * (rated - cut_in)
+
+    return wind | {"speed": tuple(moved(speed) for speed in wind["speed"])}

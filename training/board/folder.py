@@ -8,6 +8,7 @@ history.csv           a row for every submission, regime and judging
 board.csv, index.html what was judged last
 """
 
+import json
 import shutil
 import time
 from pathlib import Path
@@ -17,15 +18,18 @@ from pydantic import BeforeValidator, Field
 
 from fowt_env.descriptions.files import raise_problems, read_toml
 from fowt_env.descriptions.records import Positive, Record, validate
+from fowt_env.descriptions.turbine import Turbine
 from fowt_env.errors import InputError
 from fowt_env.files.atomic import replacing
 from fowt_env.training.board.isolated import TimeLimits
 from fowt_env.training.board.submission import CARD, read_submission
 from fowt_env.training.evaluation.cases import FOLDER as SUITES
 from fowt_env.training.evaluation.cases import Seeds, Suite, read_suite
+from fowt_env.training.evaluation.scaling import turbine_of
 from fowt_env.training.evaluation.seeds import TEST
 
 SETTINGS = "board.toml"
+DEFAULT_PLATFORM = "oc3_hywind"  # of the suites
 ENTRIES = Path(__file__).parent / "entries"  # cards of the package's own controllers
 REGIMES = (  # name, suites: of a new board
     ("in distribution", ("above_rated",)),
@@ -46,6 +50,7 @@ class BoardFile(Record):
     """The text of board.toml."""
 
     title: str
+    platform: str | None = None  # on which its suites run; None: that of each suite
     baseline: str = "gspi_oc3"
     seeds: Seeds
     call_limit: Positive = 0.1  # s, of one call of a controller's act()
@@ -81,7 +86,12 @@ class Board:
 
     def suite(self, name: str) -> Suite:
         """The board's own copy of a suite."""
-        return read_suite(self._suite_path(name))
+        return read_suite(self._suite_path(name), self.settings.platform)
+
+    @property
+    def turbine(self) -> Turbine:
+        """Turbine of the board's platform, which controllers are made for."""
+        return turbine_of(self.settings.platform or DEFAULT_PLATFORM)
 
     @property
     def limits(self) -> TimeLimits:
@@ -123,12 +133,17 @@ class Board:
         return submission.name
 
 
-def new_board(folder: Path | str, title: str = "Controllers of floating wind turbines") -> Board:
+def new_board(
+    folder: Path | str, title: str = "Controllers of floating wind turbines", platform: str | None = None
+) -> Board:
     """A new board with the package's own controllers as its first submissions.
 
-    Raises: InputError where there is one already.
+    platform: a name or a path, to whose turbine the suites are scaled; None: the suites' own.
+    Raises: InputError where there is one already, and for a platform that cannot be read.
     """
     folder = Path(folder)
+    if platform is not None:
+        turbine_of(platform)
     if (folder / SETTINGS).exists():
         raise InputError(f"board {str(folder)!r}: is there already")
     seeds = read_suite(REGIMES[0][1][0]).seeds
@@ -139,6 +154,8 @@ def new_board(folder: Path | str, title: str = "Controllers of floating wind tur
         f"seeds = {list(seeds)} # public",
         "call_limit = 0.1 # s",
     ]
+    if platform is not None:
+        lines.insert(1, f"platform = {json.dumps(str(platform))}")
     for name, suites in REGIMES:
         lines += ["", "[[regime]]", f'name = "{name}"', f"suites = {list(suites)}".replace("'", '"')]
         for suite in suites:

@@ -17,7 +17,6 @@ import pandas as pd
 
 import fowt_env
 from fowt_env.control import make
-from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.errors import InputError
 from fowt_env.files.tables import read_table
 from fowt_env.scene.build import build_scene
@@ -123,11 +122,11 @@ def check_figures(table, folder, suite):
                 )
 
 
-def inputs_of(submission):
+def inputs_of(submission, turbine):
     """What a submission is given: its declared inputs, or those of the built-in controller or policy."""
     if submission.kind == PYTHON_FILE:
         return tuple(submission.card.information)
-    return tuple(make(submission.controller(None), read_turbine("nrel5mw"), 0.1).information)
+    return tuple(make(submission.controller(None), turbine, 0.1).information)
 
 
 def package_version():

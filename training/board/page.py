@@ -43,9 +43,9 @@ th{background:#f2f5f8}td.text,th.text{text-align:left;white-space:normal}
 """
 
 
-def information_class(submission):
+def information_class(submission, turbine):
     """What a submission is given, in one of a few words that rows are compared within."""
-    used = set(inputs_of(submission))
+    used = set(inputs_of(submission, turbine))
     sensors = used - set(PRIVILEGED_INPUTS)
     words = ["rotor and blades" if sensors <= PLANT else "sensors"]
     if used & {"wind_speed", "wave_elevation"}:
@@ -69,7 +69,7 @@ def board_frame(judged):
     """
     rows = []
     board = judged.board
-    classes = {each.name: information_class(each) for each in judged.submissions}
+    classes = {each.name: information_class(each, board.turbine) for each in judged.submissions}
     cards = {each.name: each.card for each in judged.submissions}
     for regime in board.settings.regime:
         for name in regime.suites:
@@ -283,7 +283,7 @@ def _submissions(judged):
             card.author,
             card.licence,
             each.kind,
-            ", ".join(inputs_of(each)),
+            ", ".join(inputs_of(each, judged.board.turbine)),
             card.description,
             card.tuning,
         )

@@ -48,6 +48,15 @@ BOUND_EXAMPLES = """[bold]Examples[/bold]
 Deviations are shown over those of gspi_oc3 on the same model, at no more pitch travel and power deviation.
 Information: full (plant, wind and waves), measured (five sensors with their noise) or speed (rotor speed and
 blade pitch); with _preview_T where the wind is known T s ahead, with _pitch_only without torque."""
+ZEROS_EXAMPLES = """[bold]Examples[/bold]
+
+[cyan]fowt design zeros[/cyan]  OC3-Hywind, whole winds above rated
+
+[cyan]fowt design zeros --platform nrel5mw_oc4_semi --out zeros.csv[/cyan]  another platform, as a table
+
+A zero in the right half plane, near the platform's own pitch, is where holding the rotor speed with the
+blades takes the thrust that damps the platform: no feedback of rotor speed alone can be faster. pi_damping:
+least damping ratio of surge, platform pitch and rotor speed under pi; drag is left out."""
 TUNE_EXAMPLES = """[bold]Examples[/bold]
 
 [cyan]fowt design tune pi_tuned[/cyan]  three factors on the published gains, 40 settings tried
@@ -72,16 +81,31 @@ share is that of platform pitch in what is minimised, the rest is rotor speed; t
 are limits, see LQGSettings in controllers/lqr/design.py."""
 
 
-def save_lqr(settings, path):
-    """The path written: lqr with these settings ({name: value}) on the models of OC3-Hywind."""
+def save_lqr(settings, path, platform="oc3_hywind"):
+    """The path written: lqr with these settings ({name: value}) on the models of a platform."""
     import fowt_env
     from fowt_env.controllers.design.saved_files import lqr_settings, save_design
     from fowt_env.controllers.lqr.design import LQGSettings, design_models
 
     chosen = LQGSettings().changed(**settings)
-    scene = fowt_env.build_scene("oc3_hywind", wind=18.0)
-    command = " ".join(["fowt design lqr", *(f"--setting {key}={value}" for key, value in settings.items())])
+    scene = fowt_env.build_scene(platform, wind=18.0)
+    given = [f"--setting {key}={value}" for key, value in settings.items()]
+    if platform != "oc3_hywind":
+        given.append(f"--platform {platform}")
+    command = " ".join(["fowt design lqr", *given])
     return save_design(path, "lqr", scene, lqr_settings(chosen, design_models(scene)), command)
+
+
+def _scene_and_winds(platform, winds, default):
+    """(scene, winds m/s, their text) of a platform; default(turbine): the winds where none are given."""
+    import fowt_env
+
+    speeds = None if winds is None else parse_numbers(winds, "winds")
+    scene = fowt_env.build_scene(platform, wind=18.0 if speeds is None else speeds[0])
+    if speeds is None:
+        found = default(scene.turbine)
+        return scene, [float(speed) for speed in found], f"{found[0]}:{found[-1]}:1"
+    return scene, speeds, winds
 
 
 def _balanced(table):
@@ -97,14 +121,17 @@ def _balanced(table):
 @reported
 def linearize(
     platform: Annotated[str, typer.Option(help="Platform: a name or a path.")] = "oc3_hywind",
-    winds: Annotated[str, typer.Option(help="Winds, m/s: 12,18 or START:STOP:STEP.")] = "4:25:1",
+    winds: Annotated[
+        str | None,
+        typer.Option(help="Winds, m/s: 12,18 or START:STOP:STEP; default: whole ones to cut-out."),
+    ] = None,
     out_path: Annotated[
         str | None,
         typer.Option("--out", help="Modes: .csv, .parquet; models: .json, .npz; with plots: a folder."),
     ] = None,
 ):
     """Print modes and right-half-plane zeros of the floating turbine over the wind."""
-    import fowt_env
+    from fowt_env.controllers.lqr.design import design_winds
     from fowt_env.files.tables import TABLE_SUFFIXES, write_table
     from fowt_env.training.design.sweeps import (
         MODEL_SUFFIXES,
@@ -119,8 +146,7 @@ def linearize(
     if suffix and suffix not in (*TABLE_SUFFIXES, *MODEL_SUFFIXES):
         allowed = ", ".join((*TABLE_SUFFIXES, *MODEL_SUFFIXES))
         raise InputError(f"--out {out_path}: must be a folder or end with {allowed}")
-    speeds = parse_numbers(winds, "winds")
-    scene = fowt_env.build_scene(platform, wind=speeds[0])
+    scene, speeds, _ = _scene_and_winds(platform, winds, design_winds)
     with progress_bar("linearising", len(speeds)) as update:
         models = models_over(scene, speeds, lambda done, total: update(done, total=total))
     modes, zeros = mode_table(models), zero_table(models)
@@ -155,20 +181,22 @@ def pi(
     schedule: Annotated[
         str, typer.Option(help="loop (as designed at every wind) or published (Jonkman's, slower).")
     ] = "loop",
-    winds: Annotated[str, typer.Option(help="Winds, m/s: 12,18 or START:STOP:STEP.")] = "12:25:1",
+    winds: Annotated[
+        str | None,
+        typer.Option(help="Winds, m/s: 12,18 or START:STOP:STEP; default: whole ones above rated."),
+    ] = None,
     platform: Annotated[str, typer.Option(help="Platform: a name or a path.")] = "oc3_hywind",
     out_path: Annotated[str | None, typer.Option("--out", help="Design: .json.")] = None,
 ):
     """Gains of a scheduled PI from a specified frequency and damping ratio, and the platform's damping."""
     import pandas as pd
 
-    import fowt_env
     from fowt_env.controllers.design.pi import design_pi
     from fowt_env.controllers.design.saved_files import save_design
+    from fowt_env.controllers.lqr.design import winds_above_rated
     from fowt_env.training.design.sweeps import models_over
 
-    speeds = parse_numbers(winds, "winds")
-    scene = fowt_env.build_scene(platform, wind=speeds[0])
+    scene, speeds, winds = _scene_and_winds(platform, winds, winds_above_rated)
     with progress_bar("linearising", len(speeds)) as update:
         models = models_over(scene, speeds, lambda done, total: update(done, total=total))
     found = design_pi(models, scene.turbine, omega, zeta, schedule)
@@ -252,6 +280,31 @@ def bound(
         note(f"wrote {plot}")
 
 
+@design.command(epilog=ZEROS_EXAMPLES)
+@reported
+def zeros(
+    platform: Annotated[str, typer.Option(help="Platform: a name or a path.")] = "oc3_hywind",
+    winds: Annotated[
+        str | None,
+        typer.Option(help="Winds above rated, m/s: 12,18 or START:STOP:STEP; default: whole ones."),
+    ] = None,
+    out_path: Annotated[str | None, typer.Option("--out", help="Table: .csv or .parquet.")] = None,
+):
+    """Show where right-half-plane zeros from blade pitch to rotor speed bind, and what pi makes of it."""
+    from fowt_env.controllers.lqr.design import winds_above_rated
+    from fowt_env.files.tables import table_path, write_table
+    from fowt_env.training.design.sweeps import zeros_over
+
+    if out_path is not None:
+        table_path(out_path)
+    scene, speeds, _ = _scene_and_winds(platform, winds, winds_above_rated)
+    with progress_bar("linearising", None) as update:
+        table = zeros_over(scene, speeds, lambda done, total: update(done, total=total))
+    show(table, f"{platform}: zeros of blade pitch to rotor speed")
+    if out_path is not None:
+        note(f"wrote {write_table(table, out_path)}")
+
+
 @design.command(epilog=FRONT_EXAMPLES)
 @reported
 def front(
@@ -287,6 +340,7 @@ def lqr(
     ] = None,
     cases: Annotated[str, typer.Option(help="Cases or suites.")] = "ntm_14,ntm_18,ntm_22",
     seeds: Annotated[str, typer.Option(help="Validation seeds, 1000 and above.")] = "1001,1002",
+    platform: Annotated[str, typer.Option(help="Platform: a name or a path.")] = "oc3_hywind",
     out_path: Annotated[
         str | None, typer.Option("--out", help="All runs: .csv; or, without runs, the design: .json.")
     ] = None,
@@ -298,7 +352,7 @@ def lqr(
     if out_path is not None and out_path.lower().endswith(".json"):
         if vary:
             raise InputError(f"--vary {vary[0]}: a design has one value per setting; use --setting")
-        note(f"wrote {save_lqr(fixed, out_path)}")
+        note(f"wrote {save_lqr(fixed, out_path, platform)}")
         return
     variants = [fixed]
     for pair in vary or ():
@@ -307,7 +361,14 @@ def lqr(
         variants = [variant | {name: number} for variant in variants for number in numbers]
     numbers = parse_whole_numbers(seeds, "seeds")
     with progress_bar("simulating", None) as update:
-        table = sweep(variants, cases, numbers, out_path, lambda done, total: update(done, total=total))
+        table = sweep(
+            variants,
+            cases,
+            numbers,
+            out_path,
+            lambda done, total: update(done, total=total),
+            platform=platform,
+        )
     means = table.groupby(["case", "variant"], sort=False)[list(SHOWN)].mean().reset_index()
     show(means, f"means over seeds {json.dumps(numbers)}")
     if out_path is not None:
@@ -322,6 +383,7 @@ def tune_command(
     ],
     budget: Annotated[int, typer.Option(help="Settings that are tried.")] = 40,
     suite: Annotated[str, typer.Option(help="Suite whose cases are run.")] = "above_rated",
+    platform: Annotated[str, typer.Option(help="Platform: a name or a path.")] = "oc3_hywind",
     seeds: Annotated[str, typer.Option(help="Validation seeds, 1000 or more.")] = "1001,1002",
     preview: Annotated[str, typer.Option(help="Wind ahead: exact, or a lidar by its name.")] = "exact",
     jobs: Annotated[int, typer.Option(help="Worker processes.")] = 1,
@@ -337,7 +399,10 @@ def tune_command(
     from fowt_env.training.evaluation.engines import session
 
     numbers = tuple(int(seed) for seed in parse_whole_numbers(seeds, "seeds"))
+    if keep and platform != "oc3_hywind":
+        raise InputError(f"--keep: controllers/tuned.toml is OC3-Hywind's; {platform!r} is tuned for a table")
     asked = {"suite": suite, "seeds": numbers, "jobs": jobs, "engine": engine, "address": address}
+    asked |= {} if platform == "oc3_hywind" else {"platform": platform}
     asked |= {} if preview == "exact" else {"preview": preview}
     with progress_bar(f"tuning {name}", budget) as update, session(engine, jobs, address):
 

@@ -31,6 +31,8 @@ EVALUATE_EXAMPLES = """[bold]Examples[/bold]
 
 [cyan]fowt evaluate --suite mysuite.toml --controllers pi,mymodule:Mine --baseline pi[/cyan]  your own cases
 
+[cyan]fowt evaluate --suite above_rated --platform nrel5mw_oc4_semi --out results/oc4[/cyan]  another platform
+
 [cyan]fowt evaluate --suite above_rated --sensors exact --out results/exact[/cyan]  without noise and delay
 
 [bold]Files written[/bold]: runs/CONTROLLER/CASE_seedN.parquet, results.csv (a row per run), leaderboard.json
@@ -53,6 +55,10 @@ def evaluate_command(
         typer.Option(
             help="Cases or suites, comma-separated; with --suite: those of its cases. Default: above_rated."
         ),
+    ] = None,
+    platform: Annotated[
+        str | None,
+        typer.Option(help="Platform: a name or a path; winds and limits are scaled. Default: the suite's."),
     ] = None,
     seeds: Annotated[
         str | None,
@@ -89,7 +95,7 @@ def evaluate_command(
     from fowt_env.training.reports.terminal import chosen_cases, write_leaderboard
 
     folder = Path(out_folder)
-    chosen = chosen_cases(suite, cases)
+    chosen = chosen_cases(suite, cases, platform)
     numbers = None if seeds is None else parse_whole_numbers(seeds, "seeds")
     if baseline is not None and baseline not in (names := [name.strip() for name in controllers.split(",")]):
         raise unknown("baseline among --controllers", baseline, names)

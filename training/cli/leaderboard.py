@@ -33,6 +33,10 @@ controllers if there is none"""
 def add_command(
     submissions: Annotated[list[Path], typer.Argument(help="Folders, each with a card.toml.")],
     board: BoardOption = Path("board"),
+    platform: Annotated[
+        str | None,
+        typer.Option(help="Of a board that is made: a name or a path, to which the suites are scaled."),
+    ] = None,
 ):
     """Check submissions and copy them into the board; none of their code is run."""
     from fowt_env.training.board.folder import SETTINGS, Board, new_board
@@ -41,7 +45,8 @@ def add_command(
     for folder in submissions:
         read_submission(folder)
     if not (board / SETTINGS).exists():
-        first = ", ".join(each.name for each in new_board(board).submissions())
+        made = new_board(board, platform=platform)
+        first = ", ".join(each.name for each in made.submissions())
         note(f"made the board {board} with the controllers of the package: {first}")
     for folder in submissions:
         name = Board(board).add(folder)

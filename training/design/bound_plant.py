@@ -15,7 +15,9 @@ from scipy.optimize import least_squares
 
 from fowt_env.analysis.linear_drag import HullMotion, elevation_spectrum, linear_drag, with_drag
 from fowt_env.analysis.linear_model import linearize
+from fowt_env.analysis.memory_free import without_memory
 from fowt_env.analysis.wave_excitation import wave_force
+from fowt_env.controllers.gains import with_gains
 from fowt_env.controllers.lqr.design import LAST_SEA_WIND, SENSORS, SITE, TURBULENCE_CLASS, scene_at
 from fowt_env.controllers.pi import PISettings, schedule_gain
 from fowt_env.descriptions.iec import ntm_sigma
@@ -93,7 +95,7 @@ class BoundPlant:
     """
 
     def __init__(self, scene, wind, sea=None):
-        self.wind_speed, self.turbine = float(wind), scene.turbine
+        self.wind_speed, self.turbine = float(wind), with_gains(scene)
         area = pi * scene.turbine.rotor.tip_radius**2
         if area <= SMALLEST_ROTOR:
             raise InputError(
@@ -103,7 +105,7 @@ class BoundPlant:
         if sea is None:
             sea = joint_sea_state(SITE, min(self.wind_speed, LAST_SEA_WIND))
         self.sea = sea_state_of(sea)
-        model = linearize(scene_at(scene, wind))
+        model = without_memory(linearize(scene_at(scene, wind)))
         if model.pitch_rests:
             raise InputError(
                 f"wind = {wind:g}: the blade pitch rests on its limit there, and no controller moves it"

@@ -11,16 +11,21 @@ import numpy as np
 import pandas as pd
 from scipy.linalg import eigvals
 
-from fowt_env.analysis.linear_model import FORCES, linearize
-from fowt_env.controllers.lqr.design import LQGSettings, scene_at
+from fowt_env.analysis.linear_model import FORCES, linearize, modes
+from fowt_env.controllers.design.closed_loop import closed_loop_matrix
+from fowt_env.controllers.gains import with_gains
+from fowt_env.controllers.lqr.design import LQGSettings, scene_at, winds_above_rated
 from fowt_env.controllers.lqr.law import LQR
+from fowt_env.controllers.pi import PISettings
 from fowt_env.errors import InputError
 from fowt_env.files.atomic import replacing
 from fowt_env.files.tables import write_table
 from fowt_env.plant.state import STATE_INDEX
+from fowt_env.training.evaluation.cases import named_cases
 from fowt_env.training.evaluation.evaluate import evaluate
 from fowt_env.training.evaluation.seeds import VALIDATION
 
+STABLE = 1e-6  # 1/s: an azimuth that turns on has a pole at zero
 INFINITE = 1e3  # rad/s: generalised eigenvalues beyond are zeros at infinity
 MODEL_SUFFIXES = (".json", ".npz")
 SHOWN = ("RotSpeed_std_[rpm]", "PtfmPitch_std_[deg]", "GenPwr_std_[kW]", "blade_pitch_travel_[deg/s]")
@@ -74,6 +79,48 @@ def zero_table(models):
     return pd.DataFrame(rows, columns=["wind_[m/s]", "real_[rad/s]", "imag_[rad/s]"])
 
 
+def zeros_over(scene, winds=None, progress=None):
+    """DataFrame: wind, right-half-plane zero of blade pitch to rotor speed, and what it makes of the loop.
+
+    winds      m/s; None: whole ones above rated up to cut-out
+    Columns: real and imaginary part of the zero (0 where there is none) and its period; period and damping of
+    the platform's pitch with blades and torque held; the least damping ratio of surge, platform pitch and
+    rotor speed under `pi`, and whether the whole loop is stable. Drag, quadratic in the motion, is left out.
+    Raises: InputError for winds at which the blades rest.
+    """
+    turbine = with_gains(scene)
+    winds = winds_above_rated(turbine) if winds is None else winds
+    settings, rows = PISettings.published(turbine), []
+    for wind, model in models_over(scene, winds, progress).items():
+        if model.pitch_rests:
+            raise InputError(f"wind = {wind:g}: the blade pitch rests on its limit there")
+        zeros = [z for z in transmission_zeros(model) if z.real > 1e-6 and z.imag >= 0.0]
+        zero = max(zeros, key=lambda z: z.real, default=0.0j)
+        own = [mode for mode in model.modes() if mode.name == "platform_pitch"]
+        a, names = closed_loop_matrix(model, settings)
+        poles = np.linalg.eigvals(a)
+        # what oscillates as the platform and the rotor do: yaw, sway and the lines' modes are not the loop's
+        moving = [
+            mode.damping_ratio
+            for mode in modes(a, names, model.cm_height, model.arm)
+            if mode.name in ("platform_pitch", "rotor_speed", "surge")
+        ]
+        size = abs(zero)
+        rows.append(
+            {
+                "wind_[m/s]": wind,
+                "zero_real_[rad/s]": float(zero.real),
+                "zero_imag_[rad/s]": float(zero.imag),
+                "zero_period_[s]": float(2.0 * np.pi / size) if size else np.nan,
+                "platform_period_[s]": float(max((m.period for m in own), default=np.nan)),
+                "platform_damping_[-]": float(min((m.damping_ratio for m in own), default=np.nan)),
+                "pi_damping_[-]": float(min(moving, default=np.nan)),
+                "pi_stable": bool(poles.real.max() < STABLE),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
 def save_models(models, path):
     """The path written: {wind: LinearModel} as .json or .npz, SI.
 
@@ -115,9 +162,10 @@ def save_study(models, folder):
     return written
 
 
-def sweep(variants, cases, seeds, out=None, progress=None, duration=660.0, skip=60.0):
+def sweep(variants, cases, seeds, out=None, progress=None, duration=660.0, skip=60.0, platform="oc3_hywind"):
     """DataFrame of lqr with each variant of its settings ({name: value} each) and of gspi_oc3, seed by seed.
 
+    cases: names of cases and suites, scaled to the platform's turbine.
     Of the metrics it has those of KEPT, NaN where a run failed. seeds must be training seeds,
     seeds.VALIDATION.start and above: the others are for scoring. out: CSV.
     Raises: InputError for other seeds or unknown settings.
@@ -133,7 +181,7 @@ def sweep(variants, cases, seeds, out=None, progress=None, duration=660.0, skip=
         if progress is not None and row is not None:
             progress(done, total)
 
-    runs = evaluate(laws, cases, duration, skip, seeds, progress=report)
+    runs = evaluate(laws, named_cases(cases, platform), duration, skip, seeds, progress=report)
     table = runs.rename(columns={"controller": "variant"})[["variant", "case", "seed", *KEPT]]
     if out is not None:
         write_table(table, out)

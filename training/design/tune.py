@@ -167,12 +167,12 @@ def spaces():
 class Objective:
     """Cost of controllers on a suite's cases and some validation seeds."""
 
-    def __init__(self, suite=SUITE, seeds=SEEDS, **engine):
+    def __init__(self, suite=SUITE, seeds=SEEDS, platform=None, **engine):
         if any(seed < VALIDATION.start for seed in seeds):
             raise InputError(
                 f"seeds = {list(seeds)}: must be {VALIDATION.start} or more: no suite is scored on those"
             )
-        self.suite, self.seeds, self.engine = read_suite(suite), tuple(seeds), engine
+        self.suite, self.seeds, self.engine = read_suite(suite, platform), tuple(seeds), engine
         self.turbine = build_scene(self.suite.cases[0].platform).turbine
         self.base = evaluate(BASELINE, self.suite, seeds=self.seeds, **engine)
 

@@ -16,7 +16,7 @@ from pydantic import BeforeValidator, Field
 
 from fowt_env.descriptions.checks import is_number, plain_number
 from fowt_env.descriptions.files import locate, raise_problems, read_toml
-from fowt_env.descriptions.platform import read_platform
+from fowt_env.descriptions.platform import platform_names, read_platform
 from fowt_env.descriptions.records import (
     NonNegative,
     Positive,
@@ -31,6 +31,7 @@ from fowt_env.scene.options import OPTIONS
 from fowt_env.training.evaluation.faults import Fault
 from fowt_env.training.evaluation.metrics import METRICS
 from fowt_env.training.evaluation.plant_perturbation import PlantPerturbation
+from fowt_env.training.evaluation.scaling import scaled_file, within_table
 from fowt_env.weather.wind_field import FIELD_KINDS, REQUIRED, is_field
 
 FOLDER = Path(__file__).parent / "suites"
@@ -63,6 +64,7 @@ class Case:
     shift: PlantPerturbation | None = None  # what of the plant its controllers do not know
     trip: float | None = TRIP  # fraction of rated rotor speed; None: no protection
     sensors: str = EXACT  # sensor chain that controllers read through, by its name
+    displaced: dict | None = None  # {channel: what is added to the trim of the platform at the start}
 
 
 def mean_speed(case):
@@ -89,6 +91,8 @@ def described(case):
         "trip": case.trip,
         "sensors": case.sensors,
     }
+    if case.displaced is not None:
+        values["displaced"] = case.displaced
     return _plain(values)
 
 
@@ -140,6 +144,7 @@ class CaseEntry(Record):
     shift: PlantPerturbation | None = None
     trip: Trip = None  # where it is given; else the suite's
     sensors: str | None = None
+    displaced: dict[str, float] | None = None  # from the trim, in place of initial on another platform
 
 
 class Site(Record):
@@ -193,6 +198,9 @@ class SuiteFile(Record):
     duration: Positive
     skip: NonNegative = 0.0
     platform: str = "oc3_hywind"
+    turbine: str | None = (
+        None  # whose winds and limits the file has: they are scaled to that of another platform
+    )
     options: dict[str, Any] = {"fidelity": "standard"}
     left_out: str = ""
     case: tuple[CaseEntry, ...]
@@ -253,29 +261,38 @@ def suite_names():
     return sorted(path.stem for path in FOLDER.glob("*.toml"))
 
 
-def read_suite(name_or_path):
+def read_suite(name_or_path, platform=None):
     """Suite of a built-in name or of a user's TOML file.
 
+    platform: a name or a path, on which its cases run in place of the file's, scaled to its turbine
+    (training/evaluation/scaling.py); None: that of the file. A Suite stays as it is.
     Raises: InputError for an unknown name (with a suggestion), and with one line per wrong entry.
     """
     if isinstance(name_or_path, Suite):
         return name_or_path
+    platform = None if platform is None else str(platform)
     if isinstance(name_or_path, str) and name_or_path in suite_names():
-        return _built_in(name_or_path)
+        if platform is None or platform in platform_names():
+            return _built_in(name_or_path, platform)
+        return _read(FOLDER / f"{name_or_path}.toml", platform)
     path = Path(locate("suite", name_or_path, suite_names()))
-    return _read(path)
+    return _read(path, platform)
 
 
 @functools.cache
-def _built_in(name):
-    return _read(FOLDER / f"{name}.toml")
+def _built_in(name, platform):
+    return _read(FOLDER / f"{name}.toml", platform)
 
 
-def _read(path):
-    """Suite of a file."""
+def _read(path, platform=None):
+    """Suite of a file, for a platform in place of its own."""
     where = f"suite file {str(path)!r}"
     file, problems = validate(SuiteFile, read_toml(path, "suite"))
     raise_problems(where, problems)
+    try:
+        file = scaled_file(file, platform)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
     cases = []
     for number, entry in enumerate(file.case, 1):
         try:
@@ -349,7 +366,7 @@ def _case(entry, speed, file, folder):
     return Case(
         entry.name.replace("{speed}", label),
         _wind(entry.wind, speed, folder),
-        _sea(entry.sea, speed),
+        _sea(entry.sea, speed, file),
         entry.platform or file.platform,
         options,
         entry.fault,
@@ -361,6 +378,7 @@ def _case(entry, speed, file, folder):
         entry.shift,
         entry.trip if "trip" in entry.model_fields_set else file.trip,
         check_sensors(file.sensors if entry.sensors is None else entry.sensors),
+        entry.displaced if entry.initial is None else None,
     )
 
 
@@ -402,8 +420,8 @@ def _wind(spec, speed, folder):
     return spec
 
 
-def _sea(spec, speed):
-    """The sea of a case, checked. Raises: InputError."""
+def _sea(spec, speed, file):
+    """The sea of a case, checked; that of a scaled wind is within its table. Raises: InputError."""
     if isinstance(spec, dict) and "table" in spec:
         at = spec.get("speed", speed)
         extra = set(spec) - {"table", "speed"}
@@ -411,35 +429,38 @@ def _sea(spec, speed):
             raise unknown("key of a sea from a table", sorted(extra)[0], ("table", "speed"))
         if at is None:
             raise InputError("sea.speed is missing: the wind speed (m/s) of the table's row")
+        if file.turbine is not None and file.platform != "oc3_hywind" and "speed" not in spec:
+            at = within_table(spec["table"], at)
         return joint_sea_state(spec["table"], at)
     sea_state_of(spec)
     return spec
 
 
-def all_cases():
+def all_cases(platform=None):
     """{name: Case} of the built-in suites; a name that several hold means the same in each."""
     cases = {}
     for suite in suite_names():
-        for case in read_suite(suite).cases:
+        for case in read_suite(suite, platform).cases:
             cases.setdefault(case.name, replace(case, seeds=None, duration=None, skip=None))
     return cases
 
 
-def named_cases(names):
+def named_cases(names, platform=None):
     """List of Cases for names of cases and suites, each once, in the order asked for.
 
-    names: a name, several separated by commas, or a sequence of names; a suite may be a path.
+    names: a name, several separated by commas, or a sequence of names; a suite may be a path. platform: as
+    of read_suite.
     Raises: InputError for an unknown name.
     """
     if isinstance(names, str):
         names = [name.strip() for name in names.split(",") if name.strip()]
     wanted = {}
-    known = all_cases()
+    known = all_cases(platform)
     for name in names:
         if name in known:
             found = [known[name]]
         elif name in suite_names() or str(name).endswith(".toml"):
-            found = read_suite(name).cases
+            found = read_suite(name, platform).cases
         else:
             raise unknown("case", name, (*suite_names(), *known), "fowt list cases, fowt list suites")
         for case in found:

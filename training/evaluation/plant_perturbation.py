@@ -1,5 +1,6 @@
 """Plants whose figures differ from the files': factors on masses, hydrodynamics, moorings and actuators."""
 
+import dataclasses
 from typing import Annotated
 
 from pydantic import Field
@@ -17,8 +18,11 @@ PLANT = {
         ("uniform", 0.99, 1.01),
     ),
     "upper_mass": ("factor on the masses and inertias of tower and nacelle", ("uniform", 0.95, 1.05)),
-    "added_mass": ("factor on the transverse and heave added mass", ("uniform", 0.8, 1.2)),
-    "drag": ("factor on the transverse drag coefficient and linear damping", ("uniform", 0.7, 1.3)),
+    "added_mass": ("factor on the added mass of the hull", ("uniform", 0.8, 1.2)),
+    "drag": (
+        "factor on the drag coefficients, linear and quadratic damping of the hull",
+        ("uniform", 0.7, 1.3),
+    ),
     "mooring_stiffness": ("factor on the lines' wet weight and EA", ("uniform", 0.8, 1.2)),
     "actuator_lag": ("factor on the time constant of the blade-pitch drive", ("loguniform", 0.5, 2.0)),
     "air_density": ("factor on the density of air", ("normal", 1.0, 0.02)),
@@ -45,13 +49,42 @@ def plant_settings(factors, platform=PLATFORM):
             }
         )
 
-    hydro = scaled(base.hydro, factor("added_mass"), "added_mass_coefficient", "heave_added_mass")
+    hydro, potential, additional = base.hydro, base.potential_flow, base.additional
+    mass, drag = factor("added_mass"), factor("drag")
+    if hydro is not None:
+        hydro = scaled(hydro, mass, "added_mass_coefficient", "heave_added_mass")
+        hydro = scaled(hydro, drag, "drag_coefficient", "linear_damping")
+    if potential is not None and mass != 1.0:
+        names = ("added_mass", "added_mass_infinite", "added_mass_zero")
+        known = {name: getattr(potential, name) for name in names}
+        changed = {name: mass * value for name, value in known.items() if value is not None}
+        potential = dataclasses.replace(potential, **changed)
+    if additional is not None and drag != 1.0:
+        names = ("linear_damping", "quadratic_damping")
+        known = {name: getattr(additional, name) for name in names}
+        changed = {
+            name: tuple(tuple(drag * x for x in row) for row in value)
+            for name, value in known.items()
+            if value is not None
+        }
+        additional = additional.model_copy(update=changed)
     upper, tau = factor("upper_mass"), factor("actuator_lag")
     base = base.model_copy(
         update={
             "environment": scaled(base.environment, factor("air_density"), "air_density"),
             "ballast": scaled(base.ballast, factor("ballast_mass"), "mass", "inertia"),
-            "hydro": scaled(hydro, factor("drag"), "drag_coefficient", "linear_damping"),
+            "hydro": hydro,
+            "potential_flow": potential,
+            "additional": additional,
+            "members": tuple(
+                scaled(
+                    scaled(member, mass, "added_mass_coefficient", "axial_added_mass_coefficient"),
+                    drag,
+                    "drag_coefficient",
+                    "axial_drag_coefficient",
+                )
+                for member in base.members
+            ),
             "tower": scaled(base.tower, upper, "mass", "inertia"),
             "lines": tuple(
                 scaled(line, factor("mooring_stiffness"), "wet_weight", "EA") for line in base.lines

@@ -8,6 +8,7 @@ from typing import Any
 import pandas as pd
 
 import fowt_env
+from fowt_env.analysis.trim import trim
 from fowt_env.controllers import make
 from fowt_env.descriptions.checks import is_number
 from fowt_env.descriptions.sea_state import sea_state_of
@@ -77,7 +78,7 @@ def scored(run):
                 scene,
                 controller=run_controller(run, nominal),
                 duration=run.duration,
-                initial=case.initial,
+                initial=_start(case, scene),
                 stop_overspeed=case.fault is None and trip is None,
                 grid_loss=_grid_loss(case),
                 trip=trip,
@@ -118,6 +119,14 @@ def _is_steady(case, scene):
         return False
     above = scene.wind_speed > scene.turbine.rated_wind_speed
     return above and sea_state_of(case.sea).height == 0.0
+
+
+def _start(case, scene):
+    """Absolute values of channels at the start of a Case; None: its operating point."""
+    if case.displaced is None:
+        return case.initial
+    point = trim(scene)
+    return {name: point[name] + change for name, change in case.displaced.items()}
 
 
 def _gust_start(case):

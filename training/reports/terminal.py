@@ -72,14 +72,15 @@ def summary_rows(means, width):
     return headings, list(zip(*texts, strict=True)), lost
 
 
-def chosen_cases(suite, cases):
+def chosen_cases(suite, cases, platform=None):
     """Suite or list of Cases for the names of a suite and of cases, either of which may be None.
 
+    platform: a name or a path to which they are scaled; None: that of the suite.
     Raises: InputError for an unknown name, and for a case that the suite does not hold.
     """
     if suite is None:
-        return named_cases("above_rated" if cases is None else cases)
-    whole = read_suite(suite)
+        return named_cases("above_rated" if cases is None else cases, platform)
+    whole = read_suite(suite, platform)
     if cases is None:
         return whole
     known = {case.name: case for case in whole.cases}

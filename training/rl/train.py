@@ -38,6 +38,7 @@ from fowt_env.envs.tasks import SITE, task_of
 from fowt_env.errors import InputError, unknown
 from fowt_env.files.atomic import process_lives, remove_leftovers, replacing
 from fowt_env.training.evaluation.locks import locked
+from fowt_env.training.evaluation.scaling import turbine_of
 from fowt_env.training.evaluation.seeds import TRAINING, seeds_for
 from fowt_env.training.rl.checkpoint_signature import is_own, seal
 from fowt_env.training.rl.settings import (
@@ -136,7 +137,8 @@ def environment_settings(settings):
     given = dict(settings["environment"])
     given.pop("num_envs", None)
     given.pop("randomise", None)
-    task = task_of(settings["task"])
+    turbine = turbine_of(given["platform"]) if "platform" in given else None
+    task = task_of(settings["task"], turbine)
     reach = {name: given.pop(name) for name in TASK_FIELDS if name in given}
     reach = {name: tuple(value) if isinstance(value, list) else value for name, value in reach.items()}
     task = replace(task, weather_seeds=(TRAINING.start, TRAINING.stop), **reach)

@@ -103,7 +103,7 @@ def test_the_baseline_is_gspi_in_continuous_time_but_for_sampling(loops, wind):
 def test_where_gspi_is_unstable_the_ceilings_stand_for_it(loops):
     baseline = loops[12].baseline()
     assert baseline.travel == float("inf") and baseline.power == POWER_CEILING
-    assert limits(SETTINGS, 12.0, baseline)["travel"] == pytest.approx(
+    assert limits(SETTINGS, 12.0, baseline, loops[12].turbine)["travel"] == pytest.approx(
         SETTINGS.travel_near_rated * np.pi / 180.0
     )
 
@@ -112,7 +112,7 @@ def test_where_gspi_is_unstable_the_ceilings_stand_for_it(loops):
 def test_no_limit_is_passed_and_travel_is_used_up(loops, wind):
     loop = loops[wind]
     _, reached, _ = optimal_gain(loop, SETTINGS)
-    limited = limits(SETTINGS, wind, loop.baseline())
+    limited = limits(SETTINGS, wind, loop.baseline(), loop.turbine)
     for name in LIMITED:
         assert getattr(reached, name) <= (1.0 + TOLERANCE) * limited[name]
     assert reached.travel == pytest.approx(limited["travel"], rel=TOLERANCE)
