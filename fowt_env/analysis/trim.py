@@ -179,6 +179,9 @@ class _Steady:
             settle_wake(self.handle, self.x, self.dx)
             return
         rows = slice(block.offset, block.offset + block.size)
+        if block.name == "radiation":  # of a platform at rest
+            self.x[rows] = 0.0
+            return
 
         def rates_at(values):
             self.x[rows] = values

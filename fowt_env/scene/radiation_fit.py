@@ -18,14 +18,15 @@ from scipy.optimize import least_squares, nnls
 
 from fowt_env.caches import Cache
 from fowt_env.errors import InputError, PlantWarning, level_outside
-from fowt_env.plant.hydro.radiation import GROUP, ConvolutionMemory, StateSpaceMemory
+from fowt_env.plant.compile.vector_sums import PAIR_LANES, SUM_LANES
+from fowt_env.plant.hydro.radiation import ConvolutionMemory, StateSpaceMemory, whole_groups
 from fowt_env.plant.state import MOTIONS
 
 BAND = (0.15, 2.5)  # rad/s, in which errors are counted: periods of 2.5 to 42 s
 OUTSIDE = 0.1  # weight of other frequencies
 FEWEST_KNOWN = 8  # frequencies of a file within BAND
 NEGLIGIBLE = 1e-3  # of the geometric mean of the diagonals: weaker coupling is left out
-FEWEST, MOST = 2, 8  # pairs of poles of an entry
+FEWEST, MOST = 2, 10  # pairs of poles of an entry
 ROUNDS = 20  # of relocating poles
 EVALUATIONS = 40  # of the nonlinear least squares
 DECAY = (0.05, 8.0)  # 1/s, of a pole: one of less would outlast SPAN, and is narrower than files resolve
@@ -248,22 +249,23 @@ def _constrained(left, right, rows, least):
 
 def _passive_grid():
     """Frequencies (rad/s) at which Re K is held positive, and its size there: K goes with w^2 at both ends."""
-    omega = np.unique(
-        np.r_[np.geomspace(1e-3, 0.05, 10), np.arange(0.05, PASSIVE_UP_TO + 0.01, 0.025), 20.0, 50.0]
-    )
+    omega = np.unique(np.r_[np.geomspace(1e-3, 0.05, 10), np.arange(0.05, PASSIVE_UP_TO + 0.01, 0.025), 20.0, 50.0])
     return omega, omega**2 / (omega**2 + 0.3**2) / (1.0 + (omega / 3.0) ** 2)
 
 
-def _passive_residues(omega, f, w, poles, places, size):
-    """(e, 2 m) residues of the entries at `places` of a (size, size) block with Re K >= 0, least squares."""
+def _passive_residues(omega, f, w, poles, places, size, counted):
+    """(e, 2 m) residues of the entries at `places` of a (size, size) block with Re K >= 0, least squares.
+
+    counted (e,): what errors of the entries are multiplied with.
+    """
     s, free = 1j * omega, _free(poles)
     base = _columns(s, poles) @ free
     left, m = _real(base * w[:, None]), free.shape[1]
     rights = _real(f * w[:, None])
     whole = np.zeros((len(places) * left.shape[0], len(places) * m))
     for k in range(len(places)):
-        whole[k * left.shape[0] : (k + 1) * left.shape[0], k * m : (k + 1) * m] = left
-    right = rights.T.ravel()
+        whole[k * left.shape[0] : (k + 1) * left.shape[0], k * m : (k + 1) * m] = counted[k] * left
+    right = (rights * counted).T.ravel()
     grid, shape = _passive_grid()
     real = (_columns(1j * grid, poles) @ free).real / shape[:, None]
     rows, least, x = [], [], None
@@ -313,22 +315,24 @@ def _fit_block(omega, k, block, coupled, w, asked):
     scale = {i: np.sqrt(np.sqrt((np.abs(k[band, i, i]) ** 2).mean())) for i in block}
     own = np.array([np.sqrt((np.abs(k[band, i, j]) ** 2).mean()) for i, j in pairs])
     f = np.array([k[:, i, j] for i, j in pairs]).T
-    best, last = (np.inf, None), None
-    for count in range(FEWEST, MOST + 1):
-        starts = () if last is None else (np.append(last, complex(-0.5, 1.0 + 0.2 * (count % 3))),)
-        found = _fit_poles(omega, f / own, w, count, starts)
-        last = found[1]
-        best = min(best, found, key=lambda each: each[0])
-        if found[0] <= 0.9 * asked:  # passivity will cost some of it
-            break
-    poles = best[1]
     units = np.array([scale[i] * scale[j] for i, j in pairs])
     places = [(block.index(i), block.index(j)) for i, j in pairs]
-    found = _passive_residues(omega, f / units, w, poles, places, len(block)) * units[:, None]
-    half = poles.size
-    residues = {}
-    for (i, j), row in zip(pairs, found, strict=True):
-        residues[i, j] = residues[j, i] = row[:half] + 1j * row[half:]
+    best, last = (np.inf, None, None), None
+    for count in range(FEWEST, MOST + 1):
+        starts = () if last is None else (np.append(last, complex(-0.5, 1.0 + 0.2 * (count % 3))),)
+        error, last = _fit_poles(omega, f / own, w, count, starts)
+        if error > best[0]:
+            continue  # positive Re K only adds to it
+        found = _passive_residues(omega, f / units, w, last, places, len(block), units / own)
+        miss = _columns(1j * omega, last) @ found.T - f / units
+        error = float((np.sqrt((np.abs(miss[band]) ** 2).mean(axis=0)) * units / own).max())
+        best = min(best, (error, last, found), key=lambda each: each[0])
+        if best[0] <= asked:
+            break
+    _, poles, found = best
+    half, residues = poles.size, {}
+    for (i, j), row, unit in zip(pairs, found, units, strict=True):
+        residues[i, j] = residues[j, i] = unit * (row[:half] + 1j * row[half:])
     return poles, residues
 
 
@@ -370,10 +374,7 @@ def _fit(body, asked):
     fit = RadiationFit(poles, residues, {}, 0.0, asked)
     grid = _passive_grid()[0]
     far = fit.response(grid[grid <= PASSIVE_UP_TO])
-    own, of_file = (
-        _misses(fit, omega[band], k[band]),
-        _misses(fit, body.omega[known], retardation(body)[known]),
-    )
+    own, of_file = _misses(fit, omega[band], k[band]), _misses(fit, body.omega[known], retardation(body)[known])
     entries = {}
     for i, j in residues:
         if i <= j:
@@ -447,7 +448,7 @@ def memory_for_step(memory, body, dt, planar):
 def build_state_space(fit, first, motions=range(6)):
     """StateSpaceMemory of a RadiationFit, for these motions; None where none of them has a memory."""
     groups = [
-        -(-fit.poles[j].size // GROUP) * GROUP if j in motions and j in fit.poles else 0 for j in range(6)
+        whole_groups(fit.poles[j].size, PAIR_LANES) if j in motions and j in fit.poles else 0 for j in range(6)
     ]
     begin = np.concatenate([[0], np.cumsum(groups)]).astype(np.int64)
     if begin[-1] == 0:
@@ -468,7 +469,7 @@ def build_state_space(fit, first, motions=range(6)):
         int(first),
         begin,
         pole,
-        np.array([i for i, _ in places], dtype=np.int64),
+        np.searchsorted([i for i, _ in places], np.arange(7)).astype(np.int64),
         np.array([j for _, j in places], dtype=np.int64),
         weight,
     )
@@ -485,7 +486,7 @@ def build_convolution(body, dt, motions=range(6)):
     if not places:
         return None
     steps = max(1, round(SPAN / dt))
-    n = -(-steps // (2 * GROUP)) * 2 * GROUP
+    n = whole_groups(steps, SUM_LANES)
     time = 0.5 * dt * np.arange(2 * n + 1)
     kernel = retardation_kernel(body, time)
     now = np.zeros((6, 6))

@@ -16,6 +16,7 @@ from numba.extending import intrinsic
 from fowt_env.plant.compile.decorators import kernel
 
 SUM_LANES = 8
+PAIR_LANES = SUM_LANES // 2  # poles whose states, real and imaginary parts, fill the lanes of a sum
 CROSSED = ((0, 2), (0, 3), (1, 2), (1, 3))  # of rows v, g, c, s
 
 
@@ -92,7 +93,62 @@ def _four_sums(typing_context, v, g, c, s, n):
     return types.UniTuple(types.float64, 4)(v, g, c, s, types.intp), generate
 
 
+@intrinsic
+def _advance(typing_context, x, y, factors, first, start, begin, count, old, new):
+    """The loop of advance_pairs; four poles at a time, which fill 256 bits."""
+
+    def generate(context, builder, signature, args):
+        source, target, table = (
+            context.make_array(kind)(context, builder, array)
+            for kind, array in zip(signature.args[:3], args[:3], strict=True)
+        )
+        first, start, begin, count, old, new = args[3:]
+        width = cgutils.unpack_tuple(builder, table.shape, 2)[1]
+        vector = ir.VectorType(ir.DoubleType(), PAIR_LANES)
+
+        def at(base, index):
+            return builder.bitcast(builder.gep(base, [index]), vector.as_pointer())
+
+        def spread(value):
+            undefined, zero = ir.Constant(vector, ir.Undefined), ir.Constant(ir.IntType(32), 0)
+            one = builder.insert_element(undefined, value, zero)
+            places = ir.Constant(ir.VectorType(ir.IntType(32), PAIR_LANES), [0] * PAIR_LANES)
+            return builder.shuffle_vector(one, undefined, places)
+
+        before, after = spread(old), spread(new)
+        step = ir.Constant(count.type, PAIR_LANES)
+        zero = ir.Constant(count.type, 0)
+        with cgutils.for_range_slice(builder, zero, count, step, count.type) as (index, _):
+            place = builder.add(start, index)
+            other = builder.add(place, count)
+            real, imaginary = (builder.load(at(source.data, k), align=8) for k in (place, other))
+            column, rows = builder.add(begin, index), []
+            for k in range(6):
+                row = builder.mul(builder.add(first, ir.Constant(first.type, k)), width)
+                rows.append(builder.load(at(table.data, builder.add(row, column)), align=8))
+            er, ei, sr, si, nr, ni = rows
+
+            def sum_of(a, p, b, q):
+                return builder.fadd(builder.fmul(a, p), builder.fmul(b, q))
+
+            turned = builder.fsub(builder.fmul(er, real), builder.fmul(ei, imaginary))
+            builder.store(builder.fadd(turned, sum_of(sr, before, nr, after)), at(target.data, place), align=8)
+            turned = sum_of(er, imaginary, ei, real)
+            builder.store(builder.fadd(turned, sum_of(si, before, ni, after)), at(target.data, other), align=8)
+        return context.get_dummy_value()
+
+    counts = (types.intp,) * 4
+    return types.void(x, y, factors, *counts, types.float64, types.float64), generate
+
+
 if numba.config.DISABLE_JIT:
+
+    def advance_pairs(x, y, factors, first, start, begin, count, old, new):
+        """y[start:] by the first-order recursion of pairs of poles from x[start:], see the compiled form."""
+        real, imaginary = x[start : start + count].copy(), x[start + count : start + 2 * count].copy()
+        er, ei, sr, si, nr, ni = factors[first : first + 6, begin : begin + count]
+        y[start : start + count] = (er * real - ei * imaginary) + (sr * old + nr * new)
+        y[start + count : start + 2 * count] = (er * imaginary + ei * real) + (si * old + ni * new)
 
     def lane_dot(a, b, n):
         """Sum of a[k] b[k] over k < n, a multiple of SUM_LANES."""
@@ -103,6 +159,15 @@ if numba.config.DISABLE_JIT:
         return _sums_twin((v, g, c, s), CROSSED, n)
 
 else:
+
+    @kernel
+    def advance_pairs(x, y, factors, first, start, begin, count, old, new):
+        """z = e z + s old + n new for the complex states of `count` poles, a multiple of PAIR_LANES.
+
+        x, y from `start` on: the real parts of the states, then the imaginary; read from x, put into y, which
+        may be x. factors: from row `first` and column `begin` on e, s and n, real and imaginary parts.
+        """
+        _advance(x, y, factors, first, start, begin, count, old, new)
 
     @kernel
     def lane_dot(a, b, n):

@@ -15,11 +15,10 @@ import numpy as np
 
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
-from fowt_env.plant.compile.vector_sums import SUM_LANES, lane_dot
+from fowt_env.plant.compile.vector_sums import PAIR_LANES, SUM_LANES, advance_pairs, lane_dot
 from fowt_env.plant.state import Wrench, add, pose_in, to_body, to_inertial
 
 MOTIONS = 6
-GROUP = SUM_LANES // 2  # poles of a motion come in whole groups, so that its states fill the lanes
 
 
 class StateSpaceMemory(NamedTuple):
@@ -32,7 +31,7 @@ class StateSpaceMemory(NamedTuple):
     first: int  # of the memory's states in the state vector
     begin: np.ndarray  # (7,) first pole of each motion, and their number
     pole: np.ndarray  # (2, n) real and imaginary part, 1/s
-    row: np.ndarray  # (e,) motion of the force of each entry of K
+    row: np.ndarray  # (7,) first entry of K of each force, and their number
     column: np.ndarray  # (e,) motion whose velocity it takes
     weight: np.ndarray  # (e, 2 m) 2 Re r and -2 Im r, in the order of the states of the column
 
@@ -72,17 +71,21 @@ def memory_data(hydro):
     return np.zeros((0, 0))
 
 
+def whole_groups(count, lanes):
+    """The least multiple of lanes that is not below a count."""
+    return -(-count // lanes) * lanes
+
+
 # ---------------------------------------------------------------- the load
 
 
 @kernel
 def _state_force(i, x, velocity, linear, memory, data):
     total = 0.0
-    for e in range(memory.row.shape[0]):
-        if memory.row[e] == i:
-            j = memory.column[e]
-            start = memory.first + 2 * memory.begin[j]
-            total -= lane_dot(memory.weight[e], x[start:], 2 * (memory.begin[j + 1] - memory.begin[j]))
+    for e in range(memory.row[i], memory.row[i + 1]):
+        j = memory.column[e]
+        start = memory.first + 2 * memory.begin[j]
+        total -= lane_dot(memory.weight[e], x[start:], 2 * (memory.begin[j + 1] - memory.begin[j]))
     return total
 
 
@@ -156,17 +159,10 @@ def _advance_states(x, y, first, plane, memory, data):
     u = to_inertial(pose, pose.vx, pose.vy, pose.vz)
     w = to_inertial(pose, pose.wx, pose.wy, pose.wz)
     step = data[STEP]
-    er, ei, sr = data[first], data[first + 1], data[first + 2]
-    si, nr, ni = data[first + 3], data[first + 4], data[first + 5]
     for j in range(MOTIONS):
         begin, count = memory.begin[j], memory.begin[j + 1] - memory.begin[j]
-        start = memory.first + 2 * begin
-        old, new = step[1 + j], (u[j] if j < 3 else w[j - 3])
-        for k in range(count):
-            c = begin + k
-            real, imaginary = x[start + k], x[start + count + k]
-            y[start + k] = er[c] * real - ei[c] * imaginary + (sr[c] * old + nr[c] * new)
-            y[start + count + k] = er[c] * imaginary + ei[c] * real + (si[c] * old + ni[c] * new)
+        start, new = memory.first + 2 * begin, (u[j] if j < 3 else w[j - 3])
+        advance_pairs(x, y, data, first, start, begin, count, step[1 + j], new)
     return u, w
 
 
