@@ -1,4 +1,4 @@
-"""Aerodynamic loads of a rotor at a standing platform: about the hub in shaft axes, and at the blade roots."""
+"""Aerodynamic loads of a rotor on a standing platform: about the hub in shaft axes, and at blade roots."""
 
 from typing import NamedTuple
 
@@ -7,12 +7,14 @@ import numpy as np
 from fowt_env.errors import InputError
 from fowt_env.plant.aero.bem_rotor import FAST_ROTOR, SLOW_ROTOR, curved_blade_load, hub_flow
 from fowt_env.plant.aero.blade_elements import build_blade_elements, smoothstep
+from fowt_env.plant.aero.blade_shape import blade_wind
 from fowt_env.plant.aero.wake import build_skewed_wake, skew_of
 from fowt_env.plant.aero.wind import wind_now
 from fowt_env.plant.events import N_COUNTERS
 from fowt_env.plant.state import N_RIGID, State, pose_of
 from fowt_env.plant.tilt import build_tilt, rotor_pose
 from fowt_env.scene.options import chosen_stations
+from fowt_env.scene.parts import build_elements
 
 
 class RotorLoads(NamedTuple):
@@ -34,8 +36,10 @@ def rotor_loads(scene, rotor_speed, blade_pitch, azimuth=0.0, time=0.0):
     aero, turbine = scene.model.aero, scene.turbine
     if aero is None:
         raise InputError("rotor_loads: the scene has no wind (wind = None)")
-    stations = chosen_stations(scene.options["blade_stations"], turbine)
-    rotor = build_blade_elements(turbine, scene.platform.environment.air_density, stations, shaped=True)
+    density, count = scene.platform.environment.air_density, scene.options["blade_stations"]
+    rotor = build_elements(turbine, density, count)
+    if rotor.shape is None:
+        rotor = build_blade_elements(turbine, density, chosen_stations(count, turbine), shaped=True)
     skew = build_skewed_wake() if scene.options["skewed_wake"] else None
     x = np.zeros(N_RIGID)
     x[State.ROTOR_SPEED], x[State.BLADE_PITCH], x[State.AZIMUTH] = rotor_speed, blade_pitch, azimuth
@@ -48,12 +52,13 @@ def rotor_loads(scene, rotor_speed, blade_pitch, azimuth=0.0, time=0.0):
     cosine, sine = np.cos(turbine.rotor.cone), np.sin(turbine.rotor.cone)
     root = turbine.rotor.hub_radius * np.array([-sine, cosine, 0.0])
     for number in range(rotor.blades):
-        load = curved_blade_load(
-            number, time, pose, hub, induction, x, now, aero.wind, field, rotor, rotor.shape,
-            skew_of(hub, skew), skew, None, np.zeros_like(x), np.zeros(N_COUNTERS),
-        )  # fmt: skip
         psi = azimuth + 2.0 * np.pi * number / rotor.blades
         out, turning = np.array([0.0, -np.sin(psi), np.cos(psi)]), np.array([0.0, -np.cos(psi), -np.sin(psi)])
+        load = curved_blade_load(
+            number, time, pose, hub, blade_wind(out[1], out[2], rotor_speed, pose, hub), induction, x, now,
+            aero.wind, field, rotor, rotor.shape, skew_of(hub, skew), skew, None, np.zeros_like(x),
+            np.zeros(N_COUNTERS),
+        )  # fmt: skip
         axes = np.array([[1.0, 0.0, 0.0], out, turning])
         own_force, own_moment = np.array(load[:3]), np.array(load[3:])
         force += own_force @ axes

@@ -1,6 +1,6 @@
 """The tilted shaft: rotor axes, which are the body axes turned about y, and what a tilt adds elsewhere.
 
-The shaft points downwind along s = (cos tilt, 0, -sin tilt), whose upwind end is the higher one. A rotor whose
+The shaft points downwind along s = (cos tilt, 0, -sin tilt): its upwind end is the higher one. A rotor whose
 shaft lies along x has the tilt None, and then nothing is turned.
 """
 

@@ -7,7 +7,9 @@ import numpy as np
 from fowt_env.descriptions.checks import check_number
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.aero.blade_elements import build_blade_elements
+from fowt_env.plant.aero.blade_shape import is_curved
 from fowt_env.plant.aero.load import Aero, BemRotor
+from fowt_env.plant.aero.station_choice import build_fewer_elements
 from fowt_env.plant.aero.tower_drag import build_tower_drag
 from fowt_env.plant.aero.wake import n_wake_states
 from fowt_env.plant.hydro.added_inertia import build_added_inertia
@@ -38,10 +40,18 @@ def wake_states(aero):
     return n_wake_states(rotor.elements, rotor.wake) if isinstance(rotor, BemRotor) else 0
 
 
+def build_elements(turbine, density, count):
+    """BladeElements of a turbine with that many of its stations; None: all. Raises: InputError."""
+    stations = chosen_stations(count, turbine)
+    if stations is None or not is_curved(turbine):
+        return build_blade_elements(turbine, density, stations)
+    return build_fewer_elements(turbine, density, count)
+
+
 def build_aero(platform, turbine, air, rotor, options):
     """Aero part of a scene with wind."""
     density = platform.environment.air_density
-    elements = build_blade_elements(turbine, density, chosen_stations(options["blade_stations"], turbine))
+    elements = build_elements(turbine, density, options["blade_stations"])
     model = ROTORS[rotor].build(elements, options)
     tower = build_tower_drag(platform.tower, density) if options["tower_drag"] else None
     return Aero(air.series, air.field, model, build_tilt(turbine.rotor.shaft_tilt), tower)

@@ -19,11 +19,12 @@ from fowt_env.plant.aero.blade_elements import (
 from fowt_env.plant.aero.blade_shape import (
     NO_BLADE_LOAD,
     BladeShape,
-    arm_of,
     blade_wind,
     effective_pitch,
+    lever_of,
     station_at,
     station_inflow,
+    with_blade,
     with_station,
 )
 from fowt_env.plant.aero.wake import PER_ELEMENT, filtered_induction, skew_factor, skew_of
@@ -151,32 +152,47 @@ def _straight_load(t, pose, x, now, series, field, rotor, shape, skew, wake, dx,
 
 
 @kernel
-def rotor_axes_load(force_x, force_y, force_z, moment_x, moment_y, moment_z, rotor):
-    """RotorLoad of a force and moment about the rotor centre, in rotor axes."""
-    height, overhang = rotor.hub_height, rotor.overhang
+def rotor_axes_load(about_centre, factor, rotor):
+    """RotorLoad of a Wrench about the rotor centre times a factor, in rotor axes."""
+    fx, fy, fz = factor * about_centre.fx, factor * about_centre.fy, factor * about_centre.fz
+    torque, height, overhang = factor * about_centre.mx, rotor.hub_height, rotor.overhang
     return RotorLoad(
         Wrench(
-            force_x,
-            force_y,
-            force_z,
-            moment_x - height * force_y,
-            moment_y + height * force_x + overhang * force_z,
-            moment_z - overhang * force_y,
+            fx,
+            fy,
+            fz,
+            torque - height * fy,
+            factor * about_centre.my + height * fx + overhang * fz,
+            factor * about_centre.mz - overhang * fy,
         ),
-        force_x,
-        moment_x,
+        fx,
+        torque,
     )
 
 
 @kernel
 def curved_blade_load(
-    number, t, pose, hub, induction, x, now, series, field, rotor, shape, skewed, skew, wake, dx, counters
+    number,
+    t,
+    pose,
+    hub,
+    blade,
+    induction,
+    x,
+    now,
+    series,
+    field,
+    rotor,
+    shape,
+    skewed,
+    skew,
+    wake,
+    dx,
+    counters,
 ):
-    """BladeLoad of a blade of BladeShape shape; pose in rotor axes."""
+    """BladeLoad of a blade of BladeShape shape, blade: its BladeWind; pose in rotor axes."""
     blade_pitch = x[State.BLADE_PITCH]
     cosine, sine = cos(blade_pitch), sin(blade_pitch)
-    psi = x[State.AZIMUTH] + 2.0 * pi * number / rotor.blades
-    blade = blade_wind(psi, x[State.ROTOR_SPEED], pose, hub)
     load = NO_BLADE_LOAD
     for j in range(rotor.radius.shape[0]):
         at = station_at(j, cosine, sine, shape)
@@ -203,9 +219,7 @@ def curved_blade_load(
             v_normal + normal, v_tangential + tangential, j, element, shape, rotor.polars
         )
         weight = rotor.weight[j]
-        load = with_station(
-            load, weight * fn, weight * ft, weight * moment, at, arm_of(j, cosine, sine, shape)
-        )
+        load = with_station(load, weight * fn, weight * ft, weight * moment, lever_of(j, cosine, sine, shape))
     return load
 
 
@@ -216,35 +230,16 @@ def _curved_load(t, pose, x, now, series, field, rotor, shape, skew, wake, dx, c
         x[State.ROTOR_SPEED] * rotor.tip_radius, SLOW_ROTOR * hub.speed, FAST_ROTOR * hub.speed
     )
     skewed = skew_of(hub, skew)
-    fx = fy = fz = mx = my = mz = 0.0
+    total = NO_LOAD
     for number in range(rotor.blades):
         psi = x[State.AZIMUTH] + 2.0 * pi * number / rotor.blades
-        ey, ez = -sin(psi), cos(psi)
+        blade = blade_wind(-sin(psi), cos(psi), x[State.ROTOR_SPEED], pose, hub)
         load = curved_blade_load(
-            number,
-            t,
-            pose,
-            hub,
-            induction,
-            x,
-            now,
-            series,
-            field,
-            rotor,
-            shape,
-            skewed,
-            skew,
-            wake,
-            dx,
-            counters,
-        )
-        fx += load.fx
-        fy += load.fr * ey - load.ft * ez
-        fz += load.fr * ez + load.ft * ey
-        mx += load.mx
-        my += load.mr * ey - load.mt * ez
-        mz += load.mr * ez + load.mt * ey
-    return rotor_axes_load(fx, fy, fz, mx, my, mz, rotor)
+            number, t, pose, hub, blade, induction, x, now, series, field, rotor, shape, skewed, skew, wake,
+            dx, counters,
+        )  # fmt: skip
+        total = with_blade(total, load, blade)
+    return rotor_axes_load(total, 1.0, rotor)
 
 
 # the sweep over straight blades in the rotor plane, or over curved ones

@@ -33,7 +33,7 @@ import numpy as np
 
 from fowt_env.caches import Cache
 from fowt_env.errors import InputError
-from fowt_env.plant.aero.blade_shape import blade_line, build_blade_shape, is_curved
+from fowt_env.plant.aero.blade_shape import blade_line, build_blade_shape, is_curved, line_integrals
 from fowt_env.plant.compile.decorators import entry, kernel
 from fowt_env.plant.tilt import rotor_axes
 
@@ -424,7 +424,7 @@ def airload(v_normal, v_tangential, element, polars):
 
 @kernel
 def pitching_moment(v_normal, v_tangential, j, element, shape, polars):
-    """Pitching moment per length of station j in the given local flow, N m/m: nose up, about the blade axis."""
+    """Pitching moment per length of station j in the given local flow, N m/m, nose up."""
     square = v_normal * v_normal + v_tangential * v_tangential
     if square == 0.0:
         return 0.0
@@ -579,10 +579,11 @@ def _zero_lift(polar):
     return high / rise - np.radians(6.0) if rise > 1.0 else 0.0
 
 
-def build_blade_elements(turbine, air_density, stations=None, shaped=False):
+def build_blade_elements(turbine, air_density, stations=None, shaped=False, fit=None):
     """BladeElements of a turbine description; stations: indices of a subset, default all.
 
     shaped: with a BladeShape even where blades are straight and lie in the rotor plane.
+    fit: of curved blades, a function from what the stations stand for (station_choice.Fit) to another.
 
     Raises: InputError if a station lies outside the blade or a polar does not span -180 to 180 deg.
     """
@@ -614,8 +615,10 @@ def build_blade_elements(turbine, air_density, stations=None, shaped=False):
     along, end, apart = radius, rotor.tip_radius, radius  # lengths along the blade, distance from the shaft
     if shaped or is_curved(turbine):
         line = blade_line(blade, rotor.hub_radius, rotor.tip_radius)
-        weights = station_weights(line.length, chosen)
-        shape, area = build_blade_shape(turbine, line, chosen, weights, np.concatenate(moments))
+        area, first = line_integrals(line, station_weights(line.length, chosen))
+        if fit is not None:
+            area, first = fit(area, first)
+        shape = build_blade_shape(turbine, line, chosen, first / area[:, None], np.concatenate(moments))
         along, end = line.length[1:-1][chosen], line.length[-1]
         apart = np.hypot(shape.cone_cosine * radius + shape.cone_sine * shape.prebend, shape.sweep)
         moment = area * shape.arm_distance

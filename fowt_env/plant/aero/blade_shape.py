@@ -1,11 +1,11 @@
 """Blades that do not lie in the rotor plane: cone, prebend and sweep, and loads summed along them.
 
-Directions of a blade: x along the shaft, downwind; r outwards, in the plane through shaft and pitch axis; t in
-the direction of rotation, r x t = x. The momentum balance of a station is that of blade_elements.py, for the
-wind normal to the blade axis (turned by cone and slope in the plane of x and r) and along t, at the distance
-from the shaft; loads are per length of the blade axis. The slope that sweep and blade pitch add in the plane of
-r and t is left out, as AeroDyn (BEM_Mod 1) does. Blade pitch turns prebend and sweep about the pitch axis, so
-places and slopes depend on it. The pitching moment (cm) acts about the blade axis.
+Directions of a blade: x along the shaft, downwind; r outwards, in the plane through shaft and pitch axis; t
+in the direction of rotation, r x t = x. The momentum balance of a station is that of blade_elements.py, for
+the wind normal to the blade axis (turned by cone and slope in the plane of x and r) and along t, at the
+distance from the shaft; loads are per length of the blade axis. The slope that sweep and blade pitch add in
+the plane of r and t is left out, as in AeroDyn (BEM_Mod 1). Blade pitch turns prebend and sweep about the
+pitch axis, so places and slopes depend on it. The pitching moment (cm) acts about the blade axis.
 """
 
 from math import atan2, cos, sin, sqrt
@@ -13,11 +13,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fowt_env.plant.compile.decorators import kernel
+from fowt_env.plant.compile.decorators import inlined_kernel, kernel
+from fowt_env.plant.state import Wrench
 
 
 class BladeShape(NamedTuple):
-    """Where a blade's stations are at zero blade pitch, about its pitch axis. n stations, k polar segments."""
+    """Where a blade's stations are at zero blade pitch, about its pitch axis. n stations, k segments."""
 
     prebend: np.ndarray  # (n,) m, downwind of the pitch axis
     sweep: np.ndarray  # (n,) m, against the direction of rotation
@@ -30,6 +31,7 @@ class BladeShape(NamedTuple):
     moment: np.ndarray  # (k, 2) cm at the start of each segment of the polars and its slope, 1/rad
     cone_cosine: float
     cone_sine: float  # positive: blades lean upwind
+    reach: float  # m, largest distance of a station from the rotor centre
 
 
 class Station(NamedTuple):
@@ -42,12 +44,19 @@ class Station(NamedTuple):
     nr: float
 
 
-class Arm(NamedTuple):
-    """Point where a station's part of the load acts, m."""
+class Lever(NamedTuple):
+    """What the forces normal to the blade axis (n) and along t, and the pitching moment, of a station make.
 
-    x: float
-    r: float
-    t: float
+    They act at the point (x, r, t), not quite the station's own.
+    """
+
+    nx: float  # directions of the normal, as those of the Station
+    nr: float
+    turn: float  # m, moment about t by n: x nr - r nx
+    t_nx: float  # m, moment about r by n
+    t_nr: float  # m, moment about -x by n
+    x: float  # m, moment about -r by the force along t
+    r: float  # m, moment about x by the force along t
 
 
 class BladeWind(NamedTuple):
@@ -92,7 +101,7 @@ def effective_pitch(j, blade_pitch, shape):
     return atan2(sin(blade_pitch), sqrt(1.0 - s * s) * cos(blade_pitch))
 
 
-@kernel
+@inlined_kernel
 def station_at(j, cosine, sine, shape):
     """Station j; cosine and sine of the blade pitch."""
     out = cosine * shape.prebend[j] + sine * shape.sweep[j]
@@ -107,22 +116,21 @@ def station_at(j, cosine, sine, shape):
     )
 
 
-@kernel
-def arm_of(j, cosine, sine, shape):
-    """Arm of station j; cosine and sine of the blade pitch."""
+@inlined_kernel
+def lever_of(j, cosine, sine, shape):
+    """Lever of station j; cosine and sine of the blade pitch."""
+    at = station_at(j, cosine, sine, shape)
     out = cosine * shape.arm_prebend[j] + sine * shape.arm_sweep[j]
     z = shape.arm_distance[j]
-    return Arm(
-        shape.cone_cosine * out - shape.cone_sine * z,
-        shape.cone_cosine * z + shape.cone_sine * out,
-        sine * shape.arm_prebend[j] - cosine * shape.arm_sweep[j],
-    )
+    x = shape.cone_cosine * out - shape.cone_sine * z
+    r = shape.cone_cosine * z + shape.cone_sine * out
+    t = sine * shape.arm_prebend[j] - cosine * shape.arm_sweep[j]
+    return Lever(at.nx, at.nr, x * at.nr - r * at.nx, t * at.nx, t * at.nr, x, r)
 
 
 @kernel
-def blade_wind(psi, rotor_speed, pose, hub):
-    """BladeWind of the blade at the azimuth psi; pose and hub in rotor axes."""
-    ey, ez = -sin(psi), cos(psi)
+def blade_wind(ey, ez, rotor_speed, pose, hub):
+    """BladeWind of the blade in the direction (0, ey, ez); pose and hub in rotor axes."""
     return BladeWind(
         ey,
         ez,
@@ -141,7 +149,7 @@ def blade_wind(psi, rotor_speed, pose, hub):
     )
 
 
-@kernel
+@inlined_kernel
 def station_inflow(u, v, w, at, pose, blade):
     """(v_normal, v_tangential) m/s of a station in the wind (u, v, w), inertial components."""
     wind_x = pose.r11 * u + pose.r21 * v + pose.r31 * w
@@ -153,17 +161,29 @@ def station_inflow(u, v, w, at, pose, blade):
     return at.nx * (wind_x - own_x) + at.nr * (wind_r - own_r), own_t - wind_t
 
 
-@kernel
-def with_station(load, fn, ft, moment, at, arm):
-    """The BladeLoad with that of a station: its force normal to the axis and along t, its pitching moment."""
-    fx, fr = fn * at.nx, fn * at.nr
+@inlined_kernel
+def with_station(load, fn, ft, moment, lever):
+    """The BladeLoad with that of a station: forces normal to the axis and along t, pitching moment."""
     return BladeLoad(
-        load.fx + fx,
-        load.fr + fr,
+        load.fx + fn * lever.nx,
+        load.fr + fn * lever.nr,
         load.ft + ft,
-        load.mx + arm.r * ft - arm.t * fr - moment * at.nr,
-        load.mr + arm.t * fx - arm.x * ft + moment * at.nx,
-        load.mt + arm.x * fr - arm.r * fx,
+        load.mx + lever.r * ft - lever.t_nr * fn - moment * lever.nr,
+        load.mr + lever.t_nx * fn - lever.x * ft + moment * lever.nx,
+        load.mt + lever.turn * fn,
+    )
+
+
+@kernel
+def with_blade(total, load, blade):
+    """The Wrench about the rotor centre, in rotor axes, with the BladeLoad of a blade."""
+    return Wrench(
+        total.fx + load.fx,
+        total.fy + load.fr * blade.ey - load.ft * blade.ez,
+        total.fz + load.fr * blade.ez + load.ft * blade.ey,
+        total.mx + load.mx,
+        total.my + load.mr * blade.ey - load.mt * blade.ez,
+        total.mz + load.mr * blade.ez + load.mt * blade.ey,
     )
 
 
@@ -201,21 +221,20 @@ def is_curved(turbine):
     return turbine.rotor.cone != 0.0 or any(v is not None and np.any(np.asarray(v) != 0.0) for v in offsets)
 
 
-def build_blade_shape(turbine, line, chosen, weights, moment):
-    """BladeShape of the stations chosen of a BladeLine.
-
-    weights (n chosen, n + 2): of a line load linear between all points, at each of them, per unit of that at
-    a chosen station; moment: see BladeShape.
-    """
-    inner = line.points[1:-1]
-    slope = np.gradient(inner[:, 0], inner[:, 2], edge_order=2 if len(inner) > 2 else 1)
+def line_integrals(line, weights):
+    """((m,), (m, 3)): integral and first moments along a BladeLine of line loads (m, n + 2) at its points."""
     steps = np.diff(line.length)[:, None]
-    # of the whole line load, force and first moments; each piece is linear times linear
     low, high = weights[:, :-1], weights[:, 1:]
-    force = 0.5 * (low + high) @ steps
+    force = 0.5 * (low + high) @ steps[:, 0]
     first = (low @ (steps * (2.0 * line.points[:-1] + line.points[1:]))) / 6.0
     first += (high @ (steps * (line.points[:-1] + 2.0 * line.points[1:]))) / 6.0
-    arm = first / force
+    return force, first
+
+
+def build_blade_shape(turbine, line, chosen, arm, moment):
+    """BladeShape of the stations chosen of a BladeLine; arm (n, 3) and moment: see BladeShape."""
+    inner = line.points[1:-1]
+    slope = np.gradient(inner[:, 0], inner[:, 2], edge_order=2 if len(inner) > 2 else 1)
     place = inner[chosen]
     columns = (*place.T, np.sin(np.arctan(slope))[chosen], *arm.T, np.asarray(turbine.blade.chord)[chosen])
     return BladeShape(
@@ -223,4 +242,5 @@ def build_blade_shape(turbine, line, chosen, weights, moment):
         np.ascontiguousarray(moment, dtype=np.float64),
         float(np.cos(turbine.rotor.cone)),
         float(np.sin(turbine.rotor.cone)),
-    ), force[:, 0]
+        float(np.linalg.norm(place, axis=1).max()),
+    )

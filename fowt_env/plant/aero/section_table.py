@@ -43,11 +43,12 @@ from fowt_env.plant.aero.blade_shape import (
     NO_BLADE_LOAD,
     BladeLoad,
     BladeShape,
-    arm_of,
     blade_wind,
     effective_pitch,
+    lever_of,
     station_at,
     station_inflow,
+    with_blade,
     with_station,
 )
 from fowt_env.plant.aero.wind import LOWEST_HEIGHT, wind_at
@@ -55,7 +56,7 @@ from fowt_env.plant.compile.decorators import entry, inlined_kernel, kernel
 from fowt_env.plant.compile.prefetch import prefetch
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.events import Counter
-from fowt_env.plant.state import State, Wrench
+from fowt_env.plant.state import NO_LOAD, State, Wrench
 
 # Directions: v_normal/(v_normal + |v_tangential|) in AHEAD cells, from the rotor plane to the shaft (where
 # this has a kink), then on in BEHIND cells to an inflow in the plane from behind (roots in cross wind).
@@ -63,8 +64,8 @@ from fowt_env.plant.state import State, Wrench
 AHEAD, BEHIND = 512, 64
 DENSE_START, DENSE_END, DENSE_ROWS = -5.0, 30.0, 140  # deg, blade pitches where turbines operate
 COARSE_END, COARSE_ROWS = 90.0, 60  # deg, on to feather
+HALF_ROOT_3 = sqrt(0.75)  # cosine and sine of a third of a turn are -1/2 and this
 LEAST_NORMAL = 1e-9  # v_normal of the first direction: the limit from upwind, as the load jumps at zero
-CURVED_REACH = 1.1  # of the tip radius: how far curved blades on a tilted shaft reach up and down at most
 LARGEST_RATIO = 12.0  # highest over lowest point of the rotor, else wind_at: see _profile
 
 
@@ -461,15 +462,65 @@ class CurvedForce(NamedTuple):
     """Sum over a curved blade over the air density."""
 
     load: BladeLoad
-    valid: bool  # False: some station lies outside the table or the box
+    outside: int  # stations outside the table or the box: the sum is valid where it is 0
 
 
-NOT_VALID = CurvedForce(NO_BLADE_LOAD, False)
+NO_CURVED_FORCE = CurvedForce(NO_BLADE_LOAD, 0)
+
+
+class Plane(NamedTuple):
+    """A quantity linear in the place of a station: one + x, r and t times these."""
+
+    one: float
+    x: float
+    r: float
+    t: float
+
+
+class ShearedFlow(NamedTuple):
+    """Wind relative to a blade in its own directions, linear in place but for the power law times these."""
+
+    height: Plane  # over that of the profile's centre, less 1
+    flow_x: Plane
+    flow_r: Plane
+    flow_t: Plane
+    scaled_x: float
+    scaled_r: float
+    scaled_t: float
+
+
+@inlined_kernel
+def _at(plane, at):
+    return plane.one + plane.x * at.x + plane.r * at.r + plane.t * at.t
 
 
 @kernel
-def _curved_station(load, v_normal, v_tangential, j, at, arm, low, high, fraction):
-    """The BladeLoad with station j, bilinear between two rows of the table, as _station_force."""
+def _sheared_flow(pose, hub, blade, now, series, profile):
+    """ShearedFlow of a blade in a wind uniform apart from its shears."""
+    vertical, horizontal = (
+        now.vertical_shear / series.reference_length,
+        now.horizontal_shear / series.reference_length,
+    )
+    one = vertical * (hub.Z - series.reference_height) + horizontal * hub.Y
+    x = vertical * pose.r31 + horizontal * pose.r21
+    r = vertical * blade.rz + horizontal * blade.ry
+    t = vertical * blade.tz + horizontal * blade.ty
+    inverse = 1.0 / profile.centre
+    ax, ar, at = pose.r11, blade.rx, blade.tx
+    return ShearedFlow(
+        Plane(hub.Z * inverse - 1.0, inverse * pose.r31, inverse * blade.rz, inverse * blade.tz),
+        Plane(ax * one + pose.r31 * now.w - blade.vx, ax * x, ax * r + blade.wt, ax * t - blade.wr),
+        Plane(ar * one + blade.rz * now.w - blade.vr, ar * x - blade.wt, ar * r, ar * t + blade.wx),
+        Plane(at * one + blade.tz * now.w - blade.vt, at * x + blade.wr, at * r - blade.wx, at * t),
+        profile.scale * (pose.r11 * now.u + pose.r21 * now.v),
+        profile.scale * (blade.rx * now.u + blade.ry * now.v),
+        profile.scale * (blade.tx * now.u + blade.ty * now.v),
+    )
+
+
+@inlined_kernel
+def _with_looked_up(force, v_normal, v_tangential, j, lever, low, high, fraction):
+    """The CurvedForce with station j, bilinear between two rows of the table, as _station_force."""
     total = abs(v_normal) + abs(v_tangential)
     ahead = AHEAD * v_normal
     place = (ahead if v_tangential >= 0.0 else AHEAD * total - BEHIND * v_tangential) / total
@@ -484,27 +535,40 @@ def _curved_station(load, v_normal, v_tangential, j, at, arm, low, high, fractio
     fn = a * low[j, k, 0] + b * low[j, k + 1, 0] + c * high[j, k, 0] + d * high[j, k + 1, 0]
     ft = a * low[j, k, 1] + b * low[j, k + 1, 1] + c * high[j, k, 1] + d * high[j, k + 1, 1]
     moment = a * low[j, k, 2] + b * low[j, k + 1, 2] + c * high[j, k, 2] + d * high[j, k + 1, 2]
-    return with_station(load, fn, ft, moment, at, arm)
+    valid = v_normal > 0.0 and v_normal + abs(v_tangential) < LARGEST_SPEED
+    return CurvedForce(with_station(force.load, fn, ft, moment, lever), force.outside + (0 if valid else 1))
+
+
+@inlined_kernel
+def _with_sheared(force, flow, at, j, lever, profile, low, high, fraction):
+    """The CurvedForce with station j in a sheared wind."""
+    shear = _shear(_at(flow.height, at), profile)
+    along = _at(flow.flow_x, at) + shear * flow.scaled_x
+    out = _at(flow.flow_r, at) + shear * flow.scaled_r
+    v_tangential = -_at(flow.flow_t, at) - shear * flow.scaled_t
+    return _with_looked_up(force, at.nx * along + at.nr * out, v_tangential, j, lever, low, high, fraction)
 
 
 @kernel
-def _curved_sheared(pose, hub, blade, now, series, profile, low, high, fraction, cosine, sine, shape):
-    """CurvedForce in a wind uniform apart from its shears."""
-    inverse = 1.0 / series.reference_length
-    vertical, horizontal = inverse * now.vertical_shear, inverse * now.horizontal_shear
-    centre = 1.0 / profile.centre
-    load, outside = NO_BLADE_LOAD, 0
+def _sheared_blade(flow, profile, low, high, fraction, cosine, sine, shape):
+    """CurvedForce of a blade in a sheared wind."""
+    force = NO_CURVED_FORCE
     for j in range(shape.distance.shape[0]):
-        at = station_at(j, cosine, sine, shape)
-        left = hub.Y + at.x * pose.r21 + at.r * blade.ry + at.t * blade.ty
-        height = hub.Z + at.x * pose.r31 + at.r * blade.rz + at.t * blade.tz
-        shear = profile.scale * _shear(height * centre - 1.0, profile)
-        linear = vertical * (height - series.reference_height) + horizontal * left
-        v_normal, v_tangential = station_inflow(now.u * shear + linear, now.v * shear, now.w, at, pose, blade)
-        outside += 0 if v_normal > 0.0 and v_normal + abs(v_tangential) < LARGEST_SPEED else 1
-        arm = arm_of(j, cosine, sine, shape)
-        load = _curved_station(load, v_normal, v_tangential, j, at, arm, low, high, fraction)
-    return CurvedForce(load, outside == 0)
+        at, lever = station_at(j, cosine, sine, shape), lever_of(j, cosine, sine, shape)
+        force = _with_sheared(force, flow, at, j, lever, profile, low, high, fraction)
+    return force
+
+
+@kernel
+def _sheared_blades(first, second, third, profile, low, high, fraction, cosine, sine, shape):
+    """CurvedForce of each of three blades in a sheared wind, whose stations are placed once."""
+    a = b = c = NO_CURVED_FORCE
+    for j in range(shape.distance.shape[0]):
+        at, lever = station_at(j, cosine, sine, shape), lever_of(j, cosine, sine, shape)
+        a = _with_sheared(a, first, at, j, lever, profile, low, high, fraction)
+        b = _with_sheared(b, second, at, j, lever, profile, low, high, fraction)
+        c = _with_sheared(c, third, at, j, lever, profile, low, high, fraction)
+    return a, b, c
 
 
 @kernel
@@ -519,7 +583,7 @@ def _curved_in_field(t, pose, hub, blade, field, low, high, fraction, cosine, si
     else:
         s0 = start - hub.X * pace
     one = np.uintp(1)  # indices without sign are not tested for counting from the end
-    load, outside = NO_BLADE_LOAD, 0
+    force = NO_CURVED_FORCE
     for j in range(shape.distance.shape[0]):
         at = station_at(j, cosine, sine, shape)
         s = s0 - pace * (at.x * pose.r11 + at.r * blade.rx + at.t * blade.tx)
@@ -543,22 +607,21 @@ def _curved_in_field(t, pose, hub, blade, field, low, high, fraction, cosine, si
         v += late * _across(velocity, slice_next, row, column, 1, p, q, r, d)
         w += late * _across(velocity, slice_next, row, column, 2, p, q, r, d)
         v_normal, v_tangential = station_inflow(u, v, w, at, pose, blade)
-        ahead = v_normal > 0.0 and v_normal + abs(v_tangential) < LARGEST_SPEED
-        outside += 0 if inside and ahead else 1
-        arm = arm_of(j, cosine, sine, shape)
-        load = _curved_station(load, v_normal, v_tangential, j, at, arm, low, high, fraction)
-    return CurvedForce(load, outside == 0)
+        lever = lever_of(j, cosine, sine, shape)
+        force = _with_looked_up(force, v_normal, v_tangential, j, lever, low, high, fraction)
+        force = CurvedForce(force.load, force.outside + (0 if inside else 1))
+    return force
 
 
 @kernel
 def _curved_sampled(
     t, pose, hub, blade, now, series, field, blade_pitch, low, high, fraction, elements, shape, counters
 ):
-    """BladeLoad with the wind sampled station by station, and the exact solution outside the table."""
+    """CurvedForce with the wind sampled station by station, and the exact solution outside the table."""
     cosine, sine = cos(blade_pitch), sin(blade_pitch)
-    load = NO_BLADE_LOAD
+    force = NO_CURVED_FORCE
     for j in range(shape.distance.shape[0]):
-        at, arm = station_at(j, cosine, sine, shape), arm_of(j, cosine, sine, shape)
+        at, lever = station_at(j, cosine, sine, shape), lever_of(j, cosine, sine, shape)
         u, v, w = wind_at(
             t,
             hub.X + at.x * pose.r11 + at.r * blade.rx + at.t * blade.tx,
@@ -570,7 +633,7 @@ def _curved_sampled(
         )
         v_normal, v_tangential = station_inflow(u, v, w, at, pose, blade)
         if v_normal > 0.0 and v_normal + abs(v_tangential) < LARGEST_SPEED:
-            load = _curved_station(load, v_normal, v_tangential, j, at, arm, low, high, fraction)
+            force = _with_looked_up(force, v_normal, v_tangential, j, lever, low, high, fraction)
         else:
             turned = effective_pitch(j, blade_pitch, shape)
             section = blade_section(v_normal, v_tangential, turned, j, 1.0, elements)
@@ -581,8 +644,28 @@ def _curved_sampled(
                 v_normal + section.induced_normal, v_tangential + section.induced_tangential, j,
                 element_of(j, turned, elements), shape, elements.polars,
             )  # fmt: skip
-            load = with_station(load, weight * section.fn, weight * section.ft, weight * moment, at, arm)
-    return load
+            load = with_station(force.load, weight * section.fn, weight * section.ft, weight * moment, lever)
+            force = CurvedForce(load, 0)
+    return force
+
+
+@kernel
+def _three_blades(
+    azimuth, speed, pose, hub, now, series, profile, low, high, fraction, cosine, sine, shape, elements
+):
+    """(whether every station lies in the table, RotorLoad) of three blades in a sheared wind."""
+    y, z = -sin(azimuth), cos(azimuth)
+    p = blade_wind(y, z, speed, pose, hub)
+    q = blade_wind(-0.5 * y - HALF_ROOT_3 * z, HALF_ROOT_3 * y - 0.5 * z, speed, pose, hub)
+    r = blade_wind(HALF_ROOT_3 * z - 0.5 * y, -HALF_ROOT_3 * y - 0.5 * z, speed, pose, hub)
+    a, b, c = _sheared_blades(
+        _sheared_flow(pose, hub, p, now, series, profile),
+        _sheared_flow(pose, hub, q, now, series, profile),
+        _sheared_flow(pose, hub, r, now, series, profile),
+        profile, low, high, fraction, cosine, sine, shape,
+    )  # fmt: skip
+    total = with_blade(with_blade(with_blade(NO_LOAD, a.load, p), b.load, q), c.load, r)
+    return a.outside + b.outside + c.outside == 0, rotor_axes_load(total, elements.air_density, elements)
 
 
 @inlined_kernel
@@ -598,36 +681,49 @@ def _curved_table_load(t, pose, x, now, series, field, table, shape, counters):
     fraction = row - i
     low, high = table.load[i], table.load[i + 1]
     cosine, sine = cos(blade_pitch), sin(blade_pitch)
-    bottom, top = hub.Z - CURVED_REACH * elements.tip_radius, hub.Z + CURVED_REACH * elements.tip_radius
+    bottom, top = hub.Z - shape.reach, hub.Z + shape.reach
     sheared = field is None and bottom > LOWEST_HEIGHT and top < LARGEST_RATIO * bottom
     if sheared:
         profile = _profile(bottom, top, series)
     else:
         profile = _profile(1.0, 1.0, series)
-    fx = fy = fz = mx = my = mz = 0.0
+    if sheared and elements.blades == 3:
+        all_valid, load = _three_blades(
+            azimuth,
+            speed,
+            pose,
+            hub,
+            now,
+            series,
+            profile,
+            low,
+            high,
+            fraction,
+            cosine,
+            sine,
+            shape,
+            elements,
+        )
+        if all_valid:
+            return load
+    total = NO_LOAD
     for number in range(elements.blades):
-        blade = blade_wind(azimuth + 2.0 * pi * number / elements.blades, speed, pose, hub)
-        force = NOT_VALID
+        psi = azimuth + 2.0 * pi * number / elements.blades
+        blade = blade_wind(-sin(psi), cos(psi), speed, pose, hub)
         if sheared:
-            force = _curved_sheared(
-                pose, hub, blade, now, series, profile, low, high, fraction, cosine, sine, shape
-            )
+            flow = _sheared_flow(pose, hub, blade, now, series, profile)
+            force = _sheared_blade(flow, profile, low, high, fraction, cosine, sine, shape)
         elif field is not None:
             force = _curved_in_field(t, pose, hub, blade, field, low, high, fraction, cosine, sine, shape)
-        load = force.load
-        if not force.valid:
-            load = _curved_sampled(
+        else:
+            force = CurvedForce(NO_BLADE_LOAD, 1)
+        if force.outside > 0:
+            force = _curved_sampled(
                 t, pose, hub, blade, now, series, field, blade_pitch, low, high, fraction, elements, shape,
                 counters,
             )  # fmt: skip
-        fx += load.fx
-        fy += load.fr * blade.ey - load.ft * blade.ez
-        fz += load.fr * blade.ez + load.ft * blade.ey
-        mx += load.mx
-        my += load.mr * blade.ey - load.mt * blade.ez
-        mz += load.mr * blade.ez + load.mt * blade.ey
-    rho = elements.air_density
-    return rotor_axes_load(rho * fx, rho * fy, rho * fz, rho * mx, rho * my, rho * mz, elements)
+        total = with_blade(total, force.load, blade)
+    return rotor_axes_load(total, elements.air_density, elements)
 
 
 # the sweep over straight blades in the rotor plane, or over curved ones
