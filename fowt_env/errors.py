@@ -28,7 +28,10 @@ class SimulationStopped(RuntimeError):
 
 
 class PlantWarning(UserWarning):
-    """A run whose loads were less accurate than they are meant to be, as DataFrame.attrs["events"] counts."""
+    """A run whose loads were less accurate than they are meant to be, as DataFrame.attrs["events"] counts.
+
+    Also a platform whose file has what can hardly be meant.
+    """
 
 
 def level_outside() -> int:

@@ -37,7 +37,7 @@ def made_up_body(headings=tuple(range(-180, 181, 30)), qtf_headings=((0, 0), (0,
     return PotentialFlow(
         omega=omega,
         added_mass=np.tile(np.eye(6) * 1e7, (40, 1, 1)),
-        damping=np.tile(np.eye(6) * 1e5, (40, 1, 1)),
+        damping=np.eye(6) * (2e6 * omega**2 / (1.0 + omega**2) ** 3)[:, None, None],
         added_mass_infinite=np.eye(6) * 1e7,
         excitation_omega=omega,
         heading=heading,

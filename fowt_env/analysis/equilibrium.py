@@ -1,16 +1,18 @@
 """Whether a steady state is one that a platform can be in, and what pulls at it where there is none."""
 
 import warnings
-from math import acos, cos, degrees, hypot, pi, sqrt
+from math import acos, cos, degrees, hypot, isnan, sqrt
 from typing import NamedTuple
 
 import numpy as np
 
+from fowt_env.analysis.statics import statics
 from fowt_env.errors import InputError, level_outside
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.mooring import SLACK
 from fowt_env.plant.rollout import CAPSIZE
 from fowt_env.plant.state import State, pose_of
+from fowt_env.scene.geometry import in_radians
 
 MOTION_LABELS = ("surge", "sway", "heave", "roll", "platform pitch", "yaw")
 LOADS = {  # name: where Data.cache has its wrench
@@ -60,7 +62,7 @@ def check_equilibrium(scene, rest, start, slope, fresh_slope):
     if impossible := _impossible(scene, heave, upright, tilt):
         raise InputError(
             f"{label(scene)}: its loads balance only with {' and '.join(impossible)} ({_place(rest)})."
-            f" {_sentences(_causes(scene, start))}".rstrip()
+            f" {_sentences(causes_of(scene, start))}".rstrip()
         )
     odd = {}
     draft = scene.platform.draft
@@ -72,7 +74,7 @@ def check_equilibrium(scene, rest, start, slope, fresh_slope):
     if (slope is None or _growing(scene, slope)) and (growing := _growing(scene, fresh_slope())):
         time = min(growing.values())
         odd["unstable"] = f"unstable in {' and '.join(growing)}, which grows by a factor e in {time:.2g} s"
-    causes = _causes(scene, start)
+    causes = causes_of(scene, start)
     odd |= {name: text for name, text in MOORINGS.items() if name in causes}
     if not odd:
         return
@@ -81,7 +83,7 @@ def check_equilibrium(scene, rest, start, slope, fresh_slope):
         return
     _warned.add(key)
     if "tilt" in odd or "unstable" in odd:
-        causes |= {"upright": text} if (text := _metacentre(scene)) else {}
+        causes["upright"] = metacentre(scene, statics(scene))
     text = f"{label(scene)}: {'; '.join(odd.values())} ({_place(rest)}). {_sentences(causes)}"
     warnings.warn(text.rstrip(), stacklevel=level_outside())
 
@@ -91,7 +93,7 @@ def unbalanced(scene, start, end, ending=None):
 
     start, end: Evaluated; ending: what is wrong at the end in words, where it is not the platform's balance.
     """
-    causes = _causes(scene, start)
+    causes = causes_of(scene, start)
     if scene.model.mooring is None:
         why = "mooring = False" if scene.platform.lines else "it has no mooring lines"
         causes["unheld"] = (
@@ -127,7 +129,7 @@ def _impossible(scene, heave, upright, tilt):
     return found
 
 
-def _causes(scene, start):
+def causes_of(scene, start):
     """{name: sentence} of what is wrong with the undisplaced platform."""
     model, platform = scene.model, scene.platform
     weight = model.rigid_body.mass * model.rigid_body.gravity
@@ -184,26 +186,25 @@ def _mooring_causes(mooring, start, weight, net):
     together = hypot(start.cache[LoadCache.MOORING], start.cache[LoadCache.MOORING + 1])
     if len(pull) > 1 and together > ONE_SIDED * pull.sum() > 0.0:
         anchors = ", ".join(f"({x:.4g}, {y:.4g})" for x, y, _ in mooring.anchor[:4])
+        azimuths = in_radians(mooring.anchor, mooring.fairlead)
+        hint = (
+            "" if azimuths is None else f": {', '.join(f'{a:.4g}' for a in azimuths[:4])} look like radians"
+        )
         found["one-sided"] = (
             f"all mooring lines pull to the same side, with {_kilo(together)} kN (anchors at (x, y) ="
-            f" {anchors} m; azimuth_deg is in degrees)"
+            f" {anchors} m; azimuth_deg is in degrees{hint})"
         )
     return found
 
 
-def _metacentre(scene):
-    """Sentence on the stability of the undisplaced platform as a floating body."""
-    hull, body, depth = scene.model.hydro.hull, scene.model.rigid_body, scene.platform.ballast.cm_depth
-    if hull is None:
-        return ""
-    area = pi * hull.radius**2
-    volume = hull.volume_below - area * hull.z_join
-    centre = (hull.moment_below - 0.5 * area * hull.z_join**2) / volume
-    mass_centre = body.s_z / body.mass
-    height = centre + 0.25 * area * hull.radius**2 / volume - mass_centre
+def metacentre(scene, figures):
+    """Sentence on the stability of the undisplaced platform as a floating body; figures: its Statics."""
+    buoyancy, height = figures.buoyancy_centre[2], figures.metacentric_height
+    shown = "" if isnan(buoyancy) else f", that of buoyancy at {buoyancy:.3g} m"
     return (
-        f"undisplaced its centre of mass is at z = {mass_centre:.3g} m, that of buoyancy at {centre:.3g} m"
-        f" and its metacentric height {height:.3g} m (ballast.cm_depth = {depth:g} m is positive downwards)"
+        f"undisplaced its centre of mass is at z = {figures.mass_centre[2]:.3g} m{shown} and its metacentric"
+        f" height {min(height):.3g} m (ballast.cm_depth = {scene.platform.ballast.cm_depth:g} m is positive"
+        " downwards)"
     )
 
 

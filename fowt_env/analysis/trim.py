@@ -8,6 +8,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from fowt_env.analysis.equilibrium import check_equilibrium, evaluated, label, unbalanced
+from fowt_env.analysis.statics import mean_derivative
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.aero.bem_rotor import wake_equilibrium
 from fowt_env.plant.aero.wind import wind_now
@@ -15,7 +16,6 @@ from fowt_env.plant.channels import to_units
 from fowt_env.plant.compile.decorators import entry
 from fowt_env.plant.compile.handle import data_of, model_of
 from fowt_env.plant.drivetrain import build_torque_curve, generator_torque
-from fowt_env.plant.dynamics import derivative
 from fowt_env.plant.hydro.load import BandedStrips
 from fowt_env.plant.hydro.member_series import no_series
 from fowt_env.plant.rollout import output_row
@@ -114,19 +114,6 @@ def without_fluctuations(scene, wind_speed=None):
             shear_exponent=aero.wind.shear_exponent,
         )
     return scene.with_model(parts)
-
-
-@entry
-def mean_derivative(handle, x, u, azimuths, dx, mean):
-    """Mean of dx over the azimuths, into mean (n_state,)."""
-    start = x[State.AZIMUTH]
-    mean[:] = 0.0
-    for i in range(azimuths):
-        x[State.AZIMUTH] = start + i * (2.0 * pi / 3.0) / azimuths
-        derivative(0.0, x, u, model_of(handle), data_of(handle), dx)
-        for j in range(x.shape[0]):
-            mean[j] += dx[j] / azimuths
-    x[State.AZIMUTH] = start
 
 
 @entry

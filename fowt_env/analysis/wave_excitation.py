@@ -25,6 +25,9 @@ AMPLITUDE = 1e-3  # m; the force is odd in it but for drag, which is left out: f
 PAIRS = 8  # pairs of poles: 16 states
 POLE_DAMPING = 0.5  # neighbours then overlap
 LEADS = np.arange(0.0, 12.01, 0.5)  # s, of which the best fit is taken
+# of a potential-flow body, between whose columns waves interfere
+BODY_PAIRS, BODY_POLE_DAMPING, BODY_LEADS = 24, 0.25, np.arange(0.0, 18.01, 0.5)
+NOISE = 1e-6  # of the largest force, or moment: what a symmetric body has of the others in its file
 WEIGHT_FLOOR = 0.1  # fraction of a component's largest force below which errors count as absolute
 BANDS = ((0.2, 0.4), (0.4, 0.8), (0.8, 1.2), (1.2, 1.8))  # rad/s, for the report of the fit
 
@@ -116,19 +119,26 @@ class WaveFilter:
 
 
 def fit_wave_filter(scene, state):
-    """WaveFilter fitted to wave_force over BAND, with the lead of LEADS that fits best.
+    """WaveFilter fitted to wave_force over BAND, with the lead that fits best.
 
-    Poles are fixed, evenly spread over the band, so the fit is linear least squares and the model stable.
+    Poles are fixed, evenly spread over the band, so the fit is linear least squares and the model stable:
+    PAIRS of them for strips, BODY_PAIRS for a potential-flow body.
     """
     omega = np.linspace(*BAND, GRID)
     force = wave_force(scene, state, omega)
-    a, b = _resonators(np.linspace(BAND[0], 1.15 * BAND[1], PAIRS))
+    for kind in (slice(0, 3), slice(3, 6)):
+        size = np.abs(force[:, kind]).max(axis=0)
+        force[:, kind] *= size > NOISE * size.max()
+    pairs, damping, leads = PAIRS, POLE_DAMPING, LEADS
+    if scene.platform.potential_flow is not None:
+        pairs, damping, leads = BODY_PAIRS, BODY_POLE_DAMPING, BODY_LEADS
+    a, b = _resonators(np.linspace(BAND[0], 1.15 * BAND[1], pairs), damping)
     eye = np.eye(a.shape[0])
     basis = np.array([np.linalg.solve(1j * w * eye - a, b) for w in omega])
     size = np.abs(force)
     weight = 1.0 / (size + WEIGHT_FLOOR * size.max(axis=0) + (size.max(axis=0) == 0.0))
     best = None
-    for lead in LEADS:
+    for lead in leads:
         target = force * np.exp(-1j * omega * lead)[:, None]
         c = np.zeros((6, b.size))
         for row in range(6):
@@ -144,13 +154,13 @@ def fit_wave_filter(scene, state):
     return model
 
 
-def _resonators(frequencies):
+def _resonators(frequencies, damping):
     """(A, B) of second-order resonators side by side, all driven by the input."""
     n = len(frequencies)
     a, b = np.zeros((2 * n, 2 * n)), np.zeros(2 * n)
     for i, frequency in enumerate(frequencies):
         block = slice(2 * i, 2 * i + 2)
-        a[block, block] = [[0.0, frequency], [-frequency, -2.0 * POLE_DAMPING * frequency]]
+        a[block, block] = [[0.0, frequency], [-frequency, -2.0 * damping * frequency]]
         b[2 * i + 1] = frequency
     return a, b
 

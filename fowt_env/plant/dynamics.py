@@ -14,7 +14,7 @@ from fowt_env.plant.aero.bem_rotor import RotorLoad
 from fowt_env.plant.aero.load import aero_load
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.drivetrain import pitch_rate, shaft_torque
-from fowt_env.plant.hydro.load import hydro_load
+from fowt_env.plant.hydro.load import hydro_load, hydro_rates
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.mooring import mooring_load
 from fowt_env.plant.rigid_body import accelerate, attitude_rate, gravity_load
@@ -37,6 +37,7 @@ def evaluate_loads(t, x, model, data, dx):
     pose = pose_in(x, model.rigid_body.plane)
     aero = aero_load(t, pose, x, model.aero, data, dx)
     hydro = hydro_load(t, pose, x, model.hydro, data)
+    hydro_rates(x, model.hydro, dx)
     mooring = mooring_load(pose, model.mooring, data.lines, data.counters)
     evaluate_user_loads(t, pose, x, model.aero, model.hydro, model.user, data, dx)
 

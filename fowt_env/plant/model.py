@@ -81,6 +81,7 @@ class Data(NamedTuple):
     counters: np.ndarray  # (N_COUNTERS,)
     kinematics: np.ndarray  # (7, n_nodes) water kinematics at the strip nodes
     bands: object  # hydro.wave_bands.BandScratch, the same for strips with wave bands
+    excitation: np.ndarray  # hydro.excitation.excitation_scratch
     member_nodes: np.ndarray  # (n, hydro.members.N_NODE) nodes of members that are laid at each evaluation
     member_water: np.ndarray  # (n * N_WATER,) the water's motion at the members' nodes
     added_mass: np.ndarray  # (6, 6) of the last evaluation, symmetric, about the body origin

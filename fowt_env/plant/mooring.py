@@ -30,6 +30,9 @@ DEEPEST_SAG = 300.0  # above any root for spans that NEGLIGIBLE lets through; it
 # m: points of a LineTable, from so far inwards of the line's place at rest to so far outwards
 TABLE_X, TABLE_Z = 0.5, 1.0
 TABLE_INWARD, TABLE_OUTWARD, TABLE_HEIGHT = 60.0, 32.0, 30.0
+# A table is tried at half points up to so many from the line's place at rest. Where it misses the tension by
+# this share of it, as that of a tendon, which goes slack within a metre, the line is solved instead.
+TRIED_X, TRIED_Z, TABLE_ERROR = 16, 4, 2e-2
 NEGLIGIBLE = 1e-100  # spans over L below this count as none, far below the rounding of any real one
 
 
@@ -39,7 +42,7 @@ class LineTable(NamedTuple):
     tension: (n, places, heights, 2) H and V, N, at TABLE_X, TABLE_Z metres from origin.
     """
 
-    origin: np.ndarray  # (n, 2) horizontal and vertical span of the first point, m
+    origin: np.ndarray  # (n, 2) horizontal and vertical span of the first point, m; nan: a line without table
     tension: np.ndarray
 
 
@@ -95,7 +98,11 @@ def _line_table(mooring):
     counts = (int((TABLE_INWARD + TABLE_OUTWARD) / TABLE_X) + 1, int(TABLE_HEIGHT / TABLE_Z) + 1)
     tension = np.zeros((len(rest), *counts, 2))
     _fill_tensions(first, tension, mooring)
-    return LineTable(np.ascontiguousarray(first), tension)
+    table = LineTable(np.ascontiguousarray(first), tension)
+    for i, (x_f, z_f) in enumerate(rest):
+        if not _table_error(x_f, z_f, i, mooring, table) <= TABLE_ERROR:
+            first[i] = np.nan
+    return table._replace(origin=np.ascontiguousarray(first))
 
 
 @kernel
@@ -308,6 +315,23 @@ def _tensions(x_f, z_f, i, table):
         H += across[n] * (up[0] * a[0] + up[1] * b[0] + up[2] * c[0] + up[3] * d[0])
         V += across[n] * (up[0] * a[1] + up[1] * b[1] + up[2] * c[1] + up[3] * d[1])
     return H > 0.0, H, V
+
+
+@kernel
+def _table_error(x_f, z_f, i, mooring, table):
+    """Largest error of line i's table about these spans, as a share of the tension at the fairlead."""
+    worst = 0.0
+    for j in range(-TRIED_X, TRIED_X):
+        for k in range(-TRIED_Z, TRIED_Z):
+            x, z = x_f + (j + 0.5) * TABLE_X, z_f + (k + 0.5) * TABLE_Z
+            inside, H, V = _tensions(x, z, i, table)
+            if inside:
+                line = catenary(
+                    x, z, mooring.length[i], mooring.weight[i], mooring.EA[i], mooring.friction[i], 0.0
+                )
+                error = hypot(H - line.H, V - line.V)
+                worst = max(worst, error / line.fairlead_tension if line.fairlead_tension > 0.0 else error)
+    return worst
 
 
 @kernel

@@ -11,6 +11,7 @@ from fowt_env.plant.drivetrain import build_drivetrain, build_pitch_actuator, bu
 from fowt_env.plant.integrators import build_integrator
 from fowt_env.plant.model import Model
 from fowt_env.plant.state import N_RIGID
+from fowt_env.scene.geometry import warn_of_geometry
 from fowt_env.scene.mass import build_layout, build_rigid_body
 from fowt_env.scene.options import checked_options, choose_parts, samples_per_step
 from fowt_env.scene.parts import (
@@ -55,7 +56,8 @@ def build_scene(
     options   see OPTIONS; a platform file may set other defaults. planar: surge, heave and platform pitch
               alone move; of ntm and etm turbulence the part in the plane is kept
 
-    Raises: InputError naming the key, the value and what is allowed.
+    Raises: InputError naming the key, the value and what is allowed. A PlantWarning, once per platform, says
+    which of its places can hardly be meant; `fowt check` says more.
     """
     label = platform.name if isinstance(platform, Platform) else str(platform)
     if not isinstance(platform, Platform):
@@ -66,6 +68,7 @@ def build_scene(
         turbine = read_turbine(turbine)
     rotor = choose_parts(fidelity, rotor, options)
     seed = check_whole_number("seed", seed, 0)
+    warn_of_geometry(platform, label)
     air, waves = build_weather(wind, sea, seed, platform, turbine, rotor, options)
     current = build_current(options["current"]) if options["hydrodynamics"] else None
     if options["planar"]:

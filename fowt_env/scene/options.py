@@ -99,6 +99,9 @@ OPTIONS = {
     "radiation": (None, (None, "state_space", "convolution", "none")),
     "radiation_error": (0.02, "rms error of each entry of the state space over its rms, 0.001 to 0.5"),
     "current": (None, "None, a speed (m/s) or {'speed', 'heading' (deg), 'exponent'}"),
+    # where waves meet a potential-flow body: at rest, or at its surge and sway behind a low pass
+    "excitation_position": ("undisplaced", ("undisplaced", "filtered")),
+    "excitation_cutoff": (0.01, "Hz, 0.0001 to 0.5"),
     # of a potential-flow body with a difference-frequency QTF; cutoff: differences above it make no force
     "second_order": (None, (None, "none", *METHODS)),
     "second_order_cutoff": (None, "None or rad/s, > 0"),
@@ -170,6 +173,7 @@ def checked_options(given, platform):
     if options["strip_length"] is not None:
         options["strip_length"] = check_number("strip_length", options["strip_length"], 0.01, 1e3)
     options["radiation_error"] = check_number("radiation_error", options["radiation_error"], 0.001, 0.5)
+    options["excitation_cutoff"] = check_number("excitation_cutoff", options["excitation_cutoff"], 1e-4, 0.5)
     if options["second_order_cutoff"] is not None:
         options["second_order_cutoff"] = check_number(
             "second_order_cutoff", options["second_order_cutoff"], 0.0, 100.0, low_open=True

@@ -15,6 +15,7 @@ from fowt_env.plant.aero.wake import n_wake_states
 from fowt_env.plant.hydro.added_inertia import build_added_inertia
 from fowt_env.plant.hydro.body_matrices import build_body_matrices
 from fowt_env.plant.hydro.diffraction import build_strip_diffraction
+from fowt_env.plant.hydro.excitation import build_place
 from fowt_env.plant.hydro.hydrostatics import build_hull
 from fowt_env.plant.hydro.linear_damping import build_damping
 from fowt_env.plant.hydro.load import BandedStrips, ExactStrips, Hydro
@@ -58,7 +59,7 @@ def build_aero(platform, turbine, air, rotor, options):
 
 
 def build_hydro(platform, waves, current, options, first_state=N_RIGID):
-    """Hydro part of a scene in water; the states of its memory begin at first_state."""
+    """Hydro part of a scene in water; the states of waves and memory begin at first_state."""
     site, spar = platform.environment, platform.hull is not None
     strips = None
     if spar:
@@ -67,6 +68,8 @@ def build_hydro(platform, waves, current, options, first_state=N_RIGID):
         if takes_wave_bands(options, waves, shape):
             quadrature = build_quadrature(platform.hull, shape, _refinement(waves))
             strips = BandedStrips(shape, quadrature, None, None)
+    excitation = excitation_in_waves(platform, waves, options, first_state)
+    first_state += 0 if excitation is None or excitation.place is None else 2
     return Hydro(
         hull=build_hull(platform.hull, site.water_density, site.gravity) if spar else None,
         strips=strips_in_waves(strips, waves, options),
@@ -79,7 +82,7 @@ def build_hydro(platform, waves, current, options, first_state=N_RIGID):
         ),
         radiation=build_radiation(platform.potential_flow, options, default_step(options), first_state),
         members=members_in_waves(_members(platform, options), waves, options),
-        excitation=excitation_in_waves(platform, waves, options),
+        excitation=excitation,
         depth=float(site.water_depth),
     )
 
@@ -94,7 +97,8 @@ def hydro_in_waves(hydro, waves, platform, options):
         waves = flat_waves(depth=site.water_depth, density=site.water_density, gravity=site.gravity)
     strips, excitation = hydro.strips, still_excitation(hydro.excitation)
     if not is_flat(waves):
-        excitation = excitation_in_waves(platform, waves, options)
+        place = None if excitation is None else excitation.place
+        excitation = excitation_in_waves(platform, waves, options, 0 if place is None else place.first)
     if isinstance(strips, BandedStrips) and (is_flat(waves) or is_flat(hydro.waves)):
         nodes = build_quadrature(platform.hull, strips.shape, _refinement(waves))
         quadrature = strips.quadrature._replace(table=nodes.table, keel=nodes.keel)
@@ -107,8 +111,8 @@ def hydro_in_waves(hydro, waves, platform, options):
     )
 
 
-def excitation_in_waves(platform, waves, options):
-    """Excitation of a potential-flow body in waves; None without either.
+def excitation_in_waves(platform, waves, options, first_state):
+    """Excitation of a potential-flow body in waves, with states from first_state on; None without either.
 
     Raises: InputError for a sea beyond the body's coefficients, or second order without a QTF.
     """
@@ -118,9 +122,13 @@ def excitation_in_waves(platform, waves, options):
             f"second_order = {second!r}: the platform {platform.name!r} has no difference-frequency QTF;"
             " allowed without one: None or 'none'"
         )
+    place = None
+    if options["excitation_position"] == "filtered":
+        place = build_place(first_state, options["excitation_cutoff"])
     return build_excitation(
         body,
         waves,
+        place=place,
         duration=options["duration"],
         fast=options["wave_loads"] == "fast",
         planar=options["planar"],

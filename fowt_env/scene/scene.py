@@ -14,6 +14,7 @@ from fowt_env.errors import InputError
 from fowt_env.plant.channels import Channel, channels, put_hub_wind, scales
 from fowt_env.plant.compile.handle import Handle
 from fowt_env.plant.events import N_COUNTERS
+from fowt_env.plant.hydro.excitation import excitation_scratch, place_states
 from fowt_env.plant.hydro.member_series import N_WATER
 from fowt_env.plant.hydro.members import N_NODE
 from fowt_env.plant.hydro.radiation import memory_data, memory_states
@@ -66,6 +67,7 @@ class Scene:
         """What the entries of this scene's state vector are, in order."""
         internal = {"wake": wake_states(self.model.aero)}
         internal |= {f"load {load.name}": load.states for load in self.loads}
+        internal |= {"slow place": place_states(self.model.hydro)}
         return state_blocks(internal | {"radiation": memory_states(self.model.hydro)})
 
     @property
@@ -126,6 +128,7 @@ class Scene:
             counters=np.zeros(N_COUNTERS),
             kinematics=np.zeros((7, 0 if strips is None else strips.shape.nodes)),
             bands=band_scratch(getattr(strips, "bands", None), getattr(strips, "quadrature", None)),
+            excitation=excitation_scratch(hydro),
             member_nodes=np.zeros((laid, N_NODE)),
             member_water=np.zeros(N_WATER * nodes),
             added_mass=np.zeros((6, 6)),

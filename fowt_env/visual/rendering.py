@@ -20,6 +20,9 @@ WINDOW = 60.0  # s of a trace
 SAMPLING = 2  # the side view is drawn this much larger and then averaged
 DEPTH_SHIFT = 0.28  # cabinet projection: how far a metre across the wind is shifted, so that the rotor shows
 LINE_POINTS = 81
+MOST_TENSIONS = 4  # that are written out; of more lines, the least and the largest
+LEAST_SEA = 0.4  # rotor radii of water shown below a flat hull
+SPLASH = 0.1  # of the draft: what is seen from boats is yellow from there up
 WAVE_STEP = 10  # pixels of the enlarged picture between points of the sea surface
 
 INK, SOFT, FAINT, CARD, PAGE = (
@@ -136,7 +139,8 @@ class TurbinePanel:
         width, height = self.inner = (SAMPLING * size[0], SAMPLING * size[1])
         platform, turbine = scene.platform, scene.turbine
         radius = turbine.rotor.tip_radius
-        top, bottom = turbine.rotor.hub_height + 1.16 * radius, -1.18 * platform.draft
+        top = turbine.rotor.hub_height + 1.16 * radius
+        bottom = -max(1.18 * platform.draft, LEAST_SEA * radius)
         self.scale = height / (top - bottom)
         self.left = -0.5 * width / self.scale + 0.12 * radius
         self.top = top
@@ -192,7 +196,7 @@ class TurbinePanel:
         return pygame.transform.smoothscale(canvas, self.size)
 
     def _tapered(self, canvas, pose, heights, diameters, colour):
-        """A shaded cylinder or cone on the platform's axis."""
+        """A shaded body of revolution about the platform's axis."""
         edges = np.linspace(-1.0, 1.0, 8)
         for low, high in zip(edges[:-1], edges[1:], strict=True):
             light = 1.0 - 0.38 * ((0.5 * (low + high) + 0.35) / 1.35) ** 2
@@ -201,12 +205,56 @@ class TurbinePanel:
             shade = [round(c * light) for c in colour]
             self.pygame.draw.polygon(canvas, shade, self.pixels(pose.inertial(body)))
 
+    def _cylinder(self, canvas, pose, ends, diameters, colour):
+        """A shaded cylinder or cone of any direction between two body-fixed points."""
+        first, second = self.pixels(pose.inertial(ends))
+        radii = 0.5 * self.scale * np.asarray(diameters)
+        along = second - first
+        length = float(np.hypot(*along))
+        if length < 0.5 * self.scale * np.linalg.norm(np.subtract(*ends)):  # seen rather from its end
+            self.pygame.draw.circle(canvas, [round(0.85 * c) for c in colour], second, max(radii[1], 1.0))
+        if length < 1.0:
+            return
+        across = np.array([-along[1], along[0]]) / length
+        edges = np.linspace(-1.0, 1.0, 8)
+        for low, high in zip(edges[:-1], edges[1:], strict=True):
+            light = 1.0 - 0.38 * ((0.5 * (low + high) + 0.35) / 1.35) ** 2
+            corners = [(first, low, 0), (second, low, 1), (second, high, 1), (first, high, 0)]
+            body = [point + side * radii[end] * across for point, side, end in corners]
+            self.pygame.draw.polygon(canvas, [round(c * light) for c in colour], body)
+
+    def _members(self, canvas, pose, members, draft):
+        """The members of a hull, farthest first, yellow from the splash zone up."""
+        limit = -SPLASH * draft
+        for member in sorted(members, key=lambda member: -(member.start[1] + member.end[1])):
+            ends, diameters = np.array([member.start, member.end]), np.array(member.diameter)
+            heights = ends[:, 2]
+            self._cylinder(canvas, pose, ends, diameters, STEEL if heights.min() < limit else YELLOW)
+            if heights.min() < limit < heights.max():
+                share = (limit - heights[0]) / (heights[1] - heights[0])
+                cut = ends[0] + share * (ends[1] - ends[0])
+                wide = diameters[0] + share * (diameters[1] - diameters[0])
+                top = int(np.argmax(heights))
+                self._cylinder(canvas, pose, np.array([cut, ends[top]]), (wide, diameters[top]), YELLOW)
+
+    def _box(self, canvas, pose, draft, volume):
+        """A box of this draft and displaced volume, of a hull that has no shape in its file."""
+        half, deck = 0.5 * np.sqrt(volume / draft), 0.5 * draft
+        for low, high, colour in ((-draft, -SPLASH * draft, STEEL), (-SPLASH * draft, deck, YELLOW)):
+            corners = [(-half, 0.0, low), (half, 0.0, low), (half, 0.0, high), (-half, 0.0, high)]
+            self.pygame.draw.polygon(canvas, colour, self.pixels(pose.inertial(corners)))
+
     def _hull(self, canvas, pose):
-        hull, tower = self.scene.platform.hull, self.scene.platform.tower
-        z, diameter = np.array(hull.z), np.array(hull.diameter)
-        self._tapered(canvas, pose, z, diameter, STEEL)
-        splash = np.array([max(z[0], -0.1 * abs(z[0])), z[-1]])  # the part seen from boats is yellow
-        self._tapered(canvas, pose, splash, np.interp(splash, z, diameter), YELLOW)
+        platform = self.scene.platform
+        hull, tower = platform.hull, platform.tower
+        if hull is not None:
+            z, diameter = np.array(hull.z), np.array(hull.diameter)
+            self._tapered(canvas, pose, z, diameter, STEEL)
+            splash = np.array([max(z[0], -SPLASH * abs(z[0])), z[-1]])
+            self._tapered(canvas, pose, splash, np.interp(splash, z, diameter), YELLOW)
+        elif not platform.members:
+            self._box(canvas, pose, platform.draft, platform.potential_flow.volume)
+        self._members(canvas, pose, platform.members, platform.draft)
         heights = np.array([tower.base_height, tower.top_height])
         self._tapered(canvas, pose, heights, np.array([tower.base_diameter, tower.top_diameter]), WHITE)
 
@@ -323,7 +371,10 @@ class MooringPanel:
         spar = self.pixels(pose.inertial([(0.0, 0.0, keel), (0.0, 0.0, 0.0), (0.0, 0.0, hub)]))
         pygame.draw.line(picture, YELLOW, spar[0], spar[1], 3)
         pygame.draw.line(picture, SOFT, spar[1], spar[2], 2)
-        words = self._font.render(f"fairlead tensions {', '.join(texts)} kN", True, SOFT)
+        shown = ", ".join(texts)
+        if len(texts) > MOST_TENSIONS:
+            shown = f"{min(texts, key=int)} to {max(texts, key=int)}"
+        words = self._font.render(f"fairlead tensions {shown} kN", True, SOFT)
         picture.blit(words, (10, self.size[1] - 18))
         return picture
 

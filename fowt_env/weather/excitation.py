@@ -10,7 +10,21 @@ from math import pi
 import numpy as np
 
 from fowt_env.errors import InputError, PlantWarning, level_outside
-from fowt_env.plant.hydro.excitation import COLUMNS, ELEVATION, ExactExcitation, Excitation, ExcitationSeries
+from fowt_env.plant.compile.vector_sums import SUM_LANES
+from fowt_env.plant.hydro.excitation import (
+    ALONG_X,
+    ALONG_Y,
+    COLUMNS,
+    ELEVATION,
+    N_WAVE,
+    RATE,
+    TURN,
+    ExactExcitation,
+    Excitation,
+    ExcitationSeries,
+    FastExcitation,
+)
+from fowt_env.plant.hydro.wave_bands import aligned, padded
 from fowt_env.weather.harmonics import pack_table, table_of
 from fowt_env.weather.second_order import build_second_order
 
@@ -19,12 +33,13 @@ SAME_HEADING = 1e-4  # rad, of headings that the figures of files cannot tell ap
 OUT_OF_PLANE = (1, 3, 5)  # sway, roll, yaw
 
 
-def build_excitation(body, waves, *, duration, fast, planar, second_order=None, cutoff=None):
+def build_excitation(body, waves, *, duration, fast, planar, place=None, second_order=None, cutoff=None):
     """Excitation of a PotentialFlow in Waves; None without either.
 
     duration      s that the table of a sea that does not repeat has to cover
     fast          first order from a table; else by the sum over components
     planar        forces in the plane alone
+    place         SlowPlace at which the waves meet the body; None: undisplaced
     second_order  None, "none", "mean_drift", "newman" or "full"; cutoff: rad/s, of the differences, or None
 
     Raises: InputError for a sea beyond the body's headings or frequencies. Warns: PlantWarning where
@@ -40,16 +55,20 @@ def build_excitation(body, waves, *, duration, fast, planar, second_order=None, 
     first = ExactExcitation(
         waves.omega,
         waves.phase,
+        waves.wave_number * waves.cos_heading,
+        waves.wave_number * waves.sin_heading,
         np.ascontiguousarray(np.concatenate([force.real, force.imag], axis=1)),
         float(waves.ramp),
     )
-    if fast:
+    if fast and place is None:
         first = ExcitationSeries(_first_order_table(waves, force, duration), first)
+    elif fast:
+        first = _fast_sum(first, waves.amplitude)
     second = build_second_order(body, waves, second_order, duration=duration, cutoff=cutoff)
     if second is not None and planar:
         second.table.value[:, OUT_OF_PLANE] = 0.0
         second.mean[list(OUT_OF_PLANE)] = 0.0
-    return Excitation(first, second)
+    return Excitation(first, second, place)
 
 
 def _first_order_table(waves, force, duration):
@@ -60,17 +79,31 @@ def _first_order_table(waves, force, duration):
     return table_of(waves.omega, coefficient, duration)
 
 
+def _fast_sum(exact, amplitude):
+    """FastExcitation of an ExactExcitation. The phase there is k x - omega t + e: the sine changes sign."""
+    size = -(-amplitude.size // SUM_LANES) * SUM_LANES
+    wave = np.zeros((N_WAVE, size))
+    for row, values in ((RATE, exact.omega), (TURN, exact.phase % (2.0 * pi)), (ALONG_X, exact.along_x),
+                        (ALONG_Y, exact.along_y)):  # fmt: skip
+        wave[row, : amplitude.size] = values / (2.0 * pi)
+    force = np.zeros((12, size))
+    force[:, : amplitude.size] = exact.force.T
+    return FastExcitation(aligned(wave), aligned(force), aligned(padded(amplitude, size)), exact.ramp)
+
+
 def still_excitation(part):
     """An Excitation of the same types without force: no first order, and no mean drift; None of None."""
     if part is None:
         return None
-    one = np.ones(1)
-    first = ExactExcitation(one, np.zeros(1), np.zeros((1, 12)), 0.0)
+    one, none = np.ones(1), np.zeros(1)
+    first = ExactExcitation(one, none, none, none, np.zeros((1, 12)), 0.0)
     flat = pack_table(np.zeros((11, COLUMNS)), 1.0, 8.0, True)
     if isinstance(part.first, ExcitationSeries):
         first = ExcitationSeries(flat, first)
+    elif isinstance(part.first, FastExcitation):
+        first = _fast_sum(first, none)
     second = None if part.second is None else part.second._replace(table=flat, mean=np.zeros(6), ramp=0.0)
-    return Excitation(first, second)
+    return Excitation(first, second, part.place)
 
 
 def excitation_at(body, omega, heading):

@@ -6,6 +6,7 @@ import io
 import naive.mooring as naive
 import numpy as np
 import pytest
+from floaters import TENDON, tendons
 
 from fowt_env.descriptions.platform import Line
 from fowt_env.plant.events import N_COUNTERS, Counter
@@ -602,3 +603,58 @@ def test_the_tabulated_pull_has_no_steps():
     pull = np.array([wrench([s, 0.0, 0.0, 0.0, 0.0, 0.0], table)[0] for s in surge])
     slope = np.diff(pull) / np.diff(surge)
     assert np.abs(np.diff(slope)).max() < 0.01 * np.abs(slope).mean()
+
+
+# Tendons of a tension-leg platform, eight in four pairs: the MIT/NREL TLP of OpenFAST's regression tests
+
+
+def test_tendons_have_the_tensions_of_map():
+    """MAP++'s summary of that test: 3833338.083 N at the fairlead and 3680014.476 N at the anchor."""
+    lines = np.zeros((8, N_LINE))
+    load = wrench(np.zeros(6), build_mooring(tendons()), lines)
+    # it stops with a sideways pull of 247 N in a line that stands vertical, 6e-5 of the tension
+    assert lines[:, 2] == pytest.approx(np.full(8, 3833338.083), rel=2e-6)
+    assert lines[:, 3] == pytest.approx(np.full(8, 3680014.476), rel=2e-6)
+    assert lines[:, 5] == pytest.approx(np.full(8, SUSPENDED))
+    assert load == pytest.approx([0.0, 0.0, -8 * lines[0, 2], 0.0, 0.0, 0.0], abs=1e-6)
+
+
+def test_a_vertical_tendon_is_a_spring():
+    length, weight, stiffness = TENDON
+    for height in (152.11, 151.9, 155.0):
+        line = catenary(0.0, height, *TENDON, 0.0, 0.0)
+        strain = height / length - 1.0
+        assert line.fairlead_tension == pytest.approx(stiffness * strain + 0.5 * weight * length, rel=1e-12)
+        near = catenary(1e-6, height, *TENDON, 0.0, 0.0)
+        assert near.fairlead_tension == pytest.approx(line.fairlead_tension, rel=1e-12)
+        # Eq. (18) where H vanishes: x = H (log(V / V_anchor) / w + L / EA)
+        slope = np.log(line.fairlead_tension / line.anchor_tension) / weight + length / stiffness
+        assert 1e-6 / near.H == pytest.approx(slope, rel=1e-9)
+
+
+def test_taut_and_steep_lines_match_moorpy():
+    """To 1e-7 of the tension. Of a very taut line MoorPy may find both tensions negative, equal in size."""
+    moorpy = pytest.importorskip("moorpy.Catenary")
+    rng = np.random.default_rng(21)
+    length, weight, stiffness = TENDON
+    for _ in range(300):
+        chord = length * rng.uniform(0.995, 1.02)
+        lean = 10.0 ** rng.uniform(-3.5, -0.1)
+        x_f, z_f = chord * np.sin(lean), chord * np.cos(lean)
+        line = catenary(x_f, z_f, *TENDON, 0.0, 0.0)
+        assert line.converged
+        with contextlib.redirect_stdout(io.StringIO()):
+            HA, VA, HF, VF, _ = moorpy.catenary(x_f, z_f, length, stiffness, weight, CB=0.0, Tol=1e-10)
+        scale = line.fairlead_tension
+        assert [line.H, line.V] == pytest.approx(np.abs([HF, VF]), abs=1e-7 * scale)
+        assert line.anchor_tension == pytest.approx(np.hypot(HA, VA), abs=1e-7 * scale)
+
+
+def test_lines_that_no_table_follows_are_solved():
+    exact, table = build_mooring(tendons()), build_mooring(tendons(), tabulated=True)
+    assert np.isnan(table.table.origin).all()
+    assert not np.isnan(build_mooring(oc3_lines(), tabulated=True).table.origin).any()
+    motion = [4.0, -1.0, -0.1, 0.002, 0.001, 0.03]
+    assert wrench(motion, table, np.zeros((8, N_LINE))) == pytest.approx(
+        wrench(motion, exact, np.zeros((8, N_LINE))), rel=1e-12
+    )

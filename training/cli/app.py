@@ -5,7 +5,7 @@ from importlib import import_module
 from fowt_env.training.cli.console import app
 
 GROUPS = (  # modules that add their commands to the app, in the order of fowt --help
-    "simulate", "evaluate", "validate", "doctor", "benchmark", "design", "plot", "report", "scores",
+    "simulate", "check", "evaluate", "validate", "doctor", "benchmark", "design", "plot", "report", "scores",
     "leaderboard", "hydro", "train",
 )  # fmt: skip
 for group in GROUPS:

@@ -3,28 +3,36 @@
 Linear theory knows the body in its undisplaced place and pose alone, so the forces are functions of time, in
 inertial axes about the body origin. First-order forces are a sum over the wave components, or the same sum
 tabulated over time; second-order forces are tabulated always. A table holds the coefficients of a cubic
-B-spline: four rows, of eight numbers each, make a value.
+B-spline: four rows, of eight numbers each, make a value. Where the waves are to meet the body at its slowly
+varying place, first-order forces are summed with the phases of a low-passed surge and sway, two states.
 """
 
-from math import cos, floor, sin
+from math import cos, floor, pi, sin
 from typing import NamedTuple
 
 import numpy as np
 
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.compile.variants import chosen_by_class
+from fowt_env.plant.compile.vector_sums import lane_dot
+from fowt_env.plant.hydro.wave_bands import aligned, phasors
 from fowt_env.plant.hydro.waves import elevation, ramp_factor
-from fowt_env.plant.state import Wrench, add, to_body
+from fowt_env.plant.state import State, Wrench, add, to_body
 
 COLUMNS = 8  # of a table: six of the force, the elevation at the origin, and one that fills a cache line
 ELEVATION = 6
+# rows of a FastExcitation's components, phases in turns; the first three are scratch of phasors
+DISTANCE, RATE, TURN, ALONG_X, ALONG_Y, N_WAVE = range(6)
+N_SCRATCH = 5  # rows: those three, cosine and sine
 
 
 class ExactExcitation(NamedTuple):
-    """First-order force by the plain sum: Re(force exp(i (omega t - phase)))."""
+    """First-order force by the plain sum: Re(force exp(i (omega t - phase - k (x cos b + y sin b))))."""
 
     omega: np.ndarray  # (n,) rad/s
     phase: np.ndarray  # (n,) e, rad
+    along_x: np.ndarray  # (n,) k cos b, 1/m
+    along_y: np.ndarray  # (n,) k sin b
     force: np.ndarray  # (n, 12) of each component's amplitude, N and N m: six real parts, six imaginary ones
     ramp: float  # s over which the waves are raised from rest
 
@@ -45,6 +53,22 @@ class ExcitationSeries(NamedTuple):
     exact: ExactExcitation
 
 
+class FastExcitation(NamedTuple):
+    """First-order force by the sum at a place, with the phases of all components at once."""
+
+    wave: np.ndarray  # (N_WAVE, n) rows DISTANCE (zeros) to ALONG_Y; n padded with zeros to whole lanes
+    force: np.ndarray  # (12, n) of each component's amplitude, on cosine (6) and sine (6)
+    amplitude: np.ndarray  # (n,)
+    ramp: float
+
+
+class SlowPlace(NamedTuple):
+    """Surge and sway behind a first-order low pass: where the waves meet the body."""
+
+    first: int  # of its two states in the state vector
+    rate: float  # 1/s, of the filter
+
+
 class SecondOrder(NamedTuple):
     """Difference-frequency force from a table; the mean force for times beyond it."""
 
@@ -56,8 +80,27 @@ class SecondOrder(NamedTuple):
 class Excitation(NamedTuple):
     """Force of the waves on a potential-flow body."""
 
-    first: object  # ExactExcitation or ExcitationSeries
-    second: object  # SecondOrder or None
+    first: object  # ExactExcitation, ExcitationSeries or, with a place, FastExcitation
+    second: object  # SecondOrder or None; at the undisplaced place
+    place: object  # SlowPlace, or None: undisplaced
+
+
+def build_place(first, cutoff):
+    """SlowPlace whose states begin at `first`, with a cutoff frequency in Hz."""
+    return SlowPlace(int(first), float(2.0 * pi * cutoff))
+
+
+def place_states(hydro):
+    """Number of states of the slow place of a Hydro part or None."""
+    part = None if hydro is None else hydro.excitation
+    return 0 if part is None or part.place is None else 2
+
+
+def excitation_scratch(hydro):
+    """Fresh scratch array of a FastExcitation of a Hydro part or None; empty without one."""
+    part = None if hydro is None else hydro.excitation
+    first = None if part is None else part.first
+    return aligned(np.zeros((N_SCRATCH, first.amplitude.size if isinstance(first, FastExcitation) else 0)))
 
 
 @kernel
@@ -111,12 +154,12 @@ def _tabulated(value, row, fraction, scale):
 
 
 @kernel
-def exact_force(t, first):
-    """Wrench of an ExactExcitation, inertial axes."""
+def exact_force(t, x, y, first, scratch):
+    """Wrench of an ExactExcitation at an inertial place, inertial axes."""
     force = first.force
     fx = fy = fz = mx = my = mz = 0.0
     for j in range(first.omega.shape[0]):
-        angle = first.omega[j] * t - first.phase[j]
+        angle = first.omega[j] * t - first.phase[j] - (x * first.along_x[j] + y * first.along_y[j])
         c, s = cos(angle), sin(angle)
         fx += force[j, 0] * c - force[j, 6] * s
         fy += force[j, 1] * c - force[j, 7] * s
@@ -129,16 +172,69 @@ def exact_force(t, first):
 
 
 @kernel
-def series_force(t, first):
-    """Wrench of an ExcitationSeries, inertial axes."""
+def series_force(t, x, y, first, scratch):
+    """Wrench of an ExcitationSeries, inertial axes, whatever the place."""
     row, fraction = place_in(t, first.table)
     if row < 0:
-        return exact_force(t, first.exact)
+        return exact_force(t, 0.0, 0.0, first.exact, scratch)
     return _tabulated(first.table.value, row, fraction, ramp_factor(t, first.exact.ramp))
 
 
-# (t, first) -> Wrench, inertial axes
-first_order_force = chosen_by_class("first", {ExactExcitation: exact_force, ExcitationSeries: series_force})
+@kernel
+def _fill_phasors(t, x, y, wave, scratch):
+    """Fill the last two rows of scratch with cosine and sine of the components' phases at a place."""
+    for j in range(wave.shape[1]):
+        scratch[DISTANCE, j] = x * wave[ALONG_X, j] + y * wave[ALONG_Y, j]
+        scratch[RATE, j] = wave[RATE, j]
+        scratch[TURN, j] = wave[TURN, j]
+    phasors(t, 1.0, scratch, scratch[3], scratch[4])
+
+
+@kernel
+def fast_force(t, x, y, first, scratch):
+    """Wrench of a FastExcitation at an inertial place, inertial axes."""
+    _fill_phasors(t, x, y, first.wave, scratch)
+    c, s, force, n = scratch[3], scratch[4], first.force, first.amplitude.shape[0]
+    f = ramp_factor(t, first.ramp)
+    return Wrench(
+        f * (lane_dot(force[0], c, n) + lane_dot(force[6], s, n)),
+        f * (lane_dot(force[1], c, n) + lane_dot(force[7], s, n)),
+        f * (lane_dot(force[2], c, n) + lane_dot(force[8], s, n)),
+        f * (lane_dot(force[3], c, n) + lane_dot(force[9], s, n)),
+        f * (lane_dot(force[4], c, n) + lane_dot(force[10], s, n)),
+        f * (lane_dot(force[5], c, n) + lane_dot(force[11], s, n)),
+    )
+
+
+# (t, x, y, first, scratch) -> Wrench, inertial axes
+first_order_force = chosen_by_class(
+    "first",
+    {ExactExcitation: exact_force, ExcitationSeries: series_force, FastExcitation: fast_force},
+)
+
+
+@kernel
+def slow_place(x, place):
+    """(x, y) inertial place at which the waves meet the body."""
+    if place is None:
+        return 0.0, 0.0
+    return x[place.first], x[place.first + 1]
+
+
+@kernel
+def place_rates(x, part, dx):
+    """Put the rates of the slow place of an Excitation, or None, into dx."""
+    if part is None:
+        return
+    _filter_rates(x, part.place, dx)
+
+
+@kernel
+def _filter_rates(x, place, dx):
+    if place is None:
+        return
+    dx[place.first] = place.rate * (x[State.SURGE] - x[place.first])
+    dx[place.first + 1] = place.rate * (x[State.SWAY] - x[place.first + 1])
 
 
 @kernel
@@ -158,23 +254,24 @@ def add_second_order(t, force, second):
 
 
 @kernel
-def add_excitation(t, pose, load, part):
+def add_excitation(t, pose, x, load, part, scratch):
     """The load (body axes) with the force of the waves; as it is without the part."""
     if part is None:
         return load
-    force = add_second_order(t, first_order_force(t, part.first), part.second)
+    at_x, at_y = slow_place(x, part.place)
+    force = add_second_order(t, first_order_force(t, at_x, at_y, part.first, scratch), part.second)
     fx, fy, fz = to_body(pose, force.fx, force.fy, force.fz)
     mx, my, mz = to_body(pose, force.mx, force.my, force.mz)
     return add(load, Wrench(fx, fy, fz, mx, my, mz))
 
 
 @kernel
-def _summed_elevation(t, waves, first):
+def _summed_elevation(t, waves, first, scratch):
     return elevation(t, 0.0, 0.0, waves)
 
 
 @kernel
-def _tabulated_elevation(t, waves, first):
+def _tabulated_elevation(t, waves, first, scratch):
     row, fraction = place_in(t, first.table)
     if row < 0:
         return elevation(t, 0.0, 0.0, waves)
@@ -182,14 +279,25 @@ def _tabulated_elevation(t, waves, first):
     return value * ramp_factor(t, first.exact.ramp)
 
 
+@kernel
+def _fast_elevation(t, waves, first, scratch):
+    _fill_phasors(t, 0.0, 0.0, first.wave, scratch)
+    return ramp_factor(t, first.ramp) * lane_dot(first.amplitude, scratch[3], first.amplitude.shape[0])
+
+
 _elevation = chosen_by_class(
-    "first", {ExactExcitation: _summed_elevation, ExcitationSeries: _tabulated_elevation}
+    "first",
+    {
+        ExactExcitation: _summed_elevation,
+        ExcitationSeries: _tabulated_elevation,
+        FastExcitation: _fast_elevation,
+    },
 )
 
 
 @kernel
-def elevation_beside(t, waves, part):
-    """Elevation at the origin, m: from the table of an Excitation that has one, else by the sum."""
+def elevation_beside(t, waves, part, scratch):
+    """Elevation at the origin, m: as an Excitation has it, else by the sum."""
     if part is None:
         return elevation(t, 0.0, 0.0, waves)
-    return _elevation(t, waves, part.first)
+    return _elevation(t, waves, part.first, scratch)

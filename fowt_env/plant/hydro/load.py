@@ -7,7 +7,7 @@ from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.hydro.added_inertia import added_inertia_load
 from fowt_env.plant.hydro.banded_strips import banded_strip_load
 from fowt_env.plant.hydro.body_matrices import add_body_matrices
-from fowt_env.plant.hydro.excitation import add_excitation, elevation_beside
+from fowt_env.plant.hydro.excitation import add_excitation, elevation_beside, place_rates
 from fowt_env.plant.hydro.hydrostatics import hydrostatic_load
 from fowt_env.plant.hydro.linear_damping import damping_load
 from fowt_env.plant.hydro.member_buoyancy import add_member_buoyancy
@@ -101,7 +101,7 @@ def _banded_elevation(t, waves, strips, excitation, data):
 
 @kernel
 def _free_elevation(t, waves, strips, excitation, data):
-    return elevation_beside(t, waves, excitation)
+    return elevation_beside(t, waves, excitation, data.excitation)
 
 
 _elevation = chosen_by_class(
@@ -148,8 +148,16 @@ def hydro_load(t, pose, x, hydro, data):
     wrench = add_body_matrices(pose, x, wrench, hydro.matrices, data.added_mass)
     wrench = add_radiation(pose, x, wrench, hydro.radiation, data.radiation)
     wrench = add_member_loads(t, pose, wrench, hydro.members, hydro.waves, hydro.current, data)
-    wrench = add_excitation(t, pose, wrench, hydro.excitation)
+    wrench = add_excitation(t, pose, x, wrench, hydro.excitation, data.excitation)
     return HydroLoad(buoyancy, wrench, damping_load(pose, x, hydro.damping))
+
+
+@inlined_kernel
+def hydro_rates(x, hydro, dx):
+    """Put the rates of the water's internal states that have any into dx."""
+    if hydro is None:
+        return
+    place_rates(x, hydro.excitation, dx)
 
 
 @kernel

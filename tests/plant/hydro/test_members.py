@@ -5,6 +5,7 @@ from math import cos, pi, radians, sin
 
 import numpy as np
 import pytest
+from floaters import spar_members
 from naive import members as naive
 from naive.rigid_body import rotation
 from plant_helpers import make_pose
@@ -154,20 +155,7 @@ def test_the_heave_plates_of_oc4_damp_as_published():
 )
 def test_a_spar_of_members_has_the_loads_of_its_hull(platform, switches):
     hull, hydro, site = platform.hull, platform.hydro, platform.environment
-    rows = list(zip(hull.z[:-1], hull.z[1:], hull.diameter[:-1], hull.diameter[1:], strict=True))
-    half_sphere = site.water_density * 2.0 / 3.0 * pi * (0.5 * hull.diameter[0]) ** 3
-    members = build(
-        tuple(
-            Member(
-                start=(0.0, 0.0, low), end=(0.0, 0.0, high), diameter=(a, b),
-                drag_coefficient=(hydro.drag_coefficient,) * 2,
-                added_mass_coefficient=(hydro.added_mass_coefficient,) * 2,
-                axial_added_mass_coefficient=(hydro.heave_added_mass / half_sphere if n == 0 else 0.0, 0.0),
-            )
-            for n, (low, high, a, b) in enumerate(rows)
-        ),
-        *switches, site=site, cell=1.0,
-    )  # fmt: skip
+    members = build(spar_members(platform), *switches, site=site, cell=1.0)
     strips = build_strips(
         hull, hydro, density=site.water_density, depth=site.water_depth, position=switches[0],
         surface=switches[1], stretching=switches[2], cell=1.0,

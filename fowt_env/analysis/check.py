@@ -1,0 +1,205 @@
+"""Whether a platform can be what its file means: figures at rest, natural periods, and what does not fit."""
+
+import warnings
+from math import cos, degrees, hypot, pi, sin, tan
+from typing import NamedTuple
+
+import numpy as np
+
+from fowt_env.analysis.equilibrium import MOTION_LABELS, causes_of, evaluated, metacentre
+from fowt_env.analysis.statics import Evaluation, Statics, statics
+from fowt_env.analysis.trim import DIFFERENCE_STEPS, trim
+from fowt_env.errors import InputError
+from fowt_env.plant.model import LoadCache
+from fowt_env.plant.state import State, pose_of
+from fowt_env.scene.build import build_scene
+from fowt_env.scene.geometry import geometry_faults
+
+DRIFT, TILT = 0.05, 5.0  # of the water depth; deg: a rest without wind that is odd
+ROUNDS, SETTLED = 40, 1e-6  # for the added mass at a mode's own frequency
+BANDS = {  # s, natural periods of floating turbines from tension legs and barges to spars, with much to spare
+    "surge": (15.0, 600.0),
+    "sway": (15.0, 600.0),
+    "heave": (0.5, 100.0),
+    "roll": (0.5, 120.0),
+    "platform pitch": (0.5, 120.0),
+    "yaw": (1.0, 600.0),
+}
+
+
+class Check(NamedTuple):
+    """What is known of a platform at rest in still water without wind."""
+
+    label: str
+    draft: float  # m
+    statics: Statics  # of the undisplaced platform
+    rest: dict[str, float] | None  # {motion: m or deg}; None where it has no place to rest
+    periods: dict[str, float] | None  # {motion: s}, undamped; inf: nothing restores it
+    faults: tuple[str, ...]  # sentences on what does not fit
+
+
+def check_platform(platform, **options):
+    """Check of a platform: a built-in name, a path or a descriptions.platform.Platform; options of the scene.
+
+    Raises: InputError for a file that cannot be read.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # the same faults follow, each of them once
+        scene = build_scene(platform, **options)
+    figures = statics(scene)
+    faults = geometry_faults(scene.platform)
+    faults |= _static_faults(scene, figures)
+    rest = periods = None
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            point = trim(scene)
+    except InputError as error:
+        faults["rest"] = str(error).rstrip(".")
+    else:
+        rest = _rest(point.state)
+        periods = natural_modes(scene, point)
+        faults |= _rest_faults(scene, rest) | _period_faults(periods)
+    return Check(
+        scene.label, scene.platform.draft, figures, rest, periods,
+        tuple(f"{text[0].upper()}{text[1:]}." for text in faults.values()),
+    )  # fmt: skip
+
+
+def _static_faults(scene, figures):
+    """{name: sentence} of weight, buoyancy, lines and stability of the undisplaced platform."""
+    evaluation = Evaluation(scene)
+    rest = np.zeros(scene.n_state)
+    evaluation.at(rest, LoadCache.TOTAL)
+    faults = causes_of(scene, evaluated(rest, evaluation.data))
+    if not min(figures.metacentric_height) > 0.0 and figures.buoyancy > 0.0 and not _held_by_lines(figures):
+        faults["upright"] = metacentre(scene, figures)
+    return faults
+
+
+def _held_by_lines(figures):
+    """Whether lines keep the platform upright, as tension legs do: they carry a good part of its buoyancy."""
+    return figures.pull > 0.15 * figures.buoyancy
+
+
+def _rest(state):
+    """{motion: m or deg} of a state."""
+    values = [float(value) for value in state[:6]]
+    return dict(zip(MOTION_LABELS, [*values[:3], *map(degrees, values[3:])], strict=True))
+
+
+def _rest_faults(scene, rest):
+    """{name: sentence} of a rest far from where the platform's file puts it."""
+    faults, depth, draft = {}, scene.platform.environment.water_depth, scene.platform.draft
+    drift = hypot(rest["surge"], rest["sway"])
+    if drift > DRIFT * depth:
+        faults["drift"] = f"without wind it rests {drift:.4g} m from its place, in water of {depth:g} m"
+    if abs(rest["heave"]) > 0.1 * draft:
+        faults["heave"] = (
+            f"without wind it rests {rest['heave']:+.4g} m in heave, with a draft of {draft:.4g} m"
+        )
+    tilt = max(abs(rest["roll"]), abs(rest["platform pitch"]))
+    if tilt > TILT:
+        faults["tilt"] = (
+            f"without wind it leans {tilt:.3g} deg (roll {rest['roll']:.3g}, platform pitch"
+            f" {rest['platform pitch']:.3g} deg)"
+        )
+    return faults
+
+
+def _period_faults(periods):
+    """{name: sentence} of natural periods that no floating turbine has."""
+    faults = {}
+    for motion, period in periods.items():
+        low, high = BANDS[motion]
+        if not np.isfinite(period):
+            faults[motion] = f"nothing restores it in {motion}"
+        elif not low <= period <= high:
+            faults[motion] = (
+                f"its natural period in {motion} is {period:.3g} s, outside {low:g} to {high:g} s"
+            )
+    return faults
+
+
+def natural_modes(scene, point):
+    """{motion: undamped natural period s} about an operating point, from stiffness and mass.
+
+    A potential-flow body has the added mass of each mode's own frequency. Modes are named by their largest
+    motion about the centre of mass, angles weighted with half the draft; inf: nothing restores it.
+    """
+    evaluation = Evaluation(scene)
+    x = point.state.copy()
+    evaluation.u[:] = point.command
+    slopes = np.zeros((6, 6))
+    for motion in range(6):
+        step = DIFFERENCE_STEPS[motion]
+        for side in (1.0, -1.0):
+            x[motion] = point.state[motion] + side * step
+            slopes[:, motion] += side * evaluation.at(x, LoadCache.TOTAL) / (2.0 * step)
+        x[motion] = point.state[motion]
+    evaluation.at(x, LoadCache.TOTAL)
+    mass = scene.model.rigid_body.mass_matrix + evaluation.data.added_mass
+    moved = _kinematics(x)
+    height = mass[0, 4] / mass[0, 0]
+    potential = scene.platform.potential_flow
+    arm = 0.5 * scene.platform.draft
+    periods = _periods(moved, mass, slopes, height, arm)
+    if potential is None:
+        return periods
+    return {
+        motion: _at_own_frequency(motion, period, moved, mass, slopes, height, arm, potential)
+        for motion, period in periods.items()
+    }
+
+
+def _kinematics(x):
+    """(6, 6) rates of the motions by the velocities in body components, at a state."""
+    pose, roll, pitch = pose_of(np.ascontiguousarray(x)), x[State.ROLL], x[State.PLATFORM_PITCH]
+    found = np.zeros((6, 6))
+    found[:3, :3] = [[getattr(pose, f"r{i}{j}") for j in (1, 2, 3)] for i in (1, 2, 3)]
+    found[3:, 3:] = [
+        [1.0, sin(roll) * tan(pitch), cos(roll) * tan(pitch)],
+        [0.0, cos(roll), -sin(roll)],
+        [0.0, sin(roll) / cos(pitch), cos(roll) / cos(pitch)],
+    ]
+    return found
+
+
+def _periods(moved, mass, slopes, height, arm):
+    """{motion: s} of the six modes of a mass matrix and the slopes of the loads over the motions."""
+    values, vectors = np.linalg.eig(moved @ np.linalg.solve(mass, slopes))
+    shapes = vectors.copy()
+    shapes[0] += height * vectors[4]  # at the water line a pitch mode moves more in surge than in pitch
+    shapes[1] -= height * vectors[3]
+    shapes = np.abs(shapes) * np.array([1.0, 1.0, 1.0, arm, arm, arm])[:, None]
+    shapes /= shapes.sum(axis=0)
+    found, free = {}, set(range(6))
+    for mode in np.argsort(-shapes.max(axis=0)):  # most clear-cut modes first
+        motion = max(free, key=lambda i: shapes[i, mode])
+        free.discard(motion)
+        square = -values[mode].real
+        found[motion] = float(2.0 * pi / np.sqrt(square)) if square > 1e-9 else float("inf")
+    return {label: found[motion] for motion, label in enumerate(MOTION_LABELS)}
+
+
+def _at_own_frequency(motion, period, moved, mass, slopes, height, arm, potential):
+    """Natural period, s, of a motion with the added mass at its own frequency."""
+    for _ in range(ROUNDS):
+        if not np.isfinite(period):
+            return period
+        change = _added_mass(potential, 2.0 * pi / period) - potential.added_mass_infinite
+        new = _periods(moved, mass + 0.5 * (change + change.T), slopes, height, arm)[motion]
+        if not np.isfinite(new) or abs(new - period) < SETTLED * period:
+            return new
+        period = new
+    return period
+
+
+def _added_mass(potential, omega):
+    """(6, 6) added mass of a PotentialFlow at a frequency, rad/s, linear between its own."""
+    known, values = potential.omega, potential.added_mass
+    if potential.added_mass_zero is not None:
+        known = np.concatenate([[0.0], known])
+        values = np.concatenate([potential.added_mass_zero[None], values])
+    rows = values.reshape(len(known), 36)
+    return np.array([np.interp(omega, known, row) for row in rows.T]).reshape(6, 6)

@@ -1,0 +1,105 @@
+"""A platform at rest where its file puts it: weight, buoyancy, stability, pull of its lines."""
+
+from math import pi
+from typing import NamedTuple
+
+import numpy as np
+
+from fowt_env.plant.compile.decorators import entry
+from fowt_env.plant.compile.handle import data_of, model_of
+from fowt_env.plant.dynamics import derivative
+from fowt_env.plant.hydro.member_buoyancy import displaced
+from fowt_env.plant.model import LoadCache
+from fowt_env.plant.state import N_COMMANDS, N_RIGID, State, pose_of
+
+TILT_STEP = 1e-4  # rad, of the slope of the righting moment
+
+
+class Statics(NamedTuple):
+    """Figures of an undisplaced platform in still water without wind, SI, body axes about the body origin."""
+
+    weight: float  # N
+    buoyancy: float  # N
+    volume: float  # m3 of water that weighs as much
+    pull: float  # of all lines, downwards, N
+    mass_centre: np.ndarray  # (3,), m
+    buoyancy_centre: np.ndarray  # (3,), m; nan in z where a potential-flow body does not say it
+    metacentric_height: np.ndarray  # (2,) in roll and pitch, of the water alone, m
+    tension: np.ndarray  # (n_lines,) at the fairleads, N
+
+
+@entry
+def mean_derivative(handle, x, u, azimuths, dx, mean):
+    """Mean of dx over the azimuths, into mean (n_state,)."""
+    start = x[State.AZIMUTH]
+    mean[:] = 0.0
+    for i in range(azimuths):
+        x[State.AZIMUTH] = start + i * (2.0 * pi / 3.0) / azimuths
+        derivative(0.0, x, u, model_of(handle), data_of(handle), dx)
+        for j in range(x.shape[0]):
+            mean[j] += dx[j] / azimuths
+    x[State.AZIMUTH] = start
+
+
+class Evaluation:
+    """Evaluations of a scene's loads: at(x) leaves them in data."""
+
+    def __init__(self, scene):
+        self.data = scene.data()
+        self.handle = scene.handle(self.data)
+        self.u, self.dx, self.mean = np.zeros(N_COMMANDS), np.zeros(scene.n_state), np.zeros(scene.n_state)
+
+    def at(self, x, block):
+        """(6,) wrench of an entry of LoadCache at a state."""
+        mean_derivative(self.handle, x, self.u, 1, self.dx, self.mean)
+        return self.data.cache[block : block + 6].copy()
+
+
+def statics(scene):
+    """Statics of a scene without fluctuations; one without water displaces nothing."""
+    body, site, evaluation = scene.model.rigid_body, scene.platform.environment, Evaluation(scene)
+    rest = np.zeros(scene.n_state)
+    water = evaluation.at(rest, LoadCache.HYDRO)
+    pull = -evaluation.data.cache[LoadCache.MOORING + 2]
+    tension = evaluation.data.lines[:, 2].copy()
+    mass = body.mass_matrix
+    centre = np.array([mass[1, 5], -mass[0, 5], mass[0, 4]]) / body.mass
+    heights = []
+    for motion in (State.ROLL, State.PLATFORM_PITCH):
+        righting = []
+        for side in (-TILT_STEP, TILT_STEP):
+            x = rest.copy()
+            x[motion] = side
+            load = evaluation.at(x, LoadCache.HYDRO)
+            about = load[3:] - np.cross(centre, load[:3])  # the weight has no moment about its own centre
+            righting.append(about[motion - State.ROLL])
+        slope = (righting[1] - righting[0]) / (2.0 * TILT_STEP)
+        heights.append(-slope / water[2] if water[2] > 0.0 else float("nan"))
+    return Statics(
+        weight=body.mass * body.gravity,
+        buoyancy=float(water[2]),
+        volume=float(water[2] / (site.water_density * body.gravity)),
+        pull=float(pull),
+        mass_centre=centre,
+        buoyancy_centre=_buoyancy_centre(scene.model.hydro, water),
+        metacentric_height=np.array(heights),
+        tension=tension,
+    )
+
+
+def _buoyancy_centre(hydro, water):
+    """(3,) centre of buoyancy of the undisplaced platform with this load of the water; nan where unknown."""
+    if hydro is None or not water[2] > 0.0:
+        return np.full(3, np.nan)
+    volume = moment = 0.0
+    if hydro.hull is not None:
+        hull, area = hydro.hull, pi * hydro.hull.radius**2
+        volume += hull.volume_below - area * hull.z_join
+        moment += hull.moment_below - 0.5 * area * hull.z_join**2
+    if hydro.members is not None and hydro.members.bodies is not None:
+        part, _, _, first = displaced(pose_of(np.zeros(N_RIGID)), hydro.members.bodies)
+        volume += part
+        moment += first
+    known = hydro.matrices is None or not hydro.matrices.stiffness.any()
+    z = moment / volume if known and volume > 0.0 else float("nan")
+    return np.array([-water[4] / water[2], water[3] / water[2], z])

@@ -1,0 +1,89 @@
+"""fowt check: the figures of a platform at rest, and what in its file can hardly be meant."""
+
+import json
+from typing import Annotated
+
+import numpy as np
+import typer
+from rich.markup import escape
+
+from fowt_env.training.cli.arguments import parse_pairs
+from fowt_env.training.cli.console import EXIT_STOPPED, OptionOption, app, out, reported
+from fowt_env.training.cli.tables import figure, print_table
+
+CHECK_EXAMPLES = """[bold]Examples[/bold]
+
+[cyan]fowt check mine.toml[/cyan]  weight against buoyancy, stability, pretension, rest, natural periods
+
+[cyan]fowt check oc3_hywind --json[/cyan]  the same for a program
+
+[bold]Exit code[/bold]: 0 if everything fits, 1 if something does not, 2 if the file cannot be read."""
+
+
+@app.command(epilog=CHECK_EXAMPLES)
+@reported
+def check(
+    platform: Annotated[str, typer.Argument(help="A built-in name or a path to a TOML file.")],
+    option: OptionOption = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON in SI units and degrees.")] = False,
+):
+    """Check a platform: figures at rest without wind, natural periods, and what does not fit."""
+    from fowt_env.analysis.check import check_platform
+
+    found = check_platform(platform, **parse_pairs(option, "option"))
+    if as_json:
+        out.print_json(json.dumps(_plain(found)))
+    else:
+        rows = [(name, figure(value), unit) for name, value, unit in _figures(found)]
+        print_table(out, ("at rest", "value", "unit"), rows, str(platform), left=(0, 2))
+        for fault in found.faults:
+            out.print(f"[yellow]{escape(fault)}[/yellow]", soft_wrap=True, highlight=False)
+        if not found.faults:
+            out.print("[green]everything fits[/green]")
+    if found.faults:
+        raise typer.Exit(EXIT_STOPPED)
+
+
+def _figures(found):
+    """(name, value, unit) of a Check."""
+    still = found.statics
+    rows = [
+        ("weight", still.weight / 1e3, "kN"),
+        ("buoyancy", still.buoyancy / 1e3, "kN"),
+        ("displaced volume", still.volume, "m3"),
+        ("pull of the lines, downwards", still.pull / 1e3, "kN"),
+        ("buoyancy less weight and pull", (still.buoyancy - still.weight - still.pull) / 1e3, "kN"),
+        ("draft", found.draft, "m"),
+        *(
+            (f"centre of mass, {axis}", value, "m")
+            for axis, value in zip("xyz", still.mass_centre, strict=True)
+        ),
+        *(
+            (f"centre of buoyancy, {axis}", value, "m")
+            for axis, value in zip("xyz", still.buoyancy_centre, strict=True)
+        ),
+        ("metacentric height, roll", still.metacentric_height[0], "m"),
+        ("metacentric height, pitch", still.metacentric_height[1], "m"),
+        *((f"tension of line {i}", value / 1e3, "kN") for i, value in enumerate(still.tension, 1)),
+    ]
+    for motion, value in (found.rest or {}).items():
+        rows.append((f"rest, {motion}", value, "m" if motion in ("surge", "sway", "heave") else "deg"))
+    for motion, value in (found.periods or {}).items():
+        rows.append((f"natural period, {motion}", value, "s"))
+    return [row for row in rows if not np.isnan(row[1])]
+
+
+def _plain(found):
+    """A Check as what JSON holds; None for what is not finite."""
+    still = {name: np.asarray(value).tolist() for name, value in found.statics._asdict().items()}
+    whole = {"platform": found.label, "draft": found.draft, **still}
+    whole |= {"rest": found.rest, "natural_periods": found.periods, "faults": list(found.faults)}
+    return _finite(whole)
+
+
+def _finite(value):
+    if isinstance(value, dict):
+        return {name: _finite(item) for name, item in value.items()}
+    if isinstance(value, list):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not np.isfinite(value) else value
