@@ -189,7 +189,9 @@ class FloatingBody:
         buoyancy = lift * np.array([0.0, 0.0, 1.0, self.centre[1], -self.centre[0], 0.0])
         q = np.zeros(6)
         for _ in range(50):
-            left = buoyancy + weight(self.mass, self.gravity) - self.stiffness @ q + line_forces(self.lines, q)
+            left = (
+                buoyancy + weight(self.mass, self.gravity) - self.stiffness @ q + line_forces(self.lines, q)
+            )
             step = np.linalg.solve(self.stiffness + line_stiffness(self.lines, q), left)
             q = q + step
             if np.abs(step).max() < 1e-9:
@@ -292,7 +294,9 @@ def _ring(count, first, radius, depth, anchor_radius, anchor_depth, line):
         c, s = np.cos(angle), np.sin(angle)
         found.append(
             CatenaryLine(
-                (anchor_radius * c, anchor_radius * s, -anchor_depth), (radius * c, radius * s, -depth), **line
+                (anchor_radius * c, anchor_radius * s, -anchor_depth),
+                (radius * c, radius * s, -depth),
+                **line,
             )
         )
     return tuple(found)
@@ -329,6 +333,8 @@ def iti_barge(coefficients):
                 return (c * x - s * y, s * x + c * y, z)
 
             lines.append(
-                CatenaryLine(turned(*anchor, -150.0), turned(20.0, 20.0, -4.0), 473.312, weight_in_water, 5.89e8)
+                CatenaryLine(
+                    turned(*anchor, -150.0), turned(20.0, 20.0, -4.0), 473.312, weight_in_water, 5.89e8
+                )
             )
     return FloatingBody(coefficients, mass, tuple(lines), 6000.0)

@@ -2,8 +2,10 @@
 
 OpenFAST's come from ROSCO's repository and belong to an older deck of the IEA 15 MW on VolturnUS-S: lighter tower,
 other nacelle and hub, blades 0.97 m shorter in radius, another generator, g = 9.80665. `old_deck` builds that
-turbine from the deck's figures. What differs still: their radiation is the deck's state-space fit, their lines are
-those of MAP++, theirs have the potential flow of the tower around the blades, and sway, roll and yaw are held.
+turbine from the deck's figures. HydroDyn linearises by steps of 0.02 deg of the depth in translation and 2 deg in
+rotation (HydroDyn.f90, HD_Perturb_u), so that its quadratic drag leaves a damping of that velocity; the same is
+added here. What differs still: their radiation is the deck's state-space fit, their blades turn in the potential
+flow around the tower, and sway, roll and yaw are held.
 """
 
 import numpy as np
@@ -30,6 +32,14 @@ PLATFORM_DEPTH = 14.94
 TORQUE = 1.962e7  # N m
 HEAVE_STIFFNESS = 445.0687 * 1025.0 * 9.80665  # N/m
 GRAVITY = 9.80665
+DRAG_STEPS = np.radians([0.02 * 200.0] * 3 + [2.0] * 3)  # m/s and rad/s, of HydroDyn's differences
+
+
+def with_linearised_drag(scene):
+    """The scene with the damping that HydroDyn's differences make of its quadratic drag."""
+    matrices = scene.model.hydro.matrices
+    damping = matrices.linear_damping + matrices.quadratic_damping * DRAG_STEPS
+    return scene.with_model({"hydro.matrices.linear_damping": damping})
 
 
 def old_deck():
@@ -50,7 +60,9 @@ def old_deck():
             "tower": platform.tower.model_copy(update={**TOWER, "top_height": TOWER_TOP}),
             "potential_flow": _with(flow, stiffness=stiffness),
             "lines": tuple(
-                line.model_copy(update={"wet_weight": line.wet_weight * GRAVITY / platform.environment.gravity})
+                line.model_copy(
+                    update={"wet_weight": line.wet_weight * GRAVITY / platform.environment.gravity}
+                )
                 for line in platform.lines
             ),
         }
@@ -103,6 +115,8 @@ def _turbine(turbine):
     law = law.model_copy(
         update={
             "rated_torque": TORQUE, "rated_power": TORQUE * speed, "max_torque": max(TORQUE, law.max_torque),
+            # below rated nothing is compared: the curve only has to meet the other rated torque
+            "region2_constant": law.region2_constant * TORQUE / law.rated_torque,
         }
     )  # fmt: skip
     radius = turbine.blade.radius - (turbine.rotor.hub_radius - HUB_RADIUS)
@@ -160,9 +174,9 @@ def linear(study):
         study.say(f"linear model at {wind:g} m/s")
         scene = build_scene(
             platform, wind={"kind": "steady", "speed": wind}, turbine=turbine, rotor="bem", skewed_wake=True,
-            shear_exponent=SHEAR,
+            shear_exponent=SHEAR, radiation="state_space",
         )  # fmt: skip
-        model = linearize(scene)
+        model = linearize(with_linearised_drag(scene))
         theirs = poles[np.isclose(poles["wind_mps"], wind)].iloc[0]
         _operating_point(study, model, theirs, wind)
         matrix, columns, states = open_loop(model)

@@ -151,7 +151,9 @@ class ReferenceRun:
         dt = self.dt if dt is None else dt
         return simulate(
             scene,
-            controller=(controller(folder) if callable(controller) else controller) if self.controlled else None,
+            controller=(controller(folder) if callable(controller) else controller)
+            if self.controlled
+            else None,
             duration=self.duration,
             dt=dt,
             control_dt=dt,

@@ -84,7 +84,15 @@ def periods(name, study):
         period, damping = 2.0 * np.pi / theirs[motion][0], theirs[motion][1]
         here, ratio = ours[motion]
         note = f"damping ratio {damping:.3g}, here {ratio:.3g}"
-        study.add("natural periods (against the frequency domain)", motion, "s", period, here, allowed=1.0, note=note)
+        study.add(
+            "natural periods (against the frequency domain)",
+            motion,
+            "s",
+            period,
+            here,
+            allowed=1.0,
+            note=note,
+        )
 
 
 def oscillations(model):
