@@ -43,8 +43,8 @@ def validate(
     case: Annotated[
         str | None,
         typer.Option(
-            help="Groups of figures, comma-separated; or all. Those of oc3_hywind: decays, steady, floating, waves,"
-            " steps, turbulence, costs. Default: all but costs."
+            help="Groups of figures, comma-separated; or all. Those of oc3_hywind: decays, steady, floating,"
+            " waves, steps, turbulence, costs. Default: all but costs."
         ),
     ] = None,
     out_folder: Annotated[

@@ -9,6 +9,7 @@ from functools import partial
 
 import numpy as np
 import pandas as pd
+from scipy.optimize import least_squares
 
 from fowt_env.descriptions.files import DATA
 from fowt_env.training.validation import frequency_domain
@@ -23,7 +24,12 @@ AMPLITUDE = 0.02  # m, of each component
 RAMP, BEGIN, END = 100.0, 200.0, 900.0  # s, of the waves and of what is fitted
 STEP = 0.05  # s
 CHANNELS = {"PtfmSurge_[m]": 0, "PtfmHeave_[m]": 2, "PtfmPitch_[deg]": 4}
-PERIODS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
+DECAYING = (  # motions that are coupled, and their channels
+    {"surge": "PtfmSurge_[m]", "heave": "PtfmHeave_[m]", "pitch": "PtfmPitch_[deg]"},
+    {"sway": "PtfmSway_[m]", "roll": "PtfmRoll_[deg]", "yaw": "PtfmYaw_[deg]"},
+)
+OFFSET = 0.1  # m and deg from rest, at which all six motions begin
+SETTLING, DECAY = 5.0, 400.0  # s
 SMALL = 0.02  # of the largest response: smaller ones are judged by their share of it
 
 
@@ -71,40 +77,56 @@ def sea(omega):
     }  # fmt: skip
 
 
+def modal_rates(time, values, guess):
+    """Complex rates (n,), 1/s and rad/s, of the decaying modes that (m, k) values consist of.
+
+    values ~ c + sum Re(a_j exp(s_j t)) with the same s_j = -rate.real + i rate.imag in all columns: nonlinear
+    least squares in the rates, linear in the rest.
+    """
+    scale = values.std(axis=0)
+
+    def basis(rates):
+        columns = [np.ones_like(time)]
+        for real, imag in rates.reshape(-1, 2):
+            envelope = np.exp(-real * (time - time[0]))
+            columns += [envelope * np.cos(imag * time), envelope * np.sin(imag * time)]
+        return np.column_stack(columns)
+
+    def misfit(rates):
+        columns = basis(rates)
+        solution = np.linalg.lstsq(columns, values, rcond=None)[0]
+        return ((columns @ solution - values) / scale).ravel()
+
+    start = np.array([[rate.real, rate.imag] for rate in guess]).ravel()
+    found = least_squares(misfit, start, x_scale=np.abs(np.repeat(start[1::2], 2))).x.reshape(-1, 2)
+    return found[:, 0] + 1j * found[:, 1]
+
+
 def periods(name, study):
-    """Damped natural periods of the linear model against the frequency domain: 1 %."""
-    from fowt_env.analysis.linear_model import linearize
+    """Damped natural periods of small free decays against the frequency domain: 1 %."""
+    from fowt_env.analysis.trim import trim
     from fowt_env.scene.build import build_scene
+    from fowt_env.simulation import simulate
 
     study.say("natural periods")
     scene = without_drag(build_scene(name))
+    point = trim(scene)
+    initial = {
+        channel: point[channel.split("_[")[0]] + OFFSET for group in DECAYING for channel in group.values()
+    }
+    frame = simulate(scene, None, duration=DECAY, dt=STEP, output_dt=0.1, initial=initial)
     theirs = body_of(name).natural_modes()
-    ours = oscillations(linearize(scene))
-    for motion in PERIODS:
-        period, damping = 2.0 * np.pi / theirs[motion][0], theirs[motion][1]
-        here, ratio = ours[motion]
-        note = f"damping ratio {damping:.3g}, here {ratio:.3g}"
-        study.add(
-            "natural periods (against the frequency domain)",
-            motion,
-            "s",
-            period,
-            here,
-            allowed=1.0,
-            note=note,
-        )
-
-
-def oscillations(model):
-    """{motion: (damped period s, damping ratio)} of a LinearModel's modes, each named by its largest motion."""
-    found = {}
-    names = {"platform_pitch": "pitch"}
-    for mode in model.modes():
-        name = names.get(mode.name, mode.name)
-        if name in PERIODS and name not in found:
-            damped = mode.frequency * np.sqrt(max(0.0, 1.0 - mode.damping_ratio**2))
-            found[name] = (2.0 * np.pi / damped, mode.damping_ratio)
-    return {motion: found.get(motion, (float("nan"), float("nan"))) for motion in PERIODS}
+    kept = frame[frame[TIME] >= SETTLING]
+    time = kept[TIME].to_numpy()
+    for group in DECAYING:
+        guess = [complex(theirs[m][1] * theirs[m][0], theirs[m][0]) for m in group]
+        rates = modal_rates(time, kept[list(group.values())].to_numpy(), guess)
+        for motion, rate in zip(group, rates, strict=True):
+            note = f"damping ratio {theirs[motion][1]:.3g}, here {rate.real / abs(rate):.3g}"
+            both = 2.0 * np.pi / theirs[motion][0], 2.0 * np.pi / rate.imag
+            study.add(
+                "natural periods (against the frequency domain)", motion, "s", *both, allowed=1.0, note=note
+            )
 
 
 def rao(name, study):
