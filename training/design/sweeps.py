@@ -20,7 +20,6 @@ from fowt_env.controllers.pi import PISettings
 from fowt_env.errors import InputError
 from fowt_env.files.atomic import replacing
 from fowt_env.files.tables import write_table
-from fowt_env.plant.state import STATE_INDEX
 from fowt_env.training.evaluation.cases import named_cases
 from fowt_env.training.evaluation.evaluate import evaluate
 from fowt_env.training.evaluation.seeds import VALIDATION
@@ -124,8 +123,8 @@ def zeros_over(scene, winds=None, progress=None):
 def save_models(models, path):
     """The path written: {wind: LinearModel} as .json or .npz, SI.
 
-    winds (n,), states, inputs, outputs, forces (names), A (n, 14, 14), B, C, D, E, F as in LinearModel, and
-    the operating points: x (n, 14) in the order of states, u (n, 2) torque and blade pitch.
+    winds (n,), states, inputs, outputs, forces (names), A (n, m, m), B, C, D, E, F as in LinearModel, and
+    the operating points: x (n, m) in the order of states, u (n, 2) torque and blade pitch.
     Raises: InputError for another ending.
     """
     path = Path(path)
@@ -137,7 +136,7 @@ def save_models(models, path):
     content["forces"] = np.array(FORCES)
     for key in "ABCDEF":
         content[key] = np.array([getattr(model, key) for model in models.values()])
-    content["x"] = np.array([model.point.state[list(STATE_INDEX)] for model in models.values()])
+    content["x"] = np.array([model.x0 for model in models.values()])
     content["u"] = np.array([model.point.command[:2] for model in models.values()])
     with replacing(path) as temporary:
         if path.suffix.lower() == ".npz":
