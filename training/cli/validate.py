@@ -48,8 +48,12 @@ def validate(
         ),
     ] = None,
     out_folder: Annotated[
-        str, typer.Option("--out", help="Folder for what is written.")
-    ] = "results/validation",
+        str | None,
+        typer.Option(
+            "--out",
+            help="Folder for what is written; default: results/validation and, but for OC3, the platform.",
+        ),
+    ] = None,
     reference: Annotated[str | None, typer.Option(help="Folder of the OpenFAST series.")] = None,
     bts: Annotated[str | None, typer.Option(help="Full TurbSim box instead of the stored region.")] = None,
     plot: Annotated[bool, typer.Option("--plot/--no-plot", help="Make the plots.")] = True,
@@ -63,6 +67,8 @@ def validate(
     names = None if case is None else [name.strip() for name in case.split(",") if name.strip()]
     if case == "all":
         names = list(PLATFORMS[platform]()[0])
+    if out_folder is None:
+        out_folder = "results/validation" + ("" if platform == "oc3_hywind" else f"/{platform}")
     with progress_bar("validating", None) as update:
         study = validate_cases(
             names,
