@@ -19,7 +19,11 @@ SHEAR = 0.12
 MOTIONS = {"surge": "surge", "heave": "heave", "pitch": "platform_pitch"}
 SHOWN = (0.05, 0.1, 0.2, 0.3, 0.5)  # rad/s, of the responses
 # figures of the older deck, kg, m, kg m2
-TOWER = {"mass": 1262976.4, "cm_height": 55.9245, "inertia": (1.3972144e9, 1.3972144e9, 0.0)}
+TOWER = {
+    "mass": 1262976.4, "cm_height": 55.9245, "inertia": (1.3972144e9, 1.3972144e9, 0.0),
+    # TwrCd 1.0 on the diameters of AeroDyn's table, of which this taper has the same area
+    "base_diameter": 10.0, "top_diameter": 6.5, "drag_coefficient": 0.9974,
+}  # fmt: skip
 TOWER_TOP = 144.495
 YAW_BEARING, NACELLE = 100000.0, 507275.0
 NACELLE_PLACE = (-4.985, TOWER_TOP + 4.358)
