@@ -383,13 +383,25 @@ def _name_front(axes, front):
     axes.text(1.02, 0.02, "\n".join(lines), transform=axes.transAxes, fontsize=7, color=INK, va="bottom")
 
 
+def level_steps():
+    """Variants of the levels of build_scene at several steps each, on the axis "steps of the levels"."""
+    axis = "steps of the levels"
+    exact = [Variant(axis, "rk4", dt, "bem", "exact") for dt in (0.0125, 0.025, 0.05, 0.1)]
+    steps = (0.025, 0.05, 0.1)
+    standard = [Variant(axis, "ab4", dt, "lookup", "fast") for dt in steps]
+    return [*exact, *standard, *(Variant(axis, "ab4", dt, "table", "fast", TABLED) for dt in steps)]
+
+
 def select(names):
     """Variants of the axes named. Raises: InputError for an unknown axis.
 
-    "levels" stands for those that are levels of build_scene; "reference" adds none to those of every study.
+    "levels" stands for those that are levels of build_scene; "steps of the levels" are these at several steps
+    and no part of the sweep of all; "reference" adds none to those of every study.
     """
-    known = [REFERENCE, "levels", *dict.fromkeys(v.axis for v in variants())]
+    every = [*variants(), *level_steps()]
+    known = [REFERENCE, "levels", *dict.fromkeys(v.axis for v in every)]
     for name in names:
         if name not in known:
             raise unknown("axis", name, known)
-    return [v for v in variants() if v.axis in names or ("levels" in names and v.name in LEVELS)]
+    chosen = [v for v in variants() if v.axis in names or ("levels" in names and v.name in LEVELS)]
+    return chosen + [v for v in level_steps() if v.axis in names]
