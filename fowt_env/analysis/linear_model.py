@@ -1,6 +1,6 @@
 """Linear models of a scene about an operating point, by central differences of the nonlinear plant."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import pi
 from typing import NamedTuple
@@ -16,12 +16,16 @@ from fowt_env.plant.compile.handle import data_of, model_of
 from fowt_env.plant.dynamics import evaluate_loads, loads_of, respond
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measure
 from fowt_env.plant.model import LoadCache
-from fowt_env.plant.state import MOTIONS, STATE_INDEX, STATES, State
+from fowt_env.plant.state import MOTIONS, STATE_INDEX, STATES, State, pose_of
+from fowt_env.scene.radiation_fit import linear_memory
 
 # velocity steps are small because quadratic drag leaves a false damping proportional to them
 STATE_STEPS = np.array([1e-3, 1e-3, 1e-3, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-7, 1e-7, 1e-7, 1e-4, 1e-5])
+VELOCITIES = ("vx", "vy", "vz", "wx", "wy", "wz")
 INPUTS = ("generator_torque", "blade_pitch_command", "wind_speed")
 INPUT_STEPS = np.array([1.0, 1e-5, 1e-3])
+FREQUENCY_ROUNDS = 4  # of finding a period and the added mass at it
+MEMORY = "radiation_"  # begins the names of a memory's states
 FORCES = ("fx", "fy", "fz", "mx", "my", "mz")  # on the hull, body components about the body origin
 FORCE_STEPS = np.array([1e2, 1e2, 1e2, 1e4, 1e4, 1e4])  # N, N m
 MEASURED = (
@@ -39,8 +43,9 @@ RECORDED = {  # output: column of the output row, SI
 class LinearModel:
     """dx/dt = A dx + B du + E df, dy = C dx + D du + F df about an operating point, azimuth-averaged (SI).
 
-    A (14, 14), B (14, 3), C (n, 14), D (n, 3) with the names in states, inputs and outputs; E (14, 6)
-    and F (n, 6) take further forces on the hull (FORCES). point is the OperatingPoint.
+    A (m, m), B (m, 3), C (n, m), D (n, 3) with the names in states, inputs and outputs; E (m, 6)
+    and F (n, 6) take further forces on the hull (FORCES). point is the OperatingPoint. The first 14 states
+    are plant.state.STATES; those of a body with radiation memory follow, radiation_1 and so on.
     """
 
     A: np.ndarray
@@ -68,6 +73,11 @@ class LinearModel:
         if name not in self.outputs:
             raise unknown("output", name, self.outputs)
         return self.outputs.index(name)
+
+    @property
+    def x0(self):
+        """(m,) the states at the operating point."""
+        return np.r_[self.point.state[list(STATE_INDEX)], np.zeros(len(self.states) - len(STATES))]
 
     @property
     def pitch_rests(self):
@@ -152,11 +162,17 @@ def modes(a, names, cm_height, arm):
 
     A mode is named by its largest motion: translations of the centre of mass (at the water line a
     platform-pitch mode moves more in surge than in pitch), angles times arm (m), rotor speed times arm/12 s.
+    Those of the radiation memory are left out: to which its states contribute most, by participation factors.
     """
     values, vectors = np.linalg.eig(a)
     found = []
-    for value, vector in zip(values, vectors.T, strict=True):
-        if value.imag <= 1e-6:
+    remembered = [name.startswith(MEMORY) for name in names]
+    water = np.zeros(len(values))
+    if any(remembered):
+        factors = np.abs(vectors * np.linalg.inv(vectors).T)
+        water = factors[remembered].sum(axis=0) / factors.sum(axis=0)
+    for value, vector, share in zip(values, vectors.T, water, strict=True):
+        if value.imag <= 1e-6 or share > 0.5:
             continue
         part = dict(zip(names, vector, strict=True))
         participation = {
@@ -222,11 +238,14 @@ def linearize(scene, operating_point=None):
 
     The wind input moves the hub wind with its shear; waves are flat, and their small force comes in by
     wave_force. Drag has no linear part at rest in still water, so viscous damping is absent there.
-    Internal states (dynamic inflow, those of loads) are not linearised.
+    Radiation memory comes in exactly, in a scene with convolution by the fit that state_space takes. Other
+    internal states (dynamic inflow, those of loads) are not linearised.
 
     Raises: InputError if the scene has any.
     """
-    internal = [block.name for block in scene.blocks if block.steady == "settled"]
+    internal = [
+        block.name for block in scene.blocks if block.steady == "settled" and block.name != "radiation"
+    ]
     if internal:
         raise InputError(
             f"linearize: the states of {', '.join(internal)} are not linearised: build the scene without them"
@@ -262,24 +281,72 @@ def linearize(scene, operating_point=None):
         of_inputs[:, 2] = (sides[0] - sides[1]) / (2.0 * step)
     n = len(STATES)
     tensions = tuple(f"fairlead_tension_{i + 1}" for i in range(scene.n_lines))
-    return LinearModel(
+    model = LinearModel(
         of_states[:n], of_inputs[:n], of_states[n:], of_inputs[n:], of_forces[:n], of_forces[n:],
         STATES, INPUTS, (*MEASURED, *RECORDED, *tensions),
         point, body.s_z / body.mass, 0.5 * scene.platform.draft, scene,
     )  # fmt: skip
+    return _with_memory(model, linear_memory(scene))
+
+
+def _with_memory(model, memory):
+    """The LinearModel with the states of a scene.radiation_fit.LinearMemory; itself where that is None.
+
+    The platform rests at the operating point, so velocities turn into inertial axes by its attitude alone.
+    """
+    if memory is None:
+        return model
+    pose = pose_of(model.point.state)
+    turn = np.zeros((6, 6))
+    turn[:3, :3] = turn[3:, 3:] = [
+        [pose.r11, pose.r12, pose.r13], [pose.r21, pose.r22, pose.r23], [pose.r31, pose.r32, pose.r33]
+    ]  # fmt: skip
+    m, n = memory.A.shape[0], len(model.states)
+    speeds = [model.index(name) for name in VELOCITIES]
+    force = -turn.T @ memory.C
+    a = np.zeros((n + m, n + m))
+    a[:n, :n], a[:n, n:], a[n:, n:] = model.A, model.E @ force, memory.A
+    a[np.ix_(range(n, n + m), speeds)] = memory.B @ turn
+    return replace(
+        model,
+        A=a,
+        B=np.vstack([model.B, np.zeros((m, model.B.shape[1]))]),
+        C=np.hstack([model.C, model.F @ force]),
+        E=np.vstack([model.E, np.zeros((m, 6))]),
+        states=(*model.states, *(f"{MEMORY}{k + 1}" for k in range(m))),
+    )
 
 
 def natural_periods(scene):
     """{motion: undamped natural period s} of the six motions about the trim, from stiffness and mass.
 
     A motion without restoring (no moorings) gets inf. Modes are named by their largest motion, angles
-    weighted with half the draft.
+    weighted with half the draft. With radiation memory the mass is that at the motion's own frequency.
     """
     model = linearize(scene)
-    n = len(MOTIONS)
+    periods = _periods(model, 0.0)
+    if len(model.states) == len(STATES):
+        return periods
+    for motion in MOTIONS:
+        for _ in range(FREQUENCY_ROUNDS):
+            if np.isinf(periods[motion]):
+                break
+            periods[motion] = _periods(model, 2.0 * np.pi / periods[motion])[motion]
+    return periods
+
+
+def _periods(model, omega):
+    """{motion: undamped natural period s} with the added mass of the memory at a frequency, rad/s."""
+    n, m = len(MOTIONS), len(STATES)
     # velocities are body components, so positions move with kinematics K: q' = K v, v' = S q
     kinematics = model.A[:n, n : 2 * n]
     stiffness = model.A[n : 2 * n, :n]
+    if len(model.states) > m:
+        # v' = S q + N z, z' = Z z + L v: of the part of N z in phase with v' = i w v, at rest for w to 0
+        into, out = model.A[m:, n : 2 * n], model.A[n : 2 * n, m:]
+        own = model.A[m:, m:]
+        square = own @ own + omega**2 * np.eye(own.shape[0])
+        stiffness = np.linalg.solve(np.eye(n) + out @ np.linalg.solve(square, into), stiffness)
     values, vectors = np.linalg.eig(kinematics @ stiffness)
     scale = np.array([1.0, 1.0, 1.0, model.arm, model.arm, model.arm])
     shapes = np.abs(vectors) * scale[:, None]

@@ -31,7 +31,7 @@ def write_mat(model: Any, path: str | Path) -> Path:
         if hasattr(model, name):
             content[name] = np.array(getattr(model, name), dtype=object)
     content |= {
-        "x0": point.state[list(STATE_INDEX)][:, None],
+        "x0": np.asarray(model.x0 if hasattr(model, "x0") else point.state[list(STATE_INDEX)])[:, None],
         "u0": np.array([*point.command, wind])[:, None],
         "operating_point": dict(point),
     }

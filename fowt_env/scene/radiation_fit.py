@@ -1,8 +1,9 @@
-"""Radiation memory from potential-flow coefficients: rational approximation by vector fitting, or convolution.
+"""Radiation memory from potential-flow coefficients: a rational approximation, or convolution.
 
-The retardation of a body is K(i w) = B(w) + i w (A(w) - A_inf), and follows from B alone, since it is causal. So
-both forms have the K of B: files give an A that agrees with their B to some per cent, where panels are coarse or
-inner waves resonate, and by far more than the fit is in error. The rational approximation has real coefficients, stable poles, K(0) = 0 and no direct term, and the poles of motions that are coupled are common
+The retardation of a body is K(i w) = B(w) + i w (A(w) - A_inf), and follows from B alone, since it is causal.
+So both forms have the K of B: files give an A that agrees with their B to some per cent, where panels are
+coarse or inner waves resonate, and by far more than the fit is in error. The rational approximation has real
+coefficients, stable poles, K(0) = 0 and no direct term, and the poles of motions that are coupled are common
 to all entries between them. Poles are found by vector fitting (Gustavsen and Semlyen, IEEE Trans. Power
 Delivery 14(3), 1999; relaxed as in 21(3), 2006) and then by nonlinear least squares; residues by linear least
 squares under the condition that Re K is positive semidefinite (theory.md, 5.8).
@@ -11,6 +12,7 @@ squares under the condition that Re K is positive semidefinite (theory.md, 5.8).
 import hashlib
 import warnings
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -23,22 +25,26 @@ from fowt_env.plant.hydro.radiation import ConvolutionMemory, StateSpaceMemory, 
 from fowt_env.plant.state import MOTIONS
 
 BAND = (0.15, 2.5)  # rad/s, in which errors are counted: periods of 2.5 to 42 s
-OUTSIDE = 0.1  # weight of other frequencies
+OUTSIDE, BELOW = 0.1, 0.6  # weight of higher frequencies, and times frequency (rad/s) of lower ones
 FEWEST_KNOWN = 8  # frequencies of a file within BAND
 NEGLIGIBLE = 1e-3  # of the geometric mean of the diagonals: weaker coupling is left out
 FEWEST, MOST = 2, 10  # pairs of poles of an entry
-ROUNDS = 20  # of relocating poles
-EVALUATIONS = 40  # of the nonlinear least squares
+ALIKE = 2e-3  # rms in BAND by which the normal K of two blocks may differ to share a fit
+ROUNDS = 12  # of relocating poles
+EVALUATIONS = 20  # of the nonlinear least squares
+POLISHED = 2.0  # times the error that is asked for, below which poles are worth them
 DECAY = (0.05, 8.0)  # 1/s, of a pole: one of less would outlast SPAN, and is narrower than files resolve
 FREQUENCY = (0.01, 8.0)  # rad/s, of a pole
 PASSIVE_UP_TO = 10.0  # rad/s
-PASSIVE_MARGIN = 1e-5  # least Re K at which residues are held, of its size there
+PASSIVE_MARGIN = 1e-4  # least Re K at which residues are held, of its size there
 PASSIVE_ROUNDS = 60
+CHECKED = 4001  # frequencies up to there at which a fit is judged
 NOT_PASSIVE = 1e-4  # of an entry's largest value: beyond it a fit is refused
 SPAN = 60.0  # s of past velocities in a convolution
+FADE = 15.0  # s at its end in which K goes to zero: cut off, it would damp slow motions, or drive them
 SPACING = 0.005  # rad/s, of the cosine transform: its period of 1257 s is far beyond SPAN
 TRANSFORMED = 120.0  # s of K behind the target of a fit
-GRID = 0.025  # rad/s, of that target
+GRID = 0.04  # rad/s, of that target
 TAPER = 1.5  # times the last frequency, where the damping has gone to zero
 IN_PLANE = (0, 2, 4)
 
@@ -191,8 +197,11 @@ def _bounded(poles):
     return -decay + 1j * np.clip(poles.imag, 1.001 * FREQUENCY[0], 0.999 * FREQUENCY[1])
 
 
-def _fit_poles(omega, f, w, count, starts=()):
-    """(largest error, poles) of the best of `count` pairs that vector fitting and least squares find."""
+def _fit_poles(omega, f, w, count, starts, wanted):
+    """(largest error, poles) of the best of `count` pairs that vector fitting finds.
+
+    What is below `wanted` is polished by nonlinear least squares.
+    """
     s, band = 1j * omega, _in_band(omega)
 
     def error(poles):
@@ -207,19 +216,20 @@ def _fit_poles(omega, f, w, count, starts=()):
 
     middle = np.linspace(BAND[0], BAND[1] + 0.1, count)
     best = (np.inf, None)
-    bounds = np.log(np.repeat([DECAY, FREQUENCY], count, axis=0)).T
     for start in (-0.1 * middle + 1j * middle, *starts):
         poles = _bounded(start)
-        found = (error(poles), poles)
+        best = min(best, (error(poles), poles), key=lambda each: each[0])
         for _ in range(ROUNDS):
             poles = _relocated(s, f, w, poles)
             if poles.size < count:
                 break
-            found = min(found, (error(poles), poles), key=lambda each: each[0])
-        x = np.log(np.r_[-found[1].real, found[1].imag])
-        polished = unpacked(least_squares(residuals, x, bounds=bounds, max_nfev=EVALUATIONS).x)
-        best = min(best, found, (error(polished), polished), key=lambda each: each[0])
-    return best
+            best = min(best, (error(poles), poles), key=lambda each: each[0])
+    if best[0] > wanted:
+        return best
+    bounds = np.log(np.repeat([DECAY, FREQUENCY], count, axis=0)).T
+    x = np.log(np.r_[-best[1].real, best[1].imag])
+    polished = unpacked(least_squares(residuals, x, bounds=bounds, max_nfev=EVALUATIONS).x)
+    return min(best, (error(polished), polished), key=lambda each: each[0])
 
 
 # ---------------------------------------------------------------- passivity
@@ -248,10 +258,9 @@ def _constrained(left, right, rows, least):
 
 
 def _passive_grid():
-    """Frequencies (rad/s) at which Re K is held positive, and its size there: K goes with w^2 at both ends."""
-    omega = np.unique(
-        np.r_[np.geomspace(1e-3, 0.05, 10), np.arange(0.05, PASSIVE_UP_TO + 0.01, 0.025), 20.0, 50.0]
-    )
+    """Frequencies (rad/s) at which Re K is held positive, and its size there: w^2, and 1/w^2 far up."""
+    middle = np.r_[np.arange(0.05, BAND[1], 0.002), np.arange(BAND[1], PASSIVE_UP_TO + 0.01, 0.01)]
+    omega = np.unique(np.r_[np.geomspace(1e-3, 0.05, 10), middle, 20.0, 50.0])
     return omega, omega**2 / (omega**2 + 0.3**2) / (1.0 + (omega / 3.0) ** 2)
 
 
@@ -310,8 +319,12 @@ def _blocks(size):
     return blocks, coupled
 
 
-def _fit_block(omega, k, block, coupled, w, asked):
-    """(poles, {entry: residues}, scaled passivity) of motions that share poles."""
+def _fit_block(omega, k, block, coupled, w, asked, known):
+    """(poles, {entry: residues}) of motions that share poles.
+
+    known: [(normal K, poles, normal residues)] of earlier blocks, to which this one is added; a block that is
+    one of them but for scales and signs, as sway and roll are of many floaters, has its fit.
+    """
     band = _in_band(omega)
     pairs = [(i, j) for a, i in enumerate(block) for j in block[a:] if i == j or coupled[i, j]]
     scale = {i: np.sqrt(np.sqrt((np.abs(k[band, i, i]) ** 2).mean())) for i in block}
@@ -319,10 +332,16 @@ def _fit_block(omega, k, block, coupled, w, asked):
     f = np.array([k[:, i, j] for i, j in pairs]).T
     units = np.array([scale[i] * scale[j] for i, j in pairs])
     places = [(block.index(i), block.index(j)) for i, j in pairs]
+    for normal, poles, found in known:
+        if normal.shape == f.shape and len(block) < 3:
+            signs = np.where((normal.conj() * f)[band].real.sum(axis=0) < 0.0, -1.0, 1.0)
+            if np.sqrt((np.abs(signs * f / own - normal)[band] ** 2).mean(axis=0)).max() < ALIKE:
+                return poles, _residues_by_entry(pairs, found, signs * own)
     best, last = (np.inf, None, None), None
     for count in range(FEWEST, MOST + 1):
         starts = () if last is None else (np.append(last, complex(-0.5, 1.0 + 0.2 * (count % 3))),)
-        error, last = _fit_poles(omega, f / own, w, count, starts)
+        wanted = np.inf if count == MOST else POLISHED * asked
+        error, last = _fit_poles(omega, f / own, w, count, starts, wanted)
         if error > best[0]:
             continue  # positive Re K only adds to it
         found = _passive_residues(omega, f / units, w, last, places, len(block), units / own)
@@ -332,21 +351,29 @@ def _fit_block(omega, k, block, coupled, w, asked):
         if best[0] <= asked:
             break
     _, poles, found = best
-    half, residues = poles.size, {}
-    for (i, j), row, unit in zip(pairs, found, units, strict=True):
+    found = found * (units / own)[:, None]
+    known.append((f / own, poles, found))
+    return poles, _residues_by_entry(pairs, found, own)
+
+
+def _residues_by_entry(pairs, rows, units):
+    """{entry: complex residues}, both ways, of rows of their real and imaginary parts."""
+    residues = {}
+    for (i, j), row, unit in zip(pairs, rows, units, strict=True):
+        half = row.size // 2
         residues[i, j] = residues[j, i] = unit * (row[:half] + 1j * row[half:])
-    return poles, residues
+    return residues
 
 
 _FITS = Cache(16)  # (hash of the coefficients, error) -> RadiationFit
 
 
 def fit_radiation(body, error=0.02):
-    """RadiationFit of a PotentialFlow: as many poles as an rms error of each entry asks for, MOST pairs at most.
+    """RadiationFit of a PotentialFlow: as many poles as the error asks for, MOST pairs at most.
 
     error  rms over BAND of an entry, of the entry's rms there
-    Warns (PlantWarning) where an entry is left with more than twice that. Raises: InputError where Re K of the
-    fit cannot be held positive, or where the coefficients have fewer than FEWEST_KNOWN frequencies within BAND.
+    Warns (PlantWarning) where an entry is left with more than twice that. Raises: InputError where Re K of
+    the fit cannot be held positive, or with fewer than FEWEST_KNOWN frequencies within BAND.
     """
     digest = hashlib.sha256()
     for part in (body.omega, body.added_mass, body.damping, body.added_mass_infinite):
@@ -366,20 +393,18 @@ def _fit(body, asked):
     k = causal_retardation(body, omega)
     band = _in_band(omega)
     size = np.sqrt((np.abs(k[band]) ** 2).mean(axis=0))
-    w = np.where(band, 1.0, OUTSIDE)
+    # below the band by what an error is in added mass, which sets the periods of surge, sway and yaw
+    w = np.where(band, 1.0, np.where(omega < BAND[0], BELOW / omega, OUTSIDE))
     blocks, coupled = _blocks(size)
-    poles, residues = {}, {}
+    poles, residues, earlier = {}, {}, []
     for block in blocks:
-        own, found = _fit_block(omega, k, block, coupled, w, asked)
+        own, found = _fit_block(omega, k, block, coupled, w, asked, earlier)
         poles |= dict.fromkeys(block, own)
         residues |= found
     fit = RadiationFit(poles, residues, {}, 0.0, asked)
-    grid = _passive_grid()[0]
-    far = fit.response(grid[grid <= PASSIVE_UP_TO])
-    own, of_file = (
-        _misses(fit, omega[band], k[band]),
-        _misses(fit, body.omega[known], retardation(body)[known]),
-    )
+    far = fit.response(np.linspace(0.0, PASSIVE_UP_TO, CHECKED)[1:])
+    own = _misses(fit, omega[band], k[band])
+    of_file = _misses(fit, body.omega[known], retardation(body)[known])
     entries = {}
     for i, j in residues:
         if i <= j:
@@ -409,8 +434,9 @@ def _check(fit):
     for (i, j), entry in fit.entries.items():
         if i == j and entry.passivity < -NOT_PASSIVE:
             raise InputError(
-                f"potential_flow: the radiation memory of {MOTIONS[i]} cannot be fitted without making energy:"
-                f" the least Re K is {entry.passivity:.2g} of the largest; use radiation = 'convolution'"
+                f"potential_flow: the radiation memory of {MOTIONS[i]} cannot be fitted without making"
+                f" energy: the least Re K is {entry.passivity:.2g} of the largest;"
+                " use radiation = 'convolution'"
             )
     coarse = {
         f"{MOTIONS[i]}" if i == j else f"{MOTIONS[i]}-{MOTIONS[j]}": entry.error
@@ -452,9 +478,8 @@ def memory_for_step(memory, body, dt, planar):
 
 def build_state_space(fit, first, motions=range(6)):
     """StateSpaceMemory of a RadiationFit, for these motions; None where none of them has a memory."""
-    groups = [
-        whole_groups(fit.poles[j].size, PAIR_LANES) if j in motions and j in fit.poles else 0 for j in range(6)
-    ]
+    counts = [fit.poles[j].size if j in motions and j in fit.poles else 0 for j in range(6)]
+    groups = [whole_groups(count, PAIR_LANES) for count in counts]
     begin = np.concatenate([[0], np.cumsum(groups)]).astype(np.int64)
     if begin[-1] == 0:
         return None
@@ -493,7 +518,8 @@ def build_convolution(body, dt, motions=range(6)):
     steps = max(1, round(SPAN / dt))
     n = whole_groups(steps, SUM_LANES)
     time = 0.5 * dt * np.arange(2 * n + 1)
-    kernel = retardation_kernel(body, time)
+    share = np.clip((time - SPAN + FADE) / FADE, 0.0, 1.0)
+    kernel = retardation_kernel(body, time) * (0.5 + 0.5 * np.cos(np.pi * share))[:, None, None]
     now = np.zeros((6, 6))
     half, whole = np.zeros((len(places), n)), np.zeros((len(places), n))
     for e, (i, j) in enumerate(places):
@@ -509,3 +535,34 @@ def build_convolution(body, dt, motions=range(6)):
         half,
         whole,
     )
+
+
+class LinearMemory(NamedTuple):
+    """z' = A z + B q', F = -C z: the memory of a scene in inertial axes, q' (6,)."""
+
+    A: np.ndarray  # (m, m)
+    B: np.ndarray  # (m, 6)
+    C: np.ndarray  # (6, m)
+
+
+def linear_memory(scene):
+    """LinearMemory of a scene, None without a memory; for a convolution that of the fit of state_space."""
+    hydro = scene.model.hydro
+    if hydro is None or hydro.radiation is None:
+        return None
+    fit = fit_radiation(scene.platform.potential_flow, scene.options["radiation_error"])
+    motions = [j for j in (IN_PLANE if scene.options["planar"] else range(6)) if j in fit.poles]
+    size = 2 * sum(fit.poles[j].size for j in motions)
+    a, b, c = np.zeros((size, size)), np.zeros((size, 6)), np.zeros((6, size))
+    start = 0
+    for j in motions:
+        for k, pole in enumerate(fit.poles[j]):
+            at = slice(start, start + 2)
+            a[at, at] = [[pole.real, -pole.imag], [pole.imag, pole.real]]
+            b[start, j] = 1.0
+            for i in motions:
+                if (i, j) in fit.residues:
+                    residue = fit.residues[i, j][k]
+                    c[i, at] = 2.0 * residue.real, -2.0 * residue.imag
+            start += 2
+    return LinearMemory(a, b, c)
