@@ -44,8 +44,8 @@ class LinearModel:
     """dx/dt = A dx + B du + E df, dy = C dx + D du + F df about an operating point, azimuth-averaged (SI).
 
     A (m, m), B (m, 3), C (n, m), D (n, 3) with the names in states, inputs and outputs; E (m, 6)
-    and F (n, 6) take further forces on the hull (FORCES). point is the OperatingPoint. The first 14 states are
-    plant.state.STATES; those of a body with radiation memory follow, radiation_1 and so on.
+    and F (n, 6) take further forces on the hull (FORCES). point is the OperatingPoint. The first 14 states
+    are plant.state.STATES; those of a body with radiation memory follow, radiation_1 and so on.
     """
 
     A: np.ndarray

@@ -10,8 +10,7 @@ from fowt_env.descriptions.potential_flow import MAX_BYTES, DifferenceQtf, Poten
 from fowt_env.errors import InputError
 
 MODES = 6
-# A diagonal damping below zero by more than this fraction of the mode's largest is no rounding of a panel code.
-NEGATIVE_DAMPING = 0.02
+NEGATIVE_DAMPING = 0.02  # fraction of a mode's largest that rounding may leave below zero on the diagonal
 _LIMITS = {-1.0: "zero frequency (period < 0)", 0.0: "infinite frequency (period = 0)"}
 
 
@@ -131,7 +130,8 @@ def _mode(where, number, value):
     """Index of a mode 1 to 6. Raises: InputError, also for further bodies."""
     if value != int(value) or not 1 <= value <= MODES:
         raise InputError(
-            f"{where}: line {number}: mode {value:g}: must be 1 to {MODES}; files of several bodies are not read"
+            f"{where}: line {number}: mode {value:g}: must be 1 to {MODES}; files of several bodies are not"
+            " read"
         )
     return int(value) - 1
 
@@ -196,8 +196,8 @@ def _check_damping(where, omega, damping):
         if values[worst] < -NEGATIVE_DAMPING * np.abs(values).max():
             share = values[worst] / np.abs(values).max()
             raise InputError(
-                f"{where}: damping {i + 1} {i + 1} at {omega[worst]:.4g} rad/s is negative: {share:.1%} of the"
-                f" mode's largest; allowed: at least {-NEGATIVE_DAMPING:.0%}"
+                f"{where}: damping {i + 1} {i + 1} at {omega[worst]:.4g} rad/s is negative: {share:.1%} of"
+                f" the mode's largest; allowed: at least {-NEGATIVE_DAMPING:.0%}"
             )
 
 
@@ -223,7 +223,7 @@ def _product(axes):
 
 
 def _read_excitation(path):
-    """(omega, heading, dimensionless force (k, m, 6)) of a .3 file; its zero and infinite periods left out."""
+    """(omega, heading, dimensionless force (k, m, 6)) of a .3 file; zero and infinite periods left out."""
     where, rows = _rows(path, (7,))
     table = {}
     for number, (period, heading, i, _, _, real, imaginary) in rows:

@@ -220,6 +220,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self.control_dt = float(control_dt)
         self.dt = min(self.scene.dt, self.control_dt) if dt is None else float(dt)
         per_control = steps_in("control_dt", control_dt, self.dt if dt is None else dt)
+        self.scene = self.scene.with_step(self.dt)
         self._last = per_control * steps_in("duration", task.duration, control_dt, "control_dt")
         self._key = plant_key(self.scene)
         self._build(ACTION_MODES[action_mode], per_control)

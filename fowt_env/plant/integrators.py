@@ -3,8 +3,8 @@
 The blade pitch follows its own first-order law exactly within a step (constant command), so the stiffest
 part of the plant does not limit the multistep methods. Nor does the rotor in a box of wind, whose blades pass
 a cell of the grid in a tenth of a second: its load alone is evaluated several times a step
-(rotor_substeps.py). The states of radiation memory, the last of the vector, have no rates: they follow exactly
-from velocities that are linear over the step (hydro/radiation.py).
+(rotor_substeps.py). The states of radiation memory, the last of the vector, have no rates: they follow
+exactly from velocities that are linear over the step (hydro/radiation.py).
 """
 
 from typing import NamedTuple

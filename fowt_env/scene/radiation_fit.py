@@ -1,8 +1,9 @@
-"""Radiation memory from potential-flow coefficients: rational approximation by vector fitting, or convolution.
+"""Radiation memory from potential-flow coefficients: a rational approximation, or convolution.
 
-The retardation of a body is K(i w) = B(w) + i w (A(w) - A_inf), and follows from B alone, since it is causal. So
-both forms have the K of B: files give an A that agrees with their B to some per cent, where panels are coarse or
-inner waves resonate, and by far more than the fit is in error. The rational approximation has real coefficients, stable poles, K(0) = 0 and no direct term, and the poles of motions that are coupled are common
+The retardation of a body is K(i w) = B(w) + i w (A(w) - A_inf), and follows from B alone, since it is causal.
+So both forms have the K of B: files give an A that agrees with their B to some per cent, where panels are
+coarse or inner waves resonate, and by far more than the fit is in error. The rational approximation has real
+coefficients, stable poles, K(0) = 0 and no direct term, and the poles of motions that are coupled are common
 to all entries between them. Poles are found by vector fitting (Gustavsen and Semlyen, IEEE Trans. Power
 Delivery 14(3), 1999; relaxed as in 21(3), 2006) and then by nonlinear least squares; residues by linear least
 squares under the condition that Re K is positive semidefinite (theory.md, 5.8).
@@ -29,19 +30,21 @@ FEWEST_KNOWN = 8  # frequencies of a file within BAND
 NEGLIGIBLE = 1e-3  # of the geometric mean of the diagonals: weaker coupling is left out
 FEWEST, MOST = 2, 10  # pairs of poles of an entry
 ALIKE = 2e-3  # rms in BAND by which the normal K of two blocks may differ to share a fit
-ROUNDS = 20  # of relocating poles
-EVALUATIONS = 40  # of the nonlinear least squares
+ROUNDS = 12  # of relocating poles
+EVALUATIONS = 20  # of the nonlinear least squares
+POLISHED = 2.0  # times the error that is asked for, below which poles are worth them
 DECAY = (0.05, 8.0)  # 1/s, of a pole: one of less would outlast SPAN, and is narrower than files resolve
 FREQUENCY = (0.01, 8.0)  # rad/s, of a pole
 PASSIVE_UP_TO = 10.0  # rad/s
-PASSIVE_MARGIN = 1e-5  # least Re K at which residues are held, of its size there
+PASSIVE_MARGIN = 1e-4  # least Re K at which residues are held, of its size there
 PASSIVE_ROUNDS = 60
+CHECKED = 4001  # frequencies up to there at which a fit is judged
 NOT_PASSIVE = 1e-4  # of an entry's largest value: beyond it a fit is refused
 SPAN = 60.0  # s of past velocities in a convolution
 FADE = 15.0  # s at its end in which K goes to zero: cut off, it would damp slow motions, or drive them
 SPACING = 0.005  # rad/s, of the cosine transform: its period of 1257 s is far beyond SPAN
 TRANSFORMED = 120.0  # s of K behind the target of a fit
-GRID = 0.025  # rad/s, of that target
+GRID = 0.04  # rad/s, of that target
 TAPER = 1.5  # times the last frequency, where the damping has gone to zero
 IN_PLANE = (0, 2, 4)
 
@@ -194,8 +197,11 @@ def _bounded(poles):
     return -decay + 1j * np.clip(poles.imag, 1.001 * FREQUENCY[0], 0.999 * FREQUENCY[1])
 
 
-def _fit_poles(omega, f, w, count, starts=()):
-    """(largest error, poles) of the best of `count` pairs that vector fitting and least squares find."""
+def _fit_poles(omega, f, w, count, starts, wanted):
+    """(largest error, poles) of the best of `count` pairs that vector fitting finds.
+
+    What is below `wanted` is polished by nonlinear least squares.
+    """
     s, band = 1j * omega, _in_band(omega)
 
     def error(poles):
@@ -210,19 +216,20 @@ def _fit_poles(omega, f, w, count, starts=()):
 
     middle = np.linspace(BAND[0], BAND[1] + 0.1, count)
     best = (np.inf, None)
-    bounds = np.log(np.repeat([DECAY, FREQUENCY], count, axis=0)).T
     for start in (-0.1 * middle + 1j * middle, *starts):
         poles = _bounded(start)
-        found = (error(poles), poles)
+        best = min(best, (error(poles), poles), key=lambda each: each[0])
         for _ in range(ROUNDS):
             poles = _relocated(s, f, w, poles)
             if poles.size < count:
                 break
-            found = min(found, (error(poles), poles), key=lambda each: each[0])
-        x = np.log(np.r_[-found[1].real, found[1].imag])
-        polished = unpacked(least_squares(residuals, x, bounds=bounds, max_nfev=EVALUATIONS).x)
-        best = min(best, found, (error(polished), polished), key=lambda each: each[0])
-    return best
+            best = min(best, (error(poles), poles), key=lambda each: each[0])
+    if best[0] > wanted:
+        return best
+    bounds = np.log(np.repeat([DECAY, FREQUENCY], count, axis=0)).T
+    x = np.log(np.r_[-best[1].real, best[1].imag])
+    polished = unpacked(least_squares(residuals, x, bounds=bounds, max_nfev=EVALUATIONS).x)
+    return min(best, (error(polished), polished), key=lambda each: each[0])
 
 
 # ---------------------------------------------------------------- passivity
@@ -251,10 +258,9 @@ def _constrained(left, right, rows, least):
 
 
 def _passive_grid():
-    """Frequencies (rad/s) at which Re K is held positive, and its size there: K goes with w^2 at both ends."""
-    omega = np.unique(
-        np.r_[np.geomspace(1e-3, 0.05, 10), np.arange(0.05, PASSIVE_UP_TO + 0.01, 0.025), 20.0, 50.0]
-    )
+    """Frequencies (rad/s) at which Re K is held positive, and its size there: w^2, and 1/w^2 far up."""
+    middle = np.r_[np.arange(0.05, BAND[1], 0.002), np.arange(BAND[1], PASSIVE_UP_TO + 0.01, 0.01)]
+    omega = np.unique(np.r_[np.geomspace(1e-3, 0.05, 10), middle, 20.0, 50.0])
     return omega, omega**2 / (omega**2 + 0.3**2) / (1.0 + (omega / 3.0) ** 2)
 
 
@@ -334,7 +340,8 @@ def _fit_block(omega, k, block, coupled, w, asked, known):
     best, last = (np.inf, None, None), None
     for count in range(FEWEST, MOST + 1):
         starts = () if last is None else (np.append(last, complex(-0.5, 1.0 + 0.2 * (count % 3))),)
-        error, last = _fit_poles(omega, f / own, w, count, starts)
+        wanted = np.inf if count == MOST else POLISHED * asked
+        error, last = _fit_poles(omega, f / own, w, count, starts, wanted)
         if error > best[0]:
             continue  # positive Re K only adds to it
         found = _passive_residues(omega, f / units, w, last, places, len(block), units / own)
@@ -362,11 +369,11 @@ _FITS = Cache(16)  # (hash of the coefficients, error) -> RadiationFit
 
 
 def fit_radiation(body, error=0.02):
-    """RadiationFit of a PotentialFlow: as many poles as an rms error of each entry asks for, MOST pairs at most.
+    """RadiationFit of a PotentialFlow: as many poles as the error asks for, MOST pairs at most.
 
     error  rms over BAND of an entry, of the entry's rms there
-    Warns (PlantWarning) where an entry is left with more than twice that. Raises: InputError where Re K of the
-    fit cannot be held positive, or where the coefficients have fewer than FEWEST_KNOWN frequencies within BAND.
+    Warns (PlantWarning) where an entry is left with more than twice that. Raises: InputError where Re K of
+    the fit cannot be held positive, or with fewer than FEWEST_KNOWN frequencies within BAND.
     """
     digest = hashlib.sha256()
     for part in (body.omega, body.added_mass, body.damping, body.added_mass_infinite):
@@ -395,12 +402,9 @@ def _fit(body, asked):
         poles |= dict.fromkeys(block, own)
         residues |= found
     fit = RadiationFit(poles, residues, {}, 0.0, asked)
-    grid = _passive_grid()[0]
-    far = fit.response(grid[grid <= PASSIVE_UP_TO])
-    own, of_file = (
-        _misses(fit, omega[band], k[band]),
-        _misses(fit, body.omega[known], retardation(body)[known]),
-    )
+    far = fit.response(np.linspace(0.0, PASSIVE_UP_TO, CHECKED)[1:])
+    own = _misses(fit, omega[band], k[band])
+    of_file = _misses(fit, body.omega[known], retardation(body)[known])
     entries = {}
     for i, j in residues:
         if i <= j:
@@ -430,8 +434,9 @@ def _check(fit):
     for (i, j), entry in fit.entries.items():
         if i == j and entry.passivity < -NOT_PASSIVE:
             raise InputError(
-                f"potential_flow: the radiation memory of {MOTIONS[i]} cannot be fitted without making energy:"
-                f" the least Re K is {entry.passivity:.2g} of the largest; use radiation = 'convolution'"
+                f"potential_flow: the radiation memory of {MOTIONS[i]} cannot be fitted without making"
+                f" energy: the least Re K is {entry.passivity:.2g} of the largest;"
+                " use radiation = 'convolution'"
             )
     coarse = {
         f"{MOTIONS[i]}" if i == j else f"{MOTIONS[i]}-{MOTIONS[j]}": entry.error
@@ -473,9 +478,8 @@ def memory_for_step(memory, body, dt, planar):
 
 def build_state_space(fit, first, motions=range(6)):
     """StateSpaceMemory of a RadiationFit, for these motions; None where none of them has a memory."""
-    groups = [
-        whole_groups(fit.poles[j].size, PAIR_LANES) if j in motions and j in fit.poles else 0 for j in range(6)
-    ]
+    counts = [fit.poles[j].size if j in motions and j in fit.poles else 0 for j in range(6)]
+    groups = [whole_groups(count, PAIR_LANES) for count in counts]
     begin = np.concatenate([[0], np.cumsum(groups)]).astype(np.int64)
     if begin[-1] == 0:
         return None
@@ -542,7 +546,7 @@ class LinearMemory(NamedTuple):
 
 
 def linear_memory(scene):
-    """LinearMemory of a scene, None without a memory; for a convolution that of the fit that state_space has."""
+    """LinearMemory of a scene, None without a memory; for a convolution that of the fit of state_space."""
     hydro = scene.model.hydro
     if hydro is None or hydro.radiation is None:
         return None

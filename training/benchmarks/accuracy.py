@@ -34,6 +34,7 @@ CHANNELS = {
     "rotor_speed": "RotSpeed_[rpm]",
     "fairlead_tension": "FAIRTEN1_[kN]",
 }
+PLATFORM = "oc3_hywind"
 UNITS = {"strongest": "strongest components", "blade_stations": "stations", "strip_length": "m strips",
          "rotor_samples": "rotor loads a step"}  # fmt: skip
 TIMED = 1.0  # s of CPU time: shorter runs are repeated until then, longer ones timed once
@@ -65,6 +66,11 @@ class Variant:
     wave_loads: str
     # further options of build_scene, as (name, value); "strongest": that many of the sea's components
     options: tuple = ()
+
+    @property
+    def fidelity(self):
+        """Level that has these waves, for what a variant leaves open: the memory of a potential-flow body."""
+        return "reference" if self.wave_loads == "exact" else "standard"
 
     @property
     def name(self):
@@ -132,14 +138,14 @@ LEVELS = {
 }
 
 
-def _scene(variant, seed, duration, wind, sea):
+def _scene(variant, seed, duration, wind, sea, platform):
     options = dict(variant.options)
     strongest = options.pop("strongest", None)
 
     def build(sea):
         return build_scene(
-            wind=wind, sea=sea, seed=seed, duration=max(100.0, duration), rotor=variant.rotor,
-            wave_loads=variant.wave_loads, integrator=variant.integrator, **options,
+            platform, wind=wind, sea=sea, seed=seed, duration=max(100.0, duration), fidelity=variant.fidelity,
+            rotor=variant.rotor, wave_loads=variant.wave_loads, integrator=variant.integrator, **options,
         )  # fmt: skip
 
     return build(sea if strongest is None else _thinned(build(sea).model.hydro.waves, strongest))
@@ -155,9 +161,11 @@ def _thinned(waves, count):
     }  # fmt: skip
 
 
-def _run(variant, seed, duration, wind, sea):
+def _run(variant, seed, duration, wind, sea, platform):
     """DataFrame of a run of this variant."""
-    return simulate(_scene(variant, seed, duration, wind, sea), "pi", duration=duration, dt=variant.dt)
+    return simulate(
+        _scene(variant, seed, duration, wind, sea, platform), "pi", duration=duration, dt=variant.dt
+    )
 
 
 def errors(frame, reference):
@@ -175,6 +183,7 @@ def accuracy(
     sea=None,
     repeats=5,
     progress=None,
+    platform=PLATFORM,
 ):
     """DataFrame with a row per seed and variant; the first of a seed is the reference at twice its step.
 
@@ -183,6 +192,7 @@ def accuracy(
     chosen    variants (default: variants()); () leaves the reference at twice its step
     out       CSV that grows by a row as each run ends; rows already there are kept and not run again
     progress  called with (text, done, total)
+    platform  name of a platform: each needs a CSV of its own
     """
     wind, sea = wind or TURBULENCE, SEA if sea is None else sea
     check = Variant(REFERENCE, "rk4", 2.0 * finest, "bem", "exact")
@@ -199,18 +209,20 @@ def accuracy(
             continue
         if progress is not None:
             progress(f"seed {seed}: reference", done, total)
-        reference = _run(Variant(REFERENCE, "rk4", finest, "bem", "exact"), seed, duration, wind, sea)
+        reference = _run(
+            Variant(REFERENCE, "rk4", finest, "bem", "exact"), seed, duration, wind, sea, platform
+        )
         for variant in missing:
             if progress is not None:
                 progress(f"seed {seed}: {variant.name}", done, total)
-            rows.append(_row(variant, seed, duration, finest, reference, wind, sea, repeats))
+            rows.append(_row(variant, seed, duration, finest, reference, wind, sea, repeats, platform))
             _append(out, rows[-1])
             done += 1
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
-def _row(variant, seed, duration, finest, reference, wind, sea, repeats):
-    scene = _scene(variant, seed, duration, wind, sea)
+def _row(variant, seed, duration, finest, reference, wind, sea, repeats, platform):
+    scene = _scene(variant, seed, duration, wind, sea, platform)
     simulate(scene, "pi", duration=1.0, dt=variant.dt)  # compiles
     frame, cost = _timed(lambda: simulate(scene, "pi", duration=duration, dt=variant.dt), repeats)
     kernel_seconds = min(duration, max(1.0, float(round(0.2 * TIMED * duration / cost))))
@@ -302,8 +314,11 @@ def openfast_points():
     ]
 
 
-def plot_accuracy(table, path=None):
-    """Figure: error over real-time factor, both logarithmic, with the Pareto front and OpenFAST's points."""
+def plot_accuracy(table, path=None, openfast=True):
+    """Figure: error over real-time factor, both logarithmic, with the Pareto front and OpenFAST's points.
+
+    openfast: whether those points, which are of OC3-Hywind, are drawn.
+    """
     from fowt_env.visual.style import COLOURS, INK, new_figure, save_figure, style_axes
 
     points = accuracy_summary(table)
@@ -320,7 +335,8 @@ def plot_accuracy(table, path=None):
         )  # fmt: skip
     front = points[points["front"]].sort_values("real_time_factor")
     axes.plot(front["real_time_factor"], front["worst"], color=INK, linewidth=1.0, label="Pareto front")
-    _draw_openfast(axes)
+    if openfast:
+        _draw_openfast(axes)
     _name_front(axes, front)
     axes.set_xlabel("real-time factor of simulate (CPU, one core)", color=INK, fontsize=9)
     axes.set_ylabel("worst rms difference / standard deviation", color=INK, fontsize=9)
@@ -367,13 +383,25 @@ def _name_front(axes, front):
     axes.text(1.02, 0.02, "\n".join(lines), transform=axes.transAxes, fontsize=7, color=INK, va="bottom")
 
 
+def level_steps():
+    """Variants of the levels of build_scene at several steps each, on the axis "steps of the levels"."""
+    axis = "steps of the levels"
+    exact = [Variant(axis, "rk4", dt, "bem", "exact") for dt in (0.0125, 0.025, 0.05, 0.1)]
+    steps = (0.025, 0.05, 0.1)
+    standard = [Variant(axis, "ab4", dt, "lookup", "fast") for dt in steps]
+    return [*exact, *standard, *(Variant(axis, "ab4", dt, "table", "fast", TABLED) for dt in steps)]
+
+
 def select(names):
     """Variants of the axes named. Raises: InputError for an unknown axis.
 
-    "levels" stands for those that are levels of build_scene; "reference" adds none to those of every study.
+    "levels" stands for those that are levels of build_scene; "steps of the levels" are these at several steps
+    and no part of the sweep of all; "reference" adds none to those of every study.
     """
-    known = [REFERENCE, "levels", *dict.fromkeys(v.axis for v in variants())]
+    every = [*variants(), *level_steps()]
+    known = [REFERENCE, "levels", *dict.fromkeys(v.axis for v in every)]
     for name in names:
         if name not in known:
             raise unknown("axis", name, known)
-    return [v for v in variants() if v.axis in names or ("levels" in names and v.name in LEVELS)]
+    chosen = [v for v in variants() if v.axis in names or ("levels" in names and v.name in LEVELS)]
+    return chosen + [v for v in level_steps() if v.axis in names]

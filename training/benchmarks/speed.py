@@ -22,6 +22,8 @@ import pandas as pd
 import fowt_env
 from fowt_env.control import EXACT
 from fowt_env.controllers import make
+from fowt_env.descriptions.platform import read_platform
+from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.errors import InputError, unknown
 from fowt_env.files.atomic import replacing
 from fowt_env.initial_conditions import initial_state
@@ -42,6 +44,7 @@ from fowt_env.plant.state import Command, State, pose_of
 from fowt_env.scene.build import build_scene
 from fowt_env.simulation import HeldCommand, reader_of, simulate
 
+PLATFORM = "oc3_hywind"
 CALIBRATION_STEPS = 10_000_000
 REPEATS = 5
 CHUNK = 2000  # steps or calls in one timing of the kernel or of a load
@@ -74,11 +77,17 @@ class TimedScene:
     def controlled(self):
         return self.wind is not None and not self.parked
 
-    def scene(self, seed=1, duration=700.0):
+    def scene(self, seed=1, duration=700.0, platform=PLATFORM):
         """Scene of this kind, with what it holds still."""
-        wind = self.wind() if callable(self.wind) else self.wind
+        wind = self.wind(platform) if callable(self.wind) else self.wind
         scene = build_scene(
-            wind=wind, sea=self.sea, seed=seed, fidelity=self.fidelity, duration=duration, **self.options
+            platform,
+            wind=wind,
+            sea=self.sea,
+            seed=seed,
+            fidelity=self.fidelity,
+            duration=duration,
+            **self.options,
         )
         if not self.platform_fixed:
             return scene
@@ -93,10 +102,38 @@ class TimedScene:
         return x, u
 
 
-def _box():
-    from fowt_env.training.validation.openfast_cases import box_wind
+def _box(platform):
+    """Wind specification of a box that the rotor fits into: OC3's stored one, else a sum of plane waves."""
+    if platform == PLATFORM:
+        from fowt_env.training.validation.openfast_cases import box_wind
 
-    return box_wind()
+        return box_wind()
+    return made_box(read_turbine(read_platform(platform).turbine).rotor)
+
+
+def made_box(rotor, speed=18.0, seconds=620.0, dt=0.25, cell=8.0, waves=24, seed=1):
+    """Wind specification of a box for a Rotor: a sum of plane waves carried by the wind, for timing alone.
+
+    Its deviation is that of class B, its scales those of gusts that the rotor slices; no more is realistic.
+    """
+    draw = np.random.default_rng(seed)
+    reach = 1.15 * rotor.tip_radius
+    y = np.arange(-reach, reach + cell, cell)
+    z = np.arange(max(5.0, rotor.hub_height - reach - 2.0 * cell), rotor.hub_height + reach + cell, cell)
+    z = np.concatenate([np.arange(5.0, z[0], cell), z]) if z[0] > 5.0 else z
+    time = np.arange(0.0, seconds, dt)
+    parts = []
+    for deviation in (2.7, 2.1, 1.4):
+        value = np.zeros((time.size, z.size, y.size), dtype=np.float32)
+        for _ in range(waves):
+            frequency, phase = 10.0 ** draw.uniform(-2.3, 0.0), draw.uniform(0.0, 2.0 * np.pi)
+            across, up = draw.normal(0.0, 2.0 * np.pi * frequency / speed, 2)
+            angle = 2.0 * np.pi * frequency * time[:, None, None] + across * y + up * z[:, None] + phase
+            value += deviation * np.sqrt(2.0 / waves) * np.cos(angle).astype(np.float32)
+        parts.append(value)
+    parts[0] += np.float32(speed)
+    names = dict(zip("uvw", parts, strict=True))
+    return {"kind": "box", **names, "y": y, "z": z, "dt": dt, "speed": speed}
 
 
 TIMED_SCENES = {
@@ -271,12 +308,12 @@ def loop_time(scene, kind, x, u, dt, seconds, repeats=REPEATS):
     return median_time(go, repeats)
 
 
-def measure_kind(name, seconds=600.0, repeats=REPEATS, calls=CHUNK):
+def measure_kind(name, seconds=600.0, repeats=REPEATS, calls=CHUNK, platform=PLATFORM):
     """Row (dict) of one kind of scene: times per step, real-time factors and microseconds per load."""
     if name not in TIMED_SCENES:
         raise unknown("kind of scene", name, TIMED_SCENES)
     kind = TIMED_SCENES[name]
-    scene = kind.scene()
+    scene = kind.scene(platform=platform)
     if hasattr(scene.wind, "usable"):  # a handle of wind has an end
         seconds = min(seconds, 10.0 * int(scene.wind.usable // 10.0))
     x, u = kind.start(scene)
@@ -307,8 +344,8 @@ def measure_kind(name, seconds=600.0, repeats=REPEATS, calls=CHUNK):
     return row
 
 
-def speed(kinds=None, seconds=600.0, repeats=REPEATS, calls=CHUNK, progress=None):
-    """DataFrame with a row per kind of scene (all by default).
+def speed(kinds=None, seconds=600.0, repeats=REPEATS, calls=CHUNK, progress=None, platform=PLATFORM):
+    """DataFrame with a row per kind of scene (all by default) of a platform.
 
     seconds   simulated, for the real-time factors of the closed loop and of simulate
     progress  called with (text, done, total)
@@ -322,7 +359,7 @@ def speed(kinds=None, seconds=600.0, repeats=REPEATS, calls=CHUNK, progress=None
     for done, name in enumerate(names):
         if progress is not None:
             progress(name, done, len(names))
-        rows.append(measure_kind(name, seconds, repeats, calls))
+        rows.append(measure_kind(name, seconds, repeats, calls, platform))
     return pd.DataFrame(rows)
 
 

@@ -7,6 +7,7 @@ import typer
 from rich.markup import escape
 
 from fowt_env.descriptions.checks import parse_whole_numbers
+from fowt_env.errors import InputError
 from fowt_env.training.cli.console import app, from_a_clone, note, out, progress_bar, reported, show
 from fowt_env.training.cli.tables import figure, print_table
 
@@ -26,6 +27,8 @@ ACCURACY_EXAMPLES = """[bold]Examples[/bold]
 [cyan]fowt benchmark accuracy[/cyan]  every variant, three seeds of 600 s: an hour
 
 [cyan]fowt benchmark accuracy --seeds 1 --duration 100 --axes "all together"[/cyan]  a first look
+
+[cyan]fowt benchmark accuracy --platform iea15_volturnus_s --axes levels[/cyan]  another platform's levels
 
 [bold]Files written[/bold]: accuracy.csv (a row as each run ends; a rerun resumes), accuracy.png."""
 
@@ -59,6 +62,7 @@ def speed(
     ] = None,
     seconds: Annotated[float, typer.Option(help="Simulated seconds of a run.")] = 600.0,
     repeats: Annotated[int, typer.Option(help="Repeats; the median counts.")] = 5,
+    platform: Annotated[str, typer.Option(help="Platform of the scenes.")] = "oc3_hywind",
     starts: Annotated[bool, typer.Option("--starts", help="Also time the first and a later start.")] = False,
     out_path: Annotated[str, typer.Option("--out", help="CSV to write.")] = "results/benchmark/speed.csv",
 ):
@@ -68,7 +72,11 @@ def speed(
     names = None if kinds is None else [name.strip() for name in kinds.split(";") if name.strip()]
     with progress_bar("benchmark", None) as update:
         table = bench.speed(
-            names, seconds, repeats, progress=lambda text, done, total: update(done, f"timing: {text}", total)
+            names,
+            seconds,
+            repeats,
+            progress=lambda text, done, total: update(done, f"timing: {text}", total),
+            platform=platform,
         )
         times = bench.start_times() if starts else {}
     rows = [(column, *map(figure, table[column])) for column in table.columns.drop(["kind", "absent"])]
@@ -102,6 +110,7 @@ def accuracy(
         str | None, typer.Option(help="Axes of the sweep, comma-separated; default: all.")
     ] = None,
     repeats: Annotated[int, typer.Option(min=1, help="Timed repeats of short runs; the median counts.")] = 5,
+    platform: Annotated[str, typer.Option(help="Platform of the scenes.")] = "oc3_hywind",
     box: Annotated[
         bool, typer.Option("--box", help="Wind of the stored full-field TurbSim box instead.")
     ] = False,
@@ -116,6 +125,11 @@ def accuracy(
 
     chosen = None if axes is None else study.select([name.strip() for name in axes.split(",")])
     folder = Path(out_folder)
+    name = "accuracy" if platform == study.PLATFORM else f"accuracy_{platform}"
+    if box and platform != study.PLATFORM:
+        raise InputError(
+            f"--box: the stored box is {study.PLATFORM}'s; leave it out for platform {platform!r}"
+        )
     numbers = parse_whole_numbers(seeds, "seeds")
     with progress_bar("accuracy", None) as update:
         table = study.accuracy(
@@ -123,10 +137,11 @@ def accuracy(
             duration,
             finest,
             chosen,
-            folder / "accuracy.csv",
+            folder / f"{name}.csv",
             wind=box_wind() if box else None,
             repeats=repeats,
             progress=lambda text, done, total: update(done, text, total),
+            platform=platform,
         )
     rows = []
     for row in study.accuracy_summary(table).to_dict("records"):
@@ -136,10 +151,10 @@ def accuracy(
     headings = ("variant", "worst", "of", "x real time", "kernel alone", "Pareto front")
     title = "rms difference over standard deviation, and speed of simulate"
     print_table(out, headings, rows, title, left=(0, 2))
-    files = [folder / "accuracy.csv"]
+    files = [folder / f"{name}.csv"]
     if plot:
-        study.plot_accuracy(table, folder / "accuracy.png")
-        files.append(folder / "accuracy.png")
+        files.append(folder / f"{name}.png")
+        study.plot_accuracy(table, files[-1], openfast=platform == study.PLATFORM)
     note("wrote " + ", ".join(map(str, files)))
 
 

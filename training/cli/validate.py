@@ -5,6 +5,7 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
+from fowt_env.errors import unknown
 from fowt_env.training.cli.console import (
     app,
     from_a_clone,
@@ -22,6 +23,8 @@ VALIDATE_EXAMPLES = """[bold]Examples[/bold]
 
 [cyan]fowt validate[/cyan]  every figure against OpenFAST
 
+[cyan]fowt validate --platform iea15_volturnus_s[/cyan]  another platform's
+
 [cyan]fowt validate --case all --bts turbsim_18mps.bts[/cyan]  with the cheaper choices, from the full box
 
 [bold]Files written[/bold]: validation.csv and validation.md (every figure with its verdict), and plots."""
@@ -30,27 +33,49 @@ VALIDATE_EXAMPLES = """[bold]Examples[/bold]
 @app.command(epilog=VALIDATE_EXAMPLES)
 @reported
 def validate(
+    platform: Annotated[
+        str,
+        typer.Option(
+            help="oc3_hywind, iea15_volturnus_s, nrel5mw_iti_barge or nrel5mw_oc4_semi: what each is compared"
+            " with is in docs/validation.md."
+        ),
+    ] = "oc3_hywind",
     case: Annotated[
-        str, typer.Option(help="Any of decays, steady, floating, waves, steps, turbulence, costs; or all.")
-    ] = "decays,steady,floating,waves,steps,turbulence",
+        str | None,
+        typer.Option(
+            help="Groups of figures, comma-separated; or all. Those of oc3_hywind: decays, steady, floating,"
+            " waves, steps, turbulence, costs. Default: all but costs."
+        ),
+    ] = None,
     out_folder: Annotated[
-        str, typer.Option("--out", help="Folder for what is written.")
-    ] = "results/validation",
+        str | None,
+        typer.Option(
+            "--out",
+            help="Folder for what is written; default: results/validation and, but for OC3, the platform.",
+        ),
+    ] = None,
     reference: Annotated[str | None, typer.Option(help="Folder of the OpenFAST series.")] = None,
     bts: Annotated[str | None, typer.Option(help="Full TurbSim box instead of the stored region.")] = None,
     plot: Annotated[bool, typer.Option("--plot/--no-plot", help="Make the plots.")] = True,
 ):
     """Compare this plant with OpenFAST on the same cases: every figure with its verdict, and plots."""
     from fowt_env.training.validation.report import write_validation_report
-    from fowt_env.training.validation.validate import GROUPS, validate_cases
+    from fowt_env.training.validation.validate import PLATFORMS, validate_cases
 
-    names = list(GROUPS) if case == "all" else [name.strip() for name in case.split(",") if name.strip()]
+    if platform not in PLATFORMS:
+        raise unknown("platform of a validation", platform, PLATFORMS)
+    names = None if case is None else [name.strip() for name in case.split(",") if name.strip()]
+    if case == "all":
+        names = list(PLATFORMS[platform]()[0])
+    if out_folder is None:
+        out_folder = "results/validation" + ("" if platform == "oc3_hywind" else f"/{platform}")
     with progress_bar("validating", None) as update:
         study = validate_cases(
             names,
             folder=reference,
             bts=bts,
             report=lambda text, done, total: update(done, f"validating: {text}", total),
+            platform=platform,
         )
     lines, missed = [], []
     for name, rows in study.table().groupby("case", sort=False):
@@ -58,7 +83,7 @@ def validate(
         lines.append((name, str(len(rows)), *map(str, counts)))
         missed.append(counts[1])
     headings = ("case", "figures", "met", "missed", "reported")
-    print_table(out, headings, lines, "against OpenFAST", red=_places(missed))
+    print_table(out, headings, lines, platform, red=_places(missed))
     for row in study.rows:
         if row.verdict == "MISSED":
             text = f"{row.case}: {row.quantity}: {row.error:.3g} %, allowed {row.allowed:g} %"

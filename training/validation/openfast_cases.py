@@ -23,6 +23,8 @@ COLUMNS = {  # column of a reference file: (OpenFAST channel as simulate names i
     "rotor_speed_rpm": ("RotSpeed_[rpm]", 1.0),
     "blade_pitch_deg": ("BldPitch1_[deg]", 1.0),
     "gen_power_elec_kW": ("GenPwr_[kW]", 1.0),
+    "gen_torque_kNm": ("GenTq_[kN-m]", 1.0),
+    "aero_thrust_N": ("RtFldFxh_[N]", 1.0),
     "aero_thrust_kN": ("RtFldFxh_[N]", 1e3),
     "aero_torque_kNm": ("RtFldMxh_[N-m]", 1e3),
     "fair_tension1_kN": ("FAIRTEN1_[kN]", 1.0),
@@ -53,9 +55,12 @@ def _path(folder, name):
     return path
 
 
-def reference(case, folder=None):
-    """DataFrame of a reference run, columns named as simulate names them. Raises: InputError if absent."""
-    frame = pd.read_csv(_path(folder, f"{case}.csv.gz"), comment="#")
+def reference(case, folder=None, place=""):
+    """DataFrame of a reference run, columns named as simulate names them. Raises: InputError if absent.
+
+    place: folder of the run in the folder of all references.
+    """
+    frame = pd.read_csv(_path(folder, f"{place}/{case}.csv.gz" if place else f"{case}.csv.gz"), comment="#")
     values = {}
     for name in frame.columns:
         channel, factor = COLUMNS[name]
@@ -115,17 +120,29 @@ class ReferenceRun:
     controlled: bool = False
     initial: dict = field(default_factory=dict)
     options: dict = field(default_factory=dict)
+    platform: object = PLATFORM  # name, or function that returns a Platform
+    controller: object = "openfast_oc3"  # name, or function of (folder) -> controller
+    output_dt: float = 0.1  # of the reference file
+    place: str = ""  # folder of the reference file in that of all of them
+
+    def theirs(self, folder=None):
+        """DataFrame of OpenFAST's run. Raises: InputError if absent."""
+        return reference(self.case, folder, self.place)
 
     def frame(self, folder=None, bts=None, dt=None, wind=None, rotor="bem", progress=False, **options):
-        """DataFrame of this project's run, every 0.1 s; wind None: the run's own, dt None: the deck's."""
+        """DataFrame of this project's run at the reference's times; wind None: the run's own, dt None: the deck's.
+
+        controller and other arguments of build_scene may be among the options.
+        """
         from fowt_env.scene.build import build_scene
         from fowt_env.simulation import simulate
 
         if wind is None:
             wind = self.wind(folder, bts) if callable(self.wind) else self.wind
         sea = self.sea(folder) if callable(self.sea) else self.sea
+        controller = options.pop("controller", self.controller)
         scene = build_scene(
-            PLATFORM,
+            self.platform() if callable(self.platform) else self.platform,
             wind=wind,
             sea=sea,
             rotor=rotor,
@@ -134,11 +151,13 @@ class ReferenceRun:
         dt = self.dt if dt is None else dt
         return simulate(
             scene,
-            controller="openfast_oc3" if self.controlled else None,
+            controller=(controller(folder) if callable(controller) else controller)
+            if self.controlled
+            else None,
             duration=self.duration,
             dt=dt,
             control_dt=dt,
-            output_dt=0.1,
+            output_dt=self.output_dt,
             start="zero",
             initial=self.initial,
             progress=progress,

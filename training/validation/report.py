@@ -7,7 +7,6 @@ import numpy as np
 from fowt_env.files.atomic import remove_leftovers, replacing
 from fowt_env.files.markdown import markdown_table
 from fowt_env.files.tables import write_table
-from fowt_env.training.validation.openfast_cases import DECAYS
 from fowt_env.visual.style import COLOURS, INK, new_figure, save_figure, style_axes
 from fowt_env.visual.time_series import TIME, spectrum
 
@@ -30,7 +29,17 @@ OPERATING = (
     "PtfmSurge_[m]", "PtfmHeave_[m]", "PtfmPitch_[deg]", "RotSpeed_[rpm]", "BldPitch1_[deg]", "FAIRTEN1_[kN]",
 )  # fmt: skip
 WAVE = ("PtfmSurge_[m]", "PtfmHeave_[m]", "PtfmPitch_[deg]", "FAIRTEN1_[kN]")
-PLOTS = {  # case -> (channels, seconds shown); spectra of the same channels where asked for
+TURNING = ("PtfmSurge_[m]", "PtfmHeave_[m]", "PtfmPitch_[deg]", "RotSpeed_[rpm]", "BldPitch1_[deg]")
+PLANE = TURNING[:3]
+VOLTURNUS_PLOTS = {
+    "regwave_H4T9": (PLANE, (410.0, 500.0), False),
+    "waves_Hs7.5": (PLANE, (100.0, 400.0), True),
+    "waves_Hs7.5_qtf": (PLANE, (100.0, 400.0), True),
+    "float_steady_12mps": (TURNING, (0.0, 600.0), False),
+    "float_steady_18mps": (TURNING, (0.0, 600.0), False),
+    "turb_18mps_Hs7.5_uniform": (TURNING, (100.0, 400.0), True),
+}
+OC3_PLOTS = {  # case -> (channels, seconds shown); spectra of the same channels where asked for
     "float_steady_8mps": (OPERATING, (0.0, 600.0), False),
     "float_steady_18mps": (OPERATING, (0.0, 600.0), False),
     "float_windsteps_12_24": (OPERATING, (0.0, 1300.0), False),
@@ -39,6 +48,7 @@ PLOTS = {  # case -> (channels, seconds shown); spectra of the same channels whe
     "turb_18mps_Hs7.5_uniform": (OPERATING, (100.0, 400.0), True),
     "turb_18mps_Hs7.5_box": (OPERATING, (100.0, 400.0), True),
 }
+PLOTS = {"oc3_hywind": OC3_PLOTS, "iea15_volturnus_s": VOLTURNUS_PLOTS}
 HERE, THERE = "fowt_env", "OpenFAST"
 COST_PLOTS = {  # file -> (title, {legend: run})
     "costs_rotor": (
@@ -110,13 +120,13 @@ def _spectra(frames, channels, path, title, start=100.0, highest=0.7):
 
 
 def _decays(study, path):
-    """The six decays, each in its own motion."""
-    cases = [case for case in DECAYS if case in study.runs]
+    """The decays, each in its own motion."""
+    cases = [case for case in study.cases if case in study.runs and case.startswith("decay_")]
     figure = new_figure(9.0, 1.4 * len(cases) + 0.8)
     rows = figure.subplots(len(cases), 1, squeeze=False)[:, 0]
     for axes, case in zip(rows, cases, strict=True):
         style_axes(axes)
-        channel = DECAYS[case][0]
+        (channel,) = study.cases[case].initial
         for number, (legend, frame) in enumerate(zip((THERE, HERE), reversed(study.runs[case]), strict=True)):
             line = ("-", "--")[number]
             axes.plot(frame[TIME], frame[channel], line, color=COLOURS[number], linewidth=1.0, label=legend)
@@ -139,10 +149,50 @@ def _steady(study, path):
         chosen = [row for row in rows if row.quantity == quantity]
         wind = [float(row.case.removeprefix("steady_").removesuffix("mps")) for row in chosen]
         error = [row.error for row in chosen]
-        axes.plot(wind, error, "o-", color=COLOURS[number], markersize=4, label=quantity)
+        colour = COLOURS[number % len(COLOURS)]
+        axes.plot(wind, error, "o-", color=colour, markersize=4, label=quantity)
     axes.set_xlabel("wind (m/s)", fontsize=9, color=INK)
     axes.set_ylabel("difference to OpenFAST (%)", fontsize=9, color=INK)
     axes.legend(fontsize=8, frameon=False)
+    return save_figure(figure, path)
+
+
+def _responses(study, path):
+    """Responses to small waves over frequency: this plant and the frequency domain."""
+    table = study.runs["responses"][0]
+    names = [name for name in table.columns[1:] if not name.endswith(" there")]
+    figure = new_figure(9.0, 3.2)
+    for axes, name in zip(figure.subplots(1, len(names)), names, strict=True):
+        style_axes(axes)
+        unit = "deg/m" if name == "PtfmPitch" else "m/m"
+        axes.semilogy(table["omega"], table[f"{name} there"], "-", color=COLOURS[0], label="frequency domain")
+        axes.semilogy(table["omega"], table[name], "o", color=COLOURS[1], markersize=4, label=HERE)
+        axes.set_title(f"{name} ({unit})", fontsize=9, color=INK)
+        axes.set_xlabel("rad/s", fontsize=9, color=INK)
+    axes.legend(fontsize=8, frameon=False)
+    return save_figure(figure, path)
+
+
+def _poles(study, path):
+    """Frequencies and damping ratios of the linear models over wind speed."""
+    rows = [row for row in study.rows if "linear model" in row.case]
+    figure = new_figure(9.0, 3.4)
+    for axes, quantity in zip(
+        figure.subplots(1, 3), ("frequency", "damping ratio", "rotor pole"), strict=True
+    ):
+        style_axes(axes)
+        chosen = [row for row in rows if quantity in row.quantity]
+        for number, name in enumerate(dict.fromkeys(row.quantity for row in chosen)):
+            part = [row for row in chosen if row.quantity == name]
+            wind = [float(row.case.split(" at ")[1].split(" ")[0]) for row in part]
+            label = name.split(" mode")[0]
+            axes.plot(
+                wind, [row.openfast for row in part], "-", color=COLOURS[number], label=f"{label}, {THERE}"
+            )
+            axes.plot(wind, [row.here for row in part], "o", color=COLOURS[number], markersize=4, label=label)
+        axes.set_title(f"{quantity} ({chosen[0].unit})", fontsize=9, color=INK)
+        axes.set_xlabel("wind (m/s)", fontsize=9, color=INK)
+        axes.legend(fontsize=7, frameon=False)
     return save_figure(figure, path)
 
 
@@ -185,11 +235,15 @@ def write_plots(study, folder):
         paths.append(folder / f"{name}.png")
         return paths[-1]
 
-    if any(case in DECAYS for case in study.runs):
+    if any(case.startswith("decay_") for case in study.runs):
         _decays(study, path("decays"))
     if any(row.case.startswith("steady_") for row in study.rows):
         _steady(study, path("steady"))
-    for case, (channels, window, spectra) in PLOTS.items():
+    if "responses" in study.runs:
+        _responses(study, path("responses"))
+    if any("linear model" in row.case for row in study.rows):
+        _poles(study, path("linear"))
+    for case, (channels, window, spectra) in PLOTS.get(study.platform, {}).items():
         if case in study.runs:
             ours, theirs = study.runs[case]
             frames = {THERE: theirs, HERE: ours}

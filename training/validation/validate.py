@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from fowt_env.errors import InputError, unknown
-from fowt_env.training.validation.openfast_cases import DECAYS, PLATFORM, RUNS, reference, steady_reference
+from fowt_env.training.validation.openfast_cases import DECAYS, PLATFORM, RUNS, steady_reference
 from fowt_env.training.validation.signal_errors import (
     band_energy,
     decay_decrement,
@@ -69,6 +69,8 @@ class Study:
     report: object = None  # called with the text of what is being done, the runs done and their number
     total: int = 0  # runs
     done: int = 0
+    platform: str = "oc3_hywind"  # a name of PLATFORMS
+    cases: dict = field(default_factory=lambda: RUNS)  # case -> ReferenceRun
     rows: list = field(default_factory=list)
     runs: dict = field(default_factory=dict)  # case -> (this project's frame, OpenFAST's frame)
 
@@ -89,10 +91,13 @@ class Study:
         """(this project's frame, OpenFAST's frame) of a case, cut to common length."""
         if case not in self.runs:
             self.say(case)
-            theirs = reference(case, self.folder)
-            ours = RUNS[case].frame(self.folder, self.bts, **changes)
-            if not np.allclose(ours[TIME], theirs[TIME], atol=1e-6):
-                raise InputError(f"reference run {case!r}: its times are not those of the run, every 0.1 s")
+            run = self.cases[case]
+            theirs = run.theirs(self.folder)
+            ours = run.frame(self.folder, self.bts, **changes)
+            if len(ours) != len(theirs) or not np.allclose(ours[TIME], theirs[TIME], atol=1e-6):
+                raise InputError(
+                    f"reference run {case!r}: its times are not those of the run, every {run.output_dt:g} s"
+                )
             self.runs[case] = (ours, theirs)
         return self.runs[case]
 
@@ -121,18 +126,24 @@ def _since(pair, start, end=np.inf):
 def decays(study):
     """Free decays in the six motions: period 0.2 %, decrement 3 %, normalised rms error 3 %."""
     for case, (channel, _, duration) in DECAYS.items():
-        ours, theirs = study.pair(case)
-        time = theirs[TIME].to_numpy()
-        centre = theirs[channel][time > 0.5 * duration].mean()
-        mine, wanted = ours[channel].to_numpy(), theirs[channel].to_numpy()
-        periods = [decay_period(time, value, centre) for value in (wanted, mine)]
-        study.add(case, "period, first 4 cycles", "s", *periods, allowed=0.2)
-        for cycle, name in ((1, "first"), (3, "third")):
-            both = [decay_decrement(time, value, centre, cycle) for value in (wanted, mine)]
-            study.add(case, f"logarithmic decrement, {name} cycle", "-", *both, allowed=3.0)
-        error = 100.0 * normalised_rms(mine, wanted)
-        name, unit = _name(channel)
-        study.add(case, f"{name}, normalised rms error", unit, wanted.std(), mine.std(), error, 3.0)
+        add_decay(study, case, channel, duration, period=0.2, decrement=3.0, rms=3.0)
+
+
+def add_decay(study, case, channel, duration, period, decrement, rms, cycles=4, counted=(1, 3)):
+    """Rows of a free decay: mean period of the first cycles, decrements of some, and the rms error (%)."""
+    ours, theirs = study.pair(case)
+    time = theirs[TIME].to_numpy()
+    centre = theirs[channel][time > 0.5 * duration].mean()
+    mine, wanted = ours[channel].to_numpy(), theirs[channel].to_numpy()
+    periods = [decay_period(time, value, centre, cycles) for value in (wanted, mine)]
+    study.add(case, f"period, first {cycles} cycles", "s", *periods, allowed=period)
+    for cycle in counted:
+        both = [decay_decrement(time, value, centre, cycle) for value in (wanted, mine)]
+        words = {1: "first", 2: "second", 3: "third"}[cycle]
+        study.add(case, f"logarithmic decrement, {words} cycle", "-", *both, allowed=decrement)
+    error = 100.0 * normalised_rms(mine, wanted)
+    name, unit = _name(channel)
+    study.add(case, f"{name}, normalised rms error", unit, wanted.std(), mine.std(), error, rms)
 
 
 def steady(study):
@@ -253,18 +264,49 @@ GROUPS = {  # name -> (function, runs that it takes)
 }
 
 
-def validate_cases(groups=None, folder=None, bts=None, report=None):
-    """Study with every figure of the groups (names of GROUPS; None: all but costs).
+def _volturnus():
+    from fowt_env.training.validation import volturnus
+
+    return volturnus.GROUPS, volturnus.RUNS
+
+
+def _barge():
+    from fowt_env.training.validation import responses
+
+    return responses.groups("nrel5mw_iti_barge"), {}
+
+
+def _oc4():
+    from fowt_env.training.validation import responses
+
+    return responses.groups("nrel5mw_oc4_semi"), {}
+
+
+PLATFORMS = {  # name -> function that returns (groups, runs)
+    "oc3_hywind": lambda: (GROUPS, RUNS),
+    "iea15_volturnus_s": _volturnus,
+    "nrel5mw_iti_barge": _barge,
+    "nrel5mw_oc4_semi": _oc4,
+}
+
+
+def validate_cases(groups=None, folder=None, bts=None, report=None, platform="oc3_hywind"):
+    """Study with every figure of the groups (names of the platform's groups; None: all but costs).
 
     folder: reference series (None: training/validation/reference); bts: the full TurbSim box instead of the
-    stored region; report: called with (text, runs done, runs in all) before each run.
-    Raises: InputError for an unknown group or a missing reference.
+    stored region; report: called with (text, runs done, runs in all) before each run; platform: a name of
+    PLATFORMS.
+    Raises: InputError for an unknown platform or group or a missing reference.
     """
-    names = [name for name in GROUPS if name != "costs"] if groups is None else list(groups)
+    if platform not in PLATFORMS:
+        raise unknown("platform of a validation", platform, PLATFORMS)
+    known, runs = PLATFORMS[platform]()
+    names = [name for name in known if name != "costs"] if groups is None else list(groups)
     for name in names:
-        if name not in GROUPS:
-            raise unknown("validation case", name, GROUPS)
-    study = Study(folder, bts, report, sum(GROUPS[name][1] for name in names))
+        if name not in known:
+            raise unknown("validation case", name, known)
+    total = sum(known[name][1] for name in names)
+    study = Study(folder, bts, report, total, platform=platform, cases=runs)
     for name in names:
-        GROUPS[name][0](study)
+        known[name][0](study)
     return study

@@ -132,9 +132,13 @@ def _advance(typing_context, x, y, factors, first, start, begin, count, old, new
                 return builder.fadd(builder.fmul(a, p), builder.fmul(b, q))
 
             turned = builder.fsub(builder.fmul(er, real), builder.fmul(ei, imaginary))
-            builder.store(builder.fadd(turned, sum_of(sr, before, nr, after)), at(target.data, place), align=8)
+            builder.store(
+                builder.fadd(turned, sum_of(sr, before, nr, after)), at(target.data, place), align=8
+            )
             turned = sum_of(er, imaginary, ei, real)
-            builder.store(builder.fadd(turned, sum_of(si, before, ni, after)), at(target.data, other), align=8)
+            builder.store(
+                builder.fadd(turned, sum_of(si, before, ni, after)), at(target.data, other), align=8
+            )
         return context.get_dummy_value()
 
     counts = (types.intp,) * 4

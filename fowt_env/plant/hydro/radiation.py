@@ -2,10 +2,10 @@
 
     F(t) = -integral of K(tau) q'(t - tau), tau from 0 to infinity
 
-about the body origin and in inertial axes, q' being R v and R w. Two forms: a sum of exponentials with states of
-their own, which are advanced exactly while the velocities change linearly over a step; and the integral itself
-by the trapezoid rule over past velocities. The states are the last of the state vector and have no rates:
-integrators advance what is before them, and call the functions here for the rest.
+about the body origin and in inertial axes, q' being R v and R w. Two forms: a sum of exponentials with states
+of their own, which are advanced exactly while the velocities change linearly over a step; and the integral
+itself by the trapezoid rule over past velocities. The states are the last of the state vector and have no
+rates: integrators advance what is before them, and call the functions here for the rest.
 """
 
 from cmath import exp as complex_exp
@@ -15,7 +15,7 @@ import numpy as np
 
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
-from fowt_env.plant.compile.vector_sums import PAIR_LANES, SUM_LANES, advance_pairs, lane_dot
+from fowt_env.plant.compile.vector_sums import advance_pairs, lane_dot
 from fowt_env.plant.state import Wrench, add, pose_in, to_body, to_inertial
 
 MOTIONS = 6
@@ -47,11 +47,11 @@ class ConvolutionMemory(NamedTuple):
     whole: np.ndarray  # (e, n) the same a step on
 
 
-# Rows of the data of StateSpaceMemory: factor of the state, and of the velocities at the ends of the step, real
-# and imaginary, over a whole and over half a step; then the step and the velocities at its beginning.
+# Rows of the data of StateSpaceMemory: factor of the state, and of the velocities at the ends of the step,
+# real and imaginary, over a whole and over half a step; then the step and the velocities at its beginning.
 WHOLE, HALF, STEP = 0, 6, 12
 # Entries of the last row of the data of ConvolutionMemory, whose others are past velocities: where the latest
-# is, the weight of the present velocity and what is behind it (6) at this instant, half a step on and after it.
+# is, the weight of the present velocity and what is behind it (6): now, half a step on and a step on.
 PLACE, WEIGHT, TAIL, TAIL_HALF, TAIL_WHOLE, N_HEAD = 0, 1, 2, 8, 14, 20
 
 

@@ -1,0 +1,42 @@
+"""Fits of motions in small waves and of free decays, on signals whose answers are known."""
+
+import numpy as np
+import pytest
+
+from fowt_env.training.validation.responses import fitted, modal_rates, sea
+
+TIME = np.arange(100.0, 700.0, 0.1)
+
+
+def test_amplitudes_are_exact_beside_modes_that_the_start_has_left():
+    omega = np.array([0.3, 0.7, 1.1])
+    amplitude = np.array([1.0 + 0.5j, -0.2j, 0.01])
+    value = (amplitude * np.exp(1j * np.outer(TIME, omega))).real.sum(axis=1)
+    slow = 2.0 * np.exp(-0.004 * (TIME - TIME[0])) * np.cos(0.05 * TIME + 1.0)
+    found = fitted(TIME, value + slow + 3.0, omega, [0.004 + 0.05j])
+    assert found == pytest.approx(amplitude, abs=1e-9)
+
+
+def test_rates_of_two_decaying_modes_are_found_from_three_signals():
+    rates = np.array([0.002 + 0.06j, 0.08 + 0.8j])
+    draw = np.random.default_rng(1)
+    values = np.column_stack(
+        [
+            sum(
+                draw.normal()
+                * np.exp(-rate.real * (TIME - TIME[0]))
+                * np.cos(rate.imag * TIME + draw.normal())
+                for rate in rates
+            )
+            for _ in range(3)
+        ]
+    )
+    found = modal_rates(TIME, values, [0.0 + 0.058j, 0.05 + 0.75j])
+    assert found == pytest.approx(rates, rel=1e-6)
+
+
+def test_the_small_components_do_not_add_up_at_one_instant():
+    waves = sea(np.linspace(0.2, 1.5, 12))
+    elevation = (waves["amplitude"] * np.cos(np.outer(TIME, waves["omega"]) - waves["phase"])).sum(axis=1)
+    assert np.abs(elevation).max() < 0.2
+    assert waves["ramp"] > 0.0

@@ -1,0 +1,380 @@
+"""Natural periods and responses of a floating body in the frequency domain, by numpy alone.
+
+Nothing of the plant is used: coefficients come from the package's array file by the reader below, masses from the
+figures of the public decks, lines from the catenary below. Linear about the place where the body rests; drag is
+left out. The equation, with X the excitation per metre and q = surge, sway, heave, roll, pitch, yaw:
+
+    [-w^2 (M + A(w)) + i w (B(w) + D) + C + K] q = X(w).
+
+C is the hydrostatic stiffness with that of the weight, K that of the lines, D a damping that may be added.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fowt_env.errors import InputError
+
+GRAVITY, DENSITY = 9.80665, 1025.0
+NAMES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
+
+
+def read_arrays(path):
+    """{name: array} of a coefficients file of the package. Raises: InputError if it does not exist."""
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            return {name: np.asarray(file[name]) for name in file.files}
+    except OSError as error:
+        raise InputError(f"coefficients file {str(path)!r} cannot be read: {error}") from None
+
+
+def point_mass(mass, place, inertia=(0.0, 0.0, 0.0)):
+    """6x6 mass matrix about the origin of a body with these moments of inertia about its own centre."""
+    x, y, z = place
+    cross = mass * np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    matrix = np.zeros((6, 6))
+    matrix[:3, :3] = mass * np.eye(3)
+    matrix[:3, 3:] = -cross
+    matrix[3:, :3] = cross
+    matrix[3:, 3:] = np.diag(inertia) - cross @ cross / mass
+    return matrix
+
+
+def tower_mass(stations, densities, base, top, slices=400):
+    """6x6 mass matrix of a tower along z with these densities (kg/m) at fractions of its height."""
+    fraction = (np.arange(slices) + 0.5) / slices
+    length = (top - base) / slices
+    matrix = np.zeros((6, 6))
+    for f, density in zip(fraction, np.interp(fraction, stations, densities), strict=True):
+        matrix += point_mass(density * length, (0.0, 0.0, base + f * (top - base)))
+    return matrix
+
+
+def weight_stiffness(mass, gravity=GRAVITY):
+    """6x6 stiffness of the weight of a mass matrix about the displaced origin, in axes that do not turn."""
+    x, y, z = mass[1, 5], -mass[0, 5], mass[0, 4]  # moments of mass
+    stiffness = np.zeros((6, 6))
+    stiffness[3, 3] = stiffness[4, 4] = -gravity * z
+    stiffness[3, 5], stiffness[4, 5] = gravity * x, gravity * y
+    return stiffness
+
+
+def weight(mass, gravity=GRAVITY):
+    """(6,) force and moment of the weight about the undisplaced origin."""
+    return gravity * np.array([0.0, 0.0, -mass[0, 0], mass[0, 5], mass[1, 5], 0.0])
+
+
+@dataclass(frozen=True)
+class CatenaryLine:
+    """An elastic line on a flat seabed at its anchor's depth."""
+
+    anchor: tuple
+    fairlead: tuple  # body axes, undisplaced
+    length: float  # m, unstretched
+    weight: float  # N/m, in water
+    stiffness: float  # EA, N
+    friction: float = 1.0  # of the seabed
+
+
+def catenary(span, rise, line):
+    """(horizontal, vertical) tension (N) at the fairlead of a line with this span and rise (m).
+
+    Newton's method on the closed form of Jonkman (2007), with and without a part on the seabed.
+    """
+    w, length, ea, cb = line.weight, line.length, line.stiffness, line.friction
+
+    def ends(h, v):
+        a = v / h
+        if v >= w * length:  # hangs freely
+            b = (v - w * length) / h
+            x = h / w * (np.arcsinh(a) - np.arcsinh(b)) + h * length / ea
+            z = h / w * (np.hypot(1.0, a) - np.hypot(1.0, b)) + (v * length - 0.5 * w * length**2) / ea
+            return x, z
+        rest = length - v / w
+        x = rest + h / w * np.arcsinh(a) + h * length / ea
+        slack = rest - h / (cb * w) if cb > 0.0 else 0.0
+        if cb > 0.0:
+            x += 0.5 * cb * w / ea * (-(rest**2) + slack * max(slack, 0.0))
+        z = h / w * (np.hypot(1.0, a) - 1.0) + 0.5 * v * v / (ea * w)
+        return x, z
+
+    taut = 3.0 * ((length**2 - rise**2) / span**2 - 1.0) if span > 0.0 else 1e6
+    guess = np.sqrt(taut) if length > np.hypot(span, rise) else 0.2
+    h = max(0.5 * w * span / guess, 1e-3 * w * length)
+    v = 0.5 * w * (rise / np.tanh(guess) + length)
+    for _ in range(200):
+        miss = np.array(ends(h, v)) - (span, rise)
+        if np.abs(miss).max() < 1e-10 * length:
+            return h, v
+        dh, dv = 1e-6 * h, 1e-6 * v
+        jacobian = np.column_stack(
+            [
+                (np.array(ends(h + dh, v)) - ends(h - dh, v)) / (2.0 * dh),
+                (np.array(ends(h, v + dv)) - ends(h, v - dv)) / (2.0 * dv),
+            ]
+        )
+        step = np.linalg.solve(jacobian, miss)
+        share = min(1.0, 0.5 * h / max(abs(step[0]), 1e-300), 0.5 * v / max(abs(step[1]), 1e-300))
+        h, v = h - share * step[0], v - share * step[1]
+    raise InputError(f"catenary: no solution at span {span:g} m and rise {rise:g} m")
+
+
+def rotation(roll, pitch, yaw):
+    """Rotation matrix of small angles to second order: enough for stiffness by central differences."""
+    a = np.array([[0.0, -yaw, pitch], [yaw, 0.0, -roll], [-pitch, roll, 0.0]])
+    return np.eye(3) + a + 0.5 * a @ a
+
+
+def line_forces(lines, q):
+    """(6,) force and moment of the lines about the displaced origin, in axes that do not turn."""
+    total = np.zeros(6)
+    turn = rotation(*q[3:])
+    for line in lines:
+        arm = turn @ np.array(line.fairlead)
+        gap = np.array(line.anchor) - (q[:3] + arm)
+        span = np.hypot(gap[0], gap[1])
+        h, v = catenary(span, -gap[2], line)
+        force = np.array([h * gap[0] / span, h * gap[1] / span, -v])
+        total[:3] += force
+        total[3:] += np.cross(arm, force)
+    return total
+
+
+def line_stiffness(lines, q):
+    """(6, 6) stiffness of the lines at q, by central differences."""
+    steps = (0.05, 0.05, 0.05, 1e-3, 1e-3, 1e-3)
+    columns = []
+    for i, step in enumerate(steps):
+        ahead, behind = np.array(q, float), np.array(q, float)
+        ahead[i] += step
+        behind[i] -= step
+        columns.append(-(line_forces(lines, ahead) - line_forces(lines, behind)) / (2.0 * step))
+    return np.array(columns).T
+
+
+def interpolated(omega, grid, values, low=None, high=None):
+    """values (n, ...) at omega (rad/s), linear over the grid; low and high: at zero and infinite frequency."""
+    if omega < grid[0]:
+        first = values[0] if low is None else low
+        return first + (values[0] - first) * omega / grid[0]
+    if omega > grid[-1] and high is not None:
+        return high + (values[-1] - high) * grid[-1] / omega
+    at = min(max(int(np.searchsorted(grid, omega)) - 1, 0), len(grid) - 2)
+    share = (omega - grid[at]) / (grid[at + 1] - grid[at])
+    return values[at] * (1.0 - share) + values[at + 1] * share
+
+
+@dataclass(frozen=True)
+class FloatingBody:
+    """A body as the frequency domain sees it: coefficients, mass, lines, volume and its centre."""
+
+    coefficients: dict  # of read_arrays
+    mass: np.ndarray  # (6, 6)
+    lines: tuple
+    volume: float
+    centre: tuple = (0.0, 0.0)  # of buoyancy, x and y
+    added_stiffness: np.ndarray | None = None  # (6, 6)
+    added_damping: np.ndarray | None = None  # (6, 6)
+    gravity: float = GRAVITY
+
+    @property
+    def stiffness(self):
+        """(6, 6) hydrostatic stiffness with that of the weight and what is added."""
+        extra = 0.0 if self.added_stiffness is None else self.added_stiffness
+        return self.coefficients["stiffness"] + weight_stiffness(self.mass, self.gravity) + extra
+
+    def rest(self):
+        """(6,) where the body rests, by Newton's method on lines, weight and buoyancy."""
+        lift = DENSITY * self.gravity * self.volume
+        buoyancy = lift * np.array([0.0, 0.0, 1.0, self.centre[1], -self.centre[0], 0.0])
+        q = np.zeros(6)
+        for _ in range(50):
+            left = (
+                buoyancy + weight(self.mass, self.gravity) - self.stiffness @ q + line_forces(self.lines, q)
+            )
+            step = np.linalg.solve(self.stiffness + line_stiffness(self.lines, q), left)
+            q = q + step
+            if np.abs(step).max() < 1e-9:
+                return q
+        raise InputError("frequency domain: the body finds no place to rest")
+
+    def added_mass(self, omega):
+        """(6, 6) at omega (rad/s)."""
+        c = self.coefficients
+        zero = c.get("added_mass_zero")
+        return interpolated(omega, c["omega"], c["added_mass"], zero, c["added_mass_infinite"])
+
+    def damping(self, omega):
+        """(6, 6) of radiation, and what is added."""
+        c = self.coefficients
+        nothing = np.zeros((6, 6))
+        extra = nothing if self.added_damping is None else self.added_damping
+        return interpolated(omega, c["omega"], c["damping"], nothing, nothing) + extra
+
+    def excitation(self, omega, heading=0.0):
+        """(6,) complex per metre of amplitude, at omega (rad/s) and a heading (rad) of the file."""
+        c = self.coefficients
+        turns = np.abs((c["heading"] - heading + np.pi) % (2.0 * np.pi) - np.pi)
+        column = int(np.argmin(turns))
+        if turns[column] > 1e-3:
+            raise InputError(f"frequency domain: no excitation at the heading {heading:g} rad")
+        return interpolated(omega, c["excitation_omega"], c["excitation"][:, column])
+
+    def responses(self, omega, heading=0.0):
+        """(n, 6) complex motion per metre of amplitude at omega (n,) rad/s."""
+        stiffness = self.stiffness + line_stiffness(self.lines, self.rest())
+        found = []
+        for w in omega:
+            inertia = self.mass + self.added_mass(w)
+            matrix = -w * w * inertia + 1j * w * self.damping(w) + stiffness
+            found.append(np.linalg.solve(matrix, self.excitation(w, heading)))
+        return np.array(found)
+
+    def retardation(self, time, spacing=0.004):
+        """(n, 6, 6) K(t) = 2/pi times the integral of B cos(omega t), by the trapezoid rule over B linear."""
+        grid = np.arange(0.0, self.coefficients["omega"][-1] + spacing, spacing)
+        own = FloatingBody(
+            self.coefficients, self.mass, self.lines, self.volume
+        )  # without damping that is added
+        damping = np.array([own.damping(w) for w in grid]).reshape(len(grid), 36)
+        weight = np.full(len(grid), spacing)
+        weight[[0, -1]] *= 0.5
+        waves = np.cos(np.outer(time, grid)) * weight
+        return (2.0 / np.pi * waves @ damping).reshape(-1, 6, 6)
+
+    def free_decay(self, offset, duration, step=0.05, memory=60.0):
+        """(time (n,), motion (n, 6) from rest) of the body let go at rest at this offset (6,), water at rest.
+
+        Cummins' equation by the leapfrog rule: places at whole steps, velocities at halves, and the convolution
+        by the midpoint rule at those.
+        """
+        inertia = np.linalg.inv(self.mass + self.coefficients["added_mass_infinite"])
+        stiffness = self.stiffness + line_stiffness(self.lines, self.rest())
+        extra = np.zeros((6, 6)) if self.added_damping is None else self.added_damping
+        kernel = step * self.retardation((np.arange(round(memory / step)) + 0.5) * step)
+        flat = np.ascontiguousarray(kernel.transpose(1, 0, 2).reshape(6, -1))  # latest velocity first
+        past = np.zeros((len(kernel), 6))
+        count = round(duration / step)
+        motion = np.zeros((count + 1, 6))
+        motion[0] = offset
+        velocity = np.zeros(6)
+        for n in range(count):
+            force = -stiffness @ motion[n] - flat @ past.ravel() - extra @ velocity
+            velocity = velocity + (0.5 if n == 0 else 1.0) * step * (inertia @ force)
+            past[1:] = past[:-1].copy()
+            past[0] = velocity
+            motion[n + 1] = motion[n] + step * velocity
+        return step * np.arange(count + 1), motion
+
+    def natural_modes(self):
+        """{motion: (rad/s, damping ratio)} of the six modes: added mass and damping at each mode's frequency."""
+        stiffness = self.stiffness + line_stiffness(self.lines, self.rest())
+        length = self.volume ** (1.0 / 3.0)
+        scale = np.array([1.0, 1.0, 1.0, length, length, length])
+        found = {}
+        for i, name in enumerate(NAMES):
+            omega = np.sqrt(stiffness[i, i] / (self.mass + self.added_mass(0.2))[i, i])
+            for _ in range(100):
+                inverse = np.linalg.inv(self.mass + self.added_mass(omega))
+                system = np.block(
+                    [[np.zeros((6, 6)), np.eye(6)], [-inverse @ stiffness, -inverse @ self.damping(omega)]]
+                )
+                values, vectors = np.linalg.eig(system)
+                shapes = np.abs(vectors[:6]) * scale[:, None]
+                share = shapes[i] / np.linalg.norm(shapes, axis=0)
+                mode = int(np.argmax(np.where(values.imag > 0.0, share, -1.0)))
+                value = values[mode]
+                done = abs(value.imag - omega) < 1e-10
+                omega = 0.5 * (omega + value.imag)
+                if done:
+                    break
+            found[name] = (float(value.imag), float(-value.real / abs(value)))
+        return found
+
+
+# --------------------------------------------------------------------------- figures of the public decks
+
+OFFSHORE_TOWER = tuple(np.linspace(0.0, 1.0, 11))
+FLOATING_TOWER = (
+    4667.0, 4345.28, 4034.76, 3735.44, 3447.32, 3170.40, 2904.69, 2650.18, 2406.88, 2174.77, 1953.87,
+)  # fmt: skip
+BARGE_TOWER = (
+    5590.87, 5232.43, 4885.76, 4550.87, 4227.75, 3916.41, 3616.83, 3329.03, 3053.01, 2788.75, 2536.27,
+)  # fmt: skip
+
+
+def nrel5mw(tower, base):
+    """6x6 mass matrix of the NREL 5 MW on a tower from `base` to 87.6 m; the rotor as a disk at its centre."""
+    tilt, cone = np.radians(5.0), np.radians(2.5)
+    apex = np.array([-5.0191 * np.cos(tilt), 0.0, 87.6 + 1.96256 + 5.0191 * np.sin(tilt)])
+    shaft = np.array([np.cos(tilt), 0.0, -np.sin(tilt)])  # downwind
+    blade, first, polar = 17740.0, 363231.0, 11776047.0  # kg, kg m, kg m2 about the blade root
+    hub_radius = 1.5
+    mass = 3.0 * blade
+    along = (first + hub_radius * blade) / blade  # from the apex, along the blade
+    square = polar + 2.0 * hub_radius * first + hub_radius**2 * blade  # about the apex
+    centre = apex - shaft * along * np.sin(cone)  # cone leans upwind
+    turning = 3.0 * square * np.cos(cone) ** 2
+    rotor = point_mass(mass, centre, (turning, 0.5 * turning, 0.5 * turning))
+    hub = point_mass(56780.0, apex, (115926.0, 0.0, 0.0))
+    nacelle = point_mass(240000.0, (1.9, 0.0, 87.6 + 1.75), (0.0, 0.0, 2607890.0 - 240000.0 * 1.9**2))
+    generator = np.zeros((6, 6))
+    generator[3, 3] = 534.116 * 97.0**2
+    return tower_mass(OFFSHORE_TOWER, tower, base, 87.6) + rotor + hub + nacelle + generator
+
+
+def _ring(count, first, radius, depth, anchor_radius, anchor_depth, line):
+    """Equal lines around the axis, the first in this direction (deg)."""
+    found = []
+    for angle in np.radians(first + 360.0 / count * np.arange(count)):
+        c, s = np.cos(angle), np.sin(angle)
+        found.append(
+            CatenaryLine(
+                (anchor_radius * c, anchor_radius * s, -anchor_depth),
+                (radius * c, radius * s, -depth),
+                **line,
+            )
+        )
+    return tuple(found)
+
+
+def oc4_semi(coefficients):
+    """FloatingBody of OC4's DeepCwind semi: steel, and the ballast water on the axes of its columns.
+
+    HydroDyn 2, for which the deck was written, lumps the water at the nodes of the members, so that it has no
+    inertia across a member. As a solid it would make the periods of pitch and yaw 0.8 and 1.4 % longer.
+    """
+    mass = nrel5mw(FLOATING_TOWER, 10.0)
+    mass = mass + point_mass(3.85218e6, (0.0, 0.0, -8.6588), (2.56193e9, 2.56193e9, 4.24265e9))
+    for diameter, top, bottom in ((11.88, -6.17, -14.0), (23.88, -14.89, -19.94)):
+        height, area = top - bottom, 0.25 * np.pi * diameter**2
+        water = DENSITY * area * height
+        across = water * height**2 / 12.0
+        for x, y in ((14.43376, 25.0), (-28.86751, 0.0), (14.43376, -25.0)):
+            place = (x, y, 0.5 * (top + bottom))
+            mass = mass + point_mass(water, place, (across, across, 0.0))
+    line = {
+        "length": 835.35, "weight": (113.35 - DENSITY * 0.25 * np.pi * 0.0766**2) * GRAVITY, "stiffness": 7.536e8,
+    }  # fmt: skip
+    return FloatingBody(coefficients, mass, _ring(3, 60.0, 40.868, 14.0, 837.6, 200.0, line), 13917.0)
+
+
+def iti_barge(coefficients):
+    """FloatingBody of the ITI Energy barge."""
+    mass = nrel5mw(BARGE_TOWER, 0.0)
+    mass = mass + point_mass(5.452e6, (0.0, 0.0, -0.281768), (7.269e8, 7.269e8, 1.4539e9))
+    weight_in_water = (130.403 - DENSITY * 0.25 * np.pi * 0.0809**2) * GRAVITY
+    lines = []
+    for anchor in ((386.92, 171.985), (171.985, 386.95)):
+        for angle in np.radians((0.0, 90.0, 180.0, 270.0)):
+            c, s = np.cos(angle), np.sin(angle)
+
+            def turned(x, y, z, c=c, s=s):
+                return (c * x - s * y, s * x + c * y, z)
+
+            lines.append(
+                CatenaryLine(
+                    turned(*anchor, -150.0), turned(20.0, 20.0, -4.0), 473.312, weight_in_water, 5.89e8
+                )
+            )
+    return FloatingBody(coefficients, mass, tuple(lines), 6000.0)

@@ -1,0 +1,229 @@
+"""Linear models of this plant against OpenFAST's of the same turbine, above rated wind.
+
+OpenFAST's come from ROSCO's repository and belong to an older deck of the IEA 15 MW on VolturnUS-S: lighter tower,
+other nacelle and hub, blades 0.97 m shorter in radius, another generator, g = 9.80665. `old_deck` builds that
+turbine from the deck's figures. HydroDyn linearises by steps of 0.02 deg of the depth in translation and 2 deg in
+rotation (HydroDyn.f90, HD_Perturb_u), so that its quadratic drag leaves a damping of that velocity; the same is
+added here. What differs still: their radiation is the deck's state-space fit, their blades turn in the potential
+flow around the tower, and sway, roll and yaw are held.
+"""
+
+import numpy as np
+import pandas as pd
+
+from fowt_env.training.validation.openfast_cases import _path
+
+PLATFORM = "iea15_volturnus_s"
+WINDS = (13.0, 15.0, 18.0, 21.0, 24.0)  # m/s, constant generator torque in OpenFAST's models
+SHEAR = 0.12
+MOTIONS = {"surge": "surge", "heave": "heave", "pitch": "platform_pitch"}
+SHOWN = (0.05, 0.1, 0.2, 0.3, 0.5)  # rad/s, of the responses
+# figures of the older deck, kg, m, kg m2
+TOWER = {
+    "mass": 1262976.4, "cm_height": 55.9245, "inertia": (1.3972144e9, 1.3972144e9, 0.0),
+    # TwrCd 1.0 on the diameters of AeroDyn's table, of which this taper has the same area
+    "base_diameter": 10.0, "top_diameter": 6.5, "drag_coefficient": 0.9974,
+}  # fmt: skip
+TOWER_TOP = 144.495
+YAW_BEARING, NACELLE = 100000.0, 507275.0
+NACELLE_PLACE = (-4.985, TOWER_TOP + 4.358)
+NACELLE_YAW_INERTIA = 1.96179e7  # about the yaw axis
+HUB_MASS, HUB_INERTIA, GENERATOR_INERTIA = 190000.0, 1.37347e6, 8.00865e6
+BLADE_MASS, BLADE_CENTRE, BLADE_SQUARE = 64708.82, 26.892437, 9.2644705e7  # about the root, 20 lumps
+OVERHANG, TILT, CONE = 11.075, np.radians(6.0), np.radians(4.0)
+HUB_RADIUS, TIP_RADIUS, TWR2SHFT = 3.0, 120.0, 4.3478
+PLATFORM_DEPTH = 14.94
+TORQUE = 1.962e7  # N m
+HEAVE_STIFFNESS = 445.0687 * 1025.0 * 9.80665  # N/m
+GRAVITY = 9.80665
+DRAG_STEPS = np.radians([0.02 * 200.0] * 3 + [2.0] * 3)  # m/s and rad/s, of HydroDyn's differences
+
+
+def with_linearised_drag(scene):
+    """The scene with the damping that HydroDyn's differences make of its quadratic drag."""
+    matrices = scene.model.hydro.matrices
+    damping = matrices.linear_damping + matrices.quadratic_damping * DRAG_STEPS
+    return scene.with_model({"hydro.matrices.linear_damping": damping})
+
+
+def old_deck():
+    """Platform and Turbine with the older deck's figures in place of today's."""
+    from fowt_env.descriptions.platform import read_platform
+    from fowt_env.descriptions.turbine import read_turbine
+
+    platform = read_platform(PLATFORM)
+    turbine = read_turbine(platform.turbine)
+    flow = platform.potential_flow
+    stiffness = flow.stiffness.copy()
+    stiffness *= GRAVITY / platform.environment.gravity
+    stiffness[2, 2] = HEAVE_STIFFNESS
+    platform = platform.model_copy(
+        update={
+            "environment": platform.environment.model_copy(update={"gravity": GRAVITY}),
+            "ballast": platform.ballast.model_copy(update={"cm_depth": PLATFORM_DEPTH}),
+            "tower": platform.tower.model_copy(update={**TOWER, "top_height": TOWER_TOP}),
+            "potential_flow": _with(flow, stiffness=stiffness),
+            "lines": tuple(
+                line.model_copy(
+                    update={"wet_weight": line.wet_weight * GRAVITY / platform.environment.gravity}
+                )
+                for line in platform.lines
+            ),
+        }
+    )
+    return platform, _turbine(turbine)
+
+
+def _with(record, **changes):
+    from dataclasses import replace
+
+    return replace(record, **changes)
+
+
+def _turbine(turbine):
+    """The Turbine with the masses and radii of the older deck."""
+    mass = 3.0 * BLADE_MASS + HUB_MASS
+    along = BLADE_MASS * (HUB_RADIUS + BLADE_CENTRE)  # first moment about the apex
+    square = BLADE_SQUARE + 2.0 * HUB_RADIUS * BLADE_MASS * BLADE_CENTRE + HUB_RADIUS**2 * BLADE_MASS
+    about_shaft = 3.0 * square * np.cos(CONE) ** 2
+    offset = -3.0 * along * np.sin(CONE) / mass  # upwind
+    about_apex = 0.5 * about_shaft + 3.0 * square * np.sin(CONE) ** 2
+    rotor = turbine.rotor.model_copy(
+        update={
+            "mass": mass,
+            "overhang": OVERHANG * np.cos(TILT),
+            "hub_height": TOWER_TOP + TWR2SHFT + OVERHANG * np.sin(TILT),
+            "hub_radius": HUB_RADIUS,
+            "tip_radius": TIP_RADIUS,
+            "inertia": about_shaft + HUB_INERTIA,
+            "inertia_diameter": about_apex - mass * offset**2,
+            "cm_offset": offset,
+        }
+    )
+    top = YAW_BEARING + NACELLE
+    x = NACELLE * NACELLE_PLACE[0] / top
+    z = (NACELLE * NACELLE_PLACE[1] + YAW_BEARING * TOWER_TOP) / top
+    reduced = NACELLE * YAW_BEARING / top
+    gap_x, gap_z = NACELLE_PLACE[0], NACELLE_PLACE[1] - TOWER_TOP
+    own = NACELLE_YAW_INERTIA - NACELLE * NACELLE_PLACE[0] ** 2
+    nacelle = turbine.nacelle.model_copy(
+        update={
+            "mass": top,
+            "cm_downwind": x,
+            "cm_height": z,
+            "inertia": (reduced * gap_z**2, reduced * (gap_x**2 + gap_z**2), own + reduced * gap_x**2),
+        }
+    )
+    law = turbine.torque_law
+    speed = turbine.rated_rotor_speed * turbine.drivetrain.gear_ratio
+    law = law.model_copy(
+        update={
+            "rated_torque": TORQUE, "rated_power": TORQUE * speed, "max_torque": max(TORQUE, law.max_torque),
+            # below rated nothing is compared: the curve only has to meet the other rated torque
+            "region2_constant": law.region2_constant * TORQUE / law.rated_torque,
+        }
+    )  # fmt: skip
+    radius = turbine.blade.radius - (turbine.rotor.hub_radius - HUB_RADIUS)
+    return turbine.model_copy(
+        update={
+            "rotor": rotor,
+            "nacelle": nacelle,
+            "torque_law": law,
+            "drivetrain": turbine.drivetrain.model_copy(
+                update={"generator_inertia": GENERATOR_INERTIA / turbine.drivetrain.gear_ratio**2}
+            ),
+            "blade": turbine.blade.model_copy(update={"radius": radius}),
+        }
+    )
+
+
+def named_poles(matrix, states):
+    """{motion: pole with positive imaginary part, rotor: real pole} by the participation of a motion's states."""
+    value, right = np.linalg.eig(matrix)
+    share = np.abs(right.T * np.linalg.inv(right))
+    found, used = {}, set()
+    pairs = {"surge": ("surge", "vx"), "heave": ("heave", "vz"), "pitch": ("platform_pitch", "wy")}
+    for name, motion in (("rotor", ("rotor_speed",)), *pairs.items()):
+        indices = [states.index(state) for state in motion]
+        for mode in np.argsort(-share[:, indices].sum(axis=1)):
+            fits = abs(value[mode].imag) < 1e-9 if name == "rotor" else value[mode].imag > 0.0
+            if fits and mode not in used:
+                found[name] = value[mode]
+                used.add(mode)
+                break
+    return found
+
+
+def open_loop(model):
+    """(A, {input: column}, states) of a LinearModel with the blade pitch as an input at once, without azimuth."""
+    states = list(model.states)
+    pitch = states.index("blade_pitch")
+    kept = [i for i, name in enumerate(states) if name not in ("blade_pitch", "azimuth")]
+    columns = {
+        "wind": model.B[kept, model.inputs.index("wind_speed")],
+        "blade_pitch": model.A[kept, pitch],
+    }
+    return model.A[np.ix_(kept, kept)], columns, [states[i] for i in kept]
+
+
+def linear(study):
+    """Linear models above rated wind: frequencies of the platform's poles 3 %, damping and rotor pole 10 %."""
+    from fowt_env.analysis.linear_model import linearize
+    from fowt_env.scene.build import build_scene
+
+    poles = pd.read_csv(_path(study.folder, f"{PLATFORM}/linear_poles.csv.gz"), comment="#")
+    gains = pd.read_csv(_path(study.folder, f"{PLATFORM}/linear_responses.csv.gz"), comment="#")
+    platform, turbine = old_deck()
+    for wind in WINDS:
+        study.say(f"linear model at {wind:g} m/s")
+        scene = build_scene(
+            platform, wind={"kind": "steady", "speed": wind}, turbine=turbine, rotor="bem", skewed_wake=True,
+            shear_exponent=SHEAR, radiation="state_space",
+        )  # fmt: skip
+        model = linearize(with_linearised_drag(scene))
+        theirs = poles[np.isclose(poles["wind_mps"], wind)].iloc[0]
+        _operating_point(study, model, theirs, wind)
+        matrix, columns, states = open_loop(model)
+        _poles(study, named_poles(matrix, states), theirs, wind)
+        _responses(study, matrix, columns, states, gains[np.isclose(gains["wind_mps"], wind)], wind)
+
+
+def _operating_point(study, model, theirs, wind):
+    case = f"linear model at {wind:g} m/s (against OpenFAST)"
+    point = model.point
+    degrees = 180.0 / np.pi
+    for name, unit, there in (
+        ("BldPitch1", "deg", theirs["blade_pitch_rad"] * degrees),
+        ("PtfmSurge", "m", theirs["surge_m"]),
+        ("PtfmHeave", "m", theirs["heave_m"]),
+        ("PtfmPitch", "deg", theirs["pitch_rad"] * degrees),
+    ):
+        study.add(case, f"operating point, {name}", unit, there, point[name])
+
+
+def _poles(study, ours, theirs, wind):
+    case = f"linear model at {wind:g} m/s (against OpenFAST)"
+    for name in MOTIONS:
+        there = complex(theirs[f"{name}_real"], theirs[f"{name}_imag"])
+        here = ours[name]
+        study.add(case, f"{name} mode, frequency", "rad/s", there.imag, here.imag, allowed=3.0)
+        ratios = [-pole.real / abs(pole) for pole in (there, here)]
+        study.add(case, f"{name} mode, damping ratio", "-", *ratios, allowed=10.0)
+    study.add(case, "rotor pole", "1/s", theirs["rotor_real"], ours["rotor"].real, allowed=10.0)
+
+
+def _responses(study, matrix, columns, states, gains, wind):
+    case = f"responses at {wind:g} m/s (against OpenFAST)"
+    outputs = {"rotor_speed": ("rotor_speed", "rad/s"), "pitch": ("platform_pitch", "rad")}
+    inputs = {"wind": ("hub wind", "m/s"), "blade_pitch": ("blade pitch", "rad")}
+    for row in gains.to_dict("records"):
+        omega = row["omega_rad_s"]
+        if omega not in SHOWN:
+            continue
+        there = complex(row["real"], row["imag"])
+        (state, unit), (source, per) = outputs[row["output"]], inputs[row["input"]]
+        solved = np.linalg.solve(1j * omega * np.eye(len(matrix)) - matrix, columns[row["input"]])
+        here = solved[states.index(state)]
+        turned = np.degrees(np.angle(here / there))
+        quantity = f"{state.replace('_', ' ')} per {source} at {omega:g} rad/s"
+        study.add(case, quantity, f"{unit} per {per}", abs(there), abs(here), note=f"phase {turned:+.1f} deg")

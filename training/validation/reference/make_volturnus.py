@@ -1,0 +1,137 @@
+"""Makes the compact reference series of iea15_volturnus_s/: make_volturnus.py SERIES_FOLDER [LINEAR_FOLDER].
+
+SERIES_FOLDER has the OpenFAST outputs of the rigid IEA 15 MW on VolturnUS-S, LINEAR_FOLDER the linearisation files
+(lin_NN.A.lin: operating point NN, azimuth A) that ROSCO's repository holds. Series keep the columns that are
+compared, every 0.1 s or 0.2 s, with a header that says how the run was made; the steady winds are reduced to
+means over whole turns in axes that do not turn; of the linear models remain poles and frequency responses.
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+from make import write
+
+HERE = Path(__file__).resolve().parent / "iea15_volturnus_s"
+PLANE = ["surge_m", "heave_m", "pitch_deg"]
+ROTOR = ["rotor_speed_rpm", "blade_pitch_deg", "gen_torque_kNm", "gen_power_elec_kW", "aero_thrust_N"]
+MODEL = (
+    "OpenFAST v5.0.0 (2895884d2b), double precision, IEA 15 MW on VolturnUS-S, rigid: six platform motions, and the"
+    " generator where the rotor turns; potential flow with convolution, quadratic drag matrix, quasi-static lines;"
+    " loose coupling, ConvTol 1e-6, dt 0.025 s"
+)
+STILL = "still water, no wind, rotor at rest, blade pitch 0; all other states start at zero"
+ROSCO = "ROSCO 2.10.6 every 0.025 s, blade pitch follows its command at once; platform starts at zero"
+CASES = {  # case -> (columns, step, settings)
+    "static": (PLANE, 0.2, f"from rest at the undisplaced position; {STILL}"),
+    "decay_surge": (PLANE, 0.2, f"free decay from surge 10 m; {STILL}"),
+    "decay_heave": (PLANE, 0.1, f"free decay from heave 3 m; {STILL}"),
+    "decay_pitch": (PLANE, 0.1, f"free decay from platform pitch 5 deg; {STILL}"),
+    "decay_yaw": (["yaw_deg"], 0.2, f"free decay from yaw 8 deg; {STILL}"),
+    "regwave_H4T9": (PLANE, 0.1, "regular wave H 4 m T 9 s, crest at t = 0, no ramp; no wind, rotor at rest"),
+    "waves_Hs7.5": (
+        ["wave_elev_m", *PLANE], 0.2, "components of waves_hs7.5_tp10, first order; no wind, rotor at rest",
+    ),
+    "waves_Hs7.5_qtf": (
+        ["wave_elev_m", *PLANE], 0.2,
+        "components of waves_hs7.5_tp10, with the difference-frequency forces of the full QTF; no wind, rotor at rest",
+    ),
+    "float_steady_12mps": (
+        [*PLANE, *ROTOR], 0.1, f"uniform steady 12 m/s, still water; rotor 7.56 rpm, blade pitch 6.3 deg; {ROSCO}",
+    ),
+    "float_steady_18mps": (
+        [*PLANE, *ROTOR], 0.1, f"uniform steady 18 m/s, still water; rotor 7.56 rpm, blade pitch 15.4 deg; {ROSCO}",
+    ),
+    "turb_18mps_Hs7.5_uniform": (
+        [*PLANE, *ROTOR], 0.1,
+        "wind_hub_18mps blown uniformly, components of waves_hs7.5_tp10; rotor 7.56 rpm, blade pitch 15.4 deg;"
+        f" {ROSCO}",
+    ),
+}  # fmt: skip
+STEADY = {  # case -> (wind, rotor speed, blade pitches, shear exponent)
+    **{
+        f"{wind}mps": (float(wind), rpm, (pitch,) * 3, 0.0)
+        for wind, rpm, pitch in (
+            (6, 5.0, 0.0), (10, 7.05, 0.0), (12, 7.56, 6.3), (14, 7.56, 10.0), (18, 7.56, 15.4), (24, 7.56, 21.8),
+        )
+    },
+    "12mps_shear": (12.0, 7.56, (6.3,) * 3, 0.14),
+    "12mps_pitches": (12.0, 7.56, (8.3, 5.3, 6.3), 0.0),
+}  # fmt: skip
+SETTLED = 15.0  # s of a steady case that are left out
+TURNING = (("aero_Fy_N", "aero_Fz_N"), ("aero_My_Nm", "aero_Mz_Nm"))
+ROOTS = [("root1_Mx_kNm", "root1_My_kNm"), ("root2_My_kNm",), ("root3_My_kNm",)]
+
+
+def rounded(values, digits=5):
+    """Series rounded to a step that leaves `digits` digits of its largest value."""
+    largest = np.abs(values).max()
+    if largest < 1e-7:
+        return 0.0 * values
+    return values.round(max(0, digits - int(np.ceil(np.log10(largest)))))
+
+
+def series(source):
+    """The time series of every case."""
+    for case, (columns, step, settings) in CASES.items():
+        full = pd.read_csv(source / f"{case}.csv.gz", usecols=["time_s", *columns])[["time_s", *columns]]
+        every = round(step / (full["time_s"][1] - full["time_s"][0]))
+        frame = full.iloc[::every].copy()
+        for name in columns:
+            frame[name] = rounded(frame[name])
+        write(HERE / f"{case}.csv.gz", (MODEL, settings), frame)
+
+
+def whole_turns(time, rpm):
+    """Mask of the samples after SETTLED that make up whole turns (of thirds of the sampling where it is coarse)."""
+    period, step = 60.0 / rpm, time[1] - time[0]
+    turns = np.floor((time[-1] - SETTLED) / period + 1e-9)
+    return (time >= SETTLED - 1e-9) & (time < SETTLED + turns * period - 0.5 * step)
+
+
+def steady(source):
+    """Rotor loads in steady wind with the platform held: means over whole turns, in axes that do not turn."""
+    rows = []
+    for case, (wind, rpm, pitches, shear) in STEADY.items():
+        frame = pd.read_csv(source / f"steady_{case}_fixed.csv.gz")
+        time = frame["time_s"].to_numpy()
+        angle = rpm * np.pi / 30.0 * time  # blade 1 up at t = 0
+        kept = whole_turns(time, rpm)
+        row = {"case": case, "wind_mps": wind, "shear_exponent": shear, "rotor_speed_rpm": rpm}
+        row |= {f"blade_pitch{k}_deg": value for k, value in enumerate(pitches, 1)}
+        for name in ("aero_thrust_N", "aero_torque_Nm"):
+            row[name] = frame[name].to_numpy()[kept].mean()
+        for y, z in TURNING:
+            a, b = frame[y].to_numpy(), frame[z].to_numpy()
+            row[y] = (a * np.cos(angle) - b * np.sin(angle))[kept].mean()
+            row[z] = (a * np.sin(angle) + b * np.cos(angle))[kept].mean()
+        for name in [name for names in ROOTS for name in names]:
+            row[name] = frame[name].to_numpy()[kept].mean() if name in frame else np.nan
+        for name in ("root1_Mx_kNm", "root1_My_kNm"):
+            for part, wave in (("cos", np.cos(angle)), ("sin", np.sin(angle))):
+                value = 2.0 * (frame[name].to_numpy() * wave)[kept].mean() if name in frame else np.nan
+                row[f"{name}_{part}"] = value
+        rows.append(row)
+    settings = (
+        "platform and tower held, steady wind at 150 m, rotor speed and blade pitch held; means over whole turns after"
+        " 15 s; aero loads about the rotor centre, x along the shaft, y and z not turning with the rotor (z up when"
+        " blade 1 is); root moments of the structure (with weight and inertia): means, and cos and sin parts over the"
+        " azimuth of blade 1 (0: up)"
+    )
+    write(HERE / "steady.csv.gz", (MODEL, settings), pd.DataFrame(rows).map(
+        lambda v: float(f"{v:.6g}") if isinstance(v, float) else v
+    ))  # fmt: skip
+
+
+if __name__ == "__main__":
+    HERE.mkdir(exist_ok=True)
+    folder = Path(sys.argv[1])
+    series(folder)
+    steady(folder)
+    if len(sys.argv) > 2:
+        from reduce_linear import responses
+
+        responses(Path(sys.argv[2]), HERE)

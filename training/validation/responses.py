@@ -1,0 +1,181 @@
+"""Semi-submersible and barge against the frequency domain: natural periods, and responses to small waves.
+
+The plant runs in one sea of a few small components, with quadratic drag left out; the motion at each
+frequency is fitted. The other side is frequency_domain.py, which knows nothing of the plant.
+"""
+
+import tomllib
+from functools import partial
+
+import numpy as np
+import pandas as pd
+from scipy.optimize import least_squares
+
+from fowt_env.descriptions.files import DATA
+from fowt_env.training.validation import frequency_domain
+from fowt_env.training.validation.validate import TIME, _name
+
+BODIES = {
+    "nrel5mw_iti_barge": frequency_domain.iti_barge,
+    "nrel5mw_oc4_semi": frequency_domain.oc4_semi,
+}
+OMEGA = np.array([0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.15, 1.3, 1.5])  # rad/s
+AMPLITUDE = 0.02  # m, of each component
+RAMP, BEGIN, END = 100.0, 200.0, 900.0  # s, of the waves and of what is fitted
+STEP = 0.05  # s
+CHANNELS = {"PtfmSurge_[m]": 0, "PtfmHeave_[m]": 2, "PtfmPitch_[deg]": 4}
+DECAYING = (  # motions that are coupled, and their channels
+    {"surge": "PtfmSurge_[m]", "heave": "PtfmHeave_[m]", "pitch": "PtfmPitch_[deg]"},
+    {"sway": "PtfmSway_[m]", "roll": "PtfmRoll_[deg]", "yaw": "PtfmYaw_[deg]"},
+)
+OFFSET = 0.1  # m and deg from rest, at which all six motions begin
+SETTLING, DECAY = 5.0, 400.0  # s
+SMALL = 0.02  # of the largest response: smaller ones are judged by their share of it
+
+
+def body_of(name):
+    """FloatingBody of a built-in platform from the arrays that its file names."""
+    path = DATA / "platforms" / f"{name}.toml"
+    table = tomllib.loads(path.read_text())["potential_flow"]
+    return BODIES[name](frequency_domain.read_arrays(path.parent / table["coefficients"]))
+
+
+def without_drag(scene):
+    """The scene with no quadratic drag: neither that of the matrices nor that of members."""
+    hydro = scene.model.hydro
+    parts = {}
+    if hydro.matrices is not None:
+        parts["hydro.matrices"] = hydro.matrices._replace(
+            quadratic_damping=np.zeros_like(hydro.matrices.quadratic_damping)
+        )
+    if getattr(hydro, "members", None) is not None:
+        parts["hydro.members"] = None
+    return scene.with_model(parts)
+
+
+def fitted(time, value, omega, slow):
+    """Complex amplitudes (n,) of value ~ Re(sum c exp(i omega t)), with slow decaying modes beside them.
+
+    slow: complex rates (1/s) of the modes that the start has left, whose amplitudes are fitted too.
+    """
+    columns = [np.ones_like(time)]
+    for w in omega:
+        columns += [np.cos(w * time), -np.sin(w * time)]
+    for rate in slow:
+        envelope = np.exp(-rate.real * (time - time[0]))
+        columns += [envelope * np.cos(rate.imag * time), envelope * np.sin(rate.imag * time)]
+    solution = np.linalg.lstsq(np.column_stack(columns), value, rcond=None)[0]
+    return solution[1 : 2 * len(omega) : 2] + 1j * solution[2 : 2 * len(omega) + 1 : 2]
+
+
+def sea(omega):
+    """Sea specification of the small components, phases spread so that they do not add up."""
+    phase = 2.0 * np.pi * np.arange(len(omega)) ** 2 / (2.0 * len(omega))
+    return {
+        "kind": "components", "omega": omega, "amplitude": np.full(len(omega), AMPLITUDE), "phase": phase,
+        "ramp": RAMP,
+    }  # fmt: skip
+
+
+def modal_rates(time, values, guess):
+    """Complex rates (n,), 1/s and rad/s, of the decaying modes that (m, k) values consist of.
+
+    values ~ c + sum Re(a_j exp(s_j t)) with the same s_j = -rate.real + i rate.imag in all columns: nonlinear
+    least squares in the rates, linear in the rest.
+    """
+    scale = values.std(axis=0)
+
+    def basis(rates):
+        columns = [np.ones_like(time)]
+        for real, imag in rates.reshape(-1, 2):
+            envelope = np.exp(-real * (time - time[0]))
+            columns += [envelope * np.cos(imag * time), envelope * np.sin(imag * time)]
+        return np.column_stack(columns)
+
+    def misfit(rates):
+        columns = basis(rates)
+        solution = np.linalg.lstsq(columns, values, rcond=None)[0]
+        return ((columns @ solution - values) / scale).ravel()
+
+    start = np.array([[rate.real, rate.imag] for rate in guess]).ravel()
+    found = least_squares(misfit, start, x_scale=np.abs(np.repeat(start[1::2], 2))).x.reshape(-1, 2)
+    return found[:, 0] + 1j * found[:, 1]
+
+
+def periods(name, study):
+    """Damped natural periods of small free decays against those of Cummins' equation in numpy: 1 %."""
+    from fowt_env.analysis.trim import trim
+    from fowt_env.scene.build import build_scene
+    from fowt_env.simulation import simulate
+
+    study.say("natural periods")
+    scene = without_drag(build_scene(name))
+    point = trim(scene)
+    initial = {
+        channel: point[channel.split("_[")[0]] + OFFSET for group in DECAYING for channel in group.values()
+    }
+    frame = simulate(scene, None, duration=DECAY, dt=STEP, output_dt=0.1, initial=initial)
+    body = body_of(name)
+    modes = body.natural_modes()
+    offset = OFFSET * np.array([1.0, 1.0, 1.0, *[np.pi / 180.0] * 3])
+    _, motion = body.free_decay(offset, DECAY, STEP)
+    kept = frame[frame[TIME] >= SETTLING]
+    time = kept[TIME].to_numpy()
+    theirs = motion[:: round(0.1 / STEP)][-len(kept) :]
+    for group in DECAYING:
+        guess = [complex(modes[m][1] * modes[m][0], modes[m][0]) for m in group]
+        columns = [frequency_domain.NAMES.index(m) for m in group]
+        here = modal_rates(time, kept[list(group.values())].to_numpy(), guess)
+        there = modal_rates(time, theirs[:, columns], guess)
+        for label, ours, wanted in zip(group, here, there, strict=True):
+            ratios = [rate.real / abs(rate) for rate in (wanted, ours)]
+            note = f"damping ratio {ratios[0]:.3g}, here {ratios[1]:.3g}"
+            both = 2.0 * np.pi / wanted.imag, 2.0 * np.pi / ours.imag
+            case = "natural periods (against the frequency domain)"
+            study.add(case, label, "s", *both, allowed=1.0, note=note)
+
+
+def rao(name, study):
+    """Responses to small waves, 0.2 to 1.5 rad/s, against the frequency domain: amplitude 1 %."""
+    from fowt_env.scene.build import build_scene
+    from fowt_env.simulation import simulate
+
+    study.say("responses to small waves")
+    body = body_of(name)
+    known = body.coefficients["excitation_omega"]
+    omega = OMEGA[(OMEGA >= known[0]) & (known[-1] >= OMEGA)]  # the plant has no force beyond its table
+    waves = sea(omega)
+    scene = without_drag(build_scene(name, sea=waves, duration=END))
+    frame = simulate(scene, None, duration=END, dt=STEP, output_dt=0.1)
+    modes = body.natural_modes()
+    slow = [complex(ratio * w / np.sqrt(1.0 - ratio**2), w) for w, ratio in modes.values()]
+    theirs = body.responses(omega)
+    kept = frame[frame[TIME] >= BEGIN]
+    time = kept[TIME].to_numpy()
+    rows = []
+    for channel, motion in CHANNELS.items():
+        label, unit = _name(channel)
+        factor = 180.0 / np.pi if unit == "deg" else 1.0
+        # the elevation is a cos(omega t - e) at the origin: the same phase is taken off
+        here = fitted(time, kept[channel].to_numpy(), omega, slow) / AMPLITUDE * np.exp(1j * waves["phase"])
+        there = theirs[:, motion] * factor
+        largest = np.abs(there).max()
+        for w, mine, wanted in zip(omega, here, there, strict=True):
+            turned = np.degrees(np.angle(mine / wanted))
+            note = f"phase {turned:+.2f} deg"
+            error = 100.0 * (abs(mine) - abs(wanted)) / max(abs(wanted), SMALL * largest)
+            quantity = f"{label} per metre of wave at {w:g} rad/s"
+            study.add(
+                "responses to small waves (against the frequency domain)", quantity, f"{unit}/m", abs(wanted),
+                abs(mine), error, 1.0, note,
+            )  # fmt: skip
+        rows.append((label, here, there))
+    table = {"omega": omega}
+    for label, here, there in rows:
+        table |= {label: np.abs(here), f"{label} there": np.abs(there)}
+    study.runs["responses"] = (pd.DataFrame(table), None)
+
+
+def groups(name):
+    """{group: (function, runs)} of a platform."""
+    return {"periods": (partial(periods, name), 1), "responses": (partial(rao, name), 1)}

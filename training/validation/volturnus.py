@@ -1,0 +1,327 @@
+"""The IEA 15 MW on VolturnUS-S against OpenFAST: cases, and groups of figures with what is allowed.
+
+Rigid OpenFAST v5 runs of the public deck (their settings are in the heads of the series), and the linear models
+that ROSCO's repository holds of the same turbine. Nothing here is adjusted to fit.
+"""
+
+import re
+from math import pi
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from fowt_env.controllers.rosco import Rosco, RoscoSettings, _Folder, _preload, find_library
+from fowt_env.errors import InputError
+from fowt_env.training.validation.openfast_cases import ReferenceRun, _path, hub_wind, wave_components
+from fowt_env.training.validation.signal_errors import harmonics, normalised_rms
+from fowt_env.training.validation.validate import (
+    BLADE,
+    PITCH,
+    POWER,
+    SETTLED,
+    SPEED,
+    SURGE,
+    THRUST,
+    TIME,
+    _name,
+    _since,
+    add_decay,
+)
+
+PLATFORM = "iea15_volturnus_s"
+HEAVE, YAW = "PtfmHeave_[m]", "PtfmYaw_[deg]"
+PLANE = (SURGE, HEAVE, PITCH)
+DT = 0.025  # s, as OpenFAST's
+# as those runs had it: the wake skewed by the tilt of the shaft, loads of the undisturbed air
+OPTIONS = {"skewed_wake": True, "shear_exponent": 0.0}
+DECAYS = {  # case: (channel, start value, seconds, step of the reference)
+    "decay_surge": (SURGE, 10.0, 600.0, 0.2),
+    "decay_heave": (HEAVE, 3.0, 200.0, 0.1),
+    "decay_pitch": (PITCH, 5.0, 300.0, 0.1),
+    "decay_yaw": (YAW, 8.0, 500.0, 0.2),
+}
+WAVE = {"kind": "regular", "H": 4.0, "T": 9.0}
+WAVE_WINDOW = (302.0, 500.0)  # s, twenty-two periods
+HARMONICS = (SURGE, HEAVE, PITCH)
+CONTROLLED = ("float_steady_12mps", "float_steady_18mps", "turb_18mps_Hs7.5_uniform")
+
+
+SEABED_FRICTION = 1.0  # CB of the lines in those runs; the deck's own lines (MoorDyn) have none
+
+
+def as_run():
+    """Platform with the lines of those runs: with friction on the seabed."""
+    from fowt_env.descriptions.platform import read_platform
+
+    platform = read_platform(PLATFORM)
+    lines = tuple(line.model_copy(update={"seabed_friction": SEABED_FRICTION}) for line in platform.lines)
+    return platform.model_copy(update={"lines": lines})
+
+
+def _run(case, duration, **settings):
+    """ReferenceRun of this platform."""
+    settings = {"platform": as_run, "place": PLATFORM, "options": OPTIONS, **settings}
+    return ReferenceRun(case, duration, DT, **settings)
+
+
+def _start(blade_pitch):
+    return {"RotSpeed": 7.56, "BldPitch1": blade_pitch}
+
+
+def rosco(folder):
+    """Controller: ROSCO's library with the DISCON.IN and rotor table of the deck, as OpenFAST ran it."""
+    return DeckRosco(RoscoSettings(mode=2), DT, name="rosco of the deck")
+
+
+class DeckRosco(Rosco):
+    """ROSCO with the files that the turbine names, in place of what is written for a scene."""
+
+    def prepare(self, scene):
+        """Take the deck's files. Raises: InputError where the library is missing."""
+        self._source, needed = find_library()
+        _preload(needed)
+        self._efficiency = scene.turbine.drivetrain.generator_efficiency
+        path = Path(scene.turbine.discon)
+        text = path.read_text()
+        table = re.search(r'^"([^"]+)"\s*!\s*PerfFileName', text, flags=re.MULTILINE).group(1)
+        self._files = _Folder()
+        self._files.write("rotor.txt", (path.parent / table).read_text())
+        text = text.replace(f'"{table}"', '"rotor.txt"')
+        # no files of its own beside the caller's
+        text = re.sub(r"^\d+(\s*!\s*LoggingLevel)", r"0\1", text, flags=re.MULTILINE)
+        self._files.write("DISCON.IN", text)
+
+
+def without_rosco():
+    """Why there is no ROSCO here, or None."""
+    try:
+        find_library()
+    except InputError as error:
+        return str(error)
+    return None
+
+
+RUNS = {
+    "static": _run("static", 600.0, output_dt=0.2),
+    **{
+        case: _run(case, seconds, initial={channel: start}, output_dt=step)
+        for case, (channel, start, seconds, step) in DECAYS.items()
+    },
+    "regwave_H4T9": _run("regwave_H4T9", 500.0, sea=WAVE),
+    "waves_Hs7.5": _run("waves_Hs7.5", 600.0, sea=wave_components, output_dt=0.2),
+    "waves_Hs7.5_qtf": _run(
+        "waves_Hs7.5_qtf", 600.0, sea=wave_components, output_dt=0.2,
+        options={**OPTIONS, "second_order": "full"},
+    ),
+    "float_steady_12mps": _run(
+        "float_steady_12mps", 600.0, wind=12.0, controlled=True, initial=_start(6.3), controller=rosco
+    ),
+    "float_steady_18mps": _run(
+        "float_steady_18mps", 600.0, wind=18.0, controlled=True, initial=_start(15.4), controller=rosco
+    ),
+    "turb_18mps_Hs7.5_uniform": _run(
+        "turb_18mps_Hs7.5_uniform", 600.0, wind=lambda folder, bts: hub_wind(folder), sea=wave_components,
+        controlled=True, initial=_start(15.4), controller=rosco,
+    ),
+}  # fmt: skip
+
+
+def rest(study):
+    """Where the platform settles in still water: surge and heave within 0.02 m, platform pitch 0.02 deg.
+
+    Means of the last 540 s, four periods of surge, and of the last 50 s, in which it still moves.
+    """
+    case = "static"
+    for start, words in ((60.0, "last 540 s"), (550.0, "last 50 s")):
+        ours, theirs = _since(study.pair(case), start)
+        for channel in PLANE:
+            name, unit = _name(channel)
+            here, there = ours[channel].mean(), theirs[channel].mean()
+            apart = f"{here - there:+.4f} {unit}; allowed 0.02 {unit}"
+            allowed = 100.0 * 0.02 / abs(there)
+            study.add(case, f"{name}, mean of the {words}", unit, there, here, allowed=allowed, note=apart)
+
+
+def decays(study):
+    """Free decays: period 0.5 %, logarithmic decrement 5 %, rms error of the whole record 4 %."""
+    for case, (channel, _, seconds, _) in DECAYS.items():
+        add_decay(study, case, channel, seconds, period=0.5, decrement=5.0, rms=4.0)
+
+
+# of a straight blade as ElastoDyn has it (its summary): kg, m from the root, kg m2 about the root
+BLADE_MASS, BLADE_CENTRE, BLADE_SQUARE = 68507.6, 27.601, 101086645.0
+GRAVITY = 9.81
+AZIMUTHS = 24
+
+
+def _rotor_means(scene, rotor_speed, pitch):
+    """(force, moment, out-of-plane root moment of blade 1 with its cos and sin parts) over a turn, N and N m."""
+    from fowt_env.analysis.rotor_loads import rotor_loads
+
+    angles = 2.0 * pi * np.arange(AZIMUTHS) / AZIMUTHS
+    loads = [rotor_loads(scene, rotor_speed, pitch, azimuth) for azimuth in angles]
+    flap = np.array([load.root_out_of_plane[0] for load in loads])
+    waves = [np.ones(AZIMUTHS), 2.0 * np.cos(angles), 2.0 * np.sin(angles)]
+    return (
+        np.mean([load.force for load in loads], axis=0),
+        np.mean([load.moment for load in loads], axis=0),
+        np.array([np.mean(flap * wave) for wave in waves]),
+    )
+
+
+def _structural_flap(rotor, rotor_speed):
+    """(mean, cos part) of the out-of-plane root moment by weight and rotation of a rigid, straight blade, N m."""
+    tilt, cone = rotor.shaft_tilt, rotor.cone
+    first = BLADE_MASS * BLADE_CENTRE
+    # weight: down-shaft part g sin(tilt), and g cos(tilt) cos(azimuth) along the blade's radius
+    mean = first * GRAVITY * np.sin(tilt) * np.cos(cone)
+    cosine = -first * GRAVITY * np.cos(tilt) * np.sin(cone)
+    turning = rotor_speed**2 * np.sin(cone) * np.cos(cone) * (BLADE_SQUARE + rotor.hub_radius * first)
+    return mean + turning, cosine
+
+
+def rotor(study):
+    """Steady wind, platform held: rotor loads 0.5 %, in sheared wind 2 %; root moments 0.5 % of the mean one."""
+    from fowt_env.scene.build import build_scene
+
+    table = pd.read_csv(_path(study.folder, f"{PLATFORM}/steady.csv.gz"), comment="#")
+    for row in table.to_dict("records"):
+        study.say(f"rotor, {row['case']}")
+        scene = build_scene(
+            as_run(), wind={"kind": "steady", "speed": row["wind_mps"]}, rotor="bem",
+            **{**OPTIONS, "shear_exponent": row["shear_exponent"]},
+        )  # fmt: skip
+        speed = row["rotor_speed_rpm"] * pi / 30.0
+        pitches = [np.radians(row[f"blade_pitch{k}_deg"]) for k in (1, 2, 3)]
+        means = {pitch: _rotor_means(scene, speed, pitch) for pitch in dict.fromkeys(pitches)}
+        force, moment = (np.mean([means[pitch][k] for pitch in pitches], axis=0) for k in (0, 1))
+        _hub_rows(study, row, force, moment)
+        if np.isfinite(row["root1_My_kNm"]):
+            _root_rows(study, row, [means[pitch][2] for pitch in pitches], scene.turbine.rotor, speed)
+
+
+def _case(row):
+    plain = row["shear_exponent"] == 0.0 and row["blade_pitch1_deg"] == row["blade_pitch3_deg"]
+    return f"steady_{row['wind_mps']:g}mps" if plain else f"rotor, {row['case']}"
+
+
+def _hub_rows(study, row, force, moment):
+    """Rows of thrust, torque and the moments about the rotor centre; these are judged by their size together."""
+    case, allowed = _case(row), 2.0 if row["shear_exponent"] else 0.5
+    study.add(case, "aerodynamic thrust", "kN", 1e-3 * row["aero_thrust_N"], 1e-3 * force[0], allowed=allowed)
+    study.add(
+        case, "aerodynamic torque", "kN-m", 1e-3 * row["aero_torque_Nm"], 1e-3 * moment[0], allowed=allowed
+    )
+    size = np.hypot(row["aero_My_Nm"], row["aero_Mz_Nm"])
+    lever = row["aero_torque_Nm"]  # moments may pass zero: one percent of the torque is the other yardstick
+    for name, here, there in (
+        ("tilting moment at the hub", moment[1], row["aero_My_Nm"]),
+        ("yawing moment at the hub", moment[2], row["aero_Mz_Nm"]),
+    ):
+        error = 100.0 * (here - there) / size
+        note = f"{100.0 * (here - there) / lever:+.3f} % of the torque"
+        study.add(case, f"{name}, of both moments", "kN-m", 1e-3 * there, 1e-3 * here, error, allowed, note)
+    for name, here, there in (
+        ("side force at the hub", force[1], row["aero_Fy_N"]),
+        ("upward force at the hub", force[2], row["aero_Fz_N"]),
+    ):
+        error = 100.0 * (here - there) / row["aero_thrust_N"]
+        study.add(case, f"{name}, of the thrust", "kN", 1e-3 * there, 1e-3 * here, error, allowed)
+
+
+def _root_rows(study, row, flaps, rotor, speed):
+    """Rows of the out-of-plane root moments, with weight and rotation of a rigid blade added to the air's."""
+    case, allowed = _case(row), 2.0 if row["shear_exponent"] else 0.5
+    mean, cosine = _structural_flap(rotor, speed)
+    for number, flap in enumerate(flaps, 1):
+        there, here = row[f"root{number}_My_kNm"], 1e-3 * (flap[0] + mean)
+        study.add(case, f"RootMyc{number}, mean over a turn", "kN-m", there, here, allowed=allowed)
+    whole = row["root1_My_kNm"]
+    for part, here in (("cos", 1e-3 * (flaps[0][1] + cosine)), ("sin", 1e-3 * flaps[0][2])):
+        there = row[f"root1_My_kNm_{part}"]
+        error = 100.0 * (here - there) / whole
+        quantity = f"RootMyc1, {part} over the azimuth, of the mean"
+        study.add(case, quantity, "kN-m", there, here, error, allowed)
+
+
+def regular(study):
+    """Regular wave H 4 m T 9 s: first harmonics of surge, heave and platform pitch within 1 %."""
+    case, omega = "regwave_H4T9", 2.0 * pi / WAVE["T"]
+    ours, theirs = _since(study.pair(case), *WAVE_WINDOW)
+    for channel in HARMONICS:
+        name, unit = _name(channel)
+        there, here = (
+            harmonics(f[TIME].to_numpy()[:-1], f[channel].to_numpy()[:-1], omega)[0] for f in (theirs, ours)
+        )
+        turned = f"phase {np.degrees(np.angle(here / there)):+.2f} deg"
+        study.add(case, f"{name}, first harmonic", unit, abs(there), abs(here), allowed=1.0, note=turned)
+
+
+def waves(study):
+    """Irregular waves Hs 7.5 m: deviations after 100 s within 2 %, with difference-frequency forces 5 %."""
+    for case, allowed in (("waves_Hs7.5", 2.0), ("waves_Hs7.5_qtf", 5.0)):
+        ours, theirs = _since(study.pair(case), SETTLED)
+        for channel in PLANE:
+            name, unit = _name(channel)
+            both = [frame[channel].std() for frame in (theirs, ours)]
+            study.add(case, f"{name}, standard deviation", unit, *both, allowed=allowed)
+            means = [frame[channel].mean() for frame in (theirs, ours)]
+            study.add(case, f"{name}, mean", unit, *means)
+            error = 100.0 * normalised_rms(ours[channel], theirs[channel])
+            study.add(case, f"{name}, normalised rms error", unit, *both, error)
+
+
+def floating(study):
+    """Floating with ROSCO, 12 and 18 m/s and turbulence with Hs 7.5 m: deviations after 100 s within 3 %."""
+    if without_rosco():  # an extra: the other groups need none of it
+        study.say("without ROSCO: its library is not installed")
+        return
+    for case in CONTROLLED:
+        words = "with ROSCO"
+        ours, theirs = _since(study.pair(case), SETTLED)
+        for channel in (*PLANE, SPEED, BLADE, POWER, THRUST):
+            name, unit = _name(channel)
+            both = [frame[channel].std() for frame in (theirs, ours)]
+            study.add(case, f"{name}, standard deviation", unit, *both, allowed=3.0, note=words)
+            means = [frame[channel].mean() for frame in (theirs, ours)]
+            study.add(case, f"{name}, mean", unit, *means, note=words)
+            error = 100.0 * normalised_rms(ours[channel], theirs[channel])
+            study.add(case, f"{name}, normalised rms error", unit, *both, error, note=words)
+
+
+def memory(study):
+    """States of the radiation memory against convolution, on decays and an irregular sea: 1 % of the deviation."""
+    for case in ("decay_surge", "decay_heave", "decay_pitch", "waves_Hs7.5"):
+        run = RUNS[case]
+        frames = []
+        for kind in ("convolution", "state_space"):
+            study.say(f"{case}, radiation by {kind}")
+            frames.append(run.frame(study.folder, radiation=kind))
+        dear, cheap = frames
+        channels = PLANE if case.startswith("waves") else (DECAYS[case][0],)
+        for channel in channels:
+            name, unit = _name(channel)
+            error = 100.0 * normalised_rms(cheap[channel], dear[channel])
+            quantity = f"{name}, rms error over the deviation, {case}"
+            both = dear[channel].std(), cheap[channel].std()
+            study.add("radiation memory as states (against convolution)", quantity, unit, *both, error, 1.0)
+
+
+def linear(study):
+    """Linear models against OpenFAST's."""
+    from fowt_env.training.validation.linear_cases import linear as compared
+
+    compared(study)
+
+
+GROUPS = {  # name -> (function, runs that it takes)
+    "rest": (rest, 1),
+    "decays": (decays, 4),
+    "regular": (regular, 1),
+    "waves": (waves, 2),
+    "rotor": (rotor, 8),
+    "floating": (floating, 3),
+    "linear": (linear, 5),
+    "memory": (memory, 8),
+}
