@@ -1,11 +1,12 @@
 """Linear models of this plant against OpenFAST's of the same turbine, above rated wind.
 
-OpenFAST's come from ROSCO's repository and belong to an older deck of the IEA 15 MW on VolturnUS-S: a lighter
-tower, other nacelle and hub, blades whose radii are 0.97 m smaller, another generator, g = 9.80665. `old_deck`
-builds that turbine from the deck's figures. HydroDyn linearises by steps of 0.02 deg times the depth in
-translation and 2 deg in rotation (HydroDyn.f90, HD_Perturb_u), so that its quadratic drag leaves the damping of
-such a velocity; the same is added here. What differs still: their radiation is the deck's state-space fit, their
-blades turn in the potential flow around the tower, and sway, roll and yaw are held.
+OpenFAST's come from ROSCO's repository and belong to an older deck of the IEA 15 MW on VolturnUS-S: a
+lighter tower, other nacelle and hub, blades whose radii are 0.97 m smaller, another generator, g =
+9.80665. `old_deck` builds that turbine from the deck's figures. HydroDyn linearises by steps of 0.02 deg
+times the depth in translation and 2 deg in rotation (HydroDyn.f90, HD_Perturb_u), so that its quadratic
+drag leaves the damping of such a velocity; the same is added here. What differs still: their radiation
+is the deck's state-space fit, their blades turn in the potential flow around the tower, and sway, roll
+and yaw are held.
 """
 
 import numpy as np

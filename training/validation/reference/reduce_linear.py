@@ -1,17 +1,17 @@
 """Poles and responses of OpenFAST's linear models of VolturnUS-S with the tower held: `responses`.
 
 Each linearisation file has 106 states: surge, heave, platform pitch, the first fore-aft tower mode, the
-generator's azimuth, their rates, and HydroDyn's states of excitation and radiation. The files of the twelve
-azimuths of an operating point are averaged. The tower is then held by the constraint force lambda e_t that
-makes its acceleration zero: with q'' = a the accelerations of the free model and m = M^-1 e_t,
+generator's azimuth, their rates, and HydroDyn's states of excitation and radiation. The files of the
+twelve azimuths of an operating point are averaged. The tower is then held by the constraint force lambda
+e_t that makes its acceleration zero: with q'' = a the accelerations of the free model and m = M^-1 e_t,
 
     a - m a_t / m_t,  q_t = q_t' = 0.
 
-Of M^-1 only the direction of m is needed. The stiffness of the tower mode is a generalised force along e_t
-alone, so the column of A by which the accelerations depend on q_t is m up to gravity and aerodynamics: gravity
-acts on the deflected mass with about 1 % of the column of pitch. `direction_from_masses` has m from the deck's
-masses, the tower's mode shape and the added mass at infinite frequency instead; the poles by it are stored
-beside the others.
+Of M^-1 only the direction of m is needed. The stiffness of the tower mode is a generalised force along
+e_t alone, so the column of A by which the accelerations depend on q_t is m up to gravity and
+aerodynamics: gravity acts on the deflected mass with about 1 % of the column of pitch.
+`direction_from_masses` has m from the deck's masses, the tower's mode shape and the added mass at
+infinite frequency instead; the poles by it are stored beside the others.
 """
 
 from pathlib import Path
@@ -171,7 +171,8 @@ def responses(source, folder):
                     )  # fmt: skip
     model = (
         "OpenFAST (2021-02), IEA 15 MW on VolturnUS-S of ROSCO's test cases: surge, heave, platform pitch,"
-        " generator, first fore-aft tower mode; mean of the azimuths, tower held afterwards (reduce_linear.py)"
+        " generator, first fore-aft tower mode; mean of the azimuths, tower held afterwards"
+        " (reduce_linear.py)"
     )
     settings = (
         "operating points, and poles (1/s, rad/s); _other: direction of the constraint from the deck's masses"
