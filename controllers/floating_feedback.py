@@ -30,7 +30,7 @@ from fowt_env.controllers.pi import (
     speed_error,
     write_commands,
 )
-from fowt_env.controllers.tuned import tuned
+from fowt_env.controllers.tuned import tuned_for
 from fowt_env.descriptions.checks import check_number
 from fowt_env.errors import unknown
 from fowt_env.plant.compile.decorators import control_kernel, kernel
@@ -149,5 +149,5 @@ class FloatingFeedback(PI):
 
 def floating_feedback(turbine, control_dt):
     """OC3 gains with nacelle-velocity feedback to the blade pitch, which damps the platform's pitch."""
-    settings = FeedbackSettings(**tuned("floating_feedback"))
+    settings = FeedbackSettings(**tuned_for("floating_feedback", turbine))
     return FloatingFeedback(PISettings.published(turbine), settings, control_dt)

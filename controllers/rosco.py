@@ -3,11 +3,13 @@
 Abbas et al., Wind Energ. Sci. 7, 2022. The library (libdiscon of the PyPI wheel `rosco`, installed with
 --no-deps: its toolbox is not used) is called like OpenFAST calls it, by the Bladed interface. Its data
 of the plant are written for the scene at hand: DISCON.IN from the turbine's description, and the Cp, Ct,
-Cq table from this project's blade elements. Gains and schedule of the blade pitch are those published for
-OC3-Hywind, as no ROSCO tuning of it is published and the automatic one turns the proportional gain positive
-beyond 16 deg; torque above rated is constant as there. Below rated ROSCO does what it does by default: an
-extended Kalman filter estimates the wind and the torque tracks the best tip-speed ratio, with the set-point
-smoother between the regions and no peak shaving.
+Cq table from this project's blade elements. A turbine whose file names a DISCON.IN of its own is controlled
+by that one as it stands, with the table that it names, or this project's where there is none. Else gains and
+schedule of the blade pitch are those published for OC3-Hywind, as no ROSCO tuning of it is published and the
+automatic one turns the proportional gain positive beyond 16 deg (or those of controllers/gains.py); torque
+above rated is constant as there. Below rated ROSCO does what it does by default: an extended Kalman filter
+estimates the wind and the torque tracks the best tip-speed ratio, with the set-point smoother between the
+regions and no peak shaving.
 
 A loaded library is one controller that can be started once. So every reset() loads a private copy of the
 file and drops the one before.
@@ -16,6 +18,7 @@ file and drops the one before.
 import ctypes
 import importlib.util
 import os
+import re
 import shutil
 import tempfile
 import threading
@@ -31,8 +34,10 @@ from scipy.optimize import brentq
 
 from fowt_env.caches import Cache
 from fowt_env.control import check_control_dt
-from fowt_env.controllers.tuned import tuned
+from fowt_env.controllers.gains import published_set, with_gains
+from fowt_env.controllers.tuned import tuned_for
 from fowt_env.descriptions.checks import check_number, check_one_of
+from fowt_env.descriptions.files import read_text
 from fowt_env.descriptions.units import DEGREE
 from fowt_env.errors import ControllerError, InputError, unknown
 from fowt_env.plant.aero.blade_elements import build_blade_elements
@@ -46,6 +51,14 @@ RATIOS = np.linspace(2.0, 20.0, 37)  # tip-speed ratios of the table
 PITCHES = DEGREE * np.concatenate([np.arange(-5.0, 30.0, 1.0), np.linspace(30.0, 90.0, 13)])
 SCHEDULE = 0.5 * pi * np.linspace(0.0, 1.0, 40) ** 2  # blade pitch of the gain table, rad
 POLE_SPEEDS = 45  # winds of the estimator's table of poles
+MINIMUM_SPEED = 1.1  # times the cut-in speed: where region 2 starts below that, this is a minimum speed
+# Modes of a DISCON.IN that need what it is not given here: loads of single blades, yaw, flaps, files, sockets
+OFF = (
+    "IPC_ControlMode", "Y_ControlMode", "Flp_Mode", "OL_Mode", "AWC_Mode", "Ext_Mode", "ZMQ_Mode", "CC_Mode",
+    "StC_Mode",
+)  # fmt: skip
+SILENT = {"LoggingLevel": 0, "Echo": 0, "Ext_Interface": 0}  # no files beside the run's, the plain interface
+ENTRY = re.compile(r"^(?P<value>[^!]*?)(?P<gap>\s*!\s*)(?P<name>\w+)\b")
 TORQUE_FREQUENCY, TORQUE_DAMPING = 0.15, 0.7  # rad/s, of the torque loop in ROSCO's NREL 5 MW deck
 
 
@@ -70,6 +83,56 @@ class RoscoSettings:
             check_number(key, getattr(self, key), 0.0, low_open=True, allowed="positive and finite, rad/s")
         for key in ("kp", "ki"):
             check_number(key, getattr(self, key), 0.0, low_open=True, allowed="positive and finite")
+
+
+class Discon:
+    """A DISCON.IN of ROSCO, of a turbine's own.
+
+    Raises: InputError for a file that is none, and for modes that need more than the library is given.
+    """
+
+    def __init__(self, path):
+        self.path = Path(path)
+        self.text = read_text(self.path, "DISCON.IN")
+        self.values = {}
+        for line in self.text.splitlines():
+            if found := ENTRY.match(line):
+                self.values.setdefault(found["name"], found["value"].strip())
+        where = f"DISCON.IN {str(path)!r}"
+        for key in ("PerfFileName", "PerfTableSize", "Fl_Mode", "LoggingLevel", *OFF):
+            if key not in self.values:
+                raise InputError(f"{where}: {key} is missing: it is no file of ROSCO 2.9 or later")
+        for key in OFF:
+            if self.values[key] != "0":
+                raise InputError(f"{where}: {key} = {self.values[key]}: must be 0 here")
+        if self.values["Fl_Mode"] not in ("0", "1", "2"):
+            raise InputError(f"{where}: Fl_Mode = {self.values['Fl_Mode']}: must be 0, 1 or 2")
+
+    @property
+    def mode(self):
+        """Fl_Mode, which says what acceleration the library is given."""
+        return int(self.values["Fl_Mode"])
+
+    def texts(self, changes, table):
+        """(text of DISCON.IN with changes, text of its rotor table); table(): Table where it has no file."""
+        for key in changes:
+            if key not in self.values:
+                raise unknown("entry of DISCON.IN", key, self.values)
+        changes = SILENT | {"PerfFileName": '"rotor.txt"'} | changes
+        named = self.path.parent / self.values["PerfFileName"].strip("\"'")
+        if named.is_file():
+            rows = read_text(named, "rotor performance")
+        else:
+            made = table()
+            changes["PerfTableSize"] = (len(made.blade_pitch), len(made.ratio))
+            rows = table_text(made)
+        lines = []
+        for line in self.text.splitlines():
+            found = ENTRY.match(line)
+            if found and found["name"] in changes:
+                line = f"{_words(changes[found['name']])}{line[found.end('value') :]}"
+            lines.append(line)
+        return "\n".join([*lines, ""]), rows
 
 
 def find_library():
@@ -125,7 +188,8 @@ _redirecting = threading.Lock()  # of two threads at it, one would keep the othe
 class Rosco:
     """One ROSCO controller; needs prepare(scene) before reset. See the module's text.
 
-    changes: {name in DISCON.IN: value} that replace what is written there for a scene.
+    settings: RoscoSettings, with which DISCON.IN is written for a scene, or a Discon, taken as it is.
+    changes: {name in DISCON.IN: value} that replace what is written there.
     """
 
     def __init__(self, settings, control_dt, name="rosco", changes=None):
@@ -133,7 +197,9 @@ class Rosco:
         self.changes = dict(changes or {})
         self.control_dt = check_control_dt(control_dt)
         self.name = str(name)
-        felt = {0: (), 1: ("nacelle_acceleration",), 2: ("platform_pitch_acceleration",)}[settings.mode]
+        # a turbine measures the rate of its pitching: its own DISCON.IN is given the change of that
+        turning = "platform_pitch_rate" if isinstance(settings, Discon) else "platform_pitch_acceleration"
+        felt = {0: (), 1: ("nacelle_acceleration",), 2: (turning,)}[settings.mode]
         used = ("time", "rotor_speed", "generator_speed", "generator_torque", "blade_pitch", "wind_speed")
         self.information = (*used, *felt, "plant_model")
         self._felt = felt
@@ -151,7 +217,7 @@ class Rosco:
         self.__init__(**state)
 
     def prepare(self, scene):
-        """Write DISCON.IN and the rotor's table for a scene.
+        """Write DISCON.IN and the rotor's table for a scene, or those of the Discon.
 
         Raises: InputError without wind or library, and for a change of what DISCON.IN does not have.
         """
@@ -161,14 +227,18 @@ class Rosco:
         _preload(needed)
         turbine, density = scene.turbine, scene.platform.environment.air_density
         self._efficiency = turbine.drivetrain.generator_efficiency
-        table = _table(turbine, density)
-        values = deck(turbine, density, table, self.settings)
-        for key in self.changes:
-            if key not in values:
-                raise unknown("entry of DISCON.IN", key, values)
+        if isinstance(self.settings, Discon):
+            text, table = self.settings.texts(self.changes, lambda: _table(turbine, density))
+        else:
+            made = _table(turbine, density)
+            values = deck(with_gains(scene), density, made, self.settings)
+            for key in self.changes:
+                if key not in values:
+                    raise unknown("entry of DISCON.IN", key, values)
+            text, table = deck_text(values | self.changes), table_text(made)
         self._files = _Folder()
-        self._files.write("rotor.txt", table_text(table))
-        self._files.write("DISCON.IN", deck_text(values | self.changes))
+        self._files.write("rotor.txt", table)
+        self._files.write("DISCON.IN", text)
 
     def reset(self, measurement):
         """Load a fresh copy of the library and start it at a Measurement.
@@ -181,6 +251,7 @@ class Rosco:
         self._library = _Copy(self._source, self._files.path)
         self._swap = np.zeros(SWAP_SIZE, dtype=np.float32)
         self._deck = str(self._files.path / "DISCON.IN").encode()
+        self._rate = None
         self._first = (measurement.time, self._call(0, measurement))
 
     def act(self, measurement):
@@ -202,6 +273,10 @@ class Rosco:
         s[48], s[49], s[50] = TEXT_SIZE, len(self._deck), len(OUT_NAME)
         for entry, name in ((52, "nacelle_acceleration"), (82, "platform_pitch_acceleration")):
             s[entry] = getattr(m, name) if name in self._felt else 0.0
+        if "platform_pitch_rate" in self._felt:
+            rate = m.platform_pitch_rate
+            s[82] = 0.0 if self._rate is None else (rate - self._rate) / self.control_dt
+            self._rate = rate
         s[60] = 3.0
         failed = self._library.call(s, self._deck)
         if failed is not None:
@@ -336,7 +411,7 @@ def pitch_gains(turbine, gain_set="oc3"):
 
     Raises: InputError where a proportional gain would not be negative.
     """
-    published = turbine.gains[gain_set]
+    published = published_set(turbine, gain_set)
     schedule = 1.0 / (1.0 + SCHEDULE / published.gain_schedule_pitch)
     proportional, integral = -published.KP * schedule, -published.KI * schedule
     if not (proportional < 0.0).all():
@@ -353,6 +428,9 @@ def deck(turbine, density, table, settings):
     slope = -(ratio**2) / inertia  # of generator acceleration over generator torque
     best = best_ratio(turbine, table)
     proportional, integral = pitch_gains(turbine)
+    slowest = ratio * best * turbine.cut_in_wind_speed / radius
+    if law.region2_start_speed < MINIMUM_SPEED * law.cut_in_speed:
+        slowest = law.cut_in_speed
     flags = dict.fromkeys(
         (
             "LoggingLevel", "DT_Out", "Ext_Interface", "Echo",
@@ -397,7 +475,7 @@ def deck(turbine, density, table, settings):
         "VS_MaxRat": law.max_torque_rate,
         "VS_MaxTq": law.max_torque,
         "VS_MinTq": 0.0,
-        "VS_MinOMSpd": ratio * best * turbine.cut_in_wind_speed / radius,
+        "VS_MinOMSpd": slowest,
         "VS_Rgn2K": law.region2_constant,
         "VS_RtPwr": turbine.drivetrain.generator_efficiency * law.rated_power,
         "VS_RtTq": law.rated_torque,
@@ -451,10 +529,13 @@ def table_text(table):
 
 
 def rosco(turbine, control_dt):
-    """The ROSCO library with the published OC3 gains, constant torque above rated, no floating feedback."""
-    return Rosco(RoscoSettings(), control_dt, "rosco")
+    """The ROSCO library: with the turbine's own DISCON.IN, else the OC3 gains and no floating feedback."""
+    settings = RoscoSettings() if turbine.discon is None else Discon(turbine.discon)
+    return Rosco(settings, control_dt, "rosco")
 
 
 def rosco_float(turbine, control_dt):
-    """The ROSCO library with the published OC3 gains and its floating feedback, tuned on training cases."""
-    return Rosco(RoscoSettings(mode=1, **tuned("rosco_float")), control_dt, "rosco_float")
+    """The ROSCO library with OC3 gains and its floating feedback, tuned on training cases; or as rosco."""
+    if turbine.discon is not None:
+        return Rosco(Discon(turbine.discon), control_dt, "rosco_float")
+    return Rosco(RoscoSettings(mode=1, **tuned_for("rosco_float", turbine)), control_dt, "rosco_float")

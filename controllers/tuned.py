@@ -1,10 +1,33 @@
-"""The settings in tuned.toml, which training/design/tune.py has written."""
+"""The settings in tuned.toml, which training/design/tune.py has found on OC3-Hywind, for any turbine.
+
+Others than the NREL 5 MW turbine take them in their own units: velocities by the rated wind, frequencies by
+the rated rotor speed, torques by the rated torque. Nobody has searched for better ones there.
+"""
 
 import tomllib
 from pathlib import Path
 from typing import Any
 
+from fowt_env.descriptions.units import RPM
+
 TUNED = Path(__file__).parent / "tuned.toml"
+
+
+RATED_WIND, ROTOR_SPEED, TORQUE = 11.4, 12.1 * RPM, 43093.55  # of the NREL 5 MW turbine, SI
+
+
+def tuned_for(name: str, turbine: Any) -> dict[str, Any]:
+    """The settings of a controller in the units of a turbine; as they are for the NREL 5 MW turbine."""
+    wind = turbine.rated_wind_speed / RATED_WIND
+    frequency = turbine.rated_rotor_speed / ROTOR_SPEED
+    factors = {
+        "pitch_gain": 1.0 / wind,  # rad per m/s
+        "gain": 1.0 / wind,
+        "torque_gain": turbine.torque_law.rated_torque / TORQUE / wind,
+        "low_pass": frequency,
+        "high_pass": frequency,
+    }
+    return {key: value * factors.get(key, 1.0) for key, value in tuned(name).items()}
 
 
 def tuned(name: str) -> dict[str, Any]:

@@ -8,7 +8,7 @@ TENDON = (151.73, 1010.5, 1.5e9)  # unstretched length m, weight in water N/m, E
 
 
 def tendons():
-    """The eight tendons of the MIT/NREL TLP in OpenFAST's regression tests, of which two share each fairlead."""
+    """The eight tendons of the MIT/NREL TLP in OpenFAST's regression tests, two at each fairlead."""
     places = [(27.0, 0.0), (0.0, 27.0), (-27.0, 0.0), (0.0, -27.0)]
     length, weight, stiffness = TENDON
     return tuple(

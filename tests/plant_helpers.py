@@ -64,3 +64,14 @@ def random_state(rng, n=15, offset=5.0, tilt=0.1, speed=1.0, turning=0.05):
     x[State.ROTOR_SPEED] = rng.uniform(0.5, 1.4)
     x[State.BLADE_PITCH] = rng.uniform(0.0, 0.4)
     return x
+
+
+def leaning(platform, turbine):
+    """(platform, turbine) with a tilted shaft, and centres of mass off the shaft and beside the plane."""
+    ballast = platform.ballast.model_copy(update={"cm_downwind": 0.4, "cm_left": -0.3})
+    rotor = turbine.rotor.model_copy(update={"shaft_tilt": 0.12, "cm_offset": -1.6})
+    nacelle = turbine.nacelle.model_copy(update={"cm_left": 0.7})
+    return (
+        platform.model_copy(update={"ballast": ballast}),
+        turbine.model_copy(update={"rotor": rotor, "nacelle": nacelle}),
+    )

@@ -46,7 +46,7 @@ def made_up_body(headings=tuple(range(-180, 181, 30)), qtf_headings=((0, 0), (0,
         volume=8029.0,
         centre_of_buoyancy=(0.0, 0.0),
         difference_qtf=DifferenceQtf(second, pairs, value),
-        draft=20.0,
+        draft=120.0,
         source="a made-up body",
     )
 

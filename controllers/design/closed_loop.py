@@ -5,7 +5,7 @@ from math import isinf, pi
 import numpy as np
 
 from fowt_env.analysis.linear_model import LinearModel, linearize, modes
-from fowt_env.analysis.memory_free import platform_frequency
+from fowt_env.analysis.reduced_model import platform_frequency, with_pitch_lag
 from fowt_env.analysis.trim import trim
 from fowt_env.controllers.gains import with_gains
 from fowt_env.controllers.pi import PISettings, schedule_gain
@@ -26,6 +26,7 @@ def closed_loop_matrix(model: LinearModel, settings: PISettings):
     measured pitch it adds -(1 - GK) times that pitch to the command.
     Raises: InputError where the pitch rests on a limit (below rated the loop is open).
     """
+    model = with_pitch_lag(model)
     point = model.point
     pitch = float(point.state[State.BLADE_PITCH])
     if not settings.pitch_minimum < pitch < settings.pitch_maximum:
@@ -82,7 +83,7 @@ def platform_pitch_damping(winds, gain_sets, platform="oc3_hywind", **options):
     table = {name: [] for name in gain_sets}
     for wind in winds:
         scene = build_scene(platform, wind=float(wind), **options)
-        model = linearize(scene, trim(scene))
+        model = with_pitch_lag(linearize(scene, trim(scene)))
         for name, changes in gain_sets.items():
             settings = PISettings.published(with_gains(scene), **changes)
             a, names = closed_loop_matrix(model, settings)

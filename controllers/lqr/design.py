@@ -4,7 +4,7 @@ Per wind speed: surge, platform pitch, rotor and pitch actuator in the plane, th
 second-order filter fitted to its Kaimal spectrum, the waves of the site's sea as one resonance acting with
 the hull's force at the spectrum's peak. The controls are the rates of torque and blade-pitch command. The
 memory of radiated waves acts as the added mass and the damping of the platform's pitch
-(analysis/memory_free.py); what that leaves out, the estimator takes as a moment on the platform.
+(analysis/reduced_model.py); what that leaves out, the estimator takes as a moment on the platform.
 
 Winds, travels and moments that were found for the NREL 5 MW turbine are scaled to others: winds by the
 difference of the rated ones, blade-pitch travel by the rated rotor speed, moments by swept area and hub
@@ -19,7 +19,7 @@ from scipy.linalg import expm, solve_discrete_are
 from scipy.optimize import least_squares
 
 from fowt_env.analysis.linear_model import linearize
-from fowt_env.analysis.memory_free import without_memory
+from fowt_env.analysis.reduced_model import with_pitch_lag, without_memory
 from fowt_env.analysis.trim import without_fluctuations
 from fowt_env.analysis.trim_cache import plant_key, water_key
 from fowt_env.analysis.wave_excitation import wave_force
@@ -191,7 +191,7 @@ def scene_at(scene, speed):
 
 def design_model(scene, speed):
     """DesignModel of a scene's plant at a wind speed, m/s."""
-    model = without_memory(linearize(scene_at(scene, speed)))
+    model = with_pitch_lag(without_memory(linearize(scene_at(scene, speed))))
     rows = [model.index(name) for name in PLANT]
     sensors = [model.output_index(name) for name in SENSORS]
     sea = sea_state_of(joint_sea_state(SITE, min(float(speed), LAST_SEA_WIND)))

@@ -37,7 +37,7 @@ from fowt_env.plant.rollout import (
     OVERSPEED,
     STOP_REASONS,
 )
-from fowt_env.registration import ENVIRONMENTS
+from fowt_env.registration import ENTRY_POINT, ENVIRONMENTS, OTHER_PLATFORMS
 from fowt_env.scene.loads import LOADS
 from fowt_env.training.cli.app import app
 
@@ -106,7 +106,9 @@ def _drawn(task, of):
 
 def environments():
     """Registered names."""
-    return markdown(("name", "class"), [(f"`{name}`", f"`{at}`") for name, at in ENVIRONMENTS.items()])
+    rows = [(f"`{name}`", "`oc3_hywind`", f"`{at}`") for name, at in ENVIRONMENTS.items()]
+    rows += [(f"`{name}`", f"`{platform}`", f"`{ENTRY_POINT}`") for name, platform in OTHER_PLATFORMS.items()]
+    return markdown(("name", "platform", "class"), rows)
 
 
 def tasks():

@@ -16,6 +16,7 @@ from fowt_env.scene.build import build_scene
 from fowt_env.scene.geometry import geometry_faults
 
 DRIFT, TILT = 0.05, 5.0  # of the water depth; deg: a rest without wind that is odd
+SETTLED_HEAVE = 0.05  # of the draft: weight and buoyancy need not fit better than that
 ROUNDS, SETTLED = 40, 1e-6  # for the added mass at a mode's own frequency
 BANDS = {  # s, natural periods of floating turbines from tension legs and barges to spars, with much to spare
     "surge": (15.0, 600.0),
@@ -58,6 +59,8 @@ def check_platform(platform, **options):
         faults["rest"] = str(error).rstrip(".")
     else:
         rest = _rest(point.state)
+        if abs(rest["heave"]) <= SETTLED_HEAVE * scene.platform.draft:
+            faults.pop("vertical", None)  # a wide waterplane carries what is missing
         periods = natural_modes(scene, point)
         faults |= _rest_faults(scene, rest) | _period_faults(periods)
     return Check(

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fowt_env.errors import InputError
+from fowt_env.plant.hydro.members import AX, AXIAL_DRAG, DRAG
 from fowt_env.plant.hydro.strips import GAUSS_OFFSET
 from fowt_env.plant.state import State, pose_of
 from fowt_env.weather.waves import jonswap, wave_number
@@ -44,7 +45,8 @@ class LinearDrag:
     damping (6, 6): the force is minus this times the hull's velocities; excitation (n, 6) complex: force per
     elevation at the hull, of a hull at rest. at_rest (6, 6): the part of damping that the drag has without
     waves and motion, from the current alone; linear models of the plant contain that. z (m,) and
-    deviation (m,): body z of the strips' nodes, and standard deviation of the relative velocity there, m/s.
+    deviation (m,): body z of the nodes of strips and members' sides, and standard deviation of the relative
+    velocity there, m/s.
     """
 
     damping: np.ndarray
@@ -75,74 +77,105 @@ def elevation_spectrum(sea, omega):
     return found * sea.Hs**2 / 16.0 / whole
 
 
+class _Drag(NamedTuple):
+    """Points of a hull with quadratic drag in one or two directions each."""
+
+    factor: np.ndarray  # (m,) N/(m/s)^2
+    place: np.ndarray  # (m, 3) body axes, m
+    basis: np.ndarray  # (m, k, 3) unit vectors of the directions, body axes
+
+
 def linear_drag(scene, state, omega, sea, motion=AT_REST):
-    """LinearDrag of a scene's strips about a state, in a sea and with a motion of the hull.
+    """LinearDrag of a scene's hull about a state, in a sea and with a motion of the hull.
 
     omega: (n,) rad/s, rising, of the sea's spectrum, of motion.waves and of the excitation. sea: a
     descriptions.SeaState with a spectrum, or None. Nodes are those of the exact strips below the mean water
-    surface on the axis. A current of the scene is the mean of the relative velocity; what it does to the
-    mean of the drag is left out. Zero without hydrodynamics.
+    surface on the axis, and those of members in their undisplaced place. A quadratic damping matrix takes
+    part with the hull's own velocities. A current of the scene is the mean of the relative velocity; what it
+    does to the mean of the drag is left out. Zero without hydrodynamics.
     Raises: InputError for a sea that has no spectrum.
     """
     omega = np.asarray(omega, dtype=float)
     density = elevation_spectrum(sea, omega)
     hydro = scene.model.hydro
-    if hydro is None or hydro.strips is None or hydro.strips.shape is None:
-        none, excitation = np.zeros((6, 6)), np.zeros((omega.size, 6), complex)
-        damping = none + _matrix_damping(hydro, omega, density, motion)
-        return LinearDrag(damping, excitation, none, np.zeros(0), np.zeros(0))
-    strips, site = hydro.strips.shape, scene.platform.environment
-    rotation, height = _axes(state)
-    z, length, diameter = _nodes(strips, height, rotation)
-    heading = 0.0 if sea is None else np.radians(float(sea.heading))
-    place = np.outer(z, rotation[:, 2]) + [0.0, 0.0, height]  # (m, 3), the hull's mean place as origin
-    place = np.vstack([place, strips.keel_z * rotation[:, 2] + [0.0, 0.0, height]])
-    number = wave_number(omega, strips.depth, site.gravity)
-    water = _wave_velocity(omega, number, place, heading, strips.depth) @ rotation  # (n, m + 1, 3), body
-    flow = _current(hydro.current, place, strips.depth) @ rotation
-    # how the hull's velocities move the nodes, across the axis; the keel moves along it
-    moves = np.zeros((z.size, 2, 6))
-    moves[:, 0, 0] = moves[:, 1, 1] = 1.0
-    moves[:, 0, 4], moves[:, 1, 3] = z, -z
-    heave = np.zeros((1, 1, 6))
-    heave[0, 0, 2] = 1.0
-    across = 0.5 * strips.density * strips.drag_coefficient * diameter * length
-    along = np.array([0.5 * strips.density * strips.axial_drag_coefficient * strips.keel_area])
-    weight = density * np.gradient(omega) if omega.size > 1 else np.zeros(omega.size)
     damping, at_rest = np.zeros((6, 6)), np.zeros((6, 6))
-    if hydro.matrices is not None:
-        damping += _matrix_damping(hydro, omega, density, motion)
     excitation = np.zeros((omega.size, 6), complex)
-    for factor, lever, moved, mean in (
-        (across, moves, water[:, :-1, :2], flow[:-1, :2]),
-        (along, heave, water[:, -1:, 2:], flow[-1:, 2:]),
-    ):
+    heights, deviations = [np.zeros(0)], [np.zeros(0)]
+    if hydro is None:
+        return LinearDrag(damping, excitation, at_rest, heights[0], deviations[0])
+    site = scene.platform.environment
+    rotation, height = _axes(state)
+    heading = 0.0 if sea is None else np.radians(float(sea.heading))
+    number = wave_number(omega, site.water_depth, site.gravity)
+    weight = density * np.gradient(omega) if omega.size > 1 else np.zeros(omega.size)
+    for group in (*_of_strips(hydro.strips, height, rotation), *_of_members(hydro.members)):
+        # the hull's mean place is the origin
+        place = group.place @ rotation.T + [0.0, 0.0, height]
+        water = _wave_velocity(omega, number, place, heading, site.water_depth) @ rotation  # (n, m, 3), body
+        moved = np.einsum("nmj,mij->nmi", water, group.basis)
+        flow = _current(hydro.current, place, site.water_depth) @ rotation
+        mean = np.einsum("mj,mij->mi", flow, group.basis)
+        # how the hull's velocities move the points in these directions
+        lever = np.concatenate([group.basis, np.cross(group.place[:, None, :], group.basis)], axis=2)
         own = np.einsum("mij,nj->nmi", lever, np.broadcast_to(motion.waves, (omega.size, 6)))
         relative = moved - own
         covariance = np.einsum("n,nmi,nmj->mij", weight, relative, relative.conj()).real
         covariance += np.einsum("mij,jk,mlk->mil", lever, np.broadcast_to(motion.other, (6, 6)), lever)
-        gain = factor[:, None, None] * mean_slope(mean, covariance)
+        gain = group.factor[:, None, None] * mean_slope(mean, covariance)
         damping += np.einsum("mij,mik,mkl->jl", lever, gain, lever)
         excitation += np.einsum("mij,mik,nmk->nj", lever, gain, moved)
-        still = factor[:, None, None] * mean_slope(mean, np.zeros_like(covariance))
+        still = group.factor[:, None, None] * mean_slope(mean, np.zeros_like(covariance))
         at_rest += np.einsum("mij,mik,mkl->jl", lever, still, lever)
-        if factor is across:
-            deviation = np.sqrt(np.trace(covariance, axis1=1, axis2=2))
-    return LinearDrag(damping, excitation, at_rest, z, deviation)
+        if group.basis.shape[1] == 2:
+            heights.append(group.place[:, 2])
+            deviations.append(np.sqrt(np.trace(covariance, axis1=1, axis2=2)))
+    damping += _of_matrix(hydro.matrices, rotation, weight, motion)
+    return LinearDrag(damping, excitation, at_rest, np.concatenate(heights), np.concatenate(deviations))
 
 
-def _matrix_damping(hydro, omega, density, motion):
-    """(6, 6) damping for the quadratic damping matrix of a body, by the deviations of its velocities.
+def _of_strips(part, height, rotation):
+    """[_Drag] of the strips' sides and keel; empty without strips."""
+    if part is None or part.shape is None:
+        return []
+    strips = part.shape
+    z, length, diameter = _nodes(strips, height, rotation)
+    sides, keel = np.zeros((z.size, 3)), np.zeros((1, 3))
+    sides[:, 2], keel[:, 2] = z, strips.keel_z
+    across = 0.5 * strips.density * strips.drag_coefficient * diameter * length
+    along = np.array([0.5 * strips.density * strips.axial_drag_coefficient * strips.keel_area])
+    axes = np.eye(3)
+    return [
+        _Drag(across, sides, np.broadcast_to(axes[:2], (z.size, 2, 3))),
+        _Drag(along, keel, axes[None, 2:]),
+    ]
 
-    The matrix is in inertial axes; those of the hull, which leans by a few degrees, are taken for them.
-    """
-    matrices = None if hydro is None else hydro.matrices
-    if matrices is None:
+
+def _of_members(members):
+    """[_Drag] of the members' sides and ends; empty without members."""
+    if members is None:
+        return []
+    found = []
+    for column, size in ((DRAG, 2), (AXIAL_DRAG, 1)):
+        nodes = members.nodes[members.nodes[:, column] > 0.0]
+        if len(nodes):
+            axis = nodes[:, AX : AX + 3]
+            # rows of V in the singular value decomposition of an axis: itself and two across it
+            basis = np.linalg.svd(axis[:, None, :])[2]
+            found.append(
+                _Drag(nodes[:, column], nodes[:, :3], basis[:, 1:] if size == 2 else axis[:, None, :])
+            )
+    return found
+
+
+def _of_matrix(matrices, rotation, weight, motion):
+    """(6, 6) linear damping for the quadratic one of BodyMatrices, on velocities in inertial axes."""
+    if matrices is None or not matrices.quadratic_damping.any():
         return np.zeros((6, 6))
-    weight = density * np.gradient(omega) if omega.size > 1 else np.zeros(omega.size)
-    waves = np.broadcast_to(motion.waves, (omega.size, 6))
-    variance = weight @ np.abs(waves) ** 2 + np.diag(np.broadcast_to(motion.other, (6, 6)))
-    return matrices.quadratic_damping * np.sqrt(8.0 / pi * variance)
+    turn = np.kron(np.eye(2), rotation)
+    own = np.broadcast_to(motion.waves, (weight.size, 6))
+    covariance = np.einsum("n,ni,nj->ij", weight, own, np.conj(own)).real + motion.other * np.ones((6, 6))
+    deviation = np.sqrt(np.maximum(np.diag(turn @ covariance @ turn.T), 0.0))
+    return turn.T @ (matrices.quadratic_damping * np.sqrt(8.0 / pi) * deviation) @ turn
 
 
 def with_drag(model, drag):

@@ -21,6 +21,10 @@ class LoadFacts(NamedTuple):
     mirrored: bool = True  # whether a mirrored state and weather give the mirrored load
 
 
+EXCITATION = (
+    *(f"hydro.excitation.first.{name}" for name in ("force", "table.value", "exact.force")),
+    *(f"hydro.excitation.second.{name}" for name in ("table.value", "mean")),
+)
 STRIPS = ("hydro.strips.shape.", "hydro.strips.quadrature.")
 LOADS = {
     "weight": LoadFacts(
@@ -48,7 +52,9 @@ LOADS = {
     "waves": LoadFacts(
         "motion and pressure of the water that strips and keel meet; without it the water is still",
         "hydro/waves.py", "5.4", "hydro.waves", "HYDRO", {"sea": None},
-        strength=("hydro.waves.amplitude", "hydro.waves.velocity", "hydro.strips.bands.weight"),
+        strength=(
+            "hydro.waves.amplitude", "hydro.waves.velocity", "hydro.strips.bands.weight", *EXCITATION,
+        ),
     ),
     "diffraction": LoadFacts(
         "MacCamy and Fuchs' coefficient of fluid inertia in waves; without it 1 + C_A",
@@ -73,6 +79,14 @@ LOADS = {
         "hydro/added_inertia.py", "5.6", "hydro.added_inertia", "HYDRO",
         keys=("hydro.added_mass",), strength=("hydro.added_inertia.matrix",),
     ),
+    "members": LoadFacts(
+        "buoyancy, fluid inertia, wave pressure and drag on cylinders of any place and direction",
+        "hydro/members.py, hydro/member_buoyancy.py", "5.10", "hydro.members", "HYDRO", keys=("members",),
+        strength=(
+            *(f"hydro.members.{name}" for name in ("table", "nodes", "added_mass")),
+            "hydro.members.bodies.specific_weight",
+        ),
+    ),
     "body matrices": LoadFacts(
         "hydrostatics and added mass of a potential-flow body; additional preload, stiffness and damping",
         "hydro/body_matrices.py", "5.7", "hydro.matrices", "HYDRO", keys=("additional",),
@@ -80,6 +94,11 @@ LOADS = {
             f"hydro.matrices.{name}"
             for name in ("constant", "stiffness", "linear_damping", "quadratic_damping", "added_mass")
         ),
+    ),
+    "excitation": LoadFacts(
+        "force of the waves on a potential-flow body, first and second order",
+        "hydro/excitation.py", "5.9", "hydro.excitation", "HYDRO", keys=("potential_flow",),
+        strength=EXCITATION,
     ),
     "moorings": LoadFacts(
         "elastic catenaries on the seabed, at rest in the present place",

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from fowt_env.errors import InputError
 from fowt_env.plant.channels import Layout
 from fowt_env.plant.drivetrain import build_drivetrain
 from fowt_env.plant.model import RigidBody
@@ -53,6 +54,12 @@ def build_rigid_body(platform, turbine, platform_fixed=False, rotor_fixed=False,
     ballast = platform.ballast
     place = (ballast.cm_downwind, ballast.cm_left, -ballast.cm_depth)
     matrix = assemble([(ballast.mass, place, ballast.inertia), *_upper_bodies(platform, turbine)])
+    if plane is not None and matrix[0, 5] != 0.0:
+        left = -matrix[0, 5] / matrix[0, 0]
+        raise InputError(
+            f"cm_left of ballast or nacelle: the centre of mass lies {left:g} m to the left; a planar scene"
+            " needs 0 (planar = False)"
+        )
     drivetrain = build_drivetrain(turbine)
     return RigidBody(
         np.ascontiguousarray(matrix),

@@ -15,7 +15,7 @@ from fowt_env.plant.aero.wake import n_wake_states
 from fowt_env.plant.hydro.added_inertia import build_added_inertia
 from fowt_env.plant.hydro.body_matrices import build_body_matrices
 from fowt_env.plant.hydro.diffraction import build_strip_diffraction
-from fowt_env.plant.hydro.excitation import build_place
+from fowt_env.plant.hydro.excitation import build_filtered_position
 from fowt_env.plant.hydro.hydrostatics import build_hull
 from fowt_env.plant.hydro.linear_damping import build_damping
 from fowt_env.plant.hydro.load import BandedStrips, ExactStrips, Hydro
@@ -69,7 +69,7 @@ def build_hydro(platform, waves, current, options, first_state=N_RIGID):
             quadrature = build_quadrature(platform.hull, shape, _refinement(waves))
             strips = BandedStrips(shape, quadrature, None, None)
     excitation = excitation_in_waves(platform, waves, options, first_state)
-    first_state += 0 if excitation is None or excitation.place is None else 2
+    first_state += 0 if excitation is None or excitation.position is None else 2
     return Hydro(
         hull=build_hull(platform.hull, site.water_density, site.gravity) if spar else None,
         strips=strips_in_waves(strips, waves, options),
@@ -97,8 +97,8 @@ def hydro_in_waves(hydro, waves, platform, options):
         waves = flat_waves(depth=site.water_depth, density=site.water_density, gravity=site.gravity)
     strips, excitation = hydro.strips, still_excitation(hydro.excitation)
     if not is_flat(waves):
-        place = None if excitation is None else excitation.place
-        excitation = excitation_in_waves(platform, waves, options, 0 if place is None else place.first)
+        position = None if excitation is None else excitation.position
+        excitation = excitation_in_waves(platform, waves, options, 0 if position is None else position.first)
     if isinstance(strips, BandedStrips) and (is_flat(waves) or is_flat(hydro.waves)):
         nodes = build_quadrature(platform.hull, strips.shape, _refinement(waves))
         quadrature = strips.quadrature._replace(table=nodes.table, keel=nodes.keel)
@@ -122,13 +122,13 @@ def excitation_in_waves(platform, waves, options, first_state):
             f"second_order = {second!r}: the platform {platform.name!r} has no difference-frequency QTF;"
             " allowed without one: None or 'none'"
         )
-    place = None
+    position = None
     if options["excitation_position"] == "filtered":
-        place = build_place(first_state, options["excitation_cutoff"])
+        position = build_filtered_position(first_state, options["excitation_cutoff"])
     return build_excitation(
         body,
         waves,
-        place=place,
+        position=position,
         duration=options["duration"],
         fast=options["wave_loads"] == "fast",
         planar=options["planar"],

@@ -36,8 +36,9 @@ POLISHED = 2.0  # times the error that is asked for, below which poles are worth
 DECAY = (0.05, 8.0)  # 1/s, of a pole: one of less would outlast SPAN, and is narrower than files resolve
 FREQUENCY = (0.01, 8.0)  # rad/s, of a pole
 PASSIVE_UP_TO = 10.0  # rad/s
-PASSIVE_MARGIN = 1e-5  # least Re K at which residues are held, of its size there
+PASSIVE_MARGIN = 1e-4  # least Re K at which residues are held, of its size there
 PASSIVE_ROUNDS = 60
+CHECKED = 4001  # frequencies up to there at which a fit is judged
 NOT_PASSIVE = 1e-4  # of an entry's largest value: beyond it a fit is refused
 SPAN = 60.0  # s of past velocities in a convolution
 FADE = 15.0  # s at its end in which K goes to zero: cut off, it would damp slow motions, or drive them
@@ -258,7 +259,7 @@ def _constrained(left, right, rows, least):
 
 def _passive_grid():
     """Frequencies (rad/s) at which Re K is held positive, and its size there: w^2, and 1/w^2 far up."""
-    middle = np.arange(0.05, PASSIVE_UP_TO + 0.01, 0.025)
+    middle = np.r_[np.arange(0.05, BAND[1], 0.002), np.arange(BAND[1], PASSIVE_UP_TO + 0.01, 0.01)]
     omega = np.unique(np.r_[np.geomspace(1e-3, 0.05, 10), middle, 20.0, 50.0])
     return omega, omega**2 / (omega**2 + 0.3**2) / (1.0 + (omega / 3.0) ** 2)
 
@@ -401,8 +402,7 @@ def _fit(body, asked):
         poles |= dict.fromkeys(block, own)
         residues |= found
     fit = RadiationFit(poles, residues, {}, 0.0, asked)
-    grid = _passive_grid()[0]
-    far = fit.response(grid[grid <= PASSIVE_UP_TO])
+    far = fit.response(np.linspace(0.0, PASSIVE_UP_TO, CHECKED)[1:])
     own = _misses(fit, omega[band], k[band])
     of_file = _misses(fit, body.omega[known], retardation(body)[known])
     entries = {}

@@ -14,7 +14,7 @@ from fowt_env.errors import InputError
 from fowt_env.plant.channels import Channel, channels, put_hub_wind, scales
 from fowt_env.plant.compile.handle import Handle
 from fowt_env.plant.events import N_COUNTERS
-from fowt_env.plant.hydro.excitation import excitation_scratch, place_states
+from fowt_env.plant.hydro.excitation import excitation_scratch, position_states
 from fowt_env.plant.hydro.member_series import N_WATER
 from fowt_env.plant.hydro.members import N_NODE
 from fowt_env.plant.hydro.radiation import memory_data, memory_states
@@ -67,7 +67,7 @@ class Scene:
         """What the entries of this scene's state vector are, in order."""
         internal = {"wake": wake_states(self.model.aero)}
         internal |= {f"load {load.name}": load.states for load in self.loads}
-        internal |= {"slow place": place_states(self.model.hydro)}
+        internal |= {"filtered position": position_states(self.model.hydro)}
         return state_blocks(internal | {"radiation": memory_states(self.model.hydro)})
 
     @property

@@ -33,13 +33,13 @@ SAME_HEADING = 1e-4  # rad, of headings that the figures of files cannot tell ap
 OUT_OF_PLANE = (1, 3, 5)  # sway, roll, yaw
 
 
-def build_excitation(body, waves, *, duration, fast, planar, place=None, second_order=None, cutoff=None):
+def build_excitation(body, waves, *, duration, fast, planar, position=None, second_order=None, cutoff=None):
     """Excitation of a PotentialFlow in Waves; None without either.
 
     duration      s that the table of a sea that does not repeat has to cover
     fast          first order from a table; else by the sum over components
     planar        forces in the plane alone
-    place         SlowPlace at which the waves meet the body; None: undisplaced
+    position      FilteredPosition at which the waves meet the body; None: undisplaced
     second_order  None, "none", "mean_drift", "newman" or "full"; cutoff: rad/s, of the differences, or None
 
     Raises: InputError for a sea beyond the body's headings or frequencies. Warns: PlantWarning where
@@ -60,7 +60,7 @@ def build_excitation(body, waves, *, duration, fast, planar, place=None, second_
         np.ascontiguousarray(np.concatenate([force.real, force.imag], axis=1)),
         float(waves.ramp),
     )
-    if fast and place is None:
+    if fast and position is None:
         first = ExcitationSeries(_first_order_table(waves, force, duration), first)
     elif fast:
         first = _fast_sum(first, waves.amplitude)
@@ -68,7 +68,7 @@ def build_excitation(body, waves, *, duration, fast, planar, place=None, second_
     if second is not None and planar:
         second.table.value[:, OUT_OF_PLANE] = 0.0
         second.mean[list(OUT_OF_PLANE)] = 0.0
-    return Excitation(first, second, place)
+    return Excitation(first, second, position)
 
 
 def _first_order_table(waves, force, duration):
@@ -103,7 +103,7 @@ def still_excitation(part):
     elif isinstance(part.first, FastExcitation):
         first = _fast_sum(first, none)
     second = None if part.second is None else part.second._replace(table=flat, mean=np.zeros(6), ramp=0.0)
-    return Excitation(first, second, part.place)
+    return Excitation(first, second, part.position)
 
 
 def excitation_at(body, omega, heading):

@@ -9,7 +9,7 @@ from scipy.fft import ifft, next_fast_len
 from fowt_env.plant.hydro.excitation import COLUMNS, TimeTable
 
 EVEN = 1e-6  # of a spacing: what frequencies may miss a harmonic by, a phase of 6e-6 rad after one period
-SPLINE_ERROR = 1.3e-3  # of an interpolated exponential, times (omega step)^4: rms over places and phases
+SPLINE_ERROR = 1.3e-3  # of an interpolated exponential, times (omega step)^4: rms over times and phases
 TOLERANCE = 5e-6  # rms error of a table over its standard deviation
 ROUNDED = 1e-4  # of a gap: what figures of files may miss a multiple by
 MOST_HARMONICS = 20_000  # from the lowest to the highest frequency, where they are not that many themselves

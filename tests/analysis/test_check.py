@@ -1,4 +1,4 @@
-"""What is said of a platform at rest: against closed forms, published figures and files that cannot be meant."""
+"""What is said of a platform at rest: closed forms, published figures, and files that cannot be meant."""
 
 import json
 import re
@@ -12,8 +12,10 @@ from typer.testing import CliRunner
 import fowt_env
 from fowt_env.analysis.check import _at_own_frequency, check_platform
 from fowt_env.analysis.linear_model import natural_periods
+from fowt_env.descriptions.builtin import names
 from fowt_env.descriptions.files import DATA
 from fowt_env.descriptions.platform import Line, read_platform
+from fowt_env.scene.geometry import geometry_faults
 from fowt_env.training import cli
 from fowt_env.training.cli import app  # noqa: F401
 
@@ -39,7 +41,8 @@ def test_oc3_fits_and_has_its_published_figures(oc3, platform):
     assert oc3.statics.pull == pytest.approx(published["mooring_preload"], rel=1e-6)
     assert oc3.statics.mass_centre[2] == pytest.approx(-78.0, abs=0.01)
     for motion, period in published["natural_periods"].items():
-        assert oc3.periods[motion.replace("_", " ")] == pytest.approx(period, rel=4e-3)
+        name = "platform pitch" if motion == "pitch" else motion
+        assert oc3.periods[name] == pytest.approx(period, rel=4e-3)
 
 
 def test_metacentric_height_is_that_of_the_waterplane(oc3, platform):
@@ -69,7 +72,7 @@ def test_a_spar_of_members_floats_as_the_spar_does(oc3):
 
 def test_a_tension_leg_platform_rests_on_its_tendons():
     found = check_platform(tension_leg())
-    still, (length, weight, stiffness) = found.statics, TENDON
+    still, (length, _, stiffness) = found.statics, TENDON
     assert found.faults == ()
     assert still.pull == pytest.approx(8 * 3833338.083, rel=2e-6)
     # heave: eight springs and the waterplane against mass and the added mass of a half sphere
@@ -109,7 +112,7 @@ def test_a_semi_of_members_floats_upright():
 
 NONSENSE = {  # key, value, words of the faults
     "too much ballast": ("mass", "8.47e6", ("weighs 88944 kN", "9843 kN (1004 t) too heavy")),
-    "too little ballast": ("mass", "4e6", ("heave of 51.7 m" "|rests +51.7 m in heave", "(3466 t) too light")),
+    "too little ballast": ("mass", "4e6", ("+51.68 m in heave", "(3466 t) too light")),
     "diameters in dm": ("diameter", "[94.0, 94.0, 65.0, 65.0]", ("8070814 kN",)),
     "centre of mass above the water": (
         "cm_depth", "-89.9155", ("mass is at z = 88.5 m", "metacentric height -150 m|metacentric height -1"),
@@ -117,7 +120,7 @@ NONSENSE = {  # key, value, words of the faults
     "lines far too short": ("length", "500.0", ("45.3 m below the sea bed", "shorter than the way")),
     "lines too long": ("length", "1300.0", ("all mooring lines hang slack",)),
     "azimuths in radians": (
-        "azimuth_deg", "[0.0, 2.0944, 4.18879]", ("look like radians", "rests 163|rests 164"),
+        "azimuth_deg", "[0.0, 2.0944, 4.18879]", ("look like radians", "rests 199.9 m from its place"),
     ),
     "weight of the lines in kN": ("wet_weight", "0.698094", ("pull with 2.91 kN together",)),
     "fairleads in dm": ("fairlead_radius", "52.0", ("52 m from the tower axis", "the hull reaches 4.7 m")),
@@ -153,12 +156,12 @@ def test_the_added_mass_is_that_of_the_modes_own_frequency():
 
 def test_members_and_lines_in_wrong_places_are_named():
     low = semi().members[0].model_copy(update={"start": (14.4, 25.0, -220.0)})
-    with pytest.warns(fowt_env.PlantWarning, match="member 1 reaches down to z = -220 m, below the sea bed"):
+    with pytest.warns(fowt_env.PlantWarning, match="ember 1 reaches down to z = -220 m, below the sea bed"):
         fowt_env.build_scene(semi(members=(low, *semi().members[1:])))
     inside = Line(
         anchor=(-60.0, 0.0, -200.0), fairlead=(70.0, 0.0, -14.0), length=300.0, wet_weight=1e3, EA=1e9
     )
-    with pytest.warns(fowt_env.PlantWarning, match="the anchor of line 1 is nearer to the tower axis"):
+    with pytest.warns(fowt_env.PlantWarning, match="he anchor of line 1 is nearer to the tower axis"):
         fowt_env.build_scene(semi(lines=(inside,)))
 
 
@@ -167,7 +170,7 @@ def test_one_platform_is_warned_of_once():
         member.model_copy(update={"start": (x, y, 30.0), "end": (x, y, 40.0)})
         for member, (x, y) in zip(semi().members[:3], ((1.0, 0.0), (2.0, 0.0), (3.0, 0.0)), strict=True)
     )
-    with pytest.warns(fowt_env.PlantWarning, match="all 3 members lie above the water"):
+    with pytest.warns(fowt_env.PlantWarning, match="ll 3 members lie above the water"):
         fowt_env.build_scene(semi(members=dry, lines=()))
     fowt_env.build_scene(semi(members=dry, lines=()))
 
@@ -203,8 +206,11 @@ def test_the_command_refuses_a_file_that_cannot_be_read(tmp_path):
 
 
 def test_built_in_platforms_have_no_fault_of_geometry():
-    from fowt_env.descriptions.builtin import names
-    from fowt_env.scene.geometry import geometry_faults
-
     for name in names("platforms"):
         assert geometry_faults(read_platform(name)) == {}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", names("platforms"))
+def test_built_in_platforms_fit(name):
+    assert check_platform(name).faults == ()

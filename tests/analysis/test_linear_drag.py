@@ -1,5 +1,6 @@
 """Drag made linear: against means over random numbers, and against the strips' own drag in random seas."""
 
+import floaters
 import numpy as np
 import pytest
 from plant_helpers import state
@@ -15,11 +16,14 @@ from fowt_env.analysis.linear_drag import (
     with_drag,
 )
 from fowt_env.analysis.linear_model import linearize
+from fowt_env.analysis.statics import mean_derivative
 from fowt_env.analysis.wave_excitation import _strip_force
+from fowt_env.descriptions.platform import AdditionalLoads
 from fowt_env.descriptions.sea_state import sea_state_of
 from fowt_env.errors import InputError
 from fowt_env.plant.hydro.morison import morison_load
-from fowt_env.plant.state import pose_of
+from fowt_env.plant.model import LoadCache
+from fowt_env.plant.state import State, pose_of
 from fowt_env.weather.waves import build_waves
 
 SEA = sea_state_of({"kind": "jonswap", "Hs": 3.0, "Tp": 9.0, "gamma": 2.0})
@@ -179,3 +183,54 @@ def test_the_spectrum_has_the_sea_s_variance_and_a_sea_without_one_is_named(scen
 def test_without_water_there_is_no_drag(bare_scene):
     found = linear_drag(bare_scene, np.zeros(bare_scene.n_state), OMEGA, SEA)
     assert not found.damping.any() and not found.excitation.any()
+
+
+# members and matrices
+
+
+def test_a_spar_of_members_has_the_linear_drag_of_its_strips(scene):
+    fixed = {"kinematics_position": "fixed", "surface": "swl", "stretching": "none", "strip_length": 1.0}
+    members = build_scene(floaters.spar(), **fixed)
+    waves = np.zeros((OMEGA.size, 6), complex)
+    waves[:, 0], waves[:, 4] = 0.3j * OMEGA, 0.004
+    for motion in (AT_REST, HullMotion(waves, np.diag([0.04, 0.02, 0.01, 1e-5, 1e-5, 0.0]))):
+        wanted = linear_drag(scene, np.zeros(15), OMEGA, SEA, motion)
+        found = linear_drag(members, np.zeros(15), OMEGA, SEA, motion)
+        for name in ("damping", "excitation"):
+            a, b = getattr(found, name), getattr(wanted, name)
+            assert np.abs(a - b).max() < 1e-4 * np.abs(b).max()
+
+
+def test_leaning_members_have_the_drag_of_the_plant_s_slope():
+    """In a current, still water and no motion the gain is the slope of the plant's own load."""
+    current = build_scene(floaters.semi(), current={"speed": 0.8, "heading": 30.0})
+    found = linear_drag(current, np.zeros(15), OMEGA, None)
+    data = current.data()
+    handle = current.handle(data)
+    # ends that no flow meets have a slope of the step itself
+    step, slope = 1e-6, np.zeros((6, 6))
+    for column in range(6):
+        for side in (1.0, -1.0):
+            x, dx, mean = np.zeros(15), np.zeros(15), np.zeros(15)
+            x[State.VX + column] = side * step
+            mean_derivative(handle, x, np.zeros(2), 1, dx, mean)
+            load = data.cache[LoadCache.HYDRO : LoadCache.HYDRO + 6]
+            slope[:, column] -= side * load / (2.0 * step)
+    scale = np.sqrt(np.outer(np.diag(slope), np.diag(slope)))
+    assert np.abs((found.at_rest - slope) / scale).max() < 5e-4
+    assert found.damping == pytest.approx(found.at_rest, rel=1e-9)
+
+
+def test_a_quadratic_damping_matrix_takes_the_gain_of_its_motion(scene):
+    quadratic = np.diag([1e5, 2e5, 3e5, 4e9, 5e9, 6e9])
+    quadratic[0, 4] = -7e6
+    platform = floaters.semi(
+        additional=AdditionalLoads(quadratic_damping=tuple(map(tuple, quadratic.tolist())))
+    )
+    plain = linear_drag(build_scene(floaters.semi()), np.zeros(15), OMEGA, None)
+    deviation = np.array([0.5, 0.2, 0.3, 0.01, 0.02, 0.03])
+    motion = HullMotion(0.0, np.diag(deviation**2))
+    more = linear_drag(build_scene(platform), np.zeros(15), OMEGA, None, motion).damping
+    less = linear_drag(build_scene(floaters.semi()), np.zeros(15), OMEGA, None, motion).damping
+    assert more - less == pytest.approx(quadratic * np.sqrt(8.0 / np.pi) * deviation, rel=1e-9, abs=1e-3)
+    assert not plain.damping.any()

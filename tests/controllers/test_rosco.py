@@ -12,7 +12,8 @@ import pytest
 
 from fowt_env import build_scene, simulate
 from fowt_env.controllers import make
-from fowt_env.controllers.rosco import Rosco, RoscoSettings, find_library, pitch_gains
+from fowt_env.controllers.rosco import ENTRY, Discon, Rosco, RoscoSettings, find_library, pitch_gains
+from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.errors import InputError
 from fowt_env.plant.measurement import Measurement
 
@@ -161,3 +162,53 @@ def test_floating_feedback_damps_the_platform():
 def test_settings_out_of_range_are_named(key, value):
     with pytest.raises(InputError, match=key):
         Rosco(RoscoSettings(**{key: value}), 0.1)
+
+
+@pytest.fixture
+def discon():
+    """The DISCON.IN of the IEA 15 MW turbine on VolturnUS-S."""
+    return Discon(read_turbine("iea15").discon)
+
+
+def test_a_turbines_own_deck_is_taken_as_it_stands(discon):
+    text, table = discon.texts({}, None)
+    changed = [
+        (old, new) for old, new in zip(discon.text.splitlines(), text.splitlines(), strict=True) if old != new
+    ]
+    names = {ENTRY.match(new)["name"] for _, new in changed}
+    assert names == {"LoggingLevel", "Ext_Interface", "PerfFileName"}
+    for old, new in changed:
+        assert old.partition("!")[2] == new.partition("!")[2]
+    assert "Power coefficient" in table  # the file that the deck names
+    assert discon.values["PC_RefSpd"] == "0.791680000000" and discon.mode == 2
+
+
+def test_an_entry_of_the_deck_can_be_changed_and_a_wrong_one_is_named(discon):
+    text, _ = discon.texts({"SS_Mode": 0}, None)
+    assert any(line.startswith("0   ") and "SS_Mode" in line for line in text.splitlines())
+    with pytest.raises(InputError, match="PC_RefSpeed"):
+        discon.texts({"PC_RefSpeed": 1.0}, None)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "part"),
+    [
+        ("IPC_ControlMode", "1   ! IPC_ControlMode - x", "IPC_ControlMode = 1: must be 0 here"),
+        ("Fl_Mode", "3   ! Fl_Mode - x", "Fl_Mode = 3: must be 0, 1 or 2"),
+        ("PerfFileName", "", "PerfFileName is missing"),
+    ],
+)
+def test_a_deck_that_needs_more_than_it_is_given_is_refused(tmp_path, discon, old, new, part):
+    lines = [new if old in line else line for line in discon.text.splitlines()]
+    path = tmp_path / "DISCON.IN"
+    path.write_text("\n".join(lines))
+    with pytest.raises(InputError) as caught:
+        Discon(path)
+    assert part in str(caught.value)
+
+
+def test_the_feedback_of_a_deck_needs_no_more_than_sensors_have():
+    controller = make("rosco", read_turbine("iea15"), 0.1)
+    assert "platform_pitch_rate" in controller.information
+    assert "platform_pitch_acceleration" not in controller.information
+    assert make("rosco_float", read_turbine("iea15"), 0.1).information == controller.information

@@ -83,7 +83,7 @@ def test_every_built_in_platform_loads_with_its_turbine(name):
 def test_every_built_in_turbine_loads(name):
     turbine = read_turbine(name)
     assert turbine.name == name
-    assert set(turbine.gains) == {"oc3", "land"}
+    assert set(turbine.gains) in ({"oc3", "land"}, set())  # none published: derived
 
 
 def test_oc3_weight_equals_buoyancy_less_mooring_preload_within_100_N():

@@ -217,6 +217,16 @@ def _(folder, monkeypatch):
     return refused(fowt_env.trim, fowt_env.build_scene("mine.toml", fidelity="standard"))
 
 
+@under("A place in a platform file is doubted")
+def _(folder, monkeypatch):
+    text = (DATA / "platforms" / "oc3_hywind.toml").read_text()
+    (folder / "mine.toml").write_text(text.replace("fairlead_radius = 5.2", "fairlead_radius = 52.0"))
+    monkeypatch.chdir(folder)
+    with pytest.warns(fowt_env.PlantWarning) as caught:
+        fowt_env.build_scene("mine.toml")
+    return str(caught[0].message)
+
+
 @under("A controller's answer stops the run")
 def _(folder, monkeypatch):
     class Mine:

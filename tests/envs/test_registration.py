@@ -5,9 +5,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import gymnasium
 import pytest
 
 import fowt_env
+from fowt_env.descriptions.platform import platform_names
+from fowt_env.registration import OTHER_PLATFORMS
 
 pytestmark = pytest.mark.installation
 
@@ -35,6 +38,13 @@ def test_import_registers_and_loads_no_environment(imports):
 def test_a_name_with_the_module_needs_no_import():
     code = f"import gymnasium; env = gymnasium.make('fowt_env:{NAME}', wind=None); print(env.spec.id)"
     assert python(code) == NAME
+
+
+@pytest.mark.parametrize(("name", "platform"), OTHER_PLATFORMS.items())
+def test_names_of_other_platforms_make_environments_of_them(name, platform):
+    spec = gymnasium.spec(name)
+    assert spec.kwargs == {"platform": platform} and platform in platform_names()
+    assert gymnasium.spec(NAME).entry_point == spec.entry_point
 
 
 def test_registering_twice_is_silent():

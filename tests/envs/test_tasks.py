@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.envs import TASKS, FowtEnv, Task, task_tables
 from fowt_env.envs.observations import DEFAULT, KNOWN, STANDARD, check_channels
 from fowt_env.envs.rewards import REWARD_TERMS
@@ -158,3 +159,29 @@ def test_tables_show_every_entry_and_every_term():
     text = task_tables(task)
     for word in (*REWARD_TERMS, *STANDARD, "wind_preview_4s", "sin_azimuth", "47.40 kN m", "0 to 30 deg"):
         assert word in text
+
+
+def test_tasks_are_those_of_the_nrel_5_mw_turbine():
+    turbine = read_turbine("nrel5mw")
+    assert all(task_of(name, turbine) is task for name, task in TASKS.items())
+
+
+def test_tasks_are_scaled_to_a_larger_turbine():
+    turbine = read_turbine("oc3_froude_10mw")
+    above, full = task_of("above_rated", turbine), task_of("full_range", turbine)
+    rated, cut_out = turbine.rated_wind_speed, turbine.cut_out_wind_speed
+    assert above.wind["speed"] == pytest.approx((rated + 0.6, rated + 12.6))
+    assert full.wind["speed"][1] == cut_out and turbine.cut_in_wind_speed < full.wind["speed"][0] < rated
+    slower = turbine.rated_rotor_speed / read_turbine("nrel5mw").rated_rotor_speed
+    assert above.offsets["RotSpeed"] == pytest.approx((-0.5 * slower, 0.5 * slower))
+    # that drive turns a degree per turn of the rotor as fast, so that a degree costs what it did
+    assert above.weights["pitch_travel"] == pytest.approx(TASKS["above_rated"].weights["pitch_travel"])
+    mixed = task_of("above_rated_mixture", turbine)
+    assert all(air["speed"] == above.wind["speed"] for _, air, _ in mixed.weathers)
+
+
+def test_the_reach_of_the_blades_is_within_the_drive():
+    turbine = read_turbine("nrel5mw")
+    drive = turbine.pitch_drive.model_copy(update={"minimum": np.radians(1.0), "maximum": np.radians(25.0)})
+    task = task_of("above_rated", turbine.model_copy(update={"pitch_drive": drive}))
+    assert task.blade_pitch == pytest.approx((1.0, 25.0))

@@ -4,7 +4,7 @@ No mass matrix is formed. Each body has its centre, its inertia and its spin; it
 written down in full and projected on the seven speeds (v, w, w_b) by its partial velocities.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -19,7 +19,8 @@ class Body:
     mass: float
     centre: np.ndarray
     inertia: np.ndarray  # (3, 3)
-    spin: float = 0.0  # its angular velocity is w + spin * w_b * e_x
+    spin: float = 0.0  # its angular velocity is w + spin * w_b * axis
+    axis: np.ndarray = field(default_factory=lambda: np.array([1.0, 0.0, 0.0]))
 
     def velocity(self, v, w):
         return v + np.cross(w, self.centre)
@@ -30,12 +31,12 @@ class Body:
         return origin + np.cross(dw, self.centre) + np.cross(w, np.cross(w, self.centre))
 
     def turning(self, w, rotor_speed):
-        return w + np.array([self.spin * rotor_speed, 0.0, 0.0])
+        return w + self.spin * rotor_speed * self.axis
 
     def turning_rate(self, w, rotor_speed, dw, drotor_speed):
         """Absolute angular acceleration: the spin axis itself turns with the platform."""
-        spin = np.array([self.spin * rotor_speed, 0.0, 0.0])
-        return dw + np.array([self.spin * drotor_speed, 0.0, 0.0]) + np.cross(w, spin)
+        spin = self.spin * rotor_speed * self.axis
+        return dw + self.spin * drotor_speed * self.axis + np.cross(w, spin)
 
 
 def steiner(mass, r):
@@ -49,13 +50,15 @@ def bodies(platform, turbine, generator_mass=GENERATOR_MASS, generator_centre=GE
     ballast, tower, nacelle, rotor = platform.ballast, platform.tower, turbine.nacelle, turbine.rotor
     shaft = turbine.drivetrain
     spin_inertia = shaft.generator_inertia
+    turn = rotation(0.0, rotor.shaft_tilt, 0.0)  # its first column is the shaft, downwind
     generator = Body(
         generator_mass,
         generator_centre,
-        np.diag([spin_inertia, 0.7 * spin_inertia, 0.7 * spin_inertia]),
+        turn @ np.diag([spin_inertia, 0.7 * spin_inertia, 0.7 * spin_inertia]) @ turn.T,
         shaft.gear_ratio,
+        turn[:, 0],
     )
-    whole = np.array([nacelle.cm_downwind, 0.0, nacelle.cm_height])
+    whole = np.array([nacelle.cm_downwind, nacelle.cm_left, nacelle.cm_height])
     shell_mass = nacelle.mass - generator_mass
     shell_centre = (nacelle.mass * whole - generator_mass * generator_centre) / shell_mass
     about_origin = (
@@ -65,15 +68,20 @@ def bodies(platform, turbine, generator_mass=GENERATOR_MASS, generator_centre=GE
         - steiner(generator_mass, generator_centre)
     )
     return [
-        Body(ballast.mass, np.array([0.0, 0.0, -ballast.cm_depth]), np.diag(ballast.inertia)),
+        Body(
+            ballast.mass,
+            np.array([ballast.cm_downwind, ballast.cm_left, -ballast.cm_depth]),
+            np.diag(ballast.inertia),
+        ),
         Body(tower.mass, np.array([0.0, 0.0, tower.cm_height]), np.diag(tower.inertia)),
         Body(shell_mass, shell_centre, about_origin - steiner(shell_mass, shell_centre)),
         generator,
         Body(
             rotor.mass,
-            hub(turbine),
-            np.diag([rotor.inertia, rotor.inertia_diameter, rotor.inertia_diameter]),
+            hub(turbine) + rotor.cm_offset * turn[:, 0],
+            turn @ np.diag([rotor.inertia, rotor.inertia_diameter, rotor.inertia_diameter]) @ turn.T,
             1.0,
+            turn[:, 0],
         ),
     ]
 
@@ -125,11 +133,11 @@ def accelerations(
         for body in parts:
             loads[j] += body.mass * down @ body.velocity(unit[:3], unit[3:6])
         rotor, shell, spinning = parts[4], parts[2], parts[3]
-        loads[j] += hub_force @ rotor.velocity(unit[:3], unit[3:6])
+        loads[j] += hub_force @ (unit[:3] + np.cross(unit[3:6], hub(turbine)))
         loads[j] += hub_moment @ rotor.turning(unit[3:6], unit[6])
         # the stator pushes the generator rotor back, and is pushed forward as hard
-        loads[j] -= torque * spinning.turning(unit[3:6], unit[6])[0]
-        loads[j] += torque * shell.turning(unit[3:6], unit[6])[0]
+        loads[j] -= torque * spinning.turning(unit[3:6], unit[6]) @ spinning.axis
+        loads[j] += torque * shell.turning(unit[3:6], unit[6]) @ spinning.axis
     zero = np.zeros(3)
     rest = inertia_forces(parts, v, w, rotor_speed, zero, zero, 0.0)
     matrix = np.empty((7, 7))

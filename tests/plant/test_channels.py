@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 from naive import rigid_body
-from plant_helpers import random_state, rates
+from plant_helpers import leaning, random_state, rates
 
 import fowt_env
 from fowt_env.plant.channels import FIXED_CHANNELS, channels, rotor_wind, to_units
@@ -41,8 +41,21 @@ def test_units_are_those_in_the_column_names():
         assert value == pytest.approx(factors.get(channel.unit, 1.0), rel=1e-15)
 
 
-def test_tower_base_load_is_that_of_the_bodies_above_it(bare_scene, platform, turbine):
+@pytest.fixture(scope="module")
+def leaning_scene(platform, turbine):
+    """As bare_scene with a tilted shaft, and centres of mass off the shaft and beside the plane."""
+    platform, turbine = leaning(platform, turbine)
+    return fowt_env.build_scene(platform, turbine=turbine, hydrodynamics=False, mooring=False)
+
+
+@pytest.fixture(params=["bare_scene", "leaning_scene"])
+def empty_scene(request):
+    return request.getfixturevalue(request.param)
+
+
+def test_tower_base_load_is_that_of_the_bodies_above_it(empty_scene):
     # Newton and Euler for tower, nacelle shell, generator rotor and rotor, about the tower base
+    bare_scene, platform, turbine = empty_scene, empty_scene.platform, empty_scene.turbine
     base = np.array([0.0, 0.0, platform.tower.base_height])
     parts = rigid_body.bodies(platform, turbine)[1:]
     for seed in range(10):
@@ -63,14 +76,15 @@ def test_tower_base_load_is_that_of_the_bodies_above_it(bare_scene, platform, tu
         assert np.abs(got - moment).max() < 1e-10 * np.abs(moment).max()
 
 
-def test_shaft_loads_are_those_of_the_rotor_body(bare_scene, platform, turbine):
+def test_shaft_loads_are_those_of_the_rotor_body(empty_scene):
+    platform, turbine = empty_scene.platform, empty_scene.turbine
     rotor = rigid_body.bodies(platform, turbine)[4]
-    x, dx, row = moving(bare_scene)
+    x, dx, row = moving(empty_scene)
     v, w = x[7:10], x[10:13]
     down = -platform.environment.gravity * rigid_body.rotation(*x[3:6])[2]
-    thrust = rotor.mass * (down - rotor.acceleration(v, w, dx[7:10], dx[10:13]))[0]
+    thrust = rotor.mass * (down - rotor.acceleration(v, w, dx[7:10], dx[10:13])) @ rotor.axis
     assert row["RotThrust"] == pytest.approx(thrust, rel=1e-10)
-    turning = rotor.turning_rate(w, x[State.ROTOR_SPEED], dx[10:13], dx[State.ROTOR_SPEED])[0]
+    turning = rotor.turning_rate(w, x[State.ROTOR_SPEED], dx[10:13], dx[State.ROTOR_SPEED]) @ rotor.axis
     assert row["RotTorq"] == pytest.approx(-turbine.rotor.inertia * turning, rel=1e-10)
     assert row["RtFldFxh"] == row["RtFldMxh"] == 0.0
     ratio = turbine.drivetrain.gear_ratio

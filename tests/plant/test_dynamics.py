@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from naive import rigid_body
-from plant_helpers import integrate, make_pose, random_state, rates, state
+from plant_helpers import integrate, leaning, make_pose, random_state, rates, state
 from scipy.integrate import solve_ivp
 
 from fowt_env.plant.drivetrain import build_drivetrain, shaft_torque
@@ -53,7 +53,8 @@ def project_accelerations(row, turbine, body):
     about_origin = moment + np.cross(rigid_body.hub(turbine), force)
     load = add(gravity_load(pose, body), Wrench(*force, *about_origin))
     drivetrain = build_drivetrain(turbine)
-    torque = shaft_torque(moment[0], row["generator_torque"], row["rotor_speed"], drivetrain)
+    along = moment @ rigid_body.rotation(0.0, turbine.rotor.shaft_tilt, 0.0)[:, 0]
+    torque = shaft_torque(along, row["generator_torque"], row["rotor_speed"], drivetrain)
     dx = np.zeros(15)
     accelerate(pose, x, load, torque, DRY, body, np.zeros((6, 6)), dx)
     return dx[SPEEDS]
@@ -85,6 +86,15 @@ def test_accelerations_are_those_of_newton_and_euler_body_by_body(platform, turb
     for row in reference_states()[:60]:
         difference = project_accelerations(row, turbine, body) - naive_accelerations(row, platform, turbine)
         assert np.abs(difference).max() < 1e-11
+
+
+@pytest.mark.parametrize("held", [False, True])
+def test_a_tilted_rotor_turns_and_a_heavy_side_pulls_as_newton_and_euler_say(platform, turbine, held):
+    platform, turbine = leaning(platform, turbine)
+    body = build_rigid_body(platform, turbine, rotor_fixed=held)
+    for row in reference_states()[:60]:
+        expected = naive_accelerations(row, platform, turbine, held=held)
+        assert np.abs(project_accelerations(row, turbine, body) - expected).max() < 1e-11
 
 
 def test_where_the_generator_sits_and_what_it_weighs_does_not_matter(platform, turbine):

@@ -15,15 +15,17 @@ import numba
 import numpy as np
 import pytest
 from plant_helpers import random_state
+from potential_body import made_up_body
 
 import fowt_env
 from fowt_env import Force, Load, build_scene, load_kernel
-from fowt_env.descriptions.platform import AdditionalLoads, read_platform
+from fowt_env.descriptions.platform import AdditionalLoads, Member, read_platform
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rollout import forget, observe
 from fowt_env.plant.state import State
 from fowt_env.scene.loads import LOADS
 from fowt_env.scene.options import ROTORS
+from fowt_env.weather.excitation import build_excitation
 
 ROOT = Path(fowt_env.__file__).resolve().parent.parent
 FORMS = ("exact", "fast")  # of the wave loads
@@ -49,7 +51,17 @@ NOTHING = {
     "hydro.yaw_stiffness": 0.0,
     "hydro.added_mass": None,
     "additional": None,
+    "members": (),
+    "potential_flow": None,
 }
+MEMBERS = tuple(
+    Member(
+        start=(4.0, 3.0 * side, -30.0), end=(15.0, 12.0 * side, 8.0), diameter=(5.0, 3.0),
+        drag_coefficient=(0.6, 0.7), added_mass_coefficient=(0.9, 0.8), axial_drag_coefficient=(4.8, 1.0),
+        axial_added_mass_coefficient=(1.0, 0.5),
+    )
+    for side in (1.0, -1.0)
+)  # fmt: skip
 ALL = {
     "wind": 12.0,
     "sea": {"kind": "regular", "H": 4.0, "T": 9.0},
@@ -76,17 +88,28 @@ def scene_of(form):
 def scene_less(form, name):
     """Scene with every load but this one, which is left out as a user does."""
     arguments = ALL | {"loads": [Load("Push", push, [1e5, 2e5])]}
-    hydro = {"hydro.added_mass": ADDED_MASS, "additional": ADDITIONAL}
+    hydro = {
+        "hydro.added_mass": ADDED_MASS,
+        "additional": ADDITIONAL,
+        "members": MEMBERS,
+        "potential_flow": made_up_body(),
+    }
     if name:
         arguments |= LOADS[name].without
         hydro |= {key: NOTHING[key] for key in LOADS[name].keys}
-    additional = hydro.pop("additional")
+    body = hydro.pop("potential_flow")
+    beside = {key: hydro.pop(key) for key in ("additional", "members")}
     given = {key.removeprefix("hydro."): value for key, value in hydro.items()}
     platform = read_platform("oc3_hywind")
-    platform = platform.model_copy(
-        update={"hydro": platform.hydro.model_copy(update=given), "additional": additional}
+    platform = platform.model_copy(update={"hydro": platform.hydro.model_copy(update=given), **beside})
+    scene = build_scene(platform, rotor="bem", wave_loads=form, **arguments)
+    if scene.model.hydro is None or scene.model.hydro.waves is None:
+        return scene
+    # of a body whose other coefficients are left out, so that no other load depends on it
+    part = build_excitation(
+        body, scene.model.hydro.waves, duration=10.0, fast=form == "fast", planar=True, second_order="full"
     )
-    return build_scene(platform, rotor="bem", wave_loads=form, **arguments)
+    return scene.with_model({"hydro.excitation": part})
 
 
 def part_at(model, path):
@@ -178,7 +201,7 @@ def test_what_leaves_a_load_out_empties_its_slot_and_no_other(name, form):
     assert part_at(whole, slot) is not None and part_at(scene, slot) is None
     gone = {LOADS[inner].slot for inner in within(slot)}
     if name == "waves":
-        gone.add("hydro.strips.diffraction")  # of waves
+        gone |= {"hydro.strips.diffraction", "hydro.excitation"}  # of waves
     for other in {LOADS[other].slot for other in WITH_SLOT} - gone:
         assert part_at(scene, other) is not None, other
 

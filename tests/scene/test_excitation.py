@@ -30,7 +30,7 @@ BODY = made_up_body()
 def platform_of(body=BODY):
     platform = read_platform("oc3_hywind")
     return platform.model_copy(
-        update={"hull": None, "hydro": None, "potential_flow": body, "draft": 20.0, "options": {}}
+        update={"hull": None, "hydro": None, "potential_flow": body, "draft": 120.0, "options": {}}
     )
 
 
@@ -79,13 +79,13 @@ def test_a_filtered_position_has_two_states_and_keeps_its_types(form):
     scene = scene_of(form=form, excitation_position="filtered", excitation_cutoff=0.02, radiation=memory)
     blocks = {block.name: block for block in scene.blocks}
     part = scene.model.hydro.excitation
-    assert (blocks["slow place"].offset, blocks["slow place"].size) == (part.place.first, 2)
-    assert part.place.rate == pytest.approx(2.0 * np.pi * 0.02)
+    assert (blocks["filtered position"].offset, blocks["filtered position"].size) == (part.position.first, 2)
+    assert part.position.rate == pytest.approx(2.0 * np.pi * 0.02)
     if form == "fast":
         assert type(part.first) is FastExcitation
-        assert blocks["radiation"].offset == scene.model.hydro.radiation.first == part.place.first + 2
+        assert blocks["radiation"].offset == scene.model.hydro.radiation.first == part.position.first + 2
     x = np.zeros(scene.n_state)
-    x[part.place.first] = 30.0
+    x[part.position.first] = 30.0
     for sea in (None, JONSWAP | {"heading": 60.0}, {"kind": "regular", "H": 2, "T": 7}):
         moved = scene.with_weather(None, sea, 1)
         assert numba.typeof(tuple(moved.model)) == numba.typeof(tuple(scene.model))

@@ -5,6 +5,7 @@ import sys
 import time
 from math import pi, radians, tan
 
+import floaters
 import gymnasium
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ import pytest
 pytest.importorskip("pygame", reason="pygame is not installed: the extra `render` is missing")
 
 import fowt_env  # noqa: E402
+from fowt_env.descriptions.platform import read_platform  # noqa: E402
 from fowt_env.envs import FowtEnv, FowtVectorEnv  # noqa: E402
 from fowt_env.errors import InputError  # noqa: E402
 from fowt_env.plant.hydro.waves import elevation  # noqa: E402
@@ -280,3 +282,38 @@ def test_animations_that_cannot_be_made_are_named(scene, runs, tmp_path, argumen
     with pytest.raises(InputError, match="needs at least two rows"):
         animate(scene, {"cut": runs["pi"][["Time_[s]"]]}, tmp_path / "a.gif")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("make", [floaters.semi, floaters.tension_leg], ids=["semi", "tension leg"])
+def test_members_are_drawn_where_they_are(make):
+    """Each column above the water is yellow where its axis is; nothing is beside the outermost."""
+    scene = fowt_env.build_scene(make())
+    view = View([scene])
+    view.draw([ROW])
+    panel, picture = view.panels[0], view.array()
+
+    def colour(point):
+        x, y = panel.pixels(PlatformPose(REST).inertial([point]))[0] / rendering.SAMPLING
+        return picture[round(y), round(x)].astype(int)
+
+    for member in scene.platform.members:
+        top, low = np.array(member.end), np.array(member.start)
+        if top[2] <= 0.0:
+            continue
+        red, green, blue = colour(low + (top - low) * (2.0 - low[2]) / (top[2] - low[2]))
+        assert red > green > 2 * blue, member
+    red, green, blue = colour((60.0, 0.0, 3.0))
+    assert blue > red
+
+
+def test_a_hull_without_a_shape_is_a_box_of_its_draft():
+    potential = read_platform("nrel5mw_iti_barge")
+    scene = fowt_env.build_scene(potential.model_copy(update={"members": ()}))
+    view = View([scene])
+    view.draw([ROW])
+    panel, picture = view.panels[0], view.array()
+    half = 0.5 * np.sqrt(potential.potential_flow.volume / potential.draft)
+    for x, inside in ((0.9 * half, True), (1.15 * half, False)):
+        px, py = panel.pixels([(x, 0.0, 0.25 * potential.draft)])[0] / rendering.SAMPLING
+        red, green, blue = picture[round(py), round(px)].astype(int)
+        assert (red > 2 * blue) == inside

@@ -6,7 +6,7 @@ from fowt_env.training.cli.console import app
 
 GROUPS = (  # modules that add their commands to the app, in the order of fowt --help
     "simulate", "check", "evaluate", "validate", "doctor", "benchmark", "design", "plot", "report", "scores",
-    "leaderboard", "hydro", "train",
+    "leaderboard", "import_deck", "hydro", "train",
 )  # fmt: skip
 for group in GROUPS:
     import_module(f"fowt_env.training.cli.{group}")

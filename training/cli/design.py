@@ -55,8 +55,8 @@ ZEROS_EXAMPLES = """[bold]Examples[/bold]
 [cyan]fowt design zeros --platform nrel5mw_oc4_semi --out zeros.csv[/cyan]  another platform, as a table
 
 A zero in the right half plane, near the platform's own pitch, is where holding the rotor speed with the
-blades takes the thrust that damps the platform: no feedback of rotor speed alone can be faster. pi_damping:
-least damping ratio of surge, platform pitch and rotor speed under pi; drag is left out."""
+blades takes the thrust that damps the platform: no feedback of rotor speed alone can be faster. pi: damping
+ratios of platform pitch (or of the rotor, where that is less) and of surge under pi; drag is left out."""
 TUNE_EXAMPLES = """[bold]Examples[/bold]
 
 [cyan]fowt design tune pi_tuned[/cyan]  three factors on the published gains, 40 settings tried
@@ -96,12 +96,12 @@ def save_lqr(settings, path, platform="oc3_hywind"):
     return save_design(path, "lqr", scene, lqr_settings(chosen, design_models(scene)), command)
 
 
-def _scene_and_winds(platform, winds, default):
+def _scene_and_winds(platform, winds, default, **options):
     """(scene, winds m/s, their text) of a platform; default(turbine): the winds where none are given."""
     import fowt_env
 
     speeds = None if winds is None else parse_numbers(winds, "winds")
-    scene = fowt_env.build_scene(platform, wind=18.0 if speeds is None else speeds[0])
+    scene = fowt_env.build_scene(platform, wind=18.0 if speeds is None else speeds[0], **options)
     if speeds is None:
         found = default(scene.turbine)
         return scene, [float(speed) for speed in found], f"{found[0]}:{found[-1]}:1"
@@ -297,7 +297,8 @@ def zeros(
 
     if out_path is not None:
         table_path(out_path)
-    scene, speeds, _ = _scene_and_winds(platform, winds, winds_above_rated)
+    # the linear model of "reference" within 1e-3, at a tenth of the time
+    scene, speeds, _ = _scene_and_winds(platform, winds, winds_above_rated, fidelity="standard")
     with progress_bar("linearising", None) as update:
         table = zeros_over(scene, speeds, lambda done, total: update(done, total=total))
     show(table, f"{platform}: zeros of blade pitch to rotor speed")

@@ -15,7 +15,7 @@ from scipy.optimize import least_squares
 
 from fowt_env.analysis.linear_drag import HullMotion, elevation_spectrum, linear_drag, with_drag
 from fowt_env.analysis.linear_model import linearize
-from fowt_env.analysis.memory_free import without_memory
+from fowt_env.analysis.reduced_model import with_pitch_lag, without_memory
 from fowt_env.analysis.wave_excitation import wave_force
 from fowt_env.controllers.gains import with_gains
 from fowt_env.controllers.lqr.design import LAST_SEA_WIND, SENSORS, SITE, TURBULENCE_CLASS, scene_at
@@ -47,7 +47,6 @@ OMEGA = np.concatenate(
         np.geomspace(6.0, 100.0, 60),
     ]
 )
-LEAST_LAG = 0.05  # s, of a pitch drive that has none
 ROUNDS, SETTLED = 40, 1e-4  # of the drag and the motion under gspi_oc3
 START = np.diag([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])  # m2/s2: in surge, from which that begins
 
@@ -105,7 +104,7 @@ class BoundPlant:
         if sea is None:
             sea = joint_sea_state(SITE, min(self.wind_speed, LAST_SEA_WIND))
         self.sea = sea_state_of(sea)
-        model = without_memory(linearize(scene_at(scene, wind)))
+        model = with_pitch_lag(without_memory(linearize(scene_at(scene, wind))))
         if model.pitch_rests:
             raise InputError(
                 f"wind = {wind:g}: the blade pitch rests on its limit there, and no controller moves it"
@@ -156,10 +155,6 @@ class BoundPlant:
             model.D[sensors, :2] * units,
             model.D[sensors, 2],
         )
-        if self.turbine.pitch_drive.time_constant == 0.0:
-            # a drive that follows at once is no state of the plant: one that follows nearly so
-            self.A[BLADE], self.B[BLADE], self.wind[BLADE] = 0.0, 0.0, 0.0
-            self.A[BLADE, BLADE], self.B[BLADE, 1] = -1.0 / LEAST_LAG, 1.0 / LEAST_LAG
         self.E, self.F = model.E[np.ix_(rows, IN_PLANE)], model.F[np.ix_(sensors, IN_PLANE)]
 
     def baseline(self):

@@ -12,6 +12,7 @@ import pandas as pd
 from scipy.linalg import eigvals
 
 from fowt_env.analysis.linear_model import FORCES, linearize, modes
+from fowt_env.analysis.reduced_model import platform_frequency, platform_mode, with_pitch_lag
 from fowt_env.controllers.design.closed_loop import closed_loop_matrix
 from fowt_env.controllers.gains import with_gains
 from fowt_env.controllers.lqr.design import LQGSettings, scene_at, winds_above_rated
@@ -24,7 +25,6 @@ from fowt_env.training.evaluation.cases import named_cases
 from fowt_env.training.evaluation.evaluate import evaluate
 from fowt_env.training.evaluation.seeds import VALIDATION
 
-STABLE = 1e-6  # 1/s: an azimuth that turns on has a pole at zero
 INFINITE = 1e3  # rad/s: generalised eigenvalues beyond are zeros at infinity
 MODEL_SUFFIXES = (".json", ".npz")
 SHOWN = ("RotSpeed_std_[rpm]", "PtfmPitch_std_[deg]", "GenPwr_std_[kW]", "blade_pitch_travel_[deg/s]")
@@ -32,10 +32,10 @@ KEPT = (*SHOWN, "RotSpeed_max_[rpm]", "GenPwr_mean_[kW]", "TwrBsMyt_DEL_[kN-m]")
 
 
 def models_over(scene, winds, progress=None):
-    """{wind m/s: LinearModel} of a scene in steady winds."""
+    """{wind m/s: LinearModel} of a scene in steady winds; blades that follow at once lag by LEAST_LAG."""
     models = {}
     for number, wind in enumerate(winds, 1):
-        models[float(wind)] = linearize(scene_at(scene, wind))
+        models[float(wind)] = with_pitch_lag(linearize(scene_at(scene, wind)))
         if progress is not None:
             progress(number, len(winds))
     return models
@@ -83,8 +83,9 @@ def zeros_over(scene, winds=None, progress=None):
 
     winds      m/s; None: whole ones above rated up to cut-out
     Columns: real and imaginary part of the zero (0 where there is none) and its period; period and damping of
-    the platform's pitch with blades and torque held; the least damping ratio of surge, platform pitch and
-    rotor speed under `pi`, and whether the whole loop is stable. Drag, quadratic in the motion, is left out.
+    the platform's pitch with blades and torque held; under `pi` the least damping ratio of platform pitch and
+    rotor speed, and that of surge: of the modes in the plane faster and slower than half the platform's
+    frequency. Drag, quadratic in the motion, is left out.
     Raises: InputError for winds at which the blades rest.
     """
     turbine = with_gains(scene)
@@ -95,15 +96,18 @@ def zeros_over(scene, winds=None, progress=None):
             raise InputError(f"wind = {wind:g}: the blade pitch rests on its limit there")
         zeros = [z for z in transmission_zeros(model) if z.real > 1e-6 and z.imag >= 0.0]
         zero = max(zeros, key=lambda z: z.real, default=0.0j)
-        own = [mode for mode in model.modes() if mode.name == "platform_pitch"]
+        own, frequency = platform_mode(model), platform_frequency(model)
         a, names = closed_loop_matrix(model, settings)
-        poles = np.linalg.eigvals(a)
-        # what oscillates as the platform and the rotor do: yaw, sway and the lines' modes are not the loop's
+        # what oscillates as platform and rotor do: sway, roll and yaw are not the loop's
         moving = [
-            mode.damping_ratio
+            mode
             for mode in modes(a, names, model.cm_height, model.arm)
             if mode.name in ("platform_pitch", "rotor_speed", "surge")
         ]
+        fast, slow = (
+            min((m.damping_ratio for m in moving if (m.frequency > 0.5 * frequency) is part), default=np.nan)
+            for part in (True, False)
+        )
         size = abs(zero)
         rows.append(
             {
@@ -111,10 +115,10 @@ def zeros_over(scene, winds=None, progress=None):
                 "zero_real_[rad/s]": float(zero.real),
                 "zero_imag_[rad/s]": float(zero.imag),
                 "zero_period_[s]": float(2.0 * np.pi / size) if size else np.nan,
-                "platform_period_[s]": float(max((m.period for m in own), default=np.nan)),
-                "platform_damping_[-]": float(min((m.damping_ratio for m in own), default=np.nan)),
-                "pi_damping_[-]": float(min(moving, default=np.nan)),
-                "pi_stable": bool(poles.real.max() < STABLE),
+                "platform_period_[s]": np.nan if own is None else own.period,
+                "platform_damping_[-]": np.nan if own is None else own.damping_ratio,
+                "pi_pitch_damping_[-]": float(fast),
+                "pi_surge_damping_[-]": float(slow),
             }
         )
     return pd.DataFrame(rows)

@@ -35,9 +35,7 @@ def read_aerodyn(path, folders=()):
     file = PartFile(path, "AeroDyn")
     if not file.has("NumAFfiles"):
         if file.has("StallMod", "NumFoil", "InfModel"):
-            raise file.refusal(
-                "is of AeroDyn 14 (StallMod, NumFoil): must be of AeroDyn 15, into which OpenFAST's tools convert it"
-            )
+            raise file.refusal("is of AeroDyn 14 (StallMod, NumFoil): must be of AeroDyn 15")
         raise file.refusal("NumAFfiles is missing: must be the number of polar files")
     count = file.whole("NumAFfiles", low=1, high=MOST_AIRFOILS)
     columns = [
@@ -135,7 +133,7 @@ def _airfoil_files(file, count, folders):
 
 
 def _names(files, numbers):
-    """{number of a polar that the blade has: name}, by the files' stems; a stem of two files gets a number."""
+    """{number of a polar that the blade has: name}, by the files' stems; equal stems get a number."""
     used = sorted(set(numbers))
     stems = [files[number - 1].stem for number in used]
     return {

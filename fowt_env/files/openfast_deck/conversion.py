@@ -84,7 +84,7 @@ def ballast(deck):
 
 
 def additional_stiffness(deck):
-    """((6, 6) additional stiffness, comment): AddCLin, less what the weight of water in members has by itself.
+    """((6, 6) stiffness, comment): AddCLin, less what the weight of water in members has by itself.
 
     Of old files alone (hydrodyn.is_old); in all others the weight moves with the members.
     """
@@ -132,7 +132,7 @@ def stations(deck):
     radius = hub + aero.span
     if radius[-1] > tip * 1.005:
         raise aero.blade_file.refusal(
-            f"BlSpn ends at {aero.span[-1]:g} m: must be within the blade of {tip - hub:g} m (TipRad - HubRad)"
+            f"BlSpn ends at {aero.span[-1]:g} m: must be within TipRad - HubRad = {tip - hub:g} m"
         )
     radius = np.clip(radius, hub + NEAR, tip - NEAR)
     keep = np.concatenate([[True], np.diff(radius) > 1e-6])
@@ -198,7 +198,7 @@ def platform_rows(deck, name, turbine, coefficients, options=None):
             Row("top_height", values["TowerHt"], source("TowerHt")),
             Row("base_diameter", base_diameter, deck.aerodyn.file.source("TwrDiam")),
             Row("top_diameter", top_diameter, deck.aerodyn.file.source("TwrDiam")),
-            Row("drag_coefficient", drag, deck.aerodyn.file.source("TwrCd") + ", load of the table on this taper"),
+            Row("drag_coefficient", drag, deck.aerodyn.file.source("TwrCd") + ", of the table's load"),
         ],
     }  # fmt: skip
     hydro = deck.hydrodyn
@@ -303,11 +303,11 @@ def turbine_rows(deck, name):
         "": [
             Row("name", name),
             Row("source", f"imported from {deck.name}"),
-            *([Row("discon", control.discon.name, "controller of the deck, which rosco runs")] if control.discon else []),
+            *([Row("discon", control.discon.name, "of the controller rosco")] if control.discon else []),
             Row("rated_rotor_speed_rpm", rated / RPM, f"{why.get('rated_speed', '')} over GBRatio"),
             Row("rated_wind_speed", control.rated_wind_speed or 11.4, why.get("rated_wind_speed", "a guess")),
             Row("cut_in_wind_speed", control.cut_in_wind_speed, why.get("cut_in_wind_speed", "usual value")),
-            Row("cut_out_wind_speed", control.cut_out_wind_speed, why.get("cut_out_wind_speed", "usual value")),
+            Row("cut_out_wind_speed", control.cut_out_wind_speed, why.get("cut_out_wind_speed", "usual")),
             Row("overspeed_rpm", OVERSPEED * rated / RPM,
                 f"{OVERSPEED} times rated: failure threshold of the environment, a choice of this project"),
         ],
@@ -319,7 +319,7 @@ def turbine_rows(deck, name):
             Row("hub_radius", values["HubRad"], source("HubRad")),
             Row("tip_radius", values["TipRad"], source("TipRad")),
             Row("inertia", rotor.inertia, blades + ", PreCone"),
-            Row("inertia_diameter", rotor.inertia_diameter, blades + ", PreCone; no hub inertia about diameters in ElastoDyn"),
+            Row("inertia_diameter", rotor.inertia_diameter, blades + ", PreCone; of the hub none"),
             Row("shaft_tilt_deg", -math.degrees(values["ShftTilt"]) + 0.0, "minus " + source("ShftTilt")),
             Row("cone_deg", -math.degrees(values["PreCone"]) + 0.0, "minus " + source("PreCone(1)")),
             Row("cm_offset", rotor.cm_offset, blades + ", HubCM, PreCone"),
@@ -329,17 +329,19 @@ def turbine_rows(deck, name):
             Row("cm_downwind", values["NacCMxn"], source("NacCMxn")),
             *([Row("cm_left", values["NacCMyn"], source("NacCMyn"))] if values["NacCMyn"] else []),
             Row("cm_height", values["TowerHt"] + values["NacCMzn"], source("TowerHt", "NacCMzn")),
-            Row("inertia", [0.0, 0.0, nacelle], source("NacYIner") + " less NacMass at NacCMxn; yaw alone in ElastoDyn"),
+            Row("inertia", [0.0, 0.0, nacelle], source("NacYIner") + " less NacMass at NacCMxn; yaw alone"),
         ],
         "drivetrain": [
             Row("gear_ratio", values["GBRatio"], source("GBRatio")),
             Row("generator_inertia", values["GenIner"], source("GenIner") + ", about the high-speed shaft"),
             Row("mesh_loss", 1.0 - values["GBoxEff"] / 100.0, "1 less " + source("GBoxEff")),
             Row("bearing_loss", 0.0, "none in ElastoDyn"),
-            Row("generator_efficiency", control.generator_efficiency, why.get("generator_efficiency", "not in the deck")),
+            Row("generator_efficiency", control.generator_efficiency,
+                why.get("generator_efficiency", "not in the deck")),
         ],
         "pitch_drive": [
-            Row("time_constant", control.time_constant, why.get("time_constant", "followed at once: no actuator in the deck")),
+            Row("time_constant", control.time_constant,
+                why.get("time_constant", "followed at once: no actuator in the deck")),
             Row("rate_limit_deg_per_s", math.degrees(control.pitch_rate), why.get("pitch_rate", "")),
             Row("minimum_deg", math.degrees(control.minimum_pitch), why.get("minimum_pitch", "usual value")),
             Row("maximum_deg", math.degrees(control.maximum_pitch), why.get("maximum_pitch", "usual value")),

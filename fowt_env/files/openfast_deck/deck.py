@@ -56,16 +56,17 @@ class Deck:
 
 
 def read_deck(fst=None, parts=None, folders=(), discon=None):
-    """Deck of an .fst file, of part files ({"elastodyn": path ...}, PARTS), or of both: these replace the .fst's.
+    """Deck of an .fst file, of part files ({"elastodyn": path ...}, PARTS), or of both: parts replace files.
 
     folders: further ones in which files that the deck names are looked for. discon: a DISCON.IN instead of
     the deck's. Raises: InputError naming file, line, key, value and what is allowed.
     """
     parts = {name: Path(path) for name, path in (parts or {}).items() if path is not None}
+    given = tuple(parts)
     main = None if fst is None else PartFile(fst, "OpenFAST")
     folders = tuple(map(Path, folders))
     if main is not None:
-        _check_switches(main)
+        _check_switches(main, parts)
         for name, key in PARTS.items():
             if name in parts or not _switched_on(main, name):
                 continue
@@ -88,7 +89,11 @@ def read_deck(fst=None, parts=None, folders=(), discon=None):
     hydrodyn = read_hydrodyn(parts["hydrodyn"], (site.water_density, site.water_depth, 0.0), folders)
     mooring, lines, notes = None, [], []
     if "mooring" in parts:
-        kind = None if main is None else {1: 1, 3: 3}.get(main.whole("CompMooring", default=0))
+        kind = (
+            None
+            if main is None or "mooring" in given
+            else {1: 1, 3: 3}.get(main.whole("CompMooring", default=0))
+        )
         mooring, lines, notes = read_mooring(
             kind, parts["mooring"], site.water_depth, site.water_density, site.gravity
         )
@@ -143,7 +148,7 @@ def _switched_on(main, name):
     return main.whole(SWITCHES[name]) != 0
 
 
-def _check_switches(main):
+def _check_switches(main, parts):
     """Raises: InputError for modules that cannot be represented."""
     if main.has("CompElast"):
         main.one_of("CompElast", (1,), why="2 has the blades' masses in BeamDyn, 3 is simplified")
@@ -155,7 +160,9 @@ def _check_switches(main):
         ("MHK", "turbines in water cannot be represented"),
     ):
         main.one_of(key, (0,), default=0, why=why)
-    main.one_of("CompMooring", (0, 1, 3), default=0, why="FEAMooring and OrcaFlex cannot be read")
+    if "mooring" not in parts:
+        why = "FEAMooring and OrcaFlex cannot be read; give a file of MAP++ or MoorDyn with --mooring"
+        main.one_of("CompMooring", (0, 1, 3), default=0, why=why)
     if main.has("CompHydro") and main.whole("CompHydro") == 0:
         raise main.wrong("CompHydro", 0, "1: only floating turbines can be imported")
     if main.has("CompAero") and main.whole("CompAero") not in (1, 2):

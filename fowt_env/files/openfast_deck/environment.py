@@ -23,8 +23,10 @@ class Inflow:
 
 
 def read_sea(file):
-    """Sea of SeaState's file, or of HydroDyn's of FAST 8. Raises: InputError for what cannot be represented."""
-    current = file.one_of("CurrMod", (0, 1), default=0, why="2, a user's current, cannot be represented")
+    """Sea of SeaState's file, or of HydroDyn's of FAST 8. Raises: InputError."""
+    current = file.one_of(
+        "CurrMod", (0, 1), "WvCrntMod", default=0, why="2, a user's current, cannot be represented"
+    )
     more = []
     if current == 1:
         speeds = {key: file.number(key, default=0.0) for key in ("CurrSSV0", "CurrNSV0", "CurrDIV")}

@@ -1,7 +1,8 @@
-"""HydroDyn's file: potential flow, additional matrices, members with their coefficients, and ballast water."""
+"""HydroDyn's file: potential flow, additional matrices, members with coefficients, and ballast water."""
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -74,7 +75,7 @@ def read_hydrodyn(path, site, folders=()):
     """
     file = PartFile(path, "HydroDyn")
     notes = []
-    mode = file.one_of("PotMod", (0, 1), why="2, fluid impulse theory, cannot be represented", default=0)
+    mode = file.one_of("PotMod", (0, 1), why="2, fluid impulse theory, cannot be represented")
     potential = _potential(file, folders, notes) if mode == 1 else None
     growth = file.table("NMGDepths", high=MOST)
     if any(cells.get("mgthck", 0.0) != 0.0 for _, cells in growth):
@@ -88,7 +89,9 @@ def read_hydrodyn(path, site, folders=()):
         if file.whole(key, default=0) != 0:
             raise file.wrong(key, file.whole(key), f"0: {what} cannot be represented")
     second = {key: file.whole(key, default=0) for key in SECOND_ORDER}
-    rows = _members(file, site, notes)
+    rows = _members(file, site, notes, mode == 1)
+    if mode == 0 and not rows:
+        raise file.wrong("PotMod", 0, "1, or there must be members: nothing makes the platform float")
     return HydroDyn(
         file=file,
         potential=potential,
@@ -110,6 +113,10 @@ def _potential(file, folders, notes):
     bodies = file.whole("NBody", default=1, low=1)
     if bodies != 1:
         raise file.wrong("NBody", bodies, "1: floaters of several bodies cannot be represented")
+    if file.whole("NAddDOF", default=0) != 0:
+        raise file.wrong(
+            "NAddDOF", file.whole("NAddDOF"), "0: further degrees of freedom cannot be represented"
+        )
     for key in ("PtfmRefxt", "PtfmRefyt", "PtfmRefzt", "PtfmRefztRot", "PtfmRefY"):
         if file.number(key, default=0.0) != 0.0:
             raise file.wrong(
@@ -147,8 +154,8 @@ def _wamit_root(name, folders):
 # --------------------------------------------------------------------------- members
 
 
-def _members(file, site, notes):
-    """List of Cylinder."""
+def _members(file, site, notes, potential):
+    """List of Cylinder; potential: whether there is a body that members may be inside of (PropPot)."""
     rows = file.table("NMembers", texts=("proppot",), high=MOST)
     if not rows:
         return []
@@ -192,16 +199,16 @@ def _members(file, site, notes):
             raise file.refusal(f"member {number}: MSecGeom must be 1, a circular section", line)
         ends = [_looked_up(file, line, joints, cells[f"mjointid{i}"], "joint") for i in (1, 2)]
         props = [_looked_up(file, line, sections, cells[f"mpropsetid{i}"], "property set") for i in (1, 2)]
-        for place, coefficient in ends:
+        for _, coefficient in ends:
             _looked_up(file, line, axial, coefficient, "axial coefficient")
         if math.dist(ends[0][0], ends[1][0]) < 1e-6:
             raise file.refusal(f"member {number}: its joints are at one place", line)
         text = cells.get("proppot", "False").lower()
-        inside = text[:1] == "t" or text.startswith(".t") or text == "1"
-        bare_members.append((line, number, ends, props, int(cells["mcoefmod"]), inside, cells))
+        inside = potential and (text[:1] == "t" or text.startswith(".t") or text == "1")
+        bare_members.append((line, number, ends, props, int(cells["mcoefmod"]), inside))
     faces = _faces(bare_members, axial, notes)
     found = []
-    for line, number, ends, props, model, inside, cells in bare_members:
+    for line, number, ends, props, model, inside in bare_members:
         starts = [0.0, *coefficients.breaks(model, ends[0][0][2] - level, ends[1][0][2] - level), 1.0]
         low, high = (np.array(end[0]) for end in ends)
         for a, b in zip(starts[:-1], starts[1:], strict=True):
@@ -238,39 +245,51 @@ def _looked_up(file, line, known, number, what):
 def _faces(members, axial, notes):
     """{member: [(drag, added mass, pressure) of each end]}, as coefficients on the area of that end alone.
 
-    HydroDyn loads a joint by the vector sum of the areas of the members that end there. Here the largest of
-    them carries it, its coefficients scaled by the sum's part along its own axis. The drag coefficient of a
-    joint multiplies rho A |v| v / 4 in HydroDyn, and rho A |v| v / 2 here.
+    HydroDyn loads a joint by the vector sum of the areas of the members that end there, for all but drag of
+    those outside the potential-flow body. Here the largest of them carries it, its coefficients scaled by
+    the sum's part along its own axis. The drag coefficient of a joint multiplies rho A |v| v / 4 in HydroDyn,
+    and rho A |v| v / 2 here.
     """
     at = {}
-    for _, number, ends, props, _, _, _ in members:
+    for _, number, ends, props, _, inside in members:
         along = np.subtract(ends[1][0], ends[0][0])
         along /= np.linalg.norm(along)
         for end in (0, 1):
-            outward = along if end else -along
-            place = tuple(np.round(ends[end][0], 6))
-            area = 0.25 * math.pi * props[end][0] ** 2
-            at.setdefault(place, []).append((number, end, area, outward, ends[end][1], props[end][0]))
-    result = {number: [(0.0, 0.0, 0.0), (0.0, 0.0, 0.0)] for _, number, *_ in members}
-    for place, meeting in at.items():
-        drag, mass, pressure = axial[meeting[0][4]]
-        biggest = max(meeting, key=lambda item: item[2])
-        number, end, area, outward, _, diameter = biggest
-        total = sum((item[2] * item[3] for item in meeting), np.zeros(3))
-        cubes = sum((item[5] ** 3 * item[3] for item in meeting), np.zeros(3))
-        part, part3 = float(total @ outward) / area, float(cubes @ outward) / diameter**3
-        aside = np.linalg.norm(total - (total @ outward) * outward) / area
-        if (drag or mass) and aside > 1e-3:
-            notes.append((
-                f"axial loads of joint at {place} across the axis of member {number}",
-                f"left out: {aside:.2g} of the area of the member's end",
-            ))  # fmt: skip
-        result[number][end] = (
-            0.5 * drag * max(part, 0.0),
-            mass * max(part3, 0.0),
-            pressure if part > 1e-6 else 0.0,
-        )
-    return result
+            face = _Face(number, end, props[end][0], along if end else -along, ends[end][1], inside)
+            at.setdefault(tuple(np.round(ends[end][0], 6)), []).append(face)
+    result = {number: np.zeros((2, 3)) for _, number, *_ in members}
+    for place, faces in at.items():
+        drag, mass, pressure = axial[faces[0].axial]
+        wet = [face for face in faces if not face.inside]
+        for meeting, power, coefficients in (
+            (faces, 2, (0.5 * drag, 0.0, 0.0)), (wet, 3, (0.0, mass, 0.0)), (wet, 2, (0.0, 0.0, pressure)),
+        ):  # fmt: skip
+            if not meeting or not any(coefficients):
+                continue
+            biggest = max(meeting, key=lambda face: face.diameter)
+            total = sum((face.diameter**power * face.outward for face in meeting), np.zeros(3))
+            total /= biggest.diameter**power
+            part = float(total @ biggest.outward)
+            aside = float(np.linalg.norm(total - part * biggest.outward))
+            if aside > 1e-3 and (coefficients[0] or coefficients[1]):
+                notes.append((
+                    f"axial loads of the joint at {place} across member {biggest.member}",
+                    f"left out: {aside:.2g} of those along it",
+                ))  # fmt: skip
+            if part > 1e-6:
+                result[biggest.member][biggest.end] += part * np.array(coefficients)
+    return {number: tuple(map(tuple, ends.tolist())) for number, ends in result.items()}
+
+
+class _Face(NamedTuple):
+    """End of a member at a joint."""
+
+    member: int
+    end: int  # 0 or 1
+    diameter: float
+    outward: np.ndarray  # (3,)
+    axial: int  # number of the joint's axial coefficients
+    inside: bool  # of the potential-flow body
 
 
 class _Coefficients:
@@ -293,8 +312,9 @@ class _Coefficients:
         """Fractions of a member's length where depth-dependent coefficients bend."""
         if model != 2 or z1 == z2:
             return []
-        at = [(-cells.get("dpth", 0.0) - z1) / (z2 - z1) for cells in self.depth]
-        return sorted({round(t, 9) for t in at if 1e-6 < t < 1.0 - 1e-6})
+        at = sorted((-cells.get("dpth", 0.0) - z1) / (z2 - z1) for cells in self.depth)
+        inner = [t for t in at if 1e-6 < t < 1.0 - 1e-6]
+        return [t for t, before in zip(inner, [0.0, *inner], strict=False) if t - before > 1e-6]
 
     def at(self, line, number, model, z, t):
         """{cd, ca, cp} at height z and fraction t of the member's length."""

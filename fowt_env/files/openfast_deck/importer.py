@@ -62,8 +62,13 @@ def import_deck(
     with tempfile.TemporaryDirectory(prefix="fowt-import-") as temporary:
         trial = Path(temporary)
         _write(trial, deck, texts, body, markdown(report))
-        platform = read_platform(trial / "platform.toml")
-        read_turbine(platform.turbine)
+        try:
+            read_turbine(read_platform(trial / "platform.toml").turbine)
+        except InputError as error:
+            problem = str(error).replace(f"{trial}/", "")
+            raise InputError(
+                f"deck {deck.name!r}: its figures cannot be used as they are: {problem}"
+            ) from None
         _write(folder, deck, texts, body, markdown(report))
     return report
 
@@ -97,8 +102,8 @@ def _texts(deck, name, head):
         "platform.toml": toml_text(platform_rows(deck, name, "turbine/turbine.toml", COEFFICIENTS), title),
         "turbine/turbine.toml": toml_text(turbine_rows(deck, name), title),
         "turbine/blade.csv": blade_text(columns, airfoils, [
-            f"Blade of {source}: its nodes, HubRad added; end nodes 0.05 m inside root and tip, where loads are zero.",
-            "radius along the pitch axis, m; twist in degrees, positive towards feather; prebend downwind, sweep, m.",
+            f"Blade of {source}: its nodes, the end ones 0.05 m inside root and tip, where loads are 0.",
+            "radius from the rotor centre along the pitch axis, m; twist in degrees; prebend downwind, m.",
             *head,
         ]),
     }  # fmt: skip

@@ -73,7 +73,7 @@ def read_map(path, depth, density, gravity):
                 notes.append((f"line {words[0]} without contact with the sea bed", "with contact"))
         lines.append(_line(file, number, words[0], ends, length, types[words[1].lower()], words[1]))
     _check_count(file, lines)
-    turned = [_turned(line, angle) for angle in angles if angle for line in lines]
+    turned = [_turned(line, angle) for angle in angles for line in lines]
     _check_count(file, lines + turned)
     return file, lines + turned, notes
 
@@ -97,7 +97,7 @@ def _wet_weight(file, number, name, mass, diameter, density, gravity):
     weight = (mass - density * 0.25 * math.pi * diameter**2) * gravity
     if weight <= 0.0:
         raise file.refusal(
-            f"line type {name}: weighs {weight:.4g} N/m in water: must be > 0, lines that float cannot be represented",
+            f"line type {name}: weighs {weight:.4g} N/m in water: must be > 0: lines may not float",
             number,
         )
     return weight
@@ -115,7 +115,7 @@ def _line(file, number, name, ends, length, kind, type_name):
     if None in kinds:
         other = ends[kinds.index(None)]
         raise file.refusal(
-            f"line {name}: its end is a point of the type {other[1]!r} (line {other[0] + 1}); must be fixed or"
+            f"line {name}: its end has the type {other[1]!r} (line {other[0] + 1}); must be fixed or"
             " on the vessel: points between lines, bodies and rods cannot be represented",
             number,
         )
@@ -237,7 +237,7 @@ def _moordyn_type(file, number, words, density, gravity):
     stiffness = number_of(words[3].partition("|")[0])
     if stiffness is None:
         raise file.refusal(
-            f"line type {words[0]}: EA = {words[3][:60]}: must be a number, curves of tension cannot be represented",
+            f"line type {words[0]}: EA = {words[3][:60]}: must be a number, not a curve",
             number,
         )
     if "|" in words[3]:

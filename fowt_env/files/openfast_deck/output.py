@@ -31,7 +31,7 @@ def value_text(value):
 
 
 def toml_text(tables, head):
-    """Text of {table: rows}; a table whose rows are lists of rows is a list of tables. head: lines of comment."""
+    """Text of {table: rows}; lists of rows become a list of tables. head: lines of comment."""
     lines = [f"# {line}" for line in head]
     for name, rows in tables.items():
         several = bool(rows) and isinstance(rows[0], list)

@@ -1,7 +1,7 @@
 """Values of OpenFAST's part files by their keys: "value key - comment", whatever the order and the comments.
 
 A key is the first word of a line that is not a value, after at least one that is. Letters of either case;
-`BldFile(1)` and `BldFile1` are the same key. Every error names the file, the line, the key and what is allowed.
+`BldFile(1)` and `BldFile1` are the same key. Errors name the file, the line, the key and what is allowed.
 """
 
 import math
@@ -77,7 +77,8 @@ class PartFile:
             place = _key_of(words)
             if place is not None:
                 values = [word for word in words[:place] if word not in ("!", "-")]
-                self.places.setdefault(_same(words[place]), (number, values))
+                if values:
+                    self.places.setdefault(_same(words[place]), (number, values))
 
     # ------------------------------------------------------------------ messages
 
@@ -192,7 +193,7 @@ class PartFile:
         return [self._row(found[0] + i, size, key) for i in range(size)]
 
     def vector(self, key, size=6):
-        """size numbers: before a key, or one of them and the others in the lines below; zeros without the key."""
+        """size numbers: before a key, or one there and the others below it; zeros if it is missing."""
         found = self.find(key)
         if found is None:
             return [0.0] * size
@@ -278,8 +279,10 @@ class PartFile:
 
 
 # columns that only newer versions have, behind those that every version has
-OPTIONAL_COLUMNS = ("axfdmod", "axvncoff", "axfdlofsc", "t_pot", "blcb", "blcenbn", "blcenbt", "blcpn", "blcpt",
-                    "blcan", "blcat", "blcam", "t_wr", "twrti", "twrcb", "twrcp", "twrca")  # fmt: skip
+OPTIONAL_COLUMNS = (
+    "axfdmod", "axvncoff", "axfdlofsc", "blcb", "blcenbn", "blcenbt", "blcpn", "blcpt", "blcan", "blcat",
+    "blcam", "twrti", "twrcb", "twrcp", "twrca",
+)  # fmt: skip
 
 
 def _text(path, kind):

@@ -124,7 +124,7 @@ def markdown(report):
     parts = [
         f"# {report.title}",
         "",
-        "Each figure of `platform.toml` and `turbine/turbine.toml` names the file and the keys that it is from.",
+        "Figures of `platform.toml` and `turbine/turbine.toml` name the file and the keys they are from.",
         "",
         "## Key figures",
         "",

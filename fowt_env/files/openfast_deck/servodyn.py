@@ -144,7 +144,7 @@ def _simple(servo, efficiency):
         efficiency, torque, speed, law, 0.0, 0.5 * math.pi, math.radians(rate),
         sources=sources | {"minimum_speed": "30 % of rated speed: not in the deck",
                            "pitch_rate": servo.source("PitManRat(1)")},
-        notes=(("no limits of torque and pitch, no filter of the speed", "those of the NREL 5 MW turbine, scaled"),),
+        notes=(("no limits of torque, no filter of the speed", "those of the NREL 5 MW turbine, scaled"),),
     )  # fmt: skip
 
 
@@ -205,7 +205,8 @@ def _rosco(path, efficiency, air_density, radius, folders):
     if high <= low:
         raise file.wrong("PC_MaxPit", high, f"> PC_MinPit = {low:g}")
     control = Control(
-        efficiency, torque, speed, law, low, high, file.number("PC_MaxRat", low=0.0, high=10.0, open_low=True),
+        efficiency, torque, speed, law, low, high,
+        file.number("PC_MaxRat", low=0.0, high=10.0, open_low=True),
         rated_wind_speed=wind, sources=sources, notes=tuple(notes), discon=file.path,
         performance=_optional(file, "PerfFileName", folders),
     )  # fmt: skip
@@ -220,7 +221,7 @@ def _rosco_notes(file):
         "ROSCO's torque law (VS_ControlMode {:g}, minimum speed VS_MinOMSpd)".format(
             file.whole("VS_ControlMode", default=2)
         ),
-        "for the built-in controllers the law of regions 1 to 3: a parabola VS_Rgn2K from VS_MinOMSpd on, a steep"
+        "for the built-in controllers the law of regions 1 to 3: VS_Rgn2K from VS_MinOMSpd on, with a steep"
         " line below and one to VS_RtTq above it",
     )
     yield (

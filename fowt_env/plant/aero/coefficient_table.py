@@ -19,7 +19,14 @@ import numpy as np
 
 from fowt_env.caches import Cache
 from fowt_env.plant.aero.bem_rotor import FAST_ROTOR, NO_ROTOR_LOAD, SLOW_ROTOR, RotorLoad, hub_flow
-from fowt_env.plant.aero.blade_elements import blade_section, elements_key, smoothstep
+from fowt_env.plant.aero.blade_elements import (
+    blade_section,
+    element_of,
+    elements_key,
+    pitching_moment,
+    smoothstep,
+)
+from fowt_env.plant.aero.blade_shape import effective_pitch, lever_of, station_at
 from fowt_env.plant.compile.decorators import entry, kernel
 from fowt_env.plant.events import Counter
 from fowt_env.plant.state import State, Wrench
@@ -76,6 +83,30 @@ class Coefficients(NamedTuple):
 N_COEFFICIENTS = len(Coefficients._fields)
 
 
+class Leaning(NamedTuple):
+    """What cone and prebend add: cross wind along the blades, forces along their radius, moments about it.
+
+    With nx, nr, turn, t_nx, x of a station's Lever (blade_shape.py), m the pitching moment and Q the moment
+    about the shaft, integrals of ...
+    """
+
+    moment_lean: float  # -B/2 turn nr n_n, on s R^2: cross wind meets leaning blades as a gradient does
+    force_lean: float  # B/2 nr t_n, on s R
+    out_gradient: float  # B/2 nr nx r n_n, on s R^2
+    out_cross: float  # B/2 nr n_t
+    out_lean: float  # B/2 nr nr n_n
+    roll_gradient: float  # B/2 nx r (t_nx n_n - x t_n + nx m_n), on s R^3
+    roll_cross: float  # B/2 (t_nx n_t - x t_t + nx m_t)
+    roll_lean: float  # B/2 nr (t_nx n_n - x t_n + nx m_n)
+    thrust_spread: float  # B nr r nx n_n, on s R^2: cross wind that diverges
+    torque_spread: float  # B nr r Q_n, on s R^3
+    thrust_both: float  # B/2 nr nx r nx n_nn, on R^2: gradient along the cross wind
+    torque_both: float  # B/2 nr nx r Q_nn, on R^3
+
+
+N_LEANING = len(Leaning._fields)
+
+
 class TableAxis(NamedTuple):
     """Points of one variable, and a table that finds the interval a value lies in."""
 
@@ -90,8 +121,9 @@ class CoefficientTable(NamedTuple):
     theta: TableAxis
     blade_pitch: TableAxis
     load: np.ndarray  # (n, m, N_COEFFICIENTS) in the order of Coefficients
+    lean: object  # (n, m, N_LEANING) in the order of Leaning; None: straight blades in the rotor plane
     tip_radius: float
-    overhang: float
+    overhang: float  # in rotor axes, as the hub height (tilt.py)
     hub_height: float
     density: float  # of the air, kg/m3
 
@@ -112,6 +144,7 @@ class DiskInflow(NamedTuple):
     cubic_z: float
     cross_y: float
     cross_z: float
+    spread: float  # mean of the cross wind's flow outwards at the tip
 
 
 def _axis(steps, end):
@@ -190,6 +223,99 @@ def _fill(theta, blade_pitch, load, rotor):
                 c[19] += 0.25 * weight * r * r * t_nt
 
 
+@kernel
+def _loads_at(v_normal, v_tangential, j, blade_pitch, induction, rotor, shape):
+    """(fn, ft, pitching moment) of station j per length."""
+    section = blade_section(v_normal, v_tangential, blade_pitch, j, induction, rotor)
+    element = element_of(j, blade_pitch, rotor)
+    moment = pitching_moment(
+        v_normal + section.induced_normal, v_tangential + section.induced_tangential, j, element, shape,
+        rotor.polars,
+    )  # fmt: skip
+    return section.fn, section.ft, moment
+
+
+@kernel
+def _slopes(less, middle, more, co, si, size):
+    """Derivatives with v_normal and v_tangential, and the three second ones times the square of the speed."""
+    first = 0.5 * (more - less) / TURN
+    second = (more - 2.0 * middle + less) / (TURN * TURN)
+    normal, tangential = (2.0 * co * middle - si * first) / size, (2.0 * si * middle + co * first) / size
+    nn = 2.0 * (middle - co * si * first) + si * si * second
+    nt = (co * co - si * si) * first - co * si * second
+    tt = 2.0 * (middle + co * si * first) + co * co * second
+    return normal, tangential, nn, nt, tt
+
+
+@entry
+def _fill_curved(theta, blade_pitch, load, lean, rotor, shape):
+    """As _fill for curved blades; lean: see Leaning."""
+    big = rotor.tip_radius
+    for i in range(theta.shape[0]):
+        wind, tip_speed = cos(theta[i]), sin(theta[i])
+        induction = smoothstep(tip_speed, SLOW_ROTOR * abs(wind), FAST_ROTOR * abs(wind))
+        for k in range(blade_pitch.shape[0]):
+            c, d = load[i, k], lean[i, k]
+            cosine, sine = cos(blade_pitch[k]), sin(blade_pitch[k])
+            for j in range(rotor.radius.shape[0]):
+                at, lever = station_at(j, cosine, sine, shape), lever_of(j, cosine, sine, shape)
+                turned = effective_pitch(j, blade_pitch[k], shape)
+                r, nx, nr = at.r / big, at.nx, at.nr
+                arm, turn, x = lever.r / big, -lever.turn / big, lever.x / big
+                t_nx, t_nr = lever.t_nx / big, lever.t_nr / big
+                v_normal, v_tangential = nx * wind + nr * tip_speed * at.t / big, tip_speed * r
+                square = v_normal * v_normal + v_tangential * v_tangential
+                size, angle = sqrt(square), atan2(v_tangential, v_normal)
+                n, t, m = _loads_at(v_normal, v_tangential, j, turned, induction, rotor, shape)
+                low_n, low_t, low_m = _loads_at(
+                    size * cos(angle - TURN), size * sin(angle - TURN), j, turned, induction, rotor, shape
+                )
+                top_n, top_t, top_m = _loads_at(
+                    size * cos(angle + TURN), size * sin(angle + TURN), j, turned, induction, rotor, shape
+                )
+                co, si = v_normal / size, v_tangential / size
+                n_n, n_t, n_nn, n_nt, n_tt = _slopes(low_n, n, top_n, co, si, size)
+                t_n, t_t, t_nn, t_nt, t_tt = _slopes(low_t, t, top_t, co, si, size)
+                m_n, m_t, _, _, _ = _slopes(low_m / big, m / big, top_m / big, co, si, size)
+                weight = rotor.blades * rotor.weight[j] / (big * big)
+                half, quarter = 0.5 * weight, 0.25 * weight / square
+                q = nx * r  # of a gradient, in v_normal
+                bend = nx * (r * r - MEAN_SQUARE)
+                c[0] += weight * nx * n
+                c[1] += weight * (arm * t - t_nr * n - nr * m / big)
+                c[2] += weight * bend * nx * n_n
+                c[3] += weight * bend * (arm * t_n - t_nr * n_n - nr * m_n)
+                c[4] += half * turn * q * n_n
+                c[5] += half * turn * n_t
+                c[6] += half * q * t_n
+                c[7] += half * t_t
+                c[8] += quarter * nx * q * q * n_nn
+                c[9] += 2.0 * quarter * nx * q * n_nt
+                c[10] += quarter * nx * n_tt
+                c[11] += quarter * arm * q * q * t_nn
+                c[12] += 2.0 * quarter * arm * q * t_nt
+                c[13] += quarter * arm * t_tt
+                c[14] += half * turn * q * r * r * n_n
+                c[15] += half * q * r * r * t_n
+                c[16] += quarter * turn * nx * q * r * r * n_nn
+                c[17] += quarter * turn * nx * r * r * n_nt
+                c[18] += quarter * nx * q * r * r * t_nn
+                c[19] += quarter * nx * r * r * t_nt
+                d[0] += half * turn * nr * n_n
+                d[1] += half * nr * t_n
+                d[2] += half * nr * q * n_n
+                d[3] += half * nr * n_t
+                d[4] += half * nr * nr * n_n
+                about_n, about_t = t_nx * n_n - x * t_n + nx * m_n, t_nx * n_t - x * t_t + nx * m_t
+                d[5] += half * q * about_n
+                d[6] += half * about_t
+                d[7] += half * nr * about_n
+                d[8] += weight * nr * r * nx * n_n
+                d[9] += weight * nr * r * (arm * t_n - t_nr * n_n - nr * m_n)
+                d[10] += 2.0 * quarter * nr * q * nx * n_nn
+                d[11] += 2.0 * quarter * nr * q * arm * t_nn
+
+
 _tables = Cache(8)  # one per set of blade elements: building takes about two seconds
 
 
@@ -198,15 +324,27 @@ def build_coefficient_table(rotor):
     return _tables.get(elements_key(rotor), lambda: _filled_table(rotor))
 
 
+def _filled_loads(theta, blade_pitch, rotor):
+    """(load, lean) of a CoefficientTable at these points."""
+    load = np.zeros((len(theta), len(blade_pitch), N_COEFFICIENTS))
+    unit = rotor._replace(air_density=1.0)
+    if rotor.shape is None:
+        _fill(theta, blade_pitch, load, unit)
+        return load, None
+    lean = np.zeros((len(theta), len(blade_pitch), N_LEANING))
+    _fill_curved(theta, blade_pitch, load, lean, unit, rotor.shape)
+    return load, lean
+
+
 def _filled_table(rotor):
     """CoefficientTable of BladeElements, computed."""
     theta, blade_pitch = _axis(THETA_STEPS, THETA_END), _axis(PITCH_STEPS, PITCH_END)
-    load = np.zeros((len(theta.point), len(blade_pitch.point), N_COEFFICIENTS))
-    _fill(theta.point, blade_pitch.point, load, rotor._replace(air_density=1.0))
+    load, lean = _filled_loads(theta.point, blade_pitch.point, rotor)
     return CoefficientTable(
         theta,
         blade_pitch,
         load,
+        lean,
         float(rotor.tip_radius),
         float(rotor.overhang),
         float(rotor.hub_height),
@@ -286,6 +424,7 @@ def _inflow(pose, now, series, table):
     up, side = a * size * axial + pose.r11 * vertical, pose.r11 * left
     y_up, z_up = a * size * cross_y + pose.r12 * vertical, a * size * cross_z + pose.r13 * vertical
     curl = pose.r33 * y_up + pose.r23 * pose.r12 * left - pose.r32 * z_up - pose.r22 * pose.r13 * left
+    divergence = pose.r32 * y_up + pose.r22 * pose.r12 * left + pose.r33 * z_up + pose.r23 * pose.r13 * left
     return DiskInflow(
         hub.wx + MEAN_SQUARE * bend,
         0.5 * curl,
@@ -296,6 +435,46 @@ def _inflow(pose, now, series, table):
         pose.r33 * cubic,
         hub.wy,
         hub.wz,
+        0.5 * divergence,
+    )
+
+
+@kernel
+def _with_lean(plain, flow, tip_speed, blade_pitch, s, gy, gz, table, lean):
+    """The Wrench about the rotor centre with what cone and prebend add."""
+    if lean is None:
+        return plain
+    i, p = _interval(atan2(tip_speed, flow.axial), table.theta)
+    k, b = _interval(blade_pitch, table.blade_pitch)
+    w00, w01, w10, w11 = (1.0 - p) * (1.0 - b), (1.0 - p) * b, p * (1.0 - b), p * b
+    c00, c01, c10, c11 = lean[i, k], lean[i, k + 1], lean[i + 1, k], lean[i + 1, k + 1]
+    at = Leaning(
+        w00 * c00[0] + w01 * c01[0] + w10 * c10[0] + w11 * c11[0],
+        w00 * c00[1] + w01 * c01[1] + w10 * c10[1] + w11 * c11[1],
+        w00 * c00[2] + w01 * c01[2] + w10 * c10[2] + w11 * c11[2],
+        w00 * c00[3] + w01 * c01[3] + w10 * c10[3] + w11 * c11[3],
+        w00 * c00[4] + w01 * c01[4] + w10 * c10[4] + w11 * c11[4],
+        w00 * c00[5] + w01 * c01[5] + w10 * c10[5] + w11 * c11[5],
+        w00 * c00[6] + w01 * c01[6] + w10 * c10[6] + w11 * c11[6],
+        w00 * c00[7] + w01 * c01[7] + w10 * c10[7] + w11 * c11[7],
+        w00 * c00[8] + w01 * c01[8] + w10 * c10[8] + w11 * c11[8],
+        w00 * c00[9] + w01 * c01[9] + w10 * c10[9] + w11 * c11[9],
+        w00 * c00[10] + w01 * c01[10] + w10 * c10[10] + w11 * c11[10],
+        w00 * c00[11] + w01 * c01[11] + w10 * c10[11] + w11 * c11[11],
+    )
+    cy, cz = flow.cross_y, flow.cross_z
+    area = table.density * table.tip_radius * table.tip_radius
+    volume, along = area * table.tip_radius, gy * cy + gz * cz
+    force, moment = s * area, s * volume
+    return Wrench(
+        plain.fx + force * flow.spread * at.thrust_spread + area * along * at.thrust_both,
+        plain.fy + force * (gy * at.out_gradient - cz * at.out_cross + cy * at.out_lean - cz * at.force_lean),
+        plain.fz + force * (gz * at.out_gradient + cy * at.out_cross + cz * at.out_lean + cy * at.force_lean),
+        plain.mx + moment * flow.spread * at.torque_spread + volume * along * at.torque_both,
+        plain.my
+        + moment * (gy * at.roll_gradient - cz * at.roll_cross + cy * at.roll_lean + cz * at.moment_lean),
+        plain.mz
+        + moment * (gz * at.roll_gradient + cy * at.roll_cross + cz * at.roll_lean - cy * at.moment_lean),
     )
 
 
@@ -341,19 +520,21 @@ def coefficient_table_load(pose, x, now, series, table, counters):
     y -= bend * (my * at.force_bend_gradient - cz * at.force_bend_cross)
     z = s * (gz * at.force_gradient + qz * at.force_cubic + cy * at.force_cross)
     z += bend * (mz * at.force_bend_gradient + cy * at.force_bend_cross)
-    fy, fz = -force * z, force * y
+    plain = Wrench(thrust, -force * z, force * y, torque, tilt_y, tilt_z)
+    load = _with_lean(plain, flow, tip_speed, x[State.BLADE_PITCH], s, my, mz, table, table.lean)
+    fy, fz = load.fy, load.fz
     height, overhang = table.hub_height, table.overhang
     return RotorLoad(
         Wrench(
-            thrust,
+            load.fx,
             fy,
             fz,
-            torque - height * fy,
-            tilt_y + height * thrust + overhang * fz,
-            tilt_z - overhang * fy,
+            load.mx - height * fy,
+            load.my + height * load.fx + overhang * fz,
+            load.mz - overhang * fy,
         ),
-        thrust,
-        torque,
+        load.fx,
+        load.mx,
     )
 
 
@@ -364,8 +545,7 @@ def performance(rotor, tip_speed_ratio, blade_pitch):
     """
     ratio = np.ascontiguousarray(tip_speed_ratio, dtype=np.float64)
     blade_pitch = np.ascontiguousarray(blade_pitch, dtype=np.float64)
-    load = np.zeros((len(ratio), len(blade_pitch), N_COEFFICIENTS))
-    _fill(np.arctan(ratio), blade_pitch, load, rotor._replace(air_density=1.0))
+    load, _ = _filled_loads(np.arctan(ratio), blade_pitch, rotor)
     # the table's are on rho R^2 (and R) and the speed of wind and tip together
     scale = 2.0 / np.pi * (1.0 + ratio[:, None] ** 2)
     torque = scale * load[:, :, 1]

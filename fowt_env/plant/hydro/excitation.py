@@ -1,10 +1,11 @@
 """Wave force on a potential-flow body, first and second order (theory.md, 5.9).
 
-Linear theory knows the body in its undisplaced place and pose alone, so the forces are functions of time, in
-inertial axes about the body origin. First-order forces are a sum over the wave components, or the same sum
-tabulated over time; second-order forces are tabulated always. A table holds the coefficients of a cubic
-B-spline: four rows, of eight numbers each, make a value. Where the waves are to meet the body at its slowly
-varying place, first-order forces are summed with the phases of a low-passed surge and sway, two states.
+Linear theory knows the body in its undisplaced position and attitude alone, so the forces are functions of
+time, in inertial axes about the body origin. First-order forces are a sum over the wave components, or the
+same sum tabulated over time; second-order forces are tabulated always. A table holds the coefficients of a
+cubic B-spline: four rows, of eight numbers each, make a value. Where the waves are to meet the body at its
+slowly varying position, first-order forces are summed with the phases of a low-passed surge and sway, two
+states.
 """
 
 from math import cos, floor, pi, sin
@@ -54,7 +55,7 @@ class ExcitationSeries(NamedTuple):
 
 
 class FastExcitation(NamedTuple):
-    """First-order force by the sum at a place, with the phases of all components at once."""
+    """First-order force by the sum at a position, with the phases of all components at once."""
 
     wave: np.ndarray  # (N_WAVE, n) rows DISTANCE (zeros) to ALONG_Y; n padded with zeros to whole lanes
     force: np.ndarray  # (12, n) of each component's amplitude, on cosine (6) and sine (6)
@@ -62,7 +63,7 @@ class FastExcitation(NamedTuple):
     ramp: float
 
 
-class SlowPlace(NamedTuple):
+class FilteredPosition(NamedTuple):
     """Surge and sway behind a first-order low pass: where the waves meet the body."""
 
     first: int  # of its two states in the state vector
@@ -80,20 +81,20 @@ class SecondOrder(NamedTuple):
 class Excitation(NamedTuple):
     """Force of the waves on a potential-flow body."""
 
-    first: object  # ExactExcitation, ExcitationSeries or, with a place, FastExcitation
-    second: object  # SecondOrder or None; at the undisplaced place
-    place: object  # SlowPlace, or None: undisplaced
+    first: object  # ExactExcitation, ExcitationSeries or, with a position, FastExcitation
+    second: object  # SecondOrder or None; at the undisplaced position
+    position: object  # FilteredPosition, or None: undisplaced
 
 
-def build_place(first, cutoff):
-    """SlowPlace whose states begin at `first`, with a cutoff frequency in Hz."""
-    return SlowPlace(int(first), float(2.0 * pi * cutoff))
+def build_filtered_position(first, cutoff):
+    """FilteredPosition whose states begin at `first`, with a cutoff frequency in Hz."""
+    return FilteredPosition(int(first), float(2.0 * pi * cutoff))
 
 
-def place_states(hydro):
-    """Number of states of the slow place of a Hydro part or None."""
+def position_states(hydro):
+    """Number of states of the filtered position of a Hydro part or None."""
     part = None if hydro is None else hydro.excitation
-    return 0 if part is None or part.place is None else 2
+    return 0 if part is None or part.position is None else 2
 
 
 def excitation_scratch(hydro):
@@ -117,7 +118,7 @@ def place_in(t, table):
 
 @kernel
 def spline_weights(u):
-    """Weights of the four coefficients about a place at this fraction (0 to 1) between two rows."""
+    """Weights of the four coefficients about a time at this fraction (0 to 1) between two rows."""
     v = 1.0 - u
     cube, other = u * u * u, v * v * v
     return (
@@ -155,7 +156,7 @@ def _tabulated(value, row, fraction, scale):
 
 @kernel
 def exact_force(t, x, y, first, scratch):
-    """Wrench of an ExactExcitation at an inertial place, inertial axes."""
+    """Wrench of an ExactExcitation at an inertial position, inertial axes."""
     force = first.force
     fx = fy = fz = mx = my = mz = 0.0
     for j in range(first.omega.shape[0]):
@@ -173,7 +174,7 @@ def exact_force(t, x, y, first, scratch):
 
 @kernel
 def series_force(t, x, y, first, scratch):
-    """Wrench of an ExcitationSeries, inertial axes, whatever the place."""
+    """Wrench of an ExcitationSeries, inertial axes, whatever the position."""
     row, fraction = place_in(t, first.table)
     if row < 0:
         return exact_force(t, 0.0, 0.0, first.exact, scratch)
@@ -182,7 +183,7 @@ def series_force(t, x, y, first, scratch):
 
 @kernel
 def _fill_phasors(t, x, y, wave, scratch):
-    """Fill the last two rows of scratch with cosine and sine of the components' phases at a place."""
+    """Fill the last two rows of scratch with cosine and sine of the components' phases at a position."""
     for j in range(wave.shape[1]):
         scratch[DISTANCE, j] = x * wave[ALONG_X, j] + y * wave[ALONG_Y, j]
         scratch[RATE, j] = wave[RATE, j]
@@ -192,7 +193,7 @@ def _fill_phasors(t, x, y, wave, scratch):
 
 @kernel
 def fast_force(t, x, y, first, scratch):
-    """Wrench of a FastExcitation at an inertial place, inertial axes."""
+    """Wrench of a FastExcitation at an inertial position, inertial axes."""
     _fill_phasors(t, x, y, first.wave, scratch)
     c, s, force, n = scratch[3], scratch[4], first.force, first.amplitude.shape[0]
     f = ramp_factor(t, first.ramp)
@@ -214,27 +215,27 @@ first_order_force = chosen_by_class(
 
 
 @kernel
-def slow_place(x, place):
-    """(x, y) inertial place at which the waves meet the body."""
-    if place is None:
+def meeting_point(x, position):
+    """(x, y) inertial position at which the waves meet the body."""
+    if position is None:
         return 0.0, 0.0
-    return x[place.first], x[place.first + 1]
+    return x[position.first], x[position.first + 1]
 
 
 @kernel
-def place_rates(x, part, dx):
-    """Put the rates of the slow place of an Excitation, or None, into dx."""
+def position_rates(x, part, dx):
+    """Put the rates of the filtered position of an Excitation, or None, into dx."""
     if part is None:
         return
-    _filter_rates(x, part.place, dx)
+    _filter_rates(x, part.position, dx)
 
 
 @kernel
-def _filter_rates(x, place, dx):
-    if place is None:
+def _filter_rates(x, position, dx):
+    if position is None:
         return
-    dx[place.first] = place.rate * (x[State.SURGE] - x[place.first])
-    dx[place.first + 1] = place.rate * (x[State.SWAY] - x[place.first + 1])
+    dx[position.first] = position.rate * (x[State.SURGE] - x[position.first])
+    dx[position.first + 1] = position.rate * (x[State.SWAY] - x[position.first + 1])
 
 
 @kernel
@@ -258,7 +259,7 @@ def add_excitation(t, pose, x, load, part, scratch):
     """The load (body axes) with the force of the waves; as it is without the part."""
     if part is None:
         return load
-    at_x, at_y = slow_place(x, part.place)
+    at_x, at_y = meeting_point(x, part.position)
     force = add_second_order(t, first_order_force(t, at_x, at_y, part.first, scratch), part.second)
     fx, fy, fz = to_body(pose, force.fx, force.fy, force.fz)
     mx, my, mz = to_body(pose, force.mx, force.my, force.mz)

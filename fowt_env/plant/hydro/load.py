@@ -7,7 +7,7 @@ from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.hydro.added_inertia import added_inertia_load
 from fowt_env.plant.hydro.banded_strips import banded_strip_load
 from fowt_env.plant.hydro.body_matrices import add_body_matrices
-from fowt_env.plant.hydro.excitation import add_excitation, elevation_beside, place_rates
+from fowt_env.plant.hydro.excitation import add_excitation, elevation_beside, position_rates
 from fowt_env.plant.hydro.hydrostatics import hydrostatic_load
 from fowt_env.plant.hydro.linear_damping import damping_load
 from fowt_env.plant.hydro.member_buoyancy import add_member_buoyancy
@@ -157,7 +157,7 @@ def hydro_rates(x, hydro, dx):
     """Put the rates of the water's internal states that have any into dx."""
     if hydro is None:
         return
-    place_rates(x, hydro.excitation, dx)
+    position_rates(x, hydro.excitation, dx)
 
 
 @kernel

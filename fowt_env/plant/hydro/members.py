@@ -220,9 +220,10 @@ def _linear(row, column, share):
 @kernel
 def _side_node(row, along, weight, density, node):
     """Fill the node of a cell's Gauss point, weight (m) of the member."""
-    share = along / row[LENGTH]
+    per_length = 1.0 / row[LENGTH] if row[LENGTH] > 0.0 else 0.0
+    share = along * per_length
     diameter = _linear(row, DIAMETER, share)
-    slope = (row[DIAMETER + 1] - row[DIAMETER]) / row[LENGTH]
+    slope = (row[DIAMETER + 1] - row[DIAMETER]) * per_length
     mass = weight * density * 0.25 * pi * diameter * diameter
     added, pressure = _linear(row, C_ADDED, share), _linear(row, C_PRESSURE, share)
     _put_place(row, along, node)

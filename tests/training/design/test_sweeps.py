@@ -16,6 +16,7 @@ from fowt_env.training.design.sweeps import (
     sweep,
     transmission_zeros,
     zero_table,
+    zeros_over,
 )
 
 
@@ -113,3 +114,20 @@ def test_a_sweep_scores_each_variant_beside_the_baseline(tmp_path):
     travel = table["blade_pitch_travel_[deg/s]"]
     assert travel[2] < 0.8 * travel[1]
     assert len(out.read_text().splitlines()) == 4
+
+
+def test_the_table_of_zeros_is_that_of_the_models(models):
+    """13 and 20 m/s on OC3-Hywind: a right-half-plane zero at the platform's pitch, and none."""
+    scene = next(iter(models.values())).scene
+    table = zeros_over(scene, (13.0, 20.0)).set_index("wind_[m/s]")
+    zero = zero_table({13.0: models[13.0]}).iloc[0]
+    assert table["zero_real_[rad/s]"][13.0] == pytest.approx(zero["real_[rad/s]"])
+    assert table["zero_period_[s]"][13.0] == pytest.approx(table["platform_period_[s]"][13.0], rel=0.05)
+    assert table["zero_real_[rad/s]"][20.0] == 0.0 and np.isnan(table["zero_period_[s]"][20.0])
+    # the published gains leave the platform damped (theory.md, section 4)
+    assert (table["pi_pitch_damping_[-]"] > 0.0).all()
+
+
+def test_winds_at_which_the_blades_rest_have_no_zeros(models):
+    with pytest.raises(InputError, match="8: the blade pitch rests"):
+        zeros_over(next(iter(models.values())).scene, (8.0,))

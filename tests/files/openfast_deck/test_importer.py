@@ -1,0 +1,341 @@
+"""A deck becomes a platform and turbine: masses in closed form, HydroDyn's tables, moorings, refusals."""
+
+import math
+
+import numpy as np
+import pytest
+from small_deck import HYDRODYN, NAMES, write_deck
+
+from fowt_env.descriptions.platform import read_platform
+from fowt_env.descriptions.turbine import read_turbine
+from fowt_env.errors import InputError
+from fowt_env.files.openfast_deck.conversion import mass_properties
+from fowt_env.files.openfast_deck.deck import read_deck
+from fowt_env.files.openfast_deck.hydrodyn import read_hydrodyn
+from fowt_env.files.openfast_deck.importer import import_deck
+from fowt_env.files.openfast_deck.mooring import read_mooring
+
+
+@pytest.fixture(scope="module")
+def imported(tmp_path_factory):
+    """(platform, turbine, report, folder) of the small deck."""
+    folder = tmp_path_factory.mktemp("deck")
+    report = import_deck(write_deck(folder), folder / "out", name="small")
+    platform = read_platform(folder / "out" / "platform.toml")
+    return platform, read_turbine(platform.turbine), report, folder / "out"
+
+
+def refused(folder, **changes):
+    """Text of the InputError that a changed deck is refused with; nothing may be written."""
+    with pytest.raises(InputError) as caught:
+        import_deck(write_deck(folder, **changes), folder / "out")
+    assert not (folder / "out").exists()
+    return str(caught.value)
+
+
+# --------------------------------------------------------------------------- masses and geometry
+
+
+def test_rotor_has_the_mass_properties_of_its_uniform_blades_and_hub(imported):
+    rotor, cone = imported[1].rotor, math.radians(3.0)
+    blade = 200.0 * 50.0  # kg/m times m, AdjBlMs 2
+    first, second = 200.0 * (52.0**2 - 2.0**2) / 2.0, 200.0 * (52.0**3 - 2.0**3) / 3.0
+    assert rotor.mass == pytest.approx(3e4 + 3 * blade)
+    assert rotor.cm_offset == pytest.approx((-3e4 - 3 * first * math.sin(cone)) / 6e4, rel=1e-6)
+    assert rotor.inertia == pytest.approx(2e5 + 3 * second * math.cos(cone) ** 2, rel=1e-5)
+    across = 1.5 * second * math.cos(cone) ** 2 + 3 * second * math.sin(cone) ** 2 + 3e4
+    assert rotor.inertia_diameter == pytest.approx(across - 6e4 * rotor.cm_offset**2, rel=1e-5)
+    assert rotor.cone == pytest.approx(cone)
+    assert rotor.shaft_tilt == pytest.approx(math.radians(5.0))
+
+
+def test_rotor_centre_lies_along_the_tilted_shaft(imported):
+    rotor = imported[1].rotor
+    assert rotor.overhang == pytest.approx(4.0 * math.cos(math.radians(5.0)))
+    assert rotor.hub_height == pytest.approx(82.0 + 4.0 * math.sin(math.radians(5.0)))
+
+
+def test_nacelle_inertia_is_about_its_own_centre_of_mass(imported):
+    nacelle = imported[1].nacelle
+    assert nacelle.inertia == pytest.approx((0.0, 0.0, 1.0e6 - 1e5 * (2.0**2 + 0.5**2)))
+    assert (nacelle.cm_downwind, nacelle.cm_left, nacelle.cm_height) == (2.0, 0.5, 81.5)
+
+
+def test_tower_has_the_mass_of_its_taper_with_the_yaw_bearing_at_its_top(imported):
+    tower = imported[0].tower
+    # 3000 to 1000 kg/m over 70 m: moments about the base, and 5000 kg at the top
+    mass = 2000.0 * 70.0 + 5000.0
+    first = 3000.0 * 70.0**2 / 2 - 2000.0 * 70.0**2 / 3 + 5000.0 * 70.0
+    second = 3000.0 * 70.0**3 / 3 - 2000.0 * 70.0**3 / 4 + 5000.0 * 70.0**2
+    assert tower.mass == pytest.approx(mass)
+    assert tower.cm_height == pytest.approx(10.0 + first / mass, rel=1e-5)
+    assert tower.inertia[0] == pytest.approx(second - first**2 / mass, rel=1e-5)
+    assert (tower.base_diameter, tower.top_diameter) == (6.0, 4.0)
+    assert tower.drag_coefficient == pytest.approx(0.5)
+
+
+def test_water_in_members_is_ballast_with_its_own_inertia(imported):
+    ballast = imported[0].ballast
+    water = 1100.0 * math.pi * 4.5**2 * 15.0  # from -20 to -5 m, 0.5 m of steel around it
+    mass = 6.0e6 + water
+    centre = (6.0e6 * -30.0 + water * -12.5) / mass
+    own = water * (4.5**2 / 4.0 + 15.0**2 / 12.0)
+    apart = 6.0e6 * (-30.0 - centre) ** 2 + water * (-12.5 - centre) ** 2
+    assert ballast.mass == pytest.approx(mass)
+    assert ballast.cm_depth == pytest.approx(-centre)
+    assert ballast.inertia == pytest.approx(
+        (2.0e9 + own + apart, 2.1e9 + own + apart, 1.5e8 + 0.5 * water * 4.5**2), rel=1e-8
+    )
+
+
+def test_old_hydrodyn_has_water_on_the_axis_and_its_moment_in_the_additional_stiffness(tmp_path):
+    old = HYDRODYN.replace("1    NBody     \n", "").replace("1    NBody\n", "")
+    moment = 1100.0 * math.pi * 4.5**2 * 15.0 * 9.81 * 12.5
+    rows = f"0 0 0 {moment} 0 0\n0 0 0 0 {moment} 0\n0 0 0 0 0 9.0e7"
+    old = old.replace("0 0 0 0 0 0\n0 0 0 0 0 0\n0 0 0 0 0 9.0e7", rows)
+    import_deck(write_deck(tmp_path, HydroDyn=old), tmp_path / "out")
+    platform = read_platform(tmp_path / "out" / "platform.toml")
+    stiffness = np.array(platform.additional.stiffness)
+    assert stiffness[5, 5] == 9.0e7
+    assert np.abs(stiffness[:5]).max() == 0.0
+    water = 1100.0 * math.pi * 4.5**2 * 15.0
+    assert platform.ballast.inertia[2] == pytest.approx(1.5e8, rel=1e-9)
+    assert platform.ballast.mass == pytest.approx(6.0e6 + water)
+
+
+def test_the_report_s_masses_are_those_of_the_files(imported):
+    platform, turbine, report, folder = imported
+    figures = dict(report.figures)
+    total = platform.ballast.mass + platform.tower.mass + turbine.nacelle.mass + turbine.rotor.mass
+    assert figures["mass, total"] == f"{total:,.1f} kg".replace(",", " ")
+    assert figures["mass, total"] in (folder / "report.md").read_text()
+
+
+# --------------------------------------------------------------------------- aerodynamics
+
+
+def test_blade_has_the_nodes_of_aerodyn_with_the_outermost_just_inside(imported):
+    blade = imported[1].blade
+    assert blade.radius == pytest.approx([2.05, 12.0, 32.0, 51.95])
+    assert blade.prebend == pytest.approx([0.0, -0.1, -0.5, -1.5])
+    assert blade.sweep == pytest.approx([0.0, 0.2, 0.1, 0.0])
+    assert np.degrees(blade.twist) == pytest.approx([12.0, 8.0, 3.0, 0.0])
+    assert blade.polars["one"][:, 1] == pytest.approx([0.0, 0.4, 0.0])  # the first of two tables
+
+
+def test_the_middle_table_of_a_polar_is_taken_where_aerodyn_interpolates(tmp_path):
+    path = write_deck(tmp_path, AeroDyn=[("1        InCol_Alfa", "2 AFTabMod\n1 InCol_Alfa")])
+    import_deck(path, tmp_path / "out")
+    turbine = read_turbine(tmp_path / "out" / "turbine" / "turbine.toml")
+    assert turbine.blade.polars["one"][1, 1] == 0.5
+    assert "number 2 (Reynolds number 5.0 million)" in (tmp_path / "out" / "report.md").read_text()
+
+
+# --------------------------------------------------------------------------- hydrodynamics
+
+
+def test_coefficients_keep_wamit_s_figures(imported):
+    body, site = imported[0].potential_flow, imported[0].environment
+    assert body.volume == 7000.0
+    assert body.centre_of_buoyancy == (0.1, 0.0)
+    assert np.diag(body.added_mass_infinite) == pytest.approx([0.9 * 1025.0] * 6)
+    assert body.damping[1, 2, 2] == pytest.approx(1025.0 * 0.6 * 0.2 * 0.6 * math.exp(-0.6), rel=1e-6)
+    assert body.excitation[2, 2, 3] == pytest.approx(
+        site.water_density * site.gravity * (4.0 + 0.5j), rel=1e-6
+    )
+
+
+def test_additional_matrices_are_hydrodyn_s(imported):
+    extra = imported[0].additional
+    assert extra.preload == (1.0, 2.0, 3.0, 0.0, 0.0, 0.0)
+    assert extra.stiffness[5][5] == 9.0e7
+    assert extra.linear_damping[0][0] == 1.0e5
+    assert extra.quadratic_damping is None
+
+
+def test_coefficients_over_depth_split_a_member_where_they_bend(imported):
+    column = [member for member in imported[0].members if member.potential_flow]
+    assert [member.start[2] for member in column] == pytest.approx([10.0, 0.0, -10.0], abs=1e-12)
+    assert [member.drag_coefficient for member in column] == [(0.5, 0.5), (0.5, 1.5), (1.5, 1.5)]
+
+
+def test_axial_drag_of_a_joint_goes_by_the_sum_of_its_areas_and_half_of_its_coefficient(imported):
+    disc = imported[0].members[-1]
+    assert not disc.potential_flow
+    assert disc.drag_coefficient == (2.0, 3.0)
+    assert disc.added_mass_coefficient == (0.5, 0.7)
+    # rho A v^2 / 4 in HydroDyn: the ring of 20 m less the column of 10 m above, the full disc below
+    assert disc.axial_drag_coefficient == pytest.approx((0.5 * 8.0 * (1.0 - 0.25), 0.5 * 8.0))
+    # the column is in the potential-flow body: it takes no added mass from the disc
+    assert disc.axial_added_mass_coefficient == pytest.approx((1.0, 1.0))
+
+
+def test_members_without_a_potential_flow_body_have_all_their_loads(tmp_path):
+    path = write_deck(tmp_path, HydroDyn=[("1    PotMod ", "0    PotMod ")])
+    import_deck(path, tmp_path / "out")
+    platform = read_platform(tmp_path / "out" / "platform.toml")
+    assert platform.potential_flow is None
+    assert not any(member.potential_flow for member in platform.members)
+    disc = platform.members[-1]
+    assert disc.axial_added_mass_coefficient == pytest.approx((1.0 - 0.5**3, 1.0))
+    assert disc.axial_pressure_coefficient == pytest.approx((0.75, 1.0))
+
+
+# --------------------------------------------------------------------------- moorings, wind, sea
+
+
+def test_lines_of_map_are_repeated_and_weigh_what_they_do_in_water(imported):
+    lines = imported[0].lines
+    assert len(lines) == 3
+    for line, azimuth in zip(lines, (0.0, 120.0, 240.0), strict=True):
+        assert math.hypot(*line.anchor[:2]) == pytest.approx(400.0)
+        assert math.degrees(math.atan2(line.anchor[1], line.anchor[0])) % 360.0 == pytest.approx(azimuth)
+        assert line.anchor[2] == -200.0
+        assert line.wet_weight == pytest.approx((100.0 - 1025.0 * math.pi * 0.05**2) * 9.81)
+        assert line.seabed_friction == 0.7
+
+
+def test_moordyn_gives_the_lines_of_map(tmp_path):
+    write_deck(tmp_path)
+    site = (200.0, 1025.0, 9.81)
+    ours, other = (read_mooring(None, tmp_path / NAMES[name], *site)[1] for name in ("MAP", "MoorDyn"))
+    for a, b in zip(ours, other, strict=True):
+        assert a.anchor == pytest.approx(b.anchor, abs=1e-6)
+        assert a.fairlead == pytest.approx(b.fairlead, abs=1e-6)
+        assert (a.length, a.wet_weight, a.EA) == (b.length, b.wet_weight, b.EA)
+
+
+def test_a_repetition_by_zero_doubles_the_lines(tmp_path):
+    """As the tension-leg platform of OpenFAST/r-test has it: two tendons at each corner."""
+    path = write_deck(tmp_path, MAP=[("repeat 120 240", "repeat 270 180 90 0 270 180 90")])
+    lines = read_deck(path).lines
+    assert len(lines) == 8
+    assert lines[0].anchor == pytest.approx(lines[4].anchor)
+
+
+def test_site_wind_and_sea_are_those_of_the_deck(imported):
+    platform, _, report, _ = imported
+    site = platform.environment
+    assert (site.gravity, site.water_density, site.air_density) == (9.81, 1025.0, 1.2)
+    assert (site.water_depth, site.shear_exponent) == (200.0, 0.11)
+    assert "Hs 6 m, Tp 10 s, heading 15 deg" in report.suggestions[0]
+    assert "12 m/s at 80 m" in report.suggestions[1]
+
+
+def test_fast_8_has_its_site_in_its_modules(tmp_path):
+    """Gravity in ElastoDyn, air in AeroDyn, water and waves in HydroDyn; no SeaState, few switches."""
+    waves = "1000 WtrDens\n150 WtrDpth\n0 MSL2SWL\n2 WaveMod\n5 WaveHs\n9 WaveTp\n0 CurrMod\n1    PotMod "
+    path = write_deck(
+        tmp_path,
+        OpenFAST='head\n1 CompMooring\n"ed.dat" EDFile\n"ad.dat" AeroFile\n"servo.dat" ServoFile\n'
+        '"hd.dat" HydroFile\n"map.dat" MooringFile\n"unused" InflowFile\n',
+        ElastoDyn=[("3      NumBl", "9.80665 Gravity\n3 NumBl")],
+        AeroDyn=[('"default"  AirDens', "1.225 AirDens")],
+        HydroDyn=[("1    PotMod ", waves)],
+        MAP=[("400 0 depth", "400 0 -150")],
+    )
+    deck = read_deck(path)
+    assert (deck.site.gravity, deck.site.air_density) == (9.80665, 1.225)
+    assert (deck.site.water_density, deck.site.water_depth) == (1000.0, 150.0)
+    assert deck.sea.suggestion == {"kind": "jonswap", "Hs": 5.0, "Tp": 9.0}
+
+
+def test_a_deck_may_be_given_by_its_parts(tmp_path):
+    write_deck(tmp_path, SeaState=[('"default"  WtrDpth', "200  WtrDpth")])
+    names = ("elastodyn", "aerodyn", "hydrodyn", "seastate", "mooring", "servodyn")
+    kinds = ("ElastoDyn", "AeroDyn", "HydroDyn", "SeaState", "MoorDyn", "ServoDyn")
+    parts = {name: tmp_path / NAMES[kind] for name, kind in zip(names, kinds, strict=True)}
+    deck = read_deck(parts=parts)
+    assert mass_properties(deck)["rotor"] == pytest.approx(6e4)
+    assert len(deck.lines) == 3
+    assert deck.site.gravity == 9.80665
+    with pytest.raises(InputError, match="hydrodyn \\(HydroFile\\)"):
+        read_deck(parts={"elastodyn": parts["elastodyn"], "aerodyn": parts["aerodyn"]})
+
+
+# --------------------------------------------------------------------------- controller
+
+
+def test_torque_law_and_pitch_drive_are_rosco_s(imported):
+    _, turbine, _, folder = imported
+    law, drive = turbine.torque_law, turbine.pitch_drive
+    assert (law.rated_torque, law.rated_speed, law.max_torque) == (3e4, 130.0, 3.3e4)
+    assert law.rated_power == pytest.approx(3e4 * 130.0)
+    assert law.region2_constant == 1.7
+    assert law.cut_in_speed == 45.0
+    assert turbine.rated_rotor_speed == pytest.approx(130.0 / 90.0)
+    assert (turbine.rated_wind_speed, turbine.cut_out_wind_speed) == (11.0, 24.0)
+    assert (drive.minimum, drive.maximum, drive.rate_limit) == pytest.approx((0.0, 1.5, 0.1))
+    assert turbine.drivetrain.generator_efficiency == 0.95
+    assert turbine.drivetrain.mesh_loss == pytest.approx(0.02)
+    assert (folder / "turbine" / "DISCON.IN").is_file()
+    assert turbine.discon == str(folder / "turbine" / "DISCON.IN")
+
+
+def test_the_legacy_controller_of_the_5_mw_turbine_is_known_by_its_library(tmp_path):
+    path = write_deck(
+        tmp_path,
+        ServoDyn=[('"libdiscon.so"', '"ServoData/DISCON_OC3Hywind_win32.dll"')],
+        ElastoDyn=[("90     GBRatio", "97 GBRatio")],
+    )
+    import_deck(path, tmp_path / "out")
+    turbine = read_turbine(tmp_path / "out" / "turbine" / "turbine.toml")
+    known = read_turbine("nrel5mw")
+    assert turbine.torque_law == known.torque_law.model_copy(
+        update={"rated_power": turbine.torque_law.rated_power}
+    )
+    assert turbine.torque_law.rated_power == pytest.approx(known.torque_law.rated_power, rel=1e-6)
+    assert turbine.gains == known.gains
+
+
+# --------------------------------------------------------------------------- refusals
+
+
+@pytest.mark.parametrize(
+    ("part", "old", "new", "expected"),
+    [
+        ("HydroDyn", "1    NBody\n", "2    NBody\n", ("hd.dat", "NBody = 2", "must be 1")),
+        ("HydroDyn", "1    PotMod ", "2    PotMod ", ("PotMod = 2", "fluid impulse")),
+        ("HydroDyn", "0  NMGDepths", "1  NMGDepths\nMGDpth MGThck\n(m) (m)\n0 0.1", ("marine growth",)),
+        ("HydroDyn", "0    PtfmRefxt", "1.0 PtfmRefxt", ("PtfmRefxt = 1",)),
+        ("SeaState", "0     CurrMod", "2 CurrMod", ("sea.dat", "CurrMod = 2", "user's current")),
+        ("ElastoDyn", "-4.0   OverHang", "4.0 OverHang", ("OverHang = 4.0", "downwind")),
+        ("ElastoDyn", "False  Furling", "True Furling", ("Furling = True",)),
+        ("ElastoDyn", "-3     PreCone(2)", "-2 PreCone(2)", ("PreCone(2) = -2", "blades are alike")),
+        ("ElastoDyn", "1.0E6  NacYIner", "1.0E5 NacYIner", ("NacYIner",)),
+        ("ElastoDyn", "3.D4   HubMass", "-3.D4 HubMass", ("ed.dat", "line", "HubMass = -3.D4", ">= 0")),
+        ("OpenFAST", "0    MHK", "2    MHK", ("MHK = 2",)),
+        ("OpenFAST", "0    CompSub", "1    CompSub", ("CompSub = 1", "SubDyn")),
+        ("OpenFAST", "1    CompMooring", "4    CompMooring", ("CompMooring = 4", "--mooring")),
+        ("OpenFAST", '"hd.dat"', '"gone.dat"', ("HydroFile = 'gone.dat'", "no such file")),
+        ("MAP", "1 fix    400", "1 Connect 400", ("connect", "points between lines")),
+        ("MAP", "chain  0.1  100.0", "chain  0.5  100.0", ("chain", "must be > 0")),
+        ("AeroDyn", "1        NumAFfiles", "1        StallMod", ("AeroDyn 14",)),
+        ("polar", "-180.0 0.0 0.02 0.00\n   0.0 0.4", "-90.0 0.0 0.02 0.00\n   0.0 0.4", ("-180 to 180",)),
+        ("blade", "1.0 0.5 0.0 100.0", "0.0 0.5 0.0 100.0", ("blade.dat", "increase")),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_represented_is_refused_by_file_line_and_key(tmp_path, part, old, new, expected):
+    found = refused(tmp_path, **{part: [(old, new)]})
+    for text in expected:
+        assert text in found
+
+
+def test_figures_that_no_platform_can_have_are_refused_before_anything_is_written(tmp_path):
+    found = refused(tmp_path, HydroDyn=[("1.0e5 0 0 0 0 0 AddBLin", "-1.0e5 0 0 0 0 0 AddBLin")])
+    assert "platform.toml" in found
+    assert "linear_damping.1.1" in found
+
+
+def test_a_folder_with_a_platform_is_replaced_only_when_asked(imported, tmp_path):
+    path = write_deck(tmp_path)
+    import_deck(path, tmp_path / "out")
+    with pytest.raises(InputError, match="has a platform.toml already"):
+        import_deck(path, tmp_path / "out")
+    import_deck(path, tmp_path / "out", replace_files=True)
+
+
+def test_members_need_joints_and_sections_that_are_there(tmp_path):
+    write_deck(tmp_path, HydroDyn=[("1 1 2 1 1 1.0 2 1 TRUE", "1 1 9 1 1 1.0 2 1 TRUE")])
+    with pytest.raises(InputError, match="joint 9 is not there"):
+        read_hydrodyn(tmp_path / NAMES["HydroDyn"], (1025.0, 200.0, 0.0))

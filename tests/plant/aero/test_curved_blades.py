@@ -1,0 +1,297 @@
+import numpy as np
+import pytest
+from naive import curved_rotor
+from numba import config, njit
+
+from fowt_env.analysis.rotor_loads import rotor_loads
+from fowt_env.descriptions.turbine import read_turbine
+from fowt_env.plant.aero.bem_rotor import rotor_load
+from fowt_env.plant.aero.blade_elements import blade_section, build_blade_elements
+from fowt_env.plant.aero.coefficient_table import build_coefficient_table, coefficient_table_load
+from fowt_env.plant.aero.section_table import build_section_table, section_table_load
+from fowt_env.plant.aero.station_choice import build_fewer_elements
+from fowt_env.plant.aero.wind import wind_at, wind_now
+from fowt_env.plant.aero.wind_field import WindField
+from fowt_env.plant.events import N_COUNTERS
+from fowt_env.plant.state import N_RIGID, State, pose_of
+from fowt_env.plant.tilt import build_tilt, rotor_pose, to_body_axes
+from fowt_env.scene.build import build_scene
+from fowt_env.scene.options import ROTORS, chosen_stations
+from fowt_env.weather.wind import make_series
+
+STRAIGHT = read_turbine("nrel5mw")
+TILT = 0.11
+compiled = pytest.mark.skipif(config.DISABLE_JIT, reason="tables take minutes without the compiler")
+
+
+def curved(turbine=STRAIGHT, tilt=TILT, cone=0.07, bend=-3.0, blades=3):
+    """The turbine with tilt, cone, a prebend of `bend` at the tip and a sweep to and fro."""
+    x = (turbine.blade.radius - 1.5) / 61.5
+    blade = turbine.blade.model_copy(update={"prebend": bend * x**2, "sweep": 0.3 * bend * x * (0.8 - x)})
+    rotor = turbine.rotor.model_copy(update={"shaft_tilt": tilt, "cone": cone, "blades": blades})
+    return turbine.model_copy(update={"rotor": rotor, "blade": blade})
+
+
+CURVED = curved()
+ELEMENTS = build_blade_elements(CURVED, 1.225)
+
+
+def without_moment(turbine):
+    """The turbine with cm = 0 in its polars, and two blades where asked."""
+    polars = {name: polar * [1.0, 1.0, 1.0, 0.0] for name, polar in turbine.blade.polars.items()}
+    return turbine.model_copy(update={"blade": turbine.blade.model_copy(update={"polars": polars})})
+
+
+def series_of(row, shear=0.14):
+    return make_series([0.0], [row], reference_height=90.0, reference_length=126.0, shear_exponent=shear)
+
+
+def moving(n, seed=1):
+    """n states of a moving platform about 16 m/s, and their rows of wind."""
+    rng = np.random.default_rng(seed)
+    states, winds = np.zeros((n, N_RIGID)), np.zeros((n, 5))
+    states[:, :3] = rng.uniform(-1.0, 1.0, (n, 3)) * [20.0, 5.0, 3.0]
+    states[:, 3:6] = np.radians(rng.uniform(-1.0, 1.0, (n, 3)) * [2.0, 8.0, 8.0])
+    states[:, 7:10] = rng.uniform(-1.0, 1.0, (n, 3))
+    states[:, 10:13] = np.radians(rng.uniform(-1.0, 1.0, (n, 3)))
+    states[:, State.AZIMUTH] = rng.uniform(0.0, 2.0 * np.pi, n)
+    states[:, State.ROTOR_SPEED] = 1.267 * rng.uniform(0.9, 1.1, n)
+    states[:, State.BLADE_PITCH] = np.radians(rng.uniform(6.0, 18.0, n))
+    winds[:, 0] = rng.uniform(12.0, 20.0, n)
+    winds[:, 1:] = winds[:, :1] * rng.uniform(-1.0, 1.0, (n, 4)) * [0.1, 0.05, 0.06, 0.06]
+    return states, winds
+
+
+@njit
+def _solved(x, series, field, tilt, elements, counters):
+    pose = rotor_pose(pose_of(x), tilt)
+    now = wind_now(0.0, series)
+    load = rotor_load(0.0, pose, x, now, series, field, elements, None, None, x, counters)
+    return to_body_axes(load.wrench, tilt), load.thrust, load.torque
+
+
+@njit
+def _looked_up(x, series, field, tilt, table, counters):
+    pose = rotor_pose(pose_of(x), tilt)
+    load = section_table_load(0.0, pose, x, wind_now(0.0, series), series, field, table, counters)
+    return to_body_axes(load.wrench, tilt), load.thrust, load.torque
+
+
+@njit
+def _tabulated(x, series, field, tilt, table, counters):
+    pose = rotor_pose(pose_of(x), tilt)
+    load = coefficient_table_load(pose, x, wind_now(0.0, series), series, table, counters)
+    return to_body_axes(load.wrench, tilt), load.thrust, load.torque
+
+
+def by(kernel, states, winds, rotor, turbine=CURVED, field=None, shear=0.14):
+    """(n, 8): wrench about the body origin, thrust, torque of each state."""
+    tilt, counters = build_tilt(turbine.rotor.shaft_tilt), np.zeros(N_COUNTERS)
+    loads = []
+    for x, row in zip(states, winds, strict=True):
+        wrench, thrust, torque = kernel(x.copy(), series_of(row, shear), field, tilt, rotor, counters)
+        loads.append([*wrench, thrust, torque])
+    return np.array(loads)
+
+
+def test_loads_are_those_of_stations_placed_and_turned_by_matrices():
+    states, winds = moving(4)
+    found = by(_solved, states, winds, ELEMENTS)
+    for load, x, row in zip(found, states, winds, strict=True):
+        series = series_of(row)
+
+        def wind(point, series=series):
+            return np.array(wind_at(0.0, *point, wind_now(0.0, series), series, None))
+
+        expected = curved_rotor.loads(CURVED, ELEMENTS, x, wind, 1.225)
+        assert load[:6] == pytest.approx(expected, rel=1e-9, abs=1e-9 * np.abs(expected).max())
+        shaft = curved_rotor.about_y(TILT)[:, 0]
+        hub = np.array([-CURVED.rotor.overhang, 0.0, CURVED.rotor.hub_height])
+        assert load[6] == pytest.approx(expected[:3] @ shaft, rel=1e-9)
+        assert load[7] == pytest.approx((expected[3:] - np.cross(hub, expected[:3])) @ shaft, rel=1e-9)
+
+
+def test_losses_and_solidity_take_lengths_along_the_blade_and_distances_from_the_shaft():
+    points = curved_rotor.axis_points(CURVED)
+    along = 1.5 + np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))))
+    assert along[-1] > 63.05
+    assert ELEMENTS.tip_exponent == pytest.approx(1.5 * (along[-1] - along[1:-1]) / along[1:-1], rel=1e-12)
+    assert ELEMENTS.hub_exponent == pytest.approx(along[1:-1] - 1.5, rel=1e-12)
+    coned = points[1:-1] @ curved_rotor.about_y(-0.07).T
+    assert ELEMENTS.radius == pytest.approx(np.hypot(coned[:, 1], coned[:, 2]), rel=1e-12)
+    assert ELEMENTS.solidity == pytest.approx(
+        3 * CURVED.blade.chord / (2 * np.pi * ELEMENTS.radius), rel=1e-12
+    )
+
+
+def test_straight_blades_in_the_rotor_plane_have_the_same_loads_either_way():
+    turbine = without_moment(STRAIGHT)
+    states, winds = moving(5)
+    plain = build_blade_elements(turbine, 1.225)
+    shaped = build_blade_elements(turbine, 1.225, shaped=True)
+    assert plain.shape is None and shaped.shape is not None
+    a = by(_solved, states, winds, plain, turbine)
+    assert by(_solved, states, winds, shaped, turbine) == pytest.approx(a, rel=1e-9, abs=1.0)
+
+
+def test_a_tilted_shaft_is_a_pitched_platform():
+    upright, tilted = curved(tilt=0.0), CURVED
+    states, winds = moving(3)
+    states[:, [State.ROLL, State.YAW]] = 0.0
+    load = by(_solved, states, winds, build_blade_elements(tilted, 1.225), tilted)
+    # the same hub, seen from a platform that is pitched further by the tilt
+    turn = curved_rotor.about_y(TILT)
+    hub = turn.T @ [-tilted.rotor.overhang, 0.0, tilted.rotor.hub_height]
+    rotor = upright.rotor.model_copy(update={"overhang": -hub[0], "hub_height": hub[2]})
+    upright = upright.model_copy(update={"rotor": rotor})
+    states[:, State.PLATFORM_PITCH] += TILT
+    states[:, 7:10], states[:, 10:13] = states[:, 7:10] @ turn, states[:, 10:13] @ turn
+    other = by(_solved, states, winds, build_blade_elements(upright, 1.225), upright)
+    assert load[:, :3] @ turn == pytest.approx(other[:, :3], rel=1e-9)
+    assert load[:, 3:6] @ turn == pytest.approx(other[:, 3:6], rel=1e-9)
+    assert load[:, 6:] == pytest.approx(other[:, 6:], rel=1e-9)
+
+
+def box():
+    """A box of rough wind around the rotor that repeats every 60 s."""
+    rng = np.random.default_rng(4)
+    velocity = rng.normal(0.0, 1.5, (60, 20, 20, 3)).astype(np.float32)
+    velocity[..., 0] += 16.0
+    return WindField(velocity, 1.0, 0.0, 1.0 / 16.0, -95.0, 2.0, 0.1, 0.1, True)
+
+
+@compiled
+@pytest.mark.parametrize("kind", ["sheared", "box", "still lower edge"])
+@pytest.mark.parametrize("blades", [3, 2])
+def test_the_table_of_stations_gives_what_is_solved(kind, blades):
+    if blades == 2 and kind != "sheared":
+        pytest.skip("three blades alone are taken together, in a sheared wind")
+    turbine = curved(blades=blades)
+    elements = build_blade_elements(turbine, 1.225)
+    states, winds = moving(200)
+    if kind == "still lower edge":  # a blade's tip below the lowest height: sampled station by station
+        states[:, State.HEAVE] -= 45.0
+    field = box() if kind == "box" else None
+    exact = by(_solved, states, winds, elements, turbine, field)
+    quick = by(_looked_up, states, winds, build_section_table(elements), turbine, field)
+    error = np.sqrt(np.mean((quick - exact) ** 2, axis=0)) / exact.std(axis=0)
+    assert error[6:].max() < 3e-4  # thrust and torque
+    assert error.max() < 1.2e-3
+
+
+@compiled
+def test_states_outside_the_table_of_stations_are_solved():
+    states, winds = moving(3)
+    table = build_section_table(ELEMENTS)
+    parked, reversed_wind = states.copy(), winds * [-1.0, 1.0, 1.0, 1.0, 1.0]
+    parked[:, State.ROTOR_SPEED] = 0.1
+    for x, row in ((parked, winds), (states, reversed_wind)):
+        assert by(_looked_up, x, row, table) == pytest.approx(
+            by(_solved, x, row, ELEMENTS), rel=1e-9, abs=1e-3
+        )
+
+
+@compiled
+def test_the_table_of_the_rotor_gives_the_mean_over_a_turn():
+    states, winds = moving(60)
+    winds[:, 1:] = 0.0
+    turns = np.linspace(0.0, 2.0 * np.pi / 3.0, 8, endpoint=False)
+    exact = np.zeros((len(states), 8))
+    for turn in turns:
+        states[:, State.AZIMUTH] = turn
+        exact += by(_solved, states, winds, ELEMENTS) / len(turns)
+    quick = by(_tabulated, states, winds, build_coefficient_table(ELEMENTS))
+    error = np.sqrt(np.mean((quick - exact) ** 2, axis=0)) / exact.std(axis=0)
+    assert error[[0, 4, 6, 7]].max() < ROTORS["table"].error  # surge, pitch, thrust, torque
+    assert error.max() < 0.05
+
+
+@compiled
+def test_twelve_chosen_stations_stand_for_all_where_evenly_spaced_ones_do_not():
+    few = build_fewer_elements(CURVED, 1.225, 12)
+    even = build_blade_elements(CURVED, 1.225, chosen_stations(12, CURVED))
+    assert len(few.radius) == 12 and set(few.radius) <= set(ELEMENTS.radius)
+    states = np.zeros((4, N_RIGID))
+    states[:, State.ROTOR_SPEED] = 0.96, 1.267, 1.267, 1.267
+    states[:, State.BLADE_PITCH] = np.radians([0.0, 4.0, 15.0, 22.5])
+    winds = np.outer([8.0, 12.0, 18.0, 24.0], [1.0, 0.0, 0.0, 0.0, 0.0])
+    exact, chosen, spaced = (by(_solved, states, winds, e, shear=0.0)[:, 6:] for e in (ELEMENTS, few, even))
+    assert chosen == pytest.approx(exact, rel=5e-3)
+    assert np.abs(spaced / exact - 1.0).max() > 0.02
+
+
+def test_rotor_loads_about_hub_and_roots_are_sums_over_stations():
+    scene = build_scene(wind=14.0, shear_exponent=0.0, turbine=without_moment(STRAIGHT))
+    elements = build_blade_elements(STRAIGHT, 1.225)
+    fn, ft = np.array(
+        [blade_section(14.0, 1.267 * r, 0.15, j, 1.0, elements)[5:7] for j, r in enumerate(elements.radius)]
+    ).T
+    arm = elements.moment_weight - 1.5 * elements.weight
+    found = rotor_loads(scene, 1.267, 0.15, azimuth=0.3)
+    assert found.force == pytest.approx([3 * elements.weight @ fn, 0.0, 0.0], rel=1e-9, abs=1.0)
+    assert found.moment == pytest.approx([3 * elements.moment_weight @ ft, 0.0, 0.0], rel=1e-9, abs=100.0)
+    assert found.root_out_of_plane == pytest.approx(np.full(3, arm @ fn), rel=1e-9)
+    assert found.root_in_plane == pytest.approx(np.full(3, arm @ ft), rel=1e-9)
+
+
+def test_rotor_loads_of_a_curved_rotor_are_those_of_its_plant():
+    scene = build_scene(wind=14.0, turbine=CURVED)
+    found = rotor_loads(scene, 1.267, 0.15, azimuth=0.3)
+    x = np.zeros(N_RIGID)
+    x[State.ROTOR_SPEED], x[State.BLADE_PITCH], x[State.AZIMUTH] = 1.267, 0.15, 0.3
+    load = by(_solved, [x], [[14.0, 0.0, 0.0, 0.0, 0.0]], ELEMENTS)[0]
+    hub = np.array([-CURVED.rotor.overhang, 0.0, CURVED.rotor.hub_height])
+    turn = curved_rotor.about_y(TILT)
+    assert found.force == pytest.approx(load[:3] @ turn, rel=1e-9)
+    assert found.moment == pytest.approx((load[3:6] - np.cross(hub, load[:3])) @ turn, rel=1e-9)
+
+
+# OpenFAST v5.0.0 (AeroDyn, BEM_Mod 1, skewed wake), rigid IEA 15 MW on a fixed platform, uniform steady wind,
+# means over whole turns: wind m/s, rpm, blade pitch deg, aerodynamic thrust N along the shaft, torque N m
+OPENFAST = [
+    (6.0, 5.0, 0.0, 901_690.0, 5_198_400.0),
+    (10.0, 7.05, 0.0, 2_193_600.0, 18_149_000.0),
+    (12.0, 7.56, 6.3, 1_690_800.0, 20_076_000.0),
+    (14.0, 7.56, 10.0, 1_370_600.0, 20_131_000.0),
+    (18.0, 7.56, 15.4, 1_047_200.0, 20_041_000.0),
+    (24.0, 7.56, 21.8, 817_060.0, 19_825_000.0),
+]
+
+
+@compiled
+@pytest.mark.parametrize("stations", [50, 18])
+def test_thrust_and_torque_of_a_tilted_coned_and_prebent_rotor_are_those_of_aerodyn(stations):
+    for speed, rpm, pitch, thrust, torque in OPENFAST:
+        scene = build_scene(
+            "iea15_volturnus_s", wind=speed, shear_exponent=0.0, blade_stations=stations,
+            hydrodynamics=False, mooring=False,
+        )  # fmt: skip
+        turns = np.linspace(0.0, 2.0 * np.pi / 3.0, 4, endpoint=False)
+        found = [rotor_loads(scene, rpm * np.pi / 30.0, np.radians(pitch), turn) for turn in turns]
+        assert np.mean([f.force[0] for f in found]) == pytest.approx(thrust, rel=1e-3)
+        assert np.mean([f.moment[0] for f in found]) == pytest.approx(torque, rel=1e-3)
+
+
+# the same at 12 m/s with a power law of 0.14 over the height: azimuth deg, thrust N, torque N m, and the
+# moments across the shaft about the hub in axes that turn with the rotor, N m
+SHEARED = [
+    (0.0900, 1_674_410.0, 19_806_500.0, 7_521_610.0, 594_963.0),
+    (39.8700, 1_666_340.0, 19_687_000.0, 7_088_780.0, -6_136_730.0),
+    (89.7660, 1_669_490.0, 19_725_600.0, 1_814_800.0, -8_572_100.0),
+    (199.7640, 1_666_750.0, 19_684_300.0, -9_238_030.0, 1_510_390.0),
+    (300.0780, 1_663_670.0, 19_641_900.0, 4_254_380.0, 9_006_720.0),
+]
+
+
+@compiled
+def test_loads_in_shear_are_those_of_aerodyn_at_each_azimuth():
+    scene = build_scene(
+        "iea15_volturnus_s", wind=12.0, shear_exponent=0.14, skewed_wake=True, blade_stations=50,
+        hydrodynamics=False, mooring=False,
+    )  # fmt: skip
+    for degrees, thrust, torque, my, mz in SHEARED:
+        azimuth = np.radians(degrees)
+        found = rotor_loads(scene, 7.56 * np.pi / 30.0, np.radians(6.3), azimuth)
+        turned = curved_rotor.rotation(azimuth, 0.0, 0.0).T @ found.moment
+        assert found.force[0] == pytest.approx(thrust, rel=5e-4)
+        assert turned == pytest.approx([torque, my, mz], rel=5e-4, abs=4e3)

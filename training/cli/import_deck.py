@@ -1,0 +1,79 @@
+"""The command that brings in a floating turbine from a deck of OpenFAST: fowt import."""
+
+from typing import Annotated
+
+import typer
+from rich.markup import escape
+
+from fowt_env.errors import InputError
+from fowt_env.training.cli.console import app, note, out, reported
+from fowt_env.training.cli.tables import print_table
+
+EXAMPLES = """[bold]Examples[/bold]
+
+[cyan]fowt import deck/5MW_OC4Semi.fst --out my_semi[/cyan]  platform.toml, turbine, coefficients and report.md
+
+[cyan]fowt import deck.fst --out mine --discon tuned_DISCON.IN[/cyan]  another controller than the deck's
+
+[cyan]fowt import --elastodyn ED.dat --aerodyn AD15.dat --hydrodyn HD.dat --mooring MAP.dat --out mine[/cyan]  without an .fst
+
+[cyan]fowt simulate --platform my_semi/platform.toml --wind 14[/cyan]  what comes next
+
+docs/import.md says what is read, what is approximated and what is refused."""  # noqa: E501
+
+Part = Annotated[str | None, typer.Option(help="This part file, in place of the one that the .fst names.")]
+
+
+@app.command("import", epilog=EXAMPLES)
+@reported
+def import_command(
+    deck: Annotated[
+        str | None, typer.Argument(help="The .fst file; may be left out with part files.")
+    ] = None,
+    out_path: Annotated[
+        str, typer.Option("--out", help="Folder for the files, made if need be.")
+    ] = "imported",
+    name: Annotated[str | None, typer.Option(help="Of platform and turbine; default: the folder's.")] = None,
+    elastodyn: Part = None,
+    aerodyn: Part = None,
+    servodyn: Part = None,
+    hydrodyn: Part = None,
+    seastate: Part = None,
+    mooring: Part = None,
+    inflow: Part = None,
+    discon: Annotated[str | None, typer.Option(help="A DISCON.IN of ROSCO, in place of the deck's.")] = None,
+    search: Annotated[
+        list[str] | None,
+        typer.Option(help="Folder in which files that the deck names are looked for as well; repeatable."),
+    ] = None,
+    overwrite: Annotated[bool, typer.Option(help="Replace the files of an earlier import.")] = False,
+):
+    """Convert a deck of OpenFAST or FAST 8 to a platform and turbine of this project."""
+    from fowt_env.files.openfast_deck.importer import import_deck
+
+    parts = {
+        "elastodyn": elastodyn, "aerodyn": aerodyn, "servodyn": servodyn, "hydrodyn": hydrodyn,
+        "seastate": seastate, "mooring": mooring, "inflow": inflow,
+    }  # fmt: skip
+    if deck is None and not any(parts.values()):
+        raise InputError(
+            "fowt import: needs an .fst file, or part files such as --elastodyn, --aerodyn, --hydrodyn"
+        )
+    report = import_deck(
+        deck, out_path, parts=parts, search=search or (), discon=discon, name=name, replace_files=overwrite
+    )
+    print_table(out, ("figure", "value"), report.figures, report.title, left=(0, 1))
+    out.print()
+    print_table(
+        out,
+        ("in the deck", "here"),
+        report.differences,
+        "What is not as in the deck",
+        left=(0, 1),
+        prose=(0, 1),
+    )
+    out.print()
+    for line in report.suggestions:
+        out.print(escape(line), soft_wrap=True, highlight=False)
+    note(f"wrote {out_path}/platform.toml, turbine/ and report.md")
+    note(f"next: fowt simulate --platform {out_path}/platform.toml --wind 14")
