@@ -120,7 +120,7 @@ def _period_faults(periods, hub_height):
             faults[motion] = f"nothing restores it in {motion}"
         elif not low <= period <= high:
             faults[motion] = (
-                f"its natural period in {motion} is {period:.3g} s, outside {low:g} to {high:g} s"
+                f"its natural period in {motion} is {period:.3g} s, outside {low:.3g} to {high:.3g} s"
             )
     return faults
 
