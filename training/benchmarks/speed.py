@@ -256,6 +256,7 @@ def _repeat_in(handle, part, x, u, dx, m, row, n, dt):
 
 def load_times(scene, x, u, calls=CHUNK, repeats=REPEATS):
     """{load: microseconds of one call} near a state; the loop and the pose are taken off the others."""
+    scene = scene.with_step(0.1)
     handle = scene.handle()
     dx, m = np.zeros_like(x), np.zeros(N_MEASUREMENTS)
     row = np.zeros(len(scene.channels))
@@ -276,6 +277,7 @@ def load_times(scene, x, u, calls=CHUNK, repeats=REPEATS):
 
 def step_time(scene, x, u, dt, steps=CHUNK, repeats=REPEATS):
     """Microseconds of one physics step under a constant command."""
+    scene = scene.with_step(dt)
     handle = scene.handle()
 
     def go():
@@ -288,6 +290,7 @@ def step_time(scene, x, u, dt, steps=CHUNK, repeats=REPEATS):
 
 def loop_time(scene, kind, x, u, dt, seconds, repeats=REPEATS):
     """CPU seconds of the compiled closed loop, controller at 10 Hz, with one row of output."""
+    scene = scene.with_step(dt)
     controller = make("pi", scene.turbine, 0.1) if kind.controlled else HeldCommand()
     handle, dx, m = scene.handle(), np.zeros_like(x), np.zeros(N_MEASUREMENTS)
     rows = np.zeros((2, len(scene.channels)))  # of the first and the last instant

@@ -1,8 +1,8 @@
 """Natural periods and responses of a floating body in the frequency domain, by numpy alone.
 
-Nothing of the plant is used: coefficients come from the package's array file by the reader below, masses from the
-figures of the public decks, lines from the catenary below. Linear about the place where the body rests; drag is
-left out. The equation, with X the excitation per metre and q = surge, sway, heave, roll, pitch, yaw:
+Nothing of the plant is used: coefficients come from the package's array file by the reader below, masses
+from the figures of the public decks, lines from the catenary below. Linear about the place where the body
+rests; drag is left out. With X the excitation per metre and q = surge, sway, heave, roll, pitch, yaw:
 
     [-w^2 (M + A(w)) + i w (B(w) + D) + C + K] q = X(w).
 
@@ -153,7 +153,7 @@ def line_stiffness(lines, q):
 
 
 def interpolated(omega, grid, values, low=None, high=None):
-    """values (n, ...) at omega (rad/s), linear over the grid; low and high: at zero and infinite frequency."""
+    """Values (n, ...) at omega (rad/s), linear over the grid; low, high: at zero and infinite frequency."""
     if omega < grid[0]:
         first = values[0] if low is None else low
         return first + (values[0] - first) * omega / grid[0]
@@ -245,8 +245,8 @@ class FloatingBody:
     def free_decay(self, offset, duration, step=0.05, memory=60.0):
         """(time (n,), motion (n, 6) from rest) of the body let go at rest at this offset (6,), water at rest.
 
-        Cummins' equation by the leapfrog rule: places at whole steps, velocities at halves, and the convolution
-        by the midpoint rule at those.
+        Cummins' equation by the leapfrog rule: places at whole steps, velocities at halves, and the
+        convolution by the midpoint rule at those.
         """
         inertia = np.linalg.inv(self.mass + self.coefficients["added_mass_infinite"])
         stiffness = self.stiffness + line_stiffness(self.lines, self.rest())
@@ -267,7 +267,7 @@ class FloatingBody:
         return step * np.arange(count + 1), motion
 
     def natural_modes(self):
-        """{motion: (rad/s, damping ratio)} of the six modes: added mass and damping at each mode's frequency."""
+        """{motion: (rad/s, damping ratio)} of the six modes, each with the coefficients of its frequency."""
         stiffness = self.stiffness + line_stiffness(self.lines, self.rest())
         length = self.volume ** (1.0 / 3.0)
         scale = np.array([1.0, 1.0, 1.0, length, length, length])
@@ -304,7 +304,7 @@ BARGE_TOWER = (
 
 
 def nrel5mw(tower, base):
-    """6x6 mass matrix of the NREL 5 MW on a tower from `base` to 87.6 m; the rotor as a disk at its centre."""
+    """6x6 mass matrix of the NREL 5 MW on a tower from `base` to 87.6 m; the rotor as a disk."""
     tilt, cone = np.radians(5.0), np.radians(2.5)
     apex = np.array([-5.0191 * np.cos(tilt), 0.0, 87.6 + 1.96256 + 5.0191 * np.sin(tilt)])
     shaft = np.array([np.cos(tilt), 0.0, -np.sin(tilt)])  # downwind
@@ -354,7 +354,8 @@ def oc4_semi(coefficients):
             place = (x, y, 0.5 * (top + bottom))
             mass = mass + point_mass(water, place, (across, across, 0.0))
     line = {
-        "length": 835.35, "weight": (113.35 - DENSITY * 0.25 * np.pi * 0.0766**2) * GRAVITY, "stiffness": 7.536e8,
+        "length": 835.35, "stiffness": 7.536e8,
+        "weight": (113.35 - DENSITY * 0.25 * np.pi * 0.0766**2) * GRAVITY,
     }  # fmt: skip
     return FloatingBody(coefficients, mass, _ring(3, 60.0, 40.868, 14.0, 837.6, 200.0, line), 13917.0)
 

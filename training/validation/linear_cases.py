@@ -1,11 +1,12 @@
 """Linear models of this plant against OpenFAST's of the same turbine, above rated wind.
 
-OpenFAST's come from ROSCO's repository and belong to an older deck of the IEA 15 MW on VolturnUS-S: lighter tower,
-other nacelle and hub, blades 0.97 m shorter in radius, another generator, g = 9.80665. `old_deck` builds that
-turbine from the deck's figures. HydroDyn linearises by steps of 0.02 deg of the depth in translation and 2 deg in
-rotation (HydroDyn.f90, HD_Perturb_u), so that its quadratic drag leaves a damping of that velocity; the same is
-added here. What differs still: their radiation is the deck's state-space fit, their blades turn in the potential
-flow around the tower, and sway, roll and yaw are held.
+OpenFAST's come from ROSCO's repository and belong to an older deck of the IEA 15 MW on VolturnUS-S: a
+lighter tower, other nacelle and hub, blades whose radii are 0.97 m smaller, another generator, g =
+9.80665. `old_deck` builds that turbine from the deck's figures. HydroDyn linearises by steps of 0.02 deg
+times the depth in translation and 2 deg in rotation (HydroDyn.f90, HD_Perturb_u), so that its quadratic
+drag leaves the damping of such a velocity; the same is added here. What differs still: their radiation
+is the deck's state-space fit, their blades turn in the potential flow around the tower, and sway, roll
+and yaw are held.
 """
 
 import numpy as np
@@ -138,7 +139,7 @@ def _turbine(turbine):
 
 
 def named_poles(matrix, states):
-    """{motion: pole with positive imaginary part, rotor: real pole} by the participation of a motion's states."""
+    """{motion: pole with positive imaginary part, rotor: real pole} by participation factors."""
     value, right = np.linalg.eig(matrix)
     share = np.abs(right.T * np.linalg.inv(right))
     found, used = {}, set()
@@ -155,7 +156,7 @@ def named_poles(matrix, states):
 
 
 def open_loop(model):
-    """(A, {input: column}, states) of a LinearModel with the blade pitch as an input at once, without azimuth."""
+    """(A, {input: column}, states) of a LinearModel with the blade pitch as an input, without azimuth."""
     states = list(model.states)
     pitch = states.index("blade_pitch")
     kept = [i for i, name in enumerate(states) if name not in ("blade_pitch", "azimuth")]
@@ -167,7 +168,7 @@ def open_loop(model):
 
 
 def linear(study):
-    """Linear models above rated wind: frequencies of the platform's poles 3 %, damping and rotor pole 10 %."""
+    """Linear models above rated wind: frequencies of platform modes 3 %, damping and rotor pole 10 %."""
     from fowt_env.analysis.linear_model import linearize
     from fowt_env.scene.build import build_scene
 

@@ -130,9 +130,10 @@ class ReferenceRun:
         return reference(self.case, folder, self.place)
 
     def frame(self, folder=None, bts=None, dt=None, wind=None, rotor="bem", progress=False, **options):
-        """DataFrame of this project's run at the reference's times; wind None: the run's own, dt None: the deck's.
+        """DataFrame of this project's run at the reference's times.
 
-        controller and other arguments of build_scene may be among the options.
+        wind None: the run's own, dt None: the deck's. controller and other arguments of build_scene may be
+        among the options.
         """
         from fowt_env.scene.build import build_scene
         from fowt_env.simulation import simulate

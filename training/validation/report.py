@@ -159,14 +159,18 @@ def _steady(study, path):
 
 def _responses(study, path):
     """Responses to small waves over frequency: this plant and the frequency domain."""
-    table = study.runs["responses"][0]
-    names = [name for name in table.columns[1:] if not name.endswith(" there")]
+    from matplotlib.ticker import NullFormatter
+
+    ours, smooth = study.runs["responses"]
+    names = list(ours.columns[1:])
     figure = new_figure(9.0, 3.2)
     for axes, name in zip(figure.subplots(1, len(names)), names, strict=True):
         style_axes(axes)
         unit = "deg/m" if name == "PtfmPitch" else "m/m"
-        axes.semilogy(table["omega"], table[f"{name} there"], "-", color=COLOURS[0], label="frequency domain")
-        axes.semilogy(table["omega"], table[name], "o", color=COLOURS[1], markersize=4, label=HERE)
+        axes.semilogy(smooth["omega"], smooth[name], "-", color=COLOURS[0], label="frequency domain")
+        axes.semilogy(ours["omega"], ours[name], "o", color=COLOURS[1], markersize=4, label=HERE)
+        axes.set_ylim(0.5 * ours[name].min(), 3.0 * ours[name].max())
+        axes.yaxis.set_minor_formatter(NullFormatter())
         axes.set_title(f"{name} ({unit})", fontsize=9, color=INK)
         axes.set_xlabel("rad/s", fontsize=9, color=INK)
     axes.legend(fontsize=8, frameon=False)

@@ -152,7 +152,9 @@ def rao(name, study):
     theirs = body.responses(omega)
     kept = frame[frame[TIME] >= BEGIN]
     time = kept[TIME].to_numpy()
-    rows = []
+    fine = np.arange(omega[0], omega[-1], 0.002)
+    curves = np.abs(body.responses(fine))
+    ours, smooth = {"omega": omega}, {"omega": fine}
     for channel, motion in CHANNELS.items():
         label, unit = _name(channel)
         factor = 180.0 / np.pi if unit == "deg" else 1.0
@@ -169,11 +171,8 @@ def rao(name, study):
                 "responses to small waves (against the frequency domain)", quantity, f"{unit}/m", abs(wanted),
                 abs(mine), error, 1.0, note,
             )  # fmt: skip
-        rows.append((label, here, there))
-    table = {"omega": omega}
-    for label, here, there in rows:
-        table |= {label: np.abs(here), f"{label} there": np.abs(there)}
-    study.runs["responses"] = (pd.DataFrame(table), None)
+        ours[label], smooth[label] = np.abs(here), factor * curves[:, motion]
+    study.runs["responses"] = (pd.DataFrame(ours), pd.DataFrame(smooth))
 
 
 def groups(name):

@@ -1,7 +1,7 @@
 """The IEA 15 MW on VolturnUS-S against OpenFAST: cases, and groups of figures with what is allowed.
 
-Rigid OpenFAST v5 runs of the public deck (their settings are in the heads of the series), and the linear models
-that ROSCO's repository holds of the same turbine. Nothing here is adjusted to fit.
+Rigid OpenFAST v5 runs of the public deck (their settings are in the heads of the series), and the linear
+models that ROSCO's repository holds of the same turbine. Nothing here is adjusted to fit.
 """
 
 import re
@@ -156,7 +156,7 @@ AZIMUTHS = 24
 
 
 def _rotor_means(scene, rotor_speed, pitch):
-    """(force, moment, out-of-plane root moment of blade 1 with its cos and sin parts) over a turn, N and N m."""
+    """(force, moment, out-of-plane root moment of blade 1: mean, cos, sin part) over a turn, N and N m."""
     from fowt_env.analysis.rotor_loads import rotor_loads
 
     angles = 2.0 * pi * np.arange(AZIMUTHS) / AZIMUTHS
@@ -171,7 +171,7 @@ def _rotor_means(scene, rotor_speed, pitch):
 
 
 def _structural_flap(rotor, rotor_speed):
-    """(mean, cos part) of the out-of-plane root moment by weight and rotation of a rigid, straight blade, N m."""
+    """(mean, cos part) of the out-of-plane root moment by a straight blade's weight and rotation, N m."""
     tilt, cone = rotor.shaft_tilt, rotor.cone
     first = BLADE_MASS * BLADE_CENTRE
     # weight: down-shaft part g sin(tilt), and g cos(tilt) cos(azimuth) along the blade's radius
@@ -182,7 +182,7 @@ def _structural_flap(rotor, rotor_speed):
 
 
 def rotor(study):
-    """Steady wind, platform held: rotor loads 0.5 %, in sheared wind 2 %; root moments 0.5 % of the mean one."""
+    """Steady wind, platform held: rotor loads and root moments 0.5 %, in sheared wind 2 %."""
     from fowt_env.scene.build import build_scene
 
     table = pd.read_csv(_path(study.folder, f"{PLATFORM}/steady.csv.gz"), comment="#")
@@ -207,7 +207,7 @@ def _case(row):
 
 
 def _hub_rows(study, row, force, moment):
-    """Rows of thrust, torque and the moments about the rotor centre; these are judged by their size together."""
+    """Rows of thrust, torque and the moments about the rotor centre, judged by their size together."""
     case, allowed = _case(row), 2.0 if row["shear_exponent"] else 0.5
     study.add(case, "aerodynamic thrust", "kN", 1e-3 * row["aero_thrust_N"], 1e-3 * force[0], allowed=allowed)
     study.add(
@@ -291,7 +291,7 @@ def floating(study):
 
 
 def memory(study):
-    """States of the radiation memory against convolution, on decays and an irregular sea: 1 % of the deviation."""
+    """States of the radiation memory against convolution, decays and an irregular sea: 1 % of deviations."""
     for case in ("decay_surge", "decay_heave", "decay_pitch", "waves_Hs7.5"):
         run = RUNS[case]
         frames = []

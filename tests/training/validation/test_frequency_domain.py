@@ -24,7 +24,7 @@ LINE = CatenaryLine((-837.6, 0.0, -200.0), (-40.868, 0.0, -14.0), 835.35, 1065.7
 
 
 def box(damping=0.0, added=0.0, **changes):
-    """Body of one frequency-independent coefficient: a box of 20 m, half of it under water, on weak springs."""
+    """Body of one frequency-independent coefficient: a box 20 m wide, 10 m deep, on weak springs."""
     omega = np.linspace(0.05, 4.0, 80)
     mass = point_mass(DENSITY * 4000.0, (0.0, 0.0, -6.0), (5e8, 5e8, 6e8))
     ones = np.ones((omega.size, 1, 1))

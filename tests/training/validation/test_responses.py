@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from fowt_env.training.validation.responses import fitted, modal_rates, sea
+from fowt_env.training.validation.validate import validate_cases
 
 TIME = np.arange(100.0, 700.0, 0.1)
 
@@ -40,3 +41,17 @@ def test_the_small_components_do_not_add_up_at_one_instant():
     elevation = (waves["amplitude"] * np.cos(np.outer(TIME, waves["omega"]) - waves["phase"])).sum(axis=1)
     assert np.abs(elevation).max() < 0.2
     assert waves["ramp"] > 0.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("platform", "exceptions"),
+    # surge of the barge all but vanishes at 0.6 rad/s, between two steep slopes
+    [("nrel5mw_oc4_semi", ()), ("nrel5mw_iti_barge", ("PtfmSurge per metre of wave at 0.6 rad/s",))],
+)
+def test_periods_and_responses_are_those_of_the_frequency_domain_within_1_percent(platform, exceptions):
+    study = validate_cases(platform=platform)
+    assert len(study.rows) >= 36
+    for row in study.rows:
+        assert row.allowed == 1.0
+        assert row.verdict == "met" or row.quantity in exceptions, f"{row.quantity}: {row.error:.3g} %"

@@ -1,9 +1,10 @@
 """Makes the compact reference series of iea15_volturnus_s/: make_volturnus.py SERIES_FOLDER [LINEAR_FOLDER].
 
-SERIES_FOLDER has the OpenFAST outputs of the rigid IEA 15 MW on VolturnUS-S, LINEAR_FOLDER the linearisation files
-(lin_NN.A.lin: operating point NN, azimuth A) that ROSCO's repository holds. Series keep the columns that are
-compared, every 0.1 s or 0.2 s, with a header that says how the run was made; the steady winds are reduced to
-means over whole turns in axes that do not turn; of the linear models remain poles and frequency responses.
+SERIES_FOLDER has the OpenFAST outputs of the rigid IEA 15 MW on VolturnUS-S, LINEAR_FOLDER the
+linearisation files (lin_NN.A.lin: operating point NN, azimuth A) that ROSCO's repository holds. Series
+keep the columns that are compared, every 0.1 s or 0.2 s, with a header that says how the run was made;
+the steady winds are reduced to means over whole turns in axes that do not turn; of the linear models
+remain poles and frequency responses.
 """
 
 import sys
@@ -19,9 +20,9 @@ HERE = Path(__file__).resolve().parent / "iea15_volturnus_s"
 PLANE = ["surge_m", "heave_m", "pitch_deg"]
 ROTOR = ["rotor_speed_rpm", "blade_pitch_deg", "gen_torque_kNm", "gen_power_elec_kW", "aero_thrust_N"]
 MODEL = (
-    "OpenFAST v5.0.0 (2895884d2b), double precision, IEA 15 MW on VolturnUS-S, rigid: six platform motions, and the"
-    " generator where the rotor turns; potential flow with convolution, quadratic drag matrix, quasi-static lines;"
-    " loose coupling, ConvTol 1e-6, dt 0.025 s"
+    "OpenFAST v5.0.0 (2895884d2b), double precision, IEA 15 MW on VolturnUS-S, rigid: six platform motions,"
+    " and the generator where the rotor turns; potential flow with convolution, quadratic drag matrix,"
+    " quasi-static lines; loose coupling, ConvTol 1e-6, dt 0.025 s"
 )
 STILL = "still water, no wind, rotor at rest, blade pitch 0; all other states start at zero"
 ROSCO = "ROSCO 2.10.6 every 0.025 s, blade pitch follows its command at once; platform starts at zero"
@@ -37,25 +38,29 @@ CASES = {  # case -> (columns, step, settings)
     ),
     "waves_Hs7.5_qtf": (
         ["wave_elev_m", *PLANE], 0.2,
-        "components of waves_hs7.5_tp10, with the difference-frequency forces of the full QTF; no wind, rotor at rest",
+        "components of waves_hs7.5_tp10, with the difference-frequency forces of the full QTF; no wind,"
+        " rotor at rest",
     ),
     "float_steady_12mps": (
-        [*PLANE, *ROTOR], 0.1, f"uniform steady 12 m/s, still water; rotor 7.56 rpm, blade pitch 6.3 deg; {ROSCO}",
+        [*PLANE, *ROTOR], 0.1,
+        f"uniform steady 12 m/s, still water; rotor 7.56 rpm, blade pitch 6.3 deg; {ROSCO}",
     ),
     "float_steady_18mps": (
-        [*PLANE, *ROTOR], 0.1, f"uniform steady 18 m/s, still water; rotor 7.56 rpm, blade pitch 15.4 deg; {ROSCO}",
+        [*PLANE, *ROTOR], 0.1,
+        f"uniform steady 18 m/s, still water; rotor 7.56 rpm, blade pitch 15.4 deg; {ROSCO}",
     ),
     "turb_18mps_Hs7.5_uniform": (
         [*PLANE, *ROTOR], 0.1,
-        "wind_hub_18mps blown uniformly, components of waves_hs7.5_tp10; rotor 7.56 rpm, blade pitch 15.4 deg;"
-        f" {ROSCO}",
+        "wind_hub_18mps blown uniformly, components of waves_hs7.5_tp10; rotor 7.56 rpm, blade pitch 15.4"
+        f" deg; {ROSCO}",
     ),
 }  # fmt: skip
 STEADY = {  # case -> (wind, rotor speed, blade pitches, shear exponent)
     **{
         f"{wind}mps": (float(wind), rpm, (pitch,) * 3, 0.0)
         for wind, rpm, pitch in (
-            (6, 5.0, 0.0), (10, 7.05, 0.0), (12, 7.56, 6.3), (14, 7.56, 10.0), (18, 7.56, 15.4), (24, 7.56, 21.8),
+            (6, 5.0, 0.0), (10, 7.05, 0.0), (12, 7.56, 6.3), (14, 7.56, 10.0), (18, 7.56, 15.4),
+            (24, 7.56, 21.8),
         )
     },
     "12mps_shear": (12.0, 7.56, (6.3,) * 3, 0.14),
@@ -86,7 +91,7 @@ def series(source):
 
 
 def whole_turns(time, rpm):
-    """Mask of the samples after SETTLED that make up whole turns (of thirds of the sampling where it is coarse)."""
+    """Mask of the samples after SETTLED that make up whole turns."""
     period, step = 60.0 / rpm, time[1] - time[0]
     turns = np.floor((time[-1] - SETTLED) / period + 1e-9)
     return (time >= SETTLED - 1e-9) & (time < SETTLED + turns * period - 0.5 * step)
@@ -116,10 +121,10 @@ def steady(source):
                 row[f"{name}_{part}"] = value
         rows.append(row)
     settings = (
-        "platform and tower held, steady wind at 150 m, rotor speed and blade pitch held; means over whole turns after"
-        " 15 s; aero loads about the rotor centre, x along the shaft, y and z not turning with the rotor (z up when"
-        " blade 1 is); root moments of the structure (with weight and inertia): means, and cos and sin parts over the"
-        " azimuth of blade 1 (0: up)"
+        "platform and tower held, steady wind at 150 m, rotor speed and blade pitch held; means over whole"
+        " turns after 15 s; aero loads about the rotor centre, x along the shaft, y and z not turning with"
+        " the rotor (z up when blade 1 is); root moments of the structure (with weight and inertia): means,"
+        " and cos and sin parts over the azimuth of blade 1 (0: up)"
     )
     write(HERE / "steady.csv.gz", (MODEL, settings), pd.DataFrame(rows).map(
         lambda v: float(f"{v:.6g}") if isinstance(v, float) else v

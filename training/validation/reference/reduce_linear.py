@@ -1,23 +1,23 @@
 """Poles and responses of OpenFAST's linear models of VolturnUS-S with the tower held: `responses`.
 
 Each linearisation file has 106 states: surge, heave, platform pitch, the first fore-aft tower mode, the
-generator's azimuth, their rates, and HydroDyn's states of excitation and radiation. The files of the twelve
-azimuths of an operating point are averaged. The tower is then held by the constraint force lambda e_t that
-makes its acceleration zero: with q'' = a the accelerations of the free model and m = M^-1 e_t,
+generator's azimuth, their rates, and HydroDyn's states of excitation and radiation. The files of the
+twelve azimuths of an operating point are averaged. The tower is then held by the constraint force lambda
+e_t that makes its acceleration zero: with q'' = a the accelerations of the free model and m = M^-1 e_t,
 
     a - m a_t / m_t,  q_t = q_t' = 0.
 
-Of M^-1 only the direction of m is needed. The stiffness of the tower mode is a generalised force along e_t alone, so the
-column of A by which the accelerations depend on q_t is m up to gravity and aerodynamics: gravity acts on the
-deflected mass with about 1 % of the column of pitch. `direction_from_masses` has m from the deck's masses, the tower's
-mode shape and the added mass at infinite frequency instead; the poles by it are stored beside the others.
+Of M^-1 only the direction of m is needed. The stiffness of the tower mode is a generalised force along
+e_t alone, so the column of A by which the accelerations depend on q_t is m up to gravity and
+aerodynamics: gravity acts on the deflected mass with about 1 % of the column of pitch.
+`direction_from_masses` has m from the deck's masses, the tower's mode shape and the added mass at
+infinite frequency instead; the poles by it are stored beside the others.
 """
 
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
-
 from make import write
 
 RAD_PER_S = np.array([0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 0.8])  # of the responses
@@ -112,8 +112,7 @@ def direction_from_masses():
 def named_poles(A):
     """{motion: complex pole with positive imaginary part, rotor: real pole} of a model with the tower held.
 
-    A mode is found by its share of the energy-like product of right and left eigenvectors in the two states of
-    a motion (its participation).
+    A mode is found by its participation in the two states of a motion: right times left eigenvector.
     """
     value, right = np.linalg.eig(A)
     left = np.linalg.inv(right)
@@ -171,11 +170,13 @@ def responses(source, folder):
                         }
                     )  # fmt: skip
     model = (
-        "OpenFAST (2021-02), IEA 15 MW on VolturnUS-S of ROSCO's test cases: surge, heave, platform pitch, generator,"
-        " first fore-aft tower mode; mean of the azimuths, tower held afterwards (reduce_linear.py)"
+        "OpenFAST (2021-02), IEA 15 MW on VolturnUS-S of ROSCO's test cases: surge, heave, platform pitch,"
+        " generator, first fore-aft tower mode; mean of the azimuths, tower held afterwards"
+        " (reduce_linear.py)"
     )
     settings = (
-        "operating points, and poles (1/s, rad/s); _other: direction of the constraint from the deck's masses instead of the tower's stiffness;"
+        "operating points, and poles (1/s, rad/s); _other: direction of the constraint from the deck's masses"
+        " instead of the tower's stiffness;"
         " _flexible: tower free"
     )
 

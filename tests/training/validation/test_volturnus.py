@@ -1,0 +1,161 @@
+"""VolturnUS-S against OpenFAST: the figures of each group, and what is allowed, apart from what judges it."""
+
+import gzip
+import sys
+
+import numpy as np
+import pytest
+
+from fowt_env.errors import InputError
+from fowt_env.training.validation import linear_cases
+from fowt_env.training.validation.openfast_cases import FOLDER
+from fowt_env.training.validation.validate import PLATFORMS, validate_cases
+from fowt_env.training.validation.volturnus import GROUPS, PLATFORM, RUNS, _structural_flap, without_rosco
+
+REFERENCES = FOLDER / PLATFORM
+TARGETS = {  # group: {part of the quantity: what is allowed, %}
+    "decays": {"period": 0.5, "decrement": 5.0, "rms": 4.0},
+    "regular": {"first harmonic": 1.0},
+    "floating": {"standard deviation": 3.0},
+    "memory": {"rms error": 1.0},
+}
+
+
+def judged(group, *exceptions):
+    """Rows of a group; those that miss what is allowed must be among the exceptions."""
+    rows = validate_cases([group], platform=PLATFORM).rows
+    for row in rows:
+        text = f"{row.case}: {row.quantity}"
+        if row.verdict == "MISSED":
+            assert any(known in text for known in exceptions), f"{text}: {row.error:.3g} %"
+        for part, wanted in TARGETS.get(group, {}).items():
+            if part in row.quantity and np.isfinite(row.allowed):
+                assert row.allowed == wanted, text
+    return rows
+
+
+# --------------------------------------------------------------------------- quick
+
+
+def test_references_carry_their_settings_and_stay_below_3_mb():
+    size = 0
+    for path in REFERENCES.iterdir():
+        size += path.stat().st_size
+        with gzip.open(path, "rt") as file:
+            assert file.readline().startswith("# OpenFAST")
+            assert file.readline().startswith("# ")
+    assert size < 3e6
+    for case in RUNS:
+        assert (REFERENCES / f"{case}.csv.gz").is_file()
+
+
+def test_an_unknown_platform_or_group_is_named():
+    with pytest.raises(InputError, match="iea15_volturnus_s"):
+        validate_cases(platform="volturnus")
+    with pytest.raises(InputError, match="decays"):
+        validate_cases(["steady"], platform=PLATFORM)
+    assert set(PLATFORMS) >= {"oc3_hywind", PLATFORM, "nrel5mw_iti_barge", "nrel5mw_oc4_semi"}
+    assert "floating" in GROUPS
+
+
+def test_root_moment_of_a_hanging_blade_is_its_weight_at_its_arm():
+    """Without tilt and cone neither weight nor rotation bends a straight blade out of the rotor plane."""
+
+    class Rotor:
+        shaft_tilt, cone, hub_radius = 0.0, 0.0, 3.97
+
+    assert _structural_flap(Rotor, 0.8) == (0.0, 0.0)
+    Rotor.shaft_tilt = np.radians(6.0)
+    mean, cosine = _structural_flap(Rotor, 0.8)
+    assert mean == pytest.approx(68507.6 * 27.601 * 9.81 * np.sin(np.radians(6.0)))
+    assert cosine == 0.0
+
+
+def test_holding_a_coordinate_leaves_the_model_of_the_smaller_mass_matrix():
+    sys.path.insert(0, str(FOLDER))
+    try:
+        from reduce_linear import hold_tower, named_poles
+    finally:
+        sys.path.remove(str(FOLDER))
+    draw = np.random.default_rng(3)
+    mass = draw.normal(size=(5, 5))
+    mass = mass @ mass.T + 5.0 * np.eye(5)
+    mass[4, :4] = mass[:4, 4] = 0.0  # the rotor
+    stiffness, damping = np.diag([1.0, 2.0, 3.0, 400.0, 0.0]), np.diag([0.1, 0.1, 0.1, 0.0, 0.5])
+    load = draw.normal(size=(5, 1))
+    inverse = np.linalg.inv(mass)
+    full = np.block([[np.zeros((5, 5)), np.eye(5)], [-inverse @ stiffness, -inverse @ damping]])
+    held, by = hold_tower(full, np.vstack([np.zeros((5, 1)), inverse @ load]))
+    kept = [0, 1, 2]
+    small = np.linalg.inv(mass[np.ix_(kept, kept)])
+    assert held[3:6, :3] == pytest.approx(-small @ stiffness[np.ix_(kept, kept)], abs=1e-12)
+    assert held[3:6, 3:6] == pytest.approx(-small @ damping[np.ix_(kept, kept)], abs=1e-12)
+    assert by[3:6] == pytest.approx(small @ load[kept], abs=1e-12)
+    assert named_poles(held)["rotor"] == pytest.approx(-0.5 / mass[4, 4])
+
+
+def test_the_reference_poles_hardly_depend_on_how_the_tower_is_held():
+    import pandas as pd
+
+    poles = pd.read_csv(REFERENCES / "linear_poles.csv.gz", comment="#")
+    assert len(poles) == 20 and set(poles["azimuths"]) == {12}
+    above = poles[poles["wind_mps"] >= 12.0]
+    for name, within in (("surge", 2e-3), ("heave", 2e-3), ("pitch", 0.015)):
+        assert np.allclose(above[f"{name}_imag_other"], above[f"{name}_imag"], rtol=within)
+        # and the tower's own give moves them by little
+        assert np.allclose(above[f"{name}_imag_flexible"], above[f"{name}_imag"], rtol=0.02)
+
+
+def test_the_older_deck_has_the_masses_of_its_files():
+    platform, turbine = linear_cases.old_deck()
+    assert platform.tower.mass == pytest.approx(1263e3, rel=1e-3)
+    assert turbine.nacelle.mass + turbine.rotor.mass == pytest.approx(991.4e3, rel=1e-3)
+    assert turbine.rotor.tip_radius == 120.0 and turbine.rotor.hub_height == pytest.approx(150.0, abs=0.01)
+    assert turbine.blade.radius[0] > turbine.rotor.hub_radius
+    assert platform.environment.gravity == 9.80665
+
+
+# --------------------------------------------------------------------------- slow
+
+
+@pytest.mark.slow
+def test_rest_decays_and_the_regular_wave_meet_every_figure():
+    for group in ("rest", "decays", "regular"):
+        assert judged(group)
+
+
+@pytest.mark.slow
+def test_irregular_waves_miss_the_deviation_of_slow_surge_alone():
+    """2.7 % of surge instead of 2 %: a slow oscillation of 0.07 m from the start (docs/validation.md)."""
+    rows = judged("waves", "waves_Hs7.5: PtfmSurge, standard deviation")
+    assert {row.allowed for row in rows if "standard" in row.quantity} == {2.0, 5.0}
+
+
+@pytest.mark.slow
+def test_rotor_loads_in_steady_wind_miss_small_hub_moments_alone():
+    """Thrust, torque and root moments within 0.06 %; moments about the hub that are 0.1 % of the torque."""
+    rows = judged("rotor", "moment at the hub")
+    for row in rows:
+        if "thrust" in row.quantity or "torque" in row.quantity or "RootMyc" in row.quantity:
+            assert abs(row.error) < 0.1, f"{row.case}: {row.quantity}"
+        if "moment at the hub" in row.quantity:
+            assert abs(row.error) < 1.0, f"{row.case}: {row.quantity}"
+
+
+@pytest.mark.slow
+def test_floating_under_rosco_misses_the_deviation_of_heave_at_12_mps_alone():
+    if without_rosco():
+        pytest.skip(without_rosco())
+    rows = judged("floating", "float_steady_12mps: PtfmHeave, standard deviation")
+    assert len(rows) == 3 * 7 * 3
+
+
+@pytest.mark.slow
+def test_linear_models_miss_the_damping_of_heave_alone():
+    rows = judged("linear", "heave mode, damping ratio")
+    assert len([row for row in rows if row.verdict == "met"]) == 5 * 6
+
+
+@pytest.mark.slow
+def test_states_of_the_radiation_memory_stay_within_1_percent_of_convolution():
+    assert len(judged("memory")) == 6
