@@ -21,7 +21,7 @@ from fowt_env.control import (
     view_of,
 )
 from fowt_env.descriptions.checks import check_number
-from fowt_env.descriptions.sensors import SensorChain, sensor_chain
+from fowt_env.descriptions.sensors import SensorChain, sensors_of
 from fowt_env.errors import (
     ControllerInputError,
     InputError,
@@ -191,7 +191,7 @@ def simulate(
         check_number("grid_loss", grid_loss, allowed="a time in s, or None")
     if trip is not None:
         check_number("trip", trip, 1.0, low_open=True, allowed="above 1, of rated rotor speed, or None")
-    chain = sensor_chain(sensors)
+    chain = sensors_of(sensors, scene.turbine)
     held = controller is None
     if not held:
         controller = make(controller, scene.turbine, control_dt)

@@ -25,6 +25,8 @@ VELOCITIES = ("vx", "vy", "vz", "wx", "wy", "wz")
 INPUTS = ("generator_torque", "blade_pitch_command", "wind_speed")
 INPUT_STEPS = np.array([1.0, 1e-5, 1e-3])
 FREQUENCY_ROUNDS = 4  # of finding a period and the added mass at it
+# internal blocks that linearize takes: memory has matrices of its own, and flat water has no waves to meet
+LINEAR = ("radiation", "filtered position")
 MEMORY = "radiation_"  # begins the names of a memory's states
 FORCES = ("fx", "fy", "fz", "mx", "my", "mz")  # on the hull, body components about the body origin
 FORCE_STEPS = np.array([1e2, 1e2, 1e2, 1e4, 1e4, 1e4])  # N, N m
@@ -244,7 +246,7 @@ def linearize(scene, operating_point=None):
     Raises: InputError if the scene has any.
     """
     internal = [
-        block.name for block in scene.blocks if block.steady == "settled" and block.name != "radiation"
+        block.name for block in scene.blocks if block.steady == "settled" and block.name not in LINEAR
     ]
     if internal:
         raise InputError(

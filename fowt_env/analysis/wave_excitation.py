@@ -12,8 +12,10 @@ from math import pi
 
 import numpy as np
 
-from fowt_env.descriptions.sea_state import sea_state_of
+from fowt_env.descriptions.sea_state import SeaState, sea_state_of
 from fowt_env.plant.compile.decorators import entry
+from fowt_env.plant.hydro.member_series import N_WATER, motion_amplitudes
+from fowt_env.plant.hydro.members import AREA, AX, AXIAL_ADDED, FROUDE
 from fowt_env.plant.hydro.morison import morison_load
 from fowt_env.plant.state import State, pose_of
 from fowt_env.weather.excitation import OUT_OF_PLANE, excitation_at
@@ -45,8 +47,9 @@ def wave_force(scene, state, omega):
 
     Force and elevation are the real parts of these times exp(i omega t), for waves travelling along x
     past the hull at rest in `state`. Computed by the scene's own strip load for a small regular wave,
-    without drag, which is quadratic; of a potential-flow body the excitation of its table, as the plant
-    interpolates it. omega: (n,) rad/s. Zero without hydrodynamics.
+    without drag, which is quadratic; of members the same at their undisplaced nodes, and of a potential-flow
+    body the excitation of its table, as the plant interpolates it. omega: (n,) rad/s. Zero without
+    hydrodynamics.
     """
     omega = np.atleast_1d(np.asarray(omega, dtype=float))
     result = np.zeros((omega.size, 6), dtype=complex)
@@ -55,6 +58,8 @@ def wave_force(scene, state, omega):
         return result
     if hydro.strips is not None:
         result += _strip_forces(scene, state, omega, hydro.strips.shape)
+    if hydro.members is not None and hydro.members.inertial:
+        result += _member_forces(scene, state, omega, hydro.members)
     if body is not None:
         force = excitation_at(body, omega, 0.0)
         if scene.options["planar"]:
@@ -93,6 +98,36 @@ def _strip_forces(scene, state, omega, strips):
             _strip_force(strips, waves, x, t, kinematics, quarters[quarter])
         change = (quarters[0] - quarters[2]) - 1j * (quarters[1] - quarters[3])
         result[i] = change / (2.0 * AMPLITUDE)
+    return result
+
+
+def _member_forces(scene, state, omega, members):
+    """(n, 6) complex force of the members' fluid inertia and pressure."""
+    site, nodes, pose = scene.platform.environment, members.nodes, pose_of(state)
+    rotation = np.array([[getattr(pose, f"r{i}{j}") for j in (1, 2, 3)] for i in (1, 2, 3)])
+    still = np.zeros(omega.size)
+    waves = build_waves(
+        SeaState(kind="components", omega=omega, amplitude=still + 1.0, phase=still, heading=still),
+        depth=site.water_depth,
+        density=site.water_density,
+        gravity=site.gravity,
+        seed=0,
+        duration=1.0,
+    )
+    place = nodes[:, :3]
+    if members.instantaneous_position:
+        place = place @ rotation.T + [0.0, 0.0, state[State.HEAVE]]
+    # of Re(A exp(-i omega t)), from the longest wave to the shortest
+    motion = motion_amplitudes(waves, place, N_WATER).conj().reshape(len(nodes), N_WATER, -1)
+    acceleration = np.einsum("ji,njk->nik", rotation, motion[:, 3:6])
+    axis = nodes[:, AX : AX + 3]
+    along = np.einsum("ni,nik->nk", axis, acceleration)
+    push = nodes[:, AXIAL_ADDED, None] * along + nodes[:, AREA, None] * motion[:, 6]
+    force = nodes[:, FROUDE, None, None] * (acceleration - axis[:, :, None] * along[:, None])
+    force += axis[:, :, None] * push[:, None]
+    moment = np.cross(nodes[:, :3, None], force, axis=1)
+    result = np.zeros((omega.size, 6), dtype=complex)
+    result[np.argsort(omega, kind="stable")] = np.concatenate([force.sum(axis=0), moment.sum(axis=0)]).T
     return result
 
 

@@ -1,12 +1,13 @@
 """Sensor chains: what stands between the plant's true motions and what a controller reads."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 from fowt_env.caches import cached
 from fowt_env.descriptions.checks import check_number
 from fowt_env.descriptions.files import DATA, read_toml
+from fowt_env.descriptions.units import RPM
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.measurement import Measurement
 
@@ -99,6 +100,34 @@ def _chain(name: str, entries: dict[str, Any]) -> SensorChain:
                 raise unknown(f"key of sensor {name}.{quantity}:", key, known)
         sensors[quantity] = Sensor(**figures)
     return SensorChain(name, sensors, entries.get("description", ""))
+
+
+# Of the NREL 5 MW turbine, whose the built-in chains are: what is on the shafts goes with the rated figures
+ROTOR_SPEED, GENERATOR_SPEED, TORQUE = 12.1 * RPM, 122.9096, 43093.55
+
+
+def sensors_of(given: str | SensorChain | None, turbine: Any) -> SensorChain | None:
+    """The SensorChain of what a run is given as sensors, for a turbine (its description); None for none.
+
+    Noise and quantisation of speeds and torque on the shafts are fractions of the rated ones in a built-in
+    chain, which is given by name; a SensorChain stays as it is. Raises: InputError as sensor_chain.
+    """
+    chain = sensor_chain(given)
+    if chain is None or not isinstance(given, str):
+        return chain
+    factors = {
+        "rotor_speed": turbine.rated_rotor_speed / ROTOR_SPEED,
+        "generator_speed": turbine.torque_law.rated_speed / GENERATOR_SPEED,
+        "generator_torque": turbine.torque_law.rated_torque / TORQUE,
+    }
+    if all(factor == 1.0 for factor in factors.values()):
+        return chain
+    sensors = dict(chain.sensors)
+    for name, factor in factors.items():
+        if name in sensors:
+            own = sensors[name]
+            sensors[name] = replace(own, noise=factor * own.noise, step=factor * own.step)
+    return replace(chain, sensors=sensors)
 
 
 def sensor_chain(given: str | SensorChain | None) -> SensorChain | None:

@@ -212,7 +212,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
                 parts["platform"], episode.wind, sea, rotor=task.rotor, duration=length,
                 fidelity=fidelity, **nominal_options,
             )  # fmt: skip
-        self._sensors = None if sensors is None else check_sensors(sensors)
+        self._sensors = None if sensors is None else check_sensors(sensors, self.scene.turbine)
         self._chain = None  # (name, fields) of a sensor chain, which may lack what is asked for
         if isinstance(self._sensors, SensorChain):
             self._chain = self._sensors.name, self._sensors.available

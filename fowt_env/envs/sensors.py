@@ -10,7 +10,7 @@ from math import isfinite
 
 import numpy as np
 
-from fowt_env.descriptions.sensors import SensorChain, sensor_chain
+from fowt_env.descriptions.sensors import SensorChain, sensor_chain, sensors_of
 from fowt_env.envs.observations import observation_channels
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measure, Measurement
@@ -30,13 +30,13 @@ def reading_scales(turbine):
     return np.array([scales[name] for name in Measurement._fields])
 
 
-def check_sensors(given):
+def check_sensors(given, turbine=None):
     """What an environment is given as sensors: {"noise", "delay"}, or a SensorChain; "exact" is None.
 
     Raises: InputError.
     """
     if isinstance(given, str | SensorChain):
-        return sensor_chain(given)
+        return sensor_chain(given) if turbine is None else sensors_of(given, turbine)
     if not isinstance(given, Mapping):
         raise InputError(
             f"sensors = {given!r}: must be a dict with noise and delay, a SensorChain or the name of one"

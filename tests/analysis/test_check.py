@@ -4,6 +4,7 @@ import json
 import re
 from math import pi, sqrt
 
+import numba
 import numpy as np
 import pytest
 from floaters import TENDON, semi, spar, tension_leg
@@ -12,6 +13,7 @@ from typer.testing import CliRunner
 import fowt_env
 from fowt_env.analysis.check import _at_own_frequency, check_platform
 from fowt_env.analysis.linear_model import natural_periods
+from fowt_env.analysis.wave_excitation import wave_force
 from fowt_env.descriptions.builtin import names
 from fowt_env.descriptions.files import DATA
 from fowt_env.descriptions.platform import Line, read_platform
@@ -214,3 +216,34 @@ def test_built_in_platforms_have_no_fault_of_geometry():
 @pytest.mark.parametrize("name", names("platforms"))
 def test_built_in_platforms_fit(name):
     assert check_platform(name).faults == ()
+
+
+# what else takes a hull of members
+
+
+def test_a_spar_of_members_has_the_wave_force_of_its_strips():
+    fixed = {"kinematics_position": "fixed", "surface": "swl", "stretching": "none", "strip_length": 1.0}
+    omega = np.array([0.9, 0.3, 0.6, 1.5])
+    strips = wave_force(fowt_env.build_scene("oc3_hywind", **fixed), np.zeros(15), omega)
+    members = wave_force(fowt_env.build_scene(spar(), **fixed), np.zeros(15), omega)
+    for columns in (slice(0, 3), slice(3, 6)):
+        scale = np.abs(strips[:, columns]).max(axis=1)
+        assert (np.abs(members[:, columns] - strips[:, columns]).max(axis=1) < 1e-3 * scale).all()
+
+
+def test_planar_scenes_need_members_on_both_sides():
+    fowt_env.build_scene(semi(), planar=True)
+    with pytest.raises(fowt_env.InputError, match="member from .* has no mirror image"):
+        fowt_env.build_scene(semi(members=semi().members[1:]), planar=True)
+
+
+def test_other_weather_keeps_the_types_of_members():
+    sea = {"kind": "jonswap", "Hs": 4.0, "Tp": 9.0}
+    scene = fowt_env.build_scene(semi(), sea=sea, fidelity="standard", duration=100.0)
+    series = scene.model.hydro.members.series.values
+    assert series.shape[0] > 100
+    for other in (None, {"kind": "components", "omega": [0.5, 0.50002, 1.0], "amplitude": 1.0, "phase": 0.0}):
+        there = scene.with_weather(None, other, 2)
+        assert numba.typeof(there.handle()) == numba.typeof(scene.handle())
+    again = scene.with_weather(None, sea, 0)
+    assert np.array_equal(again.model.hydro.members.series.values, series)

@@ -2,7 +2,15 @@
 
 import pytest
 
-from fowt_env.descriptions.sensors import EXACT, Sensor, SensorChain, built_in_chains, sensor_chain
+from fowt_env.descriptions.sensors import (
+    EXACT,
+    Sensor,
+    SensorChain,
+    built_in_chains,
+    sensor_chain,
+    sensors_of,
+)
+from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.errors import InputError
 from fowt_env.plant.measurement import SENSOR_FIELDS
 
@@ -55,3 +63,19 @@ def test_a_figure_out_of_range_is_named(key, value):
 def test_a_chain_that_cannot_be_is_refused(sensors, message):
     with pytest.raises(InputError, match=message):
         SensorChain("own", sensors)
+
+
+def test_noise_on_the_shafts_goes_with_the_rated_figures_of_the_turbine():
+    plain, same = sensor_chain("standard"), sensors_of("standard", read_turbine("nrel5mw"))
+    assert same is plain
+    direct = read_turbine("iea15")
+    found = sensors_of("standard", direct).sensors
+    for name, rated in (
+        ("rotor_speed", direct.rated_rotor_speed),
+        ("generator_speed", direct.torque_law.rated_speed),
+        ("generator_torque", direct.torque_law.rated_torque),
+    ):
+        assert 5e-4 < found[name].noise / rated < 3e-3  # as of the NREL 5 MW turbine: 0.1 to 0.2 %
+    untouched = set(plain.sensors) - {"rotor_speed", "generator_speed", "generator_torque"}
+    assert all(found[name] == plain.sensors[name] for name in untouched)
+    assert sensors_of(plain, direct) is plain  # given as a record: as it is

@@ -8,7 +8,8 @@ import pytest
 from potential_body import made_up_body
 
 from fowt_env import build_scene
-from fowt_env.analysis.trim import without_fluctuations
+from fowt_env.analysis.linear_model import linearize
+from fowt_env.analysis.trim import trim, without_fluctuations
 from fowt_env.analysis.wave_excitation import fit_wave_filter, wave_force
 from fowt_env.descriptions.platform import read_platform
 from fowt_env.errors import InputError
@@ -147,3 +148,19 @@ def test_the_wave_filter_fits_the_force_within_its_stated_error():
         assert error[(omega >= low) & (omega <= high)].max() == pytest.approx(stated, rel=1e-6)
     assert model.errors[0.4, 0.8] < 0.02
     assert np.linalg.eigvals(model.A).real.max() < 0.0
+
+
+@pytest.mark.slow
+def test_a_filtered_position_follows_a_trim_and_leaves_linear_models_as_they_are():
+    sea = {"kind": "regular", "H": 2.0, "T": 9.0}
+    undisplaced, filtered = (
+        build_scene("iea15_volturnus_s", sea=sea, fidelity="standard", excitation_position=name)
+        for name in ("undisplaced", "filtered")
+    )
+    one, other = linearize(undisplaced), linearize(filtered)
+    assert one.states == other.states
+    assert np.allclose(one.A, other.A, rtol=1e-6, atol=1e-8)
+    waves = ["wave_elevation"]
+    assert np.allclose(one.response([0.7], waves), other.response([0.7], waves), rtol=1e-6)
+    x, first = trim(filtered).state, filtered.model.hydro.excitation.position.first
+    assert x[first : first + 2] == pytest.approx(x[:2], abs=1e-9) and abs(x[0]) > 0.1

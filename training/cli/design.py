@@ -261,7 +261,7 @@ def bound(
             power=power,
             torque_std=0.01 * torque_std,
             previews=parse_numbers(previews, "previews"),
-            noise=noise_of(sensors),
+            noise=noise_of(sensors, scene.turbine),
             sea=None if sea is None else sea_state_of(parse_sea(sea)),
             progress=lambda done, n: update(done, total=n),
         )

@@ -20,7 +20,7 @@ import numpy as np
 from scipy.linalg import expm, solve_continuous_are, solve_sylvester
 
 from fowt_env.controllers.lqr.design import SENSORS
-from fowt_env.descriptions.sensors import sensor_chain
+from fowt_env.descriptions.sensors import sensor_chain, sensors_of
 from fowt_env.descriptions.units import DEGREE
 from fowt_env.errors import InputError
 from fowt_env.training.design.bound_plant import BLADE, LEAN, OMEGA, SPEED, N
@@ -117,7 +117,7 @@ class Problem:
         """(k,) intensity of the noise of the sensors in use, per rad/s and both sides."""
         if self.information.sensors is None:
             return np.zeros(0)
-        noise = noise_of() if noise is None else dict(noise)
+        noise = noise_of(turbine=self.plant.turbine) if noise is None else dict(noise)
         for name in self.information.sensors:
             if not noise.get(name, 0.0) > 0.0:
                 raise InputError(f"noise: {name} = {noise.get(name)}: must be a standard deviation above 0")
@@ -257,13 +257,13 @@ class Problem:
         return gain, c
 
 
-def noise_of(chain="standard"):
+def noise_of(chain="standard", turbine=None):
     """{sensor: standard deviation of a reading} of SENSORS through a sensor chain, its name or a SensorChain.
 
     Noise and quantisation together; low pass and delay, small beside the plant's times, are left out.
     Raises: InputError for an unknown name, and for a chain without one of SENSORS or that is exact.
     """
-    found = sensor_chain(chain)
+    found = sensor_chain(chain) if turbine is None else sensors_of(chain, turbine)
     for name in SENSORS:
         if found is None or name not in found.sensors:
             raise InputError(

@@ -35,7 +35,9 @@ def read_aerodyn(path, folders=()):
     file = PartFile(path, "AeroDyn")
     if not file.has("NumAFfiles"):
         if file.has("StallMod", "NumFoil", "InfModel"):
-            raise file.refusal("is of AeroDyn 14 (StallMod, NumFoil): must be of AeroDyn 15")
+            raise file.refusal(
+                "is of AeroDyn 14 (StallMod, NumFoil): must be of AeroDyn 15, in the .fst or with --aerodyn"
+            )
         raise file.refusal("NumAFfiles is missing: must be the number of polar files")
     count = file.whole("NumAFfiles", low=1, high=MOST_AIRFOILS)
     columns = [

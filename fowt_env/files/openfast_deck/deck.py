@@ -104,6 +104,8 @@ def read_deck(fst=None, parts=None, folders=(), discon=None):
             raise mooring.refusal(
                 f"an anchor at z = {line.anchor[2]:g} m: must be from -{site.water_depth:g} m (WtrDpth) to 0"
             )
+    if main is not None and main.whole("CompElast", default=1) == 2:
+        notes.append(("blades of BeamDyn (CompElast 2)", "rigid, with the masses of ElastoDyn's BldFile"))
     inflow = read_inflow(parts["inflow"], folders) if "inflow" in parts else Inflow(None, None, "none")
     control = read_control(
         parts.get("servodyn"), elastodyn["GBRatio"], discon, folders, site.air_density, elastodyn["TipRad"]
@@ -151,7 +153,7 @@ def _switched_on(main, name):
 def _check_switches(main, parts):
     """Raises: InputError for modules that cannot be represented."""
     if main.has("CompElast"):
-        main.one_of("CompElast", (1,), why="2 has the blades' masses in BeamDyn, 3 is simplified")
+        main.one_of("CompElast", (1, 2), why="3, simplified ElastoDyn, cannot be read")
     if main.whole("NumTurbines", default=1) != 1:
         raise main.wrong("NumTurbines", main.whole("NumTurbines"), "1")
     for key, why in (

@@ -52,9 +52,7 @@ def import_deck(
     if folder.exists() and not folder.is_dir():
         raise InputError(f"folder {str(folder)!r} is a file; must be a folder, or not there yet")
     if (folder / "platform.toml").exists() and not replace_files:
-        raise InputError(
-            f"folder {str(folder)!r} has a platform.toml already; give another, or replace its files"
-        )
+        raise InputError(f"folder {str(folder)!r} has a platform.toml already: give another, or --overwrite")
     deck = read_deck(fst, parts, search, discon)
     body = _coefficients(deck, excitation)
     report = make_report(deck, name, body)

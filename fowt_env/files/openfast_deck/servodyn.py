@@ -67,6 +67,8 @@ def read_control(path, gear_ratio, discon=None, folders=(), air_density=1.225, r
     chosen = Path(discon) if discon is not None else None
     if chosen is None and servo is not None and servo.whole("VSContrl", default=0) != 1:
         chosen = None if _is_legacy(servo) else _optional(servo, "DLL_InFile", folders)
+        if chosen is not None and not _is_rosco(PartFile(chosen, "DISCON.IN")) and 96.0 < gear_ratio < 98.0:
+            chosen = None  # the legacy controller of the NREL 5 MW turbine reads none
     if chosen is not None:
         control = _rosco(chosen, efficiency, air_density, radius, folders)
     elif servo is None:
@@ -76,6 +78,11 @@ def read_control(path, gear_ratio, discon=None, folders=(), air_density=1.225, r
     else:
         control = _legacy(servo, efficiency, gear_ratio)
     return replace(control, sources=sources | control.sources, notes=(*notes, *control.notes))
+
+
+def _is_rosco(file):
+    """Whether a controller's file has ROSCO's keys."""
+    return any(file.has(key) for key in ("PC_RefSpd", "VS_RefSpd", "VS_RtTq"))
 
 
 def _is_legacy(servo):
@@ -162,7 +169,7 @@ def _values(file, key, default=None):
 def _rosco(path, efficiency, air_density, radius, folders):
     """Control of ROSCO's input file, its versions 2.5 to 2.10."""
     file = PartFile(path, "DISCON.IN")
-    if not any(file.has(key) for key in ("PC_RefSpd", "VS_RefSpd", "VS_RtTq")):
+    if not _is_rosco(file):
         raise file.refusal("is not of ROSCO: PC_RefSpd, VS_RefSpd and VS_RtTq are missing")
     source = file.source
     efficiency_key = "VS_GenEff"

@@ -34,7 +34,7 @@ import numpy as np
 from fowt_env.caches import Cache
 from fowt_env.errors import InputError
 from fowt_env.plant.aero.blade_shape import blade_line, build_blade_shape, is_curved, line_integrals
-from fowt_env.plant.compile.decorators import entry, kernel
+from fowt_env.plant.compile.decorators import entry, inlined_kernel, kernel
 from fowt_env.plant.tilt import rotor_axes
 
 TOLERANCE = 1e-8  # of the residual before the last step of Newton's method; after it, about its square
@@ -147,7 +147,7 @@ def element_of(j, blade_pitch, rotor):
     )
 
 
-@kernel
+@inlined_kernel
 def segment_of(alpha, foil, polars):
     """(row of polars.segment, alpha beyond its start) of a foil at alpha (rad, wrapped to +-pi)."""
     if alpha > pi or alpha < -pi:

@@ -65,14 +65,14 @@ def build_water_series(waves, place, channels, duration):
     for first in range(0, len(place), several):
         points = place[first : first + several]
         spectrum = np.zeros((len(points) * channels, size), dtype=complex)
-        np.add.at(spectrum, (slice(None), number), _amplitudes(waves, points, channels))
+        np.add.at(spectrum, (slice(None), number), motion_amplitudes(waves, points, channels))
         envelope = fft(spectrum, axis=1, overwrite_x=True)
         motion = (envelope[:, rank % size] * carrier).real
         values[:, first * channels : (first + len(points)) * channels] = motion.T
     return WaterSeries(values, tau)
 
 
-def _amplitudes(waves, place, channels):
+def motion_amplitudes(waves, place, channels):
     """(n * channels, components) complex A of the motion Re(A exp(-i omega t)) at places (n, 3)."""
     x, y, z = place[:, 0, None], place[:, 1, None], place[:, 2, None]
     k, omega = waves.wave_number, waves.omega
