@@ -13,11 +13,11 @@ from fowt_env.errors import unknown
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.drivetrain import followed_pitch, pitch_after
-from fowt_env.plant.dynamics import derivative, evaluate_loads, respond
+from fowt_env.plant.dynamics import derivative, evaluate_loads, respond, stored
 from fowt_env.plant.hydro.radiation import begin_memory, end_memory, integrated_states, memory_after
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rigid_body import attitude_rate
-from fowt_env.plant.rotor_substeps import build_substeps, follow_rotor, sample_rotor
+from fowt_env.plant.rotor_substeps import build_substeps, follow_rotor, sample_rotor, shift_samples
 from fowt_env.plant.state import Command, State
 
 START_STEPS = 3  # steps before four past derivatives exist
@@ -177,6 +177,33 @@ def adams(t, x, u, dt, model, method, data):
     cache[LoadCache.STEPS] = steps + 1.0
 
 
+@inlined_kernel
+def set_pitch(t, x, u, pitch, model, method, data):
+    """Set the blade pitch to another value at once, in a method that remembers nothing of past steps."""
+    x[State.BLADE_PITCH] = pitch
+    data.cache[LoadCache.VALID] = 0.0
+
+
+@inlined_kernel
+def set_pitch_and_history(t, x, u, pitch, model, method, data):
+    """Set the blade pitch at once, and make past derivatives those of this pitch.
+
+    A polynomial through derivatives of before and after a jump has first-order errors; what the jump changes
+    now is added to those of before, which leaves the smooth part alone.
+    """
+    before, after, history, cache = data.stages[1], data.stages[4], data.history, data.cache
+    rates(t, x, u, model, data, before)
+    was = stored(cache, LoadCache.ROTOR)
+    torque = cache[LoadCache.TORQUE]
+    x[State.BLADE_PITCH] = pitch
+    cache[LoadCache.VALID] = 0.0
+    rates(t, x, u, model, data, after)
+    for k in range(START_STEPS):
+        for i in range(State.VX, State.ROTOR_SPEED + 1):
+            history[k, i] += after[i] - before[i]
+    shift_samples(was, torque, method.substeps, data)
+
+
 class Method(NamedTuple):
     """An integrator, and what is known of it."""
 
@@ -213,6 +240,9 @@ INTEGRATORS = {
     ),
 }  # fmt: skip
 method_step = chosen_by_class("method", {type(m.part): m.step for m in INTEGRATORS.values()}, inlined=True)
+jump_pitch = chosen_by_class(
+    "method", {RungeKutta: set_pitch, Heun: set_pitch, Adams: set_pitch_and_history}, inlined=True
+)
 
 
 def build_integrator(name, rotor_samples=1):
@@ -239,8 +269,7 @@ def rotor_samples(method):
 def take_step(t, x, u, dt, model, method, data):
     """One step of the scene's integrator, x in place."""
     pitch = followed_pitch(x[State.BLADE_PITCH], u[Command.BLADE_PITCH], dt, model.actuator)
-    if pitch != x[State.BLADE_PITCH]:  # an actuator without lag jumps: the cached loads are not of this pitch
-        x[State.BLADE_PITCH] = pitch
-        data.cache[LoadCache.VALID] = 0.0
+    if pitch != x[State.BLADE_PITCH]:  # an actuator without lag jumps
+        jump_pitch(t, x, u, pitch, model, method, data)
     method_step(t, x, u, dt, model, method, data)
     data.cache[LoadCache.VALID] = 0.0

@@ -77,6 +77,25 @@ def sample_rotor(t, x, u, dt, model, substeps, data):
 
 
 @kernel
+def shift_samples(was, torque, substeps, data):
+    """Add to the samples of past steps what a jump of the blade pitch has changed; nothing without any.
+
+    was, torque: the rotor's wrench and torque before the jump; those after it are in the cache.
+    """
+    if substeps is None:
+        return
+    samples, cache = data.samples, data.cache
+    for k in range(samples.shape[0]):
+        samples[k, 0] += cache[LoadCache.ROTOR] - was.fx
+        samples[k, 1] += cache[LoadCache.ROTOR + 1] - was.fy
+        samples[k, 2] += cache[LoadCache.ROTOR + 2] - was.fz
+        samples[k, 3] += cache[LoadCache.ROTOR + 3] - was.mx
+        samples[k, 4] += cache[LoadCache.ROTOR + 4] - was.my
+        samples[k, 5] += cache[LoadCache.ROTOR + 5] - was.mz
+        samples[k, 6] += cache[LoadCache.TORQUE] - torque
+
+
+@kernel
 def follow_rotor(dt, model, substeps, data, y):
     """Add to the velocities y at the end of a step what sample_rotor found within it; nothing without any.
 
