@@ -131,6 +131,26 @@ def test_the_middle_table_of_a_polar_is_taken_where_aerodyn_interpolates(tmp_pat
     assert "number 2 (Reynolds number 5.0 million)" in (tmp_path / "out" / "report.md").read_text()
 
 
+def test_a_polar_of_any_file_name_has_a_plain_name_here(tmp_path):
+    path = write_deck(tmp_path, AeroDyn=[('"foils/One.dat"', '"#1, thick.dat"')])
+    (tmp_path / NAMES["polar"]).rename(tmp_path / "#1, thick.dat")
+    import_deck(path, tmp_path / "out")
+    turbine = read_turbine(tmp_path / "out" / "turbine" / "turbine.toml")
+    assert set(turbine.blade.polars) == {"_1__thick"}
+
+
+def test_the_rotor_table_goes_along_and_discon_names_it_beside_itself(tmp_path):
+    path = write_deck(tmp_path, DISCON=[("45.0      ! VS_MinOMSpd", '"Foils/Cp.txt" ! PerfFileName - table')])
+    (tmp_path / "Foils" / "Cp.txt").write_text("# Power coefficient\n0.1 0.4\n# Thrust coefficient\n0.5\n")
+    import_deck(path, tmp_path / "out")
+    discon = (tmp_path / "out" / "turbine" / "DISCON.IN").read_text()
+    assert '"Cp.txt"      ! PerfFileName' in discon
+    assert (tmp_path / "out" / "turbine" / "Cp.txt").is_file()
+    # without the least speed it starts at 30 % of the rated one
+    turbine = read_turbine(tmp_path / "out" / "turbine" / "turbine.toml")
+    assert turbine.torque_law.cut_in_speed == pytest.approx(0.3 * 130.0)
+
+
 # --------------------------------------------------------------------------- hydrodynamics
 
 
