@@ -195,6 +195,7 @@ def test_members_without_a_potential_flow_body_have_all_their_loads(tmp_path):
     import_deck(path, tmp_path / "out")
     platform = read_platform(tmp_path / "out" / "platform.toml")
     assert platform.potential_flow is None
+    assert platform.additional is None  # which HydroDyn has with potential flow alone
     assert not any(member.potential_flow for member in platform.members)
     disc = platform.members[-1]
     assert disc.axial_added_mass_coefficient == pytest.approx((1.0 - 0.5**3, 1.0))
