@@ -243,6 +243,20 @@ def test_site_wind_and_sea_are_those_of_the_deck(imported):
     assert "12 m/s at 80 m" in report.suggestions[1]
 
 
+@pytest.mark.parametrize(
+    ("part", "old", "new", "said"),
+    [
+        ("OpenFAST", '"wind.dat"', '"gone.dat"', "Wind of the deck: none"),
+        ("InflowWind", "1     WindType", '2 WindType\n"gone.wnd" Filename_Uni', "no such file"),
+        ("InflowWind", "1     WindType", "3 WindType", "TurbSim"),
+    ],
+)
+def test_a_deck_is_imported_without_its_wind(tmp_path, part, old, new, said):
+    report = import_deck(write_deck(tmp_path, **{part: [(old, new)]}), tmp_path / "out")
+    assert said in report.suggestions[1]
+    assert read_platform(tmp_path / "out" / "platform.toml").environment.shear_exponent == 0.14
+
+
 def test_fast_8_has_its_site_in_its_modules(tmp_path):
     """Gravity in ElastoDyn, air in AeroDyn, water and waves in HydroDyn; no SeaState, few switches."""
     waves = "1000 WtrDens\n150 WtrDpth\n0 MSL2SWL\n2 WaveMod\n5 WaveHs\n9 WaveTp\n0 CurrMod\n1    PotMod "
