@@ -1,7 +1,7 @@
 """Whether a platform can be what its file means: figures at rest, natural periods, and what does not fit."""
 
 import warnings
-from math import cos, degrees, hypot, pi, sin, tan
+from math import cos, degrees, hypot, pi, sin, sqrt, tan
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +18,7 @@ from fowt_env.scene.geometry import geometry_faults
 DRIFT, TILT = 0.05, 5.0  # of the water depth; deg: a rest without wind that is odd
 SETTLED_HEAVE = 0.05  # of the draft: weight and buoyancy need not fit better than that
 ROUNDS, SETTLED = 40, 1e-6  # for the added mass at a mode's own frequency
+FULL_SIZE = 90.0  # m, hub height that BANDS are of; a model of it has shorter periods
 BANDS = {  # s, natural periods of floating turbines from tension legs and barges to spars, with much to spare
     "surge": (15.0, 600.0),
     "sway": (15.0, 600.0),
@@ -62,7 +63,7 @@ def check_platform(platform, **options):
         if abs(rest["heave"]) <= SETTLED_HEAVE * scene.platform.draft:
             faults.pop("vertical", None)  # a wide waterplane carries what is missing
         periods = natural_modes(scene, point)
-        faults |= _rest_faults(scene, rest) | _period_faults(periods)
+        faults |= _rest_faults(scene, rest) | _period_faults(periods, scene.turbine.rotor.hub_height)
     return Check(
         scene.label, scene.platform.draft, figures, rest, periods,
         tuple(f"{text[0].upper()}{text[1:]}." for text in faults.values()),
@@ -110,16 +111,16 @@ def _rest_faults(scene, rest):
     return faults
 
 
-def _period_faults(periods):
-    """{name: sentence} of natural periods that no floating turbine has."""
-    faults = {}
+def _period_faults(periods, hub_height):
+    """{name: sentence} of natural periods that no floating turbine of this size has."""
+    faults, scale = {}, sqrt(hub_height / FULL_SIZE)  # Froude's, of times
     for motion, period in periods.items():
-        low, high = BANDS[motion]
+        low, high = BANDS[motion][0] * min(scale, 1.0), BANDS[motion][1] * max(scale, 1.0)
         if not np.isfinite(period):
             faults[motion] = f"nothing restores it in {motion}"
         elif not low <= period <= high:
             faults[motion] = (
-                f"its natural period in {motion} is {period:.3g} s, outside {low:g} to {high:g} s"
+                f"its natural period in {motion} is {period:.3g} s, outside {low:.3g} to {high:.3g} s"
             )
     return faults
 

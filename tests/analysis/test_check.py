@@ -242,7 +242,8 @@ def test_other_weather_keeps_the_types_of_members():
     scene = fowt_env.build_scene(semi(), sea=sea, fidelity="standard", duration=100.0)
     series = scene.model.hydro.members.series.values
     assert series.shape[0] > 100
-    for other in (None, {"kind": "components", "omega": [0.5, 0.50002, 1.0], "amplitude": 1.0, "phase": 0.0}):
+    odd = {"omega": [0.5, 0.50002, 1.0], "amplitude": [1.0] * 3, "phase": [0.0] * 3}
+    for other in (None, {"kind": "components", "heading": 0.0} | odd):
         there = scene.with_weather(None, other, 2)
         assert numba.typeof(there.handle()) == numba.typeof(scene.handle())
     again = scene.with_weather(None, sea, 0)

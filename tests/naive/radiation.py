@@ -5,7 +5,7 @@ from scipy.linalg import expm
 
 
 def state_matrices(memory):
-    """(A, B (n, 6), C (6, n)) of z' = A z + B v, F = -C z, of a StateSpaceMemory, in the order of its states."""
+    """(A, B (n, 6), C (6, n)) of z' = A z + B v, F = -C z, of a StateSpaceMemory, its states in order."""
     size = 2 * memory.pole.shape[1]
     a, b, c = np.zeros((size, size)), np.zeros((size, 6)), np.zeros((6, size))
     for j in range(6):
@@ -34,7 +34,7 @@ def states_after(memory, z, before, after, dt):
 
 
 def convolution(kernel, dt, velocities):
-    """-integral of K(tau) v(t - tau) at the last of velocities (n, 6), by the trapezoid rule, K(m dt) (m, 6, 6)."""
+    """-integral of K(tau) v(t - tau) at the last of velocities (n, 6), trapezoid rule; K(m dt) (m, 6, 6)."""
     total, last = np.zeros(6), len(velocities) - 1
     for m in range(min(len(kernel), last + 1)):
         share = 0.5 if m in (0, last) else 1.0

@@ -9,6 +9,7 @@ from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
 from fowt_env.plant.rigid_body import gravity_load
 from fowt_env.plant.rollout import observe, output_row
 from fowt_env.plant.state import State, pose_of
+from fowt_env.scene.mass import build_layout
 from fowt_env.weather.wind_field import read_box
 
 COMMAND = np.array([3e4, 0.2])
@@ -174,6 +175,27 @@ def test_the_rotor_s_wind_in_a_box_is_read_along_the_blades_where_they_are(storm
     own = x[7:10] + np.cross(x[10:13], layout.hub)
     assert found == pytest.approx((R.T @ wind - own)[0], rel=1e-5)
     assert layout.span[0] > 1.5 and layout.span[-1] < 63.0 and np.ptp(np.diff(layout.span)) < 1e-9
+
+
+def test_the_rotor_s_wind_is_read_along_coned_blades_and_a_tilted_shaft(storm_scene, platform, turbine):
+    rotor = turbine.rotor.model_copy(update={"shaft_tilt": 0.12, "cone": 0.08})
+    layout = build_layout(platform, turbine.model_copy(update={"rotor": rotor}))
+    x = random_state(np.random.default_rng(5), storm_scene.n_state, speed=2.0, turning=0.1)
+    R, shaft = rigid_body.rotation(*x[3:6]), rigid_body.rotation(0.0, 0.12, 0.0)
+    y, z = np.linspace(-100.0, 100.0, 21), np.linspace(5.0, 205.0, 21)
+    u, v, w = np.random.default_rng(6).standard_normal((3, 40, z.size, y.size))
+    spec = {"kind": "box", "u": u + 12.0, "v": v, "w": w, "y": y, "z": z, "dt": 0.5, "speed": 12.0}
+    box = read_box({**spec, "periodic": True}, hub_height=90.0, rotor_diameter=126.0)
+    aero = storm_scene.model.aero._replace(field=box.field())
+    found = rotor_wind(3.0, pose_of(x), x[State.AZIMUTH], aero, layout)
+    wind, hub = np.zeros(3), np.array([-rotor.overhang, 0.0, rotor.hub_height])
+    for blade in range(3):
+        psi = x[State.AZIMUTH] + 2.0 * np.pi * blade / 3
+        coned = shaft @ rigid_body.rotation(psi, 0.0, 0.0) @ rigid_body.rotation(0.0, -0.08, 0.0)
+        for distance in layout.span:
+            wind += box.at(3.0, *(x[:3] + R @ (hub + distance * coned[:, 2])))[0] / (3 * len(layout.span))
+    own = x[7:10] + np.cross(x[10:13], hub)
+    assert found == pytest.approx((R.T @ wind - own) @ shaft[:, 0], rel=1e-5)
 
 
 def test_lines_report_their_tensions(wave_scene):

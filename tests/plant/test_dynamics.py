@@ -8,6 +8,7 @@ from naive import rigid_body
 from plant_helpers import integrate, leaning, make_pose, random_state, rates, state
 from scipy.integrate import solve_ivp
 
+from fowt_env.errors import InputError
 from fowt_env.plant.drivetrain import build_drivetrain, shaft_torque
 from fowt_env.plant.hydro.hydrostatics import submerged
 from fowt_env.plant.mooring import mooring_load
@@ -95,6 +96,11 @@ def test_a_tilted_rotor_turns_and_a_heavy_side_pulls_as_newton_and_euler_say(pla
     for row in reference_states()[:60]:
         expected = naive_accelerations(row, platform, turbine, held=held)
         assert np.abs(project_accelerations(row, turbine, body) - expected).max() < 1e-11
+
+
+def test_a_planar_scene_refuses_a_heavy_side(platform, turbine):
+    with pytest.raises(InputError, match="cm_left"):
+        build_rigid_body(*leaning(platform, turbine), plane=True)
 
 
 def test_where_the_generator_sits_and_what_it_weighs_does_not_matter(platform, turbine):

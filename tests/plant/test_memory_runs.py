@@ -1,4 +1,4 @@
-"""Runs with radiation memory: free decays against OpenFAST, both forms against each other, and integrators."""
+"""Runs with radiation memory: decays against OpenFAST, both forms against each other, and integrators."""
 
 from pathlib import Path
 
@@ -8,6 +8,7 @@ import pytest
 from fowt_env import build_scene, simulate
 from fowt_env.analysis.linear_model import linearize, natural_periods
 from fowt_env.descriptions.platform import read_platform
+from fowt_env.envs.snapshot import DATA_CARRIED
 from fowt_env.plant.rollout import advance
 from fowt_env.plant.state import STATES, State, pose_of
 from fowt_env.scene.radiation_fit import fit_radiation
@@ -24,7 +25,9 @@ CHANNELS = {  # motion: (channel, offset, its unit)
 @pytest.fixture(scope="module")
 def platform():
     found = read_platform("iea15_volturnus_s")
-    lines = tuple(line.model_copy(update={"seabed_friction": 1.0}) for line in found.lines)  # as in MAP's file
+    lines = tuple(
+        line.model_copy(update={"seabed_friction": 1.0}) for line in found.lines
+    )  # as in MAP's file
     return found.model_copy(update={"lines": lines})
 
 
@@ -122,3 +125,17 @@ def test_integrators_converge_with_memory_to_second_order_or_better(platform, in
     finest = last_state(platform, "rk4", 0.0025)
     misses = [np.abs(last_state(platform, integrator, dt) - finest)[:6].max() for dt in (0.1, 0.05)]
     assert misses[0] > 3.3 * misses[1] and misses[1] < 2e-4
+
+
+@pytest.mark.parametrize("form", ["state_space", "convolution"])
+def test_a_snapshot_carries_the_memory(platform, form):
+    scene = build_scene(platform, fidelity="standard", radiation=form)
+    x, u, data = np.zeros(scene.n_state), np.zeros(2), scene.data()
+    x[State.HEAVE], x[State.YAW] = 3.0, 0.1
+    advance(scene.handle(data), x, u, 0, 60, scene.dt)
+    y, copy = x.copy(), scene.data()
+    for name in DATA_CARRIED:
+        getattr(copy, name)[:] = getattr(data, name)
+    for state, arrays in ((x, data), (y, copy)):
+        advance(scene.handle(arrays), state, u, 60, 60, scene.dt)
+    assert np.array_equal(x, y)

@@ -1,4 +1,4 @@
-"""The fit of radiation memory: against functions that are known, and the coefficients of built-in platforms."""
+"""The fit of radiation memory: against known functions, and the coefficients of built-in platforms."""
 
 import math
 from dataclasses import replace
@@ -41,7 +41,7 @@ def second_order(s, decay, frequency):
 
 
 def known_body():
-    """Surge, heave and pitch of one or two resonators; surge and pitch are coupled, and so are sway and roll."""
+    """Motions of one or two resonators; surge and pitch are coupled, and so are sway and roll."""
     k = np.zeros((OMEGA.size, 6, 6), dtype=complex)
     s = 1j * OMEGA
     one, other = second_order(s, 0.2, 0.8), second_order(s, 0.3, 1.4)

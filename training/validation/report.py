@@ -180,23 +180,21 @@ def _responses(study, path):
 def _poles(study, path):
     """Frequencies and damping ratios of the linear models over wind speed."""
     rows = [row for row in study.rows if "linear model" in row.case]
-    figure = new_figure(9.0, 3.4)
-    for axes, quantity in zip(
-        figure.subplots(1, 3), ("frequency", "damping ratio", "rotor pole"), strict=True
-    ):
+    figure = new_figure(9.0, 3.6)
+    panels = figure.subplots(1, 3)
+    for axes, quantity in zip(panels, ("frequency", "damping ratio", "rotor pole"), strict=True):
         style_axes(axes)
         chosen = [row for row in rows if quantity in row.quantity]
         for number, name in enumerate(dict.fromkeys(row.quantity for row in chosen)):
             part = [row for row in chosen if row.quantity == name]
             wind = [float(row.case.split(" at ")[1].split(" ")[0]) for row in part]
             label = name.split(" mode")[0]
-            axes.plot(
-                wind, [row.openfast for row in part], "-", color=COLOURS[number], label=f"{label}, {THERE}"
-            )
+            axes.plot(wind, [row.openfast for row in part], "-", color=COLOURS[number])
             axes.plot(wind, [row.here for row in part], "o", color=COLOURS[number], markersize=4, label=label)
         axes.set_title(f"{quantity} ({chosen[0].unit})", fontsize=9, color=INK)
         axes.set_xlabel("wind (m/s)", fontsize=9, color=INK)
-        axes.legend(fontsize=7, frameon=False)
+    panels[1].legend(fontsize=8, frameon=False)
+    figure.suptitle(f"lines: {THERE}; points: {HERE}", fontsize=10, color=INK, x=0.01, ha="left")
     return save_figure(figure, path)
 
 

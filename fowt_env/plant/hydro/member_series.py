@@ -19,7 +19,7 @@ POINTS_PER_PERIOD = (
 )
 FEWEST_ROWS = 256  # of a period: 1e-8 of a regular wave
 MOST_BYTES = 256_000_000  # of a table; a longer record is summed
-MOST_FREQUENCIES = 1_000_000  # of the lattice that the components lie on
+LONGEST = 20.0  # records, of the period that the components' lattice repeats after; a longer one is summed
 CHUNK = 2_000_000  # complex numbers transformed at once
 PHASE_ERROR = 1e-3  # rad: how far a component may drift off the lattice within the record
 
@@ -47,10 +47,11 @@ def build_water_series(waves, place, channels, duration):
     step = float(gaps.min()) if gaps.size else float(omega[0])
     base = float(omega.min())
     number = np.rint((omega - base) / step)
-    if number.max() > MOST_FREQUENCIES or np.abs(omega - base - number * step).max() * duration > PHASE_ERROR:
+    period = 2.0 * pi / step
+    drift = np.abs(omega - base - number * step).max() * duration
+    if drift > PHASE_ERROR or (gaps.size and period > LONGEST * duration):
         return no_series()
     number = number.astype(int)
-    period = 2.0 * pi / step
     most = max(FEWEST_ROWS if gaps.size == 0 else 0, ceil(POINTS_PER_PERIOD * omega.max() / step))
     size = next_fast_len(max(most, int(number.max()) + 1))
     tau = period / size
