@@ -47,7 +47,7 @@ def import_command(
         typer.Option(help="Folder in which files that the deck names are looked for as well; repeatable."),
     ] = None,
     overwrite: Annotated[bool, typer.Option(help="Replace the files of an earlier import.")] = False,
-):
+) -> None:
     """Convert a deck of OpenFAST or FAST 8 to a platform and turbine of this project."""
     from fowt_env.files.openfast_deck.importer import import_deck
 

@@ -1,5 +1,6 @@
 """AeroDyn 15's files: blade geometry, polars and the drag of the tower."""
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -137,7 +138,8 @@ def _airfoil_files(file, count, folders):
 def _names(files, numbers):
     """{number of a polar that the blade has: name}, by the files' stems; equal stems get a number."""
     used = sorted(set(numbers))
-    stems = [files[number - 1].stem for number in used]
+    # names of files of ours: neither commas nor marks of comments
+    stems = [re.sub(r"[^\w.-]", "_", files[number - 1].stem) for number in used]
     return {
         number: stem if stems.count(stem) == 1 else f"{stem}_{number}"
         for number, stem in zip(used, stems, strict=True)

@@ -70,7 +70,12 @@ def read_deck(fst=None, parts=None, folders=(), discon=None):
         for name, key in PARTS.items():
             if name in parts or not _switched_on(main, name):
                 continue
-            path = main.other(key, folders=folders, default=None)
+            try:
+                path = main.other(key, folders=folders, default=None)
+            except InputError:
+                if name != "inflow":  # the wind is a suggestion
+                    raise
+                path = None
             if path is not None:
                 parts[name] = path
     missing = [name for name in NEEDED if name not in parts]

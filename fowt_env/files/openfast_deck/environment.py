@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from fowt_env.errors import InputError
+from fowt_env.files.openfast import read_uniform_wind
 from fowt_env.files.openfast_deck.parser import PartFile, bare
 
 
@@ -79,14 +81,13 @@ def read_inflow(path, folders=()):
             speed, exponent, f"steady, {speed:g} m/s at {height:g} m, power law {exponent or 0.0:g}"
         )
     if kind == 2:
-        from fowt_env.files.openfast import read_uniform_wind
-
-        name = file.other("Filename_Uni", "Filename", folders=folders, default="unused")
-        if name is None:
-            return Inflow(None, None, "uniform wind, its file is not named")
-        wind = read_uniform_wind(name)
-        return Inflow(
-            None, wind["shear_exponent"], f"uniform wind of {name.name}, which --wind takes as it is"
-        )
+        try:  # the wind is a suggestion: without its file there is none
+            name = file.other("Filename_Uni", "Filename", folders=folders, default="unused")
+            if name is None:
+                return Inflow(None, None, "uniform wind, its file is not named")
+            exponent = read_uniform_wind(name)["shear_exponent"]
+        except InputError as error:
+            return Inflow(None, None, f"uniform wind that cannot be taken over: {error}")
+        return Inflow(None, exponent, f"uniform wind of {name.name}, which --wind takes as it is")
     names = {3: "TurbSim", 4: "Bladed", 5: "HAWC", 6: "user-defined", 7: "Bladed"}
     return Inflow(None, None, f"{names.get(kind, 'unknown')} (WindType {kind}): give the wind with --wind")

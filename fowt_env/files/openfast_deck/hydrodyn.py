@@ -88,6 +88,12 @@ def read_hydrodyn(path, site, folders=()):
     ):
         if file.whole(key, default=0) != 0:
             raise file.wrong(key, file.whole(key), f"0: {what} cannot be represented")
+    added = {"AddF0": [file.vector("AddF0")]}
+    added |= {key: file.matrix(key) for key in ("AddCLin", "AddBLin", "AddBQuad")}
+    unused = [key for key, values in added.items() if np.any(values)] if mode == 0 else []
+    for key in unused:
+        notes.append((f"{key}, which HydroDyn does not use with PotMod 0", "left out"))
+        added[key] = np.zeros_like(added[key]).tolist()
     second = {key: file.whole(key, default=0) for key in SECOND_ORDER}
     rows = _members(file, site, notes, mode == 1)
     if mode == 0 and not rows:
@@ -95,10 +101,10 @@ def read_hydrodyn(path, site, folders=()):
     return HydroDyn(
         file=file,
         potential=potential,
-        preload=tuple(file.vector("AddF0")),
-        stiffness=tuple(map(tuple, file.matrix("AddCLin"))),
-        linear_damping=tuple(map(tuple, file.matrix("AddBLin"))),
-        quadratic_damping=tuple(map(tuple, file.matrix("AddBQuad"))),
+        preload=tuple(added["AddF0"][0]),
+        stiffness=tuple(map(tuple, added["AddCLin"])),
+        linear_damping=tuple(map(tuple, added["AddBLin"])),
+        quadratic_damping=tuple(map(tuple, added["AddBQuad"])),
         members=tuple(rows),
         fills=tuple(_fills(file, rows, site)),
         second_order={key: value for key, value in second.items() if value and mode == 1},

@@ -192,6 +192,9 @@ def _rosco(path, efficiency, air_density, radius, folders):
         ),
     }
     notes = list(_rosco_notes(file))
+    performance = _optional(file, "PerfFileName", folders)
+    if performance is not None:
+        PartFile(performance, "rotor performance")  # of a text's size, as it is copied
     winds = _values(file, "WE_FOPoles_v") or _values(file, "PS_WindSpeeds") or []
     wind, how = _rated_wind(file, torque * speed, air_density, radius, folders)
     sources = {
@@ -215,7 +218,7 @@ def _rosco(path, efficiency, air_density, radius, folders):
         efficiency, torque, speed, law, low, high,
         file.number("PC_MaxRat", low=0.0, high=10.0, open_low=True),
         rated_wind_speed=wind, sources=sources, notes=tuple(notes), discon=file.path,
-        performance=_optional(file, "PerfFileName", folders),
+        performance=performance,
     )  # fmt: skip
     if len(winds) > 1 and 0.0 < winds[0] < wind < winds[-1]:
         control = replace(control, cut_in_wind_speed=winds[0], cut_out_wind_speed=winds[-1])

@@ -36,7 +36,8 @@ def test_oc4_s_excitation_and_damping_obey_haskind_s_relation():
     platform = read_platform("nrel5mw_oc4_semi")
     body, site = platform.potential_flow, platform.environment
     assert len(body.heading) == 37
-    for omega in (0.5654867, 0.7539822, 1.0681415):  # rad/s, frequencies of the excitation
+    # of RAFT's test data, then of a panel method whose panels are coarse for short waves
+    for omega, tolerance in ((0.5655, 0.02), (0.7540, 0.02), (1.0681, 0.02), (1.3823, 0.04), (1.885, 0.12)):
         k = int(np.argmin(np.abs(body.excitation_omega - omega)))
         omega = body.excitation_omega[k]
         group = site.gravity / (2.0 * omega)
@@ -44,7 +45,7 @@ def test_oc4_s_excitation_and_damping_obey_haskind_s_relation():
         radiated = scale * np.trapezoid(np.abs(body.excitation[k]) ** 2, body.heading, axis=0)
         for mode in range(6):
             damping = np.interp(omega, body.omega, body.damping[:, mode, mode])
-            assert radiated[mode] == pytest.approx(damping, rel=0.02)
+            assert radiated[mode] == pytest.approx(damping, rel=tolerance)
 
 
 def test_the_tilted_5_mw_turbine_differs_from_the_plain_one_by_tilt_and_cone():
@@ -68,3 +69,18 @@ def test_weight_and_the_pull_of_the_lines_are_near_the_buoyancy(name):
     spare = site.water_density * platform.potential_flow.volume - mass
     longest = sum(line.wet_weight * line.length for line in platform.lines) / site.gravity
     assert -0.02 * longest < spare < longest
+
+
+def test_oc4_s_excitation_is_of_one_piece_where_its_sources_meet():
+    """A cubic through two points of either source, 0.063 rad/s apart, gives the point between them."""
+    body = read_platform("nrel5mw_oc4_semi").potential_flow
+    k = int(np.argmin(np.abs(body.excitation_omega - 1.2566)))
+    places = [k - 4, k - 2, k + 1, k + 2]
+    assert body.excitation_omega[places] - body.excitation_omega[k] == pytest.approx(
+        0.0628319 * np.array([-2.0, -1.0, 1.0, 2.0]), abs=1e-5
+    )
+    between = np.tensordot([-1.0, 4.0, 4.0, -1.0], body.excitation[places], 1) / 6.0
+    scale = np.abs(body.excitation).max(axis=(0, 1))
+    # within either source the cubic itself misses by up to 0.085
+    assert (np.abs(between - body.excitation[k]) < 0.07 * scale).all()
+    assert np.abs(body.excitation[body.excitation_omega >= 2.6]).max() == 0.0

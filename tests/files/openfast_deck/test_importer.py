@@ -131,6 +131,26 @@ def test_the_middle_table_of_a_polar_is_taken_where_aerodyn_interpolates(tmp_pat
     assert "number 2 (Reynolds number 5.0 million)" in (tmp_path / "out" / "report.md").read_text()
 
 
+def test_a_polar_of_any_file_name_has_a_plain_name_here(tmp_path):
+    path = write_deck(tmp_path, AeroDyn=[('"foils/One.dat"', '"#1, thick.dat"')])
+    (tmp_path / NAMES["polar"]).rename(tmp_path / "#1, thick.dat")
+    import_deck(path, tmp_path / "out")
+    turbine = read_turbine(tmp_path / "out" / "turbine" / "turbine.toml")
+    assert set(turbine.blade.polars) == {"_1__thick"}
+
+
+def test_the_rotor_table_goes_along_and_discon_names_it_beside_itself(tmp_path):
+    path = write_deck(tmp_path, DISCON=[("45.0      ! VS_MinOMSpd", '"Foils/Cp.txt" ! PerfFileName - table')])
+    (tmp_path / "Foils" / "Cp.txt").write_text("# Power coefficient\n0.1 0.4\n# Thrust coefficient\n0.5\n")
+    import_deck(path, tmp_path / "out")
+    discon = (tmp_path / "out" / "turbine" / "DISCON.IN").read_text()
+    assert '"Cp.txt"      ! PerfFileName' in discon
+    assert (tmp_path / "out" / "turbine" / "Cp.txt").is_file()
+    # without the least speed it starts at 30 % of the rated one
+    turbine = read_turbine(tmp_path / "out" / "turbine" / "turbine.toml")
+    assert turbine.torque_law.cut_in_speed == pytest.approx(0.3 * 130.0)
+
+
 # --------------------------------------------------------------------------- hydrodynamics
 
 
@@ -175,6 +195,7 @@ def test_members_without_a_potential_flow_body_have_all_their_loads(tmp_path):
     import_deck(path, tmp_path / "out")
     platform = read_platform(tmp_path / "out" / "platform.toml")
     assert platform.potential_flow is None
+    assert platform.additional is None  # which HydroDyn has with potential flow alone
     assert not any(member.potential_flow for member in platform.members)
     disc = platform.members[-1]
     assert disc.axial_added_mass_coefficient == pytest.approx((1.0 - 0.5**3, 1.0))
@@ -220,6 +241,20 @@ def test_site_wind_and_sea_are_those_of_the_deck(imported):
     assert (site.water_depth, site.shear_exponent) == (200.0, 0.11)
     assert "Hs 6 m, Tp 10 s, heading 15 deg" in report.suggestions[0]
     assert "12 m/s at 80 m" in report.suggestions[1]
+
+
+@pytest.mark.parametrize(
+    ("part", "old", "new", "said"),
+    [
+        ("OpenFAST", '"wind.dat"', '"gone.dat"', "Wind of the deck: none"),
+        ("InflowWind", "1     WindType", '2 WindType\n"gone.wnd" Filename_Uni', "no such file"),
+        ("InflowWind", "1     WindType", "3 WindType", "TurbSim"),
+    ],
+)
+def test_a_deck_is_imported_without_its_wind(tmp_path, part, old, new, said):
+    report = import_deck(write_deck(tmp_path, **{part: [(old, new)]}), tmp_path / "out")
+    assert said in report.suggestions[1]
+    assert read_platform(tmp_path / "out" / "platform.toml").environment.shear_exponent == 0.14
 
 
 def test_fast_8_has_its_site_in_its_modules(tmp_path):
