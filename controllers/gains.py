@@ -11,6 +11,7 @@ A floating turbine's rotor loop is slower than its platform pitches (NREL/TP-500
 times the rated rotor speed over that of the NREL 5 MW turbine.
 """
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -187,7 +188,7 @@ _FREQUENCIES = Cache(64)  # (plant, water) -> rad/s
 
 
 def platform_pitch_frequency(scene):
-    """Undamped natural frequency (rad/s) of the platform's pitch about the trim of a scene.
+    """Undamped natural frequency (rad/s) of the platform's pitch about a scene's trim in rated wind.
 
     From the accelerations that small displacements give; whatever has states of its own (a wake, the memory
     of radiated waves) is held. Remembered per plant.
@@ -197,6 +198,9 @@ def platform_pitch_frequency(scene):
 
 
 def _pitch_frequency(scene):
+    if scene.model.aero is not None:
+        speed = float(scene.turbine.rated_wind_speed)
+        scene = replace(without_fluctuations(scene, speed), wind=speed, sea=None, wind_speed=speed)
     point = trim(scene)
     x, u = point.state.copy(), point.command.copy()
     body = scene.model.rigid_body._replace(platform_fixed=False, rotor_fixed=False)

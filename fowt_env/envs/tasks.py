@@ -255,7 +255,7 @@ def _check_seeds(where, seeds):
 # These rank controllers as their metrics do (docs/environment.md): with less on travel, loops that drive the
 # blades hard, and the platform with them, are paid best. Power counts little: its term falls faster above
 # rated than below, so that it draws the mean down.
-WEIGHTS = {
+WEIGHTS: dict[str, float] = {
     "power": 0.2,
     "rotor_speed": 3.0,
     "platform_motion": 6.0,
@@ -264,7 +264,7 @@ WEIGHTS = {
     "failure": 100.0,
     "power_shortfall": 0.0,
 }
-START = {  # of the order of one standard deviation in operation
+START: dict[str, tuple[float, float]] = {  # of the order of one standard deviation in operation
     "PtfmSurge": (-2.0, 2.0),
     "PtfmSway": (-0.5, 0.5),
     "PtfmHeave": (-0.3, 0.3),
