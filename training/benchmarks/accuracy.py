@@ -267,6 +267,13 @@ def _finished(out):
     return table.to_dict("records")
 
 
+def read_accuracy(path):
+    """DataFrame of a CSV of accuracy(). Raises: InputError for none, and for another file."""
+    if not Path(path).is_file():
+        raise InputError(f"accuracy table {str(path)!r} does not exist")
+    return pd.DataFrame(_finished(path), columns=COLUMNS)
+
+
 def _append(out, row):
     """Add a row to the CSV, which begins with where it was made."""
     if out is None:
@@ -314,10 +321,11 @@ def openfast_points():
     ]
 
 
-def plot_accuracy(table, path=None, openfast=True):
+def plot_accuracy(table, path=None, openfast=True, beside=None):
     """Figure: error over real-time factor, both logarithmic, with the Pareto front and OpenFAST's points.
 
-    openfast: whether those points, which are of OC3-Hywind, are drawn.
+    openfast: whether those points, which are of OC3-Hywind, are drawn; beside: (name, table) of another
+    platform, whose points of the same variants are hollow.
     """
     from fowt_env.visual.style import COLOURS, INK, new_figure, save_figure, style_axes
 
@@ -337,6 +345,13 @@ def plot_accuracy(table, path=None, openfast=True):
     axes.plot(front["real_time_factor"], front["worst"], color=INK, linewidth=1.0, label="Pareto front")
     if openfast:
         _draw_openfast(axes)
+    if beside is not None:
+        name, other = beside[0], accuracy_summary(beside[1])
+        other = other[other["variant"].isin(set(points["variant"])) & other["axis"].isin(set(points["axis"]))]
+        axes.plot(
+            other["real_time_factor"], other["worst"], "s", color=INK, markerfacecolor="none", markersize=6,
+            label=f"{name}, the same variants", linestyle="none",
+        )  # fmt: skip
     _name_front(axes, front)
     axes.set_xlabel("real-time factor of simulate (CPU, one core)", color=INK, fontsize=9)
     axes.set_ylabel("worst rms difference / standard deviation", color=INK, fontsize=9)

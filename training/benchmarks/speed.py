@@ -119,8 +119,7 @@ def made_box(rotor, speed=18.0, seconds=620.0, dt=0.25, cell=8.0, waves=24, seed
     draw = np.random.default_rng(seed)
     reach = 1.15 * rotor.tip_radius
     y = np.arange(-reach, reach + cell, cell)
-    z = np.arange(max(5.0, rotor.hub_height - reach - 2.0 * cell), rotor.hub_height + reach + cell, cell)
-    z = np.concatenate([np.arange(5.0, z[0], cell), z]) if z[0] > 5.0 else z
+    z = np.arange(5.0, rotor.hub_height + reach + cell, cell)
     time = np.arange(0.0, seconds, dt)
     parts = []
     for deviation in (2.7, 2.1, 1.4):

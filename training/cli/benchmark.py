@@ -118,6 +118,9 @@ def accuracy(
         str, typer.Option("--out", help="Folder for what is written.")
     ] = "results/benchmark",
     plot: Annotated[bool, typer.Option("--plot/--no-plot", help="Make the plot.")] = True,
+    beside: Annotated[
+        str | None, typer.Option(help="CSV of another platform, whose points are drawn beside these.")
+    ] = None,
 ):
     """Measure error against run time over integrators, steps, rotor models and wave sums."""
     from fowt_env.training.benchmarks import accuracy as study
@@ -154,7 +157,11 @@ def accuracy(
     files = [folder / f"{name}.csv"]
     if plot:
         files.append(folder / f"{name}.png")
-        study.plot_accuracy(table, files[-1], openfast=platform == study.PLATFORM)
+        other = None
+        if beside is not None:
+            whose = Path(beside).stem.removeprefix("accuracy").removeprefix("_") or study.PLATFORM
+            other = (whose, study.read_accuracy(beside))
+        study.plot_accuracy(table, files[-1], openfast=platform == study.PLATFORM, beside=other)
     note("wrote " + ", ".join(map(str, files)))
 
 

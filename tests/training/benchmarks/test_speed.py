@@ -6,6 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from fowt_env.descriptions.platform import read_platform
+from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.envs import FowtEnv
 from fowt_env.errors import InputError
 from fowt_env.scene.build import build_scene
@@ -146,3 +148,35 @@ def test_the_cost_of_an_evaluation_has_a_row_per_stage_and_the_size_of_a_run(tmp
     assert 0.01 < table.loc["whole run", "MB per run"] < 1.0
     with pytest.raises(InputError, match="count = 0"):
         benchmark_evaluation.evaluation_cost(0, suite)
+
+
+def test_levels_over_steps_include_the_levels_themselves_and_stay_out_of_the_sweep():
+    axis = "steps of the levels"
+    steps = benchmark_accuracy.select([axis])
+    assert {v.axis for v in steps} == {axis}
+    assert set(benchmark_accuracy.LEVELS) <= {v.name for v in steps}
+    assert axis not in {v.axis for v in benchmark_accuracy.variants()}
+    # what a variant leaves open is that of a level with the same waves
+    assert {(v.wave_loads, v.fidelity) for v in steps} == {("exact", "reference"), ("fast", "standard")}
+
+
+def test_points_of_another_platform_are_those_of_the_same_variants(tmp_path):
+    columns = {name: [0.1, 0.1] for name in benchmark_accuracy.CHANNELS}
+    table = pd.DataFrame(
+        {"variant": ["a", "b"], "axis": ["x", "x"], "worst": [0.1, 0.2], "worst_of": ["yaw", "yaw"],
+         "real_time_factor": [100.0, 200.0], "kernel_factor": [110.0, 210.0], **columns}
+    )  # fmt: skip
+    figure = benchmark_accuracy.plot_accuracy(table.iloc[:1], openfast=False, beside=("other", table))
+    lines = {line.get_label(): line for line in figure.axes[0].get_lines()}
+    assert len(lines["other, the same variants"].get_xdata()) == 1
+    with pytest.raises(InputError, match="does not exist"):
+        benchmark_accuracy.read_accuracy(tmp_path / "none.csv")
+
+
+def test_a_made_box_covers_the_rotor_with_the_wind_that_was_asked_for():
+    rotor = read_turbine(read_platform("iea15_volturnus_s").turbine).rotor
+    box = benchmark.made_box(rotor, seconds=60.0)
+    assert box["u"].shape == (240, box["z"].size, box["y"].size)
+    assert box["y"][-1] >= rotor.tip_radius and box["z"][-1] >= rotor.hub_height + rotor.tip_radius
+    assert np.allclose(np.diff(box["z"]), np.diff(box["z"])[0])
+    assert box["u"].mean() == pytest.approx(18.0, abs=2.0)
