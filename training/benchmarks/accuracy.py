@@ -399,19 +399,25 @@ def _name_front(axes, front):
 
 
 def level_steps():
-    """Variants of the levels of build_scene at several steps each, on the axis "steps of the levels"."""
-    axis = "steps of the levels"
+    """Variants of the levels of build_scene at several steps, and of one part of `standard` at a time."""
+    axis, alone = "steps of the levels", "parts of standard alone"
     exact = [Variant(axis, "rk4", dt, "bem", "exact") for dt in (0.0125, 0.025, 0.05, 0.1)]
     steps = (0.025, 0.05, 0.1)
     standard = [Variant(axis, "ab4", dt, "lookup", "fast") for dt in steps]
-    return [*exact, *standard, *(Variant(axis, "ab4", dt, "table", "fast", TABLED) for dt in steps)]
+    tables = [Variant(axis, "ab4", dt, "table", "fast", TABLED) for dt in steps]
+    parts = [
+        Variant(alone, "rk4", 0.025, "lookup", "exact"),
+        Variant(alone, "rk4", 0.025, "bem", "exact", (("radiation", "state_space"),)),
+    ]
+    return [*exact, *standard, *tables, *parts]
 
 
 def select(names):
     """Variants of the axes named. Raises: InputError for an unknown axis.
 
-    "levels" stands for those that are levels of build_scene; "steps of the levels" are these at several steps
-    and no part of the sweep of all; "reference" adds none to those of every study.
+    "levels" stands for those that are levels of build_scene; "steps of the levels" are these at several
+    steps and "parts of standard alone" what one of them replaces, both no part of the sweep of all;
+    "reference" adds none to those of every study.
     """
     every = [*variants(), *level_steps()]
     known = [REFERENCE, "levels", *dict.fromkeys(v.axis for v in every)]
