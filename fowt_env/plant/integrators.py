@@ -10,15 +10,17 @@ exactly from velocities that are linear over the step (hydro/radiation.py).
 from typing import NamedTuple
 
 from fowt_env.errors import unknown
+from fowt_env.plant.aero.load import rotor_part
+from fowt_env.plant.aero.wind import wind_now
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.drivetrain import followed_pitch, pitch_after
-from fowt_env.plant.dynamics import derivative, evaluate_loads, respond, stored
+from fowt_env.plant.dynamics import derivative, evaluate_loads, respond, store, stored
 from fowt_env.plant.hydro.radiation import begin_memory, end_memory, integrated_states, memory_after
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rigid_body import attitude_rate
 from fowt_env.plant.rotor_substeps import build_substeps, follow_rotor, sample_rotor, shift_samples
-from fowt_env.plant.state import Command, State
+from fowt_env.plant.state import Command, State, Wrench, add, pose_in
 
 START_STEPS = 3  # steps before four past derivatives exist
 # rad of blade pitch (30.4 deg) beyond which the lift of a free rotor's blades works against its speed: up to
@@ -185,6 +187,37 @@ def set_pitch(t, x, u, pitch, model, method, data):
 
 
 @inlined_kernel
+def renew_loads(t, x, model, user, data):
+    """Bring the loads of the last evaluation to another blade pitch: that of the rotor alone has changed.
+
+    Loads of the user's may know the blade pitch: with them all is evaluated anew.
+    """
+    if user is None:
+        renew_rotor(t, x, model, model.aero, data)
+        return
+    evaluate_loads(t, x, model, data, data.stages[0])
+
+
+@inlined_kernel
+def renew_rotor(t, x, model, aero, data):
+    """Put the rotor's load at this state in place of that of the last evaluation; nothing without one."""
+    if aero is None:
+        return
+    cache, pose = data.cache, pose_in(x, model.rigid_body.plane)
+    now = wind_now(t, aero.wind)
+    rotor = rotor_part(t, pose, x, now, aero, aero.rotor, data.stages[0], data.counters)
+    was, new = stored(cache, LoadCache.ROTOR), rotor.wrench
+    change = Wrench(
+        new.fx - was.fx, new.fy - was.fy, new.fz - was.fz,
+        new.mx - was.mx, new.my - was.my, new.mz - was.mz,
+    )  # fmt: skip
+    store(cache, LoadCache.TOTAL, add(stored(cache, LoadCache.TOTAL), change))
+    store(cache, LoadCache.ROTOR, new)
+    cache[LoadCache.TORQUE] = rotor.torque
+    cache[LoadCache.THRUST] = rotor.thrust
+
+
+@inlined_kernel
 def set_pitch_and_history(t, x, u, pitch, model, method, data):
     """Set the blade pitch at once, and make past derivatives those of this pitch.
 
@@ -196,8 +229,8 @@ def set_pitch_and_history(t, x, u, pitch, model, method, data):
     was = stored(cache, LoadCache.ROTOR)
     torque = cache[LoadCache.TORQUE]
     x[State.BLADE_PITCH] = pitch
-    cache[LoadCache.VALID] = 0.0
-    rates(t, x, u, model, data, after)
+    renew_loads(t, x, model, model.user, data)
+    respond(x, u, model, data, after)
     for k in range(START_STEPS):
         for i in range(State.VX, State.ROTOR_SPEED + 1):
             history[k, i] += after[i] - before[i]
