@@ -69,6 +69,15 @@ def test_root_moment_of_a_hanging_blade_is_its_weight_at_its_arm():
     mean, cosine = _structural_flap(Rotor, 0.8)
     assert mean == pytest.approx(68507.6 * 27.601 * 9.81 * np.sin(np.radians(6.0)))
     assert cosine == 0.0
+    Rotor.shaft_tilt, Rotor.cone = 0.0, np.radians(4.0)
+    mean, cosine = _structural_flap(Rotor, 0.0)
+    for up in (
+        1.0,
+        -1.0,
+    ):  # azimuth 0 and 180 deg; x downwind, z up: a moment around y bends the tip downwind
+        centre = 27.601 * np.array([-np.sin(Rotor.cone), 0.0, up * np.cos(Rotor.cone)])
+        moment = np.cross(centre, [0.0, 0.0, -68507.6 * 9.81])[1]
+        assert mean + up * cosine == pytest.approx(up * moment)
 
 
 def test_holding_a_coordinate_leaves_the_model_of_the_smaller_mass_matrix():
