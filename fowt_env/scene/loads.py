@@ -95,6 +95,11 @@ LOADS = {
             for name in ("constant", "stiffness", "linear_damping", "quadratic_damping", "added_mass")
         ),
     ),
+    "radiation memory": LoadFacts(
+        "what waves of its own earlier motion do to a potential-flow body",
+        "hydro/radiation.py", "5.8", "hydro.radiation", "HYDRO", {"radiation": "none"},
+        strength=("hydro.radiation.weight",),
+    ),
     "excitation": LoadFacts(
         "force of the waves on a potential-flow body, first and second order",
         "hydro/excitation.py", "5.9", "hydro.excitation", "HYDRO", keys=("potential_flow",),

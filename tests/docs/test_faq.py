@@ -164,7 +164,8 @@ def _(folder, monkeypatch):
 
 @under("Gymnasium does not know the environment")
 def _(folder, monkeypatch):
-    monkeypatch.delitem(registry, NAME)
+    for name in [name for name in registry if name.startswith("fowt_env/")]:
+        monkeypatch.delitem(registry, name)
     return message(gymnasium.error.NamespaceNotFound, gymnasium.make, NAME)
 
 

@@ -25,6 +25,7 @@ from fowt_env.plant.rollout import forget, observe
 from fowt_env.plant.state import State
 from fowt_env.scene.loads import LOADS
 from fowt_env.scene.options import ROTORS
+from fowt_env.scene.radiation_fit import build_radiation
 from fowt_env.weather.excitation import build_excitation
 
 ROOT = Path(fowt_env.__file__).resolve().parent.parent
@@ -103,13 +104,17 @@ def scene_less(form, name):
     platform = read_platform("oc3_hywind")
     platform = platform.model_copy(update={"hydro": platform.hydro.model_copy(update=given), **beside})
     scene = build_scene(platform, rotor="bem", wave_loads=form, **arguments)
-    if scene.model.hydro is None or scene.model.hydro.waves is None:
+    if scene.model.hydro is None:
         return scene
     # of a body whose other coefficients are left out, so that no other load depends on it
-    part = build_excitation(
-        body, scene.model.hydro.waves, duration=10.0, fast=form == "fast", planar=True, second_order="full"
-    )
-    return scene.with_model({"hydro.excitation": part})
+    options = {"radiation": "state_space", "radiation_error": 0.1, "planar": True} | arguments
+    parts = {"hydro.radiation": build_radiation(made_up_body(), options, 0.1, scene.n_state)}
+    if scene.model.hydro.waves is not None:
+        parts["hydro.excitation"] = build_excitation(
+            body, scene.model.hydro.waves, duration=10.0, fast=form == "fast", planar=True,
+            second_order="full",
+        )  # fmt: skip
+    return scene.with_model(parts)
 
 
 def part_at(model, path):
@@ -138,6 +143,9 @@ def wrenches(scene, states):
     handle, found = scene.handle(data), {block: [] for block in (*BLOCKS, "added mass")}
     for x in states:
         forget(handle)
+        x = np.r_[
+            x, 1e5 * np.cos(np.arange(scene.n_state - x.size))
+        ]  # motions in the plane alone have memory
         observe(handle, x.copy(), np.zeros(2), TIME, np.zeros_like(x), np.zeros(64))
         for block in BLOCKS:
             start = LoadCache[block]

@@ -100,7 +100,6 @@ def read_elastodyn(path, folders=()):
             if value != of_blades[0]:
                 raise file.wrong(f"{name}({i})", value, f"{of_blades[0]:g}, as of blade 1: blades are alike")
     values |= {"precone": math.radians(cones[0]), "tipmass": tips[0]}
-    values["rotspeed"] = file.number("RotSpeed", default=0.0) * math.pi / 30.0
     if values["tiprad"] <= values["hubrad"]:
         raise file.wrong("TipRad", values["tiprad"], f"> HubRad = {values['hubrad']:g}")
     if values["towerht"] <= values["towerbsht"]:
