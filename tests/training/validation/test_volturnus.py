@@ -69,6 +69,15 @@ def test_root_moment_of_a_hanging_blade_is_its_weight_at_its_arm():
     mean, cosine = _structural_flap(Rotor, 0.8)
     assert mean == pytest.approx(68507.6 * 27.601 * 9.81 * np.sin(np.radians(6.0)))
     assert cosine == 0.0
+    Rotor.shaft_tilt, Rotor.cone = 0.0, np.radians(4.0)
+    mean, cosine = _structural_flap(Rotor, 0.0)
+    for up in (
+        1.0,
+        -1.0,
+    ):  # azimuth 0 and 180 deg; x downwind, z up: a moment around y bends the tip downwind
+        centre = 27.601 * np.array([-np.sin(Rotor.cone), 0.0, up * np.cos(Rotor.cone)])
+        moment = np.cross(centre, [0.0, 0.0, -68507.6 * 9.81])[1]
+        assert mean + up * cosine == pytest.approx(up * moment)
 
 
 def test_holding_a_coordinate_leaves_the_model_of_the_smaller_mass_matrix():
@@ -126,7 +135,7 @@ def test_rest_decays_and_the_regular_wave_meet_every_figure():
 
 @pytest.mark.slow
 def test_irregular_waves_miss_the_deviation_of_slow_surge_alone():
-    """2.7 % of surge instead of 2 %: a slow oscillation of 0.07 m from the start (docs/validation.md)."""
+    """2.3 % of surge instead of 2 %: a slow oscillation of 0.06 m from the start (docs/validation.md)."""
     rows = judged("waves", "waves_Hs7.5: PtfmSurge, standard deviation")
     assert {row.allowed for row in rows if "standard" in row.quantity} == {2.0, 5.0}
 
@@ -139,7 +148,10 @@ def test_rotor_loads_in_steady_wind_miss_small_hub_moments_alone():
         if "thrust" in row.quantity or "torque" in row.quantity or "RootMyc" in row.quantity:
             assert abs(row.error) < 0.1, f"{row.case}: {row.quantity}"
         if "moment at the hub" in row.quantity:
-            assert abs(row.error) < 1.0, f"{row.case}: {row.quantity}"
+            (torque,) = [
+                r.openfast for r in rows if r.case == row.case and r.quantity == "aerodynamic torque"
+            ]
+            assert abs(row.here - row.openfast) < 1e-3 * torque, f"{row.case}: {row.quantity}"
 
 
 @pytest.mark.slow
