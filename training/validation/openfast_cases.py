@@ -120,7 +120,7 @@ class ReferenceRun:
     controlled: bool = False
     initial: dict = field(default_factory=dict)
     options: dict = field(default_factory=dict)
-    platform: object = PLATFORM  # name, or function that returns a Platform
+    platform: str = PLATFORM
     controller: object = "openfast_oc3"  # name, or function of (folder) -> controller
     output_dt: float = 0.1  # of the reference file
     place: str = ""  # folder of the reference file in that of all of them
@@ -143,7 +143,7 @@ class ReferenceRun:
         sea = self.sea(folder) if callable(self.sea) else self.sea
         controller = options.pop("controller", self.controller)
         scene = build_scene(
-            self.platform() if callable(self.platform) else self.platform,
+            self.platform,
             wind=wind,
             sea=sea,
             rotor=rotor,

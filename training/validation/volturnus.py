@@ -47,21 +47,9 @@ HARMONICS = (SURGE, HEAVE, PITCH)
 CONTROLLED = ("float_steady_12mps", "float_steady_18mps", "turb_18mps_Hs7.5_uniform")
 
 
-SEABED_FRICTION = 1.0  # CB of the lines in those runs; the deck's own lines (MoorDyn) have none
-
-
-def as_run():
-    """Platform with the lines of those runs: with friction on the seabed."""
-    from fowt_env.descriptions.platform import read_platform
-
-    platform = read_platform(PLATFORM)
-    lines = tuple(line.model_copy(update={"seabed_friction": SEABED_FRICTION}) for line in platform.lines)
-    return platform.model_copy(update={"lines": lines})
-
-
 def _run(case, duration, **settings):
     """ReferenceRun of this platform."""
-    settings = {"platform": as_run, "place": PLATFORM, "options": OPTIONS, **settings}
+    settings = {"platform": PLATFORM, "place": PLATFORM, "options": OPTIONS, **settings}
     return ReferenceRun(case, duration, DT, **settings)
 
 
@@ -189,7 +177,7 @@ def rotor(study):
     for row in table.to_dict("records"):
         study.say(f"rotor, {row['case']}")
         scene = build_scene(
-            as_run(), wind={"kind": "steady", "speed": row["wind_mps"]}, rotor="bem",
+            PLATFORM, wind={"kind": "steady", "speed": row["wind_mps"]}, rotor="bem",
             **{**OPTIONS, "shear_exponent": row["shear_exponent"]},
         )  # fmt: skip
         speed = row["rotor_speed_rpm"] * pi / 30.0

@@ -122,7 +122,7 @@ def design_lqr_command(monkeypatch, tmp_path):
     from fowt_env.training.design import sweeps
 
     table = frame_of(sweeps.SHOWN, 2, case=["ntm_18"] * 2, variant=["gspi_oc3", "{'pitch_rate': 8.0}"])
-    monkeypatch.setattr(sweeps, "sweep", lambda *a: table)
+    monkeypatch.setattr(sweeps, "sweep", lambda *a, **k: table)
     return ["design", "lqr"], texts_of(table)
 
 
