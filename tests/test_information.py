@@ -198,7 +198,8 @@ def test_every_built_in_controller_declares_all_that_it_uses(gust_scene, name):
     """Its run is that of one that is given everything."""
     honest = make(name, gust_scene.turbine, 0.1)
     told = make(name, gust_scene.turbine, 0.1)
-    told.information = (*Measurement._fields, *(x for x in honest.information if x in PRIVILEGED_INPUTS))
+    given = (*Measurement._fields, *(x for x in honest.information if x in PRIVILEGED_INPUTS))
+    told.__class__ = type("Told", (type(told),), {"information": given})  # of some laws it is a property
     one, other = run(gust_scene, honest, duration=20.0), run(gust_scene, told, duration=20.0)
     pd.testing.assert_frame_equal(one, other, check_exact=True)
     assert np.isfinite(one.to_numpy()).all()

@@ -12,6 +12,7 @@ from fowt_env.controllers.floating_feedback import FeedbackSettings, FloatingFee
 from fowt_env.controllers.pi import PISettings
 from fowt_env.controllers.pi import pi as make_pi
 from fowt_env.controllers.tuned import tuned
+from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.errors import InputError
 from fowt_env.plant.measurement import Measurement
 
@@ -156,5 +157,5 @@ def test_settings_out_of_range_are_named(key, value):
 
 
 def test_the_controller_of_that_name_has_the_tuned_settings():
-    law = make("floating_feedback", TURBINE, DT)
+    law = make("floating_feedback", read_turbine("nrel5mw"), DT)
     assert law.feedback == FeedbackSettings(**tuned("floating_feedback"))

@@ -27,7 +27,7 @@ MOTIONS = ["PtfmSurge", "PtfmSway", "PtfmHeave", "PtfmRoll", "PtfmPitch", "PtfmY
         ({"rotor": "ben"}, ["ben", "Did you mean 'bem'"]),
         ({"fidelity": "standart"}, ["standart", "Did you mean 'standard'"]),
         ({"surfaces": "swl"}, ["surfaces", "Did you mean 'surface'"]),
-        ({"fidelty": "standard"}, ["fidelty", "Did you mean 'fidelity'", "loads"]),
+        ({"fidelty": "standard"}, ["fidelty", "Did you mean 'fidelity'", "Nearest of"]),
         ({"winds": 18.0}, ["winds", "Did you mean 'wind'"]),
         ({"surface": "sea"}, ["surface = 'sea'", "instantaneous", "swl"]),
         ({"seed": -1}, ["seed = -1", ">= 0"]),

@@ -12,6 +12,7 @@ and yaw are held.
 import numpy as np
 import pandas as pd
 
+from fowt_env.descriptions.units import DEGREE
 from fowt_env.training.validation.openfast_cases import _path
 
 PLATFORM = "iea15_volturnus_s"
@@ -192,7 +193,7 @@ def linear(study):
 def _operating_point(study, model, theirs, wind):
     case = f"linear model at {wind:g} m/s (against OpenFAST)"
     point = model.point
-    degrees = 180.0 / np.pi
+    degrees = 1.0 / DEGREE
     for name, unit, there in (
         ("BldPitch1", "deg", theirs["blade_pitch_rad"] * degrees),
         ("PtfmSurge", "m", theirs["surge_m"]),

@@ -12,6 +12,7 @@ import pandas as pd
 from scipy.optimize import least_squares
 
 from fowt_env.descriptions.files import DATA
+from fowt_env.descriptions.units import DEGREE
 from fowt_env.training.validation import frequency_domain
 from fowt_env.training.validation.validate import TIME, _name
 
@@ -117,7 +118,7 @@ def periods(name, study):
     frame = simulate(scene, None, duration=DECAY, dt=STEP, output_dt=0.1, initial=initial)
     body = body_of(name)
     modes = body.natural_modes()
-    offset = OFFSET * np.array([1.0, 1.0, 1.0, *[np.pi / 180.0] * 3])
+    offset = OFFSET * np.array([1.0, 1.0, 1.0, *[DEGREE] * 3])
     _, motion = body.free_decay(offset, DECAY, STEP)
     kept = frame[frame[TIME] >= SETTLING]
     time = kept[TIME].to_numpy()
@@ -157,7 +158,7 @@ def rao(name, study):
     ours, smooth = {"omega": omega}, {"omega": fine}
     for channel, motion in CHANNELS.items():
         label, unit = _name(channel)
-        factor = 180.0 / np.pi if unit == "deg" else 1.0
+        factor = 1.0 / DEGREE if unit == "deg" else 1.0
         # the elevation is a cos(omega t - e) at the origin: the same phase is taken off
         here = fitted(time, kept[channel].to_numpy(), omega, slow) / AMPLITUDE * np.exp(1j * waves["phase"])
         there = theirs[:, motion] * factor

@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 
 from fowt_env.controllers.rosco import Rosco, RoscoSettings, _Folder, _preload, find_library
+from fowt_env.descriptions.units import RPM
 from fowt_env.errors import InputError
 from fowt_env.training.validation.openfast_cases import ReferenceRun, _path, hub_wind, wave_components
 from fowt_env.training.validation.signal_errors import harmonics, normalised_rms
@@ -180,7 +181,7 @@ def rotor(study):
             PLATFORM, wind={"kind": "steady", "speed": row["wind_mps"]}, rotor="bem",
             **{**OPTIONS, "shear_exponent": row["shear_exponent"]},
         )  # fmt: skip
-        speed = row["rotor_speed_rpm"] * pi / 30.0
+        speed = row["rotor_speed_rpm"] * RPM
         pitches = [np.radians(row[f"blade_pitch{k}_deg"]) for k in (1, 2, 3)]
         means = {pitch: _rotor_means(scene, speed, pitch) for pitch in dict.fromkeys(pitches)}
         force, moment = (np.mean([means[pitch][k] for pitch in pitches], axis=0) for k in (0, 1))

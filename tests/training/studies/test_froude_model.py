@@ -55,7 +55,7 @@ def test_every_figure_of_a_description_has_its_power_of_the_scale():
     for name, record in records.items():
         assert set(EXPONENTS[name]) == set(type(record).model_fields), name
     assert set(EXPONENTS["lines"]) == set(Line.model_fields)
-    apart = {"name", "source", "gains", "blade", *records}
+    apart = {"name", "source", "gains", "blade", "discon", *records}
     assert set(EXPONENTS["turbine"]) == set(type(turbine).model_fields) - apart
 
 

@@ -34,7 +34,9 @@ EXPONENTS = {  # record: {field: exponent of the scale, or one for each entry}
         "gravity": SAME, "water_density": SAME, "air_density": SAME, "water_depth": LENGTH,
         "shear_exponent": SAME,
     },
-    "ballast": {"mass": MASS, "cm_depth": LENGTH, "inertia": INERTIA},
+    "ballast": {
+        "mass": MASS, "cm_depth": LENGTH, "cm_downwind": LENGTH, "cm_left": LENGTH, "inertia": INERTIA,
+    },
     "hull": {"z": LENGTH, "diameter": LENGTH},
     "hydro": {
         "added_mass_coefficient": SAME, "drag_coefficient": SAME, "heave_added_mass": MASS,
@@ -56,9 +58,12 @@ EXPONENTS = {  # record: {field: exponent of the scale, or one for each entry}
     },
     "rotor": {
         "blades": SAME, "mass": MASS, "overhang": LENGTH, "hub_height": LENGTH, "hub_radius": LENGTH,
-        "tip_radius": LENGTH, "inertia": INERTIA, "inertia_diameter": INERTIA,
+        "tip_radius": LENGTH, "inertia": INERTIA, "inertia_diameter": INERTIA, "shaft_tilt": SAME,
+        "cone": SAME, "cm_offset": LENGTH,
     },
-    "nacelle": {"mass": MASS, "cm_downwind": LENGTH, "cm_height": LENGTH, "inertia": INERTIA},
+    "nacelle": {
+        "mass": MASS, "cm_downwind": LENGTH, "cm_left": LENGTH, "cm_height": LENGTH, "inertia": INERTIA,
+    },
     "drivetrain": {  # the gear ratio stays: generator speed falls with the rotor's
         "gear_ratio": SAME, "generator_inertia": INERTIA, "mesh_loss": SAME, "bearing_loss": SAME,
         "generator_efficiency": SAME,
@@ -84,10 +89,10 @@ LABEL = """\
 
 
 def scaled(record, name, scale):
-    """{field: value} of a description record times its powers of the scale. name: key of EXPONENTS."""
+    """{field: value} of what a record was given, times its powers of the scale. name: key of EXPONENTS."""
     result = {}
     for field, value in record.model_dump().items():
-        if field not in EXPONENTS[name] or value is None:
+        if field not in EXPONENTS[name] or field not in record.model_fields_set or value is None:
             continue
         exponent = EXPONENTS[name][field]
         if isinstance(value, int):

@@ -13,6 +13,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from fowt_env.descriptions.units import RPM
+
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from make import write
 
@@ -103,7 +105,7 @@ def steady(source):
     for case, (wind, rpm, pitches, shear) in STEADY.items():
         frame = pd.read_csv(source / f"steady_{case}_fixed.csv.gz")
         time = frame["time_s"].to_numpy()
-        angle = rpm * np.pi / 30.0 * time  # blade 1 up at t = 0
+        angle = rpm * RPM * time  # blade 1 up at t = 0
         kept = whole_turns(time, rpm)
         row = {"case": case, "wind_mps": wind, "shear_exponent": shear, "rotor_speed_rpm": rpm}
         row |= {f"blade_pitch{k}_deg": value for k, value in enumerate(pitches, 1)}
