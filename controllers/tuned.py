@@ -8,12 +8,9 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from fowt_env.descriptions.units import RPM
+from fowt_env.descriptions.nrel5mw import RATED_WIND, ROTOR_SPEED, TORQUE
 
 TUNED = Path(__file__).parent / "tuned.toml"
-
-
-RATED_WIND, ROTOR_SPEED, TORQUE = 11.4, 12.1 * RPM, 43093.55  # of the NREL 5 MW turbine, SI
 
 
 def tuned_for(name: str, turbine: Any) -> dict[str, Any]:

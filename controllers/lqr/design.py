@@ -26,16 +26,14 @@ from fowt_env.analysis.wave_excitation import wave_force
 from fowt_env.caches import Cache, cached
 from fowt_env.descriptions.checks import check_number
 from fowt_env.descriptions.iec import ntm_sigma
+from fowt_env.descriptions.nrel5mw import HUB_HEIGHT, RATED_WIND, ROTOR_SPEED, TIP_RADIUS
 from fowt_env.descriptions.sea_state import joint_sea_state, sea_state_of
-from fowt_env.descriptions.units import RPM
 from fowt_env.errors import unknown
 from fowt_env.weather.turbulence import amplitudes
 
 SITE = "gulf_of_maine_normal"  # joint sea states, as in the named suites
 LAST_SEA_WIND = 24.0  # m/s, where the table ends: the sea beyond is designed for as there
 TURBULENCE_CLASS = "B"
-RATED_WIND, ROTOR_SPEED = 11.4, 12.1 * RPM  # of the NREL 5 MW turbine, m/s and rad/s
-TIP_RADIUS, HUB_HEIGHT = 63.0, 90.0  # of the same, m
 ABOVE_RATED = 0.1  # m/s, least distance of the lowest wind that is designed for from the rated one
 PLANT = ("surge", "platform_pitch", "vx", "wy", "rotor_speed", "blade_pitch")
 SENSORS = ("rotor_speed", "blade_pitch", "platform_pitch", "platform_pitch_rate", "nacelle_acceleration")

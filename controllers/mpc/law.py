@@ -18,7 +18,6 @@ from fowt_env.controllers.lqr.design import (
     MOMENT,
     N_FEEDBACK,
     N_PLANT,
-    RATED_WIND,
     design_models,
     lowest_design_wind,
 )
@@ -30,6 +29,7 @@ from fowt_env.controllers.mpc.plan import FILTER, grid_of, newton_step, shifted,
 from fowt_env.controllers.mpc.rotor_table import rotor_table
 from fowt_env.controllers.mpc.settings import PREVIEW, MPCSettings
 from fowt_env.controllers.mpc.solver import Program, load
+from fowt_env.descriptions.nrel5mw import RATED_WIND
 from fowt_env.descriptions.units import DEGREE
 from fowt_env.errors import InputError
 from fowt_env.plant.compile.decorators import entry

@@ -7,7 +7,7 @@ from typing import Any
 from fowt_env.caches import cached
 from fowt_env.descriptions.checks import check_number
 from fowt_env.descriptions.files import DATA, read_toml
-from fowt_env.descriptions.units import RPM
+from fowt_env.descriptions.nrel5mw import GENERATOR_SPEED, ROTOR_SPEED, TORQUE
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.measurement import Measurement
 
@@ -100,10 +100,6 @@ def _chain(name: str, entries: dict[str, Any]) -> SensorChain:
                 raise unknown(f"key of sensor {name}.{quantity}:", key, known)
         sensors[quantity] = Sensor(**figures)
     return SensorChain(name, sensors, entries.get("description", ""))
-
-
-# Of the NREL 5 MW turbine, whose the built-in chains are: what is on the shafts goes with the rated figures
-ROTOR_SPEED, GENERATOR_SPEED, TORQUE = 12.1 * RPM, 122.9096, 43093.55
 
 
 def sensors_of(given: str | SensorChain | None, turbine: Any) -> SensorChain | None:

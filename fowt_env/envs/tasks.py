@@ -5,9 +5,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fowt_env.descriptions.nrel5mw import CUT_IN, CUT_OUT, PITCH_RATE, RATED_WIND, ROTOR_SPEED
 from fowt_env.descriptions.sea_state import joint_sea_state, joint_tables, sea_state_of
 from fowt_env.descriptions.turbine import Turbine
-from fowt_env.descriptions.units import DEGREE, RPM
+from fowt_env.descriptions.units import DEGREE
 from fowt_env.descriptions.wind import read_wind
 from fowt_env.envs.observations import STANDARD, check_channels
 from fowt_env.envs.rewards import check_weights
@@ -320,10 +321,6 @@ def task_of(task: str | Task, turbine: Turbine | None = None) -> Task:
     return TASKS[task] if turbine is None else scaled_task(TASKS[task], turbine)
 
 
-RATED, CUT_IN, CUT_OUT = 11.4, 3.0, 25.0  # m/s, of the NREL 5 MW turbine, whose the TASKS are
-ROTOR_SPEED, PITCH_RATE = 12.1 * RPM, 8.0 * DEGREE  # the same: rated, rad/s, and of its pitch drive, rad/s
-
-
 def scaled_task(task: Task, turbine: Turbine) -> Task:
     """A task of the NREL 5 MW turbine for another: itself where winds, speed and pitch drive are the same.
 
@@ -334,7 +331,7 @@ def scaled_task(task: Task, turbine: Turbine) -> Task:
     winds = (turbine.cut_in_wind_speed, turbine.rated_wind_speed, turbine.cut_out_wind_speed)
     drive = turbine.pitch_drive
     same = (*winds, turbine.rated_rotor_speed, drive.rate_limit) == (
-        CUT_IN, RATED, CUT_OUT, ROTOR_SPEED, PITCH_RATE,
+        CUT_IN, RATED_WIND, CUT_OUT, ROTOR_SPEED, PITCH_RATE,
     )  # fmt: skip
     if not same:
         speed = turbine.rated_rotor_speed / ROTOR_SPEED
@@ -360,8 +357,8 @@ def _scaled_wind(wind, winds):
     def moved(speed):
         if speed == CUT_OUT:
             return cut_out
-        if speed > RATED:
-            return min(rated + (speed - RATED), cut_out)
-        return cut_in + (speed - CUT_IN) / (RATED - CUT_IN) * (rated - cut_in)
+        if speed > RATED_WIND:
+            return min(rated + (speed - RATED_WIND), cut_out)
+        return cut_in + (speed - CUT_IN) / (RATED_WIND - CUT_IN) * (rated - cut_in)
 
     return wind | {"speed": tuple(moved(speed) for speed in wind["speed"])}

@@ -4,14 +4,15 @@ Rigid OpenFAST v5 runs of the public deck (their settings are in the heads of th
 models that ROSCO's repository holds of the same turbine. Nothing here is adjusted to fit.
 """
 
-import re
 from math import pi
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from fowt_env.controllers.rosco import Rosco, RoscoSettings, _Folder, _preload, find_library
+from fowt_env.controllers import make
+from fowt_env.controllers.rosco import find_library
+from fowt_env.descriptions.platform import read_platform
+from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.descriptions.units import RPM
 from fowt_env.errors import InputError
 from fowt_env.training.validation.openfast_cases import ReferenceRun, _path, hub_wind, wave_components
@@ -60,26 +61,7 @@ def _start(blade_pitch):
 
 def rosco(folder):
     """Controller: ROSCO's library with the DISCON.IN and rotor table of the deck, as OpenFAST ran it."""
-    return DeckRosco(RoscoSettings(mode=2), DT, name="rosco of the deck")
-
-
-class DeckRosco(Rosco):
-    """ROSCO with the files that the turbine names, in place of what is written for a scene."""
-
-    def prepare(self, scene):
-        """Take the deck's files. Raises: InputError where the library is missing."""
-        self._source, needed = find_library()
-        _preload(needed)
-        self._efficiency = scene.turbine.drivetrain.generator_efficiency
-        path = Path(scene.turbine.discon)
-        text = path.read_text()
-        table = re.search(r'^"([^"]+)"\s*!\s*PerfFileName', text, flags=re.MULTILINE).group(1)
-        self._files = _Folder()
-        self._files.write("rotor.txt", (path.parent / table).read_text())
-        text = text.replace(f'"{table}"', '"rotor.txt"')
-        # no files of its own beside the caller's
-        text = re.sub(r"^\d+(\s*!\s*LoggingLevel)", r"0\1", text, flags=re.MULTILINE)
-        self._files.write("DISCON.IN", text)
+    return make("rosco", read_turbine(read_platform(PLATFORM).turbine), DT)
 
 
 def without_rosco():
