@@ -96,14 +96,42 @@ LOAD_CHANNELS = (  # of each of the user's loads: about the body origin, inertia
 )
 
 
-def channels(n_lines, loads=()):
-    """Every output channel of a model with n_lines mooring lines and loads of these names, in row order."""
+BLADE_CHANNELS = (  # of a rotor whose blades have pitches of their own
+    Channel("BldPitch2", "deg", DEG_PER_RAD),
+    Channel("BldPitch3", "deg", DEG_PER_RAD),
+    Channel("RootMxc1", "kN-m", 1e-3),
+    Channel("RootMxc2", "kN-m", 1e-3),
+    Channel("RootMxc3", "kN-m", 1e-3),
+    Channel("RootMyc1", "kN-m", 1e-3),
+    Channel("RootMyc2", "kN-m", 1e-3),
+    Channel("RootMyc3", "kN-m", 1e-3),
+    Channel("LSSTipMys", "kN-m", 1e-3),
+    Channel("LSSTipMzs", "kN-m", 1e-3),
+    Channel("YawBrMxp", "kN-m", 1e-3),
+    Channel("YawBrMyp", "kN-m", 1e-3),
+    Channel("YawBrMzp", "kN-m", 1e-3),
+)
+TOWER_CHANNELS = (  # of a tower that bends
+    Channel("TTDspFA", "m", 1.0),
+    Channel("TTDspSS", "m", 1.0),
+    Channel("YawBrTAxp", "m/s^2", 1.0),
+    Channel("YawBrTAyp", "m/s^2", 1.0),
+)
+GROUPS = {"tower": TOWER_CHANNELS, "blades": BLADE_CHANNELS}  # of parts that a scene may have, in row order
+
+
+def channels(n_lines, loads=(), groups=()):
+    """Every output channel of a model with n_lines mooring lines and loads of these names, in row order.
+
+    groups: names of those GROUPS that the model has.
+    """
     lines = range(1, n_lines + 1)
     return (
         *FIXED_CHANNELS,
         *(Channel(f"FAIRTEN{i}", "kN", 1e-3) for i in lines),
         *(Channel(f"ANCHTEN{i}", "kN", 1e-3) for i in lines),
         *(Channel(f"{name}{end}", unit, 1.0) for name in loads for end, unit in LOAD_CHANNELS),
+        *(channel for name, group in GROUPS.items() if name in groups for channel in group),
     )
 
 
@@ -309,11 +337,11 @@ def put_hub_wind(rows, hub_wind, period):
         rows[:, Out.WIND1VELX + column] = np.interp(at, time, value[:, column])
 
 
-def to_units(rows, n_lines, loads=()):
-    """Rows (k, n_channels) in SI -> a copy in the units of channels(n_lines, loads)."""
-    return rows * scales(n_lines, loads)
+def to_units(rows, n_lines, loads=(), groups=()):
+    """Rows (k, n_channels) in SI -> a copy in the units of channels(n_lines, loads, groups)."""
+    return rows * scales(n_lines, loads, groups)
 
 
-def scales(n_lines, loads=()):
-    """(n_channels,) factors from SI to the units of channels(n_lines, loads)."""
-    return np.array([c.scale for c in channels(n_lines, loads)])
+def scales(n_lines, loads=(), groups=()):
+    """(n_channels,) factors from SI to the units of channels(n_lines, loads, groups)."""
+    return np.array([c.scale for c in channels(n_lines, loads, groups)])

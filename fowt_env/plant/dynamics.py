@@ -12,8 +12,9 @@ from typing import NamedTuple
 
 from fowt_env.plant.aero.bem_rotor import RotorLoad
 from fowt_env.plant.aero.load import aero_load
+from fowt_env.plant.blade_pitches import fill_pitch_rates
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
-from fowt_env.plant.drivetrain import pitch_rate, shaft_torque
+from fowt_env.plant.drivetrain import shaft_torque
 from fowt_env.plant.hydro.load import hydro_load, hydro_rates
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.mooring import mooring_load
@@ -70,7 +71,7 @@ def respond(x, u, model, data, dx):
     )
     attitude_rate(x, dx, body.plane)
     dx[State.AZIMUTH] = x[State.ROTOR_SPEED]
-    dx[State.BLADE_PITCH] = pitch_rate(x[State.BLADE_PITCH], u[Command.BLADE_PITCH], model.actuator)
+    fill_pitch_rates(x, u, model.actuator, model.pitches, dx)
     accelerate(pose, x, stored(cache, LoadCache.TOTAL), torque, data.added_mass, body, data.matrix, dx)
 
 

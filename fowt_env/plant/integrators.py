@@ -12,15 +12,15 @@ from typing import NamedTuple
 from fowt_env.errors import unknown
 from fowt_env.plant.aero.load import rotor_part
 from fowt_env.plant.aero.wind import wind_now
+from fowt_env.plant.blade_pitches import advance_pitches, pitches_jump, set_followed
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
-from fowt_env.plant.drivetrain import followed_pitch, pitch_after
 from fowt_env.plant.dynamics import derivative, evaluate_loads, respond, store, stored
 from fowt_env.plant.hydro.radiation import begin_memory, end_memory, integrated_states, memory_after
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rigid_body import attitude_rate
 from fowt_env.plant.rotor_substeps import build_substeps, follow_rotor, sample_rotor, shift_samples
-from fowt_env.plant.state import Command, State, Wrench, add, pose_in
+from fowt_env.plant.state import State, Wrench, add, pose_in
 
 START_STEPS = 3  # steps before four past derivatives exist
 # rad of blade pitch (30.4 deg) beyond which the lift of a free rotor's blades works against its speed: up to
@@ -65,29 +65,29 @@ def rates(t, x, u, model, data, dx):
 def rk4(t, x, u, dt, model, method, data):
     """One classical Runge-Kutta step of x in place, blade pitch exact at every stage."""
     k1, k2, k3, k4, y = data.stages[0], data.stages[1], data.stages[2], data.stages[3], data.stages[4]
-    half = pitch_after(x[State.BLADE_PITCH], u[Command.BLADE_PITCH], 0.5 * dt, model.actuator)
-    whole = pitch_after(x[State.BLADE_PITCH], u[Command.BLADE_PITCH], dt, model.actuator)
     n, plane, memory = integrated_states(x, model.hydro), model.rigid_body.plane, data.radiation
     rates(t, x, u, model, data, k1)
     begin_memory(x, dt, True, plane, model.hydro, memory)
     for i in range(n):
         y[i] = x[i] + 0.5 * dt * k1[i]
-    y[State.BLADE_PITCH] = half
+    advance_pitches(x, u, 0.5 * dt, model.actuator, model.pitches, y)
     memory_after(x, y, True, plane, model.hydro, memory)
     derivative(t + 0.5 * dt, y, u, model, data, k2)
     for i in range(n):
         y[i] = x[i] + 0.5 * dt * k2[i]
-    y[State.BLADE_PITCH] = half
+    advance_pitches(x, u, 0.5 * dt, model.actuator, model.pitches, y)
     memory_after(x, y, True, plane, model.hydro, memory)
     derivative(t + 0.5 * dt, y, u, model, data, k3)
     for i in range(n):
         y[i] = x[i] + dt * k3[i]
-    y[State.BLADE_PITCH] = whole
+    advance_pitches(x, u, dt, model.actuator, model.pitches, y)
     memory_after(x, y, False, plane, model.hydro, memory)
     derivative(t + dt, y, u, model, data, k4)
     for i in range(n):
-        x[i] += dt / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i])
-    x[State.BLADE_PITCH] = whole
+        y[i] = x[i] + dt / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i])
+    advance_pitches(x, u, dt, model.actuator, model.pitches, y)
+    for i in range(n):
+        x[i] = y[i]
     end_memory(x, plane, model.hydro, memory)
 
 
@@ -98,15 +98,16 @@ def heun(t, x, u, dt, model, method, data):
     n, plane, memory = integrated_states(x, model.hydro), model.rigid_body.plane, data.radiation
     rates(t, x, u, model, data, k1)
     begin_memory(x, dt, False, plane, model.hydro, memory)
-    pitch = pitch_after(x[State.BLADE_PITCH], u[Command.BLADE_PITCH], dt, model.actuator)
     for i in range(n):
         y[i] = x[i] + dt * k1[i]
-    y[State.BLADE_PITCH] = pitch
+    advance_pitches(x, u, dt, model.actuator, model.pitches, y)
     memory_after(x, y, False, plane, model.hydro, memory)
     derivative(t + dt, y, u, model, data, k2)
     for i in range(n):
-        x[i] += 0.5 * dt * (k1[i] + k2[i])
-    x[State.BLADE_PITCH] = pitch
+        y[i] = x[i] + 0.5 * dt * (k1[i] + k2[i])
+    advance_pitches(x, u, dt, model.actuator, model.pitches, y)
+    for i in range(n):
+        x[i] = y[i]
     end_memory(x, plane, model.hydro, memory)
 
 
@@ -156,17 +157,16 @@ def adams(t, x, u, dt, model, method, data):
             history[k, i] = history[k - 1, i]
     rates(t, x, u, model, data, history[0])
     begin_memory(x, dt, False, plane, model.hydro, memory)
-    pitch = pitch_after(x[State.BLADE_PITCH], u[Command.BLADE_PITCH], dt, model.actuator)
     for i in range(n):
         y[i] = x[i] + dt * bashforth(order, i, history)
-    y[State.BLADE_PITCH] = pitch
+    advance_pitches(x, u, dt, model.actuator, model.pitches, y)
     sample_rotor(t, x, u, dt, model, method.substeps, data)
     if method.corrector or steps < START_STEPS or feathering(x, model):
         memory_after(x, y, False, plane, model.hydro, memory)
         derivative(t + dt, y, u, model, data, new)
         for i in range(State.VX, n):
             y[i] = x[i] + dt * moulton(order, new[i], i, history)
-        y[State.BLADE_PITCH] = pitch
+        advance_pitches(x, u, dt, model.actuator, model.pitches, y)
     else:
         follow_rotor(dt, model, method.substeps, data, y)
     attitude_rate(y, new, model.rigid_body.plane)
@@ -180,9 +180,9 @@ def adams(t, x, u, dt, model, method, data):
 
 
 @inlined_kernel
-def set_pitch(t, x, u, pitch, model, method, data):
+def set_pitch(t, x, u, dt, model, method, data):
     """Set the blade pitch to another value at once, in a method that remembers nothing of past steps."""
-    x[State.BLADE_PITCH] = pitch
+    set_followed(x, u, dt, model.actuator, model.pitches)
     data.cache[LoadCache.VALID] = 0.0
 
 
@@ -218,7 +218,7 @@ def renew_rotor(t, x, model, aero, data):
 
 
 @inlined_kernel
-def set_pitch_and_history(t, x, u, pitch, model, method, data):
+def set_pitch_and_history(t, x, u, dt, model, method, data):
     """Set the blade pitch at once, and make past derivatives those of this pitch.
 
     A polynomial through derivatives of before and after a jump has first-order errors; what the jump changes
@@ -228,7 +228,7 @@ def set_pitch_and_history(t, x, u, pitch, model, method, data):
     rates(t, x, u, model, data, before)
     was = stored(cache, LoadCache.ROTOR)
     torque = cache[LoadCache.TORQUE]
-    x[State.BLADE_PITCH] = pitch
+    set_followed(x, u, dt, model.actuator, model.pitches)
     renew_loads(t, x, model, model.user, data)
     respond(x, u, model, data, after)
     for k in range(START_STEPS):
@@ -301,8 +301,7 @@ def rotor_samples(method):
 @inlined_kernel
 def take_step(t, x, u, dt, model, method, data):
     """One step of the scene's integrator, x in place."""
-    pitch = followed_pitch(x[State.BLADE_PITCH], u[Command.BLADE_PITCH], dt, model.actuator)
-    if pitch != x[State.BLADE_PITCH]:  # an actuator without lag jumps
-        jump_pitch(t, x, u, pitch, model, method, data)
+    if pitches_jump(x, u, dt, model.actuator, model.pitches):  # an actuator without lag
+        jump_pitch(t, x, u, dt, model, method, data)
     method_step(t, x, u, dt, model, method, data)
     data.cache[LoadCache.VALID] = 0.0

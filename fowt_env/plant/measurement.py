@@ -43,3 +43,31 @@ SENSOR_FIELDS = (  # what a turbine's own sensors show
     "time", "rotor_speed", "generator_speed", "blade_pitch", "generator_torque", "platform_pitch",
     "platform_pitch_rate", "platform_pitch_acceleration", "nacelle_acceleration", "nacelle_velocity",
 )  # fmt: skip
+
+
+class BladeMeasurement(NamedTuple):
+    """What is measured beside a Measurement where every blade has a pitch of its own.
+
+    Bending moments of the blade roots include weight and inertia: out of the rotor plane (RootMyc) and in it
+    (RootMxc). Those of hub and yaw bearing are in axes that do not turn with the rotor: tilt about y, yaw
+    about z.
+    """
+
+    azimuth: float  # rad, of the first blade, 0 up
+    blade_pitch_1: float  # rad
+    blade_pitch_2: float
+    blade_pitch_3: float
+    root_out_of_plane_1: float  # N m
+    root_out_of_plane_2: float
+    root_out_of_plane_3: float
+    root_in_plane_1: float
+    root_in_plane_2: float
+    root_in_plane_3: float
+    hub_tilt_moment: float  # N m
+    hub_yaw_moment: float
+    yaw_bearing_tilt_moment: float
+    yaw_bearing_yaw_moment: float
+
+
+BladeMeasure = IntEnum("BladeMeasure", [name.upper() for name in BladeMeasurement._fields], start=0)
+N_BLADE_MEASUREMENTS = len(BladeMeasurement._fields)

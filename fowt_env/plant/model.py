@@ -43,6 +43,7 @@ class Model(NamedTuple):
     aero: object  # aero.load.Aero or None: no aerodynamics at all
     integrator: object  # a class of integrators.INTEGRATORS
     user: object = None  # user_loads.UserLoads or None
+    pitches: object = None  # blade_pitches.BladePitches, or None: one pitch for all blades
 
 
 class LoadCache(IntEnum):
@@ -92,3 +93,4 @@ class Data(NamedTuple):
     history: np.ndarray  # (4, n_state) derivatives of past steps, latest first
     samples: np.ndarray  # (4 samples, 7) rotor loads within past steps, latest first
     radiation: np.ndarray  # hydro.radiation.memory_data: of the memory, empty without one
+    blades: np.ndarray  # (blades, 6) BladeLoad of each in the last evaluation; empty with one pitch for all

@@ -6,12 +6,12 @@ import numpy as np
 
 from fowt_env.plant.aero.load import rotor_part
 from fowt_env.plant.aero.wind import wind_now
+from fowt_env.plant.blade_pitches import advance_pitches
 from fowt_env.plant.compile.decorators import kernel
-from fowt_env.plant.drivetrain import pitch_after
 from fowt_env.plant.hydro.radiation import integrated_states
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rigid_body import accelerate
-from fowt_env.plant.state import Command, State, Wrench, pose_in
+from fowt_env.plant.state import State, Wrench, pose_in
 
 BASHFORTH = (55.0 / 24.0, -59.0 / 24.0, 37.0 / 24.0, -9.0 / 24.0)  # Adams-Bashforth 4, latest first
 N_SAMPLE = 7  # of a sample of the rotor's load: its wrench and its torque
@@ -62,9 +62,7 @@ def sample_rotor(t, x, u, dt, model, substeps, data):
         bend = 0.5 * after * after / dt
         for i in range(integrated_states(x, model.hydro)):
             between[i] = x[i] + after * history[0, i] + bend * (history[0, i] - history[past, i])
-        between[State.BLADE_PITCH] = pitch_after(
-            x[State.BLADE_PITCH], u[Command.BLADE_PITCH], after, model.actuator
-        )
+        advance_pitches(x, u, after, model.actuator, model.pitches, between)
         now = wind_now(t + after, model.aero.wind)
         pose = pose_in(between, model.rigid_body.plane)
         aero = rotor_part(

@@ -28,7 +28,7 @@ class State(IntEnum):
     WY = 11
     WZ = 12
     ROTOR_SPEED = 13  # relative to the nacelle, rad/s
-    BLADE_PITCH = 14  # collective, positive to feather, rad
+    BLADE_PITCH = 14  # collective or of the first blade, positive to feather, rad
     INTERNAL = 15  # first of the internal states, which most scenes have none of: see Block
 
 
@@ -54,12 +54,21 @@ RIGID_BLOCKS = (
 )
 
 
+FURTHER_BLOCKS = {  # kind and steady of those that are not an internal state that settles by its own rate
+    "tower_deflection": ("position", "solved"),
+    "tower_velocity": ("velocity", "zero"),
+    "other_blade_pitches": ("internal", "solved"),
+    "pitch_rate": ("internal", "zero"),
+}
+
+
 def state_blocks(internal):
     """Tuple of all Blocks of a scene with internal ones of these {name: size}, in order; none of size 0."""
     blocks, offset = list(RIGID_BLOCKS), N_RIGID
     for name, size in internal.items():
         if size:
-            blocks.append(Block(name, offset, size, "internal", "settled"))
+            kind, steady = FURTHER_BLOCKS.get(name, ("internal", "settled"))
+            blocks.append(Block(name, offset, size, kind, steady))
             offset += size
     return tuple(blocks)
 
@@ -68,13 +77,19 @@ MOTIONS = ("surge", "sway", "heave", "roll", "platform_pitch", "yaw")  # of the 
 
 
 class Command(IntEnum):
-    """Index of each command in the flat (N_COMMANDS,) float64 vector."""
+    """Index of each command in the flat (N_COMMANDS,) float64 vector.
+
+    Where every blade has a pitch of its own the vector has N_INDIVIDUAL_COMMANDS entries, from BLADE_PITCH on
+    one for each blade.
+    """
 
     GENERATOR_TORQUE = 0  # N m, high-speed shaft
     BLADE_PITCH = 1  # rad
 
 
 N_COMMANDS = len(Command)
+BLADES = 3  # of a rotor whose blades have pitches of their own
+N_INDIVIDUAL_COMMANDS = N_COMMANDS + BLADES - 1
 
 
 class Wrench(NamedTuple):

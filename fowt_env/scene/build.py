@@ -10,12 +10,13 @@ from fowt_env.descriptions.turbine import Turbine, read_turbine
 from fowt_env.plant.drivetrain import build_drivetrain, build_pitch_actuator, build_torque_limits
 from fowt_env.plant.integrators import build_integrator
 from fowt_env.plant.model import Model
-from fowt_env.plant.state import N_RIGID
+from fowt_env.plant.state import BLADES, N_RIGID
 from fowt_env.scene.geometry import warn_of_geometry
 from fowt_env.scene.mass import build_layout, build_rigid_body
 from fowt_env.scene.options import checked_options, choose_parts, samples_per_step
 from fowt_env.scene.parts import (
     build_aero,
+    build_blade_pitches,
     build_current,
     build_hydro,
     build_moorings,
@@ -78,7 +79,11 @@ def build_scene(
     user = checked_loads(loads, 0 if mooring is None else mooring.length.shape[0], options["planar"])
     aero = None if air.series is None else build_aero(platform, turbine, air, rotor, options)
     first_state = N_RIGID + wake_states(aero)
-    memory_state = first_state + sum(load.states for load in user)
+    next_state = first_state + sum(load.states for load in user)
+    pitches = None
+    if options["pitch"] == "individual":
+        pitches = build_blade_pitches(turbine, rotor, next_state)
+        next_state += BLADES - 1
     water = options["hydrodynamics"]
     model = Model(
         rigid_body=build_rigid_body(platform, turbine, plane=True if options["planar"] else None),
@@ -86,10 +91,11 @@ def build_scene(
         drivetrain=build_drivetrain(turbine),
         actuator=build_pitch_actuator(turbine.pitch_drive),
         generator=build_torque_limits(turbine.torque_law),
-        hydro=build_hydro(platform, waves, current, options, memory_state) if water else None,
+        hydro=build_hydro(platform, waves, current, options, next_state) if water else None,
         mooring=mooring,
         aero=aero,
         integrator=build_integrator(options["integrator"], samples_per_step(options, air.field)),
         user=build_user_loads(user, platform.tower.base_height, first_state),
+        pitches=pitches,
     )
     return Scene(model, platform, turbine, air.spec, sea, seed, rotor, options, air.speed, user, label)

@@ -12,6 +12,7 @@ from fowt_env.plant.aero.load import Aero, BemRotor
 from fowt_env.plant.aero.station_choice import build_fewer_elements
 from fowt_env.plant.aero.tower_drag import build_tower_drag
 from fowt_env.plant.aero.wake import n_wake_states
+from fowt_env.plant.blade_pitches import BladePitches
 from fowt_env.plant.hydro.added_inertia import build_added_inertia
 from fowt_env.plant.hydro.body_matrices import build_body_matrices
 from fowt_env.plant.hydro.diffraction import build_strip_diffraction
@@ -26,7 +27,7 @@ from fowt_env.plant.hydro.strip_quadrature import STILL_REFINEMENT, build_quadra
 from fowt_env.plant.hydro.strips import build_strips
 from fowt_env.plant.hydro.wave_bands import build_band_diffraction, build_wave_bands, can_use_bands
 from fowt_env.plant.mooring import build_mooring
-from fowt_env.plant.state import N_RIGID
+from fowt_env.plant.state import BLADES, N_RIGID
 from fowt_env.plant.tilt import build_tilt
 from fowt_env.scene.options import ROTORS, chosen_stations, default_step
 from fowt_env.scene.radiation_fit import build_radiation
@@ -56,6 +57,25 @@ def build_aero(platform, turbine, air, rotor, options):
     model = ROTORS[rotor].build(elements, options)
     tower = build_tower_drag(platform.tower, density) if options["tower_drag"] else None
     return Aero(air.series, air.field, model, build_tilt(turbine.rotor.shaft_tilt), tower)
+
+
+def build_blade_pitches(turbine, rotor, first_state):
+    """BladePitches of a rotor whose blades have pitches of their own, with states from first_state on.
+
+    Raises: InputError for another number of blades, and for a rotor model that knows one pitch alone.
+    """
+    if turbine.rotor.blades != BLADES:
+        raise InputError(
+            f"pitch = 'individual': the turbine {turbine.name!r} has {turbine.rotor.blades} blades; allowed"
+            f" {BLADES}"
+        )
+    if not ROTORS[rotor].full_field:
+        able = " or ".join(repr(name) for name, model in ROTORS.items() if model.full_field)
+        raise InputError(
+            f"rotor = {rotor!r}: is a table of the whole rotor at one blade pitch; pitch = 'individual' needs"
+            f" rotor = {able}"
+        )
+    return BladePitches(first_state)
 
 
 def build_hydro(platform, waves, current, options, first_state=N_RIGID):

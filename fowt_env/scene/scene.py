@@ -11,6 +11,7 @@ from fowt_env.descriptions.checks import check_whole_number, short
 from fowt_env.descriptions.platform import Platform
 from fowt_env.descriptions.turbine import Turbine
 from fowt_env.errors import InputError
+from fowt_env.plant.blade_pitches import N_BLADE_LOAD
 from fowt_env.plant.channels import Channel, channels, put_hub_wind, scales
 from fowt_env.plant.compile.handle import Handle
 from fowt_env.plant.events import N_COUNTERS
@@ -22,7 +23,7 @@ from fowt_env.plant.hydro.wave_bands import band_scratch
 from fowt_env.plant.integrators import rotor_samples
 from fowt_env.plant.model import N_CACHE, Data
 from fowt_env.plant.rotor_substeps import N_SAMPLE
-from fowt_env.plant.state import Block, state_blocks
+from fowt_env.plant.state import BLADES, N_COMMANDS, N_INDIVIDUAL_COMMANDS, Block, state_blocks
 from fowt_env.plant.user_loads import user_data_size
 from fowt_env.scene.options import default_step
 from fowt_env.scene.parts import hydro_in_waves, wake_states
@@ -67,6 +68,7 @@ class Scene:
         """What the entries of this scene's state vector are, in order."""
         internal = {"wake": wake_states(self.model.aero)}
         internal |= {f"load {load.name}": load.states for load in self.loads}
+        internal |= {"other_blade_pitches": 0 if self.model.pitches is None else BLADES - 1}
         internal |= {"filtered position": position_states(self.model.hydro)}
         return state_blocks(internal | {"radiation": memory_states(self.model.hydro)})
 
@@ -75,9 +77,19 @@ class Scene:
         return self.blocks[-1].offset + self.blocks[-1].size
 
     @property
+    def n_commands(self) -> int:
+        """Generator torque and the blades' pitch, or that of each of them."""
+        return N_COMMANDS if self.model.pitches is None else N_INDIVIDUAL_COMMANDS
+
+    @property
     def channels(self) -> tuple[Channel, ...]:
         """Output channels of this scene, in row order."""
-        return channels(self.n_lines, self.load_names)
+        return channels(self.n_lines, self.load_names, self.channel_groups)
+
+    @property
+    def channel_groups(self) -> tuple[str, ...]:
+        """Names of the GROUPS of channels that this scene has beside the fixed ones."""
+        return () if self.model.pitches is None else ("blades",)
 
     def values(self, rows: np.ndarray, overwrite: bool = False) -> np.ndarray:
         """Output rows (k, n_channels), in SI as kernels write them, in the units of the channels.
@@ -88,7 +100,7 @@ class Scene:
         rows = rows if overwrite else rows.copy()
         if self._hub_wind is not None:
             put_hub_wind(rows, self._hub_wind, self.model.aero.wind.period)
-        rows *= scales(self.n_lines, self.load_names)
+        rows *= scales(self.n_lines, self.load_names, self.channel_groups)
         return rows
 
     @cached_property
@@ -141,6 +153,7 @@ class Scene:
             history=np.zeros((4, self.n_state)),
             samples=np.zeros((4 * rotor_samples(self.model.integrator), N_SAMPLE)),
             radiation=memory_data(hydro),
+            blades=np.zeros((0 if self.model.pitches is None else BLADES, N_BLADE_LOAD)),
         )
 
     def handle(self, data: Data | None = None) -> Handle:
