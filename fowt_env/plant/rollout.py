@@ -9,7 +9,7 @@ import numpy as np
 from fowt_env.plant.channels import measure, record
 from fowt_env.plant.compile.decorators import entry, inlined_kernel, kernel
 from fowt_env.plant.compile.handle import data_of, model_of
-from fowt_env.plant.drivetrain import followed_torque, torque_was_limited
+from fowt_env.plant.drivetrain import followed_torque, lose_torque, torque_was_limited
 from fowt_env.plant.dynamics import loads_of
 from fowt_env.plant.hydro.radiation import forget_memory
 from fowt_env.plant.integrators import rates, take_step
@@ -210,6 +210,8 @@ def rollout(
                 if not (isfinite(u[Command.GENERATOR_TORQUE]) and isfinite(u[Command.BLADE_PITCH])):
                     return BAD_COMMAND, step, rows
             follow_torque(t, torque, u, schedule.per_control * dt, model.generator, grid_loss, data.cache)
+            if t >= grid_loss:
+                lose_torque(x, model.converter)
         if ending or step % schedule.per_output == 0:
             if rows == out.shape[0]:
                 raise IndexError("rollout: out has too few rows")
