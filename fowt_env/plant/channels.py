@@ -10,11 +10,12 @@ from fowt_env.plant.aero.load import wind_of
 from fowt_env.plant.aero.wind import wind_at, wind_now
 from fowt_env.plant.blade_pitches import mean_pitch, pitch_of
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
+from fowt_env.plant.drivetrain import torque_in_force
 from fowt_env.plant.hydro.load import surface_at_origin
 from fowt_env.plant.measurement import N_MEASUREMENTS, BladeMeasure, Measure
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rigid_body import momentum_rate
-from fowt_env.plant.state import BLADES, Command, State, pose_of, to_inertial
+from fowt_env.plant.state import BLADES, State, pose_of, to_inertial
 from fowt_env.plant.tilt import across_shaft, along_shaft, rotor_pose
 from fowt_env.plant.user_loads import record_user_loads
 
@@ -228,7 +229,7 @@ def measure(model, data, x, dx, u, t, m):
     m[Measure.ROTOR_SPEED] = x[State.ROTOR_SPEED]
     m[Measure.GENERATOR_SPEED] = layout.gear_ratio * x[State.ROTOR_SPEED]
     m[Measure.BLADE_PITCH] = mean_pitch(x, model.pitches)
-    m[Measure.GENERATOR_TORQUE] = u[Command.GENERATOR_TORQUE]
+    m[Measure.GENERATOR_TORQUE] = torque_in_force(x, u, model.converter)
     for i in range(6):
         m[Measure.SURGE + i] = x[State.SURGE + i]
         m[Measure.SURGE_RATE + i] = dx[State.SURGE + i]
@@ -277,8 +278,9 @@ def record(model, data, x, dx, u, t, loads, row):
     row[Out.ROTSPEED] = speed
     row[Out.GENSPEED] = layout.gear_ratio * speed
     row[Out.BLDPITCH1] = x[State.BLADE_PITCH]
-    row[Out.GENTQ] = u[Command.GENERATOR_TORQUE]
-    row[Out.GENPWR] = layout.generator_efficiency * layout.gear_ratio * speed * u[Command.GENERATOR_TORQUE]
+    torque = torque_in_force(x, u, model.converter)
+    row[Out.GENTQ] = torque
+    row[Out.GENPWR] = layout.generator_efficiency * layout.gear_ratio * speed * torque
     row[Out.GENTQLIM] = data.cache[LoadCache.TORQUE_LIMITED]
     # shaft loads: aerodynamics less the rotor's own inertia and weight
     hub, cm, tilt = layout.hub, layout.rotor_cm, layout.tilt

@@ -14,12 +14,12 @@ from fowt_env.plant.aero.bem_rotor import RotorLoad
 from fowt_env.plant.aero.load import aero_load
 from fowt_env.plant.blade_pitches import fill_pitch_rates
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
-from fowt_env.plant.drivetrain import shaft_torque
+from fowt_env.plant.drivetrain import fill_torque_rate, shaft_torque, torque_in_force
 from fowt_env.plant.hydro.load import hydro_load, hydro_rates
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.mooring import mooring_load
 from fowt_env.plant.rigid_body import accelerate, attitude_rate, gravity_load
-from fowt_env.plant.state import Command, State, Wrench, add, pose_in
+from fowt_env.plant.state import State, Wrench, add, pose_in
 from fowt_env.plant.user_loads import add_user_loads, evaluate_user_loads
 
 
@@ -67,11 +67,15 @@ def respond(x, u, model, data, dx):
     cache, body = data.cache, model.rigid_body
     pose = pose_in(x, body.plane)
     torque = shaft_torque(
-        cache[LoadCache.TORQUE], u[Command.GENERATOR_TORQUE], x[State.ROTOR_SPEED], model.drivetrain
+        cache[LoadCache.TORQUE],
+        torque_in_force(x, u, model.converter),
+        x[State.ROTOR_SPEED],
+        model.drivetrain,
     )
     attitude_rate(x, dx, body.plane)
     dx[State.AZIMUTH] = x[State.ROTOR_SPEED]
     fill_pitch_rates(x, u, model.actuator, model.pitches, dx)
+    fill_torque_rate(x, u, model.converter, dx)
     accelerate(pose, x, stored(cache, LoadCache.TOTAL), torque, data.added_mass, body, data.matrix, dx)
 
 

@@ -1,8 +1,8 @@
 """Fixed-step integrators of one plant: a class, a step and a row of INTEGRATORS each.
 
-The blade pitch follows its own first-order law exactly within a step (constant command), so the stiffest
-part of the plant does not limit the multistep methods. Nor does the rotor in a box of wind, whose blades pass
-a cell of the grid in a tenth of a second: its load alone is evaluated several times a step
+Blade pitch and generator torque follow their own laws exactly within a step (constant command), so the
+stiffest parts of the plant do not limit the multistep methods. Nor does the rotor in a box of wind, whose
+blades pass a cell of the grid in a tenth of a second: its load alone is evaluated several times a step
 (rotor_substeps.py). The states of radiation memory, the last of the vector, have no rates: they follow
 exactly from velocities that are linear over the step (hydro/radiation.py).
 """
@@ -12,7 +12,7 @@ from typing import NamedTuple
 from fowt_env.errors import unknown
 from fowt_env.plant.aero.load import rotor_part
 from fowt_env.plant.aero.wind import wind_now
-from fowt_env.plant.blade_pitches import advance_pitches, mean_pitch, pitches_jump, set_followed
+from fowt_env.plant.blade_pitches import advance_actuators, mean_pitch, pitches_jump, set_followed
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.dynamics import derivative, evaluate_loads, respond, store, stored
@@ -70,22 +70,22 @@ def rk4(t, x, u, dt, model, method, data):
     begin_memory(x, dt, True, plane, model.hydro, memory)
     for i in range(n):
         y[i] = x[i] + 0.5 * dt * k1[i]
-    advance_pitches(x, u, 0.5 * dt, model.actuator, model.pitches, y)
+    advance_actuators(x, u, 0.5 * dt, model, y)
     memory_after(x, y, True, plane, model.hydro, memory)
     derivative(t + 0.5 * dt, y, u, model, data, k2)
     for i in range(n):
         y[i] = x[i] + 0.5 * dt * k2[i]
-    advance_pitches(x, u, 0.5 * dt, model.actuator, model.pitches, y)
+    advance_actuators(x, u, 0.5 * dt, model, y)
     memory_after(x, y, True, plane, model.hydro, memory)
     derivative(t + 0.5 * dt, y, u, model, data, k3)
     for i in range(n):
         y[i] = x[i] + dt * k3[i]
-    advance_pitches(x, u, dt, model.actuator, model.pitches, y)
+    advance_actuators(x, u, dt, model, y)
     memory_after(x, y, False, plane, model.hydro, memory)
     derivative(t + dt, y, u, model, data, k4)
     for i in range(n):
         y[i] = x[i] + dt / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i])
-    advance_pitches(x, u, dt, model.actuator, model.pitches, y)
+    advance_actuators(x, u, dt, model, y)
     for i in range(n):
         x[i] = y[i]
     end_memory(x, plane, model.hydro, memory)
@@ -100,12 +100,12 @@ def heun(t, x, u, dt, model, method, data):
     begin_memory(x, dt, False, plane, model.hydro, memory)
     for i in range(n):
         y[i] = x[i] + dt * k1[i]
-    advance_pitches(x, u, dt, model.actuator, model.pitches, y)
+    advance_actuators(x, u, dt, model, y)
     memory_after(x, y, False, plane, model.hydro, memory)
     derivative(t + dt, y, u, model, data, k2)
     for i in range(n):
         y[i] = x[i] + 0.5 * dt * (k1[i] + k2[i])
-    advance_pitches(x, u, dt, model.actuator, model.pitches, y)
+    advance_actuators(x, u, dt, model, y)
     for i in range(n):
         x[i] = y[i]
     end_memory(x, plane, model.hydro, memory)
@@ -159,14 +159,14 @@ def adams(t, x, u, dt, model, method, data):
     begin_memory(x, dt, False, plane, model.hydro, memory)
     for i in range(n):
         y[i] = x[i] + dt * bashforth(order, i, history)
-    advance_pitches(x, u, dt, model.actuator, model.pitches, y)
+    advance_actuators(x, u, dt, model, y)
     sample_rotor(t, x, u, dt, model, method.substeps, data)
     if method.corrector or steps < START_STEPS or feathering(x, model):
         memory_after(x, y, False, plane, model.hydro, memory)
         derivative(t + dt, y, u, model, data, new)
         for i in range(State.VX, n):
             y[i] = x[i] + dt * moulton(order, new[i], i, history)
-        advance_pitches(x, u, dt, model.actuator, model.pitches, y)
+        advance_actuators(x, u, dt, model, y)
     else:
         follow_rotor(dt, model, method.substeps, data, y)
     attitude_rate(y, new, model.rigid_body.plane)

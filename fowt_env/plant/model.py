@@ -36,7 +36,7 @@ class Model(NamedTuple):
     rigid_body: RigidBody
     layout: object  # channels.Layout
     drivetrain: object  # drivetrain.Shaft
-    actuator: object  # drivetrain.PitchActuator
+    actuator: object  # drivetrain.PitchActuator or pitch_drive.PitchDrive
     generator: object  # drivetrain.TorqueLimits
     hydro: object  # hydro.load.Hydro or None
     mooring: object  # mooring.Mooring or None
@@ -44,6 +44,7 @@ class Model(NamedTuple):
     integrator: object  # a class of integrators.INTEGRATORS
     user: object = None  # user_loads.UserLoads or None
     pitches: object = None  # blade_pitches.BladePitches, or None: one pitch for all blades
+    converter: object = None  # drivetrain.TorqueLag, or None: the torque follows its command at once
 
 
 class LoadCache(IntEnum):

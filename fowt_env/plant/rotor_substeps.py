@@ -6,7 +6,7 @@ import numpy as np
 
 from fowt_env.plant.aero.load import rotor_part
 from fowt_env.plant.aero.wind import wind_now
-from fowt_env.plant.blade_pitches import advance_pitches
+from fowt_env.plant.blade_pitches import advance_actuators
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.hydro.radiation import integrated_states
 from fowt_env.plant.model import LoadCache
@@ -62,7 +62,7 @@ def sample_rotor(t, x, u, dt, model, substeps, data):
         bend = 0.5 * after * after / dt
         for i in range(integrated_states(x, model.hydro)):
             between[i] = x[i] + after * history[0, i] + bend * (history[0, i] - history[past, i])
-        advance_pitches(x, u, after, model.actuator, model.pitches, between)
+        advance_actuators(x, u, after, model, between)
         now = wind_now(t + after, model.aero.wind)
         pose = pose_in(between, model.rigid_body.plane)
         aero = rotor_part(

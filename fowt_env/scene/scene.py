@@ -26,6 +26,7 @@ from fowt_env.plant.model import N_CACHE, Data
 from fowt_env.plant.rotor_substeps import N_SAMPLE
 from fowt_env.plant.state import BLADES, N_COMMANDS, N_INDIVIDUAL_COMMANDS, Block, State, state_blocks
 from fowt_env.plant.user_loads import user_data_size
+from fowt_env.scene.actuators import drive_states
 from fowt_env.scene.options import default_step
 from fowt_env.scene.parts import hydro_in_waves, wake_states
 from fowt_env.scene.radiation_fit import memory_for_step
@@ -70,6 +71,8 @@ class Scene:
         internal = {"wake": wake_states(self.model.aero)}
         internal |= {f"load {load.name}": load.states for load in self.loads}
         internal |= {"other_blade_pitches": 0 if self.model.pitches is None else BLADES - 1}
+        internal |= drive_states(self.model.actuator, self.model.pitches)
+        internal |= {"generator_torque": 0 if self.model.converter is None else 1}
         internal |= {"filtered position": position_states(self.model.hydro)}
         return state_blocks(internal | {"radiation": memory_states(self.model.hydro)})
 

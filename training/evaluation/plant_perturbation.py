@@ -94,7 +94,7 @@ def plant_settings(factors, platform=PLATFORM):
     turbine = turbine.model_copy(
         update={
             "nacelle": scaled(turbine.nacelle, upper, "mass", "inertia"),
-            "pitch_drive": scaled(turbine.pitch_drive, tau, "time_constant"),
+            "pitch_drive": turbine.pitch_drive.slowed(tau),
         }
     )
     return {"platform": base, "turbine": turbine}
