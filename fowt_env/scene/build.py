@@ -12,7 +12,7 @@ from fowt_env.plant.integrators import build_integrator
 from fowt_env.plant.model import Model
 from fowt_env.plant.state import BLADES, N_RIGID
 from fowt_env.scene.geometry import warn_of_geometry
-from fowt_env.scene.mass import build_layout, build_rigid_body
+from fowt_env.scene.mass import build_layout, build_rigid_body, with_masses
 from fowt_env.scene.options import checked_options, choose_parts, samples_per_step
 from fowt_env.scene.parts import (
     build_aero,
@@ -24,6 +24,7 @@ from fowt_env.scene.parts import (
     wake_states,
 )
 from fowt_env.scene.scene import Scene
+from fowt_env.scene.tower import MODES, build_tower_modes, tower_states
 from fowt_env.scene.user_loads import Load, build_user_loads, checked_loads
 from fowt_env.scene.weather import Sea, Wind, build_weather
 
@@ -80,6 +81,8 @@ def build_scene(
     aero = None if air.series is None else build_aero(platform, turbine, air, rotor, options)
     first_state = N_RIGID + wake_states(aero)
     next_state = first_state + sum(load.states for load in user)
+    tower = build_tower_modes(platform, turbine, MODES[options["tower"]], next_state)
+    next_state += tower_states(tower)
     pitches = None
     if options["pitch"] == "individual":
         pitches = build_blade_pitches(turbine, rotor, next_state)
@@ -97,5 +100,6 @@ def build_scene(
         integrator=build_integrator(options["integrator"], samples_per_step(options, air.field)),
         user=build_user_loads(user, platform.tower.base_height, first_state),
         pitches=pitches,
+        tower=with_masses(tower, platform, turbine),
     )
     return Scene(model, platform, turbine, air.spec, sea, seed, rotor, options, air.speed, user, label)

@@ -91,6 +91,7 @@ OPTIONS = {
     # True: the fidelity's; "table": tensions tabulated about rest, solved beyond
     "mooring": (True, (False, True, "catenary", "table")),
     "planar": (False, (False, True)),
+    "tower": ("rigid", ("rigid", "modes", "modes2")),  # "modes": it bends in its first modes; second ones too
     "pitch": ("collective", ("collective", "individual")),  # of the blades
     "integrator": (None, (None, *INTEGRATORS)),  # None: the fidelity's
     # of the rotor's load per step, of an integrator that samples it; None: FIELD_SAMPLES in a box, else 1
