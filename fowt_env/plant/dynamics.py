@@ -50,7 +50,7 @@ def evaluate_loads(t, x, model, data, dx):
     bend = bend_of(x, model.tower)
     nacelle = turned_pose(pose, bend)
     begin_modal(x, model.tower, modal)
-    aero = aero_load(t, pose, nacelle, x, model.aero, model.tower, data, dx)
+    aero = aero_load(t, pose, nacelle, x, model.aero, model.pitches, model.tower, data, dx)
     hydro = hydro_load(t, pose, x, model.hydro, data)
     hydro_rates(x, model.hydro, dx)
     mooring = mooring_load(pose, model.mooring, data.lines, data.counters)

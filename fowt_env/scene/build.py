@@ -24,7 +24,7 @@ from fowt_env.scene.parts import (
     wake_states,
 )
 from fowt_env.scene.scene import Scene
-from fowt_env.scene.tower import MODES, build_tower_modes, tower_states
+from fowt_env.scene.tower import build_tower_modes, modes_asked, tower_states
 from fowt_env.scene.user_loads import Load, build_user_loads, checked_loads
 from fowt_env.scene.weather import Sea, Wind, build_weather
 
@@ -81,7 +81,7 @@ def build_scene(
     aero = None if air.series is None else build_aero(platform, turbine, air, rotor, options)
     first_state = N_RIGID + wake_states(aero)
     next_state = first_state + sum(load.states for load in user)
-    tower = build_tower_modes(platform, turbine, MODES[options["tower"]], next_state)
+    tower = build_tower_modes(platform, turbine, modes_asked(options), next_state)
     next_state += tower_states(tower)
     pitches = None
     if options["pitch"] == "individual":

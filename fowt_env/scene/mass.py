@@ -49,6 +49,11 @@ def _upper_bodies(platform, turbine):
     ]
 
 
+def top_mass_matrix(platform, turbine):
+    """(6, 6) mass matrix of nacelle and rotor about the body origin."""
+    return assemble(_upper_bodies(platform, turbine)[1:])
+
+
 def build_rigid_body(platform, turbine, platform_fixed=False, rotor_fixed=False, plane=None):
     """RigidBody part: Eq. (10) from the four rigid bodies. plane: True holds sway, roll and yaw at zero."""
     ballast = platform.ballast

@@ -91,8 +91,9 @@ OPTIONS = {
     # True: the fidelity's; "table": tensions tabulated about rest, solved beyond
     "mooring": (True, (False, True, "catenary", "table")),
     "planar": (False, (False, True)),
-    "tower": ("rigid", ("rigid", "modes", "modes2")),  # "modes": it bends in its first modes; second ones too
     "pitch": ("collective", ("collective", "individual")),  # of the blades
+    # bending of the tower: none, or its first mode or first two in each direction ([tower.modes] of the file)
+    "tower": ("rigid", ("rigid", "modes", "modes2")),
     "integrator": (None, (None, *INTEGRATORS)),  # None: the fidelity's
     # of the rotor's load per step, of an integrator that samples it; None: FIELD_SAMPLES in a box, else 1
     "rotor_samples": (None, "None or a number of samples, 1 to 10"),
