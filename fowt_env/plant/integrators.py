@@ -21,6 +21,7 @@ from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rigid_body import attitude_rate
 from fowt_env.plant.rotor_substeps import build_substeps, follow_rotor, sample_rotor, shift_samples
 from fowt_env.plant.state import State, Wrench, add, pose_in
+from fowt_env.plant.tower_modes import add_modal, bend_of, carried, turned_pose
 
 START_STEPS = 3  # steps before four past derivatives exist
 # rad of blade pitch (30.4 deg) beyond which the lift of a free rotor's blades works against its speed: up to
@@ -171,12 +172,23 @@ def adams(t, x, u, dt, model, method, data):
         follow_rotor(dt, model, method.substeps, data, y)
     attitude_rate(y, new, model.rigid_body.plane)
     new[State.AZIMUTH] = y[State.ROTOR_SPEED]
+    bend_on(dt, x, order, history, model.tower, y)
     for i in range(State.VX):
         x[i] += dt * moulton(order, new[i], i, history)
     for i in range(State.VX, n):
         x[i] = y[i]
     end_memory(x, plane, model.hydro, memory)
     cache[LoadCache.STEPS] = steps + 1.0
+
+
+@kernel
+def bend_on(dt, x, order, history, tower, y):
+    """Put into y the deflections of the tower by Adams-Moulton, from their new velocities there."""
+    if tower is None:
+        return
+    n = tower.slope.shape[0]
+    for i in range(tower.first, tower.first + n):
+        y[i] = x[i] + dt * moulton(order, y[n + i], i, history)
 
 
 @inlined_kernel
@@ -203,7 +215,8 @@ def renew_rotor(t, x, model, aero, data):
     """Put the rotor's load at this state in place of that of the last evaluation; nothing without one."""
     if aero is None:
         return
-    cache, pose = data.cache, pose_in(x, model.rigid_body.plane)
+    cache, bend = data.cache, bend_of(x, model.tower)
+    pose = turned_pose(pose_in(x, model.rigid_body.plane), bend)
     now = wind_now(t, aero.wind)
     rotor = rotor_part(
         t, pose, x, now, aero, aero.rotor, data.stages[0], data.counters, model.pitches, data.blades
@@ -213,7 +226,8 @@ def renew_rotor(t, x, model, aero, data):
         new.fx - was.fx, new.fy - was.fy, new.fz - was.fz,
         new.mx - was.mx, new.my - was.my, new.mz - was.mz,
     )  # fmt: skip
-    store(cache, LoadCache.TOTAL, add(stored(cache, LoadCache.TOTAL), change))
+    store(cache, LoadCache.TOTAL, add(stored(cache, LoadCache.TOTAL), carried(change, bend)))
+    add_modal(change, bend, model.tower, cache[LoadCache.MODAL :])
     store(cache, LoadCache.ROTOR, new)
     cache[LoadCache.TORQUE] = rotor.torque
     cache[LoadCache.THRUST] = rotor.thrust
@@ -236,7 +250,18 @@ def set_pitch_and_history(t, x, u, dt, model, method, data):
     for k in range(START_STEPS):
         for i in range(State.VX, State.ROTOR_SPEED + 1):
             history[k, i] += after[i] - before[i]
+        shift_tower(after, before, model.tower, history[k])
     shift_samples(was, torque, method.substeps, data)
+
+
+@kernel
+def shift_tower(after, before, tower, row):
+    """Add to the rates of the deflections' velocities in a row what is between two derivatives."""
+    if tower is None:
+        return
+    n = tower.slope.shape[0]
+    for i in range(tower.first + n, tower.first + 2 * n):
+        row[i] += after[i] - before[i]
 
 
 class Method(NamedTuple):

@@ -13,7 +13,7 @@ from fowt_env.plant.model import Model
 from fowt_env.plant.state import BLADES, N_RIGID
 from fowt_env.scene.actuators import build_actuator, build_converter, drive_states
 from fowt_env.scene.geometry import warn_of_geometry
-from fowt_env.scene.mass import build_layout, build_rigid_body
+from fowt_env.scene.mass import build_layout, build_rigid_body, with_masses
 from fowt_env.scene.options import checked_options, choose_parts, samples_per_step
 from fowt_env.scene.parts import (
     build_aero,
@@ -25,6 +25,7 @@ from fowt_env.scene.parts import (
     wake_states,
 )
 from fowt_env.scene.scene import Scene
+from fowt_env.scene.tower import build_tower_modes, modes_asked, tower_states
 from fowt_env.scene.user_loads import Load, build_user_loads, checked_loads
 from fowt_env.scene.weather import Sea, Wind, build_weather
 
@@ -83,6 +84,8 @@ def build_scene(
     aero = None if air.series is None else build_aero(platform, turbine, air, rotor, options)
     first_state = N_RIGID + wake_states(aero)
     next_state = first_state + sum(load.states for load in user)
+    tower = build_tower_modes(platform, turbine, modes_asked(options), next_state)
+    next_state += tower_states(tower)
     pitches = None
     if options["pitch"] == "individual":
         pitches = build_blade_pitches(turbine, rotor, next_state)
@@ -105,5 +108,6 @@ def build_scene(
         user=build_user_loads(user, platform.tower.base_height, first_state),
         pitches=pitches,
         converter=converter,
+        tower=with_masses(tower, platform, turbine),
     )
     return Scene(model, platform, turbine, air.spec, sea, seed, rotor, options, air.speed, user, label)

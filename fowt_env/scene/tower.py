@@ -84,6 +84,11 @@ def build_tower_modes(platform, turbine, count, first_state):
     )
 
 
+def tower_states(modes):
+    """Number of states of TowerModes or None: deflections and their velocities."""
+    return 0 if modes is None else 2 * modes.slope.shape[0]
+
+
 def _option(count):
     return list(MODES)[count]
 
