@@ -35,6 +35,7 @@ BLADE_PITCH_RATE_LIMIT = 10.0  # deg/s
 TOWER_TOP_ACCELERATION_LIMIT = 3.3  # m/s2
 ROTOR_SPEED_LIMIT = 1.3  # of rated: 15.73 rpm
 SETTLED_END = 300.0  # s at the end of a run over which it must have settled
+STANDSTILL = 10.0  # % of rated rotor speed, below which a rotor that was stopped stands: it idles feathered
 SETTLED_BAND = 5.0  # % of rated rotor speed about its final mean, beyond which it has not
 FINAL = 100.0  # s at the end, of that mean and of what still oscillates: some periods of the platform's pitch
 REQUIRED_CHANNELS = (
@@ -84,13 +85,14 @@ METRICS = (
     "RotSpeed_offset_[%]",
     "BldPitch_oscillation_[deg]",
     "settling_time_[s]",
+    "standstill_time_[s]",
 )
 
 # what names of figures that cannot be below zero have in them
 _NEVER_NEGATIVE = (
     *("_std_", "_rms_", "_DEL_", "_travel_", "_duty_"),
     *("_limited_", "_beyond_", "_violations_", "FAIRTEN_"),
-    *("_offset_", "_oscillation_", "settling_time_"),
+    *("_offset_", "_oscillation_", "settling_time_", "standstill_time_"),
 )
 # what names of figures have in them of which less, or more, is better; of any other neither can be said
 _LESS_IS_BETTER = (*_NEVER_NEGATIVE, "overspeed", "_max_")
@@ -166,6 +168,7 @@ def metrics(
     rated_power_kW=5000.0,
     steady=False,
     gust_start=None,
+    stop=None,
 ):
     """{metric: value} of a run, in the order and with the names of METRICS.
 
@@ -177,6 +180,7 @@ def metrics(
     steady            whether the wind is steady and above rated, and the water still: the run has then an
                       offset and an oscillation, else NaN
     gust_start        time (s) of a gust after which the rotor has to settle; None: no settling time (NaN)
+    stop              time (s) of what the rotor is to be stopped for; None: no standstill time (NaN)
     Standard deviations are about the run's own mean (N in the denominator). Travel is the sum of
     absolute steps per second. DEL: 1 Hz damage-equivalent load, exponent 4 (tower base fore-aft, shaft
     torque) or 3 (fairlead). torque_limited: seconds in which the generator could not follow its command,
@@ -220,14 +224,15 @@ def metrics(
     result |= _violations(kept, time, blade_pitch, rated_speed_rpm)
     speed = kept["RotSpeed_[rpm]"].to_numpy()
     result |= _settling(time, speed, blade_pitch, rated_speed_rpm, steady, gust_start)
+    result["standstill_time_[s]"] = _standstill(time, speed, rated_speed_rpm, stop)
     return {name: result[name] for name in METRICS}
 
 
-def turbine_metrics(df, turbine, skip=0.0, steady=False, gust_start=None):
+def turbine_metrics(df, turbine, skip=0.0, steady=False, gust_start=None, stop=None):
     """metrics of a run of a turbine (its description), with its rated speed and power and its pitch drive."""
     power = 1e-3 * turbine.torque_law.rated_power * turbine.drivetrain.generator_efficiency
     rate = turbine.pitch_drive.rate_limit / DEGREE
-    return metrics(df, skip, turbine.rated_rotor_speed / RPM, rate, power, steady, gust_start)
+    return metrics(df, skip, turbine.rated_rotor_speed / RPM, rate, power, steady, gust_start, stop)
 
 
 def _kept(df, skip):
@@ -262,6 +267,14 @@ def _settling(time, speed, blade_pitch, rated_speed_rpm, steady, gust_start):
         late = time[away & (time >= gust_start - 1e-9)]
         result["settling_time_[s]"] = float(late[-1] - gust_start) if late.size else 0.0
     return result
+
+
+def _standstill(time, speed, rated_speed_rpm, stop):
+    """Seconds from a stop until the rotor stands for good; NaN where it does not, or is not stopped."""
+    fast = np.abs(speed) > 0.01 * STANDSTILL * rated_speed_rpm
+    if stop is None or fast[-1] or not np.isfinite(speed).all():
+        return np.nan
+    return max(float(time[fast][-1]) - stop, 0.0) if fast.any() else 0.0
 
 
 def _violations(kept, time, blade_pitch, rated_speed_rpm):
