@@ -123,7 +123,8 @@ def settle_wake(handle, x, dx):
     rotor = aero.rotor
     wake_equilibrium(
         0.0, rotor_pose(pose_of(x), aero.tilt), x, wind_now(0.0, aero.wind), aero.wind, aero.field,
-        rotor.elements, rotor.skew, rotor.wake, dx, data_of(handle).counters,
+        rotor.elements, rotor.skew, rotor.wake, dx, data_of(handle).counters, model_of(handle).pitches,
+        data_of(handle).blades,
     )  # fmt: skip
 
 

@@ -525,7 +525,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         run, scene = self._episode, self.scene
         data = scene.data()
         # what an evaluation at this instant has left
-        for name in ("lines", "stages", "cache", "added_mass", "user"):
+        for name in ("lines", "stages", "cache", "added_mass", "user", "blades"):
             getattr(data, name)[:] = getattr(run.data, name)
         row = np.empty(len(scene.channels))
         time = run.counts[STEP] * self.dt

@@ -36,7 +36,7 @@ class Loads(NamedTuple):
 def evaluate_loads(t, x, model, data, dx):
     """Every load at a state, into data; writes only the rates of internal states into dx. No command."""
     pose = pose_in(x, model.rigid_body.plane)
-    aero = aero_load(t, pose, x, model.aero, data, dx)
+    aero = aero_load(t, pose, x, model.aero, model.pitches, data, dx)
     hydro = hydro_load(t, pose, x, model.hydro, data)
     hydro_rates(x, model.hydro, dx)
     mooring = mooring_load(pose, model.mooring, data.lines, data.counters)

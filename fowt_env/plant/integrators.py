@@ -12,7 +12,7 @@ from typing import NamedTuple
 from fowt_env.errors import unknown
 from fowt_env.plant.aero.load import rotor_part
 from fowt_env.plant.aero.wind import wind_now
-from fowt_env.plant.blade_pitches import advance_pitches, pitches_jump, set_followed
+from fowt_env.plant.blade_pitches import advance_pitches, mean_pitch, pitches_jump, set_followed
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.dynamics import derivative, evaluate_loads, respond, store, stored
@@ -136,7 +136,7 @@ def moulton(order, new, i, history):
 @kernel
 def feathering(x, model):
     """Whether a free rotor's blades are pitched beyond FEATHERING, where its speed is heavily damped."""
-    return x[State.BLADE_PITCH] > FEATHERING and not model.rigid_body.rotor_fixed
+    return mean_pitch(x, model.pitches) > FEATHERING and not model.rigid_body.rotor_fixed
 
 
 @inlined_kernel
@@ -205,7 +205,9 @@ def renew_rotor(t, x, model, aero, data):
         return
     cache, pose = data.cache, pose_in(x, model.rigid_body.plane)
     now = wind_now(t, aero.wind)
-    rotor = rotor_part(t, pose, x, now, aero, aero.rotor, data.stages[0], data.counters)
+    rotor = rotor_part(
+        t, pose, x, now, aero, aero.rotor, data.stages[0], data.counters, model.pitches, data.blades
+    )
     was, new = stored(cache, LoadCache.ROTOR), rotor.wrench
     change = Wrench(
         new.fx - was.fx, new.fy - was.fy, new.fz - was.fz,

@@ -75,7 +75,7 @@ N_CACHE = 38
 class Data(NamedTuple):
     """What changes: scratch of one plant.
 
-    lines, counters, cache, history, samples and radiation last between calls.
+    lines, counters, cache, history, samples, radiation and blades last between calls.
     """
 
     lines: np.ndarray  # (n_lines, 6) mooring warm start and results
@@ -93,4 +93,5 @@ class Data(NamedTuple):
     history: np.ndarray  # (4, n_state) derivatives of past steps, latest first
     samples: np.ndarray  # (4 samples, 7) rotor loads within past steps, latest first
     radiation: np.ndarray  # hydro.radiation.memory_data: of the memory, empty without one
-    blades: np.ndarray  # (blades, 6) BladeLoad of each in the last evaluation; empty with one pitch for all
+    # (blades, 6) BladeLoad of each: as the cache while this is VALID; empty with one pitch for all blades
+    blades: np.ndarray

@@ -66,8 +66,9 @@ def sample_rotor(t, x, u, dt, model, substeps, data):
         now = wind_now(t + after, model.aero.wind)
         pose = pose_in(between, model.rigid_body.plane)
         aero = rotor_part(
-            t + after, pose, between, now, model.aero, model.aero.rotor, data.stages[3], data.counters
-        )
+            t + after, pose, between, now, model.aero, model.aero.rotor, data.stages[3], data.counters,
+            model.pitches, data.blades,
+        )  # fmt: skip
         row = samples[n - 1 - part]
         row[0], row[1], row[2] = aero.wrench.fx, aero.wrench.fy, aero.wrench.fz
         row[3], row[4], row[5] = aero.wrench.mx, aero.wrench.my, aero.wrench.mz

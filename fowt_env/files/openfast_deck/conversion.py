@@ -161,7 +161,7 @@ def tower_drag(deck):
 # --------------------------------------------------------------------------- files
 
 
-def platform_rows(deck, name, turbine, coefficients, options=None):
+def platform_rows(deck, name, turbine, coefficients, distribution, options=None):
     """{table: rows} of platform.toml; "" is its head, "lines" and "members" are lists of tables."""
     site, values = deck.site, deck.elastodyn
     source = values.file.source
@@ -201,6 +201,8 @@ def platform_rows(deck, name, turbine, coefficients, options=None):
             Row("drag_coefficient", drag, deck.aerodyn.file.source("TwrCd") + ", of the table's load"),
         ],
     }  # fmt: skip
+    if values.bending is not None:
+        tables["tower.modes"] = _bending_rows(values.bending, distribution)
     hydro = deck.hydrodyn
     if hydro.potential is not None:
         tables["potential_flow"] = [
@@ -238,6 +240,27 @@ def platform_rows(deck, name, turbine, coefficients, options=None):
     if options:
         tables["options"] = [Row(key, value) for key, value in options.items()]
     return tables
+
+
+def _bending_rows(modes, distribution):
+    """Rows of [tower.modes] of a descriptions.tower_modes.TowerBending."""
+    rows = [
+        Row(
+            "distribution",
+            distribution,
+            "tower: TMassDen, TwFAStif, TwSSStif, with AdjTwMa, AdjFASt, AdjSSSt",
+        ),
+        Row("fore_aft", modes.fore_aft, "tower: TwFAM1Sh, TwFAM2Sh, of the powers 2 to 6"),
+        Row("side_side", modes.side_side, "tower: TwSSM1Sh, TwSSM2Sh"),
+        Row("fore_aft_damping", modes.fore_aft_damping, "tower: TwrFADmp"),
+        Row("side_side_damping", modes.side_side_damping, "tower: TwrSSDmp"),
+    ]
+    for name, key in (("fore_aft_tuner", "FAStTunr"), ("side_side_tuner", "SSStTunr")):
+        if any(factor != 1.0 for factor in getattr(modes, name)):
+            rows.append(Row(name, getattr(modes, name), f"tower: {key}"))
+    if modes.top_mass:
+        rows.append(Row("top_mass", modes.top_mass, "ElastoDyn: YawBrMass, in the mass above too"))
+    return [*rows, Row("elements", modes.elements, "ElastoDyn: TwrNodes")]
 
 
 def draft(deck):

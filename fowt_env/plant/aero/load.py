@@ -42,23 +42,24 @@ NO_AERO_LOAD = AeroLoad(RotorLoad(NO_LOAD, 0.0, 0.0), NO_LOAD)
 
 
 @inlined_kernel
-def _solved(t, pose, x, now, aero, rotor, dx, counters):
+def _solved(t, pose, x, now, aero, rotor, dx, counters, pitches, blades):
     return rotor_load(
-        t, pose, x, now, aero.wind, aero.field, rotor.elements, rotor.skew, rotor.wake, dx, counters
-    )
+        t, pose, x, now, aero.wind, aero.field, rotor.elements, rotor.skew, rotor.wake, dx, counters, pitches,
+        blades,
+    )  # fmt: skip
 
 
 @inlined_kernel
-def _by_sections(t, pose, x, now, aero, rotor, dx, counters):
-    return section_table_load(t, pose, x, now, aero.wind, aero.field, rotor, counters)
+def _by_sections(t, pose, x, now, aero, rotor, dx, counters, pitches, blades):
+    return section_table_load(t, pose, x, now, aero.wind, aero.field, rotor, counters, pitches, blades)
 
 
 @inlined_kernel
-def _by_coefficients(t, pose, x, now, aero, rotor, dx, counters):
+def _by_coefficients(t, pose, x, now, aero, rotor, dx, counters, pitches, blades):
     return coefficient_table_load(pose, x, now, aero.wind, rotor, counters)
 
 
-# (t, pose, x, now, aero, rotor, dx, counters) -> RotorLoad, both pose and load in rotor axes
+# (t, pose, x, now, aero, rotor, dx, counters, pitches, blades) -> RotorLoad, pose and load in rotor axes
 _rotor_model = chosen_by_class(
     "rotor",
     {BemRotor: _solved, SectionTable: _by_sections, CoefficientTable: _by_coefficients},
@@ -67,19 +68,22 @@ _rotor_model = chosen_by_class(
 
 
 @inlined_kernel
-def rotor_part(t, pose, x, now, aero, rotor, dx, counters):
-    """RotorLoad by the rotor model that rotor is, body axes; of dx the wake's rates alone are written."""
-    load = _rotor_model(t, rotor_pose(pose, aero.tilt), x, now, aero, rotor, dx, counters)
+def rotor_part(t, pose, x, now, aero, rotor, dx, counters, pitches, blades):
+    """RotorLoad by the rotor model that rotor is, body axes; of dx the wake's rates alone are written.
+
+    pitches, blades: blades with pitches of their own, and where the load of each is put, as in rotor_load.
+    """
+    load = _rotor_model(t, rotor_pose(pose, aero.tilt), x, now, aero, rotor, dx, counters, pitches, blades)
     return RotorLoad(to_body_axes(load.wrench, aero.tilt), load.thrust, load.torque)
 
 
 @inlined_kernel
-def aero_load(t, pose, x, aero, data, dx):
+def aero_load(t, pose, x, aero, pitches, data, dx):
     """AeroLoad at a state; writes the wake's rates into dx."""
     if aero is None:
         return NO_AERO_LOAD
     now = wind_now(t, aero.wind)
-    rotor = rotor_part(t, pose, x, now, aero, aero.rotor, dx, data.counters)
+    rotor = rotor_part(t, pose, x, now, aero, aero.rotor, dx, data.counters, pitches, data.blades)
     return AeroLoad(rotor, tower_load(t, pose, now, aero.wind, aero.field, aero.tower))
 
 
