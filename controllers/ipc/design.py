@@ -1,4 +1,4 @@
-"""What individual pitch control needs of turbine and platform: gain and lag of its loop, platform frequencies.
+"""What individual pitch control needs of a turbine: how its blades answer to pitch, and how its drive lags.
 
 A cyclic pitch theta_i = theta_t cos psi_i + theta_y sin psi_i of blades at the azimuths psi_i changes the
 root moments out of the rotor plane, and in multi-blade coordinates
@@ -8,8 +8,8 @@ M_tilt = 2/3 sum M_i cos psi_i,    M_yaw = 2/3 sum M_i sin psi_i
 both by the slope G = dM/d theta of a single blade, since a blade that is stiff answers at once and the rotor
 is alike in all azimuths: (M_tilt, M_yaw) changes by G (theta_t, theta_y), and tilt and yaw are coupled by
 nothing but the lag of the pitch drive at one cycle a revolution (1P), which turns the vector by its phase.
-Bossanyi, Wind Energy 6(2), 2003, and 8(4), 2005; the offset of the azimuth that turns it back: Mulders et al.,
-Wind Energy 22(9), 2019.
+Bossanyi, Wind Energy 6(2), 2003, and 8(4), 2005; the offset of the azimuth that turns it back: Mulders,
+Pamososuryo, Disario and van Wingerden, Wind Energy 22(6), 2019.
 """
 
 from math import atan2
@@ -76,6 +76,6 @@ def _root_slope(turbine):
 
 
 def drive_lag(turbine, frequency):
-    """Phase (rad, positive) by which a turbine's pitch drive lags behind a command of this frequency, rad/s."""
+    """Phase (rad) by which a turbine's pitch drive lags behind a command of a frequency (rad/s), positive."""
     drive = turbine.pitch_drive
     return atan2(drive.time_constant * frequency, 1.0)

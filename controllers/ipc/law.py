@@ -1,27 +1,27 @@
-"""Individual pitch control: the PI law for torque and mean pitch, and a cyclic pitch against once-a-turn loads.
+"""Individual pitch control: the PI law for torque and mean pitch, and a cyclic pitch against 1P loads.
 
 The root moments out of the rotor plane become tilt and yaw moment M of the hub in axes that do not turn
 (multi-blade coordinates, controllers/ipc/design.py). The moment without cyclic pitch theta is estimated as
-M - G theta with the slope G of the root moment, scheduled on the mean pitch; it passes a notch at three times
-the rotor speed, where the blades' own second and fourth harmonics appear, and theta follows what would cancel it,
--(M - G theta)/G, with a first-order lag. Without the notch this is integral control of M with the gain
-bandwidth/|G|: the lag is that of its closed loop, the estimate makes it robust to the notches and limits, and
-at rest M = 0 whatever the error of G. There is no proportional part: below the notch the plant answers at once,
-and all that one would add is turbulence. Back in the blades' axes the azimuth leads by what the pitch drive and
-the control period lag at 1P, so that tilt stays tilt and yaw yaw.
+M - G theta with the slope G of the root moment, scheduled on the mean pitch. It passes a notch at three times
+the rotor speed, where the blades' own second and fourth harmonics appear, and theta follows what would cancel
+it, -(M - G theta)/G, with a first-order lag. Without the notch this is integral control of M with the gain
+bandwidth/|G|, and at rest M = 0 whatever the error of G; through the estimate notches and limits leave the loop
+damped. There is no proportional part: below the notch the rotor answers at once, and all that one would add is
+turbulence. Back in the blades' axes the azimuth leads by what the pitch drive and the control period lag at
+one cycle a revolution (1P), so that tilt stays tilt and yaw yaw.
 
-The cyclic amplitude is limited to `amplitude`, to what the drive's rate allows at the present rotor speed, and
-to the distance of the mean pitch from the drive's ends. So it fades in above rated with the mean pitch; what is
-cut off is not wound up.
+The cyclic amplitude is limited to `amplitude`, to what the drive's rate allows at the present rotor speed,
+and to the distance of the mean pitch from the drive's ends. So it fades in above rated with the mean pitch;
+what is cut off is not wound up.
 
-With a `bound` only what exceeds it is cancelled: theta follows -(1 - bound/|M - G theta|) (M - G theta)/G, and
-nothing within the bound. So the least cyclic pitch that keeps the moment at the bound is used, in the
+With a `bound` only what exceeds it is cancelled: theta follows -(1 - bound/|M - G theta|) (M - G theta)/G,
+and nothing within the bound. So the least cyclic pitch that keeps the moment at the bound is used, in the
 direction of the load: output-constrained control of the magnitude of tilt and yaw together, Hummel, Kober and
 Mulders, Wind Energ. Sci. 10, 2005-2024, 2025.
 
-With `notches` the estimate also passes notches at frequencies of the platform. A yawing platform feels the moment
-of the wind that its blades then meet; cancelling that takes away its damping, and cyclic pitch itself drives
-sway and roll by the blades' tangential loads.
+With `notches` the estimate also passes notches at frequencies of the platform. A yawing platform feels the
+moment of the wind that its blades then meet; cancelling that takes away its damping, and cyclic pitch itself
+drives sway and roll by the blades' tangential loads.
 """
 
 from dataclasses import dataclass, replace
@@ -30,7 +30,6 @@ from math import cos, exp, hypot, pi, sin, tan
 
 import numpy as np
 
-from fowt_env.control import check_control_dt
 from fowt_env.controllers.gains import platform_frequency
 from fowt_env.controllers.ipc.design import drive_lag, root_slope
 from fowt_env.controllers.pi import PI, Memory, Parameter, PISettings, pi_step
@@ -107,7 +106,10 @@ N_MEMORY = CyclicMemory.FILTERS + 2 * 2 * FILTERS
 
 @kernel
 def notch_coefficients(frequency, damping, dt):
-    """(b0, b1, b2, a1, a2) of (s^2 + w^2)/(s^2 + 2 damping w s + w^2), bilinear and exact at w = frequency."""
+    """(b0, b1, b2, a1, a2) of (s^2 + w^2)/(s^2 + 2 damping w s + w^2) at w = frequency, rad/s.
+
+    Bilinear, exact at w.
+    """
     k = tan(0.5 * min(frequency * dt, NYQUIST_SHARE * pi))
     scale = 1.0 / (1.0 + 2.0 * damping * k + k * k)
     b0, b1 = (1.0 + k * k) * scale, 2.0 * (k * k - 1.0) * scale
@@ -229,7 +231,6 @@ class IPC(PI):
         own[: len(self.parameters)] = self.parameters
         own[CyclicParameter.SLOPE] = np.nan  # until prepare
         self.parameters, self.memory = own, np.zeros(N_MEMORY)
-        self.command = np.zeros(1 + BLADES)
 
     def cyclic_settings(self, scene):
         """The IPCSettings for a scene."""

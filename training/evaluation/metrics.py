@@ -37,7 +37,7 @@ HUB_LOADS = (
     "LSSTipMzs",
     "YawBrMyp",
     "YawBrMzp",
-)  # of hub and yaw bearing, axes that do not turn
+)  # in axes that do not turn
 BLADES = (1, 2, 3)
 # The constraints of the ATLAS Offshore contest (ARPA-E, 2019).
 BLADE_PITCH_RATE_LIMIT = 10.0  # deg/s
@@ -193,10 +193,10 @@ def metrics(
     gust_start        time (s) of a gust after which the rotor has to settle; None: no settling time (NaN)
     Standard deviations are about the run's own mean (N in the denominator). Travel is the sum of
     absolute steps per second. DEL: 1 Hz damage-equivalent load, exponent 4 (tower base fore-aft, shaft
-    torque, hub, yaw bearing), 10 (blade roots, of the blade for which it is greatest) or 3 (fairlead); those of
-    blades, hub and yaw bearing and the mean travel of the blades are of a rotor whose blades have pitches of
-    their own, NaN of others. torque_limited: seconds in which the generator could not follow its command,
-    being at the end of its range or its rate. FAIRTEN: the line for which the figure is greatest.
+    torque, hub and yaw bearing), 10 (blade roots; of the blade for which it is greatest) or 3 (fairlead). Those
+    of blades, hub and yaw bearing, and the mean travel of each blade, are NaN where all blades have one pitch.
+    torque_limited: seconds in which the generator could not follow its command, being at the end of its range
+    or its rate. FAIRTEN: the line for which the figure is greatest.
     beyond: seconds past a constraint (blade-pitch rate 10 deg/s, tower-top acceleration 3.3 m/s2, rotor
     speed 1.3 times rated), violations: how often it was passed. RotSpeed_offset: size of the mean rotor
     speed's distance from rated over the last 300 s, in percent of it; BldPitch_oscillation: greatest minus

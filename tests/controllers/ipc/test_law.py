@@ -12,6 +12,7 @@ from fowt_env.controllers.ipc.law import (
     IPC,
     CyclicMemory,
     IPCSettings,
+    greatest_amplitude,
     ipc,
     ipc_constrained,
     notch_coefficients,
@@ -35,9 +36,9 @@ def slope_at(pitch):
     return found.at_zero * (1.0 + pitch / found.doubling)
 
 
-def prepared(law, scene=SimpleNamespace(turbine=TURBINE)):
-    """A controller that has been told of a scene and starts at STILL with equal pitches."""
-    law.prepare(scene)
+def prepared(law):
+    """A controller that has been told of the turbine and starts at STILL with equal pitches."""
+    law.prepare(SimpleNamespace(turbine=TURBINE))
     measurement = SimpleNamespace(**STILL._asdict())
     measurement.blades = SimpleNamespace(blade_pitch_1=MEAN, blade_pitch_2=MEAN, blade_pitch_3=MEAN)
     law.reset(measurement)
@@ -50,9 +51,9 @@ def custom(**settings):
 
 
 def run(law, load, seconds=60.0, speed=SPEED, time_constant=0.2):
-    """(n, 4) of hub tilt and yaw moment (N m) and of the cyclic amplitudes in force (rad), at control instants.
+    """(n, 4) of hub tilt and yaw moment (N m) and of the cyclic pitch in force (rad), at control instants.
 
-    load(t): (tilt, yaw) moment without cyclic pitch, and the moment of each blade beyond that as a function of
+    load(t): (tilt, yaw) moment without cyclic pitch, and the moment of a blade beyond that as a function of
     its azimuth. The blades follow their commands with a first-order lag.
     """
     gain, azimuth = slope_at(MEAN), 0.3
@@ -142,15 +143,11 @@ def test_the_cyclic_pitch_stays_within_its_limits_and_leaves_them_at_once():
 
 @pytest.mark.parametrize(("mean", "expected"), [(0.0, 0.0), (0.01, 0.01), (0.5, 0.04)])
 def test_the_amplitude_grows_with_the_room_that_the_mean_pitch_has(mean, expected):
-    from fowt_env.controllers.ipc.law import greatest_amplitude
-
     law = custom(amplitude=0.04)
     assert greatest_amplitude(mean, SPEED, law.parameters) == pytest.approx(expected)
 
 
 def test_the_rate_of_the_drive_limits_the_amplitude():
-    from fowt_env.controllers.ipc.law import greatest_amplitude
-
     law = custom(amplitude=0.5, rate_share=0.5)
     assert greatest_amplitude(0.6, SPEED, law.parameters) == pytest.approx(0.5 * np.radians(8.0) / SPEED)
 
