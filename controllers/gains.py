@@ -212,7 +212,7 @@ def platform_frequency(scene, motion):
 
 
 def _modes(scene):
-    """(6,) eigenvalues of the platform's accelerations over its position, (6, 6) shares of motions in modes."""
+    """(6,) eigenvalues of the platform's accelerations over position, (6, 6) shares of motions in modes."""
     if scene.model.aero is not None:
         speed = float(scene.turbine.rated_wind_speed)
         scene = replace(without_fluctuations(scene, speed), wind=speed, sea=None, wind_speed=speed)

@@ -5,10 +5,10 @@ The root moments out of the rotor plane become tilt and yaw moment M of the hub 
 M - G theta with the slope G of the root moment, scheduled on the mean pitch. It passes a notch at three times
 the rotor speed, where the blades' own second and fourth harmonics appear, and theta follows what would cancel
 it, -(M - G theta)/G, with a first-order lag. Without the notch this is integral control of M with the gain
-bandwidth/|G|, and at rest M = 0 whatever the error of G; through the estimate notches and limits leave the loop
-damped. There is no proportional part: below the notch the rotor answers at once, and all that one would add is
-turbulence. Back in the blades' axes the azimuth leads by what the pitch drive and the control period lag at
-one cycle a revolution (1P), so that tilt stays tilt and yaw yaw.
+bandwidth/|G|, and at rest M = 0 whatever the error of G; with the estimate, notches and limits leave the loop
+damped. There is no proportional part: below the notch the rotor answers at once, and all that it would add
+is turbulence. Back in the blades' axes the azimuth leads by what the pitch drive and the control period lag
+at one cycle a revolution (1P), so that tilt stays tilt and yaw yaw.
 
 The cyclic amplitude is limited to `amplitude`, to what the drive's rate allows at the present rotor speed,
 and to the distance of the mean pitch from the drive's ends. So it fades in above rated with the mean pitch;

@@ -193,8 +193,8 @@ def metrics(
     gust_start        time (s) of a gust after which the rotor has to settle; None: no settling time (NaN)
     Standard deviations are about the run's own mean (N in the denominator). Travel is the sum of
     absolute steps per second. DEL: 1 Hz damage-equivalent load, exponent 4 (tower base fore-aft, shaft
-    torque, hub and yaw bearing), 10 (blade roots; of the blade for which it is greatest) or 3 (fairlead). Those
-    of blades, hub and yaw bearing, and the mean travel of each blade, are NaN where all blades have one pitch.
+    torque, hub, yaw bearing), 10 (blade roots, of the worst blade) or 3 (fairlead). Those of
+    blades, hub and yaw bearing, and the mean travel of each blade, are NaN where all have one pitch.
     torque_limited: seconds in which the generator could not follow its command, being at the end of its range
     or its rate. FAIRTEN: the line for which the figure is greatest.
     beyond: seconds past a constraint (blade-pitch rate 10 deg/s, tower-top acceleration 3.3 m/s2, rotor
