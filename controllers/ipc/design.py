@@ -23,6 +23,8 @@ from fowt_env.errors import InputError
 from fowt_env.plant.aero.blade_elements import blade_section, build_blade_elements
 from fowt_env.plant.compile.decorators import entry
 
+BANDWIDTH = 0.25  # of the loop, as a fraction of the rated rotor speed
+
 
 class RootSlope(NamedTuple):
     """Slope G of a blade's root moment over its pitch along the steady curve above rated."""
@@ -79,3 +81,9 @@ def drive_lag(turbine, frequency):
     """Phase (rad) by which a turbine's pitch drive lags behind a command of a frequency (rad/s), positive."""
     drive = turbine.pitch_drive
     return atan2(drive.time_constant * frequency, 1.0)
+
+
+def lead_time(turbine, control_dt):
+    """Time (s) by which the blades lag behind a cyclic command at 1P: drive and half a control period."""
+    rated = turbine.rated_rotor_speed
+    return drive_lag(turbine, rated) / rated + 0.5 * control_dt

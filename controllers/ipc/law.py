@@ -31,7 +31,7 @@ from math import cos, exp, hypot, pi, sin, tan
 import numpy as np
 
 from fowt_env.controllers.gains import platform_frequency
-from fowt_env.controllers.ipc.design import drive_lag, root_slope
+from fowt_env.controllers.ipc.design import BANDWIDTH, lead_time, root_slope
 from fowt_env.controllers.pi import PI, Memory, Parameter, PISettings, pi_step
 from fowt_env.descriptions.checks import check_number
 from fowt_env.descriptions.units import DEGREE
@@ -51,7 +51,7 @@ CONSTRAINED_BOUND = 0.1  # of the greatest root moment in steady wind, of ipc_co
 class IPCSettings:
     """What shapes the cyclic pitch. Raises: InputError naming the key, value and allowed range."""
 
-    bandwidth: float = 0.25  # of the loop, as a fraction of the rated rotor speed
+    bandwidth: float = BANDWIDTH
     amplitude: float = 5.0 * DEGREE  # rad, greatest cyclic pitch
     rate_share: float = 0.8  # of the drive's rate limit that the cyclic pitch may use
     notch_damping: float = 0.5  # of the notch at 3P: half its width over its frequency
@@ -241,7 +241,6 @@ class IPC(PI):
         super().prepare(scene)
         turbine, cyclic, p = scene.turbine, self.cyclic_settings(scene), self.parameters
         slope, rated = root_slope(turbine), turbine.rated_rotor_speed
-        lag = drive_lag(turbine, rated) / rated + 0.5 * self.law_dt  # a command is held for a period
         for entry, value in {
             CyclicParameter.DECAY: exp(-self.law_dt * cyclic.bandwidth * rated),
             CyclicParameter.SLOPE: slope.at_zero,
@@ -249,7 +248,7 @@ class IPC(PI):
             CyclicParameter.AMPLITUDE: cyclic.amplitude,
             CyclicParameter.RATE: cyclic.rate_share * turbine.pitch_drive.rate_limit,
             CyclicParameter.NOTCH_DAMPING: cyclic.notch_damping,
-            CyclicParameter.LEAD_TIME: lag if cyclic.lead else 0.0,
+            CyclicParameter.LEAD_TIME: lead_time(turbine, self.law_dt) if cyclic.lead else 0.0,
             CyclicParameter.BOUND: cyclic.bound * slope.moment,
         }.items():
             p[entry] = value
