@@ -8,12 +8,13 @@ import numpy as np
 
 from fowt_env.plant.aero.load import wind_of
 from fowt_env.plant.aero.wind import wind_at, wind_now
+from fowt_env.plant.blade_pitches import mean_pitch, pitch_of
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.hydro.load import surface_at_origin
-from fowt_env.plant.measurement import Measure
+from fowt_env.plant.measurement import N_MEASUREMENTS, BladeMeasure, Measure
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rigid_body import momentum_rate
-from fowt_env.plant.state import Command, State, pose_of, to_inertial
+from fowt_env.plant.state import BLADES, Command, State, pose_of, to_inertial
 from fowt_env.plant.tilt import across_shaft, along_shaft, rotor_pose
 from fowt_env.plant.user_loads import record_user_loads
 
@@ -217,7 +218,7 @@ def elevation_now(t, hydro, data):
 
 @inlined_kernel
 def measure(model, data, x, dx, u, t, m):
-    """Fill the measurement array m (N_MEASUREMENTS,) from a state and its derivative."""
+    """Fill the measurement array m (Scene.n_measurements,) from a state and its derivative."""
     layout = model.layout
     pose = pose_of(x)
     wind = wind_of(t, 0.0, 0.0, layout.hub[2], model.aero)
@@ -226,7 +227,7 @@ def measure(model, data, x, dx, u, t, m):
     m[Measure.TIME] = t
     m[Measure.ROTOR_SPEED] = x[State.ROTOR_SPEED]
     m[Measure.GENERATOR_SPEED] = layout.gear_ratio * x[State.ROTOR_SPEED]
-    m[Measure.BLADE_PITCH] = x[State.BLADE_PITCH]
+    m[Measure.BLADE_PITCH] = mean_pitch(x, model.pitches)
     m[Measure.GENERATOR_TORQUE] = u[Command.GENERATOR_TORQUE]
     for i in range(6):
         m[Measure.SURGE + i] = x[State.SURGE + i]
@@ -236,6 +237,17 @@ def measure(model, data, x, dx, u, t, m):
     m[Measure.PLATFORM_PITCH_ACCELERATION] = dx[State.WY]
     m[Measure.WIND_SPEED] = wind[0]
     m[Measure.WAVE_ELEVATION] = elevation_now(t, model.hydro, data)
+    measure_blades(pose, x, dx, u, model.pitches, model, data, m)
+
+
+@kernel
+def measure_blades(pose, x, dx, u, pitches, model, data, m):
+    """Fill the BladeMeasurement behind a Measurement; nothing with one pitch for all blades."""
+    if pitches is None:
+        return
+    m[N_MEASUREMENTS + BladeMeasure.AZIMUTH] = x[State.AZIMUTH] % (2.0 * pi)
+    for blade in range(BLADES):
+        m[N_MEASUREMENTS + BladeMeasure.BLADE_PITCH_1 + blade] = pitch_of(blade, x, pitches)
 
 
 @inlined_kernel

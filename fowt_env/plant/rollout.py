@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fowt_env.plant.blade_pitches import pitch_of, spread_command
 from fowt_env.plant.channels import measure, record
 from fowt_env.plant.compile.decorators import entry, inlined_kernel, kernel
 from fowt_env.plant.compile.handle import data_of, model_of
@@ -13,10 +14,10 @@ from fowt_env.plant.drivetrain import followed_torque, torque_was_limited
 from fowt_env.plant.dynamics import loads_of
 from fowt_env.plant.hydro.radiation import forget_memory
 from fowt_env.plant.integrators import rates, take_step
-from fowt_env.plant.measurement import Measure
+from fowt_env.plant.measurement import N_MEASUREMENTS, BladeMeasure, Measure
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.sensing import Setting, read
-from fowt_env.plant.state import Command, State
+from fowt_env.plant.state import BLADES, Command, State
 
 RUNNING, NON_FINITE, CAPSIZED, OVERSPEED, BLOWN_UP, BAD_COMMAND = 0, 1, 2, 3, 4, 5
 CAPSIZE = 1.4  # rad (80 deg) of platform pitch: the Euler angles are singular at 90 deg
@@ -61,7 +62,7 @@ def advance_plant(model, data, x, u, first, n, dt):
 
 @entry
 def advance(handle, x, u, first, n, dt):
-    """Advance x (n_state,) in place by n steps of dt under constant u (2,); returns the status."""
+    """Advance x (n_state,) in place by n steps of dt under constant u (n_commands,); returns the status."""
     return advance_plant(model_of(handle), data_of(handle), x, u, first, n, dt)
 
 
@@ -81,7 +82,7 @@ def output_plant(model, data, x, u, t, dx, row):
 
 @entry
 def observe(handle, x, u, t, dx, measurement):
-    """Fill dx (n_state,) and measurement (N_MEASUREMENTS,) at time t under u.
+    """Fill dx (n_state,) and measurement (Scene.n_measurements,) at time t under u.
 
     The loads kept by the data arrays are used where they are fresh: after changing x from outside,
     call forget first.
@@ -141,30 +142,61 @@ class Schedule(NamedTuple):
     trip: float = inf  # rotor speed (rad/s) beyond which the protection stops the turbine at the next one
     feathering: float = 0.0  # rad in a control period, of such a stop
     feathered: float = 0.0  # rad, where it ends
+    individual: bool = False  # whether the law commands each blade, else one pitch for all
 
 
 class Protection(IntEnum):
     """Entries of a run's protection array, which outlives the calls of rollout."""
 
     TRIPPED_AT = 0  # s; infinite: not yet
-    TARGET = 1  # rad, blade pitch commanded since
+    TARGET = 1  # rad, pitch commanded since, an entry for each blade
 
 
 def new_protection():
     """Protection array of a turbine that has not tripped."""
-    return np.array([inf, 0.0])
+    return np.array([inf] + BLADES * [0.0])
 
 
 @kernel
-def stop_turbine(t, x, u, schedule, protection):
+def stop_turbine(t, x, u, schedule, pitches, protection):
     """Put the command of an emergency stop into u: no torque, blades feathering from where they were."""
     if protection[Protection.TRIPPED_AT] > t:
         protection[Protection.TRIPPED_AT] = t
-        protection[Protection.TARGET] = x[State.BLADE_PITCH]
-    target = min(protection[Protection.TARGET] + schedule.feathering, schedule.feathered)
-    protection[Protection.TARGET] = target
+        for blade in range(u.shape[0] - Command.BLADE_PITCH):
+            protection[Protection.TARGET + blade] = pitch_of(blade, x, pitches)
     u[Command.GENERATOR_TORQUE] = 0.0
-    u[Command.BLADE_PITCH] = target
+    for blade in range(u.shape[0] - Command.BLADE_PITCH):
+        target = min(protection[Protection.TARGET + blade] + schedule.feathering, schedule.feathered)
+        protection[Protection.TARGET + blade] = target
+        u[Command.BLADE_PITCH + blade] = target
+
+
+@kernel
+def hide_command(u, hidden, individual, pitches):
+    """Hide of the command in force what a law that is about to overwrite it does not declare."""
+    u[Command.GENERATOR_TORQUE] += hidden[Measure.GENERATOR_TORQUE]
+    if not hide_pitches(u, hidden, individual, pitches):
+        u[Command.BLADE_PITCH] += hidden[Measure.BLADE_PITCH]
+
+
+@kernel
+def hide_pitches(u, hidden, individual, pitches):
+    """As hide_command, of a law that commands each blade. Returns whether it does."""
+    if pitches is None:
+        return False
+    if individual:
+        for blade in range(BLADES):
+            u[Command.BLADE_PITCH + blade] += hidden[N_MEASUREMENTS + BladeMeasure.BLADE_PITCH_1 + blade]
+    return individual
+
+
+@kernel
+def all_finite(values):
+    """Whether every entry is finite."""
+    for value in values:
+        if not isfinite(value):
+            return False
+    return True
 
 
 @entry
@@ -199,15 +231,15 @@ def rollout(
             observe_plant(model, data, x, u, t, dx, measurement)
             torque, grid_loss = u[Command.GENERATOR_TORQUE], schedule.grid_loss
             if protection[Protection.TRIPPED_AT] <= t or x[State.ROTOR_SPEED] > schedule.trip:
-                stop_turbine(t, x, u, schedule, protection)
+                stop_turbine(t, x, u, schedule, model.pitches, protection)
                 grid_loss = t
             else:
                 read(reader, step // schedule.per_control, t, measurement)
-                hidden = reader.sensors.chain[Setting.HIDDEN]
-                u[Command.GENERATOR_TORQUE] += hidden[Measure.GENERATOR_TORQUE]
-                u[Command.BLADE_PITCH] += hidden[Measure.BLADE_PITCH]
+                hide_command(u, reader.sensors.chain[Setting.HIDDEN], schedule.individual, model.pitches)
                 law(parameters, memory, reader.reading, u)
-                if not (isfinite(u[Command.GENERATOR_TORQUE]) and isfinite(u[Command.BLADE_PITCH])):
+                if not schedule.individual:
+                    spread_command(u, model.pitches)
+                if not all_finite(u):
                     return BAD_COMMAND, step, rows
             follow_torque(t, torque, u, schedule.per_control * dt, model.generator, grid_loss, data.cache)
         if ending or step % schedule.per_output == 0:

@@ -21,9 +21,10 @@ from fowt_env.plant.hydro.members import N_NODE
 from fowt_env.plant.hydro.radiation import memory_data, memory_states
 from fowt_env.plant.hydro.wave_bands import band_scratch
 from fowt_env.plant.integrators import rotor_samples
+from fowt_env.plant.measurement import N_BLADE_MEASUREMENTS, N_MEASUREMENTS
 from fowt_env.plant.model import N_CACHE, Data
 from fowt_env.plant.rotor_substeps import N_SAMPLE
-from fowt_env.plant.state import BLADES, N_COMMANDS, N_INDIVIDUAL_COMMANDS, Block, state_blocks
+from fowt_env.plant.state import BLADES, N_COMMANDS, N_INDIVIDUAL_COMMANDS, Block, State, state_blocks
 from fowt_env.plant.user_loads import user_data_size
 from fowt_env.scene.options import default_step
 from fowt_env.scene.parts import hydro_in_waves, wake_states
@@ -80,6 +81,18 @@ class Scene:
     def n_commands(self) -> int:
         """Generator torque and the blades' pitch, or that of each of them."""
         return N_COMMANDS if self.model.pitches is None else N_INDIVIDUAL_COMMANDS
+
+    @property
+    def pitch_states(self) -> tuple[int, ...]:
+        """Indices in the state of the blades' pitch, or of that of each of them."""
+        pitches = self.model.pitches
+        others = () if pitches is None else range(pitches.first, pitches.first + BLADES - 1)
+        return (int(State.BLADE_PITCH), *others)
+
+    @property
+    def n_measurements(self) -> int:
+        """Fields of a Measurement and, where every blade has a pitch of its own, of a BladeMeasurement."""
+        return N_MEASUREMENTS + (0 if self.model.pitches is None else N_BLADE_MEASUREMENTS)
 
     @property
     def channels(self) -> tuple[Channel, ...]:
