@@ -19,9 +19,9 @@ and nothing within the bound. So the least cyclic pitch that keeps the moment at
 direction of the load: output-constrained control of the magnitude of tilt and yaw together, Hummel, Kober and
 Mulders, Wind Energ. Sci. 10, 2005-2024, 2025.
 
-With `notches` the estimate also passes notches at frequencies of the platform. A yawing platform feels the
-moment of the wind that its blades then meet; cancelling that takes away its damping, and cyclic pitch itself
-drives sway and roll by the blades' tangential loads.
+With `tilt_notches` and `yaw_notches` the estimates also pass notches at frequencies of the platform. A yawing
+platform feels the moment of the wind that its blades then meet, and cancelling that takes away its damping;
+the cyclic pitch against the tilt moment drives sway and roll, by the blades' tangential loads.
 """
 
 from dataclasses import dataclass, replace
@@ -57,7 +57,8 @@ class IPCSettings:
     notch_damping: float = 0.5  # of the notch at 3P: half its width over its frequency
     lead: bool = True  # whether the azimuth leads by the drive's lag
     bound: float = 0.0  # of the moment that is left, as a fraction of the greatest steady root moment
-    notches: tuple[float, ...] = ()  # rad/s, of the platform, in both channels
+    tilt_notches: tuple[float, ...] = ()  # rad/s, of the platform
+    yaw_notches: tuple[float, ...] = ()
     platform_damping: float = 0.5  # of these notches
 
     def __post_init__(self):
@@ -67,10 +68,12 @@ class IPCSettings:
         for key in ("notch_damping", "platform_damping"):
             check_number(key, getattr(self, key), 0.0, low_open=True, allowed="positive and finite")
         check_number("bound", self.bound, 0.0, allowed="0 or more and finite")
-        if len(self.notches) > PLATFORM_NOTCHES:
-            raise InputError(f"notches: {len(self.notches)} frequencies: at most {PLATFORM_NOTCHES} fit")
-        for frequency in self.notches:
-            check_number("notches", frequency, 0.0, low_open=True, allowed="positive and finite, rad/s")
+        for key in ("tilt_notches", "yaw_notches"):
+            notches = getattr(self, key)
+            if len(notches) > PLATFORM_NOTCHES:
+                raise InputError(f"{key}: {len(notches)} frequencies: at most {PLATFORM_NOTCHES} fit")
+            for frequency in notches:
+                check_number(key, frequency, 0.0, low_open=True, allowed="positive and finite, rad/s")
 
 
 class CyclicParameter(IntEnum):
@@ -84,10 +87,10 @@ class CyclicParameter(IntEnum):
     NOTCH_DAMPING = DECAY + 5
     LEAD_TIME = DECAY + 6  # s
     BOUND = DECAY + 7  # N m
-    NOTCHES = DECAY + 8  # coefficients of the platform's notches
+    NOTCHES = DECAY + 8  # coefficients of the platform's notches, first those of the tilt channel
 
 
-N_PARAMETERS = CyclicParameter.NOTCHES + PLATFORM_NOTCHES * COEFFICIENTS
+N_PARAMETERS = CyclicParameter.NOTCHES + 2 * PLATFORM_NOTCHES * COEFFICIENTS
 FILTERS = 1 + PLATFORM_NOTCHES  # of each channel
 
 
@@ -134,17 +137,19 @@ def filtered(value, coefficients, memory, at, started):
 
 @kernel
 def platform_notch(parameters, k):
-    """Coefficients of the platform's notch k."""
+    """Coefficients of the platform's notch k; those of the yaw channel follow those of the tilt channel."""
     i = CyclicParameter.NOTCHES + k * COEFFICIENTS
     return parameters[i], parameters[i + 1], parameters[i + 2], parameters[i + 3], parameters[i + 4]
 
 
 @kernel
-def channel(value, third, parameters, memory, at, started):
-    """Moment (N m) of a channel behind its notches; third: coefficients of that at 3P."""
+def notched(value, axis, third, parameters, memory, started):
+    """Moment (N m) of an axis (0 tilt, 1 yaw) behind its notches; third: coefficients of that at 3P."""
+    at = CyclicMemory.FILTERS + 2 * FILTERS * axis
     value = filtered(value, third, memory, at, started)
     for k in range(PLATFORM_NOTCHES):
-        value = filtered(value, platform_notch(parameters, k), memory, at + 2 * (k + 1), started)
+        coefficients = platform_notch(parameters, axis * PLATFORM_NOTCHES + k)
+        value = filtered(value, coefficients, memory, at + 2 * (k + 1), started)
     return value
 
 
@@ -184,9 +189,8 @@ def cyclic_step(parameters, memory, measurement, command):
     started = memory[CyclicMemory.STARTED] > 0.5
     memory[CyclicMemory.STARTED] = 1.0
     third = notch_coefficients(BLADES * abs(rotor_speed), p[CyclicParameter.NOTCH_DAMPING], dt)
-    at = CyclicMemory.FILTERS
-    tilt = channel(tilt - slope * along, third, p, memory, at, started)
-    yaw = channel(yaw - slope * across, third, p, memory, at + 2 * FILTERS, started)
+    tilt = notched(tilt - slope * along, 0, third, p, memory, started)
+    yaw = notched(yaw - slope * across, 1, third, p, memory, started)
 
     share, follow = share_beyond(tilt, yaw, p[CyclicParameter.BOUND]), 1.0 - p[CyclicParameter.DECAY]
     along += follow * (-share * tilt / slope - along)
@@ -252,13 +256,13 @@ class IPC(PI):
             CyclicParameter.BOUND: cyclic.bound * slope.moment,
         }.items():
             p[entry] = value
-        p[CyclicParameter.NOTCHES :] = 0.0
-        for k in range(PLATFORM_NOTCHES):
-            at = CyclicParameter.NOTCHES + k * COEFFICIENTS
-            p[at] = 1.0  # passes everything
-            if k < len(cyclic.notches):
-                found = notch_coefficients(float(cyclic.notches[k]), cyclic.platform_damping, self.law_dt)
-                p[at : at + COEFFICIENTS] = found
+        coefficients = np.zeros((2, PLATFORM_NOTCHES, COEFFICIENTS))
+        coefficients[:, :, 0] = 1.0  # passes everything
+        for axis, notches in enumerate((cyclic.tilt_notches, cyclic.yaw_notches)):
+            for k, frequency in enumerate(notches):
+                found = notch_coefficients(float(frequency), cyclic.platform_damping, self.law_dt)
+                coefficients[axis, k] = found
+        p[CyclicParameter.NOTCHES :] = coefficients.ravel()
 
     def reset(self, measurement):
         """Start as PI.reset, each blade from its measured pitch and with no cyclic pitch.
@@ -274,14 +278,14 @@ class IPC(PI):
 
 
 class FloatingIPC(IPC):
-    """IPC with notches at the frequencies in which the platform yaws, rolls and sways."""
+    """IPC with notches at the frequencies in which the platform yaws, and rolls and sways."""
 
     inputs = (*IPC.inputs, "plant_model")
 
     def cyclic_settings(self, scene):
         """The IPCSettings with the scene's platform frequencies as notches."""
-        motions = (State.YAW, State.ROLL, State.SWAY)
-        return replace(self.cyclic, notches=tuple(platform_frequency(scene, motion) for motion in motions))
+        sway, roll, yaw = (platform_frequency(scene, m) for m in (State.SWAY, State.ROLL, State.YAW))
+        return replace(self.cyclic, tilt_notches=(sway, roll), yaw_notches=(yaw, roll))
 
 
 def ipc(turbine, control_dt):

@@ -6,7 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fowt_env.control import call_law
+from fowt_env import build_scene
+from fowt_env.control import make, whole_view
 from fowt_env.controllers.ipc.design import drive_lag, root_slope
 from fowt_env.controllers.ipc.law import (
     IPC,
@@ -39,9 +40,9 @@ def slope_at(pitch):
 def prepared(law):
     """A controller that has been told of the turbine and starts at STILL with equal pitches."""
     law.prepare(SimpleNamespace(turbine=TURBINE))
-    measurement = SimpleNamespace(**STILL._asdict())
-    measurement.blades = SimpleNamespace(blade_pitch_1=MEAN, blade_pitch_2=MEAN, blade_pitch_3=MEAN)
-    law.reset(measurement)
+    blades = np.zeros(len(BladeMeasure))
+    blades[BladeMeasure.BLADE_PITCH_1 : BladeMeasure.BLADE_PITCH_1 + 3] = MEAN
+    law.reset(whole_view([*STILL, *blades]))
     return law
 
 
@@ -50,30 +51,30 @@ def custom(**settings):
     return prepared(IPC(PISettings.published(TURBINE), IPCSettings(**settings), DT))
 
 
-def run(law, load, seconds=60.0, speed=SPEED, time_constant=0.2):
+def run(law, load, seconds=60.0, time_constant=0.2, measured=STILL):
     """(n, 4) of hub tilt and yaw moment (N m) and of the cyclic pitch in force (rad), at control instants.
 
     load(t): (tilt, yaw) moment without cyclic pitch, and the moment of a blade beyond that as a function of
     its azimuth. The blades follow their commands with a first-order lag.
     """
     gain, azimuth = slope_at(MEAN), 0.3
-    pitch, command, rows = np.full(3, MEAN), np.full(4, MEAN), []
+    pitch, rows = np.full(3, MEAN), []
     decay = exp(-DT / SUBSTEPS / time_constant)
     for step in range(round(seconds / DT)):
         psi = azimuth + 2.0 * pi / 3.0 * np.arange(3)
         tilt, yaw, further = load(step * DT)
         moment = 4e6 + tilt * np.cos(psi) + yaw * np.sin(psi) + further(psi) + gain * (pitch - MEAN)
-        values = np.zeros(len(STILL) + len(BladeMeasure))
-        values[: len(STILL)] = STILL._replace(time=step * DT)
+        values = np.concatenate([measured._replace(time=step * DT), np.zeros(len(BladeMeasure))])
         blades = values[len(STILL) :]
+        blades[BladeMeasure.BLADE_PITCH_1 : BladeMeasure.BLADE_PITCH_1 + 3] = pitch
         blades[BladeMeasure.AZIMUTH] = azimuth % (2.0 * pi)
         blades[BladeMeasure.ROOT_OUT_OF_PLANE_1 : BladeMeasure.ROOT_OUT_OF_PLANE_1 + 3] = moment
         found = [2.0 / 3.0 * np.sum(v * f(psi)) for v in (moment, pitch) for f in (np.cos, np.sin)]
         rows.append(found)
-        call_law(law.law, law.parameters, law.memory, values, command)
+        command = np.array(law.act(whole_view(values)))
         for _ in range(SUBSTEPS):
             pitch = command[1:] + decay * (pitch - command[1:])
-            azimuth += speed * DT / SUBSTEPS
+            azimuth += SPEED * DT / SUBSTEPS
     return np.array(rows)
 
 
@@ -174,10 +175,9 @@ def test_platform_notches_leave_their_frequencies_in_the_moments():
     def sway(t):
         return 1e6 * sin(frequency * t), 1e6 * cos(frequency * t), lambda psi: 0.0 * psi
 
-    plain, notched = (run(custom(notches=n), sway, seconds=300.0)[2000:] for n in ((), (frequency,)))
-    assert np.abs(plain[:, 2:]).max() > 0.01
-    assert np.abs(notched[:, 2:]).max() < 5e-4
-    rows = run(custom(notches=(0.05, frequency, 0.76)), steady(1.5e6, 0.0), seconds=300.0)
+    rows = run(custom(yaw_notches=(frequency,)), sway, seconds=150.0)[1000:]
+    assert np.abs(rows[:, 2]).max() > 0.01 and np.abs(rows[:, 3]).max() < 5e-4
+    rows = run(custom(tilt_notches=(0.05, frequency, 0.76)), steady(1.5e6, 0.0), seconds=150.0)
     assert abs(rows[-1, 0]) < 1e4  # the mean moment is still taken away
 
 
@@ -201,8 +201,21 @@ def test_settings_outside_their_range_are_named(key):
 
 def test_more_notches_than_fit_are_refused():
     with pytest.raises(InputError, match="at most 3"):
-        IPCSettings(notches=(0.1, 0.2, 0.3, 0.4))
+        IPCSettings(tilt_notches=(0.1, 0.2, 0.3, 0.4))
 
 
 def test_the_lag_is_that_of_the_drive_at_one_turn():
     assert drive_lag(TURBINE, SPEED) == pytest.approx(np.arctan(0.2 * SPEED))
+
+
+def test_the_rosco_library_turns_the_blades_the_same_way():
+    pytest.importorskip("rosco", reason="needs the ROSCO library: pip install --no-deps rosco")
+    law = make("rosco_ipc", TURBINE, DT)
+    law.prepare(build_scene("oc3_hywind", wind=18.0, fidelity="fast"))
+    start = STILL._replace(wind_speed=18.0)
+    blades = np.zeros(len(BladeMeasure))
+    blades[BladeMeasure.BLADE_PITCH_1 : BladeMeasure.BLADE_PITCH_1 + 3] = MEAN
+    law.reset(whole_view([*start, *blades]))
+    rows = run(law, steady(1.5e6, -0.8e6), seconds=100.0, measured=start)
+    assert np.abs(rows[-1, :2]).max() < 0.1 * 0.8e6
+    assert rows[-1, 2:] == pytest.approx([1.5e6 / -slope_at(MEAN), -0.8e6 / -slope_at(MEAN)], rel=0.1)
