@@ -12,6 +12,7 @@ from fowt_env.errors import (
     unknown,
 )
 from fowt_env.plant.state import OUT_OF_PLANE, Command, State, pose_of
+from fowt_env.scene.actuators import rest_actuators
 from fowt_env.scene.scene import Scene
 
 STARTS = ("trim", "zero")
@@ -81,4 +82,5 @@ def initial_state(
                 f" [{drive.minimum / DEGREE:g}, {drive.maximum / DEGREE:g}] deg"
             )
         u[Command.BLADE_PITCH + blade] = x[index]
+    rest_actuators(scene.model, x, u)
     return x, u

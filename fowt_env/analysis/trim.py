@@ -21,6 +21,7 @@ from fowt_env.plant.hydro.member_series import no_series
 from fowt_env.plant.rollout import output_row
 from fowt_env.plant.state import Command, State, pose_of
 from fowt_env.plant.tilt import rotor_pose
+from fowt_env.scene.actuators import rest_actuators
 from fowt_env.scene.scene import Scene
 from fowt_env.weather.excitation import still_excitation
 from fowt_env.weather.wind import make_series
@@ -149,7 +150,8 @@ class _Steady:
         self.slope = None  # last Jacobian of the motions
 
     def rates(self):
-        """Azimuth-averaged derivative at the present state and command."""
+        """Azimuth-averaged derivative at the present state and command, with actuators at rest."""
+        rest_actuators(self.scene.model, self.x, self.u)
         for block in self.scene.blocks:
             if block.steady == "settled":
                 self.settle_internal(block)
@@ -397,6 +399,7 @@ def trim_prescribed(scene, rotor_speed, blade_pitch, platform="floating"):
 
 def _point(scene, steady, platform):
     """OperatingPoint at the present state, channels averaged over the azimuth."""
+    rest_actuators(scene.model, steady.x, steady.u)
     state, command = steady.x.copy(), steady.u.copy()
     rows = []
     for i in range(AZIMUTHS):

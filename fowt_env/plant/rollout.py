@@ -10,7 +10,7 @@ from fowt_env.plant.blade_pitches import pitch_of, spread_command
 from fowt_env.plant.channels import measure, record
 from fowt_env.plant.compile.decorators import entry, inlined_kernel, kernel
 from fowt_env.plant.compile.handle import data_of, model_of
-from fowt_env.plant.drivetrain import followed_torque, torque_was_limited
+from fowt_env.plant.drivetrain import followed_torque, lose_torque, torque_was_limited
 from fowt_env.plant.dynamics import loads_of
 from fowt_env.plant.hydro.radiation import forget_memory
 from fowt_env.plant.integrators import rates, take_step
@@ -242,6 +242,8 @@ def rollout(
                 if not all_finite(u):
                     return BAD_COMMAND, step, rows
             follow_torque(t, torque, u, schedule.per_control * dt, model.generator, grid_loss, data.cache)
+            if t >= grid_loss:
+                lose_torque(x, model.converter)
         if ending or step % schedule.per_output == 0:
             if rows == out.shape[0]:
                 raise IndexError("rollout: out has too few rows")

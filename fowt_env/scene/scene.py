@@ -26,9 +26,11 @@ from fowt_env.plant.model import N_CACHE, Data
 from fowt_env.plant.rotor_substeps import N_SAMPLE
 from fowt_env.plant.state import BLADES, N_COMMANDS, N_INDIVIDUAL_COMMANDS, Block, State, state_blocks
 from fowt_env.plant.user_loads import user_data_size
+from fowt_env.scene.actuators import drive_states
 from fowt_env.scene.options import default_step
 from fowt_env.scene.parts import hydro_in_waves, wake_states
 from fowt_env.scene.radiation_fit import memory_for_step
+from fowt_env.scene.tower import tower_states
 from fowt_env.scene.user_loads import Load, first_nonfinite_load
 from fowt_env.scene.weather import Sea, Wind, build_weather
 from fowt_env.weather.wind import hub_series
@@ -69,7 +71,11 @@ class Scene:
         """What the entries of this scene's state vector are, in order."""
         internal = {"wake": wake_states(self.model.aero)}
         internal |= {f"load {load.name}": load.states for load in self.loads}
+        bending = tower_states(self.model.tower) // 2
+        internal |= {"tower_deflection": bending, "tower_velocity": bending}
         internal |= {"other_blade_pitches": 0 if self.model.pitches is None else BLADES - 1}
+        internal |= drive_states(self.model.actuator, self.model.pitches)
+        internal |= {"generator_torque": 0 if self.model.converter is None else 1}
         internal |= {"filtered position": position_states(self.model.hydro)}
         return state_blocks(internal | {"radiation": memory_states(self.model.hydro)})
 
@@ -102,7 +108,8 @@ class Scene:
     @property
     def channel_groups(self) -> tuple[str, ...]:
         """Names of the GROUPS of channels that this scene has beside the fixed ones."""
-        return () if self.model.pitches is None else ("blades",)
+        parts = {"tower": self.model.tower, "blades": self.model.pitches}
+        return tuple(name for name, part in parts.items() if part is not None)
 
     def values(self, rows: np.ndarray, overwrite: bool = False) -> np.ndarray:
         """Output rows (k, n_channels), in SI as kernels write them, in the units of the channels.
@@ -157,7 +164,7 @@ class Scene:
             member_nodes=np.zeros((laid, N_NODE)),
             member_water=np.zeros(N_WATER * nodes),
             added_mass=np.zeros((6, 6)),
-            matrix=np.zeros((6, 6)),
+            matrix=np.zeros((6 + tower_states(self.model.tower) // 2,) * 2),
             stages=np.zeros((5, self.n_state)),
             cache=np.zeros(N_CACHE),
             user=np.zeros(

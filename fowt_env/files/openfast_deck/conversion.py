@@ -303,6 +303,21 @@ def _member_rows(member):
     return rows
 
 
+def _second_order(control, why):
+    """Table of the pitch drive of second order, where the deck's controller has one."""
+    if control.second_order is None:
+        return {}
+    frequency, damping = control.second_order
+    return {
+        "pitch_drive.second_order": [
+            Row(
+                "natural_frequency", frequency, why["natural_frequency"] + "; used where a scene asks for it"
+            ),
+            Row("damping", damping, why["damping"]),
+        ]
+    }
+
+
 def turbine_rows(deck, name):
     """{table: rows} of turbine.toml."""
     values, control = deck.elastodyn, deck.control
@@ -369,6 +384,7 @@ def turbine_rows(deck, name):
             Row("minimum_deg", math.degrees(control.minimum_pitch), why.get("minimum_pitch", "usual value")),
             Row("maximum_deg", math.degrees(control.maximum_pitch), why.get("maximum_pitch", "usual value")),
         ],
+        **_second_order(control, why),
         "torque_law": law_rows,
     }  # fmt: skip
     for gain_set, (proportional, integral, half) in control.gains.items():
