@@ -80,7 +80,10 @@ def _root_slope(turbine):
 def drive_lag(turbine, frequency):
     """Phase (rad) by which a turbine's pitch drive lags behind a command of a frequency (rad/s), positive."""
     drive = turbine.pitch_drive
-    return atan2(drive.time_constant * frequency, 1.0)
+    if drive.natural_frequency is None:
+        return atan2(drive.time_constant * frequency, 1.0)
+    ratio = frequency / drive.natural_frequency
+    return atan2(2.0 * drive.damping * ratio, 1.0 - ratio * ratio)
 
 
 def lead_time(turbine, control_dt):

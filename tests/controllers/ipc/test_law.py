@@ -8,7 +8,7 @@ import pytest
 
 from fowt_env import build_scene
 from fowt_env.control import make, whole_view
-from fowt_env.controllers.ipc.design import drive_lag, root_slope
+from fowt_env.controllers.ipc.design import drive_lag, lead_time, root_slope
 from fowt_env.controllers.ipc.law import (
     IPC,
     CyclicMemory,
@@ -206,6 +206,11 @@ def test_more_notches_than_fit_are_refused():
 
 def test_the_lag_is_that_of_the_drive_at_one_turn():
     assert drive_lag(TURBINE, SPEED) == pytest.approx(np.arctan(0.2 * SPEED))
+    drive = TURBINE.pitch_drive.model_copy(update={"natural_frequency": 5.0, "damping": 0.7})
+    other = TURBINE.model_copy(update={"pitch_drive": drive})
+    answer = 25.0 / (25.0 - SPEED**2 + 2j * 0.7 * 5.0 * SPEED)
+    assert drive_lag(other, SPEED) == pytest.approx(-np.angle(answer))
+    assert lead_time(other, 0.1) == pytest.approx(-np.angle(answer) / SPEED + 0.05)
 
 
 def test_the_rosco_library_turns_the_blades_the_same_way():
