@@ -33,7 +33,6 @@ from fowt_env.plant.aero.blade_elements import (
     smoothstep,
 )
 from fowt_env.plant.aero.blade_shape import (
-    NO_BLADE_LOAD,
     BladeLoad,
     BladeShape,
     blade_wind,
@@ -251,16 +250,38 @@ def _load_cell(flow, rows):
     return _cell(flow.normal, flow.tangential, total * total, total, REVERSED, rows.fraction)
 
 
+@inlined_kernel
+def _with_straight(force, v_normal, v_tangential, i, j, rows, rate, x, dx, rotor):
+    """The CurvedForce of a straight blade with station j in this wind, wake states from i on."""
+    flow = _flow(v_normal, v_tangential, i, j, rows, rate, x, dx, rotor)
+    cell = _load_cell(flow, rows)
+    fn = _looked_up(cell, j, 0, rows.low_load, rows.high_load)
+    ft = _looked_up(cell, j, 1, rows.low_load, rows.high_load)
+    load, arm = force.load, rotor.arm[j]
+    return CurvedForce(
+        BladeLoad(load.fx + fn, 0.0, load.ft + ft, load.mx + arm * ft, 0.0, load.mt - arm * fn),
+        force.outside + (0 if flow.inside and cell.inside else 1),
+    )
+
+
+@inlined_kernel
+def _with_curved(force, v_normal, v_tangential, i, j, lever, rows, rate, x, dx, rotor):
+    """As _with_straight of a curved blade."""
+    flow = _flow(v_normal, v_tangential, i, j, rows, rate, x, dx, rotor)
+    cell = _load_cell(flow, rows)
+    fn = _looked_up(cell, j, 0, rows.low_load, rows.high_load)
+    ft = _looked_up(cell, j, 1, rows.low_load, rows.high_load)
+    moment = _looked_up(cell, j, 2, rows.low_load, rows.high_load)
+    load = with_station(force.load, fn, ft, moment, lever)
+    return CurvedForce(load, force.outside + (0 if flow.inside and cell.inside else 1))
+
+
 @kernel
-def _straight_blade(
-    number, psi, t, pose, hub, x, now, series, field, sheared, profile, blade_pitch, rows, rate, rotor, shape,
-    dx,
-):  # fmt: skip
-    """CurvedForce of a straight blade."""
-    elements = rotor.elements
-    blade = _blade(psi, x[State.ROTOR_SPEED], pose, hub)
-    start = State.INTERNAL + PER_ELEMENT * number * elements.radius.shape[0]
-    # v = v0 + v1 radius + v2 profile in a sheared wind
+def _straight_sheared(
+    start, psi, pose, hub, now, series, profile, blade_pitch, rows, rate, x, dx, rotor, shape
+):
+    """CurvedForce of a straight blade in a sheared wind: v = v0 + v1 radius + v2 profile."""
+    blade, radii = _blade(psi, x[State.ROTOR_SPEED], pose, hub), rotor.elements.radius
     height, left = hub.Z - series.reference_height, hub.Y
     linear = (now.vertical_shear * height + now.horizontal_shear * left) / series.reference_length
     slope = (now.vertical_shear * blade.rz + now.horizontal_shear * blade.ry) / series.reference_length
@@ -271,81 +292,90 @@ def _straight_blade(
     t1 = blade.spin - blade.tx * slope
     t2 = -profile.scale * (blade.tx * now.u + blade.ty * now.v)
     z0, z1 = hub.Z / profile.centre - 1.0, blade.rz / profile.centre
-    force_n = force_t = moment_n = moment_t = 0.0
-    outside = 0
-    for j in range(elements.radius.shape[0]):
-        radius = elements.radius[j]
-        if sheared:
-            shear = _shear(z0 + z1 * radius, profile)
-            v_normal = n0 + n1 * radius + n2 * shear
-            v_tangential = t0 + t1 * radius + t2 * shear
-        else:
-            u, v, w = wind_at(
-                t,
-                hub.X + radius * blade.rx,
-                hub.Y + radius * blade.ry,
-                hub.Z + radius * blade.rz,
-                now,
-                series,
-                field,
-            )
-            v_normal = pose.r11 * u + pose.r21 * v + pose.r31 * w - hub.vx - radius * blade.normal_rate
-            v_tangential = blade.tangential + radius * blade.spin
-            v_tangential -= blade.tx * u + blade.ty * v + blade.tz * w
-        flow = _flow(v_normal, v_tangential, start + PER_ELEMENT * j, j, rows, rate, x, dx, rotor)
-        cell = _load_cell(flow, rows)
-        fn = _looked_up(cell, j, 0, rows.low_load, rows.high_load)
-        ft = _looked_up(cell, j, 1, rows.low_load, rows.high_load)
-        force_n += fn
-        force_t += ft
-        moment_n += rotor.arm[j] * fn
-        moment_t += rotor.arm[j] * ft
-        outside += 0 if flow.inside and cell.inside else 1
-    return CurvedForce(BladeLoad(force_n, 0.0, force_t, moment_t, 0.0, -moment_n), outside)
-
-
-@kernel
-def _curved_blade(
-    number, psi, t, pose, hub, x, now, series, field, sheared, profile, blade_pitch, rows, rate, rotor, shape,
-    dx,
-):  # fmt: skip
-    """CurvedForce of a blade of a BladeShape."""
-    blade = blade_wind(-sin(psi), cos(psi), x[State.ROTOR_SPEED], pose, hub)
-    wind = _sheared_flow(pose, hub, blade, now, series, profile)
-    cosine, sine = cos(blade_pitch), sin(blade_pitch)
-    start = State.INTERNAL + PER_ELEMENT * number * shape.distance.shape[0]
     force = NO_CURVED_FORCE
-    for j in range(shape.distance.shape[0]):
-        at = station_at(j, cosine, sine, shape)
-        if sheared:
-            shear = _shear(_at(wind.height, at), profile)
-            along = _at(wind.flow_x, at) + shear * wind.scaled_x
-            out = _at(wind.flow_r, at) + shear * wind.scaled_r
-            v_normal = at.nx * along + at.nr * out
-            v_tangential = -_at(wind.flow_t, at) - shear * wind.scaled_t
-        else:
-            u, v, w = wind_at(
-                t,
-                hub.X + at.x * pose.r11 + at.r * blade.rx + at.t * blade.tx,
-                hub.Y + at.x * pose.r21 + at.r * blade.ry + at.t * blade.ty,
-                hub.Z + at.x * pose.r31 + at.r * blade.rz + at.t * blade.tz,
-                now,
-                series,
-                field,
-            )
-            v_normal, v_tangential = station_inflow(u, v, w, at, pose, blade)
-        flow = _flow(v_normal, v_tangential, start + PER_ELEMENT * j, j, rows, rate, x, dx, rotor)
-        cell = _load_cell(flow, rows)
-        fn = _looked_up(cell, j, 0, rows.low_load, rows.high_load)
-        ft = _looked_up(cell, j, 1, rows.low_load, rows.high_load)
-        moment = _looked_up(cell, j, 2, rows.low_load, rows.high_load)
-        load = with_station(force.load, fn, ft, moment, lever_of(j, cosine, sine, shape))
-        force = CurvedForce(load, force.outside + (0 if flow.inside and cell.inside else 1))
+    for j in range(radii.shape[0]):
+        radius = radii[j]
+        shear = _shear(z0 + z1 * radius, profile)
+        v_normal, v_tangential = n0 + n1 * radius + n2 * shear, t0 + t1 * radius + t2 * shear
+        i = start + PER_ELEMENT * j
+        force = _with_straight(force, v_normal, v_tangential, i, j, rows, rate, x, dx, rotor)
     return force
 
 
-# a blade straight and in the rotor plane, or a curved one
-_blade_force = chosen_by_class("shape", {type(None): _straight_blade, BladeShape: _curved_blade})
+@kernel
+def _curved_sheared(
+    start, psi, pose, hub, now, series, profile, blade_pitch, rows, rate, x, dx, rotor, shape
+):
+    """CurvedForce of a curved blade in a sheared wind."""
+    blade = blade_wind(-sin(psi), cos(psi), x[State.ROTOR_SPEED], pose, hub)
+    wind = _sheared_flow(pose, hub, blade, now, series, profile)
+    cosine, sine = cos(blade_pitch), sin(blade_pitch)
+    force = NO_CURVED_FORCE
+    for j in range(shape.distance.shape[0]):
+        at, lever = station_at(j, cosine, sine, shape), lever_of(j, cosine, sine, shape)
+        shear = _shear(_at(wind.height, at), profile)
+        along = _at(wind.flow_x, at) + shear * wind.scaled_x
+        out = _at(wind.flow_r, at) + shear * wind.scaled_r
+        v_normal = at.nx * along + at.nr * out
+        v_tangential = -_at(wind.flow_t, at) - shear * wind.scaled_t
+        i = start + PER_ELEMENT * j
+        force = _with_curved(force, v_normal, v_tangential, i, j, lever, rows, rate, x, dx, rotor)
+    return force
+
+
+@kernel
+def _straight_sampled(
+    start, psi, t, pose, hub, now, series, field, blade_pitch, rows, rate, x, dx, rotor, shape
+):
+    """CurvedForce of a straight blade, the wind sampled station by station."""
+    blade, radii = _blade(psi, x[State.ROTOR_SPEED], pose, hub), rotor.elements.radius
+    force = NO_CURVED_FORCE
+    for j in range(radii.shape[0]):
+        radius = radii[j]
+        u, v, w = wind_at(
+            t,
+            hub.X + radius * blade.rx,
+            hub.Y + radius * blade.ry,
+            hub.Z + radius * blade.rz,
+            now,
+            series,
+            field,
+        )
+        v_normal = pose.r11 * u + pose.r21 * v + pose.r31 * w - hub.vx - radius * blade.normal_rate
+        v_tangential = blade.tangential + radius * blade.spin - (blade.tx * u + blade.ty * v + blade.tz * w)
+        i = start + PER_ELEMENT * j
+        force = _with_straight(force, v_normal, v_tangential, i, j, rows, rate, x, dx, rotor)
+    return force
+
+
+@kernel
+def _curved_sampled(
+    start, psi, t, pose, hub, now, series, field, blade_pitch, rows, rate, x, dx, rotor, shape
+):
+    """CurvedForce of a curved blade, the wind sampled station by station."""
+    blade = blade_wind(-sin(psi), cos(psi), x[State.ROTOR_SPEED], pose, hub)
+    cosine, sine = cos(blade_pitch), sin(blade_pitch)
+    force = NO_CURVED_FORCE
+    for j in range(shape.distance.shape[0]):
+        at, lever = station_at(j, cosine, sine, shape), lever_of(j, cosine, sine, shape)
+        u, v, w = wind_at(
+            t,
+            hub.X + at.x * pose.r11 + at.r * blade.rx + at.t * blade.tx,
+            hub.Y + at.x * pose.r21 + at.r * blade.ry + at.t * blade.ty,
+            hub.Z + at.x * pose.r31 + at.r * blade.rz + at.t * blade.tz,
+            now,
+            series,
+            field,
+        )
+        v_normal, v_tangential = station_inflow(u, v, w, at, pose, blade)
+        i = start + PER_ELEMENT * j
+        force = _with_curved(force, v_normal, v_tangential, i, j, lever, rows, rate, x, dx, rotor)
+    return force
+
+
+# blades straight and in the rotor plane, or curved ones
+_sheared_blade = chosen_by_class("shape", {type(None): _straight_sheared, BladeShape: _curved_sheared})
+_sampled_blade = chosen_by_class("shape", {type(None): _straight_sampled, BladeShape: _curved_sampled})
 
 
 @kernel
@@ -371,11 +401,21 @@ def _tabled_load(t, pose, x, now, series, field, rotor, hub, first_row, dx, pitc
     total, outside = NO_LOAD, 0
     for number in range(elements.blades):
         psi = x[State.AZIMUTH] + 2.0 * pi * number / elements.blades
-        rows = _rows(_blade_row(number, first_row, x, pitches), rotor)
-        force = _blade_force(
-            number, psi, t, pose, hub, x, now, series, field, sheared, profile, pitch_of(number, x, pitches),
-            rows, rate, rotor, elements.shape, dx,
-        )  # fmt: skip
+        start = State.INTERNAL + PER_ELEMENT * number * elements.radius.shape[0]
+        rows, blade_pitch = (
+            _rows(_blade_row(number, first_row, x, pitches), rotor),
+            pitch_of(number, x, pitches),
+        )
+        if sheared:
+            force = _sheared_blade(
+                start, psi, pose, hub, now, series, profile, blade_pitch, rows, rate, x, dx, rotor,
+                elements.shape,
+            )  # fmt: skip
+        else:
+            force = _sampled_blade(
+                start, psi, t, pose, hub, now, series, field, blade_pitch, rows, rate, x, dx, rotor,
+                elements.shape,
+            )  # fmt: skip
         store_blade_load(number, force.load, elements.air_density, pitches, blades)
         total = with_blade(total, force.load, Direction(-sin(psi), cos(psi)))
         outside += force.outside
