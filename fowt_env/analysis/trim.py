@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from fowt_env.analysis.equilibrium import check_equilibrium, evaluated, label, unbalanced
 from fowt_env.analysis.statics import mean_derivative
 from fowt_env.errors import InputError, unknown
-from fowt_env.plant.aero.bem_rotor import wake_equilibrium
+from fowt_env.plant.aero.load import settled_wake
 from fowt_env.plant.aero.wind import wind_now
 from fowt_env.plant.channels import to_units
 from fowt_env.plant.compile.decorators import entry
@@ -119,14 +119,12 @@ def without_fluctuations(scene, wind_speed=None):
 
 @entry
 def settle_wake(handle, x, dx):
-    """Set the wake states of x to their steady values for the rest of it; the rotor must be a BemRotor."""
+    """Set the wake states of x to their steady values for the rest of it; the rotor must have such states."""
     aero = model_of(handle).aero
-    rotor = aero.rotor
-    wake_equilibrium(
-        0.0, rotor_pose(pose_of(x), aero.tilt), x, wind_now(0.0, aero.wind), aero.wind, aero.field,
-        rotor.elements, rotor.skew, rotor.wake, dx, data_of(handle).counters, model_of(handle).pitches,
-        data_of(handle).blades,
-    )  # fmt: skip
+    pose, now, data = rotor_pose(pose_of(x), aero.tilt), wind_now(0.0, aero.wind), data_of(handle)
+    settled_wake(
+        0.0, pose, x, now, aero, aero.rotor, dx, data.counters, model_of(handle).pitches, data.blades
+    )
 
 
 SETTLING = 8  # Newton steps for a block of internal states; one is enough where they are linear
