@@ -8,6 +8,7 @@ import numpy as np
 
 from fowt_env.plant.aero.load import wind_of
 from fowt_env.plant.aero.wind import wind_at, wind_now
+from fowt_env.plant.blade_outputs import rates_of, record_blades
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.hydro.load import surface_at_origin
 from fowt_env.plant.measurement import Measure
@@ -153,6 +154,7 @@ class Layout(NamedTuple):
     lean: float  # m upwind per metre along a blade, sine of the cone
     reach: float  # m from the shaft per metre along a blade, cosine of the cone
     rotor_cm: np.ndarray  # (3,) centre of mass of the rotor, m
+    blade_masses: object = None  # blade_outputs.BladeMasses, or None: one pitch for all blades
 
 
 @kernel
@@ -291,6 +293,7 @@ def record(model, data, x, dx, u, t, loads, row):
         row[N_FIXED + i] = data.lines[i, 2]
         row[N_FIXED + n + i] = data.lines[i, 3]
     record_user_loads(pose, model.user, data, row[N_FIXED + 2 * n :])
+    record_blades(pose, rates_of(dx), x, dx, model.pitches, model, data, row)
 
 
 @inlined_kernel
