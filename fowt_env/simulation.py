@@ -263,11 +263,11 @@ def guard_of(scene: Scene, limits: Protection, faults: Sequence[Fault], control_
     ordered, rates, rows = [inf, inf], [limits.normal_rate, limits.emergency_rate], []
     for fault in faults:
         rows += _failures(scene, fault)
-        kind = Stop.NORMAL if fault.kind == "normal_stop" else Stop.EMERGENCY
+        stop = Stop.NORMAL if fault.kind == "normal_stop" else Stop.EMERGENCY
         if fault.kind in STOP_FAULTS or fault.delay is not None:
-            ordered[kind] = min(ordered[kind], fault.time + (fault.delay or 0.0))
+            ordered[stop] = min(ordered[stop], fault.time + (fault.delay or 0.0))
             if fault.rate is not None:
-                rates[kind] = radians(fault.rate)
+                rates[stop] = radians(fault.rate)
     steps = [min(rate, drive.rate_limit) * control_dt for rate in rates]
     off_speed = limits.off_speed * turbine.rated_rotor_speed
     return build_guard(trips, ordered, steps, drive.maximum, off_speed, rows)

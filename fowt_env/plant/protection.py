@@ -133,6 +133,14 @@ def tower_top_acceleration(x, dx, layout):
 
 
 @kernel
+def pitches_of(pitches):
+    """Number of pitches that the blades have: one for all, or one each."""
+    if pitches is None:
+        return 1
+    return BLADES
+
+
+@kernel
 def kind_now(k, t, guard):
     """Failure of a row of the faults, -1 before its time."""
     if t < guard.faults[k, Part.TIME] - ROUNDING:
@@ -155,7 +163,7 @@ def encoder_offset(blade, t, guard):
 def pitch_deviation(t, x, actuator, pitches, guard):
     """Greatest difference (rad) of encoder and command of a blade, and of that between two blades."""
     low = high = largest = 0.0
-    for blade in range(BLADES):
+    for blade in range(pitches_of(pitches)):
         command = clamp(guard.watch[Watch.COMMAND + blade], actuator.minimum, actuator.maximum)
         error = pitch_of(blade, x, pitches) - encoder_offset(blade, t, guard) - command
         low, high = (error, error) if blade == 0 else (min(low, error), max(high, error))
