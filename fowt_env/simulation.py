@@ -13,6 +13,7 @@ import pandas as pd
 from fowt_env.control import (
     EXACT,
     CompiledController,
+    check_pitches,
     foreseen,
     hidden,
     known_scene,
@@ -35,11 +36,11 @@ from fowt_env.initial_conditions import initial_state
 from fowt_env.plant.compile.decorators import control_kernel
 from fowt_env.plant.compile.handle import Handle
 from fowt_env.plant.events import counted, harm
-from fowt_env.plant.measurement import N_MEASUREMENTS, Measure, Measurement
+from fowt_env.plant.measurement import BladeMeasurement, Measurement
 from fowt_env.plant.protection import Failure, Guard, Stop, Trip, Watch, build_guard
 from fowt_env.plant.rollout import OVERSPEED, RUNNING, STOP_REASONS, Schedule, rollout
 from fowt_env.plant.sensing import NacelleMotion, Reader, Setting, new_past, no_motion, open_reader
-from fowt_env.plant.state import BLADES, State
+from fowt_env.plant.state import BLADES, N_COMMANDS, N_INDIVIDUAL_COMMANDS, State
 from fowt_env.scene.scene import Scene
 from fowt_env.weather.preview import Motion, Preview
 from fowt_env.weather.sensor_noise import draw_sensors
@@ -66,19 +67,22 @@ def hold(parameters, memory, measurement, command):
 
 @control_kernel
 def given(parameters, memory, measurement, command):
-    """The command that stands in parameters: torque, blade pitch."""
-    command[0] = parameters[0]
-    command[1] = parameters[1]
+    """The command that stands in parameters: torque, blade pitch or that of each blade."""
+    for i in range(parameters.shape[0]):
+        command[i] = parameters[i]
 
 
 class HeldCommand(CompiledController):
     """The law of controller=None: the command stays as it is."""
 
     kernel = staticmethod(hold)
-    information = ("generator_torque", "blade_pitch")
+    information: tuple[str, ...] = ("generator_torque", "blade_pitch")
 
-    def __init__(self) -> None:
+    def __init__(self, individual: bool = False) -> None:
+        self.individual = individual
         super().__init__("none", np.zeros(1), 1)
+        if individual:
+            self.information += ("blade_pitch_1", "blade_pitch_2", "blade_pitch_3")
 
     def reset(self, measurement: Measurement) -> None:
         """Nothing to start."""
@@ -146,7 +150,8 @@ def simulate(
     controller  None: the rotor is held at the trim's speed and blade pitch (at rest without wind); a
                 name of a built-in one or "module:Class"; or an object with
                 reset(measurement) and act(measurement) -> (generator torque N m, blade pitch rad), and
-                prepare(scene) where it needs more than measurements (control.py)
+                prepare(scene) where it needs more than measurements; one that commands each blade
+                (control.py) needs a scene with pitch="individual"
     duration    s; rows run from 0 to duration inclusive, every output_dt
     dt          physics step, s; must divide control_dt and output_dt, and output_dt the duration.
                 None: scene.dt (0.0125 s at fidelity "reference", 0.1 s at the others)
@@ -212,18 +217,20 @@ def simulate(
         raise InputError(f"faults: {wrong[0].kind}: controller=None has nobody whom a fault could trouble")
     if not held:
         controller = make(controller, scene.turbine, control_dt)
+        check_pitches(controller, scene.model.pitches is not None)
         with _controllers_own():
             controller.prepare(known_scene(scene if nominal is None else nominal, controller))
     x, u = initial_state(scene, start, initial)
     if held:
         scene = scene.with_model({"rigid_body.rotor_fixed": True})
-        controller = HeldCommand()
+        controller = HeldCommand(scene.model.pitches is not None)
         per_control = last  # nobody reads the measurements
         chain = None
     overspeed = scene.turbine.overspeed if stop_overspeed else inf
     losses = [inf if time is None else time for time in (grid_loss, *(fault.grid_loss for fault in wrong))]
     loss = min(losses) - 1e-9  # an instant may miss it by rounding
-    schedule = Schedule(float(dt), per_control, per_output, last, float(overspeed), float(loss))
+    ends = float(overspeed), float(loss)
+    schedule = Schedule(float(dt), per_control, per_output, last, *ends, bool(controller.individual))
     guard = guard_of(scene, limits, wrong, per_control * dt)
     reader = reader_of(scene, controller, chain, preview, schedule)
     loop = _Loop(scene, controller, x, u, schedule, reader, guard)
@@ -278,9 +285,14 @@ def _failures(scene, fault):
     if fault.kind not in FAILURES:
         return []
     kind, time = FAILURES[fault.kind], fault.time
-    if fault.kind not in BLADE_FAULTS:
-        return [(kind, time, Measure[fault.field.upper()], fault.value or 0.0, 0.0)]
     individual = scene.model.pitches is not None
+    if fault.kind not in BLADE_FAULTS:
+        fields = (*Measurement._fields, *(BladeMeasurement._fields if individual else ()))
+        if fault.field not in fields:
+            raise InputError(
+                f"faults: {fault.kind}: field = {fault.field!r}: needs a scene with pitch='individual'"
+            )
+        return [(kind, time, fields.index(fault.field), fault.value or 0.0, 0.0)]
     if fault.blades is not None and not individual:
         raise InputError(
             f"faults: {fault.kind}: blades = {list(fault.blades)}: needs a scene with pitch='individual'"
@@ -307,15 +319,16 @@ def reader_of(
     """
     control_dt, duration = schedule.per_control * schedule.dt, schedule.last * schedule.dt
     readings = -(-schedule.last // schedule.per_control) + 1
-    sensors = draw_sensors(chain, control_dt, scene.seed, readings)
-    available = None if chain is None else (chain.name, chain.available)
-    sensors.chain[Setting.HIDDEN] = hidden(controller, available)
+    individual = scene.model.pitches is not None
+    sensors = draw_sensors(chain, control_dt, scene.seed, readings, individual)
+    available = None if chain is None else (chain.name, chain.available + chain.available_of_blades)
+    sensors.chain[Setting.HIDDEN] = hidden(controller, available, individual)
     leads = preview_leads(controller)
     time, values, motion = np.zeros(0), np.zeros((0, 0)), None
     if leads:
         time, values, motion = foreseen(scene, leads, preview, duration)
     moving = no_motion() if motion is None else nacelle_motion(motion, control_dt)
-    reading = np.zeros(N_MEASUREMENTS + len(leads))
+    reading = np.zeros(scene.n_measurements + len(leads))
     return Reader(sensors, new_past(sensors.chain), time, values, moving, reading)
 
 
@@ -355,10 +368,10 @@ class _Loop:
         self.handle = scene.handle(self.data)
         self.x, self.u, self.schedule = x, u, schedule
         self.dx = np.zeros_like(x)
-        self.measurement = np.zeros(N_MEASUREMENTS)
+        self.measurement = np.zeros(scene.n_measurements)
         self.guard = build_guard() if guard is None else guard
         self.guarding = Handle(None, self.guard)
-        self.reader = open_reader() if reader is None else reader
+        self.reader = open_reader(scene.n_measurements) if reader is None else reader
         self.given = Handle(None, self.reader)
         self.view = view_of(controller)
         self.rows = np.empty((schedule.last // schedule.per_output + 1, len(scene.channels)))
@@ -368,8 +381,10 @@ class _Loop:
             self.law = controller.law, controller.parameters, controller.memory
             self.given_to_law = self.given
         else:
-            self.law = given.compiled, np.zeros(2), np.zeros(1)
-            self.given_to_law = Handle(None, open_reader())  # the controller has its reading already
+            size = N_INDIVIDUAL_COMMANDS if schedule.individual else N_COMMANDS
+            self.law = given.compiled, np.zeros(size), np.zeros(1)
+            # the controller has its reading already
+            self.given_to_law = Handle(None, open_reader(scene.n_measurements))
 
     def go(self, report):
         """Run to the end. Raises: SimulationStopped; KeyboardInterrupt with the frame so far."""

@@ -384,7 +384,7 @@ def test_readings_are_those_of_the_chain_taken_one_by_one(gust_scene, chain):
     drawn = draw_noise(np.array(list(noise.values())), gust_scene.seed, 200)
     twin = NaiveSensors(chain, 0.1, drawn)
     for measured, reading in zip(true.seen(), read.seen(), strict=True):
-        wanted = twin.read(Measurement(*measured[:N_MEASUREMENTS]))
+        wanted = twin.read(dict(zip(Measurement._fields, measured[:N_MEASUREMENTS], strict=True)))
         got = dict(zip(Measurement._fields, reading[:N_MEASUREMENTS], strict=True))
         for name in Measurement._fields:
             assert got[name] == pytest.approx(wanted.get(name, np.nan), rel=1e-12, abs=1e-12, nan_ok=True), (

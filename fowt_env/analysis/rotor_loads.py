@@ -57,7 +57,7 @@ def rotor_loads(scene, rotor_speed, blade_pitch, azimuth=0.0, time=0.0):
         load = curved_blade_load(
             number, time, pose, hub, blade_wind(out[1], out[2], rotor_speed, pose, hub), induction, x, now,
             aero.wind, field, rotor, rotor.shape, skew_of(hub, skew), skew, None, np.zeros_like(x),
-            np.zeros(N_COUNTERS),
+            np.zeros(N_COUNTERS), None,
         )  # fmt: skip
         axes = np.array([[1.0, 0.0, 0.0], out, turning])
         own_force, own_moment = np.array(load[:3]), np.array(load[3:])

@@ -19,8 +19,9 @@ from fowt_env.plant.drivetrain import build_torque_curve, generator_torque
 from fowt_env.plant.hydro.load import BandedStrips
 from fowt_env.plant.hydro.member_series import no_series
 from fowt_env.plant.rollout import output_row
-from fowt_env.plant.state import N_COMMANDS, Command, State, pose_of
+from fowt_env.plant.state import Command, State, pose_of
 from fowt_env.plant.tilt import rotor_pose
+from fowt_env.scene.actuators import rest_actuators
 from fowt_env.scene.scene import Scene
 from fowt_env.weather.excitation import still_excitation
 from fowt_env.weather.wind import make_series
@@ -44,7 +45,7 @@ PLATFORM_MODES = ("floating", "fixed")
 class OperatingPoint(Mapping):
     """Steady state as a mapping of OpenFAST channels, e.g. op["RotThrust"] in kN.
 
-    Attributes: state (n_state,) and command (generator torque N m, blade pitch rad), both SI;
+    Attributes: state (n_state,) and command (n_commands,): generator torque N m, blade pitch rad, both SI;
     wind_speed (m/s or None); platform ("floating" or "fixed").
     """
 
@@ -123,7 +124,8 @@ def settle_wake(handle, x, dx):
     rotor = aero.rotor
     wake_equilibrium(
         0.0, rotor_pose(pose_of(x), aero.tilt), x, wind_now(0.0, aero.wind), aero.wind, aero.field,
-        rotor.elements, rotor.skew, rotor.wake, dx, data_of(handle).counters,
+        rotor.elements, rotor.skew, rotor.wake, dx, data_of(handle).counters, model_of(handle).pitches,
+        data_of(handle).blades,
     )  # fmt: skip
 
 
@@ -140,7 +142,7 @@ class _Steady:
         self.data = self.scene.data()
         self.handle = self.scene.handle(self.data)
         self.x = np.zeros(self.scene.n_state)
-        self.u = np.zeros(N_COMMANDS)
+        self.u = np.zeros(self.scene.n_commands)
         self.dx = np.zeros_like(self.x)
         self.mean = np.zeros_like(self.x)
         self.curve = build_torque_curve(self.scene.turbine.torque_law)
@@ -148,7 +150,8 @@ class _Steady:
         self.slope = None  # last Jacobian of the motions
 
     def rates(self):
-        """Azimuth-averaged derivative at the present state and command."""
+        """Azimuth-averaged derivative at the present state and command, with actuators at rest."""
+        rest_actuators(self.scene.model, self.x, self.u)
         for block in self.scene.blocks:
             if block.steady == "settled":
                 self.settle_internal(block)
@@ -197,10 +200,14 @@ class _Steady:
         """w_b' with the torque of the static curve, platform as it is."""
         ratio = self.scene.turbine.drivetrain.gear_ratio
         self.x[State.ROTOR_SPEED] = rotor_speed
-        self.x[State.BLADE_PITCH] = blade_pitch
         self.u[Command.GENERATOR_TORQUE] = generator_torque(ratio * rotor_speed, blade_pitch, self.curve)
-        self.u[Command.BLADE_PITCH] = blade_pitch
+        self.set_pitch(blade_pitch)
         return self.rates()[State.ROTOR_SPEED]
+
+    def set_pitch(self, blade_pitch):
+        """Set the pitch (rad) of all blades, and its command."""
+        self.x[list(self.scene.pitch_states)] = blade_pitch
+        self.u[Command.BLADE_PITCH :] = blade_pitch
 
     def settle_rotor(self):
         """Set rotor speed, blade pitch and torque to their steady values for the present platform."""
@@ -382,7 +389,7 @@ def trim_prescribed(scene, rotor_speed, blade_pitch, platform="floating"):
     body = scene.model.rigid_body._replace(platform_fixed=platform == "fixed", rotor_fixed=True)
     steady = _Steady(without_fluctuations(scene).with_model(rigid_body=body))
     steady.x[State.ROTOR_SPEED] = rotor_speed
-    steady.x[State.BLADE_PITCH] = steady.u[Command.BLADE_PITCH] = blade_pitch
+    steady.set_pitch(blade_pitch)
     if platform == "floating":
         remaining = steady.settle(steady.motions())
         if not remaining < 1e3 * TOLERANCE:
@@ -392,13 +399,14 @@ def trim_prescribed(scene, rotor_speed, blade_pitch, platform="floating"):
 
 def _point(scene, steady, platform):
     """OperatingPoint at the present state, channels averaged over the azimuth."""
+    rest_actuators(scene.model, steady.x, steady.u)
     state, command = steady.x.copy(), steady.u.copy()
     rows = []
     for i in range(AZIMUTHS):
         x = state.copy()
         x[State.AZIMUTH] += i * (2.0 * pi / 3.0) / AZIMUTHS
         rows.append(output_row(steady.handle, x, command, 0.0, len(scene.channels)))
-    row = to_units(np.mean(rows, axis=0), scene.n_lines, scene.load_names)
+    row = to_units(np.mean(rows, axis=0), scene.n_lines, scene.load_names, scene.channel_groups)
     names = [channel.name for channel in scene.channels]
     values = {name: float(value) for name, value in zip(names, row, strict=True)}
     values["Azimuth"] = 0.0

@@ -21,6 +21,7 @@ from fowt_env.descriptions.records import (
     to_si,
     validate,
 )
+from fowt_env.descriptions.tower_modes import TowerBending, mass_problem, read_tower_modes
 from fowt_env.descriptions.turbine import Inertia, Vector3, turbine_file, turbine_names
 from fowt_env.errors import InputError
 
@@ -144,7 +145,7 @@ class Member(Record):
 
 
 class Tower(Record):
-    """Rigid tower, with the taper that its drag needs."""
+    """Tower as one rigid body, with the taper that its drag needs, and how it bends where that is known."""
 
     mass: NonNegative
     cm_height: Finite
@@ -154,11 +155,15 @@ class Tower(Record):
     base_diameter: Positive
     top_diameter: Positive
     drag_coefficient: NonNegative = 1.0
+    modes: TowerBending | None = None
 
     @model_validator(mode="after")
     def _heights(self):
         if self.top_height <= self.base_height:
             raise ValueError(f"top_height = {self.top_height}: must be > base_height = {self.base_height} m")
+        if self.modes is not None:
+            if problem := mass_problem(self.modes, self.mass, self.top_height - self.base_height):
+                raise ValueError(problem)
         return self
 
 
@@ -305,6 +310,13 @@ def read_platform(name_or_path: str | Path) -> Platform:
         except InputError as error:
             problems.append(f"potential_flow: {error}")
             del data["potential_flow"]
+    tower = data.get("tower")
+    if isinstance(tower, dict) and "modes" in tower:
+        data["tower"] = {key: value for key, value in tower.items() if key != "modes"}
+        try:
+            data["tower"]["modes"] = read_tower_modes(tower["modes"], path.parent)
+        except InputError as error:
+            problems.append(str(error))
     if isinstance(data.get("turbine"), str):
         try:
             turbine = locate("turbine", data["turbine"], turbine_names(), turbine_file, path.parent)

@@ -74,6 +74,7 @@ from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
 from fowt_env.plant.rollout import STOP_REASONS, output
 from fowt_env.plant.sensing import new_past
 from fowt_env.plant.state import Command, State
+from fowt_env.scene.actuators import rest_actuators
 from fowt_env.scene.build import build_scene
 from fowt_env.scene.options import OPTIONS
 from fowt_env.scene.scene import Scene
@@ -330,7 +331,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         find = cached_trim if episode.exact_start else interpolated_trim
         state, command = find(scene, self._key, scene.wind_speed)
         reference = Reference(float(state[State.PLATFORM_PITCH]), float(state[State.ROTOR_SPEED]))
-        state, command = _moved(state, command, episode.offsets, scene.turbine.pitch_drive)
+        state, command = _moved(state, command, episode.offsets, scene)
         return Start(episode, scene, self._nominal_in(scene), state, command, reference)
 
     def _begin(self, planned):
@@ -525,7 +526,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         run, scene = self._episode, self.scene
         data = scene.data()
         # what an evaluation at this instant has left
-        for name in ("lines", "stages", "cache", "added_mass", "user"):
+        for name in ("lines", "stages", "cache", "added_mass", "user", "blades"):
             getattr(data, name)[:] = getattr(run.data, name)
         row = np.empty(len(scene.channels))
         time = run.counts[STEP] * self.dt
@@ -658,9 +659,9 @@ def _nominal_parts(given):
     return {"turbine": None} | dict(given)
 
 
-def _moved(state, command, offsets, drive):
+def _moved(state, command, offsets, scene):
     """(state, command) moved by {channel: offset in its unit}, the blade pitch within its drive's range."""
-    x, u = state.copy(), command.copy()
+    x, u, drive = state.copy(), command.copy(), scene.turbine.pitch_drive
     for name, value in offsets.items():
         index, factor = INITIAL[name]
         x[index] += value * factor
@@ -671,6 +672,7 @@ def _moved(state, command, offsets, drive):
         )
     x[State.BLADE_PITCH] = min(max(x[State.BLADE_PITCH], drive.minimum), drive.maximum)
     u[Command.BLADE_PITCH] = x[State.BLADE_PITCH]
+    rest_actuators(scene.model, x, u)
     return x, u
 
 

@@ -48,7 +48,7 @@ class SafetyLayer(gymnasium.Wrapper):
         self._baseline = named_baseline(baseline, plant.design_scene.turbine, plant.control_dt)
         drive = plant.scene.turbine.pitch_drive
         # a command this far ahead of the blades keeps a first-order drive at its limit until the next one
-        self._feather = drive.rate_limit * (drive.time_constant + plant.control_dt)
+        self._feather = drive.rate_limit * (drive.lag + plant.control_dt)
         self._highest = drive.maximum
         self._last_speed = None
         self._left = 0  # control periods until the agent has the turbine back; 0: it has

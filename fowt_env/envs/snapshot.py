@@ -11,6 +11,7 @@ CARRIED = (
 )  # fmt: skip
 DATA_CARRIED = (
     "lines", "counters", "stages", "cache", "added_mass", "user", "history", "samples", "radiation",
+    "blades",
 )  # fmt: skip
 
 

@@ -49,6 +49,11 @@ def _upper_bodies(platform, turbine):
     ]
 
 
+def top_mass_matrix(platform, turbine):
+    """(6, 6) mass matrix of nacelle and rotor about the body origin."""
+    return assemble(_upper_bodies(platform, turbine)[1:])
+
+
 def build_rigid_body(platform, turbine, platform_fixed=False, rotor_fixed=False, plane=None):
     """RigidBody part: Eq. (10) from the four rigid bodies. plane: True holds sway, roll and yaw at zero."""
     ballast = platform.ballast
@@ -74,6 +79,30 @@ def build_rigid_body(platform, turbine, platform_fixed=False, rotor_fixed=False,
         platform_fixed,
         rotor_fixed,
         plane,
+    )
+
+
+def with_masses(modes, platform, turbine):
+    """TowerModes (or None) with the mass properties of what is below and above the tower's top.
+
+    Floater and straight tower are one rigid body, nacelle and rotor another, as in build_rigid_body.
+    """
+    if modes is None:
+        return None
+    ballast = platform.ballast
+    place = (ballast.cm_downwind, ballast.cm_left, -ballast.cm_depth)
+    tower, *upper = _upper_bodies(platform, turbine)
+    above = [
+        (mass, np.subtract(centre, (0.0, 0.0, modes.top_height)), inertia) for mass, centre, inertia in upper
+    ]
+    matrix, tilt = assemble(above), turbine.rotor.shaft_tilt
+    return modes._replace(
+        lower=np.ascontiguousarray(assemble([(ballast.mass, place, ballast.inertia), tower])),
+        straight=np.ascontiguousarray(assemble([tower])),
+        upper_mass=float(matrix[0, 0]),
+        upper_moment=np.array([matrix[1, 5], -matrix[0, 5], matrix[0, 4]]),
+        upper_inertia=np.ascontiguousarray(matrix[3:, 3:]),
+        shaft=np.array([np.cos(tilt), 0.0, -np.sin(tilt)]),
     )
 
 

@@ -33,14 +33,15 @@ def section_cm(turbine, j, alpha):
     return np.interp((alpha + np.pi) % (2 * np.pi) - np.pi, polar[:, 0], polar[:, 3])
 
 
-def loads(turbine, elements, x, wind, density):
+def loads(turbine, elements, x, wind, density, pitches=None):
     """(6,) force and moment about the body origin, body axes; wind: inertial point (3,) to velocity (3,).
 
-    x: state of the plant, rows as in fowt_env.plant.state.State.
+    x: state of the plant, rows as in fowt_env.plant.state.State. pitches: rad, one for each blade; None: that
+    of the state for all.
     """
     rotor, blade = turbine.rotor, turbine.blade
     place, angles, v, w = x[:3], x[3:6], x[7:10], x[10:13]
-    azimuth, speed, pitch = x[6], x[13], x[14]
+    azimuth, speed = x[6], x[13]
     body = rotation(*angles)
     shaft = about_y(rotor.shaft_tilt)  # columns are the rotor axes in body components
     hub = np.array([-rotor.overhang, 0.0, rotor.hub_height])
@@ -48,6 +49,7 @@ def loads(turbine, elements, x, wind, density):
     slope = np.arctan(np.gradient(points[1:-1, 0], points[1:-1, 2], edge_order=2))
     force, moment = np.zeros(3), np.zeros(3)
     for number in range(rotor.blades):
+        pitch = x[14] if pitches is None else pitches[number]
         turn = rotation(azimuth + 2 * np.pi * number / rotor.blades, 0.0, 0.0)
         coned = shaft @ turn @ about_y(-rotor.cone)  # blade axes without pitch, in body components
         pitched = coned @ rotation(0.0, 0.0, -pitch)

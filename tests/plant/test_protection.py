@@ -245,3 +245,55 @@ def test_wrong_faults_and_trips_are_refused_before_anything_runs(scene, options,
 
 def test_every_kind_of_fault_is_of_one_group():
     assert len(KINDS) == len(set(KINDS)) and not set(BLADE_FAULTS) & set(SENSOR_FAULTS)
+
+
+# Blades of their own
+
+
+@pytest.fixture(scope="module")
+def three():
+    return fowt_env.build_scene("oc3_hywind", wind=16.0, fidelity="standard", pitch="individual")
+
+
+PITCHES = ["BldPitch1_[deg]", "BldPitch2_[deg]", "BldPitch3_[deg]"]
+
+
+def test_a_stop_with_one_stuck_blade_leaves_it_and_stands_on_the_others(three):
+    stuck = {"kind": "stuck_pitch", "time": 2.0, "blades": [2]}
+    stop = {"kind": "emergency_stop", "time": 4.0}
+    frame = run(three, duration=60.0, faults=[stuck, stop], protection="turbine")
+    first, second, third = (frame[name].to_numpy() for name in PITCHES)
+    assert second[-1] == pytest.approx(second[20], abs=0.05)
+    np.testing.assert_array_equal(first, third)
+    assert first[-1] == pytest.approx(90.0, abs=0.1) and frame[SPEED].iloc[-1] < 4.0
+    assert frame["PtfmYaw_[deg]"].abs().max() > 2.0 * run(three, faults=stop)["PtfmYaw_[deg]"].abs().max()
+
+
+@pytest.mark.parametrize("blade", [1, 2, 3])
+def test_a_blade_that_runs_away_trips_by_its_deviation(three, blade):
+    fault = {"kind": "pitch_runaway", "time": 2.0, "blades": [blade], "towards": "fine"}
+    frame = run(three, protection="turbine", faults=fault)
+    assert frame.attrs["trip"] == "pitch_deviation"
+    command = frame[PITCHES[blade % 3]]  # the others follow it
+    off = np.abs(frame[PITCHES[blade - 1]] - command) > 5.0
+    assert frame.attrs["tripped"] == pytest.approx(first_time(frame[TIME], off, 1.0), abs=0.2)
+    assert frame[PITCHES[blade - 1]].iloc[-1] == pytest.approx(0.0, abs=0.05)
+
+
+def test_an_offset_blade_is_seen_by_the_mean_of_true_pitches_alone(three):
+    fault = {"kind": "pitch_offset", "time": 2.0, "blades": [3], "offset": 1.0}
+    controller = Delegate(three.turbine, DT)
+    frame = run(three, controller, duration=6.0, faults=fault, protection="turbine")
+    assert frame[PITCHES[2]].iloc[-1] == pytest.approx(frame[PITCHES[0]].iloc[-1] + 1.0, abs=0.02)
+    assert frame.attrs["tripped"] is None
+    mean = np.radians(frame[PITCHES].mean(axis=1).to_numpy()[:-1])
+    late = frame[TIME].to_numpy()[:-1] >= 2.0 - 1e-9
+    read = np.array(controller.read)[:, 2]
+    np.testing.assert_allclose(read, mean - late * np.radians(1.0) / 3.0, rtol=1e-9)
+
+
+def test_single_blades_have_the_same_bits_compiled_and_in_python(three):
+    fault = {"kind": "pitch_offset", "time": 2.0, "blades": [2, 3], "offset": -1.0}
+    options = {"faults": fault, "protection": "turbine", "sensors": "standard", "duration": 8.0}
+    compiled, python = run(three, **options), run(three, Delegate(three.turbine, DT), **options)
+    pd.testing.assert_frame_equal(compiled, python, check_exact=True)

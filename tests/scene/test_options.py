@@ -53,7 +53,7 @@ def load_of(name, wind, speed, blade_pitch, density=1.225):
     for azimuth in np.linspace(0.0, 2.0 * np.pi / 3.0, 8, endpoint=False):
         x = state(rotor_speed=speed, blade_pitch=blade_pitch, azimuth=azimuth)
         now = wind_now(0.0, aero.wind)
-        found = rotor_part(0.0, pose_of(x), x, now, aero, aero.rotor, np.zeros_like(x), counters)
+        found = rotor_part(0.0, pose_of(x), x, now, aero, aero.rotor, np.zeros_like(x), counters, None, None)
         rows.append([found.thrust, found.torque, *found.wrench])
     return np.mean(rows, axis=0)
 

@@ -230,7 +230,7 @@ def _of_wind(part, t, pose, x, aero, data, dx):
         return 0.0
     now = wind_now(t, aero.wind) if part == 1 else wind_now(0.0, aero.wind)
     if part == 2:
-        load = rotor_part(t, pose, x, now, aero, aero.rotor, dx, data.counters)
+        load = rotor_part(t, pose, x, now, aero, aero.rotor, dx, data.counters, None, data.blades)
         return load.thrust + load.wrench.mz
     if part == 3:
         return tower_load(t, pose, now, aero.wind, aero.field, aero.tower).my

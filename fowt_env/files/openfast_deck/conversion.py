@@ -161,7 +161,7 @@ def tower_drag(deck):
 # --------------------------------------------------------------------------- files
 
 
-def platform_rows(deck, name, turbine, coefficients, options=None):
+def platform_rows(deck, name, turbine, coefficients, distribution, options=None):
     """{table: rows} of platform.toml; "" is its head, "lines" and "members" are lists of tables."""
     site, values = deck.site, deck.elastodyn
     source = values.file.source
@@ -201,6 +201,8 @@ def platform_rows(deck, name, turbine, coefficients, options=None):
             Row("drag_coefficient", drag, deck.aerodyn.file.source("TwrCd") + ", of the table's load"),
         ],
     }  # fmt: skip
+    if values.bending is not None:
+        tables["tower.modes"] = _bending_rows(values.bending, distribution)
     hydro = deck.hydrodyn
     if hydro.potential is not None:
         tables["potential_flow"] = [
@@ -238,6 +240,27 @@ def platform_rows(deck, name, turbine, coefficients, options=None):
     if options:
         tables["options"] = [Row(key, value) for key, value in options.items()]
     return tables
+
+
+def _bending_rows(modes, distribution):
+    """Rows of [tower.modes] of a descriptions.tower_modes.TowerBending."""
+    rows = [
+        Row(
+            "distribution",
+            distribution,
+            "tower: TMassDen, TwFAStif, TwSSStif, with AdjTwMa, AdjFASt, AdjSSSt",
+        ),
+        Row("fore_aft", modes.fore_aft, "tower: TwFAM1Sh, TwFAM2Sh, of the powers 2 to 6"),
+        Row("side_side", modes.side_side, "tower: TwSSM1Sh, TwSSM2Sh"),
+        Row("fore_aft_damping", modes.fore_aft_damping, "tower: TwrFADmp"),
+        Row("side_side_damping", modes.side_side_damping, "tower: TwrSSDmp"),
+    ]
+    for name, key in (("fore_aft_tuner", "FAStTunr"), ("side_side_tuner", "SSStTunr")):
+        if any(factor != 1.0 for factor in getattr(modes, name)):
+            rows.append(Row(name, getattr(modes, name), f"tower: {key}"))
+    if modes.top_mass:
+        rows.append(Row("top_mass", modes.top_mass, "ElastoDyn: YawBrMass, in the mass above too"))
+    return [*rows, Row("elements", modes.elements, "ElastoDyn: TwrNodes")]
 
 
 def draft(deck):
@@ -278,6 +301,21 @@ def _member_rows(member):
             )
             rows.append(Row(key, list(value), comment))
     return rows
+
+
+def _second_order(control, why):
+    """Table of the pitch drive of second order, where the deck's controller has one."""
+    if control.second_order is None:
+        return {}
+    frequency, damping = control.second_order
+    return {
+        "pitch_drive.second_order": [
+            Row(
+                "natural_frequency", frequency, why["natural_frequency"] + "; used where a scene asks for it"
+            ),
+            Row("damping", damping, why["damping"]),
+        ]
+    }
 
 
 def turbine_rows(deck, name):
@@ -346,6 +384,7 @@ def turbine_rows(deck, name):
             Row("minimum_deg", math.degrees(control.minimum_pitch), why.get("minimum_pitch", "usual value")),
             Row("maximum_deg", math.degrees(control.maximum_pitch), why.get("maximum_pitch", "usual value")),
         ],
+        **_second_order(control, why),
         "torque_law": law_rows,
     }  # fmt: skip
     for gain_set, (proportional, integral, half) in control.gains.items():

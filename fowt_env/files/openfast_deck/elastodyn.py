@@ -9,13 +9,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fowt_env.descriptions.records import validate
 from fowt_env.descriptions.rotor_mass import BladeMass, blade_mass
+from fowt_env.descriptions.tower_modes import TowerBending
 from fowt_env.files.openfast_deck.parser import PartFile
 
 MASS = {"low": 0.0, "high": 1e12}  # kg
 INERTIA = {"low": 0.0, "high": 1e18}  # kg m2
 LENGTH = {"low": -1e4, "high": 1e4}  # m
 NODES = {"low": 1, "high": 999}
+LARGEST = {"kg/m": 1e9, "N m2": 1e18}
 
 
 @dataclass(frozen=True)
@@ -37,6 +40,7 @@ class ElastoDyn:
     blades: int
     blade: BladeMass
     tower: Span
+    bending: TowerBending | None  # of a tower file with mode shapes
     platform_products: tuple  # PtfmXYIner, PtfmYZIner, PtfmXZIner, kg m2
     gravity: float | None  # of FAST 8, where it stands here
     flexible: tuple  # names of degrees of freedom that are on and that the plant does not have
@@ -106,35 +110,43 @@ def read_elastodyn(path, folders=()):
         raise file.wrong("TowerHt", values["towerht"], f"> TowerBsHt = {values['towerbsht']:g}")
     if values["overhang"] > 0.0:
         raise file.wrong("OverHang", values["overhang"], "<= 0: downwind rotors cannot be represented")
+    tower, bending = _tower(file, folders, values)
     return ElastoDyn(
         file=file,
         values=values,
         blades=blades,
         blade=_blade(file, folders, values),
-        tower=_tower(file, folders, values["towerht"] - values["towerbsht"]),
+        tower=tower,
+        bending=bending,
         platform_products=tuple(file.number(f"Ptfm{name}Iner", default=0.0) for name in ("XY", "YZ", "XZ")),
         gravity=file.number("Gravity", default=None, low=0.0, open_low=True),
         flexible=tuple(what for key, what in FLEXIBLE.items() if file.flag(key, default=False)),
     )
 
 
-def _distributed(path, kind, count_key, first, density, factor):
-    """((n,) fraction of the length, (n,) kg/m) of a blade or tower file."""
-    file = PartFile(path, kind)
+def _distributed(file, count_key, first, *columns):
+    """((n,) fraction of the length, then (n,) of each column) of a blade or tower file.
+
+    columns: (name, unit, key of the factor on it); values are from 0 to 1e9 kg/m or to 1e18 N m2.
+    """
     count = file.whole(count_key, low=2, high=10_000)
     rows = file.headed(first, count)
-    name = density.lower()
-    if name not in rows[0][1]:
-        raise file.refusal(f"the column {density} is missing", rows[0][0] - 1)
-    adjust = file.number(factor, default=1.0, low=0.0, high=1e3)
     place = np.array([cells[first.lower()] for _, cells in rows])
-    values = np.array([cells[name] for _, cells in rows])
     for i, (line, _) in enumerate(rows):
         if not 0.0 <= place[i] <= 1.0 or (i and place[i] <= place[i - 1]):
             raise file.refusal(f"{first} = {place[i]:g}: must increase from 0 to 1", line)
-        if not 0.0 <= values[i] <= 1e9:
-            raise file.refusal(f"{density} = {values[i]:g}: must be from 0 to 1e9 kg/m", line)
-    return place, adjust * values
+    found = [place]
+    for name, unit, factor in columns:
+        if name.lower() not in rows[0][1]:
+            raise file.refusal(f"the column {name} is missing", rows[0][0] - 1)
+        adjust = file.number(factor, default=1.0, low=0.0, high=1e3)
+        values = np.array([cells[name.lower()] for _, cells in rows])
+        largest = LARGEST[unit]
+        for value, (line, _) in zip(values, rows, strict=True):
+            if not 0.0 <= value <= largest:
+                raise file.refusal(f"{name} = {value:g}: must be from 0 to {largest:g} {unit}", line)
+        found.append(adjust * values)
+    return found
 
 
 def _span(length, nodes, place, density):
@@ -156,16 +168,60 @@ def _blade(file, folders, values):
         if name not in (None, first) and i <= file.whole("NumBl"):
             raise file.wrong(f"BldFile({i})", name, "the file of blade 1: blades are alike")
     nodes = file.whole("BldNodes", default=50, **NODES)
-    place, density = _distributed(path, "blade", "NBlInpSt", "BlFract", "BMassDen", "AdjBlMs")
+    place, density = _distributed(
+        PartFile(path, "blade"), "NBlInpSt", "BlFract", ("BMassDen", "kg/m", "AdjBlMs")
+    )
     tip = values["tiprad"]
     blade = blade_mass(place, density, values["hubrad"], tip, nodes)
     return BladeMass(np.append(blade.radius, tip), np.append(blade.mass, values["tipmass"]))
 
 
-def _tower(file, folders, length):
+def _tower(file, folders, values):
+    """(Span, TowerBending or None) of the tower file."""
     path = file.other("TwrFile", folders=folders)
     if path is None:
         raise file.wrong("TwrFile", "unused", "the tower file: the mass of the tower is in it")
     nodes = file.whole("TwrNodes", default=20, **NODES)
-    place, density = _distributed(path, "tower", "NTwInpSt", "HtFract", "TMassDen", "AdjTwMa")
-    return _span(length, nodes, place, density)
+    tower = PartFile(path, "tower")
+    place, density = _distributed(tower, "NTwInpSt", "HtFract", ("TMassDen", "kg/m", "AdjTwMa"))
+    span = _span(values["towerht"] - values["towerbsht"], nodes, place, density)
+    return span, _bending(tower, nodes, values["yawbrmass"])
+
+
+def _bending(tower, nodes, top_mass):
+    """TowerBending of a tower file; None of one without shapes, or without mass or stiffness somewhere."""
+    if not tower.has("TwFAM1Sh(2)"):
+        return None
+    place, density, *stiffness = _distributed(
+        tower, "NTwInpSt", "HtFract", ("TMassDen", "kg/m", "AdjTwMa"), ("TwFAStif", "N m2", "AdjFASt"),
+        ("TwSSStif", "N m2", "AdjSSSt"),
+    )  # fmt: skip
+    if min(map(np.min, (density, *stiffness))) <= 0.0 or (place[0], place[-1]) != (0.0, 1.0):
+        return None
+
+    def of_modes(name, default, factor=1.0, **limits):
+        return tuple(factor * tower.number(f"{name}({i})", default=default, **limits) for i in (1, 2))
+
+    def shapes(letters):
+        return tuple(
+            tuple(tower.number(f"Tw{letters}M{i}Sh({power})") for power in range(2, 7)) for i in (1, 2)
+        )
+
+    given = {
+        "height_fraction": tuple(place.tolist()),
+        "mass_density": tuple(density.tolist()),
+        "fore_aft_stiffness": tuple(stiffness[0].tolist()),
+        "side_side_stiffness": tuple(stiffness[1].tolist()),
+        "fore_aft": shapes("FA"),
+        "side_side": shapes("SS"),
+        "fore_aft_damping": of_modes("TwrFADmp", 1.0, 0.01, low=0.0, high=99.0),
+        "side_side_damping": of_modes("TwrSSDmp", 1.0, 0.01, low=0.0, high=99.0),
+        "fore_aft_tuner": of_modes("FAStTunr", 1.0, low=0.0, high=1e3, open_low=True),
+        "side_side_tuner": of_modes("SSStTunr", 1.0, low=0.0, high=1e3, open_low=True),
+        "top_mass": top_mass,
+        "elements": nodes,
+    }
+    found, problems = validate(TowerBending, given)
+    if problems:
+        raise tower.refusal("; ".join(problems))
+    return found

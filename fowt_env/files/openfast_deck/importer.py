@@ -16,11 +16,12 @@ from fowt_env.errors import InputError
 from fowt_env.files.atomic import replacing
 from fowt_env.files.openfast_deck.conversion import platform_rows, stations, turbine_rows
 from fowt_env.files.openfast_deck.deck import read_deck
-from fowt_env.files.openfast_deck.output import blade_text, polar_text, toml_text
+from fowt_env.files.openfast_deck.output import blade_text, polar_text, toml_text, tower_text
 from fowt_env.files.openfast_deck.report import make_report, markdown
 
 UNITS = "SI units (kg, m, s, N, rad) unless a key says otherwise (_deg, _rpm, _deg_per_s)."
 COEFFICIENTS = "hydro.npz"
+DISTRIBUTION = "tower.csv"
 
 
 def import_deck(
@@ -35,7 +36,7 @@ def import_deck(
     replace_files=False,
     head=(),
 ):
-    """Report of a deck written as platform.toml, turbine/, hydro.npz and report.md into a folder.
+    """Report of a deck written as platform.toml, turbine/, hydro.npz, tower.csv and report.md into a folder.
 
     fst            the .fst file, or None with parts
     folder         made if need be; its files are left alone unless replace_files
@@ -97,7 +98,9 @@ def _texts(deck, name, head):
     columns, airfoils = stations(deck)
     source = deck.aerodyn.blade_file.path.name
     texts = {
-        "platform.toml": toml_text(platform_rows(deck, name, "turbine/turbine.toml", COEFFICIENTS), title),
+        "platform.toml": toml_text(
+            platform_rows(deck, name, "turbine/turbine.toml", COEFFICIENTS, DISTRIBUTION), title
+        ),
         "turbine/turbine.toml": toml_text(turbine_rows(deck, name), title),
         "turbine/blade.csv": blade_text(columns, airfoils, [
             f"Blade of {source}: its nodes, the end ones 0.05 m inside root and tip, where loads are 0.",
@@ -105,6 +108,11 @@ def _texts(deck, name, head):
             *head,
         ]),
     }  # fmt: skip
+    if (bending := deck.elastodyn.bending) is not None:
+        texts[DISTRIBUTION] = tower_text(bending, [
+            f"Tower of {deck.elastodyn.file.text('TwrFile')}: mass density in kg/m, stiffness (EI) in N m2.",
+            *head,
+        ])  # fmt: skip
     for airfoil, polar in deck.aerodyn.polars.items():
         texts[f"turbine/polars/{airfoil}.csv"] = polar_text(
             polar, [f"{airfoil} of {deck.aerodyn.file.path.name}; alpha in degrees.", *head]

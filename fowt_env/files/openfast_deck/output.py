@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from fowt_env.descriptions.tower_modes import COLUMNS
+
 WIDTH = 40  # characters of a line before its comment
 
 
@@ -59,6 +61,15 @@ def blade_text(columns, airfoils, head):
     for row, name in zip(columns, airfoils, strict=True):
         cells = [f"{value + 0.0:.8g}" for value in row]
         lines.append(",".join([*cells[:3], name, *(cells[3:] if shaped else ())]))
+    return "\n".join(lines) + "\n"
+
+
+def tower_text(modes, head):
+    """Text of the distribution file of a descriptions.tower_modes.TowerBending."""
+    lines = [f"# {line}" for line in head]
+    lines.append(",".join(COLUMNS))
+    rows = zip(*(getattr(modes, name) for name in COLUMNS), strict=True)
+    lines += [",".join(f"{value + 0.0:.10g}" for value in row) for row in rows]
     return "\n".join(lines) + "\n"
 
 

@@ -8,6 +8,13 @@ from fowt_env.files.markdown import markdown_table
 from fowt_env.files.openfast_deck.conversion import ballast, hub_place, mass_properties, rotor_mass
 from fowt_env.files.openfast_deck.hydrodyn import is_old
 
+TOWER_OPTIONS = {  # what a degree of freedom's name begins with: the option of a scene that has it
+    "first fore-aft": 'tower = "modes"',
+    "first side-to-side": 'tower = "modes"',
+    "second fore-aft": 'tower = "modes2"',
+    "second side-to-side": 'tower = "modes2"',
+}
+
 
 class Report(NamedTuple):
     """Rows of three tables: figures (name, value), differences (deck, here), sources (part, file)."""
@@ -66,8 +73,10 @@ def _figures(deck, body):
 
 def _differences(deck):
     """(what the deck has, what the plant has) of everything that is not alike."""
+    bends = deck.elastodyn.bending is not None
     for what in deck.elastodyn.flexible:
-        yield what, "rigid"
+        option = next((option for word, option in TOWER_OPTIONS.items() if what.startswith(word)), None)
+        yield what, f"rigid; with the option {option} as in the deck" if bends and option else "rigid"
     if any(deck.elastodyn.platform_products):
         names = "PtfmXYIner, PtfmYZIner, PtfmXZIner"
         yield f"products of inertia of the platform ({names})", "left out: its principal axes are the body's"

@@ -18,6 +18,7 @@ from fowt_env.plant.aero.blade_elements import (
 )
 from fowt_env.plant.aero.blade_shape import (
     NO_BLADE_LOAD,
+    BladeLoad,
     BladeShape,
     blade_wind,
     effective_pitch,
@@ -29,6 +30,7 @@ from fowt_env.plant.aero.blade_shape import (
 )
 from fowt_env.plant.aero.wake import PER_ELEMENT, filtered_induction, skew_factor, skew_of
 from fowt_env.plant.aero.wind import wind_at
+from fowt_env.plant.blade_pitches import pitch_of
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.events import Counter
@@ -88,15 +90,26 @@ def hub_flow(t, pose, now, series, field, overhang, hub_height):
     return HubFlow(X, Y, Z, vx, vy, vz, wx, wy, wz, sqrt(wx * wx + wy * wy + wz * wz))
 
 
+@kernel
+def store_blade_load(blade, load, factor, pitches, blades):
+    """Put a factor times the BladeLoad of a blade into blades; nothing with one pitch for all blades."""
+    if pitches is None:
+        return
+    row = blades[blade]
+    row[0], row[1], row[2] = factor * load.fx, factor * load.fr, factor * load.ft
+    row[3], row[4], row[5] = factor * load.mx, factor * load.mr, factor * load.mt
+
+
 @inlined_kernel
-def _straight_load(t, pose, x, now, series, field, rotor, shape, skew, wake, dx, counters):
+def _straight_load(t, pose, x, now, series, field, rotor, shape, skew, wake, dx, counters, pitches, blades):
     hub = hub_flow(t, pose, now, series, field, rotor.overhang, rotor.hub_height)
-    speed, azimuth, blade_pitch = x[State.ROTOR_SPEED], x[State.AZIMUTH], x[State.BLADE_PITCH]
+    speed, azimuth = x[State.ROTOR_SPEED], x[State.AZIMUTH]
     induction = smoothstep(speed * rotor.tip_radius, SLOW_ROTOR * hub.speed, FAST_ROTOR * hub.speed)
     skewed = skew_of(hub, skew)
     stations = rotor.radius.shape[0]
     thrust = torque = fy = fz = my = mz = 0.0
     for blade in range(rotor.blades):
+        blade_pitch = pitch_of(blade, x, pitches)
         psi = azimuth + 2.0 * pi * blade / rotor.blades
         ey, ez = -sin(psi), cos(psi)  # e_r = (0, ey, ez), e_t = (0, -ez, ey)
         rx, ry, rz = (
@@ -137,6 +150,8 @@ def _straight_load(t, pose, x, now, series, field, rotor, shape, skew, wake, dx,
         fz += force_t * ey
         my += moment_n * ez  # e_r x e_x = -e_t
         mz -= moment_n * ey
+        load = BladeLoad(force_n, 0.0, force_t, moment_t, 0.0, -moment_n)
+        store_blade_load(blade, load, 1.0, pitches, blades)
     return RotorLoad(
         Wrench(
             thrust,
@@ -189,9 +204,10 @@ def curved_blade_load(
     wake,
     dx,
     counters,
+    pitches,
 ):
     """BladeLoad of a blade of BladeShape shape, blade: its BladeWind; pose in rotor axes."""
-    blade_pitch = x[State.BLADE_PITCH]
+    blade_pitch = pitch_of(number, x, pitches)
     cosine, sine = cos(blade_pitch), sin(blade_pitch)
     load = NO_BLADE_LOAD
     for j in range(rotor.radius.shape[0]):
@@ -224,7 +240,7 @@ def curved_blade_load(
 
 
 @inlined_kernel
-def _curved_load(t, pose, x, now, series, field, rotor, shape, skew, wake, dx, counters):
+def _curved_load(t, pose, x, now, series, field, rotor, shape, skew, wake, dx, counters, pitches, blades):
     hub = hub_flow(t, pose, now, series, field, rotor.overhang, rotor.hub_height)
     induction = smoothstep(
         x[State.ROTOR_SPEED] * rotor.tip_radius, SLOW_ROTOR * hub.speed, FAST_ROTOR * hub.speed
@@ -236,8 +252,9 @@ def _curved_load(t, pose, x, now, series, field, rotor, shape, skew, wake, dx, c
         blade = blade_wind(-sin(psi), cos(psi), x[State.ROTOR_SPEED], pose, hub)
         load = curved_blade_load(
             number, t, pose, hub, blade, induction, x, now, series, field, rotor, shape, skewed, skew, wake,
-            dx, counters,
+            dx, counters, pitches,
         )  # fmt: skip
+        store_blade_load(number, load, 1.0, pitches, blades)
         total = with_blade(total, load, blade)
     return rotor_axes_load(total, 1.0, rotor)
 
@@ -247,7 +264,7 @@ _sweep = chosen_by_class("shape", {type(None): _straight_load, BladeShape: _curv
 
 
 @kernel
-def rotor_load(t, pose, x, now, series, field, rotor, skew, wake, dx, counters):
+def rotor_load(t, pose, x, now, series, field, rotor, skew, wake, dx, counters, pitches, blades):
     """RotorLoad of the state x at time t in rotor axes; theory.md, 5.1. No rotor or no wind series: zero.
 
     pose                in rotor axes (tilt.py)
@@ -255,16 +272,20 @@ def rotor_load(t, pose, x, now, series, field, rotor, skew, wake, dx, counters):
     skew, wake          optional SkewedWake and DynamicInflow (wake.py)
     dx                  derivative of the state: only the wake states are written
     counters            counters[Counter.BEM_FALLBACK] grows by one per station without a bracket
+    pitches             BladePitches, or None: one pitch for all blades
+    blades              with pitches the BladeLoad of each blade is put there, (blades, 6)
     """
     if rotor is None:
         return NO_ROTOR_LOAD
     if series is None:
         return NO_ROTOR_LOAD
-    return _sweep(t, pose, x, now, series, field, rotor, rotor.shape, skew, wake, dx, counters)
+    return _sweep(
+        t, pose, x, now, series, field, rotor, rotor.shape, skew, wake, dx, counters, pitches, blades
+    )
 
 
 @kernel
-def wake_equilibrium(t, pose, x, now, series, field, rotor, skew, wake, dx, counters):
+def wake_equilibrium(t, pose, x, now, series, field, rotor, skew, wake, dx, counters, pitches, blades):
     """Number of wake states, set in x to their steady values for the rest of x held as it is.
 
     The filter is linear in its states: the rates at two values of the first stage, 0 and 1, give its
@@ -277,11 +298,11 @@ def wake_equilibrium(t, pose, x, now, series, field, rotor, skew, wake, dx, coun
     count = PER_ELEMENT * rotor.blades * rotor.radius.shape[0]
     for i in range(State.INTERNAL, State.INTERNAL + count):
         x[i] = 0.0
-    rotor_load(t, pose, x, now, series, field, rotor, skew, wake, dx, counters)
+    rotor_load(t, pose, x, now, series, field, rotor, skew, wake, dx, counters, pitches, blades)
     for i in range(State.INTERNAL, State.INTERNAL + count, 2):
         x[i + 1] = dx[i]
         x[i] = 1.0
-    rotor_load(t, pose, x, now, series, field, rotor, skew, wake, dx, counters)
+    rotor_load(t, pose, x, now, series, field, rotor, skew, wake, dx, counters, pitches, blades)
     for i in range(State.INTERNAL, State.INTERNAL + count, 2):
         x[i] = x[i + 1] / (x[i + 1] - dx[i])
         x[i + 1] = x[i] / 0.4

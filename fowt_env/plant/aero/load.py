@@ -5,12 +5,14 @@ from typing import NamedTuple
 from fowt_env.plant.aero.bem_rotor import RotorLoad, rotor_load
 from fowt_env.plant.aero.coefficient_table import CoefficientTable, coefficient_table_load
 from fowt_env.plant.aero.section_table import SectionTable, section_table_load
-from fowt_env.plant.aero.tower_drag import tower_load
+from fowt_env.plant.aero.tower_drag import bent_tower_load, tower_load
 from fowt_env.plant.aero.wind import WindSeries, wind_at, wind_now
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
+from fowt_env.plant.model import LoadCache
 from fowt_env.plant.state import NO_LOAD, Wrench
 from fowt_env.plant.tilt import rotor_pose, to_body_axes
+from fowt_env.plant.tower_modes import TowerModes
 
 
 class BemRotor(NamedTuple):
@@ -32,7 +34,7 @@ class Aero(NamedTuple):
 
 
 class AeroLoad(NamedTuple):
-    """Loads of the wind, body components about the body origin."""
+    """Loads of the wind, body components about the body origin; of the rotor in those of its Pose."""
 
     rotor: RotorLoad
     tower: Wrench
@@ -42,23 +44,24 @@ NO_AERO_LOAD = AeroLoad(RotorLoad(NO_LOAD, 0.0, 0.0), NO_LOAD)
 
 
 @inlined_kernel
-def _solved(t, pose, x, now, aero, rotor, dx, counters):
+def _solved(t, pose, x, now, aero, rotor, dx, counters, pitches, blades):
     return rotor_load(
-        t, pose, x, now, aero.wind, aero.field, rotor.elements, rotor.skew, rotor.wake, dx, counters
-    )
+        t, pose, x, now, aero.wind, aero.field, rotor.elements, rotor.skew, rotor.wake, dx, counters, pitches,
+        blades,
+    )  # fmt: skip
 
 
 @inlined_kernel
-def _by_sections(t, pose, x, now, aero, rotor, dx, counters):
-    return section_table_load(t, pose, x, now, aero.wind, aero.field, rotor, counters)
+def _by_sections(t, pose, x, now, aero, rotor, dx, counters, pitches, blades):
+    return section_table_load(t, pose, x, now, aero.wind, aero.field, rotor, counters, pitches, blades)
 
 
 @inlined_kernel
-def _by_coefficients(t, pose, x, now, aero, rotor, dx, counters):
+def _by_coefficients(t, pose, x, now, aero, rotor, dx, counters, pitches, blades):
     return coefficient_table_load(pose, x, now, aero.wind, rotor, counters)
 
 
-# (t, pose, x, now, aero, rotor, dx, counters) -> RotorLoad, both pose and load in rotor axes
+# (t, pose, x, now, aero, rotor, dx, counters, pitches, blades) -> RotorLoad, pose and load in rotor axes
 _rotor_model = chosen_by_class(
     "rotor",
     {BemRotor: _solved, SectionTable: _by_sections, CoefficientTable: _by_coefficients},
@@ -67,20 +70,40 @@ _rotor_model = chosen_by_class(
 
 
 @inlined_kernel
-def rotor_part(t, pose, x, now, aero, rotor, dx, counters):
-    """RotorLoad by the rotor model that rotor is, body axes; of dx the wake's rates alone are written."""
-    load = _rotor_model(t, rotor_pose(pose, aero.tilt), x, now, aero, rotor, dx, counters)
+def rotor_part(t, pose, x, now, aero, rotor, dx, counters, pitches, blades):
+    """RotorLoad by the rotor model that rotor is, body axes; of dx the wake's rates alone are written.
+
+    pitches, blades: blades with pitches of their own, and where the load of each is put, as in rotor_load.
+    """
+    load = _rotor_model(t, rotor_pose(pose, aero.tilt), x, now, aero, rotor, dx, counters, pitches, blades)
     return RotorLoad(to_body_axes(load.wrench, aero.tilt), load.thrust, load.torque)
 
 
+@kernel
+def _straight_drag(t, pose, x, now, aero, modes, modal):
+    return tower_load(t, pose, now, aero.wind, aero.field, aero.tower)
+
+
+@kernel
+def _bent_drag(t, pose, x, now, aero, modes, modal):
+    return bent_tower_load(t, pose, x, now, aero.wind, aero.field, aero.tower, modes, modal)
+
+
+# (t, pose, x, now, aero, modes, modal) -> Wrench; the forces on a bending tower's deflections go to modal
+_drag = chosen_by_class("modes", {type(None): _straight_drag, TowerModes: _bent_drag})
+
+
 @inlined_kernel
-def aero_load(t, pose, x, aero, data, dx):
-    """AeroLoad at a state; writes the wake's rates into dx."""
+def aero_load(t, pose, nacelle, x, aero, pitches, modes, data, dx):
+    """AeroLoad at a state; writes the wake's rates into dx and adds to the forces on a tower's deflections.
+
+    nacelle: nacelle_pose, whose axes and origin the rotor's load has. modes: TowerModes or None.
+    """
     if aero is None:
         return NO_AERO_LOAD
     now = wind_now(t, aero.wind)
-    rotor = rotor_part(t, pose, x, now, aero, aero.rotor, dx, data.counters)
-    return AeroLoad(rotor, tower_load(t, pose, now, aero.wind, aero.field, aero.tower))
+    rotor = rotor_part(t, nacelle, x, now, aero, aero.rotor, dx, data.counters, pitches, data.blades)
+    return AeroLoad(rotor, _drag(t, pose, x, now, aero, modes, data.cache[LoadCache.MODAL :]))
 
 
 @kernel

@@ -29,6 +29,7 @@ from fowt_env.plant.aero.bem_rotor import (
     hub_flow,
     rotor_axes_load,
     rotor_load,
+    store_blade_load,
 )
 from fowt_env.plant.aero.blade_elements import (
     LARGEST_SPEED,
@@ -52,11 +53,12 @@ from fowt_env.plant.aero.blade_shape import (
     with_station,
 )
 from fowt_env.plant.aero.wind import LOWEST_HEIGHT, wind_at
+from fowt_env.plant.blade_pitches import pitch_of
 from fowt_env.plant.compile.decorators import entry, inlined_kernel, kernel
 from fowt_env.plant.compile.prefetch import prefetch
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.events import Counter
-from fowt_env.plant.state import NO_LOAD, State, Wrench
+from fowt_env.plant.state import BLADES, NO_LOAD, State, Wrench
 
 # Directions: v_normal/(v_normal + |v_tangential|) in AHEAD cells, from the rotor plane to the shaft (where
 # this has a kink), then on in BEHIND cells to an inflow in the plane from behind (roots in cross wind).
@@ -196,6 +198,25 @@ def _pitch_row(blade_pitch):
     if DENSE_END <= degrees < COARSE_END:
         return DENSE_ROWS + (degrees - DENSE_END) * (COARSE_ROWS / (COARSE_END - DENSE_END))
     return -1.0
+
+
+@kernel
+def _blade_row(blade, first, x, pitches):
+    """_pitch_row of a blade; first: that of the first one."""
+    if pitches is None:
+        return first
+    return _pitch_row(pitch_of(blade, x, pitches))
+
+
+@kernel
+def _all_rows(first, x, pitches):
+    """Whether every blade's pitch lies in the table; first: _pitch_row of the first one."""
+    if pitches is None:
+        return first >= 0.0
+    inside = first >= 0.0
+    for blade in range(1, BLADES):
+        inside = inside and _pitch_row(pitch_of(blade, x, pitches)) >= 0.0
+    return inside
 
 
 @kernel
@@ -404,17 +425,15 @@ def _sampled_force(
 
 
 @inlined_kernel
-def _straight_table_load(t, pose, x, now, series, field, table, shape, counters):
+def _straight_table_load(t, pose, x, now, series, field, table, shape, counters, pitches, blades):
     elements = table.elements
     hub = hub_flow(t, pose, now, series, field, elements.overhang, elements.hub_height)
-    speed, azimuth, blade_pitch = x[State.ROTOR_SPEED], x[State.AZIMUTH], x[State.BLADE_PITCH]
+    speed, azimuth = x[State.ROTOR_SPEED], x[State.AZIMUTH]
     induction = smoothstep(speed * elements.tip_radius, SLOW_ROTOR * hub.speed, FAST_ROTOR * hub.speed)
-    row = _pitch_row(blade_pitch)
-    if not (induction == 1.0 and row >= 0.0):
-        return rotor_load(t, pose, x, now, series, field, elements, None, None, x, counters)
-    i = int(row)
-    fraction = row - i
-    low, high = table.load[i], table.load[i + 1]
+    first_row = _pitch_row(x[State.BLADE_PITCH])
+    if not (induction == 1.0 and _all_rows(first_row, x, pitches)):
+        return rotor_load(t, pose, x, now, series, field, elements, None, None, x, counters, pitches, blades)
+    density = elements.air_density
     bottom, top = hub.Z - elements.tip_radius, hub.Z + elements.tip_radius
     sheared = field is None and bottom > LOWEST_HEIGHT and top < LARGEST_RATIO * bottom
     if sheared:
@@ -423,6 +442,10 @@ def _straight_table_load(t, pose, x, now, series, field, table, shape, counters)
         profile = _profile(1.0, 1.0, series)
     thrust = torque = fy = fz = my = mz = 0.0
     for number in range(elements.blades):
+        row = _blade_row(number, first_row, x, pitches)
+        i = int(row)
+        fraction = row - i
+        low, high = table.load[i], table.load[i + 1]
         blade = _blade(azimuth + 2.0 * pi * number / elements.blades, speed, pose, hub)
         force = BladeForce(0.0, 0.0, 0.0, 0.0, False)
         if sheared:
@@ -433,15 +456,17 @@ def _straight_table_load(t, pose, x, now, series, field, table, shape, counters)
             force = _field_force(t, pose, hub, blade, field, low, high, fraction, table.radius, table.arm)
         if not force.valid:
             force = _sampled_force(
-                t, pose, hub, blade, now, series, field, blade_pitch, low, high, fraction, table, counters
-            )
+                t, pose, hub, blade, now, series, field, pitch_of(number, x, pitches), low, high, fraction,
+                table, counters,
+            )  # fmt: skip
         thrust += force.force_n
         torque += force.moment_t
         fy -= force.force_t * blade.ez
         fz += force.force_t * blade.ey
         my += force.moment_n * blade.ez  # e_r x e_x = -e_t
         mz -= force.moment_n * blade.ey
-    density = elements.air_density
+        load = BladeLoad(force.force_n, 0.0, force.force_t, force.moment_t, 0.0, -force.moment_n)
+        store_blade_load(number, load, density, pitches, blades)
     thrust, torque = density * thrust, density * torque
     fy, fz = density * fy, density * fz
     return RotorLoad(
@@ -650,37 +675,61 @@ def _curved_sampled(
 
 
 @kernel
+def _loads_of_three(first, second, third, first_row, x, profile, table, shape, pitches):
+    """CurvedForce of each of three blades in the ShearedFlow of each."""
+    i = int(first_row)
+    low, high, fraction = table.load[i], table.load[i + 1], first_row - i
+    cosine, sine = cos(x[State.BLADE_PITCH]), sin(x[State.BLADE_PITCH])
+    if pitches is None:
+        return _sheared_blades(first, second, third, profile, low, high, fraction, cosine, sine, shape)
+    second_row, third_row = _blade_row(1, first_row, x, pitches), _blade_row(2, first_row, x, pitches)
+    j, k = int(second_row), int(third_row)
+    second_pitch, third_pitch = pitch_of(1, x, pitches), pitch_of(2, x, pitches)
+    return (
+        _sheared_blade(first, profile, low, high, fraction, cosine, sine, shape),
+        _sheared_blade(
+            second, profile, table.load[j], table.load[j + 1], second_row - j, cos(second_pitch),
+            sin(second_pitch), shape,
+        ),
+        _sheared_blade(
+            third, profile, table.load[k], table.load[k + 1], third_row - k, cos(third_pitch),
+            sin(third_pitch), shape,
+        ),
+    )  # fmt: skip
+
+
+@kernel
 def _three_blades(
-    azimuth, speed, pose, hub, now, series, profile, low, high, fraction, cosine, sine, shape, elements
+    azimuth, speed, first_row, x, pose, hub, now, series, profile, table, shape, pitches, blades
 ):
     """(whether every station lies in the table, RotorLoad) of three blades in a sheared wind."""
+    density = table.elements.air_density
     y, z = -sin(azimuth), cos(azimuth)
     p = blade_wind(y, z, speed, pose, hub)
     q = blade_wind(-0.5 * y - HALF_ROOT_3 * z, HALF_ROOT_3 * y - 0.5 * z, speed, pose, hub)
     r = blade_wind(HALF_ROOT_3 * z - 0.5 * y, -HALF_ROOT_3 * y - 0.5 * z, speed, pose, hub)
-    a, b, c = _sheared_blades(
+    a, b, c = _loads_of_three(
         _sheared_flow(pose, hub, p, now, series, profile),
         _sheared_flow(pose, hub, q, now, series, profile),
         _sheared_flow(pose, hub, r, now, series, profile),
-        profile, low, high, fraction, cosine, sine, shape,
+        first_row, x, profile, table, shape, pitches,
     )  # fmt: skip
+    store_blade_load(0, a.load, density, pitches, blades)
+    store_blade_load(1, b.load, density, pitches, blades)
+    store_blade_load(2, c.load, density, pitches, blades)
     total = with_blade(with_blade(with_blade(NO_LOAD, a.load, p), b.load, q), c.load, r)
-    return a.outside + b.outside + c.outside == 0, rotor_axes_load(total, elements.air_density, elements)
+    return a.outside + b.outside + c.outside == 0, rotor_axes_load(total, density, table.elements)
 
 
 @inlined_kernel
-def _curved_table_load(t, pose, x, now, series, field, table, shape, counters):
+def _curved_table_load(t, pose, x, now, series, field, table, shape, counters, pitches, blades):
     elements = table.elements
     hub = hub_flow(t, pose, now, series, field, elements.overhang, elements.hub_height)
-    speed, azimuth, blade_pitch = x[State.ROTOR_SPEED], x[State.AZIMUTH], x[State.BLADE_PITCH]
+    speed, azimuth = x[State.ROTOR_SPEED], x[State.AZIMUTH]
     induction = smoothstep(speed * elements.tip_radius, SLOW_ROTOR * hub.speed, FAST_ROTOR * hub.speed)
-    row = _pitch_row(blade_pitch)
-    if not (induction == 1.0 and row >= 0.0):
-        return rotor_load(t, pose, x, now, series, field, elements, None, None, x, counters)
-    i = int(row)
-    fraction = row - i
-    low, high = table.load[i], table.load[i + 1]
-    cosine, sine = cos(blade_pitch), sin(blade_pitch)
+    first_row = _pitch_row(x[State.BLADE_PITCH])
+    if not (induction == 1.0 and _all_rows(first_row, x, pitches)):
+        return rotor_load(t, pose, x, now, series, field, elements, None, None, x, counters, pitches, blades)
     bottom, top = hub.Z - shape.reach, hub.Z + shape.reach
     sheared = field is None and bottom > LOWEST_HEIGHT and top < LARGEST_RATIO * bottom
     if sheared:
@@ -689,25 +738,17 @@ def _curved_table_load(t, pose, x, now, series, field, table, shape, counters):
         profile = _profile(1.0, 1.0, series)
     if sheared and elements.blades == 3:
         all_valid, load = _three_blades(
-            azimuth,
-            speed,
-            pose,
-            hub,
-            now,
-            series,
-            profile,
-            low,
-            high,
-            fraction,
-            cosine,
-            sine,
-            shape,
-            elements,
+            azimuth, speed, first_row, x, pose, hub, now, series, profile, table, shape, pitches, blades
         )
         if all_valid:
             return load
     total = NO_LOAD
     for number in range(elements.blades):
+        blade_pitch, row = pitch_of(number, x, pitches), _blade_row(number, first_row, x, pitches)
+        i = int(row)
+        fraction = row - i
+        low, high = table.load[i], table.load[i + 1]
+        cosine, sine = cos(blade_pitch), sin(blade_pitch)
         psi = azimuth + 2.0 * pi * number / elements.blades
         blade = blade_wind(-sin(psi), cos(psi), speed, pose, hub)
         if sheared:
@@ -722,6 +763,7 @@ def _curved_table_load(t, pose, x, now, series, field, table, shape, counters):
                 t, pose, hub, blade, now, series, field, blade_pitch, low, high, fraction, elements, shape,
                 counters,
             )  # fmt: skip
+        store_blade_load(number, force.load, elements.air_density, pitches, blades)
         total = with_blade(total, force.load, blade)
     return rotor_axes_load(total, elements.air_density, elements)
 
@@ -733,13 +775,14 @@ _table_sweep = chosen_by_class(
 
 
 @kernel
-def section_table_load(t, pose, x, now, series, field, table, counters):
+def section_table_load(t, pose, x, now, series, field, table, counters, pitches, blades):
     """RotorLoad of the state x at time t from the tables of the stations, in rotor axes. No table or no wind
     series: zero.
 
     pose                in rotor axes (tilt.py)
     now, series, field  wind (weather/wind.py); every station has the wind of where it is at this instant
     counters            as in rotor_load, for the exact solutions outside the table
+    pitches, blades     as in rotor_load
     Against rotor_load: rms 1e-4 of the load's standard deviation over all operating states, for thrust and
     torque; tests/plant/aero/test_section_table.py has the figures.
     """
@@ -747,4 +790,6 @@ def section_table_load(t, pose, x, now, series, field, table, counters):
         return NO_ROTOR_LOAD
     if series is None:
         return NO_ROTOR_LOAD
-    return _table_sweep(t, pose, x, now, series, field, table, table.elements.shape, counters)
+    return _table_sweep(
+        t, pose, x, now, series, field, table, table.elements.shape, counters, pitches, blades
+    )

@@ -52,7 +52,7 @@ def test_a_broken_file_is_an_input_error(tmp_path, part):
             warnings.simplefilter("error")
             try:
                 deck = read_deck(path)
-                platform_rows(deck, "x", "x", "x")
+                platform_rows(deck, "x", "x", "x", "x")
                 turbine_rows(deck, "x")
                 stations(deck)
                 markdown(make_report(deck, "x"))

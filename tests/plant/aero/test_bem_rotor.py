@@ -74,7 +74,9 @@ def state(speed=0.0, blade_pitch=0.0, azimuth=0.0, position=(0,) * 6, velocity=(
 def load(x, series, rotor=ROTOR, counters=None):
     counters = np.zeros(N_COUNTERS) if counters is None else counters
     now = wind_now(0.0, series)
-    return rotor_load(0.0, pose_of(x), x, now, series, None, rotor, None, None, np.zeros_like(x), counters)
+    return rotor_load(
+        0.0, pose_of(x), x, now, series, None, rotor, None, None, np.zeros_like(x), counters, None, None
+    )
 
 
 @njit
@@ -408,7 +410,7 @@ series = make_series([0.0], [[%r, 1.0, 0.5, 0.5, 0.2]], reference_height=90.0, r
                      shear_exponent=0.14)
 x = np.zeros(N_RIGID); x[3:7] = 0.02, 0.05, 0.1, 0.3; x[7:13] = 0.01; x[13:15] = %r, %r
 load = rotor_load(0.0, pose_of(x), x, wind_now(0.0, series), series, None, rotor, None, None, x.copy(),
-                  np.zeros(3))
+                  np.zeros(3), None, None)
 print(*(v.hex() for v in map(float, load.wrench)))
 """
 

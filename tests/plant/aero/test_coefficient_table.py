@@ -47,7 +47,9 @@ def from_table(x, series, table=TABLE, counters=None):
 
 def from_sections(x, series):
     now, counters = wind_now(0.0, series), np.zeros(N_COUNTERS)
-    return rotor_load(0.0, pose_of(x), x, now, series, None, ROTOR, None, None, np.zeros_like(x), counters)
+    return rotor_load(
+        0.0, pose_of(x), x, now, series, None, ROTOR, None, None, np.zeros_like(x), counters, None, None
+    )
 
 
 def over_azimuth(x, series, points=8):

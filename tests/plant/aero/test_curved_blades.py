@@ -66,14 +66,14 @@ def moving(n, seed=1):
 def _solved(x, series, field, tilt, elements, counters):
     pose = rotor_pose(pose_of(x), tilt)
     now = wind_now(0.0, series)
-    load = rotor_load(0.0, pose, x, now, series, field, elements, None, None, x, counters)
+    load = rotor_load(0.0, pose, x, now, series, field, elements, None, None, x, counters, None, None)
     return to_body_axes(load.wrench, tilt), load.thrust, load.torque
 
 
 @njit
 def _looked_up(x, series, field, tilt, table, counters):
     pose = rotor_pose(pose_of(x), tilt)
-    load = section_table_load(0.0, pose, x, wind_now(0.0, series), series, field, table, counters)
+    load = section_table_load(0.0, pose, x, wind_now(0.0, series), series, field, table, counters, None, None)
     return to_body_axes(load.wrench, tilt), load.thrust, load.torque
 
 

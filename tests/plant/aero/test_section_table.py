@@ -61,8 +61,8 @@ def loads(states, winds, series, field, rotor, table, counters, exact, quick):
         x = states[i]
         series.value[0] = winds[i]
         now, pose = wind_now(0.0, series), pose_of(x)
-        a = rotor_load(0.0, pose, x, now, series, field, rotor, None, None, x, counters)
-        b = section_table_load(0.0, pose, x, now, series, field, table, counters)
+        a = rotor_load(0.0, pose, x, now, series, field, rotor, None, None, x, counters, None, None)
+        b = section_table_load(0.0, pose, x, now, series, field, table, counters, None, None)
         for out, load in ((exact, a), (quick, b)):
             w = load.wrench
             out[i, 0], out[i, 1], out[i, 2] = w.fx, w.fy, w.fz
@@ -127,9 +127,9 @@ def test_absent_table_or_wind_gives_exactly_zero():
     x, winds = one()
     series = series_of(winds[0])
     now, pose, counters = wind_now(0.0, series), pose_of(x[0]), np.zeros(N_COUNTERS)
-    assert section_table_load(0.0, pose, x[0], now, series, None, None, counters) == NO_ROTOR_LOAD
+    assert section_table_load(0.0, pose, x[0], now, series, None, None, counters, None, None) == NO_ROTOR_LOAD
     calm = wind_now(0.0, None)
-    assert section_table_load(0.0, pose, x[0], calm, None, None, TABLE, counters) == NO_ROTOR_LOAD
+    assert section_table_load(0.0, pose, x[0], calm, None, None, TABLE, counters, None, None) == NO_ROTOR_LOAD
     thin = build_blade_elements(TURBINE, 0.0)
     for speed in (1.2, 0.0):
         states, winds = one(speed)
@@ -365,7 +365,7 @@ for x, row in zip(given["states"], given["winds"]):
     )
     for box in (None, field):
         load = section_table_load(
-            0.0, pose_of(x), x, wind_now(0.0, series), series, box, table, np.zeros(8)
+            0.0, pose_of(x), x, wind_now(0.0, series), series, box, table, np.zeros(8), None, None
         )
         print(*[repr(float(value)) for value in (*load.wrench, load.thrust, load.torque)])
 """

@@ -42,7 +42,21 @@ def state(speed=1.267, blade_pitch=0.05, azimuth=0.4, platform_pitch=0.0):
 def arguments(x, series, skew=None, wake=None):
     dx = np.zeros_like(x)
     now = wind_now(0.0, series)
-    return (0.0, pose_of(x), x, now, series, None, ROTOR, skew, wake, dx, np.zeros(N_COUNTERS)), dx
+    return (
+        0.0,
+        pose_of(x),
+        x,
+        now,
+        series,
+        None,
+        ROTOR,
+        skew,
+        wake,
+        dx,
+        np.zeros(N_COUNTERS),
+        None,
+        None,
+    ), dx
 
 
 def load(x, series, skew=None, wake=None):

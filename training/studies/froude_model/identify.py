@@ -200,6 +200,7 @@ def froude_platform(turbine):
                     "mass": tower.mass * f.mass,
                     "inertia": tuple(value * f.inertia for value in tower.inertia),
                     **{name: getattr(tower, name) * f.length for name in heights},
+                    "modes": None,
                 }
             ),
             "lines": (),

@@ -1,0 +1,126 @@
+"""A tower that bends, as platform files have it: distributed mass and stiffness, and shapes of modes.
+
+As ElastoDyn has it: polynomial shapes over the height, each of the tower clamped at its base, and sums over
+equal elements.
+"""
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from fowt_env.descriptions.files import DATA, column, raise_problems, read_table
+from fowt_env.descriptions.records import Finite, NonNegative, Positive, Record, bounded, validate
+
+COLUMNS = ("height_fraction", "mass_density", "fore_aft_stiffness", "side_side_stiffness")
+POWERS = np.arange(2, 7)  # of the height fraction, in a shape
+END = 0.0015  # how far from 1 a shape may be at the top: ElastoDyn's limit; the rest is scaled away
+MASS = 0.01  # how far the mass of the distribution may be from the tower's, of it
+LARGEST = {"mass_density": 1e9, "fore_aft_stiffness": 1e18, "side_side_stiffness": 1e18}
+
+Shape = tuple[Finite, Finite, Finite, Finite, Finite]
+Share = bounded(ge=0, lt=1)
+
+
+class ModeShapes(Record):
+    """What [tower.modes] has beside the distribution: one or two modes each way, the lowest first."""
+
+    fore_aft: tuple[Shape, ...]  # coefficients of x^2 to x^6, x from 0 at the base to 1 at the top
+    side_side: tuple[Shape, ...]
+    fore_aft_damping: tuple[Share, ...]  # structural damping ratio of each, of the tower without its top
+    side_side_damping: tuple[Share, ...]
+    fore_aft_tuner: tuple[Positive, ...] | None = None  # factors on the stiffness of each
+    side_side_tuner: tuple[Positive, ...] | None = None
+    top_mass: NonNegative = 0.0  # kg, of the tower's mass: a point at its top, as the yaw bearing
+    # equal ones, mass and stiffness at their middles, as ElastoDyn's TwrNodes
+    elements: Annotated[int, Field(strict=True, ge=1, le=999)] = 20
+
+    @model_validator(mode="after")
+    def _alike(self):
+        problems = []
+        count = len(self.fore_aft)
+        if count not in (1, 2):
+            problems.append(f"fore_aft: has {count} shapes; must be 1 or 2")
+        for name in (
+            "side_side", "fore_aft_damping", "side_side_damping", "fore_aft_tuner", "side_side_tuner",
+        ):  # fmt: skip
+            values = getattr(self, name)
+            if values is not None and len(values) != count:
+                problems.append(f"{name}: has {len(values)} entries; must be {count}, as many as fore_aft")
+        for name in ("fore_aft", "side_side"):
+            for i, shape in enumerate(getattr(self, name), 1):
+                if abs(sum(shape) - 1.0) > END:
+                    problems.append(
+                        f"{name}.{i}: adds up to {sum(shape):g}; must be 1 (within {END}), at the top"
+                    )
+        if problems:
+            raise ValueError("\n".join(problems))
+        return self
+
+
+class TowerBending(ModeShapes):
+    """Distributed mass and stiffness of a tower, linear between heights, and the shapes of its modes."""
+
+    height_fraction: tuple[Finite, ...]  # of the tower's height, from 0 to 1
+    mass_density: tuple[Positive, ...]  # kg/m
+    fore_aft_stiffness: tuple[Positive, ...]  # EI, N m2
+    side_side_stiffness: tuple[Positive, ...]
+
+    def mass(self, height):
+        """Mass (kg) of a tower of this height (m), summed over the elements."""
+        line = np.interp(self.middles(), self.height_fraction, self.mass_density)
+        return float(line.mean()) * height + self.top_mass
+
+    def middles(self):
+        """(elements,) height fractions of the middles of the elements."""
+        return (np.arange(self.elements) + 0.5) / self.elements
+
+
+def mass_problem(modes, mass, height):
+    """What is wrong between a TowerBending and its tower's mass (kg) and height (m); None if nothing is."""
+    found = modes.mass(height)
+    if abs(found - mass) <= MASS * mass:
+        return None
+    return (
+        f"modes.distribution: has a mass of {found:.6g} kg with top_mass; must be the tower's mass ="
+        f" {mass:.6g} kg within {MASS:.0%}"
+    )
+
+
+class _ModesTable(ModeShapes):
+    """The table [tower.modes] of a platform file."""
+
+    distribution: str  # a CSV file with COLUMNS, relative to the platform file or among the built-in ones
+
+
+def read_tower_modes(table, folder):
+    """TowerBending of the table [tower.modes] of a platform file in this folder.
+
+    Raises: InputError naming the file, the key and what is allowed.
+    """
+    record, problems = validate(_ModesTable, table)
+    raise_problems("tower.modes", problems)
+    path = folder / Path(record.distribution).expanduser()
+    if not path.exists() and (builtin := DATA / "platforms" / record.distribution).is_file():
+        path = builtin
+    given = {name: getattr(record, name) for name in record.model_fields_set if name != "distribution"}
+    return TowerBending(**_read_distribution(path), **given)
+
+
+def _read_distribution(path):
+    """{column: tuple of numbers} of a distribution file."""
+    rows = read_table(path, "tower", COLUMNS)
+    problems = []
+    values = {"height_fraction": column(rows, "height_fraction", problems, 0.0, 1.0, open_ends=False)}
+    values |= {
+        name: column(rows, name, problems, 0.0, largest, open_ends=True) for name, largest in LARGEST.items()
+    }
+    place = values["height_fraction"]
+    for (number, row), before, here in zip(rows[1:], place[:-1], place[1:], strict=True):
+        if here <= before:
+            problems.append(f"line {number}: height_fraction = {row['height_fraction']}: must increase")
+    if not problems and (place[0] != 0.0 or place[-1] != 1.0):
+        problems.append(f"height_fraction: goes from {place[0]:g} to {place[-1]:g}; must go from 0 to 1")
+    raise_problems(f"tower file {str(path)!r}", problems)
+    return {name: tuple(map(float, value)) for name, value in values.items()}

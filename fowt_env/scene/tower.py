@@ -1,0 +1,130 @@
+"""The bending of the tower as the plant has it: integrals of mass, stiffness and weight along the modes.
+
+Sums over ElastoDyn's elements, mass and stiffness at their middles (theory.md, section 2.8).
+"""
+
+import numpy as np
+
+from fowt_env.descriptions.tower_modes import POWERS
+from fowt_env.errors import InputError
+from fowt_env.plant.aero.tower_drag import POINTS
+from fowt_env.plant.tower_modes import TowerModes
+
+MODES = {"rigid": 0, "modes": 1, "modes2": 2}  # option tower: modes in each direction
+
+
+def modes_asked(options):
+    """Modes in each direction that a scene's options ask for. Raises: InputError in a planar scene."""
+    count = MODES[options["tower"]]
+    if count and options["planar"]:
+        raise InputError(
+            f"tower = {options['tower']!r}: the tower bends to the sides too; a planar scene needs 'rigid'"
+            " (or planar = False)"
+        )
+    return count
+
+
+def mode_shapes(modes, count):
+    """((n, 5) coefficients, (n,) whether it is a fore-aft one) of the modes, n = 2 count; 1 at the top."""
+    pairs = zip(modes.fore_aft[:count], modes.side_side[:count], strict=True)
+    shapes = np.array([shape for pair in pairs for shape in pair])
+    return shapes / shapes.sum(axis=1, keepdims=True), np.tile([True, False], count)
+
+
+def shape_values(shapes, fraction, derivative=0):
+    """(points, n) values of shapes, or their derivatives by the height fraction, at height fractions."""
+    power, factor = POWERS.copy(), np.ones(len(POWERS))
+    for _ in range(derivative):
+        factor = factor * power
+        power = power - 1
+    return np.asarray(fraction)[:, None] ** power @ (shapes * factor).T
+
+
+def build_tower_modes(platform, turbine, count, first_state):
+    """TowerModes of that many modes in each direction, their states from first_state on; None for none.
+
+    Raises: InputError where the platform file says too little of the tower.
+    """
+    if count == 0:
+        return None
+    tower, bending = platform.tower, platform.tower.modes
+    if bending is None or len(bending.fore_aft) < count:
+        known = "no [tower.modes]" if bending is None else "first modes alone in [tower.modes]"
+        raise InputError(
+            f"tower = {_option(count)!r}: the platform {platform.name!r} has {known} in its file; allowed:"
+            f" {', '.join(repr(_option(k)) for k in range(count if bending else 1))}"
+        )
+    height = tower.top_height - tower.base_height
+    shapes, fore_aft = mode_shapes(bending, count)
+    middle = bending.middles()
+    cell = height / bending.elements
+    mass = cell * np.interp(middle, bending.height_fraction, bending.mass_density)
+    shape = shape_values(shapes, middle)
+    slope = shape_values(shapes, middle, 1) / height
+    curvature = shape_values(shapes, middle, 2) / height**2
+    alike = np.equal.outer(fore_aft, fore_aft)
+    generalised = np.einsum("k,ki,kj->ij", mass, shape, shape)
+    stiffness = _stiffness(bending, middle, curvature, fore_aft, cell, count)
+    # what hangs on each element: all above it, and of its own mass that above its middle
+    top = bending.top_mass + turbine.nacelle.mass + turbine.rotor.mass
+    above = mass[::-1].cumsum()[::-1] - 0.5 * mass + top
+    return TowerModes(
+        first=int(first_state),
+        fore_aft=fore_aft.astype(float),
+        top_height=float(tower.top_height),
+        slope=shape_values(shapes, [1.0], 1)[0] / height,
+        first_moment=mass @ shape + bending.top_mass,
+        height_moment=(mass * (tower.base_height + height * middle)) @ shape
+        + bending.top_mass * tower.top_height,
+        mass=np.ascontiguousarray(generalised + bending.top_mass),
+        stiffness=np.ascontiguousarray(stiffness),
+        damping=np.ascontiguousarray(_damping(bending, stiffness, generalised, count)),
+        weight_stiffness=np.where(alike, np.einsum("k,ki,kj->ij", cell * above, slope, slope), 0.0),
+        drag_shape=np.ascontiguousarray(shape_values(shapes, _drag_points())),
+    )
+
+
+def tower_states(modes):
+    """Number of states of TowerModes or None: deflections and their velocities."""
+    return 0 if modes is None else 2 * modes.slope.shape[0]
+
+
+def _option(count):
+    return list(MODES)[count]
+
+
+def _drag_points():
+    """Height fractions of the points of aero.tower_drag.build_tower_drag."""
+    return 0.5 * (np.polynomial.legendre.leggauss(POINTS)[0] + 1.0)
+
+
+def _stiffness(bending, middle, curvature, fore_aft, cell, count):
+    """(n, n) of EI times two curvatures, with the root of the product of both modes' tuners."""
+    known = bending.height_fraction
+    sides = (np.interp(middle, known, bending.side_side_stiffness),
+             np.interp(middle, known, bending.fore_aft_stiffness))  # fmt: skip
+    ones = (1.0,) * count
+    tuner = _each(bending.fore_aft_tuner or ones, bending.side_side_tuner or ones, count)
+    found = np.zeros((2 * count, 2 * count))
+    for along in (False, True):
+        rows = np.flatnonzero(fore_aft == along)
+        part = curvature[:, rows]
+        found[np.ix_(rows, rows)] = np.einsum("k,ki,kj->ij", cell * sides[along], part, part)
+    return found * np.sqrt(np.outer(tuner, tuner))
+
+
+def _damping(bending, stiffness, generalised, count):
+    """(n, n) of 2 zeta K / omega, zeta and omega of the second mode, without the mass on the tower's top.
+
+    ElastoDyn's CTFA and CTSS: its frequency there is of the bare tower, without weight.
+    """
+    ratio = _each(bending.fore_aft_damping, bending.side_side_damping, count)
+    bare = np.sqrt(np.diag(stiffness) / np.diag(generalised))
+    return stiffness * (2.0 * ratio / bare)
+
+
+def _each(fore_aft, side_side, count):
+    """(n,) of figures of the modes in the plant's order."""
+    return np.array(
+        [value for pair in zip(fore_aft[:count], side_side[:count], strict=True) for value in pair]
+    )
