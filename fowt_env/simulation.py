@@ -36,7 +36,7 @@ from fowt_env.initial_conditions import initial_state
 from fowt_env.plant.compile.decorators import control_kernel
 from fowt_env.plant.compile.handle import Handle
 from fowt_env.plant.events import counted, harm
-from fowt_env.plant.measurement import Measure, Measurement
+from fowt_env.plant.measurement import BladeMeasurement, Measurement
 from fowt_env.plant.protection import Failure, Guard, Stop, Trip, Watch, build_guard
 from fowt_env.plant.rollout import OVERSPEED, RUNNING, STOP_REASONS, Schedule, rollout
 from fowt_env.plant.sensing import NacelleMotion, Reader, Setting, new_past, no_motion, open_reader
@@ -229,8 +229,8 @@ def simulate(
     overspeed = scene.turbine.overspeed if stop_overspeed else inf
     losses = [inf if time is None else time for time in (grid_loss, *(fault.grid_loss for fault in wrong))]
     loss = min(losses) - 1e-9  # an instant may miss it by rounding
-    individual = bool(controller.individual)
-    schedule = Schedule(float(dt), per_control, per_output, last, float(overspeed), float(loss), individual)
+    ends = float(overspeed), float(loss)
+    schedule = Schedule(float(dt), per_control, per_output, last, *ends, bool(controller.individual))
     guard = guard_of(scene, limits, wrong, per_control * dt)
     reader = reader_of(scene, controller, chain, preview, schedule)
     loop = _Loop(scene, controller, x, u, schedule, reader, guard)
@@ -270,11 +270,11 @@ def guard_of(scene: Scene, limits: Protection, faults: Sequence[Fault], control_
     ordered, rates, rows = [inf, inf], [limits.normal_rate, limits.emergency_rate], []
     for fault in faults:
         rows += _failures(scene, fault)
-        kind = Stop.NORMAL if fault.kind == "normal_stop" else Stop.EMERGENCY
+        stop = Stop.NORMAL if fault.kind == "normal_stop" else Stop.EMERGENCY
         if fault.kind in STOP_FAULTS or fault.delay is not None:
-            ordered[kind] = min(ordered[kind], fault.time + (fault.delay or 0.0))
+            ordered[stop] = min(ordered[stop], fault.time + (fault.delay or 0.0))
             if fault.rate is not None:
-                rates[kind] = radians(fault.rate)
+                rates[stop] = radians(fault.rate)
     steps = [min(rate, drive.rate_limit) * control_dt for rate in rates]
     off_speed = limits.off_speed * turbine.rated_rotor_speed
     return build_guard(trips, ordered, steps, drive.maximum, off_speed, rows)
@@ -285,9 +285,14 @@ def _failures(scene, fault):
     if fault.kind not in FAILURES:
         return []
     kind, time = FAILURES[fault.kind], fault.time
-    if fault.kind not in BLADE_FAULTS:
-        return [(kind, time, Measure[fault.field.upper()], fault.value or 0.0, 0.0)]
     individual = scene.model.pitches is not None
+    if fault.kind not in BLADE_FAULTS:
+        fields = (*Measurement._fields, *(BladeMeasurement._fields if individual else ()))
+        if fault.field not in fields:
+            raise InputError(
+                f"faults: {fault.kind}: field = {fault.field!r}: needs a scene with pitch='individual'"
+            )
+        return [(kind, time, fields.index(fault.field), fault.value or 0.0, 0.0)]
     if fault.blades is not None and not individual:
         raise InputError(
             f"faults: {fault.kind}: blades = {list(fault.blades)}: needs a scene with pitch='individual'"

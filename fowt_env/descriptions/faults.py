@@ -8,13 +8,13 @@ from pydantic import Field, model_validator
 from fowt_env.descriptions.files import raise_problems
 from fowt_env.descriptions.records import Finite, NonNegative, Positive, Record, validate
 from fowt_env.errors import InputError, unknown
-from fowt_env.plant.measurement import Measurement
+from fowt_env.plant.measurement import BladeMeasurement, Measurement
 
 STOP_FAULTS = ("emergency_stop", "normal_stop")
 BLADE_FAULTS = ("stuck_pitch", "pitch_runaway", "pitch_offset")
 SENSOR_FAULTS = ("sensor_bias", "sensor_freeze", "sensor_loss")
 KINDS = ("grid_loss", *STOP_FAULTS, *BLADE_FAULTS, *SENSOR_FAULTS)
-FIELDS = tuple(name for name in Measurement._fields if name != "time")
+FIELDS = tuple(name for name in (*Measurement._fields, *BladeMeasurement._fields) if name != "time")
 # keys of a kind beside kind and time; those that it needs
 KEYS = {
     "grid_loss": ("delay", "rate"),
@@ -50,7 +50,8 @@ class Fault(Record):
     backup          true: the fault is one of control, so that an emergency stop feathers these blades all the
                     same, from their own energy stores; without it nothing moves them
     blades          [1], [2, 3] ...; without it all of them. Single ones need a scene with pitch="individual"
-    sensor_bias     `value` (SI) is added to the reading of `field`, a field of Measurement
+    sensor_bias     `value` (SI) is added to the reading of `field`: of Measurement or, with
+                    pitch="individual", of BladeMeasurement
     sensor_freeze   the reading stays what it is at `time`
     sensor_loss     the reading is zero
     """

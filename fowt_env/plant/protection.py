@@ -14,8 +14,9 @@ from fowt_env.plant.blade_pitches import pitch_of
 from fowt_env.plant.channels import acceleration_at
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.compile.handle import by_reference
-from fowt_env.plant.drivetrain import clamp, torque_in_force
-from fowt_env.plant.measurement import Measure
+from fowt_env.plant.drivetrain import clamp
+from fowt_env.plant.measurement import N_MEASUREMENTS, BladeMeasure, Measure
+from fowt_env.plant.sensing import place_of
 from fowt_env.plant.state import BLADES, Command, State, pose_of
 from fowt_env.plant.tower_modes import bend_of, nacelle_rates, turned_pose
 
@@ -63,7 +64,7 @@ class Part(IntEnum):
 
     KIND = 0  # Failure
     TIME = 1  # s from which it is there
-    PLACE = 2  # blade (0, 1, 2), or place in the reading
+    PLACE = 2  # blade (0, 1, 2), or field of the measurement
     VALUE = 3  # of an offset (rad) or bias (SI); a runaway's end: below zero fine, above feather
     BACKUP = 4  # 1: in an emergency stop the blade feathers all the same, by a drive of its own
 
@@ -126,12 +127,21 @@ def build_guard(trips=None, ordered=(inf, inf), rates=(0.0, 0.0), feathered=0.0,
 
 
 @kernel
-def tower_top_acceleration(x, dx, layout, tower):
+def tower_top_acceleration(x, dx, model):
     """Size of the tower top's acceleration in the plane of the nacelle, m/s2."""
-    top, pose, bend = layout.tower_top, pose_of(x), bend_of(x, tower)
-    rates = nacelle_rates(pose, bend, dx, tower)
-    ax, ay, _ = acceleration_at(turned_pose(pose, bend), rates, top[0], top[1], top[2])
+    pose, top = pose_of(x), model.layout.tower_top
+    bend = bend_of(x, model.tower)
+    nacelle, moving = turned_pose(pose, bend), nacelle_rates(pose, bend, dx, model.tower)
+    ax, ay, _ = acceleration_at(nacelle, moving, top[0], top[1], top[2])
     return hypot(ax, ay)
+
+
+@kernel
+def pitches_of(pitches):
+    """Number of pitches that the blades have: one for all, or one each."""
+    if pitches is None:
+        return 1
+    return BLADES
 
 
 @kernel
@@ -157,7 +167,7 @@ def encoder_offset(blade, t, guard):
 def pitch_deviation(t, x, actuator, pitches, guard):
     """Greatest difference (rad) of encoder and command of a blade, and of that between two blades."""
     low = high = largest = 0.0
-    for blade in range(BLADES):
+    for blade in range(pitches_of(pitches)):
         command = clamp(guard.watch[Watch.COMMAND + blade], actuator.minimum, actuator.maximum)
         error = pitch_of(blade, x, pitches) - encoder_offset(blade, t, guard) - command
         low, high = (error, error) if blade == 0 else (min(low, error), max(high, error))
@@ -166,19 +176,19 @@ def pitch_deviation(t, x, actuator, pitches, guard):
 
 
 @kernel
-def watched(trip, t, x, dx, u, model, guard):
+def watched(trip, t, x, dx, measurement, model, guard):
     """What a trip watches."""
     if trip == Trip.OVERSPEED:
         return x[State.ROTOR_SPEED]
     if trip == Trip.OVERPOWER:
-        return model.layout.gear_ratio * x[State.ROTOR_SPEED] * torque_in_force(x, u, model.converter)
+        return measurement[Measure.GENERATOR_SPEED] * measurement[Measure.GENERATOR_TORQUE]
     if trip == Trip.ACCELERATION:
-        return tower_top_acceleration(x, dx, model.layout, model.tower)
+        return tower_top_acceleration(x, dx, model)
     return pitch_deviation(t, x, model.actuator, model.pitches, guard)
 
 
 @kernel
-def watch_turbine(t, x, dx, u, model, guard):
+def watch_turbine(t, x, dx, u, measurement, model, guard):
     """Whether the turbine is being stopped at a control instant, at which its limits are looked at first."""
     watch, trips = guard.watch, guard.trips
     if isnan(watch[Watch.COMMAND]):
@@ -191,7 +201,7 @@ def watch_turbine(t, x, dx, u, model, guard):
         since = Watch.SINCE + trip
         if isinf(trips[trip, Limit.VALUE]):
             continue
-        if not watched(trip, t, x, dx, u, model, guard) > trips[trip, Limit.VALUE]:
+        if not watched(trip, t, x, dx, measurement, model, guard) > trips[trip, Limit.VALUE]:
             watch[since] = inf
             continue
         if isinf(watch[since]):
@@ -203,7 +213,8 @@ def watch_turbine(t, x, dx, u, model, guard):
                 watch[Watch.TRIPPED_AT], watch[Watch.TRIP] = t, trip
     if stop > watch[Watch.STOP]:
         if watch[Watch.STOP] < 0.0:
-            watch[Watch.TORQUE], watch[Watch.SPEED] = u[Command.GENERATOR_TORQUE], x[State.ROTOR_SPEED]
+            watch[Watch.TORQUE] = measurement[Measure.GENERATOR_TORQUE]
+            watch[Watch.SPEED] = x[State.ROTOR_SPEED]
             for blade in range(BLADES):
                 pitch = pitch_of(blade, x, model.pitches) - encoder_offset(blade, t, guard)
                 watch[Watch.TARGET + blade] = pitch
@@ -268,14 +279,21 @@ def break_drives(t, x, u, model, guard):
 
 
 @kernel
-def break_sensors(t, guard, reading):
-    """Put what faulty sensors make of a reading into it; what it hides stays hidden."""
+def break_sensors(t, guard, reader):
+    """Put what faulty sensors make of a reader's reading into it; what it hides stays hidden."""
+    reading, fields = reader.reading, reader.sensors.chain.shape[1]
+    ahead = reading.shape[0] - fields
     for k in range(guard.faults.shape[0]):
         kind = kind_now(k, t, guard)
-        i, value = int(guard.faults[k, Part.PLACE]), guard.faults[k, Part.VALUE]
-        if kind == Failure.OFFSET and i == 0:
+        field, value = int(guard.faults[k, Part.PLACE]), guard.faults[k, Part.VALUE]
+        if kind == Failure.OFFSET and fields == N_MEASUREMENTS:
             reading[Measure.BLADE_PITCH] -= value
-        elif kind == Failure.BIAS:
+        elif kind == Failure.OFFSET:
+            reading[Measure.BLADE_PITCH] -= value / BLADES
+            field += N_MEASUREMENTS + BladeMeasure.BLADE_PITCH_1
+            reading[place_of(field, ahead)] -= value
+        i = place_of(field, ahead)
+        if kind == Failure.BIAS:
             reading[i] += value
         elif kind == Failure.FREEZE:
             if isnan(guard.held[k]):

@@ -198,7 +198,7 @@ def rollout(
     if first == end:
         observe_plant(model, data, x, u, first * dt, dx, measurement)
         read(reader, first // schedule.per_control, first * dt, measurement)
-        break_sensors(first * dt, guard, reader.reading)
+        break_sensors(first * dt, guard, reader)
         return RUNNING, first, rows
     for step in range(first, end + 1):
         t = step * dt
@@ -210,14 +210,14 @@ def rollout(
         if not ending and step % schedule.per_control == 0:
             observe_plant(model, data, x, u, t, dx, measurement)
             torque, grid_loss = u[Command.GENERATOR_TORQUE], schedule.grid_loss
-            if watch_turbine(t, x, dx, u, model, guard):
+            if watch_turbine(t, x, dx, u, measurement, model, guard):
                 stop_turbine(x, u, guard)
                 if int(guard.watch[Watch.STOP]) == Stop.EMERGENCY:
                     grid_loss = t
             else:
                 own_command(u, guard)
                 read(reader, step // schedule.per_control, t, measurement)
-                break_sensors(t, guard, reader.reading)
+                break_sensors(t, guard, reader)
                 hide_command(u, reader.sensors.chain[Setting.HIDDEN], schedule.individual, model.pitches)
                 law(parameters, memory, reader.reading, u)
                 if not schedule.individual:
