@@ -131,7 +131,7 @@ class Preview(PI):
             raise InputError(f"controller {self.name!r}: needs a scene with wind to look ahead")
         super().prepare(scene)
         step = self.control_dt
-        delay = self.preview.preview_time - scene.turbine.pitch_drive.time_constant - 0.5 * step
+        delay = self.preview.preview_time - scene.turbine.pitch_drive.lag - 0.5 * step
         if delay <= 0.0:
             raise InputError(
                 f"preview_time = {self.preview.preview_time} s: must exceed the actuator's lag and half a"

@@ -13,7 +13,13 @@ A controller has reset(measurement) and act(measurement). Beside these it may ha
   coming. Where it is not, the scene has a `turbine` and nothing else;
 - preview_times, where "wind_preview" is declared: how far ahead (s, increasing) it is given the
   rotor-averaged wind, as `measurement.wind_preview`, or after the N_MEASUREMENTS entries of a compiled law's
-  array.
+  array;
+- individual = True where it commands the pitch of each blade: act returns (generator torque, pitch of blade
+  1, of blade 2, of blade 3), and a compiled law writes these four. It needs a scene with pitch="individual".
+  In such a scene other controllers have their one pitch given to all blades, blade_pitch is the mean of the
+  blades', and any controller may declare fields of BladeMeasurement: `measurement.blades` has them, a
+  compiled law's array behind the wind ahead. Of the pitches in force a law that commands each blade sees
+  those that it declares (blade_pitch_1 ...).
 
 The built-in controllers are built on the simulator, and so it imports none of them: it knows the name of the
 package that has them (CATALOGUE), and imports that when a run or an environment asks for a name.
@@ -38,9 +44,16 @@ from fowt_env.descriptions.checks import check_number
 from fowt_env.descriptions.lidar import lidars
 from fowt_env.errors import ControllerError, InputError, unknown
 from fowt_env.plant.compile.decorators import kernel
-from fowt_env.plant.measurement import N_MEASUREMENTS, SENSOR_FIELDS, Measurement
+from fowt_env.plant.measurement import (
+    BLADE_SENSOR_FIELDS,
+    N_BLADE_MEASUREMENTS,
+    N_MEASUREMENTS,
+    SENSOR_FIELDS,
+    BladeMeasurement,
+    Measurement,
+)
 from fowt_env.plant.sensing import GIVEN, HIDDEN
-from fowt_env.plant.state import N_COMMANDS
+from fowt_env.plant.state import N_COMMANDS, N_INDIVIDUAL_COMMANDS
 from fowt_env.weather.lidar import lidar_preview
 from fowt_env.weather.preview import Preview, check_times, exact_preview
 
@@ -60,8 +73,11 @@ class Controller(Protocol):
     def reset(self, measurement: Measurement) -> object:
         """Start afresh from a Measurement, so that the first command does not bump the plant."""
 
-    def act(self, measurement: Measurement) -> tuple[float, float]:
-        """(generator torque N m on the high-speed shaft, blade pitch rad) held until the next call."""
+    def act(self, measurement: Measurement) -> tuple[float, ...]:
+        """(generator torque N m on the high-speed shaft, blade pitch rad) held until the next call.
+
+        With individual = True the pitch of each of the three blades.
+        """
 
 
 @kernel
@@ -86,12 +102,14 @@ class CompiledController:
     kernel: Callable[..., None] | None = None
     information: tuple[str, ...] = ()  # what the law uses: Measurement fields and PRIVILEGED_INPUTS
     preview_times: tuple[float, ...] = ()  # s ahead that it is given the wind
+    individual: bool = False  # whether the law commands the pitch of each blade, else one for all
 
     def __init__(self, name: str, parameters: npt.ArrayLike, n_memory: int) -> None:
         self.name = str(name)
         self.parameters = np.ascontiguousarray(parameters, dtype=np.float64)
         self.memory = np.zeros(n_memory)
-        self.command = np.zeros(N_COMMANDS)  # in force, for act(); a first call must not rely on it
+        # in force, for act(); a first call must not rely on it
+        self.command = np.zeros(N_INDIVIDUAL_COMMANDS if self.individual else N_COMMANDS)
 
     @property
     def law(self) -> Any:
@@ -105,27 +123,37 @@ class CompiledController:
         """Set memory from a Measurement, forgetting everything before."""
         raise NotImplementedError(f"{type(self).__name__} must define reset(measurement)")
 
-    def act(self, measurement: Measurement) -> tuple[float, float]:
-        """(generator torque, blade pitch) for a Measurement; advances the memory by one period.
+    def act(self, measurement: Measurement) -> tuple[float, ...]:
+        """(generator torque, blade pitch or that of each blade) for a Measurement; advances the memory.
 
         What the law does not declare it reads as NaN, as in the compiled loop.
         """
-        values = np.array([*measurement, *wind_ahead(measurement)], dtype=np.float64)
-        size = N_MEASUREMENTS + len(self.preview_times)
-        if values.shape != (size,):
+        blades = values_of_blades(measurement)
+        values = np.array([*measurement, *wind_ahead(measurement), *blades], dtype=np.float64)
+        leads, shown = len(self.preview_times), mask(self.name, tuple(self.information))
+        if not blades and declares_blades(self):
+            raise InputError(
+                f"controller {self.name!r}: the measurement has no fields of single blades, which it declares"
+            )
+        if values.shape != (N_MEASUREMENTS + leads + len(blades),):
+            size = N_MEASUREMENTS + leads + len(blades)
             raise InputError(f"measurement has shape {values.shape}: must be ({size},)")
-        values[:N_MEASUREMENTS] += mask(self.name, tuple(self.information))
+        values[:N_MEASUREMENTS] += shown[:N_MEASUREMENTS]
+        if blades:
+            values[N_MEASUREMENTS + leads :] += shown[N_MEASUREMENTS:]
         call_law(self.law, self.parameters, self.memory, values, self.command)
-        return float(self.command[0]), float(self.command[1])
+        return tuple(self.command.tolist())
 
 
 class CheckedController:
-    """A Python controller whose every answer is checked to be two finite numbers."""
+    """A Python controller whose every answer is checked to be two finite numbers, or four if individual."""
 
     def __init__(self, controller: Any, name: str | None = None) -> None:
         self.controller = controller
         self.name = str(name or getattr(controller, "name", type(controller).__name__))
-        self.information = tuple(getattr(controller, "information", SENSOR_FIELDS))
+        self.individual = bool(getattr(controller, "individual", False))
+        own = SENSOR_FIELDS + (BLADE_SENSOR_FIELDS if self.individual else ())
+        self.information = tuple(getattr(controller, "information", own))
         self.declared = hasattr(controller, "information")
         self.preview_times = tuple(getattr(controller, "preview_times", ()))
 
@@ -140,28 +168,33 @@ class CheckedController:
 
     def _given(self, measurement):
         """The part of a Measurement that the controller declares."""
-        view = view_of(self)
-        if isinstance(measurement, view.__self__):
-            return measurement
-        return view([*measurement, *wind_ahead(measurement)])
+        view = _view_class(self.name, self.information, len(self.preview_times))
+        return measurement if isinstance(measurement, view) else view.of(measurement)
 
-    def act(self, measurement: Measurement) -> tuple[float, float]:
-        """(generator torque, blade pitch) as floats.
+    def act(self, measurement: Measurement) -> tuple[float, ...]:
+        """(generator torque, blade pitch or that of each blade) as floats.
 
         Raises: ControllerError naming the controller, the time and what it returned.
         """
         returned = self.controller.act(self._given(measurement))
         try:
             values = np.asarray(returned)
-            good = values.shape == (N_COMMANDS,) and values.dtype.kind in "iuf"
+            size = N_INDIVIDUAL_COMMANDS if self.individual else N_COMMANDS
+            good = values.shape == (size,) and values.dtype.kind in "iuf"
         except ValueError:  # ragged sequences
             good = False
-        if good and isfinite(values[0]) and isfinite(values[1]):
-            return float(values[0]), float(values[1])
+        if good and all(map(isfinite, values)):
+            return tuple(float(value) for value in values)
         time = float(measurement.time)
+        wanted = (
+            "four finite numbers, (generator torque in N m on the high-speed shaft, pitch of each blade in"
+            " rad)"
+            if self.individual
+            else "two finite numbers, (generator torque in N m on the high-speed shaft, blade pitch in rad)"
+        )
         raise ControllerError(
-            f"controller {self.name!r} returned {_shown(returned)} at t = {time:.3f} s: act() must return two"
-            " finite numbers, (generator torque in N m on the high-speed shaft, blade pitch in rad)",
+            f"controller {self.name!r} returned {_shown(returned)} at t = {time:.3f} s: act() must return"
+            f" {wanted}",
             controller=self.name,
             time=time,
             returned=returned,
@@ -178,16 +211,31 @@ class MeasurementView(Measurement):
     _hidden: frozenset[str] = frozenset()
     _places: tuple[int, ...] = ()  # of the hidden fields
     _foresees = False
+    _leads = 0  # how many times the wind is foreseen for
+    _blade_class: type
     _ahead: tuple[float, ...] = ()
+    _blades: "BladeView | None" = None
 
     @classmethod
     def take(cls, values: Sequence[float]) -> "MeasurementView":
-        """The view of (N_MEASUREMENTS + leads,) values."""
-        shown = list(values[:N_MEASUREMENTS])
+        """The view of (N_MEASUREMENTS + leads,) values, or with those of BladeMeasurement behind them."""
+        rest = N_MEASUREMENTS + cls._leads
+        return cls._taken(values[:N_MEASUREMENTS], values[N_MEASUREMENTS:rest], values[rest:])
+
+    @classmethod
+    def of(cls, measurement: Any) -> "MeasurementView":
+        """The view of a Measurement, with the wind ahead and the blades that it carries."""
+        return cls._taken(measurement, wind_ahead(measurement), values_of_blades(measurement))
+
+    @classmethod
+    def _taken(cls, values, ahead, blades):
+        shown = list(values)
         for place in cls._places:
             shown[place] = nan
         view = cls._make(shown)
-        view._ahead = tuple(values[N_MEASUREMENTS:])
+        view._ahead = tuple(ahead)
+        if len(blades):
+            view._blades = cls._blade_class.take(blades, shown[0])
         return view
 
     @property
@@ -197,9 +245,22 @@ class MeasurementView(Measurement):
             self._refuse("wind_preview")
         return self._ahead
 
+    @property
+    def blades(self) -> "BladeView":
+        """BladeMeasurement of a scene whose blades have pitches of their own."""
+        if self._blades is None:
+            raise ControllerError(
+                f"controller {self._controller!r} reads 'blades': the scene has one pitch for all blades;"
+                " build it with pitch='individual'",
+                controller=self._controller,
+                time=float(tuple.__getitem__(self, 0)),
+                returned=None,
+            )
+        return self._blades
+
     def _replace(self, **changes):
         view = super()._replace(**changes)
-        view._ahead = self._ahead
+        view._ahead, view._blades = self._ahead, self._blades
         return view
 
     def __getitem__(self, key):
@@ -214,39 +275,86 @@ class MeasurementView(Measurement):
         return Measurement, tuple(self)
 
     def _refuse(self, name):
-        time = float(tuple.__getitem__(self, 0))
-        also = "" if name in Measurement._fields else " and give preview_times"
-        raise ControllerError(
-            f"controller {self._controller!r} reads {name!r} at t = {time:.3f} s and does not declare it: add"
-            f" {name!r} to its attribute information{also}",
-            controller=self._controller,
-            time=time,
-            returned=None,
-        )
+        _refuse(self._controller, name, tuple.__getitem__(self, 0))
+
+
+class BladeView(BladeMeasurement):
+    """A BladeMeasurement that holds what a controller declares, as MeasurementView does."""
+
+    _controller = ""
+    _hidden: frozenset[str] = frozenset()
+    _time = 0.0
+
+    @classmethod
+    def take(cls, values: Sequence[float], time: float) -> "BladeView":
+        """The view of (N_BLADE_MEASUREMENTS,) values at a time (s)."""
+        names = BladeMeasurement._fields
+        view = cls._make(nan if n in cls._hidden else v for n, v in zip(names, values, strict=True))
+        view._time = time
+        return view
+
+    def __getitem__(self, key):
+        value = super().__getitem__(key)
+        if self._hidden and not isinstance(key, slice):
+            name = BladeMeasurement._fields[operator.index(key)]
+            if name in self._hidden:
+                self._refuse(name)
+        return value
+
+    def __reduce__(self):
+        return BladeMeasurement, tuple(self)
+
+    def _refuse(self, name):
+        _refuse(self._controller, name, self._time)
+
+
+def _refuse(controller, name, time):
+    """Raise ControllerError: a controller asks at a time (s) for what it does not declare."""
+    also = " and give preview_times" if name == "wind_preview" else ""
+    raise ControllerError(
+        f"controller {controller!r} reads {name!r} at t = {time:.3f} s and does not declare it: add"
+        f" {name!r} to its attribute information{also}",
+        controller=controller,
+        time=float(time),
+        returned=None,
+    )
+
+
+def _hiding(name, fields, information):
+    """Members of the view class of a controller's name that hide the fields which are not in information."""
+    hidden_fields = frozenset(fields) - {"time", *information}
+    refusing = {field: property(lambda self, field=field: self._refuse(field)) for field in hidden_fields}
+    return {"_controller": name, "_hidden": hidden_fields, **refusing}
 
 
 @cached(256)
-def _view_class(name, information):
-    """MeasurementView of a controller's name and information."""
-    hidden_fields = frozenset(Measurement._fields) - {"time", *information}
-    members = {
-        "_controller": name,
-        "_hidden": hidden_fields,
-        "_places": tuple(i for i, field in enumerate(Measurement._fields) if field in hidden_fields),
+def _view_class(name, information, leads):
+    """MeasurementView of a controller's name, information and number of preview_times."""
+    members = _hiding(name, Measurement._fields, information)
+    members |= {
+        "_places": tuple(i for i, field in enumerate(Measurement._fields) if field in members["_hidden"]),
         "_foresees": "wind_preview" in information,
-        **{field: property(lambda self, field=field: self._refuse(field)) for field in hidden_fields},
+        "_leads": leads,
+        "_blade_class": type("BladeView", (BladeView,), _hiding(name, BladeMeasurement._fields, information)),
     }
     return type("MeasurementView", (MeasurementView,), members)
 
 
 def view_of(controller: Any) -> Callable[[Sequence[float]], MeasurementView]:
     """What makes the view that a controller is given from its array of readings."""
-    return _view_class(controller.name, tuple(controller.information)).take
+    return _view_class(controller.name, tuple(controller.information), len(controller.preview_times)).take
+
+
+def whole_view(values: Sequence[float], wind: Sequence[float] = ()) -> MeasurementView:
+    """The view of measured values, of which nothing is hidden, and of the wind (m/s) that is foreseen."""
+    everything = (*Measurement._fields, *BladeMeasurement._fields, "wind_preview")
+    rest = values[N_MEASUREMENTS:]
+    return _view_class("", everything, len(wind)).take([*values[:N_MEASUREMENTS], *wind, *rest])
 
 
 def with_wind_ahead(measurement: Measurement, wind: Sequence[float]) -> MeasurementView:
     """The measurement with the wind (m/s) that is foreseen, of which nothing else is hidden."""
-    return _view_class("", (*Measurement._fields, "wind_preview")).take([*measurement, *wind])
+    return whole_view([*measurement, *values_of_blades(measurement)], wind)
 
 
 def wind_ahead(measurement: Any) -> tuple[float, ...]:
@@ -254,32 +362,70 @@ def wind_ahead(measurement: Any) -> tuple[float, ...]:
     return getattr(measurement, "_ahead", ())
 
 
+def values_of_blades(measurement: Any) -> tuple[float, ...]:
+    """(N_BLADE_MEASUREMENTS,) the BladeMeasurement that a measurement carries; () where it carries none."""
+    blades = getattr(measurement, "_blades", None)
+    return () if blades is None else tuple(blades)
+
+
+def declares_blades(controller: Any) -> bool:
+    """Whether a controller declares a field of BladeMeasurement."""
+    return not set(BladeMeasurement._fields).isdisjoint(controller.information)
+
+
+def check_pitches(controller: Any, individual: bool) -> None:
+    """Refuse what needs blades with pitches of their own in a scene that has one pitch for all.
+
+    Raises: InputError.
+    """
+    if individual:
+        return
+    lacking = ""
+    if getattr(controller, "individual", False):
+        lacking = "commands the pitch of each blade"
+    elif declares_blades(controller):
+        name = next(name for name in controller.information if name in BladeMeasurement._fields)
+        lacking = f"declares {name!r}, which is measured where every blade has a pitch of its own"
+    if lacking:
+        raise InputError(
+            f"controller {controller.name!r}: {lacking}, and the scene has one pitch for all: build it with"
+            " pitch='individual'"
+        )
+
+
 @cached(256)
 def mask(name: str, information: tuple[str, ...]) -> np.ndarray:
-    """(N_MEASUREMENTS,) GIVEN for what is declared, and the time, HIDDEN for the rest; read only.
+    """GIVEN for what is declared, and the time, HIDDEN for the rest; read only.
 
-    Raises: InputError for a name that is neither a field of Measurement nor a privileged input.
+    (N_MEASUREMENTS + N_BLADE_MEASUREMENTS,), the fields of Measurement first.
+    Raises: InputError for a name that is neither a field of these nor a privileged input.
     """
-    known = (*Measurement._fields, *PRIVILEGED_INPUTS)
+    fields = (*Measurement._fields, *BladeMeasurement._fields)
+    known = (*fields, *PRIVILEGED_INPUTS)
     for item in information:
         if item not in known:
             raise unknown(f"information of controller {name!r}:", item, known)
     declared = {"time", *information}
-    values = np.array([GIVEN if field in declared else HIDDEN for field in Measurement._fields])
+    values = np.array([GIVEN if field in declared else HIDDEN for field in fields])
     values.setflags(write=False)
     return values
 
 
-def hidden(controller: Any, chain: tuple[str, Sequence[str]] | None = None) -> np.ndarray:
+def hidden(
+    controller: Any, chain: tuple[str, Sequence[str]] | None = None, individual: bool = False
+) -> np.ndarray:
     """mask of a run: what the controller declares, and the sensor chain (name, fields that it has) shows.
 
-    Raises: InputError where it declares a field that the chain does not have.
+    individual: whether the scene's blades have pitches of their own; else it is of the N_MEASUREMENTS fields.
+    Raises: InputError where it declares a field that the chain does not have, or the scene (check_pitches).
     """
-    values = mask(controller.name, tuple(controller.information)).copy()
+    check_pitches(controller, individual)
+    size = N_MEASUREMENTS + (N_BLADE_MEASUREMENTS if individual else 0)
+    values = mask(controller.name, tuple(controller.information))[:size].copy()
     if chain is None:
         return values
     name, available = chain
-    for index, field in enumerate(Measurement._fields):
+    for index, field in enumerate((*Measurement._fields, *BladeMeasurement._fields)[:size]):
         if field == "time" or field in available or np.isnan(values[index]):
             continue
         if getattr(controller, "declared", True):

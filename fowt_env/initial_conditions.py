@@ -12,6 +12,7 @@ from fowt_env.errors import (
     unknown,
 )
 from fowt_env.plant.state import OUT_OF_PLANE, Command, State, pose_of
+from fowt_env.scene.actuators import rest_actuators
 from fowt_env.scene.scene import Scene
 
 STARTS = ("trim", "zero")
@@ -24,7 +25,7 @@ INITIAL = {  # channel: (state, factor to SI)
     "PtfmYaw": (State.YAW, DEGREE),
     "Azimuth": (State.AZIMUTH, DEGREE),
     "RotSpeed": (State.ROTOR_SPEED, RPM),
-    "BldPitch1": (State.BLADE_PITCH, DEGREE),
+    "BldPitch1": (State.BLADE_PITCH, DEGREE),  # and BldPitch2 and 3 of blades with pitches of their own
     "PtfmTVxi": (State.VX, 1.0),
     "PtfmTVyi": (State.VY, 1.0),
     "PtfmTVzi": (State.VZ, 1.0),
@@ -39,20 +40,28 @@ def initial_state(
 ) -> tuple[np.ndarray, np.ndarray]:
     """(state, command) that a run begins with.
 
-    start: "trim" the floating steady state in the mean wind; "zero" all platform states zero, with
-    the rotor speed and blade pitch of that wind on a fixed platform. initial: {channel: absolute value}.
+    start: "trim" the floating steady state in the mean wind; "zero" all states of platform and tower zero,
+    with the rotor speed and blade pitch of that wind on a fixed platform. initial: {channel: absolute value};
+    BldPitch1 is that of all blades where they have one pitch, and of the first where each has its own;
+    TTDspFA and TTDspSS bend the tower in its first modes alone.
     """
     if start not in STARTS:
         raise unknown("start", start, STARTS)
     point = trim(scene, platform="floating" if start == "trim" else "fixed")
     x, u = point.state.copy(), point.command.copy()
+    known = INITIAL | {f"BldPitch{blade}": (i, DEGREE) for blade, i in enumerate(scene.pitch_states, 1)}
+    if (tower := scene.model.tower) is not None:
+        known |= {"TTDspFA": (tower.first, 1.0), "TTDspSS": (tower.first + 1, 1.0)}
+        deflections = slice(tower.first, tower.first + len(tower.slope))
+        if start == "zero" or any(str(name).startswith("TTDsp") for name in initial or {}):
+            x[deflections] = 0.0
     rates = {}
     for name, value in (initial or {}).items():
         key = str(name).split("_[")[0]
-        if key not in INITIAL:
-            raise unknown("channel of initial", name, INITIAL)
+        if key not in known:
+            raise unknown("channel of initial", name, known)
         check_number(f"initial[{name!r}]", value)
-        index, factor = INITIAL[key]
+        index, factor = known[key]
         if scene.model.rigid_body.plane is not None and index in OUT_OF_PLANE and value != 0.0:
             raise refusal(f"initial[{name!r}]", value, "0 in a planar scene")
         if State.VX <= index <= State.WZ:
@@ -72,10 +81,12 @@ def initial_state(
         x[State.VX : State.VX + 3] = rotation.T @ inertial[:3]
         x[State.WX : State.WX + 3] = rotation.T @ inertial[3:]
     drive = scene.turbine.pitch_drive
-    if not drive.minimum <= x[State.BLADE_PITCH] <= drive.maximum:
-        raise InputError(
-            f"initial['BldPitch1'] = {x[State.BLADE_PITCH] / DEGREE:g} deg: must be in"
-            f" [{drive.minimum / DEGREE:g}, {drive.maximum / DEGREE:g}] deg"
-        )
-    u[Command.BLADE_PITCH] = x[State.BLADE_PITCH]
+    for blade, index in enumerate(scene.pitch_states):
+        if not drive.minimum <= x[index] <= drive.maximum:
+            raise InputError(
+                f"initial['BldPitch{blade + 1}'] = {x[index] / DEGREE:g} deg: must be in"
+                f" [{drive.minimum / DEGREE:g}, {drive.maximum / DEGREE:g}] deg"
+            )
+        u[Command.BLADE_PITCH + blade] = x[index]
+    rest_actuators(scene.model, x, u)
     return x, u

@@ -100,11 +100,42 @@ BlFract PitchAxis StrcTwst BMassDen FlpStff EdgStff
 TOWER = """------- TOWER -------
 falls from 3000 to 1000 kg/m
 2    NTwInpSt - stations
+1.0  TwrFADmp(1) - percent
+2.0  TwrFADmp(2)
+3.0  TwrSSDmp(1)
+4.0  TwrSSDmp(2)
+1.0  FAStTunr(1) - factors on the stiffness of modes
+1.1  FAStTunr(2)
+1.0  SSStTunr(1)
+1.0  SSStTunr(2)
 1.0  AdjTwMa  - factor
+2.0  AdjFASt  - factor
+1.0  AdjSSSt  - factor
 HtFract TMassDen TwFAStif TwSSStif
 (-) (kg/m) (Nm^2) (Nm^2)
-0.0 3000.0 1e12 1e12
-1.0 1000.0 1e12 1e12
+0.0 3000.0 1e12 3e12
+1.0 1000.0 5e11 1e12
+---------------------- MODE SHAPES ---------------------------------------------
+0.8     TwFAM1Sh(2) - of x^2
+0.4     TwFAM1Sh(3) - of x^3
+-0.1    TwFAM1Sh(4) - of x^4
+-0.2    TwFAM1Sh(5) - of x^5
+0.1     TwFAM1Sh(6) - of x^6
+20.0    TwFAM2Sh(2) - of x^2
+-10.0   TwFAM2Sh(3) - of x^3
+-5.0    TwFAM2Sh(4) - of x^4
+-3.0    TwFAM2Sh(5) - of x^5
+-1.0    TwFAM2Sh(6) - of x^6
+0.7     TwSSM1Sh(2) - of x^2
+0.3     TwSSM1Sh(3) - of x^3
+0.0     TwSSM1Sh(4) - of x^4
+0.0     TwSSM1Sh(5) - of x^5
+0.0     TwSSM1Sh(6) - of x^6
+-9.0    TwSSM2Sh(2) - of x^2
+4.0     TwSSM2Sh(3) - of x^3
+3.0     TwSSM2Sh(4) - of x^4
+2.0     TwSSM2Sh(5) - of x^5
+1.0     TwSSM2Sh(6) - of x^6
 """
 
 AERODYN = """------- AERODYN INPUT FILE -------

@@ -19,7 +19,7 @@ from scipy.linalg import expm, solve_discrete_are
 from scipy.optimize import least_squares
 
 from fowt_env.analysis.linear_model import linearize
-from fowt_env.analysis.reduced_model import with_pitch_lag, without_memory
+from fowt_env.analysis.reduced_model import with_pitch_lag, without_inertia, without_memory
 from fowt_env.analysis.trim import without_fluctuations
 from fowt_env.analysis.trim_cache import plant_key, water_key
 from fowt_env.analysis.wave_excitation import wave_force
@@ -189,7 +189,7 @@ def scene_at(scene, speed):
 
 def design_model(scene, speed):
     """DesignModel of a scene's plant at a wind speed, m/s."""
-    model = with_pitch_lag(without_memory(linearize(scene_at(scene, speed))))
+    model = with_pitch_lag(without_inertia(without_memory(linearize(scene_at(scene, speed)))))
     rows = [model.index(name) for name in PLANT]
     sensors = [model.output_index(name) for name in SENSORS]
     sea = sea_state_of(joint_sea_state(SITE, min(float(speed), LAST_SEA_WIND)))

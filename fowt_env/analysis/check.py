@@ -8,6 +8,7 @@ import numpy as np
 
 from fowt_env.analysis.equilibrium import MOTION_LABELS, causes_of, evaluated, metacentre
 from fowt_env.analysis.statics import Evaluation, Statics, statics
+from fowt_env.analysis.tower_frequencies import TowerFrequency, tower_frequencies
 from fowt_env.analysis.trim import DIFFERENCE_STEPS, trim
 from fowt_env.errors import InputError
 from fowt_env.plant.model import LoadCache
@@ -37,6 +38,7 @@ class Check(NamedTuple):
     statics: Statics  # of the undisplaced platform
     rest: dict[str, float] | None  # {motion: m or deg}; None where it has no place to rest
     periods: dict[str, float] | None  # {motion: s}, undamped; inf: nothing restores it
+    tower: dict[str, TowerFrequency]  # of the bending modes that the file has; empty without a rest
     faults: tuple[str, ...]  # sentences on what does not fit
 
 
@@ -51,7 +53,7 @@ def check_platform(platform, **options):
     figures = statics(scene)
     faults = geometry_faults(scene.platform)
     faults |= _static_faults(scene, figures)
-    rest = periods = None
+    rest, periods, tower = None, None, {}
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -62,10 +64,10 @@ def check_platform(platform, **options):
         rest = _rest(point.state)
         if abs(rest["heave"]) <= SETTLED_HEAVE * scene.platform.draft:
             faults.pop("vertical", None)  # a wide waterplane carries what is missing
-        periods = natural_modes(scene, point)
+        periods, tower = natural_modes(scene, point)
         faults |= _rest_faults(scene, rest) | _period_faults(periods, scene.turbine.rotor.hub_height)
     return Check(
-        scene.label, scene.platform.draft, figures, rest, periods,
+        scene.label, scene.platform.draft, figures, rest, periods, tower,
         tuple(f"{text[0].upper()}{text[1:]}." for text in faults.values()),
     )  # fmt: skip
 
@@ -126,10 +128,11 @@ def _period_faults(periods, hub_height):
 
 
 def natural_modes(scene, point):
-    """{motion: undamped natural period s} about an operating point, from stiffness and mass.
+    """({motion: undamped natural period s}, {mode: TowerFrequency}) about an operating point.
 
-    A potential-flow body has the added mass of each mode's own frequency. Modes are named by their largest
-    motion about the centre of mass, angles weighted with half the draft; inf: nothing restores it.
+    From stiffness and mass. A potential-flow body has the added mass of each mode's own frequency. Modes are
+    named by their largest motion about the centre of mass, angles weighted with half the draft; inf: nothing
+    restores it.
     """
     evaluation = Evaluation(scene)
     x = point.state.copy()
@@ -147,13 +150,14 @@ def natural_modes(scene, point):
     height = mass[0, 4] / mass[0, 0]
     potential = scene.platform.potential_flow
     arm = 0.5 * scene.platform.draft
+    tower = tower_frequencies(scene, mass, slopes, moved)
     periods = _periods(moved, mass, slopes, height, arm)
     if potential is None:
-        return periods
+        return periods, tower
     return {
         motion: _at_own_frequency(motion, period, moved, mass, slopes, height, arm, potential)
         for motion, period in periods.items()
-    }
+    }, tower
 
 
 def _kinematics(x):

@@ -14,19 +14,25 @@ from fowt_env.plant.channels import N_FIXED, Out, measure, record
 from fowt_env.plant.compile.decorators import entry
 from fowt_env.plant.compile.handle import data_of, model_of
 from fowt_env.plant.dynamics import evaluate_loads, loads_of, respond
-from fowt_env.plant.measurement import N_MEASUREMENTS, Measure
+from fowt_env.plant.measurement import Measure
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.state import MOTIONS, STATE_INDEX, STATES, State, pose_of
+from fowt_env.scene.actuators import linear_actuator
 from fowt_env.scene.radiation_fit import linear_memory
 
 # velocity steps are small because quadratic drag leaves a false damping proportional to them
 STATE_STEPS = np.array([1e-3, 1e-3, 1e-3, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-7, 1e-7, 1e-7, 1e-4, 1e-5])
 VELOCITIES = ("vx", "vy", "vz", "wx", "wy", "wz")
+ACTUATOR_STATES = {  # block of the scene's state vector: (name of its state in a linear model, step)
+    "pitch_rate": ("pitch_rate", 1e-5),
+    "generator_torque": ("generator_torque_in_force", 1.0),
+}
 INPUTS = ("generator_torque", "blade_pitch_command", "wind_speed")
 INPUT_STEPS = np.array([1.0, 1e-5, 1e-3])
 FREQUENCY_ROUNDS = 4  # of finding a period and the added mass at it
 # internal blocks that linearize takes: memory has matrices of its own, and flat water has no waves to meet
 LINEAR = ("radiation", "filtered position")
+DRIVE = ("blade_pitch", "pitch_rate")  # states of a pitch drive with inertia
 MEMORY = "radiation_"  # begins the names of a memory's states
 FORCES = ("fx", "fy", "fz", "mx", "my", "mz")  # on the hull, body components about the body origin
 FORCE_STEPS = np.array([1e2, 1e2, 1e2, 1e4, 1e4, 1e4])  # N, N m
@@ -47,7 +53,8 @@ class LinearModel:
 
     A (m, m), B (m, 3), C (n, m), D (n, 3) with the names in states, inputs and outputs; E (m, 6)
     and F (n, 6) take further forces on the hull (FORCES). point is the OperatingPoint. The first 14 states
-    are plant.state.STATES; those of a body with radiation memory follow, radiation_1 and so on.
+    are plant.state.STATES; those of ACTUATOR_STATES follow where the plant has them, then those of a body
+    with radiation memory, radiation_1 and so on.
     """
 
     A: np.ndarray
@@ -79,7 +86,9 @@ class LinearModel:
     @property
     def x0(self):
         """(m,) the states at the operating point."""
-        return np.r_[self.point.state[list(STATE_INDEX)], np.zeros(len(self.states) - len(STATES))]
+        names, rows, _ = plant_states(self.scene)
+        row_of = dict(zip(names, rows, strict=True))
+        return np.array([self.point.state[row_of[n]] if n in row_of else 0.0 for n in self.states])
 
     @property
     def pitch_rests(self):
@@ -150,6 +159,27 @@ class LinearModel:
         )
 
 
+def plant_states(scene):
+    """(names, indices in the state vector, steps of differences) of a LinearModel's states, less memory."""
+    names, rows, steps = list(STATES), [int(i) for i in STATE_INDEX], list(STATE_STEPS)
+    for block in scene.blocks:
+        if block.name in ACTUATOR_STATES:
+            name, step = ACTUATOR_STATES[block.name]
+            names.append(name)
+            rows.append(block.offset)
+            steps.append(step)
+    return tuple(names), rows, steps
+
+
+def of_all_blades(scene, rows):
+    """[indices] that each state of plant_states stands for: of what each blade has, those of all blades."""
+    together = {int(State.BLADE_PITCH): list(scene.pitch_states)}
+    for block in scene.blocks:
+        if block.name in ACTUATOR_STATES:
+            together[block.offset] = list(range(block.offset, block.offset + block.size))
+    return [together.get(row, [row]) for row in rows]
+
+
 class Mode(NamedTuple):
     """One oscillating mode."""
 
@@ -164,11 +194,14 @@ def modes(a, names, cm_height, arm):
 
     A mode is named by its largest motion: translations of the centre of mass (at the water line a
     platform-pitch mode moves more in surge than in pitch), angles times arm (m), rotor speed times arm/12 s.
-    Those of the radiation memory are left out: to which its states contribute most, by participation factors.
+    Those of the radiation memory and of a pitch drive with inertia are left out: to which their states
+    contribute most, by participation factors.
     """
     values, vectors = np.linalg.eig(a)
     found = []
     remembered = [name.startswith(MEMORY) for name in names]
+    if "pitch_rate" in names:
+        remembered = [is_memory or name in DRIVE for is_memory, name in zip(remembered, names, strict=True)]
     water = np.zeros(len(values))
     if any(remembered):
         factors = np.abs(vectors * np.linalg.inv(vectors).T)
@@ -224,15 +257,17 @@ class _Plant:
         self.handle = scene.handle()
         self.columns = [*RECORDED.values(), *range(N_FIXED, N_FIXED + n_lines)]
         self.measures = [Measure[name.upper()] for name in MEASURED]
+        self.states = plant_states(scene)[1]
         rows = len(scene.channels)
-        self.scratch = (np.zeros(scene.n_state), np.zeros(N_MEASUREMENTS), np.zeros(rows))
-        self.means = (np.zeros(scene.n_state), np.zeros(N_MEASUREMENTS), np.zeros(rows))
+        measured = scene.n_measurements
+        self.scratch = (np.zeros(scene.n_state), np.zeros(measured), np.zeros(rows))
+        self.means = (np.zeros(scene.n_state), np.zeros(measured), np.zeros(rows))
 
     def __call__(self, x, u, force):
-        """(14 + n_outputs,) rates of STATES and the outputs."""
+        """Rates of plant_states and the outputs."""
         _mean_response(self.handle, x, u, force, AZIMUTHS, *self.scratch, *self.means)
         rates, measured, recorded = self.means
-        return np.r_[rates[list(STATE_INDEX)], measured[self.measures], recorded[self.columns]]
+        return np.r_[rates[self.states], measured[self.measures], recorded[self.columns]]
 
 
 def linearize(scene, operating_point=None):
@@ -241,7 +276,9 @@ def linearize(scene, operating_point=None):
     The wind input moves the hub wind with its shear; waves are flat, and their small force comes in by
     wave_force. Drag has no linear part at rest in still water, so viscous damping is absent there.
     Radiation memory comes in exactly, in a scene with convolution by the fit that state_space takes. Other
-    internal states (dynamic inflow, those of loads) are not linearised.
+    internal states (dynamic inflow, those of loads) are not linearised. A pitch drive counts without deadband
+    and friction, within which it would not move at all. blade_pitch is that of all blades together, also
+    where each has its own: multiblade.py has the rest.
 
     Raises: InputError if the scene has any.
     """
@@ -255,13 +292,14 @@ def linearize(scene, operating_point=None):
         )
     point = trim(scene) if operating_point is None else operating_point
     body = scene.model.rigid_body._replace(platform_fixed=point.platform == "fixed")
-    plant = _Plant(without_fluctuations(scene, point.wind_speed).with_model(rigid_body=body), scene.n_lines)
+    parts = {"rigid_body": body, "actuator": linear_actuator(scene.model.actuator)}
+    plant = _Plant(without_fluctuations(scene, point.wind_speed).with_model(parts), scene.n_lines)
     x, u, force = point.state.copy(), point.command.copy(), np.zeros(6)
 
     def slopes(vector, indices, steps):
         columns = []
         for index, step in zip(indices, steps, strict=True):
-            keep = vector[index]
+            keep = vector[index].copy()
             vector[index] = keep + step
             up = plant(x, u, force)
             vector[index] = keep - step
@@ -270,22 +308,23 @@ def linearize(scene, operating_point=None):
             columns.append((up - down) / (2.0 * step))
         return np.array(columns).T
 
-    of_states = slopes(x, [int(i) for i in STATE_INDEX], STATE_STEPS)
+    names, rows, state_steps = plant_states(scene)
+    of_states = slopes(x, of_all_blades(scene, rows), state_steps)
     of_inputs = np.zeros((of_states.shape[0], len(INPUTS)))
-    of_inputs[:, :2] = slopes(u, range(2), INPUT_STEPS[:2])
-    of_forces = slopes(force, range(6), FORCE_STEPS)
+    of_inputs[:, :2] = slopes(u, ([0], list(range(1, scene.n_commands))), INPUT_STEPS[:2])
+    of_forces = slopes(force, [[i] for i in range(6)], FORCE_STEPS)
     if point.wind_speed is not None:
         step = INPUT_STEPS[2]
         sides = []
         for sign in (1.0, -1.0):
-            air = without_fluctuations(scene, point.wind_speed + sign * step).with_model(rigid_body=body)
+            air = without_fluctuations(scene, point.wind_speed + sign * step).with_model(parts)
             sides.append(_Plant(air, scene.n_lines)(x, u, force))
         of_inputs[:, 2] = (sides[0] - sides[1]) / (2.0 * step)
-    n = len(STATES)
+    n = len(names)
     tensions = tuple(f"fairlead_tension_{i + 1}" for i in range(scene.n_lines))
     model = LinearModel(
         of_states[:n], of_inputs[:n], of_states[n:], of_inputs[n:], of_forces[:n], of_forces[n:],
-        STATES, INPUTS, (*MEASURED, *RECORDED, *tensions),
+        names, INPUTS, (*MEASURED, *RECORDED, *tensions),
         point, body.s_z / body.mass, 0.5 * scene.platform.draft, scene,
     )  # fmt: skip
     return _with_memory(model, linear_memory(scene))
@@ -327,7 +366,7 @@ def natural_periods(scene):
     """
     model = linearize(scene)
     periods = _periods(model, 0.0)
-    if len(model.states) == len(STATES):
+    if not any(name.startswith(MEMORY) for name in model.states):
         return periods
     for motion in MOTIONS:
         for _ in range(FREQUENCY_ROUNDS):
@@ -339,7 +378,8 @@ def natural_periods(scene):
 
 def _periods(model, omega):
     """{motion: undamped natural period s} with the added mass of the memory at a frequency, rad/s."""
-    n, m = len(MOTIONS), len(STATES)
+    n = len(MOTIONS)
+    m = sum(not name.startswith(MEMORY) for name in model.states)
     # velocities are body components, so positions move with kinematics K: q' = K v, v' = S q
     kinematics = model.A[:n, n : 2 * n]
     stiffness = model.A[n : 2 * n, :n]

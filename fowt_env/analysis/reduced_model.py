@@ -6,29 +6,59 @@ dx/dt.
 So the force of the memory becomes the added mass and the damping of that frequency, exactly there and nearly
 about it, and the model has the rigid body's states alone.
 
-Blades that follow their command at once are no state: designs give them LEAST_LAG.
+Blades that follow their command at once are no state: designs give them LEAST_LAG. A drive with inertia is to
+them the lag that trails a slow command as far, and a generator that lags follows at once.
 """
 
 from dataclasses import replace
 
 import numpy as np
 
-from fowt_env.analysis.linear_model import MEMORY, VELOCITIES
+from fowt_env.analysis.linear_model import ACTUATOR_STATES, MEMORY, VELOCITIES
 from fowt_env.plant.state import MOTIONS
 
 LEAST_LAG = 0.05  # s, of a pitch drive that has none
+ADDED = tuple(name for name, _ in ACTUATOR_STATES.values())
+TORQUE = ACTUATOR_STATES["generator_torque"][0]
 NAMES = ("platform_pitch", "surge", "heave")  # of modes that may be the platform's pitch, the likeliest first
 FAR = 0.3  # of the undamped frequency, within which its mode is
 
 
 def with_pitch_lag(model):
     """The LinearModel with blades that lag; itself where its pitch drive has a time constant."""
-    if model.scene.turbine.pitch_drive.time_constant > 0.0:
+    if model.scene.turbine.pitch_drive.lag > 0.0:
         return model
     a, b, blade = model.A.copy(), model.B.copy(), model.index("blade_pitch")
     a[blade], b[blade] = 0.0, 0.0
     a[blade, blade], b[blade, model.inputs.index("blade_pitch_command")] = -1.0 / LEAST_LAG, 1.0 / LEAST_LAG
     return replace(model, A=a, B=b)
+
+
+def without_inertia(model):
+    """The LinearModel with a first-order lag of the blades and none of the torque; itself where it is so."""
+    lagging = [i for i, name in enumerate(model.states) if name in ADDED]
+    if not lagging:
+        return model
+    kept = [i for i in range(len(model.states)) if i not in lagging]
+    a, b, d = model.A.copy(), model.B.copy(), model.D.copy()
+    blade, lag = model.index("blade_pitch"), model.scene.turbine.pitch_drive.lag
+    if "pitch_rate" in model.states:
+        a[blade], b[blade] = 0.0, 0.0
+        a[blade, blade] = -1.0 / lag
+        b[blade, model.inputs.index("blade_pitch_command")] = 1.0 / lag
+    if TORQUE in model.states:
+        torque, command = model.index(TORQUE), model.inputs.index("generator_torque")
+        b[:, command] += a[:, torque]
+        d[:, command] += model.C[:, torque]
+    return replace(
+        model,
+        A=a[np.ix_(kept, kept)],
+        B=b[kept],
+        C=model.C[:, kept],
+        D=d,
+        E=model.E[kept],
+        states=tuple(model.states[i] for i in kept),
+    )
 
 
 def memory_states(model):

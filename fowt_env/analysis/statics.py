@@ -10,7 +10,7 @@ from fowt_env.plant.compile.handle import data_of, model_of
 from fowt_env.plant.dynamics import derivative
 from fowt_env.plant.hydro.member_buoyancy import displaced
 from fowt_env.plant.model import LoadCache
-from fowt_env.plant.state import N_COMMANDS, N_RIGID, State, pose_of
+from fowt_env.plant.state import N_RIGID, State, pose_of
 
 TILT_STEP = 1e-4  # rad, of the slope of the righting moment
 
@@ -47,7 +47,8 @@ class Evaluation:
     def __init__(self, scene):
         self.data = scene.data()
         self.handle = scene.handle(self.data)
-        self.u, self.dx, self.mean = np.zeros(N_COMMANDS), np.zeros(scene.n_state), np.zeros(scene.n_state)
+        self.u = np.zeros(scene.n_commands)
+        self.dx, self.mean = np.zeros(scene.n_state), np.zeros(scene.n_state)
 
     def at(self, x, block):
         """(6,) wrench of an entry of LoadCache at a state."""

@@ -19,8 +19,9 @@ from fowt_env.plant.drivetrain import build_torque_curve, generator_torque
 from fowt_env.plant.hydro.load import BandedStrips
 from fowt_env.plant.hydro.member_series import no_series
 from fowt_env.plant.rollout import output_row
-from fowt_env.plant.state import N_COMMANDS, Command, State, pose_of
+from fowt_env.plant.state import Command, State, pose_of
 from fowt_env.plant.tilt import rotor_pose
+from fowt_env.scene.actuators import rest_actuators
 from fowt_env.scene.scene import Scene
 from fowt_env.weather.excitation import still_excitation
 from fowt_env.weather.wind import make_series
@@ -38,13 +39,14 @@ DIFFERENCE_STEPS = {  # of the differences, m, rad and rad/s
     int(State.ROTOR_SPEED): 1e-4,
     int(State.BLADE_PITCH): 1e-5,
 }
+DEFLECTION_STEP = 1e-3  # m, of those of a tower that bends
 PLATFORM_MODES = ("floating", "fixed")
 
 
 class OperatingPoint(Mapping):
     """Steady state as a mapping of OpenFAST channels, e.g. op["RotThrust"] in kN.
 
-    Attributes: state (n_state,) and command (generator torque N m, blade pitch rad), both SI;
+    Attributes: state (n_state,) and command (n_commands,): generator torque N m, blade pitch rad, both SI;
     wind_speed (m/s or None); platform ("floating" or "fixed").
     """
 
@@ -139,7 +141,7 @@ class _Steady:
         self.data = self.scene.data()
         self.handle = self.scene.handle(self.data)
         self.x = np.zeros(self.scene.n_state)
-        self.u = np.zeros(N_COMMANDS)
+        self.u = np.zeros(self.scene.n_commands)
         self.dx = np.zeros_like(self.x)
         self.mean = np.zeros_like(self.x)
         self.curve = build_torque_curve(self.scene.turbine.torque_law)
@@ -147,7 +149,8 @@ class _Steady:
         self.slope = None  # last Jacobian of the motions
 
     def rates(self):
-        """Azimuth-averaged derivative at the present state and command."""
+        """Azimuth-averaged derivative at the present state and command, with actuators at rest."""
+        rest_actuators(self.scene.model, self.x, self.u)
         for block in self.scene.blocks:
             if block.steady == "settled":
                 self.settle_internal(block)
@@ -196,10 +199,14 @@ class _Steady:
         """w_b' with the torque of the static curve, platform as it is."""
         ratio = self.scene.turbine.drivetrain.gear_ratio
         self.x[State.ROTOR_SPEED] = rotor_speed
-        self.x[State.BLADE_PITCH] = blade_pitch
         self.u[Command.GENERATOR_TORQUE] = generator_torque(ratio * rotor_speed, blade_pitch, self.curve)
-        self.u[Command.BLADE_PITCH] = blade_pitch
+        self.set_pitch(blade_pitch)
         return self.rates()[State.ROTOR_SPEED]
+
+    def set_pitch(self, blade_pitch):
+        """Set the pitch (rad) of all blades, and its command."""
+        self.x[list(self.scene.pitch_states)] = blade_pitch
+        self.u[Command.BLADE_PITCH :] = blade_pitch
 
     def settle_rotor(self):
         """Set rotor speed, blade pitch and torque to their steady values for the present platform."""
@@ -234,35 +241,48 @@ class _Steady:
 
     def motions(self):
         """Indices of the positions that the scene's platform can change."""
-        return [0, 1, 2, 3, 4, 5] if self.scene.model.rigid_body.plane is None else [0, 2, 4]
+        body = self.scene.model.rigid_body
+        if body.platform_fixed:
+            return []
+        return [0, 1, 2, 3, 4, 5] if body.plane is None else [0, 2, 4]
+
+    def positions(self):
+        """Indices of the platform's motions and of the deflections of a tower that bends."""
+        tower = self.scene.model.tower
+        return self.motions() + (
+            [] if tower is None else list(range(tower.first, tower.first + _modes(tower)))
+        )
 
     def free_states(self):
-        """Indices of the states that a floating trim finds: motions, pitch or speed of a turning rotor."""
-        motions = self.motions()
+        """Indices of the states that a trim finds: positions, pitch or speed of a turning rotor."""
+        positions = self.positions()
         wind = self.scene.wind_speed
         if wind is None or not 0.0 < wind <= self.scene.turbine.cut_out_wind_speed:
-            return motions
+            return positions
         rotor_speed, blade_pitch = self.x[State.ROTOR_SPEED], self.x[State.BLADE_PITCH]
         if blade_pitch > self.scene.turbine.pitch_drive.minimum:
-            return [*motions, int(State.BLADE_PITCH)]
-        return [*motions, int(State.ROTOR_SPEED)] if rotor_speed > 0.0 else motions
+            return [*positions, int(State.BLADE_PITCH)]
+        return [*positions, int(State.ROTOR_SPEED)] if rotor_speed > 0.0 else positions
 
     def residual(self, free):
-        """Accelerations that vanish in the steady state, of the platform and of a rotor that is free."""
-        motions = self.motions()
-        accelerations = [State.VX + motion for motion in motions]
-        if len(free) > len(motions):
+        """Accelerations of the free states, which vanish in the steady one."""
+        if free[-1:] in ([State.BLADE_PITCH], [State.ROTOR_SPEED]):
             self.rotor_acceleration(self.x[State.ROTOR_SPEED], self.x[State.BLADE_PITCH])
-            accelerations.append(State.ROTOR_SPEED)
         else:
             self.rates()
-        return self.mean[accelerations]
+        return self.mean[[self._acceleration(index) for index in free]]
+
+    def _acceleration(self, index):
+        """Index of the state whose rate is the acceleration that balances with a free state."""
+        if index in (State.BLADE_PITCH, State.ROTOR_SPEED):
+            return State.ROTOR_SPEED
+        return State.VX + index if index < State.AZIMUTH else index + _modes(self.scene.model.tower)
 
     def jacobian(self, free):
         """Derivatives of the residual by the free states, central differences."""
         columns = []
         for index in free:
-            step = DIFFERENCE_STEPS[index]
+            step = DIFFERENCE_STEPS.get(index, DEFLECTION_STEP)
             keep = self.x[index]
             self.x[index] = keep + step
             up = self.residual(free)
@@ -333,10 +353,16 @@ class _Steady:
         check_equilibrium(self.scene, rest, self.start, self.slope, fresh_slope)
 
 
+def _modes(tower):
+    """Number of modes of a TowerModes."""
+    return tower.slope.shape[0]
+
+
 def trim(scene: Scene, platform: str = "floating") -> OperatingPoint:
     """OperatingPoint of a scene: steady state in its mean wind, waves flat.
 
-    platform: "floating" finds the six motions too; "fixed" holds them at zero. Rotor speed and
+    platform: "floating" finds the six motions too; "fixed" holds them at zero. Deflections of a tower that
+    bends are found either way. Rotor speed and
     blade pitch follow the torque curve below rated and rated speed above; beyond the cut-out wind
     the rotor is parked with feathered blades, and without wind it stands.
 
@@ -357,7 +383,7 @@ def _trim(scene, platform):
     body = scene.model.rigid_body._replace(platform_fixed=fixed, rotor_fixed=False)
     steady = _Steady(without_fluctuations(scene).with_model(rigid_body=body))
     steady.settle_rotor()
-    if not fixed:
+    if steady.positions():
         for _ in range(OUTER_ROUNDS):
             # which of pitch and speed is free follows from the rotor's balance on the platform as it is
             free = steady.free_states()
@@ -381,9 +407,9 @@ def trim_prescribed(scene, rotor_speed, blade_pitch, platform="floating"):
     body = scene.model.rigid_body._replace(platform_fixed=platform == "fixed", rotor_fixed=True)
     steady = _Steady(without_fluctuations(scene).with_model(rigid_body=body))
     steady.x[State.ROTOR_SPEED] = rotor_speed
-    steady.x[State.BLADE_PITCH] = steady.u[Command.BLADE_PITCH] = blade_pitch
-    if platform == "floating":
-        remaining = steady.settle(steady.motions())
+    steady.set_pitch(blade_pitch)
+    if steady.positions():
+        remaining = steady.settle(steady.positions())
         if not remaining < 1e3 * TOLERANCE:
             raise steady.refusal()
     return _point(scene, steady, platform)
@@ -391,13 +417,14 @@ def trim_prescribed(scene, rotor_speed, blade_pitch, platform="floating"):
 
 def _point(scene, steady, platform):
     """OperatingPoint at the present state, channels averaged over the azimuth."""
+    rest_actuators(scene.model, steady.x, steady.u)
     state, command = steady.x.copy(), steady.u.copy()
     rows = []
     for i in range(AZIMUTHS):
         x = state.copy()
         x[State.AZIMUTH] += i * (2.0 * pi / 3.0) / AZIMUTHS
         rows.append(output_row(steady.handle, x, command, 0.0, len(scene.channels)))
-    row = to_units(np.mean(rows, axis=0), scene.n_lines, scene.load_names)
+    row = to_units(np.mean(rows, axis=0), scene.n_lines, scene.load_names, scene.channel_groups)
     names = [channel.name for channel in scene.channels]
     values = {name: float(value) for name, value in zip(names, row, strict=True)}
     values["Azimuth"] = 0.0

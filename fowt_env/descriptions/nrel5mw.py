@@ -8,3 +8,4 @@ GENERATOR_SPEED = 122.9096  # rated, rad/s
 TORQUE = 43093.55  # rated, on the high-speed shaft, N m
 PITCH_RATE = 8.0 * DEGREE  # of its pitch drive, rad/s
 TIP_RADIUS, HUB_HEIGHT = 63.0, 90.0  # m
+GEAR_RATIO = 97.0

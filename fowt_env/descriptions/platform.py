@@ -316,7 +316,7 @@ def read_platform(name_or_path: str | Path) -> Platform:
         try:
             data["tower"]["modes"] = read_tower_modes(tower["modes"], path.parent)
         except InputError as error:
-            problems.append(f"tower.modes: {error}")
+            problems.append(str(error))
     if isinstance(data.get("turbine"), str):
         try:
             turbine = locate("turbine", data["turbine"], turbine_names(), turbine_file, path.parent)

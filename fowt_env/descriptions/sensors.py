@@ -7,17 +7,21 @@ from typing import Any
 from fowt_env.caches import cached
 from fowt_env.descriptions.checks import check_number
 from fowt_env.descriptions.files import DATA, read_toml
-from fowt_env.descriptions.nrel5mw import GENERATOR_SPEED, ROTOR_SPEED, TORQUE
+from fowt_env.descriptions.nrel5mw import GEAR_RATIO, GENERATOR_SPEED, ROTOR_SPEED, TORQUE
 from fowt_env.errors import InputError, unknown
-from fowt_env.plant.measurement import Measurement
+from fowt_env.plant.measurement import BladeMeasure, BladeMeasurement, Measurement
 
 EXACT = "exact"
 LONGEST_DELAY = 100.0  # s
+FIELDS = Measurement._fields + BladeMeasurement._fields
+MOMENTS = BladeMeasurement._fields[BladeMeasure.ROOT_OUT_OF_PLANE_1 :]
 
 
 @dataclass(frozen=True)
 class Sensor:
-    """How one field of a Measurement is read: low pass, delay, noise and quantisation, in this order; SI.
+    """How one field of a Measurement or BladeMeasurement is read: SI.
+
+    Low pass, delay, noise and quantisation, in this order.
 
     Raises: InputError naming the key, value and allowed range.
     """
@@ -43,7 +47,8 @@ class Sensor:
 class SensorChain:
     """Sensors by the field of Measurement that they show; no controller can read what a chain does not have.
 
-    The time is always read as it is. Raises: InputError naming the field, key, value and allowed range.
+    Those of BladeMeasurement are read where every blade has a pitch of its own. The time is always read as it
+    is. Raises: InputError naming the field, key, value and allowed range.
     """
 
     name: str
@@ -52,7 +57,7 @@ class SensorChain:
 
     def __post_init__(self) -> None:
         where = f"sensor chain {self.name!r}"
-        known = [name for name in Measurement._fields if name != "time"]
+        known = [name for name in FIELDS if name != "time"]
         for name, sensor in self.sensors.items():
             if name not in known:
                 raise unknown(f"field of {where}:", name, known)
@@ -78,8 +83,13 @@ class SensorChain:
 
     @property
     def available(self) -> tuple[str, ...]:
-        """Fields that the chain shows, in the order of Measurement."""
+        """Fields of Measurement that the chain shows, in its order."""
         return tuple(name for name in Measurement._fields if name in self.sensors)
+
+    @property
+    def available_of_blades(self) -> tuple[str, ...]:
+        """Fields of BladeMeasurement that the chain shows, in its order."""
+        return tuple(name for name in BladeMeasurement._fields if name in self.sensors)
 
 
 @cached(1)
@@ -106,7 +116,8 @@ def sensors_of(given: str | SensorChain | None, turbine: Any) -> SensorChain | N
     """The SensorChain of what a run is given as sensors, for a turbine (its description); None for none.
 
     Noise and quantisation of speeds and torque on the shafts are fractions of the rated ones in a built-in
-    chain, which is given by name; a SensorChain stays as it is. Raises: InputError as sensor_chain.
+    chain, which is given by name, and those of bending moments of the rated torque on the rotor's shaft; a
+    SensorChain stays as it is. Raises: InputError as sensor_chain.
     """
     chain = sensor_chain(given)
     if chain is None or not isinstance(given, str):
@@ -116,6 +127,8 @@ def sensors_of(given: str | SensorChain | None, turbine: Any) -> SensorChain | N
         "generator_speed": turbine.torque_law.rated_speed / GENERATOR_SPEED,
         "generator_torque": turbine.torque_law.rated_torque / TORQUE,
     }
+    slow = turbine.drivetrain.gear_ratio * factors["generator_torque"] / GEAR_RATIO
+    factors |= dict.fromkeys(MOMENTS, slow)
     if all(factor == 1.0 for factor in factors.values()):
         return chain
     sensors = dict(chain.sensors)

@@ -100,7 +100,7 @@ def read_tower_modes(table, folder):
     Raises: InputError naming the file, the key and what is allowed.
     """
     record, problems = validate(_ModesTable, table)
-    raise_problems("[tower.modes]", problems)
+    raise_problems("tower.modes", problems)
     path = folder / Path(record.distribution).expanduser()
     if not path.exists() and (builtin := DATA / "platforms" / record.distribution).is_file():
         path = builtin

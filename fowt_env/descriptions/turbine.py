@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from fowt_env.descriptions.checks import is_number
 from fowt_env.descriptions.files import DATA, column, locate, raise_problems, read_table, read_toml
+from fowt_env.descriptions.protection import Protection
 from fowt_env.descriptions.records import (
     Finite,
     FloatArray,
@@ -35,6 +36,10 @@ class Nacelle(Record):
     cm_left: Finite = 0.0
 
 
+BLADE_MASSES = ("blade_mass", "blade_first_moment", "blade_second_moment")
+BLADE_SLACK = 1.01  # between figures of a turbine file that are rounded, or of bent blades
+
+
 class Rotor(Record):
     """Rotor masses and geometry. The rotor centre is where the blades' pitch axes meet."""
 
@@ -49,11 +54,42 @@ class Rotor(Record):
     shaft_tilt: bounded(gt=-0.5, lt=0.5) = 0.0  # rad, positive: the upwind end points up
     cone: bounded(gt=-0.5, lt=0.5) = 0.0  # rad, positive: blades lean upwind, away from the tower
     cm_offset: Finite = 0.0  # of its centre of mass from the rotor centre along the shaft, downwind, m
+    blade_mass: NonNegative | None = None  # of one blade; outputs of single blades need it and its moments
+    blade_first_moment: NonNegative | None = None  # kg m, about the blade's root, along the pitch axis
+    blade_second_moment: NonNegative | None = None  # kg m2, the same
 
     @model_validator(mode="after")
     def _radii(self):
         if self.tip_radius <= self.hub_radius:
             raise ValueError(f"tip_radius = {self.tip_radius}: must exceed hub_radius = {self.hub_radius}")
+        return self
+
+    @model_validator(mode="after")
+    def _blade_masses(self):
+        given = {key: getattr(self, key) for key in BLADE_MASSES}
+        missing = [key for key, value in given.items() if value is None]
+        if missing and len(missing) < len(given):
+            raise ValueError(f"{missing[0]}: is missing; {', '.join(BLADE_MASSES)} go together")
+        if missing:
+            return self
+        mass, first, second = given.values()
+        if self.blades * mass > self.mass * BLADE_SLACK:
+            raise ValueError(f"blade_mass = {mass:g}: must be <= mass/blades = {self.mass / self.blades:g}")
+        longest = mass * (self.tip_radius - self.hub_radius)
+        if first > longest * BLADE_SLACK:
+            raise ValueError(f"blade_first_moment = {first:g}: must be <= {longest:g}, blade_mass at the tip")
+        if first**2 > mass * second * BLADE_SLACK:
+            raise ValueError(
+                f"blade_second_moment = {second:g}: must be >= blade_first_moment**2/blade_mass ="
+                f" {first**2 / mass:g}"
+            )
+        about_shaft = second + 2.0 * self.hub_radius * first + self.hub_radius**2 * mass
+        about_shaft *= self.blades * np.cos(self.cone) ** 2
+        if about_shaft > self.inertia * BLADE_SLACK:
+            raise ValueError(
+                f"blade_second_moment = {second:g}: about the blade's root; with the other blades it makes"
+                f" {about_shaft:g} about the shaft, must be <= inertia = {self.inertia:g}"
+            )
         return self
 
 
@@ -65,21 +101,93 @@ class Drivetrain(Record):
     mesh_loss: NonNegative = 0.0  # zeta_m
     bearing_loss: NonNegative = 0.0  # zeta_v
     generator_efficiency: Fraction
+    torque_time_constant: Positive | None = None  # s, of generator and converter; None: followed at once
+
+
+class SecondOrderDrive(Record):
+    """Blade-pitch drive with inertia: natural frequency, damping ratio, and what it may have beside them."""
+
+    natural_frequency: bounded(gt=0, le=100)  # w, rad/s
+    damping: bounded(gt=0, le=5)  # zeta
+    acceleration_limit: Positive | None = None  # rad/s2
+    deadband: NonNegative = 0.0  # rad, change of the command that is not followed
+    friction: NonNegative = 0.0  # rad, distance from the command at which a blade at rest begins to move
 
 
 class PitchDrive(Record):
-    """Blade-pitch actuator. time_constant 0: the command is followed at once."""
+    """Blade-pitch drive: first order with time_constant, second with natural_frequency and damping.
 
-    time_constant: NonNegative  # tau_p, s
+    time_constant 0: the command is followed at once. second_order is another drive of the same turbine, used
+    where a scene asks for it.
+    """
+
+    time_constant: NonNegative | None = None  # tau_p, s
     rate_limit: Positive  # rad/s
     minimum: Finite  # rad
     maximum: Finite  # rad
+    natural_frequency: bounded(gt=0, le=100) | None = None  # and so on, as in SecondOrderDrive
+    damping: bounded(gt=0, le=5) | None = None
+    acceleration_limit: Positive | None = None
+    deadband: NonNegative = 0.0
+    friction: NonNegative = 0.0
+    second_order: SecondOrderDrive | None = None
 
     @model_validator(mode="after")
     def _limits(self):
         if self.maximum <= self.minimum:
             raise ValueError(f"maximum = {self.maximum}: must exceed minimum = {self.minimum}")
         return self
+
+    @model_validator(mode="after")
+    def _order(self):
+        if self.natural_frequency is None and self.time_constant is None:
+            raise ValueError(
+                "time_constant is missing: must be a number >= 0; or natural_frequency and damping, of a"
+                " drive of second order"
+            )
+        if (self.natural_frequency is None) != (self.damping is None):
+            missing = "damping" if self.damping is None else "natural_frequency"
+            raise ValueError(f"{missing} is missing: natural_frequency and damping belong together, each > 0")
+        if self.natural_frequency is not None and self.time_constant is not None:
+            raise ValueError(
+                f"time_constant = {self.time_constant:g}: given beside natural_frequency and damping;"
+                " allowed: it, of a drive of first order, or they, of one of second order"
+            )
+        for key in ("acceleration_limit", "deadband", "friction"):
+            value = getattr(self, key)
+            if self.natural_frequency is None and value:
+                raise ValueError(f"{key} = {value:g}: needs natural_frequency and damping")
+        return self
+
+    @property
+    def lag(self):
+        """Time constant of the first-order lag that trails a slow command by as much, s."""
+        if self.natural_frequency is None:
+            return self.time_constant
+        return 2.0 * self.damping / self.natural_frequency
+
+    def slowed(self, factor):
+        """A copy with that many times the lag."""
+        if self.natural_frequency is None:
+            return self.model_copy(update={"time_constant": factor * self.time_constant})
+        return self.model_copy(update={"natural_frequency": self.natural_frequency / factor})
+
+
+def with_second_order_drive(turbine):
+    """The turbine with the drive of its [pitch_drive.second_order]; itself where its drive is of that order.
+
+    Raises: InputError where its file has none.
+    """
+    drive = turbine.pitch_drive
+    if drive.natural_frequency is not None:
+        return turbine
+    if drive.second_order is None:
+        raise InputError(
+            f"pitch_drive = 'second_order': the turbine {turbine.name!r} has no [pitch_drive.second_order]"
+            " with natural_frequency (rad/s) and damping in its file; allowed here 'file'"
+        )
+    figures = drive.second_order.model_dump() | {"time_constant": None}
+    return turbine.model_copy(update={"pitch_drive": drive.model_copy(update=figures)})
 
 
 class TorqueLaw(Record):
@@ -256,6 +364,7 @@ class Turbine(Record):
     gains: dict[
         str, PitchGains
     ] = {}  # published ones by name; without any they are derived (controllers/gains.py)
+    protection: Protection = Protection()
     blade: Blade
     discon: str | None = None  # path of a DISCON.IN of ROSCO for this turbine
     source: str = ""

@@ -7,7 +7,15 @@ all blades the part is None.
 from typing import NamedTuple
 
 from fowt_env.plant.compile.decorators import kernel
-from fowt_env.plant.drivetrain import followed_pitch, pitch_after, pitch_rate
+from fowt_env.plant.compile.variants import chosen_by_class
+from fowt_env.plant.drivetrain import (
+    PitchActuator,
+    advance_torque,
+    followed_pitch,
+    pitch_after,
+    pitch_rate,
+)
+from fowt_env.plant.pitch_drive import PitchDrive, advance_drive, fill_drive_rates, keep, stays
 from fowt_env.plant.state import BLADES, Command, State
 
 N_BLADE_LOAD = 6  # entries of a blade_shape.BladeLoad
@@ -36,10 +44,44 @@ def mean_pitch(x, pitches):
 
 
 @kernel
+def _advance_lagging(blade, i, x, u, after, actuator, y):
+    y[i] = pitch_after(x[i], u[Command.BLADE_PITCH + blade], after, actuator)
+
+
+@kernel
+def _fill_lagging(blade, i, x, u, actuator, dx):
+    dx[i] = pitch_rate(x[i], u[Command.BLADE_PITCH + blade], actuator)
+
+
+@kernel
+def _lagging_jumps(blade, i, x, u, dt, actuator):
+    return followed_pitch(x[i], u[Command.BLADE_PITCH + blade], dt, actuator) != x[i]
+
+
+@kernel
+def _set_lagging(blade, i, x, u, dt, actuator):
+    x[i] = followed_pitch(x[i], u[Command.BLADE_PITCH + blade], dt, actuator)
+
+
+# of one blade, whose pitch has the index i in the state
+advance_pitch = chosen_by_class("actuator", {PitchActuator: _advance_lagging, PitchDrive: advance_drive})
+fill_rates = chosen_by_class("actuator", {PitchActuator: _fill_lagging, PitchDrive: fill_drive_rates})
+jumps = chosen_by_class("actuator", {PitchActuator: _lagging_jumps, PitchDrive: stays})
+set_at_once = chosen_by_class("actuator", {PitchActuator: _set_lagging, PitchDrive: keep})
+
+
+@kernel
 def advance_pitches(x, u, after, actuator, pitches, y):
     """Put into y the pitches at a time `after` (s) the state x, under a constant command u."""
-    y[State.BLADE_PITCH] = pitch_after(x[State.BLADE_PITCH], u[Command.BLADE_PITCH], after, actuator)
+    advance_pitch(0, State.BLADE_PITCH, x, u, after, actuator, y)
     _advance_others(x, u, after, actuator, pitches, y)
+
+
+@kernel
+def advance_actuators(x, u, after, model, y):
+    """Put into y the pitches and the torque in force at a time `after` (s) the state x, under a command u."""
+    advance_pitches(x, u, after, model.actuator, model.pitches, y)
+    advance_torque(x, u, after, model.converter, y)
 
 
 @kernel
@@ -47,14 +89,13 @@ def _advance_others(x, u, after, actuator, pitches, y):
     if pitches is None:
         return
     for blade in range(1, BLADES):
-        i = pitches.first + blade - 1
-        y[i] = pitch_after(x[i], u[Command.BLADE_PITCH + blade], after, actuator)
+        advance_pitch(blade, pitches.first + blade - 1, x, u, after, actuator, y)
 
 
 @kernel
 def fill_pitch_rates(x, u, actuator, pitches, dx):
     """Put the rates of the pitches into dx."""
-    dx[State.BLADE_PITCH] = pitch_rate(x[State.BLADE_PITCH], u[Command.BLADE_PITCH], actuator)
+    fill_rates(0, State.BLADE_PITCH, x, u, actuator, dx)
     _fill_other_rates(x, u, actuator, pitches, dx)
 
 
@@ -63,15 +104,13 @@ def _fill_other_rates(x, u, actuator, pitches, dx):
     if pitches is None:
         return
     for blade in range(1, BLADES):
-        i = pitches.first + blade - 1
-        dx[i] = pitch_rate(x[i], u[Command.BLADE_PITCH + blade], actuator)
+        fill_rates(blade, pitches.first + blade - 1, x, u, actuator, dx)
 
 
 @kernel
 def pitches_jump(x, u, dt, actuator, pitches):
     """Whether an actuator without lag moves a blade at the beginning of a step of dt (s)."""
-    pitch = followed_pitch(x[State.BLADE_PITCH], u[Command.BLADE_PITCH], dt, actuator)
-    return pitch != x[State.BLADE_PITCH] or _others_jump(x, u, dt, actuator, pitches)
+    return jumps(0, State.BLADE_PITCH, x, u, dt, actuator) or _others_jump(x, u, dt, actuator, pitches)
 
 
 @kernel
@@ -79,8 +118,7 @@ def _others_jump(x, u, dt, actuator, pitches):
     if pitches is None:
         return False
     for blade in range(1, BLADES):
-        i = pitches.first + blade - 1
-        if followed_pitch(x[i], u[Command.BLADE_PITCH + blade], dt, actuator) != x[i]:
+        if jumps(blade, pitches.first + blade - 1, x, u, dt, actuator):
             return True
     return False
 
@@ -88,7 +126,7 @@ def _others_jump(x, u, dt, actuator, pitches):
 @kernel
 def set_followed(x, u, dt, actuator, pitches):
     """Set the pitches of x to those that an actuator without lag has at the beginning of a step of dt (s)."""
-    x[State.BLADE_PITCH] = followed_pitch(x[State.BLADE_PITCH], u[Command.BLADE_PITCH], dt, actuator)
+    set_at_once(0, State.BLADE_PITCH, x, u, dt, actuator)
     _set_others(x, u, dt, actuator, pitches)
 
 
@@ -97,8 +135,7 @@ def _set_others(x, u, dt, actuator, pitches):
     if pitches is None:
         return
     for blade in range(1, BLADES):
-        i = pitches.first + blade - 1
-        x[i] = followed_pitch(x[i], u[Command.BLADE_PITCH + blade], dt, actuator)
+        set_at_once(blade, pitches.first + blade - 1, x, u, dt, actuator)
 
 
 @kernel

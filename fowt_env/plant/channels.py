@@ -8,14 +8,18 @@ import numpy as np
 
 from fowt_env.plant.aero.load import wind_of
 from fowt_env.plant.aero.wind import wind_at, wind_now
+from fowt_env.plant.blade_outputs import measure_blades, record_blades
+from fowt_env.plant.blade_pitches import mean_pitch
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
+from fowt_env.plant.drivetrain import torque_in_force
 from fowt_env.plant.hydro.load import surface_at_origin
 from fowt_env.plant.measurement import Measure
 from fowt_env.plant.model import LoadCache
-from fowt_env.plant.rigid_body import momentum_rate
-from fowt_env.plant.state import Command, State, pose_of, to_inertial
-from fowt_env.plant.tilt import across_shaft, along_shaft, rotor_pose
-from fowt_env.plant.user_loads import record_user_loads
+from fowt_env.plant.state import State, pose_of, to_inertial
+from fowt_env.plant.tilt import along_shaft, rotor_pose
+from fowt_env.plant.tower_modes import Twist, bend_of, nacelle_rates, turned_pose
+from fowt_env.plant.tower_outputs import carried_at_base, record_tower
+from fowt_env.plant.user_loads import record_user_loads, user_channels
 
 DEG_PER_RAD = 180.0 / pi
 RPM_PER_RAD_S = 30.0 / pi
@@ -153,6 +157,7 @@ class Layout(NamedTuple):
     lean: float  # m upwind per metre along a blade, sine of the cone
     reach: float  # m from the shaft per metre along a blade, cosine of the cone
     rotor_cm: np.ndarray  # (3,) centre of mass of the rotor, m
+    blade_masses: object = None  # blade_outputs.BladeMasses, or None: one pitch for all blades
 
 
 @kernel
@@ -194,14 +199,24 @@ def _rotor_wind(t, pose, azimuth, now, series, field, layout):
 
 @kernel
 def point_acceleration(pose, dx, px, py, pz):
-    """Absolute acceleration (body components) of a body-fixed point: v' + w x v + w' x p + w x (w x p)."""
+    """Absolute acceleration (body components) of a body-fixed point, from the rates of a state."""
+    rates = Twist(dx[State.VX], dx[State.VY], dx[State.VZ], dx[State.WX], dx[State.WY], dx[State.WZ])
+    return acceleration_at(pose, rates, px, py, pz)
+
+
+@kernel
+def acceleration_at(pose, rates, px, py, pz):
+    """Absolute acceleration of a point fixed in the frame of a Pose: v' + w x v + w' x p + w x (w x p).
+
+    rates: Twist of the pose. All components are the frame's.
+    """
     wx, wy, wz = pose.wx, pose.wy, pose.wz
     ux = pose.vx + wy * pz - wz * py
     uy = pose.vy + wz * px - wx * pz
     uz = pose.vz + wx * py - wy * px
-    ax = dx[State.VX] + dx[State.WY] * pz - dx[State.WZ] * py + wy * uz - wz * uy
-    ay = dx[State.VY] + dx[State.WZ] * px - dx[State.WX] * pz + wz * ux - wx * uz
-    az = dx[State.VZ] + dx[State.WX] * py - dx[State.WY] * px + wx * uy - wy * ux
+    ax = rates.vx + rates.wy * pz - rates.wz * py + wy * uz - wz * uy
+    ay = rates.vy + rates.wz * px - rates.wx * pz + wz * ux - wx * uz
+    az = rates.vz + rates.wx * py - rates.wy * px + wx * uy - wy * ux
     return ax, ay, az
 
 
@@ -217,25 +232,27 @@ def elevation_now(t, hydro, data):
 
 @inlined_kernel
 def measure(model, data, x, dx, u, t, m):
-    """Fill the measurement array m (N_MEASUREMENTS,) from a state and its derivative."""
+    """Fill the measurement array m (Scene.n_measurements,) from a state and its derivative."""
     layout = model.layout
-    pose = pose_of(x)
+    pose, bend = pose_of(x), bend_of(x, model.tower)
+    nacelle, moving = turned_pose(pose, bend), nacelle_rates(pose, bend, dx, model.tower)
     wind = wind_of(t, 0.0, 0.0, layout.hub[2], model.aero)
     top = layout.tower_top
-    ax, _, _ = point_acceleration(pose, dx, top[0], top[1], top[2])
+    ax, _, _ = acceleration_at(nacelle, moving, top[0], top[1], top[2])
     m[Measure.TIME] = t
     m[Measure.ROTOR_SPEED] = x[State.ROTOR_SPEED]
     m[Measure.GENERATOR_SPEED] = layout.gear_ratio * x[State.ROTOR_SPEED]
-    m[Measure.BLADE_PITCH] = x[State.BLADE_PITCH]
-    m[Measure.GENERATOR_TORQUE] = u[Command.GENERATOR_TORQUE]
+    m[Measure.BLADE_PITCH] = mean_pitch(x, model.pitches)
+    m[Measure.GENERATOR_TORQUE] = torque_in_force(x, u, model.converter)
     for i in range(6):
         m[Measure.SURGE + i] = x[State.SURGE + i]
         m[Measure.SURGE_RATE + i] = dx[State.SURGE + i]
     m[Measure.NACELLE_ACCELERATION] = ax
-    m[Measure.NACELLE_VELOCITY] = pose.vx + pose.wy * top[2] - pose.wz * top[1]
+    m[Measure.NACELLE_VELOCITY] = nacelle.vx + nacelle.wy * top[2] - nacelle.wz * top[1]
     m[Measure.PLATFORM_PITCH_ACCELERATION] = dx[State.WY]
     m[Measure.WIND_SPEED] = wind[0]
     m[Measure.WAVE_ELEVATION] = elevation_now(t, model.hydro, data)
+    measure_blades(nacelle, moving, x, dx, model.pitches, model, data, m)
 
 
 @inlined_kernel
@@ -243,7 +260,8 @@ def record(model, data, x, dx, u, t, loads, row):
     """Fill one output row (n_channels,), SI, in the order of channels()."""
     layout = model.layout
     body = model.rigid_body
-    pose = pose_of(x)
+    pose, bend = pose_of(x), bend_of(x, model.tower)
+    nacelle, moving = turned_pose(pose, bend), nacelle_rates(pose, bend, dx, model.tower)
     row[Out.TIME] = t
     for i in range(6):
         row[Out.PTFMSURGE + i] = x[State.SURGE + i]
@@ -257,7 +275,7 @@ def record(model, data, x, dx, u, t, loads, row):
     row[Out.PTFMTAXI], row[Out.PTFMTAYI], row[Out.PTFMTAZI] = accelerations
     row[Out.PTFMRAXI], row[Out.PTFMRAYI], row[Out.PTFMRAZI] = spins
     top = layout.tower_top
-    ax, ay, _ = point_acceleration(pose, dx, top[0], top[1], top[2])
+    ax, ay, _ = acceleration_at(nacelle, moving, top[0], top[1], top[2])
     row[Out.NCIMUTAXS], row[Out.NCIMUTAYS] = ax, ay
 
     speed = x[State.ROTOR_SPEED]
@@ -265,19 +283,20 @@ def record(model, data, x, dx, u, t, loads, row):
     row[Out.ROTSPEED] = speed
     row[Out.GENSPEED] = layout.gear_ratio * speed
     row[Out.BLDPITCH1] = x[State.BLADE_PITCH]
-    row[Out.GENTQ] = u[Command.GENERATOR_TORQUE]
-    row[Out.GENPWR] = layout.generator_efficiency * layout.gear_ratio * speed * u[Command.GENERATOR_TORQUE]
+    torque = torque_in_force(x, u, model.converter)
+    row[Out.GENTQ] = torque
+    row[Out.GENPWR] = layout.generator_efficiency * layout.gear_ratio * speed * torque
     row[Out.GENTQLIM] = data.cache[LoadCache.TORQUE_LIMITED]
     # shaft loads: aerodynamics less the rotor's own inertia and weight
     hub, cm, tilt = layout.hub, layout.rotor_cm, layout.tilt
-    cx, _, cz = point_acceleration(pose, dx, cm[0], cm[1], cm[2])
-    push = along_shaft(cx + body.gravity * pose.r31, cz + body.gravity * pose.r33, tilt)
+    cx, _, cz = acceleration_at(nacelle, moving, cm[0], cm[1], cm[2])
+    push = along_shaft(cx + body.gravity * nacelle.r31, cz + body.gravity * nacelle.r33, tilt)
     row[Out.ROTTHRUST] = loads.rotor.thrust - layout.rotor_mass * push
-    turning = dx[State.ROTOR_SPEED] + along_shaft(dx[State.WX], dx[State.WZ], tilt)
+    turning = dx[State.ROTOR_SPEED] + along_shaft(moving.wx, moving.wz, tilt)
     row[Out.ROTTORQ] = loads.rotor.torque - layout.rotor_inertia * turning
     row[Out.RTFLDFXH] = loads.rotor.thrust
     row[Out.RTFLDMXH] = loads.rotor.torque
-    tower_base(pose, x, dx, loads, body, layout, row)
+    tower_base(pose, x, dx, loads, bend, body, layout, model.tower, row)
 
     h = loads.hydro
     row[Out.HYDROFXI], row[Out.HYDROFYI], row[Out.HYDROFZI] = to_inertial(pose, h.fx, h.fy, h.fz)
@@ -285,48 +304,30 @@ def record(model, data, x, dx, u, t, loads, row):
     row[Out.WAVE1ELEV] = elevation_now(t, model.hydro, data)
     wind = wind_of(t, 0.0, 0.0, hub[2], model.aero)
     row[Out.WIND1VELX], row[Out.WIND1VELY], row[Out.WIND1VELZ] = wind
-    row[Out.RTVAVGXH] = rotor_wind(t, pose, x[State.AZIMUTH], model.aero, layout)
+    row[Out.RTVAVGXH] = rotor_wind(t, nacelle, x[State.AZIMUTH], model.aero, layout)
     n = data.lines.shape[0]
     for i in range(n):
         row[N_FIXED + i] = data.lines[i, 2]
         row[N_FIXED + n + i] = data.lines[i, 3]
-    record_user_loads(pose, model.user, data, row[N_FIXED + 2 * n :])
+    n = N_FIXED + 2 * n
+    record_user_loads(pose, bend, model.user, data, row[n:])
+    record_tower(bend, ax, ay, row[n + user_channels(model.user) :])
+    record_blades(nacelle, moving, x, dx, model.pitches, model, data, row)
 
 
 @inlined_kernel
-def tower_base(pose, x, dx, loads, body, layout, row):
+def tower_base(pose, x, dx, loads, bend, body, layout, tower, row):
     """Loads carried at the tower base: aerodynamics and weight above it less the momentum rate there.
 
     Body axes at (0, 0, base_height), quasi-static sense of OpenFAST's TwrBs (load of the upper part
     on the lower one).
     """
-    m = layout.upper_matrix
-    c = momentum_rate(pose, x[State.ROTOR_SPEED], m, body.coupling, body.tilt)
-    mass, sx, sy, sz = m[0, 0], m[1, 5], -m[0, 5], m[0, 4]
-    nx, ny, nz = pose.r31, pose.r32, pose.r33
-    g = body.gravity
-    f = loads.rotor.wrench
-    w = loads.tower
-    fx = f.fx + w.fx - mass * g * nx - c.fx
-    fy = f.fy + w.fy - mass * g * ny - c.fy
-    fz = f.fz + w.fz - mass * g * nz - c.fz
-    spun = body.coupling * dx[State.ROTOR_SPEED]
-    mx = f.mx + w.mx + g * sz * ny - g * sy * nz - c.mx - along_shaft(spun, 0.0, body.tilt)
-    my = f.my + w.my - g * (sz * nx - sx * nz) - c.my
-    mz = f.mz + w.mz - g * sx * ny + g * sy * nx - c.mz + across_shaft(spun, body.tilt)
-    for j in range(6):
-        a = dx[State.VX + j]
-        fx -= m[0, j] * a
-        fy -= m[1, j] * a
-        fz -= m[2, j] * a
-        mx -= m[3, j] * a
-        my -= m[4, j] * a
-        mz -= m[5, j] * a
+    load = carried_at_base(pose, x, dx, loads, bend, body, layout, tower)
     z = layout.base_height
-    row[Out.TWRBSFXT], row[Out.TWRBSFYT], row[Out.TWRBSFZT] = fx, fy, fz
-    row[Out.TWRBSMXT] = mx + z * fy
-    row[Out.TWRBSMYT] = my - z * fx
-    row[Out.TWRBSMZT] = mz
+    row[Out.TWRBSFXT], row[Out.TWRBSFYT], row[Out.TWRBSFZT] = load.fx, load.fy, load.fz
+    row[Out.TWRBSMXT] = load.mx + z * load.fy
+    row[Out.TWRBSMYT] = load.my - z * load.fx
+    row[Out.TWRBSMZT] = load.mz
 
 
 def put_hub_wind(rows, hub_wind, period):

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.compile.decorators import kernel
+from fowt_env.plant.state import Command
 
 REGION3 = ("constant_torque", "constant_power")
 
@@ -116,8 +117,15 @@ def build_drivetrain(turbine):
     )
 
 
+class TorqueLag(NamedTuple):
+    """First-order lag of generator and converter: the torque in force is a state."""
+
+    time_constant: float  # s
+    torque: int  # index in the state of the torque in force
+
+
 def build_pitch_actuator(pitch_drive):
-    """PitchActuator of a descriptions.turbine.PitchDrive."""
+    """PitchActuator of a descriptions.turbine.PitchDrive without inertia."""
     return PitchActuator(
         time_constant=float(pitch_drive.time_constant),
         rate_limit=float(pitch_drive.rate_limit),
@@ -181,6 +189,40 @@ def followed_torque(torque, command, period, limits):
     if abs(change) <= step * (1.0 + SLACK):
         return target
     return torque + step if change > 0.0 else torque - step
+
+
+@kernel
+def torque_in_force(x, u, converter):
+    """Generator torque now, N m: the command, or where it lags (converter not None) a state."""
+    if converter is None:
+        return u[Command.GENERATOR_TORQUE]
+    return x[converter.torque]
+
+
+@kernel
+def advance_torque(x, u, after, converter, y):
+    """Put into y the torque in force a time `after` (s) the state x; nothing without a lag."""
+    if converter is None:
+        return
+    command = u[Command.GENERATOR_TORQUE]
+    left = exp(-after / converter.time_constant)
+    y[converter.torque] = command + (x[converter.torque] - command) * left
+
+
+@kernel
+def fill_torque_rate(x, u, converter, dx):
+    """Put the rate of the torque in force into dx; nothing without a lag."""
+    if converter is None:
+        return
+    dx[converter.torque] = (u[Command.GENERATOR_TORQUE] - x[converter.torque]) / converter.time_constant
+
+
+@kernel
+def lose_torque(x, converter):
+    """Take the torque in force at once, as off the grid; nothing without a lag."""
+    if converter is None:
+        return
+    x[converter.torque] = 0.0
 
 
 @kernel

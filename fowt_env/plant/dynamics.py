@@ -14,19 +14,30 @@ from fowt_env.plant.aero.bem_rotor import RotorLoad
 from fowt_env.plant.aero.load import aero_load
 from fowt_env.plant.blade_pitches import fill_pitch_rates
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
-from fowt_env.plant.drivetrain import shaft_torque
+from fowt_env.plant.drivetrain import fill_torque_rate, shaft_torque, torque_in_force
 from fowt_env.plant.hydro.load import hydro_load, hydro_rates
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.mooring import mooring_load
-from fowt_env.plant.rigid_body import accelerate, attitude_rate, gravity_load
-from fowt_env.plant.state import Command, State, Wrench, add, pose_in
-from fowt_env.plant.user_loads import add_user_loads, evaluate_user_loads
+from fowt_env.plant.rigid_body import attitude_rate, gravity_load
+from fowt_env.plant.state import State, Wrench, add, pose_in
+from fowt_env.plant.tower_modes import (
+    accelerate_turbine,
+    add_bent_weight,
+    add_modal,
+    add_modal_weight,
+    begin_modal,
+    bend_of,
+    carried,
+    fill_tower_rates,
+    turned_pose,
+)
+from fowt_env.plant.user_loads import add_modal_user_loads, add_user_loads, evaluate_user_loads
 
 
 class Loads(NamedTuple):
     """Loads of one evaluation, for outputs (body components about the body origin)."""
 
-    rotor: RotorLoad
+    rotor: RotorLoad  # of a tower that bends in nacelle axes, about the nacelle frame's origin
     tower: Wrench  # drag, and the user's loads above the tower base
     hydro: Wrench  # buoyancy, strip loads with added mass times acceleration, additional linear terms
     mooring: Wrench
@@ -35,21 +46,28 @@ class Loads(NamedTuple):
 @kernel
 def evaluate_loads(t, x, model, data, dx):
     """Every load at a state, into data; writes only the rates of internal states into dx. No command."""
-    pose = pose_in(x, model.rigid_body.plane)
-    aero = aero_load(t, pose, x, model.aero, model.pitches, data, dx)
+    pose, modal = pose_in(x, model.rigid_body.plane), data.cache[LoadCache.MODAL :]
+    bend = bend_of(x, model.tower)
+    nacelle = turned_pose(pose, bend)
+    begin_modal(x, model.tower, modal)
+    aero = aero_load(t, pose, nacelle, x, model.aero, model.pitches, model.tower, data, dx)
     hydro = hydro_load(t, pose, x, model.hydro, data)
     hydro_rates(x, model.hydro, dx)
     mooring = mooring_load(pose, model.mooring, data.lines, data.counters)
-    evaluate_user_loads(t, pose, x, model.aero, model.hydro, model.user, data, dx)
+    evaluate_user_loads(t, pose, nacelle, bend, x, model.aero, model.hydro, model.user, data, dx)
 
-    tower = add_user_loads(aero.tower, True, model.user, data)
-    load = add(aero.rotor.wrench, tower)
+    tower = add_user_loads(aero.tower, True, bend, model.user, data)
+    load = add(carried(aero.rotor.wrench, bend), tower)
     load = add(load, gravity_load(pose, model.rigid_body))
+    load = add_bent_weight(load, pose, x, bend, model.tower, model.rigid_body.gravity)
     load = add(load, hydro.buoyancy)
     load = add(load, hydro.strips)
     load = add(load, mooring)
     load = add(load, hydro.damping)
-    load = add_user_loads(load, False, model.user, data)
+    load = add_user_loads(load, False, bend, model.user, data)
+    add_modal(aero.rotor.wrench, bend, model.tower, modal)
+    add_modal_user_loads(bend, model.tower, model.user, data, modal)
+    add_modal_weight(pose, x, bend, model.tower, model.rigid_body.gravity, modal)
 
     cache = data.cache
     store(cache, LoadCache.TOTAL, load)
@@ -67,12 +85,18 @@ def respond(x, u, model, data, dx):
     cache, body = data.cache, model.rigid_body
     pose = pose_in(x, body.plane)
     torque = shaft_torque(
-        cache[LoadCache.TORQUE], u[Command.GENERATOR_TORQUE], x[State.ROTOR_SPEED], model.drivetrain
+        cache[LoadCache.TORQUE],
+        torque_in_force(x, u, model.converter),
+        x[State.ROTOR_SPEED],
+        model.drivetrain,
     )
     attitude_rate(x, dx, body.plane)
     dx[State.AZIMUTH] = x[State.ROTOR_SPEED]
     fill_pitch_rates(x, u, model.actuator, model.pitches, dx)
-    accelerate(pose, x, stored(cache, LoadCache.TOTAL), torque, data.added_mass, body, data.matrix, dx)
+    fill_torque_rate(x, u, model.converter, dx)
+    fill_tower_rates(x, cache[LoadCache.MODAL :], model.tower, dx)
+    load = stored(cache, LoadCache.TOTAL)
+    accelerate_turbine(pose, x, load, torque, data.added_mass, body, model.tower, data.matrix, dx)
 
 
 @inlined_kernel

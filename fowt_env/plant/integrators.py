@@ -1,8 +1,8 @@
 """Fixed-step integrators of one plant: a class, a step and a row of INTEGRATORS each.
 
-The blade pitch follows its own first-order law exactly within a step (constant command), so the stiffest
-part of the plant does not limit the multistep methods. Nor does the rotor in a box of wind, whose blades pass
-a cell of the grid in a tenth of a second: its load alone is evaluated several times a step
+Blade pitch and generator torque follow their own laws exactly within a step (constant command), so the
+stiffest parts of the plant do not limit the multistep methods. Nor does the rotor in a box of wind, whose
+blades pass a cell of the grid in a tenth of a second: its load alone is evaluated several times a step
 (rotor_substeps.py). The states of radiation memory, the last of the vector, have no rates: they follow
 exactly from velocities that are linear over the step (hydro/radiation.py).
 """
@@ -12,7 +12,7 @@ from typing import NamedTuple
 from fowt_env.errors import unknown
 from fowt_env.plant.aero.load import rotor_part
 from fowt_env.plant.aero.wind import wind_now
-from fowt_env.plant.blade_pitches import advance_pitches, mean_pitch, pitches_jump, set_followed
+from fowt_env.plant.blade_pitches import advance_actuators, mean_pitch, pitches_jump, set_followed
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.dynamics import derivative, evaluate_loads, respond, store, stored
@@ -21,6 +21,7 @@ from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rigid_body import attitude_rate
 from fowt_env.plant.rotor_substeps import build_substeps, follow_rotor, sample_rotor, shift_samples
 from fowt_env.plant.state import State, Wrench, add, pose_in
+from fowt_env.plant.tower_modes import add_modal, bend_of, carried, turned_pose
 
 START_STEPS = 3  # steps before four past derivatives exist
 # rad of blade pitch (30.4 deg) beyond which the lift of a free rotor's blades works against its speed: up to
@@ -70,22 +71,22 @@ def rk4(t, x, u, dt, model, method, data):
     begin_memory(x, dt, True, plane, model.hydro, memory)
     for i in range(n):
         y[i] = x[i] + 0.5 * dt * k1[i]
-    advance_pitches(x, u, 0.5 * dt, model.actuator, model.pitches, y)
+    advance_actuators(x, u, 0.5 * dt, model, y)
     memory_after(x, y, True, plane, model.hydro, memory)
     derivative(t + 0.5 * dt, y, u, model, data, k2)
     for i in range(n):
         y[i] = x[i] + 0.5 * dt * k2[i]
-    advance_pitches(x, u, 0.5 * dt, model.actuator, model.pitches, y)
+    advance_actuators(x, u, 0.5 * dt, model, y)
     memory_after(x, y, True, plane, model.hydro, memory)
     derivative(t + 0.5 * dt, y, u, model, data, k3)
     for i in range(n):
         y[i] = x[i] + dt * k3[i]
-    advance_pitches(x, u, dt, model.actuator, model.pitches, y)
+    advance_actuators(x, u, dt, model, y)
     memory_after(x, y, False, plane, model.hydro, memory)
     derivative(t + dt, y, u, model, data, k4)
     for i in range(n):
         y[i] = x[i] + dt / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i])
-    advance_pitches(x, u, dt, model.actuator, model.pitches, y)
+    advance_actuators(x, u, dt, model, y)
     for i in range(n):
         x[i] = y[i]
     end_memory(x, plane, model.hydro, memory)
@@ -100,12 +101,12 @@ def heun(t, x, u, dt, model, method, data):
     begin_memory(x, dt, False, plane, model.hydro, memory)
     for i in range(n):
         y[i] = x[i] + dt * k1[i]
-    advance_pitches(x, u, dt, model.actuator, model.pitches, y)
+    advance_actuators(x, u, dt, model, y)
     memory_after(x, y, False, plane, model.hydro, memory)
     derivative(t + dt, y, u, model, data, k2)
     for i in range(n):
         y[i] = x[i] + 0.5 * dt * (k1[i] + k2[i])
-    advance_pitches(x, u, dt, model.actuator, model.pitches, y)
+    advance_actuators(x, u, dt, model, y)
     for i in range(n):
         x[i] = y[i]
     end_memory(x, plane, model.hydro, memory)
@@ -159,24 +160,35 @@ def adams(t, x, u, dt, model, method, data):
     begin_memory(x, dt, False, plane, model.hydro, memory)
     for i in range(n):
         y[i] = x[i] + dt * bashforth(order, i, history)
-    advance_pitches(x, u, dt, model.actuator, model.pitches, y)
+    advance_actuators(x, u, dt, model, y)
     sample_rotor(t, x, u, dt, model, method.substeps, data)
     if method.corrector or steps < START_STEPS or feathering(x, model):
         memory_after(x, y, False, plane, model.hydro, memory)
         derivative(t + dt, y, u, model, data, new)
         for i in range(State.VX, n):
             y[i] = x[i] + dt * moulton(order, new[i], i, history)
-        advance_pitches(x, u, dt, model.actuator, model.pitches, y)
+        advance_actuators(x, u, dt, model, y)
     else:
         follow_rotor(dt, model, method.substeps, data, y)
     attitude_rate(y, new, model.rigid_body.plane)
     new[State.AZIMUTH] = y[State.ROTOR_SPEED]
+    bend_on(dt, x, order, history, model.tower, y)
     for i in range(State.VX):
         x[i] += dt * moulton(order, new[i], i, history)
     for i in range(State.VX, n):
         x[i] = y[i]
     end_memory(x, plane, model.hydro, memory)
     cache[LoadCache.STEPS] = steps + 1.0
+
+
+@kernel
+def bend_on(dt, x, order, history, tower, y):
+    """Put into y the deflections of the tower by Adams-Moulton, from their new velocities there."""
+    if tower is None:
+        return
+    n = tower.slope.shape[0]
+    for i in range(tower.first, tower.first + n):
+        y[i] = x[i] + dt * moulton(order, y[n + i], i, history)
 
 
 @inlined_kernel
@@ -203,7 +215,8 @@ def renew_rotor(t, x, model, aero, data):
     """Put the rotor's load at this state in place of that of the last evaluation; nothing without one."""
     if aero is None:
         return
-    cache, pose = data.cache, pose_in(x, model.rigid_body.plane)
+    cache, bend = data.cache, bend_of(x, model.tower)
+    pose = turned_pose(pose_in(x, model.rigid_body.plane), bend)
     now = wind_now(t, aero.wind)
     rotor = rotor_part(
         t, pose, x, now, aero, aero.rotor, data.stages[0], data.counters, model.pitches, data.blades
@@ -213,7 +226,8 @@ def renew_rotor(t, x, model, aero, data):
         new.fx - was.fx, new.fy - was.fy, new.fz - was.fz,
         new.mx - was.mx, new.my - was.my, new.mz - was.mz,
     )  # fmt: skip
-    store(cache, LoadCache.TOTAL, add(stored(cache, LoadCache.TOTAL), change))
+    store(cache, LoadCache.TOTAL, add(stored(cache, LoadCache.TOTAL), carried(change, bend)))
+    add_modal(change, bend, model.tower, cache[LoadCache.MODAL :])
     store(cache, LoadCache.ROTOR, new)
     cache[LoadCache.TORQUE] = rotor.torque
     cache[LoadCache.THRUST] = rotor.thrust
@@ -236,7 +250,18 @@ def set_pitch_and_history(t, x, u, dt, model, method, data):
     for k in range(START_STEPS):
         for i in range(State.VX, State.ROTOR_SPEED + 1):
             history[k, i] += after[i] - before[i]
+        shift_tower(after, before, model.tower, history[k])
     shift_samples(was, torque, method.substeps, data)
+
+
+@kernel
+def shift_tower(after, before, tower, row):
+    """Add to the rates of the deflections' velocities in a row what is between two derivatives."""
+    if tower is None:
+        return
+    n = tower.slope.shape[0]
+    for i in range(tower.first + n, tower.first + 2 * n):
+        row[i] += after[i] - before[i]
 
 
 class Method(NamedTuple):

@@ -16,7 +16,7 @@ class Measurement(NamedTuple):
     time: float  # s
     rotor_speed: float  # rad/s
     generator_speed: float  # rad/s, high-speed shaft
-    blade_pitch: float  # rad
+    blade_pitch: float  # rad; the mean of blades with pitches of their own
     generator_torque: float  # N m, high-speed shaft, as applied until now
     surge: float  # m
     sway: float
@@ -71,3 +71,4 @@ class BladeMeasurement(NamedTuple):
 
 BladeMeasure = IntEnum("BladeMeasure", [name.upper() for name in BladeMeasurement._fields], start=0)
 N_BLADE_MEASUREMENTS = len(BladeMeasurement._fields)
+BLADE_SENSOR_FIELDS = BladeMeasurement._fields[: BladeMeasure.HUB_TILT_MOMENT]  # encoders, strain gauges

@@ -36,7 +36,7 @@ class Model(NamedTuple):
     rigid_body: RigidBody
     layout: object  # channels.Layout
     drivetrain: object  # drivetrain.Shaft
-    actuator: object  # drivetrain.PitchActuator
+    actuator: object  # drivetrain.PitchActuator or pitch_drive.PitchDrive
     generator: object  # drivetrain.TorqueLimits
     hydro: object  # hydro.load.Hydro or None
     mooring: object  # mooring.Mooring or None
@@ -44,6 +44,8 @@ class Model(NamedTuple):
     integrator: object  # a class of integrators.INTEGRATORS
     user: object = None  # user_loads.UserLoads or None
     pitches: object = None  # blade_pitches.BladePitches, or None: one pitch for all blades
+    converter: object = None  # drivetrain.TorqueLag, or None: the torque follows its command at once
+    tower: object = None  # tower_modes.TowerModes, or None: a rigid tower
 
 
 class LoadCache(IntEnum):
@@ -58,7 +60,7 @@ class LoadCache(IntEnum):
     TORQUE = 2  # aerodynamic, about the shaft
     THRUST = 3
     TOTAL = 4  # six entries each: sum of all loads, ...
-    ROTOR = 10
+    ROTOR = 10  # of the rotor: with a tower that bends in nacelle axes, about the nacelle frame's origin
     TOWER = 16
     HYDRO = 22  # buoyancy, strips and linear damping
     MOORING = 28
@@ -66,9 +68,10 @@ class LoadCache(IntEnum):
     ELEVATED = 35  # 1 while ELEVATION, of the surface at the origin, is of TIME
     ELEVATION = 36
     TORQUE_LIMITED = 37  # 1 in a control period whose torque command the generator could not follow
+    MODAL = 38  # tower_modes.MOST_MODES entries: generalised forces on the deflections of a tower that bends
 
 
-N_CACHE = 38
+N_CACHE = 42
 
 
 @by_reference
@@ -86,7 +89,7 @@ class Data(NamedTuple):
     member_nodes: np.ndarray  # (n, hydro.members.N_NODE) nodes of members that are laid at each evaluation
     member_water: np.ndarray  # (n * N_WATER,) the water's motion at the members' nodes
     added_mass: np.ndarray  # (6, 6) of the last evaluation, symmetric, about the body origin
-    matrix: np.ndarray  # (6, 6) mass with added mass, solved in place
+    matrix: np.ndarray  # (6 + n, 6 + n) mass with added mass, solved in place; n: modes of the tower
     stages: np.ndarray  # (5, n_state) derivatives and states within a step
     cache: np.ndarray  # (N_CACHE,), see LoadCache
     user: np.ndarray  # (user_loads.user_data_size(n),) wrench of each user load, and its inputs

@@ -1,22 +1,31 @@
 """Fixed-step advance of one plant, and the compiled loop of a whole run with its controller."""
 
-from enum import IntEnum
-from math import inf, isfinite
+from math import isfinite
 from typing import NamedTuple
 
 import numpy as np
 
+from fowt_env.plant.blade_pitches import spread_command
 from fowt_env.plant.channels import measure, record
 from fowt_env.plant.compile.decorators import entry, inlined_kernel, kernel
 from fowt_env.plant.compile.handle import data_of, model_of
-from fowt_env.plant.drivetrain import followed_torque, torque_was_limited
+from fowt_env.plant.drivetrain import followed_torque, lose_torque, torque_was_limited
 from fowt_env.plant.dynamics import loads_of
 from fowt_env.plant.hydro.radiation import forget_memory
 from fowt_env.plant.integrators import rates, take_step
-from fowt_env.plant.measurement import Measure
+from fowt_env.plant.measurement import N_MEASUREMENTS, BladeMeasure, Measure
 from fowt_env.plant.model import LoadCache
+from fowt_env.plant.protection import (
+    Stop,
+    Watch,
+    break_drives,
+    break_sensors,
+    own_command,
+    stop_turbine,
+    watch_turbine,
+)
 from fowt_env.plant.sensing import Setting, read
-from fowt_env.plant.state import Command, State
+from fowt_env.plant.state import BLADES, Command, State
 
 RUNNING, NON_FINITE, CAPSIZED, OVERSPEED, BLOWN_UP, BAD_COMMAND = 0, 1, 2, 3, 4, 5
 CAPSIZE = 1.4  # rad (80 deg) of platform pitch: the Euler angles are singular at 90 deg
@@ -61,7 +70,7 @@ def advance_plant(model, data, x, u, first, n, dt):
 
 @entry
 def advance(handle, x, u, first, n, dt):
-    """Advance x (n_state,) in place by n steps of dt under constant u (2,); returns the status."""
+    """Advance x (n_state,) in place by n steps of dt under constant u (n_commands,); returns the status."""
     return advance_plant(model_of(handle), data_of(handle), x, u, first, n, dt)
 
 
@@ -81,7 +90,7 @@ def output_plant(model, data, x, u, t, dx, row):
 
 @entry
 def observe(handle, x, u, t, dx, measurement):
-    """Fill dx (n_state,) and measurement (N_MEASUREMENTS,) at time t under u.
+    """Fill dx (n_state,) and measurement (Scene.n_measurements,) at time t under u.
 
     The loads kept by the data arrays are used where they are fresh: after changing x from outside,
     call forget first.
@@ -138,55 +147,58 @@ class Schedule(NamedTuple):
     last: int  # step at which the run ends, with a row
     overspeed: float  # rotor speed (rad/s) beyond which the run ends at the next control instant
     grid_loss: float  # s, time from which the generator has no torque
-    trip: float = inf  # rotor speed (rad/s) beyond which the protection stops the turbine at the next one
-    feathering: float = 0.0  # rad in a control period, of such a stop
-    feathered: float = 0.0  # rad, where it ends
-
-
-class Protection(IntEnum):
-    """Entries of a run's protection array, which outlives the calls of rollout."""
-
-    TRIPPED_AT = 0  # s; infinite: not yet
-    TARGET = 1  # rad, blade pitch commanded since
-
-
-def new_protection():
-    """Protection array of a turbine that has not tripped."""
-    return np.array([inf, 0.0])
+    individual: bool = False  # whether the law commands each blade, else one pitch for all
 
 
 @kernel
-def stop_turbine(t, x, u, schedule, protection):
-    """Put the command of an emergency stop into u: no torque, blades feathering from where they were."""
-    if protection[Protection.TRIPPED_AT] > t:
-        protection[Protection.TRIPPED_AT] = t
-        protection[Protection.TARGET] = x[State.BLADE_PITCH]
-    target = min(protection[Protection.TARGET] + schedule.feathering, schedule.feathered)
-    protection[Protection.TARGET] = target
-    u[Command.GENERATOR_TORQUE] = 0.0
-    u[Command.BLADE_PITCH] = target
+def hide_command(u, hidden, individual, pitches):
+    """Hide of the command in force what a law that is about to overwrite it does not declare."""
+    u[Command.GENERATOR_TORQUE] += hidden[Measure.GENERATOR_TORQUE]
+    if not hide_pitches(u, hidden, individual, pitches):
+        u[Command.BLADE_PITCH] += hidden[Measure.BLADE_PITCH]
+
+
+@kernel
+def hide_pitches(u, hidden, individual, pitches):
+    """As hide_command, of a law that commands each blade. Returns whether it does."""
+    if pitches is None:
+        return False
+    if individual:
+        for blade in range(BLADES):
+            u[Command.BLADE_PITCH + blade] += hidden[N_MEASUREMENTS + BladeMeasure.BLADE_PITCH_1 + blade]
+    return individual
+
+
+@kernel
+def all_finite(values):
+    """Whether every entry is finite."""
+    for value in values:
+        if not isfinite(value):
+            return False
+    return True
 
 
 @entry
 def rollout(
-    handle, x, u, law, parameters, memory, reading, protection, measurement, dx, schedule, first, end, out
+    handle, x, u, law, parameters, memory, reading, guarding, measurement, dx, schedule, first, end, out
 ):
     """Closed loop over the instants first <= step < end, and at the run's last one; rows go to out.
 
     law         compiled control law (CompiledController.law), called at every control instant
     reading     Handle whose data is the Reader that stands between measurement and law
-    protection  new_protection() of the run; once it has tripped, the law is not called again
+    guarding    Handle whose data is the Guard of the run: once it stops the turbine, the law is not called
     first       = end: nothing moves, and measurement and the reader's reading are filled as at that instant
     out         (k, n_channels) of the rows to come, SI
-    Returns (status, step reached, rows written). x (n_state,), u, memory, the reader, protection and
+    Returns (status, step reached, rows written). x (n_state,), u, memory, the reader, the guard and
     measurement are written.
     """
     model, data = model_of(handle), data_of(handle)
-    reader = data_of(reading)
+    reader, guard = data_of(reading), data_of(guarding)
     dt, rows = schedule.dt, 0
     if first == end:
         observe_plant(model, data, x, u, first * dt, dx, measurement)
         read(reader, first // schedule.per_control, first * dt, measurement)
+        break_sensors(first * dt, guard, reader)
         return RUNNING, first, rows
     for step in range(first, end + 1):
         t = step * dt
@@ -198,18 +210,24 @@ def rollout(
         if not ending and step % schedule.per_control == 0:
             observe_plant(model, data, x, u, t, dx, measurement)
             torque, grid_loss = u[Command.GENERATOR_TORQUE], schedule.grid_loss
-            if protection[Protection.TRIPPED_AT] <= t or x[State.ROTOR_SPEED] > schedule.trip:
-                stop_turbine(t, x, u, schedule, protection)
-                grid_loss = t
+            if watch_turbine(t, x, dx, u, measurement, model, guard):
+                stop_turbine(x, u, guard)
+                if int(guard.watch[Watch.STOP]) == Stop.EMERGENCY:
+                    grid_loss = t
             else:
+                own_command(u, guard)
                 read(reader, step // schedule.per_control, t, measurement)
-                hidden = reader.sensors.chain[Setting.HIDDEN]
-                u[Command.GENERATOR_TORQUE] += hidden[Measure.GENERATOR_TORQUE]
-                u[Command.BLADE_PITCH] += hidden[Measure.BLADE_PITCH]
+                break_sensors(t, guard, reader)
+                hide_command(u, reader.sensors.chain[Setting.HIDDEN], schedule.individual, model.pitches)
                 law(parameters, memory, reader.reading, u)
-                if not (isfinite(u[Command.GENERATOR_TORQUE]) and isfinite(u[Command.BLADE_PITCH])):
+                if not schedule.individual:
+                    spread_command(u, model.pitches)
+                if not all_finite(u):
                     return BAD_COMMAND, step, rows
+            break_drives(t, x, u, model, guard)
             follow_torque(t, torque, u, schedule.per_control * dt, model.generator, grid_loss, data.cache)
+            if t >= grid_loss:
+                lose_torque(x, model.converter)
         if ending or step % schedule.per_output == 0:
             if rows == out.shape[0]:
                 raise IndexError("rollout: out has too few rows")

@@ -6,12 +6,19 @@ import numpy as np
 
 from fowt_env.plant.aero.load import rotor_part
 from fowt_env.plant.aero.wind import wind_now
-from fowt_env.plant.blade_pitches import advance_pitches
+from fowt_env.plant.blade_pitches import advance_actuators
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.hydro.radiation import integrated_states
 from fowt_env.plant.model import LoadCache
-from fowt_env.plant.rigid_body import accelerate
 from fowt_env.plant.state import State, Wrench, pose_in
+from fowt_env.plant.tower_modes import (
+    accelerate_turbine,
+    add_tower_steps,
+    bend_of,
+    carried,
+    fill_impulse,
+    nacelle_pose,
+)
 
 BASHFORTH = (55.0 / 24.0, -59.0 / 24.0, 37.0 / 24.0, -9.0 / 24.0)  # Adams-Bashforth 4, latest first
 N_SAMPLE = 7  # of a sample of the rotor's load: its wrench and its torque
@@ -62,9 +69,9 @@ def sample_rotor(t, x, u, dt, model, substeps, data):
         bend = 0.5 * after * after / dt
         for i in range(integrated_states(x, model.hydro)):
             between[i] = x[i] + after * history[0, i] + bend * (history[0, i] - history[past, i])
-        advance_pitches(x, u, after, model.actuator, model.pitches, between)
+        advance_actuators(x, u, after, model, between)
         now = wind_now(t + after, model.aero.wind)
-        pose = pose_in(between, model.rigid_body.plane)
+        pose = nacelle_pose(pose_in(between, model.rigid_body.plane), between, model.tower)
         aero = rotor_part(
             t + after, pose, between, now, model.aero, model.aero.rotor, data.stages[3], data.counters,
             model.pitches, data.blades,
@@ -117,10 +124,13 @@ def follow_rotor(dt, model, substeps, data, y):
     extra, still = data.stages[3], data.stages[2]
     for i in range(still.shape[0]):
         still[i] = 0.0  # without velocities the equation of motion has no terms but the load
-    body = model.rigid_body
-    accelerate(
-        pose_in(still, body.plane), still, Wrench(fx, fy, fz, mx, my, mz), torque, data.added_mass, body,
+    body, load = model.rigid_body, Wrench(fx, fy, fz, mx, my, mz)
+    bend = bend_of(y, model.tower)
+    fill_impulse(load, y, bend, model.tower, still, extra)
+    accelerate_turbine(
+        pose_in(still, body.plane), still, carried(load, bend), torque, data.added_mass, body, model.tower,
         data.matrix, extra,
     )  # fmt: skip
     for i in range(State.VX, State.ROTOR_SPEED + 1):
         y[i] += dt * extra[i]
+    add_tower_steps(dt, extra, model.tower, y)

@@ -1,4 +1,8 @@
-"""Between plant and controller: sensors, what the controller may know, and the wind that is foreseen."""
+"""Between plant and controller: sensors, what the controller may know, and the wind that is foreseen.
+
+A measurement has N_MEASUREMENTS fields and, where every blade has a pitch of its own, those of
+BladeMeasurement after them. In a reading the wind that is foreseen stands between the two.
+"""
 
 from enum import IntEnum
 from typing import NamedTuple
@@ -27,8 +31,8 @@ class Setting(IntEnum):
 class Sensors(NamedTuple):
     """What stays fixed in a run: noise is drawn beforehand, so that a snapshot needs no generator."""
 
-    chain: np.ndarray  # (len(Setting), N_MEASUREMENTS)
-    noise: np.ndarray  # (readings, N_MEASUREMENTS), SI; the last row goes on; no row: exact sensors
+    chain: np.ndarray  # (len(Setting), n) of the n fields of a measurement
+    noise: np.ndarray  # (readings, n), SI; the last row goes on; no row: exact sensors
 
 
 class NacelleMotion(NamedTuple):
@@ -53,34 +57,38 @@ class Reader(NamedTuple):
     preview_time: np.ndarray  # (k,) s, increasing
     preview: np.ndarray  # (leads, k) rotor-averaged wind read at these times, m/s
     motion: NacelleMotion
-    reading: np.ndarray  # (N_MEASUREMENTS + leads,) of the present control instant
+    reading: np.ndarray  # (n + leads,) of the present control instant
 
 
-def open_chain() -> np.ndarray:
-    """Sensors.chain of exact sensors that hide nothing."""
-    chain = np.zeros((len(Setting), N_MEASUREMENTS))
+def open_chain(size: int = N_MEASUREMENTS) -> np.ndarray:
+    """Sensors.chain of exact sensors of so many fields that hide nothing."""
+    chain = np.zeros((len(Setting), size))
     chain[Setting.HIDDEN] = GIVEN
-    chain[Setting.SOURCE] = np.arange(N_MEASUREMENTS)
+    chain[Setting.SOURCE] = np.arange(size)
     return chain
 
 
 def new_past(chain: np.ndarray) -> np.ndarray:
     """Memory of a chain: a ring of (longest delay + 1) measurements, the low passes, the integrals."""
-    return np.zeros((int(chain[Setting.DELAY].max()) + 3, N_MEASUREMENTS))
+    return np.zeros((int(chain[Setting.DELAY].max()) + 3, chain.shape[1]))
 
 
-def open_reader() -> Reader:
+def open_reader(size: int = N_MEASUREMENTS) -> Reader:
     """Reader of everything that is measured, as it is, and of no wind ahead."""
-    chain = open_chain()
-    sensors = Sensors(chain, np.zeros((0, N_MEASUREMENTS)))
-    return Reader(
-        sensors, new_past(chain), np.zeros(0), np.zeros((0, 0)), no_motion(), np.zeros(N_MEASUREMENTS)
-    )
+    chain = open_chain(size)
+    sensors = Sensors(chain, np.zeros((0, size)))
+    return Reader(sensors, new_past(chain), np.zeros(0), np.zeros((0, 0)), no_motion(), np.zeros(size))
 
 
 def no_motion() -> NacelleMotion:
     """NacelleMotion of a preview that it does not get into."""
     return NacelleMotion(np.zeros((0, 0)), np.zeros(3), np.zeros(1))
+
+
+@kernel
+def place_of(field, ahead):
+    """Index in a reading of a field of the measurement; ahead: how many times the wind is foreseen for."""
+    return field if field < N_MEASUREMENTS else field + ahead
 
 
 @kernel
@@ -93,13 +101,15 @@ def take_reading(sensors, period, measurement, past, reading):
     if sensors is None:
         return
     chain = sensors.chain
+    n = chain.shape[1]
+    ahead = reading.shape[0] - n
     if sensors.noise.shape[0] == 0:
-        for i in range(N_MEASUREMENTS):
-            reading[i] = measurement[i] + chain[Setting.HIDDEN, i]
+        for i in range(n):
+            reading[place_of(i, ahead)] = measurement[i] + chain[Setting.HIDDEN, i]
         return
     size = past.shape[0] - 2
     drawn = min(period, sensors.noise.shape[0] - 1)
-    for i in range(N_MEASUREMENTS):
+    for i in range(n):
         value = measurement[i]
         kept = chain[Setting.KEPT, i]
         if kept > 0.0:
@@ -115,19 +125,19 @@ def take_reading(sensors, period, measurement, past, reading):
         step = chain[Setting.STEP, i]
         if step > 0.0:
             value = step * np.floor(value / step + 0.5)
-        reading[i] = value
+        reading[place_of(i, ahead)] = value
     reading[Measure.TIME] = measurement[Measure.TIME]
-    for i in range(N_MEASUREMENTS):
+    for i in range(n):
         source = int(chain[Setting.SOURCE, i])
         if source != i:
             value = 0.0  # a mean velocity is none that an accelerometer sees
             if period > 0:
                 value = chain[Setting.LEFT, i] * past[size + 1, i]
-                value += chain[Setting.PERIOD, i] * reading[source]
+                value += chain[Setting.PERIOD, i] * reading[place_of(source, ahead)]
             past[size + 1, i] = value
-            reading[i] = value
-    for i in range(N_MEASUREMENTS):
-        reading[i] += chain[Setting.HIDDEN, i]
+            reading[place_of(i, ahead)] = value
+    for i in range(n):
+        reading[place_of(i, ahead)] += chain[Setting.HIDDEN, i]
 
 
 @kernel

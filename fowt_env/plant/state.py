@@ -59,6 +59,8 @@ FURTHER_BLOCKS = {  # kind and steady of those that are not an internal state th
     "tower_velocity": ("velocity", "zero"),
     "other_blade_pitches": ("internal", "solved"),
     "pitch_rate": ("internal", "zero"),
+    "followed_pitch": ("internal", "solved"),
+    "generator_torque": ("internal", "solved"),
 }
 
 

@@ -14,6 +14,7 @@ from fowt_env.plant.aero.load import wind_of
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.hydro.load import surface_at_origin, water_at
 from fowt_env.plant.state import State, Wrench, add, to_body, to_inertial
+from fowt_env.plant.tower_modes import add_modal, carried
 
 MOST_LOADS = 8
 
@@ -130,6 +131,24 @@ def call_kernel(i, user, parameters, motion, force):
 
 
 @kernel
+def fill_axes(pose, motion):
+    """Fill the rotation from the axes of a Pose to inertial ones."""
+    motion[Motion.R11], motion[Motion.R12], motion[Motion.R13] = pose.r11, pose.r12, pose.r13
+    motion[Motion.R21], motion[Motion.R22], motion[Motion.R23] = pose.r21, pose.r22, pose.r23
+    motion[Motion.R31], motion[Motion.R32], motion[Motion.R33] = pose.r31, pose.r32, pose.r33
+
+
+@kernel
+def carrier(above, pose, nacelle, bend, motion):
+    """Pose of what a load acts on, with its axes filled in: above the base of a bending tower the nacelle."""
+    if bend is None:
+        return pose
+    at = nacelle if above else pose
+    fill_axes(at, motion)
+    return at
+
+
+@kernel
 def fill_common(t, pose, x, elevation, motion):
     """Fill what is the same for every load."""
     motion[Motion.TIME] = t
@@ -137,9 +156,7 @@ def fill_common(t, pose, x, elevation, motion):
     motion[Motion.ROLL] = x[State.ROLL]
     motion[Motion.PLATFORM_PITCH] = x[State.PLATFORM_PITCH]
     motion[Motion.YAW] = x[State.YAW]
-    motion[Motion.R11], motion[Motion.R12], motion[Motion.R13] = pose.r11, pose.r12, pose.r13
-    motion[Motion.R21], motion[Motion.R22], motion[Motion.R23] = pose.r21, pose.r22, pose.r23
-    motion[Motion.R31], motion[Motion.R32], motion[Motion.R33] = pose.r31, pose.r32, pose.r33
+    fill_axes(pose, motion)
     motion[Motion.ROTOR_SPEED] = x[State.ROTOR_SPEED]
     motion[Motion.AZIMUTH] = x[State.AZIMUTH]
     motion[Motion.BLADE_PITCH] = x[State.BLADE_PITCH]
@@ -192,8 +209,11 @@ def body_wrench(pose, px, py, pz, body_axes, force):
 
 
 @kernel
-def evaluate_user_loads(t, pose, x, aero, hydro, user, data, dx):
+def evaluate_user_loads(t, pose, nacelle, bend, x, aero, hydro, user, data, dx):
     """Fill data.user (user_data_size(n, most),): the wrench of each load, body axes about the body origin.
+
+    Above the base of a tower that bends (bend: Bend, else None) they act on the nacelle: their motion is the
+    nacelle's, and the wrench has the axes and the origin of its pose.
 
     Entry 6 n becomes the number, from 1, of the first load that gave a number that is not finite while
     what it was given was finite. Rates of the loads' own states go into dx.
@@ -207,10 +227,11 @@ def evaluate_user_loads(t, pose, x, aero, hydro, user, data, dx):
     for i in range(n):
         px, py, pz = user.point[i, 0], user.point[i, 1], user.point[i, 2]
         axes = user.body_axes[i]
-        fill_place(pose, px, py, pz, axes, motion)
+        at = carrier(user.above[i], pose, nacelle, bend, motion)
+        fill_place(at, px, py, pz, axes, motion)
         u, v, w = wind_of(t, motion[Motion.X], motion[Motion.Y], motion[Motion.Z], aero)
-        put(motion, Motion.WIND_X, pose, axes, u, v, w)
-        fill_water(t, pose, hydro, user.water[i], axes, motion)
+        put(motion, Motion.WIND_X, at, axes, u, v, w)
+        fill_water(t, at, hydro, user.water[i], axes, motion)
         first, states = user.first_state[i], user.first_state[i + 1] - user.first_state[i]
         for j in range(states):
             motion[Motion.STATE + j] = x[first + j]
@@ -226,7 +247,7 @@ def evaluate_user_loads(t, pose, x, aero, hydro, user, data, dx):
             user_data[6 * n] = i + 1.0
         for j in range(states):
             dx[first + j] = force[Force.RATE + j]
-        load = body_wrench(pose, px, py, pz, axes, force)
+        load = body_wrench(at, px, py, pz, axes, force)
         k = 6 * i
         user_data[k], user_data[k + 1], user_data[k + 2] = load.fx, load.fy, load.fz
         user_data[k + 3], user_data[k + 4], user_data[k + 5] = load.mx, load.my, load.mz
@@ -243,22 +264,49 @@ def user_wrench(i, user_data):
 
 
 @kernel
-def add_user_loads(load, above, user, data):
+def borne_wrench(i, bend, user, data):
+    """Wrench of load i about the body origin, body axes, wherever it acts."""
+    if bend is None:
+        return user_wrench(i, data.user)
+    load = user_wrench(i, data.user)
+    return carried(load, bend) if user.above[i] else load
+
+
+@kernel
+def add_user_loads(load, above, bend, user, data):
     """The load with those of the user's added that act above the tower base, or those that do not."""
     if user is None:
         return load
     for i in range(user.point.shape[0]):
         if user.above[i] == above:
-            load = add(load, user_wrench(i, data.user))
+            load = add(load, borne_wrench(i, bend, user, data))
     return load
 
 
 @kernel
-def record_user_loads(pose, user, data, row):
+def add_modal_user_loads(bend, tower, user, data, modal):
+    """Add to modal (n,) the generalised forces of the user's loads on the nacelle."""
+    if user is None:
+        return
+    for i in range(user.point.shape[0]):
+        if user.above[i]:
+            add_modal(user_wrench(i, data.user), bend, tower, modal)
+
+
+@kernel
+def record_user_loads(pose, bend, user, data, row):
     """Fill six channels of each load into row: force and moment about the body origin, inertial axes."""
     if user is None:
         return
     for i in range(user.point.shape[0]):
-        load = user_wrench(i, data.user)
+        load = borne_wrench(i, bend, user, data)
         row[6 * i], row[6 * i + 1], row[6 * i + 2] = to_inertial(pose, load.fx, load.fy, load.fz)
         row[6 * i + 3], row[6 * i + 4], row[6 * i + 5] = to_inertial(pose, load.mx, load.my, load.mz)
+
+
+@kernel
+def user_channels(user):
+    """Number of output channels of the user's loads."""
+    if user is None:
+        return 0
+    return 6 * user.point.shape[0]

@@ -6,13 +6,14 @@ from typing import Any
 
 from fowt_env.descriptions.checks import check_whole_number
 from fowt_env.descriptions.platform import Platform, read_platform
-from fowt_env.descriptions.turbine import Turbine, read_turbine
-from fowt_env.plant.drivetrain import build_drivetrain, build_pitch_actuator, build_torque_limits
+from fowt_env.descriptions.turbine import Turbine, read_turbine, with_second_order_drive
+from fowt_env.plant.drivetrain import build_drivetrain, build_torque_limits
 from fowt_env.plant.integrators import build_integrator
 from fowt_env.plant.model import Model
 from fowt_env.plant.state import BLADES, N_RIGID
+from fowt_env.scene.actuators import build_actuator, build_converter, drive_states
 from fowt_env.scene.geometry import warn_of_geometry
-from fowt_env.scene.mass import build_layout, build_rigid_body
+from fowt_env.scene.mass import build_layout, build_rigid_body, with_masses
 from fowt_env.scene.options import checked_options, choose_parts, samples_per_step
 from fowt_env.scene.parts import (
     build_aero,
@@ -24,6 +25,7 @@ from fowt_env.scene.parts import (
     wake_states,
 )
 from fowt_env.scene.scene import Scene
+from fowt_env.scene.tower import build_tower_modes, modes_asked, tower_states
 from fowt_env.scene.user_loads import Load, build_user_loads, checked_loads
 from fowt_env.scene.weather import Sea, Wind, build_weather
 
@@ -67,6 +69,8 @@ def build_scene(
     turbine = options["turbine"] or platform.turbine
     if not isinstance(turbine, Turbine):
         turbine = read_turbine(turbine)
+    if options["pitch_drive"] == "second_order":
+        turbine = with_second_order_drive(turbine)
     rotor = choose_parts(fidelity, rotor, options)
     seed = check_whole_number("seed", seed, 0)
     warn_of_geometry(platform, label)
@@ -80,16 +84,22 @@ def build_scene(
     aero = None if air.series is None else build_aero(platform, turbine, air, rotor, options)
     first_state = N_RIGID + wake_states(aero)
     next_state = first_state + sum(load.states for load in user)
+    tower = build_tower_modes(platform, turbine, modes_asked(options), next_state)
+    next_state += tower_states(tower)
     pitches = None
     if options["pitch"] == "individual":
         pitches = build_blade_pitches(turbine, rotor, next_state)
         next_state += BLADES - 1
+    actuator = build_actuator(turbine.pitch_drive, next_state, 1 if pitches is None else BLADES)
+    next_state += sum(drive_states(actuator, pitches).values())
+    converter = build_converter(turbine.drivetrain, next_state)
+    next_state += 0 if converter is None else 1
     water = options["hydrodynamics"]
     model = Model(
         rigid_body=build_rigid_body(platform, turbine, plane=True if options["planar"] else None),
-        layout=build_layout(platform, turbine),
+        layout=build_layout(platform, turbine, pitches is not None),
         drivetrain=build_drivetrain(turbine),
-        actuator=build_pitch_actuator(turbine.pitch_drive),
+        actuator=actuator,
         generator=build_torque_limits(turbine.torque_law),
         hydro=build_hydro(platform, waves, current, options, next_state) if water else None,
         mooring=mooring,
@@ -97,5 +107,7 @@ def build_scene(
         integrator=build_integrator(options["integrator"], samples_per_step(options, air.field)),
         user=build_user_loads(user, platform.tower.base_height, first_state),
         pitches=pitches,
+        converter=converter,
+        tower=with_masses(tower, platform, turbine),
     )
     return Scene(model, platform, turbine, air.spec, sea, seed, rotor, options, air.speed, user, label)

@@ -2,7 +2,9 @@
 
 import numpy as np
 
+from fowt_env.descriptions.turbine import BLADE_MASSES
 from fowt_env.errors import InputError
+from fowt_env.plant.blade_outputs import BladeMasses
 from fowt_env.plant.channels import Layout
 from fowt_env.plant.drivetrain import build_drivetrain
 from fowt_env.plant.model import RigidBody
@@ -49,6 +51,11 @@ def _upper_bodies(platform, turbine):
     ]
 
 
+def top_mass_matrix(platform, turbine):
+    """(6, 6) mass matrix of nacelle and rotor about the body origin."""
+    return assemble(_upper_bodies(platform, turbine)[1:])
+
+
 def build_rigid_body(platform, turbine, platform_fixed=False, rotor_fixed=False, plane=None):
     """RigidBody part: Eq. (10) from the four rigid bodies. plane: True holds sway, roll and yaw at zero."""
     ballast = platform.ballast
@@ -77,8 +84,51 @@ def build_rigid_body(platform, turbine, platform_fixed=False, rotor_fixed=False,
     )
 
 
-def build_layout(platform, turbine):
-    """Layout part: points and masses that outputs need."""
+def with_masses(modes, platform, turbine):
+    """TowerModes (or None) with the mass properties of what is below and above the tower's top.
+
+    Floater and straight tower are one rigid body, nacelle and rotor another, as in build_rigid_body.
+    """
+    if modes is None:
+        return None
+    ballast = platform.ballast
+    place = (ballast.cm_downwind, ballast.cm_left, -ballast.cm_depth)
+    tower, *upper = _upper_bodies(platform, turbine)
+    above = [
+        (mass, np.subtract(centre, (0.0, 0.0, modes.top_height)), inertia) for mass, centre, inertia in upper
+    ]
+    matrix, tilt = assemble(above), turbine.rotor.shaft_tilt
+    return modes._replace(
+        lower=np.ascontiguousarray(assemble([(ballast.mass, place, ballast.inertia), tower])),
+        straight=np.ascontiguousarray(assemble([tower])),
+        upper_mass=float(matrix[0, 0]),
+        upper_moment=np.array([matrix[1, 5], -matrix[0, 5], matrix[0, 4]]),
+        upper_inertia=np.ascontiguousarray(matrix[3:, 3:]),
+        shaft=np.array([np.cos(tilt), 0.0, -np.sin(tilt)]),
+    )
+
+
+def build_blade_masses(turbine):
+    """BladeMasses of a turbine. Raises: InputError where its file does not have them."""
+    rotor, nacelle = turbine.rotor, turbine.nacelle
+    if rotor.blade_mass is None:
+        raise InputError(
+            f"rotor.blade_mass: is missing in the turbine {turbine.name!r}; pitch = 'individual' needs"
+            f" {', '.join(BLADE_MASSES)} for the moments at blade roots"
+        )
+    upper = [(nacelle.mass, (nacelle.cm_downwind, nacelle.cm_left, nacelle.cm_height), nacelle.inertia)]
+    return BladeMasses(
+        float(rotor.hub_radius),
+        float(rotor.blade_first_moment),
+        float(rotor.blade_second_moment + rotor.hub_radius * rotor.blade_first_moment),
+        float(rotor.cm_offset),
+        float(rotor.inertia_diameter),
+        np.ascontiguousarray(assemble([*upper, _rotor_body(rotor)])),
+    )
+
+
+def build_layout(platform, turbine, individual=False):
+    """Layout part: points and masses that outputs need; individual: those of single blades too."""
     rotor = turbine.rotor
     hub_x, hub_z = rotor_axes(-rotor.overhang, rotor.hub_height, rotor.shaft_tilt)
     return Layout(
@@ -97,4 +147,5 @@ def build_layout(platform, turbine):
         float(np.sin(rotor.cone)),
         float(np.cos(rotor.cone)),
         np.ascontiguousarray(_rotor_body(rotor)[1]),
+        build_blade_masses(turbine) if individual else None,
     )

@@ -100,6 +100,10 @@ OPTIONS = {
     "mooring": (True, (False, True, "catenary", "table")),
     "planar": (False, (False, True)),
     "pitch": ("collective", ("collective", "individual")),  # of the blades
+    # "second_order": that of [pitch_drive.second_order] of the turbine file; "file": the file's [pitch_drive]
+    "pitch_drive": ("file", ("file", "second_order")),
+    # bending of the tower: none, or its first mode or first two in each direction ([tower.modes] of the file)
+    "tower": ("rigid", ("rigid", "modes", "modes2")),
     "integrator": (None, (None, *INTEGRATORS)),  # None: the fidelity's
     # of the rotor's load per step, of an integrator that samples it; None: FIELD_SAMPLES in a box, else 1
     "rotor_samples": (None, "None or a number of samples, 1 to 10"),

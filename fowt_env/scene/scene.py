@@ -21,13 +21,16 @@ from fowt_env.plant.hydro.members import N_NODE
 from fowt_env.plant.hydro.radiation import memory_data, memory_states
 from fowt_env.plant.hydro.wave_bands import band_scratch
 from fowt_env.plant.integrators import rotor_samples
+from fowt_env.plant.measurement import N_BLADE_MEASUREMENTS, N_MEASUREMENTS
 from fowt_env.plant.model import N_CACHE, Data
 from fowt_env.plant.rotor_substeps import N_SAMPLE
-from fowt_env.plant.state import BLADES, N_COMMANDS, N_INDIVIDUAL_COMMANDS, Block, state_blocks
+from fowt_env.plant.state import BLADES, N_COMMANDS, N_INDIVIDUAL_COMMANDS, Block, State, state_blocks
 from fowt_env.plant.user_loads import user_data_size
+from fowt_env.scene.actuators import drive_states
 from fowt_env.scene.options import default_step
 from fowt_env.scene.parts import hydro_in_waves, wake_states
 from fowt_env.scene.radiation_fit import memory_for_step
+from fowt_env.scene.tower import tower_states
 from fowt_env.scene.user_loads import Load, first_nonfinite_load
 from fowt_env.scene.weather import Sea, Wind, build_weather
 from fowt_env.weather.wind import hub_series
@@ -68,7 +71,11 @@ class Scene:
         """What the entries of this scene's state vector are, in order."""
         internal = {"wake": wake_states(self.model.aero)}
         internal |= {f"load {load.name}": load.states for load in self.loads}
+        bending = tower_states(self.model.tower) // 2
+        internal |= {"tower_deflection": bending, "tower_velocity": bending}
         internal |= {"other_blade_pitches": 0 if self.model.pitches is None else BLADES - 1}
+        internal |= drive_states(self.model.actuator, self.model.pitches)
+        internal |= {"generator_torque": 0 if self.model.converter is None else 1}
         internal |= {"filtered position": position_states(self.model.hydro)}
         return state_blocks(internal | {"radiation": memory_states(self.model.hydro)})
 
@@ -82,6 +89,18 @@ class Scene:
         return N_COMMANDS if self.model.pitches is None else N_INDIVIDUAL_COMMANDS
 
     @property
+    def pitch_states(self) -> tuple[int, ...]:
+        """Indices in the state of the blades' pitch, or of that of each of them."""
+        pitches = self.model.pitches
+        others = () if pitches is None else range(pitches.first, pitches.first + BLADES - 1)
+        return (int(State.BLADE_PITCH), *others)
+
+    @property
+    def n_measurements(self) -> int:
+        """Fields of a Measurement and, where every blade has a pitch of its own, of a BladeMeasurement."""
+        return N_MEASUREMENTS + (0 if self.model.pitches is None else N_BLADE_MEASUREMENTS)
+
+    @property
     def channels(self) -> tuple[Channel, ...]:
         """Output channels of this scene, in row order."""
         return channels(self.n_lines, self.load_names, self.channel_groups)
@@ -89,7 +108,8 @@ class Scene:
     @property
     def channel_groups(self) -> tuple[str, ...]:
         """Names of the GROUPS of channels that this scene has beside the fixed ones."""
-        return () if self.model.pitches is None else ("blades",)
+        parts = {"tower": self.model.tower, "blades": self.model.pitches}
+        return tuple(name for name, part in parts.items() if part is not None)
 
     def values(self, rows: np.ndarray, overwrite: bool = False) -> np.ndarray:
         """Output rows (k, n_channels), in SI as kernels write them, in the units of the channels.
@@ -144,7 +164,7 @@ class Scene:
             member_nodes=np.zeros((laid, N_NODE)),
             member_water=np.zeros(N_WATER * nodes),
             added_mass=np.zeros((6, 6)),
-            matrix=np.zeros((6, 6)),
+            matrix=np.zeros((6 + tower_states(self.model.tower) // 2,) * 2),
             stages=np.zeros((5, self.n_state)),
             cache=np.zeros(N_CACHE),
             user=np.zeros(

@@ -1,6 +1,6 @@
 """The bending of the tower as the plant has it: integrals of mass, stiffness and weight along the modes.
 
-Sums over ElastoDyn's elements, mass and stiffness at their middles (theory.md, section 3.5).
+Sums over ElastoDyn's elements, mass and stiffness at their middles (theory.md, section 2.8).
 """
 
 import numpy as np
@@ -11,6 +11,17 @@ from fowt_env.plant.aero.tower_drag import POINTS
 from fowt_env.plant.tower_modes import TowerModes
 
 MODES = {"rigid": 0, "modes": 1, "modes2": 2}  # option tower: modes in each direction
+
+
+def modes_asked(options):
+    """Modes in each direction that a scene's options ask for. Raises: InputError in a planar scene."""
+    count = MODES[options["tower"]]
+    if count and options["planar"]:
+        raise InputError(
+            f"tower = {options['tower']!r}: the tower bends to the sides too; a planar scene needs 'rigid'"
+            " (or planar = False)"
+        )
+    return count
 
 
 def mode_shapes(modes, count):
@@ -71,6 +82,11 @@ def build_tower_modes(platform, turbine, count, first_state):
         weight_stiffness=np.where(alike, np.einsum("k,ki,kj->ij", cell * above, slope, slope), 0.0),
         drag_shape=np.ascontiguousarray(shape_values(shapes, _drag_points())),
     )
+
+
+def tower_states(modes):
+    """Number of states of TowerModes or None: deflections and their velocities."""
+    return 0 if modes is None else 2 * modes.slope.shape[0]
 
 
 def _option(count):

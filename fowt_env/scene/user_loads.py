@@ -126,7 +126,8 @@ class Load:
     kernel      made with load_kernel
     parameters  numbers that the kernel is given: a list, an array or a NamedTuple
     point       where it acts, body axes, m: x downwind, z up from the still-water level. At or above the
-                tower base it counts in the tower-base loads
+                tower base it counts in the tower-base loads, and where the tower bends it acts on the
+                nacelle: motion, body axes and the force's are then the nacelle's, angles the platform's
     axes        "inertial" or "body": of velocities and force
     water       whether the kernel reads the motion of the water at its point (Motion.WATER_X ...), whose
                 sum over 225 wave components takes 6 microseconds, as three steps at fidelity "standard"

@@ -76,6 +76,10 @@ def test_noise_on_the_shafts_goes_with_the_rated_figures_of_the_turbine():
         ("generator_torque", direct.torque_law.rated_torque),
     ):
         assert 5e-4 < found[name].noise / rated < 3e-3  # as of the NREL 5 MW turbine: 0.1 to 0.2 %
-    untouched = set(plain.sensors) - {"rotor_speed", "generator_speed", "generator_torque"}
+    moments = [name for name in plain.sensors if name.startswith("root_")]
+    shaft = direct.torque_law.rated_torque * direct.drivetrain.gear_ratio
+    for name in moments:
+        assert found[name].noise / shaft == pytest.approx(8.0e4 / 4.18e6, rel=1e-3)
+    untouched = set(plain.sensors) - {"rotor_speed", "generator_speed", "generator_torque", *moments}
     assert all(found[name] == plain.sensors[name] for name in untouched)
     assert sensors_of(plain, direct) is plain  # given as a record: as it is

@@ -3,8 +3,6 @@
 from collections import deque
 from math import exp
 
-from fowt_env.plant.measurement import Measurement
-
 
 class NaiveSensors:
     """Readings of a SensorChain: low pass, delay, noise, quantisation; integrals of readings after these."""
@@ -13,12 +11,13 @@ class NaiveSensors:
         self.chain, self.dt, self.noise = chain, control_dt, iter(noise)
         self.low, self.past, self.integral = {}, {}, {}
 
-    def read(self, measurement):
-        drawn = dict(zip(Measurement._fields, next(self.noise), strict=True))
-        shown = {"time": measurement.time}
+    def read(self, true):
+        """Readings {field: value} of what is true {field: value}."""
+        drawn = dict(zip(true, next(self.noise), strict=True))
+        shown = {"time": true["time"]}
         for name, sensor in self.chain.sensors.items():
-            if sensor.integral_of is None:
-                shown[name] = self.measured(name, sensor, getattr(measurement, name), drawn[name])
+            if name in true and sensor.integral_of is None:
+                shown[name] = self.measured(name, sensor, true[name], drawn[name])
         for name, sensor in self.chain.sensors.items():
             if sensor.integral_of is not None:
                 if name in self.integral:

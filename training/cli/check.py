@@ -70,6 +70,8 @@ def _figures(found):
         rows.append((f"rest, {motion}", value, "m" if motion in ("surge", "sway", "heave") else "deg"))
     for motion, value in (found.periods or {}).items():
         rows.append((f"natural period, {motion}", value, "s"))
+    for mode, values in found.tower.items():
+        rows += [(f"tower, {mode}, {base}", value, "Hz") for base, value in values._asdict().items()]
     return [row for row in rows if not np.isnan(row[1])]
 
 
@@ -77,7 +79,9 @@ def _plain(found):
     """A Check as what JSON holds; None for what is not finite."""
     still = {name: np.asarray(value).tolist() for name, value in found.statics._asdict().items()}
     whole = {"platform": found.label, "draft": found.draft, **still}
-    whole |= {"rest": found.rest, "natural_periods": found.periods, "faults": list(found.faults)}
+    whole |= {"rest": found.rest, "natural_periods": found.periods}
+    whole |= {"tower_frequencies": {mode: values._asdict() for mode, values in found.tower.items()}}
+    whole |= {"faults": list(found.faults)}
     return _finite(whole)
 
 

@@ -69,6 +69,9 @@ def plant_settings(factors, platform=PLATFORM):
         }
         additional = additional.model_copy(update=changed)
     upper, tau = factor("upper_mass"), factor("actuator_lag")
+    tower = scaled(base.tower, upper, "mass", "inertia")
+    if tower.modes is not None and upper != 1.0:
+        tower = tower.model_copy(update={"modes": scaled(tower.modes, upper, "mass_density", "top_mass")})
     base = base.model_copy(
         update={
             "environment": scaled(base.environment, factor("air_density"), "air_density"),
@@ -85,7 +88,7 @@ def plant_settings(factors, platform=PLATFORM):
                 )
                 for member in base.members
             ),
-            "tower": scaled(base.tower, upper, "mass", "inertia"),
+            "tower": tower,
             "lines": tuple(
                 scaled(line, factor("mooring_stiffness"), "wet_weight", "EA") for line in base.lines
             ),
@@ -94,7 +97,7 @@ def plant_settings(factors, platform=PLATFORM):
     turbine = turbine.model_copy(
         update={
             "nacelle": scaled(turbine.nacelle, upper, "mass", "inertia"),
-            "pitch_drive": scaled(turbine.pitch_drive, tau, "time_constant"),
+            "pitch_drive": turbine.pitch_drive.slowed(tau),
         }
     )
     return {"platform": base, "turbine": turbine}

@@ -63,7 +63,7 @@ def old_deck():
         update={
             "environment": platform.environment.model_copy(update={"gravity": GRAVITY}),
             "ballast": platform.ballast.model_copy(update={"cm_depth": PLATFORM_DEPTH}),
-            "tower": platform.tower.model_copy(update={**TOWER, "top_height": TOWER_TOP}),
+            "tower": platform.tower.model_copy(update={**TOWER, "top_height": TOWER_TOP, "modes": None}),
             "potential_flow": _with(flow, stiffness=stiffness),
             "lines": tuple(
                 line.model_copy(

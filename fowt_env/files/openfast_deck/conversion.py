@@ -303,6 +303,21 @@ def _member_rows(member):
     return rows
 
 
+def _second_order(control, why):
+    """Table of the pitch drive of second order, where the deck's controller has one."""
+    if control.second_order is None:
+        return {}
+    frequency, damping = control.second_order
+    return {
+        "pitch_drive.second_order": [
+            Row(
+                "natural_frequency", frequency, why["natural_frequency"] + "; used where a scene asks for it"
+            ),
+            Row("damping", damping, why["damping"]),
+        ]
+    }
+
+
 def turbine_rows(deck, name):
     """{table: rows} of turbine.toml."""
     values, control = deck.elastodyn, deck.control
@@ -322,6 +337,8 @@ def turbine_rows(deck, name):
     why = {"rated_power": "rated_torque times rated_speed, mechanical"} | why
     law_rows = [Row(key, value, why.get(key, "")) for key, value in law.items()]
     blades = source("BldFile(1)", "HubMass", "HubIner")
+    span = values.blade.radius - values["HubRad"]
+    own = [float(values.blade.mass @ span**power) for power in range(3)]
     tables = {
         "": [
             Row("name", name),
@@ -346,6 +363,9 @@ def turbine_rows(deck, name):
             Row("shaft_tilt_deg", -math.degrees(values["ShftTilt"]) + 0.0, "minus " + source("ShftTilt")),
             Row("cone_deg", -math.degrees(values["PreCone"]) + 0.0, "minus " + source("PreCone(1)")),
             Row("cm_offset", rotor.cm_offset, blades + ", HubCM, PreCone"),
+            Row("blade_mass", own[0], source("BldFile(1)") + ", BldNodes elements"),
+            Row("blade_first_moment", own[1], "the same, about the root"),
+            Row("blade_second_moment", own[2], "the same, about the root"),
         ],
         "nacelle": [
             Row("mass", values["NacMass"], source("NacMass")),
@@ -369,6 +389,7 @@ def turbine_rows(deck, name):
             Row("minimum_deg", math.degrees(control.minimum_pitch), why.get("minimum_pitch", "usual value")),
             Row("maximum_deg", math.degrees(control.maximum_pitch), why.get("maximum_pitch", "usual value")),
         ],
+        **_second_order(control, why),
         "torque_law": law_rows,
     }  # fmt: skip
     for gain_set, (proportional, integral, half) in control.gains.items():

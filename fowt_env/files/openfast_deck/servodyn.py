@@ -24,6 +24,7 @@ class Control:
     maximum_pitch: float
     pitch_rate: float  # rad/s
     time_constant: float = 0.0  # s, of the pitch actuator
+    second_order: tuple | None = None  # natural frequency (rad/s) and damping ratio of one with inertia
     rated_wind_speed: float | None = None
     cut_in_wind_speed: float = 3.0
     cut_out_wind_speed: float = 25.0
@@ -208,6 +209,7 @@ def _rosco(path, efficiency, air_density, radius, folders):
         "time_constant": "followed at once: " + ("PA_Mode of " + path.name + " acts inside ROSCO"
                           if file.whole("PA_Mode", default=0) else "the deck has no actuator"),
         "generator_efficiency": source(efficiency_key),
+        "natural_frequency": source("PA_CornerFreq"), "damping": source("PA_Damping"),
         "cut_in_wind_speed": source("WE_FOPoles_v"), "cut_out_wind_speed": source("WE_FOPoles_v"),
     }  # fmt: skip
     low = file.number("PC_MinPit", default=0.0, low=-1.0, high=1.0)
@@ -218,11 +220,21 @@ def _rosco(path, efficiency, air_density, radius, folders):
         efficiency, torque, speed, law, low, high,
         file.number("PC_MaxRat", low=0.0, high=10.0, open_low=True),
         rated_wind_speed=wind, sources=sources, notes=tuple(notes), discon=file.path,
-        performance=performance,
+        performance=performance, second_order=_pitch_drive(file),
     )  # fmt: skip
     if len(winds) > 1 and 0.0 < winds[0] < wind < winds[-1]:
         control = replace(control, cut_in_wind_speed=winds[0], cut_out_wind_speed=winds[-1])
     return control
+
+
+def _pitch_drive(file):
+    """(natural frequency rad/s, damping ratio) of ROSCO's pitch actuator of second order, else None."""
+    if file.whole("PA_Mode", default=0) != 2:
+        return None
+    return (
+        file.number("PA_CornerFreq", low=0.0, high=100.0, open_low=True),
+        file.number("PA_Damping", default=0.707, low=0.0, high=5.0, open_low=True),
+    )
 
 
 def _rosco_notes(file):
@@ -243,7 +255,8 @@ def _rosco_notes(file):
     if file.whole("PA_Mode", default=0):
         yield (
             "pitch actuator within ROSCO (PA_Mode)",
-            "pitch_drive.time_constant 0: set it for other controllers",
+            "pitch_drive.time_constant 0: set it for other controllers"
+            + (", or the option pitch_drive = 'second_order'" if _pitch_drive(file) else ""),
         )
     if file.whole("IPC_ControlMode", default=0):
         yield "individual pitch control (IPC_ControlMode)", "collective pitch"

@@ -10,12 +10,14 @@ from fowt_env.plant.aero.section_inflow import (
     dynamic_sections_load,
 )
 from fowt_env.plant.aero.section_table import SectionTable, section_table_load
-from fowt_env.plant.aero.tower_drag import tower_load
+from fowt_env.plant.aero.tower_drag import bent_tower_load, tower_load
 from fowt_env.plant.aero.wind import WindSeries, wind_at, wind_now
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
+from fowt_env.plant.model import LoadCache
 from fowt_env.plant.state import NO_LOAD, Wrench
 from fowt_env.plant.tilt import rotor_pose, to_body_axes
+from fowt_env.plant.tower_modes import TowerModes
 
 
 class BemRotor(NamedTuple):
@@ -37,7 +39,7 @@ class Aero(NamedTuple):
 
 
 class AeroLoad(NamedTuple):
-    """Loads of the wind, body components about the body origin."""
+    """Loads of the wind, body components about the body origin; of the rotor in those of its Pose."""
 
     rotor: RotorLoad
     tower: Wrench
@@ -111,14 +113,31 @@ def rotor_part(t, pose, x, now, aero, rotor, dx, counters, pitches, blades):
     return RotorLoad(to_body_axes(load.wrench, aero.tilt), load.thrust, load.torque)
 
 
+@kernel
+def _straight_drag(t, pose, x, now, aero, modes, modal):
+    return tower_load(t, pose, now, aero.wind, aero.field, aero.tower)
+
+
+@kernel
+def _bent_drag(t, pose, x, now, aero, modes, modal):
+    return bent_tower_load(t, pose, x, now, aero.wind, aero.field, aero.tower, modes, modal)
+
+
+# (t, pose, x, now, aero, modes, modal) -> Wrench; the forces on a bending tower's deflections go to modal
+_drag = chosen_by_class("modes", {type(None): _straight_drag, TowerModes: _bent_drag})
+
+
 @inlined_kernel
-def aero_load(t, pose, x, aero, pitches, data, dx):
-    """AeroLoad at a state; writes the wake's rates into dx."""
+def aero_load(t, pose, nacelle, x, aero, pitches, modes, data, dx):
+    """AeroLoad at a state; writes the wake's rates into dx and adds to the forces on a tower's deflections.
+
+    nacelle: nacelle_pose, whose axes and origin the rotor's load has. modes: TowerModes or None.
+    """
     if aero is None:
         return NO_AERO_LOAD
     now = wind_now(t, aero.wind)
-    rotor = rotor_part(t, pose, x, now, aero, aero.rotor, dx, data.counters, pitches, data.blades)
-    return AeroLoad(rotor, tower_load(t, pose, now, aero.wind, aero.field, aero.tower))
+    rotor = rotor_part(t, nacelle, x, now, aero, aero.rotor, dx, data.counters, pitches, data.blades)
+    return AeroLoad(rotor, _drag(t, pose, x, now, aero, modes, data.cache[LoadCache.MODAL :]))
 
 
 @kernel

@@ -7,7 +7,7 @@ import numpy as np
 
 from fowt_env.plant.aero.wind import wind_at
 from fowt_env.plant.compile.decorators import kernel
-from fowt_env.plant.state import NO_LOAD, Wrench
+from fowt_env.plant.state import NO_LOAD, Wrench, to_inertial
 
 POINTS = 6  # Gauss points: force and moment to 4e-6 against 60 points, sheared wind on a pitching tower
 
@@ -56,3 +56,41 @@ def tower_load(t, pose, now, series, field, tower):
         mx -= z * pressure * wy
         my += z * pressure * wx
     return Wrench(fx, fy, 0.0, mx, my, 0.0)
+
+
+@kernel
+def bent_tower_load(t, pose, x, now, series, field, tower, modes, modal):
+    """tower_load of a tower that bends: at its displaced points, relative to their own velocity.
+
+    modes: tower_modes.TowerModes. The generalised forces on its deflections are added to modal (n,).
+    """
+    if tower is None:
+        return NO_LOAD
+    if series is None:
+        return NO_LOAD
+    n = modes.slope.shape[0]
+    first, rate = modes.first, modes.first + n
+    fx = fy = mx = my = mz = 0.0
+    for i in range(tower.z.shape[0]):
+        z, shape = tower.z[i], modes.drag_shape[i]
+        px = py = vx = vy = 0.0
+        for j in range(0, n, 2):
+            px += shape[j] * x[first + j]
+            py += shape[j + 1] * x[first + j + 1]
+            vx += shape[j] * x[rate + j]
+            vy += shape[j + 1] * x[rate + j + 1]
+        X, Y, Z = to_inertial(pose, px, py, z)
+        u, v, w = wind_at(t, pose.x + X, pose.y + Y, pose.z + Z, now, series, field)
+        wx = pose.r11 * u + pose.r21 * v + pose.r31 * w - pose.vx - pose.wy * z + pose.wz * py - vx
+        wy = pose.r12 * u + pose.r22 * v + pose.r32 * w - pose.vy + pose.wx * z - pose.wz * px - vy
+        pressure = tower.factor[i] * sqrt(wx * wx + wy * wy)
+        along, side = pressure * wx, pressure * wy
+        fx += along
+        fy += side
+        mx -= z * side
+        my += z * along
+        mz += px * side - py * along
+        for j in range(0, n, 2):
+            modal[j] += shape[j] * along
+            modal[j + 1] += shape[j + 1] * side
+    return Wrench(fx, fy, 0.0, mx, my, mz)

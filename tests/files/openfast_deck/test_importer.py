@@ -45,6 +45,9 @@ def test_rotor_has_the_mass_properties_of_its_uniform_blades_and_hub(imported):
     assert rotor.inertia == pytest.approx(2e5 + 3 * second * math.cos(cone) ** 2, rel=1e-5)
     across = 1.5 * second * math.cos(cone) ** 2 + 3 * second * math.sin(cone) ** 2 + 3e4
     assert rotor.inertia_diameter == pytest.approx(across - 6e4 * rotor.cm_offset**2, rel=1e-5)
+    assert rotor.blade_mass == pytest.approx(blade)
+    assert rotor.blade_first_moment == pytest.approx(200.0 * 50.0**2 / 2.0, rel=1e-9)
+    assert rotor.blade_second_moment == pytest.approx(200.0 * 50.0**3 / 3.0, rel=1e-3)  # BldNodes lumps
     assert rotor.cone == pytest.approx(cone)
     assert rotor.shaft_tilt == pytest.approx(math.radians(5.0))
 
@@ -72,6 +75,41 @@ def test_tower_has_the_mass_of_its_taper_with_the_yaw_bearing_at_its_top(importe
     assert tower.inertia[0] == pytest.approx(second - first**2 / mass, rel=1e-5)
     assert (tower.base_diameter, tower.top_diameter) == (6.0, 4.0)
     assert tower.drag_coefficient == pytest.approx(0.5)
+
+
+def test_tower_bends_with_the_shapes_damping_and_factors_of_its_file(imported):
+    platform, _, report, folder = imported
+    modes = platform.tower.modes
+    assert modes.height_fraction == (0.0, 1.0) and modes.mass_density == (3000.0, 1000.0)
+    assert modes.fore_aft_stiffness == (2e12, 1e12)  # AdjFASt 2
+    assert modes.side_side_stiffness == (3e12, 1e12)
+    assert modes.fore_aft == ((0.8, 0.4, -0.1, -0.2, 0.1), (20.0, -10.0, -5.0, -3.0, -1.0))
+    assert modes.side_side == ((0.7, 0.3, 0.0, 0.0, 0.0), (-9.0, 4.0, 3.0, 2.0, 1.0))
+    assert modes.fore_aft_damping == (0.01, 0.02) and modes.side_side_damping == (0.03, 0.04)
+    assert modes.fore_aft_tuner == (1.0, 1.1) and modes.side_side_tuner is None
+    assert (modes.top_mass, modes.elements) == (5000.0, 400)
+    assert "TwrFADmp" in (folder / "platform.toml").read_text()
+    assert not any("tower mode" in what for what, _ in report.differences)  # the deck has them off
+
+
+def test_a_deck_whose_tower_bends_says_which_option_has_it(tmp_path):
+    report = import_deck(
+        write_deck(tmp_path, ElastoDyn=[("False  TwFADOF1", "True   TwFADOF1")]), tmp_path / "out"
+    )
+    assert dict(report.differences)["first fore-aft tower mode"].startswith(
+        'rigid; with the option tower = "modes"'
+    )
+
+
+@pytest.mark.parametrize("old, new", [("TwFAM1Sh(2)", "TwOtherSh(2)"), ("0.0 3000.0 1e12", "0.0 3000.0 0.0")])
+def test_a_tower_file_without_shapes_or_stiffness_gives_a_rigid_tower(tmp_path, old, new):
+    import_deck(write_deck(tmp_path, tower=[(old, new)]), tmp_path / "out")
+    assert read_platform(tmp_path / "out" / "platform.toml").tower.modes is None
+
+
+def test_a_shape_that_is_not_1_at_the_top_is_refused_with_its_file(tmp_path):
+    text = refused(tmp_path, tower=[("0.8     TwFAM1Sh(2)", "0.9     TwFAM1Sh(2)")])
+    assert "tower.dat" in text and "fore_aft.1: adds up to 1.1" in text
 
 
 def test_water_in_members_is_ballast_with_its_own_inertia(imported):

@@ -1,0 +1,96 @@
+"""Natural frequencies of a tower that bends: clamped at its base, and on its floating platform."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from fowt_env.plant.state import State
+from fowt_env.scene.mass import top_mass_matrix
+from fowt_env.scene.tower import build_tower_modes
+
+NAMES = {  # mode in each direction -> names, fore-aft and side-side
+    0: ("first fore-aft", "first side-side"),
+    1: ("second fore-aft", "second side-side"),
+}
+
+
+class TowerFrequency(NamedTuple):
+    """Undamped natural frequencies of one bending mode, Hz, with the rotor locked."""
+
+    clamped: float
+    floating: float  # on the platform at rest
+
+
+class _Bending(NamedTuple):
+    """Linear equation of the deflections q about a straight upright tower, and their coupling."""
+
+    fore_aft: np.ndarray  # (n,) bool
+    mass: np.ndarray  # (n, n) kg
+    stiffness: np.ndarray  # (n, n) N/m, with weight
+    inertia: np.ndarray  # (6, n) of the platform's six equations by the second derivatives of q
+    weight: np.ndarray  # (6, n) of the platform's six equations by q
+
+
+def tower_frequencies(scene, mass, slopes, kinematics, count=None):
+    """{mode: TowerFrequency} of a scene's platform; empty where its file has no [tower.modes].
+
+    mass        (6, 6) of the rigid turbine with the added mass, about the body origin
+    slopes      (6, 6) of the loads on it by its motions
+    kinematics  (6, 6) rates of the motions by the velocities
+    count       of modes in each direction; None: all of the file
+    """
+    modes = scene.platform.tower.modes
+    if modes is None:
+        return {}
+    tower = bending(scene.platform, scene.turbine, len(modes.fore_aft) if count is None else count)
+    n = len(tower.fore_aft)
+    whole = np.block([[mass, tower.inertia], [tower.inertia.T, tower.mass]])
+    restoring = np.block([[-slopes, tower.weight], [tower.weight.T, tower.stiffness]])
+    moved = np.eye(6 + n)
+    moved[:6, :6] = kinematics
+    found = {}
+    for along in (True, False):
+        rows = np.flatnonzero(tower.fore_aft == along)
+        block = np.ix_(rows, rows)
+        clamped = _frequencies(np.linalg.solve(tower.mass[block], tower.stiffness[block]))[0]
+        values, vectors = _frequencies(moved @ np.linalg.solve(whole, restoring))
+        size = np.abs(vectors[6:])
+        mine = [k for k in np.argsort(values)[-n:] if size[rows, k].max() == size[:, k].max()]
+        for number, (low, k) in enumerate(zip(np.sort(clamped), mine, strict=True)):
+            found[NAMES[number][0 if along else 1]] = TowerFrequency(float(low), float(values[k]))
+    return {name: found[name] for pair in NAMES.values() for name in pair if name in found}
+
+
+def _frequencies(matrix):
+    """((n,) Hz, (n, n) shapes) of x'' = -matrix x; 0 of what is not restored."""
+    squares, shapes = np.linalg.eig(matrix)
+    return np.sqrt(np.maximum(squares.real, 0.0)) / (2.0 * np.pi), shapes
+
+
+def bending(platform, turbine, count):
+    """_Bending of that many modes in each direction, with nacelle and rotor as one rigid body on the top."""
+    tower = build_tower_modes(platform, turbine, count, 0)
+    gravity, height, slope = platform.environment.gravity, tower.top_height, tower.slope
+    along, across = tower.fore_aft, 1.0 - tower.fore_aft
+    top = top_mass_matrix(platform, turbine)
+    moved = np.zeros((6, len(slope)))  # velocity of the top body, as of a frame at the body origin
+    moved[0], moved[1] = along * (1.0 - slope * height), across * (1.0 - slope * height)
+    moved[3], moved[4] = -across * slope, along * slope
+    alike = np.outer(along, along) + np.outer(across, across)
+    arm = top[0, 4] / top[0, 0] - height  # of its centre of mass above the tower top
+    hanging = tower.weight_stiffness + top[0, 0] * arm * np.outer(slope, slope) * alike
+    inertia = top @ moved
+    inertia[0] += along * tower.first_moment
+    inertia[1] += across * tower.first_moment
+    inertia[3] -= across * tower.height_moment
+    inertia[4] += along * tower.height_moment
+    aside = gravity * (tower.first_moment + top[0, 0] * (1.0 + arm * slope))
+    weight = np.zeros_like(inertia)
+    weight[State.ROLL], weight[State.PLATFORM_PITCH] = across * aside, -along * aside
+    return _Bending(
+        along == 1.0,
+        tower.mass * alike + moved.T @ top @ moved,
+        tower.stiffness - gravity * hanging,
+        inertia,
+        weight,
+    )

@@ -1,0 +1,227 @@
+"""Second-order blade-pitch drive with limits, deadband and friction (theory.md, section 3).
+
+    pitch'' = w^2 (target - pitch) - 2 zeta w pitch' - w^2 friction sign(pitch')
+
+The command is constant over a control period, so the drive is solved by itself: in one piece where it can
+meet no limit, else piece by piece from one event to the next. What comes out depends on the plant's step by
+rounding alone. Friction is Coulomb's with an equal force to break away
+(Armstrong-Helouvry, Dupont and Canudas de Wit, Automatica 30 (1994) 1083): a blade at rest stays there until
+the drive pulls harder, so that to slow commands the drive is a play of half width `friction`.
+"""
+
+from math import cos, cosh, exp, sin, sinh, sqrt
+from typing import NamedTuple
+
+from fowt_env.plant.compile.decorators import kernel
+from fowt_env.plant.drivetrain import clamp
+from fowt_env.plant.state import Command
+
+# Of 1/w, the longest piece between two looks for events. Within it an acceleration may pass its limit unseen
+# by TURN^2/8 of it, and nothing else can happen twice.
+TURN = 0.1
+HALVINGS = 45  # of a piece, to find an event in it
+PIECES = 10_000  # at most in a step: a bound that no drive comes near
+SETTLED = 1e-12  # rad: a blade so near its place of rest is there, and at w times it (rad/s) it rests
+
+
+class PitchDrive(NamedTuple):
+    """Second-order blade-pitch drive, collective or one of each blade."""
+
+    natural_frequency: float  # rad/s
+    damping: float  # ratio
+    rate_limit: float  # rad/s
+    acceleration_limit: float  # rad/s2; infinite: none
+    deadband: float  # rad, change of the command that is not followed
+    friction: float  # rad, distance from the command at which a blade at rest begins to move
+    minimum: float  # rad
+    maximum: float  # rad
+    rate: int  # index in the state of the first blade's pitch rate; those of the others follow
+    held: object  # the same of the command that is followed, or None without a deadband
+
+
+@kernel
+def propagator(t, drive):
+    """(a, b, c, d): distance from rest and rate after t (s) are a e + b r and c e + d r, without limits."""
+    w, decay = drive.natural_frequency, drive.damping * drive.natural_frequency
+    square = (1.0 - drive.damping * drive.damping) * w * w
+    fade = exp(-decay * t)
+    if square > 0.0:
+        turning = sqrt(square)
+        even, odd = fade * cos(turning * t), fade * sin(turning * t) / turning
+    elif square < 0.0:
+        turning = sqrt(-square)
+        even, odd = fade * cosh(turning * t), fade * sinh(turning * t) / turning
+    else:
+        even, odd = fade, fade * t
+    return even + decay * odd, odd, -w * w * odd, even - decay * odd
+
+
+@kernel
+def pull(pitch, rate, rest, drive):
+    """Acceleration that the drive gives without limits towards a place of rest, rad/s2."""
+    w = drive.natural_frequency
+    return w * w * (rest - pitch) - 2.0 * drive.damping * w * rate
+
+
+@kernel
+def drive_after(pitch, rate, target, after, drive):
+    """(pitch, rate) a time `after` (s) later with the target held, which lies within the position limits."""
+    w = drive.natural_frequency
+    error = pitch - target
+    reach = sqrt((w * error) ** 2 + rate * rate)  # never grows: it bounds rate, distance and acceleration
+    if reach < SETTLED * w:
+        return target, 0.0
+    if drive.friction <= 0.0 and reach <= drive.rate_limit:
+        strongest = w * reach * sqrt(1.0 + 4.0 * drive.damping**2)
+        inside = target - reach / w >= drive.minimum and target + reach / w <= drive.maximum
+        if inside and strongest <= drive.acceleration_limit:
+            a, b, c, d = propagator(after, drive)
+            return target + a * error + b * rate, c * error + d * rate
+    return _limited_after(pitch, rate, target, after, drive)
+
+
+@kernel
+def _limited_after(pitch, rate, target, after, drive):
+    """drive_after where a limit or friction may act: piece by piece, each of one law of motion."""
+    w, fastest, strongest = drive.natural_frequency, drive.rate_limit, drive.acceleration_limit
+    pitch = clamp(pitch, drive.minimum, drive.maximum)
+    rate = clamp(rate, -fastest, fastest)
+    left, longest = after, TURN / w
+    whole = propagator(longest, drive)
+    for _ in range(PIECES):
+        if left <= 0.0:
+            break
+        if rate == 0.0:
+            if abs(target - pitch) <= drive.friction + SETTLED:
+                break  # sticks
+            way = 1.0 if target > pitch else -1.0
+        else:
+            way = 1.0 if rate > 0.0 else -1.0
+        rest = target - way * drive.friction
+        if abs(rest - pitch) < SETTLED and abs(rate) < SETTLED * w:
+            return rest, 0.0
+        now = pull(pitch, rate, rest, drive)
+        if abs(now) <= SETTLED * w * w:
+            now = 0.0  # what rounding leaves of it at the end of a slewing would change sign at once
+        if way * rate >= fastest and way * now > 0.0:  # slews until it no longer pulls
+            spell = min(way * (rest - pitch) / fastest - 2.0 * drive.damping / w, left)
+            pitch += way * fastest * spell
+            left -= spell
+            continue
+        law = clamp(now, -strongest, strongest)
+        saturated = law != now
+        length = min(left, longest)
+        motion = whole if length == longest else propagator(length, drive)
+        new, speed = _piece(pitch, rate, rest, law, saturated, length, motion)
+        if _over(new, speed, way, rest, now, saturated, drive):
+            low, high = 0.0, length
+            for _ in range(HALVINGS):
+                middle = 0.5 * (low + high)
+                motion = propagator(middle, drive)
+                new, speed = _piece(pitch, rate, rest, law, saturated, middle, motion)
+                if _over(new, speed, way, rest, now, saturated, drive):
+                    high = middle
+                else:
+                    low = middle
+            length = high
+            new, speed = _piece(pitch, rate, rest, law, saturated, high, propagator(high, drive))
+            if way * speed < 0.0:
+                speed = 0.0
+            speed = clamp(speed, -fastest, fastest)
+            if new < drive.minimum or new > drive.maximum:
+                new, speed = clamp(new, drive.minimum, drive.maximum), 0.0
+        pitch, rate = new, speed
+        left -= length
+    return pitch, rate
+
+
+@kernel
+def _piece(pitch, rate, rest, law, saturated, length, motion):
+    """(pitch, rate) after a piece of motion: at a constant acceleration, or of the drive alone."""
+    if saturated:
+        return pitch + length * (rate + 0.5 * length * law), rate + length * law
+    a, b, c, d = motion
+    error = pitch - rest
+    return rest + a * error + b * rate, c * error + d * rate
+
+
+@kernel
+def _over(pitch, rate, way, rest, before, saturated, drive):
+    """Whether a piece of motion with this end is over before it: turned, at a limit or off one."""
+    if way * rate < 0.0 or abs(rate) > drive.rate_limit:
+        return True
+    if pitch < drive.minimum or pitch > drive.maximum:
+        return True
+    now = pull(pitch, rate, rest, drive)
+    if saturated:
+        return abs(now) < drive.acceleration_limit or now * before < 0.0
+    return abs(now) > drive.acceleration_limit or now * before < 0.0
+
+
+@kernel
+def drive_acceleration(pitch, rate, target, drive):
+    """Acceleration of the pitch now, rad/s2."""
+    if rate == 0.0:
+        if abs(target - pitch) <= drive.friction:
+            return 0.0
+        way = 1.0 if target > pitch else -1.0
+    else:
+        way = 1.0 if rate > 0.0 else -1.0
+    now = pull(pitch, rate, target - way * drive.friction, drive)
+    if way * rate >= drive.rate_limit and way * now > 0.0:
+        return 0.0
+    return clamp(now, -drive.acceleration_limit, drive.acceleration_limit)
+
+
+@kernel
+def followed_command(held, command, drive):
+    """The command that is followed, within the position limits: the held one where the new one is near it."""
+    if abs(command - held) <= drive.deadband:
+        command = held
+    return clamp(command, drive.minimum, drive.maximum)
+
+
+@kernel
+def target_of(blade, x, u, drive, held):
+    """Where a blade is to go, rad."""
+    command = u[Command.BLADE_PITCH + blade]
+    if held is None:
+        return clamp(command, drive.minimum, drive.maximum)
+    return followed_command(x[held + blade], command, drive)
+
+
+@kernel
+def _hold(blade, target, held, y):
+    """Put the command that is followed into y; nothing without a deadband."""
+    if held is None:
+        return
+    y[held + blade] = target
+
+
+@kernel
+def advance_drive(blade, i, x, u, after, actuator, y):
+    """Put into y what a blade's drive has a time `after` (s) the state x; i: index of its pitch."""
+    target = target_of(blade, x, u, actuator, actuator.held)
+    pitch, rate = drive_after(x[i], x[actuator.rate + blade], target, after, actuator)
+    y[i], y[actuator.rate + blade] = pitch, rate
+    _hold(blade, target, actuator.held, y)
+
+
+@kernel
+def fill_drive_rates(blade, i, x, u, actuator, dx):
+    """Put the rates of a blade's drive into dx; i: index of its pitch."""
+    target = target_of(blade, x, u, actuator, actuator.held)
+    rate = x[actuator.rate + blade]
+    dx[i], dx[actuator.rate + blade] = rate, drive_acceleration(x[i], rate, target, actuator)
+    _hold(blade, 0.0, actuator.held, dx)
+
+
+@kernel
+def stays(blade, i, x, u, dt, actuator):
+    """False: a drive with inertia moves no blade at once."""
+    return False
+
+
+@kernel
+def keep(blade, i, x, u, dt, actuator):
+    """Nothing: a drive with inertia moves no blade at once."""

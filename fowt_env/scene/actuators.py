@@ -1,0 +1,59 @@
+"""Actuators of a scene: pitch drives and the lag of the generator, their states, and how they rest."""
+
+from math import inf
+
+from fowt_env.plant.drivetrain import TorqueLag, build_pitch_actuator
+from fowt_env.plant.pitch_drive import PitchDrive
+from fowt_env.plant.state import BLADES, Command
+
+
+def build_actuator(pitch_drive, first_state, blades):
+    """Actuator of a descriptions.turbine.PitchDrive, of so many blades with states from first_state on."""
+    if pitch_drive.natural_frequency is None:
+        return build_pitch_actuator(pitch_drive)
+    limit = pitch_drive.acceleration_limit
+    return PitchDrive(
+        natural_frequency=float(pitch_drive.natural_frequency),
+        damping=float(pitch_drive.damping),
+        rate_limit=float(pitch_drive.rate_limit),
+        acceleration_limit=inf if limit is None else float(limit),
+        deadband=float(pitch_drive.deadband),
+        friction=float(pitch_drive.friction),
+        minimum=float(pitch_drive.minimum),
+        maximum=float(pitch_drive.maximum),
+        rate=first_state,
+        held=first_state + blades if pitch_drive.deadband > 0.0 else None,
+    )
+
+
+def build_converter(drivetrain, first_state):
+    """TorqueLag of a descriptions.turbine.Drivetrain with its state at first_state; None without a lag."""
+    if drivetrain.torque_time_constant is None:
+        return None
+    return TorqueLag(float(drivetrain.torque_time_constant), first_state)
+
+
+def drive_states(actuator, pitches):
+    """{name of a block: number of states} of a pitch actuator."""
+    blades = 1 if pitches is None else BLADES
+    moving = isinstance(actuator, PitchDrive)
+    held = moving and actuator.held is not None
+    return {"pitch_rate": blades if moving else 0, "followed_pitch": blades if held else 0}
+
+
+def rest_actuators(model, x, u):
+    """Set what actuators have of the state x to rest at the command u, blade pitches aside."""
+    actuator, blades = model.actuator, 1 if model.pitches is None else BLADES
+    if isinstance(actuator, PitchDrive):
+        x[actuator.rate : actuator.rate + blades] = 0.0
+        if actuator.held is not None:
+            x[actuator.held : actuator.held + blades] = u[Command.BLADE_PITCH : Command.BLADE_PITCH + blades]
+    if model.converter is not None:
+        x[model.converter.torque] = u[Command.GENERATOR_TORQUE]
+
+
+def linear_actuator(actuator):
+    """The actuator as a linear model has it: without deadband and friction."""
+    if not isinstance(actuator, PitchDrive):
+        return actuator
+    return actuator._replace(deadband=0.0, friction=0.0)

@@ -1,0 +1,258 @@
+"""Slow, obvious twin of a turbine whose tower bends: particles, the second derivatives of their paths.
+
+Every rigid body is a handful of particles of the same mass, centre and inertia (some of negative mass), the
+tower a row of them, and the rotor and the generator turn. A path of the generalised coordinates
+c = (r, angles, azimuth, q) gives each particle's velocity and acceleration by Taylor arithmetic, and virtual
+power the equation of motion: no mass matrix, velocity term or angular velocity is written down anywhere.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+SPIN_CENTRE = np.array([2.0, 0.3, 88.0])  # m, of the generator's wheel, which may be anywhere in the nacelle
+
+
+class Path:
+    """Value, first and second derivative by time."""
+
+    __array_ufunc__ = None
+
+    def __init__(self, value, first=0.0, second=0.0):
+        self.value, self.first, self.second = value, first, second
+
+    def __add__(self, other):
+        o = other if isinstance(other, Path) else Path(other)
+        return Path(self.value + o.value, self.first + o.first, self.second + o.second)
+
+    def __mul__(self, other):
+        o = other if isinstance(other, Path) else Path(other)
+        return Path(
+            self.value * o.value,
+            self.first * o.value + self.value * o.first,
+            self.second * o.value + 2.0 * self.first * o.first + self.value * o.second,
+        )
+
+    def __neg__(self):
+        return self * -1.0
+
+    def __sub__(self, other):
+        return self + (-other if isinstance(other, Path) else -np.asarray(other))
+
+    __radd__, __rmul__ = __add__, __mul__
+
+    def sin_cos(self):
+        s, c = np.sin(self.value), np.cos(self.value)
+        return (
+            Path(s, c * self.first, c * self.second - s * self.first**2),
+            Path(c, -s * self.first, -s * self.second - c * self.first**2),
+        )
+
+
+def turned(axis, angle, point):
+    """A point [x, y, z] turned about a coordinate axis."""
+    s, c = angle.sin_cos()
+    x, y, z = point
+    if axis == 0:
+        return [x, c * y - s * z, s * y + c * z]
+    if axis == 1:
+        return [c * x + s * z, y, c * z - s * x]
+    return [c * x - s * y, s * x + c * y, z]
+
+
+def particles(mass, centre, inertia):
+    """(masses (7,), places (7, 3)) of the same mass, centre and inertia (3,) or (3, 3) about it."""
+    tensor = np.diag(inertia) if np.ndim(inertia) == 1 else inertia
+    moments, axes = np.linalg.eigh(0.5 * np.trace(tensor) * np.eye(3) - tensor)
+    masses, places = [mass], [np.array(centre, dtype=float)]
+    for moment, axis in zip(moments, axes.T, strict=True):
+        share = np.copysign(0.1 * mass, moment)
+        away = np.sqrt(moment / (2.0 * share)) * axis
+        masses[0] -= 2.0 * share
+        masses += [share, share]
+        places += [centre + away, centre - away]
+    return np.array(masses), np.array(places)
+
+
+@dataclass
+class Tower:
+    """Line mass in lumps, with the shapes of n modes (fore-aft and side-side by turns) there."""
+
+    height: np.ndarray  # (k,) m
+    mass: np.ndarray  # (k,) kg
+    shape: np.ndarray  # (k, n)
+    slope: np.ndarray  # (n,) at the top, where the shapes are 1
+    top: float  # m
+    stiffness: np.ndarray
+    damping: np.ndarray
+    weight_stiffness: np.ndarray
+
+
+class Turbine:
+    """The particles of a platform, its bending tower and a turbine (two descriptions)."""
+
+    def __init__(self, platform, turbine, tower):
+        ballast, straight, nacelle, rotor = platform.ballast, platform.tower, turbine.nacelle, turbine.rotor
+        self.tower, self.n, self.gravity = tower, len(tower.slope), platform.environment.gravity
+        self.ratio, self.tilt = turbine.drivetrain.gear_ratio, rotor.shaft_tilt
+        shaft = np.array([np.cos(self.tilt), 0.0, -np.sin(self.tilt)])
+        self.hub = np.array([-rotor.overhang, 0.0, rotor.hub_height])
+        place = np.array([ballast.cm_downwind, ballast.cm_left, -ballast.cm_depth])
+        floor = [
+            particles(ballast.mass, place, ballast.inertia),
+            particles(straight.mass, np.array([0.0, 0.0, straight.cm_height]), straight.inertia),
+            # the lumps move the straight tower's mass from its axis: taken off there, put back displaced
+            (-tower.mass, np.column_stack([0.0 * tower.height, 0.0 * tower.height, tower.height])),
+        ]
+        self.floor = [np.concatenate(parts) for parts in zip(*floor, strict=True)]
+        centre = np.array([nacelle.cm_downwind, nacelle.cm_left, nacelle.cm_height])
+        wheel, rim = self._wheel(turbine.drivetrain.generator_inertia)
+        self.nacelle = [
+            np.concatenate(parts)
+            for parts in zip(
+                particles(nacelle.mass, centre, nacelle.inertia), (-wheel, rim + SPIN_CENTRE), strict=True
+            )
+        ]
+        along = np.outer(shaft, shaft)
+        inertia = rotor.inertia * along + rotor.inertia_diameter * (np.eye(3) - along)
+        masses, places = particles(rotor.mass, self.hub + rotor.cm_offset * shaft, inertia)
+        self.rotor = masses, places - self.hub
+        self.wheel = wheel, rim
+
+    def _wheel(self, inertia):
+        """(masses (4,), places (4, 3)) of a rim around the shaft."""
+        side = np.array([[0.0, 1.0, 0.0], [np.sin(self.tilt), 0.0, np.cos(self.tilt)]])
+        return np.full(4, 0.25 * inertia), np.concatenate([side, -side])
+
+    def angles(self, c):
+        """Bending slopes at the top: about y, about x."""
+        a = b = Path(0.0)
+        for i in range(self.n):
+            turn = c[7 + i] * self.tower.slope[i]
+            a, b = (a + turn, b) if i % 2 == 0 else (a, b - turn)
+        return a, b
+
+    def on_platform(self, c, point):
+        for axis in range(3):
+            point = turned(axis, c[3 + axis], point)
+        return [p + c[i] for i, p in enumerate(point)]
+
+    def on_nacelle(self, c, point):
+        a, b = self.angles(c)
+        x, y, z = turned(1, a, turned(0, b, [point[0], point[1], point[2] + Path(-self.tower.top)]))
+        for i in range(self.n):
+            x, y = (x + c[7 + i], y) if i % 2 == 0 else (x, y + c[7 + i])
+        return self.on_platform(c, [x, y, z + self.tower.top])
+
+    def on_shaft(self, c, point, centre, turns):
+        point = turned(1, Path(-self.tilt), point)
+        point = turned(1, Path(self.tilt), turned(0, c[6] * turns, point))
+        return self.on_nacelle(c, [p + centre[i] for i, p in enumerate(point)])
+
+    def bodies(self, c):
+        """[(masses, [X, Y, Z] Paths)] of all particles for coordinates [Path]."""
+        tower = self.tower
+        x = y = Path(np.zeros(len(tower.height)))
+        for i in range(self.n):
+            moved = c[7 + i] * tower.shape[:, i]
+            x, y = (x + moved, y) if i % 2 == 0 else (x, y + moved)
+        return [
+            (self.floor[0], self.on_platform(c, columns(self.floor[1]))),
+            (tower.mass, self.on_platform(c, [x, y, Path(tower.height)])),
+            (self.nacelle[0], self.on_nacelle(c, columns(self.nacelle[1]))),
+            (self.rotor[0], self.on_shaft(c, columns(self.rotor[1]), self.hub, 1.0)),
+            (self.wheel[0], self.on_shaft(c, columns(self.wheel[1]), SPIN_CENTRE, self.ratio)),
+        ]
+
+    def potential(self, c):
+        """Path of the potential energy: weight, shortening of the tower, its structure."""
+        total = Path(0.0)
+        for masses, (_, _, Z) in self.bodies(c):
+            weight = Z * (masses * self.gravity)
+            total = total + Path(*(np.sum(part) for part in (weight.value, weight.first, weight.second)))
+        upright = self.on_platform([Path(0.0)] * 3 + c[3:], [Path(0.0), Path(0.0), Path(1.0)])[2]
+        for i in range(self.n):
+            for j in range(self.n):
+                square = c[7 + i] * c[7 + j] * 0.5
+                fall = upright * (self.gravity * self.tower.weight_stiffness[i, j])
+                total = total + square * self.tower.stiffness[i, j] - square * fall
+        return total
+
+    def kinetic(self, c):
+        return 0.5 * sum(np.sum(m * (x.first**2)) for m, place in self.bodies(c) for x in place)
+
+    def accelerations(self, x, blocks, torque, forces, added):
+        """(v', w', q'', rotor acceleration) at a plant's state.
+
+        blocks: (index of q, of its rates); torque: of the generator, its own shaft; added: (6, 6) added mass.
+        forces: [(on the nacelle or not, point, force, moment, (3,) each)] in the axes of what they act on.
+        """
+        n, size = self.n, 7 + self.n
+        place = np.r_[x[:6], x[6], x[blocks[0] : blocks[0] + n]]
+        unit = np.eye(size)
+        turning = np.array([self.motion(self.still(place, unit[k]))[1] for k in range(size)]).T
+        R = self.frame(self.still(place, np.zeros(size)))[0]
+        rate = np.zeros(size)
+        rate[:3], rate[3:6] = R @ x[7:10], np.linalg.solve(turning[:, 3:6], x[10:13])
+        rate[6], rate[7:] = x[13], x[blocks[1] : blocks[1] + n]
+
+        moving = [Path(place[k], rate[k]) for k in range(size)]
+        columns_of = [self.still(place, unit[k]) for k in range(size)]
+        effect = [[[X.first for X in body[1]] for body in self.bodies(c)] for c in columns_of]
+        matrix, right = np.zeros((size, size)), np.zeros(size)
+        for number, (masses, found) in enumerate(self.bodies(moving)):
+            jacobian = [
+                np.array([np.broadcast_to(e, masses.shape) for e in effect[k][number]]) for k in range(size)
+            ]
+            bias = np.array([np.broadcast_to(X.second, masses.shape) for X in found])
+            for k in range(size):
+                right[k] -= np.sum(masses * bias * jacobian[k])
+                for j in range(size):
+                    matrix[k, j] += np.sum(masses * jacobian[k] * jacobian[j])
+        for k in range(size):
+            right[k] -= self.potential(columns_of[k]).first
+        right[7:] -= self.tower.damping @ rate[7:]
+        right[6] -= self.ratio * torque
+        for aloft, point, force, moment in forces:
+            carry = self.on_nacelle if aloft else self.on_platform
+            frame, _, _ = self.frame(self.still(place, np.zeros(size)), aloft)
+            for k in range(size):
+                speed = np.array([float(X.first) for X in carry(columns_of[k], [Path(p) for p in point])])
+                right[k] += (frame @ force) @ speed + moment @ self.motion(columns_of[k], aloft)[1]
+        # added mass acts on the rates of the body's own velocity components, which are linear in c''
+        body = np.array([np.concatenate(self.motion(columns_of[k])[:2]) for k in range(size)]).T
+        bias = np.concatenate(self.motion(moving)[2:])
+        matrix += body.T @ added @ body
+        right -= body.T @ added @ bias
+        second = np.linalg.solve(matrix, right)
+        return np.r_[body @ second + bias, second[7:], second[6]]
+
+    def still(self, place, rate):
+        return [Path(p, r) for p, r in zip(place, rate, strict=True)]
+
+    def frame(self, c, aloft=False):
+        """Rotation (3, 3) of platform or nacelle, and its first and second derivatives."""
+        carry = self.on_nacelle if aloft else self.on_platform
+        origin = carry(c, [Path(0.0)] * 3)
+        ends = [carry(c, [Path(float(i == k)) for i in range(3)]) for k in range(3)]
+        parts = [[e - o for e, o in zip(end, origin, strict=True)] for end in ends]
+        return tuple(
+            np.array([[float(getattr(p, name)) for p in part] for part in parts]).T
+            for name in ("value", "first", "second")
+        )
+
+    def motion(self, c, aloft=False):
+        """(v, w, v', w') of platform or nacelle, components in its own axes; c'' zero or as in c."""
+        R, dR, ddR = self.frame(c, aloft)
+        r1, r2 = np.array([p.first for p in c[:3]]), np.array([p.second for p in c[:3]])
+        return R.T @ r1, vee(R.T @ dR), R.T @ r2 + dR.T @ r1, vee(R.T @ ddR + dR.T @ dR)
+
+
+def columns(places):
+    return [Path(places[:, i]) for i in range(3)]
+
+
+def vee(matrix):
+    """The vector of the antisymmetric part of a matrix."""
+    m = 0.5 * (matrix - matrix.T)
+    return np.array([m[2, 1], m[0, 2], m[1, 0]])
