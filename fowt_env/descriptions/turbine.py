@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from fowt_env.descriptions.checks import is_number
 from fowt_env.descriptions.files import DATA, column, locate, raise_problems, read_table, read_toml
+from fowt_env.descriptions.protection import Protection
 from fowt_env.descriptions.records import (
     Finite,
     FloatArray,
@@ -363,6 +364,7 @@ class Turbine(Record):
     gains: dict[
         str, PitchGains
     ] = {}  # published ones by name; without any they are derived (controllers/gains.py)
+    protection: Protection = Protection()
     blade: Blade
     discon: str | None = None  # path of a DISCON.IN of ROSCO for this turbine
     source: str = ""

@@ -34,17 +34,6 @@ class BladeMasses(NamedTuple):
     upper_matrix: np.ndarray  # (6, 6) mass matrix of nacelle and rotor
 
 
-class PoseRates(NamedTuple):
-    """Rates of the velocity components (vx..wz) of a Pose, m/s2 and rad/s2, in its own axes."""
-
-    vx: float
-    vy: float
-    vz: float
-    wx: float
-    wy: float
-    wz: float
-
-
 class HubMotion(NamedTuple):
     """Motion of the hub in rotor axes, which do not turn with the rotor."""
 
@@ -79,12 +68,6 @@ class BladeMoments(NamedTuple):
     bearing_roll: float  # at the tower top, axes of the nacelle frame
     bearing_tilt: float
     bearing_yaw: float
-
-
-@kernel
-def rates_of(dx):
-    """PoseRates of the platform from the rates of the state."""
-    return PoseRates(dx[State.VX], dx[State.VY], dx[State.VZ], dx[State.WX], dx[State.WY], dx[State.WZ])
 
 
 @kernel

@@ -12,11 +12,11 @@ from fowt_env.descriptions.rotor_mass import BladeMass, rotor_mass_properties
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.errors import InputError
 from fowt_env.plant import blade_outputs
-from fowt_env.plant.blade_outputs import PoseRates
 from fowt_env.plant.channels import BLADE_CHANNELS
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rollout import output, output_row
 from fowt_env.plant.state import N_RIGID, State, Wrench, pose_of
+from fowt_env.plant.tower_modes import Twist
 from fowt_env.scene.mass import build_layout, build_rigid_body
 
 GRAVITY = 9.80665
@@ -88,7 +88,7 @@ def test_moments_are_those_of_lumps_that_move_with_nacelle_and_rotor(seed):
         moment += own @ load[3:] + np.cross(axes.T @ (centre - place), own @ load[:3])
     found = np.zeros(11)
     moments(
-        pose_of(x), PoseRates(*rates[:6]), at[6], velocity[6], rates[6], loads, Wrench(*force, *moment), body,
+        pose_of(x), Twist(*rates[:6]), at[6], velocity[6], rates[6], loads, Wrench(*force, *moment), body,
         layout, found,
     )  # fmt: skip
     expected = [
@@ -131,7 +131,7 @@ def test_outputs_are_the_moments_under_the_loads_of_the_last_evaluation(scene):
     output(scene.handle(data), x, np.zeros(scene.n_commands), 0.0, dx, np.empty(len(scene.channels)))
     expected = np.zeros(11)
     moments(
-        pose_of(x), PoseRates(*dx[State.VX : State.ROTOR_SPEED]), x[State.AZIMUTH], x[State.ROTOR_SPEED],
+        pose_of(x), Twist(*dx[State.VX : State.ROTOR_SPEED]), x[State.AZIMUTH], x[State.ROTOR_SPEED],
         dx[State.ROTOR_SPEED], data.blades, Wrench(*data.cache[LoadCache.ROTOR : LoadCache.ROTOR + 6]),
         scene.model.rigid_body, scene.model.layout, expected,
     )  # fmt: skip
