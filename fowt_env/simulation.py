@@ -1,7 +1,7 @@
 """One run of a scene with a controller, to a table of OpenFAST channels."""
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import contextmanager
 from math import exp, inf, isfinite, isinf, radians
 from time import perf_counter
@@ -22,6 +22,8 @@ from fowt_env.control import (
     view_of,
 )
 from fowt_env.descriptions.checks import check_number
+from fowt_env.descriptions.faults import BLADE_FAULTS, STOP_FAULTS, Fault, read_faults
+from fowt_env.descriptions.protection import Protection, TripLimit, read_protection
 from fowt_env.descriptions.sensors import SensorChain, sensors_of
 from fowt_env.errors import (
     ControllerInputError,
@@ -34,18 +36,11 @@ from fowt_env.initial_conditions import initial_state
 from fowt_env.plant.compile.decorators import control_kernel
 from fowt_env.plant.compile.handle import Handle
 from fowt_env.plant.events import counted, harm
-from fowt_env.plant.measurement import Measurement
-from fowt_env.plant.rollout import (
-    OVERSPEED,
-    RUNNING,
-    STOP_REASONS,
-    Protection,
-    Schedule,
-    new_protection,
-    rollout,
-)
+from fowt_env.plant.measurement import BladeMeasurement, Measurement
+from fowt_env.plant.protection import Failure, Guard, Stop, Trip, Watch, build_guard
+from fowt_env.plant.rollout import OVERSPEED, RUNNING, STOP_REASONS, Schedule, rollout
 from fowt_env.plant.sensing import NacelleMotion, Reader, Setting, new_past, no_motion, open_reader
-from fowt_env.plant.state import N_COMMANDS, N_INDIVIDUAL_COMMANDS, State
+from fowt_env.plant.state import BLADES, N_COMMANDS, N_INDIVIDUAL_COMMANDS, State
 from fowt_env.scene.scene import Scene
 from fowt_env.weather.preview import Motion, Preview
 from fowt_env.weather.sensor_noise import draw_sensors
@@ -55,7 +50,14 @@ from fowt_env.weather.wind_field import WindBox
 # grow longer until they last about CHUNK_TIME.
 FIRST_CHUNK = 20.0  # simulated seconds
 CHUNK_TIME = 0.05  # s of the clock
-FEATHERING = radians(8.0)  # rad/s of an emergency stop: the rate of NREL/TP-500-38060's pitch drive
+FAILURES = {
+    "stuck_pitch": Failure.STUCK,
+    "pitch_runaway": Failure.RUNAWAY,
+    "pitch_offset": Failure.OFFSET,
+    "sensor_bias": Failure.BIAS,
+    "sensor_freeze": Failure.FREEZE,
+    "sensor_loss": Failure.LOSS,
+}
 
 
 @control_kernel
@@ -137,6 +139,8 @@ def simulate(
     stop_overspeed: bool = False,
     grid_loss: float | None = None,
     trip: float | None = None,
+    protection: str | Mapping[str, Any] | Protection | None = None,
+    faults: Fault | Mapping[str, Any] | Sequence[Any] | None = None,
     sensors: str | SensorChain | None = None,
     preview: str | Preview | Callable[[Scene, tuple[float, ...]], Preview] = EXACT,
     nominal: Scene | None = None,
@@ -156,10 +160,16 @@ def simulate(
     stop_overspeed  end the run, as an environment does, at a control instant with a rotor speed beyond the
                 turbine file's overspeed
     grid_loss   time (s) from which the generator is off the grid and has no torque; None: never
-    trip        rotor speed over rated, above 1, at which the protection stops the turbine: from that control
-                instant on the controller is not heard, the generator has no torque and the blades feather at
-                8 deg/s (the pitch drive's limit, if that is slower) to the drive's maximum. The run goes
-                on to its end. None: no protection
+    trip        rotor speed over rated, above 1, beyond which the protection stops the turbine at once: the
+                overspeed of `protection`, with an emergency stop. None: what `protection` has
+    protection  trips by overspeed, overpower, tower-top acceleration and pitch deviation: "turbine" for those
+                of the turbine file, a mapping of its [protection] keys in place of single ones of these
+                (False: no such trip), or a Protection (fowt_env.descriptions.protection). From the trip on
+                the controller is not heard and the blades feather to the drive's maximum: in an emergency
+                stop without torque, in a normal one with a torque that falls with the rotor speed. The run
+                goes on to its end. None: no trips
+    faults      what goes wrong: a Fault (fowt_env.descriptions.faults), a mapping of its keys, or a list of
+                these. The run goes on whatever the rotor speed, unless stop_overspeed
     sensors     what the controller reads: None or "exact" for the measurements as they are, the name of a
                 built-in chain ("standard") or a SensorChain (fowt_env.descriptions.sensors). Rows are of
                 the true motions; the noise follows from the scene's seed and is the same for every controller
@@ -177,7 +187,8 @@ def simulate(
     attrs["events"] of the DataFrame: {name: count} of what the plant met outside its usual range
     (fowt_env.plant.events), of those that happened. A PlantWarning says so at the end of a run whose loads
     were less accurate for it. attrs["tripped"]: time (s) at which the protection stopped the turbine, or
-    None.
+    None; attrs["trip"]: the trip that did, as "overspeed"; attrs["stop"]: "normal" or "emergency" where the
+    turbine was being stopped at the end, by a trip or a fault, else None.
 
     Raises: InputError before anything runs (ControllerInputError where the controller raised it, whenever
     that is); SimulationStopped (with the rows so far) on capsize, a numerical blow-up, a
@@ -196,8 +207,14 @@ def simulate(
         check_number("grid_loss", grid_loss, allowed="a time in s, or None")
     if trip is not None:
         check_number("trip", trip, 1.0, low_open=True, allowed="above 1, of rated rotor speed, or None")
+    limits = read_protection(protection, scene.turbine.protection)
+    if trip is not None:
+        limits = limits.model_copy(update={"overspeed": TripLimit(limit=trip)})
     chain = sensors_of(sensors, scene.turbine)
     held = controller is None
+    wrong = read_faults(faults)
+    if held and wrong:
+        raise InputError(f"faults: {wrong[0].kind}: controller=None has nobody whom a fault could trouble")
     if not held:
         controller = make(controller, scene.turbine, control_dt)
         check_pitches(controller, scene.model.pitches is not None)
@@ -210,22 +227,13 @@ def simulate(
         per_control = last  # nobody reads the measurements
         chain = None
     overspeed = scene.turbine.overspeed if stop_overspeed else inf
-    loss = inf if grid_loss is None else grid_loss - 1e-9  # an instant may miss it by rounding
-    drive = scene.turbine.pitch_drive
-    schedule = Schedule(
-        float(dt),
-        per_control,
-        per_output,
-        last,
-        float(overspeed),
-        float(loss),
-        inf if trip is None else float(trip * scene.turbine.rated_rotor_speed),
-        min(FEATHERING, drive.rate_limit) * per_control * dt,
-        drive.maximum,
-        bool(controller.individual),
-    )
+    losses = [inf if time is None else time for time in (grid_loss, *(fault.grid_loss for fault in wrong))]
+    loss = min(losses) - 1e-9  # an instant may miss it by rounding
+    ends = float(overspeed), float(loss)
+    schedule = Schedule(float(dt), per_control, per_output, last, *ends, bool(controller.individual))
+    guard = guard_of(scene, limits, wrong, per_control * dt)
     reader = reader_of(scene, controller, chain, preview, schedule)
-    loop = _Loop(scene, controller, x, u, schedule, reader)
+    loop = _Loop(scene, controller, x, u, schedule, reader, guard)
     with _bar(progress) as report, _controllers_own():
         loop.go(report)
     frame = loop.frame()
@@ -241,6 +249,61 @@ def _controllers_own():
         yield
     except InputError as error:
         raise ControllerInputError(str(error)) from error
+
+
+def guard_of(scene: Scene, limits: Protection, faults: Sequence[Fault], control_dt: float) -> Guard:
+    """Guard of a run: the trips of a protection, and the faults. Raises: InputError."""
+    turbine, drive = scene.turbine, scene.turbine.pitch_drive
+    units = {
+        Trip.OVERSPEED: turbine.rated_rotor_speed,
+        Trip.OVERPOWER: turbine.torque_law.rated_power,
+        Trip.ACCELERATION: 1.0,
+        Trip.PITCH_DEVIATION: 1.0,
+    }
+    trips = []
+    for kind, unit in units.items():
+        found = getattr(limits, kind.name.lower())
+        if found is None:
+            trips.append((inf, 0.0, Stop.EMERGENCY))
+        else:
+            trips.append((float(found.limit * unit), found.time, Stop[found.stop.upper()]))
+    ordered, rates, rows = [inf, inf], [limits.normal_rate, limits.emergency_rate], []
+    for fault in faults:
+        rows += _failures(scene, fault)
+        stop = Stop.NORMAL if fault.kind == "normal_stop" else Stop.EMERGENCY
+        if fault.kind in STOP_FAULTS or fault.delay is not None:
+            ordered[stop] = min(ordered[stop], fault.time + (fault.delay or 0.0))
+            if fault.rate is not None:
+                rates[stop] = radians(fault.rate)
+    steps = [min(rate, drive.rate_limit) * control_dt for rate in rates]
+    off_speed = limits.off_speed * turbine.rated_rotor_speed
+    return build_guard(trips, ordered, steps, drive.maximum, off_speed, rows)
+
+
+def _failures(scene, fault):
+    """Rows of Guard.faults of a Fault: (kind, time, place, value, backup)."""
+    if fault.kind not in FAILURES:
+        return []
+    kind, time = FAILURES[fault.kind], fault.time
+    individual = scene.model.pitches is not None
+    if fault.kind not in BLADE_FAULTS:
+        fields = (*Measurement._fields, *(BladeMeasurement._fields if individual else ()))
+        if fault.field not in fields:
+            raise InputError(
+                f"faults: {fault.kind}: field = {fault.field!r}: needs a scene with pitch='individual'"
+            )
+        return [(kind, time, fields.index(fault.field), fault.value or 0.0, 0.0)]
+    if fault.blades is not None and not individual:
+        raise InputError(
+            f"faults: {fault.kind}: blades = {list(fault.blades)}: needs a scene with pitch='individual'"
+        )
+    blades = range(BLADES if individual else 1)
+    if fault.blades is not None:
+        blades = [number - 1 for number in fault.blades]
+    value = radians(fault.offset or 0.0)
+    if fault.towards is not None:
+        value = -1.0 if fault.towards == "fine" else 1.0
+    return [(kind, time, blade, value, float(fault.backup)) for blade in blades]
 
 
 def reader_of(
@@ -298,7 +361,7 @@ def _linear(lag):
 class _Loop:
     """A run in chunks, compiled where the controller is."""
 
-    def __init__(self, scene, controller, x, u, schedule, reader=None):
+    def __init__(self, scene, controller, x, u, schedule, reader=None, guard=None):
         self.scene = scene
         self.controller = controller
         self.data = scene.data()
@@ -306,7 +369,8 @@ class _Loop:
         self.x, self.u, self.schedule = x, u, schedule
         self.dx = np.zeros_like(x)
         self.measurement = np.zeros(scene.n_measurements)
-        self.protection = new_protection()
+        self.guard = build_guard() if guard is None else guard
+        self.guarding = Handle(None, self.guard)
         self.reader = open_reader(scene.n_measurements) if reader is None else reader
         self.given = Handle(None, self.reader)
         self.view = view_of(controller)
@@ -343,7 +407,7 @@ class _Loop:
 
     def _roll(self, first, end, given):
         status, step, count = rollout(
-            self.handle, self.x, self.u, *self.law, given, self.protection, self.measurement, self.dx,
+            self.handle, self.x, self.u, *self.law, given, self.guarding, self.measurement, self.dx,
             self.schedule, first, end, self.rows[self.filled :],
         )  # fmt: skip
         self.filled += count
@@ -359,7 +423,7 @@ class _Loop:
         """Have a controller in Python say what to do from a step on; one that is stopped is not asked."""
         if self.x[State.ROTOR_SPEED] > self.schedule.overspeed:
             self._check(OVERSPEED, step)
-        if np.isinf(self.protection[Protection.TRIPPED_AT]):
+        if self.guard.watch[Watch.STOP] < 0.0:
             self.law[1][:] = self.controller.act(self._read(step))
 
     def _check(self, status, step):
@@ -374,8 +438,12 @@ class _Loop:
         values = self.scene.values(self.rows[: self.filled], overwrite=True)
         frame = pd.DataFrame(values, columns=[c.column for c in self.scene.channels])
         frame.attrs["events"] = counted(self.data.counters)
-        tripped = float(self.protection[Protection.TRIPPED_AT])
-        frame.attrs["tripped"] = None if isinf(tripped) else tripped
+        watch = self.guard.watch
+        tripped, stop = float(watch[Watch.TRIPPED_AT]), int(watch[Watch.STOP])
+        known = not isinf(tripped)
+        frame.attrs["tripped"] = tripped if known else None
+        frame.attrs["trip"] = Trip(int(watch[Watch.TRIP])).name.lower() if known else None
+        frame.attrs["stop"] = Stop(stop).name.lower() if stop >= 0 else None
         return frame
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from naive.faults import Overridden
 from plant_helpers import random_state
 
 import fowt_env
@@ -14,13 +15,13 @@ from fowt_env import simulation
 from fowt_env.control import CompiledController
 from fowt_env.controllers import make
 from fowt_env.controllers.constant import Constant
+from fowt_env.descriptions.faults import Fault
 from fowt_env.errors import ControllerError, InputError, SimulationStopped
 from fowt_env.initial_conditions import initial_state
 from fowt_env.plant.compile.decorators import control_kernel
 from fowt_env.plant.events import EVENTS, Counter
 from fowt_env.plant.rollout import Schedule, advance
 from fowt_env.plant.state import State, pose_of
-from fowt_env.training.evaluation.faults import Fault, FaultedController
 
 ROOT = Path(__file__).resolve().parent.parent
 COLUMNS = ["PtfmSurge_[m]", "PtfmHeave_[m]", "PtfmPitch_[deg]", "PtfmYaw_[deg]"]
@@ -146,7 +147,7 @@ def test_a_trip_is_an_emergency_stop_at_the_instant_in_which_the_speed_is_passed
     tripped = run(storm_scene, controller=controller, trip=1.1, **options)
     assert tripped.attrs["tripped"] == pytest.approx(at, abs=1e-9)
     inner = make(controller, storm_scene.turbine, 0.1)
-    stop = FaultedController(inner, Fault(kind="emergency_stop", time=at), np.radians(90.0), 0.1)
+    stop = Overridden(inner, Fault(kind="emergency_stop", time=at), np.radians(90.0), 0.1)
     stopped = run(storm_scene, controller=stop, **options)
     pd.testing.assert_frame_equal(tripped, stopped, check_exact=True)
     assert tripped["BldPitch1_[deg]"].iloc[-1] == pytest.approx(90.0, abs=0.1)

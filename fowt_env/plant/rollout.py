@@ -1,12 +1,11 @@
 """Fixed-step advance of one plant, and the compiled loop of a whole run with its controller."""
 
-from enum import IntEnum
-from math import inf, isfinite
+from math import isfinite
 from typing import NamedTuple
 
 import numpy as np
 
-from fowt_env.plant.blade_pitches import pitch_of, spread_command
+from fowt_env.plant.blade_pitches import spread_command
 from fowt_env.plant.channels import measure, record
 from fowt_env.plant.compile.decorators import entry, inlined_kernel, kernel
 from fowt_env.plant.compile.handle import data_of, model_of
@@ -16,6 +15,15 @@ from fowt_env.plant.hydro.radiation import forget_memory
 from fowt_env.plant.integrators import rates, take_step
 from fowt_env.plant.measurement import N_MEASUREMENTS, BladeMeasure, Measure
 from fowt_env.plant.model import LoadCache
+from fowt_env.plant.protection import (
+    Stop,
+    Watch,
+    break_drives,
+    break_sensors,
+    own_command,
+    stop_turbine,
+    watch_turbine,
+)
 from fowt_env.plant.sensing import Setting, read
 from fowt_env.plant.state import BLADES, Command, State
 
@@ -139,36 +147,7 @@ class Schedule(NamedTuple):
     last: int  # step at which the run ends, with a row
     overspeed: float  # rotor speed (rad/s) beyond which the run ends at the next control instant
     grid_loss: float  # s, time from which the generator has no torque
-    trip: float = inf  # rotor speed (rad/s) beyond which the protection stops the turbine at the next one
-    feathering: float = 0.0  # rad in a control period, of such a stop
-    feathered: float = 0.0  # rad, where it ends
     individual: bool = False  # whether the law commands each blade, else one pitch for all
-
-
-class Protection(IntEnum):
-    """Entries of a run's protection array, which outlives the calls of rollout."""
-
-    TRIPPED_AT = 0  # s; infinite: not yet
-    TARGET = 1  # rad, pitch commanded since, an entry for each blade
-
-
-def new_protection():
-    """Protection array of a turbine that has not tripped."""
-    return np.array([inf] + BLADES * [0.0])
-
-
-@kernel
-def stop_turbine(t, x, u, schedule, pitches, protection):
-    """Put the command of an emergency stop into u: no torque, blades feathering from where they were."""
-    if protection[Protection.TRIPPED_AT] > t:
-        protection[Protection.TRIPPED_AT] = t
-        for blade in range(u.shape[0] - Command.BLADE_PITCH):
-            protection[Protection.TARGET + blade] = pitch_of(blade, x, pitches)
-    u[Command.GENERATOR_TORQUE] = 0.0
-    for blade in range(u.shape[0] - Command.BLADE_PITCH):
-        target = min(protection[Protection.TARGET + blade] + schedule.feathering, schedule.feathered)
-        protection[Protection.TARGET + blade] = target
-        u[Command.BLADE_PITCH + blade] = target
 
 
 @kernel
@@ -201,24 +180,25 @@ def all_finite(values):
 
 @entry
 def rollout(
-    handle, x, u, law, parameters, memory, reading, protection, measurement, dx, schedule, first, end, out
+    handle, x, u, law, parameters, memory, reading, guarding, measurement, dx, schedule, first, end, out
 ):
     """Closed loop over the instants first <= step < end, and at the run's last one; rows go to out.
 
     law         compiled control law (CompiledController.law), called at every control instant
     reading     Handle whose data is the Reader that stands between measurement and law
-    protection  new_protection() of the run; once it has tripped, the law is not called again
+    guarding    Handle whose data is the Guard of the run: once it stops the turbine, the law is not called
     first       = end: nothing moves, and measurement and the reader's reading are filled as at that instant
     out         (k, n_channels) of the rows to come, SI
-    Returns (status, step reached, rows written). x (n_state,), u, memory, the reader, protection and
+    Returns (status, step reached, rows written). x (n_state,), u, memory, the reader, the guard and
     measurement are written.
     """
     model, data = model_of(handle), data_of(handle)
-    reader = data_of(reading)
+    reader, guard = data_of(reading), data_of(guarding)
     dt, rows = schedule.dt, 0
     if first == end:
         observe_plant(model, data, x, u, first * dt, dx, measurement)
         read(reader, first // schedule.per_control, first * dt, measurement)
+        break_sensors(first * dt, guard, reader)
         return RUNNING, first, rows
     for step in range(first, end + 1):
         t = step * dt
@@ -230,17 +210,21 @@ def rollout(
         if not ending and step % schedule.per_control == 0:
             observe_plant(model, data, x, u, t, dx, measurement)
             torque, grid_loss = u[Command.GENERATOR_TORQUE], schedule.grid_loss
-            if protection[Protection.TRIPPED_AT] <= t or x[State.ROTOR_SPEED] > schedule.trip:
-                stop_turbine(t, x, u, schedule, model.pitches, protection)
-                grid_loss = t
+            if watch_turbine(t, x, dx, u, measurement, model, guard):
+                stop_turbine(x, u, guard)
+                if int(guard.watch[Watch.STOP]) == Stop.EMERGENCY:
+                    grid_loss = t
             else:
+                own_command(u, guard)
                 read(reader, step // schedule.per_control, t, measurement)
+                break_sensors(t, guard, reader)
                 hide_command(u, reader.sensors.chain[Setting.HIDDEN], schedule.individual, model.pitches)
                 law(parameters, memory, reader.reading, u)
                 if not schedule.individual:
                     spread_command(u, model.pitches)
                 if not all_finite(u):
                     return BAD_COMMAND, step, rows
+            break_drives(t, x, u, model, guard)
             follow_torque(t, torque, u, schedule.per_control * dt, model.generator, grid_loss, data.cache)
             if t >= grid_loss:
                 lose_torque(x, model.converter)

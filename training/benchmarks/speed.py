@@ -39,7 +39,8 @@ from fowt_env.plant.hydro.load import strip_load
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.mooring import mooring_load
-from fowt_env.plant.rollout import Schedule, advance, forget, new_protection, observe, output, rollout
+from fowt_env.plant.protection import build_guard
+from fowt_env.plant.rollout import Schedule, advance, forget, observe, output, rollout
 from fowt_env.plant.state import Command, State, pose_of
 from fowt_env.scene.build import build_scene
 from fowt_env.simulation import HeldCommand, reader_of, simulate
@@ -142,6 +143,7 @@ TIMED_SCENES = {
     "full-field box, standard": TimedScene(_box, SEA, "standard"),
     "exact waves, look-up rotor": TimedScene(TURBULENCE, SEA, "standard", {"wave_loads": "exact"}),
     "BEM rotor, fast waves": TimedScene(TURBULENCE, SEA, "standard", {"rotor": "bem"}),
+    "dynamic inflow": TimedScene(TURBULENCE, SEA, options={"dynamic_inflow": True}),
     "still water, wind": TimedScene(TURBULENCE, None, absent="waves"),
     "no wind, waves": TimedScene(None, SEA, absent="wind, rotor, tower drag"),
     "still water, no wind": TimedScene(None, None, absent="waves, wind, rotor, tower drag"),
@@ -296,6 +298,7 @@ def loop_time(scene, kind, x, u, dt, seconds, repeats=REPEATS):
     last = round(seconds / dt)
     schedule = Schedule(float(dt), round(0.1 / dt), last + 1, last, inf, inf)
     reader = Handle(None, reader_of(scene, controller, None, EXACT, schedule))
+    guarding = Handle(None, build_guard())
 
     def go():
         y, v = x.copy(), u.copy()
@@ -303,7 +306,7 @@ def loop_time(scene, kind, x, u, dt, seconds, repeats=REPEATS):
         observe(handle, y, v, 0.0, dx, m)
         controller.reset(Measurement(*m.tolist()))
         rollout(
-            handle, y, v, controller.law, controller.parameters, controller.memory, reader, new_protection(),
+            handle, y, v, controller.law, controller.parameters, controller.memory, reader, guarding,
             m, dx, schedule, 0, last, rows,
         )  # fmt: skip
 

@@ -15,8 +15,10 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field
 
 from fowt_env.descriptions.checks import is_number, plain_number
+from fowt_env.descriptions.faults import Fault
 from fowt_env.descriptions.files import locate, raise_problems, read_toml
 from fowt_env.descriptions.platform import platform_names, read_platform
+from fowt_env.descriptions.protection import Protection, read_protection
 from fowt_env.descriptions.records import (
     NonNegative,
     Positive,
@@ -28,7 +30,6 @@ from fowt_env.descriptions.sensors import EXACT, sensor_chain
 from fowt_env.descriptions.wind import read_wind
 from fowt_env.errors import InputError, unknown
 from fowt_env.scene.options import OPTIONS
-from fowt_env.training.evaluation.faults import Fault
 from fowt_env.training.evaluation.metrics import METRICS
 from fowt_env.training.evaluation.plant_perturbation import PlantPerturbation
 from fowt_env.training.evaluation.scaling import scaled_file, within_table
@@ -62,9 +63,11 @@ class Case:
     duration: float | None = None  # s
     skip: float | None = None  # s
     shift: PlantPerturbation | None = None  # what of the plant its controllers do not know
-    trip: float | None = TRIP  # fraction of rated rotor speed; None: no protection
+    trip: float | None = TRIP  # fraction of rated rotor speed; None: that of the protection, if it has one
     sensors: str = EXACT  # sensor chain that controllers read through, by its name
     displaced: dict | None = None  # {channel: what is added to the trim of the platform at the start}
+    protection: object = None  # as simulate takes it: None, "turbine" or a mapping of trips
+    source: str = ""  # of the case, where it is another than the suite's
 
 
 def mean_speed(case):
@@ -93,6 +96,10 @@ def described(case):
     }
     if case.displaced is not None:
         values["displaced"] = case.displaced
+    if case.protection is not None:
+        values["protection"] = case.protection
+    if case.source:
+        values["source"] = case.source
     return _plain(values)
 
 
@@ -126,6 +133,17 @@ def _no_trip(value):
 Trip = Annotated[Annotated[float, Field(gt=1.0, le=3.0, strict=True)] | None, BeforeValidator(_no_trip)]
 
 
+def _checked_protection(value):
+    """What simulate takes as protection, if it can be read; None for false."""
+    if value is False or value is None:
+        return None
+    read_protection(value, Protection())
+    return value
+
+
+Protected = Annotated[Any, BeforeValidator(_checked_protection)]
+
+
 class CaseEntry(Record):
     """One [[case]] of a suite file, before it is spread over its wind speeds."""
 
@@ -143,6 +161,8 @@ class CaseEntry(Record):
     skip: NonNegative | None = None
     shift: PlantPerturbation | None = None
     trip: Trip = None  # where it is given; else the suite's
+    protection: Protected = None  # likewise
+    source: str = ""
     sensors: str | None = None
     displaced: dict[str, float] | None = None  # from the trim, in place of initial on another platform
 
@@ -206,6 +226,7 @@ class SuiteFile(Record):
     case: tuple[CaseEntry, ...]
     score: Score | None = None
     trip: Trip = TRIP
+    protection: Protected = None
     sensors: str = EXACT
     site: Site | None = None
     limits: Limits = Limits()
@@ -379,6 +400,8 @@ def _case(entry, speed, file, folder):
         entry.trip if "trip" in entry.model_fields_set else file.trip,
         check_sensors(file.sensors if entry.sensors is None else entry.sensors),
         entry.displaced if entry.initial is None else None,
+        entry.protection if "protection" in entry.model_fields_set else file.protection,
+        entry.source,
     )
 
 

@@ -11,10 +11,12 @@ import fowt_env
 from fowt_env.analysis.trim import trim
 from fowt_env.controllers import make
 from fowt_env.descriptions.checks import is_number
+from fowt_env.descriptions.protection import read_protection
 from fowt_env.descriptions.sea_state import sea_state_of
+from fowt_env.descriptions.units import DEGREE
 from fowt_env.descriptions.wind import read_wind
 from fowt_env.errors import ControllerError, ControllerInputError, InputError, PlantWarning, SimulationStopped
-from fowt_env.training.evaluation.faults import faulted, idling
+from fowt_env.training.evaluation.faults import idling
 from fowt_env.training.evaluation.guard import attempt, reason_of
 from fowt_env.training.evaluation.metrics import METRICS, TIME, turbine_metrics
 from fowt_env.training.evaluation.model_mismatch import perturbed_sensors
@@ -70,6 +72,7 @@ def scored(run):
         scene = fowt_env.build_scene(wind=wind, sea=case.sea, seed=run.seed, **options | parts)
 
     trip = None if case.parked else case.trip
+    protection = None if case.parked else case.protection
 
     def work():
         with warnings.catch_warnings():
@@ -79,9 +82,11 @@ def scored(run):
                 controller=run_controller(run, nominal),
                 duration=run.duration,
                 initial=_start(case, scene),
-                stop_overspeed=case.fault is None and trip is None,
-                grid_loss=_grid_loss(case),
+                stop_overspeed=case.fault is None and trip is None and protection is None,
+                grid_loss=0.0 if case.parked else None,
                 trip=trip,
+                protection=protection,
+                faults=case.fault,
                 nominal=nominal,
                 **{"sensors": case.sensors} | run.options | _degraded(run, nominal.turbine),
             )
@@ -94,8 +99,9 @@ def scored(run):
         ended = frame.attrs["tripped"]
         if ended is None:
             return _row(run, OK, frame) | figures, frame
-        reason = f"overspeed trip at {ended:.1f} s: rotor speed beyond {trip:g} of rated"
-        return _row(run, TRIPPED, frame) | figures | {"reason": reason, "stopped_[s]": ended}, frame
+        status = OK if _expected(case, ended) else TRIPPED
+        reason = _trip_reason(frame.attrs["trip"], ended, case, nominal.turbine)
+        return _row(run, status, frame) | figures | {"reason": reason, "stopped_[s]": ended}, frame
     if isinstance(error, InputError) and not isinstance(error, ControllerInputError):
         raise error  # the run's settings
     frame, stopped = _end(error)
@@ -109,7 +115,9 @@ def lost_row(run, reason):
 
 def run_metrics(frame, case, scene, skip):
     """{metric: value} of the time series of a run of a Case in its nominal scene, scored from `skip` s on."""
-    return turbine_metrics(frame, scene.turbine, skip, _is_steady(case, scene), _gust_start(case))
+    fault = case.fault
+    stop = fault.time if fault is not None and fault.ends_operation else None
+    return turbine_metrics(frame, scene.turbine, skip, _is_steady(case, scene), _gust_start(case), stop)
 
 
 def _is_steady(case, scene):
@@ -160,11 +168,28 @@ def _end(error):
     return frame, float(stopped)
 
 
-def _grid_loss(case):
-    """Time (s) from which the case's generator is off the grid; None: never. A parked turbine's always is."""
-    if case.parked:
-        return 0.0
-    return None if case.fault is None else case.fault.grid_loss
+def _expected(case, time):
+    """Whether a trip at a time (s) is what the protection of a Case is for, and no controller's failure."""
+    fault = case.fault
+    return fault is not None and fault.ends_operation and time >= fault.time - 1e-9
+
+
+TRIPS = {  # what each watches, with its limit
+    "overspeed": "rotor speed beyond {:g} of rated",
+    "overpower": "generator power beyond {:g} of rated",
+    "acceleration": "tower-top acceleration beyond {:g} m/s2",
+    "pitch_deviation": "a blade pitch off its command by more than {:.3g} deg",
+}
+
+
+def _trip_reason(trip, time, case, turbine):
+    """Text of a trip: which, when, and its limit."""
+    limit = case.trip
+    if trip != "overspeed" or limit is None:
+        limit = getattr(read_protection(case.protection, turbine.protection), trip).limit
+    if trip == "pitch_deviation":
+        limit /= DEGREE
+    return f"{trip.replace('_', ' ')} trip at {time:.1f} s: {TRIPS[trip].format(limit)}"
 
 
 def _degraded(run, turbine):
@@ -176,7 +201,7 @@ def _degraded(run, turbine):
 
 
 def run_controller(run, nominal):
-    """What simulate is given as controller: the run's own, with its fault, or a parked turbine's.
+    """What simulate is given as controller: the run's own, or a parked turbine's.
 
     nominal: the scene that the controller is prepared for.
     Raises: ControllerInputError where it cannot be made.
@@ -186,7 +211,6 @@ def run_controller(run, nominal):
         return idling(nominal.turbine) if nominal.wind_speed else None
     control_dt = run.options.get("control_dt", CONTROL_DT)
     try:
-        controller = make(run.controller, nominal.turbine, control_dt)
+        return make(run.controller, nominal.turbine, control_dt)
     except InputError as error:
         raise ControllerInputError(str(error)) from error
-    return faulted(controller, case.fault, nominal.turbine, control_dt)

@@ -52,6 +52,7 @@ def test_every_figure_of_a_description_has_its_power_of_the_scale():
     records = {name: getattr(platform, name) for name in ("environment", "ballast", "hull", "hydro", "tower")}
     records |= {name: getattr(turbine, name) for name in ("rotor", "nacelle", "drivetrain", "pitch_drive")}
     records |= {"torque_law": turbine.torque_law, "gains": turbine.gains["oc3"]}
+    records |= {"protection": turbine.protection, "trip": turbine.protection.overspeed}
     for name, record in records.items():
         assert set(EXPONENTS[name]) == set(type(record).model_fields), name
     assert set(EXPONENTS["lines"]) == set(Line.model_fields)

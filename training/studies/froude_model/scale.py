@@ -19,6 +19,7 @@ import typer
 
 from fowt_env.descriptions.checks import check_number
 from fowt_env.descriptions.platform import DATA, read_platform
+from fowt_env.descriptions.protection import TripLimit
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.descriptions.units import DEGREE
 from fowt_env.errors import InputError
@@ -59,7 +60,8 @@ EXPONENTS = {  # record: {field: exponent of the scale, or one for each entry}
     "rotor": {
         "blades": SAME, "mass": MASS, "overhang": LENGTH, "hub_height": LENGTH, "hub_radius": LENGTH,
         "tip_radius": LENGTH, "inertia": INERTIA, "inertia_diameter": INERTIA, "shaft_tilt": SAME,
-        "cone": SAME, "cm_offset": LENGTH,
+        "cone": SAME, "cm_offset": LENGTH, "blade_mass": MASS, "blade_first_moment": MASS + LENGTH,
+        "blade_second_moment": INERTIA,
     },
     "nacelle": {
         "mass": MASS, "cm_downwind": LENGTH, "cm_left": LENGTH, "cm_height": LENGTH, "inertia": INERTIA,
@@ -69,6 +71,11 @@ EXPONENTS = {  # record: {field: exponent of the scale, or one for each entry}
         "generator_efficiency": SAME,
     },
     "pitch_drive": {"time_constant": TIME, "rate_limit": RATE, "minimum": SAME, "maximum": SAME},
+    "protection": {
+        "overspeed": SAME, "overpower": SAME, "acceleration": SAME, "pitch_deviation": SAME,
+        "normal_rate": RATE, "emergency_rate": RATE, "off_speed": SAME,
+    },
+    "trip": {"limit": SAME, "time": TIME, "stop": SAME},
     "torque_law": {
         "rated_torque": MOMENT, "rated_power": POWER_EXPONENT, "rated_speed": RATE, "cut_in_speed": RATE,
         "region2_start_speed": RATE, "region2_constant": MOMENT - 2.0 * RATE, "transition_speed": RATE,
@@ -95,7 +102,9 @@ def scaled(record, name, scale):
         if field not in EXPONENTS[name] or field not in record.model_fields_set or value is None:
             continue
         exponent = EXPONENTS[name][field]
-        if isinstance(value, int):
+        if isinstance(value, dict):  # a trip, which has a table of its own
+            continue
+        if isinstance(value, int | str):
             result[field] = value
         elif isinstance(value, float):
             result[field] = value * scale**exponent
@@ -114,8 +123,11 @@ def turbine_text(turbine, name, scale, polars="polars"):
     lines = [LABEL.format(origin=turbine.name, what="TURBINE", scale=scale), "", f'name = "{name}"']
     lines.append(f'source = "{turbine.name} by Froude\'s law, scale {scale:.6g}; not a real turbine"')
     lines += [f"{key} = {toml_value(value)}" for key, value in scaled(turbine, "turbine", scale).items()]
-    for part in ("rotor", "nacelle", "drivetrain", "pitch_drive", "torque_law"):
+    for part in ("rotor", "nacelle", "drivetrain", "pitch_drive", "protection", "torque_law"):
         lines += _table(part, scaled(getattr(turbine, part), part, scale))
+    for which, trip in turbine.protection:
+        if isinstance(trip, TripLimit) and which in turbine.protection.model_fields_set:
+            lines += _table(f"protection.{which}", scaled(trip, "trip", scale))
     for gain_set, gains in turbine.gains.items():
         lines += _table(f"gains.{gain_set}", scaled(gains, "gains", scale))
     lines += _table("blade", {"stations": "blade.csv", "polars": polars})

@@ -1,0 +1,111 @@
+"""What goes wrong in a run: the grid, a pitch drive, a sensor; and stops that are ordered."""
+
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+
+from fowt_env.descriptions.files import raise_problems
+from fowt_env.descriptions.records import Finite, NonNegative, Positive, Record, validate
+from fowt_env.errors import InputError, unknown
+from fowt_env.plant.measurement import BladeMeasurement, Measurement
+
+STOP_FAULTS = ("emergency_stop", "normal_stop")
+BLADE_FAULTS = ("stuck_pitch", "pitch_runaway", "pitch_offset")
+SENSOR_FAULTS = ("sensor_bias", "sensor_freeze", "sensor_loss")
+KINDS = ("grid_loss", *STOP_FAULTS, *BLADE_FAULTS, *SENSOR_FAULTS)
+FIELDS = tuple(name for name in (*Measurement._fields, *BladeMeasurement._fields) if name != "time")
+# keys of a kind beside kind and time; those that it needs
+KEYS = {
+    "grid_loss": ("delay", "rate"),
+    "emergency_stop": ("rate",),
+    "normal_stop": ("rate",),
+    "stuck_pitch": ("blades", "backup"),
+    "pitch_runaway": ("blades", "towards", "backup"),
+    "pitch_offset": ("blades", "offset"),
+    "sensor_bias": ("field", "value"),
+    "sensor_freeze": ("field",),
+    "sensor_loss": ("field",),
+}
+NEEDED = ("towards", "offset", "field", "value")
+Blade = Annotated[int, Field(ge=1, le=3, strict=True)]
+
+
+class Fault(Record):
+    """A fault of a load case.
+
+    A run with a fault goes on past the turbine's overspeed, which ends any other as failed: how far a rotor
+    without torque or pitch runs away is what such a case shows.
+
+    grid_loss       the generator torque is zero from `time` on; the controller goes on pitching. With a
+                    delay (s) the protection feathers the blades that long after the loss
+    emergency_stop  the generator torque is zero and the blades feather from `time` on
+    normal_stop     the blades feather at the normal rate; the torque falls with the rotor speed
+    rate            deg/s of feathering in these, in place of the turbine's protection's; within the limit of
+                    the pitch drive
+    stuck_pitch     blades stay from `time` on where they are then; the torque is still the controller's
+    pitch_runaway   blades run to `towards`, "fine" or "feather", an end of the drive's range, as fast as the
+                    drive can
+    pitch_offset    blades are `offset` (deg) beyond what their encoders show, and so beyond their command
+    backup          true: the fault is one of control, so that an emergency stop feathers these blades all the
+                    same, from their own energy stores; without it nothing moves them
+    blades          [1], [2, 3] ...; without it all of them. Single ones need a scene with pitch="individual"
+    sensor_bias     `value` (SI) is added to the reading of `field`: of Measurement or, with
+                    pitch="individual", of BladeMeasurement
+    sensor_freeze   the reading stays what it is at `time`
+    sensor_loss     the reading is zero
+    """
+
+    kind: Literal[KINDS]
+    time: NonNegative  # s
+    delay: NonNegative | None = None  # s
+    rate: Positive | None = None  # deg/s
+    blades: tuple[Blade, ...] | None = None
+    backup: Annotated[bool, Field(strict=True)] = False
+    towards: Literal["fine", "feather"] | None = None
+    offset: Finite | None = None  # deg
+    field: str | None = None
+    value: Finite | None = None
+
+    @model_validator(mode="after")
+    def _keys(self):
+        for key in sorted(self.model_fields_set - {"kind", "time", *KEYS[self.kind]}):
+            if getattr(self, key) not in (None, False):
+                raise ValueError(f"{key}: is no key of {self.kind}, which has {', '.join(KEYS[self.kind])}")
+        for key in NEEDED:
+            if key in KEYS[self.kind] and getattr(self, key) is None:
+                raise ValueError(f"{key} is missing: {self.kind} needs it")
+        if self.field is not None and self.field not in FIELDS:
+            raise ValueError(str(unknown("field", self.field, FIELDS)))
+        if self.blades is not None and len(set(self.blades)) != max(len(self.blades), 1):
+            raise ValueError(f"blades = {list(self.blades)}: must be one or more of 1, 2, 3, each once")
+        return self
+
+    @property
+    def grid_loss(self) -> float | None:
+        """Time (s) from which the generator is off the grid; None: it stays."""
+        return self.time if self.kind in ("grid_loss", "emergency_stop") else None
+
+    @property
+    def ends_operation(self) -> bool:
+        """Whether the turbine is to be stopped for it: what its protection does then is part of the case."""
+        return self.kind not in SENSOR_FAULTS
+
+
+def read_faults(value: Any) -> tuple[Fault, ...]:
+    """Tuple of Faults from none, one or several, each a Fault or a mapping of its keys.
+
+    Raises: InputError with a line per wrong key.
+    """
+    if value is None:
+        return ()
+    if isinstance(value, Fault | Mapping):
+        value = (value,)
+    if isinstance(value, str) or not isinstance(value, Sequence):
+        raise InputError(f"faults = {value!r}: must be a Fault, a mapping of its keys, or a list of them")
+    found = []
+    for number, item in enumerate(value, 1):
+        record, problems = (item, []) if isinstance(item, Fault) else validate(Fault, item)
+        raise_problems(f"faults.{number}", problems)
+        found.append(record)
+    return tuple(found)

@@ -1,0 +1,86 @@
+"""What stops a turbine: the limits of its protection, and how it is stopped."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, model_validator
+
+from fowt_env.descriptions.files import raise_problems
+from fowt_env.descriptions.records import NonNegative, Positive, Record, bounded, to_si, validate
+from fowt_env.descriptions.units import DEGREE
+from fowt_env.errors import InputError
+
+OWN = "turbine"  # the protection of the turbine's own file
+STOPS = ("normal", "emergency")
+NORMAL_RATE = 0.9 * DEGREE  # rad/s
+EMERGENCY_RATE = 8.0 * DEGREE
+OFF_SPEED = 0.3
+
+
+class TripLimit(Record):
+    """A limit, how long it must be passed without a break, and the stop that follows."""
+
+    limit: Positive
+    time: NonNegative = 0.0  # s
+    stop: Literal[STOPS] = "emergency"
+
+
+def _none(value):
+    """None for false, which is how a file says that there is no such trip."""
+    return None if value is False else value
+
+
+Limited = Annotated[TripLimit | None, BeforeValidator(_none)]
+
+
+class Protection(Record):
+    """Trips of a turbine, each with a TripLimit or none, and the two stops.
+
+    What a file leaves out is chosen: trips at 1.3 of rated rotor speed, 1.25 of rated power for 1 s, 3.3 m/s2
+    (the constraint of the ATLAS Offshore contest, ARPA-E 2019) and 5 deg for 1 s; feathering at 8 deg/s in an
+    emergency (NREL/TP-500-38060) and at 0.9 deg/s else (90 deg in 100 s: ASME OMAE2020 V009T09A070), each at
+    most as fast as the pitch drive can. A normal stop takes the torque back with the rotor speed, to none at
+    off_speed, where the generator is taken off.
+    """
+
+    overspeed: Limited = TripLimit(limit=1.3)  # of rated rotor speed
+    overpower: Limited = TripLimit(limit=1.25, time=1.0, stop="normal")  # of rated power
+    # of the tower top in the plane of the nacelle, m/s2
+    acceleration: Limited = TripLimit(limit=3.3, stop="normal")
+    # of a blade's measured pitch from its command, or of that among the blades, rad
+    pitch_deviation: Limited = TripLimit(limit=5.0 * DEGREE, time=1.0)
+    normal_rate: Positive = NORMAL_RATE  # rad/s
+    emergency_rate: Positive = EMERGENCY_RATE
+    off_speed: bounded(gt=0, lt=1) = OFF_SPEED  # of rated rotor speed
+
+    @model_validator(mode="after")
+    def _above_rated(self):
+        for name in ("overspeed", "overpower"):
+            trip = getattr(self, name)
+            if trip is not None and not trip.limit > 1.0:
+                raise ValueError(f"{name}.limit = {trip.limit:g}: must be above 1, of rated")
+        return self
+
+
+NO_TRIPS = dict.fromkeys(("overspeed", "overpower", "acceleration", "pitch_deviation"))
+
+
+def read_protection(value: Any, own: Protection) -> Protection:
+    """Protection from what a run or case gives: None (no trips), "turbine" (own), a mapping or a Protection.
+
+    A mapping has the keys of a turbine file's [protection], in place of single ones of `own`; false for no
+    trip. Raises: InputError naming the key, value and allowed range.
+    """
+    if isinstance(value, Protection):
+        return value
+    if value is None:
+        return own.model_copy(update=NO_TRIPS)
+    if isinstance(value, str) and value == OWN:
+        return own
+    if not isinstance(value, Mapping):
+        raise InputError(f"protection = {value!r}: must be {OWN!r}, a table of trips, or none")
+    problems: list[str] = []
+    data, origin = to_si(dict(value), problems)
+    record, found = validate(Protection, data, origin)
+    raise_problems("protection", problems + found)
+    return own.model_copy(update={key: getattr(record, key) for key in data})

@@ -1,0 +1,49 @@
+"""Faults and stops as a wrapper around a controller: its commands, overridden from the fault on."""
+
+from math import radians
+
+from fowt_env.control import CheckedController, CompiledController
+from fowt_env.plant.measurement import SENSOR_FIELDS
+
+
+class Overridden:
+    """A controller with a Fault of the grid or of all blades, read through exact sensors.
+
+    feathered: rad, where feathering ends; rate: deg/s of it, from where the blades are measured.
+    """
+
+    def __init__(self, inner, fault, feathered, control_dt, rate=8.0):
+        if not isinstance(inner, CompiledController | CheckedController):
+            inner = CheckedController(inner)
+        self.name = f"{inner.name} with {fault.kind}"
+        self.inner, self.fault = inner, fault
+        self.feathered = float(feathered)
+        self.step = radians(rate if fault.rate is None else fault.rate) * control_dt
+        self.stuck = self.target = None
+        self.information = (*getattr(inner, "information", SENSOR_FIELDS), "blade_pitch")
+        self.preview_times = tuple(getattr(inner, "preview_times", ()))
+
+    def prepare(self, scene):
+        if hasattr(self.inner, "prepare"):
+            self.inner.prepare(scene)
+
+    def reset(self, measurement):
+        self.stuck = self.target = None
+        self.inner.reset(measurement)
+
+    def act(self, measurement):
+        torque, blade_pitch = self.inner.act(measurement)
+        fault = self.fault
+        late = measurement.time - fault.time
+        if late < -1e-9:
+            return torque, blade_pitch
+        if fault.kind == "stuck_pitch":
+            if self.stuck is None:
+                self.stuck = measurement.blade_pitch
+            return torque, self.stuck
+        delay = 0.0 if fault.kind == "emergency_stop" else fault.delay
+        if delay is not None and late >= delay - 1e-9:
+            start = measurement.blade_pitch if self.target is None else self.target
+            self.target = min(start + self.step, self.feathered)
+            blade_pitch = self.target
+        return 0.0, blade_pitch
