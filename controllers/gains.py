@@ -56,6 +56,7 @@ class PowerSlope(NamedTuple):
     doubling: float  # rad, the blade pitch at which it has doubled
     blade_pitch: np.ndarray  # (n,) rad, and the slopes that the line is fitted to
     slope: np.ndarray  # (n,) W/rad
+    wind: np.ndarray  # (n,) m/s
 
 
 def gains(design_frequency, damping, inertia, rated_speed, gear_ratio, dP_dpitch):
@@ -124,8 +125,8 @@ def _power_slope(turbine, density):
     if not surplus(finest, slowest) < 0.0 < surplus(finest, fastest):
         raise InputError(f"{where}: its rotor does not reach rated torque at rated speed below cut-out")
     reached = brentq(lambda wind: surplus(finest, wind), slowest, fastest)
-    pitches, slopes = [], []
-    for wind in np.linspace(reached, fastest, SPEEDS):
+    pitches, slopes, winds = [], [], np.linspace(reached, fastest, SPEEDS)
+    for wind in winds:
         if surplus(STEEPEST_PITCH, wind) > 0.0:
             raise InputError(
                 f"{where}: its rotor is beyond rated torque at {wind:.3g} m/s at any blade pitch"
@@ -139,7 +140,7 @@ def _power_slope(turbine, density):
     growth, at_zero = np.polyfit(pitches, slopes, 1)
     if not (at_zero < 0.0 and growth < 0.0):
         raise InputError(f"{where}: its power does not fall faster the more the blades are pitched")
-    return PowerSlope(float(at_zero), float(at_zero / growth), np.array(pitches), np.array(slopes))
+    return PowerSlope(float(at_zero), float(at_zero / growth), np.array(pitches), np.array(slopes), winds)
 
 
 def land_frequency(turbine):
@@ -184,20 +185,34 @@ def gains_of_turbine(turbine, gain_set="oc3"):
     return derived_gains(turbine, (LAND if gain_set == "land" else FLOATING) * speed)
 
 
-_FREQUENCIES = Cache(64)  # (plant, water) -> rad/s
+_MODES = Cache(64)  # (plant, water) -> eigenvalues, shares
 
 
 def platform_pitch_frequency(scene):
-    """Undamped natural frequency (rad/s) of the platform's pitch about a scene's trim in rated wind.
+    """platform_frequency of the platform's pitch."""
+    return platform_frequency(scene, State.PLATFORM_PITCH)
 
+
+def platform_frequency(scene, motion):
+    """Undamped natural frequency (rad/s) of a platform motion about a scene's trim in rated wind.
+
+    motion: State.SURGE ... State.YAW; the frequency is that of the mode in which it has the greatest share.
     From the accelerations that small displacements give; whatever has states of its own (a wake, the memory
     of radiated waves) is held. Remembered per plant.
-    Raises: InputError as trim, and where nothing restores the pitch.
+    Raises: InputError as trim, and where nothing restores the motion.
     """
-    return _FREQUENCIES.get((plant_key(scene), water_key(scene)), lambda: _pitch_frequency(scene))
+    values, shares = _MODES.get((plant_key(scene), water_key(scene)), lambda: _modes(scene))
+    square = -float(values[np.argmax(shares[motion])].real)
+    if not square > 0.0:
+        what = "pitch" if motion == State.PLATFORM_PITCH else State(motion).name.lower()
+        raise InputError(
+            f"platform {scene.platform.name!r}: nothing restores its {what}: no gains are derived"
+        )
+    return square**0.5
 
 
-def _pitch_frequency(scene):
+def _modes(scene):
+    """(6,) eigenvalues of the platform's accelerations over position, (6, 6) shares of motions in modes."""
     if scene.model.aero is not None:
         speed = float(scene.turbine.rated_wind_speed)
         scene = replace(without_fluctuations(scene, speed), wind=speed, sea=None, wind_speed=speed)
@@ -222,13 +237,7 @@ def _pitch_frequency(scene):
     values, vectors = np.linalg.eig(kinematics @ stiffness)
     arm = 0.5 * scene.platform.draft
     size = np.abs(vectors) * np.array([1.0, 1.0, 1.0, arm, arm, arm])[:, None]
-    share = size[State.PLATFORM_PITCH] / size.sum(axis=0)
-    square = -float(values[np.argmax(share)].real)
-    if not square > 0.0:
-        raise InputError(
-            f"platform {scene.platform.name!r}: nothing restores its pitch: no gains are derived"
-        )
-    return square**0.5
+    return values, size / size.sum(axis=0)
 
 
 def floating_frequency(scene):

@@ -3,13 +3,14 @@
 from fowt_env.controllers.constant import constant
 from fowt_env.controllers.floating_feedback import floating_feedback
 from fowt_env.controllers.gspi import gspi_land, gspi_oc3
+from fowt_env.controllers.ipc.law import ipc, ipc_constrained, ipc_floating
 from fowt_env.controllers.lqr.law import lqr
 from fowt_env.controllers.mpc.law import lq_preview, mpc, mpc_lidar, mpc_preview
 from fowt_env.controllers.openfast_baseline import openfast_oc3
 from fowt_env.controllers.pi import pi, pi_land, pi_land_power, pi_tuned, pi_unscheduled
 from fowt_env.controllers.preview import preview
 from fowt_env.controllers.printed_eq8 import eq8_literal
-from fowt_env.controllers.rosco import rosco, rosco_float
+from fowt_env.controllers.rosco import rosco, rosco_float, rosco_ipc
 
 CONTROLLERS = {  # name -> factory(turbine: descriptions.turbine.Turbine, control_dt: float) -> controller
     "constant": constant,
@@ -17,6 +18,9 @@ CONTROLLERS = {  # name -> factory(turbine: descriptions.turbine.Turbine, contro
     "floating_feedback": floating_feedback,
     "gspi_land": gspi_land,
     "gspi_oc3": gspi_oc3,
+    "ipc": ipc,
+    "ipc_constrained": ipc_constrained,
+    "ipc_floating": ipc_floating,
     "lq_preview": lq_preview,
     "lqr": lqr,
     "mpc": mpc,
@@ -31,4 +35,5 @@ CONTROLLERS = {  # name -> factory(turbine: descriptions.turbine.Turbine, contro
     "preview": preview,
     "rosco": rosco,
     "rosco_float": rosco_float,
+    "rosco_ipc": rosco_ipc,
 }

@@ -11,6 +11,11 @@ above rated is constant as there. Below rated ROSCO does what it does by default
 estimates the wind and the torque tracks the best tip-speed ratio, with the set-point smoother between the
 regions and no peak shaving.
 
+Its individual pitch control integrates the tilt and yaw moment of the hub to cyclic pitch. It is switched on
+in the turbine's own DISCON.IN, whose gains stay. Else the integral gain is that of `ipc`
+(controllers/ipc/design.py) at zero blade pitch, as the library has no schedule for it, with the azimuth lead
+for the lag of the drive and the limits of its toolbox.
+
 A loaded library is one controller that can be started once. So every reset() loads a private copy of the
 file and drops the one before.
 """
@@ -35,6 +40,7 @@ from scipy.optimize import brentq
 from fowt_env.caches import Cache
 from fowt_env.control import check_control_dt
 from fowt_env.controllers.gains import published_set, with_gains
+from fowt_env.controllers.ipc.design import BANDWIDTH, lead_time, root_slope
 from fowt_env.controllers.tuned import tuned_for
 from fowt_env.descriptions.checks import check_number, check_one_of
 from fowt_env.descriptions.files import read_text
@@ -52,11 +58,14 @@ PITCHES = DEGREE * np.concatenate([np.arange(-5.0, 30.0, 1.0), np.linspace(30.0,
 SCHEDULE = 0.5 * pi * np.linspace(0.0, 1.0, 40) ** 2  # blade pitch of the gain table, rad
 POLE_SPEEDS = 45  # winds of the estimator's table of poles
 MINIMUM_SPEED = 1.1  # times the cut-in speed: where region 2 starts below that, this is a minimum speed
-# Modes of a DISCON.IN that need what it is not given here: loads of single blades, yaw, flaps, files, sockets
+INDIVIDUAL = "IPC_ControlMode"  # loads of single blades, which the individual variant is given
+# Modes of a DISCON.IN that need what it is not given here: yaw, flaps, files, sockets
 OFF = (
-    "IPC_ControlMode", "Y_ControlMode", "Flp_Mode", "OL_Mode", "AWC_Mode", "Ext_Mode", "ZMQ_Mode", "CC_Mode",
+    "Y_ControlMode", "Flp_Mode", "OL_Mode", "AWC_Mode", "Ext_Mode", "ZMQ_Mode", "CC_Mode",
     "StC_Mode",
 )  # fmt: skip
+IPC_AMPLITUDE = 0.2618  # rad, greatest cyclic pitch: IPC_IntSat of its toolbox
+IPC_RAMP = (0.8, 1.0)  # of rated wind, over which it fades in: IPC_Vramp of its toolbox
 SILENT = {"LoggingLevel": 0, "Echo": 0, "Ext_Interface": 0}  # no files beside the run's, the plain interface
 ENTRY = re.compile(r"^(?P<value>[^!]*?)(?P<gap>\s*!\s*)(?P<name>\w+)\b")
 TORQUE_FREQUENCY, TORQUE_DAMPING = 0.15, 0.7  # rad/s, of the torque loop in ROSCO's NREL 5 MW deck
@@ -88,10 +97,11 @@ class RoscoSettings:
 class Discon:
     """A DISCON.IN of ROSCO, of a turbine's own.
 
+    individual: whether it controls the pitch of each blade, which is switched on where the file has it off.
     Raises: InputError for a file that is none, and for modes that need more than the library is given.
     """
 
-    def __init__(self, path):
+    def __init__(self, path, individual=False):
         self.path = Path(path)
         self.text = read_text(self.path, "DISCON.IN")
         self.values = {}
@@ -99,10 +109,11 @@ class Discon:
             if found := ENTRY.match(line):
                 self.values.setdefault(found["name"], found["value"].strip())
         where = f"DISCON.IN {str(path)!r}"
-        for key in ("PerfFileName", "PerfTableSize", "Fl_Mode", "LoggingLevel", *OFF):
+        for key in ("PerfFileName", "PerfTableSize", "Fl_Mode", "LoggingLevel", INDIVIDUAL, *OFF):
             if key not in self.values:
                 raise InputError(f"{where}: {key} is missing: it is no file of ROSCO 2.9 or later")
-        for key in OFF:
+        self.switched = {INDIVIDUAL: 1} if individual and self.values[INDIVIDUAL] == "0" else {}
+        for key in OFF if individual else (INDIVIDUAL, *OFF):
             if self.values[key] != "0":
                 raise InputError(f"{where}: {key} = {self.values[key]}: must be 0 here")
         if self.values["Fl_Mode"] not in ("0", "1", "2"):
@@ -118,7 +129,7 @@ class Discon:
         for key in changes:
             if key not in self.values:
                 raise unknown("entry of DISCON.IN", key, self.values)
-        changes = SILENT | {"PerfFileName": '"rotor.txt"'} | changes
+        changes = SILENT | {"PerfFileName": '"rotor.txt"'} | self.switched | changes
         named = self.path.parent / self.values["PerfFileName"].strip("\"'")
         if named.is_file():
             rows = read_text(named, "rotor performance")
@@ -190,18 +201,22 @@ class Rosco:
 
     settings: RoscoSettings, with which DISCON.IN is written for a scene, or a Discon, taken as it is.
     changes: {name in DISCON.IN: value} that replace what is written there.
+    individual: whether it is given the loads of single blades and commands the pitch of each; a Discon then
+    is made for it too.
     """
 
-    def __init__(self, settings, control_dt, name="rosco", changes=None):
+    def __init__(self, settings, control_dt, name="rosco", changes=None, individual=False):
         self.settings = settings
         self.changes = dict(changes or {})
         self.control_dt = check_control_dt(control_dt)
         self.name = str(name)
+        self.individual = bool(individual)
         # a turbine measures the rate of its pitching: its own DISCON.IN is given the change of that
         turning = "platform_pitch_rate" if isinstance(settings, Discon) else "platform_pitch_acceleration"
         felt = {0: (), 1: ("nacelle_acceleration",), 2: (turning,)}[settings.mode]
         used = ("time", "rotor_speed", "generator_speed", "generator_torque", "blade_pitch", "wind_speed")
-        self.information = (*used, *felt, "plant_model")
+        blades = BLADE_INPUTS if self.individual else ()
+        self.information = (*used, *felt, *blades, "plant_model")
         self._felt = felt
         self._forget()
 
@@ -210,7 +225,7 @@ class Rosco:
 
     def __getstate__(self):
         """Everything but the running library: a copy needs prepare() and reset() of its own."""
-        kept = ("settings", "control_dt", "name", "changes")
+        kept = ("settings", "control_dt", "name", "changes", "individual")
         return {key: getattr(self, key) for key in kept}
 
     def __setstate__(self, state):
@@ -232,6 +247,8 @@ class Rosco:
         else:
             made = _table(turbine, density)
             values = deck(with_gains(scene), density, made, self.settings)
+            if self.individual:
+                values |= individual_entries(turbine, self.control_dt)
             for key in self.changes:
                 if key not in values:
                     raise unknown("entry of DISCON.IN", key, values)
@@ -255,7 +272,10 @@ class Rosco:
         self._first = (measurement.time, self._call(0, measurement))
 
     def act(self, measurement):
-        """(generator torque, blade pitch). Raises: ControllerError with ROSCO's own words where it fails."""
+        """(generator torque, blade pitch or that of each blade).
+
+        Raises: ControllerError with ROSCO's own words where it fails.
+        """
         if self._first is not None:
             time, commands = self._first
             self._first = None
@@ -278,6 +298,12 @@ class Rosco:
             s[82] = 0.0 if self._rate is None else (rate - self._rate) / self.control_dt
             self._rate = rate
         s[60] = 3.0
+        if self.individual:
+            blades = m.blades
+            s[27] = 1.0
+            s[59] = blades.azimuth
+            for entry, name in SWAPPED.items():
+                s[entry] = getattr(blades, name)
         failed = self._library.call(s, self._deck)
         if failed is not None:
             raise ControllerError(
@@ -286,9 +312,20 @@ class Rosco:
                 time=m.time,
                 returned=None,
             )
+        if self.individual:
+            return float(s[46]), float(s[41]), float(s[42]), float(s[43])
         return float(s[46]), float(s[41])
 
 
+SWAPPED = {  # entries of the interface's array
+    3: "blade_pitch_1",
+    32: "blade_pitch_2",
+    33: "blade_pitch_3",
+    29: "root_out_of_plane_1",
+    30: "root_out_of_plane_2",
+    31: "root_out_of_plane_3",
+}
+BLADE_INPUTS = ("azimuth", *SWAPPED.values())
 OUT_NAME = b"rosco"  # root of the files that ROSCO would write at higher logging levels
 
 
@@ -502,6 +539,21 @@ def deck(turbine, density, table, settings):
     }
 
 
+def individual_entries(turbine, control_dt):
+    """{name: value} of DISCON.IN that switch on individual pitch control at 1P."""
+    gain = BANDWIDTH * turbine.rated_rotor_speed / -root_slope(turbine).at_zero
+    return {
+        INDIVIDUAL: 1,
+        "IPC_Vramp": tuple(share * turbine.rated_wind_speed for share in IPC_RAMP),
+        "IPC_SatMode": 2,
+        "IPC_IntSat": IPC_AMPLITUDE,
+        "IPC_KP": (0.0, 0.0),
+        "IPC_KI": (gain, 0.0),
+        "IPC_aziOffset": (turbine.rated_rotor_speed * lead_time(turbine, control_dt), 0.0),
+        "IPC_CornerFreqAct": 0.0,
+    }
+
+
 def _words(value):
     """Text of a value of the deck."""
     if isinstance(value, str):
@@ -539,3 +591,9 @@ def rosco_float(turbine, control_dt):
     if turbine.discon is not None:
         return Rosco(Discon(turbine.discon), control_dt, "rosco_float")
     return Rosco(RoscoSettings(mode=1, **tuned_for("rosco_float", turbine)), control_dt, "rosco_float")
+
+
+def rosco_ipc(turbine, control_dt):
+    """The ROSCO library as rosco, with its individual pitch control at 1P."""
+    settings = RoscoSettings() if turbine.discon is None else Discon(turbine.discon, individual=True)
+    return Rosco(settings, control_dt, "rosco_ipc", individual=True)

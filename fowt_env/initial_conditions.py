@@ -40,15 +40,21 @@ def initial_state(
 ) -> tuple[np.ndarray, np.ndarray]:
     """(state, command) that a run begins with.
 
-    start: "trim" the floating steady state in the mean wind; "zero" all platform states zero, with
-    the rotor speed and blade pitch of that wind on a fixed platform. initial: {channel: absolute value};
-    BldPitch1 is that of all blades where they have one pitch, and of the first where each has its own.
+    start: "trim" the floating steady state in the mean wind; "zero" all states of platform and tower zero,
+    with the rotor speed and blade pitch of that wind on a fixed platform. initial: {channel: absolute value};
+    BldPitch1 is that of all blades where they have one pitch, and of the first where each has its own;
+    TTDspFA and TTDspSS bend the tower in its first modes alone.
     """
     if start not in STARTS:
         raise unknown("start", start, STARTS)
     point = trim(scene, platform="floating" if start == "trim" else "fixed")
     x, u = point.state.copy(), point.command.copy()
     known = INITIAL | {f"BldPitch{blade}": (i, DEGREE) for blade, i in enumerate(scene.pitch_states, 1)}
+    if (tower := scene.model.tower) is not None:
+        known |= {"TTDspFA": (tower.first, 1.0), "TTDspSS": (tower.first + 1, 1.0)}
+        deflections = slice(tower.first, tower.first + len(tower.slope))
+        if start == "zero" or any(str(name).startswith("TTDsp") for name in initial or {}):
+            x[deflections] = 0.0
     rates = {}
     for name, value in (initial or {}).items():
         key = str(name).split("_[")[0]

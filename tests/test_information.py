@@ -28,6 +28,8 @@ from fowt_env.weather.preview import Motion, Preview, add_motion, exact_preview,
 from fowt_env.weather.sensor_noise import draw_noise
 
 GUST = {"kind": "steps", "speeds": [17.0, 19.0, 16.0], "every": 10.0, "ramp": 4.0}
+ROSCO = {"rosco", "rosco_float"}
+INDIVIDUAL = {"ipc", "ipc_constrained", "ipc_floating", "rosco_ipc"}  # of scenes with pitch="individual"
 ONES = Measurement(*[1.0 + i for i in range(N_MEASUREMENTS)])
 
 
@@ -193,7 +195,7 @@ def test_an_unknown_name_is_refused(gust_scene, information):
         run(gust_scene, Watcher(information))
 
 
-@pytest.mark.parametrize("name", sorted(set(CONTROLLERS) - {"rosco", "rosco_float"}))
+@pytest.mark.parametrize("name", sorted(set(CONTROLLERS) - ROSCO - INDIVIDUAL))
 def test_every_built_in_controller_declares_all_that_it_uses(gust_scene, name):
     """Its run is that of one that is given everything."""
     honest = make(name, gust_scene.turbine, 0.1)

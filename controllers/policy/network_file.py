@@ -16,7 +16,7 @@ from fowt_env.controllers.registry import CONTROLLERS
 from fowt_env.descriptions.array_files import read_arrays
 from fowt_env.descriptions.files import parse_json, raise_problems
 from fowt_env.descriptions.records import Finite, NonNegative, Positive, Record, unknown_key, validate
-from fowt_env.envs.actions import ACTION_MODES
+from fowt_env.envs.actions import ACTION_MODES, n_actions
 from fowt_env.envs.decisions import DecisionSettings
 from fowt_env.envs.observations import KNOWN, N_ACTIONS
 from fowt_env.errors import InputError
@@ -39,7 +39,7 @@ class PolicySettings(Record):
     clip_observation: Positive
     control_dt: Positive
     decisions: dict[str, Any]  # of DecisionSettings
-    action_mode: Literal[tuple(ACTION_MODES)]
+    action_mode: Literal[tuple(name for name, mode in ACTION_MODES.items() if n_actions(mode) == N_ACTIONS)]
     baseline: Literal[tuple(CONTROLLERS)]  # an import path would run code
     observation: Annotated[list[Literal[KNOWN]], Field(min_length=1, max_length=200)]
     wind_preview: Annotated[list[NonNegative], Field(max_length=200)]  # s

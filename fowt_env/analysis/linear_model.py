@@ -14,7 +14,7 @@ from fowt_env.plant.channels import N_FIXED, Out, measure, record
 from fowt_env.plant.compile.decorators import entry
 from fowt_env.plant.compile.handle import data_of, model_of
 from fowt_env.plant.dynamics import evaluate_loads, loads_of, respond
-from fowt_env.plant.measurement import N_MEASUREMENTS, Measure
+from fowt_env.plant.measurement import Measure
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.state import MOTIONS, STATE_INDEX, STATES, State, pose_of
 from fowt_env.scene.actuators import linear_actuator
@@ -171,6 +171,15 @@ def plant_states(scene):
     return tuple(names), rows, steps
 
 
+def of_all_blades(scene, rows):
+    """[indices] that each state of plant_states stands for: of what each blade has, those of all blades."""
+    together = {int(State.BLADE_PITCH): list(scene.pitch_states)}
+    for block in scene.blocks:
+        if block.name in ACTUATOR_STATES:
+            together[block.offset] = list(range(block.offset, block.offset + block.size))
+    return [together.get(row, [row]) for row in rows]
+
+
 class Mode(NamedTuple):
     """One oscillating mode."""
 
@@ -250,8 +259,9 @@ class _Plant:
         self.measures = [Measure[name.upper()] for name in MEASURED]
         self.states = plant_states(scene)[1]
         rows = len(scene.channels)
-        self.scratch = (np.zeros(scene.n_state), np.zeros(N_MEASUREMENTS), np.zeros(rows))
-        self.means = (np.zeros(scene.n_state), np.zeros(N_MEASUREMENTS), np.zeros(rows))
+        measured = scene.n_measurements
+        self.scratch = (np.zeros(scene.n_state), np.zeros(measured), np.zeros(rows))
+        self.means = (np.zeros(scene.n_state), np.zeros(measured), np.zeros(rows))
 
     def __call__(self, x, u, force):
         """Rates of plant_states and the outputs."""
@@ -267,7 +277,8 @@ def linearize(scene, operating_point=None):
     wave_force. Drag has no linear part at rest in still water, so viscous damping is absent there.
     Radiation memory comes in exactly, in a scene with convolution by the fit that state_space takes. Other
     internal states (dynamic inflow, those of loads) are not linearised. A pitch drive counts without deadband
-    and friction, within which it would not move at all.
+    and friction, within which it would not move at all. blade_pitch is that of all blades together, also
+    where each has its own: multiblade.py has the rest.
 
     Raises: InputError if the scene has any.
     """
@@ -288,7 +299,7 @@ def linearize(scene, operating_point=None):
     def slopes(vector, indices, steps):
         columns = []
         for index, step in zip(indices, steps, strict=True):
-            keep = vector[index]
+            keep = vector[index].copy()
             vector[index] = keep + step
             up = plant(x, u, force)
             vector[index] = keep - step
@@ -298,10 +309,10 @@ def linearize(scene, operating_point=None):
         return np.array(columns).T
 
     names, rows, state_steps = plant_states(scene)
-    of_states = slopes(x, rows, state_steps)
+    of_states = slopes(x, of_all_blades(scene, rows), state_steps)
     of_inputs = np.zeros((of_states.shape[0], len(INPUTS)))
-    of_inputs[:, :2] = slopes(u, range(2), INPUT_STEPS[:2])
-    of_forces = slopes(force, range(6), FORCE_STEPS)
+    of_inputs[:, :2] = slopes(u, ([0], list(range(1, scene.n_commands))), INPUT_STEPS[:2])
+    of_forces = slopes(force, [[i] for i in range(6)], FORCE_STEPS)
     if point.wind_speed is not None:
         step = INPUT_STEPS[2]
         sides = []

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from fowt_env.analysis.equilibrium import check_equilibrium, evaluated, label, unbalanced
 from fowt_env.analysis.statics import mean_derivative
 from fowt_env.errors import InputError, unknown
-from fowt_env.plant.aero.bem_rotor import wake_equilibrium
+from fowt_env.plant.aero.load import settled_wake
 from fowt_env.plant.aero.wind import wind_now
 from fowt_env.plant.channels import to_units
 from fowt_env.plant.compile.decorators import entry
@@ -39,6 +39,7 @@ DIFFERENCE_STEPS = {  # of the differences, m, rad and rad/s
     int(State.ROTOR_SPEED): 1e-4,
     int(State.BLADE_PITCH): 1e-5,
 }
+DEFLECTION_STEP = 1e-3  # m, of those of a tower that bends
 PLATFORM_MODES = ("floating", "fixed")
 
 
@@ -119,14 +120,12 @@ def without_fluctuations(scene, wind_speed=None):
 
 @entry
 def settle_wake(handle, x, dx):
-    """Set the wake states of x to their steady values for the rest of it; the rotor must be a BemRotor."""
+    """Set the wake states of x to their steady values for the rest of it; the rotor must have such states."""
     aero = model_of(handle).aero
-    rotor = aero.rotor
-    wake_equilibrium(
-        0.0, rotor_pose(pose_of(x), aero.tilt), x, wind_now(0.0, aero.wind), aero.wind, aero.field,
-        rotor.elements, rotor.skew, rotor.wake, dx, data_of(handle).counters, model_of(handle).pitches,
-        data_of(handle).blades,
-    )  # fmt: skip
+    pose, now, data = rotor_pose(pose_of(x), aero.tilt), wind_now(0.0, aero.wind), data_of(handle)
+    settled_wake(
+        0.0, pose, x, now, aero, aero.rotor, dx, data.counters, model_of(handle).pitches, data.blades
+    )
 
 
 SETTLING = 8  # Newton steps for a block of internal states; one is enough where they are linear
@@ -242,35 +241,48 @@ class _Steady:
 
     def motions(self):
         """Indices of the positions that the scene's platform can change."""
-        return [0, 1, 2, 3, 4, 5] if self.scene.model.rigid_body.plane is None else [0, 2, 4]
+        body = self.scene.model.rigid_body
+        if body.platform_fixed:
+            return []
+        return [0, 1, 2, 3, 4, 5] if body.plane is None else [0, 2, 4]
+
+    def positions(self):
+        """Indices of the platform's motions and of the deflections of a tower that bends."""
+        tower = self.scene.model.tower
+        return self.motions() + (
+            [] if tower is None else list(range(tower.first, tower.first + _modes(tower)))
+        )
 
     def free_states(self):
-        """Indices of the states that a floating trim finds: motions, pitch or speed of a turning rotor."""
-        motions = self.motions()
+        """Indices of the states that a trim finds: positions, pitch or speed of a turning rotor."""
+        positions = self.positions()
         wind = self.scene.wind_speed
         if wind is None or not 0.0 < wind <= self.scene.turbine.cut_out_wind_speed:
-            return motions
+            return positions
         rotor_speed, blade_pitch = self.x[State.ROTOR_SPEED], self.x[State.BLADE_PITCH]
         if blade_pitch > self.scene.turbine.pitch_drive.minimum:
-            return [*motions, int(State.BLADE_PITCH)]
-        return [*motions, int(State.ROTOR_SPEED)] if rotor_speed > 0.0 else motions
+            return [*positions, int(State.BLADE_PITCH)]
+        return [*positions, int(State.ROTOR_SPEED)] if rotor_speed > 0.0 else positions
 
     def residual(self, free):
-        """Accelerations that vanish in the steady state, of the platform and of a rotor that is free."""
-        motions = self.motions()
-        accelerations = [State.VX + motion for motion in motions]
-        if len(free) > len(motions):
+        """Accelerations of the free states, which vanish in the steady one."""
+        if free[-1:] in ([State.BLADE_PITCH], [State.ROTOR_SPEED]):
             self.rotor_acceleration(self.x[State.ROTOR_SPEED], self.x[State.BLADE_PITCH])
-            accelerations.append(State.ROTOR_SPEED)
         else:
             self.rates()
-        return self.mean[accelerations]
+        return self.mean[[self._acceleration(index) for index in free]]
+
+    def _acceleration(self, index):
+        """Index of the state whose rate is the acceleration that balances with a free state."""
+        if index in (State.BLADE_PITCH, State.ROTOR_SPEED):
+            return State.ROTOR_SPEED
+        return State.VX + index if index < State.AZIMUTH else index + _modes(self.scene.model.tower)
 
     def jacobian(self, free):
         """Derivatives of the residual by the free states, central differences."""
         columns = []
         for index in free:
-            step = DIFFERENCE_STEPS[index]
+            step = DIFFERENCE_STEPS.get(index, DEFLECTION_STEP)
             keep = self.x[index]
             self.x[index] = keep + step
             up = self.residual(free)
@@ -341,10 +353,16 @@ class _Steady:
         check_equilibrium(self.scene, rest, self.start, self.slope, fresh_slope)
 
 
+def _modes(tower):
+    """Number of modes of a TowerModes."""
+    return tower.slope.shape[0]
+
+
 def trim(scene: Scene, platform: str = "floating") -> OperatingPoint:
     """OperatingPoint of a scene: steady state in its mean wind, waves flat.
 
-    platform: "floating" finds the six motions too; "fixed" holds them at zero. Rotor speed and
+    platform: "floating" finds the six motions too; "fixed" holds them at zero. Deflections of a tower that
+    bends are found either way. Rotor speed and
     blade pitch follow the torque curve below rated and rated speed above; beyond the cut-out wind
     the rotor is parked with feathered blades, and without wind it stands.
 
@@ -365,7 +383,7 @@ def _trim(scene, platform):
     body = scene.model.rigid_body._replace(platform_fixed=fixed, rotor_fixed=False)
     steady = _Steady(without_fluctuations(scene).with_model(rigid_body=body))
     steady.settle_rotor()
-    if not fixed:
+    if steady.positions():
         for _ in range(OUTER_ROUNDS):
             # which of pitch and speed is free follows from the rotor's balance on the platform as it is
             free = steady.free_states()
@@ -390,8 +408,8 @@ def trim_prescribed(scene, rotor_speed, blade_pitch, platform="floating"):
     steady = _Steady(without_fluctuations(scene).with_model(rigid_body=body))
     steady.x[State.ROTOR_SPEED] = rotor_speed
     steady.set_pitch(blade_pitch)
-    if platform == "floating":
-        remaining = steady.settle(steady.motions())
+    if steady.positions():
+        remaining = steady.settle(steady.positions())
         if not remaining < 1e3 * TOLERANCE:
             raise steady.refusal()
     return _point(scene, steady, platform)

@@ -36,6 +36,10 @@ class Nacelle(Record):
     cm_left: Finite = 0.0
 
 
+BLADE_MASSES = ("blade_mass", "blade_first_moment", "blade_second_moment")
+BLADE_SLACK = 1.01  # between figures of a turbine file that are rounded, or of bent blades
+
+
 class Rotor(Record):
     """Rotor masses and geometry. The rotor centre is where the blades' pitch axes meet."""
 
@@ -50,11 +54,42 @@ class Rotor(Record):
     shaft_tilt: bounded(gt=-0.5, lt=0.5) = 0.0  # rad, positive: the upwind end points up
     cone: bounded(gt=-0.5, lt=0.5) = 0.0  # rad, positive: blades lean upwind, away from the tower
     cm_offset: Finite = 0.0  # of its centre of mass from the rotor centre along the shaft, downwind, m
+    blade_mass: NonNegative | None = None  # of one blade; outputs of single blades need it and its moments
+    blade_first_moment: NonNegative | None = None  # kg m, about the blade's root, along the pitch axis
+    blade_second_moment: NonNegative | None = None  # kg m2, the same
 
     @model_validator(mode="after")
     def _radii(self):
         if self.tip_radius <= self.hub_radius:
             raise ValueError(f"tip_radius = {self.tip_radius}: must exceed hub_radius = {self.hub_radius}")
+        return self
+
+    @model_validator(mode="after")
+    def _blade_masses(self):
+        given = {key: getattr(self, key) for key in BLADE_MASSES}
+        missing = [key for key, value in given.items() if value is None]
+        if missing and len(missing) < len(given):
+            raise ValueError(f"{missing[0]}: is missing; {', '.join(BLADE_MASSES)} go together")
+        if missing:
+            return self
+        mass, first, second = given.values()
+        if self.blades * mass > self.mass * BLADE_SLACK:
+            raise ValueError(f"blade_mass = {mass:g}: must be <= mass/blades = {self.mass / self.blades:g}")
+        longest = mass * (self.tip_radius - self.hub_radius)
+        if first > longest * BLADE_SLACK:
+            raise ValueError(f"blade_first_moment = {first:g}: must be <= {longest:g}, blade_mass at the tip")
+        if first**2 > mass * second * BLADE_SLACK:
+            raise ValueError(
+                f"blade_second_moment = {second:g}: must be >= blade_first_moment**2/blade_mass ="
+                f" {first**2 / mass:g}"
+            )
+        about_shaft = second + 2.0 * self.hub_radius * first + self.hub_radius**2 * mass
+        about_shaft *= self.blades * np.cos(self.cone) ** 2
+        if about_shaft > self.inertia * BLADE_SLACK:
+            raise ValueError(
+                f"blade_second_moment = {second:g}: about the blade's root; with the other blades it makes"
+                f" {about_shaft:g} about the shaft, must be <= inertia = {self.inertia:g}"
+            )
         return self
 
 

@@ -1,6 +1,7 @@
-"""What the two actions in [-1, 1] mean: the three action modes as physical commands.
+"""What the actions in [-1, 1] mean: the action modes as physical commands.
 
-The first action belongs to the rotor-speed channel (generator torque), the second to blade pitch.
+The first action belongs to the rotor-speed channel (generator torque), the second to blade pitch. In the mode
+"individual" the second to fourth belong to the pitch of each blade.
 """
 
 from enum import IntEnum
@@ -17,7 +18,7 @@ from fowt_env.plant.drivetrain import (
     followed_torque,
 )
 from fowt_env.plant.measurement import Measure
-from fowt_env.plant.state import Command
+from fowt_env.plant.state import N_COMMANDS, N_INDIVIDUAL_COMMANDS, Command
 
 # Set-point mode: PI on rotor speed through torque, this natural frequency and damping ratio of the
 # rigid rotor. Fast beside the platform's pitch (0.21 rad/s), slow beside the torque rate limit.
@@ -31,6 +32,7 @@ class ActionMode(IntEnum):
     DIRECT = 0
     SETPOINT = 1
     RESIDUAL = 2
+    INDIVIDUAL = 3
 
 
 ACTION_MODES = {mode.name.lower(): mode for mode in ActionMode}
@@ -50,11 +52,18 @@ class ActionMap(NamedTuple):
     control_dt: float  # s
     tracking_gain: float  # set-point mode: N m per rad/s of rotor speed
     tracking_rate: float  # set-point mode: N m/s per rad/s
+    individual: bool  # whether the baseline of the residual mode commands each blade
 
 
-def build_action_map(mode, task, turbine, control_dt):
+def n_actions(mode):
+    """Number of actions of an ActionMode."""
+    return N_INDIVIDUAL_COMMANDS if mode == ActionMode.INDIVIDUAL else N_COMMANDS
+
+
+def build_action_map(mode, task, turbine, control_dt, individual=False):
     """ActionMap of a ActionMode, a Task and a descriptions.turbine.Turbine.
 
+    individual: whether the baseline of the residual mode commands each blade.
     Raises: InputError where the pitch action reaches beyond the actuator.
     """
     law, drive = turbine.torque_law, turbine.pitch_drive
@@ -84,6 +93,7 @@ def build_action_map(mode, task, turbine, control_dt):
         control_dt=float(control_dt),
         tracking_gain=float(2.0 * TRACKING_DAMPING * TRACKING_FREQUENCY * inertia),
         tracking_rate=float(TRACKING_FREQUENCY**2 * inertia),
+        individual=bool(individual),
     )
 
 
@@ -132,27 +142,41 @@ def baseline_command(baseline_law, parameters, memory, measurement, command):
 
 @kernel
 def command_of(action, actions, baseline_law, parameters, memory, measurement, u, commanded):
-    """Set u = (generator torque N m, blade pitch rad) from an accepted action.
+    """Set u = (generator torque N m, blade pitch or that of each blade rad) from an accepted action.
 
-    commanded (2,): filled with the command before the limits. The torque in u is what the generator reaches
+    commanded (as u): filled with the command before the limits. The torque in u is what the generator reaches
     of it; the pitch actuator limits itself.
     """
-    commanded[Command.GENERATOR_TORQUE] = u[Command.GENERATOR_TORQUE]
-    commanded[Command.BLADE_PITCH] = u[Command.BLADE_PITCH]
+    for i in range(u.shape[0]):
+        commanded[i] = u[i]
     if actions.mode == ActionMode.RESIDUAL:
         baseline_command(baseline_law, parameters, memory, measurement, commanded)
+        if not actions.individual:
+            spread(commanded)
         commanded[0] += action[0] * actions.residual_torque
-        commanded[1] += action[1] * actions.residual_pitch
+        for i in range(int(Command.BLADE_PITCH), u.shape[0]):
+            commanded[i] += action[1] * actions.residual_pitch
     else:
         commanded[0] = unscale(action[0], actions.low, actions.high)
-        commanded[1] = unscale(action[1], actions.pitch_low, actions.pitch_high)
+        for i in range(int(Command.BLADE_PITCH), action.shape[0]):
+            commanded[i] = unscale(action[i], actions.pitch_low, actions.pitch_high)
+        if actions.mode != ActionMode.INDIVIDUAL:
+            spread(commanded)
         if actions.mode == ActionMode.SETPOINT:
             commanded[0] = tracking_torque(measurement[Measure.ROTOR_SPEED], commanded[0], memory, actions)
     torque = u[Command.GENERATOR_TORQUE]
     u[Command.GENERATOR_TORQUE] = followed_torque(
         torque, commanded[Command.GENERATOR_TORQUE], actions.control_dt, actions.generator
     )
-    u[Command.BLADE_PITCH] = commanded[Command.BLADE_PITCH]
+    for i in range(int(Command.BLADE_PITCH), u.shape[0]):
+        u[i] = commanded[i]
+
+
+@kernel
+def spread(command):
+    """Give the first blade's pitch to all whose pitch is commanded."""
+    for i in range(int(Command.BLADE_PITCH) + 1, command.shape[0]):
+        command[i] = command[Command.BLADE_PITCH]
 
 
 @kernel
@@ -167,7 +191,8 @@ def action_of(u, rotor_speed, actions, action):
         return
     first = rotor_speed if actions.mode == ActionMode.SETPOINT else u[Command.GENERATOR_TORQUE]
     action[0] = scale(first, actions.low, actions.high)
-    action[1] = scale(u[Command.BLADE_PITCH], actions.pitch_low, actions.pitch_high)
+    for i in range(int(Command.BLADE_PITCH), action.shape[0]):
+        action[i] = scale(u[i], actions.pitch_low, actions.pitch_high)
 
 
 def start_tracking(memory, measurement, actions):

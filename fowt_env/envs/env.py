@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import contextmanager
 from copy import copy, deepcopy
 from dataclasses import replace
-from math import isfinite, pi
+from math import pi
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -23,14 +23,14 @@ from fowt_env.control import (
     make,
     preview_leads,
     view_of,
-    with_wind_ahead,
+    whole_view,
 )
 from fowt_env.descriptions.platform import Platform, read_platform
 from fowt_env.descriptions.records import RENAMED
 from fowt_env.descriptions.sea_state import sea_state_of
 from fowt_env.descriptions.sensors import SensorChain
 from fowt_env.descriptions.turbine import Turbine, read_turbine
-from fowt_env.envs.actions import ACTION_MODES, ActionMode, build_action_map, start_tracking
+from fowt_env.envs.actions import ACTION_MODES, ActionMode, build_action_map, n_actions, start_tracking
 from fowt_env.envs.episode import (
     BAD_ACTION,
     N_COUNTS,
@@ -46,8 +46,8 @@ from fowt_env.envs.episode import (
     start_episode,
 )
 from fowt_env.envs.observations import (
+    BLADE_CHANNELS,
     ESTIMATE_CHANNELS,
-    N_ACTIONS,
     PREVIEW,
     build_observation_map,
     check_channels,
@@ -70,10 +70,10 @@ from fowt_env.initial_conditions import INITIAL
 from fowt_env.plant.channels import DEG_PER_RAD
 from fowt_env.plant.compile.handle import Handle
 from fowt_env.plant.events import counted
-from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
+from fowt_env.plant.measurement import Measurement
 from fowt_env.plant.rollout import STOP_REASONS, output
 from fowt_env.plant.sensing import new_past
-from fowt_env.plant.state import Command, State
+from fowt_env.plant.state import N_COMMANDS, Command, State
 from fowt_env.scene.actuators import rest_actuators
 from fowt_env.scene.build import build_scene
 from fowt_env.scene.options import OPTIONS
@@ -88,13 +88,15 @@ REWARD_KEYS = tuple(f"reward/{name}" for name in REWARD_TERMS)
 
 
 class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
-    """Floating wind turbine whose generator torque and blade pitch are commanded.
+    """Floating wind turbine whose generator torque and blade pitch, or that of each blade, are commanded.
 
     task          name in TASKS ("above_rated", "full_range", "steady"), scaled to the platform's turbine, or
                   a Task, which is taken as it is
     platform      built-in name, path or descriptions.platform.Platform
     rotor         "bem", "lookup" or "table"; None: the task's, or else that of the fidelity
-    action_mode   "direct", "setpoint" or "residual", see the table of actions
+    action_mode   "direct", "setpoint", "residual" or "individual", see the table of actions. "individual"
+                  commands the pitch of each blade, in a scene with pitch = "individual"; in such a scene the
+                  others give their one pitch to all blades
     baseline      compiled controller, by name, that the residual mode adds to; lqr goes on from the sum, so
                   that what is added in every period is an addition to its rates
     observation   channel names in place of the task's; "default" among them stands for the task's
@@ -176,6 +178,12 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             load_pygame()
         if action_mode not in ACTION_MODES:
             raise unknown("action_mode", action_mode, ACTION_MODES)
+        mode = ACTION_MODES[action_mode]
+        if mode == ActionMode.INDIVIDUAL and options.setdefault("pitch", "individual") != "individual":
+            raise InputError(
+                f"pitch = {options['pitch']!r}: action_mode = 'individual' commands the pitch of each blade,"
+                " which needs pitch = 'individual'"
+            )
         for key in options:
             if key in RENAMED:
                 raise InputError(f"setting {key!r} of FowtEnv: is called {RENAMED[key]} now")
@@ -216,7 +224,10 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self._sensors = None if sensors is None else check_sensors(sensors, self.scene.turbine)
         self._chain = None  # (name, fields) of a sensor chain, which may lack what is asked for
         if isinstance(self._sensors, SensorChain):
-            self._chain = self._sensors.name, self._sensors.available
+            self._chain = (
+                self._sensors.name,
+                self._sensors.available + (self._sensors.available_of_blades if self.individual else ()),
+            )
             _check_shown(task.observation, self._chain)
         self.control_dt = float(control_dt)
         self.dt = min(self.scene.dt, self.control_dt) if dt is None else float(dt)
@@ -224,8 +235,8 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self.scene = self.scene.with_step(self.dt)
         self._last = per_control * steps_in("duration", task.duration, control_dt, "control_dt")
         self._key = plant_key(self.scene)
-        self._build(ACTION_MODES[action_mode], per_control)
-        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (N_ACTIONS,), np.float32)
+        self._build(mode, per_control)
+        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (n_actions(mode),), np.float32)
         low, high = self._config.observation_map.low, self._config.observation_map.high
         self.observation_space = gymnasium.spaces.Box(low.astype(np.float32), high.astype(np.float32))
         self._running = False
@@ -236,6 +247,11 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             self._key, action_mode, baseline, *observed, self.dt, self.control_dt, self._last,
             (nominal_key, self._sensors),
         )  # fmt: skip
+
+    @property
+    def individual(self) -> bool:
+        """Whether every blade has a pitch of its own."""
+        return self.scene.model.pitches is not None
 
     def twin(self) -> "FowtEnv":
         """Another environment of the same settings, before its first reset; shares what is never written."""
@@ -249,7 +265,8 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     def _build(self, mode, per_control):
         """Allocate the arrays of a run and fill what never changes."""
         scene, turbine, task = self.scene, self.scene.turbine, self.task
-        observed = self.observed = entries(task.observation, turbine, task.wind_preview)
+        individual, actions = self.individual, n_actions(mode)
+        observed = self.observed = entries(task.observation, turbine, task.wind_preview, actions, individual)
         self._baseline = None
         baseline_law = None
         parameters, memory = np.zeros(1), np.zeros(1)
@@ -261,17 +278,19 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         if set(ESTIMATE_CHANNELS) & set(task.observation):
             self._estimator = catalogue().WindEstimator(self.design_scene.turbine, self.control_dt)
             estimator_law = self._estimator.law
-            hidden(self._estimator, self._chain)  # refuses what the sensors do not show
+            hidden(self._estimator, self._chain, individual)  # refuses what the sensors do not show
         leads, given = (), None
         if self._baseline is not None:
             leads = preview_leads(self._baseline)
-            given = Given(hidden(self._baseline, self._chain), *self._foresee(scene, leads))
+            given = Given(hidden(self._baseline, self._chain, individual), *self._foresee(scene, leads))
         estimating, sensed = self._estimator is not None, self._sensors is not None
         self._baseline_law = Handle(None, baseline_law)
         self._estimator_law = Handle(None, estimator_law)
         self._config = EpisodeConfig(
             model=scene.model,
-            actions=build_action_map(mode, task, turbine, self.control_dt),
+            actions=build_action_map(
+                mode, task, turbine, self.control_dt, self._baseline is not None and self._baseline.individual
+            ),
             parameters=parameters,
             estimator=self._estimator.parameters if estimating else None,
             observation_map=build_observation_map(observed, task.wind_preview),
@@ -284,25 +303,26 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             given=given,
         )
         n = scene.n_state
-        measurement = np.zeros(N_MEASUREMENTS)
-        reading = np.zeros(N_MEASUREMENTS) if sensed else measurement
+        measured = scene.n_measurements
+        measurement = np.zeros(measured)
+        reading = np.zeros(measured) if sensed else measurement
         self._episode = EpisodeData(
             data=scene.data(),
             x=np.zeros(n),
-            u=np.zeros(2),
+            u=np.zeros(scene.n_commands),
             memory=memory,
             estimate=self._estimator.memory if estimating else None,
-            action=np.zeros(N_ACTIONS),
+            action=np.zeros(actions),
             measurement=measurement,
             reading=reading,
             past=new_past(self._config.sensors.chain) if sensed else None,
             observation=np.zeros(len(observed), dtype=np.float32),
             counts=np.zeros(N_COUNTS, dtype=np.int64),
             reference=np.zeros(len(Reference._fields)),
-            previous_measurement=np.zeros(N_MEASUREMENTS),
+            previous_measurement=np.zeros(measured),
             dx=np.zeros(n),
-            baseline_command=np.zeros(2),
-            baseline_reading=reading if self._baseline is None else np.zeros(N_MEASUREMENTS + len(leads)),
+            baseline_command=np.zeros(scene.n_commands),
+            baseline_reading=reading if self._baseline is None else np.zeros(measured + len(leads)),
             signals=np.zeros(PREVIEW + len(task.wind_preview)),
             terms=np.zeros(N_TERMS),
         )
@@ -331,7 +351,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         find = cached_trim if episode.exact_start else interpolated_trim
         state, command = find(scene, self._key, scene.wind_speed)
         reference = Reference(float(state[State.PLATFORM_PITCH]), float(state[State.ROTOR_SPEED]))
-        state, command = _moved(state, command, episode.offsets, scene)
+        state, command = _moved(scene, state, command, episode.offsets)
         return Start(episode, scene, self._nominal_in(scene), state, command, reference)
 
     def _begin(self, planned):
@@ -376,25 +396,31 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         try:
             requested = np.array(action, dtype=np.float64)  # a copy: steady types, whatever was given
         except (TypeError, ValueError):
-            raise InputError(f"action = {action!r}: must be {N_ACTIONS} numbers") from None
-        if requested.shape != (N_ACTIONS,):
-            raise InputError(f"action has shape {requested.shape}: must be ({N_ACTIONS},)")
+            raise InputError(f"action = {action!r}: must be {self._episode.action.size} numbers") from None
+        if requested.shape != self._episode.action.shape:
+            raise InputError(f"action has shape {requested.shape}: must be {self.action_space.shape}")
         status, reward = act(self._handle, self._baseline_law, self._estimator_law, requested)
         if status == BAD_ACTION:
             raise InputError(f"action = {action!r}: must be finite")
         return self._result(status, reward)
 
-    def step_physical(self, torque: float, blade_pitch: float) -> StepResult:
+    def step_physical(self, torque: float, *blade_pitch: float) -> StepResult:
         """As step, under a generator torque (N m) and blade pitch (rad), applied as simulate does.
 
-        The generator and the pitch actuator follow it as far as their limits allow.
+        blade_pitch: one for all blades, or three where each has its own. The generator and the pitch actuator
+        follow it as far as their limits allow.
         """
         if not self._running:
             raise ResetNeeded("call reset() first: no episode is running")
-        torque, blade_pitch = float(torque), float(blade_pitch)
-        if not (isfinite(torque) and isfinite(blade_pitch)):
-            raise InputError(f"torque = {torque!r}, blade_pitch = {blade_pitch!r}: must be finite")
-        return self._result(*act_physical(self._handle, self._estimator_law, torque, blade_pitch))
+        command = np.empty(self._episode.u.shape)
+        if len(blade_pitch) not in (1, command.size - 1):
+            many = "one" if command.size == N_COMMANDS else f"one, or {command.size - 1}"
+            raise InputError(f"blade_pitch = {blade_pitch!r}: must be {many}")
+        command[:1], command[1:] = torque, blade_pitch
+        if not np.isfinite(command).all():
+            values = ", ".join(repr(float(value)) for value in blade_pitch)
+            raise InputError(f"torque = {float(torque)!r}, blade_pitch = {values}: must be finite")
+        return self._result(*act_physical(self._handle, self._estimator_law, command))
 
     def _result(self, status, reward):
         """What step returns, from the status and reward of a control period."""
@@ -493,7 +519,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     def _drawn(self, scene, per_control):
         """Sensors of an episode in a scene's weather."""
         readings = self._last // per_control + 1
-        scales = reading_scales(scene.turbine)
+        scales = reading_scales(scene.turbine, self.individual)
         return draw_sensors(self._sensors, scales, self.control_dt, scene.seed, readings)
 
     @staticmethod
@@ -504,15 +530,16 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     def measurement(self, preview_times: Sequence[float] = ()) -> Measurement:
         """Measurement of all fields now (SI), as the sensors read them.
 
+        Where every blade has a pitch of its own it has blades, a BladeMeasurement.
         preview_times: increasing, s; with them it has wind_preview, the rotor-averaged wind that far ahead.
         """
         if self._handle is None:
             raise ResetNeeded("call reset() first: nothing has been measured yet")
-        measurement = Measurement(*self._episode.reading.tolist())
+        reading = self._episode.reading.tolist()
         if not len(preview_times):
-            return measurement
+            return whole_view(reading) if self.individual else Measurement(*reading)
         time, values = self._foresee(self.scene, tuple(preview_times))
-        return with_wind_ahead(measurement, [float(np.interp(measurement.time, time, row)) for row in values])
+        return whole_view(reading, [float(np.interp(reading[0], time, row)) for row in values])
 
     @property
     def design_scene(self) -> Scene:
@@ -628,7 +655,7 @@ def _turbine_of(platform, turbine):
 def _check_shown(names, chain):
     """Refuse observation channels that a chain (name, fields) of sensors does not show."""
     for name in names:
-        if name in Measurement._fields and name not in chain[1]:
+        if name in (*Measurement._fields, *BLADE_CHANNELS) and name not in chain[1]:
             raise InputError(
                 f"observation: {name!r}: the sensor chain {chain[0]!r} does not have it; it has"
                 f" {', '.join(chain[1])}"
@@ -659,8 +686,11 @@ def _nominal_parts(given):
     return {"turbine": None} | dict(given)
 
 
-def _moved(state, command, offsets, scene):
-    """(state, command) moved by {channel: offset in its unit}, the blade pitch within its drive's range."""
+def _moved(scene, state, command, offsets):
+    """(state, command) moved by {channel: offset in its unit}, the blade pitch within its drive's range.
+
+    BldPitch1 stands for all blades, whose pitches are the same at an operating point.
+    """
     x, u, drive = state.copy(), command.copy(), scene.turbine.pitch_drive
     for name, value in offsets.items():
         index, factor = INITIAL[name]
@@ -670,8 +700,8 @@ def _moved(state, command, offsets, scene):
             f"offsets['PtfmPitch'] = {offsets['PtfmPitch']:g}: leads to"
             f" {x[State.PLATFORM_PITCH] * DEG_PER_RAD:g} deg, must stay inside (-90, 90) deg"
         )
-    x[State.BLADE_PITCH] = min(max(x[State.BLADE_PITCH], drive.minimum), drive.maximum)
-    u[Command.BLADE_PITCH] = x[State.BLADE_PITCH]
+    x[list(scene.pitch_states)] = min(max(x[State.BLADE_PITCH], drive.minimum), drive.maximum)
+    u[Command.BLADE_PITCH :] = x[State.BLADE_PITCH]
     rest_actuators(scene.model, x, u)
     return x, u
 

@@ -16,10 +16,10 @@ from fowt_env.plant.compile.decorators import entry, kernel
 from fowt_env.plant.compile.handle import by_reference, data_of, model_of
 from fowt_env.plant.drivetrain import followed_torque, torque_was_limited
 from fowt_env.plant.hydro.radiation import forget_memory
-from fowt_env.plant.measurement import N_MEASUREMENTS, Measure
+from fowt_env.plant.measurement import Measure
 from fowt_env.plant.model import Data, LoadCache, Model
 from fowt_env.plant.rollout import NON_FINITE, OVERSPEED, RUNNING, advance_plant, observe_plant
-from fowt_env.plant.sensing import Sensors, read_preview, take_reading
+from fowt_env.plant.sensing import Sensors, place_of, read_preview, take_reading
 from fowt_env.plant.state import Command, State
 
 BAD_ACTION = -1  # beside the statuses of rollout.py
@@ -31,7 +31,7 @@ SHOWN_COUNTS = {"saturated_actions": SATURATED, "torque_limited": LIMITED}  # in
 class Given(NamedTuple):
     """What a baseline controller declares, and the wind ahead that it is given."""
 
-    hidden: np.ndarray  # (N_MEASUREMENTS,) added to a reading: fowt_env.control.mask
+    hidden: np.ndarray  # (n_measurements,) added to a reading: fowt_env.control.hidden
     preview_time: np.ndarray  # (k,) s; no entry: no wind ahead
     preview: np.ndarray  # (leads, k) m/s
 
@@ -60,23 +60,23 @@ class EpisodeData(NamedTuple):
 
     data: Data
     x: np.ndarray  # (n_state,)
-    u: np.ndarray  # (2,) generator torque and blade-pitch command in force
+    u: np.ndarray  # (n_commands,) generator torque and blade-pitch command in force
     memory: np.ndarray  # of the baseline law or the set-point loop
     estimate: np.ndarray | None  # memory of the estimator; None: no channel asks for it
-    action: np.ndarray  # (2,) last accepted action
-    measurement: np.ndarray  # (N_MEASUREMENTS,) at the present instant
+    action: np.ndarray  # (actions,) last accepted action
+    measurement: np.ndarray  # (n_measurements,) at the present instant
     reading: np.ndarray  # the same as sensors show it; without any the measurement itself
     past: np.ndarray | None  # what the sensors remember: delays, low passes and integrals
     observation: np.ndarray  # (n,) float32
     # int64: physics steps done, control periods with a clipped action, those with a torque at its limits
     counts: np.ndarray
     reference: np.ndarray  # rewards.Reference of the episode
-    previous_measurement: np.ndarray  # (N_MEASUREMENTS,) scratch from here on: one control period ago
+    previous_measurement: np.ndarray  # (n_measurements,) scratch from here on: one control period ago
     dx: np.ndarray  # (n_state,)
-    baseline_command: np.ndarray  # (2,) command of the last period, before the generator's limits
+    baseline_command: np.ndarray  # (n_commands,) command of the last period, before the generator's limits
     baseline_reading: (
         np.ndarray
-    )  # (N_MEASUREMENTS + leads,) what the baseline is given; the reading without one
+    )  # (n_measurements + leads,) what the baseline is given; the reading without one
     signals: np.ndarray  # what observations are made of
     terms: np.ndarray  # (N_TERMS,) of the last period
 
@@ -109,8 +109,9 @@ def give_reading(given, t, reading, baseline_reading):
     """Fill what the baseline is given at time t (s) from the reading."""
     if given is None:
         return
-    for i in range(N_MEASUREMENTS):
-        baseline_reading[i] = reading[i] + given.hidden[i]
+    ahead = baseline_reading.shape[0] - reading.shape[0]
+    for i in range(reading.shape[0]):
+        baseline_reading[place_of(i, ahead)] = reading[i] + given.hidden[i]
     read_preview(t, given.preview_time, given.preview, baseline_reading)
 
 
@@ -154,7 +155,13 @@ def update_estimate(estimator_law, config, episode):
     """Take the period that is over, its command and what is read now into the estimate."""
     if estimator_law is None:
         return
-    estimator_law(config.estimator, episode.estimate, episode.reading, episode.u)
+    u = episode.u
+    first, total, blades = u[Command.BLADE_PITCH], 0.0, u.shape[0] - int(Command.BLADE_PITCH)
+    for blade in range(blades):
+        total += u[Command.BLADE_PITCH + blade]
+    u[Command.BLADE_PITCH] = total / blades  # it knows one pitch
+    estimator_law(config.estimator, episode.estimate, episode.reading, u)
+    u[Command.BLADE_PITCH] = first
 
 
 @kernel
@@ -188,7 +195,7 @@ def advance_period(config, episode, estimator_law):
 
 @entry
 def act(handle, baseline_law, estimator_law, action):
-    """One control period under an action (2,) in [-1, 1]; returns (status, reward).
+    """One control period under an action (actions,) in [-1, 1]; returns (status, reward).
 
     baseline_law, estimator_law: Handles whose data is the control kernel, or None; Python takes ten times as
     long to hand over a kernel itself. BAD_ACTION leaves everything as it was.
@@ -206,18 +213,17 @@ def act(handle, baseline_law, estimator_law, action):
 
 
 @entry
-def act_physical(handle, estimator_law, torque, blade_pitch):
-    """One control period under a physical command, as simulate applies it; returns (status, reward).
+def act_physical(handle, estimator_law, command):
+    """One control period under a physical command (n_commands,), as simulate applies it: (status, reward).
 
     estimator_law: as act takes it.
     """
     config, episode = model_of(handle), data_of(handle)
-    episode.baseline_command[Command.GENERATOR_TORQUE] = torque
-    episode.baseline_command[Command.BLADE_PITCH] = blade_pitch
-    previous_torque = episode.u[Command.GENERATOR_TORQUE]
+    torque = episode.u[Command.GENERATOR_TORQUE]
+    copy_into(episode.baseline_command, command)
+    copy_into(episode.u, command)
     episode.u[Command.GENERATOR_TORQUE] = followed_torque(
-        previous_torque, torque, config.actions.control_dt, config.model.generator
+        torque, command[Command.GENERATOR_TORQUE], config.actions.control_dt, config.model.generator
     )
-    episode.u[Command.BLADE_PITCH] = blade_pitch
     action_of(episode.u, episode.x[State.ROTOR_SPEED], config.actions, episode.action)
     return advance_period(config, episode, estimator_law.data)

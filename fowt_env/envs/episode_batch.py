@@ -12,7 +12,7 @@ from fowt_env.plant.compile.decorators import entry, kernel, parallel_entry
 
 @kernel
 def first_unusable(actions, active):
-    """Index of the first active row of actions (n, 2) that is not finite, or -1."""
+    """Index of the first active row of actions (n, actions) that is not finite, or -1."""
     for i in range(actions.shape[0]):
         for k in range(actions.shape[1]):
             if active[i] and not isfinite(actions[i, k]):
@@ -30,7 +30,7 @@ def act_some(handles, baseline_law, estimator_law, actions, active, statuses, re
 
 @entry
 def act_all(handles, baseline_law, estimator_law, actions, active, statuses, rewards):
-    """One control period of each active environment under its row of actions (n, 2), on this thread.
+    """One control period of each active environment under its row of actions, on this thread.
 
     handles: list of n Handles of one type. Fills statuses (n,) and rewards (n,). Returns -1, or the index of
     the first active environment whose action is not finite; then nothing was moved.

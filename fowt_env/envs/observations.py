@@ -14,20 +14,26 @@ from fowt_env.descriptions.units import DEGREE
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.aero.load import wind_of
 from fowt_env.plant.compile.decorators import kernel
-from fowt_env.plant.measurement import N_MEASUREMENTS, Measure
-from fowt_env.plant.state import MOTIONS, State
+from fowt_env.plant.measurement import (
+    N_BLADE_MEASUREMENTS,
+    N_MEASUREMENTS,
+    BladeMeasure,
+    BladeMeasurement,
+    Measure,
+)
+from fowt_env.plant.state import MOTIONS, N_COMMANDS, N_INDIVIDUAL_COMMANDS, State
 
 SIN_AZIMUTH = N_MEASUREMENTS  # signals that follow the measurements
 COS_AZIMUTH = N_MEASUREMENTS + 1
 FIRST_ACTION = N_MEASUREMENTS + 2
-SECOND_ACTION = N_MEASUREMENTS + 3
-ESTIMATES = N_MEASUREMENTS + 4
+ESTIMATES = FIRST_ACTION + N_INDIVIDUAL_COMMANDS
 ESTIMATED = (  # what an estimator's memory begins with, see controllers/lqr/law.py
     "surge", "platform_pitch", "surge_rate", "platform_pitch_rate", "rotor_speed", "blade_pitch",
     "wind_tendency", "wind", "wave", "wave_quadrature", "moment", "mean_wind",
 )  # fmt: skip
-PREVIEW = ESTIMATES + len(ESTIMATED)
-N_ACTIONS = 2
+OF_BLADES = ESTIMATES + len(ESTIMATED)  # BladeMeasurement
+PREVIEW = OF_BLADES + N_BLADE_MEASUREMENTS
+N_ACTIONS = N_COMMANDS  # of every mode but "individual"
 DEFAULT = "default"  # in a list of channels: the task's own
 
 
@@ -104,8 +110,42 @@ ESTIMATE_CHANNELS = {  # made by the estimator of lqr from what a turbine measur
 }  # fmt: skip
 
 
-def observation_channels(turbine, preview=()):
-    """{channel: tuple of its Entries} for a descriptions.turbine.Turbine; preview: look-ahead times (s)."""
+ORDINALS = ("first", "second", "third", "fourth")
+BLADE_MEANINGS = {  # of the fields of BladeMeasurement that are channels of their own
+    "root_out_of_plane": "bending moment of the root of blade {} out of the rotor plane",
+    "root_in_plane": "bending moment of the root of blade {} in the rotor plane",
+    "hub_tilt_moment": "tilting moment at the hub, axes that do not turn with the rotor",
+    "hub_yaw_moment": "yawing moment at the hub, axes that do not turn with the rotor",
+    "yaw_bearing_tilt_moment": "tilting moment at the yaw bearing",
+    "yaw_bearing_yaw_moment": "yawing moment at the yaw bearing",
+}
+BLADE_CHANNELS = BladeMeasurement._fields[BladeMeasure.BLADE_PITCH_1 :]  # where blades have own pitches
+
+
+def _blade_channels(turbine):
+    """{channel: (Entry,)} of BLADE_CHANNELS; moments over the rated torque on the rotor's shaft."""
+    drive, table = turbine.pitch_drive, {}
+    moment = turbine.drivetrain.gear_ratio * turbine.torque_law.rated_torque
+    for name in BLADE_CHANNELS:
+        signal = OF_BLADES + int(BladeMeasure[name.upper()])
+        part, _, blade = name.rpartition("_")
+        if part == "blade_pitch":
+            entry = Entry(
+                name, "rad", signal, 0.0, 15.0 * DEGREE, drive.minimum, drive.maximum,
+                f"pitch of blade {blade}, positive to feather",
+            )  # fmt: skip
+        else:
+            meaning = BLADE_MEANINGS.get(part, BLADE_MEANINGS.get(name, "")).format(blade)
+            entry = _symmetric(name, "N m", moment, 50.0 * moment, meaning, signal)
+        table[name] = (entry,)
+    return table
+
+
+def observation_channels(turbine, preview=(), actions=N_ACTIONS):
+    """{channel: tuple of its Entries} for a descriptions.turbine.Turbine.
+
+    preview: look-ahead times (s); actions: their number.
+    """
     rated, law, drive = turbine.rated_rotor_speed, turbine.torque_law, turbine.pitch_drive
     table = {entry.name: (entry,) for entry in FIXED}
     table["rotor_speed"] = (
@@ -117,7 +157,7 @@ def observation_channels(turbine, preview=()):
     table["blade_pitch"] = (
         Entry(
             "blade_pitch", "rad", int(Measure.BLADE_PITCH), 0.0, 15.0 * DEGREE, drive.minimum, drive.maximum,
-            "collective blade pitch, positive to feather",
+            "blade pitch, positive to feather; of blades with pitches of their own the mean",
         ),
     )  # fmt: skip
     table["generator_torque"] = (
@@ -131,15 +171,18 @@ def observation_channels(turbine, preview=()):
         _symmetric("sin_azimuth", "-", 1.0, 1.0, "sine of the rotor azimuth", SIN_AZIMUTH),
         _symmetric("cos_azimuth", "-", 1.0, 1.0, "cosine of the rotor azimuth", COS_AZIMUTH),
     )
-    table["previous_action"] = (
-        _symmetric("previous_action_0", "-", 1.0, 1.0, "first component of the last action", FIRST_ACTION),
-        _symmetric("previous_action_1", "-", 1.0, 1.0, "second component of the last action", SECOND_ACTION),
-    )
+    table["previous_action"] = tuple(
+        _symmetric(
+            f"previous_action_{i}", "-", 1.0, 1.0, f"{ORDINALS[i]} component of the last action",
+            FIRST_ACTION + i,
+        )
+        for i in range(actions)
+    )  # fmt: skip
     table["wind_preview"] = tuple(
         _wind(f"wind_preview_{ahead:g}s", PREVIEW + i, f"wind along x at the hub {ahead:g} s ahead, exact")
         for i, ahead in enumerate(preview)
     )
-    return table | ESTIMATE_CHANNELS
+    return table | ESTIMATE_CHANNELS | _blade_channels(turbine)
 
 
 def check_channels(where, names, default=None):
@@ -151,7 +194,7 @@ def check_channels(where, names, default=None):
         raise InputError(f"{where} = {names!r}: must be a list of channel names, such as ({names!r},)")
     if not isinstance(names, Iterable):
         raise InputError(f"{where} = {names!r}: must be a list of channel names, such as ('rotor_speed',)")
-    known = KNOWN if default is None else (*KNOWN, DEFAULT)
+    known = (*KNOWN, *BLADE_CHANNELS) if default is None else (*KNOWN, *BLADE_CHANNELS, DEFAULT)
     chosen = []
     for name in names:
         if name not in known:
@@ -162,7 +205,7 @@ def check_channels(where, names, default=None):
     return tuple(dict.fromkeys(chosen))
 
 
-KNOWN = (
+KNOWN = (  # channels of every scene with wind
     *(entry.name for entry in FIXED),
     "rotor_speed",
     "blade_pitch",
@@ -175,11 +218,20 @@ KNOWN = (
 )
 
 
-def entries(names, turbine, preview):
-    """Entries of an observation in order. Raises: InputError for a preview without times."""
+def entries(names, turbine, preview, actions=N_ACTIONS, individual=False):
+    """Entries of an observation in order; individual: whether every blade has a pitch of its own.
+
+    Raises: InputError for a preview without times, and for channels of single blades where there are none.
+    """
+    for name in names:
+        if name in BLADE_CHANNELS and not individual:
+            raise InputError(
+                f"observation: {name!r}: is measured where every blade has a pitch of its own: needs"
+                " pitch = 'individual'"
+            )
     if "wind_preview" in names and not len(preview):
         raise InputError("wind_preview: give the look-ahead times, for example wind_preview=(2.0, 4.0, 6.0)")
-    table = observation_channels(turbine, preview)
+    table = observation_channels(turbine, preview, actions)
     return tuple(entry for name in names for entry in table[name])
 
 
@@ -214,16 +266,19 @@ def build_observation_map(observed, preview):
 def fill_signals(t, model, x, reading, action, estimate, preview, signals):
     """Fill signals (n,): what sensors read, azimuth, last action, estimates, and the hub wind at t + preview.
 
+    reading: of a Measurement, and of a BladeMeasurement where there is one.
     estimate: memory of an estimator, or None.
     """
     for i in range(N_MEASUREMENTS):
         signals[i] = reading[i]
     signals[SIN_AZIMUTH] = np.sin(x[State.AZIMUTH])
     signals[COS_AZIMUTH] = np.cos(x[State.AZIMUTH])
-    signals[FIRST_ACTION] = action[0]
-    signals[SECOND_ACTION] = action[1]
+    for i in range(action.shape[0]):
+        signals[FIRST_ACTION + i] = action[i]
+    for i in range(N_MEASUREMENTS, reading.shape[0]):
+        signals[OF_BLADES + i - N_MEASUREMENTS] = reading[i]
     if estimate is not None:
-        for i in range(PREVIEW - ESTIMATES):
+        for i in range(OF_BLADES - ESTIMATES):
             signals[ESTIMATES + i] = estimate[i]
     for i in range(preview.shape[0]):
         ahead = t + preview[i]

@@ -12,7 +12,8 @@ import numpy as np
 
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.compile.decorators import kernel
-from fowt_env.plant.measurement import Measure
+from fowt_env.plant.measurement import N_MEASUREMENTS, BladeMeasure, Measure
+from fowt_env.plant.state import BLADES
 
 AT_MARGIN = 0.1  # value of tolerance() one margin outside its bounds
 STEEPNESS = -log(AT_MARGIN)
@@ -63,7 +64,12 @@ REWARD_TERMS = {
         "1 with the platform pitch at rest at the operating point, a tenth at an oscillation of 5 deg"
         " amplitude (angle and rate over 2 pi/30 s taken together)",
     ),
-    "pitch_travel": RewardTerm(-1.0, 0.0, "blade-pitch travel over the most that the rate limit allows"),
+    "pitch_travel": RewardTerm(
+        -1.0,
+        0.0,
+        "blade-pitch travel over the most that the rate limit allows; of blades with pitches of their own the"
+        " mean",
+    ),
     "torque_travel": RewardTerm(-1.0, 0.0, "change of generator torque over the most its rate limit allows"),
     "failure": RewardTerm(-1.0, 0.0, "-1 in the step that ends in failure, else 0"),
     "power_shortfall": RewardTerm(-1.0, 0.0, "minus the missing fraction of rated power; more adds nothing"),
@@ -127,6 +133,18 @@ def travel_term(previous, after, max_increment):
 
 
 @kernel
+def pitch_travel_term(previous, m, scales):
+    """travel_term of the blade pitch; the mean over blades with pitches of their own."""
+    if m.shape[0] == N_MEASUREMENTS:
+        return travel_term(previous[Measure.BLADE_PITCH], m[Measure.BLADE_PITCH], scales.max_pitch_increment)
+    total = 0.0
+    for blade in range(BLADES):
+        i = N_MEASUREMENTS + BladeMeasure.BLADE_PITCH_1 + blade
+        total += travel_term(previous[i], m[i], scales.max_pitch_increment)
+    return total / BLADES
+
+
+@kernel
 def fill_terms(m, previous, reference, failed, scales, terms):
     """Fill terms (N_TERMS,) from the measurements m and previous, one control period apart."""
     speed = m[Measure.ROTOR_SPEED]
@@ -136,9 +154,7 @@ def fill_terms(m, previous, reference, failed, scales, terms):
     terms[TermIndex.PLATFORM_MOTION] = platform_motion_term(
         m[Measure.PLATFORM_PITCH], m[Measure.PLATFORM_PITCH_RATE], reference[0]
     )
-    terms[TermIndex.PITCH_TRAVEL] = travel_term(
-        previous[Measure.BLADE_PITCH], m[Measure.BLADE_PITCH], scales.max_pitch_increment
-    )
+    terms[TermIndex.PITCH_TRAVEL] = pitch_travel_term(previous, m, scales)
     terms[TermIndex.TORQUE_TRAVEL] = travel_term(
         previous[Measure.GENERATOR_TORQUE], torque, scales.max_torque_increment
     )

@@ -4,7 +4,7 @@ from math import isfinite, pi
 
 import gymnasium
 
-from fowt_env.control import known_scene
+from fowt_env.control import check_pitches, known_scene
 from fowt_env.errors import InputError
 
 AHEAD = 1.0  # s: the rotor speed is checked where it will be, since feathering takes its time
@@ -46,6 +46,7 @@ class SafetyLayer(gymnasium.Wrapper):
         self._gentle = release * self._steepest
         self._calm = round(calm / plant.control_dt)
         self._baseline = named_baseline(baseline, plant.design_scene.turbine, plant.control_dt)
+        check_pitches(self._baseline, plant.scene.model.pitches is not None)
         drive = plant.scene.turbine.pitch_drive
         # a command this far ahead of the blades keeps a first-order drive at its limit until the next one
         self._feather = drive.rate_limit * (drive.lag + plant.control_dt)
@@ -78,12 +79,13 @@ class SafetyLayer(gymnasium.Wrapper):
                 plant.restart_loops()
         guarded = self._left > 0
         if guarded:
-            torque, blade_pitch = self._baseline.act(measured)
+            torque, *pitches = self._baseline.act(measured)
             if speed > self._fastest:
-                blade_pitch = min(max(blade_pitch, measured.blade_pitch + self._feather), self._highest)
+                low = measured.blade_pitch + self._feather
+                pitches = [min(max(blade_pitch, low), self._highest) for blade_pitch in pitches]
                 self._baseline.reset(measured)  # goes on from where the blades are
             self.guarded_periods += 1
-            result = plant.step_physical(torque, blade_pitch)
+            result = plant.step_physical(torque, *pitches)
         else:
             result = self.env.step(action)
         info = result[-1]

@@ -11,9 +11,9 @@ from math import isfinite
 import numpy as np
 
 from fowt_env.descriptions.sensors import SensorChain, sensor_chain, sensors_of
-from fowt_env.envs.observations import observation_channels
+from fowt_env.envs.observations import BLADE_CHANNELS, observation_channels
 from fowt_env.errors import InputError, unknown
-from fowt_env.plant.measurement import N_MEASUREMENTS, Measure, Measurement
+from fowt_env.plant.measurement import N_MEASUREMENTS, BladeMeasurement, Measurement
 from fowt_env.plant.sensing import Sensors, Setting, open_chain
 from fowt_env.weather.sensor_noise import draw_noise
 from fowt_env.weather.sensor_noise import draw_sensors as draw_chain
@@ -21,13 +21,18 @@ from fowt_env.weather.sensor_noise import draw_sensors as draw_chain
 LONGEST_DELAY = 1000  # control periods
 
 
-def reading_scales(turbine):
-    """(N_MEASUREMENTS,) what noise of 1 is on each field of a Measurement, SI; 0 for the time."""
+def reading_scales(turbine, individual=False):
+    """(N_MEASUREMENTS,) what noise of 1 is on each field of a Measurement, SI; 0 for the time.
+
+    individual: with the fields of a BladeMeasurement behind them; 0 for the azimuth, which is exact.
+    """
     table = observation_channels(turbine)
     scales = {name: table[name][0].scale for name in Measurement._fields if name in table}
     scales["generator_speed"] = turbine.drivetrain.gear_ratio * scales["rotor_speed"]
     scales["time"] = 0.0  # a clock, not a sensor
-    return np.array([scales[name] for name in Measurement._fields])
+    scales |= {name: table[name][0].scale for name in BLADE_CHANNELS} | {"azimuth": 0.0}
+    fields = Measurement._fields + (BladeMeasurement._fields if individual else ())
+    return np.array([scales[name] for name in fields])
 
 
 def check_sensors(given, turbine=None):
@@ -58,16 +63,16 @@ def check_sensors(given, turbine=None):
 def draw_sensors(settings, scales, control_dt, seed, readings):
     """Sensors of an episode from what check_sensors returned, by the seed of its weather.
 
-    A noise is a fraction of the scales (N_MEASUREMENTS,). What a SensorChain does not have reads as NaN.
+    A noise is a fraction of the scales (reading_scales). What a SensorChain does not have reads as NaN.
     """
     if isinstance(settings, SensorChain):
-        sensors = draw_chain(settings, control_dt, seed, readings)
-        for name in Measurement._fields:
+        sensors = draw_chain(settings, control_dt, seed, readings, scales.size > N_MEASUREMENTS)
+        for i, name in enumerate((Measurement._fields + BladeMeasurement._fields)[: scales.size]):
             if name != "time" and name not in settings.sensors:
-                sensors.chain[Setting.HIDDEN, Measure[name.upper()]] = np.nan
+                sensors.chain[Setting.HIDDEN, i] = np.nan
         return sensors
-    chain = open_chain()
+    chain = open_chain(scales.size)
     chain[Setting.DELAY] = settings["delay"]
     if settings["noise"] == 0.0:
-        return Sensors(chain, np.zeros((1, N_MEASUREMENTS)))
+        return Sensors(chain, np.zeros((1, scales.size)))
     return Sensors(chain, draw_noise(settings["noise"] * scales, seed, readings))

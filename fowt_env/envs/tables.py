@@ -14,7 +14,7 @@ def _figure(value):
 
 
 def action_table(task, turbine):
-    """Meaning of the two actions in each mode."""
+    """Meaning of the actions in each mode."""
     law = turbine.torque_law
     rpm = 30.0 / 3.141592653589793
     low, high = (fraction * turbine.rated_rotor_speed * rpm for fraction in task.setpoint)
@@ -30,6 +30,8 @@ def action_table(task, turbine):
             f"added to the baseline's torque, +-{task.residual_torque * law.rated_torque * 1e-3:.2f} kN m",
         ),
         ("residual", 1, f"added to the baseline's blade pitch, +-{task.residual_pitch:g} deg"),
+        ("individual", 0, f"generator torque, 0 to {law.max_torque * 1e-3:.2f} kN m (high-speed shaft)"),
+        ("individual", "1 to 3", f"{pitch}, of each blade"),
     ]
     return markdown_table(("mode", "action", "from -1 to 1"), rows, aligned=True)
 

@@ -16,7 +16,6 @@ from gymnasium.vector.utils import batch_space
 from fowt_env.envs.env import REWARD_KEYS, FowtEnv, kept_if_refused
 from fowt_env.envs.episode import N_COUNTS, RUNNING, SHOWN_COUNTS, STEP
 from fowt_env.envs.episode_batch import act_all, act_all_parallel, thread_limit
-from fowt_env.envs.observations import N_ACTIONS
 from fowt_env.envs.rewards import N_TERMS
 from fowt_env.envs.snapshot import Snapshot
 from fowt_env.errors import InputError, unknown
@@ -225,14 +224,13 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
 
     def _act(self, actions, active):
         """One control period of the active environments under checked actions."""
+        wanted = self.action_space.shape
         try:
             requested = np.array(actions, dtype=np.float64)  # a copy: steady types, whatever was given
         except (TypeError, ValueError):
-            raise InputError(
-                f"actions = {actions!r}: must be ({self.num_envs}, {N_ACTIONS}) numbers"
-            ) from None
-        if requested.shape != (self.num_envs, N_ACTIONS):
-            raise InputError(f"actions have shape {requested.shape}: must be ({self.num_envs}, {N_ACTIONS})")
+            raise InputError(f"actions = {actions!r}: must be {wanted} numbers") from None
+        if requested.shape != wanted:
+            raise InputError(f"actions have shape {requested.shape}: must be {wanted}")
         arguments = (
             self._handles, self._baseline_law, self._estimator_law, requested, active, self._statuses,
             self._rewards,

@@ -8,13 +8,14 @@ import numpy as np
 
 from fowt_env.plant.aero.load import wind_of
 from fowt_env.plant.aero.wind import wind_at, wind_now
-from fowt_env.plant.blade_pitches import mean_pitch, pitch_of
+from fowt_env.plant.blade_outputs import measure_blades, record_blades
+from fowt_env.plant.blade_pitches import mean_pitch
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.drivetrain import torque_in_force
 from fowt_env.plant.hydro.load import surface_at_origin
-from fowt_env.plant.measurement import N_MEASUREMENTS, BladeMeasure, Measure
+from fowt_env.plant.measurement import Measure
 from fowt_env.plant.model import LoadCache
-from fowt_env.plant.state import BLADES, State, pose_of, to_inertial
+from fowt_env.plant.state import State, pose_of, to_inertial
 from fowt_env.plant.tilt import along_shaft, rotor_pose
 from fowt_env.plant.tower_modes import Twist, bend_of, nacelle_rates, turned_pose
 from fowt_env.plant.tower_outputs import carried_at_base, record_tower
@@ -156,6 +157,7 @@ class Layout(NamedTuple):
     lean: float  # m upwind per metre along a blade, sine of the cone
     reach: float  # m from the shaft per metre along a blade, cosine of the cone
     rotor_cm: np.ndarray  # (3,) centre of mass of the rotor, m
+    blade_masses: object = None  # blade_outputs.BladeMasses, or None: one pitch for all blades
 
 
 @kernel
@@ -250,17 +252,7 @@ def measure(model, data, x, dx, u, t, m):
     m[Measure.PLATFORM_PITCH_ACCELERATION] = dx[State.WY]
     m[Measure.WIND_SPEED] = wind[0]
     m[Measure.WAVE_ELEVATION] = elevation_now(t, model.hydro, data)
-    measure_blades(pose, x, dx, u, model.pitches, model, data, m)
-
-
-@kernel
-def measure_blades(pose, x, dx, u, pitches, model, data, m):
-    """Fill the BladeMeasurement behind a Measurement; nothing with one pitch for all blades."""
-    if pitches is None:
-        return
-    m[N_MEASUREMENTS + BladeMeasure.AZIMUTH] = x[State.AZIMUTH] % (2.0 * pi)
-    for blade in range(BLADES):
-        m[N_MEASUREMENTS + BladeMeasure.BLADE_PITCH_1 + blade] = pitch_of(blade, x, pitches)
+    measure_blades(nacelle, moving, x, dx, model.pitches, model, data, m)
 
 
 @inlined_kernel
@@ -320,6 +312,7 @@ def record(model, data, x, dx, u, t, loads, row):
     n = N_FIXED + 2 * n
     record_user_loads(pose, bend, model.user, data, row[n:])
     record_tower(bend, ax, ay, row[n + user_channels(model.user) :])
+    record_blades(nacelle, moving, x, dx, model.pitches, model, data, row)
 
 
 @inlined_kernel

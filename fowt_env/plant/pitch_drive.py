@@ -4,7 +4,7 @@
 
 The command is constant over a control period, so the drive is solved by itself: in one piece where it can
 meet no limit, else piece by piece from one event to the next. What comes out depends on the plant's step by
-rounding alone, but for the acceleration limit (TURN). Friction is Coulomb's with an equal force to break away
+rounding alone. Friction is Coulomb's with an equal force to break away
 (Armstrong-Helouvry, Dupont and Canudas de Wit, Automatica 30 (1994) 1083): a blade at rest stays there until
 the drive pulls harder, so that to slow commands the drive is a play of half width `friction`.
 """
@@ -20,7 +20,7 @@ from fowt_env.plant.state import Command
 # by TURN^2/8 of it, and nothing else can happen twice.
 TURN = 0.1
 HALVINGS = 45  # of a piece, to find an event in it
-PIECES = 100_000  # at most in a step: a bound that no drive comes near
+PIECES = 10_000  # at most in a step: a bound that no drive comes near
 SETTLED = 1e-12  # rad: a blade so near its place of rest is there, and at w times it (rad/s) it rests
 
 
@@ -101,7 +101,9 @@ def _limited_after(pitch, rate, target, after, drive):
         if abs(rest - pitch) < SETTLED and abs(rate) < SETTLED * w:
             return rest, 0.0
         now = pull(pitch, rate, rest, drive)
-        if way * rate >= fastest and way * now > SETTLED * w * w:  # slews until it no longer pulls
+        if abs(now) <= SETTLED * w * w:
+            now = 0.0  # what rounding leaves of it at the end of a slewing would change sign at once
+        if way * rate >= fastest and way * now > 0.0:  # slews until it no longer pulls
             spell = min(way * (rest - pitch) / fastest - 2.0 * drive.damping / w, left)
             pitch += way * fastest * spell
             left -= spell

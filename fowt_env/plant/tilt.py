@@ -76,6 +76,14 @@ def along_shaft(x, z, tilt):
 
 
 @kernel
+def in_rotor_axes(x, z, tilt):
+    """(x, z) components in rotor axes of a vector with these body components."""
+    if tilt is None:
+        return x, z
+    return tilt.cosine * x - tilt.sine * z, tilt.sine * x + tilt.cosine * z
+
+
+@kernel
 def across_shaft(size, tilt):
     """How far a vector of this size along the shaft points down, against the body's z axis."""
     if tilt is None:

@@ -97,7 +97,7 @@ def build_scene(
     water = options["hydrodynamics"]
     model = Model(
         rigid_body=build_rigid_body(platform, turbine, plane=True if options["planar"] else None),
-        layout=build_layout(platform, turbine),
+        layout=build_layout(platform, turbine, pitches is not None),
         drivetrain=build_drivetrain(turbine),
         actuator=actuator,
         generator=build_torque_limits(turbine.torque_law),

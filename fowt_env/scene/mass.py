@@ -2,7 +2,9 @@
 
 import numpy as np
 
+from fowt_env.descriptions.turbine import BLADE_MASSES
 from fowt_env.errors import InputError
+from fowt_env.plant.blade_outputs import BladeMasses
 from fowt_env.plant.channels import Layout
 from fowt_env.plant.drivetrain import build_drivetrain
 from fowt_env.plant.model import RigidBody
@@ -106,8 +108,27 @@ def with_masses(modes, platform, turbine):
     )
 
 
-def build_layout(platform, turbine):
-    """Layout part: points and masses that outputs need."""
+def build_blade_masses(turbine):
+    """BladeMasses of a turbine. Raises: InputError where its file does not have them."""
+    rotor, nacelle = turbine.rotor, turbine.nacelle
+    if rotor.blade_mass is None:
+        raise InputError(
+            f"rotor.blade_mass: is missing in the turbine {turbine.name!r}; pitch = 'individual' needs"
+            f" {', '.join(BLADE_MASSES)} for the moments at blade roots"
+        )
+    upper = [(nacelle.mass, (nacelle.cm_downwind, nacelle.cm_left, nacelle.cm_height), nacelle.inertia)]
+    return BladeMasses(
+        float(rotor.hub_radius),
+        float(rotor.blade_first_moment),
+        float(rotor.blade_second_moment + rotor.hub_radius * rotor.blade_first_moment),
+        float(rotor.cm_offset),
+        float(rotor.inertia_diameter),
+        np.ascontiguousarray(assemble([*upper, _rotor_body(rotor)])),
+    )
+
+
+def build_layout(platform, turbine, individual=False):
+    """Layout part: points and masses that outputs need; individual: those of single blades too."""
     rotor = turbine.rotor
     hub_x, hub_z = rotor_axes(-rotor.overhang, rotor.hub_height, rotor.shaft_tilt)
     return Layout(
@@ -126,4 +147,5 @@ def build_layout(platform, turbine):
         float(np.sin(rotor.cone)),
         float(np.cos(rotor.cone)),
         np.ascontiguousarray(_rotor_body(rotor)[1]),
+        build_blade_masses(turbine) if individual else None,
     )

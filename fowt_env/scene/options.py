@@ -10,6 +10,7 @@ from fowt_env.errors import InputError, unknown
 from fowt_env.plant.aero.blade_elements import BladeElements
 from fowt_env.plant.aero.coefficient_table import build_coefficient_table
 from fowt_env.plant.aero.load import BemRotor
+from fowt_env.plant.aero.section_inflow import build_dynamic_sections
 from fowt_env.plant.aero.section_table import build_section_table
 from fowt_env.plant.aero.wake import build_dynamic_inflow, build_skewed_wake
 from fowt_env.plant.integrators import INTEGRATORS
@@ -21,7 +22,7 @@ class RotorModel(NamedTuple):
 
     summary: str
     build: Callable[[BladeElements, Mapping[str, Any]], Any]  # (elements, options) -> part of the model
-    induction: bool  # whether it has states or angles of the wake: dynamic_inflow, skewed_wake
+    wake: tuple[str, ...]  # the options of the wake that it takes, of WAKE_OPTIONS
     full_field: bool  # whether blades meet a box of wind point by point; else its average over the rotor
     error: float  # of a motion or tension at most, rms over its standard deviation: docs/performance.md
 
@@ -45,19 +46,26 @@ def _build_bem(elements, options):
     return BemRotor(elements, skew, wake)
 
 
+def _build_lookup(elements, options):
+    if options["dynamic_inflow"]:
+        return build_dynamic_sections(elements, build_dynamic_inflow())
+    return build_section_table(elements)
+
+
+WAKE_OPTIONS = ("dynamic_inflow", "skewed_wake")  # what asks for the induced velocity
 ROTORS = {
     "bem": RotorModel(
         "blade-element momentum solved at every blade and station",
-        _build_bem, induction=True, full_field=True, error=0.0,
+        _build_bem, wake=WAKE_OPTIONS, full_field=True, error=0.0,
     ),
     "lookup": RotorModel(
         "the same sweep from a table per station",
-        lambda elements, options: build_section_table(elements), induction=False, full_field=True, error=2e-4,
+        _build_lookup, wake=("dynamic_inflow",), full_field=True, error=2e-4,
     ),
     "table": RotorModel(
         "the whole rotor as one table",
         lambda elements, options: build_coefficient_table(elements),
-        induction=False, full_field=False, error=2e-2,
+        wake=(), full_field=False, error=2e-2,
     ),
 }  # fmt: skip
 FIDELITIES = {
@@ -129,12 +137,13 @@ def choose_parts(fidelity, rotor, options):
     level = FIDELITIES[fidelity]
     if rotor is not None and rotor not in tuple(ROTORS):
         raise unknown("rotor model", rotor, ROTORS)
-    # induction is not in the tables; a level falls back to what has it, an explicit choice is refused
-    able = [name for name, model in ROTORS.items() if model.induction]
-    needs_induction = options["dynamic_inflow"] or options["skewed_wake"]
-    if needs_induction and rotor is not None and rotor not in able:
+    # not every table has what a wake needs; a level falls back to what has it, an explicit choice is refused
+    wanted = [name for name in WAKE_OPTIONS if options[name]]
+    able = [name for name, model in ROTORS.items() if set(wanted) <= set(model.wake)]
+    if rotor is not None and rotor not in able:
+        lacking = " and ".join(name for name in wanted if name not in ROTORS[rotor].wake)
         need = " or ".join(repr(name) for name in able)
-        raise InputError(f"rotor = {rotor!r}: skewed_wake and dynamic_inflow need rotor = {need}")
+        raise InputError(f"rotor = {rotor!r}: it has no {lacking}, which needs rotor = {need}")
     options["fidelity"] = fidelity
     options["explicit_wave_loads"] = options["wave_loads"] is not None
     for part in ("wave_loads", "integrator", "radiation"):
@@ -143,7 +152,7 @@ def choose_parts(fidelity, rotor, options):
     if options["mooring"] is True:
         options["mooring"] = level.mooring
     if rotor is None:
-        rotor = able[0] if needs_induction and level.rotor not in able else level.rotor
+        rotor = level.rotor if level.rotor in able else able[-1]  # the cheapest
     return rotor
 
 

@@ -9,6 +9,7 @@ from fowt_env.errors import InputError, unknown
 from fowt_env.plant.aero.blade_elements import build_blade_elements
 from fowt_env.plant.aero.blade_shape import is_curved
 from fowt_env.plant.aero.load import Aero, BemRotor
+from fowt_env.plant.aero.section_inflow import DynamicSections
 from fowt_env.plant.aero.station_choice import build_fewer_elements
 from fowt_env.plant.aero.tower_drag import build_tower_drag
 from fowt_env.plant.aero.wake import n_wake_states
@@ -39,7 +40,7 @@ from fowt_env.weather.waves import flat_waves, is_flat
 def wake_states(aero):
     """Number of states of the wake of an Aero part or None."""
     rotor = None if aero is None else aero.rotor
-    return n_wake_states(rotor.elements, rotor.wake) if isinstance(rotor, BemRotor) else 0
+    return n_wake_states(rotor.elements, rotor.wake) if isinstance(rotor, (BemRotor, DynamicSections)) else 0
 
 
 def build_elements(turbine, density, count):

@@ -10,12 +10,12 @@ import pytest
 from naive.turbine import turbine
 
 from fowt_env import build_scene, controllers
-from fowt_env.control import PRIVILEGED_INPUTS, with_wind_ahead
+from fowt_env.control import PRIVILEGED_INPUTS, whole_view, with_wind_ahead
 from fowt_env.controllers import CONTROLLERS, CheckedController, information, make
 from fowt_env.controllers.constant import Constant
 from fowt_env.controllers.policy.controller import shipped_agents
 from fowt_env.errors import ControllerError, InputError
-from fowt_env.plant.measurement import Measurement
+from fowt_env.plant.measurement import BladeMeasurement, Measurement
 
 ROOT = Path(__file__).resolve().parents[2]
 QUIET = Measurement(*[0.0] * len(Measurement._fields))
@@ -24,7 +24,12 @@ RATED = QUIET._replace(
 )
 
 
-ROSCO = {"rosco", "rosco_float"}  # not part of the package: tests of them are skipped without the library
+BLADES = BladeMeasurement._make([0.0, 0.2, 0.2, 0.2, 6e6, 5e6, 4e6, *[0.0] * 7])
+ROSCO = {
+    "rosco",
+    "rosco_float",
+    "rosco_ipc",
+}  # not part of the package: tests of them are skipped without the library
 OSQP = {"lq_preview", "mpc", "mpc_lidar", "mpc_preview"}  # the same
 
 
@@ -57,7 +62,9 @@ def scene():
 
 
 def ahead(controller, measurement, wind=18.0):
-    """The measurement with a steady wind at all times that the controller looks ahead."""
+    """The measurement with a steady wind at all times that the controller looks ahead, and with blades."""
+    if controller.individual:
+        return whole_view([*measurement, *BLADES._replace(azimuth=measurement.time)])
     return with_wind_ahead(measurement, [wind] * len(controller.preview_times))
 
 
@@ -81,9 +88,10 @@ def test_every_controller_commands_within_the_turbines_limits(name, scene):
     for k in range(500):
         speed, blade_pitch = rng.uniform(0.0, 200.0), rng.uniform(0.0, 1.5)
         m = RATED._replace(time=0.1 * k, generator_speed=speed, blade_pitch=blade_pitch)
-        torque, pitch = controller.act(ahead(controller, m, wind[k]))
+        torque, *pitches = controller.act(ahead(controller, m, wind[k]))
         assert 0.0 <= torque <= 47402.91
-        assert -1e-15 <= pitch <= 1.570796  # ROSCO's own limit is rounded
+        assert len(pitches) == (3 if controller.individual else 1)
+        assert all(-1e-15 <= pitch <= 1.570796 for pitch in pitches)  # ROSCO's own limit is rounded
 
 
 @pytest.mark.parametrize("name", sorted(CONTROLLERS))
@@ -121,7 +129,7 @@ def test_every_name_says_what_it_is(name):
 def test_every_name_says_what_it_uses(name):
     used = information(name)
     assert used
-    assert set(used) <= {*Measurement._fields, *PRIVILEGED_INPUTS}
+    assert set(used) <= {*Measurement._fields, *BladeMeasurement._fields, *PRIVILEGED_INPUTS}
 
 
 def test_a_scene_reaches_only_controllers_that_ask_for_it():

@@ -207,6 +207,17 @@ def test_a_deck_that_needs_more_than_it_is_given_is_refused(tmp_path, discon, ol
     assert part in str(caught.value)
 
 
+def test_the_individual_variant_switches_a_decks_own_gains_on_and_nothing_else(tmp_path, discon):
+    individual = Discon(discon.path, individual=True)
+    one, other = discon.texts({}, None)[0].splitlines(), individual.texts({}, None)[0].splitlines()
+    (line,) = [new for old, new in zip(one, other, strict=True) if old != new]
+    assert ENTRY.match(line)["name"] == "IPC_ControlMode" and line.split()[0] == "1"
+    path = tmp_path / "DISCON.IN"
+    lines = ["2   ! IPC_ControlMode - x" if "IPC_ControlMode" in x else x for x in discon.text.splitlines()]
+    path.write_text("\n".join(lines))
+    assert not Discon(path, individual=True).switched  # 1P and 2P, as the file has it
+
+
 def test_the_feedback_of_a_deck_needs_no_more_than_sensors_have():
     controller = make("rosco", read_turbine("iea15"), 0.1)
     assert "platform_pitch_rate" in controller.information

@@ -1,5 +1,6 @@
 """Torque laws of turbine files that leave out what follows from the rest."""
 
+import numpy as np
 import pytest
 
 from fowt_env.descriptions.turbine import read_turbine, turbine_file
@@ -83,3 +84,49 @@ def test_a_discon_in_that_is_not_there_is_named(tmp_path):
     )
     with pytest.raises(InputError, match=r"discon = 'no.IN': must be a file"):
         read_turbine(path)
+
+
+@pytest.mark.parametrize(
+    "name, hub",
+    [
+        ("nrel5mw", 115926.0),
+        ("nrel5mw_openfast", 115926.0),
+        ("nrel5mw_tilted", 115926.0),
+        ("iea15", 969952.0),
+    ],
+)
+def test_blades_and_hub_make_the_inertia_about_the_shaft(name, hub):
+    """Second moment about the shaft by Steiner's rule; hub: HubIner of the decks, kg m2."""
+    rotor = read_turbine(name).rotor
+    reach = rotor.blade_second_moment + 2.0 * rotor.hub_radius * rotor.blade_first_moment
+    reach += rotor.hub_radius**2 * rotor.blade_mass
+    assert rotor.inertia == pytest.approx(3.0 * np.cos(rotor.cone) ** 2 * reach + hub, rel=1e-5)
+    assert rotor.blade_first_moment / rotor.blade_mass == pytest.approx(
+        {"iea15": 27.601, "nrel5mw": 20.475}.get(name, 20.650), abs=5e-4
+    )
+
+
+@pytest.mark.parametrize(
+    "change, part",
+    [
+        ("blade_mass = 40000.0", "rotor: blade_mass = 40000: must be <= mass/blades = 36666.7"),
+        (
+            "blade_mass = 4000.0",
+            "rotor: blade_first_moment = 363231: must be <= 246000, blade_mass at the tip",
+        ),
+        (
+            "blade_first_moment = 5e5",
+            "rotor: blade_second_moment = 1.1776e+07: must be >= blade_first_moment",
+        ),
+        ("blade_second_moment = 12905655.0", "it makes 4.2105"),  # about the rotor centre instead of the root
+        ("", "rotor: blade_first_moment: is missing; blade_mass, blade_first_moment"),
+    ],
+)
+def test_impossible_masses_of_a_blade_are_named(tmp_path, change, part):
+    lines = turbine_file("nrel5mw").read_text().replace('"blade.csv"', '"nrel5mw/blade.csv"').split("\n")
+    key = change.split(" ")[0] or "blade_first_moment"
+    text = "\n".join(change if line.startswith(f"{key} =") else line for line in lines)
+    (tmp_path / "mine.toml").write_text(text.replace('"polars"', '"nrel5mw/polars"'))
+    with pytest.raises(InputError) as caught:
+        read_turbine(tmp_path / "mine.toml")
+    assert part in str(caught.value)

@@ -143,6 +143,7 @@ TIMED_SCENES = {
     "full-field box, standard": TimedScene(_box, SEA, "standard"),
     "exact waves, look-up rotor": TimedScene(TURBULENCE, SEA, "standard", {"wave_loads": "exact"}),
     "BEM rotor, fast waves": TimedScene(TURBULENCE, SEA, "standard", {"rotor": "bem"}),
+    "dynamic inflow": TimedScene(TURBULENCE, SEA, options={"dynamic_inflow": True}),
     "still water, wind": TimedScene(TURBULENCE, None, absent="waves"),
     "no wind, waves": TimedScene(None, SEA, absent="wind, rotor, tower drag"),
     "still water, no wind": TimedScene(None, None, absent="waves, wind, rotor, tower drag"),

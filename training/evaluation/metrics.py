@@ -29,7 +29,16 @@ STATISTICS = {
 }
 # Inverse slopes m of the S-N curves. Welded steel of the tower: 4, the usual choice for tubular towers in
 # IEC 61400-1 practice. Stud or studless chain at the fairlead: 3 (DNV-OS-E301, T-N curves; 5 is wire rope's).
-TOWER_EXPONENT, CHAIN_EXPONENT = 4.0, 3.0
+# Glass-fibre laminate of blades: 10, as in IEC 61400-1 practice.
+TOWER_EXPONENT, CHAIN_EXPONENT, BLADE_EXPONENT = 4.0, 3.0, 10.0
+BLADE_ROOTS = ("RootMyc", "RootMxc")  # channels of each blade, of which the greatest figure counts
+HUB_LOADS = (
+    "LSSTipMys",
+    "LSSTipMzs",
+    "YawBrMyp",
+    "YawBrMzp",
+)  # in axes that do not turn
+BLADES = (1, 2, 3)
 # The constraints of the ATLAS Offshore contest (ARPA-E, 2019).
 BLADE_PITCH_RATE_LIMIT = 10.0  # deg/s
 TOWER_TOP_ACCELERATION_LIMIT = 3.3  # m/s2
@@ -76,6 +85,9 @@ METRICS = (
     "TwrBsMyt_DEL_[kN-m]",
     "RotTorq_DEL_[kN-m]",
     "FAIRTEN_DEL_[kN]",
+    *(f"{name}_DEL_[kN-m]" for name in (*BLADE_ROOTS, *HUB_LOADS)),
+    "each_blade_travel_[deg/s]",
+    "PtfmSway_std_[m]",
     "blade_pitch_rate_beyond_[s]",
     "blade_pitch_rate_violations_[-]",
     "tower_top_acceleration_beyond_[s]",
@@ -123,6 +135,8 @@ def mean_exponent(metric):
     controller's, is no part of it. Any other: 1.
     """
     if "_DEL_" in metric:
+        if metric.startswith(BLADE_ROOTS):
+            return BLADE_EXPONENT
         return CHAIN_EXPONENT if metric.startswith("FAIRTEN") else TOWER_EXPONENT
     return 2.0 if "_std_" in metric or "_rms_" in metric else 1.0
 
@@ -183,8 +197,10 @@ def metrics(
     stop              time (s) of what the rotor is to be stopped for; None: no standstill time (NaN)
     Standard deviations are about the run's own mean (N in the denominator). Travel is the sum of
     absolute steps per second. DEL: 1 Hz damage-equivalent load, exponent 4 (tower base fore-aft, shaft
-    torque) or 3 (fairlead). torque_limited: seconds in which the generator could not follow its command,
-    being at the end of its range or its rate. FAIRTEN: the line for which the figure is greatest.
+    torque, hub, yaw bearing), 10 (blade roots, of the worst blade) or 3 (fairlead). Those of
+    blades, hub and yaw bearing, and the mean travel of each blade, are NaN where all have one pitch.
+    torque_limited: seconds in which the generator could not follow its command, being at the end of its range
+    or its rate. FAIRTEN: the line for which the figure is greatest.
     beyond: seconds past a constraint (blade-pitch rate 10 deg/s, tower-top acceleration 3.3 m/s2, rotor
     speed 1.3 times rated), violations: how often it was passed. RotSpeed_offset: size of the mean rotor
     speed's distance from rated over the last 300 s, in percent of it; BldPitch_oscillation: greatest minus
@@ -217,10 +233,20 @@ def metrics(
     result["FAIRTEN_max_[kN]"] = float(lines.max()) if lines.size else np.nan
     loads = [damage_equivalent_load(line, length, CHAIN_EXPONENT) for line in lines.T]
     result["FAIRTEN_DEL_[kN]"] = float(np.max(loads)) if loads else np.nan
-    for name in ("TwrBsMyt", "RotTorq"):
+    for name in ("TwrBsMyt", "RotTorq", *HUB_LOADS):
         load = kept.get(f"{name}_[kN-m]")
         value = np.nan if load is None else damage_equivalent_load(load, length, TOWER_EXPONENT)
         result[f"{name}_DEL_[kN-m]"] = value
+    for name in BLADE_ROOTS:
+        roots = [kept.get(f"{name}{i}_[kN-m]") for i in BLADES]
+        loads = [np.nan if m is None else damage_equivalent_load(m, length, BLADE_EXPONENT) for m in roots]
+        result[f"{name}_DEL_[kN-m]"] = float(np.max(loads))
+    pitches = [kept.get(f"BldPitch{i}_[deg]") for i in BLADES]
+    known = all(pitch is not None for pitch in pitches)
+    mean = np.mean([travel(time, pitch.to_numpy()) for pitch in pitches]) if known else np.nan
+    result["each_blade_travel_[deg/s]"] = float(mean)
+    sway = kept.get("PtfmSway_[m]")
+    result["PtfmSway_std_[m]"] = np.nan if sway is None else float(np.std(sway))
     result |= _violations(kept, time, blade_pitch, rated_speed_rpm)
     speed = kept["RotSpeed_[rpm]"].to_numpy()
     result |= _settling(time, speed, blade_pitch, rated_speed_rpm, steady, gust_start)

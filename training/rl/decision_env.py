@@ -8,6 +8,8 @@ from fowt_env.descriptions.checks import check_number
 from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.envs.actions import ACTION_MODES
 from fowt_env.envs.decisions import Decisions, wind_entry
+from fowt_env.envs.observations import BLADE_CHANNELS, N_ACTIONS
+from fowt_env.errors import InputError
 from fowt_env.plant.measurement import Measure
 from fowt_env.training.evaluation.metrics import REDUCTIONS, TOWER_EXPONENT, damage_equivalent_load, travel
 from fowt_env.training.rl.sb3_env import FowtSB3VecEnv
@@ -30,6 +32,13 @@ class DecisionVecEnv(VecEnvWrapper):
         self.settings = settings
         self.channels = venv.observation_space.shape[0]
         first = venv.env.envs[0]
+        of_blades = [entry.name for entry in first.observed if entry.name in BLADE_CHANNELS]
+        if venv.action_space.shape != (N_ACTIONS,) or of_blades:
+            seen = ", ".join(of_blades) or "no single blades"
+            raise InputError(
+                f"environment: action_mode = {first.action_mode!r}, observation of {seen}: agents are trained"
+                " here with one pitch for all blades; use FowtEnv itself"
+            )
         wind = wind_entry(settings, ACTION_MODES[first.action_mode], first.observed)
         self.decisions = Decisions(venv.num_envs, self.channels, settings, first.control_dt, wind)
         repeats = settings.history

@@ -286,12 +286,20 @@ def linear(study):
     compared(study)
 
 
+def blades(study):
+    """Moments of single blades, hub and tower against OpenFAST's."""
+    from fowt_env.training.validation.blade_loads import blades as compared
+
+    compared(study)
+
+
 GROUPS = {  # name -> (function, runs that it takes)
     "rest": (rest, 1),
     "decays": (decays, 4),
     "regular": (regular, 1),
     "waves": (waves, 2),
     "rotor": (rotor, 8),
+    "blades": (blades, 6),
     "floating": (floating, 3),
     "linear": (linear, 5),
     "memory": (memory, 8),

@@ -337,6 +337,8 @@ def turbine_rows(deck, name):
     why = {"rated_power": "rated_torque times rated_speed, mechanical"} | why
     law_rows = [Row(key, value, why.get(key, "")) for key, value in law.items()]
     blades = source("BldFile(1)", "HubMass", "HubIner")
+    span = values.blade.radius - values["HubRad"]
+    own = [float(values.blade.mass @ span**power) for power in range(3)]
     tables = {
         "": [
             Row("name", name),
@@ -361,6 +363,9 @@ def turbine_rows(deck, name):
             Row("shaft_tilt_deg", -math.degrees(values["ShftTilt"]) + 0.0, "minus " + source("ShftTilt")),
             Row("cone_deg", -math.degrees(values["PreCone"]) + 0.0, "minus " + source("PreCone(1)")),
             Row("cm_offset", rotor.cm_offset, blades + ", HubCM, PreCone"),
+            Row("blade_mass", own[0], source("BldFile(1)") + ", BldNodes elements"),
+            Row("blade_first_moment", own[1], "the same, about the root"),
+            Row("blade_second_moment", own[2], "the same, about the root"),
         ],
         "nacelle": [
             Row("mass", values["NacMass"], source("NacMass")),

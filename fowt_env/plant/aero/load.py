@@ -2,8 +2,13 @@
 
 from typing import NamedTuple
 
-from fowt_env.plant.aero.bem_rotor import RotorLoad, rotor_load
+from fowt_env.plant.aero.bem_rotor import RotorLoad, rotor_load, wake_equilibrium
 from fowt_env.plant.aero.coefficient_table import CoefficientTable, coefficient_table_load
+from fowt_env.plant.aero.section_inflow import (
+    DynamicSections,
+    dynamic_sections_equilibrium,
+    dynamic_sections_load,
+)
 from fowt_env.plant.aero.section_table import SectionTable, section_table_load
 from fowt_env.plant.aero.tower_drag import bent_tower_load, tower_load
 from fowt_env.plant.aero.wind import WindSeries, wind_at, wind_now
@@ -28,7 +33,7 @@ class Aero(NamedTuple):
 
     wind: WindSeries
     field: object  # wind_field.WindField, which replaces the series, or None
-    rotor: object  # BemRotor, SectionTable or CoefficientTable
+    rotor: object  # BemRotor, SectionTable, DynamicSections or CoefficientTable
     tilt: object  # tilt.Tilt of the shaft or None
     tower: object  # tower_drag.TowerDrag or None
 
@@ -57,6 +62,11 @@ def _by_sections(t, pose, x, now, aero, rotor, dx, counters, pitches, blades):
 
 
 @inlined_kernel
+def _by_dynamic_sections(t, pose, x, now, aero, rotor, dx, counters, pitches, blades):
+    return dynamic_sections_load(t, pose, x, now, aero.wind, aero.field, rotor, dx, counters, pitches, blades)
+
+
+@inlined_kernel
 def _by_coefficients(t, pose, x, now, aero, rotor, dx, counters, pitches, blades):
     return coefficient_table_load(pose, x, now, aero.wind, rotor, counters)
 
@@ -64,9 +74,33 @@ def _by_coefficients(t, pose, x, now, aero, rotor, dx, counters, pitches, blades
 # (t, pose, x, now, aero, rotor, dx, counters, pitches, blades) -> RotorLoad, pose and load in rotor axes
 _rotor_model = chosen_by_class(
     "rotor",
-    {BemRotor: _solved, SectionTable: _by_sections, CoefficientTable: _by_coefficients},
+    {
+        BemRotor: _solved,
+        SectionTable: _by_sections,
+        DynamicSections: _by_dynamic_sections,
+        CoefficientTable: _by_coefficients,
+    },
     inlined=True,
 )
+
+
+@kernel
+def _settled_elements(t, pose, x, now, aero, rotor, dx, counters, pitches, blades):
+    return wake_equilibrium(
+        t, pose, x, now, aero.wind, aero.field, rotor.elements, rotor.skew, rotor.wake, dx, counters, pitches,
+        blades,
+    )  # fmt: skip
+
+
+@kernel
+def _settled_sections(t, pose, x, now, aero, rotor, dx, counters, pitches, blades):
+    return dynamic_sections_equilibrium(
+        t, pose, x, now, aero.wind, aero.field, rotor, dx, counters, pitches, blades
+    )
+
+
+# (t, pose in rotor axes, x, now, aero, rotor, ...) -> number of wake states, which are now steady in x
+settled_wake = chosen_by_class("rotor", {BemRotor: _settled_elements, DynamicSections: _settled_sections})
 
 
 @inlined_kernel

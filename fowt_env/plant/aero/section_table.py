@@ -12,7 +12,7 @@ pitches. Where the exact load jumps from one root of the momentum balance to ano
 where it fades within a few hundredths of an angle (a root in nearly axial flow), the table smooths it
 over one cell.
 
-Skewed wake and dynamic inflow need the induction, which is not tabulated: they need rotor_load.
+The induction is not tabulated: dynamic inflow needs section_inflow.py, a skewed wake rotor_load.
 """
 
 from math import cos, pi, sin, sqrt
@@ -174,11 +174,16 @@ def build_section_table(elements):
     return SectionTable(load, elements.radius, arm, elements)
 
 
-def _filled_table(elements):
-    """The loads of a SectionTable."""
+def table_pitches():
+    """Blade pitches of the rows of a table, rad."""
     dense = np.linspace(DENSE_START, DENSE_END, DENSE_ROWS, endpoint=False)
     coarse = np.linspace(DENSE_END, COARSE_END, COARSE_ROWS + 1)
-    blade_pitch = np.radians(np.concatenate((dense, coarse)))
+    return np.radians(np.concatenate((dense, coarse)))
+
+
+def _filled_table(elements):
+    """The loads of a SectionTable."""
+    blade_pitch = table_pitches()
     size = (len(blade_pitch), len(elements.radius), AHEAD + BEHIND + 1)
     if elements.shape is None:
         load = np.zeros((*size, 2), dtype=np.float32)

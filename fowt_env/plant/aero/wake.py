@@ -82,9 +82,15 @@ def skew_factor(induced_normal, v_normal, ey, ez, span, skewed, skew):
 
 
 @kernel
+def pace(a):
+    """Factor on 1/tau_1 and 1/tau_2 at axial induction a, 1 without."""
+    return 1.0 - 1.3 * min(max(a, 0.0), 0.5)
+
+
+@kernel
 def time_constants(a, wind_speed, radius, tip_radius, wake):
     """(tau_1, tau_2) s of a blade element with axial induction a."""
-    slow = 1.1 / (1.0 - 1.3 * min(max(a, 0.0), 0.5)) * tip_radius / max(wind_speed, LOWEST_WIND)
+    slow = 1.1 / pace(a) * tip_radius / max(wind_speed, LOWEST_WIND)
     span = radius / tip_radius
     slow *= wake.scale
     return slow, (0.39 - 0.26 * span * span) * slow

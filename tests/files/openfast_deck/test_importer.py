@@ -45,6 +45,9 @@ def test_rotor_has_the_mass_properties_of_its_uniform_blades_and_hub(imported):
     assert rotor.inertia == pytest.approx(2e5 + 3 * second * math.cos(cone) ** 2, rel=1e-5)
     across = 1.5 * second * math.cos(cone) ** 2 + 3 * second * math.sin(cone) ** 2 + 3e4
     assert rotor.inertia_diameter == pytest.approx(across - 6e4 * rotor.cm_offset**2, rel=1e-5)
+    assert rotor.blade_mass == pytest.approx(blade)
+    assert rotor.blade_first_moment == pytest.approx(200.0 * 50.0**2 / 2.0, rel=1e-9)
+    assert rotor.blade_second_moment == pytest.approx(200.0 * 50.0**3 / 3.0, rel=1e-3)  # BldNodes lumps
     assert rotor.cone == pytest.approx(cone)
     assert rotor.shaft_tilt == pytest.approx(math.radians(5.0))
 

@@ -36,7 +36,8 @@ def written(tmp_path, text, head=HEAD):
 
 
 def test_the_built_in_suites_can_be_read_and_say_where_they_come_from():
-    assert set(SUITES) | {"faults", "sea_states", "settling", "shifted", "steady"} == set(suite_names())
+    others = {"faults", "ipc", "sea_states", "settling", "shifted", "steady"}
+    assert set(SUITES) | others == set(suite_names())
     for name in suite_names():
         suite = read_suite(name)
         assert suite.name == name and suite.description and suite.source and suite.cases and suite.seeds

@@ -8,6 +8,7 @@ from fowt_env.training.evaluation.metrics import (
     METRICS,
     REDUCTIONS,
     damage_equivalent_load,
+    mean_exponent,
     metrics,
     travel,
     turbine_metrics,
@@ -99,6 +100,28 @@ def test_fairlead_figures_are_those_of_the_worst_line():
     )
     assert result["FAIRTEN_std_[kN]"] == pytest.approx(20.0, rel=1e-2)
     assert result["FAIRTEN_max_[kN]"] == 900.0
+
+
+def test_figures_of_single_blades_are_those_of_the_worst_blade_and_absent_without_them():
+    names = [f"{name}{i}_[kN-m]" for name in ("RootMyc", "RootMxc") for i in (1, 2, 3)]
+    waves = {
+        name: lambda t, a=i + 1.0: 1e3 * a * np.cos(2.0 * np.pi * t / 5.0) for i, name in enumerate(names)
+    }
+    waves |= {
+        f"BldPitch{i}_[deg]": lambda t, i=i: 10.0 + i * np.cos(2.0 * np.pi * t / 10.0) for i in (1, 2, 3)
+    }
+    waves["YawBrMzp_[kN-m]"] = lambda t: 500.0 * np.cos(2.0 * np.pi * t / 5.0)
+    result = metrics(synthetic_run(**waves))
+    # 20 cycles of the range 2 A in 100 s, exponent m: 2 A (20/100)^(1/m)
+    assert result["RootMyc_DEL_[kN-m]"] == pytest.approx(6e3 * 0.2**0.1, rel=1e-9)
+    assert result["RootMxc_DEL_[kN-m]"] == pytest.approx(12e3 * 0.2**0.1, rel=1e-9)
+    assert result["YawBrMzp_DEL_[kN-m]"] == pytest.approx(1e3 * 0.2**0.25, rel=1e-9)
+    assert result["each_blade_travel_[deg/s]"] == pytest.approx(
+        0.8, rel=1e-9
+    )  # 4 A a period, A = 2 on the mean
+    assert np.isnan(metrics(synthetic_run())["RootMyc_DEL_[kN-m]"])
+    assert np.isnan(metrics(synthetic_run())["each_blade_travel_[deg/s]"])
+    assert mean_exponent("RootMxc_DEL_[kN-m]") == 10.0 and mean_exponent("YawBrMzp_DEL_[kN-m]") == 4.0
 
 
 def test_skipped_seconds_do_not_count():

@@ -118,6 +118,9 @@ def model_turbine():
             "tip_radius": rotor.tip_radius * f.length,
             "inertia": rotor.inertia * f.inertia,
             "inertia_diameter": rotor.inertia_diameter * f.inertia,
+            "blade_mass": rotor.blade_mass * f.mass,
+            "blade_first_moment": rotor.blade_first_moment * f.mass * f.length,
+            "blade_second_moment": rotor.blade_second_moment * f.inertia,
         },
         "nacelle": {
             "mass": nacelle.mass * f.mass,

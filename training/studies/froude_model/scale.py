@@ -60,7 +60,8 @@ EXPONENTS = {  # record: {field: exponent of the scale, or one for each entry}
     "rotor": {
         "blades": SAME, "mass": MASS, "overhang": LENGTH, "hub_height": LENGTH, "hub_radius": LENGTH,
         "tip_radius": LENGTH, "inertia": INERTIA, "inertia_diameter": INERTIA, "shaft_tilt": SAME,
-        "cone": SAME, "cm_offset": LENGTH,
+        "cone": SAME, "cm_offset": LENGTH, "blade_mass": MASS, "blade_first_moment": MASS + LENGTH,
+        "blade_second_moment": INERTIA,
     },
     "nacelle": {
         "mass": MASS, "cm_downwind": LENGTH, "cm_left": LENGTH, "cm_height": LENGTH, "inertia": INERTIA,

@@ -133,11 +133,48 @@ def steady(source):
     ))  # fmt: skip
 
 
+BLADE_CASES = ("12mps_shear", "12mps_pitches")
+BLADE_CHANNELS = {
+    "RootMxc1": "root1_Mx_kNm", "RootMyc1": "root1_My_kNm", "RootMyc2": "root2_My_kNm",
+    "RootMyc3": "root3_My_kNm", "YawBrMyp": "yaw_bearing_My_kNm", "YawBrMzp": "yaw_bearing_Mz_kNm",
+    "TwrBsMyt": "twr_base_My_kNm", "TwrBsMxt": "twr_base_Mx_kNm",
+}  # fmt: skip
+
+
+def blade_loads(source):
+    """Moments of single blades, yaw bearing and tower base: means and harmonics over the azimuth."""
+    rows = []
+    for case in BLADE_CASES:
+        wind, rpm, pitches, shear = STEADY[case]
+        frame = pd.read_csv(source / f"steady_{case}_fixed.csv.gz")
+        time = frame["time_s"].to_numpy()
+        kept = whole_turns(time, rpm)
+        angle = rpm * RPM * time[kept]  # blade 1 up at t = 0
+        settings = {"case": case, "wind_mps": wind, "shear_exponent": shear, "rotor_speed_rpm": rpm}
+        settings |= {f"blade_pitch{k}_deg": value for k, value in enumerate(pitches, 1)}
+        for channel, column in BLADE_CHANNELS.items():
+            values = frame[column].to_numpy()[kept]
+            row = settings | {"channel": channel, "mean_kNm": values.mean()}
+            for order in (1, 3):
+                row[f"cos{order}_kNm"] = 2.0 * (values * np.cos(order * angle)).mean()
+                row[f"sin{order}_kNm"] = 2.0 * (values * np.sin(order * angle)).mean()
+            rows.append(row)
+    settings = (
+        "platform and tower held, steady wind at 150 m, rotor speed and blade pitches held; ElastoDyn's"
+        " moments over whole turns after 15 s: mean, cos and sin parts of the first and third harmonic over"
+        " the azimuth of blade 1 (0: up)"
+    )
+    write(HERE / "blade_loads.csv.gz", (MODEL, settings), pd.DataFrame(rows).map(
+        lambda v: float(f"{v:.6g}") if isinstance(v, float) else v
+    ))  # fmt: skip
+
+
 if __name__ == "__main__":
     HERE.mkdir(exist_ok=True)
     folder = Path(sys.argv[1])
     series(folder)
     steady(folder)
+    blade_loads(folder)
     if len(sys.argv) > 2:
         from reduce_linear import responses
 

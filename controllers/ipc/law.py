@@ -1,0 +1,304 @@
+"""Individual pitch control: the PI law for torque and mean pitch, and a cyclic pitch against 1P loads.
+
+The root moments out of the rotor plane become tilt and yaw moment M of the hub in axes that do not turn
+(multi-blade coordinates, controllers/ipc/design.py). The moment without cyclic pitch theta is estimated as
+M - G theta with the slope G of the root moment, scheduled on the mean pitch. It passes a notch at three times
+the rotor speed, where the blades' own second and fourth harmonics appear, and theta follows what would cancel
+it, -(M - G theta)/G, with a first-order lag. Without the notch this is integral control of M with the gain
+bandwidth/|G|, and at rest M = 0 whatever the error of G; with the estimate, notches and limits leave the loop
+damped. There is no proportional part: below the notch the rotor answers at once, and all that it would add
+is turbulence. Back in the blades' axes the azimuth leads by what the pitch drive and the control period lag
+at one cycle a revolution (1P), so that tilt stays tilt and yaw yaw.
+
+The cyclic amplitude is limited to `amplitude`, to what the drive's rate allows at the present rotor speed,
+and to the distance of the mean pitch from the drive's ends. So it fades in above rated with the mean pitch;
+what is cut off is not wound up.
+
+With a `bound` only what exceeds it is cancelled: theta follows -(1 - bound/|M - G theta|) (M - G theta)/G,
+and nothing within the bound. So the least cyclic pitch that keeps the moment at the bound is used, in the
+direction of the load: output-constrained control of the magnitude of tilt and yaw together, Hummel, Kober and
+Mulders, Wind Energ. Sci. 10, 2005-2024, 2025.
+
+With `tilt_notches` and `yaw_notches` the estimates also pass notches at frequencies of the platform. A yawing
+platform feels the moment of the wind that its blades then meet, and cancelling that takes away its damping;
+the cyclic pitch against the tilt moment drives sway and roll, by the blades' tangential loads.
+"""
+
+from dataclasses import dataclass, replace
+from enum import IntEnum
+from math import cos, exp, hypot, pi, sin, tan
+
+import numpy as np
+
+from fowt_env.controllers.gains import platform_frequency
+from fowt_env.controllers.ipc.design import BANDWIDTH, lead_time, root_slope
+from fowt_env.controllers.pi import PI, Memory, Parameter, PISettings, pi_step
+from fowt_env.descriptions.checks import check_number
+from fowt_env.descriptions.units import DEGREE
+from fowt_env.errors import InputError
+from fowt_env.plant.compile.decorators import control_kernel, kernel
+from fowt_env.plant.drivetrain import TorqueCurve, clamp, rate_limit
+from fowt_env.plant.measurement import N_MEASUREMENTS, BladeMeasure, Measure
+from fowt_env.plant.state import BLADES, Command, State
+
+PLATFORM_NOTCHES = 3  # of each channel
+COEFFICIENTS = 5  # of a notch: b0, b1, b2, a1, a2
+NYQUIST_SHARE = 0.9  # of half the sampling frequency, beyond which no notch is placed
+CONSTRAINED_BOUND = 0.1  # of the greatest root moment in steady wind, of ipc_constrained
+
+
+@dataclass(frozen=True)
+class IPCSettings:
+    """What shapes the cyclic pitch. Raises: InputError naming the key, value and allowed range."""
+
+    bandwidth: float = BANDWIDTH
+    amplitude: float = 5.0 * DEGREE  # rad, greatest cyclic pitch
+    rate_share: float = 0.8  # of the drive's rate limit that the cyclic pitch may use
+    notch_damping: float = 0.5  # of the notch at 3P: half its width over its frequency
+    lead: bool = True  # whether the azimuth leads by the drive's lag
+    bound: float = 0.0  # of the moment that is left, as a fraction of the greatest steady root moment
+    tilt_notches: tuple[float, ...] = ()  # rad/s, of the platform
+    yaw_notches: tuple[float, ...] = ()
+    platform_damping: float = 0.5  # of these notches
+
+    def __post_init__(self):
+        for key, high in (("bandwidth", 1.0), ("amplitude", 0.5), ("rate_share", 1.0)):
+            allowed = f"above 0 and at most {high:g}"
+            check_number(key, getattr(self, key), 0.0, high, low_open=True, allowed=allowed)
+        for key in ("notch_damping", "platform_damping"):
+            check_number(key, getattr(self, key), 0.0, low_open=True, allowed="positive and finite")
+        check_number("bound", self.bound, 0.0, allowed="0 or more and finite")
+        for key in ("tilt_notches", "yaw_notches"):
+            notches = getattr(self, key)
+            if len(notches) > PLATFORM_NOTCHES:
+                raise InputError(f"{key}: {len(notches)} frequencies: at most {PLATFORM_NOTCHES} fit")
+            for frequency in notches:
+                check_number(key, frequency, 0.0, low_open=True, allowed="positive and finite, rad/s")
+
+
+class CyclicParameter(IntEnum):
+    """Entries of the law's parameter array beyond those it shares with the PI law."""
+
+    DECAY = Parameter.CURVE + len(TorqueCurve._fields)  # of the distance to the target, in a period
+    SLOPE = DECAY + 1  # G at zero pitch, N m/rad
+    DOUBLING = DECAY + 2  # rad
+    AMPLITUDE = DECAY + 3  # rad
+    RATE = DECAY + 4  # rad/s, of the cyclic pitch
+    NOTCH_DAMPING = DECAY + 5
+    LEAD_TIME = DECAY + 6  # s
+    BOUND = DECAY + 7  # N m
+    NOTCHES = DECAY + 8  # coefficients of the platform's notches, first those of the tilt channel
+
+
+N_PARAMETERS = CyclicParameter.NOTCHES + 2 * PLATFORM_NOTCHES * COEFFICIENTS
+FILTERS = 1 + PLATFORM_NOTCHES  # of each channel
+
+
+class CyclicMemory(IntEnum):
+    """Entries of the law's memory array beyond those it shares with the PI law."""
+
+    STARTED = len(Memory)  # 0 before the first period
+    BLADES = STARTED + 1  # last commands of the three blades, rad
+    TILT = STARTED + 4  # cyclic pitch, rad
+    YAW = STARTED + 5
+    FILTERS = STARTED + 6  # two states of each notch, first those of the tilt channel
+
+
+N_MEMORY = CyclicMemory.FILTERS + 2 * 2 * FILTERS
+
+
+@kernel
+def notch_coefficients(frequency, damping, dt):
+    """(b0, b1, b2, a1, a2) of (s^2 + w^2)/(s^2 + 2 damping w s + w^2) at w = frequency, rad/s.
+
+    Bilinear, exact at w.
+    """
+    k = tan(0.5 * min(frequency * dt, NYQUIST_SHARE * pi))
+    scale = 1.0 / (1.0 + 2.0 * damping * k + k * k)
+    b0, b1 = (1.0 + k * k) * scale, 2.0 * (k * k - 1.0) * scale
+    return b0, b1, b0, b1, (1.0 - 2.0 * damping * k + k * k) * scale
+
+
+@kernel
+def filtered(value, coefficients, memory, at, started):
+    """Output of a second-order filter; advances its two states in memory by one period.
+
+    Where it has not started it rests at this value.
+    """
+    b0, b1, b2, a1, a2 = coefficients
+    if not started:
+        memory[at + 1] = (b2 - a2) * value
+        memory[at] = (b1 - a1) * value + memory[at + 1]
+    result = b0 * value + memory[at]
+    memory[at] = b1 * value - a1 * result + memory[at + 1]
+    memory[at + 1] = b2 * value - a2 * result
+    return result
+
+
+@kernel
+def platform_notch(parameters, k):
+    """Coefficients of the platform's notch k; those of the yaw channel follow those of the tilt channel."""
+    i = CyclicParameter.NOTCHES + k * COEFFICIENTS
+    return parameters[i], parameters[i + 1], parameters[i + 2], parameters[i + 3], parameters[i + 4]
+
+
+@kernel
+def notched(value, axis, third, parameters, memory, started):
+    """Moment (N m) of an axis (0 tilt, 1 yaw) behind its notches; third: coefficients of that at 3P."""
+    at = CyclicMemory.FILTERS + 2 * FILTERS * axis
+    value = filtered(value, third, memory, at, started)
+    for k in range(PLATFORM_NOTCHES):
+        coefficients = platform_notch(parameters, axis * PLATFORM_NOTCHES + k)
+        value = filtered(value, coefficients, memory, at + 2 * (k + 1), started)
+    return value
+
+
+@kernel
+def share_beyond(tilt, yaw, bound):
+    """Share of a moment (N m) by which its magnitude exceeds the bound; 0 within it."""
+    magnitude = hypot(tilt, yaw)
+    return 0.0 if magnitude <= bound else 1.0 - bound / magnitude
+
+
+@kernel
+def greatest_amplitude(mean_pitch, rotor_speed, parameters):
+    """Greatest cyclic pitch (rad) at a mean pitch (rad) and rotor speed, rad/s."""
+    p = parameters
+    room = min(mean_pitch - p[Parameter.PITCH_MINIMUM], p[Parameter.PITCH_MAXIMUM] - mean_pitch)
+    room = min(room, p[CyclicParameter.AMPLITUDE])
+    if rotor_speed > 0.0:
+        room = min(room, p[CyclicParameter.RATE] / rotor_speed)
+    return max(room, 0.0)
+
+
+@kernel
+def cyclic_step(parameters, memory, measurement, command):
+    """One period of the cyclic pitch on top of the mean pitch that stands in command."""
+    p = parameters
+    dt, mean = p[Parameter.CONTROL_DT], command[Command.BLADE_PITCH]
+    rotor_speed = memory[Memory.FILTERED_SPEED] / p[Parameter.GEAR_RATIO]
+    azimuth = measurement[N_MEASUREMENTS + BladeMeasure.AZIMUTH]
+    tilt = yaw = 0.0
+    for blade in range(BLADES):
+        psi = azimuth + 2.0 * pi * blade / BLADES
+        moment = measurement[N_MEASUREMENTS + BladeMeasure.ROOT_OUT_OF_PLANE_1 + blade]
+        tilt += 2.0 / BLADES * moment * cos(psi)
+        yaw += 2.0 / BLADES * moment * sin(psi)
+    slope = p[CyclicParameter.SLOPE] * (1.0 + mean / p[CyclicParameter.DOUBLING])
+    along, across = memory[CyclicMemory.TILT], memory[CyclicMemory.YAW]
+    started = memory[CyclicMemory.STARTED] > 0.5
+    memory[CyclicMemory.STARTED] = 1.0
+    third = notch_coefficients(BLADES * abs(rotor_speed), p[CyclicParameter.NOTCH_DAMPING], dt)
+    tilt = notched(tilt - slope * along, 0, third, p, memory, started)
+    yaw = notched(yaw - slope * across, 1, third, p, memory, started)
+
+    share, follow = share_beyond(tilt, yaw, p[CyclicParameter.BOUND]), 1.0 - p[CyclicParameter.DECAY]
+    along += follow * (-share * tilt / slope - along)
+    across += follow * (-share * yaw / slope - across)
+    limit, amplitude = greatest_amplitude(mean, rotor_speed, p), hypot(along, across)
+    if amplitude > limit:
+        along, across = along * limit / amplitude, across * limit / amplitude
+    memory[CyclicMemory.TILT], memory[CyclicMemory.YAW] = along, across
+
+    step = dt * p[Parameter.PITCH_RATE_LIMIT]
+    for blade in range(BLADES):
+        psi = azimuth + 2.0 * pi * blade / BLADES + rotor_speed * p[CyclicParameter.LEAD_TIME]
+        target = mean + along * cos(psi) + across * sin(psi)
+        target = clamp(target, p[Parameter.PITCH_MINIMUM], p[Parameter.PITCH_MAXIMUM])
+        pitch = rate_limit(memory[CyclicMemory.BLADES + blade], target, step)
+        memory[CyclicMemory.BLADES + blade] = pitch
+        command[Command.BLADE_PITCH + blade] = pitch
+
+
+@control_kernel
+def ipc_law(parameters, memory, measurement, command):
+    """One period: torque and mean pitch of the PI law, and the cyclic pitch of each blade."""
+    speed, pitch = measurement[Measure.GENERATOR_SPEED], measurement[Measure.BLADE_PITCH]
+    pi_step(parameters, memory, speed, pitch, command)
+    cyclic_step(parameters, memory, measurement, command)
+
+
+class IPC(PI):
+    """PI law of a PISettings with the cyclic pitch of an IPCSettings; needs prepare(scene) before reset."""
+
+    kernel = staticmethod(ipc_law)
+    individual = True
+    inputs = (
+        *PI.inputs, "azimuth", "blade_pitch_1", "blade_pitch_2", "blade_pitch_3",
+        "root_out_of_plane_1", "root_out_of_plane_2", "root_out_of_plane_3",
+    )  # fmt: skip
+
+    def __init__(self, settings, cyclic, control_dt, name="ipc"):
+        super().__init__(settings, control_dt, name)
+        self.cyclic = cyclic
+        own = np.zeros(N_PARAMETERS)
+        own[: len(self.parameters)] = self.parameters
+        own[CyclicParameter.SLOPE] = np.nan  # until prepare
+        self.parameters, self.memory = own, np.zeros(N_MEMORY)
+
+    def cyclic_settings(self, scene):
+        """The IPCSettings for a scene."""
+        return self.cyclic
+
+    def prepare(self, scene):
+        """Take the gains of the scene's turbine, and of its platform where the law asks for it."""
+        super().prepare(scene)
+        turbine, cyclic, p = scene.turbine, self.cyclic_settings(scene), self.parameters
+        slope, rated = root_slope(turbine), turbine.rated_rotor_speed
+        for entry, value in {
+            CyclicParameter.DECAY: exp(-self.law_dt * cyclic.bandwidth * rated),
+            CyclicParameter.SLOPE: slope.at_zero,
+            CyclicParameter.DOUBLING: slope.doubling,
+            CyclicParameter.AMPLITUDE: cyclic.amplitude,
+            CyclicParameter.RATE: cyclic.rate_share * turbine.pitch_drive.rate_limit,
+            CyclicParameter.NOTCH_DAMPING: cyclic.notch_damping,
+            CyclicParameter.LEAD_TIME: lead_time(turbine, self.law_dt) if cyclic.lead else 0.0,
+            CyclicParameter.BOUND: cyclic.bound * slope.moment,
+        }.items():
+            p[entry] = value
+        coefficients = np.zeros((2, PLATFORM_NOTCHES, COEFFICIENTS))
+        coefficients[:, :, 0] = 1.0  # passes everything
+        for axis, notches in enumerate((cyclic.tilt_notches, cyclic.yaw_notches)):
+            for k, frequency in enumerate(notches):
+                found = notch_coefficients(float(frequency), cyclic.platform_damping, self.law_dt)
+                coefficients[axis, k] = found
+        p[CyclicParameter.NOTCHES :] = coefficients.ravel()
+
+    def reset(self, measurement):
+        """Start as PI.reset, each blade from its measured pitch and with no cyclic pitch.
+
+        Raises: InputError where prepare() was not called.
+        """
+        if np.isnan(self.parameters[CyclicParameter.SLOPE]):
+            raise InputError(f"controller {self.name!r}: call prepare(scene) before reset(measurement)")
+        super().reset(measurement)
+        self.memory[CyclicMemory.STARTED :] = 0.0
+        pitches = [getattr(measurement.blades, f"blade_pitch_{i + 1}") for i in range(BLADES)]
+        self.memory[CyclicMemory.BLADES : CyclicMemory.BLADES + BLADES] = pitches
+
+
+class FloatingIPC(IPC):
+    """IPC with notches at the frequencies in which the platform yaws, and rolls and sways."""
+
+    inputs = (*IPC.inputs, "plant_model")
+
+    def cyclic_settings(self, scene):
+        """The IPCSettings with the scene's platform frequencies as notches."""
+        sway, roll, yaw = (platform_frequency(scene, m) for m in (State.SWAY, State.ROLL, State.YAW))
+        return replace(self.cyclic, tilt_notches=(sway, roll), yaw_notches=(yaw, roll))
+
+
+def ipc(turbine, control_dt):
+    """PI law with 1P individual pitch control: tilt and yaw moment of the hub to cyclic pitch."""
+    return IPC(PISettings.published(turbine), IPCSettings(), control_dt, "ipc")
+
+
+def ipc_constrained(turbine, control_dt):
+    """As ipc, as far as the hub's moments exceed a bound: most of the relief for half of the pitch travel."""
+    settings = IPCSettings(bound=CONSTRAINED_BOUND)
+    return IPC(PISettings.published(turbine), settings, control_dt, "ipc_constrained")
+
+
+def ipc_floating(turbine, control_dt):
+    """As ipc, with notches at the frequencies of the platform's yaw, roll and sway."""
+    return FloatingIPC(PISettings.published(turbine), IPCSettings(), control_dt, "ipc_floating")
