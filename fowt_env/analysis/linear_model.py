@@ -34,6 +34,7 @@ FREQUENCY_ROUNDS = 4  # of finding a period and the added mass at it
 LINEAR = ("radiation", "filtered position")
 DRIVE = ("blade_pitch", "pitch_rate")  # states of a pitch drive with inertia
 MEMORY = "radiation_"  # begins the names of a memory's states
+CYCLIC = ("tilt_", "yaw_")  # begin the names of states that single blades add, see multiblade.py
 FORCES = ("fx", "fy", "fz", "mx", "my", "mz")  # on the hull, body components about the body origin
 FORCE_STEPS = np.array([1e2, 1e2, 1e2, 1e4, 1e4, 1e4])  # N, N m
 MEASURED = (
@@ -128,7 +129,7 @@ class LinearModel:
     def to_statespace(self):
         """control.StateSpace with named states, inputs and outputs (SI).
 
-        Its fourth input, wave_elevation, is the elevation at the hull's mean place wave_filter.lead
+        Its last input, wave_elevation, is the elevation at the hull's mean place wave_filter.lead
         seconds ahead: the force of waves at depth is not a causal function of the elevation. The states
         wave_1 ... are those of the filter, whose errors wave_filter.errors lists by band.
         Raises: InputError that names the extra to install.
@@ -143,8 +144,8 @@ class LinearModel:
         n, m = len(self.states), waves.B.size
         a = np.zeros((n + m, n + m))
         a[:n, :n], a[:n, n:], a[n:, n:] = self.A, self.E @ waves.C, waves.A
-        b = np.zeros((n + m, 4))
-        b[:n, :3], b[n:, 3] = self.B, waves.B
+        b = np.zeros((n + m, len(self.inputs) + 1))
+        b[:n, :-1], b[n:, -1] = self.B, waves.B
         c = np.hstack([self.C, self.F @ waves.C])
         d = np.hstack([self.D, np.zeros((len(self.outputs), 1))])
         return control.ss(
@@ -194,12 +195,12 @@ def modes(a, names, cm_height, arm):
 
     A mode is named by its largest motion: translations of the centre of mass (at the water line a
     platform-pitch mode moves more in surge than in pitch), angles times arm (m), rotor speed times arm/12 s.
-    Those of the radiation memory and of a pitch drive with inertia are left out: to which their states
-    contribute most, by participation factors.
+    Those of the radiation memory, of a pitch drive with inertia and of single blades' pitches are left out:
+    to which their states contribute most, by participation factors.
     """
     values, vectors = np.linalg.eig(a)
     found = []
-    remembered = [name.startswith(MEMORY) for name in names]
+    remembered = [name.startswith((MEMORY, *CYCLIC)) for name in names]
     if "pitch_rate" in names:
         remembered = [is_memory or name in DRIVE for is_memory, name in zip(remembered, names, strict=True)]
     water = np.zeros(len(values))
@@ -270,6 +271,24 @@ class _Plant:
         return np.r_[rates[self.states], measured[self.measures], recorded[self.columns]]
 
 
+def check_linear(scene):
+    """Raise InputError for a scene with internal states that are not linearised."""
+    internal = [
+        block.name for block in scene.blocks if block.steady == "settled" and block.name not in LINEAR
+    ]
+    if internal:
+        raise InputError(
+            f"linearize: the states of {', '.join(internal)} are not linearised: build the scene without them"
+            " (dynamic_inflow=False)"
+        )
+
+
+def steady_parts(scene, point):
+    """{path: part} of the model that is differentiated about an OperatingPoint."""
+    body = scene.model.rigid_body._replace(platform_fixed=point.platform == "fixed")
+    return {"rigid_body": body, "actuator": linear_actuator(scene.model.actuator)}
+
+
 def linearize(scene, operating_point=None):
     """LinearModel of a scene about an operating point (default: its floating trim).
 
@@ -282,17 +301,10 @@ def linearize(scene, operating_point=None):
 
     Raises: InputError if the scene has any.
     """
-    internal = [
-        block.name for block in scene.blocks if block.steady == "settled" and block.name not in LINEAR
-    ]
-    if internal:
-        raise InputError(
-            f"linearize: the states of {', '.join(internal)} are not linearised: build the scene without them"
-            " (dynamic_inflow=False)"
-        )
+    check_linear(scene)
     point = trim(scene) if operating_point is None else operating_point
-    body = scene.model.rigid_body._replace(platform_fixed=point.platform == "fixed")
-    parts = {"rigid_body": body, "actuator": linear_actuator(scene.model.actuator)}
+    parts = steady_parts(scene, point)
+    body = parts["rigid_body"]
     plant = _Plant(without_fluctuations(scene, point.wind_speed).with_model(parts), scene.n_lines)
     x, u, force = point.state.copy(), point.command.copy(), np.zeros(6)
 
@@ -327,10 +339,10 @@ def linearize(scene, operating_point=None):
         names, INPUTS, (*MEASURED, *RECORDED, *tensions),
         point, body.s_z / body.mass, 0.5 * scene.platform.draft, scene,
     )  # fmt: skip
-    return _with_memory(model, linear_memory(scene))
+    return with_memory(model, linear_memory(scene))
 
 
-def _with_memory(model, memory):
+def with_memory(model, memory):
     """The LinearModel with the states of a scene.radiation_fit.LinearMemory; itself where that is None.
 
     The platform rests at the operating point, so velocities turn into inertial axes by its attitude alone.
