@@ -275,7 +275,9 @@ def test_readings_of_blades_are_those_of_the_chain_with_noise_of_their_own(scene
     std = np.array([chain.sensors[name].noise if name in chain.sensors else 0.0 for name in fields])
     noise = draw_noise(std, scene.seed, 61)
     np.testing.assert_array_equal(noise[:, :N_MEASUREMENTS], draw_noise(std[:N_MEASUREMENTS], scene.seed, 61))
-    assert abs(np.corrcoef(noise[:, 1], noise[:, N_MEASUREMENTS + 1])[0, 1]) < 0.4
+    plain = draw_noise(np.ones(len(fields)), scene.seed, 61)
+    own = plain[:, N_MEASUREMENTS:].ravel()
+    assert abs(np.corrcoef(plain[:, :N_MEASUREMENTS].ravel()[: own.size], own)[0, 1]) < 0.15
     twin = NaiveSensors(chain, 0.1, noise)
     for measured, reading in zip(true.seen(), read.seen(), strict=True):
         wanted = twin.read(dict(zip(fields, measured[:-4], strict=True)))
@@ -440,7 +442,7 @@ def test_moments_of_cyclic_pitch_are_those_of_a_run_with_it(scene, tilt, yaw):
     names = ("hub_tilt_moment", "hub_yaw_moment", "root_out_of_plane_tilt")
     rows = [model.output_index(name) for name in names]
     wanted = model.C[rows, -2:] @ pitches
-    np.testing.assert_allclose(found, wanted, atol=0.01 * np.abs(wanted).max())
+    np.testing.assert_allclose(found, wanted, atol=0.005 * np.abs(wanted).max())
 
 
 def test_a_scene_with_one_pitch_has_no_multi_blade_model(collective_scene):
