@@ -35,6 +35,12 @@ def constant_load(parameters, motion, force):
 
 
 @load_kernel
+def dashpot(parameters, motion, force):
+    for i in range(3):
+        force[Force.FX + i] = -parameters[0] * motion[Motion.VX + i]
+
+
+@load_kernel
 def spring(parameters, motion, force):
     """A spring to an inertial point, the same in every direction."""
     for i in range(3):
@@ -289,3 +295,18 @@ def test_an_impulse_of_the_rotor_is_that_of_a_short_push(platform, turbine):
     pushed = case.twin.fall(path, -torque / case.twin.ratio, [push], np.zeros((6, 6)))
     expected = case.twin.accelerations(pushed) - case.twin.accelerations(none)
     assert np.abs(case.accelerations(rates_of) - expected).max() < 1e-10 * np.abs(expected).max()
+
+
+def test_a_load_aloft_moves_with_the_nacelle(platform, turbine):
+    rng = np.random.default_rng(5)
+    loads = [Load("aloft", dashpot, point=ALOFT, parameters=[1e5]), CONSTANT[1]]
+    case = Bending(platform, turbine, 2, loads)
+    columns = [i for i, channel in enumerate(case.scene.channels) if channel.name.startswith("aloft")]
+    for _ in range(5):
+        x = case.random(rng)
+        path = case.twin.path(x, case.blocks)
+        point = case.twin.on_nacelle(path, [flexible_tower.Path(p) for p in ALOFT])
+        force = -1e5 * np.array([float(X.first) for X in point])
+        moment = np.cross([float(X.value) for X in point] - x[:3], force)
+        row = output_row(case.scene.handle(), x, np.zeros(2), 0.0, len(case.scene.channels))
+        assert row[columns] == pytest.approx(np.r_[force, moment], rel=1e-10)
