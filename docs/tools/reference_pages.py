@@ -20,7 +20,7 @@ from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.envs import rewards
 from fowt_env.envs.actions import TRACKING_DAMPING, TRACKING_FREQUENCY
-from fowt_env.envs.observations import KNOWN, STANDARD, entries
+from fowt_env.envs.observations import BLADE_CHANNELS, KNOWN, STANDARD, entries
 from fowt_env.envs.tables import action_table, observation_table
 from fowt_env.envs.tasks import TASKS, Episode
 from fowt_env.files.atomic import replacing
@@ -180,7 +180,15 @@ def observation():
 
 def channels():
     """Entries of the channels that the tasks leave out."""
-    others = [name for name in KNOWN if name not in STANDARD]
+    return _entries_of([name for name in KNOWN if name not in STANDARD])
+
+
+def blades():
+    """Entries of the channels of single blades."""
+    return _entries_of(BLADE_CHANNELS)
+
+
+def _entries_of(others):
     machine = turbine()
     rows = [
         (
@@ -192,7 +200,7 @@ def channels():
             entry.meaning,
         )
         for name in others
-        for entry in entries((name,), machine, PREVIEW)
+        for entry in entries((name,), machine, PREVIEW, individual=True)
     ]
     return markdown(("channel", "entry", "unit", "centre", "scale", "low", "high", "meaning"), rows)
 
@@ -270,7 +278,7 @@ def integrators():
 
 TABLES = {
     "environment.md": (
-        environments, tasks, offsets, actions, actuators, observation, channels, reward, meanings,
+        environments, tasks, offsets, actions, actuators, observation, channels, blades, reward, meanings,
         terminations, options, events,
     ),
     "theory.md": (loads, integrators),

@@ -33,7 +33,10 @@ SIMULATE_EXAMPLES = """[bold]Examples[/bold]
 
 [cyan]fowt simulate --wind none --start zero --controller none --initial PtfmSurge=10[/cyan]  free decay
 
-[cyan]fowt simulate --wind '{"kind": "etm", "speed": 18, "class": "A"}'[/cyan]  any wind, as JSON"""
+[cyan]fowt simulate --wind '{"kind": "etm", "speed": 18, "class": "A"}'[/cyan]  any wind, as JSON
+
+[cyan]fowt simulate --controller ipc --option pitch=individual[/cyan]  a pitch for each blade"""
+OF_BLADES = ("RootMyc1_[kN-m]", "LSSTipMys_[kN-m]", "LSSTipMzs_[kN-m]")  # of scenes that have them
 
 
 @app.command(epilog=SIMULATE_EXAMPLES)
@@ -145,7 +148,8 @@ def _print_channels(frame, title):
     from fowt_env.visual.time_series import PANELS
 
     rows = []
-    for channel in dict.fromkeys([*(channel for _, channel in PANELS), "GenTq_[kN-m]", "RotThrust_[kN]"]):
+    main = (*(channel for _, channel in PANELS), "GenTq_[kN-m]", "RotThrust_[kN]", *OF_BLADES)
+    for channel in dict.fromkeys(main):
         if channel in frame.columns:
             x = frame[channel]
             mean, deviation = x.mean(), x.std(ddof=0)
