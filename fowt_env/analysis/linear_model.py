@@ -22,6 +22,8 @@ from fowt_env.scene.radiation_fit import linear_memory
 
 # velocity steps are small because quadratic drag leaves a false damping proportional to them
 STATE_STEPS = np.array([1e-3, 1e-3, 1e-3, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-7, 1e-7, 1e-7, 1e-4, 1e-5])
+TOWER = ("tower_fore_aft", "tower_side_side", "tower_fore_aft_2", "tower_side_side_2")  # its deflections
+TOWER_BLOCKS = {"tower_deflection": ("", 1e-3), "tower_velocity": ("_rate", 1e-5)}  # ends of names, steps
 VELOCITIES = ("vx", "vy", "vz", "wx", "wy", "wz")
 ACTUATOR_STATES = {  # block of the scene's state vector: (name of its state in a linear model, step)
     "pitch_rate": ("pitch_rate", 1e-5),
@@ -34,6 +36,7 @@ FREQUENCY_ROUNDS = 4  # of finding a period and the added mass at it
 LINEAR = ("radiation", "filtered position")
 DRIVE = ("blade_pitch", "pitch_rate")  # states of a pitch drive with inertia
 MEMORY = "radiation_"  # begins the names of a memory's states
+CYCLIC = ("tilt_", "yaw_")  # begin the names of states that single blades add, see multiblade.py
 FORCES = ("fx", "fy", "fz", "mx", "my", "mz")  # on the hull, body components about the body origin
 FORCE_STEPS = np.array([1e2, 1e2, 1e2, 1e4, 1e4, 1e4])  # N, N m
 MEASURED = (
@@ -53,8 +56,9 @@ class LinearModel:
 
     A (m, m), B (m, 3), C (n, m), D (n, 3) with the names in states, inputs and outputs; E (m, 6)
     and F (n, 6) take further forces on the hull (FORCES). point is the OperatingPoint. The first 14 states
-    are plant.state.STATES; those of ACTUATOR_STATES follow where the plant has them, then those of a body
-    with radiation memory, radiation_1 and so on.
+    are plant.state.STATES; those of a tower that bends follow, its deflections (TOWER) and their rates
+    (tower_fore_aft_rate and so on), then those of ACTUATOR_STATES where the plant has them, and last those of
+    a body with radiation memory, radiation_1 and so on.
     """
 
     A: np.ndarray
@@ -128,7 +132,7 @@ class LinearModel:
     def to_statespace(self):
         """control.StateSpace with named states, inputs and outputs (SI).
 
-        Its fourth input, wave_elevation, is the elevation at the hull's mean place wave_filter.lead
+        Its last input, wave_elevation, is the elevation at the hull's mean place wave_filter.lead
         seconds ahead: the force of waves at depth is not a causal function of the elevation. The states
         wave_1 ... are those of the filter, whose errors wave_filter.errors lists by band.
         Raises: InputError that names the extra to install.
@@ -143,8 +147,8 @@ class LinearModel:
         n, m = len(self.states), waves.B.size
         a = np.zeros((n + m, n + m))
         a[:n, :n], a[:n, n:], a[n:, n:] = self.A, self.E @ waves.C, waves.A
-        b = np.zeros((n + m, 4))
-        b[:n, :3], b[n:, 3] = self.B, waves.B
+        b = np.zeros((n + m, len(self.inputs) + 1))
+        b[:n, :-1], b[n:, -1] = self.B, waves.B
         c = np.hstack([self.C, self.F @ waves.C])
         d = np.hstack([self.D, np.zeros((len(self.outputs), 1))])
         return control.ss(
@@ -163,6 +167,11 @@ def plant_states(scene):
     """(names, indices in the state vector, steps of differences) of a LinearModel's states, less memory."""
     names, rows, steps = list(STATES), [int(i) for i in STATE_INDEX], list(STATE_STEPS)
     for block in scene.blocks:
+        if block.name in TOWER_BLOCKS:
+            end, step = TOWER_BLOCKS[block.name]
+            names += [name + end for name in TOWER[: block.size]]
+            rows += range(block.offset, block.offset + block.size)
+            steps += block.size * [step]
         if block.name in ACTUATOR_STATES:
             name, step = ACTUATOR_STATES[block.name]
             names.append(name)
@@ -193,13 +202,14 @@ def modes(a, names, cm_height, arm):
     """[Mode] of a system matrix a (n, n) with these state names, slowest first.
 
     A mode is named by its largest motion: translations of the centre of mass (at the water line a
-    platform-pitch mode moves more in surge than in pitch), angles times arm (m), rotor speed times arm/12 s.
-    Those of the radiation memory and of a pitch drive with inertia are left out: to which their states
-    contribute most, by participation factors.
+    platform-pitch mode moves more in surge than in pitch), angles times arm (m), rotor speed times arm/12 s,
+    deflections of the tower as they are.
+    Those of the radiation memory, of a pitch drive with inertia and of single blades' pitches are left out:
+    to which their states contribute most, by participation factors.
     """
     values, vectors = np.linalg.eig(a)
     found = []
-    remembered = [name.startswith(MEMORY) for name in names]
+    remembered = [name.startswith((MEMORY, *CYCLIC)) for name in names]
     if "pitch_rate" in names:
         remembered = [is_memory or name in DRIVE for is_memory, name in zip(remembered, names, strict=True)]
     water = np.zeros(len(values))
@@ -218,6 +228,7 @@ def modes(a, names, cm_height, arm):
             "platform_pitch": arm * abs(part["platform_pitch"]),
             "yaw": arm * abs(part["yaw"]),
             "rotor_speed": arm / 12.0 * abs(part["rotor_speed"]),
+            **{deflection: abs(part[deflection]) for deflection in TOWER if deflection in part},
         }
         name = max(participation, key=participation.get)
         found.append(
@@ -270,6 +281,24 @@ class _Plant:
         return np.r_[rates[self.states], measured[self.measures], recorded[self.columns]]
 
 
+def check_linear(scene):
+    """Raise InputError for a scene with internal states that are not linearised."""
+    internal = [
+        block.name for block in scene.blocks if block.steady == "settled" and block.name not in LINEAR
+    ]
+    if internal:
+        raise InputError(
+            f"linearize: the states of {', '.join(internal)} are not linearised: build the scene without them"
+            " (dynamic_inflow=False)"
+        )
+
+
+def steady_parts(scene, point):
+    """{path: part} of the model that is differentiated about an OperatingPoint."""
+    body = scene.model.rigid_body._replace(platform_fixed=point.platform == "fixed")
+    return {"rigid_body": body, "actuator": linear_actuator(scene.model.actuator)}
+
+
 def linearize(scene, operating_point=None):
     """LinearModel of a scene about an operating point (default: its floating trim).
 
@@ -282,17 +311,10 @@ def linearize(scene, operating_point=None):
 
     Raises: InputError if the scene has any.
     """
-    internal = [
-        block.name for block in scene.blocks if block.steady == "settled" and block.name not in LINEAR
-    ]
-    if internal:
-        raise InputError(
-            f"linearize: the states of {', '.join(internal)} are not linearised: build the scene without them"
-            " (dynamic_inflow=False)"
-        )
+    check_linear(scene)
     point = trim(scene) if operating_point is None else operating_point
-    body = scene.model.rigid_body._replace(platform_fixed=point.platform == "fixed")
-    parts = {"rigid_body": body, "actuator": linear_actuator(scene.model.actuator)}
+    parts = steady_parts(scene, point)
+    body = parts["rigid_body"]
     plant = _Plant(without_fluctuations(scene, point.wind_speed).with_model(parts), scene.n_lines)
     x, u, force = point.state.copy(), point.command.copy(), np.zeros(6)
 
@@ -327,10 +349,10 @@ def linearize(scene, operating_point=None):
         names, INPUTS, (*MEASURED, *RECORDED, *tensions),
         point, body.s_z / body.mass, 0.5 * scene.platform.draft, scene,
     )  # fmt: skip
-    return _with_memory(model, linear_memory(scene))
+    return with_memory(model, linear_memory(scene))
 
 
-def _with_memory(model, memory):
+def with_memory(model, memory):
     """The LinearModel with the states of a scene.radiation_fit.LinearMemory; itself where that is None.
 
     The platform rests at the operating point, so velocities turn into inertial axes by its attitude alone.
@@ -361,14 +383,15 @@ def _with_memory(model, memory):
 def natural_periods(scene):
     """{motion: undamped natural period s} of the six motions about the trim, from stiffness and mass.
 
-    A motion without restoring (no moorings) gets inf. Modes are named by their largest motion, angles
-    weighted with half the draft. With radiation memory the mass is that at the motion's own frequency.
+    Those of a tower that bends follow, named by TOWER. A motion without restoring (no moorings) gets inf.
+    Modes are named by their largest motion, angles weighted with half the draft. With radiation memory the
+    mass is that at the motion's own frequency.
     """
     model = linearize(scene)
     periods = _periods(model, 0.0)
     if not any(name.startswith(MEMORY) for name in model.states):
         return periods
-    for motion in MOTIONS:
+    for motion in periods:
         for _ in range(FREQUENCY_ROUNDS):
             if np.isinf(periods[motion]):
                 break
@@ -378,19 +401,22 @@ def natural_periods(scene):
 
 def _periods(model, omega):
     """{motion: undamped natural period s} with the added mass of the memory at a frequency, rad/s."""
-    n = len(MOTIONS)
-    m = sum(not name.startswith(MEMORY) for name in model.states)
+    deflections = [name for name in TOWER if name in model.states]
+    names = (*MOTIONS, *deflections)
+    n = len(names)
+    places = [model.index(name) for name in names]
+    speeds = [model.index(name) for name in (*VELOCITIES, *(f"{name}_rate" for name in deflections))]
+    memory = [i for i, name in enumerate(model.states) if name.startswith(MEMORY)]
     # velocities are body components, so positions move with kinematics K: q' = K v, v' = S q
-    kinematics = model.A[:n, n : 2 * n]
-    stiffness = model.A[n : 2 * n, :n]
-    if len(model.states) > m:
+    kinematics, stiffness = model.A[np.ix_(places, speeds)], model.A[np.ix_(speeds, places)]
+    if memory:
         # v' = S q + N z, z' = Z z + L v: of the part of N z in phase with v' = i w v, at rest for w to 0
-        into, out = model.A[m:, n : 2 * n], model.A[n : 2 * n, m:]
-        own = model.A[m:, m:]
+        into, out = model.A[np.ix_(memory, speeds)], model.A[np.ix_(speeds, memory)]
+        own = model.A[np.ix_(memory, memory)]
         square = own @ own + omega**2 * np.eye(own.shape[0])
         stiffness = np.linalg.solve(np.eye(n) + out @ np.linalg.solve(square, into), stiffness)
     values, vectors = np.linalg.eig(kinematics @ stiffness)
-    scale = np.array([1.0, 1.0, 1.0, model.arm, model.arm, model.arm])
+    scale = np.array([1.0, 1.0, 1.0, model.arm, model.arm, model.arm, *(1.0 for _ in deflections)])
     shapes = np.abs(vectors) * scale[:, None]
     periods = {}
     free = set(range(n))
@@ -399,5 +425,5 @@ def _periods(model, omega):
         name = next(i for i in order if i in free)
         free.discard(name)
         square = -values[motion].real
-        periods[MOTIONS[name]] = float(2.0 * np.pi / np.sqrt(square)) if square > 1e-9 else float("inf")
-    return {motion: periods[motion] for motion in MOTIONS}
+        periods[names[name]] = float(2.0 * np.pi / np.sqrt(square)) if square > 1e-9 else float("inf")
+    return {name: periods[name] for name in names}

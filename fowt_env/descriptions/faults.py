@@ -89,7 +89,7 @@ class Fault(Record):
     @property
     def ends_operation(self) -> bool:
         """Whether the turbine is to be stopped for it: what its protection does then is part of the case."""
-        return self.kind not in SENSOR_FAULTS
+        return self.kind not in (*SENSOR_FAULTS, "pitch_offset")
 
 
 def read_faults(value: Any) -> tuple[Fault, ...]:

@@ -24,6 +24,7 @@ from fowt_env.plant.state import N_COMMANDS, N_INDIVIDUAL_COMMANDS, Command
 # rigid rotor. Fast beside the platform's pitch (0.21 rad/s), slow beside the torque rate limit.
 TRACKING_FREQUENCY = 0.5  # rad/s
 TRACKING_DAMPING = 1.0
+FIRST_PITCH = int(Command.BLADE_PITCH)  # numba has no int() of an enum
 
 
 class ActionMode(IntEnum):
@@ -154,11 +155,11 @@ def command_of(action, actions, baseline_law, parameters, memory, measurement, u
         if not actions.individual:
             spread(commanded)
         commanded[0] += action[0] * actions.residual_torque
-        for i in range(int(Command.BLADE_PITCH), u.shape[0]):
+        for i in range(FIRST_PITCH, u.shape[0]):
             commanded[i] += action[1] * actions.residual_pitch
     else:
         commanded[0] = unscale(action[0], actions.low, actions.high)
-        for i in range(int(Command.BLADE_PITCH), action.shape[0]):
+        for i in range(FIRST_PITCH, action.shape[0]):
             commanded[i] = unscale(action[i], actions.pitch_low, actions.pitch_high)
         if actions.mode != ActionMode.INDIVIDUAL:
             spread(commanded)
@@ -168,14 +169,14 @@ def command_of(action, actions, baseline_law, parameters, memory, measurement, u
     u[Command.GENERATOR_TORQUE] = followed_torque(
         torque, commanded[Command.GENERATOR_TORQUE], actions.control_dt, actions.generator
     )
-    for i in range(int(Command.BLADE_PITCH), u.shape[0]):
+    for i in range(FIRST_PITCH, u.shape[0]):
         u[i] = commanded[i]
 
 
 @kernel
 def spread(command):
     """Give the first blade's pitch to all whose pitch is commanded."""
-    for i in range(int(Command.BLADE_PITCH) + 1, command.shape[0]):
+    for i in range(FIRST_PITCH + 1, command.shape[0]):
         command[i] = command[Command.BLADE_PITCH]
 
 
@@ -191,7 +192,7 @@ def action_of(u, rotor_speed, actions, action):
         return
     first = rotor_speed if actions.mode == ActionMode.SETPOINT else u[Command.GENERATOR_TORQUE]
     action[0] = scale(first, actions.low, actions.high)
-    for i in range(int(Command.BLADE_PITCH), action.shape[0]):
+    for i in range(FIRST_PITCH, action.shape[0]):
         action[i] = scale(u[i], actions.pitch_low, actions.pitch_high)
 
 

@@ -156,7 +156,7 @@ def update_estimate(estimator_law, config, episode):
     if estimator_law is None:
         return
     u = episode.u
-    first, total, blades = u[Command.BLADE_PITCH], 0.0, u.shape[0] - int(Command.BLADE_PITCH)
+    first, total, blades = u[Command.BLADE_PITCH], 0.0, u.shape[0] - Command.BLADE_PITCH
     for blade in range(blades):
         total += u[Command.BLADE_PITCH + blade]
     u[Command.BLADE_PITCH] = total / blades  # it knows one pitch

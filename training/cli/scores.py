@@ -11,7 +11,7 @@ from fowt_env.training.cli.console import app, note, out, progress_bar, reported
 scores = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode="rich",
-    help="Score agents relative to baselines, case by case, against the performance limit, in a gust.",
+    help="Score agents over baselines, case by case, against the performance limit, in faults, in a gust.",
 )
 app.add_typer(scores, name="scores")
 
@@ -163,6 +163,26 @@ def bound(
     if plot is not None:
         plot_fractions(found, fronts, plot)
         note(f"wrote {plot}")
+
+
+FAULTS_EXAMPLES = """[bold]Examples[/bold]
+
+[cyan]fowt evaluate --suite faults --controllers pi,gspi_oc3,rosco_float,lqr --out results/faults[/cyan]
+
+[cyan]fowt scores faults results/faults[/cyan]
+
+Survived: no capsize, blow-up or error, and within the suite's limits of rotor speed and platform pitch. A
+trip is no failure here; the last table counts them."""
+
+
+@scores.command(epilog=FAULTS_EXAMPLES)
+@reported
+def faults(results: FoldersArgument, cases: CasesOption = None, out_path: OutOption = None):
+    """Print which controllers survive which faults, with the largest motions and loads and the trips."""
+    from fowt_env.training.reports.survival import survival, survival_markdown
+
+    found = survival(_runs(results, cases))
+    _shown(survival_markdown(found), {"": found}, out_path)
 
 
 GUST_EXAMPLES = """[bold]Examples[/bold]

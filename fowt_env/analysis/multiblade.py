@@ -1,0 +1,187 @@
+"""Linear models of a rotor whose blades have pitches of their own, in multi-blade coordinates.
+
+A quantity q_i of the blades i = 1, 2, 3 at the azimuths psi_i is q_i = q_0 + q_c cos psi_i + q_s sin psi_i,
+psi = 0 up: q_0 is collective, q_c tilts the load of the rotor and q_s yaws it. At each azimuth the plant is
+differentiated by these coordinates and its answers are turned into them; then the derivatives are averaged
+over the azimuth. What varies within a third of a turn, in wind with shear at three times the rotor's
+frequency, is left out.
+"""
+
+from math import cos, pi, sin
+
+import numpy as np
+
+from fowt_env.analysis.linear_model import (
+    CYCLIC,
+    FORCE_STEPS,
+    INPUT_STEPS,
+    INPUTS,
+    MEASURED,
+    RECORDED,
+    LinearModel,
+    check_linear,
+    of_all_blades,
+    plant_states,
+    steady_parts,
+    with_memory,
+)
+from fowt_env.analysis.trim import AZIMUTHS, trim, without_fluctuations
+from fowt_env.errors import InputError
+from fowt_env.plant.channels import N_FIXED, measure, record
+from fowt_env.plant.compile.decorators import entry
+from fowt_env.plant.compile.handle import data_of, model_of
+from fowt_env.plant.dynamics import evaluate_loads, loads_of, respond
+from fowt_env.plant.measurement import N_MEASUREMENTS, BladeMeasure, Measure
+from fowt_env.plant.model import LoadCache
+from fowt_env.plant.state import BLADES, Command, State
+from fowt_env.scene.radiation_fit import linear_memory
+
+CYCLIC_INPUTS = ("tilt_pitch_command", "yaw_pitch_command")
+NOT_TURNING = ("hub_tilt_moment", "hub_yaw_moment", "yaw_bearing_tilt_moment", "yaw_bearing_yaw_moment")
+OF_ROOTS = ("root_out_of_plane", "root_in_plane")
+MOMENTS = (*NOT_TURNING, *(f"{name}{part}" for name in OF_ROOTS for part in ("", "_tilt", "_yaw")))
+
+
+@entry
+def _mean_response(
+    handle, x, u, force, cyclic, places, azimuths, y, v, dx, measurement, row, rates, turned, measured,
+    moments, recorded,
+):  # fmt: skip
+    """Means over the azimuth of what a state with cyclic parts answers.
+
+    cyclic (k + 1, 2): cosine and sine parts of what each blade has, by the rows of places (k, 3), its indices
+    in the state, and of the pitch commands. turned (k, 2): those of the rates; moments: as MOMENTS. y, v, dx,
+    measurement, row: scratch.
+    """
+    model, data = model_of(handle), data_of(handle)
+    rates[:] = 0.0
+    turned[:] = 0.0
+    measured[:] = 0.0
+    moments[:] = 0.0
+    recorded[:] = 0.0
+    blocks = places.shape[0]
+    for i in range(azimuths):
+        azimuth = x[State.AZIMUTH] + i * (2.0 * pi / BLADES) / azimuths
+        y[:] = x
+        v[:] = u
+        y[State.AZIMUTH] = azimuth
+        for blade in range(BLADES):
+            psi = azimuth + blade * 2.0 * pi / BLADES
+            for k in range(blocks):
+                y[places[k, blade]] += cyclic[k, 0] * cos(psi) + cyclic[k, 1] * sin(psi)
+            v[Command.BLADE_PITCH + blade] += cyclic[blocks, 0] * cos(psi) + cyclic[blocks, 1] * sin(psi)
+        evaluate_loads(0.0, y, model, data, dx)
+        for j in range(6):
+            data.cache[LoadCache.TOTAL + j] += force[j]
+            data.cache[LoadCache.HYDRO + j] += force[j]
+        respond(y, v, model, data, dx)
+        measure(model, data, y, dx, v, 0.0, measurement)
+        record(model, data, y, dx, v, 0.0, loads_of(data, dx), row)
+        rates += dx / azimuths
+        measured += measurement / azimuths
+        recorded += row / azimuths
+        for j in range(4):
+            moments[j] += measurement[N_MEASUREMENTS + BladeMeasure.HUB_TILT_MOMENT + j] / azimuths
+        for blade in range(BLADES):
+            psi = azimuth + blade * 2.0 * pi / BLADES
+            c, s = 2.0 * cos(psi) / BLADES / azimuths, 2.0 * sin(psi) / BLADES / azimuths
+            for k in range(blocks):
+                turned[k, 0] += c * dx[places[k, blade]]
+                turned[k, 1] += s * dx[places[k, blade]]
+            for j in range(2):
+                root = measurement[N_MEASUREMENTS + BladeMeasure.ROOT_OUT_OF_PLANE_1 + BLADES * j + blade]
+                moments[4 + 3 * j] += root / BLADES / azimuths
+                moments[5 + 3 * j] += c * root
+                moments[6 + 3 * j] += s * root
+    for k in range(blocks):
+        mean = 0.0
+        for blade in range(BLADES):
+            mean += rates[places[k, blade]] / BLADES
+        rates[places[k, 0]] = mean
+        # d(q_c cos psi + q_s sin psi)/dt: the coordinates stand still, the blades turn
+        turned[k, 0] -= x[State.ROTOR_SPEED] * cyclic[k, 1]
+        turned[k, 1] += x[State.ROTOR_SPEED] * cyclic[k, 0]
+    data.cache[LoadCache.VALID] = 0.0
+
+
+class _Plant:
+    """Rates and outputs of a scene without fluctuations, in multi-blade coordinates."""
+
+    def __init__(self, scene, places):
+        self.handle, self.places = scene.handle(), places
+        self.states = plant_states(scene)[1]
+        self.columns = [*RECORDED.values(), *range(N_FIXED, N_FIXED + scene.n_lines)]
+        self.measures = [Measure[name.upper()] for name in MEASURED]
+        n, commands, fields, rows = scene.n_state, scene.n_commands, scene.n_measurements, len(scene.channels)
+        self.scratch = (np.zeros(n), np.zeros(commands), np.zeros(n), np.zeros(fields), np.zeros(rows))
+        turned = np.zeros((len(places), 2))
+        self.means = (np.zeros(n), turned, np.zeros(fields), np.zeros(len(MOMENTS)), np.zeros(rows))
+
+    def __call__(self, x, u, force, cyclic):
+        """Rates of the states and of the cyclic ones, then the outputs."""
+        _mean_response(self.handle, x, u, force, cyclic, self.places, AZIMUTHS, *self.scratch, *self.means)
+        rates, turned, measured, moments, recorded = self.means
+        return np.r_[
+            rates[self.states], turned.ravel(), measured[self.measures], recorded[self.columns], moments
+        ]
+
+
+def linearize_blades(scene, operating_point=None):
+    """LinearModel of a scene with pitch="individual" in multi-blade coordinates, averaged over the azimuth.
+
+    Beside the states, inputs and outputs of linearize it has the states tilt_pitch and yaw_pitch (of a drive
+    with inertia their rates too: CYCLIC), rad, the inputs CYCLIC_INPUTS, rad, and the outputs MOMENTS, N m:
+    those at hub and yaw bearing, and of the blade roots the mean, cosine (tilt) and sine (yaw) parts. States
+    and inputs of linearize are those of all blades together. operating_point: default, its floating trim,
+    at which all blades have the same pitch.
+
+    Raises: InputError for a scene with one pitch for all blades, and as linearize.
+    """
+    if scene.model.pitches is None:
+        raise InputError(
+            "linearize_blades: the scene has one pitch for all blades; build it with pitch='individual'"
+        )
+    check_linear(scene)
+    point = trim(scene) if operating_point is None else operating_point
+    names, rows, state_steps = plant_states(scene)
+    together = of_all_blades(scene, rows)
+    own = [i for i, indices in enumerate(together) if len(indices) == BLADES]
+    places = np.array([together[i] for i in own])
+    parts = steady_parts(scene, point)
+    x, u, force, cyclic = point.state.copy(), point.command.copy(), np.zeros(6), np.zeros((len(own) + 1, 2))
+
+    def plant_at(speed):
+        return _Plant(without_fluctuations(scene, speed).with_model(parts), places)
+
+    plant = plant_at(point.wind_speed)
+
+    def slope(array, index, step):
+        keep = np.array(array[index])
+        sides = []
+        for sign in (1.0, -1.0):
+            array[index] = keep + sign * step
+            sides.append(plant(x, u, force, cyclic))
+        array[index] = keep
+        return (sides[0] - sides[1]) / (2.0 * step)
+
+    columns = [slope(x, indices, step) for indices, step in zip(together, state_steps, strict=True)]
+    columns += [slope(cyclic, (k, part), state_steps[i]) for k, i in enumerate(own) for part in range(2)]
+    inputs = [slope(u, 0, INPUT_STEPS[0]), slope(u, list(range(1, scene.n_commands)), INPUT_STEPS[1])]
+    if point.wind_speed is None:
+        inputs.append(np.zeros_like(inputs[0]))
+    else:
+        sides = [plant_at(point.wind_speed + sign * INPUT_STEPS[2])(x, u, force, cyclic) for sign in (1, -1)]
+        inputs.append((sides[0] - sides[1]) / (2.0 * INPUT_STEPS[2]))
+    inputs += [slope(cyclic, (len(own), part), INPUT_STEPS[1]) for part in range(2)]
+    forces = [slope(force, i, FORCE_STEPS[i]) for i in range(6)]
+    of_states, of_inputs, of_forces = (np.array(found).T for found in (columns, inputs, forces))
+    states = (*names, *(f"{part}{names[i].removeprefix('blade_')}" for i in own for part in CYCLIC))
+    n = len(states)
+    tensions = tuple(f"fairlead_tension_{i + 1}" for i in range(scene.n_lines))
+    body = scene.model.rigid_body
+    model = LinearModel(
+        of_states[:n], of_inputs[:n], of_states[n:], of_inputs[n:], of_forces[:n], of_forces[n:],
+        states, (*INPUTS, *CYCLIC_INPUTS), (*MEASURED, *RECORDED, *tensions, *MOMENTS),
+        point, body.s_z / body.mass, 0.5 * scene.platform.draft, scene,
+    )  # fmt: skip
+    return with_memory(model, linear_memory(scene))
