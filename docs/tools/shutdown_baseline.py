@@ -15,7 +15,7 @@ STANDING = 0.1  # of rated rotor speed
 
 
 def stop(env, rate, seed):
-    """{figure: value} of an episode that feathers at a rate (deg/s); the torque falls with the rotor speed."""
+    """{figure: value} of an episode feathered at a rate (deg/s); the torque falls with the rotor speed."""
     env.reset(seed=seed)
     rated, begun = env.scene.turbine.rated_rotor_speed, env.measurement()
     pitch, total, terminated, truncated = begun.blade_pitch, 0.0, False, False

@@ -126,9 +126,9 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     to 0.05 m of surge and 0.03 deg of blade pitch, in the cells next to rated wind to 0.9 m and 0.6 deg.
     reset(options=...) takes "wind", "sea", "weather_seed", "offsets" and "shutdown" in place of what is
     drawn; the info of reset has them under "episode", and given as options they replay the episode. Weather
-    never compiles anything anew: an environment whose task has a sea takes any sea, None for still water, but one
-    built in still water takes none; neither is a box of full-field wind exchanged for another wind. What is
-    refused leaves the environment as it was, in its episode.
+    never compiles anything anew: an environment whose task has a sea takes any sea, None for still water, but
+    one built in still water takes none; neither is a box of full-field wind exchanged for another wind. What
+    is refused leaves the environment as it was, in its episode.
 
     An action beyond [-1, 1] counts as the nearest end, and info["saturated_actions"] counts the periods
     in which that happened. The torque stays within the generator's range and moves at most as fast as its

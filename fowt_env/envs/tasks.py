@@ -286,7 +286,7 @@ START: dict[str, tuple[float, float]] = {  # of the order of one standard deviat
 }
 # A rotor that stands soon, on a platform and tower that move little. Feathering as fast as it goes is rough.
 STOP_WEIGHTS: dict[str, float] = {
-    "standstill": 6.0,
+    "standstill": 4.0,
     "platform_rate": 6.0,
     "tower_top": 6.0,
     "pitch_travel": 1.0,
