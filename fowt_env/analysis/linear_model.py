@@ -22,6 +22,8 @@ from fowt_env.scene.radiation_fit import linear_memory
 
 # velocity steps are small because quadratic drag leaves a false damping proportional to them
 STATE_STEPS = np.array([1e-3, 1e-3, 1e-3, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-7, 1e-7, 1e-7, 1e-4, 1e-5])
+TOWER = ("tower_fore_aft", "tower_side_side", "tower_fore_aft_2", "tower_side_side_2")  # its deflections
+TOWER_BLOCKS = {"tower_deflection": ("", 1e-3), "tower_velocity": ("_rate", 1e-5)}  # ends of names, steps
 VELOCITIES = ("vx", "vy", "vz", "wx", "wy", "wz")
 ACTUATOR_STATES = {  # block of the scene's state vector: (name of its state in a linear model, step)
     "pitch_rate": ("pitch_rate", 1e-5),
@@ -54,8 +56,9 @@ class LinearModel:
 
     A (m, m), B (m, 3), C (n, m), D (n, 3) with the names in states, inputs and outputs; E (m, 6)
     and F (n, 6) take further forces on the hull (FORCES). point is the OperatingPoint. The first 14 states
-    are plant.state.STATES; those of ACTUATOR_STATES follow where the plant has them, then those of a body
-    with radiation memory, radiation_1 and so on.
+    are plant.state.STATES; those of a tower that bends follow, its deflections (TOWER) and their rates
+    (tower_fore_aft_rate and so on), then those of ACTUATOR_STATES where the plant has them, and last those of
+    a body with radiation memory, radiation_1 and so on.
     """
 
     A: np.ndarray
@@ -164,6 +167,11 @@ def plant_states(scene):
     """(names, indices in the state vector, steps of differences) of a LinearModel's states, less memory."""
     names, rows, steps = list(STATES), [int(i) for i in STATE_INDEX], list(STATE_STEPS)
     for block in scene.blocks:
+        if block.name in TOWER_BLOCKS:
+            end, step = TOWER_BLOCKS[block.name]
+            names += [name + end for name in TOWER[: block.size]]
+            rows += range(block.offset, block.offset + block.size)
+            steps += block.size * [step]
         if block.name in ACTUATOR_STATES:
             name, step = ACTUATOR_STATES[block.name]
             names.append(name)
@@ -194,7 +202,8 @@ def modes(a, names, cm_height, arm):
     """[Mode] of a system matrix a (n, n) with these state names, slowest first.
 
     A mode is named by its largest motion: translations of the centre of mass (at the water line a
-    platform-pitch mode moves more in surge than in pitch), angles times arm (m), rotor speed times arm/12 s.
+    platform-pitch mode moves more in surge than in pitch), angles times arm (m), rotor speed times arm/12 s,
+    deflections of the tower as they are.
     Those of the radiation memory, of a pitch drive with inertia and of single blades' pitches are left out:
     to which their states contribute most, by participation factors.
     """
@@ -219,6 +228,7 @@ def modes(a, names, cm_height, arm):
             "platform_pitch": arm * abs(part["platform_pitch"]),
             "yaw": arm * abs(part["yaw"]),
             "rotor_speed": arm / 12.0 * abs(part["rotor_speed"]),
+            **{deflection: abs(part[deflection]) for deflection in TOWER if deflection in part},
         }
         name = max(participation, key=participation.get)
         found.append(
@@ -373,14 +383,15 @@ def with_memory(model, memory):
 def natural_periods(scene):
     """{motion: undamped natural period s} of the six motions about the trim, from stiffness and mass.
 
-    A motion without restoring (no moorings) gets inf. Modes are named by their largest motion, angles
-    weighted with half the draft. With radiation memory the mass is that at the motion's own frequency.
+    Those of a tower that bends follow, named by TOWER. A motion without restoring (no moorings) gets inf.
+    Modes are named by their largest motion, angles weighted with half the draft. With radiation memory the
+    mass is that at the motion's own frequency.
     """
     model = linearize(scene)
     periods = _periods(model, 0.0)
     if not any(name.startswith(MEMORY) for name in model.states):
         return periods
-    for motion in MOTIONS:
+    for motion in periods:
         for _ in range(FREQUENCY_ROUNDS):
             if np.isinf(periods[motion]):
                 break
@@ -390,19 +401,22 @@ def natural_periods(scene):
 
 def _periods(model, omega):
     """{motion: undamped natural period s} with the added mass of the memory at a frequency, rad/s."""
-    n = len(MOTIONS)
-    m = sum(not name.startswith(MEMORY) for name in model.states)
+    deflections = [name for name in TOWER if name in model.states]
+    names = (*MOTIONS, *deflections)
+    n = len(names)
+    places = [model.index(name) for name in names]
+    speeds = [model.index(name) for name in (*VELOCITIES, *(f"{name}_rate" for name in deflections))]
+    memory = [i for i, name in enumerate(model.states) if name.startswith(MEMORY)]
     # velocities are body components, so positions move with kinematics K: q' = K v, v' = S q
-    kinematics = model.A[:n, n : 2 * n]
-    stiffness = model.A[n : 2 * n, :n]
-    if len(model.states) > m:
+    kinematics, stiffness = model.A[np.ix_(places, speeds)], model.A[np.ix_(speeds, places)]
+    if memory:
         # v' = S q + N z, z' = Z z + L v: of the part of N z in phase with v' = i w v, at rest for w to 0
-        into, out = model.A[m:, n : 2 * n], model.A[n : 2 * n, m:]
-        own = model.A[m:, m:]
+        into, out = model.A[np.ix_(memory, speeds)], model.A[np.ix_(speeds, memory)]
+        own = model.A[np.ix_(memory, memory)]
         square = own @ own + omega**2 * np.eye(own.shape[0])
         stiffness = np.linalg.solve(np.eye(n) + out @ np.linalg.solve(square, into), stiffness)
     values, vectors = np.linalg.eig(kinematics @ stiffness)
-    scale = np.array([1.0, 1.0, 1.0, model.arm, model.arm, model.arm])
+    scale = np.array([1.0, 1.0, 1.0, model.arm, model.arm, model.arm, *(1.0 for _ in deflections)])
     shapes = np.abs(vectors) * scale[:, None]
     periods = {}
     free = set(range(n))
@@ -411,5 +425,5 @@ def _periods(model, omega):
         name = next(i for i in order if i in free)
         free.discard(name)
         square = -values[motion].real
-        periods[MOTIONS[name]] = float(2.0 * np.pi / np.sqrt(square)) if square > 1e-9 else float("inf")
-    return {motion: periods[motion] for motion in MOTIONS}
+        periods[names[name]] = float(2.0 * np.pi / np.sqrt(square)) if square > 1e-9 else float("inf")
+    return {name: periods[name] for name in names}

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import pi
+from math import cos, pi, sin
 
 import numpy as np
 from scipy.optimize import brentq
@@ -196,12 +196,29 @@ class _Steady:
         self.x[rows] = values
 
     def rotor_acceleration(self, rotor_speed, blade_pitch):
-        """w_b' with the torque of the static curve, platform as it is."""
+        """w_b' with the torque of the static curve, platform as it is and a tower that bends at rest."""
         ratio = self.scene.turbine.drivetrain.gear_ratio
         self.x[State.ROTOR_SPEED] = rotor_speed
         self.u[Command.GENERATOR_TORQUE] = generator_torque(ratio * rotor_speed, blade_pitch, self.curve)
         self.set_pitch(blade_pitch)
-        return self.rates()[State.ROTOR_SPEED]
+        rates, model = self.rates(), self.scene.model
+        if model.tower is None:
+            return rates[State.ROTOR_SPEED]
+        # far from its rest the nacelle accelerates, and the rotor with it: that is no lack of torque
+        body = model.rigid_body
+        return rates[State.ROTOR_SPEED] + body.coupling / body.rotor_row * self._shaft_turning(rates)
+
+    def _shaft_turning(self, rates):
+        """Angular acceleration of the nacelle about the shaft, rad/s2, of a turbine at rest."""
+        tower = self.scene.model.tower
+        bent, bending = self.x[self.deflections()], rates[[self._acceleration(i) for i in self.deflections()]]
+        a, b = tower.slope[0::2] @ bent[0::2], -tower.slope[1::2] @ bent[1::2]  # about y, then about x
+        about_y, about_x = tower.slope[0::2] @ bending[0::2], -tower.slope[1::2] @ bending[1::2]
+        turned_y = np.array([[cos(a), 0.0, sin(a)], [0.0, 1.0, 0.0], [-sin(a), 0.0, cos(a)]])
+        turned_x = np.array([[1.0, 0.0, 0.0], [0.0, cos(b), -sin(b)], [0.0, sin(b), cos(b)]])
+        carried = (turned_y @ turned_x).T @ rates[State.WX : State.WZ + 1]
+        own = np.array([about_x, about_y * cos(b), -about_y * sin(b)])
+        return tower.shaft @ (carried + own)
 
     def set_pitch(self, blade_pitch):
         """Set the pitch (rad) of all blades, and its command."""
@@ -246,12 +263,14 @@ class _Steady:
             return []
         return [0, 1, 2, 3, 4, 5] if body.plane is None else [0, 2, 4]
 
-    def positions(self):
-        """Indices of the platform's motions and of the deflections of a tower that bends."""
+    def deflections(self):
+        """Indices of the deflections of a tower that bends."""
         tower = self.scene.model.tower
-        return self.motions() + (
-            [] if tower is None else list(range(tower.first, tower.first + _modes(tower)))
-        )
+        return [] if tower is None else list(range(tower.first, tower.first + len(tower.slope)))
+
+    def positions(self):
+        """Indices of the platform's motions and of the tower's deflections."""
+        return self.motions() + self.deflections()
 
     def free_states(self):
         """Indices of the states that a trim finds: positions, pitch or speed of a turning rotor."""
@@ -276,7 +295,7 @@ class _Steady:
         """Index of the state whose rate is the acceleration that balances with a free state."""
         if index in (State.BLADE_PITCH, State.ROTOR_SPEED):
             return State.ROTOR_SPEED
-        return State.VX + index if index < State.AZIMUTH else index + _modes(self.scene.model.tower)
+        return State.VX + index if index < State.AZIMUTH else index + len(self.deflections())
 
     def jacobian(self, free):
         """Derivatives of the residual by the free states, central differences."""
@@ -351,11 +370,6 @@ class _Steady:
             return self._of_motions(self.jacobian(self.motions()))
 
         check_equilibrium(self.scene, rest, self.start, self.slope, fresh_slope)
-
-
-def _modes(tower):
-    """Number of modes of a TowerModes."""
-    return tower.slope.shape[0]
 
 
 def trim(scene: Scene, platform: str = "floating") -> OperatingPoint:

@@ -11,7 +11,7 @@ CARRIED = (
 )  # fmt: skip
 DATA_CARRIED = (
     "lines", "counters", "stages", "cache", "added_mass", "user", "history", "samples", "radiation",
-    "blades",
+    "blades", "elastic",
 )  # fmt: skip
 
 

@@ -1,8 +1,8 @@
 """Bending moments of blade roots, hub and yaw bearing, where every blade has a pitch of its own.
 
 As ElastoDyn has them: with what the outer part loads the inner one, by the air, its weight and its inertia
-(theory.md, 6.6). Blades are rigid and, as masses, straight along their pitch axes. Kernels take the Pose of
-the frame that the nacelle is fixed in, and the rates of its velocities.
+(theory.md, 6.6). Blades are rigid and, as masses, straight along their pitch axes. Pose and rates that
+kernels take are those of the frame that is fixed in the nacelle (tower_modes.nacelle_pose, nacelle_rates).
 """
 
 from math import cos, pi, sin

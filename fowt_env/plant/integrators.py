@@ -21,7 +21,14 @@ from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rigid_body import attitude_rate
 from fowt_env.plant.rotor_substeps import build_substeps, follow_rotor, sample_rotor, shift_samples
 from fowt_env.plant.state import State, Wrench, add, pose_in
-from fowt_env.plant.tower_modes import add_modal, bend_of, carried, turned_pose
+from fowt_env.plant.tower_modes import (
+    add_modal,
+    bend_of,
+    carried,
+    correct_elastic,
+    keep_elastic,
+    turned_pose,
+)
 
 START_STEPS = 3  # steps before four past derivatives exist
 # rad of blade pitch (30.4 deg) beyond which the lift of a free rotor's blades works against its speed: up to
@@ -156,6 +163,7 @@ def adams(t, x, u, dt, model, method, data):
     for k in range(START_STEPS, 0, -1):
         for i in range(n):
             history[k, i] = history[k - 1, i]
+    keep_elastic(x, model.tower, data.elastic)
     rates(t, x, u, model, data, history[0])
     begin_memory(x, dt, False, plane, model.hydro, memory)
     for i in range(n):
@@ -170,6 +178,10 @@ def adams(t, x, u, dt, model, method, data):
         advance_actuators(x, u, dt, model, y)
     else:
         follow_rotor(dt, model, method.substeps, data, y)
+        correct_elastic(
+            dt, x, history, model.rigid_body, model.tower, data.matrix, data.elastic, data.stages[2],
+            data.stages[3], y,
+        )  # fmt: skip
     attitude_rate(y, new, model.rigid_body.plane)
     new[State.AZIMUTH] = y[State.ROTOR_SPEED]
     bend_on(dt, x, order, history, model.tower, y)

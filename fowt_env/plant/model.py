@@ -78,7 +78,7 @@ N_CACHE = 42
 class Data(NamedTuple):
     """What changes: scratch of one plant.
 
-    lines, counters, cache, history, samples, radiation and blades last between calls.
+    lines, counters, cache, history, elastic, samples, radiation and blades last between calls.
     """
 
     lines: np.ndarray  # (n_lines, 6) mooring warm start and results
@@ -94,6 +94,9 @@ class Data(NamedTuple):
     cache: np.ndarray  # (N_CACHE,), see LoadCache
     user: np.ndarray  # (user_loads.user_data_size(n),) wrench of each user load, and its inputs
     history: np.ndarray  # (4, n_state) derivatives of past steps, latest first
+    elastic: (
+        np.ndarray
+    )  # (4, n) forces of the tower's structure on its deflections at past steps, latest first
     samples: np.ndarray  # (4 samples, 7) rotor loads within past steps, latest first
     radiation: np.ndarray  # hydro.radiation.memory_data: of the memory, empty without one
     # (blades, 6) BladeLoad of each: as the cache while this is VALID; empty with one pitch for all blades

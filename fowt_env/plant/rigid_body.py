@@ -111,6 +111,12 @@ def solve_spd(a, b):
             pivot -= scaled * a[i, j]
             a[i, j] = scaled  # L
         a[i, i] = 1.0 / pivot
+    substitute_spd(a, b)
+
+
+@kernel
+def substitute_spd(a, b):
+    """Solve for another right-hand side b in place, with what solve_spd has left of the matrix."""
     for i in range(6):
         total = b[i]
         for k in range(i):

@@ -12,10 +12,16 @@ import numpy as np
 
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
-from fowt_env.plant.rigid_body import accelerate, momentum_rate, solve_spd
+from fowt_env.plant.rigid_body import accelerate, momentum_rate, solve_spd, substitute_spd
 from fowt_env.plant.state import Pose, State, Wrench
 
 MOST_MODES = 4
+# of the fourth difference of the structure's force: the error of Adams-Bashforth 4 (251/720) less that with
+# which Adams-Moulton 4 moves the deflections (19/720), so that those of velocity and position cancel
+ELASTIC_WEIGHT = 232.0 / 720.0
+ELASTIC_ROUNDS = (
+    2  # of the correction with its own new force: one is stable to 0.7 over the frequency, two to 1.29
+)
 
 
 class TowerModes(NamedTuple):
@@ -520,32 +526,33 @@ def _take_modal_rates(pose, x, fx, fy, mx, my, mz, bend, tower, modal):
 
 
 @kernel
-def _solve(matrix, b, modal, platform_fixed):
-    """Solve for the platform's accelerations into b (6,) and those of the deflections into modal (n,).
-
-    The modes leave the system one by one, the last first, and follow from the rest in the order of their
-    rows. Of the matrix the lower triangle counts, which is overwritten.
-    """
-    n = modal.shape[0]
+def _factor_modes(matrix, n):
+    """Take the n modes out of the platform's system, the last first; the lower triangle alone counts."""
     for k in range(n - 1, -1, -1):
         row = 6 + k
         over = 1.0 / matrix[row, row]
-        for i in range(6):
+        for i in range(6 + k):
             factor = matrix[row, i] * over
             for j in range(i + 1):
                 matrix[i, j] -= factor * matrix[row, j]
-            b[i] -= factor * modal[k]
-        for i in range(k):
-            factor = matrix[row, 6 + i] * over
-            for j in range(7 + i):
-                matrix[6 + i, j] -= factor * matrix[row, j]
-            modal[i] -= factor * modal[k]
-    if platform_fixed:
+
+
+@kernel
+def _without_modes(matrix, b, modal):
+    """Take the modes out of the right-hand sides b (6,) and modal (n,), with what _factor_modes has left."""
+    for k in range(modal.shape[0] - 1, -1, -1):
+        row = 6 + k
+        force = modal[k] / matrix[row, row]
         for i in range(6):
-            b[i] = 0.0
-    else:
-        solve_spd(matrix, b)
-    for k in range(n):
+            b[i] -= matrix[row, i] * force
+        for i in range(k):
+            modal[i] -= matrix[row, 6 + i] * force
+
+
+@kernel
+def _find_modes(matrix, b, modal):
+    """Put the accelerations of the deflections into modal, from those of the platform in b."""
+    for k in range(modal.shape[0]):
         row = 6 + k
         total = modal[k]
         for i in range(6):
@@ -589,18 +596,29 @@ def accelerate_bending(pose, x, load, torque, added, body, tower, matrix, dx):
             matrix[i, j] = tower.lower[i, j] + added[i, j]
     _add_body(matrix, d, free, mass, bend)
     _add_modes(x, free, mass, bend, tower, matrix)
-    _solve(matrix, b, modal, body.platform_fixed)
-
+    _factor_modes(matrix, n)
+    _without_modes(matrix, b, modal)
+    if body.platform_fixed:
+        b[:] = 0.0
+    else:
+        solve_spd(matrix, b)
+    _find_modes(matrix, b, modal)
     if body.rotor_fixed:
         dx[State.ROTOR_SPEED] = 0.0
         return
-    for i in range(0, n, 2):
+    turning = _along_shaft(bx, by, bz, b, modal, bend, tower, upper.nx, upper.ny, upper.nz)
+    dx[State.ROTOR_SPEED] = (torque - body.coupling * turning) / body.rotor_row
+
+
+@kernel
+def _along_shaft(bx, by, bz, b, modal, bend, tower, nx, ny, nz):
+    """Rate of the nacelle's rotation along the shaft (n), of its bias (b) and the accelerations."""
+    for i in range(0, modal.shape[0], 2):
         by += tower.slope[i] * modal[i]
         rolling = tower.slope[i + 1] * modal[i + 1]
         bx -= rolling * bend.ca
         bz += rolling * bend.sa
-    turning = upper.nx * (bx + b[3]) + upper.ny * (by + b[4]) + upper.nz * (bz + b[5])
-    dx[State.ROTOR_SPEED] = (torque - body.coupling * turning) / body.rotor_row
+    return nx * (bx + b[3]) + ny * (by + b[4]) + nz * (bz + b[5])
 
 
 @inlined_kernel
@@ -645,6 +663,64 @@ def add_tower_steps(dt, dx, tower, x):
     v = tower.first + tower.slope.shape[0]
     for i in range(v, v + tower.slope.shape[0]):
         x[i] += dt * dx[i]
+
+
+# ---------------------------------------------------------------- time steps
+
+
+@kernel
+def keep_elastic(x, tower, elastic):
+    """Put the forces of the tower's structure at a state before those of past steps; nothing when rigid."""
+    if tower is None:
+        return
+    for k in range(elastic.shape[0] - 1, 0, -1):
+        for i in range(elastic.shape[1]):
+            elastic[k, i] = elastic[k - 1, i]
+    begin_modal(x, tower, elastic[0])
+
+
+@kernel
+def correct_elastic(dt, x, history, body, tower, matrix, elastic, still, extra, y):
+    """Correct in y the velocities of Adams-Bashforth 4 for the force of the tower's structure.
+
+    It is linear in the new deflections and velocities, so that its fourth difference with them is known for
+    little: theory.md, section 6.3. matrix: what the solve at the step's beginning has left; still and extra
+    (n_state,) are scratch.
+    """
+    if tower is None:
+        return
+    n, q = tower.slope.shape[0], tower.first
+    v = q + n
+    b, modal = extra[State.VX : State.WZ + 1], extra[v : v + n]
+    new, done = still[v : v + n], still[q:v]
+    done[:] = 0.0
+    bend, t = _bent(x, tower), tower.shaft
+    nx, ny, nz = from_nacelle(bend, t[0], t[1], t[2])
+    for _ in range(ELASTIC_ROUNDS):
+        for i in range(n):
+            y[q + i] = x[q + i] + dt / 24.0 * (
+                9.0 * y[v + i] + 19.0 * history[0, q + i] - 5.0 * history[1, q + i] + history[2, q + i]
+            )  # fmt: skip
+        begin_modal(y, tower, new)
+        for i in range(n):
+            past = 4.0 * (elastic[0, i] + elastic[2, i]) - 6.0 * elastic[1, i] - elastic[3, i]
+            force = ELASTIC_WEIGHT * (new[i] - past)
+            modal[i] = force - done[i]
+            done[i] = force
+        b[:] = 0.0
+        _without_modes(matrix, b, modal)
+        if body.platform_fixed:
+            b[:] = 0.0
+        else:
+            substitute_spd(matrix, b)
+        _find_modes(matrix, b, modal)
+        for i in range(6):
+            y[State.VX + i] += dt * b[i]
+        for i in range(n):
+            y[v + i] += dt * modal[i]
+        if not body.rotor_fixed:
+            turning = _along_shaft(0.0, 0.0, 0.0, b, modal, bend, tower, nx, ny, nz)
+            y[State.ROTOR_SPEED] -= dt * body.coupling / body.rotor_row * turning
 
 
 # ---------------------------------------------------------------- rates of the nacelle and above the base

@@ -14,7 +14,7 @@ from fowt_env.plant.state import BLADES, N_RIGID
 from fowt_env.scene.actuators import build_actuator, build_converter, drive_states
 from fowt_env.scene.geometry import warn_of_geometry
 from fowt_env.scene.mass import build_layout, build_rigid_body, with_masses
-from fowt_env.scene.options import checked_options, choose_parts, samples_per_step
+from fowt_env.scene.options import checked_options, choose_parts, default_step, samples_per_step
 from fowt_env.scene.parts import (
     build_aero,
     build_blade_pitches,
@@ -25,7 +25,7 @@ from fowt_env.scene.parts import (
     wake_states,
 )
 from fowt_env.scene.scene import Scene
-from fowt_env.scene.tower import build_tower_modes, modes_asked, tower_states
+from fowt_env.scene.tower import build_tower_modes, modes_asked, tower_frequency, tower_states
 from fowt_env.scene.user_loads import Load, build_user_loads, checked_loads
 from fowt_env.scene.weather import Sea, Wind, build_weather
 
@@ -86,6 +86,8 @@ def build_scene(
     next_state = first_state + sum(load.states for load in user)
     tower = build_tower_modes(platform, turbine, modes_asked(options), next_state)
     next_state += tower_states(tower)
+    tower = with_masses(tower, platform, turbine)
+    dt = default_step(options, tower_frequency(tower))
     pitches = None
     if options["pitch"] == "individual":
         pitches = build_blade_pitches(turbine, rotor, next_state)
@@ -101,13 +103,13 @@ def build_scene(
         drivetrain=build_drivetrain(turbine),
         actuator=actuator,
         generator=build_torque_limits(turbine.torque_law),
-        hydro=build_hydro(platform, waves, current, options, next_state) if water else None,
+        hydro=build_hydro(platform, waves, current, options, dt, next_state) if water else None,
         mooring=mooring,
         aero=aero,
         integrator=build_integrator(options["integrator"], samples_per_step(options, air.field)),
         user=build_user_loads(user, platform.tower.base_height, first_state),
         pitches=pitches,
         converter=converter,
-        tower=with_masses(tower, platform, turbine),
+        tower=tower,
     )
     return Scene(model, platform, turbine, air.spec, sea, seed, rotor, options, air.speed, user, label)

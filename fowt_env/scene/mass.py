@@ -108,22 +108,22 @@ def with_masses(modes, platform, turbine):
     )
 
 
-def build_blade_masses(turbine):
+def build_blade_masses(platform, turbine):
     """BladeMasses of a turbine. Raises: InputError where its file does not have them."""
-    rotor, nacelle = turbine.rotor, turbine.nacelle
+    rotor = turbine.rotor
     if rotor.blade_mass is None:
         raise InputError(
             f"rotor.blade_mass: is missing in the turbine {turbine.name!r}; pitch = 'individual' needs"
             f" {', '.join(BLADE_MASSES)} for the moments at blade roots"
         )
-    upper = [(nacelle.mass, (nacelle.cm_downwind, nacelle.cm_left, nacelle.cm_height), nacelle.inertia)]
+    _, *upper = _upper_bodies(platform, turbine)
     return BladeMasses(
         float(rotor.hub_radius),
         float(rotor.blade_first_moment),
         float(rotor.blade_second_moment + rotor.hub_radius * rotor.blade_first_moment),
         float(rotor.cm_offset),
         float(rotor.inertia_diameter),
-        np.ascontiguousarray(assemble([*upper, _rotor_body(rotor)])),
+        np.ascontiguousarray(assemble(upper)),
     )
 
 
@@ -147,5 +147,5 @@ def build_layout(platform, turbine, individual=False):
         float(np.sin(rotor.cone)),
         float(np.cos(rotor.cone)),
         np.ascontiguousarray(_rotor_body(rotor)[1]),
-        build_blade_masses(turbine) if individual else None,
+        build_blade_masses(platform, turbine) if individual else None,
     )

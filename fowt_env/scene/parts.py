@@ -30,7 +30,7 @@ from fowt_env.plant.hydro.wave_bands import build_band_diffraction, build_wave_b
 from fowt_env.plant.mooring import build_mooring
 from fowt_env.plant.state import BLADES, N_RIGID
 from fowt_env.plant.tilt import build_tilt
-from fowt_env.scene.options import ROTORS, chosen_stations, default_step
+from fowt_env.scene.options import ROTORS, chosen_stations
 from fowt_env.scene.radiation_fit import build_radiation
 from fowt_env.scene.weather import IN_PLANE
 from fowt_env.weather.excitation import build_excitation, still_excitation
@@ -79,8 +79,8 @@ def build_blade_pitches(turbine, rotor, first_state):
     return BladePitches(first_state)
 
 
-def build_hydro(platform, waves, current, options, first_state=N_RIGID):
-    """Hydro part of a scene in water; the states of waves and memory begin at first_state."""
+def build_hydro(platform, waves, current, options, dt, first_state=N_RIGID):
+    """Hydro part of a scene in water stepped by dt (s); states of waves and memory begin at first_state."""
     site, spar = platform.environment, platform.hull is not None
     strips = None
     if spar:
@@ -101,7 +101,7 @@ def build_hydro(platform, waves, current, options, first_state=N_RIGID):
         matrices=build_body_matrices(
             platform.potential_flow, platform.additional, site.water_density, site.gravity
         ),
-        radiation=build_radiation(platform.potential_flow, options, default_step(options), first_state),
+        radiation=build_radiation(platform.potential_flow, options, dt, first_state),
         members=members_in_waves(_members(platform, options), waves, options),
         excitation=excitation,
         depth=float(site.water_depth),

@@ -30,7 +30,7 @@ from fowt_env.scene.actuators import drive_states
 from fowt_env.scene.options import default_step
 from fowt_env.scene.parts import hydro_in_waves, wake_states
 from fowt_env.scene.radiation_fit import memory_for_step
-from fowt_env.scene.tower import tower_states
+from fowt_env.scene.tower import tower_frequency, tower_states
 from fowt_env.scene.user_loads import Load, first_nonfinite_load
 from fowt_env.scene.weather import Sea, Wind, build_weather
 from fowt_env.weather.wind import hub_series
@@ -171,6 +171,7 @@ class Scene:
                 user_data_size(len(self.loads), max((load.states for load in self.loads), default=0))
             ),
             history=np.zeros((4, self.n_state)),
+            elastic=np.zeros((4, tower_states(self.model.tower) // 2)),
             samples=np.zeros((4 * rotor_samples(self.model.integrator), N_SAMPLE)),
             radiation=memory_data(hydro),
             blades=np.zeros((0 if self.model.pitches is None else BLADES, N_BLADE_LOAD)),
@@ -218,8 +219,8 @@ class Scene:
 
     @property
     def dt(self) -> float:
-        """Default physics step, s: that of the scene's integrator, or a finer one of its fidelity."""
-        return default_step(self.options)
+        """Default physics step, s: that of the scene's integrator, or finer by its fidelity or its tower."""
+        return default_step(self.options, tower_frequency(self.model.tower))
 
     def with_step(self, dt: float) -> "Scene":
         """This scene, made to be stepped by dt (s): a convolution of radiation is of one step alone."""

@@ -89,6 +89,39 @@ def tower_states(modes):
     return 0 if modes is None else 2 * modes.slope.shape[0]
 
 
+def tower_frequency(modes):
+    """Largest natural frequency (rad/s) of TowerModes on their floater without water; 0 for None (rigid).
+
+    Structure and inertia alone, of the straight tower and the rotor held: added mass and weight lower it.
+    """
+    if modes is None:
+        return 0.0
+    n, along = len(modes.slope), modes.fore_aft
+    across, height, first = 1.0 - along, modes.top_height, modes.upper_moment
+    cross = np.cross(np.eye(3), first)
+    upper = np.block([[modes.upper_mass * np.eye(3), -cross], [cross, modes.upper_inertia]])
+    # velocity of the tower top and of the nacelle's rotation, by the platform's six and by the deflections'
+    moved = np.zeros((6, 6 + n))
+    moved[:, :6] = np.eye(6)
+    moved[0, 4], moved[1, 3] = height, -height
+    moved[0, 6:], moved[1, 6:], moved[3, 6:], moved[4, 6:] = (
+        along,
+        across,
+        -across * modes.slope,
+        along * modes.slope,
+    )
+    mass = moved.T @ upper @ moved
+    mass[:6, :6] += modes.lower
+    tower = np.zeros((6, n))
+    tower[0], tower[1] = along * modes.first_moment, across * modes.first_moment
+    tower[3], tower[4] = -across * modes.height_moment, along * modes.height_moment
+    mass[:6, 6:] += tower
+    mass[6:, :6] += tower.T
+    mass[6:, 6:] += modes.mass * (np.outer(along, along) + np.outer(across, across))
+    flexibility = np.linalg.inv(mass)[6:, 6:]
+    return float(np.sqrt(np.linalg.eigvals(flexibility @ modes.stiffness).real.max()))
+
+
 def _option(count):
     return list(MODES)[count]
 

@@ -94,28 +94,26 @@ class Turbine:
     def __init__(self, platform, turbine, tower):
         ballast, straight, nacelle, rotor = platform.ballast, platform.tower, turbine.nacelle, turbine.rotor
         self.tower, self.n, self.gravity = tower, len(tower.slope), platform.environment.gravity
-        self.ratio, self.tilt = turbine.drivetrain.gear_ratio, rotor.shaft_tilt
+        self.ratio, self.tilt, self.base = (
+            turbine.drivetrain.gear_ratio,
+            rotor.shaft_tilt,
+            straight.base_height,
+        )
         shaft = np.array([np.cos(self.tilt), 0.0, -np.sin(self.tilt)])
         self.hub = np.array([-rotor.overhang, 0.0, rotor.hub_height])
+        self.rotor_centre = self.hub + rotor.cm_offset * shaft
         place = np.array([ballast.cm_downwind, ballast.cm_left, -ballast.cm_depth])
-        floor = [
-            particles(ballast.mass, place, ballast.inertia),
-            particles(straight.mass, np.array([0.0, 0.0, straight.cm_height]), straight.inertia),
-            # the lumps move the straight tower's mass from its axis: taken off there, put back displaced
-            (-tower.mass, np.column_stack([0.0 * tower.height, 0.0 * tower.height, tower.height])),
-        ]
-        self.floor = [np.concatenate(parts) for parts in zip(*floor, strict=True)]
+        self.floater = particles(ballast.mass, place, ballast.inertia)
+        # the lumps take the straight tower's mass from its axis and put it where they are
+        axis = np.column_stack([0.0 * tower.height, 0.0 * tower.height, tower.height])
+        whole = particles(straight.mass, np.array([0.0, 0.0, straight.cm_height]), straight.inertia)
+        self.straight = together(whole, (-tower.mass, axis))
         centre = np.array([nacelle.cm_downwind, nacelle.cm_left, nacelle.cm_height])
         wheel, rim = self._wheel(turbine.drivetrain.generator_inertia)
-        self.nacelle = [
-            np.concatenate(parts)
-            for parts in zip(
-                particles(nacelle.mass, centre, nacelle.inertia), (-wheel, rim + SPIN_CENTRE), strict=True
-            )
-        ]
+        self.nacelle = together(particles(nacelle.mass, centre, nacelle.inertia), (-wheel, rim + SPIN_CENTRE))
         along = np.outer(shaft, shaft)
         inertia = rotor.inertia * along + rotor.inertia_diameter * (np.eye(3) - along)
-        masses, places = particles(rotor.mass, self.hub + rotor.cm_offset * shaft, inertia)
+        masses, places = particles(rotor.mass, self.rotor_centre, inertia)
         self.rotor = masses, places - self.hub
         self.wheel = wheel, rim
 
@@ -157,7 +155,8 @@ class Turbine:
             moved = c[7 + i] * tower.shape[:, i]
             x, y = (x + moved, y) if i % 2 == 0 else (x, y + moved)
         return [
-            (self.floor[0], self.on_platform(c, columns(self.floor[1]))),
+            (self.floater[0], self.on_platform(c, columns(self.floater[1]))),
+            (self.straight[0], self.on_platform(c, columns(self.straight[1]))),
             (tower.mass, self.on_platform(c, [x, y, Path(tower.height)])),
             (self.nacelle[0], self.on_nacelle(c, columns(self.nacelle[1]))),
             (self.rotor[0], self.on_shaft(c, columns(self.rotor[1]), self.hub, 1.0)),
@@ -168,8 +167,8 @@ class Turbine:
         """Path of the potential energy: weight, shortening of the tower, its structure."""
         total = Path(0.0)
         for masses, (_, _, Z) in self.bodies(c):
-            weight = Z * (masses * self.gravity)
-            total = total + Path(*(np.sum(part) for part in (weight.value, weight.first, weight.second)))
+            parts = (np.asarray(part) * masses for part in (Z.value, Z.first, Z.second))
+            total = total + Path(*(np.sum(part, axis=-1, keepdims=True) for part in parts)) * self.gravity
         upright = self.on_platform([Path(0.0)] * 3 + c[3:], [Path(0.0), Path(0.0), Path(1.0)])[2]
         for i in range(self.n):
             for j in range(self.n):
@@ -181,71 +180,119 @@ class Turbine:
     def kinetic(self, c):
         return 0.5 * sum(np.sum(m * (x.first**2)) for m, place in self.bodies(c) for x in place)
 
-    def accelerations(self, x, blocks, torque, forces, added):
-        """(v', w', q'', rotor acceleration) at a plant's state.
-
-        blocks: (index of q, of its rates); torque: of the generator, its own shaft; added: (6, 6) added mass.
-        forces: [(on the nacelle or not, point, force, moment, (3,) each)] in the axes of what they act on.
-        """
-        n, size = self.n, 7 + self.n
+    def path(self, x, blocks):
+        """Coordinates [Path] of a plant's state, no second derivatives; blocks: index of q, of its rates."""
+        n = self.n
         place = np.r_[x[:6], x[6], x[blocks[0] : blocks[0] + n]]
-        unit = np.eye(size)
-        turning = np.array([self.motion(self.still(place, unit[k]))[1] for k in range(size)]).T
-        R = self.frame(self.still(place, np.zeros(size)))[0]
-        rate = np.zeros(size)
-        rate[:3], rate[3:6] = R @ x[7:10], np.linalg.solve(turning[:, 3:6], x[10:13])
+        rate, units = np.zeros(7 + n), self.units(place)
+        rate[:3] = self.frame(units)[0] @ x[7:10]
+        rate[3:6] = np.linalg.solve(self.motion(units)[1][:, 3:6], x[10:13])
         rate[6], rate[7:] = x[13], x[blocks[1] : blocks[1] + n]
-
-        moving = [Path(place[k], rate[k]) for k in range(size)]
-        columns_of = [self.still(place, unit[k]) for k in range(size)]
-        effect = [[[X.first for X in body[1]] for body in self.bodies(c)] for c in columns_of]
-        matrix, right = np.zeros((size, size)), np.zeros(size)
-        for number, (masses, found) in enumerate(self.bodies(moving)):
-            jacobian = [
-                np.array([np.broadcast_to(e, masses.shape) for e in effect[k][number]]) for k in range(size)
-            ]
-            bias = np.array([np.broadcast_to(X.second, masses.shape) for X in found])
-            for k in range(size):
-                right[k] -= np.sum(masses * bias * jacobian[k])
-                for j in range(size):
-                    matrix[k, j] += np.sum(masses * jacobian[k] * jacobian[j])
-        for k in range(size):
-            right[k] -= self.potential(columns_of[k]).first
-        right[7:] -= self.tower.damping @ rate[7:]
-        right[6] -= self.ratio * torque
-        for aloft, point, force, moment in forces:
-            carry = self.on_nacelle if aloft else self.on_platform
-            frame, _, _ = self.frame(self.still(place, np.zeros(size)), aloft)
-            for k in range(size):
-                speed = np.array([float(X.first) for X in carry(columns_of[k], [Path(p) for p in point])])
-                right[k] += (frame @ force) @ speed + moment @ self.motion(columns_of[k], aloft)[1]
-        # added mass acts on the rates of the body's own velocity components, which are linear in c''
-        body = np.array([np.concatenate(self.motion(columns_of[k])[:2]) for k in range(size)]).T
-        bias = np.concatenate(self.motion(moving)[2:])
-        matrix += body.T @ added @ body
-        right -= body.T @ added @ bias
-        second = np.linalg.solve(matrix, right)
-        return np.r_[body @ second + bias, second[7:], second[6]]
-
-    def still(self, place, rate):
         return [Path(p, r) for p, r in zip(place, rate, strict=True)]
 
+    def units(self, place):
+        """One path for each coordinate, along which it alone moves: a row of first derivatives each."""
+        return [Path(p, unit[:, None]) for p, unit in zip(place, np.eye(len(place)), strict=True)]
+
+    def fall(self, moving, torque, forces, added):
+        """moving (a path) with the second derivatives that follow from its loads.
+
+        torque: of the generator, on its own shaft; added: (6, 6) added mass.
+        forces: [(on the nacelle or not, point, force, moment, (3,) each)] in the axes of what they act on.
+        """
+        size = 7 + self.n
+        units = self.units([c.value for c in moving])
+        matrix, right = np.zeros((size, size)), -self.potential(units).first[:, 0]
+        for (masses, alone), (_, found) in zip(self.bodies(units), self.bodies(moving), strict=True):
+            jacobian = np.array([np.broadcast_to(X.first, (size, len(masses))) for X in alone])
+            bias = np.array([np.broadcast_to(X.second, masses.shape) for X in found])
+            right -= np.einsum("p,ip,ikp->k", masses, bias, jacobian)
+            matrix += np.einsum("p,ijp,ikp->jk", masses, jacobian, jacobian)
+        right[7:] -= self.tower.damping @ [c.first for c in moving[7:]]
+        right[6] -= self.ratio * torque
+        for aloft, point, force, moment in forces:
+            place = self.carry(aloft)(units, [Path(p) for p in point])
+            speed = np.array([np.broadcast_to(X.first, (size, 1))[:, 0] for X in place])
+            right += (self.frame(units, aloft)[0] @ force) @ speed + moment @ self.motion(units, aloft)[1]
+        # added mass acts on the rates of the body's own velocity components, which are linear in c''
+        body = np.concatenate(self.motion(units)[:2])
+        matrix += body.T @ added @ body
+        right -= body.T @ added @ np.concatenate(self.motion(moving)[2:])
+        return [
+            Path(c.value, c.first, a) for c, a in zip(moving, np.linalg.solve(matrix, right), strict=True)
+        ]
+
+    def accelerations(self, falling):
+        """(v', w', q'', rotor acceleration) of a path."""
+        second = [c.second for c in falling]
+        return np.r_[self.motion(falling)[2], self.motion(falling)[3], second[7:], second[6]]
+
+    def point(self, falling, place):
+        """(velocity, acceleration) of a point of the nacelle, in its axes."""
+        found, R = self.on_nacelle(falling, [Path(p) for p in place]), self.frame(falling, True)[0]
+        return R.T @ [float(X.first) for X in found], R.T @ [float(X.second) for X in found]
+
+    def base_load(self, falling, forces):
+        """Force and moment on the tower's base, in the platform's axes: of forces and masses above it."""
+        R, up = self.frame(falling)[0], np.array([0.0, 0.0, 1.0])
+        foot = np.array([X.value for X in self.on_platform(falling, [Path(0.0), Path(0.0), Path(self.base)])])
+        force, moment = np.zeros(3), np.zeros(3)
+        for masses, found in self.bodies(falling)[1:]:
+            at = np.array([np.broadcast_to(X.value, masses.shape) for X in found])
+            a = np.array([np.broadcast_to(X.second, masses.shape) for X in found])
+            weight = -masses * (a + self.gravity * up[:, None])
+            force += weight.sum(axis=1)
+            moment += np.cross(at.T - foot, weight.T).sum(axis=0)
+        for aloft, point, push, turn in forces:
+            if aloft:
+                at = np.array([float(X.value) for X in self.on_nacelle(falling, [Path(p) for p in point])])
+                frame = self.frame(falling, True)[0]
+                force += frame @ push
+                moment += np.cross(at - foot, frame @ push) + frame @ turn
+        q = np.array([c.value for c in falling[7:]])
+        fall = 0.5 * q @ self.tower.weight_stiffness @ q  # kg m, along the tower's axis
+        moment += np.cross(-fall * R[:, 2], -self.gravity * up)
+        return np.r_[R.T @ force, R.T @ moment]
+
+    def carry(self, aloft):
+        return self.on_nacelle if aloft else self.on_platform
+
     def frame(self, c, aloft=False):
-        """Rotation (3, 3) of platform or nacelle, and its first and second derivatives."""
-        carry = self.on_nacelle if aloft else self.on_platform
+        """Rotation (3, 3) of platform or nacelle, and its two derivatives, (3, 3) or (3, 3, k)."""
+        carry = self.carry(aloft)
         origin = carry(c, [Path(0.0)] * 3)
         ends = [carry(c, [Path(float(i == k)) for i in range(3)]) for k in range(3)]
         parts = [[e - o for e, o in zip(end, origin, strict=True)] for end in ends]
-        return tuple(
-            np.array([[float(getattr(p, name)) for p in part] for part in parts]).T
-            for name in ("value", "first", "second")
+        size = self.rows(c)
+        return (
+            np.array([[p.value for p in part] for part in parts]).T,
+            np.array([[spread(p.first, size) for p in part] for part in parts]).swapaxes(0, 1),
+            np.array([[spread(p.second, size) for p in part] for part in parts]).swapaxes(0, 1),
         )
 
+    def rows(self, c):
+        """Shape of the derivatives of a quantity: () or, of units, (k,)."""
+        return np.broadcast_shapes(*(np.shape(p.first) for p in c))[:1]
+
     def motion(self, c, aloft=False):
-        """(v, w, v', w') of platform or nacelle, components in its own axes; c'' zero or as in c."""
+        """(v, w, v', w'), (3,) or (3, k), of platform or nacelle in its own axes."""
         R, dR, ddR = self.frame(c, aloft)
-        r1, r2 = np.array([p.first for p in c[:3]]), np.array([p.second for p in c[:3]])
-        return R.T @ r1, vee(R.T @ dR), R.T @ r2 + dR.T @ r1, vee(R.T @ ddR + dR.T @ dR)
+        size = self.rows(c)
+        r1 = np.array([spread(p.first, size) for p in c[:3]])
+        r2 = np.array([spread(p.second, size) for p in c[:3]])
+        turning = np.einsum("ji,jk...->ik...", R, ddR) + np.einsum("ji...,jk...->ik...", dR, dR)
+        rate = R.T @ r2 + np.einsum("ji...,j...->i...", dR, r1)
+        return R.T @ r1, vee(np.einsum("ji,jk...->ik...", R, dR)), rate, vee(turning)
+
+
+def spread(derivative, size):
+    """A derivative () or (k, 1) in the shape (k,) of units, or ()."""
+    return np.broadcast_to(derivative, size + (1,) * len(size)).reshape(size)
+
+
+def together(*parts):
+    """One (masses, places) of several."""
+    return tuple(np.concatenate(arrays) for arrays in zip(*parts, strict=True))
 
 
 def columns(places):
@@ -254,5 +301,5 @@ def columns(places):
 
 def vee(matrix):
     """The vector of the antisymmetric part of a matrix."""
-    m = 0.5 * (matrix - matrix.T)
+    m = 0.5 * (matrix - matrix.swapaxes(0, 1))
     return np.array([m[2, 1], m[0, 2], m[1, 0]])

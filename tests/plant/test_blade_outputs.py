@@ -13,8 +13,9 @@ from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.errors import InputError
 from fowt_env.plant import blade_outputs
 from fowt_env.plant.channels import BLADE_CHANNELS
+from fowt_env.plant.measurement import N_MEASUREMENTS
 from fowt_env.plant.model import LoadCache
-from fowt_env.plant.rollout import output, output_row
+from fowt_env.plant.rollout import observe, output, output_row
 from fowt_env.plant.state import N_RIGID, State, Wrench, pose_of
 from fowt_env.plant.tower_modes import Twist
 from fowt_env.scene.mass import build_layout, build_rigid_body
@@ -141,6 +142,16 @@ def test_outputs_are_the_moments_under_the_loads_of_the_last_evaluation(scene):
     assert (found["BldPitch1"], found["BldPitch2"], found["BldPitch3"]) == (0.15, 0.12, 0.19)
     assert data.blades[:, 3].sum() == pytest.approx(found["RtFldMxh"], rel=1e-12)
     assert tuple(scene.channels[-len(BLADE_CHANNELS) :]) == BLADE_CHANNELS
+
+
+def test_a_measurement_has_the_moments_of_the_outputs(scene):
+    x, u, m = turning(scene, 0.15, 0.12, 0.19), np.zeros(scene.n_commands), np.empty(scene.n_measurements)
+    x[State.AZIMUTH] += 2.0 * np.pi
+    found = row_of(scene, x)
+    observe(scene.handle(), x, u, 0.0, np.zeros_like(x), m)
+    names = ["Azimuth", *(f"BldPitch{k}" for k in (1, 2, 3)), *(f"RootMyc{k}" for k in (1, 2, 3))]
+    names += [*(f"RootMxc{k}" for k in (1, 2, 3)), "LSSTipMys", "LSSTipMzs", "YawBrMyp", "YawBrMzp"]
+    assert list(m[N_MEASUREMENTS:]) == [found[name] for name in names]
 
 
 def test_a_blade_pitched_to_feather_bends_less_out_of_the_rotor_plane(scene):

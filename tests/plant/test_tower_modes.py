@@ -1,16 +1,24 @@
 import numpy as np
 import pytest
 from naive import flexible_tower
-from plant_helpers import leaning, random_state, rates
+from plant_helpers import leaning, random_state, rates, state
 
 from fowt_env import Load, build_scene, load_kernel
-from fowt_env.plant.state import N_RIGID, State
-from fowt_env.plant.tower_modes import TowerModes
+from fowt_env.plant.channels import Out
+from fowt_env.plant.integrators import START_STEPS
+from fowt_env.plant.measurement import N_MEASUREMENTS, Measure
+from fowt_env.plant.model import LoadCache
+from fowt_env.plant.rollout import advance, forget, observe, output_row
+from fowt_env.plant.state import N_RIGID, State, pose_of
+from fowt_env.plant.tower_modes import TowerModes, nacelle_pose
+from fowt_env.plant.user_loads import Force, Motion
 from fowt_env.scene.mass import with_masses
+from fowt_env.scene.tower import tower_frequency
 
-KINDS = {2: "modes", 4: "modes2"}
 ALOFT, BELOW = np.array([3.0, -2.0, 91.0]), np.array([4.0, 3.0, -30.0])  # m, points of two loads
 FORCES = np.array([[3e5, -2e5, 1e5, 2e6, -1e6, 3e6], [-5e5, 4e5, 8e4, 1e7, 2e7, -3e6]])  # N and N m there
+PINS = np.array([[0.0, 0.0, -30.0], [4.0, 9.0, 2.0]])  # m, points that springs hold
+SPRING = 4e6  # N/m
 
 
 @load_kernel
@@ -19,15 +27,11 @@ def constant_load(parameters, motion, force):
         force[i] = parameters[i]
 
 
-def bending_scene(n, platform, turbine, **options):
-    """A turbine in empty space with n modes and two constant loads, in the axes of nacelle and platform."""
-    loads = [
-        Load(name, constant_load, point=point, parameters=force, axes="body")
-        for name, point, force in zip(("aloft", "below"), (ALOFT, BELOW), FORCES, strict=True)
-    ]
-    return build_scene(
-        platform, turbine=turbine, tower=KINDS[n], hydrodynamics=False, mooring=False, loads=loads, **options
-    )
+@load_kernel
+def spring(parameters, motion, force):
+    """A spring to an inertial point, the same in every direction."""
+    for i in range(3):
+        force[Force.FX + i] = parameters[0] * (parameters[1 + i] - motion[Motion.X + i])
 
 
 def lumps(n, rng, top, base=10.0):
@@ -42,11 +46,11 @@ def lumps(n, rng, top, base=10.0):
     )
 
 
-def modes_of(tower, first):
+def modes_of(tower):
     """TowerModes of lumps."""
     n = len(tower.slope)
     return TowerModes(
-        first=first,
+        first=N_RIGID,
         fore_aft=np.array([1.0, 0.0] * (n // 2)),
         top_height=tower.top,
         slope=tower.slope,
@@ -60,28 +64,193 @@ def modes_of(tower, first):
     )
 
 
-def random_bending(rng, n, size):
-    """(state, index of the first deflection) of a scene in wild motion."""
-    first = N_RIGID
-    x = random_state(rng, size, tilt=0.3, speed=3.0, turning=0.3)
-    x[first : first + n] = 2.0 * rng.normal(size=n)
-    x[first + n : first + 2 * n] = 3.0 * rng.normal(size=n)
-    return x
+class Bending:
+    """A leaning turbine in empty space with n modes and two loads of the user's, and its twin."""
+
+    def __init__(self, platform, turbine, n, loads, damped=True, **options):
+        platform, turbine = leaning(platform, turbine)
+        self.tower, self.n = lumps(n, np.random.default_rng(n), platform.tower.top_height), n
+        if not damped:
+            self.tower.damping[:] = 0.0
+        self.twin = flexible_tower.Turbine(platform, turbine, self.tower)
+        scene = build_scene(
+            platform,
+            turbine=turbine,
+            tower="modes",
+            hydrodynamics=False,
+            mooring=False,
+            loads=loads,
+            **options,
+        )
+        self.scene = scene.with_model(tower=with_masses(modes_of(self.tower), platform, turbine))
+        self.blocks = N_RIGID, N_RIGID + n
+
+    def random(self, rng):
+        """A state in wild motion."""
+        x = random_state(rng, self.scene.n_state, tilt=0.3, speed=3.0, turning=0.3)
+        x[N_RIGID : N_RIGID + self.n] = 2.0 * rng.normal(size=self.n)
+        x[N_RIGID + self.n :] = 3.0 * rng.normal(size=self.n)
+        return x
+
+    def accelerations(self, dx):
+        rate = slice(N_RIGID + self.n, N_RIGID + 2 * self.n)
+        return np.r_[dx[State.VX : State.WZ + 1], dx[rate], dx[State.ROTOR_SPEED]]
+
+
+CONSTANT = [
+    Load(name, constant_load, point=point, parameters=force, axes="body")
+    for name, point, force in zip(("aloft", "below"), (ALOFT, BELOW), FORCES, strict=True)
+]
+ACTING = [(True, ALOFT, *FORCES[0].reshape(2, 3)), (False, BELOW, *FORCES[1].reshape(2, 3))]
 
 
 @pytest.mark.parametrize("n", [2, 4])
 def test_accelerations_are_those_of_particles_on_their_paths(platform, turbine, n):
     rng = np.random.default_rng(n)
-    platform, turbine = leaning(platform, turbine)
-    tower = lumps(n, rng, platform.tower.top_height)
-    modes = modes_of(tower, N_RIGID)
-    scene = bending_scene(2, platform, turbine).with_model(tower=with_masses(modes, platform, turbine))
-    twin = flexible_tower.Turbine(platform, turbine, tower)
-    forces = [(True, ALOFT, *FORCES[0].reshape(2, 3)), (False, BELOW, *FORCES[1].reshape(2, 3))]
+    case = Bending(platform, turbine, n, CONSTANT)
     for _ in range(200):
-        x = random_bending(rng, n, scene.n_state)
-        dx = rates(scene, x, u=(2e4, 0.0))
-        rate = slice(N_RIGID + n, N_RIGID + 2 * n)
-        found = np.r_[dx[State.VX : State.WZ + 1], dx[rate], dx[State.ROTOR_SPEED]]
-        expected = twin.accelerations(x, (N_RIGID, N_RIGID + n), 2e4, forces, np.zeros((6, 6)))
+        x = case.random(rng)
+        found = case.accelerations(rates(case.scene, x, u=(2e4, 0.0)))
+        falling = case.twin.fall(case.twin.path(x, case.blocks), 2e4, ACTING, np.zeros((6, 6)))
+        expected = case.twin.accelerations(falling)
         assert np.abs(found - expected).max() < 1e-10 * np.abs(expected).max()
+
+
+def test_outputs_are_those_of_particles_on_their_paths(platform, turbine):
+    rng = np.random.default_rng(7)
+    case = Bending(platform, turbine, 4, CONSTANT)
+    scene, twin = case.scene, case.twin
+    top, u = np.array([0.0, 0.0, case.tower.top]), np.array([2e4, 0.0])
+    for _ in range(10):
+        x = case.random(rng)
+        falling = twin.fall(twin.path(x, case.blocks), 2e4, ACTING, np.zeros((6, 6)))
+        row = output_row(scene.handle(), x, u, 0.0, len(scene.channels))
+        base = row[Out.TWRBSFXT : Out.TWRBSMZT + 1]
+        expected = twin.base_load(falling, ACTING)
+        assert np.abs(base - expected).max() < 1e-10 * np.abs(expected).max()
+        velocity, acceleration = twin.point(falling, top)
+        assert row[[Out.NCIMUTAXS, Out.NCIMUTAYS]] == pytest.approx(acceleration[:2], rel=1e-9)
+        deflection = x[N_RIGID : N_RIGID + 4].reshape(2, 2).sum(axis=0)
+        assert row[-4:] == pytest.approx([*deflection, *acceleration[:2]], rel=1e-9)
+        _, centre = twin.point(falling, twin.rotor_centre)
+        R, _, _ = twin.frame(falling, True)
+        shaft = np.array([np.cos(twin.tilt), 0.0, -np.sin(twin.tilt)])
+        push = shaft @ (centre + twin.gravity * R[2])
+        assert row[Out.ROTTHRUST] == pytest.approx(-turbine.rotor.mass * push, rel=1e-9)
+        turning = shaft @ twin.motion(falling, True)[3] + falling[6].second
+        assert row[Out.ROTTORQ] == pytest.approx(-turbine.rotor.inertia * turning, rel=1e-9)
+        measured, dx = np.zeros(N_MEASUREMENTS), np.zeros_like(x)
+        observe(scene.handle(), x, u, 0.0, dx, measured)
+        assert measured[Measure.NACELLE_VELOCITY] == pytest.approx(velocity[0], rel=1e-9)
+        assert measured[Measure.NACELLE_ACCELERATION] == pytest.approx(acceleration[0], rel=1e-9)
+
+
+def test_the_nacelle_frame_is_where_the_nacelle_is(platform, turbine):
+    rng = np.random.default_rng(3)
+    case = Bending(platform, turbine, 4, CONSTANT)
+    for _ in range(10):
+        x = case.random(rng)
+        pose, path = nacelle_pose(pose_of(x), x, case.scene.model.tower), case.twin.path(x, case.blocks)
+        origin = [float(X.value) for X in case.twin.on_nacelle(path, [flexible_tower.Path(0.0)] * 3)]
+        R, _, _ = case.twin.frame(path, True)
+        velocity, _ = case.twin.point(path, np.zeros(3))
+        turning = case.twin.motion(path, True)[1]
+        found, expected = np.array(pose), np.r_[origin, R.ravel(), velocity, turning]
+        assert np.abs(found - expected).max() < 1e-12 * np.abs(expected).max()
+
+
+def springs():
+    """Loads of the user's: two springs that hold two points of the platform where they are upright."""
+    return [
+        Load(name, spring, point=pin, parameters=(SPRING, *pin))
+        for name, pin in zip(("one", "other"), PINS, strict=True)
+    ]
+
+
+def swinging(case):
+    """A state of a turbine on its springs in lively motion."""
+    x = state(
+        case.scene.n_state, surge=0.4, sway=-0.2, roll=0.03, platform_pitch=0.05, yaw=0.02, rotor_speed=1.2
+    )
+    x[State.VX : State.WZ + 1] = [0.5, -0.2, 0.1, 0.01, 0.02, -0.01]
+    x[N_RIGID : N_RIGID + case.n] = [0.3, -0.2, 0.02, 0.01][: case.n]
+    return x
+
+
+@pytest.mark.slow
+def test_energy_is_kept_over_a_million_steps(platform, turbine):
+    case = Bending(platform, turbine, 2, springs(), damped=False, integrator="rk4")
+    x, u, dt, parts = swinging(case), np.zeros(2), 0.001, 20
+    handle = case.scene.handle()
+
+    def energy():
+        path = case.twin.path(x, case.blocks)
+        held = 0.0
+        for pin in PINS:
+            place = [
+                float(X.value) for X in case.twin.on_platform(path, [flexible_tower.Path(p) for p in pin])
+            ]
+            held += 0.5 * SPRING * np.sum((place - pin) ** 2)
+        return case.twin.kinetic(path), case.twin.potential(path).value + held
+
+    kinetic, total, spin = [], [], 0.5 * case.scene.model.rigid_body.rotor_row * x[State.ROTOR_SPEED] ** 2
+    forget(handle)
+    for part in range(parts + 1):
+        T, V = energy()
+        kinetic.append(T - spin)
+        total.append(T + V)
+        if part < parts:
+            assert advance(handle, x, u, part * 1_000_000 // parts, 1_000_000 // parts, dt) == 0
+    assert np.ptp(total) < 1e-9 * max(kinetic)
+
+
+@pytest.fixture(scope="module")
+def pinned(platform, turbine):
+    """{integrator: Bending on springs}."""
+    return {name: Bending(platform, turbine, 2, springs(), integrator=name) for name in ("rk4", "ab4")}
+
+
+def exact(pinned, duration, samples):
+    """(samples + 1, n_state) of a swinging turbine, by steps of half a millisecond at most."""
+    case, dt = pinned["rk4"], 0.0005
+    x, handle, found = swinging(case), case.scene.handle(), []
+    forget(handle)
+    for k in range(samples):
+        found.append(x.copy())
+        steps = int(np.ceil(duration / samples / dt))
+        assert advance(handle, x, np.zeros(2), k * steps, steps, duration / samples / steps) == 0
+    return np.array([*found, x])
+
+
+def swung(pinned, integrator, dt, steps):
+    """State after steps; a multistep method is given its past, which its own first steps are of low order."""
+    case, u = pinned[integrator], np.zeros(2)
+    data = case.scene.data()
+    handle, tower = case.scene.handle(data), case.scene.model.tower
+    start = exact(pinned, START_STEPS * dt, START_STEPS)
+    q, v = slice(N_RIGID, N_RIGID + case.n), slice(N_RIGID + case.n, N_RIGID + 2 * case.n)
+    for k, x in enumerate(start[:-1]):
+        forget(handle)
+        observe(handle, x, u, k * dt, data.history[START_STEPS - 1 - k], np.zeros(N_MEASUREMENTS))
+        data.elastic[START_STEPS - 1 - k] = -tower.stiffness @ x[q] - tower.damping @ x[v]
+    forget(handle)
+    data.cache[LoadCache.STEPS] = START_STEPS
+    x = start[-1].copy()
+    assert advance(handle, x, u, START_STEPS, steps - START_STEPS, dt) == 0
+    return x
+
+
+@pytest.mark.parametrize("integrator", ["rk4", "ab4"])
+def test_it_converges_with_order_four(pinned, integrator):
+    end = exact(pinned, 4.0, 1)[-1]
+    errors = [np.linalg.norm((swung(pinned, integrator, 4.0 / n, n) - end)[N_RIGID:]) for n in (200, 400)]
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(4.0, abs=0.35)
+
+
+def test_a_tower_keeps_its_period_at_the_default_step(pinned):
+    # 0.1 s is 0.3 over the frequency of OC3-Hywind: Adams-Bashforth 4 alone is 8 deg late after 20 periods
+    dt = 0.3 / tower_frequency(pinned["ab4"].scene.model.tower)
+    steps = round(20 * 2.0 * np.pi / 0.3)
+    end = exact(pinned, steps * dt, 1)[-1]
+    late = swung(pinned, "ab4", dt, steps) - end
+    assert np.abs(late[N_RIGID:]).max() < 0.01 * np.abs(end[N_RIGID:]).max()

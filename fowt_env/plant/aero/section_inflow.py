@@ -53,7 +53,6 @@ from fowt_env.plant.aero.section_table import (
     _all_rows,
     _at,
     _blade,
-    _blade_row,
     _pitch_row,
     _profile,
     _shear,
@@ -69,6 +68,7 @@ from fowt_env.plant.state import NO_LOAD, State
 
 # further cells of the loads before the first: a wake that lags a lull may blow back through the rotor plane
 REVERSED = 64
+THIRD = 2.0 * pi / 3.0  # of a turn, rad
 
 
 class DynamicSections(NamedTuple):
@@ -85,6 +85,8 @@ class DynamicSections(NamedTuple):
 class Rows(NamedTuple):
     """The two rows of the tables about a blade pitch, and its place between them."""
 
+    cosine: float  # of the blade pitch
+    sine: float
     low_induced: np.ndarray  # (n, directions, 2)
     high_induced: np.ndarray
     low_load: np.ndarray  # (n, directions, 2 or 3)
@@ -100,22 +102,25 @@ class Direction(NamedTuple):
 
 
 class Cell(NamedTuple):
-    """The cell of a direction, its weights in the low and the high row, and whether the table has it."""
+    """The cell of a direction, its weights in the low and the high row."""
 
     k: int
     a: float
     b: float
     c: float
     d: float
-    inside: bool
 
 
 class Flow(NamedTuple):
-    """Flow at a station with its wake, m/s, and whether the tables know the wind that made it."""
+    """Flow at a station with its wake."""
 
-    normal: float
+    normal: float  # m/s
     tangential: float
-    inside: bool
+    rate_0: float  # of the four wake states, m/s2
+    rate_1: float
+    rate_2: float
+    rate_3: float
+    outside: int  # 1 where the tables do not know it, else 0
 
 
 @entry
@@ -183,10 +188,22 @@ def _filled_tables(elements):
 
 
 @inlined_kernel
-def _rows(row, rotor):
-    """Rows of a place among the rows of the tables."""
+def _rows(blade_pitch, rotor):
+    """Rows of a blade pitch (rad) within the table."""
+    row = _pitch_row(blade_pitch)
     i = int(row)
-    return Rows(rotor.induced[i], rotor.induced[i + 1], rotor.load[i], rotor.load[i + 1], row - i)
+    return Rows(
+        cos(blade_pitch), sin(blade_pitch), rotor.induced[i], rotor.induced[i + 1], rotor.load[i],
+        rotor.load[i + 1], row - i,
+    )  # fmt: skip
+
+
+@inlined_kernel
+def _blade_rows(blade, first, x, rotor, pitches):
+    """Rows of a blade; first: those of the first one."""
+    if pitches is None:
+        return first
+    return _rows(pitch_of(blade, x, pitches), rotor)
 
 
 @inlined_kernel
@@ -197,17 +214,15 @@ def _cell(v_normal, v_tangential, scale, total, first, fraction):
     """
     ahead = AHEAD * v_normal
     place = (ahead if v_tangential >= 0.0 else AHEAD * total - BEHIND * v_tangential) / total + first
-    inside = place >= 0.0 and (v_normal > 0.0 or v_tangential > 0.0)
     place = place if place > 0.0 else 0.0  # not a number too
     k = min(int(place), first + AHEAD + BEHIND - 1)
     part = place - k
     return Cell(
-        k,
+        np.uintp(k),  # indices without sign are not tested for counting from the end
         scale * (1.0 - fraction) * (1.0 - part),
         scale * (1.0 - fraction) * part,
         scale * fraction * (1.0 - part),
         scale * fraction * part,
-        inside,
     )
 
 
@@ -215,17 +230,18 @@ def _cell(v_normal, v_tangential, scale, total, first, fraction):
 def _looked_up(cell, j, part, low, high):
     """A part of what the table has at a Cell of station j."""
     k = cell.k
+    after = k + np.uintp(1)
     return (
         cell.a * low[j, k, part]
-        + cell.b * low[j, k + 1, part]
+        + cell.b * low[j, after, part]
         + cell.c * high[j, k, part]
-        + cell.d * high[j, k + 1, part]
+        + cell.d * high[j, after, part]
     )
 
 
 @inlined_kernel
-def _flow(v_normal, v_tangential, i, j, rows, rate, x, dx, rotor):
-    """Flow at station j in this wind with the wake states from i on, whose rates go into dx.
+def _flow(v_normal, v_tangential, i, j, rows, rate, x, rotor):
+    """Flow at station j in this wind with the wake states from i on.
 
     rate: 1/tau_1 without induction, 1/s. The filter is that of wake.filtered_induction.
     """
@@ -235,12 +251,25 @@ def _flow(v_normal, v_tangential, i, j, rows, rate, x, dx, rotor):
     steady_tangential = _looked_up(cell, j, 1, rows.low_induced, rows.high_induced)
     slow = rate * pace(-steady_normal / v_normal)
     fast = slow * rotor.ratio[j]
-    normal, tangential = x[i + 1], x[i + 3]
-    dx[i] = (0.4 * steady_normal - x[i]) * slow
-    dx[i + 1] = (x[i] + 0.6 * steady_normal - normal) * fast
-    dx[i + 2] = (0.4 * steady_tangential - x[i + 2]) * slow
-    dx[i + 3] = (x[i + 2] + 0.6 * steady_tangential - tangential) * fast
-    return Flow(v_normal + normal, v_tangential + tangential, v_normal > 0.0 and total < LARGEST_SPEED)
+    a, b, c, d = np.uintp(i), np.uintp(i + 1), np.uintp(i + 2), np.uintp(i + 3)
+    first_normal, normal, first_tangential, tangential = x[a], x[b], x[c], x[d]
+    known = v_normal + normal > 0.0 or REVERSED * v_tangential >= -AHEAD * (v_normal + normal)
+    return Flow(
+        v_normal + normal,
+        v_tangential + tangential,
+        (0.4 * steady_normal - first_normal) * slow,
+        (first_normal + 0.6 * steady_normal - normal) * fast,
+        (0.4 * steady_tangential - first_tangential) * slow,
+        (first_tangential + 0.6 * steady_tangential - tangential) * fast,
+        0 if v_normal > 0.0 and total < LARGEST_SPEED and known else 1,
+    )
+
+
+@inlined_kernel
+def _put_rates(flow, i, dx):
+    """Put the rates of a Flow into dx, from state i on."""
+    dx[np.uintp(i)], dx[np.uintp(i + 1)] = flow.rate_0, flow.rate_1
+    dx[np.uintp(i + 2)], dx[np.uintp(i + 3)] = flow.rate_2, flow.rate_3
 
 
 @inlined_kernel
@@ -251,82 +280,143 @@ def _load_cell(flow, rows):
 
 
 @inlined_kernel
-def _with_straight(force, v_normal, v_tangential, i, j, rows, rate, x, dx, rotor):
-    """The CurvedForce of a straight blade with station j in this wind, wake states from i on."""
-    flow = _flow(v_normal, v_tangential, i, j, rows, rate, x, dx, rotor)
+def _with_straight(force, flow, j, rows, rotor):
+    """The CurvedForce of a straight blade with station j in this Flow."""
     cell = _load_cell(flow, rows)
     fn = _looked_up(cell, j, 0, rows.low_load, rows.high_load)
     ft = _looked_up(cell, j, 1, rows.low_load, rows.high_load)
     load, arm = force.load, rotor.arm[j]
     return CurvedForce(
         BladeLoad(load.fx + fn, 0.0, load.ft + ft, load.mx + arm * ft, 0.0, load.mt - arm * fn),
-        force.outside + (0 if flow.inside and cell.inside else 1),
+        force.outside + flow.outside,
     )
 
 
 @inlined_kernel
-def _with_curved(force, v_normal, v_tangential, i, j, lever, rows, rate, x, dx, rotor):
-    """As _with_straight of a curved blade."""
-    flow = _flow(v_normal, v_tangential, i, j, rows, rate, x, dx, rotor)
+def _with_curved(force, flow, j, lever, rows):
+    """The CurvedForce of a curved blade with station j in this Flow."""
     cell = _load_cell(flow, rows)
     fn = _looked_up(cell, j, 0, rows.low_load, rows.high_load)
     ft = _looked_up(cell, j, 1, rows.low_load, rows.high_load)
     moment = _looked_up(cell, j, 2, rows.low_load, rows.high_load)
     load = with_station(force.load, fn, ft, moment, lever)
-    return CurvedForce(load, force.outside + (0 if flow.inside and cell.inside else 1))
+    return CurvedForce(load, force.outside + flow.outside)
 
 
-@kernel
-def _straight_sheared(
-    start, psi, pose, hub, now, series, profile, blade_pitch, rows, rate, x, dx, rotor, shape
-):
-    """CurvedForce of a straight blade in a sheared wind: v = v0 + v1 radius + v2 profile."""
-    blade, radii = _blade(psi, x[State.ROTOR_SPEED], pose, hub), rotor.elements.radius
+class StraightWind(NamedTuple):
+    """Wind relative to a straight blade in a sheared wind: v0 + v1 radius + v2 profile(z0 + z1 radius)."""
+
+    n0: float  # normal
+    n1: float
+    n2: float
+    t0: float  # tangential
+    t1: float
+    t2: float
+    z0: float
+    z1: float
+
+
+@inlined_kernel
+def _straight_wind(psi, pose, hub, x, now, series, profile):
+    """StraightWind of the blade at azimuth psi."""
+    blade = _blade(psi, x[State.ROTOR_SPEED], pose, hub)
     height, left = hub.Z - series.reference_height, hub.Y
     linear = (now.vertical_shear * height + now.horizontal_shear * left) / series.reference_length
     slope = (now.vertical_shear * blade.rz + now.horizontal_shear * blade.ry) / series.reference_length
-    n0 = pose.r11 * linear + pose.r31 * now.w - hub.vx
-    n1 = pose.r11 * slope - blade.normal_rate
-    n2 = profile.scale * (pose.r11 * now.u + pose.r21 * now.v)
-    t0 = blade.tangential - blade.tx * linear - blade.tz * now.w
-    t1 = blade.spin - blade.tx * slope
-    t2 = -profile.scale * (blade.tx * now.u + blade.ty * now.v)
-    z0, z1 = hub.Z / profile.centre - 1.0, blade.rz / profile.centre
-    force = NO_CURVED_FORCE
-    for j in range(radii.shape[0]):
-        radius = radii[j]
-        shear = _shear(z0 + z1 * radius, profile)
-        v_normal, v_tangential = n0 + n1 * radius + n2 * shear, t0 + t1 * radius + t2 * shear
-        i = start + PER_ELEMENT * j
-        force = _with_straight(force, v_normal, v_tangential, i, j, rows, rate, x, dx, rotor)
-    return force
+    return StraightWind(
+        pose.r11 * linear + pose.r31 * now.w - hub.vx,
+        pose.r11 * slope - blade.normal_rate,
+        profile.scale * (pose.r11 * now.u + pose.r21 * now.v),
+        blade.tangential - blade.tx * linear - blade.tz * now.w,
+        blade.spin - blade.tx * slope,
+        -profile.scale * (blade.tx * now.u + blade.ty * now.v),
+        hub.Z / profile.centre - 1.0,
+        blade.rz / profile.centre,
+    )
 
 
-@kernel
-def _curved_sheared(
-    start, psi, pose, hub, now, series, profile, blade_pitch, rows, rate, x, dx, rotor, shape
-):
-    """CurvedForce of a curved blade in a sheared wind."""
+@inlined_kernel
+def _straight_inflow(wind, radius, profile):
+    """(v_normal, v_tangential) m/s of a station in a sheared wind."""
+    shear = _shear(wind.z0 + wind.z1 * radius, profile)
+    return wind.n0 + wind.n1 * radius + wind.n2 * shear, wind.t0 + wind.t1 * radius + wind.t2 * shear
+
+
+@inlined_kernel
+def _straight_sheared(azimuth, pose, hub, now, series, profile, rows, rate, x, dx, rotor, shape):
+    """CurvedForce of each of three straight blades in a sheared wind; rows: Rows of each.
+
+    A station of all three at a time, and rates put away last, keep the processor busier than one by one.
+    """
+    first = _straight_wind(azimuth, pose, hub, x, now, series, profile)
+    second = _straight_wind(azimuth + THIRD, pose, hub, x, now, series, profile)
+    third = _straight_wind(azimuth + 2.0 * THIRD, pose, hub, x, now, series, profile)
+    a = b = c = NO_CURVED_FORCE
+    n = rotor.elements.radius.shape[0]
+    for j in range(n):
+        radius = rotor.elements.radius[j]
+        i = State.INTERNAL + PER_ELEMENT * j
+        k, m = i + PER_ELEMENT * n, i + 2 * PER_ELEMENT * n
+        un, ut = _straight_inflow(first, radius, profile)
+        vn, vt = _straight_inflow(second, radius, profile)
+        wn, wt = _straight_inflow(third, radius, profile)
+        p = _flow(un, ut, i, j, rows[0], rate, x, rotor)
+        q = _flow(vn, vt, k, j, rows[1], rate, x, rotor)
+        r = _flow(wn, wt, m, j, rows[2], rate, x, rotor)
+        a = _with_straight(a, p, j, rows[0], rotor)
+        b = _with_straight(b, q, j, rows[1], rotor)
+        c = _with_straight(c, r, j, rows[2], rotor)
+        _put_rates(p, i, dx)
+        _put_rates(q, k, dx)
+        _put_rates(r, m, dx)
+    return a, b, c
+
+
+@inlined_kernel
+def _curved_wind(psi, pose, hub, x, now, series, profile):
+    """ShearedFlow of the blade at azimuth psi."""
     blade = blade_wind(-sin(psi), cos(psi), x[State.ROTOR_SPEED], pose, hub)
-    wind = _sheared_flow(pose, hub, blade, now, series, profile)
-    cosine, sine = cos(blade_pitch), sin(blade_pitch)
-    force = NO_CURVED_FORCE
-    for j in range(shape.distance.shape[0]):
-        at, lever = station_at(j, cosine, sine, shape), lever_of(j, cosine, sine, shape)
-        shear = _shear(_at(wind.height, at), profile)
-        along = _at(wind.flow_x, at) + shear * wind.scaled_x
-        out = _at(wind.flow_r, at) + shear * wind.scaled_r
-        v_normal = at.nx * along + at.nr * out
-        v_tangential = -_at(wind.flow_t, at) - shear * wind.scaled_t
-        i = start + PER_ELEMENT * j
-        force = _with_curved(force, v_normal, v_tangential, i, j, lever, rows, rate, x, dx, rotor)
-    return force
+    return _sheared_flow(pose, hub, blade, now, series, profile)
+
+
+@inlined_kernel
+def _curved_inflow(wind, at, profile):
+    """(v_normal, v_tangential) m/s of a Station in a sheared wind."""
+    shear = _shear(_at(wind.height, at), profile)
+    along = _at(wind.flow_x, at) + shear * wind.scaled_x
+    out = _at(wind.flow_r, at) + shear * wind.scaled_r
+    return at.nx * along + at.nr * out, -_at(wind.flow_t, at) - shear * wind.scaled_t
+
+
+@inlined_kernel
+def _curved_sheared(azimuth, pose, hub, now, series, profile, rows, rate, x, dx, rotor, shape):
+    """As _straight_sheared of curved blades."""
+    first = _curved_wind(azimuth, pose, hub, x, now, series, profile)
+    second = _curved_wind(azimuth + THIRD, pose, hub, x, now, series, profile)
+    third = _curved_wind(azimuth + 2.0 * THIRD, pose, hub, x, now, series, profile)
+    a = b = c = NO_CURVED_FORCE
+    n = rotor.elements.radius.shape[0]
+    for j in range(n):
+        i = State.INTERNAL + PER_ELEMENT * j
+        k, m = i + PER_ELEMENT * n, i + 2 * PER_ELEMENT * n
+        u, v, w = rows[0], rows[1], rows[2]
+        un, ut = _curved_inflow(first, station_at(j, u.cosine, u.sine, shape), profile)
+        vn, vt = _curved_inflow(second, station_at(j, v.cosine, v.sine, shape), profile)
+        wn, wt = _curved_inflow(third, station_at(j, w.cosine, w.sine, shape), profile)
+        p = _flow(un, ut, i, j, u, rate, x, rotor)
+        q = _flow(vn, vt, k, j, v, rate, x, rotor)
+        r = _flow(wn, wt, m, j, w, rate, x, rotor)
+        a = _with_curved(a, p, j, lever_of(j, u.cosine, u.sine, shape), u)
+        b = _with_curved(b, q, j, lever_of(j, v.cosine, v.sine, shape), v)
+        c = _with_curved(c, r, j, lever_of(j, w.cosine, w.sine, shape), w)
+        _put_rates(p, i, dx)
+        _put_rates(q, k, dx)
+        _put_rates(r, m, dx)
+    return a, b, c
 
 
 @kernel
-def _straight_sampled(
-    start, psi, t, pose, hub, now, series, field, blade_pitch, rows, rate, x, dx, rotor, shape
-):
+def _straight_sampled(start, psi, t, pose, hub, now, series, field, rows, rate, x, dx, rotor, shape):
     """CurvedForce of a straight blade, the wind sampled station by station."""
     blade, radii = _blade(psi, x[State.ROTOR_SPEED], pose, hub), rotor.elements.radius
     force = NO_CURVED_FORCE
@@ -344,20 +434,19 @@ def _straight_sampled(
         v_normal = pose.r11 * u + pose.r21 * v + pose.r31 * w - hub.vx - radius * blade.normal_rate
         v_tangential = blade.tangential + radius * blade.spin - (blade.tx * u + blade.ty * v + blade.tz * w)
         i = start + PER_ELEMENT * j
-        force = _with_straight(force, v_normal, v_tangential, i, j, rows, rate, x, dx, rotor)
+        flow = _flow(v_normal, v_tangential, i, j, rows, rate, x, rotor)
+        force = _with_straight(force, flow, j, rows, rotor)
+        _put_rates(flow, i, dx)
     return force
 
 
 @kernel
-def _curved_sampled(
-    start, psi, t, pose, hub, now, series, field, blade_pitch, rows, rate, x, dx, rotor, shape
-):
+def _curved_sampled(start, psi, t, pose, hub, now, series, field, rows, rate, x, dx, rotor, shape):
     """CurvedForce of a curved blade, the wind sampled station by station."""
     blade = blade_wind(-sin(psi), cos(psi), x[State.ROTOR_SPEED], pose, hub)
-    cosine, sine = cos(blade_pitch), sin(blade_pitch)
     force = NO_CURVED_FORCE
     for j in range(shape.distance.shape[0]):
-        at, lever = station_at(j, cosine, sine, shape), lever_of(j, cosine, sine, shape)
+        at, lever = station_at(j, rows.cosine, rows.sine, shape), lever_of(j, rows.cosine, rows.sine, shape)
         u, v, w = wind_at(
             t,
             hub.X + at.x * pose.r11 + at.r * blade.rx + at.t * blade.tx,
@@ -369,13 +458,23 @@ def _curved_sampled(
         )
         v_normal, v_tangential = station_inflow(u, v, w, at, pose, blade)
         i = start + PER_ELEMENT * j
-        force = _with_curved(force, v_normal, v_tangential, i, j, lever, rows, rate, x, dx, rotor)
+        flow = _flow(v_normal, v_tangential, i, j, rows, rate, x, rotor)
+        force = _with_curved(force, flow, j, lever, rows)
+        _put_rates(flow, i, dx)
     return force
 
 
 # blades straight and in the rotor plane, or curved ones
-_sheared_blade = chosen_by_class("shape", {type(None): _straight_sheared, BladeShape: _curved_sheared})
+_sheared_blades = chosen_by_class(
+    "shape", {type(None): _straight_sheared, BladeShape: _curved_sheared}, inlined=True
+)
 _sampled_blade = chosen_by_class("shape", {type(None): _straight_sampled, BladeShape: _curved_sampled})
+
+
+@kernel
+def _direction(psi):
+    """Direction of a blade at azimuth psi."""
+    return Direction(-sin(psi), cos(psi))
 
 
 @kernel
@@ -387,8 +486,8 @@ def _reach(tip_radius, shape):
 
 
 @kernel
-def _tabled_load(t, pose, x, now, series, field, rotor, hub, first_row, dx, pitches, blades):
-    """(stations outside the tables, RotorLoad) of a fast rotor whose blade pitches lie within them."""
+def _tabled_load(t, pose, x, now, series, field, rotor, hub, dx, pitches, blades):
+    """(stations outside the tables, RotorLoad) of a fast rotor of three blades at pitches within them."""
     elements = rotor.elements
     reach = _reach(elements.tip_radius, elements.shape)
     bottom, top = hub.Z - reach, hub.Z + reach
@@ -398,28 +497,31 @@ def _tabled_load(t, pose, x, now, series, field, rotor, hub, first_row, dx, pitc
     else:
         profile = _profile(1.0, 1.0, series)
     rate = 1.0 / time_constants(0.0, hub.speed, 0.0, elements.tip_radius, rotor.wake)[0]
-    total, outside = NO_LOAD, 0
-    for number in range(elements.blades):
-        psi = x[State.AZIMUTH] + 2.0 * pi * number / elements.blades
-        start = State.INTERNAL + PER_ELEMENT * number * elements.radius.shape[0]
-        rows, blade_pitch = (
-            _rows(_blade_row(number, first_row, x, pitches), rotor),
-            pitch_of(number, x, pitches),
+    azimuth, shape = x[State.AZIMUTH], elements.shape
+    low = _rows(x[State.BLADE_PITCH], rotor)
+    rows = low, _blade_rows(1, low, x, rotor, pitches), _blade_rows(2, low, x, rotor, pitches)
+    if sheared:
+        a, b, c = _sheared_blades(azimuth, pose, hub, now, series, profile, rows, rate, x, dx, rotor, shape)
+    else:
+        n = PER_ELEMENT * elements.radius.shape[0]
+        a = _sampled_blade(
+            State.INTERNAL, azimuth, t, pose, hub, now, series, field, rows[0], rate, x, dx, rotor, shape
         )
-        if sheared:
-            force = _sheared_blade(
-                start, psi, pose, hub, now, series, profile, blade_pitch, rows, rate, x, dx, rotor,
-                elements.shape,
-            )  # fmt: skip
-        else:
-            force = _sampled_blade(
-                start, psi, t, pose, hub, now, series, field, blade_pitch, rows, rate, x, dx, rotor,
-                elements.shape,
-            )  # fmt: skip
-        store_blade_load(number, force.load, elements.air_density, pitches, blades)
-        total = with_blade(total, force.load, Direction(-sin(psi), cos(psi)))
-        outside += force.outside
-    return outside, rotor_axes_load(total, elements.air_density, elements)
+        b = _sampled_blade(
+            State.INTERNAL + n, azimuth + THIRD, t, pose, hub, now, series, field, rows[1], rate, x, dx,
+            rotor, shape,
+        )  # fmt: skip
+        c = _sampled_blade(
+            State.INTERNAL + 2 * n, azimuth + 2.0 * THIRD, t, pose, hub, now, series, field, rows[2], rate,
+            x, dx, rotor, shape,
+        )  # fmt: skip
+    store_blade_load(0, a.load, elements.air_density, pitches, blades)
+    store_blade_load(1, b.load, elements.air_density, pitches, blades)
+    store_blade_load(2, c.load, elements.air_density, pitches, blades)
+    total = with_blade(NO_LOAD, a.load, _direction(azimuth))
+    total = with_blade(total, b.load, _direction(azimuth + THIRD))
+    total = with_blade(total, c.load, _direction(azimuth + 2.0 * THIRD))
+    return a.outside + b.outside + c.outside, rotor_axes_load(total, elements.air_density, elements)
 
 
 @kernel
@@ -429,7 +531,8 @@ def dynamic_sections_load(t, pose, x, now, series, field, rotor, dx, counters, p
     pose                in rotor axes (tilt.py)
     now, series, field  wind (weather/wind.py); every station has the wind of where it is at this instant
     dx                  derivative of the state: only the wake states are written
-    counters            as in rotor_load, to which all is left where a station lies outside the tables
+    counters            as in rotor_load, to which all is left of other than three blades, or
+                        where a station lies outside the tables
     pitches, blades     as in rotor_load
     """
     if rotor is None:
@@ -440,10 +543,8 @@ def dynamic_sections_load(t, pose, x, now, series, field, rotor, dx, counters, p
     hub = hub_flow(t, pose, now, series, field, elements.overhang, elements.hub_height)
     spin, first_row = x[State.ROTOR_SPEED] * elements.tip_radius, _pitch_row(x[State.BLADE_PITCH])
     induction = smoothstep(spin, SLOW_ROTOR * hub.speed, FAST_ROTOR * hub.speed)
-    if induction == 1.0 and _all_rows(first_row, x, pitches):
-        outside, load = _tabled_load(
-            t, pose, x, now, series, field, rotor, hub, first_row, dx, pitches, blades
-        )
+    if elements.blades == 3 and induction == 1.0 and _all_rows(first_row, x, pitches):
+        outside, load = _tabled_load(t, pose, x, now, series, field, rotor, hub, dx, pitches, blades)
         if outside == 0:
             return load
     return rotor_load(

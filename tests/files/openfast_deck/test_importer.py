@@ -345,6 +345,17 @@ def test_torque_law_and_pitch_drive_are_rosco_s(imported):
     assert turbine.discon == str(folder / "turbine" / "DISCON.IN")
 
 
+def test_the_pitch_actuator_of_rosco_is_the_second_drive_of_the_turbine(tmp_path):
+    text = "2 ! PA_Mode - actuator\n1.5 ! PA_CornerFreq - rad/s\n0.7 ! PA_Damping - of it"
+    path = write_deck(tmp_path, DISCON=[("0         ! PA_Mode - actuator", text)])
+    import_deck(path, tmp_path / "out")
+    drive = read_turbine(tmp_path / "out" / "turbine" / "turbine.toml").pitch_drive
+    assert (drive.time_constant, drive.natural_frequency) == (0.0, None)
+    assert (drive.second_order.natural_frequency, drive.second_order.damping) == (1.5, 0.7)
+    written = (tmp_path / "out" / "turbine" / "turbine.toml").read_text()
+    assert "PA_CornerFreq" in written and "PA_Damping" in written
+
+
 def test_the_legacy_controller_of_the_5_mw_turbine_is_known_by_its_library(tmp_path):
     path = write_deck(
         tmp_path,

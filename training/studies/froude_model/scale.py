@@ -30,6 +30,10 @@ PLATFORM, TURBINE = "oc3_hywind", "nrel5mw"
 POWER_EXPONENT = 3.5
 SAME, TIME, SPEED, RATE = 0.0, 0.5, 0.5, -0.5  # exponents of the scale; RATE: per time
 LENGTH, MASS, FORCE, INERTIA, MOMENT = 1.0, 3.0, 3.0, 5.0, 4.0
+SECOND_ORDER = {  # of a pitch drive
+    "natural_frequency": RATE, "damping": SAME, "acceleration_limit": 2.0 * RATE, "deadband": SAME,
+    "friction": SAME,
+}  # fmt: skip
 EXPONENTS = {  # record: {field: exponent of the scale, or one for each entry}
     "environment": {
         "gravity": SAME, "water_density": SAME, "air_density": SAME, "water_depth": LENGTH,
@@ -68,9 +72,13 @@ EXPONENTS = {  # record: {field: exponent of the scale, or one for each entry}
     },
     "drivetrain": {  # the gear ratio stays: generator speed falls with the rotor's
         "gear_ratio": SAME, "generator_inertia": INERTIA, "mesh_loss": SAME, "bearing_loss": SAME,
-        "generator_efficiency": SAME,
+        "generator_efficiency": SAME, "torque_time_constant": TIME,
     },
-    "pitch_drive": {"time_constant": TIME, "rate_limit": RATE, "minimum": SAME, "maximum": SAME},
+    "pitch_drive": {
+        "time_constant": TIME, "rate_limit": RATE, "minimum": SAME, "maximum": SAME, **SECOND_ORDER,
+        "second_order": SAME,
+    },
+    "second_order": SECOND_ORDER,
     "protection": {
         "overspeed": SAME, "overpower": SAME, "acceleration": SAME, "pitch_deviation": SAME,
         "normal_rate": RATE, "emergency_rate": RATE, "off_speed": SAME,
@@ -102,7 +110,7 @@ def scaled(record, name, scale):
         if field not in EXPONENTS[name] or field not in record.model_fields_set or value is None:
             continue
         exponent = EXPONENTS[name][field]
-        if isinstance(value, dict):  # a trip, which has a table of its own
+        if isinstance(value, dict):  # has a table of its own
             continue
         if isinstance(value, int | str):
             result[field] = value
@@ -125,6 +133,10 @@ def turbine_text(turbine, name, scale, polars="polars"):
     lines += [f"{key} = {toml_value(value)}" for key, value in scaled(turbine, "turbine", scale).items()]
     for part in ("rotor", "nacelle", "drivetrain", "pitch_drive", "protection", "torque_law"):
         lines += _table(part, scaled(getattr(turbine, part), part, scale))
+    if turbine.pitch_drive.second_order is not None:
+        lines += _table(
+            "pitch_drive.second_order", scaled(turbine.pitch_drive.second_order, "second_order", scale)
+        )
     for which, trip in turbine.protection:
         if isinstance(trip, TripLimit) and which in turbine.protection.model_fields_set:
             lines += _table(f"protection.{which}", scaled(trip, "trip", scale))
