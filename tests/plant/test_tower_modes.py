@@ -74,6 +74,7 @@ def modes_of(tower):
         damping=tower.damping,
         weight_stiffness=tower.weight_stiffness,
         drag_shape=np.zeros((6, n)),
+        count=(0,) * n,
     )
 
 
