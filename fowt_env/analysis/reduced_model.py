@@ -1,10 +1,10 @@
-"""Linear models as designs of controllers take them: no memory of radiated waves, blades that lag.
+"""Linear models as designs of controllers take them: no memory of waves or wake, blades that lag.
 
 The states of the memory, z, follow the motion x by z' = A_zz z + A_zx x + B_z u + E_z f. At a frequency w
 they are a complex gain times x, u and f, whose real part acts with x and whose imaginary part, over w, with
 dx/dt.
 So the force of the memory becomes the added mass and the damping of that frequency, exactly there and nearly
-about it, and the model has the rigid body's states alone.
+about it, and the model has the rigid body's states alone. The wake of dynamic inflow is such a memory too.
 
 Blades that follow their command at once are no state: designs give them LEAST_LAG. A drive with inertia is to
 them the lag that trails a slow command as far, and a generator that lags follows at once.
@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fowt_env.analysis.linear_model import ACTUATOR_STATES, MEMORY, VELOCITIES
+from fowt_env.analysis.linear_model import ACTUATOR_STATES, MEMORY, VELOCITIES, WAKE
 from fowt_env.plant.state import MOTIONS
 
 LEAST_LAG = 0.05  # s, of a pitch drive that has none
@@ -62,8 +62,8 @@ def without_inertia(model):
 
 
 def memory_states(model):
-    """Indices of the states of a LinearModel that belong to the memory of radiated waves."""
-    return [i for i, name in enumerate(model.states) if name.startswith(MEMORY)]
+    """Indices of the states of a LinearModel that belong to the memory of radiated waves or to the wake."""
+    return [i for i, name in enumerate(model.states) if name.startswith((MEMORY, WAKE))]
 
 
 def platform_frequency(model):

@@ -119,7 +119,8 @@ def _straight(x, tower):
 
 
 @kernel
-def _bent(x, tower):
+def bend_by_modes(x, tower):
+    """Bend of a state."""
     n = tower.slope.shape[0]
     q, v = tower.first, tower.first + n
     ux = uy = vx = vy = a = b = da = db = 0.0
@@ -136,7 +137,7 @@ def _bent(x, tower):
 
 
 # (x, tower) -> Bend of a state, None for a rigid tower
-bend_of = chosen_by_class("tower", {type(None): _straight, TowerModes: _bent})
+bend_of = chosen_by_class("tower", {type(None): _straight, TowerModes: bend_by_modes})
 
 
 @kernel
@@ -571,7 +572,7 @@ def accelerate_bending(pose, x, load, torque, added, body, tower, matrix, dx):
     """
     n = tower.slope.shape[0]
     b, modal = dx[State.VX : State.WZ + 1], dx[tower.first + n : tower.first + 2 * n]
-    bend, d, mass = _bent(x, tower), masses_of(x, tower), tower.upper_mass
+    bend, d, mass = bend_by_modes(x, tower), masses_of(x, tower), tower.upper_mass
     upper = upper_of(bend, tower)
     spin = body.coupling * x[State.ROTOR_SPEED]
     ratio = 0.0 if body.rotor_fixed else body.coupling / body.rotor_row
@@ -694,7 +695,7 @@ def correct_elastic(dt, x, history, body, tower, matrix, elastic, still, extra, 
     b, modal = extra[State.VX : State.WZ + 1], extra[v : v + n]
     new, done = still[v : v + n], still[q:v]
     done[:] = 0.0
-    bend, t = _bent(x, tower), tower.shaft
+    bend, t = bend_by_modes(x, tower), tower.shaft
     nx, ny, nz = from_nacelle(bend, t[0], t[1], t[2])
     for _ in range(ELASTIC_ROUNDS):
         for i in range(n):

@@ -9,8 +9,15 @@ from fowt_env.plant.integrators import START_STEPS
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measure
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rollout import advance, forget, observe, output_row
-from fowt_env.plant.state import N_RIGID, State, pose_of
-from fowt_env.plant.tower_modes import TowerModes, nacelle_pose
+from fowt_env.plant.state import N_RIGID, State, Wrench, pose_of
+from fowt_env.plant.tower_modes import (
+    TowerModes,
+    accelerate_bending,
+    bend_by_modes,
+    carried,
+    fill_impulse,
+    nacelle_pose,
+)
 from fowt_env.plant.user_loads import Force, Motion
 from fowt_env.scene.mass import with_masses
 from fowt_env.scene.tower import tower_frequency
@@ -254,3 +261,31 @@ def test_a_tower_keeps_its_period_at_the_default_step(pinned):
     end = exact(pinned, steps * dt, 1)[-1]
     late = swung(pinned, "ab4", dt, steps) - end
     assert np.abs(late[N_RIGID:]).max() < 0.01 * np.abs(end[N_RIGID:]).max()
+
+
+def test_an_impulse_of_the_rotor_is_that_of_a_short_push(platform, turbine):
+    """What a rotor followed within a step adds to the velocities: M^-1 J^T of its load, and nothing else."""
+    case = Bending(platform, turbine, 2, CONSTANT)
+    tower, body = case.scene.model.tower, case.scene.model.rigid_body
+    rng = np.random.default_rng(4)
+    x = case.random(rng)
+    load, torque = Wrench(*(1e6 * rng.normal(size=6))), 3e5
+    bend, still, rates_of = bend_by_modes(x, tower), np.zeros_like(x), np.full(len(x), 7.0)
+    fill_impulse(load, x, bend, tower, still, rates_of)
+    accelerate_bending(
+        pose_of(still),
+        still,
+        carried(load, bend),
+        torque,
+        np.zeros((6, 6)),
+        body,
+        tower,
+        np.zeros((8, 8)),
+        rates_of,
+    )
+    x[7:14] = x[N_RIGID + 2 :] = 0.0  # at rest the twin knows no other forces of velocity
+    path, push = case.twin.path(x, case.blocks), (True, np.zeros(3), np.array(load[:3]), np.array(load[3:]))
+    none = case.twin.fall(path, 0.0, [], np.zeros((6, 6)))
+    pushed = case.twin.fall(path, -torque / case.twin.ratio, [push], np.zeros((6, 6)))
+    expected = case.twin.accelerations(pushed) - case.twin.accelerations(none)
+    assert np.abs(case.accelerations(rates_of) - expected).max() < 1e-10 * np.abs(expected).max()

@@ -144,6 +144,8 @@ TIMED_SCENES = {
     "exact waves, look-up rotor": TimedScene(TURBULENCE, SEA, "standard", {"wave_loads": "exact"}),
     "BEM rotor, fast waves": TimedScene(TURBULENCE, SEA, "standard", {"rotor": "bem"}),
     "dynamic inflow": TimedScene(TURBULENCE, SEA, options={"dynamic_inflow": True}),
+    "bending tower": TimedScene(TURBULENCE, SEA, options={"tower": "modes"}),
+    "bending tower, second modes": TimedScene(TURBULENCE, SEA, options={"tower": "modes2"}),
     "still water, wind": TimedScene(TURBULENCE, None, absent="waves"),
     "no wind, waves": TimedScene(None, SEA, absent="wind, rotor, tower drag"),
     "still water, no wind": TimedScene(None, None, absent="waves, wind, rotor, tower drag"),

@@ -9,7 +9,7 @@ from rich.markup import escape
 from fowt_env.descriptions.checks import parse_numbers
 from fowt_env.errors import SimulationStopped, unknown
 from fowt_env.files.tables import SERIES_SUFFIXES, table_path, write_table
-from fowt_env.training.cli.arguments import parse_pairs, parse_sea, parse_wind
+from fowt_env.training.cli.arguments import parse_fault, parse_pairs, parse_protection, parse_sea, parse_wind
 from fowt_env.training.cli.console import (
     OptionOption,
     PlatformOption,
@@ -33,7 +33,12 @@ SIMULATE_EXAMPLES = """[bold]Examples[/bold]
 
 [cyan]fowt simulate --wind none --start zero --controller none --initial PtfmSurge=10[/cyan]  free decay
 
-[cyan]fowt simulate --wind '{"kind": "etm", "speed": 18, "class": "A"}'[/cyan]  any wind, as JSON"""
+[cyan]fowt simulate --wind '{"kind": "etm", "speed": 18, "class": "A"}'[/cyan]  any wind, as JSON
+
+[cyan]fowt simulate --controller ipc --option pitch=individual[/cyan]  a pitch for each blade
+
+[cyan]fowt simulate --wind 18 --fault grid_loss:100 --protection turbine[/cyan]  a fault, and trips"""
+OF_BLADES = ("RootMyc1_[kN-m]", "LSSTipMys_[kN-m]", "LSSTipMzs_[kN-m]")  # of scenes that have them
 
 
 @app.command(epilog=SIMULATE_EXAMPLES)
@@ -68,6 +73,13 @@ def simulate(
     initial: Annotated[
         list[str] | None, typer.Option(metavar="CHANNEL=VALUE", help="Start value, OpenFAST units; repeats.")
     ] = None,
+    fault: Annotated[
+        list[str] | None,
+        typer.Option(metavar="KIND:TIME or JSON", help="What goes wrong: grid_loss:100; repeats."),
+    ] = None,
+    protection: Annotated[
+        str, typer.Option(help="Trips: none, turbine (those of its file), or JSON of single ones.")
+    ] = "none",
     option: OptionOption = None,
     out_path: Annotated[str | None, typer.Option("--out", help="Series: .csv, .parquet or .outb.")] = None,
     plot: Annotated[str | None, typer.Option(help="Stacked plot of the run, e.g. run.png.")] = None,
@@ -99,6 +111,8 @@ def simulate(
                 output_dt=output_dt,
                 start=start,
                 initial=parse_pairs(initial, "initial") or None,
+                protection=parse_protection(protection),
+                faults=[parse_fault(text) for text in fault or ()],
                 progress=update,
             )
         except (SimulationStopped, KeyboardInterrupt) as error:
@@ -108,6 +122,9 @@ def simulate(
             raise
     _print_channels(frame, title)
     _note_limits(frame, scene.turbine)
+    if frame.attrs["trip"] is not None:
+        trip = frame.attrs["trip"].replace("_", " ")
+        note(f"{trip} trip at {frame.attrs['tripped']:.1f} s: {frame.attrs['stop']} stop")
     _save_run(frame, out_path, plot, title)
 
 
@@ -145,7 +162,8 @@ def _print_channels(frame, title):
     from fowt_env.visual.time_series import PANELS
 
     rows = []
-    for channel in dict.fromkeys([*(channel for _, channel in PANELS), "GenTq_[kN-m]", "RotThrust_[kN]"]):
+    main = (*(channel for _, channel in PANELS), "GenTq_[kN-m]", "RotThrust_[kN]", *OF_BLADES)
+    for channel in dict.fromkeys(main):
         if channel in frame.columns:
             x = frame[channel]
             mean, deviation = x.mean(), x.std(ddof=0)
