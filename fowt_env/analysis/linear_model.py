@@ -58,9 +58,9 @@ class LinearModel:
 
     A (m, m), B (m, 3), C (n, m), D (n, 3) with the names in states, inputs and outputs; E (m, 6)
     and F (n, 6) take further forces on the hull (FORCES). point is the OperatingPoint. The first 14 states
-    are plant.state.STATES; those of a tower that bends follow, its deflections (TOWER) and their rates
-    (tower_fore_aft_rate and so on), then those of ACTUATOR_STATES where the plant has them, and last those of
-    a body with radiation memory, radiation_1 and so on.
+    are plant.state.STATES; those of dynamic inflow follow, wake_1 and so on, those of a tower that bends, its
+    deflections (TOWER) and their rates (tower_fore_aft_rate and so on), then those of ACTUATOR_STATES where
+    the plant has them, and last those of a body with radiation memory, radiation_1 and so on.
     """
 
     A: np.ndarray

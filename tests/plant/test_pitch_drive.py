@@ -73,13 +73,14 @@ def test_limits_and_friction_act_as_in_short_steps(name):
         assert rate == pytest.approx(naive.rate, abs=1e-3)
 
 
+@pytest.mark.parametrize("step", [0.1, 1.0])
 @pytest.mark.parametrize("name", CASES)
-def test_what_comes_out_does_not_depend_on_the_step(name):
+def test_what_comes_out_does_not_depend_on_the_step(name, step):
     rng, made = np.random.default_rng(5), drive(**CASES[name])
     commands = np.clip(rng.normal(0.12, 0.12, 60), made.minimum, made.maximum)
-    whole = followed(made, commands, 0.1)
+    whole = followed(made, commands, step)
     for parts in (2, 7, 40):
-        assert followed(made, commands, 0.1, parts) == pytest.approx(whole, abs=1e-11)
+        assert followed(made, commands, step, parts) == pytest.approx(whole, abs=1e-11)
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -194,6 +195,11 @@ def test_each_blade_has_a_drive_of_its_own_with_the_same_limits():
     )
     assert y[17:20] == pytest.approx([0.035, -0.035, 0.0], rel=1e-14)
     assert y[16] == 0.3 and y[20:] == pytest.approx([0.5, 0.1, 0.3])
+    moving = y.copy()
+    advance_pitches(moving, u, 0.1, made, pitches, y)
+    for blade, command in ((1, 0.1), (2, 0.3)):
+        wanted = drive_after(moving[14 + blade], moving[17 + blade], command, 0.1, made)
+        assert (y[14 + blade], y[17 + blade]) == pytest.approx(wanted, rel=1e-14)
     fill_pitch_rates(y, u, made, pitches, dx)
     assert dx[14:17] == pytest.approx(y[17:20], rel=1e-14) and np.all(dx[17:] == 0.0)
     assert not pitches_jump(x, u, 0.1, made, pitches)

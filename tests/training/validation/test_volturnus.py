@@ -134,6 +134,16 @@ def test_rest_decays_and_the_regular_wave_meet_every_figure():
 
 
 @pytest.mark.slow
+def test_a_tower_that_bends_rings_and_loads_its_base_as_openfast_s():
+    rows = judged("tower")
+    assert {row.allowed for row in rows if "frequency" in row.quantity} == {1.0}
+    if not without_rosco():
+        bands = [row for row in rows if "Hz (" in row.quantity]
+        assert [row.allowed for row in bands] == 3 * [5.0]
+        assert all(abs(row.error) < 1.0 for row in bands)
+
+
+@pytest.mark.slow
 def test_irregular_waves_miss_the_deviation_of_slow_surge_alone():
     """2.3 % of surge instead of 2 %: a slow oscillation of 0.06 m from the start (docs/validation.md)."""
     rows = judged("waves", "waves_Hs7.5: PtfmSurge, standard deviation")
