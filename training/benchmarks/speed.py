@@ -143,7 +143,6 @@ TIMED_SCENES = {
     "full-field box, standard": TimedScene(_box, SEA, "standard"),
     "exact waves, look-up rotor": TimedScene(TURBULENCE, SEA, "standard", {"wave_loads": "exact"}),
     "BEM rotor, fast waves": TimedScene(TURBULENCE, SEA, "standard", {"rotor": "bem"}),
-    "dynamic inflow": TimedScene(TURBULENCE, SEA, options={"dynamic_inflow": True}),
     "bending tower": TimedScene(TURBULENCE, SEA, options={"tower": "modes"}),
     "bending tower, second modes": TimedScene(TURBULENCE, SEA, options={"tower": "modes2"}),
     "a pitch for each blade": TimedScene(TURBULENCE, SEA, options={"pitch": "individual"}),
@@ -167,6 +166,7 @@ TIMED_SCENES = {
         platform_fixed=True,
         absent="strips, waves, buoyancy, mooring; 6x6 solve (at run time)",
     ),  # fmt: skip
+    "dynamic inflow": TimedScene(TURBULENCE, SEA, options={"dynamic_inflow": True}),
 }
 
 

@@ -51,19 +51,30 @@ def rough_field():
 
 
 @njit
-def _many(states, winds, series, field, rotor, counters, pitches, out, rates):
-    """out (2, n, 8): loads solved and looked up, rates (2, n, n_state)."""
+def _many(states, winds, series, field, rotor, counters, pitches, out, rates, blades):
+    """out (2, n, 8): loads solved and looked up, rates (2, n, n_state), blades (2, n, 3, 6)."""
     elements, wake = rotor.elements, rotor.wake
-    blades = np.zeros((3, 6))
     for i in range(states.shape[0]):
         x = states[i]
         series.value[0] = winds[i]
         now, pose = wind_now(0.0, series), pose_of(x)
         a = rotor_load(
-            0.0, pose, x, now, series, field, elements, None, wake, rates[0, i], counters, pitches, blades
+            0.0,
+            pose,
+            x,
+            now,
+            series,
+            field,
+            elements,
+            None,
+            wake,
+            rates[0, i],
+            counters,
+            pitches,
+            blades[0, i],
         )
         b = dynamic_sections_load(
-            0.0, pose, x, now, series, field, rotor, rates[1, i], counters, pitches, blades
+            0.0, pose, x, now, series, field, rotor, rates[1, i], counters, pitches, blades[1, i]
         )
         for k, load in enumerate((a, b)):
             w = load.wrench
@@ -76,7 +87,11 @@ def both(states, winds, rotor, field=None, pitches=None):
     """((2, n, 8), (2, n, n_state)): loads and rates, solved and looked up."""
     out, rates = np.zeros((2, len(states), 8)), np.zeros((2, *states.shape))
     series = series_of([1.0, 0.0, 0.0, 0.0, 0.0])
-    _many(states, winds, series, field, rotor, np.zeros(N_COUNTERS), pitches, out, rates)
+    blades = np.zeros((2, len(states), 3, 6))
+    _many(states, winds, series, field, rotor, np.zeros(N_COUNTERS), pitches, out, rates, blades)
+    if pitches is not None:
+        share = np.abs(blades[1] - blades[0]).max(axis=(0, 1)) / np.abs(blades[0]).max(axis=(0, 1)).clip(1e-9)
+        assert share.max() < 0.01, share
     return out, rates
 
 
