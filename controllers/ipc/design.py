@@ -23,7 +23,7 @@ from fowt_env.errors import InputError
 from fowt_env.plant.aero.blade_elements import blade_section, build_blade_elements
 from fowt_env.plant.compile.decorators import entry
 
-BANDWIDTH = 0.25  # of the loop, as a fraction of the rated rotor speed
+BANDWIDTH = 0.4  # of the loop, as a fraction of the rated rotor speed
 
 
 class RootSlope(NamedTuple):

@@ -19,14 +19,14 @@ and nothing within the bound. So the least cyclic pitch that keeps the moment at
 direction of the load: output-constrained control of the magnitude of tilt and yaw together, Hummel, Kober and
 Mulders, Wind Energ. Sci. 10, 2005-2024, 2025.
 
-With `tilt_notches` and `yaw_notches` the estimates also pass notches at frequencies of the platform. A yawing
-platform feels the moment of the wind that its blades then meet, and cancelling that takes away its damping;
-the cyclic pitch against the tilt moment drives sway and roll, by the blades' tangential loads.
+A platform can be left alone: the yaw moment is then cancelled below `yaw_corner` only, and the estimated tilt
+moment passes `tilt_notches` at frequencies of the platform. The yaw moment turns the platform, and the cyclic
+pitch against the tilt moment drives sway and roll, by the blades' tangential loads.
 """
 
 from dataclasses import dataclass, replace
 from enum import IntEnum
-from math import cos, exp, hypot, pi, sin, tan
+from math import cos, exp, hypot, inf, pi, sin, tan
 
 import numpy as np
 
@@ -41,9 +41,10 @@ from fowt_env.plant.drivetrain import TorqueCurve, clamp, rate_limit
 from fowt_env.plant.measurement import N_MEASUREMENTS, BladeMeasure, Measure
 from fowt_env.plant.state import BLADES, Command, State
 
-PLATFORM_NOTCHES = 3  # of each channel
+TILT_NOTCHES = 3  # at most, beside that at 3P
 COEFFICIENTS = 5  # of a notch: b0, b1, b2, a1, a2
 NYQUIST_SHARE = 0.9  # of half the sampling frequency, beyond which no notch is placed
+BELOW_PLATFORM = 0.25  # of the slowest platform frequency: corner of the yaw moment of ipc_floating
 CONSTRAINED_BOUND = 0.1  # of the greatest root moment in steady wind, of ipc_constrained
 
 
@@ -58,22 +59,24 @@ class IPCSettings:
     lead: bool = True  # whether the azimuth leads by the drive's lag
     bound: float = 0.0  # of the moment that is left, as a fraction of the greatest steady root moment
     tilt_notches: tuple[float, ...] = ()  # rad/s, of the platform
-    yaw_notches: tuple[float, ...] = ()
-    platform_damping: float = 0.5  # of these notches
+    tilt_damping: float = 0.5  # of these notches
+    yaw_corner: float = inf  # rad/s, of a first-order low pass of the yaw moment; inf: none
 
     def __post_init__(self):
         for key, high in (("bandwidth", 1.0), ("amplitude", 0.5), ("rate_share", 1.0)):
             allowed = f"above 0 and at most {high:g}"
             check_number(key, getattr(self, key), 0.0, high, low_open=True, allowed=allowed)
-        for key in ("notch_damping", "platform_damping"):
+        for key in ("notch_damping", "tilt_damping"):
             check_number(key, getattr(self, key), 0.0, low_open=True, allowed="positive and finite")
         check_number("bound", self.bound, 0.0, allowed="0 or more and finite")
-        for key in ("tilt_notches", "yaw_notches"):
-            notches = getattr(self, key)
-            if len(notches) > PLATFORM_NOTCHES:
-                raise InputError(f"{key}: {len(notches)} frequencies: at most {PLATFORM_NOTCHES} fit")
-            for frequency in notches:
-                check_number(key, frequency, 0.0, low_open=True, allowed="positive and finite, rad/s")
+        allowed = "positive, rad/s; inf: none"
+        check_number("yaw_corner", self.yaw_corner, 0.0, low_open=True, infinite=True, allowed=allowed)
+        if len(self.tilt_notches) > TILT_NOTCHES:
+            raise InputError(
+                f"tilt_notches: {len(self.tilt_notches)} frequencies: at most {TILT_NOTCHES} fit"
+            )
+        for frequency in self.tilt_notches:
+            check_number("tilt_notches", frequency, 0.0, low_open=True, allowed="positive and finite, rad/s")
 
 
 class CyclicParameter(IntEnum):
@@ -87,11 +90,11 @@ class CyclicParameter(IntEnum):
     NOTCH_DAMPING = DECAY + 5
     LEAD_TIME = DECAY + 6  # s
     BOUND = DECAY + 7  # N m
-    NOTCHES = DECAY + 8  # coefficients of the platform's notches, first those of the tilt channel
+    YAW_DECAY = DECAY + 8  # of the yaw moment's low pass, in a period
+    NOTCHES = DECAY + 9  # coefficients of the tilt moment's notches
 
 
-N_PARAMETERS = CyclicParameter.NOTCHES + 2 * PLATFORM_NOTCHES * COEFFICIENTS
-FILTERS = 1 + PLATFORM_NOTCHES  # of each channel
+N_PARAMETERS = CyclicParameter.NOTCHES + TILT_NOTCHES * COEFFICIENTS
 
 
 class CyclicMemory(IntEnum):
@@ -101,10 +104,11 @@ class CyclicMemory(IntEnum):
     BLADES = STARTED + 1  # last commands of the three blades, rad
     TILT = STARTED + 4  # cyclic pitch, rad
     YAW = STARTED + 5
-    FILTERS = STARTED + 6  # two states of each notch, first those of the tilt channel
+    SLOW_YAW = STARTED + 6  # N m, of the yaw moment's low pass
+    FILTERS = STARTED + 7  # two states of each notch: tilt and yaw at 3P, tilt at the platform's frequencies
 
 
-N_MEMORY = CyclicMemory.FILTERS + 2 * 2 * FILTERS
+N_MEMORY = CyclicMemory.FILTERS + 2 * (2 + TILT_NOTCHES)
 
 
 @kernel
@@ -136,21 +140,16 @@ def filtered(value, coefficients, memory, at, started):
 
 
 @kernel
-def platform_notch(parameters, k):
-    """Coefficients of the platform's notch k; those of the yaw channel follow those of the tilt channel."""
-    i = CyclicParameter.NOTCHES + k * COEFFICIENTS
-    return parameters[i], parameters[i + 1], parameters[i + 2], parameters[i + 3], parameters[i + 4]
-
-
-@kernel
-def notched(value, axis, third, parameters, memory, started):
-    """Moment (N m) of an axis (0 tilt, 1 yaw) behind its notches; third: coefficients of that at 3P."""
-    at = CyclicMemory.FILTERS + 2 * FILTERS * axis
-    value = filtered(value, third, memory, at, started)
-    for k in range(PLATFORM_NOTCHES):
-        coefficients = platform_notch(parameters, axis * PLATFORM_NOTCHES + k)
-        value = filtered(value, coefficients, memory, at + 2 * (k + 1), started)
-    return value
+def without_platform(tilt, yaw, parameters, memory, started):
+    """(tilt, yaw) moment (N m) without what the platform is left alone with."""
+    for k in range(TILT_NOTCHES):
+        i = CyclicParameter.NOTCHES + k * COEFFICIENTS
+        c = parameters[i], parameters[i + 1], parameters[i + 2], parameters[i + 3], parameters[i + 4]
+        tilt = filtered(tilt, c, memory, CyclicMemory.FILTERS + 2 * (2 + k), started)
+    decay = parameters[CyclicParameter.YAW_DECAY]
+    slow = (1.0 - decay) * yaw + decay * memory[CyclicMemory.SLOW_YAW]
+    memory[CyclicMemory.SLOW_YAW] = slow
+    return tilt, slow
 
 
 @kernel
@@ -189,8 +188,10 @@ def cyclic_step(parameters, memory, measurement, command):
     started = memory[CyclicMemory.STARTED] > 0.5
     memory[CyclicMemory.STARTED] = 1.0
     third = notch_coefficients(BLADES * abs(rotor_speed), p[CyclicParameter.NOTCH_DAMPING], dt)
-    tilt = notched(tilt - slope * along, 0, third, p, memory, started)
-    yaw = notched(yaw - slope * across, 1, third, p, memory, started)
+    at = CyclicMemory.FILTERS
+    tilt = filtered(tilt - slope * along, third, memory, at, started)
+    yaw = filtered(yaw - slope * across, third, memory, at + 2, started)
+    tilt, yaw = without_platform(tilt, yaw, p, memory, started)
 
     share, follow = share_beyond(tilt, yaw, p[CyclicParameter.BOUND]), 1.0 - p[CyclicParameter.DECAY]
     along += follow * (-share * tilt / slope - along)
@@ -254,14 +255,15 @@ class IPC(PI):
             CyclicParameter.NOTCH_DAMPING: cyclic.notch_damping,
             CyclicParameter.LEAD_TIME: lead_time(turbine, self.law_dt) if cyclic.lead else 0.0,
             CyclicParameter.BOUND: cyclic.bound * slope.moment,
+            CyclicParameter.YAW_DECAY: exp(-self.law_dt * cyclic.yaw_corner)
+            if cyclic.yaw_corner < inf
+            else 0.0,
         }.items():
             p[entry] = value
-        coefficients = np.zeros((2, PLATFORM_NOTCHES, COEFFICIENTS))
-        coefficients[:, :, 0] = 1.0  # passes everything
-        for axis, notches in enumerate((cyclic.tilt_notches, cyclic.yaw_notches)):
-            for k, frequency in enumerate(notches):
-                found = notch_coefficients(float(frequency), cyclic.platform_damping, self.law_dt)
-                coefficients[axis, k] = found
+        coefficients = np.zeros((TILT_NOTCHES, COEFFICIENTS))
+        coefficients[:, 0] = 1.0  # passes everything
+        for k, frequency in enumerate(cyclic.tilt_notches):
+            coefficients[k] = notch_coefficients(float(frequency), cyclic.tilt_damping, self.law_dt)
         p[CyclicParameter.NOTCHES :] = coefficients.ravel()
 
     def reset(self, measurement):
@@ -278,14 +280,16 @@ class IPC(PI):
 
 
 class FloatingIPC(IPC):
-    """IPC with notches at the frequencies in which the platform yaws, and rolls and sways."""
+    """IPC that leaves sway, roll and yaw of the platform alone, as far as their own frequencies go."""
 
     inputs = (*IPC.inputs, "plant_model")
 
     def cyclic_settings(self, scene):
-        """The IPCSettings with the scene's platform frequencies as notches."""
+        """The IPCSettings with notches at sway and roll, and a corner well below the slowest of the three."""
         sway, roll, yaw = (platform_frequency(scene, m) for m in (State.SWAY, State.ROLL, State.YAW))
-        return replace(self.cyclic, tilt_notches=(sway, roll), yaw_notches=(yaw, roll))
+        return replace(
+            self.cyclic, tilt_notches=(sway, roll), yaw_corner=BELOW_PLATFORM * min(sway, roll, yaw)
+        )
 
 
 def ipc(turbine, control_dt):
@@ -300,5 +304,5 @@ def ipc_constrained(turbine, control_dt):
 
 
 def ipc_floating(turbine, control_dt):
-    """As ipc, with notches at the frequencies of the platform's yaw, roll and sway."""
+    """As ipc, but leaves sway, roll and yaw of the platform alone."""
     return FloatingIPC(PISettings.published(turbine), IPCSettings(), control_dt, "ipc_floating")

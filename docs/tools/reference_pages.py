@@ -20,7 +20,7 @@ from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.envs import rewards
 from fowt_env.envs.actions import TRACKING_DAMPING, TRACKING_FREQUENCY
-from fowt_env.envs.observations import BLADE_CHANNELS, KNOWN, STANDARD, entries
+from fowt_env.envs.observations import BLADE_CHANNELS, KNOWN, STANDARD, STOP_CHANNELS, entries
 from fowt_env.envs.tables import action_table, observation_table
 from fowt_env.envs.tasks import TASKS, Episode
 from fowt_env.files.atomic import replacing
@@ -57,6 +57,9 @@ FORMULAS = {
     "torque_travel": "-clip(abs(Q - Q_before) / (Q_rate * control_dt), 0, 1)",
     "failure": "-1 if failed else 0",
     "power_shortfall": "clip(P / P_rated, 0, 1) - 1",
+    "standstill": "-clip(abs(W) / W_rated, 0, 1)",
+    "platform_rate": "tolerance(abs(rate) * {TILT_PERIOD:g} / (2 * pi), 0, 0, radians({tilt:g}))",
+    "tower_top": "-clip((a / {TOP_ACCELERATION:g})**2, 0, 1)",
 }
 OPTIONS = {  # of reset: the value that is taken in place of the drawn one
     "wind": "wind of the episode, as `build_scene` takes it",
@@ -64,6 +67,7 @@ OPTIONS = {  # of reset: the value that is taken in place of the drawn one
     "weather_seed": "seed of its turbulence and waves",
     "offsets": "`{channel: offset}` from the operating point, in the channel's unit, for all drawn ones",
     "exact_start": "whether the operating point is exact (so where `wind` is given) or interpolated",
+    "shutdown": "s of operation before the stop is signalled, in a task that has one; `None`: none",
 }
 assert set(OPTIONS) == set(Episode._fields) and set(FORMULAS) == set(rewards.REWARD_TERMS)
 
@@ -75,7 +79,10 @@ def turbine():
 
 def reward_formulas():
     """{term: its formula as a Python expression}."""
-    values = {name: getattr(rewards, name) for name in ("POWER_MARGIN", "SPEED_MARGIN", "TILT_PERIOD")}
+    values = {
+        name: getattr(rewards, name)
+        for name in ("POWER_MARGIN", "SPEED_MARGIN", "TILT_PERIOD", "TOP_ACCELERATION")
+    }
     return {name: text.format(**values, tilt=rewards.TILT_MARGIN / DEGREE) for name, text in FORMULAS.items()}
 
 
@@ -125,6 +132,10 @@ def tasks():
             "reach of the set-point",
             *(_range(tuple(fraction * rated for fraction in task.setpoint), " rpm") for task in chosen),
         ),
+        (
+            "a stop is signalled after",
+            *("-" if task.shutdown is None else _range(task.shutdown, " s") for task in chosen),
+        ),
         ("weather seeds", *(f"{task.weather_seeds[0]} to {task.weather_seeds[1] - 1}" for task in chosen)),
     ]
     return markdown(("", *(f"`{task.name}`" for task in chosen)), rows)
@@ -173,14 +184,14 @@ def actuators():
 
 def observation():
     """Entries of the tasks' observation."""
-    same = {task.observation for task in TASKS.values()}
+    same = {task.observation for task in TASKS.values() if task.shutdown is None}
     assert same == {STANDARD}, "tasks that differ in what is seen need a table each"
     return observation_table(TASKS["above_rated"], turbine())
 
 
 def channels():
     """Entries of the channels that the tasks leave out."""
-    return _entries_of([name for name in KNOWN if name not in STANDARD])
+    return _entries_of([name for name in (*KNOWN, *STOP_CHANNELS) if name not in STANDARD])
 
 
 def blades():

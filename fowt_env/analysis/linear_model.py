@@ -33,9 +33,11 @@ INPUTS = ("generator_torque", "blade_pitch_command", "wind_speed")
 INPUT_STEPS = np.array([1.0, 1e-5, 1e-3])
 FREQUENCY_ROUNDS = 4  # of finding a period and the added mass at it
 # internal blocks that linearize takes: memory has matrices of its own, and flat water has no waves to meet
-LINEAR = ("radiation", "filtered position")
+LINEAR = ("radiation", "filtered position", "wake")
 DRIVE = ("blade_pitch", "pitch_rate")  # states of a pitch drive with inertia
 MEMORY = "radiation_"  # begins the names of a memory's states
+WAKE = "wake_"  # begins the names of the states of dynamic inflow, four per annulus
+WAKE_STEP = 1e-3  # m/s, of the differences
 CYCLIC = ("tilt_", "yaw_")  # begin the names of states that single blades add, see multiblade.py
 FORCES = ("fx", "fy", "fz", "mx", "my", "mz")  # on the hull, body components about the body origin
 FORCE_STEPS = np.array([1e2, 1e2, 1e2, 1e4, 1e4, 1e4])  # N, N m
@@ -56,9 +58,9 @@ class LinearModel:
 
     A (m, m), B (m, 3), C (n, m), D (n, 3) with the names in states, inputs and outputs; E (m, 6)
     and F (n, 6) take further forces on the hull (FORCES). point is the OperatingPoint. The first 14 states
-    are plant.state.STATES; those of a tower that bends follow, its deflections (TOWER) and their rates
-    (tower_fore_aft_rate and so on), then those of ACTUATOR_STATES where the plant has them, and last those of
-    a body with radiation memory, radiation_1 and so on.
+    are plant.state.STATES; those of dynamic inflow follow, wake_1 and so on, those of a tower that bends, its
+    deflections (TOWER) and their rates (tower_fore_aft_rate and so on), then those of ACTUATOR_STATES where
+    the plant has them, and last those of a body with radiation memory, radiation_1 and so on.
     """
 
     A: np.ndarray
@@ -167,6 +169,11 @@ def plant_states(scene):
     """(names, indices in the state vector, steps of differences) of a LinearModel's states, less memory."""
     names, rows, steps = list(STATES), [int(i) for i in STATE_INDEX], list(STATE_STEPS)
     for block in scene.blocks:
+        if block.name == "wake":
+            each = block.size // scene.turbine.rotor.blades
+            names += [f"{WAKE}{k + 1}" for k in range(each)]
+            rows += range(block.offset, block.offset + each)
+            steps += each * [WAKE_STEP]
         if block.name in TOWER_BLOCKS:
             end, step = TOWER_BLOCKS[block.name]
             names += [name + end for name in TOWER[: block.size]]
@@ -184,6 +191,10 @@ def of_all_blades(scene, rows):
     """[indices] that each state of plant_states stands for: of what each blade has, those of all blades."""
     together = {int(State.BLADE_PITCH): list(scene.pitch_states)}
     for block in scene.blocks:
+        if block.name == "wake":
+            each = block.size // scene.turbine.rotor.blades
+            for row in range(block.offset, block.offset + each):
+                together[row] = list(range(row, block.offset + block.size, each))
         if block.name in ACTUATOR_STATES:
             together[block.offset] = list(range(block.offset, block.offset + block.size))
     return [together.get(row, [row]) for row in rows]
@@ -204,12 +215,12 @@ def modes(a, names, cm_height, arm):
     A mode is named by its largest motion: translations of the centre of mass (at the water line a
     platform-pitch mode moves more in surge than in pitch), angles times arm (m), rotor speed times arm/12 s,
     deflections of the tower as they are.
-    Those of the radiation memory, of a pitch drive with inertia and of single blades' pitches are left out:
-    to which their states contribute most, by participation factors.
+    Those of the radiation memory, of dynamic inflow, of a pitch drive with inertia and of single blades'
+    pitches are left out: to which their states contribute most, by participation factors.
     """
     values, vectors = np.linalg.eig(a)
     found = []
-    remembered = [name.startswith((MEMORY, *CYCLIC)) for name in names]
+    remembered = [name.startswith((MEMORY, WAKE, *CYCLIC)) for name in names]
     if "pitch_rate" in names:
         remembered = [is_memory or name in DRIVE for is_memory, name in zip(remembered, names, strict=True)]
     water = np.zeros(len(values))
@@ -268,7 +279,10 @@ class _Plant:
         self.handle = scene.handle()
         self.columns = [*RECORDED.values(), *range(N_FIXED, N_FIXED + n_lines)]
         self.measures = [Measure[name.upper()] for name in MEASURED]
-        self.states = plant_states(scene)[1]
+        names, self.states, _ = plant_states(scene)
+        groups = of_all_blades(scene, self.states)
+        self.wake = [i for i, name in enumerate(names) if name.startswith(WAKE)]
+        self.annuli = [groups[i] for i in self.wake]  # in wind with shear their blades' rates differ
         rows = len(scene.channels)
         measured = scene.n_measurements
         self.scratch = (np.zeros(scene.n_state), np.zeros(measured), np.zeros(rows))
@@ -278,18 +292,20 @@ class _Plant:
         """Rates of plant_states and the outputs."""
         _mean_response(self.handle, x, u, force, AZIMUTHS, *self.scratch, *self.means)
         rates, measured, recorded = self.means
-        return np.r_[rates[self.states], measured[self.measures], recorded[self.columns]]
+        of_states = rates[self.states]
+        if self.wake:
+            of_states[self.wake] = rates[self.annuli].mean(axis=1)
+        return np.r_[of_states, measured[self.measures], recorded[self.columns]]
 
 
-def check_linear(scene):
+def check_linear(scene, known=LINEAR):
     """Raise InputError for a scene with internal states that are not linearised."""
-    internal = [
-        block.name for block in scene.blocks if block.steady == "settled" and block.name not in LINEAR
-    ]
+    internal = [block.name for block in scene.blocks if block.steady == "settled" and block.name not in known]
     if internal:
+        hint = " (dynamic_inflow=False)" if "wake" in internal else ""
         raise InputError(
-            f"linearize: the states of {', '.join(internal)} are not linearised: build the scene without them"
-            " (dynamic_inflow=False)"
+            f"linearize: the states of {', '.join(internal)} are not linearised: build the scene without"
+            f" them{hint}"
         )
 
 
@@ -304,10 +320,11 @@ def linearize(scene, operating_point=None):
 
     The wind input moves the hub wind with its shear; waves are flat, and their small force comes in by
     wave_force. Drag has no linear part at rest in still water, so viscous damping is absent there.
-    Radiation memory comes in exactly, in a scene with convolution by the fit that state_space takes. Other
-    internal states (dynamic inflow, those of loads) are not linearised. A pitch drive counts without deadband
-    and friction, within which it would not move at all. blade_pitch is that of all blades together, also
-    where each has its own: multiblade.py has the rest.
+    Radiation memory comes in exactly, in a scene with convolution by the fit that state_space takes. The wake
+    of dynamic inflow comes in by annulus, its blades moved together: wake_1 to 4 are those of the innermost
+    station (aero/wake.py). Other internal states (those of loads) are not linearised. A pitch drive counts
+    without deadband and friction, within which it would not move at all. blade_pitch is that of all blades
+    together, also where each has its own: multiblade.py has the rest.
 
     Raises: InputError if the scene has any.
     """

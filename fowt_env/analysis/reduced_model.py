@@ -1,10 +1,10 @@
-"""Linear models as designs of controllers take them: no memory of radiated waves, blades that lag.
+"""Linear models as designs of controllers take them: no memory of waves or wake, blades that lag.
 
 The states of the memory, z, follow the motion x by z' = A_zz z + A_zx x + B_z u + E_z f. At a frequency w
 they are a complex gain times x, u and f, whose real part acts with x and whose imaginary part, over w, with
 dx/dt.
 So the force of the memory becomes the added mass and the damping of that frequency, exactly there and nearly
-about it, and the model has the rigid body's states alone.
+about it, and the model has the rigid body's states alone. The wake of dynamic inflow follows at once.
 
 Blades that follow their command at once are no state: designs give them LEAST_LAG. A drive with inertia is to
 them the lag that trails a slow command as far, and a generator that lags follows at once.
@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fowt_env.analysis.linear_model import ACTUATOR_STATES, MEMORY, VELOCITIES
+from fowt_env.analysis.linear_model import ACTUATOR_STATES, MEMORY, VELOCITIES, WAKE
 from fowt_env.plant.state import MOTIONS
 
 LEAST_LAG = 0.05  # s, of a pitch drive that has none
@@ -98,11 +98,35 @@ def _undamped(model):
     return float(np.sqrt(max(-values[chosen].real, 1e-6)))
 
 
+def without_wake(model):
+    """The LinearModel whose wake follows at once, the quasi-steady one; itself without dynamic inflow."""
+    wake = [i for i, name in enumerate(model.states) if name.startswith(WAKE)]
+    if not wake:
+        return model
+    kept = [i for i in range(len(model.states)) if i not in wake]
+    own = model.A[np.ix_(wake, wake)]
+    by_state, by_input, by_force = (
+        -np.linalg.solve(own, part) for part in (model.A[np.ix_(wake, kept)], model.B[wake], model.E[wake])
+    )
+    into, out = model.A[np.ix_(kept, wake)], model.C[:, wake]
+    return replace(
+        model,
+        A=model.A[np.ix_(kept, kept)] + into @ by_state,
+        B=model.B[kept] + into @ by_input,
+        E=model.E[kept] + into @ by_force,
+        C=model.C[:, kept] + out @ by_state,
+        D=model.D + out @ by_input,
+        F=model.F + out @ by_force,
+        states=tuple(model.states[i] for i in kept),
+    )
+
+
 def without_memory(model, omega=None):
-    """The LinearModel with added mass and damping for its memory of radiated waves; itself without one.
+    """The LinearModel with added mass and damping for its memory of radiated waves, and without_wake.
 
     omega: rad/s, where both are exact; None: platform_frequency(model).
     """
+    model = without_wake(model)
     memory = memory_states(model)
     if not memory:
         return model

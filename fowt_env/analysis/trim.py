@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import pi
+from math import cos, pi, sin
 
 import numpy as np
 from scipy.optimize import brentq
@@ -204,10 +204,21 @@ class _Steady:
         rates, model = self.rates(), self.scene.model
         if model.tower is None:
             return rates[State.ROTOR_SPEED]
-        # far from its rest the tower's top accelerates, and the rotor with it: that is no lack of torque
-        rolling = model.tower.slope[1::2] @ rates[[self._acceleration(i) for i in self.deflections()[1::2]]]
-        ratio = model.rigid_body.coupling / model.rigid_body.rotor_row
-        return rates[State.ROTOR_SPEED] - ratio * model.tower.shaft[0] * rolling
+        # far from its rest the nacelle accelerates, and the rotor with it: that is no lack of torque
+        body = model.rigid_body
+        return rates[State.ROTOR_SPEED] + body.coupling / body.rotor_row * self._shaft_turning(rates)
+
+    def _shaft_turning(self, rates):
+        """Angular acceleration of the nacelle about the shaft, rad/s2, of a turbine at rest."""
+        tower = self.scene.model.tower
+        bent, bending = self.x[self.deflections()], rates[[self._acceleration(i) for i in self.deflections()]]
+        a, b = tower.slope[0::2] @ bent[0::2], -tower.slope[1::2] @ bent[1::2]  # about y, then about x
+        about_y, about_x = tower.slope[0::2] @ bending[0::2], -tower.slope[1::2] @ bending[1::2]
+        turned_y = np.array([[cos(a), 0.0, sin(a)], [0.0, 1.0, 0.0], [-sin(a), 0.0, cos(a)]])
+        turned_x = np.array([[1.0, 0.0, 0.0], [0.0, cos(b), -sin(b)], [0.0, sin(b), cos(b)]])
+        carried = (turned_y @ turned_x).T @ rates[State.WX : State.WZ + 1]
+        own = np.array([about_x, about_y * cos(b), -about_y * sin(b)])
+        return tower.shaft @ (carried + own)
 
     def set_pitch(self, blade_pitch):
         """Set the pitch (rad) of all blades, and its command."""

@@ -84,6 +84,7 @@ from fowt_env.weather.preview import exact_preview
 SMALL_SEA = {"kind": "regular", "H": 1e-3, "T": 10.0}  # of a scene whose first draw happens to have no waves
 SHORTEST_WEATHER = 600.0  # s of random wind and sea: turbulence intensity is defined over 10 min
 StepResult = tuple[np.ndarray, float, bool, bool, dict[str, Any]]
+REFERENCE_SHUTDOWN = Reference._fields.index("shutdown")
 REWARD_KEYS = tuple(f"reward/{name}" for name in REWARD_TERMS)
 
 
@@ -123,11 +124,11 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     sea drawn from the task's ranges with the environment's seed: the same seed gives the same bits.
     Where the mean wind is drawn, the operating point is linear between exact ones 0.25 m/s apart: right
     to 0.05 m of surge and 0.03 deg of blade pitch, in the cells next to rated wind to 0.9 m and 0.6 deg.
-    reset(options=...) takes "wind", "sea", "weather_seed" and "offsets" in place of what is drawn; the
-    info of reset has them under "episode", and given as options they replay the episode. Weather never
-    compiles anything anew: an environment whose task has a sea takes any sea, None for still water, but one
-    built in still water takes none; neither is a box of full-field wind exchanged for another wind. What is
-    refused leaves the environment as it was, in its episode.
+    reset(options=...) takes "wind", "sea", "weather_seed", "offsets" and "shutdown" in place of what is
+    drawn; the info of reset has them under "episode", and given as options they replay the episode. Weather
+    never compiles anything anew: an environment whose task has a sea takes any sea, None for still water, but
+    one built in still water takes none; neither is a box of full-field wind exchanged for another wind. What
+    is refused leaves the environment as it was, in its episode.
 
     An action beyond [-1, 1] counts as the nearest end, and info["saturated_actions"] counts the periods
     in which that happened. The torque stays within the generator's range and moves at most as fast as its
@@ -137,6 +138,9 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     An episode is terminated by failure: rotor speed beyond the turbine file's overspeed, capsize
     (platform pitch beyond 80 deg) or a state that is not finite; info["termination"] has the reason. It
     is truncated at the end of its duration.
+
+    In a task with `shutdown` the baseline operates the turbine, within reset, for the time that is drawn. The
+    episode begins where the stop is signalled; its duration counts the operation too.
 
     A picture shows one control period, so that 30 of them a second are three times real time.
 
@@ -367,9 +371,11 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         if self._estimator is not None:
             self._estimator.reset(self.measurement())
             rewrite_observation(self._handle)
+        if planned.episode.shutdown is not None:
+            self._operate(planned.episode.shutdown)
         self._running = True
         info = {
-            "time": 0.0,
+            "time": int(run.counts[STEP]) * self.dt,
             **dict.fromkeys(SHOWN_COUNTS, 0),
             "events": self._events(),
             "wind_speed": self.scene.wind_speed,
@@ -378,6 +384,25 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         if self.render_mode == "human":
             self.render()
         return run.observation.copy(), info
+
+    def _operate(self, seconds):
+        """Let the baseline have the turbine for so long; then the stop is signalled."""
+        controller = named_baseline(self.baseline, self.design_scene.turbine, self.control_dt)
+        leads = preview_leads(controller)
+        controller.prepare(known_scene(self.design_scene, controller))
+        controller.reset(self.measurement(leads))
+        run = self._episode
+        command = np.empty(run.u.shape)
+        for _ in range(round(seconds / self.control_dt)):
+            torque, *blade_pitch = controller.act(self.measurement(leads))
+            command[0], command[1:] = torque, blade_pitch
+            status, _ = act_physical(self._handle, self._estimator_law, command)
+            if status != RUNNING:  # and the first step of the episode ends it
+                break
+        run.counts[1:] = 0
+        run.reference[REFERENCE_SHUTDOWN] = int(run.counts[STEP]) * self.dt
+        self.restart_loops()
+        rewrite_observation(self._handle)
 
     def restart_loops(self) -> None:
         """Start the baseline of residual mode, or the loop of set-point mode, from what is measured now.

@@ -121,7 +121,7 @@ def write_observation(config, episode):
     t = episode.counts[STEP] * config.dt
     observation_map = config.observation_map
     fill_signals(
-        t, config.model, episode.x, episode.reading, episode.action, episode.estimate,
+        t, config.model, episode.x, episode.reading, episode.action, episode.estimate, episode.reference[2],
         observation_map.preview, episode.signals,
     )  # fmt: skip
     fill_observation(episode.signals, observation_map, episode.observation)

@@ -32,7 +32,8 @@ ESTIMATED = (  # what an estimator's memory begins with, see controllers/lqr/law
     "wind_tendency", "wind", "wave", "wave_quadrature", "moment", "mean_wind",
 )  # fmt: skip
 OF_BLADES = ESTIMATES + len(ESTIMATED)  # BladeMeasurement
-PREVIEW = OF_BLADES + N_BLADE_MEASUREMENTS
+SINCE_SHUTDOWN = OF_BLADES + N_BLADE_MEASUREMENTS
+PREVIEW = SINCE_SHUTDOWN + 1
 N_ACTIONS = N_COMMANDS  # of every mode but "individual"
 DEFAULT = "default"  # in a list of channels: the task's own
 
@@ -110,6 +111,13 @@ ESTIMATE_CHANNELS = {  # made by the estimator of lqr from what a turbine measur
 }  # fmt: skip
 
 
+STOP_CHANNELS = {  # of tasks in which the turbine is to be stopped
+    "time_since_shutdown": (
+        Entry(
+            "time_since_shutdown", "s", SINCE_SHUTDOWN, 0.0, 60.0, 0.0, 1e5, "time since a stop was signalled"
+        ),
+    ),
+}  # fmt: skip
 ORDINALS = ("first", "second", "third", "fourth")
 BLADE_MEANINGS = {  # of the fields of BladeMeasurement that are channels of their own
     "root_out_of_plane": "bending moment of the root of blade {} out of the rotor plane",
@@ -182,7 +190,7 @@ def observation_channels(turbine, preview=(), actions=N_ACTIONS):
         _wind(f"wind_preview_{ahead:g}s", PREVIEW + i, f"wind along x at the hub {ahead:g} s ahead, exact")
         for i, ahead in enumerate(preview)
     )
-    return table | ESTIMATE_CHANNELS | _blade_channels(turbine)
+    return table | ESTIMATE_CHANNELS | _blade_channels(turbine) | STOP_CHANNELS
 
 
 def check_channels(where, names, default=None):
@@ -194,7 +202,7 @@ def check_channels(where, names, default=None):
         raise InputError(f"{where} = {names!r}: must be a list of channel names, such as ({names!r},)")
     if not isinstance(names, Iterable):
         raise InputError(f"{where} = {names!r}: must be a list of channel names, such as ('rotor_speed',)")
-    known = (*KNOWN, *BLADE_CHANNELS) if default is None else (*KNOWN, *BLADE_CHANNELS, DEFAULT)
+    known = (*KNOWN, *BLADE_CHANNELS, *STOP_CHANNELS, *(() if default is None else (DEFAULT,)))
     chosen = []
     for name in names:
         if name not in known:
@@ -263,11 +271,11 @@ def build_observation_map(observed, preview):
 
 
 @kernel
-def fill_signals(t, model, x, reading, action, estimate, preview, signals):
+def fill_signals(t, model, x, reading, action, estimate, shutdown, preview, signals):
     """Fill signals (n,): what sensors read, azimuth, last action, estimates, and the hub wind at t + preview.
 
     reading: of a Measurement, and of a BladeMeasurement where there is one.
-    estimate: memory of an estimator, or None.
+    estimate: memory of an estimator, or None; shutdown: s, from which the turbine is to be stopped.
     """
     for i in range(N_MEASUREMENTS):
         signals[i] = reading[i]
@@ -280,6 +288,7 @@ def fill_signals(t, model, x, reading, action, estimate, preview, signals):
     if estimate is not None:
         for i in range(OF_BLADES - ESTIMATES):
             signals[ESTIMATES + i] = estimate[i]
+    signals[SINCE_SHUTDOWN] = max(t - shutdown, 0.0)
     for i in range(preview.shape[0]):
         ahead = t + preview[i]
         wind = wind_of(ahead, 0.0, 0.0, model.layout.hub[2], model.aero)

@@ -5,7 +5,7 @@ To add one: a kernel, a line in REWARD_TERMS and one in fill_terms. reward = sum
 
 from collections.abc import Mapping
 from enum import IntEnum
-from math import exp, hypot, isfinite, log, pi
+from math import exp, hypot, inf, isfinite, log, pi
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +20,7 @@ STEEPNESS = -log(AT_MARGIN)
 POWER_MARGIN = 0.2  # fraction of rated power above rated at which the power term has fallen to a tenth
 SPEED_MARGIN = 0.2  # fraction of rated rotor speed outside the band at which its term has fallen to a tenth
 TILT_MARGIN = 5.0 * pi / 180.0  # rad, amplitude of platform pitch at which its term has fallen to a tenth
+TOP_ACCELERATION = 3.3  # m/s2 of the tower top, the limit of the ATLAS Offshore contest (ARPA-E 2019)
 TILT_PERIOD = 30.0  # s, about that of platform pitch: turns its rate into an amplitude
 
 
@@ -38,6 +39,7 @@ class Reference(NamedTuple):
 
     platform_pitch: float  # rad
     rotor_speed: float  # rad/s
+    shutdown: float = inf  # s, from which the turbine is to be stopped
 
 
 class RewardTerm(NamedTuple):
@@ -73,6 +75,16 @@ REWARD_TERMS = {
     "torque_travel": RewardTerm(-1.0, 0.0, "change of generator torque over the most its rate limit allows"),
     "failure": RewardTerm(-1.0, 0.0, "-1 in the step that ends in failure, else 0"),
     "power_shortfall": RewardTerm(-1.0, 0.0, "minus the missing fraction of rated power; more adds nothing"),
+    "standstill": RewardTerm(-1.0, 0.0, "minus the rotor speed, either way, over rated"),
+    "platform_rate": RewardTerm(
+        0.0,
+        1.0,
+        "1 with the platform pitch at rest wherever it is, a tenth at the rate of an oscillation of 5 deg"
+        " amplitude in 30 s",
+    ),
+    "tower_top": RewardTerm(
+        -1.0, 0.0, "minus the square of the tower top's fore-aft acceleration over 3.3 m/s2"
+    ),
 }
 TermIndex = IntEnum("TermIndex", [name.upper() for name in REWARD_TERMS], start=0)
 N_TERMS = len(REWARD_TERMS)
@@ -127,6 +139,18 @@ def platform_motion_term(platform_pitch, rate, steady_pitch):
 
 
 @kernel
+def standstill_term(speed, scales):
+    """Minus the share of rated rotor speed."""
+    return 0.0 - unit_fraction(abs(speed) / scales.rated_speed)
+
+
+@kernel
+def tower_top_term(acceleration):
+    """Minus the square of the acceleration (m/s2) over its limit."""
+    return 0.0 - unit_fraction((acceleration / TOP_ACCELERATION) ** 2)
+
+
+@kernel
 def travel_term(previous, after, max_increment):
     """Minus the fraction of the possible travel that was used in one control period."""
     return 0.0 - unit_fraction(abs(after - previous) / max_increment)
@@ -160,6 +184,9 @@ def fill_terms(m, previous, reference, failed, scales, terms):
     )
     terms[TermIndex.FAILURE] = -1.0 if failed else 0.0
     terms[TermIndex.POWER_SHORTFALL] = power_shortfall_term(speed, torque, scales)
+    terms[TermIndex.STANDSTILL] = standstill_term(speed, scales)
+    terms[TermIndex.PLATFORM_RATE] = platform_motion_term(0.0, m[Measure.PLATFORM_PITCH_RATE], 0.0)
+    terms[TermIndex.TOWER_TOP] = tower_top_term(m[Measure.NACELLE_ACCELERATION])
 
 
 @kernel

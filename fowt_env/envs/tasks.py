@@ -10,7 +10,7 @@ from fowt_env.descriptions.sea_state import joint_sea_state, joint_tables, sea_s
 from fowt_env.descriptions.turbine import Turbine
 from fowt_env.descriptions.units import DEGREE
 from fowt_env.descriptions.wind import read_wind
-from fowt_env.envs.observations import STANDARD, check_channels
+from fowt_env.envs.observations import STANDARD, STOP_CHANNELS, check_channels
 from fowt_env.envs.rewards import check_weights
 from fowt_env.errors import InputError, unknown
 from fowt_env.initial_conditions import INITIAL
@@ -33,6 +33,7 @@ class Episode(NamedTuple):
     weather_seed: int
     offsets: dict  # {channel: what is added to the operating point, in the channel's unit}
     exact_start: bool  # operating point of this very wind, or interpolated between others
+    shutdown: float | None = None  # s of operation by the baseline before the agent has to stop the turbine
 
 
 @dataclass(frozen=True)
@@ -62,6 +63,9 @@ class Task:
     residual_torque: float = 0.1  # largest addition to the baseline's torque, fraction of rated torque
     residual_pitch: float = 2.0  # deg, largest addition to the baseline's blade pitch
     wind_preview: tuple = ()  # s, look-ahead times of the channel wind_preview
+    # s, range of what the baseline operates the turbine before a stop is signalled and the agent takes over;
+    # None: nothing is to be stopped, and the agent has it from the start
+    shutdown: tuple | None = None
     weather_seeds: tuple = (0, LARGEST_SEED)  # range (low, below) from which an episode's weather is drawn
 
     def __post_init__(self):
@@ -79,6 +83,10 @@ class Task:
         _number(f"{where}: residual_pitch", self.residual_pitch, 0.0, 90.0)
         set_field(self, "wind_preview", _check_preview(where, self.wind_preview))
         _check_seeds(where, self.weather_seeds)
+        if self.shutdown is not None:
+            set_field(self, "shutdown", _range(f"{where}: shutdown", self.shutdown, 0.0, self.duration))
+        for name in set(self.observation) & set(STOP_CHANNELS) if self.shutdown is None else ():
+            raise InputError(f"{where}: observation: {name!r}: needs a task with shutdown")
         if _is_mixture(self.wind):
             set_field(self, "wind", _check_mixture(where, self.wind, self.sea))
         for _, wind, sea in self.weathers:
@@ -99,7 +107,8 @@ class Task:
         wind, sea = _weather(*chosen[i][1:], lambda low, high: float(rng.uniform(low, high)))
         seed = int(rng.integers(*self.weather_seeds))
         offsets = {name: float(rng.uniform(*bounds)) for name, bounds in self.offsets.items()}
-        return Episode(wind, sea, seed, offsets, self.fixed_wind)
+        shutdown = None if self.shutdown is None else float(rng.uniform(*self.shutdown))
+        return Episode(wind, sea, seed, offsets, self.fixed_wind, shutdown)
 
     @property
     def has_sea(self):
@@ -275,6 +284,15 @@ START: dict[str, tuple[float, float]] = {  # of the order of one standard deviat
     "RotSpeed": (-0.5, 0.5),
     "Azimuth": (0.0, 360.0),
 }
+# A rotor that stands soon, on a platform and tower that move little. Feathering as fast as it goes is rough.
+STOP_WEIGHTS: dict[str, float] = {
+    "standstill": 4.0,
+    "platform_rate": 6.0,
+    "tower_top": 6.0,
+    "pitch_travel": 1.0,
+    "torque_travel": 0.0,
+    "failure": 100.0,
+}
 JOINT = {"kind": "joint", "table": SITE}
 GUST_START = (60.0, 300.0)  # s
 
@@ -307,6 +325,16 @@ TASKS = {
             sea={"kind": "joint", "table": SITE},
         ),
         Task(name="steady", wind={"kind": "steady", "speed": (4.0, 25.0)}, sea=None),
+        Task(
+            name="shutdown",
+            wind={"kind": "ntm", "speed": (12.0, 24.0), "class": "B"},
+            sea={"kind": "joint", "table": SITE},
+            duration=240.0,
+            observation=(*STANDARD, "nacelle_acceleration", "time_since_shutdown"),
+            weights=STOP_WEIGHTS,
+            blade_pitch=(0.0, 90.0),
+            shutdown=(20.0, 60.0),
+        ),
         Task(name="above_rated_mixture", wind=_mixture(12.0, 24.0), setpoint=(0.85, 1.15)),
     )
 }

@@ -15,7 +15,7 @@ from fowt_env.plant.drivetrain import (
     pitch_after,
     pitch_rate,
 )
-from fowt_env.plant.pitch_drive import PitchDrive, advance_drive, fill_drive_rates, keep, stays
+from fowt_env.plant.pitch_drive import PitchDrive, advance_drive, fill_drive_rates, halt_drive, keep, stays
 from fowt_env.plant.state import BLADES, Command, State
 
 N_BLADE_LOAD = 6  # entries of a blade_shape.BladeLoad
@@ -63,10 +63,16 @@ def _set_lagging(blade, i, x, u, dt, actuator):
     x[i] = followed_pitch(x[i], u[Command.BLADE_PITCH + blade], dt, actuator)
 
 
+@kernel
+def _halt_lagging(blade, i, x, actuator):
+    return
+
+
 # of one blade, whose pitch has the index i in the state
 advance_pitch = chosen_by_class("actuator", {PitchActuator: _advance_lagging, PitchDrive: advance_drive})
 fill_rates = chosen_by_class("actuator", {PitchActuator: _fill_lagging, PitchDrive: fill_drive_rates})
 jumps = chosen_by_class("actuator", {PitchActuator: _lagging_jumps, PitchDrive: stays})
+halt = chosen_by_class("actuator", {PitchActuator: _halt_lagging, PitchDrive: halt_drive})
 set_at_once = chosen_by_class("actuator", {PitchActuator: _set_lagging, PitchDrive: keep})
 
 
@@ -136,6 +142,15 @@ def _set_others(x, u, dt, actuator, pitches):
         return
     for blade in range(1, BLADES):
         set_at_once(blade, pitches.first + blade - 1, x, u, dt, actuator)
+
+
+@kernel
+def halt_blade(blade, x, actuator, pitches):
+    """Take the pitch rate of a blade that sticks (0, 1, 2): its pitch has none to lose without inertia."""
+    if pitches is None:
+        halt(0, State.BLADE_PITCH, x, actuator)
+        return
+    halt(blade, State.BLADE_PITCH if blade == 0 else pitches.first + blade - 1, x, actuator)
 
 
 @kernel

@@ -198,7 +198,7 @@ def bend_on(dt, x, order, history, tower, y):
     """Put into y the deflections of the tower by Adams-Moulton, from their new velocities there."""
     if tower is None:
         return
-    n = tower.slope.shape[0]
+    n = len(tower.count)
     for i in range(tower.first, tower.first + n):
         y[i] = x[i] + dt * moulton(order, y[n + i], i, history)
 
@@ -271,7 +271,7 @@ def shift_tower(after, before, tower, row):
     """Add to the rates of the deflections' velocities in a row what is between two derivatives."""
     if tower is None:
         return
-    n = tower.slope.shape[0]
+    n = len(tower.count)
     for i in range(tower.first + n, tower.first + 2 * n):
         row[i] += after[i] - before[i]
 

@@ -217,6 +217,13 @@ def fill_drive_rates(blade, i, x, u, actuator, dx):
 
 
 @kernel
+def halt_drive(blade, i, x, actuator):
+    """Bring a blade to rest where it is; i: index of its pitch."""
+    x[actuator.rate + blade] = 0.0
+    _hold(blade, x[i], actuator.held, x)
+
+
+@kernel
 def stays(blade, i, x, u, dt, actuator):
     """False: a drive with inertia moves no blade at once."""
     return False

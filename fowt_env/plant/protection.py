@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fowt_env.plant.blade_pitches import pitch_of
+from fowt_env.plant.blade_pitches import halt_blade, pitch_of
 from fowt_env.plant.channels import acceleration_at
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.compile.handle import by_reference
@@ -272,6 +272,7 @@ def break_drives(t, x, u, model, guard):
             if isnan(guard.held[k]):
                 guard.held[k] = pitch_of(blade, x, model.pitches)
             u[i] = guard.held[k]
+            halt_blade(blade, x, model.actuator, model.pitches)
         elif kind == Failure.RUNAWAY:
             u[i] = model.actuator.minimum if value < 0.0 else model.actuator.maximum
         elif kind == Failure.OFFSET:

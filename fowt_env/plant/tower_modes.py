@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
+from fowt_env.plant.compile.handle import by_reference
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.rigid_body import accelerate, momentum_rate, solve_spd, substitute_spd
 from fowt_env.plant.state import Pose, State, Wrench
@@ -24,6 +25,7 @@ ELASTIC_ROUNDS = (
 )
 
 
+@by_reference
 class TowerModes(NamedTuple):
     """Modes of a tower, n of them: first fore-aft, first side-side, then the second ones if there are."""
 
@@ -38,6 +40,7 @@ class TowerModes(NamedTuple):
     damping: np.ndarray  # (n, n) N s/m, of the structure
     weight_stiffness: np.ndarray  # (n, n) kg/m, times gravity taken off the stiffness: axial shortening
     drag_shape: np.ndarray  # (points, n) shapes at the points of tower_drag.TowerDrag
+    count: tuple  # n zeros: its length is known when a kernel is compiled, and so that of every loop
     lower: object = None  # (6, 6) mass matrix of floater and straight tower about the body origin
     straight: object = None  # (6, 6) that of the straight tower alone
     upper_mass: float = 0.0  # kg, of nacelle and rotor
@@ -118,9 +121,10 @@ def _straight(x, tower):
     return None
 
 
-@kernel
-def _bent(x, tower):
-    n = tower.slope.shape[0]
+@inlined_kernel
+def bend_by_modes(x, tower):
+    """Bend of a state."""
+    n = len(tower.count)
     q, v = tower.first, tower.first + n
     ux = uy = vx = vy = a = b = da = db = 0.0
     for i in range(0, n, 2):
@@ -136,7 +140,7 @@ def _bent(x, tower):
 
 
 # (x, tower) -> Bend of a state, None for a rigid tower
-bend_of = chosen_by_class("tower", {type(None): _straight, TowerModes: _bent})
+bend_of = chosen_by_class("tower", {type(None): _straight, TowerModes: bend_by_modes})
 
 
 @kernel
@@ -215,17 +219,17 @@ def add_modal(load, bend, tower, modal):
     fx, fy, _ = from_nacelle(bend, load.fx, load.fy, load.fz)
     turning = bend.cb * (load.my - bend.z * load.fx) - bend.sb * load.mz
     rolling = load.mx + bend.z * load.fy
-    for i in range(0, tower.slope.shape[0], 2):
+    for i in range(0, len(tower.count), 2):
         modal[i] += fx + tower.slope[i] * turning
         modal[i + 1] += fy - tower.slope[i + 1] * rolling
 
 
-@kernel
+@inlined_kernel
 def begin_modal(x, tower, modal):
     """Set modal (n,) to the generalised forces of the tower's structure; nothing with a rigid tower."""
     if tower is None:
         return
-    n = tower.slope.shape[0]
+    n = len(tower.count)
     q, v = tower.first, tower.first + n
     for i in range(n):
         force = 0.0
@@ -234,10 +238,10 @@ def begin_modal(x, tower, modal):
         modal[i] = force
 
 
-@kernel
+@inlined_kernel
 def shortening(x, tower):
     """First moment of mass (kg m) by which bending brings the masses nearer to the tower base."""
-    n, q = tower.slope.shape[0], tower.first
+    n, q = len(tower.count), tower.first
     total = 0.0
     for i in range(n):
         for j in range(n):
@@ -245,10 +249,10 @@ def shortening(x, tower):
     return total
 
 
-@kernel
+@inlined_kernel
 def displaced_moment(x, bend, tower):
     """(x, y, z) kg m: how far bending moves the whole turbine's first moment of mass, platform axes."""
-    n, q = tower.slope.shape[0], tower.first
+    n, q = len(tower.count), tower.first
     dx = dy = 0.0
     for i in range(0, n, 2):
         dx += tower.first_moment[i] * x[q + i]
@@ -278,7 +282,7 @@ def add_modal_weight(pose, x, bend, tower, gravity, modal):
     """Add to modal (n,) the generalised forces of the weight; nothing with a rigid tower."""
     if bend is None:
         return
-    n, q, g = tower.slope.shape[0], tower.first, gravity
+    n, q, g = len(tower.count), tower.first, gravity
     s, m = tower.upper_moment, tower.upper_mass
     nx, ny, nz = pose.r31, pose.r32, pose.r33
     sx, sy, sz = from_nacelle(bend, s[0], s[1], s[2])
@@ -297,10 +301,10 @@ def add_modal_weight(pose, x, bend, tower, gravity, modal):
 # ---------------------------------------------------------------- inertia
 
 
-@kernel
+@inlined_kernel
 def masses_of(x, tower):
     """Masses of a state."""
-    n = tower.slope.shape[0]
+    n = len(tower.count)
     q, v = tower.first, tower.first + n
     dx = dy = ex = ey = gxx = gxy = gyy = vx = vy = wx = wy = hxx = hxy = hyx = hyy = 0.0
     for i in range(0, n, 2):
@@ -327,7 +331,7 @@ def masses_of(x, tower):
     return Masses(dx, dy, ex, ey, gxx, gxy, gyy, vx, vy, wx, wy, hxx, hxy, hyx, hyy)
 
 
-@kernel
+@inlined_kernel
 def upper_of(bend, tower):
     """Upper of a bent tower."""
     s, m, t = tower.upper_moment, tower.upper_inertia, tower.shaft
@@ -342,7 +346,7 @@ def upper_of(bend, tower):
     return Upper(sx, sy, sz, xx, yy, zz, xy, xz, yz, nx, ny, nz)
 
 
-@kernel
+@inlined_kernel
 def with_free_rotor(upper, inertia):
     """Upper without an inertia (kg m2) about the shaft."""
     u = upper
@@ -368,7 +372,7 @@ def cross(ax, ay, az, bx, by, bz):
     return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
-@kernel
+@inlined_kernel
 def top_bias(pose, bend):
     """Acceleration of the tower top and of the nacelle's rotation, and the nacelle's angular velocity.
 
@@ -387,7 +391,7 @@ def top_bias(pose, bend):
     return ax, ay, az, bx, by, bz, wx + tx, wy + ty, wz + tz
 
 
-@kernel
+@inlined_kernel
 def upper_rate(upper, mass, spin, ax, ay, az, bx, by, bz, wx, wy, wz):
     """Rate of momentum of nacelle and rotor about the tower top, platform axes: (force, moment), six numbers.
 
@@ -408,7 +412,7 @@ def upper_rate(upper, mass, spin, ax, ay, az, bx, by, bz, wx, wy, wz):
     )  # fmt: skip
 
 
-@kernel
+@inlined_kernel
 def deflection_rate(pose, d):
     """Wrench about the body origin: what velocities and deflections d (Masses) add to the straight tower's
     rate of momentum, with no rate of any velocity.
@@ -434,7 +438,7 @@ def deflection_rate(pose, d):
 # ---------------------------------------------------------------- equation of motion
 
 
-@kernel
+@inlined_kernel
 def _add_body(matrix, d, upper, mass, bend):
     """Add to the platform's rows (lower triangle) the bent tower's and the nacelle's masses."""
     u, px, py, pz = upper, bend.x, bend.y, bend.z
@@ -458,11 +462,11 @@ def _add_body(matrix, d, upper, mass, bend):
     matrix[5, 4] += u.yz - mass * py * pz - py * u.sz - pz * u.sy - d.ey
 
 
-@kernel
+@inlined_kernel
 def _add_modes(x, upper, mass, bend, tower, matrix):
     """Fill the rows of the modes (lower triangle)."""
     u, px, py, pz = upper, bend.x, bend.y, bend.z
-    n, q = tower.slope.shape[0], tower.first
+    n, q = len(tower.count), tower.first
     tx, tz = bend.ca, -bend.sa  # axis about which side-side modes turn the nacelle
     ax, ay, az = u.xy, u.yy, u.yz  # inertia times the y axis
     bx, by, bz = turn(u, tx, 0.0, tz)
@@ -497,10 +501,10 @@ def _add_modes(x, upper, mass, bend, tower, matrix):
             matrix[row, 7 + j] = ly - tower.slope[j + 1] * (tx * kx + tz * kz) + tower.mass[i + 1, j + 1]
 
 
-@kernel
+@inlined_kernel
 def _take_modal_rates(pose, x, fx, fy, mx, my, mz, bend, tower, modal):
     """Take off modal (n,) the terms of velocities: of the tower's line mass, and of a wrench at its top."""
-    n = tower.slope.shape[0]
+    n = len(tower.count)
     q, v = tower.first, tower.first + n
     wx, wy, wz = pose.wx, pose.wy, pose.wz
     ax, ay, _ = cross(wx, wy, wz, pose.vx, pose.vy, pose.vz)
@@ -525,7 +529,7 @@ def _take_modal_rates(pose, x, fx, fy, mx, my, mz, bend, tower, modal):
         )  # fmt: skip
 
 
-@kernel
+@inlined_kernel
 def _factor_modes(matrix, n):
     """Take the n modes out of the platform's system, the last first; the lower triangle alone counts."""
     for k in range(n - 1, -1, -1):
@@ -537,10 +541,10 @@ def _factor_modes(matrix, n):
                 matrix[i, j] -= factor * matrix[row, j]
 
 
-@kernel
-def _without_modes(matrix, b, modal):
+@inlined_kernel
+def _without_modes(matrix, b, modal, n):
     """Take the modes out of the right-hand sides b (6,) and modal (n,), with what _factor_modes has left."""
-    for k in range(modal.shape[0] - 1, -1, -1):
+    for k in range(n - 1, -1, -1):
         row = 6 + k
         force = modal[k] / matrix[row, row]
         for i in range(6):
@@ -549,10 +553,10 @@ def _without_modes(matrix, b, modal):
             modal[i] -= matrix[row, 6 + i] * force
 
 
-@kernel
-def _find_modes(matrix, b, modal):
+@inlined_kernel
+def _find_modes(matrix, b, modal, n):
     """Put the accelerations of the deflections into modal, from those of the platform in b."""
-    for k in range(modal.shape[0]):
+    for k in range(n):
         row = 6 + k
         total = modal[k]
         for i in range(6):
@@ -569,9 +573,9 @@ def accelerate_bending(pose, x, load, torque, added, body, tower, matrix, dx):
     load: on the whole turbine, about the body origin. dx comes with the generalised forces on the deflections
     where it has the rates of their velocities. matrix (6 + n, 6 + n) is scratch.
     """
-    n = tower.slope.shape[0]
+    n = len(tower.count)
     b, modal = dx[State.VX : State.WZ + 1], dx[tower.first + n : tower.first + 2 * n]
-    bend, d, mass = _bent(x, tower), masses_of(x, tower), tower.upper_mass
+    bend, d, mass = bend_by_modes(x, tower), masses_of(x, tower), tower.upper_mass
     upper = upper_of(bend, tower)
     spin = body.coupling * x[State.ROTOR_SPEED]
     ratio = 0.0 if body.rotor_fixed else body.coupling / body.rotor_row
@@ -597,12 +601,12 @@ def accelerate_bending(pose, x, load, torque, added, body, tower, matrix, dx):
     _add_body(matrix, d, free, mass, bend)
     _add_modes(x, free, mass, bend, tower, matrix)
     _factor_modes(matrix, n)
-    _without_modes(matrix, b, modal)
+    _without_modes(matrix, b, modal, n)
     if body.platform_fixed:
         b[:] = 0.0
     else:
         solve_spd(matrix, b)
-    _find_modes(matrix, b, modal)
+    _find_modes(matrix, b, modal, n)
     if body.rotor_fixed:
         dx[State.ROTOR_SPEED] = 0.0
         return
@@ -610,10 +614,10 @@ def accelerate_bending(pose, x, load, torque, added, body, tower, matrix, dx):
     dx[State.ROTOR_SPEED] = (torque - body.coupling * turning) / body.rotor_row
 
 
-@kernel
+@inlined_kernel
 def _along_shaft(bx, by, bz, b, modal, bend, tower, nx, ny, nz):
     """Rate of the nacelle's rotation along the shaft (n), of its bias (b) and the accelerations."""
-    for i in range(0, modal.shape[0], 2):
+    for i in range(0, len(tower.count), 2):
         by += tower.slope[i] * modal[i]
         rolling = tower.slope[i + 1] * modal[i + 1]
         bx -= rolling * bend.ca
@@ -637,7 +641,7 @@ def fill_tower_rates(x, modal, tower, dx):
     """Put the rates of the deflections into dx, and for accelerate_bending the forces on them."""
     if tower is None:
         return
-    n, q = tower.slope.shape[0], tower.first
+    n, q = len(tower.count), tower.first
     for i in range(n):
         dx[q + i] = x[q + n + i]
         dx[q + n + i] = modal[i]
@@ -648,7 +652,7 @@ def fill_impulse(load, x, bend, tower, still, dx):
     """Put into `still` the deflections of x, and into dx the forces on them of a wrench of the nacelle."""
     if bend is None:
         return
-    n, q = tower.slope.shape[0], tower.first
+    n, q = len(tower.count), tower.first
     for i in range(n):
         still[q + i] = x[q + i]
         dx[q + n + i] = 0.0
@@ -660,8 +664,8 @@ def add_tower_steps(dt, dx, tower, x):
     """Add dt times the rates in dx to the velocities of the deflections in x."""
     if tower is None:
         return
-    v = tower.first + tower.slope.shape[0]
-    for i in range(v, v + tower.slope.shape[0]):
+    v = tower.first + len(tower.count)
+    for i in range(v, v + len(tower.count)):
         x[i] += dt * dx[i]
 
 
@@ -689,12 +693,12 @@ def correct_elastic(dt, x, history, body, tower, matrix, elastic, still, extra, 
     """
     if tower is None:
         return
-    n, q = tower.slope.shape[0], tower.first
+    n, q = len(tower.count), tower.first
     v = q + n
     b, modal = extra[State.VX : State.WZ + 1], extra[v : v + n]
     new, done = still[v : v + n], still[q:v]
     done[:] = 0.0
-    bend, t = _bent(x, tower), tower.shaft
+    bend, t = bend_by_modes(x, tower), tower.shaft
     nx, ny, nz = from_nacelle(bend, t[0], t[1], t[2])
     for _ in range(ELASTIC_ROUNDS):
         for i in range(n):
@@ -708,12 +712,12 @@ def correct_elastic(dt, x, history, body, tower, matrix, elastic, still, extra, 
             modal[i] = force - done[i]
             done[i] = force
         b[:] = 0.0
-        _without_modes(matrix, b, modal)
+        _without_modes(matrix, b, modal, n)
         if body.platform_fixed:
             b[:] = 0.0
         else:
             substitute_spd(matrix, b)
-        _find_modes(matrix, b, modal)
+        _find_modes(matrix, b, modal, n)
         for i in range(6):
             y[State.VX + i] += dt * b[i]
         for i in range(n):
@@ -734,9 +738,9 @@ def _platform_rates(pose, bend, dx, tower):
 @kernel
 def _top_rates(pose, bend, dx, tower):
     """Absolute acceleration of the tower top and of the nacelle's rotation, platform axes: Twist."""
-    v = tower.first + tower.slope.shape[0]
+    v = tower.first + len(tower.count)
     ax, ay, az, bx, by, bz, _, _, _ = top_bias(pose, bend)
-    for i in range(0, tower.slope.shape[0], 2):
+    for i in range(0, len(tower.count), 2):
         rolling = tower.slope[i + 1] * dx[v + i + 1]
         ax += dx[v + i]
         ay += dx[v + i + 1]
@@ -772,7 +776,7 @@ nacelle_rates = chosen_by_class("tower", {type(None): _platform_rates, TowerMode
 @kernel
 def above_base_rate(pose, x, dx, bend, body, tower):
     """Wrench about the body origin, body axes: rate of momentum of the bent tower, nacelle and rotor."""
-    n, mass = tower.slope.shape[0], tower.upper_mass
+    n, mass = len(tower.count), tower.upper_mass
     q, v = tower.first, tower.first + n
     top, upper, d = _top_rates(pose, bend, dx, tower), upper_of(bend, tower), masses_of(x, tower)
     _, _, _, _, _, _, wx, wy, wz = top_bias(pose, bend)

@@ -40,15 +40,24 @@ class Fidelity(NamedTuple):
     dt: float | None = None  # s, default step with its own integrator; None: that of the integrator
 
 
+def least_lag(dt, integrator):
+    """Shortest time constant (s) of the wake that an integrator follows with the step dt (s)."""
+    return LAG_MARGIN * dt / INTEGRATORS[integrator].decay_limit
+
+
+def _build_wake(options):
+    return build_dynamic_inflow(least=least_lag(default_step(options), options["integrator"]))
+
+
 def _build_bem(elements, options):
     skew = build_skewed_wake() if options["skewed_wake"] else None
-    wake = build_dynamic_inflow() if options["dynamic_inflow"] else None
+    wake = _build_wake(options) if options["dynamic_inflow"] else None
     return BemRotor(elements, skew, wake)
 
 
 def _build_lookup(elements, options):
     if options["dynamic_inflow"]:
-        return build_dynamic_sections(elements, build_dynamic_inflow())
+        return build_dynamic_sections(elements, _build_wake(options))
     return build_section_table(elements)
 
 
@@ -88,6 +97,7 @@ FIDELITIES = {
 # frequency times step, in place of a limit of stability that an integrator lacks: at half of it an undamped
 # oscillation grows as one with a damping ratio of -0.5 % by heun, of -0.04 % by abm4
 SLOW_GROWTH = 0.7
+LAG_MARGIN = 1.25  # of the shortest lag over what just does not grow
 FIELD_SAMPLES = 3  # rotor loads per step in a box of wind, whose cells the blades cross in 0.1 s
 OPTIONS = {
     # name: (default, allowed values or a description of the allowed range)

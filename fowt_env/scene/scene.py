@@ -27,7 +27,7 @@ from fowt_env.plant.rotor_substeps import N_SAMPLE
 from fowt_env.plant.state import BLADES, N_COMMANDS, N_INDIVIDUAL_COMMANDS, Block, State, state_blocks
 from fowt_env.plant.user_loads import user_data_size
 from fowt_env.scene.actuators import drive_states
-from fowt_env.scene.options import default_step
+from fowt_env.scene.options import default_step, least_lag
 from fowt_env.scene.parts import hydro_in_waves, wake_states
 from fowt_env.scene.radiation_fit import memory_for_step
 from fowt_env.scene.tower import tower_frequency, tower_states
@@ -223,11 +223,18 @@ class Scene:
         return default_step(self.options, tower_frequency(self.model.tower))
 
     def with_step(self, dt: float) -> "Scene":
-        """This scene, made to be stepped by dt (s): a convolution of radiation is of one step alone."""
-        hydro = self.model.hydro
+        """This scene, made to be stepped by dt (s).
+
+        A convolution of radiation is of one step alone, and dynamic inflow has no lag too short for it.
+        """
+        hydro, parts = self.model.hydro, {}
         memory = None if hydro is None else hydro.radiation
         fitting = memory_for_step(memory, self.platform.potential_flow, dt, self.options["planar"])
-        return self if fitting is memory else self.with_model({"hydro.radiation": fitting})
+        if fitting is not memory:
+            parts["hydro.radiation"] = fitting
+        if wake_states(self.model.aero):
+            parts["aero.rotor.wake.least"] = least_lag(dt, self.options["integrator"])
+        return self.with_model(parts) if parts else self
 
     def with_model(self, parts: Mapping[str, Any] | None = None, **slots: Any) -> "Scene":
         """A copy with some parts of the model replaced (same types: no recompilation).

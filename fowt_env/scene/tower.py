@@ -81,6 +81,7 @@ def build_tower_modes(platform, turbine, count, first_state):
         damping=np.ascontiguousarray(_damping(bending, stiffness, generalised, count)),
         weight_stiffness=np.where(alike, np.einsum("k,ki,kj->ij", cell * above, slope, slope), 0.0),
         drag_shape=np.ascontiguousarray(shape_values(shapes, _drag_points())),
+        count=(0,) * len(shapes),
     )
 
 

@@ -3,8 +3,12 @@ import pytest
 from plant_helpers import rates
 
 import fowt_env
-from fowt_env.analysis.linear_model import linearize, natural_periods
+from fowt_env.analysis.linear_model import WAKE, linearize, natural_periods
+from fowt_env.analysis.reduced_model import without_wake
+from fowt_env.analysis.trim import trim
 from fowt_env.errors import InputError
+from fowt_env.plant.aero.blade_elements import blade_section
+from fowt_env.plant.aero.wake import time_constants
 from fowt_env.plant.state import STATE_INDEX, State
 
 PERIODS = {"surge": 124.0, "sway": 124.0, "heave": 30.8, "roll": 29.9, "platform_pitch": 29.9, "yaw": 8.28}
@@ -115,3 +119,33 @@ def test_linear_model_of_a_fixed_platform_has_no_platform_motion(storm_scene):
 def test_unknown_state_name_is_refused(still_scene):
     with pytest.raises(InputError, match="Did you mean 'surge'"):
         linearize(still_scene).index("surg")
+
+
+def test_the_wake_decays_at_its_own_lags_and_at_rest_is_the_quasi_steady_one():
+    wind, settings = 18.0, {"fidelity": "standard", "shear_exponent": 0.0}
+    scene = fowt_env.build_scene(wind=wind, dynamic_inflow=True, **settings)
+    point = trim(scene, "fixed")
+    model = linearize(scene, point)
+    rotor = scene.model.aero.rotor.elements
+    lags = []
+    for j, radius in enumerate(rotor.radius):
+        in_plane = point.state[State.ROTOR_SPEED] * radius
+        a = blade_section(wind, in_plane, point.state[State.BLADE_PITCH], j, 1.0, rotor).a
+        lags.append(time_constants(a, wind, radius, rotor.tip_radius, scene.model.aero.rotor.wake))
+    wake = [i for i, name in enumerate(model.states) if name.startswith(WAKE)]
+    decay = -1.0 / np.diag(model.A)[wake].reshape(-1, 4)
+    assert decay[:, ::2] == pytest.approx(np.array(lags)[:, [0, 0]], rel=2e-3)
+    assert decay[:, 1::2] == pytest.approx(np.array(lags)[:, [1, 1]], rel=2e-3)
+    assert not any(mode.name.startswith(WAKE) for mode in model.modes())
+
+    plain = linearize(fowt_env.build_scene(wind=wind, **settings))
+    settled = without_wake(linearize(scene))
+    thrust = plain.output_index("rotor_thrust")
+    inputs = ("blade_pitch_command", "wind_speed")
+    omega = 2.0 * np.pi * np.array([0.01, 0.05, 0.2])
+    slow, quick = (m.response(omega, inputs)[:, thrust] for m in (settled, plain))
+    assert settled.states == plain.states
+    # two tables: 3e-3 in the slope over the blade pitch, whose rows are 0.25 deg apart
+    assert np.abs(slow / quick - 1.0).max() < 5e-3
+    lagging = linearize(scene).response(omega, inputs)[:, thrust]
+    assert 0.06 < abs(lagging[1, 0] / quick[1, 0] - 1.0) < 0.1

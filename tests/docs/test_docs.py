@@ -81,7 +81,7 @@ def test_the_printed_reward_formulas_give_what_the_kernels_give():
         now[Measure.ROTOR_SPEED] = rng.uniform(0.2, 1.8)
         now[Measure.GENERATOR_TORQUE] = rng.uniform(0.0, 47e3)
         now[Measure.PLATFORM_PITCH], now[Measure.PLATFORM_PITCH_RATE] = rng.normal(scale=[0.08, 0.02])
-        now[Measure.BLADE_PITCH] = rng.uniform(0.0, 0.5)
+        now[Measure.BLADE_PITCH], now[Measure.NACELLE_ACCELERATION] = rng.uniform(0.0, 0.5), rng.normal()
         before[Measure.BLADE_PITCH] = now[Measure.BLADE_PITCH] + rng.normal(scale=0.01)
         before[Measure.GENERATOR_TORQUE] = now[Measure.GENERATOR_TORQUE] + rng.normal(scale=1e3)
         reference = np.array([rng.normal(scale=0.05), rng.uniform(0.7, 1.4)])
@@ -93,7 +93,7 @@ def test_the_printed_reward_formulas_give_what_the_kernels_give():
             "P_rated": law.rated_power,
             "W": now[Measure.ROTOR_SPEED], "W_0": reference[1], "W_rated": turbine.rated_rotor_speed,
             "theta": now[Measure.PLATFORM_PITCH], "theta_0": reference[0],
-            "rate": now[Measure.PLATFORM_PITCH_RATE],
+            "rate": now[Measure.PLATFORM_PITCH_RATE], "a": now[Measure.NACELLE_ACCELERATION],
             "beta": now[Measure.BLADE_PITCH], "beta_before": before[Measure.BLADE_PITCH],
             "beta_rate": turbine.pitch_drive.rate_limit,
             "Q": now[Measure.GENERATOR_TORQUE], "Q_before": before[Measure.GENERATOR_TORQUE],

@@ -6,7 +6,7 @@ from scipy.linalg import expm
 
 from fowt_env.plant.blade_pitches import BladePitches, advance_pitches, fill_pitch_rates, pitches_jump
 from fowt_env.plant.drivetrain import TorqueLag, advance_torque, fill_torque_rate, torque_in_force
-from fowt_env.plant.pitch_drive import PitchDrive, drive_acceleration, drive_after
+from fowt_env.plant.pitch_drive import PitchDrive, drive_acceleration, drive_after, halt_drive, propagator
 from fowt_env.plant.state import Command, State
 from tests.naive.pitch_drive import NaiveDrive, play
 
@@ -73,13 +73,14 @@ def test_limits_and_friction_act_as_in_short_steps(name):
         assert rate == pytest.approx(naive.rate, abs=1e-3)
 
 
+@pytest.mark.parametrize("step", [0.1, 1.0])
 @pytest.mark.parametrize("name", CASES)
-def test_what_comes_out_does_not_depend_on_the_step(name):
+def test_what_comes_out_does_not_depend_on_the_step(name, step):
     rng, made = np.random.default_rng(5), drive(**CASES[name])
     commands = np.clip(rng.normal(0.12, 0.12, 60), made.minimum, made.maximum)
-    whole = followed(made, commands, 0.1)
+    whole = followed(made, commands, step)
     for parts in (2, 7, 40):
-        assert followed(made, commands, 0.1, parts) == pytest.approx(whole, abs=1e-11)
+        assert followed(made, commands, step, parts) == pytest.approx(whole, abs=1e-11)
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -108,6 +109,26 @@ def test_without_an_acceleration_limit_a_held_command_never_gains_energy():
                 now = (made.natural_frequency * (pitch - target)) ** 2 + rate**2
                 assert now <= energy * (1.0 + 1e-12) + 1e-20
                 energy = now
+
+
+def test_the_end_of_a_slewing_is_passed_whatever_rounding_leaves():
+    made = drive(w=20.0, zeta=1.2, rate=0.035, friction=0.001)
+    target = 0.049268249036087425
+    rest = target - made.friction
+    end = rest - 2.0 * made.damping * made.rate_limit / made.natural_frequency
+    a, b, c, d = propagator(0.1, made)
+    for ulps in range(-40, 41):
+        pitch = end + ulps * np.spacing(end)
+        wanted = rest + a * (pitch - rest) + b * 0.035, c * (pitch - rest) + d * 0.035
+        assert drive_after(pitch, 0.035, target, 0.1, made) == pytest.approx(wanted, abs=1e-11)
+
+
+def test_a_peak_of_the_rate_just_beyond_its_limit_is_cut():
+    fastest = max(drive_after(0.0, 0.0, 0.1, t, drive())[1] for t in np.linspace(0.05, 0.15, 2001))
+    made = drive(rate=0.9999 * fastest)
+    whole = drive_after(0.0, 0.0, 0.1, 0.25, made)
+    assert followed(made, [0.1], 0.25, 2000)[0] == pytest.approx(whole, abs=1e-11)
+    assert abs(whole[0] - drive_after(0.0, 0.0, 0.1, 0.25, drive())[0]) > 1e-8
 
 
 def test_a_far_step_slews_at_the_rate_limit_and_lags_by_two_zeta_over_w():
@@ -174,9 +195,21 @@ def test_each_blade_has_a_drive_of_its_own_with_the_same_limits():
     )
     assert y[17:20] == pytest.approx([0.035, -0.035, 0.0], rel=1e-14)
     assert y[16] == 0.3 and y[20:] == pytest.approx([0.5, 0.1, 0.3])
+    moving = y.copy()
+    advance_pitches(moving, u, 0.1, made, pitches, y)
+    for blade, command in ((1, 0.1), (2, 0.3)):
+        wanted = drive_after(moving[14 + blade], moving[17 + blade], command, 0.1, made)
+        assert (y[14 + blade], y[17 + blade]) == pytest.approx(wanted, rel=1e-14)
     fill_pitch_rates(y, u, made, pitches, dx)
     assert dx[14:17] == pytest.approx(y[17:20], rel=1e-14) and np.all(dx[17:] == 0.0)
     assert not pitches_jump(x, u, 0.1, made, pitches)
+
+
+def test_a_blade_that_sticks_loses_its_rate_and_what_it_was_going_to():
+    x = state(0.1, held=(0.105,))
+    x[RATE] = 0.3
+    halt_drive(0, int(State.BLADE_PITCH), x, drive(deadband=0.01, held=16))
+    assert x[14:].tolist() == [0.1, 0.0, 0.1]
 
 
 def test_the_torque_lags_as_an_exponential_of_whatever_step():

@@ -75,12 +75,25 @@ def test_no_density_and_no_wind_at_rest_are_no_load(name):
 
 @pytest.mark.parametrize("option", ["dynamic_inflow", "skewed_wake"])
 @pytest.mark.parametrize("name", ROTORS)
-def test_induction_is_taken_by_those_that_have_it_and_refused_by_the_others(name, option):
-    if ROTORS[name].induction:
+def test_a_wake_is_taken_by_those_that_have_it_and_refused_by_the_others(name, option):
+    if option in ROTORS[name].wake:
         assert build_scene(wind=8.0, rotor=name, **{option: True}).rotor == name
         return
-    with pytest.raises(InputError, match=f"rotor = '{name}': skewed_wake and dynamic_inflow need rotor = "):
+    with pytest.raises(InputError, match=f"rotor = '{name}': it has no {option}, which needs rotor = 'bem'"):
         build_scene(wind=8.0, rotor=name, **{option: True})
+
+
+@pytest.mark.parametrize("wanted", [{"dynamic_inflow"}, {"skewed_wake"}, {"dynamic_inflow", "skewed_wake"}])
+@pytest.mark.parametrize("level", FIDELITIES)
+def test_a_level_has_the_cheapest_rotor_with_the_wake_that_is_wanted(level, wanted):
+    found = build_scene(wind=8.0, fidelity=level, **dict.fromkeys(wanted, True)).rotor
+    assert found == ("lookup" if level != "reference" and wanted == {"dynamic_inflow"} else "bem")
+
+
+def test_the_wake_lags_no_less_than_the_step_follows():
+    scene = build_scene(wind=8.0, fidelity="standard", dynamic_inflow=True)
+    assert scene.model.aero.rotor.wake.least == pytest.approx(1.25 * 0.1 / 0.3)
+    assert scene.with_step(0.05).model.aero.rotor.wake.least == pytest.approx(1.25 * 0.05 / 0.3)
 
 
 @pytest.mark.parametrize("name", ROTORS)

@@ -83,6 +83,7 @@ class Variant:
 REFERENCE = "reference"  # axis of the runs at twice the finest step
 LARGER_STEPS = {"rk4": 0.1}  # s, largest of the sweep where it is not the default step
 TABLED = (("mooring", "table"),)
+BENDING = (("tower", "modes"),)  # another plant, with a reference of its own
 
 
 def step_sizes(integrator):
@@ -136,6 +137,14 @@ LEVELS = {
     "ab4 0.1 s, table, fast waves, mooring by table": "fast",
     f"rk4 {FIDELITIES['reference'].dt:g} s, bem, exact waves": "reference",
 }
+
+
+def bending_steps():
+    """Variants with a tower that bends in its first modes, at several steps."""
+    axis = "bending tower"
+    found = [Variant(axis, "rk4", dt, "bem", "exact", BENDING) for dt in (0.0125, 0.025, 0.05, 0.1)]
+    found += [Variant(axis, "rk4", dt, "lookup", "fast", BENDING) for dt in (0.0125, 0.05, 0.1)]
+    return found + [Variant(axis, "ab4", dt, "lookup", "fast", BENDING) for dt in (0.025, 0.05, 0.1)]
 
 
 def _scene(variant, seed, duration, wind, sea, platform):
@@ -207,12 +216,15 @@ def accuracy(
         done += len(plan) - len(missing)
         if not missing:
             continue
-        if progress is not None:
-            progress(f"seed {seed}: reference", done, total)
-        reference = _run(
-            Variant(REFERENCE, "rk4", finest, "bem", "exact"), seed, duration, wind, sea, platform
-        )
+        references = {}
         for variant in missing:
+            plant = tuple(option for option in variant.options if option in BENDING)
+            if plant not in references:
+                if progress is not None:
+                    progress(f"seed {seed}: reference", done, total)
+                exact = Variant(REFERENCE, "rk4", finest, "bem", "exact", plant)
+                references[plant] = _run(exact, seed, duration, wind, sea, platform)
+            reference = references[plant]
             if progress is not None:
                 progress(f"seed {seed}: {variant.name}", done, total)
             rows.append(_row(variant, seed, duration, finest, reference, wind, sea, repeats, platform))
@@ -416,13 +428,14 @@ def select(names):
     """Variants of the axes named. Raises: InputError for an unknown axis.
 
     "levels" stands for those that are levels of build_scene; "steps of the levels" are these at several
-    steps and "parts of standard alone" what one of them replaces, both no part of the sweep of all;
+    steps, "parts of standard alone" what one of them replaces and "bending tower" a plant of its own, none
+    of them part of the sweep of all;
     "reference" adds none to those of every study.
     """
-    every = [*variants(), *level_steps()]
+    every = [*variants(), *level_steps(), *bending_steps()]
     known = [REFERENCE, "levels", *dict.fromkeys(v.axis for v in every)]
     for name in names:
         if name not in known:
             raise unknown("axis", name, known)
     chosen = [v for v in variants() if v.axis in names or ("levels" in names and v.name in LEVELS)]
-    return chosen + [v for v in level_steps() if v.axis in names]
+    return chosen + [v for v in (*level_steps(), *bending_steps()) if v.axis in names]

@@ -143,7 +143,9 @@ TIMED_SCENES = {
     "full-field box, standard": TimedScene(_box, SEA, "standard"),
     "exact waves, look-up rotor": TimedScene(TURBULENCE, SEA, "standard", {"wave_loads": "exact"}),
     "BEM rotor, fast waves": TimedScene(TURBULENCE, SEA, "standard", {"rotor": "bem"}),
-    "dynamic inflow": TimedScene(TURBULENCE, SEA, options={"dynamic_inflow": True}),
+    "bending tower": TimedScene(TURBULENCE, SEA, options={"tower": "modes"}),
+    "bending tower, second modes": TimedScene(TURBULENCE, SEA, options={"tower": "modes2"}),
+    "a pitch for each blade": TimedScene(TURBULENCE, SEA, options={"pitch": "individual"}),
     "still water, wind": TimedScene(TURBULENCE, None, absent="waves"),
     "no wind, waves": TimedScene(None, SEA, absent="wind, rotor, tower drag"),
     "still water, no wind": TimedScene(None, None, absent="waves, wind, rotor, tower drag"),
@@ -164,6 +166,7 @@ TIMED_SCENES = {
         platform_fixed=True,
         absent="strips, waves, buoyancy, mooring; 6x6 solve (at run time)",
     ),  # fmt: skip
+    "dynamic inflow": TimedScene(TURBULENCE, SEA, options={"dynamic_inflow": True}),
 }
 
 
@@ -219,19 +222,19 @@ def _repeat(part, model, data, x, u, dx, m, row, n, dt):
         if part == 5:
             total += mooring_load(pose, model.mooring, data.lines, data.counters).my
         else:
-            total += _of_wind(part, t, pose, x, model.aero, data, dx)
+            total += _of_wind(part, t, pose, x, model.aero, model.pitches, data, dx)
             total += _of_water(part, t, pose, model.hydro, data)
     return total
 
 
 @kernel
-def _of_wind(part, t, pose, x, aero, data, dx):
+def _of_wind(part, t, pose, x, aero, pitches, data, dx):
     """Something of one of the loads of the wind, if part is one."""
     if aero is None:
         return 0.0
     now = wind_now(t, aero.wind) if part == 1 else wind_now(0.0, aero.wind)
     if part == 2:
-        load = rotor_part(t, pose, x, now, aero, aero.rotor, dx, data.counters, None, data.blades)
+        load = rotor_part(t, pose, x, now, aero, aero.rotor, dx, data.counters, pitches, data.blades)
         return load.thrust + load.wrench.mz
     if part == 3:
         return tower_load(t, pose, now, aero.wind, aero.field, aero.tower).my
@@ -259,7 +262,7 @@ def load_times(scene, x, u, calls=CHUNK, repeats=REPEATS):
     """{load: microseconds of one call} near a state; the loop and the pose are taken off the others."""
     scene = scene.with_step(0.1)
     handle = scene.handle()
-    dx, m = np.zeros_like(x), np.zeros(N_MEASUREMENTS)
+    dx, m = np.zeros_like(x), np.zeros(scene.n_measurements)
     row = np.zeros(len(scene.channels))
     forget(handle)
     output(handle, x, u, 0.0, dx, row)  # fills the cached loads that measure and record read
@@ -293,7 +296,7 @@ def loop_time(scene, kind, x, u, dt, seconds, repeats=REPEATS):
     """CPU seconds of the compiled closed loop, controller at 10 Hz, with one row of output."""
     scene = scene.with_step(dt)
     controller = make("pi", scene.turbine, 0.1) if kind.controlled else HeldCommand()
-    handle, dx, m = scene.handle(), np.zeros_like(x), np.zeros(N_MEASUREMENTS)
+    handle, dx, m = scene.handle(), np.zeros_like(x), np.zeros(scene.n_measurements)
     rows = np.zeros((2, len(scene.channels)))  # of the first and the last instant
     last = round(seconds / dt)
     schedule = Schedule(float(dt), round(0.1 / dt), last + 1, last, inf, inf)
@@ -304,7 +307,7 @@ def loop_time(scene, kind, x, u, dt, seconds, repeats=REPEATS):
         y, v = x.copy(), u.copy()
         forget(handle)
         observe(handle, y, v, 0.0, dx, m)
-        controller.reset(Measurement(*m.tolist()))
+        controller.reset(Measurement(*m[:N_MEASUREMENTS].tolist()))
         rollout(
             handle, y, v, controller.law, controller.parameters, controller.memory, reader, guarding,
             m, dx, schedule, 0, last, rows,

@@ -54,6 +54,23 @@ def parse_sea(text):
     return {"kind": kind, **dict(zip(keys, values, strict=False))}
 
 
+def parse_fault(text):
+    """Mapping that simulate takes as a fault, from "grid_loss:100" (kind and time, s) or JSON."""
+    if text.lstrip().startswith("{"):
+        return _json(text, "fault")
+    kind, _, time = text.partition(":")
+    if parse_number(time) is None:
+        raise InputError(f"fault = {text!r}: must be KIND:TIME with a time in s, or JSON of its keys")
+    return {"kind": kind, "time": parse_number(time)}
+
+
+def parse_protection(text):
+    """What simulate takes as protection, from "none", "turbine" or JSON of trips."""
+    if text.strip().lower() == "none":
+        return None
+    return _json(text, "protection") if text.lstrip().startswith("{") else text
+
+
 def parse_pairs(pairs, what):
     """{key: value} from "key=value" texts (None: none); values are JSON where they can be, else text."""
     result = {}

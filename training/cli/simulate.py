@@ -9,7 +9,7 @@ from rich.markup import escape
 from fowt_env.descriptions.checks import parse_numbers
 from fowt_env.errors import SimulationStopped, unknown
 from fowt_env.files.tables import SERIES_SUFFIXES, table_path, write_table
-from fowt_env.training.cli.arguments import parse_pairs, parse_sea, parse_wind
+from fowt_env.training.cli.arguments import parse_fault, parse_pairs, parse_protection, parse_sea, parse_wind
 from fowt_env.training.cli.console import (
     OptionOption,
     PlatformOption,
@@ -35,7 +35,9 @@ SIMULATE_EXAMPLES = """[bold]Examples[/bold]
 
 [cyan]fowt simulate --wind '{"kind": "etm", "speed": 18, "class": "A"}'[/cyan]  any wind, as JSON
 
-[cyan]fowt simulate --controller ipc --option pitch=individual[/cyan]  a pitch for each blade"""
+[cyan]fowt simulate --controller ipc --option pitch=individual[/cyan]  a pitch for each blade
+
+[cyan]fowt simulate --wind 18 --fault grid_loss:100 --protection turbine[/cyan]  a fault, and trips"""
 OF_BLADES = ("RootMyc1_[kN-m]", "LSSTipMys_[kN-m]", "LSSTipMzs_[kN-m]")  # of scenes that have them
 
 
@@ -71,6 +73,13 @@ def simulate(
     initial: Annotated[
         list[str] | None, typer.Option(metavar="CHANNEL=VALUE", help="Start value, OpenFAST units; repeats.")
     ] = None,
+    fault: Annotated[
+        list[str] | None,
+        typer.Option(metavar="KIND:TIME or JSON", help="What goes wrong: grid_loss:100; repeats."),
+    ] = None,
+    protection: Annotated[
+        str, typer.Option(help="Trips: none, turbine (those of its file), or JSON of single ones.")
+    ] = "none",
     option: OptionOption = None,
     out_path: Annotated[str | None, typer.Option("--out", help="Series: .csv, .parquet or .outb.")] = None,
     plot: Annotated[str | None, typer.Option(help="Stacked plot of the run, e.g. run.png.")] = None,
@@ -102,6 +111,8 @@ def simulate(
                 output_dt=output_dt,
                 start=start,
                 initial=parse_pairs(initial, "initial") or None,
+                protection=parse_protection(protection),
+                faults=[parse_fault(text) for text in fault or ()],
                 progress=update,
             )
         except (SimulationStopped, KeyboardInterrupt) as error:
@@ -111,6 +122,9 @@ def simulate(
             raise
     _print_channels(frame, title)
     _note_limits(frame, scene.turbine)
+    if frame.attrs["trip"] is not None:
+        trip = frame.attrs["trip"].replace("_", " ")
+        note(f"{trip} trip at {frame.attrs['tripped']:.1f} s: {frame.attrs['stop']} stop")
     _save_run(frame, out_path, plot, title)
 
 

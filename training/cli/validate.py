@@ -44,7 +44,7 @@ def validate(
         str | None,
         typer.Option(
             help="Groups of figures, comma-separated; or all. Those of oc3_hywind: decays, steady, floating,"
-            " waves, steps, turbulence, costs. Default: all but costs."
+            " waves, steps, turbulence, tower, costs. Default: all but costs."
         ),
     ] = None,
     out_folder: Annotated[

@@ -24,6 +24,8 @@ LABELS = {
     "FAIRTEN1_[kN]": "tension 1\n(kN)",
     "FAIRTEN2_[kN]": "tension 2\n(kN)",
     "Wave1Elev_[m]": "wave\n(m)",
+    "TTDspFA_[m]": "tower top\n(m)",
+    "TwrBsMyt_[kN-m]": "tower base\n(kN m)",
 }
 OPERATING = (
     "PtfmSurge_[m]", "PtfmHeave_[m]", "PtfmPitch_[deg]", "RotSpeed_[rpm]", "BldPitch1_[deg]", "FAIRTEN1_[kN]",
@@ -31,6 +33,7 @@ OPERATING = (
 WAVE = ("PtfmSurge_[m]", "PtfmHeave_[m]", "PtfmPitch_[deg]", "FAIRTEN1_[kN]")
 TURNING = ("PtfmSurge_[m]", "PtfmHeave_[m]", "PtfmPitch_[deg]", "RotSpeed_[rpm]", "BldPitch1_[deg]")
 PLANE = TURNING[:3]
+BENDING = ("PtfmPitch_[deg]", "RotSpeed_[rpm]", "TTDspFA_[m]", "TwrBsMyt_[kN-m]")
 VOLTURNUS_PLOTS = {
     "regwave_H4T9": (PLANE, (410.0, 500.0), False),
     "waves_Hs7.5": (PLANE, (100.0, 400.0), True),
@@ -38,6 +41,7 @@ VOLTURNUS_PLOTS = {
     "float_steady_12mps": (TURNING, (0.0, 600.0), False),
     "float_steady_18mps": (TURNING, (0.0, 600.0), False),
     "turb_18mps_Hs7.5_uniform": (TURNING, (100.0, 400.0), True),
+    "turb_18mps_Hs7.5_uniform_tower": (BENDING, (100.0, 200.0), True),
 }
 OC3_PLOTS = {  # case -> (channels, seconds shown); spectra of the same channels where asked for
     "float_steady_8mps": (OPERATING, (0.0, 600.0), False),
@@ -46,6 +50,7 @@ OC3_PLOTS = {  # case -> (channels, seconds shown); spectra of the same channels
     "regwave_H3T5": (WAVE, (560.0, 600.0), True),
     "regwave_H3T5_displaced": (WAVE, (560.0, 600.0), True),
     "turb_18mps_Hs7.5_uniform": (OPERATING, (100.0, 400.0), True),
+    "turb_18mps_Hs7.5_uniform_flex": (BENDING, (100.0, 200.0), True),
     "turb_18mps_Hs7.5_box": (OPERATING, (100.0, 400.0), True),
 }
 PLOTS = {"oc3_hywind": OC3_PLOTS, "iea15_volturnus_s": VOLTURNUS_PLOTS}

@@ -1,6 +1,7 @@
 """Measures of how far one time series is from another: decays, harmonics, band energies, errors."""
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from fowt_env.errors import InputError
 
@@ -39,6 +40,29 @@ def decay_decrement(time, value, centre, cycle=1):
     peaks = extrema(time, value - centre)
     height = np.abs(np.diff(peaks))
     return float(np.log(height[2 * cycle - 2] / height[2 * cycle]))
+
+
+def ringing(time, value, low, high):
+    """(Hz, damping ratio) of the damped oscillation between two frequencies (Hz) that a series has.
+
+    A least-squares fit beside a polynomial of eighth order, which takes slower motion.
+    """
+    at = (time - time.mean()) / (0.5 * (time[-1] - time[0]))
+    slow = np.polynomial.chebyshev.chebvander(at, 8)
+    rest = value - slow @ np.linalg.lstsq(slow, value, rcond=None)[0]
+    size = 32 * len(time)
+    frequency = np.fft.rfftfreq(size, (time[-1] - time[0]) / (len(time) - 1))
+    inside = (frequency >= low) & (frequency <= high)
+    largest = np.argmax(np.abs(np.fft.rfft(rest * np.hanning(len(time)), size)) * inside)
+
+    def left(figures):
+        omega, ratio = figures
+        waves = np.exp((1j - ratio) * omega * (time - time[0]))
+        basis = np.column_stack([waves.real, waves.imag, slow])
+        return value - basis @ np.linalg.lstsq(basis, value, rcond=None)[0]
+
+    found = least_squares(left, [2.0 * np.pi * frequency[largest], 0.005], x_scale=[1e-2, 1e-3]).x
+    return float(found[0] / (2.0 * np.pi)), float(found[1])
 
 
 def normalised_rms(value, reference):

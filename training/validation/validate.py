@@ -253,6 +253,13 @@ def costs(study):
     cheaper_choices(study)
 
 
+def tower(study):
+    """A tower that bends against ElastoDyn with all its modes: tower-base moment by bands, motions."""
+    from fowt_env.training.validation.tower_modes import oc3
+
+    oc3(study)
+
+
 GROUPS = {  # name -> (function, runs that it takes)
     "decays": (decays, 6),
     "steady": (steady, 18),
@@ -260,6 +267,7 @@ GROUPS = {  # name -> (function, runs that it takes)
     "waves": (waves, 6),
     "steps": (steps, 1),
     "turbulence": (turbulence, 2),
+    "tower": (tower, 1),
     "costs": (costs, 8),
 }
 

@@ -37,6 +37,7 @@ PLANE = (SURGE, HEAVE, PITCH)
 DT = 0.025  # s, as OpenFAST's
 # as those runs had it: the wake skewed by the tilt of the shaft, loads of the undisturbed air
 OPTIONS = {"skewed_wake": True, "shear_exponent": 0.0}
+BENDING = {**OPTIONS, "tower": "modes"}
 DECAYS = {  # case: (channel, start value, seconds, step of the reference)
     "decay_surge": (SURGE, 10.0, 600.0, 0.2),
     "decay_heave": (HEAVE, 3.0, 200.0, 0.1),
@@ -94,6 +95,11 @@ RUNS = {
     "turb_18mps_Hs7.5_uniform": _run(
         "turb_18mps_Hs7.5_uniform", 600.0, wind=lambda folder, bts: hub_wind(folder), sea=wave_components,
         controlled=True, initial=_start(15.4), controller=rosco,
+    ),
+    "decay_pitch_tower": _run("decay_pitch_tower", 300.0, initial={PITCH: 5.0}, options=BENDING),
+    "turb_18mps_Hs7.5_uniform_tower": _run(
+        "turb_18mps_Hs7.5_uniform_tower", 600.0, wind=lambda folder, bts: hub_wind(folder),
+        sea=wave_components, controlled=True, initial=_start(15.4), controller=rosco, options=BENDING,
     ),
 }  # fmt: skip
 
@@ -279,6 +285,13 @@ def memory(study):
             study.add("radiation memory as states (against convolution)", quantity, unit, *both, error, 1.0)
 
 
+def tower(study):
+    """A tower that bends in its first modes: frequency, tower-base moment by bands, motions."""
+    from fowt_env.training.validation.tower_modes import volturnus
+
+    volturnus(study)
+
+
 def linear(study):
     """Linear models against OpenFAST's."""
     from fowt_env.training.validation.linear_cases import linear as compared
@@ -301,6 +314,7 @@ GROUPS = {  # name -> (function, runs that it takes)
     "rotor": (rotor, 8),
     "blades": (blades, 6),
     "floating": (floating, 3),
+    "tower": (tower, 2),
     "linear": (linear, 5),
     "memory": (memory, 8),
 }

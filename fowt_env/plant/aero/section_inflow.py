@@ -68,6 +68,7 @@ from fowt_env.plant.state import NO_LOAD, State
 
 # further cells of the loads before the first: a wake that lags a lull may blow back through the rotor plane
 REVERSED = 64
+LEAST_LAG = 1e-6  # s, of a wake without a least one
 THIRD = 2.0 * pi / 3.0  # of a turn, rad
 
 
@@ -109,6 +110,13 @@ class Cell(NamedTuple):
     b: float
     c: float
     d: float
+
+
+class Rate(NamedTuple):
+    """How fast the wake follows, 1/s."""
+
+    slow: float  # 1/tau_1 without induction
+    most: float  # of both filters
 
 
 class Flow(NamedTuple):
@@ -172,7 +180,8 @@ def build_dynamic_sections(elements, wake):
     unit = elements._replace(air_density=1.0)
     induced, load = _tables.get(elements_key(unit), lambda: _filled_tables(unit))
     arm = np.ascontiguousarray(elements.moment_weight / elements.weight, dtype=np.float64)
-    lags = np.array([time_constants(0.0, 1.0, r, elements.tip_radius, wake) for r in elements.radius])
+    free = wake._replace(least=0.0)
+    lags = np.array([time_constants(0.0, 1.0, r, elements.tip_radius, free) for r in elements.radius])
     return DynamicSections(induced, load, arm, lags[:, 0] / lags[:, 1], elements, wake)
 
 
@@ -243,14 +252,15 @@ def _looked_up(cell, j, part, low, high):
 def _flow(v_normal, v_tangential, i, j, rows, rate, x, rotor):
     """Flow at station j in this wind with the wake states from i on.
 
-    rate: 1/tau_1 without induction, 1/s. The filter is that of wake.filtered_induction.
+    The filter is that of wake.filtered_induction.
     """
     total = abs(v_normal) + abs(v_tangential)
     cell = _cell(v_normal, v_tangential, total, total, 0, rows.fraction)
     steady_normal = _looked_up(cell, j, 0, rows.low_induced, rows.high_induced)
     steady_tangential = _looked_up(cell, j, 1, rows.low_induced, rows.high_induced)
-    slow = rate * pace(-steady_normal / v_normal)
-    fast = slow * rotor.ratio[j]
+    slow = pace(-steady_normal / v_normal) * rate.slow
+    fast = min(slow * rotor.ratio[j], rate.most)
+    slow = min(slow, rate.most)
     a, b, c, d = np.uintp(i), np.uintp(i + 1), np.uintp(i + 2), np.uintp(i + 3)
     first_normal, normal, first_tangential, tangential = x[a], x[b], x[c], x[d]
     known = v_normal + normal > 0.0 or REVERSED * v_tangential >= -AHEAD * (v_normal + normal)
@@ -496,7 +506,9 @@ def _tabled_load(t, pose, x, now, series, field, rotor, hub, dx, pitches, blades
         profile = _profile(bottom, top, series)
     else:
         profile = _profile(1.0, 1.0, series)
-    rate = 1.0 / time_constants(0.0, hub.speed, 0.0, elements.tip_radius, rotor.wake)[0]
+    wake = DynamicInflow(rotor.wake.scale, 0.0)
+    slow, _ = time_constants(0.0, hub.speed, 0.0, elements.tip_radius, wake)
+    rate = Rate(1.0 / slow, 1.0 / max(rotor.wake.least, LEAST_LAG))
     azimuth, shape = x[State.AZIMUTH], elements.shape
     low = _rows(x[State.BLADE_PITCH], rotor)
     rows = low, _blade_rows(1, low, x, rotor, pitches), _blade_rows(2, low, x, rotor, pitches)

@@ -687,20 +687,31 @@ def _loads_of_three(first, second, third, first_row, x, profile, table, shape, p
     cosine, sine = cos(x[State.BLADE_PITCH]), sin(x[State.BLADE_PITCH])
     if pitches is None:
         return _sheared_blades(first, second, third, profile, low, high, fraction, cosine, sine, shape)
-    second_row, third_row = _blade_row(1, first_row, x, pitches), _blade_row(2, first_row, x, pitches)
-    j, k = int(second_row), int(third_row)
+    return _sheared_each(first, second, third, first_row, x, profile, table, shape, pitches)
+
+
+@kernel
+def _sheared_each(first, second, third, first_row, x, profile, table, shape, pitches):
+    """As _sheared_blades of blades with pitches of their own: a station of all three at a time, which keeps
+    the processor busier than one blade after the other."""
     second_pitch, third_pitch = pitch_of(1, x, pitches), pitch_of(2, x, pitches)
-    return (
-        _sheared_blade(first, profile, low, high, fraction, cosine, sine, shape),
-        _sheared_blade(
-            second, profile, table.load[j], table.load[j + 1], second_row - j, cos(second_pitch),
-            sin(second_pitch), shape,
-        ),
-        _sheared_blade(
-            third, profile, table.load[k], table.load[k + 1], third_row - k, cos(third_pitch),
-            sin(third_pitch), shape,
-        ),
-    )  # fmt: skip
+    second_row, third_row = _pitch_row(second_pitch), _pitch_row(third_pitch)
+    i, k, m = int(first_row), int(second_row), int(third_row)
+    low_a, high_a, fraction_a = table.load[i], table.load[i + 1], first_row - i
+    low_b, high_b, fraction_b = table.load[k], table.load[k + 1], second_row - k
+    low_c, high_c, fraction_c = table.load[m], table.load[m + 1], third_row - m
+    cos_a, sin_a = cos(x[State.BLADE_PITCH]), sin(x[State.BLADE_PITCH])
+    cos_b, sin_b = cos(second_pitch), sin(second_pitch)
+    cos_c, sin_c = cos(third_pitch), sin(third_pitch)
+    a = b = c = NO_CURVED_FORCE
+    for j in range(shape.distance.shape[0]):
+        at, lever = station_at(j, cos_a, sin_a, shape), lever_of(j, cos_a, sin_a, shape)
+        a = _with_sheared(a, first, at, j, lever, profile, low_a, high_a, fraction_a)
+        at, lever = station_at(j, cos_b, sin_b, shape), lever_of(j, cos_b, sin_b, shape)
+        b = _with_sheared(b, second, at, j, lever, profile, low_b, high_b, fraction_b)
+        at, lever = station_at(j, cos_c, sin_c, shape), lever_of(j, cos_c, sin_c, shape)
+        c = _with_sheared(c, third, at, j, lever, profile, low_c, high_c, fraction_c)
+    return a, b, c
 
 
 @kernel

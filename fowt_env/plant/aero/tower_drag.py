@@ -68,7 +68,7 @@ def bent_tower_load(t, pose, x, now, series, field, tower, modes, modal):
         return NO_LOAD
     if series is None:
         return NO_LOAD
-    n = modes.slope.shape[0]
+    n = len(modes.count)
     first, rate = modes.first, modes.first + n
     fx = fy = mx = my = mz = 0.0
     for i in range(tower.z.shape[0]):

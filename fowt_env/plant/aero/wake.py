@@ -33,6 +33,7 @@ class DynamicInflow(NamedTuple):
     """
 
     scale: float  # 1; other values only to study the effect
+    least: float  # s, no time constant is shorter: what the integrator follows, see least_lag
 
 
 class Skew(NamedTuple):
@@ -48,9 +49,9 @@ def build_skewed_wake(strength=15.0 * pi / 32.0):
     return SkewedWake(float(strength))
 
 
-def build_dynamic_inflow(scale=1.0):
-    """DynamicInflow with its time constants scaled."""
-    return DynamicInflow(float(scale))
+def build_dynamic_inflow(scale=1.0, least=0.0):
+    """DynamicInflow with its time constants scaled, and none below least (s)."""
+    return DynamicInflow(float(scale), float(least))
 
 
 def n_wake_states(elements, wake):
@@ -93,7 +94,7 @@ def time_constants(a, wind_speed, radius, tip_radius, wake):
     slow = 1.1 / pace(a) * tip_radius / max(wind_speed, LOWEST_WIND)
     span = radius / tip_radius
     slow *= wake.scale
-    return slow, (0.39 - 0.26 * span * span) * slow
+    return max(slow, wake.least), max((0.39 - 0.26 * span * span) * slow, wake.least)
 
 
 @kernel

@@ -37,7 +37,7 @@ def chosen_by_class(argument, cases, inlined=False):
 
 
 def _class_of(kind):
-    """Class of the values of a numba type."""
+    """Class of the values of a numba type, or of what a Reference refers to."""
     if isinstance(kind, types.NoneType):
         return type(None)
-    return getattr(kind, "instance_class", None)
+    return getattr(getattr(kind, "target", kind), "instance_class", None)

@@ -8,7 +8,7 @@ import pytest
 
 from fowt_env import build_scene
 from fowt_env.control import make, whole_view
-from fowt_env.controllers.ipc.design import drive_lag, lead_time, root_slope
+from fowt_env.controllers.ipc.design import BANDWIDTH, drive_lag, lead_time, root_slope
 from fowt_env.controllers.ipc.law import (
     IPC,
     CyclicMemory,
@@ -92,7 +92,7 @@ def test_steady_tilt_and_yaw_moments_are_taken_away_at_the_stated_bandwidth():
     early = (size < 0.6) & (size > 0.05)
     rate = -np.polyfit(time[early], np.log(size[early]), 1)[0]
     # the lags of drive and notch make it faster than a lag of first order
-    assert rate == pytest.approx(0.25 * SPEED, rel=0.2)
+    assert rate == pytest.approx(BANDWIDTH * SPEED, rel=0.2)
 
 
 def test_the_lead_keeps_tilt_and_yaw_apart():
@@ -138,7 +138,7 @@ def test_the_cyclic_pitch_stays_within_its_limits_and_leaves_them_at_once():
     assert np.hypot(rows[:, 2], rows[:, 3]).max() < 1.001 * limit
     assert rows[590, 2] == pytest.approx(limit * cos(drive_lag(TURBINE, SPEED)), rel=2e-3)  # behind the drive
     # not wound up: half a second later it is on its way, two crossings of the circle take 2 limit/rate
-    rate = 0.25 * SPEED * (4e6 - 0.02 * -slope_at(MEAN)) / -slope_at(MEAN)
+    rate = BANDWIDTH * SPEED * (4e6 - 0.02 * -slope_at(MEAN)) / -slope_at(MEAN)
     assert rows[600 + round(2.5 * limit / rate / DT) + 5, 2] < 0.0
 
 
@@ -169,16 +169,19 @@ def test_a_notch_stops_its_frequency_alone():
     )
 
 
-def test_platform_notches_leave_their_frequencies_in_the_moments():
+def test_what_belongs_to_the_platform_is_left_in_the_moments():
     frequency = 0.2
 
     def sway(t):
         return 1e6 * sin(frequency * t), 1e6 * cos(frequency * t), lambda psi: 0.0 * psi
 
-    rows = run(custom(yaw_notches=(frequency,)), sway, seconds=150.0)[1000:]
-    assert np.abs(rows[:, 2]).max() > 0.01 and np.abs(rows[:, 3]).max() < 5e-4
+    rows = run(custom(tilt_notches=(frequency,), yaw_corner=0.01), sway, seconds=150.0)[1000:]
+    assert np.abs(rows[:, 2]).max() < 5e-4  # 0.018 rad would cancel it
+    assert np.abs(rows[:, 3]).max() < 0.05 * 0.018
     rows = run(custom(tilt_notches=(0.05, frequency, 0.76)), steady(1.5e6, 0.0), seconds=150.0)
-    assert abs(rows[-1, 0]) < 1e4  # the mean moment is still taken away
+    assert abs(rows[-1, 0]) < 1e4  # the mean moments are still taken away
+    rows = run(custom(yaw_corner=0.1), steady(0.0, 1.5e6), seconds=150.0)
+    assert abs(rows[-1, 1]) < 1e4
 
 
 def test_before_prepare_it_cannot_start():
@@ -193,7 +196,9 @@ def test_reset_forgets_the_cyclic_pitch():
     assert np.array_equal(run(prepared(law), steady(2e6, 1e6), seconds=10.0), first)
 
 
-@pytest.mark.parametrize("key", ["bandwidth", "amplitude", "rate_share", "notch_damping", "platform_damping"])
+@pytest.mark.parametrize(
+    "key", ["bandwidth", "amplitude", "rate_share", "notch_damping", "tilt_damping", "yaw_corner"]
+)
 def test_settings_outside_their_range_are_named(key):
     with pytest.raises(InputError, match=key):
         IPCSettings(**{key: 0.0})

@@ -3,14 +3,16 @@ import pytest
 from naive import rotor as naive
 
 from fowt_env.descriptions.platform import read_platform
-from fowt_env.plant.aero.tower_drag import build_tower_drag, tower_load
+from fowt_env.plant.aero.tower_drag import bent_tower_load, build_tower_drag, tower_load
 from fowt_env.plant.aero.wind import wind_at, wind_now
 from fowt_env.plant.state import N_RIGID, NO_LOAD, pose_of
+from fowt_env.scene.tower import build_tower_modes
 from fowt_env.weather.wind import make_series
 
 pytestmark = pytest.mark.installation
 
-TOWER = read_platform("oc3_hywind").tower
+PLATFORM = read_platform("oc3_hywind")
+TOWER = PLATFORM.tower
 PART = build_tower_drag(TOWER, 1.225)
 
 
@@ -62,6 +64,29 @@ def test_moving_tower_in_sheared_wind_agrees_with_the_naive_twin(seed):
     result = np.array(load(x, series, build_tower_drag(TOWER, 1.225, points=40)))
     assert result[:3] == pytest.approx(force, abs=1e-6 * np.linalg.norm(force))
     assert result[3:] == pytest.approx(moment, abs=1e-6 * np.linalg.norm(moment))
+
+
+def test_a_bent_tower_is_pushed_where_it_is_as_fast_as_it_moves(turbine):
+    rng = np.random.default_rng(2)
+    modes = build_tower_modes(PLATFORM, turbine, 1, N_RIGID)
+    series = wind_series(12.0, v=3.0, vertical=2.0, shear=0.14)
+    for _ in range(5):
+        x = np.zeros(N_RIGID + 4)
+        x[:6], x[7:13] = rng.normal(0, 0.3, 6), rng.normal(0, 0.3, 6)
+        x[N_RIGID:] = rng.normal(0, 3.0, 4)
+        pose, now, modal = pose_of(x), wind_now(0.0, series), np.ones(2)
+        R, v, w = np.array(pose[3:12]).reshape(3, 3), x[7:10], x[10:13]
+        force, moment, work = np.zeros(3), np.zeros(3), np.ones(2)
+        for z, factor, shape in zip(PART.z, PART.factor, modes.drag_shape, strict=True):
+            place = np.array([*(shape * x[N_RIGID : N_RIGID + 2]), z])
+            speed = v + np.cross(w, place) + [*(shape * x[N_RIGID + 2 :]), 0.0]
+            relative = R.T @ wind_at(0.0, *(x[:3] + R @ place), now, series, None) - speed
+            push = factor * np.hypot(*relative[:2]) * relative * [1.0, 1.0, 0.0]
+            force, moment, work = force + push, moment + np.cross(place, push), work + shape * push[:2]
+        found = bent_tower_load(0.0, pose, x, now, series, None, PART, modes, modal)
+        assert found[:3] == pytest.approx(force, rel=1e-12)
+        assert found[3:] == pytest.approx(moment, rel=1e-12)
+        assert modal == pytest.approx(work, rel=1e-12)
 
 
 def test_still_air_never_adds_energy():

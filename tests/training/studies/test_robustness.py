@@ -64,6 +64,12 @@ def test_random_scenes_and_states_stay_finite_and_bounded():
 
 
 @pytest.mark.slow
+def test_random_scenes_and_states_with_a_bending_tower_stay_finite_and_bounded():
+    plants = (f"standard{random_cases.BENDS}",)
+    assert no_failure(random_cases.random_cases(200, seed=13, per_weather=10, plants=plants))
+
+
+@pytest.mark.slow
 def test_many_random_scenes_and_states_of_every_fidelity_stay_finite_and_bounded():
     plants = ("standard", "fast", "standard", "standard", "reference")
     # `fowt benchmark stability --cases N` runs more

@@ -10,6 +10,7 @@ from fowt_env.training.validation.signal_errors import (
     decay_period,
     harmonics,
     normalised_rms,
+    ringing,
 )
 
 TIME = np.linspace(0.0, 200.0, 2001)
@@ -52,3 +53,12 @@ def test_normalised_rms_of_a_shifted_copy_is_the_shift_over_the_deviation():
     value = np.random.default_rng(1).standard_normal(1000)
     assert normalised_rms(value, value) == 0.0
     assert normalised_rms(value + 0.3, value) == pytest.approx(0.3 / value.std())
+
+
+@pytest.mark.parametrize(("frequency", "ratio"), [(0.518, 0.006), (0.37, 0.03)])
+def test_frequency_and_damping_of_a_ringing_tower_are_found_beside_its_slow_motion(frequency, ratio):
+    time = TIME[TIME < 20.0]
+    omega = 2.0 * np.pi * frequency
+    value = 0.2 * np.exp(-ratio * omega * time) * np.cos(omega * time + 0.3)
+    slow = decay(28.0, 0.2, 0.1)[: len(time)]
+    assert ringing(time, value + slow, 0.2, 1.0) == pytest.approx((frequency, ratio), rel=2e-3)

@@ -33,6 +33,7 @@ DURATION = 30.0  # s of each case: three wave periods, one of platform pitch
 WEATHER = 60.0  # s of random wind and sea
 SEGMENT = 1.0  # s between changes of an open-loop command
 PER_WEATHER = 50  # initial states in each weather
+BENDS = " with a bending tower"  # ends the name of a plant whose tower has its first modes
 PLANTS = ("standard",) * 44 + ("reference",) + ("fast",) * 5  # fidelity of each weather, in turn
 KEYS = ("fidelity", "integrator", "dt", "duration", "wind", "sea", "seed", "state", "commands")
 
@@ -227,7 +228,7 @@ class Runner:
         commands = np.array(commands, dtype=float).reshape(-1, 2)
         u = np.array([0.0, x[State.BLADE_PITCH]])
         energy, speed = self.bounds(x)
-        for carried in (data.lines, data.counters, data.cache, data.history):
+        for carried in (data.lines, data.counters, data.cache, data.history, data.elastic):
             carried[:] = 0.0  # as in a scene of its own: a case runs alike alone and among others
         law, parameters, memory = hold.compiled, np.zeros(1), np.zeros(1)
         if len(commands) == 0:
@@ -309,9 +310,13 @@ def draw_sea(rng):
     return sea
 
 
-def draw_state(rng, turbine):
-    """(15,) state anywhere in the valid range: lines taut to slack, 30 deg of tilt, rotor to 150 %."""
-    x = np.zeros(N_RIGID)
+def draw_state(rng, turbine, tower=None):
+    """State anywhere in the valid range: lines taut to slack, 30 deg of tilt, rotor to 150 %.
+
+    (15,), and those of a tower that bends (TowerModes): to 1 m and 2 m/s in each mode.
+    """
+    modes = 0 if tower is None else len(tower.slope)
+    x = np.zeros(N_RIGID + 2 * modes)
     offset, bearing = rng.uniform(0.0, 30.0), rng.uniform(0.0, 2.0 * pi)
     x[:3] = offset * cos(bearing), offset * sin(bearing), rng.uniform(-8.0, 8.0)
     tilt, towards = radians(rng.uniform(0.0, 30.0)), rng.uniform(0.0, 2.0 * pi)
@@ -323,6 +328,8 @@ def draw_state(rng, turbine):
     x[State.ROTOR_SPEED] = 0.0 if stopped else rng.uniform(0.0, 1.5) * turbine.rated_rotor_speed
     drive = turbine.pitch_drive
     x[State.BLADE_PITCH] = rng.uniform(drive.minimum, drive.maximum)
+    x[N_RIGID : N_RIGID + modes] = rng.uniform(-1.0, 1.0, modes)
+    x[N_RIGID + modes :] = rng.uniform(-2.0, 2.0, modes)
     return x
 
 
@@ -337,7 +344,8 @@ def draw_commands(rng, turbine, duration):
 def _case(scene, wind, sea, seed, state, commands, duration):
     """The replayable dict of a case."""
     return {
-        "fidelity": scene.options["fidelity"], "integrator": scene.options["integrator"], "dt": scene.dt,
+        "fidelity": scene.options["fidelity"], "tower": scene.options["tower"],
+        "integrator": scene.options["integrator"], "dt": scene.dt,
         "duration": duration, "wind": wind, "sea": sea, "seed": seed,
         "state": [float(value) for value in state],
         "commands": np.asarray(commands).tolist(),
@@ -348,7 +356,7 @@ def random_case_scene(case):
     """Scene of a case."""
     return build_scene(
         wind=case["wind"], sea=case["sea"], seed=case["seed"], fidelity=case["fidelity"],
-        integrator=case["integrator"], duration=WEATHER,
+        integrator=case["integrator"], tower=case.get("tower", "rigid"), duration=WEATHER,
     )  # fmt: skip
 
 
@@ -403,7 +411,7 @@ def random_cases(count, seed=0, per_weather=PER_WEATHER, duration=DURATION, plan
     progress: called with (text, done, total).
     """
     for plant in plants:
-        if plant not in FIDELITIES:
+        if plant.removesuffix(BENDS) not in FIDELITIES:
             raise unknown("fidelity", plant, FIDELITIES)
     sequence = np.random.SeedSequence(seed)
     tally, bases = Tally(), {}
@@ -426,7 +434,11 @@ def _one_weather(tally, bases, plant, rng, number, duration, check):
     tally.per_plant[plant] = tally.per_plant.get(plant, 0) + number
     try:
         if plant not in bases:
-            bases[plant] = build_scene(wind=wind, sea=sea, seed=seed, fidelity=plant, duration=WEATHER)
+            fidelity = plant.removesuffix(BENDS)
+            tower = "rigid" if fidelity == plant else "modes"
+            bases[plant] = build_scene(
+                wind=wind, sea=sea, seed=seed, fidelity=fidelity, duration=WEATHER, tower=tower
+            )
         scene = bases[plant].with_weather(wind, sea, seed)
         runner = Runner(scene, scene.dt)
     except Exception as error:  # any exception is what this looks for
@@ -436,7 +448,7 @@ def _one_weather(tally, bases, plant, rng, number, duration, check):
         return
     hardest = None
     for _ in range(number):
-        state = draw_state(rng, scene.turbine)
+        state = draw_state(rng, scene.turbine, scene.model.tower)
         commands = draw_commands(rng, scene.turbine, duration)
         case = _case(scene, wind, sea, seed, state, commands, duration)
         tally.cases += 1

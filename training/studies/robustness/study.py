@@ -122,7 +122,21 @@ def _factor(value):
 def cases_part(sizes, folder, progress):
     """Found of the random scenes and states; failures are stored as replayable files in folder/failures."""
     tally = random_cases.random_cases(sizes.cases, sizes.seed, sizes.per_weather, progress=progress)
-    paths = random_cases.store_case(tally.failures, Path(folder) / "failures")
+    return _found_of(tally, Path(folder) / "failures")
+
+
+def tower_part(sizes, folder, progress):
+    """Found of a twentieth as many random scenes and states with a tower that bends, as cases_part."""
+    plants = (f"standard{random_cases.BENDS}",)
+    tally = random_cases.random_cases(
+        max(1, sizes.cases // 20), sizes.seed, sizes.per_weather, plants=plants, progress=progress
+    )
+    return _found_of(tally, Path(folder) / "tower_failures")
+
+
+def _found_of(tally, failures):
+    """Found of a Tally, whose failures go into a folder."""
+    paths = random_cases.store_case(tally.failures, failures)
     reasons = [reason for _, reason in tally.failures]
     broken = sum("exception" in reason or "non-finite" in reason for reason in reasons)
     found = Found()
@@ -288,6 +302,7 @@ def plain_part(sizes, folder, progress):
 PARTS = {
     "map": map_part,
     "cases": cases_part,
+    "tower": tower_part,
     "hostile": hostile_part,
     "extremes": extremes_part,
     "long": long_part,
@@ -296,6 +311,7 @@ PARTS = {
 TITLES = {
     "map": "Stability map",
     "cases": "Random scenes and initial states",
+    "tower": "The same with a tower that bends",
     "hostile": "Hostile actions",
     "extremes": "Extremes",
     "long": "Long runs, order and attitude",
@@ -389,6 +405,10 @@ METHODS = {
         " the water, and the work that the wind's thrust can do over the hub's travel; that on the rotor"
         f" speed a tip-speed ratio of {random_cases.FASTEST_TIP:g}. A failure is stored as JSON and runs"
         " again by `fowt benchmark stability --replay FILE`."
+    ),
+    "tower": (
+        'Scenes of the option tower = "modes", with deflections to 1 m and rates to 2 m/s at the start in'
+        " each direction."
     ),
     "hostile": (
         "The environment at its defaults. An episode that ends early is started anew until the periods are"

@@ -21,6 +21,11 @@ MODEL = (
     "OpenFAST v5.0.0 (2895884d2b), double precision, rigid strip-theory OC3-Hywind with the NREL 5 MW: zero"
     " tilt and cone, hub at z = 90 m, six platform motions and generator; loose coupling, ConvTol 1e-6"
 )
+FLEXIBLE = MODEL.replace("rigid strip-theory", "strip-theory").replace(
+    "six platform motions and generator",
+    "six platform motions, generator, two flap and one edge mode per blade, two tower modes each way,"
+    " drivetrain torsion, nacelle yaw",
+)
 STILL = "still water, rotor parked, no aerodynamics; all other states start at zero"
 WIND = "platform starts at zero; DISCON of OC3-Hywind; no waves"
 SEA = (
@@ -64,6 +69,10 @@ CASES = {  # case -> (columns, settings)
         ["wave_elev_m", *MOTION_COLUMNS, *ROTOR, *TENSION_COLUMNS],
         f"dt 0.0125 s; hub wind of wind_hub_18mps blown uniformly over rotor and tower; {SEA}",
     ),
+    "turb_18mps_Hs7.5_uniform_flex": (
+        [*MOTION_COLUMNS, *ROTOR, *TENSION_COLUMNS, "twr_base_My_kNm", "tower_top_fa_m"],
+        f"dt 0.0125 s; hub wind of wind_hub_18mps blown uniformly over rotor and tower; {SEA}",
+    ),
     "turb_18mps_Hs7.5_box": (
         ["wave_elev_m", *MOTION_COLUMNS, *ROTOR, *TENSION_COLUMNS],
         f"dt 0.0125 s; full-field TurbSim box; {SEA}",
@@ -86,7 +95,7 @@ def series(source):
         for name in columns:  # a motion that stays below 1e-9 of the others is rounding of the solver
             if np.abs(frame[name]).max() < 1e-7:
                 frame[name] = 0.0
-        write(HERE / f"{case}.csv.gz", (MODEL, settings), frame)
+        write(HERE / f"{case}.csv.gz", (FLEXIBLE if case.endswith("_flex") else MODEL, settings), frame)
 
 
 def inputs(source):

@@ -26,6 +26,10 @@ MODEL = (
     " and the generator where the rotor turns; potential flow with convolution, quadratic drag matrix,"
     " quasi-static lines; loose coupling, ConvTol 1e-6, dt 0.025 s"
 )
+BENDING = MODEL.replace(
+    ", rigid: six platform motions,", ", six platform motions, first fore-aft and side-to-side tower modes,"
+).replace("dt 0.025 s", "dt 0.0125 s")
+TOWER = ["twr_base_My_kNm", "tower_top_fa_m", "nacelle_acc_x_mps2"]
 STILL = "still water, no wind, rotor at rest, blade pitch 0; all other states start at zero"
 ROSCO = "ROSCO 2.10.6 every 0.025 s, blade pitch follows its command at once; platform starts at zero"
 CASES = {  # case -> (columns, step, settings)
@@ -57,6 +61,13 @@ CASES = {  # case -> (columns, step, settings)
         f" deg; {ROSCO}",
     ),
 }  # fmt: skip
+BENDING_CASES = {  # the same, with a tower that bends
+    "decay_pitch_tower": ([*PLANE, *TOWER], 0.1, f"free decay from platform pitch 5 deg; {STILL}"),
+    "turb_18mps_Hs7.5_uniform_tower": (
+        [*PLANE, *ROTOR, *TOWER, "twr_base_Mx_kNm", "tower_top_ss_m"], 0.1,
+        CASES["turb_18mps_Hs7.5_uniform"][2],
+    ),
+}  # fmt: skip
 STEADY = {  # case -> (wind, rotor speed, blade pitches, shear exponent)
     **{
         f"{wind}mps": (float(wind), rpm, (pitch,) * 3, 0.0)
@@ -83,13 +94,13 @@ def rounded(values, digits=5):
 
 def series(source):
     """The time series of every case."""
-    for case, (columns, step, settings) in CASES.items():
+    for case, (columns, step, settings) in {**CASES, **BENDING_CASES}.items():
         full = pd.read_csv(source / f"{case}.csv.gz", usecols=["time_s", *columns])[["time_s", *columns]]
         every = round(step / (full["time_s"][1] - full["time_s"][0]))
         frame = full.iloc[::every].copy()
         for name in columns:
             frame[name] = rounded(frame[name])
-        write(HERE / f"{case}.csv.gz", (MODEL, settings), frame)
+        write(HERE / f"{case}.csv.gz", (BENDING if case in BENDING_CASES else MODEL, settings), frame)
 
 
 def whole_turns(time, rpm):
