@@ -7,13 +7,13 @@ PROJECT := pyproject.toml constraints.txt
 TESTS = $(BIN)/python -m pytest --numprocesses auto --maxprocesses 8 --dist loadfile --no-loadscope-reorder
 INSTALL = $(BIN)/python -m pip install --quiet --constraint constraints.txt --editable
 
-.PHONY: help demo test test-all test-rest test-quick coverage lint docs format clean
+.PHONY: help demo test test-all test-rest test-nightly test-quick coverage lint docs format clean
 .DELETE_ON_ERROR:
 
 help:
 	@echo "make demo        score the PI controller of Eq. (8) above rated: table and plots under results/demo"
 	@echo "make test        prove this installation: each layer against an independent reference"
-	@echo "make test-all    all tests (make test-rest: those that make test leaves out)"
+	@echo "make test-all    all tests: make test, make test-rest (the other ones) and make test-nightly (the longest)"
 	@echo "make test-quick  all but the slow ones, as after an edit: minutes once their kernels are compiled"
 	@echo "make coverage    what the quick tests reach of what users touch; pages in htmlcov"
 	@echo "make lint        ruff and mypy;  make format: let ruff mend what it can"
@@ -44,7 +44,10 @@ test-all: $(VENV)/.installed-dev
 	$(TESTS) -m "" --durations=20
 
 test-rest: $(VENV)/.installed-dev
-	$(TESTS) -m "not installation" --durations=20
+	$(TESTS) -m "not installation and not nightly" --durations=20
+
+test-nightly: $(VENV)/.installed-dev
+	$(TESTS) -m nightly --durations=20
 
 test-quick: $(VENV)/.installed-dev
 	$(TESTS)

@@ -67,6 +67,7 @@ def index_reached(python, folder):
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_the_lowest_declared_versions_run_what_users_run_first(tmp_path, record_property):
     """Every direct dependency at its lower bound, theirs as pip chooses; the checkout is not installed."""
     subprocess.run([sys.executable, "-m", "venv", tmp_path / "venv"], check=True)

@@ -314,6 +314,7 @@ def test_a_load_aloft_moves_with_the_nacelle(platform, turbine):
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_the_default_step_errs_by_less_than_a_hundredth_at_the_tower_base():
     """Of both moments there, whose side-side one rings with a third of a per cent of damping."""
     wind, sea = {"kind": "ntm", "speed": 18.0, "class": "B"}, {"kind": "jonswap", "Hs": 7.5, "Tp": 10.0}

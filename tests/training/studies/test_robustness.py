@@ -64,12 +64,14 @@ def test_random_scenes_and_states_stay_finite_and_bounded():
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_random_scenes_and_states_with_a_bending_tower_stay_finite_and_bounded():
     plants = (f"standard{random_cases.BENDS}",)
     assert no_failure(random_cases.random_cases(200, seed=13, per_weather=10, plants=plants))
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_many_random_scenes_and_states_of_every_fidelity_stay_finite_and_bounded():
     plants = ("standard", "fast", "standard", "standard", "reference")
     # `fowt benchmark stability --cases N` runs more
@@ -168,5 +170,6 @@ def test_without_the_compiler_a_scene_gives_the_same_numbers():
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_without_the_compiler_every_scene_and_environment_gives_the_same_numbers():
     assert max(without_compiler.differences().values()) <= study.PLAIN

@@ -323,6 +323,7 @@ def test_turbulence_with_irregular_waves_meets_every_figure_in_both_winds():
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_cheaper_choices_cost_what_the_documentation_says():
     study = validate_cases(["costs"])
     found = {(row.case, row.quantity): row.error for row in study.rows}
