@@ -17,7 +17,6 @@ os.environ.pop("COLUMNS", None)
 KINDS = {
     "environment": ["tests/envs/test_env.py", "tests/envs/test_golden.py"],
     "command line": ["tests/training/cli/test_app.py", "tests/training/evaluation/test_evaluate.py"],
-    "single blades": ["tests/plant/test_blade_outputs.py", "tests/controllers/ipc/test_plant.py"],
     "openfast": ["tests/training/validation/test_validate.py"],
 }
 KIND_OF = {file: kind for kind, files in KINDS.items() for file in files}

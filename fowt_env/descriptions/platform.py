@@ -15,6 +15,7 @@ from fowt_env.descriptions.potential_flow import PotentialFlow, read_potential_f
 from fowt_env.descriptions.records import (
     Finite,
     NonNegative,
+    Place,
     Positive,
     Record,
     bounded,
@@ -44,10 +45,10 @@ class Ballast(Record):
     """Floater with its ballast, as one rigid body."""
 
     mass: Positive
-    cm_depth: Finite  # below still water, positive downwards, m
+    cm_depth: Place  # below still water, positive downwards, m
     inertia: Inertia  # about its own centre of mass, kg m2
-    cm_downwind: Finite = 0.0  # of the tower axis, m
-    cm_left: Finite = 0.0  # looking downwind, m
+    cm_downwind: Place = 0.0  # of the tower axis, m
+    cm_left: Place = 0.0  # looking downwind, m
 
 
 class Hull(Record):
@@ -148,10 +149,10 @@ class Tower(Record):
     """Tower as one rigid body, with the taper that its drag needs, and how it bends where that is known."""
 
     mass: NonNegative
-    cm_height: Finite
+    cm_height: Place
     inertia: Inertia  # about its own centre of mass
-    base_height: Finite
-    top_height: Finite
+    base_height: Place
+    top_height: Place
     base_diameter: Positive
     top_diameter: Positive
     drag_coefficient: NonNegative = 1.0

@@ -48,6 +48,7 @@ def _number_or_array(value):
 Positive = bounded(gt=0)
 NonNegative = bounded(ge=0)
 Finite = bounded()
+Place = bounded(ge=-1e5, le=1e5)  # m, whose square times a mass is a number still
 Fraction = bounded(gt=0, le=1)
 FloatArray = Annotated[np.ndarray, BeforeValidator(_float_array)]
 NumberOrArray = Annotated[typing.Any, BeforeValidator(_number_or_array)]

@@ -175,15 +175,15 @@ def midpoint(t, x, u, dt, model, method, data):
     \"\"\"One step of the explicit midpoint rule, blade pitch exact.\"\"\"
     k1, k2, y = data.stages[0], data.stages[1], data.stages[4]
     rates(t, x, u, model, data, k1)
-    half = pitch_after(x[State.BLADE_PITCH], u[Command.BLADE_PITCH], 0.5 * dt, model.actuator)
-    whole = pitch_after(x[State.BLADE_PITCH], u[Command.BLADE_PITCH], dt, model.actuator)
     for i in range(x.shape[0]):
         y[i] = x[i] + 0.5 * dt * k1[i]
-    y[State.BLADE_PITCH] = half
+    advance_actuators(x, u, 0.5 * dt, model, y)
     derivative(t + 0.5 * dt, y, u, model, data, k2)
     for i in range(x.shape[0]):
-        x[i] += dt * k2[i]
-    x[State.BLADE_PITCH] = whole
+        y[i] = x[i] + dt * k2[i]
+    advance_actuators(x, u, dt, model, y)
+    for i in range(x.shape[0]):
+        x[i] = y[i]
 
 
 """

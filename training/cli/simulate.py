@@ -122,7 +122,7 @@ def simulate(
             raise
     _print_channels(frame, title)
     _note_limits(frame, scene.turbine)
-    if frame.attrs["trip"] is not None:
+    if frame.attrs.get("trip") is not None:
         trip = frame.attrs["trip"].replace("_", " ")
         note(f"{trip} trip at {frame.attrs['tripped']:.1f} s: {frame.attrs['stop']} stop")
     _save_run(frame, out_path, plot, title)
