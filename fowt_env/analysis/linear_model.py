@@ -11,7 +11,7 @@ from fowt_env.analysis.trim import AZIMUTHS, trim, without_fluctuations
 from fowt_env.analysis.wave_excitation import fit_wave_filter, wave_force
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.channels import N_FIXED, Out, measure, record
-from fowt_env.plant.compile.decorators import entry
+from fowt_env.plant.compile.decorators import entry, inlined_kernel
 from fowt_env.plant.compile.handle import data_of, model_of
 from fowt_env.plant.dynamics import evaluate_loads, loads_of, respond
 from fowt_env.plant.measurement import Measure
@@ -248,6 +248,18 @@ def modes(a, names, cm_height, arm):
     return sorted(found, key=lambda mode: -mode.period)
 
 
+@inlined_kernel
+def fill_response(x, u, force, model, data, dx, measurement, row):
+    """Fill state rates, measurement and output row under u and further hull forces (6,)."""
+    evaluate_loads(0.0, x, model, data, dx)
+    for j in range(6):
+        data.cache[LoadCache.TOTAL + j] += force[j]
+        data.cache[LoadCache.HYDRO + j] += force[j]
+    respond(x, u, model, data, dx)
+    measure(model, data, x, dx, u, 0.0, measurement)
+    record(model, data, x, dx, u, 0.0, loads_of(data, dx), row)
+
+
 @entry
 def _mean_response(handle, x, u, force, azimuths, dx, measurement, row, rates, measured, recorded):
     """Azimuth means of state rates, measurement and output row under u and further hull forces (6,)."""
@@ -258,13 +270,7 @@ def _mean_response(handle, x, u, force, azimuths, dx, measurement, row, rates, m
     recorded[:] = 0.0
     for i in range(azimuths):
         x[State.AZIMUTH] = start + i * (2.0 * pi / 3.0) / azimuths
-        evaluate_loads(0.0, x, model, data, dx)
-        for j in range(6):
-            data.cache[LoadCache.TOTAL + j] += force[j]
-            data.cache[LoadCache.HYDRO + j] += force[j]
-        respond(x, u, model, data, dx)
-        measure(model, data, x, dx, u, 0.0, measurement)
-        record(model, data, x, dx, u, 0.0, loads_of(data, dx), row)
+        fill_response(x, u, force, model, data, dx, measurement, row)
         rates += dx / azimuths
         measured += measurement / azimuths
         recorded += row / azimuths

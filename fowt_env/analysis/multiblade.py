@@ -21,6 +21,7 @@ from fowt_env.analysis.linear_model import (
     RECORDED,
     LinearModel,
     check_linear,
+    fill_response,
     of_all_blades,
     plant_states,
     steady_parts,
@@ -28,10 +29,9 @@ from fowt_env.analysis.linear_model import (
 )
 from fowt_env.analysis.trim import AZIMUTHS, trim, without_fluctuations
 from fowt_env.errors import InputError
-from fowt_env.plant.channels import N_FIXED, measure, record
+from fowt_env.plant.channels import N_FIXED
 from fowt_env.plant.compile.decorators import entry
 from fowt_env.plant.compile.handle import data_of, model_of
-from fowt_env.plant.dynamics import evaluate_loads, loads_of, respond
 from fowt_env.plant.measurement import N_MEASUREMENTS, BladeMeasure, Measure
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.state import BLADES, Command, State
@@ -71,13 +71,7 @@ def _mean_response(
             for k in range(blocks):
                 y[places[k, blade]] += cyclic[k, 0] * cos(psi) + cyclic[k, 1] * sin(psi)
             v[Command.BLADE_PITCH + blade] += cyclic[blocks, 0] * cos(psi) + cyclic[blocks, 1] * sin(psi)
-        evaluate_loads(0.0, y, model, data, dx)
-        for j in range(6):
-            data.cache[LoadCache.TOTAL + j] += force[j]
-            data.cache[LoadCache.HYDRO + j] += force[j]
-        respond(y, v, model, data, dx)
-        measure(model, data, y, dx, v, 0.0, measurement)
-        record(model, data, y, dx, v, 0.0, loads_of(data, dx), row)
+        fill_response(y, v, force, model, data, dx, measurement, row)
         rates += dx / azimuths
         measured += measurement / azimuths
         recorded += row / azimuths
