@@ -4,7 +4,7 @@ The rotor loop of a pitch controller has a frequency and a damping ratio. On lan
 floating platform a loop as quick as the platform's own pitch motion (0.21 rad/s) takes that motion's damping
 away. So: linearise over the wind, design for several frequencies, keep the platform's damping in view, and
 let simulations decide. The seeds for tuning are not those that controllers are scored on (1 to 6).
-`fowt design pi` and `fowt design lqr` do the same from the command line; docs/design.md has the background.
+`fowt design pi` and `fowt design lqr` do the same from the command line; linear-design.md has the background.
 """
 
 import fowt_env

@@ -1,6 +1,6 @@
 """Writes what the reference pages take from the code: `python docs/tools/reference_pages.py`.
 
-docs/cli.md is written whole. In docs/environment.md the text between a pair of marks
+docs/reference/cli.md is written whole. In docs/reference/environment.md the text between a pair of marks
 
     <!-- from the code: NAME -->
     <!-- end -->
@@ -288,11 +288,11 @@ def integrators():
 
 
 TABLES = {
-    "environment.md": (
+    "reference/environment.md": (
         environments, tasks, offsets, actions, actuators, observation, channels, blades, reward, meanings,
         terminations, options, events,
     ),
-    "theory.md": (loads, integrators),
+    "explanation/theory.md": (loads, integrators),
 }  # fmt: skip
 
 
@@ -381,7 +381,7 @@ def _plain(text):
 def main():
     """Write the pages."""
     pages = {page: with_tables(page, (DOCS / page).read_text()) for page in TABLES}
-    for page, text in (pages | {"cli.md": cli_page()}).items():
+    for page, text in (pages | {"reference/cli.md": cli_page()}).items():
         with replacing(DOCS / page) as target:
             target.write_text(text)
 

@@ -1,7 +1,7 @@
 """Controllers ranked by the default reward and by their metrics: `python docs/tools/reward_ranking.py`.
 
 Each runs in the same turbulence at 14, 18 and 22 m/s. The reward is that of the environment's step, from the
-rows of the run; docs/environment.md has the table.
+rows of the run; docs/reference/environment.md has the table.
 """
 
 import numpy as np
@@ -72,7 +72,7 @@ def ranking(names=CONTROLLERS, weights=None):
 
 
 def markdown(table):
-    """The ranking as the table of docs/environment.md."""
+    """The ranking as the table of docs/reference/environment.md."""
     rows = [(f"`{name}`", *(f"{value:.2f}" for value in row)) for name, row in table.T.items()]
     return markdown_table(("baseline", "reward of a step", *METRICS), rows, aligned=True)
 

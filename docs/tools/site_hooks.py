@@ -39,8 +39,10 @@ TAG = re.compile(r"\\tag\{([^}]*)\}")
 
 def on_config(config):
     """The configuration with the examples in the contents."""
-    (learn,) = (part["Learn"] for part in config.nav if isinstance(part, dict) and "Learn" in part)
-    learn.append({"Examples": ["examples/index.md", *sorted(EXAMPLES.values())]})
+    (tutorials,) = (
+        part["Tutorials"] for part in config.nav if isinstance(part, dict) and "Tutorials" in part
+    )
+    tutorials.append({"Examples": ["examples/index.md", *sorted(EXAMPLES.values())]})
     return config
 
 

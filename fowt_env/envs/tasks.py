@@ -262,7 +262,7 @@ def _check_seeds(where, seeds):
         )
 
 
-# These rank controllers as their metrics do (docs/environment.md): with less on travel, loops that drive the
+# These rank controllers as their metrics do (environment.md): with less on travel, loops that drive the
 # blades hard, and the platform with them, are paid best. Power counts little: its term falls faster above
 # rated than below, so that it draws the mean down.
 WEIGHTS: dict[str, float] = {

@@ -12,7 +12,7 @@ class LoadFacts(NamedTuple):
 
     summary: str
     file: str  # of fowt_env/plant, with its equation
-    section: str  # of docs/theory.md
+    section: str  # of docs/explanation/theory.md
     slot: str | None  # path in plant.model.Model that is None where it is absent; None: always there
     total: str  # entry of plant.model.LoadCache that holds it beside others of its kind
     without: Mapping[str, Any] = NOTHING  # arguments of build_scene that leave it out

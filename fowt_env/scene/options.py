@@ -24,7 +24,7 @@ class RotorModel(NamedTuple):
     build: Callable[[BladeElements, Mapping[str, Any]], Any]  # (elements, options) -> part of the model
     wake: tuple[str, ...]  # the options of the wake that it takes, of WAKE_OPTIONS
     full_field: bool  # whether blades meet a box of wind point by point; else its average over the rotor
-    error: float  # of a motion or tension at most, rms over its standard deviation: docs/performance.md
+    error: float  # of a motion or tension at most, rms over its standard deviation: performance.md
 
 
 class Fidelity(NamedTuple):
@@ -36,7 +36,7 @@ class Fidelity(NamedTuple):
     integrator: str
     mooring: str
     radiation: str
-    error: float  # of a motion or tension at most, rms over its standard deviation: docs/performance.md
+    error: float  # of a motion or tension at most, rms over its standard deviation: performance.md
     dt: float | None = None  # s, default step with its own integrator; None: that of the integrator
 
 

@@ -1,4 +1,4 @@
-"""docs/controllers.md against the controllers that there are."""
+"""docs/reference/controllers.md against the controllers that there are."""
 
 import re
 import tomllib
@@ -10,7 +10,9 @@ from fowt_env import build_scene, simulate
 from fowt_env.controllers import CONTROLLERS, make
 from fowt_env.controllers.tuned import TUNED
 
-TEXT = (Path(__file__).resolve().parents[2] / "docs" / "controllers.md").read_text(encoding="utf-8")
+TEXT = (Path(__file__).resolve().parents[2] / "docs" / "reference" / "controllers.md").read_text(
+    encoding="utf-8"
+)
 
 
 def rows(heading):

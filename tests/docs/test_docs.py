@@ -46,18 +46,19 @@ def test_the_tables_of_a_page_are_those_of_the_code(page):
 
 
 def test_a_table_that_is_not_the_code_s_is_noticed():
-    text = (DOCS / "environment.md").read_text()
+    text = (DOCS / "reference/environment.md").read_text()
     assert text.count("| -20    |") == 1
     changed = text.replace("| -20    |", "| -21    |")
-    assert PAGES.with_tables("environment.md", changed) == text
+    assert PAGES.with_tables("reference/environment.md", changed) == text
     with pytest.raises(ValueError, match="rewards"):
         PAGES.with_tables(
-            "environment.md", text.replace("from the code: reward -->", "from the code: rewards -->")
+            "reference/environment.md",
+            text.replace("from the code: reward -->", "from the code: rewards -->"),
         )
 
 
 def test_the_page_of_the_command_line_is_that_of_the_commands():
-    assert PAGES.cli_page() == (DOCS / "cli.md").read_text(), AGAIN
+    assert PAGES.cli_page() == (DOCS / "reference/cli.md").read_text(), AGAIN
 
 
 def clip(x, low, high):
@@ -106,7 +107,9 @@ def test_the_printed_reward_formulas_give_what_the_kernels_give():
 
 
 def test_the_info_table_has_every_key_and_no_other():
-    section = (DOCS / "environment.md").read_text().partition("\n## Info\n")[2].partition("\n## ")[0]
+    section = (
+        (DOCS / "reference/environment.md").read_text().partition("\n## Info\n")[2].partition("\n## ")[0]
+    )
     rows = [line.strip("| ").split(" | ") for line in section.splitlines() if line.startswith("| `")]
     told = {"reset": set(), "step": set(), "last step": set(), "step, at a failure": set()}
     for key, where, _ in rows:
@@ -122,11 +125,11 @@ def test_the_info_table_has_every_key_and_no_other():
 
 
 def test_every_task_is_in_the_reference():
-    text = (DOCS / "environment.md").read_text()
+    text = (DOCS / "reference/environment.md").read_text()
     assert all(f"`{name}`" in text for name in TASKS)
 
 
-README, SPEED, VALIDATION = "README.md", "docs/performance.md", "docs/validation.md"
+README, SPEED, VALIDATION = "README.md", "docs/explanation/performance.md", "docs/results/validation.md"
 FIGURES = {  # what several pages say: {page: pattern with the figure as its group}
     "speed of standard": {
         README: r"\| `standard` \| every .*\| ([\d,]+) \|",
@@ -183,7 +186,7 @@ FIGURES = {  # what several pages say: {page: pattern with the figure as its gro
     },
     "rotor speed of mpc": {
         README: r"\| `mpc` \| [^|]+ \| \S+ (\S+) %",
-        "docs/rl.md": r"`mpc` alone is at (\S+) % in rotor speed",
+        "docs/explanation/reinforcement-learning.md": r"`mpc` alone is at (\S+) % in rotor speed",
     },
     "controller in the gust": {
         README: r"gust at 18 m/s under `pi` and `(\w+)`",
@@ -229,7 +232,9 @@ NUMBERS = {"six": 6, "sixteen": 16}
 def test_counts_in_words_are_those_of_the_files():
     examples = re.search(r"\| `examples/` \| (\w+) programs", (ROOT / README).read_text())[1]
     assert NUMBERS[examples] == len(list((ROOT / "examples").glob("[0-9]*.py")))
-    agents = re.search(r"^(\w+) agents are shipped", (DOCS / "rl.md").read_text(), re.M)[1]
+    agents = re.search(
+        r"^(\w+) agents are shipped", (DOCS / "explanation/reinforcement-learning.md").read_text(), re.M
+    )[1]
     assert NUMBERS[agents.lower()] == len(shipped_agents())
 
 
@@ -263,7 +268,7 @@ def test_files_and_modules_that_a_page_names_exist(page):
 
 
 def test_the_page_of_the_package_has_its_public_names_first():
-    first = (DOCS / "api" / "fowt_env.md").read_text().partition("\n## Further names\n")[0]
+    first = (DOCS / "reference" / "api" / "fowt_env.md").read_text().partition("\n## Further names\n")[0]
     names = re.findall(r"^::: [\w.]+\.(\w+)$(?!\n    options)", first, re.M)
     names += [name for group in re.findall(r"members: \[(.*)\]", first) for name in group.split(", ")]
     assert sorted(names) == fowt_env.__all__
@@ -309,7 +314,7 @@ def test_links_out_of_docs_lead_to_the_site_s_own_pages():
     assert hooks.linked("[e](../examples/01_simulate.py)", "page.md") == "[e](examples/01_simulate.md)"
     assert hooks.linked("[`e`](01_simulate.py)", "examples/index.md") == "[`e`](01_simulate.md)"
     assert hooks.linked("![f](docs/figures/gust.gif)", "readme.md") == "![f](figures/gust.gif)"
-    assert hooks.linked("[g](../../CONTRIBUTING.md)", "api/envs.md") == "[g](../contributing.md)"
+    assert hooks.linked("[g](../../CONTRIBUTING.md)", "reference/envs.md") == "[g](../contributing.md)"
 
 
 def test_docstrings_keep_their_lists_of_names_and_their_signs():
@@ -340,6 +345,8 @@ def test_the_site_is_built_without_a_warning_and_needs_no_network(tmp_path):
         assert not re.search(r'<(script|img|iframe)[^>]+src="https?:', text), page
         assert not re.search(r'<link[^>]+rel="(stylesheet|preconnect|icon)"[^>]+href="https?:', text), page
         assert 'class="arithmatex"' not in text, page  # a formula that was not drawn
-    theory = (tmp_path / "theory.html").read_text(encoding="utf-8")
-    assert theory.count('class="number"') == len(re.findall(r"\\tag\{", (DOCS / "theory.md").read_text()))
+    theory = (tmp_path / "explanation" / "theory.html").read_text(encoding="utf-8")
+    assert theory.count('class="number"') == len(
+        re.findall(r"\\tag\{", (DOCS / "explanation/theory.md").read_text())
+    )
     assert 'aria-label="' + html.escape(r"v = R^T \dot r") + '"' in theory

@@ -1,4 +1,4 @@
-"""The programs and commands of docs/getting-started.md and docs/extending.md do what the pages say."""
+"""The programs and commands of getting-started.md and extending.md do what the pages say."""
 
 import contextlib
 import io
@@ -49,13 +49,13 @@ def folder(tmp_path, monkeypatch):
 
 def test_every_block_of_getting_started_runs(folder):
     pytest.importorskip("matplotlib", reason="matplotlib is not installed: the extra `plot` is missing")
-    run_blocks(blocks("getting-started.md"), folder)
+    run_blocks(blocks("tutorials/getting-started.md"), folder)
     assert (folder / "run.csv").stat().st_size > 1e5 and (folder / "run.png").stat().st_size > 1e4
     assert (folder / "results" / "first" / "leaderboard.json").exists()
 
 
 def test_every_block_of_extending_runs(folder):
-    run_blocks(blocks("extending.md"), folder)
+    run_blocks(blocks("guides/extending.md"), folder)
     table = pd.read_csv(folder / "results" / "damper" / "results.csv").set_index("controller")
     assert (table["status"] == "ok").all()
     swing = table["PtfmPitch_std_[deg]"]
@@ -74,14 +74,14 @@ def test_the_statistics_that_the_readme_shows_are_those_of_its_program():
         assert abs(float(a) - float(b)) < 1.5 * 10.0 ** -len(b.partition(".")[2]), again
 
 
-@pytest.mark.parametrize("page", ["index.md", "environment.md"])
+@pytest.mark.parametrize("page", ["index.md", "reference/environment.md"])
 def test_every_block_of_a_page_runs(folder, page):
     found = blocks(page)
     assert found
     run_blocks(found, folder)
 
 
-@pytest.mark.parametrize("page", ["getting-started.md", "faq.md", "index.md"])
+@pytest.mark.parametrize("page", ["tutorials/getting-started.md", "guides/faq.md", "index.md"])
 def test_extras_that_a_page_installs_exist(page):
     named = re.findall(r"pip install [^\n`]*?\[([\w,]+)\]", (DOCS / page).read_text())
     assert {extra for group in named for extra in group.split(",")} <= set(EXTRAS)

@@ -1,4 +1,4 @@
-"""docs/faq.md quotes each error as it is met: here each is provoked, and compared."""
+"""docs/guides/faq.md quotes each error as it is met: here each is provoked, and compared."""
 
 import os
 import re
@@ -25,7 +25,7 @@ from fowt_env.training.cli import app as cli
 from fowt_env.training.cli import health
 
 NAME = "fowt_env/OC3Hywind-v1"
-MESSAGES = [block for block in blocks("faq.md") if block.language == "text"]
+MESSAGES = [block for block in blocks("guides/faq.md") if block.language == "text"]
 PROVOKED = {}  # heading of the page: functions of (folder, monkeypatch) that return what is printed there
 
 

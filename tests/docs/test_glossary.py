@@ -11,7 +11,7 @@ UNITS = {"-", "m", "m2", "s", "rad", "kg", "kg m", "kg m2", "N", "N m", "m/s", "
 def rows():
     """{word: {heading: cell}} of all tables of the page."""
     found = {}
-    for line in (DOCS / "glossary.md").read_text(encoding="utf-8").splitlines():
+    for line in (DOCS / "reference/glossary.md").read_text(encoding="utf-8").splitlines():
         if line.startswith("| ") and not line.startswith("| word "):
             cells = [cell.strip() for cell in line.strip("|").split(" | ")]
             assert len(cells) == len(HEADINGS), line

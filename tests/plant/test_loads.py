@@ -294,7 +294,7 @@ def test_each_of_its_strengths_is_in_a_form_of_the_model(name):
 @pytest.mark.parametrize("name", LOADS)
 def test_its_file_and_its_section_exist(name):
     load = LOADS[name]
-    theory = (ROOT / "docs" / "theory.md").read_text()
+    theory = (ROOT / "docs" / "explanation" / "theory.md").read_text()
     assert f"### {load.section} " in theory
     for file in load.file.split(", "):
         assert (ROOT / "fowt_env" / "plant" / file).is_file()

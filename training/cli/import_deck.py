@@ -19,7 +19,7 @@ EXAMPLES = """[bold]Examples[/bold]
 
 [cyan]fowt simulate --platform my_semi/platform.toml --wind 14[/cyan]  what comes next
 
-docs/import.md says what is read, what is approximated and what is refused."""  # noqa: E501
+docs/guides/import.md says what is read, what is approximated and what is refused."""  # noqa: E501
 
 Part = Annotated[str | None, typer.Option(help="This part file, in place of the one that the .fst names.")]
 

@@ -37,7 +37,7 @@ def validate(
         str,
         typer.Option(
             help="oc3_hywind, iea15_volturnus_s, nrel5mw_iti_barge or nrel5mw_oc4_semi: what each is compared"
-            " with is in docs/validation.md."
+            " with is in docs/results/validation.md."
         ),
     ] = "oc3_hywind",
     case: Annotated[

@@ -5,7 +5,7 @@
 Runs the suite `ipc` with the controllers of NAMES and with `ipc` behind the bounds of BOUNDS. Printed are
 figures over those of the same law with one pitch for all blades: means over winds and seeds, with the
 exponents of their S-N curves. The shares of a bound are those of `ipc` that it leaves: how much of what that
-takes off the blade roots, for how much of what it adds to the travel. docs/controllers.md has the outcome.
+takes off the blade roots, for how much of what it adds to the travel. controllers.md has the outcome.
 """
 
 import argparse

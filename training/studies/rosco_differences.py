@@ -4,7 +4,7 @@
 
 From the published law towards ROSCO: its periods, the place of the gain schedule, the pitch that sets it.
 From ROSCO towards the published law: the set-point smoother, the torque law, and gains that undo the place of
-the schedule. Cases of normal turbulence at WINDS on validation seeds; docs/controllers.md has the outcome.
+the schedule. Cases of normal turbulence at WINDS on validation seeds; controllers.md has the outcome.
 """
 
 import argparse

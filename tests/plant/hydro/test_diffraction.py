@@ -31,7 +31,7 @@ from fowt_env.weather.waves import build_waves, wave_number
 
 pytestmark = pytest.mark.installation
 
-VALIDITY = Path(__file__).resolve().parents[3] / "docs" / "validity.md"
+VALIDITY = Path(__file__).resolve().parents[3] / "docs" / "explanation" / "validity.md"
 SWITCHES = [("instantaneous", "instantaneous", "wheeler"), ("fixed", "swl", "none")]
 STILL = (np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
 # omega, amplitude, phase, heading; the longest is felt at the seabed, the shortest has ka = 2.3 on the spar
@@ -266,7 +266,7 @@ def test_long_wave_only_exchanges_the_coefficient(platform, site):
 
 
 def published_rows():
-    """[(period, force ratio, force lag, moment ratio, moment lag)] of the table in docs/validity.md."""
+    """[(period, force ratio, force lag, moment ratio, moment lag)] of the table in validity.md."""
     rows = []
     for line in VALIDITY.read_text().splitlines():
         cells = [cell.strip() for cell in line.strip("|").split("|")]
@@ -334,7 +334,7 @@ def first_harmonic(frame, column, period):
 
 @pytest.mark.slow
 def test_regular_wave_of_five_seconds_lags_more_than_the_panel_model():
-    """OpenFAST's panels have both 9.1 deg behind its strips, 0.3 and 0.8 % longer (docs/validity.md)."""
+    """OpenFAST's panels have both 9.1 deg behind its strips, 0.3 and 0.8 % longer (validity.md)."""
     harmonics = []
     for diffraction in (None, "maccamy_fuchs"):
         scene = build_scene(

@@ -284,7 +284,7 @@ def test_platform_pitch_at_18_mps_after_100_s_misses_3_percent_by_the_tip_node_a
     """3.9 %: 0.003 deg of a record whose deviation is 0.08 deg.
 
     With AeroDyn's tip node (0.1 % of thrust, see the quick test) and strip forces along the undisplaced
-    axis, as HydroDyn has them, the same figure is 0.4 % (docs/validation.md).
+    axis, as HydroDyn has them, the same figure is 0.4 % (docs/results/validation.md).
     """
     (row,) = [
         r

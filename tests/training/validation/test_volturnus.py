@@ -145,7 +145,7 @@ def test_a_tower_that_bends_rings_and_loads_its_base_as_openfast_s():
 
 @pytest.mark.slow
 def test_irregular_waves_miss_the_deviation_of_slow_surge_alone():
-    """2.3 % of surge instead of 2 %: a slow oscillation of 0.06 m from the start (docs/validation.md)."""
+    """2.3 % of surge instead of 2 %: a slow oscillation of 0.06 m from the start (validation.md)."""
     rows = judged("waves", "waves_Hs7.5: PtfmSurge, standard deviation")
     assert {row.allowed for row in rows if "standard" in row.quantity} == {2.0, 5.0}
 

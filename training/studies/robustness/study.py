@@ -1,4 +1,4 @@
-"""Stability under stress: the parts of the study, what each claims, and the report docs/robustness.md.
+"""Stability under stress: the parts of the study, what each claims, and the report numerical-robustness.md.
 
 Each part stores what it found as JSON beside the others, so that a report can join runs of several days.
 """
