@@ -35,7 +35,7 @@ def in_wind(storm_scene):
 
 
 def test_trim_in_still_water_has_the_known_offsets(at_rest):
-    # theory.md, section 7; the overhanging rotor leaves a small lean upwind
+    # model-choices.md, OC3-Hywind; the overhanging rotor leaves a small lean upwind
     assert at_rest["PtfmSurge"] == pytest.approx(-0.0503, abs=5e-5)
     assert at_rest["PtfmHeave"] == pytest.approx(0.125e-3, abs=1e-6)
     assert at_rest["PtfmPitch"] == pytest.approx(-0.0422, abs=5e-5)

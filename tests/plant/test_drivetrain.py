@@ -103,7 +103,7 @@ def test_an_unknown_region_3_law_gets_a_suggestion():
 
 def test_inertias_are_the_published_ones():
     drivetrain = build_drivetrain(turbine())
-    assert drivetrain.inertia_row == pytest.approx(4.38584e7, rel=1e-6)  # theory.md, section 7
+    assert drivetrain.inertia_row == pytest.approx(4.38584e7, rel=1e-6)  # model-choices.md, OC3-Hywind
     assert drivetrain.coupling == pytest.approx(3.88847e7, rel=1e-6)
 
 

@@ -31,7 +31,7 @@ L, W, EA = 902.2, 698.094, 384.243e6
 Z_REST, X_REST = 250.0, 848.67
 LINE = (L, W, EA)
 
-# theory.md 5.5: x_F m; H, V, T kN; length on seabed m; regime
+# model-choices.md: x_F m; H, V, T kN; length on seabed m; regime
 LINE_TABLE = [
     (700.0, 14.489, 188.410, 188.966, 632.31, TOUCHDOWN),
     (750.0, 56.027, 223.572, 230.486, 581.94, TOUCHDOWN),

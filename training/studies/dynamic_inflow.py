@@ -1,6 +1,6 @@
 """What dynamic inflow does to a run, and how near the look-up comes to blade-element momentum with it.
 
-    python -m fowt_env.training.studies.dynamic_inflow           # the errors in docs/explanation/theory.md
+    python -m fowt_env.training.studies.dynamic_inflow           # the table of docs/results/model-choices.md
     python -m fowt_env.training.studies.dynamic_inflow --speed   # the time of a run with and without it
 
 Class B turbulence, a sea of 7.5 m above rated and of 4 m below, 540 s after 60 s under `pi`, at fidelity

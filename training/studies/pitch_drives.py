@@ -1,6 +1,6 @@
 """What the pitch drive does to a run: none, one of first order, one of second order.
 
-    python -m fowt_env.training.studies.pitch_drives              # the table of docs/explanation/validity.md
+    python -m fowt_env.training.studies.pitch_drives              # the table of docs/results/model-choices.md
     python -m fowt_env.training.studies.pitch_drives --speed      # time of a run with and without inertia
 
 18 m/s, class B turbulence, the sea of that wind at the site of the suites, three seeds, 600 s after 100 s, at

@@ -23,7 +23,7 @@ ROTOR = build_blade_elements(TURBINE, 1.225)
 AREA = np.pi * ROTOR.tip_radius**2
 RPM = np.pi / 30
 
-# theory.md, 5.1: wind m/s, rpm, blade pitch deg, C_P, C_T, thrust kN, torque MN m
+# model-choices.md: wind m/s, rpm, blade pitch deg, C_P, C_T, thrust kN, torque MN m
 REFERENCE = [
     (8.0, 9.156, 0.0, 0.4883, 0.7904, 386.3, 1.9916),
     (11.4, 12.1, 0.0, 0.4831, 0.7522, 746.5, 4.3139),

@@ -31,7 +31,7 @@ from fowt_env.weather.waves import build_waves, wave_number
 
 pytestmark = pytest.mark.installation
 
-VALIDITY = Path(__file__).resolve().parents[3] / "docs" / "explanation" / "validity.md"
+MODEL_CHOICES = Path(__file__).resolve().parents[3] / "docs" / "results" / "model-choices.md"
 SWITCHES = [("instantaneous", "instantaneous", "wheeler"), ("fixed", "swl", "none")]
 STILL = (np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
 # omega, amplitude, phase, heading; the longest is felt at the seabed, the shortest has ka = 2.3 on the spar
@@ -266,9 +266,9 @@ def test_long_wave_only_exchanges_the_coefficient(platform, site):
 
 
 def published_rows():
-    """[(period, force ratio, force lag, moment ratio, moment lag)] of the table in validity.md."""
+    """[(period, force ratio, force lag, moment ratio, moment lag)] of the table in model-choices.md."""
     rows = []
-    for line in VALIDITY.read_text().splitlines():
+    for line in MODEL_CHOICES.read_text().splitlines():
         cells = [cell.strip() for cell in line.strip("|").split("|")]
         if len(cells) == 10 and cells[0].isdigit():
             pairs = [cell.removesuffix(" deg").split(", ") for cell in cells[-2:]]
@@ -276,7 +276,7 @@ def published_rows():
     return rows
 
 
-def test_integrated_force_and_moment_are_the_columns_of_the_validity_table(platform, site):
+def test_integrated_force_and_moment_are_the_columns_of_the_published_table(platform, site):
     strips = strips_of(platform, "fixed", "swl", "none")._replace(drag_coefficient=0.0)
     rows = published_rows()
     assert [row[0] for row in rows] == [3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0]
@@ -334,7 +334,7 @@ def first_harmonic(frame, column, period):
 
 @pytest.mark.slow
 def test_regular_wave_of_five_seconds_lags_more_than_the_panel_model():
-    """OpenFAST's panels have both 9.1 deg behind its strips, 0.3 and 0.8 % longer (validity.md)."""
+    """OpenFAST's panels have both 9.1 deg behind its strips, 0.3 and 0.8 % longer (model-choices.md)."""
     harmonics = []
     for diffraction in (None, "maccamy_fuchs"):
         scene = build_scene(
