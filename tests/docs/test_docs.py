@@ -129,39 +129,42 @@ def test_every_task_is_in_the_reference():
     assert all(f"`{name}`" in text for name in TASKS)
 
 
-README, SPEED, VALIDATION = "README.md", "docs/explanation/performance.md", "docs/results/validation.md"
+README, VALIDATION = "README.md", "docs/results/validation.md"
+PERFORMANCE, SPEED = "docs/explanation/performance.md", "docs/results/speed.md"
 FIGURES = {  # what several pages say: {page: pattern with the figure as its group}
     "speed of standard": {
         README: r"\| `standard` \| every .*\| ([\d,]+) \|",
-        SPEED: r"([\d,]+) and [\d,]+ when it is quiet",
+        PERFORMANCE: r"\| `\"standard\"` \|.*\| ([\d,]+) \|",
+        SPEED: r"([\d,]+) with\s`standard`, ",
     },
     "speed of fast": {
         README: r"\| `fast` \| .*\| ([\d,]+) \|",
-        SPEED: r"[\d,]+ and ([\d,]+) when it is quiet",
+        PERFORMANCE: r"\| `\"fast\"` \|.*\| ([\d,]+) \|",
+        SPEED: r"([\d,]+) with `fast`",
     },
     "error of standard": {
         README: r"\| `standard` \| every .*\| (\S+) \| [\d,]+ \|",
-        SPEED: r"errs by (\S+) of a standard deviation",
+        PERFORMANCE: r"\| `\"standard\"` \|.*\| (\S+) \| [\d,]+ \|",
     },
     "error of fast": {
         README: r"\| `fast` \| .*\| (\S+) \| [\d,]+ \|",
-        SPEED: r"errs by (\S+), which one would",
+        PERFORMANCE: r"\| `\"fast\"` \|.*\| (\S+) \| [\d,]+ \|",
     },
     "speed of standard in a box": {
         README: r"box of full-field wind `standard` errs by \S+ at ([\d,]+) times",
-        SPEED: r"`standard`, three rotor loads a step\) \| .* \| ([\d,]+) \| [\d,]+ \|",
+        SPEED: r"`standard` \(three rotor loads a step\) \| .* \| ([\d,]+) \|",
     },
     "calibration of the quiet machine": {
         README: r"on a machine that took (\S+) ms",
-        SPEED: r"and takes (\S+) ms\swhen the machine is quiet",
+        SPEED: r"calibration: (\S+) ms for",
     },
     "slowest OpenFAST": {
         README: r"same rigid model at (\S+) to \d+ times real time",
-        SPEED: r"quiet machine: (\S+) times real time",
+        SPEED: r"same rigid model here at (\S+) times real time",
     },
     "fastest OpenFAST": {
         README: r"same rigid model at \S+ to (\d+) times real time",
-        SPEED: r"(\d+) at the coarsest sensible ones",
+        SPEED: r"and (\d+) with the coarsest sensible ones",
     },
     "figures of the validation": {
         README: r"\d+ of (\d+) figures within",
@@ -202,22 +205,64 @@ def test_pages_that_give_the_same_figure_agree(name):
     assert len({values[0] for values in found.values()}) == 1, found
 
 
+def stored(name):
+    """Rows of a stored sweep of docs/figures by variant."""
+    return pd.read_csv(DOCS / "figures" / name, comment="#").groupby("variant")
+
+
+def table_of(heading):
+    """Rows of cells of the first table after a heading of the page of measured speeds."""
+    text = (ROOT / SPEED).read_text().partition(f"# {heading}\n")[2]
+    lines = [line for line in text.partition("\n#")[0].splitlines() if line.startswith("| ")]
+    return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines[1:]]
+
+
+def shows(text, speed):
+    """Whether a text is a speed, rounded to three figures and a whole number."""
+    return abs(float(text.replace(",", "")) - speed) <= 0.005 * speed + 0.5
+
+
 def test_the_errors_of_the_levels_are_the_largest_of_the_stored_sweep():
-    sweep = pd.read_csv(DOCS / "figures" / "accuracy.csv", comment="#").groupby("variant")["worst"]
-    readme, page = (ROOT / README).read_text(), (ROOT / SPEED).read_text()
+    sweep = stored("accuracy.csv")["worst"]
     rows = dict(
         re.findall(
-            r"^\| `(\w+)`(?: \(default\))? \| .*?\| (\d\S*)(?: in heave[^|]*)? \| [\d,]+ \|$", readme, re.M
+            r"^\| `(\w+)`(?: \(default\))? \| .*?\| (\d\S*)(?: in heave[^|]*)? \| [\d,]+ \|$",
+            (ROOT / README).read_text(),
+            re.M,
         )
     )
     assert set(rows) == {"reference", "standard", "fast"}
+    variants = {
+        level: variant
+        for variant, level in re.findall(r"^\| ([^|]*) \(`(\w+)`\) \|", (ROOT / SPEED).read_text(), re.M)
+    }
     for level, error in rows.items():
-        row = rf"^\| [\w ]+ \| ([^|]*) \(`{level}`\) \| (\S+) \| (\S+) \|"
-        ((variant, mean, largest),) = re.findall(row, page, re.M)
-        seeds = sweep.get_group(variant)
-        assert (mean, largest) == (f"{seeds.mean():.1e}", f"{seeds.max():.1e}")
         digits = len(error.partition("e")[0].replace(".", "")) - 1
-        assert float(error) == float(f"{seeds.max():.{digits}e}"), level
+        assert float(error) == float(f"{sweep.get_group(variants[level]).max():.{digits}e}"), level
+
+
+def test_the_table_of_errors_and_speeds_is_that_of_the_stored_sweep():
+    sweep, rows = stored("accuracy.csv"), table_of("Error against run time")
+    assert len(rows) > 6
+    for label, mean, largest, worst_of, speed in rows:
+        seeds = sweep.get_group(re.sub(r" \(`\w+`\)", "", label))
+        assert (mean, largest) == (f"{seeds['worst'].mean():.1e}", f"{seeds['worst'].max():.1e}"), label
+        assert worst_of.replace(" ", "_") in set(seeds["worst_of"]), label
+        assert shows(speed, seeds["real_time_factor"].median()), label
+
+
+def test_the_table_of_the_box_is_that_of_the_stored_sweep():
+    sweep, rows = stored("accuracy_box.csv"), table_of("Full-field wind")
+    standard = "ab4 0.1 s, lookup, fast waves"
+    counts = {f"with {n} rotor load" if n == 1 else f"with {n}": n for n in (1, 2, 4)}
+    names = {label: f"{standard}, {n} rotor loads a step" for label, n in counts.items()}
+    names |= {"`standard` (three rotor loads a step)": standard}
+    names |= {"`fast`": "ab4 0.1 s, table, fast waves, mooring by table"}
+    assert {label for label, *_ in rows} == set(names)
+    for label, error, worst_of, speed in rows:
+        (row,) = sweep.get_group(names[label]).to_dict("records")
+        assert error == f"{row['worst']:.1e}" and worst_of.replace(" ", "_") == row["worst_of"], label
+        assert shows(speed, row["real_time_factor"]), label
 
 
 def test_the_table_of_compile_times_has_the_rows_of_the_benchmark():
