@@ -97,7 +97,7 @@ STABILITY_EXAMPLES = """[bold]Examples[/bold]
 
 [cyan]fowt benchmark stability --replay results/stability/failures/case_0000.json[/cyan]  a failure again
 
-[bold]Files written[/bold]: a JSON file per part, failures/case_NNNN.json, robustness.md."""
+[bold]Files written[/bold]: PART.json, failures/case_NNNN.json, robustness.md, robustness/PART.csv."""
 
 
 @benchmarks.command(epilog=ACCURACY_EXAMPLES)

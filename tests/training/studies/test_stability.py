@@ -3,6 +3,7 @@
 import json
 
 import numpy as np
+import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
@@ -243,13 +244,20 @@ def test_the_report_counts_what_was_missed(tmp_path, monkeypatch):
         found.claim("good", 3, "1", "1", True)
         found.claim("bad", 4, "2", "1", False)
         found.tables.append(["Values", ["a", "b"], [["x", "1"]]])
+        found.tables.append(["Many", ["a", "b"], [[f"y{n}", "2"] for n in range(40)]])
         return found
 
     monkeypatch.setitem(study.PARTS, "plain", part)
-    study.study(tmp_path, ["plain"])
+    study.study(tmp_path, ["plain"], study.Sizes(seed=3))
     text = study.write_robustness_report(tmp_path, tmp_path / "report.md").read_text()
     assert "2 checks, 1 of them missed" in text
-    assert "| bad | 4 | 2 | 1 | **MISSED** |" in text and "| x | 1 |" in text
+    assert (
+        "| bad | 4 | **MISSED**: 2 | 1 |" in text and "| good | 3 | 1 | 1 |" in text and "| x | 1 |" in text
+    )
+    assert "`fowt benchmark stability --parts plain --seed 3`" in text
+    assert "(report/plain_2.csv)" in text and "y39" not in text
+    many = pd.read_csv(tmp_path / "report" / "plain_2.csv")
+    assert list(many["a"]) == [f"y{n}" for n in range(40)] and (many["b"] == 2).all()
     with pytest.raises(InputError, match="unknown part"):
         study.study(tmp_path, ["maps"])
 

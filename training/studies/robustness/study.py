@@ -1,4 +1,4 @@
-"""Stability under stress: the parts of the study, what each claims, and the report numerical-robustness.md.
+"""Stability under stress: the parts of the study, what each claims, and the report.
 
 Each part stores what it found as JSON beside the others, so that a report can join runs of several days.
 """
@@ -10,11 +10,14 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
+import fowt_env
 from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.errors import unknown
 from fowt_env.files.atomic import replacing
 from fowt_env.files.markdown import markdown_table
+from fowt_env.files.tables import write_table
 from fowt_env.plant.integrators import INTEGRATORS
 from fowt_env.plant.rollout import RUNNING
 from fowt_env.training.benchmarks.speed import header
@@ -37,6 +40,7 @@ ORDER_SLACK = 0.35  # that a measured order may lie below the method's
 TURNED = 1e-6  # entries of a rotation matrix
 PLAIN = 1e-9  # rounding of functions that Python and the compiler take from different libraries
 STEP_CHANGE = 0.05  # of an extreme's peak with half the step
+ROWS_SHOWN = 10  # of a table in the report
 
 
 @dataclass
@@ -87,16 +91,16 @@ def map_part(sizes, folder, progress):
             f"{integrator}: default step of {INTEGRATORS[integrator].dt:g} s",
             f"{len(rows)} kinds of scene",
             f"least margin {least['margin']:.1f} ({least['kind']})",
-            f"factor {step_limits.MARGIN:g} below the first blow-up",
+            f"factor {step_limits.MARGIN:g}",
             least["margin"] >= step_limits.MARGIN,
         )
     both = table[np.isfinite(table["theory_s"]) & np.isfinite(table["measured_s"])]
     ratio = both["measured_s"] / both["theory_s"]
     found.claim(
-        "measured limit over that of theory",
+        "measured limit over linear theory's",
         f"{len(table)} limits, {len(both)} below {step_limits.LARGEST_STEP:g} s in both",
         f"{ratio.min():.2f} to {ratio.max():.2f}, median {ratio.median():.3f}" if len(both) else "none",
-        "none below 0.8: theory misses no faster mode",
+        "none below 0.8",
         len(both) == 0 or ratio.min() > 0.8,
     )
     rows = [
@@ -142,12 +146,12 @@ def _found_of(tally, failures):
     found = Found()
     spread = ", ".join(f"{count} {plant}" for plant, count in tally.per_plant.items())
     what = f"{tally.cases} states in {tally.weathers} weathers ({spread})"
-    found.claim("random scenes and states: NaN or exception", what, f"{broken}", "none", broken == 0)
+    found.claim("NaN or exception", what, f"{broken}", "none", broken == 0)
     found.claim(
-        "random scenes and states: kinetic energy and rotor speed bounded",
+        "kinetic energy and rotor speed bounded",
         f"{tally.cases}",
-        f"{len(reasons) - broken} beyond; largest ratio to the energy bound {tally.worst_ratio:.2f}",
-        "none beyond the bound, no stop or peak that a finer step does not have",
+        f"{len(reasons) - broken} above; largest ratio to the energy bound {tally.worst_ratio:.2f}",
+        "none above the bound, no stop or peak that a finer step does not have",
         len(reasons) == broken,
     )
     found.claim(
@@ -183,16 +187,16 @@ def hostile_part(sizes, folder, progress):
     refused = table["policy"] == "NaN and infinity"
     attacks = table[~refused]
     found.claim(
-        "hostile actions: state, observation and reward finite, or an end with its reason",
+        "state, observation and reward finite, or an end with its reason",
         f"{int(attacks['steps'].sum())} control periods, {len(attacks)} policies, modes and tasks",
         f"{int((~attacks['finite']).sum())} not finite",
         "none",
         attacks["finite"].all(),
     )
     found.claim(
-        "actions of NaN or infinity refused, the state left as it was",
+        "NaN or infinity refused, state untouched",
         f"{int(table[refused]['steps'].sum())}",
-        f"{int((~table[refused]['finite']).sum())} kinds of environment that were not",
+        f"{int((~table[refused]['finite']).sum())} accepted",
         "all refused",
         table[refused]["finite"].all(),
     )
@@ -211,13 +215,18 @@ def extremes_part(sizes, folder, progress):
     """Found of the extreme events."""
     table = stability_extremes.extremes(sizes.extremes, seed=sizes.seed + 1, progress=progress)
     found = Found()
-    for group, rows in table.groupby("group", sort=False):
-        stops = rows[~rows["verdict"].str.startswith("finite")]
-        text = f"{int((~rows['finite']).sum())} not finite, {len(stops)} stopped with their reason"
-        found.claim(f"{group}: state finite", f"{len(rows)} runs", text, "all finite", rows["finite"].all())
+    groups = ", ".join(
+        f"{count} {group}" for group, count in table.groupby("group", sort=False).size().items()
+    )
+    stops = (~table["verdict"].str.startswith("finite")).sum()
+    found.claim(
+        "state finite to the end", f"{len(table)} runs: {groups}",
+        f"{(~table['finite']).sum()} not finite, {stops} stopped with their reason", "all finite",
+        table["finite"].all(),
+    )  # fmt: skip
     changes = table["step_change"].dropna()
     found.claim(
-        "peaks of the extremes with half the step",
+        "peaks with half the step",
         f"{len(changes)} runs",
         f"largest change {changes.max():.2%}" if len(changes) else "none",
         f"{STEP_CHANGE:.0%}",
@@ -238,32 +247,32 @@ def long_part(sizes, folder, progress):
     """Found of the long runs, the orders and the quaternion."""
     long, found = long_runs, Found()
     for integrator in INTEGRATORS:
-        for steps, when in ((min(SECULAR_STEPS, sizes.steps), "at the default step"), (sizes.steps, "long")):
+        for steps in (min(SECULAR_STEPS, sizes.steps), sizes.steps):
             drift = long.free_drift(integrator, steps, progress=progress)
             limits = DRIFT[integrator]
             text = ", ".join(f"{key} {drift[key]:.1e}" for key in limits)
             good = drift["status"] == RUNNING and all(drift[key] <= limits[key] for key in limits)
             target = ", ".join(f"{key} {most:.0e}" for key, most in limits.items())
             found.claim(
-                f"free body, {integrator}, {when}: relative change of energy and momenta",
+                f"free body, {integrator}: relative drift",
                 f"{steps} steps of {INTEGRATORS[integrator].dt:g} s", text, target, good,
             )  # fmt: skip
     for integrator, most in FLOATING_DRIFT.items():
         drift = long.floating_drift(integrator, sizes.steps, progress=progress)
         found.claim(
-            f"undamped floating body on its lines, {integrator}: change of energy over that of motion",
+            f"floating body, {integrator}: drift of energy over that of motion",
             f"{sizes.steps} steps of {INTEGRATORS[integrator].dt:g} s", f"{drift['energy']:.1e}",
             f"{most:.0e}", drift["status"] == RUNNING and drift["energy"] <= most,
         )  # fmt: skip
     memory = long.plant_memory(sizes.steps, progress)
     found.claim(
-        "resident memory, full plant under the PI in turbulence and waves", f"{memory['steps']} steps",
+        "memory, full plant in turbulence and waves", f"{memory['steps']} steps",
         f"{memory['growth_MB']:.2f} MB after the first tenth", f"{MEMORY_MB:g} MB",
         memory["status"] == RUNNING and memory["growth_MB"] <= MEMORY_MB,
     )  # fmt: skip
     memory = long.environment_memory(max(2000, sizes.steps // 50), progress)
     found.claim(
-        "resident memory, environment", f"{memory['steps']} control periods, {memory['resets']} resets",
+        "memory, environment", f"{memory['steps']} control periods, {memory['resets']} resets",
         f"{memory['growth_MB']:.2f} MB after the first tenth", f"{MEMORY_MB:g} MB",
         memory["growth_MB"] <= MEMORY_MB,
     )  # fmt: skip
@@ -354,81 +363,97 @@ def stored_parts(folder):
 
 
 def write_robustness_report(folder, path):
-    """Write the Markdown report of every part that the folder holds; returns the path."""
+    """Write the Markdown report of every part that the folder holds; returns the path.
+
+    Tables of more than ROWS_SHOWN rows become CSV files in a folder beside the report, of its name.
+    """
+    path = Path(path)
     parts = stored_parts(folder)
-    claims = [(TITLES[part], claim) for part, stored in parts.items() for claim in stored["claims"]]
-    failed = sum(not claim["holds"] for _, claim in claims)
+    verdicts = [claim["holds"] for stored in parts.values() for claim in stored["claims"]]
     lines = [
-        "# Robustness: what was done to break the simulator, and what came of it", "",
-        f"Made by `fowt benchmark stability`; {len(claims)} checks, {failed} of them missed. Figures of each"
-        " part hold for the sizes in its rows.", "",
+        "# Numerical robustness", "",
+        f"{len(verdicts)} checks, {verdicts.count(False)} of them missed. Version {fowt_env.__version__};"
+        " each part names the date and commit of its runs and the command that repeats them.",
     ]  # fmt: skip
-    columns = ["part", "check", "count", "found", "target", "verdict"]
-    rows = [
-        [title, c["what"], c["count"], c["found"], c["target"], "holds" if c["holds"] else "**MISSED**"]
-        for title, c in claims
-    ]
-    lines.append(markdown_table(columns, rows))
     for part, stored in parts.items():
-        lines += ["", f"## {TITLES[part]}", "", METHODS[part], ""]
-        lines.append(f"Run on {stored['date']}, {stored['minutes']:.1f} minutes.")
-        for title, columns, rows in stored["tables"]:
-            lines += ["", f"**{title}**", "", markdown_table(columns, rows)]
+        lines += ["", f"## {TITLES[part]}", "", f"{_origin(part, stored)} {METHODS[part]}", ""]
+        rows = [
+            [c["what"], c["count"], c["found"] if c["holds"] else f"**MISSED**: {c['found']}", c["target"]]
+            for c in stored["claims"]
+        ]
+        lines.append(markdown_table(["check", "count", "found", "target"], rows))
+        for number, (title, columns, rows) in enumerate(stored["tables"]):
+            if len(rows) <= ROWS_SHOWN:
+                lines += ["", f"**{title}**", "", markdown_table(columns, rows)]
+                continue
+            name = f"{part}_{number + 1}.csv" if number else f"{part}.csv"
+            write_table(pd.DataFrame(rows, columns=columns), path.with_suffix("") / name)
+            lines += ["", f"[{title}: all {len(rows)} rows]({path.stem}/{name})."]
     with replacing(path) as temporary:
         Path(temporary).write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return Path(path)
+    return path
 
 
+def _origin(part, stored):
+    """When a part was run, on what source, and the command that repeats it."""
+    about = dict(line.partition(": ")[::2] for line in stored["about"])
+    sizes = Sizes(**stored["sizes"])
+    words = [f"{option} {getattr(sizes, name)}" for name, option in REPEATED[part]]
+    words += [f"--seed {sizes.seed}"] if sizes.seed else []
+    commit = about["commit"][:7]
+    command = " ".join(["fowt benchmark stability --parts", part, *words])
+    return f"{stored['date']}, {commit}, `{command}`."
+
+
+CASES = (("cases", "--cases"),)
+REPEATED = {  # sizes that the command of a part takes: (field of Sizes, option)
+    "map": (),
+    "cases": CASES,
+    "tower": CASES,
+    "hostile": (("hostile_steps", "--hostile"),),
+    "extremes": (),
+    "long": (("steps", "--steps"),),
+    "plain": (),
+}
 METHODS = {
     "map": (
-        f"Each run starts off its operating point in every state, keeps its command, and lasts"
-        f" {step_limits.DURATION:g} s. It has blown up where it stops, or where a state's peak over the"
-        f" second half is more than {step_limits.GROWTH:g} times that of a run with"
-        f" {step_limits.FINE_STEP:g} s steps. Steps grow by {step_limits.SCAN - 1:.0%} from the default"
-        " until the first blow-up, then bisection. Theory is the amplification matrix of the very scheme on"
-        " the linear model about the same point: blade pitch by its own exact law,"
-        " Adams positions by Adams-Moulton from the new velocities. Its limit is where errors double over"
-        " the run beyond what the plant itself does. The linear model has no drag, which the runs have:"
-        " that is why some limits are higher than theory's. Yaw and rotor"
-        " limit them all. The feathered blades of an idling rotor damp its speed by up to 4.5 1/s:"
-        " there ab4 corrects its step, as abm4 does everywhere (`integrators.FEATHERING`). By itself it"
-        " would keep less than a factor of two from 26 m/s on, and blow up at 0.1 s from 50 m/s on."
+        f"Each run starts off its operating point in every state, keeps its command and lasts"
+        f" {step_limits.DURATION:g} s. It has blown up where it stops, or where a peak of its second half is"
+        f" more than {step_limits.GROWTH:g} times that with steps of {step_limits.FINE_STEP:g} s. Theory is"
+        " the amplification matrix of the integrator on the linear model, which has no drag: some limits"
+        " are therefore higher than its own. Yaw and rotor speed set the limits. Where feathered blades of an"
+        " idling rotor damp its speed, ab4 corrects its step as abm4 does (`integrators.FEATHERING`); without"
+        " that it would blow up at 0.1 s from 50 m/s on."
     ),
     "cases": (
-        f"Wind from still air to 70 m/s (steady, NTM, ETM, the turbulent extreme wind, gusts; from any"
-        " direction), seas to Hs 17 m or a regular wave to 30 m as steep as it may be, from any side;"
-        " offsets to 30 m (lines taut on one side and slack on the other), tilt to 30 deg, yaw to 30 deg,"
-        " speeds to 3 m/s and 0.1 rad/s, rotor from rest to 150 %, any blade pitch; a third under the PI, a"
-        f" third under a constant command, a third under a new random command every second."
-        f" {random_cases.DURATION:g} s each. The bound on the platform's kinetic energy is"
-        f" {random_cases.FACTOR:g} times the sum of the energy it starts with, its own at the speed of"
-        " the water, and the work that the wind's thrust can do over the hub's travel; that on the rotor"
-        f" speed a tip-speed ratio of {random_cases.FASTEST_TIP:g}. A failure is stored as JSON and runs"
-        " again by `fowt benchmark stability --replay FILE`."
+        "Wind from still air to 70 m/s (steady, NTM, ETM, EWM, gusts; any direction), seas to Hs 17 m or a"
+        " regular wave to 30 m as steep as it may be; at the start offsets to 30 m, tilt and yaw to 30 deg,"
+        " speeds to 3 m/s and 0.1 rad/s, rotor from rest to 150 %, any blade pitch. A third under the PI, a"
+        f" third under a constant command, a third under a random one every second; {random_cases.DURATION:g}"
+        " s each. The bound on the kinetic energy of the platform is"
+        f" {random_cases.FACTOR:g} times the sum of its energy at the start, its own at the speed of"
+        " the water, and the work that thrust can do; that on the rotor speed a tip-speed ratio of"
+        f" {random_cases.FASTEST_TIP:g}."
     ),
     "tower": (
-        'Scenes of the option tower = "modes", with deflections to 1 m and rates to 2 m/s at the start in'
-        " each direction."
+        'A twentieth as many with `tower="modes"`, deflections to 1 m and rates to 2 m/s at the start.'
     ),
     "hostile": (
-        "The environment at its defaults. An episode that ends early is started anew until the periods are"
-        " spent; `step` must give finite observations and rewards throughout."
+        "Environment at its defaults; an episode that ends early is started anew. Policies: bang-bang at"
+        " Nyquist, constant corners, random, platform-pitch resonance, far outside the range."
     ),
     "extremes": (
         f"Standard fidelity, {stability_extremes.DURATION:g} s, the event at {stability_extremes.EVENT:g} s,"
-        " PI control where the rotor runs. The catenary has no breaking strength and the rotor no"
-        " aerodynamic brake: tensions and overspeeds are what the rigid model has, and say that it stays"
-        " finite, not that a turbine survives."
+        " PI control where the rotor runs. Lines have no breaking strength and the rotor no"
+        " aerodynamic brake: the runs say that the state stays finite, not that a turbine survives."
     ),
     "long": (
-        "The free body drifts and nutates in empty space with its rotor turning. The floating body has its"
+        "The free body drifts and nutates in empty space with its rotor turning; energy and momenta are"
+        " computed outside the stepping code. The floating body has"
         " hull, weight and lines, but no drag, damping or added mass, so that its energy is known."
-        " Angular momentum is about the centre of mass."
-        " Momenta and energies are computed from the mass matrix outside the stepping code."
     ),
     "plain": (
         f"{without_compiler.STEPS_PER_SCENE} steps of each scene by each integrator, and"
-        f" {without_compiler.ENV_STEPS} control periods of environments, in a process without the compiler,"
-        " with the scenes handed over."
+        f" {without_compiler.ENV_STEPS} control periods of environments."
     ),
 }
