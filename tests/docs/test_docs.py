@@ -265,6 +265,23 @@ def test_the_table_of_the_box_is_that_of_the_stored_sweep():
         assert shows(speed, row["real_time_factor"]), label
 
 
+def test_the_counts_of_the_validation_are_those_of_the_stored_figures():
+    """Per platform in the first table, and in sum over the cases of a platform's own table."""
+    text = (ROOT / VALIDATION).read_text()
+    rows = re.findall(r"^\| `(\w+)` \| [^|]+ \| (\d+) of (\d+) \|$", text, re.M)
+    assert len(rows) == 4
+    for platform, met, judged in rows:
+        folder = DOCS / "results" / "validation" / ("" if platform == "oc3_hywind" else platform)
+        verdicts = pd.read_csv(folder / "validation.csv")["verdict"].value_counts()
+        assert (int(met), int(judged)) == (verdicts["met"], verdicts["met"] + verdicts.get("MISSED", 0))
+    table = text.partition("<!-- measured: fowt validate --platform iea15_volturnus_s -->")[2].partition(
+        "\n\n#"
+    )[0]
+    cases = re.findall(r"(\d+) of (\d+) \|$", table, re.M)
+    total = {platform: (int(met), int(judged)) for platform, met, judged in rows}
+    assert tuple(np.array(cases, dtype=int).sum(axis=0)) == total["iea15_volturnus_s"]
+
+
 def test_the_table_of_compile_times_has_the_rows_of_the_benchmark():
     table = (ROOT / SPEED).read_text().partition("<!-- measured: fowt benchmark compile -->")[2]
     rows = re.findall(r"^\| ([\w -]+) \| [^|]+ \| \d+\.\d \|$", table.partition("<!-- end -->")[0], re.M)
