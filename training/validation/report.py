@@ -1,9 +1,11 @@
 """What a validation leaves behind: the table (CSV and Markdown) and the overlay plots per case."""
 
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
 
+import fowt_env
 from fowt_env.files.atomic import remove_leftovers, replacing
 from fowt_env.files.markdown import markdown_table
 from fowt_env.files.tables import write_table
@@ -273,22 +275,42 @@ def _shown(value):
     return "" if not np.isfinite(value) else f"{value:.5g}"
 
 
-def markdown(study):
-    """Markdown of the tables, one per case."""
-    lines = []
-    for case in dict.fromkeys(row.case for row in study.rows):
+def markdown(study, plots=(), date=None):
+    """Markdown of the tables, one per case, each with the plots of its name; other plots come first.
+
+    plots: names of files beside the text; date: as YYYY-MM-DD, default today
+    """
+    date = f"{datetime.now(UTC):%Y-%m-%d}" if date is None else date
+    cases = list(dict.fromkeys(row.case for row in study.rows))
+    owned = {case: [f"{case}.png", f"{case}_spectra.png"] for case in cases}
+    others = [name for name in plots if not any(name in names for names in owned.values())]
+    lines = [
+        f"# Every figure of {study.platform}", "",
+        f"{date}, version {fowt_env.__version__}: `fowt validate --platform {study.platform}`. Without an"
+        " allowed error a figure is reported, not judged.", "",
+        *_images(others),
+    ]  # fmt: skip
+    for case in cases:
         rows = [row for row in study.rows if row.case == case]
         against = "OpenFAST" if "against" not in case else "reference"
-        header = ("figure", "unit", against, "here", "error %", "allowed %", "verdict")
+        header = ("figure", "unit", against, "here", "error %", "allowed %")
         cells = []
         for row in rows:
             quantity = f"{row.quantity} ({row.note})" if row.note else row.quantity
             error = "" if not np.isfinite(row.error) else f"{row.error:.3g}"
+            error = f"**{error}, missed**" if row.verdict == "MISSED" else error
             allowed = "" if not np.isfinite(row.allowed) else f"{row.allowed:g}"
-            values = (_shown(row.openfast), _shown(row.here), error, allowed, row.verdict)
+            values = (_shown(row.openfast), _shown(row.here), error, allowed)
             cells.append((quantity, row.unit, *values))
-        lines += [f"### {case}", "", markdown_table(header, cells), ""]
+        lines += [f"## {case}", "", markdown_table(header, cells), ""]
+        lines += _images(name for name in owned[case] if name in plots)
     return "\n".join(lines)
+
+
+def _images(names):
+    """Lines of Markdown that show images."""
+    lines = [f"![{Path(name).stem.replace('_', ' ')}]({name})" for name in names]
+    return [*lines, ""] if lines else []
 
 
 def write_validation_report(study, folder, plots=True):
@@ -297,6 +319,7 @@ def write_validation_report(study, folder, plots=True):
     folder.mkdir(parents=True, exist_ok=True)
     remove_leftovers(folder)
     paths = [write_table(study.table(), folder / "validation.csv"), folder / "validation.md"]
+    images = write_plots(study, folder) if plots else []
     with replacing(paths[1]) as temporary:
-        temporary.write_text(markdown(study) + "\n", encoding="utf-8")
-    return paths + (write_plots(study, folder) if plots else [])
+        temporary.write_text(markdown(study, [path.name for path in images]) + "\n", encoding="utf-8")
+    return paths + images

@@ -5,6 +5,7 @@ its measured value and its cause, in a test whose name says so.
 """
 
 import gzip
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -29,7 +30,7 @@ from fowt_env.training.validation.openfast_cases import (
     reference,
     steady_reference,
 )
-from fowt_env.training.validation.report import write_validation_report
+from fowt_env.training.validation.report import markdown, write_validation_report
 from fowt_env.training.validation.signal_errors import (
     decay_decrement,
     decay_period,
@@ -260,7 +261,10 @@ def test_the_report_has_every_figure_and_its_plots(tmp_path):
             assert abs(mine / theirs - 1.0) < 0.01 * target(row) + 1e-3
     paths = write_validation_report(study, tmp_path)
     text = (tmp_path / "validation.md").read_text()
-    assert text.count("| met |") == len(study.rows) == 24
+    assert text.count("\n| ") == len(study.rows) + 6 == 30  # heads of 6 tables
+    assert "missed" not in text and text.index("![decays](decays.png)") < text.index("## decay_surge")
+    study.rows[0] = replace(study.rows[0], error=50.0)
+    assert "| **50, missed** | 0.2 |" in markdown(study)
     assert all(path.stat().st_size > 0 for path in paths) and len(paths) == 3
 
 

@@ -1,5 +1,6 @@
 """What `fowt paper` leaves behind: time series, statistics, claims, and plots like the paper's."""
 
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -204,12 +205,13 @@ def periods_table():
 def write_paper_report(study, folder, plot=True):
     """Write everything that a study holds into a folder; returns the paths."""
     folder = Path(folder)
-    paths, text = [], ["# Against the paper", "", "Written by `fowt paper`.", ""]
+    written = f"{datetime.now(UTC):%Y-%m-%d}, version {fowt_env.__version__}"
+    paths, text = [], ["# Every claim of the paper", "", f"{written}: `fowt paper all,full_scale`.", ""]
     if study.runs:
         for case, frame in study.runs.items():
             paths.append(Path(write_table(frame, folder / "runs" / f"{case}.parquet")))
         paths.append(Path(write_table(load_cases.statistics(study.runs), folder / "statistics.csv")))
-        text += ["## Natural periods of the model", "", periods_table(), "", "## Claims", ""]
+        text += ["## Natural periods of the 1:50 model", "", periods_table(), "", "## Claims", ""]
         text += [claims_table(study), "", "## Statistics, model scale", "", statistics_table(study.runs), ""]
     if study.full:
         text += ["## Double frequency, H 3 m, T 5 s, full scale", "", double_frequency_table(study.full), ""]

@@ -151,7 +151,7 @@ def _found_of(tally, failures):
         "kinetic energy and rotor speed bounded",
         f"{tally.cases}",
         f"{len(reasons) - broken} above; largest ratio to the energy bound {tally.worst_ratio:.2f}",
-        "none, nor a stop that a finer step does not have",
+        "none, nor a stop that a finer step lacks",
         len(reasons) == broken,
     )
     found.claim(
@@ -421,13 +421,13 @@ METHODS = {
         f" {step_limits.DURATION:g} s. It has blown up where it stops, or where a peak of its second half is"
         f" more than {step_limits.GROWTH:g} times that with steps of {step_limits.FINE_STEP:g} s. Theory is"
         " the amplification matrix of the integrator on the linear model, which has no drag: some limits"
-        " are therefore higher than its own. Yaw and rotor speed set the limits. Where feathered blades of an"
+        " are therefore higher than its own. Yaw and rotor speed set the limits. Where the blades of an"
         " idling rotor damp its speed, ab4 corrects its step as abm4 does (`integrators.FEATHERING`)."
     ),
     "cases": (
         "Wind from still air to 70 m/s (steady, NTM, ETM, EWM, gusts; any direction), seas to Hs 17 m or a"
         " regular wave to 30 m as steep as it may be; at the start offsets to 30 m, tilt and yaw to 30 deg,"
-        " speeds to 3 m/s and 0.1 rad/s, rotor from rest to 150 %, any blade pitch. A third under the PI, a"
+        " speeds to 3 m/s and 0.1 rad/s, rotor to 150 %, any blade pitch. A third under the PI, a"
         f" third under a constant command, a third under a random one every second; {random_cases.DURATION:g}"
         " s each. The bound on the kinetic energy of the platform is"
         f" {random_cases.FACTOR:g} times the sum of its energy at the start, its own at the speed of"
@@ -438,13 +438,13 @@ METHODS = {
         'A twentieth as many with `tower="modes"`, deflections to 1 m and rates to 2 m/s at the start.'
     ),
     "hostile": (
-        "Environment at its defaults; an episode that ends early is started anew. Policies: bang-bang at"
+        "Environment at its defaults; episodes that end early restart. Policies: bang-bang at"
         " Nyquist, constant corners, random, platform-pitch resonance, far outside the range."
     ),
     "extremes": (
         f"Standard fidelity, {stability_extremes.DURATION:g} s, the event at {stability_extremes.EVENT:g} s,"
         " PI control where the rotor runs. Lines have no breaking strength and the rotor no"
-        " aerodynamic brake: the runs say that the state stays finite, not that a turbine survives."
+        " aerodynamic brake: a finite state does not say that a turbine survives."
     ),
     "long": (
         "The free body drifts and nutates in empty space with its rotor turning: relative drifts of its"
