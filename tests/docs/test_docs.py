@@ -282,6 +282,19 @@ def test_the_counts_of_the_validation_are_those_of_the_stored_figures():
     assert tuple(np.array(cases, dtype=int).sum(axis=0)) == total["iea15_volturnus_s"]
 
 
+def test_the_margins_of_the_robustness_page_are_those_of_its_table():
+    text = (DOCS / "results" / "numerical-robustness.md").read_text()
+    table = pd.read_csv(DOCS / "results" / "numerical-robustness" / "map.csv", na_values="-")
+    found = re.findall(
+        r"^\| (\w+): default step of (\S+) s \| (\d+) kinds of scene \| least margin (\S+) ", text, re.M
+    )
+    assert len(found) == table["integrator"].nunique()
+    for integrator, step, count, margin in found:
+        rows = table[table["integrator"] == integrator]
+        assert (len(rows), set(rows["default, s"])) == (int(count), {float(step)})
+        assert rows["margin"].min() == float(margin)
+
+
 def test_the_table_of_compile_times_has_the_rows_of_the_benchmark():
     table = (ROOT / SPEED).read_text().partition("<!-- measured: fowt benchmark compile -->")[2]
     rows = re.findall(r"^\| ([\w -]+) \| [^|]+ \| \d+\.\d \|$", table.partition("<!-- end -->")[0], re.M)

@@ -421,7 +421,7 @@ METHODS = {
         f" {step_limits.DURATION:g} s. It has blown up where it stops, or where a peak of its second half is"
         f" more than {step_limits.GROWTH:g} times that with steps of {step_limits.FINE_STEP:g} s. Theory is"
         " the amplification matrix of the integrator on the linear model, which has no drag: some limits"
-        " are therefore higher than its own. Yaw and rotor speed set the limits. Where the blades of an"
+        " are therefore higher than its own. Yaw and rotor speed limit. Where the blades of an"
         " idling rotor damp its speed, ab4 corrects its step as abm4 does (`integrators.FEATHERING`)."
     ),
     "cases": (
