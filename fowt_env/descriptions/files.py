@@ -12,11 +12,12 @@ from pathlib import Path
 import numpy as np
 
 from fowt_env.descriptions.checks import interval, short
-from fowt_env.errors import InputError
+from fowt_env.errors import NEAREST, InputError
 
 DATA = Path(__file__).parents[1] / "data"
 MAX_BYTES = 5_000_000  # a description is a few kB; anything far larger is a wrong file
 MAX_LISTED = 20  # problems listed in one message
+MOST_NAMED = 12  # names that are all listed; of more the NEAREST are
 MAX_DEPTH = 32  # parts of a dotted key; tomllib's time goes with their square
 _KEY_PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""
 _DEEP_KEY = re.compile(rf"(?m)(?:^|[\[{{,])[ \t]*{_KEY_PART}(?:[ \t]*\.[ \t]*{_KEY_PART}){{{MAX_DEPTH}}}")
@@ -134,24 +135,35 @@ def raise_problems(where, problems):
     raise InputError("\n  ".join([f"{where}: {len(problems)} problems", *shown, *more]))
 
 
-def locate(kind, name_or_path, known, builtin=None, folder=Path()):
-    """File of a known built-in name (builtin(name) -> Path), or of a user's path relative to folder."""
+def locate(kind, name_or_path, known, builtin=None, folder=Path(), listed=None, also=""):
+    """File of a known built-in name (builtin(name) -> Path), or of a user's path relative to folder.
+
+    listed: the command that prints the names, for messages; also: what is allowed beside name and path.
+    """
     if isinstance(name_or_path, str) and name_or_path in known:
         return builtin(name_or_path)
     if not isinstance(name_or_path, (str, Path)):
         raise InputError(f"{kind} = {short(name_or_path)}: must be a built-in name or a path to a .toml file")
     path = _as_path(name_or_path)
     if path is None:
-        raise _unknown_name(kind, name_or_path, known)
+        raise _unknown_name(kind, name_or_path, known, listed, also)
     return folder / path
 
 
-def _unknown_name(kind, name, known):
+def _unknown_name(kind, name, known, command, also):
     nearest = difflib.get_close_matches(name.lower(), known, n=3)
     hint = f" Did you mean {' or '.join(map(repr, nearest))}?" if nearest else ""
-    listed = ", ".join(known) if len(known) <= 12 else f'the {len(known)} of names("{kind}s")'
+    if len(known) <= MOST_NAMED:
+        listed = ", ".join(known)
+    else:
+        near = difflib.get_close_matches(name.lower(), known, n=NEAREST, cutoff=0.0)
+        printed = "" if command is None else f", all by `{command}`"
+        listed = f"one of {len(known)} names (nearest: {', '.join(near)}{printed})"
+    others = f", {also}" if also else ""
     label = kind.replace("_", " ")
-    return InputError(f"unknown {label} {short(name)}.{hint} Allowed: {listed}, or a path to a .toml file")
+    return InputError(
+        f"unknown {label} {short(name)}.{hint} Allowed: {listed}{others}, or a path to a .toml file"
+    )
 
 
 def _as_path(name_or_path):

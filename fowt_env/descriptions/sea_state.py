@@ -9,8 +9,8 @@ from typing import Literal
 import numpy as np
 from pydantic import model_validator
 
-from fowt_env.descriptions.checks import check_number, is_number, short
-from fowt_env.descriptions.files import DATA, locate, raise_problems, read_toml
+from fowt_env.descriptions.checks import check_number, is_number, parse_number, short
+from fowt_env.descriptions.files import DATA, locate, parse_json, raise_problems, read_toml
 from fowt_env.descriptions.records import (
     FloatArray,
     NonNegative,
@@ -32,10 +32,19 @@ SEA_KEYS = {  # kind -> (required keys, optional keys); the common keys may be g
     "pierson_moskowitz": (("Hs",), ("Tp",)),
     "components": (("omega", "amplitude"), ("phase",)),
 }
+TEXT_KEYS = {  # of the kinds that may be written as a text: KIND:NUMBER:NUMBER ..., and how many it needs
+    "regular": (("H", "T"), 2),
+    "jonswap": (("Hs", "Tp", "gamma"), 2),
+    "pierson_moskowitz": (("Hs", "Tp"), 1),
+}
 COMMON_SEA_KEYS = ("name", "kind", "heading", "ramp", "wind", "source", "confidence")
 
 
 Period = bounded(ge=0.01, le=10_000.0)  # s; far beyond any sea or tank, and the sums over waves stay finite
+
+
+LISTED = "fowt list seas"  # the command that prints the names
+SEA_FORMS = "KIND:NUMBERS (jonswap:4:9, regular:3:5), a mapping with 'kind'"
 
 
 class SeaState(Record):
@@ -221,14 +230,43 @@ def read_sea_state(name_or_path):
     """SeaState from a built-in name (sea_states()) or a user's TOML file with its keys at the top level."""
     if isinstance(name_or_path, str) and name_or_path in _sea_data()[0]:
         return _sea_data()[0][name_or_path]
-    path = locate("sea_state", name_or_path, _sea_data()[0])
+    path = locate("sea_state", name_or_path, _sea_data()[0], listed=LISTED, also=SEA_FORMS)
     state, problems = validate(SeaState, read_toml(path, "sea state"))
     raise_problems(f"sea state file {str(path)!r}", problems)
     return state
 
 
+def sea_of(spec):
+    """The sea that a text stands for, as None or a mapping; names, paths and anything else as they are.
+
+    "jonswap:4:9" (Hs, Tp and, if given, gamma); "regular:3:5" (H, T); "pierson_moskowitz:4" (Hs and, if
+    given, Tp); JSON of a mapping; "none" and "still".
+    Raises: InputError for a text of one of these kinds that lacks a number.
+    """
+    if not isinstance(spec, str):
+        return spec
+    text = spec.strip()
+    if text.lower() in ("none", "still"):
+        return None
+    if text.startswith("{"):
+        try:
+            return parse_json(text)
+        except ValueError as error:
+            raise InputError(f"sea = {short(text)}: not valid JSON: {error}") from None
+    kind, *rest = text.split(":")
+    if kind not in TEXT_KEYS:
+        return spec
+    keys, needed = TEXT_KEYS[kind]
+    values = [parse_number(item) for item in rest]
+    if None in values or not needed <= len(values) <= len(keys):
+        form = ":".join((kind, *keys[:needed])) + "".join(f"[:{key}]" for key in keys[needed:])
+        raise InputError(f"sea = {short(text)}: must be {form} with a number for each")
+    return {"kind": kind, **dict(zip(keys, values, strict=False))}
+
+
 def sea_state_of(spec):
-    """SeaState from None (still water), a name, a path, a mapping {"kind": ..., ...} or a SeaState."""
+    """SeaState from None (still water), a name, a path, a text (sea_of), a mapping or a SeaState."""
+    spec = sea_of(spec)
     if spec is None:
         return SeaState(kind="still")
     if isinstance(spec, SeaState):
@@ -239,7 +277,9 @@ def sea_state_of(spec):
         return state
     if isinstance(spec, (str, Path)):
         return read_sea_state(spec)
-    raise InputError(f"sea state = {short(spec)}: must be None, a name, a path, a mapping or a SeaState")
+    raise InputError(
+        f"sea state = {short(spec)}: must be None, a name ({LISTED}), {SEA_FORMS}, a path or a SeaState"
+    )
 
 
 def joint_sea_state(table, wind_speed):

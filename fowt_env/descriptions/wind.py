@@ -1,15 +1,20 @@
 """What a user may ask of the wind: the kinds, their keys, units, ranges and defaults, and the checks.
 
-KINDS is the whole list; `read_wind` turns a number or a dictionary into a checked WindSpec.
+KINDS are those that are uniform over the rotor but for shear, FIELD_KINDS the boxes of full-field wind.
+`wind_of` turns the text or path that stands for a wind into a number or a mapping, and `read_wind` these
+into a checked WindSpec.
 """
 
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from fowt_env.descriptions.checks import check_number, check_whole_number, refusal
+from fowt_env.descriptions.checks import check_number, check_whole_number, parse_number, refusal, short
+from fowt_env.descriptions.files import parse_json
 from fowt_env.descriptions.iec import REFERENCE_SPEED, TURBULENCE_INTENSITY
+from fowt_env.descriptions.wind_files import TABLES, UNIFORM, read_uniform_wind, read_wind_table
 from fowt_env.errors import InputError, unknown
 
 
@@ -84,6 +89,33 @@ class Samples(NamedTuple):
         return array
 
 
+class Array(NamedTuple):
+    """A non-empty array of finite numbers with a given number of axes."""
+
+    axes: int
+    default: object = None
+
+    def read(self, where, value):
+        try:
+            array = np.asarray(value, dtype=np.float32 if self.axes > 1 else np.float64)
+        except (TypeError, ValueError):
+            raise InputError(f"{where}: must be an array of numbers with {self.axes} axes") from None
+        if array.ndim != self.axes or array.size == 0 or not np.isfinite(array).all():
+            raise InputError(f"{where} has shape {array.shape}: must be finite numbers with {self.axes} axes")
+        return array
+
+
+class Text(NamedTuple):
+    """A path."""
+
+    default: object = None
+
+    def read(self, where, value):
+        if not isinstance(value, str | Path):
+            raise InputError(f"{where} = {value!r}: must be a path")
+        return Path(value).expanduser()
+
+
 class Seed(NamedTuple):
     """A non-negative whole number."""
 
@@ -154,6 +186,47 @@ KINDS = {
     "ewm": {"turbine_class": TURBINE_CLASS, "recurrence": Choice((50, 1), 50), "turbulent": Flag(False)}
     | RANDOM,
 }
+REQUIRED = object()
+SHIFT = Number(0.0, 1e5, "s", None)
+FIELD_KINDS = {  # kind -> {key: (rule, default)}; None: found from the box
+    "bts": {
+        "path": (Text(), REQUIRED),
+        "periodic": (Flag(), None),
+        "shift": (SHIFT, None),
+    },
+    "box": {
+        "u": (Array(3), REQUIRED),
+        "v": (Array(3), None),
+        "w": (Array(3), None),
+        "y": (Array(1), REQUIRED),
+        "z": (Array(1), REQUIRED),
+        "dt": (Number(1e-4, 1e3, "s"), REQUIRED),
+        "speed": (MOVING, REQUIRED),
+        "periodic": (Flag(), False),
+        "shift": (SHIFT, None),
+    },
+    "mann": {
+        "speed": (MOVING, REQUIRED),
+        "class": (TURBULENCE_CLASS, "B"),
+        "sigma": (NTM_SIGMA, "90%"),
+        "seed": (Seed(), None),
+        "dt": (Number(0.05, 1.0, "s"), 0.2),
+        "shear_exponent": (Number(0.0, 1.0, ""), None),
+    },
+}
+ALL_KINDS = (*KINDS, *FIELD_KINDS)
+BOX = ".bts"  # ending of TurbSim's boxes
+OTHER_NAMES = {  # what others call a kind
+    "turbsim": "bts",
+    "constant": "steady",
+    "uniform": "steady",
+    "kaimal": "ntm",
+    "turbulent": "ntm",
+}
+FORMS = (
+    f"a speed (18), KIND:SPEED[:CLASS] (ntm:18:B), a {BOX}, {', '.join(UNIFORM)}, {' or '.join(TABLES)} file,"
+    f" a mapping with 'kind' or its JSON, or none; kinds: {', '.join(ALL_KINDS)}"
+)
 
 
 @dataclass(frozen=True)
@@ -167,25 +240,73 @@ class WindSpec:
         return self.values[key]
 
 
+def wind_of(spec: Any) -> Any:
+    """The wind that a text or a path stands for, as a number or a mapping; anything else as it is.
+
+    "18"; "ntm:18:B", which is KIND:SPEED[:CLASS]; JSON of a mapping; "none"; a path to a .bts box, a uniform
+    wind file of InflowWind (.wnd, .hh) or a table of time (s) and speed (m/s) (.csv, .parquet).
+    Raises: InputError for other texts, and for a table or uniform wind file that cannot be read.
+    """
+    if not isinstance(spec, str | Path):
+        return spec
+    text = str(spec).strip()
+    if text.lower() == "none":
+        return None
+    number = parse_number(text)
+    if number is not None:
+        return number
+    if text.startswith("{"):
+        try:
+            return parse_json(text)
+        except ValueError as error:
+            raise InputError(f"wind = {short(text)}: not valid JSON: {error}") from None
+    if is_wind_file(text):
+        path = Path(text).expanduser()
+        if path.suffix.lower() == BOX:
+            return {"kind": "bts", "path": str(path)}
+        return read_uniform_wind(path) if path.suffix.lower() in UNIFORM else read_wind_table(path)
+    kind, *rest = text.split(":")
+    if rest and kind not in ALL_KINDS and kind.isidentifier():
+        raise unknown_kind(kind)
+    if not rest or len(rest) > 2 or parse_number(rest[0]) is None:
+        other = OTHER_NAMES.get(text.lower(), text.lower())
+        hint = f"; {other!r} is a kind, and needs more: a mapping" if other in ALL_KINDS else ""
+        raise InputError(f"wind = {short(text)}: must be {FORMS}{hint}")
+    found = {"kind": kind, "speed": parse_number(rest[0])}
+    return found | {"class": rest[1]} if len(rest) == 2 else found
+
+
+def is_wind_file(text: str) -> bool:
+    """Whether a text is the path of a wind, by its ending."""
+    return Path(text).suffix.lower() in (BOX, *UNIFORM, *TABLES) and not text.lstrip().startswith("{")
+
+
+def unknown_kind(kind):
+    """InputError for a kind of wind that there is not, with what others call a kind as a suggestion."""
+    other = OTHER_NAMES.get(kind.lower()) if isinstance(kind, str) else None
+    if other is None:
+        return unknown("wind.kind", kind, ALL_KINDS)
+    of_a_file = ", and a path to a .bts file is a wind by itself" if other == "bts" else ""
+    return InputError(
+        f"unknown wind.kind {kind!r}. It is called {other!r} here{of_a_file}. Known: {', '.join(ALL_KINDS)}"
+    )
+
+
 def read_wind(spec):
-    """WindSpec of a speed in m/s, a dictionary with "kind", or a WindSpec.
+    """WindSpec of a speed in m/s, a mapping with "kind", a text (wind_of), or a WindSpec.
 
     Raises: InputError naming the key, its value and what is allowed.
     """
     if isinstance(spec, WindSpec):
         return spec
+    spec = wind_of(spec)
     if not isinstance(spec, dict):
-        if isinstance(spec, str):
-            raise InputError(
-                f"wind = {spec!r}: must be None, a speed in m/s or a dictionary with 'kind', one of "
-                + ", ".join(KINDS)
-            )
         spec = {"kind": "steady", "speed": SPEED.read("wind", spec)}
     if "kind" not in spec:
-        raise InputError(f"wind.kind is missing: must be one of {', '.join(KINDS)}")
+        raise InputError(f"wind.kind is missing: must be one of {', '.join(ALL_KINDS)}")
     kind = spec["kind"]
     if not isinstance(kind, str) or kind not in KINDS:
-        raise unknown("wind.kind", kind, KINDS)
+        raise unknown_kind(kind)
     keys = KINDS[kind] | SHARED
     for key in spec:
         if key != "kind" and key not in keys:

@@ -27,9 +27,10 @@ from fowt_env.control import (
 )
 from fowt_env.descriptions.platform import Platform, read_platform
 from fowt_env.descriptions.records import RENAMED
-from fowt_env.descriptions.sea_state import sea_state_of
+from fowt_env.descriptions.sea_state import sea_of, sea_state_of
 from fowt_env.descriptions.sensors import SensorChain
 from fowt_env.descriptions.turbine import Turbine, read_turbine
+from fowt_env.descriptions.wind import wind_of
 from fowt_env.envs.actions import ACTION_MODES, ActionMode, build_action_map, n_actions, start_tracking
 from fowt_env.envs.episode import (
     BAD_ACTION,
@@ -739,8 +740,12 @@ def _with_options(drawn, options):
             raise unknown("option of reset", key, Episode._fields)
         if key == "offsets":
             value = {name: check_offset(name, offset) for name, offset in value.items()}
-        if key == "wind" and value is None:
-            raise InputError("options['wind'] = None: an episode needs a wind (0.0 for still air)")
+        if key == "wind":
+            value = wind_of(value)
+            if value is None:
+                raise InputError("options['wind'] = None: an episode needs a wind (0.0 for still air)")
+        if key == "sea":
+            value = sea_of(value)
         changes[key] = value
     if "wind" in changes:
         changes.setdefault("exact_start", True)

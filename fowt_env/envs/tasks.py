@@ -6,10 +6,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fowt_env.descriptions.nrel5mw import CUT_IN, CUT_OUT, PITCH_RATE, RATED_WIND, ROTOR_SPEED
-from fowt_env.descriptions.sea_state import joint_sea_state, joint_tables, sea_state_of
+from fowt_env.descriptions.sea_state import joint_sea_state, joint_tables, sea_of, sea_state_of
 from fowt_env.descriptions.turbine import Turbine
 from fowt_env.descriptions.units import DEGREE
-from fowt_env.descriptions.wind import read_wind
+from fowt_env.descriptions.wind import read_wind, wind_of
 from fowt_env.envs.observations import STANDARD, STOP_CHANNELS, check_channels
 from fowt_env.envs.rewards import check_weights
 from fowt_env.errors import InputError, unknown
@@ -89,6 +89,8 @@ class Task:
             raise InputError(f"{where}: observation: {name!r}: needs a task with shutdown")
         if _is_mixture(self.wind):
             set_field(self, "wind", _check_mixture(where, self.wind, self.sea))
+        set_field(self, "wind", wind_of(self.wind))
+        set_field(self, "sea", sea_of(self.sea))
         for _, wind, sea in self.weathers:
             _check_weather(where, wind, sea)
 
@@ -162,7 +164,7 @@ def _check_mixture(where, mixture, sea):
         if is_field(entry[1]):
             raise InputError(f"{where}: wind[{i}]: a box of full-field wind cannot be part of a mixture")
         _number(f"{where}: share of wind[{i}]", entry[0], 0.0, 1e6, low_open=True)
-        checked.append((float(entry[0]), entry[1], entry[2]))
+        checked.append((float(entry[0]), wind_of(entry[1]), sea_of(entry[2])))
     return tuple(checked)
 
 

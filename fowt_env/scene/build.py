@@ -44,11 +44,14 @@ def build_scene(
     """Scene of a platform, a wind and a sea.
 
     platform  built-in name, path to a TOML file, or a descriptions.platform.Platform
-    wind      None: no aerodynamics; 0.0: still air; a speed (m/s); or a dict with "kind": steady,
-              series, steps, eog, edc, ecd, ews, ewm, ntm, etm (weather/wind.py), or a box of full-field
-              wind: bts, box, mann (weather/wind_field.py), rotor-averaged for rotor "table"
-    sea       None: still water; a named sea state; or a dict with "kind": regular, jonswap,
-              pierson_moskowitz, components
+    wind      None: no aerodynamics; 0.0: still air; a speed (m/s); "ntm:18:B" (KIND:SPEED:CLASS); a path to a
+              box of TurbSim (.bts), a uniform wind file (.wnd, .hh) or a table of time and speed (.csv,
+              .parquet); or a dict with "kind": steady, series, steps, eog, edc, ecd, ews, ewm, ntm, etm
+              (weather/wind.py), or a box of full-field wind: bts, box, mann (weather/wind_field.py),
+              rotor-averaged for rotor "table"
+    sea       None: still water; a named sea state (`fowt list seas`); "jonswap:4:9" (Hs, Tp), "regular:3:5"
+              (H, T); a path to a TOML file; or a dict with "kind": regular, jonswap, pierson_moskowitz,
+              components
     seed      of everything random: the same seed gives the same bits
     rotor     "bem": blade-element momentum solved at every blade and station; "lookup": the same sweep
               from a table per station; "table": the whole rotor as one table. None: the fidelity's

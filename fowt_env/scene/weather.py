@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fowt_env.descriptions.sea_state import SeaState, sea_state_of
+from fowt_env.descriptions.wind import wind_of
 from fowt_env.errors import InputError
 from fowt_env.plant.aero.wind import WindSeries
 from fowt_env.scene.options import ROTORS
@@ -15,7 +16,7 @@ from fowt_env.weather.wind import build_wind, make_series, nominal_speed
 from fowt_env.weather.wind_field import WindBox, hub_speed, is_field, read_box, rotor_average
 
 # what users may give as wind and sea, see build_scene
-Wind = float | dict[str, Any] | WindSeries | WindBox | None
+Wind = float | str | Path | dict[str, Any] | WindSeries | WindBox | None
 Sea = str | Path | Mapping[str, Any] | SeaState | None
 IN_PLANE = 1e-9  # fraction of a vector out of the plane of a planar scene that rounding may leave
 
@@ -31,6 +32,7 @@ class Air(NamedTuple):
 
 def build_air(wind, seed, turbine, rotor, shear, duration):
     """Air of a wind specification."""
+    wind = wind_of(wind)
     hub, diameter = turbine.rotor.hub_height, 2.0 * turbine.rotor.tip_radius
     if not is_field(wind):
         series = build_wind(

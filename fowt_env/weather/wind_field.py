@@ -11,13 +11,11 @@ Sources of boxes: TurbSim files (turbsim.py), the user's arrays, Mann turbulence
 
 from dataclasses import dataclass
 from math import ceil
-from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
 from fowt_env.descriptions.iec import length_scale, ntm_sigma
-from fowt_env.descriptions.wind import MOVING, NTM_SIGMA, TURBULENCE_CLASS, Flag, Number, Seed
+from fowt_env.descriptions.wind import FIELD_KINDS, REQUIRED, wind_of
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.aero.wind_field import WindField, field_at
 from fowt_env.plant.compile.decorators import kernel
@@ -28,68 +26,9 @@ MARGIN = 75.0  # m of platform drift against the wind that a box must still cove
 DISK_RADII, DISK_AZIMUTHS = 12, 36  # points of the rotor average
 
 
-# --------------------------------------------------------------------------- what a user may ask for
-
-
-class Array(NamedTuple):
-    """A non-empty array of finite numbers with a given number of axes."""
-
-    axes: int
-    default: object = None
-
-    def read(self, where, value):
-        try:
-            array = np.asarray(value, dtype=np.float32 if self.axes > 1 else np.float64)
-        except (TypeError, ValueError):
-            raise InputError(f"{where}: must be an array of numbers with {self.axes} axes") from None
-        if array.ndim != self.axes or array.size == 0 or not np.isfinite(array).all():
-            raise InputError(f"{where} has shape {array.shape}: must be finite numbers with {self.axes} axes")
-        return array
-
-
-class Text(NamedTuple):
-    """A path."""
-
-    default: object = None
-
-    def read(self, where, value):
-        if not isinstance(value, str | Path):
-            raise InputError(f"{where} = {value!r}: must be a path")
-        return Path(value).expanduser()
-
-
-REQUIRED = object()
-SHIFT = Number(0.0, 1e5, "s", None)
-FIELD_KINDS = {  # kind -> {key: (rule, default)}; None: found from the box
-    "bts": {
-        "path": (Text(), REQUIRED),
-        "periodic": (Flag(), None),
-        "shift": (SHIFT, None),
-    },
-    "box": {
-        "u": (Array(3), REQUIRED),
-        "v": (Array(3), None),
-        "w": (Array(3), None),
-        "y": (Array(1), REQUIRED),
-        "z": (Array(1), REQUIRED),
-        "dt": (Number(1e-4, 1e3, "s"), REQUIRED),
-        "speed": (MOVING, REQUIRED),
-        "periodic": (Flag(), False),
-        "shift": (SHIFT, None),
-    },
-    "mann": {
-        "speed": (MOVING, REQUIRED),
-        "class": (TURBULENCE_CLASS, "B"),
-        "sigma": (NTM_SIGMA, "90%"),
-        "seed": (Seed(), None),
-        "dt": (Number(0.05, 1.0, "s"), 0.2),
-        "shear_exponent": (Number(0.0, 1.0, ""), None),
-    },
-}
-
-
 def is_field(spec):
     """Whether a wind specification asks for a box of full-field wind."""
+    spec = wind_of(spec)
     kind = spec.get("kind") if isinstance(spec, dict) else None
     return isinstance(spec, WindBox) or (isinstance(kind, str) and kind in FIELD_KINDS)
 

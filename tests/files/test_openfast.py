@@ -5,8 +5,9 @@ import pandas as pd
 import pytest
 
 import fowt_env
+from fowt_env.descriptions.wind_files import read_uniform_wind
 from fowt_env.errors import InputError
-from fowt_env.files.openfast import read_outb, read_uniform_wind, write_outb
+from fowt_env.files.openfast import read_outb, write_outb
 from fowt_env.files.tables import read_table, write_table
 from fowt_env.plant.aero.wind import wind_at, wind_now
 from fowt_env.training.cli.arguments import parse_wind

@@ -342,7 +342,7 @@ def test_mean_of_a_gust_is_the_wind_before_it():
         (float("nan"), "wind = nan [0, 100]"),
         (float("inf"), "wind = inf"),
         (True, "wind = True number"),
-        ("18", "wind = '18' kind ntm"),
+        ("18 m/s", "wind = '18 m/s' KIND:SPEED ntm bts box mann"),
         ([18.0, 19.0], "wind number"),
         ({"speed": 18.0}, "wind.kind missing steady"),
         ({"kind": "steedy", "speed": 18.0}, "'steedy' Did you mean 'steady'"),

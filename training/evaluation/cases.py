@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
-from fowt_env.descriptions.checks import is_number, plain_number
+from fowt_env.descriptions.checks import is_number, plain_number, short
 from fowt_env.descriptions.faults import Fault
 from fowt_env.descriptions.files import locate, raise_problems, read_toml
 from fowt_env.descriptions.platform import platform_names, read_platform
@@ -27,13 +27,13 @@ from fowt_env.descriptions.records import (
 )
 from fowt_env.descriptions.sea_state import SeaState, joint_sea_state, sea_state_of
 from fowt_env.descriptions.sensors import EXACT, sensor_chain
-from fowt_env.descriptions.wind import read_wind
+from fowt_env.descriptions.wind import FIELD_KINDS, FORMS, REQUIRED, is_wind_file, read_wind, wind_of
 from fowt_env.errors import InputError, unknown
 from fowt_env.scene.options import OPTIONS
 from fowt_env.training.evaluation.metrics import METRICS
 from fowt_env.training.evaluation.plant_perturbation import PlantPerturbation
 from fowt_env.training.evaluation.scaling import scaled_file, within_table
-from fowt_env.weather.wind_field import FIELD_KINDS, REQUIRED, is_field
+from fowt_env.weather.wind_field import is_field
 
 FOLDER = Path(__file__).parent / "suites"
 WIND_KINDS = ("rotor-averaged", "full-field")
@@ -296,7 +296,7 @@ def read_suite(name_or_path, platform=None):
         if platform is None or platform in platform_names():
             return _built_in(name_or_path, platform)
         return _read(FOLDER / f"{name_or_path}.toml", platform)
-    path = Path(locate("suite", name_or_path, suite_names()))
+    path = Path(locate("suite", name_or_path, suite_names(), listed="fowt list suites"))
     return _read(path, platform)
 
 
@@ -417,10 +417,12 @@ def _wind(spec, speed, folder):
         if speed is not None:
             raise InputError("wind is missing: speed has nothing to fill")
         return None
+    if isinstance(spec, str):
+        spec = wind_of(str(folder / Path(spec).expanduser()) if is_wind_file(spec) else spec)
     if is_number(spec):
         return float(spec)
     if not isinstance(spec, dict):
-        raise InputError(f"wind = {spec!r}: must be a speed (m/s) or a table with a kind")
+        raise InputError(f"wind = {short(spec)}: must be {FORMS}")
     spec = dict(spec)
     if speed is not None:
         if "speed" in spec:
