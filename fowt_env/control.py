@@ -1,6 +1,11 @@
 """What a controller is, and the one place that turns a name into one.
 
-A controller has reset(measurement) and act(measurement). Beside these it may have
+A controller has reset(measurement) and act(measurement). So has a plain function of the measurement, which is
+act by itself: f(measurement) -> (generator torque, blade pitch). A function counts as one where a single
+argument has to be given to it and that is not called `turbine`; with two, (turbine, control_dt), or with none
+it is a factory, which makes the controller of a run, or the function that is one. Nothing resets what a
+function remembers: a factory makes it afresh for every run. The attributes below may be set on a function
+too, as f.information = ("wind_speed",). Beside its methods a controller may have
 
 - information, a tuple of the Measurement fields that it uses and of its PRIVILEGED_INPUTS. It is given these
   and nothing else. A compiled law reads NaN in every other field, and so it does as the torque or the blade
@@ -25,14 +30,17 @@ The built-in controllers are built on the simulator, and so it imports none of t
 package that has them (CATALOGUE), and imports that when a run or an environment asks for a name.
 """
 
+import difflib
 import importlib
 import inspect
 import operator
 import reprlib
 import sys
+import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from math import isfinite, nan
+from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -42,7 +50,7 @@ from fowt_env.analysis.trim import without_fluctuations
 from fowt_env.caches import cached
 from fowt_env.descriptions.checks import check_number
 from fowt_env.descriptions.lidar import lidars
-from fowt_env.errors import ControllerError, InputError, unknown
+from fowt_env.errors import ControllerError, InputError, SimulationStopped, unknown
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.measurement import (
     BLADE_SENSOR_FIELDS,
@@ -163,8 +171,14 @@ class CheckedController:
             self.controller.prepare(scene)
 
     def reset(self, measurement: Measurement) -> None:
-        """Reset the controller inside."""
-        self.controller.reset(self._given(measurement))
+        """Reset the controller inside. Raises: ControllerError for whatever that raises."""
+        given = self._given(measurement)
+        try:
+            self.controller.reset(given)
+        except (ControllerError, InputError, SimulationStopped):
+            raise
+        except Exception as error:
+            raise _failure(self.name, "reset", error, float(measurement.time)) from error
 
     def _given(self, measurement):
         """The part of a Measurement that the controller declares."""
@@ -174,9 +188,15 @@ class CheckedController:
     def act(self, measurement: Measurement) -> tuple[float, ...]:
         """(generator torque, blade pitch or that of each blade) as floats.
 
-        Raises: ControllerError naming the controller, the time and what it returned.
+        Raises: ControllerError naming the controller, the time and what it returned or raised.
         """
-        returned = self.controller.act(self._given(measurement))
+        given = self._given(measurement)
+        try:
+            returned = self.controller.act(given)
+        except (ControllerError, InputError, SimulationStopped):
+            raise
+        except Exception as error:
+            raise _failure(self.name, "act", error, float(measurement.time)) from error
         try:
             values = np.asarray(returned)
             size = N_INDIVIDUAL_COMMANDS if self.individual else N_COMMANDS
@@ -192,6 +212,8 @@ class CheckedController:
             if self.individual
             else "two finite numbers, (generator torque in N m on the high-speed shaft, blade pitch in rad)"
         )
+        if hasattr(returned, "act"):
+            wanted += "; a function that makes a controller takes two arguments, (turbine, control_dt)"
         raise ControllerError(
             f"controller {self.name!r} returned {_shown(returned)} at t = {time:.3f} s: act() must return"
             f" {wanted}",
@@ -201,6 +223,61 @@ class CheckedController:
         )
 
 
+class FunctionController:
+    """A function of the measurement as a controller: it is asked as act, and there is nothing to reset.
+
+    information, preview_times, individual and prepare are the function's attributes, where it has them.
+    """
+
+    def __init__(self, function: Callable[[Any], Any]) -> None:
+        self.function = function
+        self.name = str(getattr(function, "__name__", type(function).__name__))
+        for key in ("information", "preview_times", "individual", "prepare"):
+            if hasattr(function, key):
+                setattr(self, key, getattr(function, key))
+
+    def reset(self, measurement: Measurement) -> None:
+        """Nothing to start."""
+
+    def act(self, measurement: Measurement) -> Any:
+        """What the function returns."""
+        return self.function(measurement)
+
+
+def _failure(controller, method, error, time):
+    """ControllerError that says where and when a controller in Python raised an error."""
+    frames = traceback.extract_tb(error.__traceback__)[1:]  # the first is the caller's own
+    own = [frame for frame in frames if frame.filename != __file__]
+    inside = [frame for frame in own if frame.filename == own[0].filename]  # not a library that it calls
+    place = f", {Path(inside[-1].filename).name} line {inside[-1].lineno}" if inside else ""
+    try:
+        text = _lacking(error) or str(error)
+    except Exception:  # an exception may be a controller's own, and so may be its text
+        text = ""
+    said = f": {text}" if text else ""
+    return ControllerError(
+        f"controller {controller!r} raised {type(error).__name__} in {method}() at t = {time:.3f} s{place}"
+        f"{said}",
+        controller=controller,
+        time=time,
+        returned=None,
+    )
+
+
+def _lacking(error):
+    """Words on an attribute that a measurement does not have, with the nearest; "" for other errors."""
+    of_blades = isinstance(getattr(error, "obj", None), BladeMeasurement)
+    if not isinstance(error, AttributeError) or not of_blades and not isinstance(error.obj, Measurement):
+        return ""
+    known = BladeMeasurement._fields if of_blades else (*Measurement._fields, "wind_preview", "blades")
+    what = "measurement.blades has" if of_blades else "a measurement has"
+    if not of_blades and error.name in BladeMeasurement._fields:
+        return f"{what} no {error.name!r}: it is measurement.blades.{error.name}"
+    near = difflib.get_close_matches(str(error.name), known, n=3)
+    hint = f". Did you mean {' or '.join(map(repr, near))}?" if near else f": it has {', '.join(known)}"
+    return f"{what} no {error.name!r}{hint}"
+
+
 class MeasurementView(Measurement):
     """A Measurement that holds what a controller declares and NaN for the rest, which raises when asked for.
 
@@ -208,6 +285,7 @@ class MeasurementView(Measurement):
     """
 
     _controller = ""
+    _information: tuple[str, ...] = ()
     _hidden: frozenset[str] = frozenset()
     _places: tuple[int, ...] = ()  # of the hidden fields
     _foresees = False
@@ -272,7 +350,10 @@ class MeasurementView(Measurement):
         return value
 
     def __reduce__(self):
-        return Measurement, tuple(self)
+        blades = () if self._blades is None else tuple(self._blades)
+        return _view_again, (
+            self._controller, self._information, self._leads, tuple(self), self._ahead, blades,
+        )  # fmt: skip
 
     def _refuse(self, name):
         _refuse(self._controller, name, tuple.__getitem__(self, 0))
@@ -282,6 +363,7 @@ class BladeView(BladeMeasurement):
     """A BladeMeasurement that holds what a controller declares, as MeasurementView does."""
 
     _controller = ""
+    _information: tuple[str, ...] = ()
     _hidden: frozenset[str] = frozenset()
     _time = 0.0
 
@@ -302,7 +384,7 @@ class BladeView(BladeMeasurement):
         return value
 
     def __reduce__(self):
-        return BladeMeasurement, tuple(self)
+        return _blades_again, (self._controller, self._information, tuple(self), self._time)
 
     def _refuse(self, name):
         _refuse(self._controller, name, self._time)
@@ -324,7 +406,8 @@ def _hiding(name, fields, information):
     """Members of the view class of a controller's name that hide the fields which are not in information."""
     hidden_fields = frozenset(fields) - {"time", *information}
     refusing = {field: property(lambda self, field=field: self._refuse(field)) for field in hidden_fields}
-    return {"_controller": name, "_hidden": hidden_fields, **refusing}
+    about = {"_controller": name, "_information": information, "_hidden": hidden_fields}
+    return {**about, **refusing}
 
 
 @cached(256)
@@ -338,6 +421,16 @@ def _view_class(name, information, leads):
         "_blade_class": type("BladeView", (BladeView,), _hiding(name, BladeMeasurement._fields, information)),
     }
     return type("MeasurementView", (MeasurementView,), members)
+
+
+def _view_again(name, information, leads, values, ahead, blades):
+    """A MeasurementView as it was before it was pickled."""
+    return _view_class(name, information, leads)._taken(values, ahead, blades)
+
+
+def _blades_again(name, information, values, time):
+    """A BladeView as it was before it was pickled."""
+    return _view_class(name, information, 0)._blade_class.take(values, time)
 
 
 def view_of(controller: Any) -> Callable[[Sequence[float]], MeasurementView]:
@@ -552,11 +645,12 @@ def make(controller: Any, turbine: Any, control_dt: float) -> Any:
     """Controller ready for a run, from a name, an import path or an object.
 
     controller: a built-in name ("pi"); "policy:NAME" or "policy:PATH" of a trained agent; "design:FILE" with
-    a file of `fowt design`; "module:Name" with Name a class, a factory or a controller (looked for in
-    the working folder too); such a class or factory itself; or an object with reset(measurement) and
-    act(measurement). Classes and factories are called with (turbine, control_dt) where they take two
-    arguments, else with none. Compiled controllers come back as they are, others inside a
-    CheckedController.
+    a file of `fowt design`; "module:Name" with Name a class, a factory, a function or a controller (looked
+    for in the working folder too); such a class, factory or function itself; or an object with
+    reset(measurement) and act(measurement). Classes and factories are called with (turbine, control_dt) where
+    they take two arguments, else with none. A function that needs one argument, not called turbine, is the
+    law itself: f(measurement) -> (torque, blade pitch). Compiled controllers come back as they are, others
+    inside a CheckedController.
     Raises: InputError for unknown names (with a suggestion), paths that cannot be imported, agents and
     designs that cannot be used, and objects without reset and act.
     """
@@ -567,7 +661,10 @@ def make(controller: Any, turbine: Any, control_dt: float) -> Any:
         own = ":" in name and not name.startswith(tuple(catalogue().PREFIXES))
         controller = _imported(name) if own else catalogue().named(name)
     if isinstance(controller, type) or not isinstance(controller, Controller):
-        controller = _called(controller, name, turbine, control_dt)
+        if not _is_law(controller):
+            controller = _called(controller, name, turbine, control_dt)
+        if _is_law(controller):
+            controller = FunctionController(controller)
     for method in ("reset", "act"):
         if not callable(getattr(controller, method, None)):
             raise InputError(
@@ -597,6 +694,21 @@ def _imported(path):
     return getattr(module, attribute)
 
 
+def _is_law(given):
+    """Whether something is a function of the measurement (FunctionController) and no factory or object."""
+    if not callable(given) or isinstance(given, type) or hasattr(given, "act"):
+        return False
+    try:
+        parameters = inspect.signature(given).parameters.values()
+    except ValueError:  # some built-in callables have none
+        return False
+    free = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
+    needed = [one for one in parameters if one.default is one.empty and one.kind not in free]
+    if len(needed) != 1 or needed[0].kind is inspect.Parameter.KEYWORD_ONLY:
+        return False
+    return needed[0].name != "turbine"
+
+
 def _called(factory, name, turbine, control_dt):
     """What a class or factory makes; anything that cannot be called comes back as it is."""
     if not callable(factory):
@@ -612,5 +724,6 @@ def _called(factory, name, turbine, control_dt):
             continue
         return factory(*arguments)
     raise InputError(
-        f"controller {name or factory!r}: must take (turbine, control_dt) or no arguments, not {signature}"
+        f"controller {name or factory!r}: must take (turbine, control_dt) or no arguments, or be a function"
+        f" of the measurement alone, not {signature}"
     )

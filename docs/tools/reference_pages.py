@@ -15,6 +15,7 @@ from pathlib import Path
 import typer
 from rich.text import Text
 
+from fowt_env.descriptions.measurements import HEAD, measurement_rows
 from fowt_env.descriptions.platform import read_platform
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.descriptions.units import DEGREE, RPM
@@ -27,6 +28,7 @@ from fowt_env.files.atomic import replacing
 from fowt_env.files.markdown import markdown_table
 from fowt_env.plant.events import EVENTS
 from fowt_env.plant.integrators import INTEGRATORS
+from fowt_env.plant.measurement import BladeMeasurement, Measurement
 from fowt_env.plant.rollout import (
     BLOWN_UP,
     CAPSIZE,
@@ -252,6 +254,21 @@ def terminations():
     )
 
 
+def measurements():
+    """Fields of a Measurement."""
+    return _measured(Measurement)
+
+
+def blade_measurements():
+    """Fields of a BladeMeasurement."""
+    return _measured(BladeMeasurement)
+
+
+def _measured(of):
+    rows = [(f"`{name}`", *rest) for name, *rest in measurement_rows(of)]
+    return markdown(HEAD, rows)
+
+
 def options():
     """What reset takes as options."""
     return markdown(("option", "meaning"), [(f"`{name}`", text) for name, text in OPTIONS.items()])
@@ -292,6 +309,7 @@ TABLES = {
         environments, tasks, offsets, actions, actuators, observation, channels, blades, reward, meanings,
         terminations, options, events,
     ),
+    "reference/controllers.md": (measurements, blade_measurements),
     "explanation/theory.md": (loads, integrators),
 }  # fmt: skip
 
