@@ -13,6 +13,7 @@ from fowt_env.errors import (
 )
 from fowt_env.plant.state import OUT_OF_PLANE, Command, State, pose_of
 from fowt_env.scene.actuators import rest_actuators
+from fowt_env.scene.channel_names import channel_name
 from fowt_env.scene.scene import Scene
 
 STARTS = ("trim", "zero")
@@ -41,9 +42,9 @@ def initial_state(
     """(state, command) that a run begins with.
 
     start: "trim" the floating steady state in the mean wind; "zero" all states of platform and tower zero,
-    with the rotor speed and blade pitch of that wind on a fixed platform. initial: {channel: absolute value};
-    BldPitch1 is that of all blades where they have one pitch, and of the first where each has its own;
-    TTDspFA and TTDspSS bend the tower in its first modes alone.
+    with the rotor speed and blade pitch of that wind on a fixed platform. initial: {channel: absolute value},
+    named PtfmPitch or PtfmPitch_[deg]; BldPitch1 is that of all blades where they have one pitch, and of the
+    first where each has its own; TTDspFA and TTDspSS bend the tower in its first modes alone.
     """
     if start not in STARTS:
         raise unknown("start", start, STARTS)
@@ -57,7 +58,7 @@ def initial_state(
             x[deflections] = 0.0
     rates = {}
     for name, value in (initial or {}).items():
-        key = str(name).split("_[")[0]
+        key = channel_name(name)
         if key not in known:
             raise unknown("channel of initial", name, known)
         check_number(f"initial[{name!r}]", value)

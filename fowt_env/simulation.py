@@ -1,9 +1,10 @@
 """One run of a scene with a controller, to a table of OpenFAST channels."""
 
+import os
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import contextmanager
-from math import exp, inf, isfinite, isinf, radians
+from math import exp, inf, isfinite, isinf, pi, radians
 from time import perf_counter
 from typing import Any
 
@@ -12,6 +13,7 @@ import pandas as pd
 
 from fowt_env.control import (
     EXACT,
+    CommandUnits,
     CompiledController,
     check_pitches,
     foreseen,
@@ -25,6 +27,7 @@ from fowt_env.descriptions.checks import check_number
 from fowt_env.descriptions.faults import BLADE_FAULTS, STOP_FAULTS, Fault, read_faults
 from fowt_env.descriptions.protection import Protection, TripLimit, read_protection
 from fowt_env.descriptions.sensors import SensorChain, sensors_of
+from fowt_env.descriptions.units import RPM
 from fowt_env.errors import (
     ControllerInputError,
     InputError,
@@ -33,6 +36,7 @@ from fowt_env.errors import (
     level_outside,
 )
 from fowt_env.initial_conditions import initial_state
+from fowt_env.plant.channels import Out
 from fowt_env.plant.compile.decorators import control_kernel
 from fowt_env.plant.compile.handle import Handle
 from fowt_env.plant.events import counted, harm
@@ -40,8 +44,8 @@ from fowt_env.plant.measurement import BladeMeasurement, Measurement
 from fowt_env.plant.protection import Failure, Guard, Stop, Trip, Watch, build_guard
 from fowt_env.plant.rollout import OVERSPEED, RUNNING, STOP_REASONS, Schedule, rollout
 from fowt_env.plant.sensing import NacelleMotion, Reader, Setting, new_past, no_motion, open_reader
-from fowt_env.plant.state import BLADES, N_COMMANDS, N_INDIVIDUAL_COMMANDS, State
-from fowt_env.scene.scene import Scene
+from fowt_env.plant.state import BLADES, N_COMMANDS, N_INDIVIDUAL_COMMANDS, Command, State
+from fowt_env.scene.scene import Scene, check_scene
 from fowt_env.weather.preview import Motion, Preview
 from fowt_env.weather.sensor_noise import draw_sensors
 from fowt_env.weather.wind_field import WindBox
@@ -50,6 +54,9 @@ from fowt_env.weather.wind_field import WindBox
 # grow longer until they last about CHUNK_TIME.
 FIRST_CHUNK = 20.0  # simulated seconds
 CHUNK_TIME = 0.05  # s of the clock
+GIB = 2.0**30
+MOST_MEMORY = 0.8  # of the machine's that a table may take
+LIMITED = 0.5  # of a run's time with the generator torque limited, where it is worth a warning
 FAILURES = {
     "stuck_pitch": Failure.STUCK,
     "pitch_runaway": Failure.RUNAWAY,
@@ -126,6 +133,26 @@ def check_duration(scene: Scene, duration: float) -> None:
             raise InputError(f"duration = {duration:g} s: the wind series ends at {end:g} s")
 
 
+def check_memory(scene: Scene, duration: float, output_dt: float) -> None:
+    """Refuse a run whose table this machine cannot hold. Raises: InputError."""
+    rows, columns = round(duration / output_dt) + 1, len(scene.channels)
+    needed, most = 8.0 * rows * columns, MOST_MEMORY * physical_memory()
+    if needed > most:
+        raise InputError(
+            f"duration = {duration:g} s: a table of {rows} rows of {columns} channels takes"
+            f" {needed / GIB:.3g} GiB, and {most / GIB:.3g} GiB are allowed here: take a longer output_dt"
+            f" (now {output_dt:g} s), or several runs"
+        )
+
+
+def physical_memory() -> float:
+    """Bytes of memory that this machine has; inf where it does not say."""
+    try:
+        return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+    except (AttributeError, ValueError, OSError):
+        return inf
+
+
 def simulate(
     scene: Scene,
     controller: Any = "pi",
@@ -147,11 +174,13 @@ def simulate(
 ) -> pd.DataFrame:
     """DataFrame of one run, columns named as OpenFAST writes them (`PtfmPitch_[deg]`).
 
+    scene       what build_scene makes: a platform in its wind and sea. A platform's name alone is refused
     controller  None: the rotor is held at the trim's speed and blade pitch (at rest without wind); a
-                name of a built-in one or "module:Class"; or an object with
+                name of a built-in one or "module:Class"; an object with
                 reset(measurement) and act(measurement) -> (generator torque N m, blade pitch rad), and
-                prepare(scene) where it needs more than measurements; one that commands each blade
-                (control.py) needs a scene with pitch="individual"
+                prepare(scene) where it needs more than measurements; or a function of the measurement
+                alone that returns this pair. One that commands each blade (control.py) needs a scene
+                with pitch="individual"
     duration    s; rows run from 0 to duration inclusive, every output_dt
     dt          physics step, s; must divide control_dt and output_dt, and output_dt the duration.
                 None: scene.dt (0.0125 s at fidelity "reference", 0.1 s at the others)
@@ -184,17 +213,24 @@ def simulate(
     most as far as its max_torque_rate allows, whatever is commanded: GenTq is the torque in force, and
     GenTqLim is 1 while it differs from the command.
 
-    attrs["events"] of the DataFrame: {name: count} of what the plant met outside its usual range
-    (fowt_env.plant.events), of those that happened. A PlantWarning says so at the end of a run whose loads
-    were less accurate for it. attrs["tripped"]: time (s) at which the protection stopped the turbine, or
-    None; attrs["trip"]: the trip that did, as "overspeed"; attrs["stop"]: "normal" or "emergency" where the
-    turbine was being stopped at the end, by a trip or a fault, else None.
+    Columns have their unit in the name, as in OpenFAST's files: frame["RotSpeed_[rpm]"];
+    frame.filter(like="RotSpeed") finds one without it. attrs["events"] of the DataFrame: {name: count} of
+    what the plant met outside its usual range (fowt_env.plant.events), of those that happened.
+    attrs["torque_limited"]: time (s) for which the generator torque was not the commanded one.
+    attrs["tripped"]: time (s) at which the protection stopped the turbine, or None; attrs["trip"]: the trip
+    that did, as "overspeed"; attrs["stop"]: "normal" or "emergency" where the turbine was being stopped at
+    the end, by a trip or a fault, else None.
+
+    Warns (PlantWarning) once of commands that can hardly be in N m and rad; and at the end of a run whose
+    loads were less accurate for its events, whose rotor is beyond the overspeed, or whose torque was limited
+    for half of the time (these two where nothing stops the turbine and there are no faults).
 
     Raises: InputError before anything runs (ControllerInputError where the controller raised it, whenever
     that is); SimulationStopped (with the rows so far) on capsize, a numerical blow-up, a
     non-finite state or command or, where it is to stop there, overspeed; ControllerError if a controller
     returns anything but two finite numbers or reads what it does not declare.
     """
+    check_scene(scene)
     if dt is None:
         dt = min(scene.dt, control_dt, output_dt)
     per_control = steps_in("control_dt", control_dt, dt)
@@ -202,6 +238,7 @@ def simulate(
     last = steps_in("duration", duration, dt)
     steps_in("duration", duration, output_dt, "output_dt")
     check_duration(scene, duration)
+    check_memory(scene, duration, output_dt)
     scene = scene.with_step(dt)
     if grid_loss is not None:
         check_number("grid_loss", grid_loss, allowed="a time in s, or None")
@@ -237,7 +274,10 @@ def simulate(
     with _bar(progress) as report, _controllers_own():
         loop.go(report)
     frame = loop.frame()
-    if found := harm(frame.attrs["events"]):
+    said = [harm(frame.attrs["events"])]
+    if not (held or wrong or grid_loss is not None):
+        said += loop.out_of_bounds(frame.attrs)
+    if found := ". ".join(filter(None, said)):
         warnings.warn(f"{scene.label}: {found}", PlantWarning, stacklevel=level_outside())
     return frame
 
@@ -377,6 +417,9 @@ class _Loop:
         self.rows = np.empty((schedule.last // schedule.per_output + 1, len(scene.channels)))
         self.filled = 0
         self.compiled = isinstance(controller, CompiledController)
+        self.units = CommandUnits(
+            f"controller {controller.name!r}", scene.turbine, schedule.per_control * schedule.dt
+        )
         if self.compiled:
             self.law = controller.law, controller.parameters, controller.memory
             self.given_to_law = self.given
@@ -411,6 +454,8 @@ class _Loop:
             self.schedule, first, end, self.rows[self.filled :],
         )  # fmt: skip
         self.filled += count
+        if self.compiled and abs(pitch := self.u[Command.BLADE_PITCH]) > pi:
+            self.units.warn(0.0, float(pitch))
         self._check(status, step)
         return step
 
@@ -424,7 +469,9 @@ class _Loop:
         if self.x[State.ROTOR_SPEED] > self.schedule.overspeed:
             self._check(OVERSPEED, step)
         if self.guard.watch[Watch.STOP] < 0.0:
-            self.law[1][:] = self.controller.act(self._read(step))
+            command = self.controller.act(self._read(step))
+            self.law[1][:] = command
+            self.units.see(command[0], command[1], self.x[State.ROTOR_SPEED])
 
     def _check(self, status, step):
         if status != RUNNING:
@@ -438,6 +485,10 @@ class _Loop:
         values = self.scene.values(self.rows[: self.filled], overwrite=True)
         frame = pd.DataFrame(values, columns=[c.column for c in self.scene.channels])
         frame.attrs["events"] = counted(self.data.counters)
+        period = self.schedule.per_output * self.schedule.dt
+        frame.attrs["torque_limited"] = float(np.count_nonzero(values[:-1, Out.GENTQLIM]) * period)
+        if self.compiled:
+            self.units.see_run(values[:, Out.GENTQ] * 1e3, values[:, Out.ROTSPEED] * RPM, period)
         watch = self.guard.watch
         tripped, stop = float(watch[Watch.TRIPPED_AT]), int(watch[Watch.STOP])
         known = not isinf(tripped)
@@ -445,6 +496,28 @@ class _Loop:
         frame.attrs["trip"] = Trip(int(watch[Watch.TRIP])).name.lower() if known else None
         frame.attrs["stop"] = Stop(stop).name.lower() if stop >= 0 else None
         return frame
+
+    def out_of_bounds(self, attrs):
+        """Sentences on a turbine that nothing stops, at the end of a run without faults."""
+        if attrs["stop"] is not None:
+            return []
+        found, turbine = [], self.scene.turbine
+        speed, duration = float(self.x[State.ROTOR_SPEED]), self.schedule.last * self.schedule.dt
+        if speed > turbine.overspeed:
+            found.append(
+                f"the rotor turns at {speed / RPM:.4g} rpm at the end, beyond the overspeed of"
+                f" {turbine.overspeed / RPM:.4g} rpm in the turbine file (stop_overspeed=True ends the run"
+                " there, protection='turbine' stops the turbine)"
+            )
+        limited = attrs["torque_limited"]
+        if limited >= max(1.0, LIMITED * duration):
+            law = turbine.torque_law
+            found.append(
+                f"the generator torque was limited for {limited:.4g} of {duration:.4g} s: controller"
+                f" {self.controller.name!r} commanded more than 0 to {law.max_torque * 1e-3:.4g} kN m, or"
+                f" faster than {law.max_torque_rate * 1e-3:.4g} kN m/s (GenTqLim)"
+            )
+        return found
 
 
 class _bar:

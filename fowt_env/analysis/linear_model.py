@@ -19,6 +19,7 @@ from fowt_env.plant.model import LoadCache
 from fowt_env.plant.state import MOTIONS, STATE_INDEX, STATES, State, pose_of
 from fowt_env.scene.actuators import linear_actuator
 from fowt_env.scene.radiation_fit import linear_memory
+from fowt_env.scene.scene import check_scene
 
 # velocity steps are small because quadratic drag leaves a false damping proportional to them
 STATE_STEPS = np.array([1e-3, 1e-3, 1e-3, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-7, 1e-7, 1e-7, 1e-4, 1e-5])
@@ -334,6 +335,7 @@ def linearize(scene, operating_point=None):
 
     Raises: InputError if the scene has any.
     """
+    check_scene(scene)
     check_linear(scene)
     point = trim(scene) if operating_point is None else operating_point
     parts = steady_parts(scene, point)

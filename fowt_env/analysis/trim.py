@@ -22,7 +22,8 @@ from fowt_env.plant.rollout import output_row
 from fowt_env.plant.state import Command, State, pose_of
 from fowt_env.plant.tilt import rotor_pose
 from fowt_env.scene.actuators import rest_actuators
-from fowt_env.scene.scene import Scene
+from fowt_env.scene.channel_names import channel_name
+from fowt_env.scene.scene import Scene, check_scene
 from fowt_env.weather.excitation import still_excitation
 from fowt_env.weather.wind import make_series
 from fowt_env.weather.wind_field import steady_field
@@ -44,7 +45,7 @@ PLATFORM_MODES = ("floating", "fixed")
 
 
 class OperatingPoint(Mapping):
-    """Steady state as a mapping of OpenFAST channels, e.g. op["RotThrust"] in kN.
+    """Steady state as a mapping of OpenFAST channels, e.g. op["RotThrust"] or op["RotThrust_[kN]"].
 
     Attributes: state (n_state,) and command (n_commands,): generator torque N m, blade pitch rad, both SI;
     wind_speed (m/s or None); platform ("floating" or "fixed").
@@ -58,15 +59,16 @@ class OperatingPoint(Mapping):
         self.platform = platform
 
     def __getitem__(self, name):
-        if name not in self._values:
+        key = channel_name(name)
+        if key not in self._values:
             raise unknown("channel", name, self._values)
-        return self._values[name]
+        return self._values[key]
 
     def get(self, name, default=None):
-        return self._values.get(name, default)
+        return self._values.get(channel_name(name), default)
 
     def __contains__(self, name):
-        return name in self._values
+        return channel_name(name) in self._values
 
     def __iter__(self):
         return iter(self._values)
@@ -384,6 +386,7 @@ def trim(scene: Scene, platform: str = "floating") -> OperatingPoint:
     be in it (keel in the sea bed, tower base under water). Warns once of a platform that rests where hardly
     one is meant to.
     """
+    check_scene(scene)
     if platform not in PLATFORM_MODES:
         raise unknown("platform mode of trim", platform, PLATFORM_MODES)
     if platform not in scene.trims:

@@ -16,6 +16,7 @@ from gymnasium.error import ResetNeeded
 
 from fowt_env.analysis.trim_cache import cached_trim, interpolated_trim, plant_key
 from fowt_env.control import (
+    CommandUnits,
     CompiledController,
     catalogue,
     hidden,
@@ -77,6 +78,7 @@ from fowt_env.plant.sensing import new_past
 from fowt_env.plant.state import N_COMMANDS, Command, State
 from fowt_env.scene.actuators import rest_actuators
 from fowt_env.scene.build import build_scene
+from fowt_env.scene.channel_names import channel_name
 from fowt_env.scene.options import OPTIONS
 from fowt_env.scene.scene import Scene
 from fowt_env.simulation import check_duration, steps_in
@@ -375,6 +377,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         if planned.episode.shutdown is not None:
             self._operate(planned.episode.shutdown)
         self._running = True
+        self._units = CommandUnits("step_physical", self.scene.turbine, self.control_dt)
         info = {
             "time": int(run.counts[STEP]) * self.dt,
             **dict.fromkeys(SHOWN_COUNTS, 0),
@@ -446,6 +449,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         if not np.isfinite(command).all():
             values = ", ".join(repr(float(value)) for value in blade_pitch)
             raise InputError(f"torque = {float(torque)!r}, blade_pitch = {values}: must be finite")
+        self._units.see(float(command[0]), float(command[1]), self._episode.x[State.ROTOR_SPEED])
         return self._result(*act_physical(self._handle, self._estimator_law, command))
 
     def _result(self, status, reward):
@@ -739,7 +743,7 @@ def _with_options(drawn, options):
         if key not in Episode._fields:
             raise unknown("option of reset", key, Episode._fields)
         if key == "offsets":
-            value = {name: check_offset(name, offset) for name, offset in value.items()}
+            value = {channel_name(name): check_offset(name, offset) for name, offset in value.items()}
         if key == "wind":
             value = wind_of(value)
             if value is None:

@@ -16,6 +16,7 @@ from fowt_env.errors import InputError, unknown
 from fowt_env.initial_conditions import INITIAL
 from fowt_env.plant.aero.wind import WindSeries
 from fowt_env.plant.state import State
+from fowt_env.scene.channel_names import channel_name
 from fowt_env.weather.wind import nominal_speed
 from fowt_env.weather.wind_field import is_field
 
@@ -231,6 +232,7 @@ def _range(where, value, low, high):
 
 def check_offset(name, value):
     """The offset (in the channel's unit) of one episode. Raises: InputError."""
+    name = channel_name(name)
     if name not in OFFSETS:
         raise unknown("channel of offsets", name, OFFSETS)
     _number(f"offsets[{name!r}]", value, -360.0, 360.0)
@@ -239,7 +241,7 @@ def check_offset(name, value):
 
 def _check_offsets(where, offsets):
     checked = {}
-    for name, bounds in dict(offsets).items():
+    for name, bounds in {channel_name(name): bounds for name, bounds in dict(offsets).items()}.items():
         if name not in OFFSETS:
             raise unknown(f"channel of {where}: offsets", name, OFFSETS)
         checked[name] = _range(f"{where}: offsets[{name!r}]", bounds, -360.0, 360.0)

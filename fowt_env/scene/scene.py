@@ -253,6 +253,15 @@ class Scene:
         )
 
 
+def check_scene(scene: Any) -> None:
+    """Raises: InputError for anything but a Scene, as for the name of a platform."""
+    if not isinstance(scene, Scene):
+        raise InputError(
+            f"scene = {short(scene)}: must be a Scene, a platform in its wind and sea:"
+            " build_scene('oc3_hywind', wind='ntm:18:B', sea='jonswap:4:9')"
+        )
+
+
 def _replaced(part, path, value):
     """A part of a model with that at a path of field names replaced."""
     name, *rest = path

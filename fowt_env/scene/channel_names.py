@@ -1,0 +1,22 @@
+"""Names of output channels as users write them: RotSpeed, or RotSpeed_[rpm] as the column of a table."""
+
+from typing import Any
+
+from fowt_env.errors import InputError
+from fowt_env.plant.channels import BLADE_CHANNELS, FIXED_CHANNELS, TOWER_CHANNELS
+
+UNITS = {channel.name: channel.unit for channel in (*FIXED_CHANNELS, *BLADE_CHANNELS, *TOWER_CHANNELS)}
+
+
+def channel_name(name: Any) -> Any:
+    """The bare name of a channel: "RotSpeed" of "RotSpeed_[rpm]"; what is no text as it is.
+
+    Raises: InputError for a unit other than the channel's own.
+    """
+    if not isinstance(name, str) or "_[" not in name:
+        return name
+    bare, _, unit = name.partition("_[")
+    unit = unit.removesuffix("]")
+    if UNITS.get(bare, unit) != unit:
+        raise InputError(f"channel {name!r}: {bare} is in {UNITS[bare]}: must be {bare}_[{UNITS[bare]}]")
+    return bare
