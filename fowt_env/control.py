@@ -245,7 +245,7 @@ class CommandUnits:
         self._turning = TURNING * turbine.rated_rotor_speed
         self._needed = max(1, round(1.0 / control_dt))
         self._count = 0
-        self._warned = False
+        self.warned = False
 
     def see(self, torque: float, blade_pitch: float, rotor_speed: float) -> None:
         """Take note of the command (N m, rad) of one control period at a rotor speed (rad/s)."""
@@ -266,9 +266,9 @@ class CommandUnits:
 
     def warn(self, torque: float, blade_pitch: float) -> None:
         """Say what was commanded, once."""
-        if self._warned:
+        if self.warned:
             return
-        self._warned = True
+        self.warned = True
         if not -pi <= blade_pitch <= pi:
             said = f"blade pitch {blade_pitch:.3g} rad = {blade_pitch / DEGREE:.0f} deg"
         else:

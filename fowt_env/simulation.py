@@ -277,7 +277,7 @@ def simulate(
     said = [harm(frame.attrs["events"])]
     if not (held or wrong or grid_loss is not None):
         said += loop.out_of_bounds(frame.attrs)
-    if found := ". ".join(filter(None, said)):
+    if found := ". ".join(f"{text[0].upper()}{text[1:]}" for text in said if text):
         warnings.warn(f"{scene.label}: {found}", PlantWarning, stacklevel=level_outside())
     return frame
 
@@ -510,12 +510,12 @@ class _Loop:
                 " there, protection='turbine' stops the turbine)"
             )
         limited = attrs["torque_limited"]
-        if limited >= max(1.0, LIMITED * duration):
+        if limited >= max(1.0, LIMITED * duration) and not self.units.warned:
             law = turbine.torque_law
             found.append(
                 f"the generator torque was limited for {limited:.4g} of {duration:.4g} s: controller"
-                f" {self.controller.name!r} commanded more than 0 to {law.max_torque * 1e-3:.4g} kN m, or"
-                f" faster than {law.max_torque_rate * 1e-3:.4g} kN m/s (GenTqLim)"
+                f" {self.controller.name!r} commanded less than 0 or more than"
+                f" {law.max_torque * 1e-3:.4g} kN m, or changes faster than {law.max_torque_rate * 1e-3:.4g} kN m/s (GenTqLim)"
             )
         return found
 

@@ -270,7 +270,11 @@ def wind_of(spec: Any) -> Any:
         raise unknown_kind(kind)
     if not rest or len(rest) > 2 or parse_number(rest[0]) is None:
         other = OTHER_NAMES.get(text.lower(), text.lower())
-        hint = f"; {other!r} is a kind, and needs more: a mapping" if other in ALL_KINDS else ""
+        hint = ""
+        if other == "bts":
+            hint = f"; a box of TurbSim is the path of its {BOX} file"
+        elif other in ALL_KINDS:
+            hint = f"; {other!r} is a kind and needs more, as {other}:18 or a mapping"
         raise InputError(f"wind = {short(text)}: must be {FORMS}{hint}")
     found = {"kind": kind, "speed": parse_number(rest[0])}
     return found | {"class": rest[1]} if len(rest) == 2 else found

@@ -6,6 +6,7 @@ from typing import Any
 
 from fowt_env.descriptions.checks import check_whole_number
 from fowt_env.descriptions.platform import Platform, read_platform
+from fowt_env.descriptions.sea_state import sea_state_of
 from fowt_env.descriptions.turbine import Turbine, read_turbine, with_second_order_drive
 from fowt_env.plant.drivetrain import build_drivetrain, build_torque_limits
 from fowt_env.plant.integrators import build_integrator
@@ -24,6 +25,7 @@ from fowt_env.scene.parts import (
     check_symmetry,
     wake_states,
 )
+from fowt_env.scene.plausibility import warn_of_weather
 from fowt_env.scene.scene import Scene
 from fowt_env.scene.tower import build_tower_modes, modes_asked, tower_frequency, tower_states
 from fowt_env.scene.user_loads import Load, build_user_loads, checked_loads
@@ -62,8 +64,9 @@ def build_scene(
     options   see OPTIONS; a platform file may set other defaults. planar: surge, heave and platform pitch
               alone move; of ntm and etm turbulence the part in the plane is kept
 
-    Raises: InputError naming the key, the value and what is allowed. A PlantWarning, once per platform, says
-    which of its places can hardly be meant; `fowt check` says more.
+    Raises: InputError naming the key, the value and what is allowed. Warns (PlantWarning), once, of places of
+    the platform that can hardly be meant (`fowt check` says more), of waves steeper than breaking ones, and
+    of a mean wind in which the turbine does not operate.
     """
     label = platform.name if isinstance(platform, Platform) else str(platform)
     if not isinstance(platform, Platform):
@@ -78,6 +81,7 @@ def build_scene(
     seed = check_whole_number("seed", seed, 0)
     warn_of_geometry(platform, label)
     air, waves = build_weather(wind, sea, seed, platform, turbine, rotor, options)
+    warn_of_weather(air, sea_state_of(sea), platform, turbine, label)
     current = build_current(options["current"]) if options["hydrodynamics"] else None
     if options["planar"]:
         members = platform.members if options["hydrodynamics"] else ()

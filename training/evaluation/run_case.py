@@ -66,7 +66,11 @@ def scored(run):
     wind = case.wind
     if is_field(wind):
         wind = cached_box(wind, case.platform, run.seed, options)
-    nominal = scene = fowt_env.build_scene(case.platform, wind=wind, sea=case.sea, seed=run.seed, **options)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", ".*the mean wind of", PlantWarning)  # a case's is what it is for
+        nominal = scene = fowt_env.build_scene(
+            case.platform, wind=wind, sea=case.sea, seed=run.seed, **options
+        )
     if case.shift is not None and case.shift.factors:
         parts = perturbed_parts(case.shift, case.platform)
         scene = fowt_env.build_scene(wind=wind, sea=case.sea, seed=run.seed, **options | parts)

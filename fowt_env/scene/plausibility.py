@@ -1,0 +1,65 @@
+"""What is odd about the wind and the sea of a scene, and warned of when it is built."""
+
+import warnings
+from math import pi, tanh
+
+import numpy as np
+
+from fowt_env.descriptions.checks import is_number
+from fowt_env.errors import PlantWarning, level_outside
+from fowt_env.weather.waves import wave_number
+from fowt_env.weather.wind_field import WindBox
+
+STEEPEST = 1.0 / 7.0  # height over length of a wave that breaks in deep water, times tanh(k depth) in other
+MEAN_WINDS = ("steady", "ntm", "etm")  # kinds whose speed is a mean that a turbine operates in
+_warned = set()  # texts
+
+
+def warn_of_weather(air, sea, platform, turbine, label):
+    """Warn, once per text, of an Air and a SeaState that can hardly be meant for a platform and turbine."""
+    faults = [*wind_faults(air, turbine), *sea_faults(sea, platform.environment)]
+    text = " ".join(f"{fault[0].upper()}{fault[1:]}." for fault in faults)
+    if text and (label, text) not in _warned:
+        _warned.add((label, text))
+        warnings.warn(f"platform {label!r}: {text}", PlantWarning, stacklevel=level_outside())
+
+
+def wind_faults(air, turbine):
+    """Sentences on a mean wind in which a turbine does not operate; none of still air, gusts and extremes."""
+    spec = air.spec
+    kind = spec.get("kind") if isinstance(spec, dict) else getattr(spec, "kind", None)
+    if not air.speed or not (is_number(spec) or isinstance(spec, WindBox) or kind in MEAN_WINDS):
+        return []
+    if air.speed > turbine.cut_out_wind_speed:
+        return [
+            f"the mean wind of {air.speed:.4g} m/s is above the turbine's cut-out wind of"
+            f" {turbine.cut_out_wind_speed:.4g} m/s: a run starts with feathered blades and a rotor at rest"
+        ]
+    if air.speed < turbine.cut_in_wind_speed:
+        return [
+            f"the mean wind of {air.speed:.4g} m/s is below the turbine's cut-in wind of"
+            f" {turbine.cut_in_wind_speed:.4g} m/s"
+        ]
+    return []
+
+
+def sea_faults(sea, site):
+    """Sentences on a SeaState in which the waves would break, by Miche's limit.
+
+    Height over length at most 1/7 tanh(k depth) (R. Miche, Annales des Ponts et Chaussees 114, 1944;
+    DNV-RP-C205, 3.4.6). Of a spectrum it is the significant height over the length at the peak, which real
+    seas stay well below: 1/11.6 in the steepest of the built-in ones.
+    """
+    height, period = (sea.H, sea.T) if sea.kind == "regular" else (sea.Hs, sea.Tp)
+    if not height or not period:
+        return []
+    depth = site.water_depth
+    k = float(wave_number(np.array([2.0 * pi / period]), depth, site.gravity)[0])
+    length, steepest = 2.0 * pi / k, STEEPEST * tanh(k * depth)
+    if height <= steepest * length:
+        return []
+    names = ("H", "T") if sea.kind == "regular" else ("Hs", "Tp")
+    return [
+        f"waves of {names[0]} = {height:.4g} m and {names[1]} = {period:.4g} s are {length:.3g} m long: their"
+        f" steepness of {height / length:.2g} is beyond that of breaking waves, {steepest:.2g}"
+    ]
