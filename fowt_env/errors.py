@@ -2,7 +2,10 @@
 
 import difflib
 import sys
-from collections.abc import Iterable
+import warnings
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import Any
 
 
@@ -41,6 +44,28 @@ def level_outside() -> int:
     while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] == own:
         level, frame = level + 1, frame.f_back
     return level
+
+
+_said: set[object] = set()  # keys
+_muted = ContextVar("muted", default=False)
+
+
+def warn_once(key: object, text: str) -> None:
+    """Warn (PlantWarning), where the first line outside of this package is, once per key and process."""
+    if key in _said or _muted.get():
+        return
+    _said.add(key)
+    warnings.warn(text, PlantWarning, stacklevel=level_outside())
+
+
+@contextmanager
+def muted() -> Iterator[None]:
+    """Context in which warn_once says nothing, and says it when it is asked to outside."""
+    token = _muted.set(True)
+    try:
+        yield
+    finally:
+        _muted.reset(token)
 
 
 MOST_LISTED, NEAREST = 30, 5  # names that are all listed; how many are where there are more

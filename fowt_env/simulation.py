@@ -514,8 +514,9 @@ class _Loop:
             law = turbine.torque_law
             found.append(
                 f"the generator torque was limited for {limited:.4g} of {duration:.4g} s: controller"
-                f" {self.controller.name!r} commanded less than 0 or more than {law.max_torque * 1e-3:.4g} kN m,"
-                f" or changes faster than {law.max_torque_rate * 1e-3:.4g} kN m/s (GenTqLim)"
+                f" {self.controller.name!r} commanded less than 0 or more than"
+                f" {law.max_torque * 1e-3:.4g} kN m, or changes faster than"
+                f" {law.max_torque_rate * 1e-3:.4g} kN m/s (GenTqLim)"
             )
         return found
 

@@ -1,6 +1,5 @@
 """Whether a platform can be what its file means: figures at rest, natural periods, and what does not fit."""
 
-import warnings
 from math import cos, degrees, hypot, pi, sin, sqrt, tan
 from typing import NamedTuple
 
@@ -10,7 +9,7 @@ from fowt_env.analysis.equilibrium import MOTION_LABELS, causes_of, evaluated, m
 from fowt_env.analysis.statics import Evaluation, Statics, statics
 from fowt_env.analysis.tower_frequencies import TowerFrequency, tower_frequencies
 from fowt_env.analysis.trim import DIFFERENCE_STEPS, trim
-from fowt_env.errors import InputError
+from fowt_env.errors import InputError, muted
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.state import State, pose_of
 from fowt_env.scene.build import build_scene
@@ -47,16 +46,14 @@ def check_platform(platform, **options):
 
     Raises: InputError for a file that cannot be read.
     """
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the same faults follow, each of them once
+    with muted():  # the same faults follow, each of them once
         scene = build_scene(platform, **options)
     figures = statics(scene)
     faults = geometry_faults(scene.platform)
     faults |= _static_faults(scene, figures)
     rest, periods, tower = None, None, {}
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
+        with muted():
             point = trim(scene)
     except InputError as error:
         faults["rest"] = str(error).rstrip(".")

@@ -1,13 +1,12 @@
 """Whether a steady state is one that a platform can be in, and what pulls at it where there is none."""
 
-import warnings
 from math import acos, cos, degrees, hypot, isnan, sqrt
 from typing import NamedTuple
 
 import numpy as np
 
 from fowt_env.analysis.statics import statics
-from fowt_env.errors import InputError, level_outside
+from fowt_env.errors import InputError, warn_once
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.mooring import SLACK
 from fowt_env.plant.rollout import CAPSIZE
@@ -29,7 +28,6 @@ ONE_SIDED = 0.9  # horizontal pull of all lines together, of the sum of each one
 GROWTH = 1e-3  # square of a motion's rate of growth, of gravity over the draft
 MOORINGS = {"slack": "slack moorings", "weak": "loose moorings", "one-sided": "moorings to one side"}
 HEAVY = 0.02  # net vertical force on the undisplaced platform that is worth a word, of its weight
-_warned = set()  # hashes of platforms, each with what was odd about it
 
 
 class Evaluated(NamedTuple):
@@ -79,13 +77,10 @@ def check_equilibrium(scene, rest, start, slope, fresh_slope):
     if not odd:
         return
     key = hash((repr(scene.platform), scene.turbine.name, *odd))
-    if key in _warned:
-        return
-    _warned.add(key)
     if "tilt" in odd or "unstable" in odd:
         causes["upright"] = metacentre(scene, statics(scene))
     text = f"{label(scene)}: {'; '.join(odd.values())} ({_place(rest)}). {_sentences(causes)}"
-    warnings.warn(text.rstrip(), stacklevel=level_outside())
+    warn_once(key, text.rstrip())
 
 
 def unbalanced(scene, start, end, ending=None):

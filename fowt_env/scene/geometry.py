@@ -1,18 +1,16 @@
 """Whether the places in a platform file can be meant: lines, anchors, fairleads, members."""
 
-import warnings
 from math import degrees, dist
 
 import numpy as np
 
-from fowt_env.errors import PlantWarning, level_outside
+from fowt_env.errors import warn_once
 
 WIDE = 4.0  # of the hull's reach from the tower axis, where a fairlead is odd
 LOW = 1.2  # of the draft
 ABOVE_BED = 0.1  # of the water depth, between an anchor and the sea bed
 STRAIN = 0.05  # of a line, twice what breaks chain and wire
 UPRIGHT = 0.2  # horizontal over vertical span of a tendon, whose anchor may lie anywhere below
-_warned = set()  # hashes of platforms with what was odd about them
 
 
 def geometry_faults(platform):
@@ -26,11 +24,8 @@ def warn_of_geometry(platform, label):
     if not faults:
         return
     key = hash((repr(platform.lines), repr(platform.members), *faults))
-    if key in _warned:
-        return
-    _warned.add(key)
     text = " ".join(f"{text[0].upper()}{text[1:]}." for text in faults.values())
-    warnings.warn(f"platform {label!r}: {text}", PlantWarning, stacklevel=level_outside())
+    warn_once(key, f"platform {label!r}: {text}")
 
 
 def in_radians(anchors, fairleads):

@@ -1,27 +1,24 @@
 """What is odd about the wind and the sea of a scene, and warned of when it is built."""
 
-import warnings
 from math import pi, tanh
 
 import numpy as np
 
 from fowt_env.descriptions.checks import is_number
-from fowt_env.errors import PlantWarning, level_outside
+from fowt_env.errors import warn_once
 from fowt_env.weather.waves import wave_number
 from fowt_env.weather.wind_field import WindBox
 
 STEEPEST = 1.0 / 7.0  # height over length of a wave that breaks in deep water, times tanh(k depth) in other
 MEAN_WINDS = ("steady", "ntm", "etm")  # kinds whose speed is a mean that a turbine operates in
-_warned = set()  # texts
 
 
 def warn_of_weather(air, sea, platform, turbine, label):
     """Warn, once per text, of an Air and a SeaState that can hardly be meant for a platform and turbine."""
     faults = [*wind_faults(air, turbine), *sea_faults(sea, platform.environment)]
     text = " ".join(f"{fault[0].upper()}{fault[1:]}." for fault in faults)
-    if text and (label, text) not in _warned:
-        _warned.add((label, text))
-        warnings.warn(f"platform {label!r}: {text}", PlantWarning, stacklevel=level_outside())
+    if text:
+        warn_once((label, text), f"platform {label!r}: {text}")
 
 
 def wind_faults(air, turbine):

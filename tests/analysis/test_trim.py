@@ -9,7 +9,7 @@ from plant_helpers import state
 from typer.testing import CliRunner
 
 import fowt_env
-from fowt_env.analysis import equilibrium
+from fowt_env import errors
 from fowt_env.analysis.equilibrium import check_equilibrium, evaluated
 from fowt_env.analysis.trim import AZIMUTHS, mean_derivative, trim, without_fluctuations
 from fowt_env.descriptions.builtin import names
@@ -161,7 +161,7 @@ def test_a_scene_that_cannot_rest_is_refused(bare_scene):
 @pytest.fixture
 def warned(monkeypatch):
     """Warnings of platforms as in a process that has given none."""
-    monkeypatch.setattr(equilibrium, "_warned", set())
+    monkeypatch.setattr(errors, "_said", set())
 
 
 def edited(folder, key, value):

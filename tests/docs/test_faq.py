@@ -15,12 +15,12 @@ from gymnasium.envs.registration import registry
 from typer.testing import CliRunner
 
 import fowt_env
+from fowt_env import errors
 from fowt_env.controllers import make
 from fowt_env.descriptions.platform import DATA, read_platform
 from fowt_env.envs import FowtEnv
 from fowt_env.plant.compile import announcement, decorators
 from fowt_env.plant.compile.versions import check_numba
-from fowt_env.scene import geometry
 from fowt_env.training.cli import app as cli
 from fowt_env.training.cli import health
 
@@ -224,7 +224,7 @@ def _(folder, monkeypatch):
     text = (DATA / "platforms" / "oc3_hywind.toml").read_text()
     (folder / "mine.toml").write_text(text.replace("fairlead_radius = 5.2", "fairlead_radius = 52.0"))
     monkeypatch.chdir(folder)
-    monkeypatch.setattr(geometry, "_warned", set())  # another test of this process may have met the same
+    monkeypatch.setattr(errors, "_said", set())  # another test of this process may have met the same
     with pytest.warns(fowt_env.PlantWarning) as caught:
         fowt_env.build_scene("mine.toml")
     return str(caught[0].message)

@@ -15,7 +15,14 @@ from fowt_env.descriptions.protection import read_protection
 from fowt_env.descriptions.sea_state import sea_state_of
 from fowt_env.descriptions.units import DEGREE
 from fowt_env.descriptions.wind import read_wind
-from fowt_env.errors import ControllerError, ControllerInputError, InputError, PlantWarning, SimulationStopped
+from fowt_env.errors import (
+    ControllerError,
+    ControllerInputError,
+    InputError,
+    PlantWarning,
+    SimulationStopped,
+    muted,
+)
 from fowt_env.training.evaluation.faults import idling
 from fowt_env.training.evaluation.guard import attempt, reason_of
 from fowt_env.training.evaluation.metrics import METRICS, TIME, turbine_metrics
@@ -66,8 +73,7 @@ def scored(run):
     wind = case.wind
     if is_field(wind):
         wind = cached_box(wind, case.platform, run.seed, options)
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", ".*the mean wind of", PlantWarning)  # a case's is what it is for
+    with muted():  # a case's weather is what it is for, and others build its platform too
         nominal = scene = fowt_env.build_scene(
             case.platform, wind=wind, sea=case.sea, seed=run.seed, **options
         )
