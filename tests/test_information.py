@@ -19,10 +19,18 @@ from fowt_env.control import (
     view_of,
 )
 from fowt_env.controllers import CONTROLLERS
+from fowt_env.descriptions.measurements import measurement_rows
 from fowt_env.descriptions.sensors import Sensor, SensorChain, built_in_chains
 from fowt_env.errors import ControllerError, InputError, SimulationStopped
 from fowt_env.plant.compile.decorators import control_kernel
-from fowt_env.plant.measurement import N_MEASUREMENTS, SENSOR_FIELDS, Measure, Measurement
+from fowt_env.plant.measurement import (
+    N_BLADE_MEASUREMENTS,
+    N_MEASUREMENTS,
+    SENSOR_FIELDS,
+    BladeMeasurement,
+    Measure,
+    Measurement,
+)
 from fowt_env.weather.lidar import lidar_preview
 from fowt_env.weather.preview import Motion, Preview, add_motion, exact_preview, rotor_wind_series
 from fowt_env.weather.sensor_noise import draw_noise
@@ -156,6 +164,22 @@ def test_a_view_is_a_measurement_with_nan_for_the_rest():
         _ = later.heave
     for same in (copy.deepcopy(view), pickle.loads(pickle.dumps(view))):
         assert np.array_equal(np.array(same), values, equal_nan=True)
+        assert same.wind_preview == (17.5,) and same.surge == view.surge
+        with pytest.raises(ControllerError, match="reads 'heave' at t = 1.000 s"):
+            _ = same.heave
+
+
+def test_a_copied_view_has_the_blades_and_what_they_hide():
+    declared = ("azimuth", "wind_preview")
+    watcher = Watcher(declared, (1.0, 2.0))
+    blades = list(range(N_BLADE_MEASUREMENTS))
+    view = view_of(make(watcher, None, 0.1))([*ONES, 17.5, 18.5, *blades])
+    for same in (copy.deepcopy(view), pickle.loads(pickle.dumps(view))):
+        assert same.wind_preview == (17.5, 18.5) and same.blades.azimuth == blades[0]
+        again = pickle.loads(pickle.dumps(same.blades))
+        for kept in (same.blades, again):
+            with pytest.raises(ControllerError, match="reads 'blade_pitch_1' at t = 1.000 s"):
+                _ = kept.blade_pitch_1
 
 
 def test_a_controller_that_declares_nothing_is_given_the_turbine_s_own_sensors(gust_scene):
@@ -425,3 +449,16 @@ def test_another_seed_has_other_noise():
         run(scene, law, sensors="standard")
         speeds.append(law.seen()[:, Measure.ROTOR_SPEED])
     assert np.abs(speeds[0] - speeds[1]).max() > 1e-3
+
+
+@pytest.mark.parametrize("of", [Measurement, BladeMeasurement])
+def test_the_help_of_a_measurement_has_every_field_with_its_unit(of):
+    rows = measurement_rows(of)
+    assert [row[0] for row in rows] == list(of._fields)
+    for name, unit, _, meaning, sensor in rows:
+        assert any(
+            line.split()[:1] == [name] and unit in line and meaning in line
+            for line in of.__doc__.splitlines()
+        )
+        assert sensor in ("yes", "no")
+    assert fowt_env.Measurement is Measurement

@@ -599,3 +599,56 @@ def test_double_frequency_comes_from_position_and_from_surface():
     for i in range(2):
         in_order = [measured[key][i] for key in expected]
         assert in_order == sorted(in_order)
+
+
+@pytest.fixture(scope="module")
+def steady():
+    return fowt_env.build_scene("oc3_hywind", wind=18.0, fidelity="standard", duration=60.0)
+
+
+def warnings_of(do):
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        do()
+    return [str(warning.message) for warning in caught]
+
+
+@pytest.mark.parametrize("law", ["compiled", "function"])
+@pytest.mark.parametrize(
+    ("torque", "pitch", "words"),
+    [(43093.0, 14.8, "14.8 rad = 848 deg"), (43.09, 0.26, "43.09 N m, 0.1 % of the rated")],
+)
+def test_commands_in_other_units_are_warned_of_compiled_or_not(law, torque, pitch, words, steady):
+    given = Constant(torque, pitch) if law == "compiled" else lambda measurement: (torque, pitch)
+    texts = warnings_of(lambda: run(steady, controller=given, duration=20.0))
+    assert len([text for text in texts if words in text]) == 1, texts
+
+
+def test_a_moment_beyond_the_limits_is_no_other_unit(steady):
+    def law(measurement):  # 0.9 s at a time
+        return (43093.0, 0.26) if measurement.time % 1.0 < 0.05 else (43093.0, 4.0)
+
+    assert not warnings_of(lambda: run(steady, controller=law, duration=1.0))
+    small = warnings_of(lambda: run(steady, controller=lambda m: (0.0, 0.3), duration=5.0))
+    assert not small  # no torque is a command, not a unit
+
+
+@pytest.mark.parametrize("controller", ["pi", "gspi_oc3", "lqr"])
+def test_built_in_controllers_run_without_a_warning(controller, steady):
+    texts = warnings_of(lambda: run(steady, controller=controller, duration=20.0))
+    assert not texts
+
+
+def test_a_run_says_for_how_long_its_torque_was_limited(steady):
+    with pytest.warns(fowt_env.PlantWarning, match="limited for 4 of 4 s"):
+        frame = run(steady, controller=lambda m: (60e3, 0.26), duration=4.0)
+    assert frame.attrs["torque_limited"] == pytest.approx(4.0)
+    assert run(steady, controller="pi", duration=4.0).attrs["torque_limited"] == 0.0
+
+
+def test_a_table_beyond_the_memory_of_the_machine_is_refused(monkeypatch, steady):
+    monkeypatch.setattr(simulation, "physical_memory", lambda: 1e6)
+    with pytest.raises(InputError, match=r"duration = 60 s: a table of 601 rows.*0.000\d* GiB.*output_dt"):
+        monkeypatch.setattr(simulation, "MOST_MEMORY", 0.2)
+        run(steady, controller="pi", duration=60.0)
+    run(steady, controller="pi", duration=2.0)

@@ -1,5 +1,6 @@
 """Names, import paths and objects that can be controllers, and what they may return."""
 
+import functools
 import pickle
 import subprocess
 import sys
@@ -276,3 +277,91 @@ def test_the_plant_does_not_import_controllers():
 
 def test_public_names_exist():
     assert all(hasattr(controllers, name) for name in controllers.__all__)
+
+
+def law_of_measurement(measurement):
+    return 4e4, 0.2
+
+
+def counting(turbine, control_dt):
+    """A factory of laws that remember."""
+    calls = []
+
+    def law(measurement):
+        calls.append(measurement.time)
+        return 4e4, 0.01 * len(calls)
+
+    return law
+
+
+def test_a_function_of_the_measurement_is_a_controller():
+    for given in (law_of_measurement, lambda m: (4e4, 0.2), functools.partial(law_of_measurement)):
+        controller = make(given, turbine(), 0.1)
+        controller.reset(RATED)
+        assert controller.act(RATED) == (4e4, 0.2)
+    assert make(law_of_measurement, turbine(), 0.1).name == "law_of_measurement"
+
+
+def test_a_function_is_given_the_turbine_s_own_sensors_or_what_it_declares():
+    def surging(measurement):
+        return 4e4, measurement.surge
+
+    with pytest.raises(ControllerError, match="'surging' reads 'surge'"):
+        make(surging, turbine(), 0.1).act(RATED)
+    surging.information = ("surge",)
+    assert make(surging, turbine(), 0.1).act(RATED) == (4e4, RATED.surge)
+
+
+def test_a_factory_stays_one_and_may_make_a_function():
+    def of_turbine_alone(turbine, control_dt=0.2):
+        return Returning((control_dt, 0.2))
+
+    assert make(of_turbine_alone, turbine(), 0.1).act(RATED) == (0.1, 0.2)
+
+    def by_name(turbine):  # a law's only argument would not be called so
+        return 1.0, 2.0
+
+    with pytest.raises(InputError, match="must take"):
+        make(by_name, turbine(), 0.1)
+    runs = [make(counting, turbine(), 0.1) for _ in range(2)]
+    assert [run.act(RATED)[1] for run in runs for _ in range(2)] == [0.01, 0.02, 0.01, 0.02]
+
+
+def test_an_import_path_may_name_a_function(tmp_path, monkeypatch):
+    (tmp_path / "my_function.py").write_text("def law(m):\n    return 1.0, m.blade_pitch\n")
+    monkeypatch.chdir(tmp_path)
+    controller = make("my_function:law", turbine(), 0.1)
+    assert controller.act(RATED) == (1.0, RATED.blade_pitch) and controller.name == "my_function:law"
+
+
+def test_an_error_of_a_controller_names_it_the_time_and_the_line():
+    def failing(measurement):
+        return {}["torque"]
+
+    line = failing.__code__.co_firstlineno + 1
+    with pytest.raises(ControllerError) as caught:
+        make(failing, turbine(), 0.1).act(RATED._replace(time=3.5))
+    words = f"'failing' raised KeyError in act() at t = 3.500 s, test_registry.py line {line}: 'torque'"
+    assert words in str(caught.value)
+    assert isinstance(caught.value.__cause__, KeyError) and caught.value.time == 3.5
+
+    class Starting:
+        def reset(self, measurement):
+            raise OSError("no file")
+
+        act = law_of_measurement
+
+    with pytest.raises(ControllerError, match=r"'Starting' raised OSError in reset\(\) .*: no file"):
+        make(Starting(), turbine(), 0.1).reset(RATED)
+
+
+def test_an_error_whose_text_fails_is_named_all_the_same():
+    class Mute(Exception):
+        def __str__(self):
+            raise RuntimeError
+
+    def failing(measurement):
+        raise Mute
+
+    with pytest.raises(ControllerError, match="'failing' raised Mute in act"):
+        make(failing, turbine(), 0.1).act(RATED)

@@ -11,7 +11,7 @@ from fowt_env.envs import FowtEnv, FowtVectorEnv
 from fowt_env.envs.episode import act, act_physical, start_episode
 from fowt_env.envs.episode_batch import act_all
 from fowt_env.envs.tasks import Task
-from fowt_env.errors import InputError
+from fowt_env.errors import InputError, PlantWarning
 from fowt_env.plant.compile import handle
 
 QUICK = {"rotor": "table", "wave_components": 20}
@@ -29,6 +29,7 @@ EPISODES = [
     {"wind": {"kind": "eog", "speed": 14.0}, "sea": JONSWAP | {"Hs": 0.0}},
     {"wind": {"kind": "series", "time": FROZEN, "speed": [12.0, 15.0]}, "sea": CROSSING | {"heading": 40.0}},
     {"wind": {"kind": "steps", "speeds": [13.0, 15.0], "every": 50.0}, "sea": "still"},
+    {"wind": "ntm:16:B", "sea": "jonswap:4:9"},
     {"wind": BOX, "sea": JONSWAP},  # rotor-averaged for the table: a series
 ]
 ENTRIES = (act, act_physical, act_all, start_episode, mean_derivative)
@@ -176,3 +177,28 @@ def test_a_snapshot_of_still_water_is_not_for_an_environment_with_a_sea():
         batch.set_state([env.get_state(), still.get_state()])
     for old, new in zip(before, batch.get_state(), strict=True):
         assert all(map(np.array_equal, old.arrays, new.arrays))
+
+
+def test_texts_are_weathers_of_tasks_and_resets():
+    env = quick(wind="ntm:16:B", sea="jonswap:4:9")
+    assert env.task.wind == NTM and env.task.sea == JONSWAP
+    texts, mappings = (
+        {"weather_seed": 3, "wind": w, "sea": s} for w, s in (("ntm:16:B", "jonswap:4:9"), (NTM, JONSWAP))
+    )
+    first, again = env.reset(seed=1, options=texts)[1], env.reset(seed=1, options=mappings)[1]
+    assert first["episode"] == again["episode"]
+    with pytest.raises(InputError, match=r"wind = 'ntm16': must be .*ntm:18:B"):
+        env.reset(options={"wind": "ntm16"})
+    with pytest.raises(InputError, match="an episode needs a wind"):
+        env.reset(options={"wind": "none"})
+
+
+def test_a_physical_command_in_degrees_is_warned_of_once():
+    env = quick()
+    env.reset(seed=1, options={"wind": 18.0})
+    with pytest.warns(
+        PlantWarning, match="step_physical: commanded blade pitch 14.8 rad = 848 deg"
+    ) as caught:
+        for _ in range(15):
+            env.step_physical(43093.0, 14.8)
+    assert len(caught) == 1

@@ -12,7 +12,7 @@ from fowt_env.descriptions.iec import ntm_sigma
 from fowt_env.errors import InputError
 from fowt_env.plant.aero.wind_field import field_at
 from fowt_env.weather.turbulence import drawn_ntm_sigma
-from fowt_env.weather.wind_field import WindBox, hub_speed, read_box, rotor_average, steady_field
+from fowt_env.weather.wind_field import WindBox, hub_speed, is_field, read_box, rotor_average, steady_field
 
 HUB, DIAMETER = 90.0, 126.0
 Y = np.linspace(-75.0, 75.0, 11)
@@ -159,6 +159,10 @@ def test_a_turbsim_file_is_read_slice_by_slice(tmp_path):
     assert read.velocity == pytest.approx(box.velocity, abs=2e-4)  # 16-bit integers in the file
     assert (read.dt, read.speed, read.periodic) == (pytest.approx(0.5), pytest.approx(12.0), False)
     assert read.shift == pytest.approx(box.shift)
+    for given in (path, str(path)):  # the path is the wind
+        assert is_field(given)
+        scene = fowt_env.build_scene("oc3_hywind", wind=given, rotor="table")
+        np.testing.assert_array_equal(scene.wind.velocity, read.velocity)
 
 
 @pytest.mark.slow

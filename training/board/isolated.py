@@ -220,6 +220,8 @@ def serve(incoming: int, outgoing: int) -> None:
                 controller, answer = _done(what, content, controller)
                 kind = OK
             except BaseException as error:  # SystemExit too: the run is told why it fails
+                own = error.__cause__ if isinstance(error, ControllerError) else None  # the controller's
+                error = error if own is None else own
                 kind, answer = ERROR, f"{type(error).__name__}: {error}".encode()[:LONGEST_ANSWER]
             _write(outgoing, kind + LENGTH.pack(len(answer)) + answer)
 

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from fowt_env.descriptions.sea_state import sea_state_of
 from fowt_env.errors import InputError, unknown
 from fowt_env.training.evaluation.cases import (
     Case,
@@ -88,13 +89,26 @@ sea = {table = "north_sea"}
 name = "calm"
 wind = 16.0
 seeds = 1
+
+[[case]]
+name = "texts"
+wind = "etm:18:C"
+sea = "jonswap:4:9"
+
+[[case]]
+name = "file"
+wind = "mine.csv"
 """
+    (tmp_path / "mine.csv").write_text("time,speed\n0,12\n600,14\n")  # beside the suite, wherever it is run
     suite = read_suite(written(tmp_path, text))
     assert (suite.name, suite.version, suite.seeds) == ("mine", 3, (1, 2))
-    assert [case.name for case in suite.cases] == ["windy_13", "windy_17_5", "calm"]
+    assert [case.name for case in suite.cases] == ["windy_13", "windy_17_5", "calm", "texts", "file"]
     assert suite.cases[1].wind == {"kind": "ntm", "class": "A", "speed": 17.5}
     assert 3.1 < suite.cases[1].sea.Hs < 4.1
     assert suite.cases[2].wind == 16.0 and suite.cases[2].seeds == (1,)
+    assert suite.cases[3].wind == {"kind": "etm", "speed": 18.0, "class": "C"}
+    assert sea_state_of(suite.cases[3].sea).Tp == 9.0
+    assert suite.cases[4].wind["speed"].tolist() == [12.0, 14.0]
 
 
 WIND = "wind = 16.0"

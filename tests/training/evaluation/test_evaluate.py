@@ -124,6 +124,15 @@ def test_a_controller_that_wants_more_than_the_generator_can_give_is_seen_to():
     assert table.loc["held", "torque_limited_[s]"] > 1.0 and table.loc["pi", "torque_limited_[s]"] == 0.0
 
 
+def test_a_function_of_the_measurement_is_compared_like_any_controller():
+    def held(measurement):
+        return 43093.0, 0.26
+
+    rows = evaluate([held, "pi"], [CALM], **SHORT).set_index("controller")
+    assert rows.loc["held", "status"] == rows.loc["pi", "status"] == "ok"
+    assert rows.loc["held", "BldPitch1_std_[deg]"] < 1e-9 < rows.loc["pi", "BldPitch1_std_[deg]"]
+
+
 def test_a_failing_run_is_a_row_with_its_reason_and_the_others_go_on():
     table = evaluate({"broken": Broken(), "crashing": Crashing(), "fine": Frozen()}, [CALM], **SHORT)
     rows = table.set_index("controller")
