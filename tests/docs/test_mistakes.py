@@ -89,7 +89,7 @@ REFUSED = {  # mistake: (what is done with a scene, error, what the answer has t
         ControllerError,
         "'Asked' raised ZeroDivisionError in act() t = 0.000 s division",
     ),
-    "no reset": (run(type("X", (), {"act": lambda s, m: FINE})()), InputError, "no method reset(measurement)"),
+    "no reset": (run(type("X", (), {"act": lambda s, m: FINE})()), InputError, "no method reset(measurement"),
     "function of three": (
         run(lambda a, b, c: FINE),
         InputError,
@@ -168,7 +168,7 @@ REFUSED = {  # mistake: (what is done with a scene, error, what the answer has t
     "step after the end": (environment(ended, duration=5.0), ResetNeeded, "reset()"),
 }
 WARNED = {  # mistake: (what is done, what the warning has to say)
-    "degrees": (answers(lambda m: (43093.0, 14.8)), "'Asked' blade pitch 14.8 rad = 848 deg blade pitch in rad"),
+    "degrees": (answers(lambda m: (43093.0, 14.8)), "'Asked' blade pitch 14.8 rad = 848 deg commands are"),
     "kN m": (answers(lambda m: (43.09, 0.26)), "'Asked' torque 43.09 N m 0.1 % of the rated 43094 N m"),
     "torque of the slow shaft": (answers(lambda m: (4.18e6, 0.26)), "9.7e+03 % of the rated"),
     "runaway": (run(lambda m: (0.0, 0.0), duration=20.0), "beyond the overspeed of 15.73 rpm protection="),
