@@ -258,6 +258,10 @@ class CommandUnits:
             if self._count >= self._needed:
                 self.warn(torque, blade_pitch)
 
+    def is_little(self, torque: float) -> bool:
+        """Whether a torque (N m) is one that a law in N m has for moments at most."""
+        return 0.0 < torque < self._few
+
     def see_run(self, torque: np.ndarray, rotor_speed: np.ndarray, period: float) -> None:
         """Take note of the torque in force (n,) N m of a whole run, recorded every period (s)."""
         few = (torque > 0.0) & (torque < self._few) & (rotor_speed > self._turning)

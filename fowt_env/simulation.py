@@ -487,7 +487,7 @@ class _Loop:
         frame.attrs["events"] = counted(self.data.counters)
         period = self.schedule.per_output * self.schedule.dt
         frame.attrs["torque_limited"] = float(np.count_nonzero(values[:-1, Out.GENTQLIM]) * period)
-        if self.compiled:
+        if self.compiled and self.units.is_little(self.u[Command.GENERATOR_TORQUE]):
             self.units.see_run(values[:, Out.GENTQ] * 1e3, values[:, Out.ROTSPEED] * RPM, period)
         watch = self.guard.watch
         tripped, stop = float(watch[Watch.TRIPPED_AT]), int(watch[Watch.STOP])
