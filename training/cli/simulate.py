@@ -1,13 +1,11 @@
-"""fowt simulate, trim and list: one run, operating points, names."""
+"""fowt simulate and trim: one run, and operating points."""
 
 from typing import Annotated
 
 import typer
-from rich.columns import Columns
-from rich.markup import escape
 
 from fowt_env.descriptions.checks import parse_numbers
-from fowt_env.errors import SimulationStopped, unknown
+from fowt_env.errors import SimulationStopped
 from fowt_env.files.tables import SERIES_SUFFIXES, table_path, write_table
 from fowt_env.training.cli.arguments import parse_fault, parse_pairs, parse_protection, parse_sea, parse_wind
 from fowt_env.training.cli.console import (
@@ -236,46 +234,3 @@ def trim(
 
         plot_schedule(points, plot, title)
         note(f"wrote {plot}")
-
-
-@app.command(name="list")
-@reported
-def list_names(
-    kind: Annotated[
-        str, typer.Argument(help="platforms, turbines, seas, controllers, agents, suites or cases; or all.")
-    ] = "all",
-):
-    """List the names that the other commands accept."""
-    from fowt_env.controllers import CONTROLLERS
-    from fowt_env.controllers.policy.controller import shipped_agents
-    from fowt_env.descriptions.builtin import names
-    from fowt_env.training.evaluation.cases import all_cases, read_suite, suite_names
-
-    known = {
-        "platforms": lambda: names("platforms"),
-        "turbines": lambda: names("turbines"),
-        "seas": lambda: names("sea_states"),
-        "controllers": lambda: list(CONTROLLERS),
-        "agents": lambda: [f"policy:{name}" for name in shipped_agents()],
-        "suites": lambda: [f"{suite} ({len(read_suite(suite).cases)} cases)" for suite in suite_names()],
-        "cases": lambda: list(all_cases()),
-    }
-    if kind != "all" and kind not in known:
-        raise unknown("kind of name", kind, ("all", *known))
-    for heading in known if kind == "all" else (kind,):
-        out.print(f"[bold]{heading}[/bold]")
-        if heading == "controllers":
-            _print_controllers(CONTROLLERS)
-            continue
-        out.print(Columns(map(escape, known[heading]()), padding=(0, 3), expand=False), highlight=False)
-
-
-def _print_controllers(factories):
-    """Print the controllers: name, what each is, and what it uses."""
-    from fowt_env.controllers import information
-
-    rows = [
-        (name, factory.__doc__.splitlines()[0], ", ".join(information(name)))
-        for name, factory in factories.items()
-    ]
-    print_table(out, ("name", "what it is", "what it uses"), rows, prose=(1, 2))

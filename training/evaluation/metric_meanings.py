@@ -51,7 +51,7 @@ def metric_meaning(metric):
     if metric in MEANINGS:
         return MEANINGS[metric]
     channel, statistic = metric.partition("_[")[0].rsplit("_", 1)
-    return f"{STATISTICS[statistic]} of: {channel_meaning(channel)}"
+    return f"{channel_meaning(channel)}: {STATISTICS[statistic]}"
 
 
 def metric_table():
