@@ -16,7 +16,9 @@ def table_path(path, allowed=TABLE_SUFFIXES):
     """
     path = Path(path)
     if path.suffix.lower() not in allowed:
-        raise InputError(f"output file {str(path)!r}: must end with {' or '.join(allowed)}")
+        *others, last = allowed
+        endings = f"{', '.join(others)} or {last}" if others else last
+        raise InputError(f"file {str(path)!r}: must end with {endings}")
     return path
 
 
@@ -33,6 +35,19 @@ def write_table(frame, path):
         else:
             frame.to_parquet(temporary.absolute(), index=False)  # "a:b/c" alone would be read as a URI
     return path
+
+
+def read_series(path):
+    """DataFrame of a time series that write_table wrote, or of OpenFAST's binary output (.outb).
+
+    Raises: InputError if there is no such file, its ending is another, or it is broken.
+    """
+    path = table_path(path, SERIES_SUFFIXES)
+    if path.suffix.lower() != ".outb":
+        return read_table(path)
+    from fowt_env.files.openfast import read_outb
+
+    return read_outb(path)
 
 
 def read_table(path):

@@ -27,7 +27,10 @@ def check(
     option: OptionOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON in SI units and degrees.")] = False,
 ):
-    """Check a platform: figures at rest without wind, natural periods, and what does not fit."""
+    """Check a platform: weight, stability, natural periods.
+
+    Prints what it is at rest without wind, and what in its file does not fit together.
+    """
     from fowt_env.analysis.check import check_platform
 
     found = check_platform(platform, **parse_pairs(option, "option"))

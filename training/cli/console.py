@@ -37,7 +37,7 @@ GROUPS = {  # of fowt --help: heading -> its commands, in the order in which the
 }
 START = (  # lines of fowt --help for those who have never used it
     ("fowt simulate --wind 18 --plot run.png", "one run: statistics and a picture"),
-    ("fowt list", "platforms, winds, seas, controllers, ..."),
+    ("fowt list", "names: platforms, seas, controllers"),
     ("fowt evaluate --controllers pi,lqr", "compare controllers"),
     ("fowt COMMAND --help", "options, and examples to copy"),
 )
@@ -48,7 +48,7 @@ class Overview(TyperGroup):
 
     def format_help(self, ctx, formatter):
         """Print the help of the whole command."""
-        out.print(f"[bold]fowt COMMAND[/bold]  {self.help}\n", highlight=False)
+        out.print(f"[bold]fowt[/bold]  {self.help}  [dim](--version)[/dim]\n", highlight=False)
         width = max(len(command) for command, _ in START)
         for command, text in START:
             out.print(f"  [cyan]{command:{width}}[/cyan]  {text}", highlight=False)
@@ -73,7 +73,7 @@ class Overview(TyperGroup):
 
 
 def summary_of(command):
-    """First sentence of a command's help, without its full stop."""
+    """First paragraph of a command's help, without its full stop."""
     return " ".join((command.help or "").split("\n\n")[0].split()).removesuffix(".")
 
 
@@ -84,7 +84,7 @@ app = typer.Typer(
     add_completion=False,
     rich_markup_mode="rich",
     pretty_exceptions_enable=False,
-    help="Floating wind turbines: simulate, design, compare and train controllers.",
+    help="Floating wind turbines: simulate, control, compare, train.",
 )
 
 

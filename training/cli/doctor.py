@@ -26,7 +26,10 @@ out = Console()
 def doctor(
     test: Annotated[bool, typer.Option("--test/--no-test", help="Run the self-test.")] = True,
 ):
-    """Check this installation: versions, optional parts, kernel cache, a short run with known figures."""
+    """Check this installation.
+
+    Versions, optional parts, the cache of compiled kernels, and a short run with known results.
+    """
     _print_versions()
     _print_extras()
     faults = [package.advice for package in requirements.versions() if not package.fits]

@@ -16,6 +16,7 @@ from fowt_env.training.cli.console import (
     fail,
     note,
     out,
+    output,
     progress_bar,
     reported,
 )
@@ -62,7 +63,9 @@ def evaluate_command(
     ] = None,
     seeds: Annotated[
         str | None,
-        typer.Option(help="1,2,3 or 1:6:1, same for each controller. Default: the suite's, else 1."),
+        typer.Option(
+            help="1,2,3 or 1:6:1 (6 included), the same for each controller. Default: the suite's, else 1."
+        ),
     ] = None,
     duration: Annotated[
         float | None, typer.Option(help="Length of each run, s. Default: the suite's, else 660.")
@@ -90,11 +93,14 @@ def evaluate_command(
     ] = "results/evaluation",
     plot: Annotated[bool, typer.Option("--plot/--no-plot", help="Make the plots.")] = True,
 ):
-    """Score controllers on load cases: a leaderboard with intervals, metrics by case, the runs, and plots."""
+    """Compare controllers on load cases: a leaderboard.
+
+    With intervals, metrics by case, the time series of all runs, and plots.
+    """
     from fowt_env.training.evaluation.evaluate import evaluate, summary
     from fowt_env.training.reports.terminal import chosen_cases, write_leaderboard
 
-    folder = Path(out_folder)
+    folder = Path(output(out_folder, folder=True))
     chosen = chosen_cases(suite, cases, platform)
     numbers = None if seeds is None else parse_whole_numbers(seeds, "seeds")
     if baseline is not None and baseline not in (names := [name.strip() for name in controllers.split(",")]):

@@ -6,7 +6,7 @@ import typer
 from rich.markup import escape
 
 from fowt_env.errors import InputError
-from fowt_env.training.cli.console import app, note, out, reported
+from fowt_env.training.cli.console import app, note, out, output, reported
 from fowt_env.training.cli.tables import print_table
 
 EXAMPLES = """[bold]Examples[/bold]
@@ -48,7 +48,7 @@ def import_command(
     ] = None,
     overwrite: Annotated[bool, typer.Option(help="Replace the files of an earlier import.")] = False,
 ) -> None:
-    """Convert a deck of OpenFAST or FAST 8 to a platform and turbine of this project."""
+    """Convert an OpenFAST or FAST 8 deck to a platform file."""
     from fowt_env.files.openfast_deck.importer import import_deck
 
     parts = {
@@ -59,6 +59,7 @@ def import_command(
         raise InputError(
             "fowt import: needs an .fst file, or part files such as --elastodyn, --aerodyn, --hydrodyn"
         )
+    output(out_path, folder=True)
     report = import_deck(
         deck, out_path, parts=parts, search=search or (), discon=discon, name=name, replace_files=overwrite
     )

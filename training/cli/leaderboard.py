@@ -5,11 +5,11 @@ from typing import Annotated
 
 import typer
 
-from fowt_env.training.cli.console import app, note, out, progress_bar, reported
+from fowt_env.training.cli.console import app, note, out, output, progress_bar, reported
 from fowt_env.training.cli.tables import print_table
 
 board_app = typer.Typer(
-    help="A standing board: add submissions, judge them, show what came of it.", no_args_is_help=True
+    help="Keep a standing board of submitted controllers.", no_args_is_help=True
 )
 app.add_typer(board_app, name="leaderboard")
 
@@ -45,6 +45,7 @@ def add_command(
     for folder in submissions:
         read_submission(folder)
     if not (board / SETTINGS).exists():
+        output(board, "--board", folder=True)
         made = new_board(board, platform=platform)
         first = ", ".join(each.name for each in made.submissions())
         note(f"made the board {board} with the controllers of the package: {first}")
@@ -83,6 +84,7 @@ def run_command(
     from fowt_env.training.board.page import write_board
 
     holder = Board(board)
+    output(private, "--private", folder=True)
     with progress_bar("judging", None) as update:
 
         def report(done, total, text):
@@ -93,7 +95,10 @@ def run_command(
     note(f"wrote {', '.join(path.name for path in written)} in {board}")
 
 
-@board_app.command(name="show")
+SHOW_EXAMPLES = """[cyan]fowt leaderboard show[/cyan]  the board in ./board, its first regime"""
+
+
+@board_app.command(name="show", epilog=SHOW_EXAMPLES)
 @reported
 def show_command(
     board: BoardOption = Path("board"),

@@ -358,7 +358,7 @@ def list_names(
     part: Annotated[str | None, typer.Argument(help="Show the rows with this text in them.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ):
-    """Names that the other commands take: platforms, winds, seas, controllers, ..."""
+    """Names that the other commands take, with what each is."""
     if kind is None:
         _print_overview(as_json)
         return

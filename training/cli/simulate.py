@@ -10,11 +10,13 @@ from fowt_env.files.tables import SERIES_SUFFIXES, table_path, write_table
 from fowt_env.training.cli.arguments import parse_fault, parse_pairs, parse_protection, parse_sea, parse_wind
 from fowt_env.training.cli.console import (
     OptionOption,
+    RANGE,
     PlatformOption,
     RotorOption,
     app,
     note,
     out,
+    output,
     progress_bar,
     reported,
 )
@@ -33,6 +35,8 @@ SIMULATE_EXAMPLES = """[bold]Examples[/bold]
 
 [cyan]fowt simulate --wind '{"kind": "etm", "speed": 18, "class": "A"}'[/cyan]  any wind, as JSON
 
+[cyan]fowt simulate --controller policy:ppo_lqr --wind ntm:16:B[/cyan]  a trained agent
+
 [cyan]fowt simulate --controller ipc --option pitch=individual[/cyan]  a pitch for each blade
 
 [cyan]fowt simulate --wind 18 --fault grid_loss:100 --protection turbine[/cyan]  a fault, and trips"""
@@ -46,14 +50,23 @@ def simulate(
     wind: Annotated[
         str,
         typer.Option(
-            help="m/s, KIND:SPEED[:CLASS] (ntm:18:B), JSON, a .csv of time and speed, a .wnd or .hh, or none."
+            help="m/s; KIND:SPEED[:CLASS] as ntm:18:B or eog:18; a file: .csv of time and speed, .wnd, .hh; JSON"
+            " (also of the full-field kinds bts, mann and box); or none. See fowt list winds."
         ),
     ] = "18",
     sea: Annotated[
-        str, typer.Option(help="Name, jonswap:HS:TP[:GAMMA], regular:H:T, JSON, or none (still water).")
+        str,
+        typer.Option(
+            help="Name of fowt list seas, jonswap:HS:TP[:GAMMA], regular:H:T, JSON, or none (still water)."
+        ),
     ] = "none",
     controller: Annotated[
-        str, typer.Option(help="Name, module:Name, design:FILE or none (constant command).")
+        str,
+        typer.Option(
+            help="Name of fowt list controllers, policy:NAME of fowt list agents or policy:FILE.npz, design:FILE.json,"
+            " module:Name of your own. none: rotor speed and blade pitch held (at rest without wind);"
+            " constant: torque and blade pitch held, the rotor turns freely."
+        ),
     ] = "pi",
     duration: Annotated[float, typer.Option(help="Length of the run, s.")] = 600.0,
     dt: Annotated[float | None, typer.Option(help="Physics step, s; default: that of the fidelity.")] = None,
@@ -82,12 +95,14 @@ def simulate(
     out_path: Annotated[str | None, typer.Option("--out", help="Series: .csv, .parquet or .outb.")] = None,
     plot: Annotated[str | None, typer.Option(help="Stacked plot of the run, e.g. run.png.")] = None,
 ):
-    """Simulate one run, print its statistics, and save its time series and plot."""
+    """Simulate one run: statistics, time series and a plot."""
     import fowt_env
 
     if out_path is not None:
         table_path(out_path, SERIES_SUFFIXES)  # a wrong ending should not cost a run
     options = {"duration": max(700.0, duration), **parse_pairs(option, "option")}
+    output(out_path)
+    output(plot, "--plot")
     scene = fowt_env.build_scene(
         platform,
         wind=parse_wind(wind),
@@ -196,20 +211,22 @@ TRIM_CHANNELS = (
 @reported
 def trim(
     platform: PlatformOption = "oc3_hywind",
-    winds: Annotated[str, typer.Option(help="Steady winds, m/s: 8,11.4,18 or START:STOP:STEP.")] = "4:24:1",
+    winds: Annotated[str, typer.Option(help=f"Steady winds, m/s: {RANGE}.")] = "4:24:1",
     fixed: Annotated[bool, typer.Option("--fixed", help="Fix the platform.")] = False,
     rotor: RotorOption = None,
     option: OptionOption = None,
     out_path: Annotated[str | None, typer.Option("--out", help="All channels: .csv or .parquet.")] = None,
     plot: Annotated[str | None, typer.Option(help="Plot of the schedule, e.g. schedule.png.")] = None,
 ):
-    """Print the steady operating point over wind speed."""
+    """Steady operating points over the wind speed."""
     import pandas as pd
 
     import fowt_env
 
     if out_path is not None:
         table_path(out_path)
+    output(out_path)
+    output(plot, "--plot")
     speeds = parse_numbers(winds, "winds")
     options = parse_pairs(option, "option")
     rows = []

@@ -40,7 +40,10 @@ def train(
         list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a setting; repeatable.")
     ] = None,
 ):
-    """Train an agent with stable-baselines3, validate it as it learns, keep the best."""
+    """Train an agent with stable-baselines3 (PPO, SAC, TQC).
+
+    It is validated as it learns and at the end; best.npz is the policy that scored best.
+    """
     from fowt_env.training.rl.train import Training, resolve
 
     folder = Path(out_folder or f"runs/{task}_{algo}_{seed}")
@@ -75,7 +78,7 @@ def export_policy(
         bool, typer.Option("--trust-zip", help="Load the checkpoint, which executes code from it.")
     ] = False,
 ):
-    """Write the policy of a run's newest checkpoint as a plain array file."""
+    """Turn a training run's checkpoint into a policy file."""
     from fowt_env.training.rl.export import export_run
 
     if Path(out_path).suffix != ".npz":
