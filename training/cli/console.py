@@ -25,8 +25,8 @@ from fowt_env.training.cli.tables import figure, print_table
 
 EXIT_STOPPED, EXIT_INPUT, EXIT_INTERRUPTED = 1, 2, 130
 STUDIES = "fowt_env.training.studies"  # left out of the wheel
-out = Console()
-err = Console(stderr=True)
+out = Console(emoji=False)  # a controller module:Name: is no picture
+err = Console(stderr=True, emoji=False)
 GROUPS = {  # of fowt --help: heading -> its commands, in the order in which they are shown
     "Run": ("simulate", "trim", "plot", "animate", "check", "import", "hydro"),
     "Design": ("linearize", "design"),
@@ -221,8 +221,8 @@ def _lines(description, total, every):
         now, whole = time.monotonic(), total or whole
         if now - said >= every:
             said = now
-            share = f" {100.0 * done / whole:.0f} %" if whole else ""
-            note(f"{now - began:.0f} s:{share} {text or description}")
+            share = f", {100.0 * done / whole:.0f} %" if whole else ""
+            note(f"{now - began:.0f} s{share}: {text or description}")
 
     return update
 

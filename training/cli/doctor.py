@@ -18,7 +18,7 @@ DOCTOR_EXAMPLES = """[bold]Examples[/bold]
 
 [bold]Exit code[/bold]: 0 if versions and the self-test's figures (unless left out) are right, 1 if not."""
 
-out = Console()
+out = Console(emoji=False)
 
 
 @app.command(epilog=DOCTOR_EXAMPLES)

@@ -187,16 +187,15 @@ def _suites():
 
 
 def _cases():
-    from fowt_env.training.evaluation.cases import read_suite, suite_names
-    from fowt_env.training.evaluation.conditions import event_text, sea_text, wind_text
+    from fowt_env.training.evaluation.cases import described, read_suite, suite_names
+    from fowt_env.training.evaluation.conditions import described_texts
 
     rows = []
     for name in suite_names():
         suite = read_suite(name)
         for case in suite.cases:
-            wind = "; ".join(filter(None, (wind_text(case.wind), event_text(case))))
             length = figure(case.duration or suite.duration)
-            rows.append((case.name, name, wind, sea_text(case.sea), length))
+            rows.append((case.name, name, *described_texts(described(case)), length))
     return rows
 
 

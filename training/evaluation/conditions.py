@@ -44,12 +44,12 @@ def sea_text(sea):
     return f"{kind} Hs {state.Hs:.4g} m, Tp {state.Tp:.4g} s"
 
 
-def event_text(case):
-    """Text of what is out of the ordinary in a Case: its fault, a parked rotor, a shifted plant; else ""."""
-    parts = ["parked"] if case.parked else []
-    if case.fault is not None:
-        parts.append(f"{case.fault.kind.replace('_', ' ')} at {case.fault.time:g} s")
-    if case.shift is not None:
-        changes = case.shift.model_dump(exclude_defaults=True)
-        parts += [f"{key.replace('_', ' ')} {value:g}" for key, value in changes.items()]
-    return ", ".join(parts)
+def described_texts(about):
+    """(wind and what happens, sea) in words, of a case as cases.described gives it: a fault, parked, shifts."""
+    parts = [wind_text(about["wind"])]
+    if about["parked"]:
+        parts.append("parked")
+    if about["fault"] is not None:
+        parts.append(f"{about['fault']['kind'].replace('_', ' ')} at {about['fault']['time']:g} s")
+    parts += [f"{key.replace('_', ' ')} {value:g}" for key, value in (about["shift"] or {}).items()]
+    return "; ".join(parts), sea_text(about["sea"])

@@ -37,6 +37,7 @@ NO_WORKERS = (
     f"worker processes died {ATTEMPTS} times (out of memory, killed, or started by a program without"
     " `if __name__ == '__main__':`); {} runs are left: the same command continues with them"
 )
+LONGEST_REASON = 200  # characters of what Ray says
 DONE, RAISED, UNREADABLE = "done", "raised", "unreadable"  # what an answer of a worker is
 
 
@@ -253,7 +254,7 @@ def session(engine, jobs=1, address=None):
     """Context that stays connected to Ray, so that several evaluations inside share its warm workers.
 
     Does nothing for other engines, nor where this process is connected already.
-    Raises: InputError where Ray is not installed.
+    Raises: InputError where Ray is not installed, does not start or cannot be reached.
     """
     if engine != "ray":
         yield
@@ -268,11 +269,24 @@ def session(engine, jobs=1, address=None):
         options = {"num_cpus": jobs, "include_dashboard": False}
         if NICENESS not in os.environ:  # Ray's own choice, 15, waits for whatever else the machine does
             options["_system_config"] = {"worker_niceness": 0}
-    ray.init(log_to_driver=False, logging_level="error", **options)
+    _start(ray, options)
     try:
         yield
     finally:
         ray.shutdown()
+
+
+def _start(ray, options):
+    """Connect to Ray. Raises: InputError in one line, whatever Ray raises and says."""
+    _, error = attempt(lambda: ray.init(log_to_driver=False, logging_level="error", **options))
+    if error is None:
+        return
+    attempt(ray.shutdown)  # of what has been started of it
+    what = f"no cluster at {options['address']!r}" if "address" in options else "Ray does not start"
+    reason = " ".join(str(error).split())[:LONGEST_REASON]
+    raise InputError(
+        f"engine = 'ray': {what} ({type(error).__name__}: {reason}); without Ray: engine 'processes'"
+    ) from None
 
 
 def _ray_module():
