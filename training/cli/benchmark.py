@@ -17,25 +17,25 @@ benchmarks = typer.Typer(
 app.add_typer(benchmarks, name="benchmark")
 SPEED_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt benchmark speed[/cyan]  every kind of scene, load by load (some minutes: each kind is compiled)
+[cyan]fowt benchmark speed[/cyan]  # every kind of scene, load by load (some minutes: each kind is compiled)
 
-[cyan]fowt benchmark speed --kinds "full, standard;full, fast" --starts[/cyan]  two kinds, and start times
+[cyan]fowt benchmark speed --kinds "full, standard;full, fast" --starts[/cyan]  # two kinds, and start times
 
 [bold]File written[/bold]: speed.csv, headed by machine, versions, commit and calibration."""
 ACCURACY_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt benchmark accuracy[/cyan]  every variant, three seeds of 600 s: an hour
+[cyan]fowt benchmark accuracy[/cyan]  # every variant, three seeds of 600 s: an hour
 
-[cyan]fowt benchmark accuracy --seeds 1 --duration 100 --axes "all together"[/cyan]  a first look
+[cyan]fowt benchmark accuracy --seeds 1 --duration 100 --axes "all together"[/cyan]  # a first look
 
-[cyan]fowt benchmark accuracy --platform iea15_volturnus_s --axes levels[/cyan]  another platform's levels
+[cyan]fowt benchmark accuracy --platform iea15_volturnus_s --axes levels[/cyan]  # another platform's levels
 
 [bold]Files written[/bold]: accuracy.csv (a row as each run ends; a rerun resumes), accuracy.png."""
 
 
 COMPILE_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt benchmark compile[/cyan]  a minute or two; kernels of other runs are left as they are"""
+[cyan]fowt benchmark compile[/cyan]  # a minute or two; kernels of other runs are left as they are"""
 
 
 @benchmarks.command(name="compile", epilog=COMPILE_EXAMPLES)
@@ -91,13 +91,13 @@ def speed(
 
 STABILITY_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt benchmark stability[/cyan]  every part on small counts: some minutes
+[cyan]fowt benchmark stability[/cyan]  # every part on small counts: some minutes
 
-[cyan]fowt benchmark stability --cases 100000 --steps 10000000 --hostile 3000[/cyan]  as documented: an hour
+[cyan]fowt benchmark stability --cases 100000 --steps 10000000 --hostile 3000[/cyan]  # as documented: an hour
 
-[cyan]fowt benchmark stability --parts map,extremes[/cyan]  two parts; the report joins those of the folder
+[cyan]fowt benchmark stability --parts map,extremes[/cyan]  # two parts; the report joins those of the folder
 
-[cyan]fowt benchmark stability --replay results/stability/failures/case_0000.json[/cyan]  a failure again
+[cyan]fowt benchmark stability --replay results/stability/failures/case_0000.json[/cyan]  # a failure again
 
 [bold]Files written[/bold]: PART.json, failures/case_NNNN.json, robustness.md, robustness/PART.csv."""
 
@@ -172,9 +172,9 @@ def accuracy(
 
 EVALUATION_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt benchmark evaluation[/cyan]  21 runs of the suite above_rated with pi
+[cyan]fowt benchmark evaluation[/cyan]  # 21 runs of the suite above_rated with pi
 
-[cyan]fowt benchmark evaluation --count 7 --controller lqr --ray[/cyan]  another controller, and Ray"""
+[cyan]fowt benchmark evaluation --count 7 --controller lqr --ray[/cyan]  # another controller, and Ray"""
 
 
 @benchmarks.command(epilog=EVALUATION_EXAMPLES)

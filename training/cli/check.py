@@ -13,9 +13,9 @@ from fowt_env.training.cli.tables import figure, print_table
 
 CHECK_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt check mine.toml[/cyan]  weight against buoyancy, stability, pretension, rest, natural periods
+[cyan]fowt check mine.toml[/cyan]  # weight against buoyancy, stability, pretension, rest, natural periods
 
-[cyan]fowt check oc3_hywind --json[/cyan]  the same for a program
+[cyan]fowt check oc3_hywind --json[/cyan]  # the same for a program
 
 [bold]Exit code[/bold]: 0 if everything fits, 1 if something does not, 2 if the file cannot be read."""
 

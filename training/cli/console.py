@@ -10,7 +10,6 @@ from typing import Annotated
 import typer
 from rich.console import Console
 from rich.markup import escape
-from typer.core import TyperGroup
 from rich.progress import (
     BarColumn,
     Progress,
@@ -19,6 +18,7 @@ from rich.progress import (
     TextColumn,
     TimeElapsedColumn,
 )
+from typer.core import TyperGroup
 
 from fowt_env.errors import ControllerError, InputError, SimulationStopped
 from fowt_env.training.cli.tables import figure, print_table
@@ -51,7 +51,7 @@ class Overview(TyperGroup):
         out.print(f"[bold]fowt[/bold]  {self.help}  [dim](--version)[/dim]\n", highlight=False)
         width = max(len(command) for command, _ in START)
         for command, text in START:
-            out.print(f"  [cyan]{command:{width}}[/cyan]  {text}", highlight=False)
+            out.print(f"  [cyan]{command:{width}}[/cyan]  # {text}", highlight=False)
         names = max(map(len, self.commands))
         headings = max(map(len, GROUPS))
         for group, commands in self.by_group().items():
@@ -59,7 +59,7 @@ class Overview(TyperGroup):
             for number, command in enumerate(commands):
                 heading = group if number == 0 else ""
                 text = summary_of(self.commands[command])
-                line = f"[bold]{heading:{headings}}[/bold]  [cyan]{command:{names}}[/cyan]  {escape(text)}"
+                line = f"[bold]{heading:{headings}}[/bold]  [cyan]{command:{names}}[/cyan]  # {escape(text)}"
                 out.print(line, highlight=False)
 
     def by_group(self):
@@ -232,7 +232,10 @@ PlatformOption = Annotated[
     str, typer.Option(help="Platform: a name of fowt list platforms, or a path to a TOML file.")
 ]
 OptionOption = Annotated[
-    list[str] | None, typer.Option("--option", metavar="KEY=VALUE", help="Option of the scene, of fowt list options; repeatable.")
+    list[str] | None,
+    typer.Option(
+        "--option", metavar="KEY=VALUE", help="Option of the scene, of fowt list options; repeatable."
+    ),
 ]
 RotorOption = Annotated[
     str | None, typer.Option(help="Rotor model: bem, lookup or table; default: that of the fidelity.")

@@ -25,20 +25,22 @@ from fowt_env.training.cli.console import (
 )
 from fowt_env.training.cli.tables import print_table
 
-design = typer.Typer(no_args_is_help=True, rich_markup_mode="rich", help="Design and tune controllers, and find their limits.")
+design = typer.Typer(
+    no_args_is_help=True, rich_markup_mode="rich", help="Design and tune controllers, and find their limits."
+)
 app.add_typer(design, name="design")
 
 LINEARIZE_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt linearize --winds 18[/cyan]  modes with periods and damping at one wind
+[cyan]fowt linearize --winds 18[/cyan]  # modes with periods and damping at one wind
 
-[cyan]fowt linearize --winds 4:25:1 --out modes.csv[/cyan]  the sweep, cut-in to cut-out
+[cyan]fowt linearize --winds 4:25:1 --out modes.csv[/cyan]  # the sweep, cut-in to cut-out
 
-[cyan]fowt linearize --out study[/cyan]  a folder: tables, models, pole map, damping and Bode plots
+[cyan]fowt linearize --out study[/cyan]  # a folder: tables, models, pole map, damping and Bode plots
 
-[cyan]fowt linearize --winds 18 --out model.mat[/cyan]  the matrices, for MATLAB and Simulink (write_mat)
+[cyan]fowt linearize --winds 18 --out model.mat[/cyan]  # the matrices, for MATLAB and Simulink (write_mat)
 
-[cyan]fowt linearize --winds 12:24:2 --out models.npz[/cyan]  those of several winds, as arrays
+[cyan]fowt linearize --winds 12:24:2 --out models.npz[/cyan]  # those of several winds, as arrays
 
 In Python, fowt_env.linearize(scene).to_statespace() is the same model as a control.StateSpace.
 
@@ -47,65 +49,65 @@ rotor speed bounds how fast any pitch controller on speed alone may be. Below ra
 its minimum: the zeros and Bode plots of blade pitch leave those winds out."""
 PI_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt design pi --omega 0.2 --zeta 0.7 --out my.json[/cyan]  the published aim, on this rotor
+[cyan]fowt design pi --omega 0.2 --zeta 0.7 --out my.json[/cyan]  # the published aim, on this rotor
 
-[cyan]fowt evaluate --controllers gspi_oc3,design:my.json --cases ntm_18[/cyan]  score it
+[cyan]fowt evaluate --controllers gspi_oc3,design:my.json --cases ntm_18[/cyan]  # score it
 
 slope: rotor acceleration per blade pitch; KP, KI, omega, zeta: of the rotor loop at that wind;
 platform_zeta: damping of platform pitch under these gains, without viscous drag, negative where unstable."""
 BOUND_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt design bound --wind 18[/cyan]  the performance limit of linear control, at 18 m/s
+[cyan]fowt design bound --wind 18[/cyan]  # the performance limit of linear control, at 18 m/s
 
-[cyan]fowt design bound --out bound.csv --plot bound.png[/cyan]  all winds above rated
+[cyan]fowt design bound --out bound.csv --plot bound.png[/cyan]  # all winds above rated
 
-[cyan]fowt design bound --wind 18 --information measured,measured_pitch_only[/cyan]  what torque is worth
+[cyan]fowt design bound --wind 18 --information measured,measured_pitch_only[/cyan]  # what torque is worth
 
-[cyan]fowt design bound --wind 18 --previews 5 --information full,full_preview_5[/cyan]  5 s of wind ahead
+[cyan]fowt design bound --wind 18 --previews 5 --information full,full_preview_5[/cyan]  # 5 s of wind ahead
 
 Deviations are shown over those of gspi_oc3 on the same model, at no more pitch travel and power deviation.
 Information: full (plant, wind and waves), measured (five sensors with their noise) or speed (rotor speed and
 blade pitch); with _preview_T where the wind is known T s ahead, with _pitch_only without torque."""
 ZEROS_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt design zeros[/cyan]  OC3-Hywind, whole winds above rated
+[cyan]fowt design zeros[/cyan]  # OC3-Hywind, whole winds above rated
 
-[cyan]fowt design zeros --platform nrel5mw_oc4_semi --out zeros.csv[/cyan]  another platform, as a table
+[cyan]fowt design zeros --platform nrel5mw_oc4_semi --out zeros.csv[/cyan]  # another platform, as a table
 
 A zero in the right half plane, near the platform's own pitch, is where holding the rotor speed with the
 blades takes the thrust that damps the platform: no feedback of rotor speed alone can be faster. pi: damping
 ratios of platform pitch (or of the rotor, where that is less) and of surge under pi; drag is left out."""
 TUNE_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt design tune pi_tuned[/cyan]  three factors on the published gains, 40 settings tried
+[cyan]fowt design tune pi_tuned[/cyan]  # three factors on the published gains, 40 settings tried
 
-[cyan]fowt design tune rosco_float --jobs 2 --keep[/cyan]  and put what it finds into controllers/tuned.toml
+[cyan]fowt design tune rosco_float --jobs 2 --keep[/cyan]  # and put what it finds into controllers/tuned.toml
 
 Cost: mean of rotor-speed and platform-pitch deviation over gspi_oc3's, over the lifetime, and penalties
 beyond the limits of the suite, for energy below 99.5 % and for failed or tripped runs. Written:
 OUT/tune_NAME.csv, a row per setting as soon as it has run."""
 FRONT_EXAMPLES = """[bold]Example[/bold]
 
-[cyan]fowt design front --runs sweep.csv --bound bound.csv --plot front.png[/cyan]  lqr beside the limit
+[cyan]fowt design front --runs sweep.csv --bound bound.csv --plot front.png[/cyan]  # lqr beside the limit
 
 The tables are those of fowt design lqr-sweep --vary ... --out and fowt design bound --out."""
 LQR_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt design lqr[/cyan]  the settings and their defaults
+[cyan]fowt design lqr[/cyan]  # the settings and their defaults
 
-[cyan]fowt design lqr --setting travel=0.8 --out my.json[/cyan]  a design with less blade-pitch travel
+[cyan]fowt design lqr --setting travel=0.8 --out my.json[/cyan]  # a design with less blade-pitch travel
 
-[cyan]fowt simulate --controller design:my.json --wind ntm:18:B[/cyan]  run it
+[cyan]fowt simulate --controller design:my.json --wind ntm:18:B[/cyan]  # run it
 
 share is that of platform pitch in what is minimised, the rest is rotor speed; travel, power, torque and shaft
 are limits, see LQGSettings in controllers/lqr/design.py. Many values at once: fowt design lqr-sweep."""
 SWEEP_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt design lqr-sweep[/cyan]  the shipped settings against gspi_oc3 on validation seeds
+[cyan]fowt design lqr-sweep[/cyan]  # the shipped settings against gspi_oc3 on validation seeds
 
-[cyan]fowt design lqr-sweep --vary share=0.3,0.5,0.7 --out sweep.csv[/cyan]  from rotor speed to platform pitch
+[cyan]fowt design lqr-sweep --vary share=0.3,0.5,0.7 --out sweep.csv[/cyan]  # from rotor speed to platform pitch
 
-[cyan]fowt design front --runs sweep.csv --bound bound.csv[/cyan]  beside the limit of fowt design bound --out"""
+[cyan]fowt design front --runs sweep.csv --bound bound.csv[/cyan]  # beside the limit of fowt design bound --out"""
 SETTINGS = {  # of LQGSettings, in words
     "share": "of platform pitch in what is minimised; the rest: rotor speed",
     "share_growth": "of the share, per m/s",
@@ -477,7 +479,9 @@ def tune_command(
     budget: Annotated[int, typer.Option(help="Settings that are tried.")] = 40,
     suite: Annotated[str, typer.Option(help="Suite whose cases are run.")] = "above_rated",
     platform: PlatformOption = "oc3_hywind",
-    seeds: Annotated[str, typer.Option(help="Validation seeds, 1000 or more: 1001,1002 or 1001:1006:1 (1006 included).")] = "1001,1002",
+    seeds: Annotated[
+        str, typer.Option(help="Validation seeds, 1000 or more: 1001,1002 or 1001:1006:1 (1006 included).")
+    ] = "1001,1002",
     preview: Annotated[str, typer.Option(help="Wind ahead: exact, or a lidar by its name.")] = "exact",
     jobs: Annotated[int, typer.Option(help="Worker processes.")] = 1,
     engine: Annotated[str, typer.Option(help="Where the runs go: processes or ray.")] = "processes",

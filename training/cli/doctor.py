@@ -12,9 +12,9 @@ from fowt_env.training.cli.console import app, reported
 
 DOCTOR_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt doctor[/cyan]  all of it; the self-test compiles kernels if it must, up to a minute
+[cyan]fowt doctor[/cyan]  # all of it; the self-test compiles kernels if it must, up to a minute
 
-[cyan]fowt doctor --no-test[/cyan]  versions, optional parts and the cache alone
+[cyan]fowt doctor --no-test[/cyan]  # versions, optional parts and the cache alone
 
 [bold]Exit code[/bold]: 0 if versions and the self-test's figures (unless left out) are right, 1 if not."""
 

@@ -26,19 +26,19 @@ from fowt_env.training.cli.tables import print_table, table_width
 MOST_CASES = 12  # whose conditions are printed
 EVALUATE_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt evaluate --suite above_rated --controllers pi,pi_land --jobs 2[/cyan]  the headline comparison
+[cyan]fowt evaluate --suite above_rated --controllers pi,pi_land --jobs 2[/cyan]  # the headline comparison
 
-[cyan]fowt evaluate --controllers pi --cases above_rated[/cyan]  the PI of Eq. (8), 12 to 24 m/s, one seed
+[cyan]fowt evaluate --controllers pi --cases above_rated[/cyan]  # the PI of Eq. (8), 12 to 24 m/s, one seed
 
 [cyan]fowt evaluate --controllers pi,pi_land --cases ntm_18,paper_18 --seeds 1,2,3 --jobs 2[/cyan]
 
-[cyan]fowt evaluate --suite mysuite.toml --controllers pi,mymodule:Mine --baseline pi[/cyan]  your own cases
+[cyan]fowt evaluate --suite mysuite.toml --controllers pi,mymodule:Mine --baseline pi[/cyan]  # your own cases
 
-[cyan]fowt evaluate --suite above_rated --platform nrel5mw_oc4_semi --out results/oc4[/cyan]  another platform
+[cyan]fowt evaluate --suite above_rated --platform nrel5mw_oc4_semi --out results/oc4[/cyan]  # another platform
 
-[cyan]fowt evaluate --suite above_rated --sensors exact --out results/exact[/cyan]  without noise and delay
+[cyan]fowt evaluate --suite above_rated --sensors exact --out results/exact[/cyan]  # without noise and delay
 
-[cyan]fowt evaluate --controllers pi,mymodule:Mine --out results/mine --retry-failed[/cyan]  once it is repaired
+[cyan]fowt evaluate --controllers pi,mymodule:Mine --out results/mine --retry-failed[/cyan]  # once it is repaired
 
 [bold]Files written[/bold]: runs/CONTROLLER/CASE_seedN.parquet, results.csv (a row per run), leaderboard.json
 (means, intervals, paired differences, versions), manifest.json (the settings), summary.csv (means by

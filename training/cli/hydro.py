@@ -13,9 +13,9 @@ from fowt_env.training.cli.tables import print_table
 
 EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt hydro semi.gdf --depth 200 --out hydro.npz[/cyan]  0.05 to 3 rad/s, waves from -180 to 180 deg
+[cyan]fowt hydro semi.gdf --depth 200 --out hydro.npz[/cyan]  # 0.05 to 3 rad/s, waves from -180 to 180 deg
 
-[cyan]fowt hydro spar.stl --depth 320 --omega 0.1:2.5:0.1 --heading 0[/cyan]  fewer of both
+[cyan]fowt hydro spar.stl --depth 320 --omega 0.1:2.5:0.1 --heading 0[/cyan]  # fewer of both
 
 In the platform file: [potential_flow] coefficients = "hydro.npz" and displaced_volume, which is printed.
 A problem takes a second with 3000 panels; there are six and one per heading at each frequency."""
@@ -29,10 +29,10 @@ def hydro(
     out_file: Annotated[Path, typer.Option("--out", help="Coefficients to write (.npz).")] = Path(
         "hydro.npz"
     ),
-    omega: Annotated[
-        str, typer.Option(help=f"Frequencies, rad/s: {RANGE}.")
-    ] = "0.05:3:0.05",
-    heading: Annotated[str, typer.Option(help=f"Directions of travel of the waves, deg: {RANGE}.")] = "-180:180:30",
+    omega: Annotated[str, typer.Option(help=f"Frequencies, rad/s: {RANGE}.")] = "0.05:3:0.05",
+    heading: Annotated[
+        str, typer.Option(help=f"Directions of travel of the waves, deg: {RANGE}.")
+    ] = "-180:180:30",
     density: Annotated[float, typer.Option(help="Of the water, kg/m3.")] = 1025.0,
     gravity: Annotated[float, typer.Option(help="m/s2.")] = 9.80665,
     lid: Annotated[

@@ -11,13 +11,13 @@ from fowt_env.training.cli.tables import print_table
 
 EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt import deck/5MW_OC4Semi.fst --out my_semi[/cyan]  platform.toml, turbine, coefficients and report.md
+[cyan]fowt import deck/5MW_OC4Semi.fst --out my_semi[/cyan]  # platform.toml, turbine, coefficients and report.md
 
-[cyan]fowt import deck.fst --out mine --discon tuned_DISCON.IN[/cyan]  another controller than the deck's
+[cyan]fowt import deck.fst --out mine --discon tuned_DISCON.IN[/cyan]  # another controller than the deck's
 
-[cyan]fowt import --elastodyn ED.dat --aerodyn AD15.dat --hydrodyn HD.dat --mooring MAP.dat --out mine[/cyan]  without an .fst
+[cyan]fowt import --elastodyn ED.dat --aerodyn AD15.dat --hydrodyn HD.dat --mooring MAP.dat --out mine[/cyan]  # without an .fst
 
-[cyan]fowt simulate --platform my_semi/platform.toml --wind 14[/cyan]  what comes next
+[cyan]fowt simulate --platform my_semi/platform.toml --wind 14[/cyan]  # what comes next
 
 docs/guides/import.md says what is read, what is approximated and what is refused."""  # noqa: E501
 

@@ -8,9 +8,7 @@ import typer
 from fowt_env.training.cli.console import app, note, out, output, progress_bar, reported
 from fowt_env.training.cli.tables import print_table
 
-board_app = typer.Typer(
-    help="Keep a standing board of submitted controllers.", no_args_is_help=True
-)
+board_app = typer.Typer(help="Keep a standing board of submitted controllers.", no_args_is_help=True)
 app.add_typer(board_app, name="leaderboard")
 
 BoardOption = Annotated[Path, typer.Option("--board", help="Folder of the board.")]
@@ -24,7 +22,7 @@ ADD_EXAMPLES = """A submission is a folder with card.toml and the controller tha
     information = ["generator_speed", "blade_pitch"]
     tuning = "gains by hand, seeds 1001 to 1004"
 
-[cyan]fowt leaderboard add my_controller[/cyan]  into ./board, which is made with the package's own
+[cyan]fowt leaderboard add my_controller[/cyan]  # into ./board, which is made with the package's own
 controllers if there is none"""
 
 
@@ -54,9 +52,9 @@ def add_command(
         note(f"added {name}; judge it with: fowt leaderboard run --board {board}")
 
 
-RUN_EXAMPLES = """[cyan]fowt leaderboard run --jobs 2[/cyan]  all submissions on the public seeds
+RUN_EXAMPLES = """[cyan]fowt leaderboard run --jobs 2[/cyan]  # all submissions on the public seeds
 
-[cyan]fowt leaderboard run --secret seeds.txt --private private --trust-code[/cyan]  on the organiser's
+[cyan]fowt leaderboard run --secret seeds.txt --private private --trust-code[/cyan]  # on the organiser's
 seeds too
 
 Python files run only with [bold]--trust-code[/bold], each in a process of its own, with your user's
@@ -95,7 +93,7 @@ def run_command(
     note(f"wrote {', '.join(path.name for path in written)} in {board}")
 
 
-SHOW_EXAMPLES = """[cyan]fowt leaderboard show[/cyan]  the board in ./board, its first regime"""
+SHOW_EXAMPLES = """[cyan]fowt leaderboard show[/cyan]  # the board in ./board, its first regime"""
 
 
 @board_app.command(name="show", epilog=SHOW_EXAMPLES)

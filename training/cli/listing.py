@@ -339,15 +339,15 @@ KINDS = {
 }  # fmt: skip
 LIST_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt list[/cyan]  the kinds of names, how many there are of each, and where they are used
+[cyan]fowt list[/cyan]  # the kinds of names, how many there are of each, and where they are used
 
-[cyan]fowt list seas[/cyan]  sea states with Hs, Tp and source
+[cyan]fowt list seas[/cyan]  # sea states with Hs, Tp and source
 
-[cyan]fowt list cases above_rated[/cyan]  wind, sea and duration of the cases of a suite
+[cyan]fowt list cases above_rated[/cyan]  # wind, sea and duration of the cases of a suite
 
-[cyan]fowt list channels tower[/cyan]  rows with "tower" in them
+[cyan]fowt list channels tower[/cyan]  # rows with "tower" in them
 
-[cyan]fowt list metrics --json[/cyan]  for a program"""
+[cyan]fowt list metrics --json[/cyan]  # for a program"""
 
 
 @app.command(name="list", epilog=LIST_EXAMPLES)
@@ -371,7 +371,7 @@ def list_names(
         tables = {name: _as_mappings(KINDS[name], rows) for name, rows in found.items()}
         out.print_json(json.dumps(tables if kind == "all" else tables[kind]))
         return
-    for number, (name, rows) in enumerate((item for item in found.items() if item[1])):
+    for number, (name, rows) in enumerate(item for item in found.items() if item[1]):
         if number:
             out.print()
         _print_kind(name, rows)

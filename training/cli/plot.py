@@ -11,27 +11,28 @@ from fowt_env.training.cli.console import app, note, output, reported
 PLOTS = ("series", "spectra", "boxes", "raos", "schedule")
 PLOT_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt plot series run.csv[/cyan]  stacked time series, into series.png
+[cyan]fowt plot series run.csv[/cyan]  # stacked time series, into series.png
 
-[cyan]fowt plot spectra pi.csv lqr.csv --skip 100 --out spectra.png[/cyan]  two runs over each other
+[cyan]fowt plot spectra pi.csv lqr.csv --skip 100 --out spectra.png[/cyan]  # two runs over each other
 
-[cyan]fowt plot series openfast.outb run.csv[/cyan]  a run of OpenFAST beside one of fowt simulate
+[cyan]fowt plot series openfast.outb run.csv[/cyan]  # a run of OpenFAST beside one of fowt simulate
 
-[cyan]fowt plot boxes results/demo/runs/*/ntm_18_seed1.parquet --out boxes.png[/cyan]  a box for each run
+[cyan]fowt plot boxes results/demo/runs/*/ntm_18_seed1.parquet --out boxes.png[/cyan]  # a box for each run
 
-[cyan]fowt plot raos waves.parquet --skip 100[/cyan]  motion per metre of wave, of a run in irregular waves
+[cyan]fowt plot raos waves.parquet --skip 100[/cyan]  # motion per metre of wave, of a run in irregular waves
 
-[cyan]fowt plot schedule steady.csv[/cyan]  operating points that fowt trim --out wrote
+[cyan]fowt plot schedule steady.csv[/cyan]  # operating points that fowt trim --out wrote
 
-Runs are files of fowt simulate --out and of an evaluation's runs folder, and OpenFAST's binary outputs (.outb)
-with the same channels."""
+Runs are files of fowt simulate --out, of an evaluation's runs folder, and binary outputs of OpenFAST (.outb)."""
 
 
 @app.command(epilog=PLOT_EXAMPLES)
 @reported
 def plot(
     kind: Annotated[str, typer.Argument(help="series, spectra, boxes, raos or schedule.")],
-    files: Annotated[list[str], typer.Argument(help="Runs, .csv, .parquet or .outb; one line or box for each.")],
+    files: Annotated[
+        list[str], typer.Argument(help="Runs, .csv, .parquet or .outb; one line or box for each.")
+    ],
     out_path: Annotated[
         str | None, typer.Option("--out", help="Picture: .png, .svg, .pdf ...; default: KIND.png.")
     ] = None,

@@ -11,7 +11,7 @@ from fowt_env.training.cli.console import OptionOption, app, note, output, progr
 
 REPORT_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt report results/demo[/cyan]  results/demo/report.html
+[cyan]fowt report results/demo[/cyan]  # results/demo/report.html
 
 [cyan]fowt report results/suite --cases ntm_12,ntm_24 --seeds 1,2 --rate 5 --out page.html[/cyan]
 
@@ -29,7 +29,8 @@ def report(
         str | None, typer.Option(help="Cases with time series, comma-separated; default: up to 64 runs.")
     ] = None,
     seeds: Annotated[
-        str | None, typer.Option(help="Seeds whose time series go in: 1,2 or 1:6:1 (6 included); default: the first.")
+        str | None,
+        typer.Option(help="Seeds whose time series go in: 1,2 or 1:6:1 (6 included); default: the first."),
     ] = None,
     rate: Annotated[
         float | None, typer.Option(help="Samples per second of the time series; default: 2 or less.")
@@ -63,7 +64,7 @@ def report(
 
 ANIMATE_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt animate gust.gif[/cyan]  OC3 and land gains in an extreme operating gust at 18 m/s
+[cyan]fowt animate gust.gif[/cyan]  # OC3 and land gains in an extreme operating gust at 18 m/s
 
 [cyan]fowt animate run.mp4 --controllers pi --wind ntm:14:B --sea jonswap:4:9 --duration 120[/cyan]"""
 

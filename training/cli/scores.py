@@ -106,11 +106,11 @@ CASES_EXAMPLES = """[bold]Examples[/bold]
 
 [cyan]fowt evaluate --suite shifted --controllers policy:ppo_lqr,gspi_oc3 --out results/shifted[/cyan]
 
-[cyan]fowt scores cases results/shifted --out results/shifted/scores[/cyan]  every shifted plant by itself
+[cyan]fowt scores cases results/shifted --out results/shifted/scores[/cyan]  # every shifted plant by itself
 
-[cyan]fowt scores cases results/gusts --figures "RotSpeed_max_[rpm],PtfmPitch_max_[deg]"[/cyan]  any metric
+[cyan]fowt scores cases results/gusts --figures "RotSpeed_max_[rpm],PtfmPitch_max_[deg]"[/cyan]  # any metric
 
-[cyan]fowt scores cases results/sea_states --each[/cyan]  one row per sea state"""
+[cyan]fowt scores cases results/sea_states --each[/cyan]  # one row per sea state"""
 
 
 @scores.command(name="cases", epilog=CASES_EXAMPLES)

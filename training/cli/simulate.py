@@ -9,8 +9,8 @@ from fowt_env.errors import SimulationStopped
 from fowt_env.files.tables import SERIES_SUFFIXES, table_path, write_table
 from fowt_env.training.cli.arguments import parse_fault, parse_pairs, parse_protection, parse_sea, parse_wind
 from fowt_env.training.cli.console import (
-    OptionOption,
     RANGE,
+    OptionOption,
     PlatformOption,
     RotorOption,
     app,
@@ -25,21 +25,21 @@ from fowt_env.training.cli.tables import figure, print_table
 ROUNDING = 1e-9  # a standard deviation below this fraction of the mean is none
 SIMULATE_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt simulate --wind 18 --sea paper_wind_wave --plot run.png[/cyan]  steady wind, irregular sea
+[cyan]fowt simulate --wind 18 --sea paper_wind_wave --plot run.png[/cyan]  # steady wind, irregular sea
 
-[cyan]fowt simulate --wind ntm:18:B --seed 3 --controller pi_land --out run.csv[/cyan]  turbulence, land gains
+[cyan]fowt simulate --wind ntm:18:B --seed 3 --controller pi_land --out run.csv[/cyan]  # turbulence, land gains
 
-[cyan]fowt simulate --wind none --sea regular:3:5 --controller none --start zero[/cyan]  waves alone
+[cyan]fowt simulate --wind none --sea regular:3:5 --controller none --start zero[/cyan]  # waves alone
 
-[cyan]fowt simulate --wind none --start zero --controller none --initial PtfmSurge=10[/cyan]  free decay
+[cyan]fowt simulate --wind none --start zero --controller none --initial PtfmSurge=10[/cyan]  # free decay
 
-[cyan]fowt simulate --wind '{"kind": "etm", "speed": 18, "class": "A"}'[/cyan]  any wind, as JSON
+[cyan]fowt simulate --wind '{"kind": "etm", "speed": 18, "class": "A"}'[/cyan]  # any wind, as JSON
 
-[cyan]fowt simulate --controller policy:ppo_lqr --wind ntm:16:B[/cyan]  a trained agent
+[cyan]fowt simulate --controller policy:ppo_lqr --wind ntm:16:B[/cyan]  # a trained agent
 
-[cyan]fowt simulate --controller ipc --option pitch=individual[/cyan]  a pitch for each blade
+[cyan]fowt simulate --controller ipc --option pitch=individual[/cyan]  # a pitch for each blade
 
-[cyan]fowt simulate --wind 18 --fault grid_loss:100 --protection turbine[/cyan]  a fault, and trips"""
+[cyan]fowt simulate --wind 18 --fault grid_loss:100 --protection turbine[/cyan]  # a fault, and trips"""
 OF_BLADES = ("RootMyc1_[kN-m]", "LSSTipMys_[kN-m]", "LSSTipMzs_[kN-m]")  # of scenes that have them
 
 
@@ -189,11 +189,11 @@ def _print_channels(frame, title):
 
 TRIM_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt trim[/cyan]  the floating turbine from cut-in to cut-out
+[cyan]fowt trim[/cyan]  # the floating turbine from cut-in to cut-out
 
-[cyan]fowt trim --winds 8,11.4,18 --fixed --out steady.csv[/cyan]  fixed platform, into a file
+[cyan]fowt trim --winds 8,11.4,18 --fixed --out steady.csv[/cyan]  # fixed platform, into a file
 
-[cyan]fowt trim --plot schedule.png[/cyan]  the steady schedule as a picture"""
+[cyan]fowt trim --plot schedule.png[/cyan]  # the steady schedule as a picture"""
 TRIM_CHANNELS = (
     "RotSpeed",
     "BldPitch1",

@@ -16,24 +16,27 @@ LINE_EVERY = 10.0  # s between lines of progress without a terminal
 WRITTEN = ("best.npz", "last.npz", "validation.csv", "learning_curve.png")
 TRAIN_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt train --steps 20000 --out runs/first[/cyan]  a first try
+[cyan]fowt train --steps 20000 --out runs/first[/cyan]  # a first try
 
 [cyan]fowt train --algo ppo --steps 4000000 --seed 0 --out runs/ppo_0[/cyan]
 
-[cyan]fowt train --out runs/ppo_0 --resume[/cyan]  go on after Ctrl-C, kill or a crash
+[cyan]fowt train --out runs/ppo_0 --resume[/cyan]  # go on after Ctrl-C, kill or a crash
 
 [cyan]fowt train --set environment.observation=preview --set environment.reward.pitch_travel=20[/cyan]
 
 [bold]Steps[/bold] are decisions of the agent, each several control periods (decisions.hold).
-[bold]Files written[/bold]: settings.yml, versions.json, checkpoints/, validation.csv, best.npz, last.npz,
-learning_curve.png, tensorboard/. A policy runs as  fowt evaluate --controllers policy:runs/ppo_0/best.npz"""
+[bold]Files written[/bold]: best.npz, last.npz (policies), validation.csv, learning_curve.png, settings.yml,
+versions.json, checkpoints/, tensorboard/. A policy runs as policy:runs/ppo_0/best.npz wherever a controller does.
+Without a terminal a line of progress is printed every 10 s."""
 
 
 @app.command(epilog=TRAIN_EXAMPLES)
 @reported
 def train(
     algo: Annotated[str, typer.Option(help="ppo, sac or tqc.")] = "ppo",
-    task: Annotated[str, typer.Option(help="Settings of training/rl/ALGO.yml: above_rated, ...")] = "above_rated",
+    task: Annotated[
+        str, typer.Option(help="Settings of training/rl/ALGO.yml: above_rated, ...")
+    ] = "above_rated",
     seed: Annotated[int, typer.Option(help="Random seed of networks and episodes.")] = 0,
     steps: Annotated[int | None, typer.Option(help="Decisions; default 2000000, or as before.")] = None,
     out_folder: Annotated[str | None, typer.Option("--out", help="Folder of the run.")] = None,
@@ -98,9 +101,9 @@ def _print_validations(run):
 
 EXPORT_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt export-policy runs/ppo_0 --out mine.npz --trust-zip[/cyan]  of a run of your own
+[cyan]fowt export-policy runs/ppo_0 --out mine.npz --trust-zip[/cyan]  # of a run of your own
 
-[cyan]fowt evaluate --controllers policy:mine.npz,pi[/cyan]  compare it
+[cyan]fowt evaluate --controllers policy:mine.npz,pi[/cyan]  # compare it
 
 fowt train writes best.npz and last.npz by itself: this is for a run that was stopped."""
 
@@ -131,7 +134,7 @@ def export_policy(
 
 TRAINING_EXAMPLES = """[bold]Example[/bold]
 
-[cyan]fowt benchmark training --envs 16 --steps 20000[/cyan]  a first look"""
+[cyan]fowt benchmark training --envs 16 --steps 20000[/cyan]  # a first look"""
 
 
 @benchmarks.command(epilog=TRAINING_EXAMPLES)

@@ -20,13 +20,13 @@ from fowt_env.training.cli.tables import figure, print_table
 
 VALIDATE_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt validate --case decays,steady[/cyan]  the quick ones
+[cyan]fowt validate --case decays,steady[/cyan]  # the quick ones
 
-[cyan]fowt validate[/cyan]  every figure against OpenFAST
+[cyan]fowt validate[/cyan]  # every figure against OpenFAST
 
-[cyan]fowt validate --platform iea15_volturnus_s[/cyan]  another platform's
+[cyan]fowt validate --platform iea15_volturnus_s[/cyan]  # another platform's
 
-[cyan]fowt validate --case all --bts turbsim_18mps.bts[/cyan]  with the cheaper choices, from the full box
+[cyan]fowt validate --case all --bts turbsim_18mps.bts[/cyan]  # with the cheaper choices, from the full box
 
 [bold]Files written[/bold]: validation.csv and validation.md (every figure with its verdict), and plots."""
 
@@ -98,11 +98,11 @@ def validate(
 
 PAPER_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt paper LC5[/cyan]  one load case of the 1:50 model
+[cyan]fowt paper LC5[/cyan]  # one load case of the 1:50 model
 
-[cyan]fowt paper all[/cyan]  LC1 to LC12 with the paper's claims checked
+[cyan]fowt paper all[/cyan]  # LC1 to LC12 with the paper's claims checked
 
-[cyan]fowt paper full_scale[/cyan]  decays, regular wave, wind and waves at full scale
+[cyan]fowt paper full_scale[/cyan]  # decays, regular wave, wind and waves at full scale
 
 [bold]Files written[/bold]: runs/CASE.parquet, statistics.csv, paper.md (claims and tables), and plots."""
 
