@@ -313,8 +313,9 @@ def cli_page():
     lines = [
         "# Command line",
         "Written by `python docs/tools/reference_pages.py` from the commands; `--help` says the same.",
-        "Exit codes: 0 done; 1 a run stopped, or a check failed; 2 an argument cannot be used; 130 interrupted.",
-        "Folders for what is written are made in the working folder alone, and said to be. Ranges include their"
+        "Exit codes: 0 done; 1 a run stopped, or a check failed; 2 an argument cannot be used;"
+        " 130 interrupted.",
+        "New folders are made in the working folder alone, and announced. Ranges include their"
         " end: `--winds 4:24:1` has 24, `--seeds 1:6:1` has 6.",
         "## Options of several commands",
         _options_table(shared),

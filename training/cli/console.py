@@ -174,7 +174,7 @@ def output(path, option="--out", folder=False):
     if not inside and not (folder and place.parent.is_dir()):
         missing = place.parent if folder else place
         raise InputError(
-            f"{option} {str(path)!r}: there is no folder {str(missing)!r}; make it first: new folders are made"
+            f"{option} {str(path)!r}: there is no folder {str(missing)!r}; make it first: folders are made"
             " in the working folder alone"
         )
     note(f"makes the folder {place}")

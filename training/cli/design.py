@@ -105,9 +105,9 @@ SWEEP_EXAMPLES = """[bold]Examples[/bold]
 
 [cyan]fowt design lqr-sweep[/cyan]  # the shipped settings against gspi_oc3 on validation seeds
 
-[cyan]fowt design lqr-sweep --vary share=0.3,0.5,0.7 --out sweep.csv[/cyan]  # from rotor speed to platform pitch
+[cyan]fowt design lqr-sweep --vary share=0.3,0.5,0.7 --out sweep.csv[/cyan]  # three designs
 
-[cyan]fowt design front --runs sweep.csv --bound bound.csv[/cyan]  # beside the limit of fowt design bound --out"""
+[cyan]fowt design front --runs sweep.csv --bound bound.csv[/cyan]  # beside the performance limit"""
 SETTINGS = {  # of LQGSettings, in words
     "share": "of platform pitch in what is minimised; the rest: rotor speed",
     "share_growth": "of the share, per m/s",
@@ -172,7 +172,7 @@ def linearize(
         str | None,
         typer.Option(
             "--out",
-            help="Modes: .csv, .parquet; models: .json, .npz, of one wind .mat; all of it, with plots: a folder.",
+            help="Modes: .csv, .parquet; models: .json, .npz, of one wind .mat; all, with plots: a folder.",
         ),
     ] = None,
 ):

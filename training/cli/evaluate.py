@@ -12,6 +12,7 @@ from fowt_env.errors import InputError, unknown
 from fowt_env.files.tables import write_table
 from fowt_env.training.cli.console import (
     EXIT_INTERRUPTED,
+    EXIT_STOPPED,
     app,
     err,
     fail,
@@ -34,11 +35,11 @@ EVALUATE_EXAMPLES = """[bold]Examples[/bold]
 
 [cyan]fowt evaluate --suite mysuite.toml --controllers pi,mymodule:Mine --baseline pi[/cyan]  # your own cases
 
-[cyan]fowt evaluate --suite above_rated --platform nrel5mw_oc4_semi --out results/oc4[/cyan]  # another platform
+[cyan]fowt evaluate --suite above_rated --platform nrel5mw_oc4_semi --out results/oc4[/cyan]
 
 [cyan]fowt evaluate --suite above_rated --sensors exact --out results/exact[/cyan]  # without noise and delay
 
-[cyan]fowt evaluate --controllers pi,mymodule:Mine --out results/mine --retry-failed[/cyan]  # once it is repaired
+[cyan]fowt evaluate --controllers pi,mymodule:Mine --out results/mine --retry-failed[/cyan]  # what failed
 
 [bold]Files written[/bold]: runs/CONTROLLER/CASE_seedN.parquet, results.csv (a row per run), leaderboard.json
 (means, intervals, paired differences, versions), manifest.json (the settings), summary.csv (means by
@@ -104,6 +105,7 @@ def evaluate_command(
 
     With intervals, metrics by case, the time series of all runs, and plots.
     """
+    from fowt_env.training.evaluation.engines import WorkersLost
     from fowt_env.training.evaluation.evaluate import evaluate, summary
     from fowt_env.training.reports.terminal import chosen_cases, write_leaderboard
 
@@ -140,6 +142,8 @@ def evaluate_command(
         except KeyboardInterrupt:
             place = f"in {folder / 'results.csv'}; the same command continues with the others"
             fail(f"interrupted; the {finished} finished runs are {place}", EXIT_INTERRUPTED)
+        except WorkersLost as error:
+            fail(error, EXIT_STOPPED)
     _print_conditions(folder, suite)
     board = write_leaderboard(table, folder, baseline)
     means = summary(table)

@@ -93,6 +93,7 @@ class Kind(NamedTuple):
     rows: Callable[[], list]
     prose: tuple[int, ...] = ()
     right: tuple[int, ...] = ()
+    extra: tuple[str, ...] = ()  # further keys of the JSON, whose texts stand at the end of the rows
     notes: int | None = None  # column whose texts stand below the table, once each
     remark: str = ""
 
@@ -155,7 +156,7 @@ def _controllers():
         motion = not {"nacelle_velocity", "nacelle_acceleration"}.isdisjoint(needs)
         extra = "wind ahead" if ahead else "blade loads" if blades else "motion" if motion else ""
         last = any(mark in summary for mark in LAST) or name == "constant"
-        rows.append((last, ahead, blades, (name, summary, extra)))
+        rows.append((last, ahead, blades, (name, summary, extra, ", ".join(needs))))
     return [row[-1] for row in sorted(rows, key=lambda row: row[:-1])]
 
 
@@ -289,8 +290,9 @@ KINDS = {
     "controllers": Kind(
         "--controller", "built-in control laws",
         ("name", "what it is", "also uses"), _controllers, prose=(1,),
+        extra=("measurements and models",),
         remark="Also policy:NAME (fowt list agents), design:FILE (fowt design) and module:Name (your own).\n"
-        "All use generator speed, torque and blade pitch; motion: of nacelle and platform. All of it: --json.",
+        "All use generator speed, torque and blade pitch; motion: nacelle and platform. All of it: --json.",
     ),
     "agents": Kind(
         "--controller", "trained agents that come with the package",
@@ -323,7 +325,7 @@ KINDS = {
     "options": Kind(
         "--option", "parts of the model, as of build_scene",
         ("option", "what it is", "values, default first"), _options, prose=(1, 2),
-        remark="None: that of the fidelity, the platform or the turbine. JSON where a value is no text: null.",
+        remark="None: that of the fidelity, the platform or the turbine. What is no text is JSON: null.",
     ),
     "faults": Kind(
         "--fault", "what goes wrong in a run",
@@ -385,7 +387,7 @@ def _rows_with(rows, part):
 
 def _as_mappings(kind, rows):
     """[{heading: text}] of the rows of a Kind."""
-    keys = [" ".join(heading.split()) for heading in kind.headings]
+    keys = [" ".join(heading.split()) for heading in (*kind.headings, *kind.extra)]
     return [dict(zip(keys, row, strict=True)) for row in rows]
 
 
@@ -402,7 +404,7 @@ def _print_overview(as_json):
 def _print_kind(name, rows):
     kind = KINDS[name]
     left = [i for i in range(len(kind.headings)) if i not in kind.right]
-    found = {}
+    rows, found = [row[: len(kind.headings)] for row in rows], {}
     if kind.notes is not None:
         found = {row[kind.notes]: "" for row in rows}
         found = {text: str(number) for number, text in enumerate(found, 1)}

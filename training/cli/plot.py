@@ -23,7 +23,7 @@ PLOT_EXAMPLES = """[bold]Examples[/bold]
 
 [cyan]fowt plot schedule steady.csv[/cyan]  # operating points that fowt trim --out wrote
 
-Runs are files of fowt simulate --out, of an evaluation's runs folder, and binary outputs of OpenFAST (.outb)."""
+Runs are files of fowt simulate --out, of an evaluation's runs folder, and .outb of OpenFAST."""
 
 
 @app.command(epilog=PLOT_EXAMPLES)

@@ -70,7 +70,7 @@ OutOption = Annotated[
 ]
 BASELINES_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt evaluate --suite above_rated --controllers policy:ppo_lqr,gspi_oc3,rosco_float --out results/rl[/cyan]
+[cyan]fowt evaluate --controllers policy:ppo_lqr,gspi_oc3,rosco_float --out results/rl[/cyan]
 
 [cyan]fowt scores baselines results/rl --against gspi_oc3,rosco_float --out results/rl/scores[/cyan]
 

@@ -27,7 +27,7 @@ SIMULATE_EXAMPLES = """[bold]Examples[/bold]
 
 [cyan]fowt simulate --wind 18 --sea paper_wind_wave --plot run.png[/cyan]  # steady wind, irregular sea
 
-[cyan]fowt simulate --wind ntm:18:B --seed 3 --controller pi_land --out run.csv[/cyan]  # turbulence, land gains
+[cyan]fowt simulate --wind ntm:18:B --seed 3 --controller gspi_oc3 --out run.csv[/cyan]  # turbulence
 
 [cyan]fowt simulate --wind none --sea regular:3:5 --controller none --start zero[/cyan]  # waves alone
 
@@ -50,8 +50,8 @@ def simulate(
     wind: Annotated[
         str,
         typer.Option(
-            help="m/s; KIND:SPEED[:CLASS] as ntm:18:B or eog:18; a file: .csv of time and speed, .wnd, .hh; JSON"
-            " (also of the full-field kinds bts, mann and box); or none. See fowt list winds."
+            help="m/s; KIND:SPEED[:CLASS] as ntm:18:B or eog:18; a file: .csv of time and speed, .wnd, .hh;"
+            " JSON (also of the full-field kinds bts, mann and box); or none. See fowt list winds."
         ),
     ] = "18",
     sea: Annotated[
@@ -63,9 +63,9 @@ def simulate(
     controller: Annotated[
         str,
         typer.Option(
-            help="Name of fowt list controllers, policy:NAME of fowt list agents or policy:FILE.npz, design:FILE.json,"
-            " module:Name of your own. none: rotor speed and blade pitch held (at rest without wind);"
-            " constant: torque and blade pitch held, the rotor turns freely."
+            help="Name of fowt list controllers, policy:NAME of fowt list agents, policy:FILE.npz,"
+            " design:FILE.json, module:Name of your own. none: rotor speed and blade pitch held (at rest"
+            " without wind); constant: torque and blade pitch held, the rotor turns freely."
         ),
     ] = "pi",
     duration: Annotated[float, typer.Option(help="Length of the run, s.")] = 600.0,

@@ -26,7 +26,7 @@ TRAIN_EXAMPLES = """[bold]Examples[/bold]
 
 [bold]Steps[/bold] are decisions of the agent, each several control periods (decisions.hold).
 [bold]Files written[/bold]: best.npz, last.npz (policies), validation.csv, learning_curve.png, settings.yml,
-versions.json, checkpoints/, tensorboard/. A policy runs as policy:runs/ppo_0/best.npz wherever a controller does.
+versions.json, checkpoints/, tensorboard/. A policy runs as the controller policy:runs/ppo_0/best.npz.
 Without a terminal a line of progress is printed every 10 s."""
 
 

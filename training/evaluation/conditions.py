@@ -1,7 +1,7 @@
 """The conditions of a load case in words: its wind, its sea, and what happens in it."""
 
 from fowt_env.descriptions.checks import is_number
-from fowt_env.descriptions.sea_state import SeaState, sea_state_of
+from fowt_env.descriptions.sea_state import SeaState, sea_state_of, sea_states
 
 STILL = "still water"
 UNITS = {"speed": "m/s", "every": "s", "direction": "deg", "recurrence": "years"}
@@ -33,6 +33,8 @@ def sea_text(sea):
     """Text of a sea as build_scene takes it: "JONSWAP Hs 1.86 m, Tp 7.94 s", "regular H 3 m, T 5 s"."""
     if sea is None:
         return STILL
+    if isinstance(sea, str) and sea not in sea_states():
+        return sea  # the path of a file
     state = sea if isinstance(sea, SeaState) else sea_state_of(sea)
     if state.height == 0.0:
         return STILL
@@ -45,7 +47,7 @@ def sea_text(sea):
 
 
 def described_texts(about):
-    """(wind and what happens, sea) in words, of a case as cases.described gives it: a fault, parked, shifts."""
+    """(wind with what happens, sea) in words, of a case as cases.described gives it."""
     parts = [wind_text(about["wind"])]
     if about["parked"]:
         parts.append("parked")

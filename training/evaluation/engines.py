@@ -41,6 +41,10 @@ LONGEST_REASON = 200  # characters of what Ray says
 DONE, RAISED, UNREADABLE = "done", "raised", "unreadable"  # what an answer of a worker is
 
 
+class WorkersLost(RuntimeError):
+    """Worker processes that cannot be started; what was done before is kept."""
+
+
 def outcomes(function, tasks, jobs=1, engine="processes", address=None, limit=None, lost=None):
     """Yield (index, function(task)) for every task as it ends.
 
@@ -48,8 +52,8 @@ def outcomes(function, tasks, jobs=1, engine="processes", address=None, limit=No
              at the address, or a local one of `jobs` workers
     limit    seconds that a task should take at most: a worker that dies later on it is not tried again
     lost     lost(task, reason) is the outcome of a task on which workers die; None: RuntimeError
-    Raises: InputError for an unknown engine, jobs < 1, or tasks that cannot be sent; RuntimeError where
-    workers cannot be started.
+    Raises: InputError for an unknown engine, jobs < 1, tasks that cannot be sent, or a Ray that does not
+    start; WorkersLost where workers cannot be started.
     """
     if engine not in ENGINES:
         raise unknown("engine", engine, ENGINES)
@@ -108,7 +112,7 @@ def _processes(function, tasks, indices, jobs, limit, lost):
                     unborn += not worker.ready
                     if unborn == ATTEMPTS:
                         left = queue.left + sum(other.at_work for other in workers)
-                        raise RuntimeError(NO_WORKERS.format(left))
+                        raise WorkersLost(NO_WORKERS.format(left))
                 elif worker.ready:
                     worker.index = None
                     yield index, _outcome(answer, tasks[index], lost)

@@ -232,10 +232,11 @@ class ResultsFolder:
             done = [row["status"] for key, row in self.rows.items() if key[0] == label]
             if before != code and done:
                 place = run_file(self.given / "runs", label, "", 0).parent
-                failed = ", or --retry-failed: all of them failed" if set(done) == {FAILED} else ""
+                failed = ", or use --retry-failed" if set(done) == {FAILED} else ""
                 raise InputError(
                     f"results folder {str(self.given)!r}: the code of controller {label!r} has changed since"
-                    f" its runs there; remove {str(place)!r} to run them again, or choose another folder{failed}"
+                    f" its runs there; remove {str(place)!r} to run them again, or choose another"
+                    f" folder{failed}"
                 )
 
     def _refused(self, why):
