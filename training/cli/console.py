@@ -169,13 +169,13 @@ def output(path, option="--out", folder=False):
     if place.is_dir():
         return path
     if place.exists():
-        raise InputError(f"{option} {str(path)!r}: {str(place)!r} is a file, not a folder")
+        raise InputError(f"{option} {str(path)!r}: cannot be written: {str(place)!r} is a file, not a folder")
     inside = place.resolve().is_relative_to(Path.cwd())
     if not inside and not (folder and place.parent.is_dir()):
         missing = place.parent if folder else place
         raise InputError(
-            f"{option} {str(path)!r}: there is no folder {str(missing)!r}; make it first: folders are made"
-            " in the working folder alone"
+            f"{option} {str(path)!r}: cannot be written: there is no folder {str(missing)!r}; make it"
+            " first: folders are made in the working folder alone"
         )
     note(f"makes the folder {place}")
     return path

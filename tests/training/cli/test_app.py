@@ -385,7 +385,7 @@ def test_a_folder_made_in_the_working_folder_is_announced(tmp_path, monkeypatch)
     assert "makes the folder" not in fowt("simulate", "--duration", "1", "--out", "a/b/run.csv")[1]
     assert output(str(tmp_path.parent / "results"), folder=True)  # the last part may be new anywhere
     (tmp_path / "file").write_text("")
-    with pytest.raises(InputError, match=r"--out 'file/run.csv': 'file' is a file"):
+    with pytest.raises(InputError, match=r"--out 'file/run.csv': cannot be written: 'file' is a file"):
         output("file/run.csv")
 
 
