@@ -43,7 +43,7 @@ COMPILE_EXAMPLES = """[bold]Examples[/bold]
 def compile_command(
     out_path: Annotated[str, typer.Option("--out", help="CSV to write.")] = "results/benchmark/compile.csv",
 ):
-    """Time the first run of six kinds of scene, from no compiled kernels."""
+    """Time the first run of six kinds of scene: compiling."""
     from fowt_env.training.benchmarks import compile_time
     from fowt_env.training.benchmarks import speed as bench
 
@@ -67,7 +67,7 @@ def speed(
     starts: Annotated[bool, typer.Option("--starts", help="Also time the first and a later start.")] = False,
     out_path: Annotated[str, typer.Option("--out", help="CSV to write.")] = "results/benchmark/speed.csv",
 ):
-    """Time simulate, step by step and load by load, on each kind of scene."""
+    """Time simulate on each kind of scene, load by load."""
     from fowt_env.training.benchmarks import speed as bench
 
     names = None if kinds is None else [name.strip() for name in kinds.split(";") if name.strip()]

@@ -77,6 +77,7 @@ def summary_of(command):
     return " ".join((command.help or "").split("\n\n")[0].split()).removesuffix(".")
 
 
+new_folders: list[Path] = []  # that the command under way may make
 app = typer.Typer(
     name="fowt",
     cls=Overview,
@@ -105,6 +106,7 @@ def reported(command):
 
     @functools.wraps(command)
     def run(*args, **kwargs):
+        new_folders.clear()
         try:
             with warnings.catch_warnings():
                 warnings.showwarning = _show_warning
@@ -122,6 +124,10 @@ def reported(command):
                 raise typer.Exit(EXIT_STOPPED) from None
             # of a controller or a library, not the command's own
             fail(f"ended early by {type(error).__name__}: {error}", EXIT_STOPPED)
+        finally:
+            for folder in new_folders:
+                if folder.is_dir():
+                    note(f"made the folder {folder}")
 
     return run
 
@@ -159,8 +165,8 @@ def note(message):
 def output(path, option="--out", folder=False):
     """The path that an option names, None for None, once what is written there has a folder or may make one.
 
-    A missing folder is made, and said to be, in the working folder alone; elsewhere it must exist, but for
-    the last part of an option that names a folder. Nothing is made here.
+    A missing folder may be made in the working folder alone; elsewhere it must exist, but for the last part
+    of an option that names a folder. None is made here; `reported` says at the end which have been.
     Raises: InputError naming option, path and the folder that is missing.
     """
     if path is None:
@@ -177,7 +183,7 @@ def output(path, option="--out", folder=False):
             f"{option} {str(path)!r}: cannot be written: there is no folder {str(missing)!r}; make it"
             " first: folders are made in the working folder alone"
         )
-    note(f"makes the folder {place}")
+    new_folders.append(place)
     return path
 
 

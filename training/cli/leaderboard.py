@@ -36,7 +36,10 @@ def add_command(
         typer.Option(help="Of a board that is made: a name or a path, to which the suites are scaled."),
     ] = None,
 ):
-    """Check submissions and copy them into the board; none of their code is run."""
+    """Check submissions and copy them into the board.
+
+    None of their code is run.
+    """
     from fowt_env.training.board.folder import SETTINGS, Board, new_board
     from fowt_env.training.board.submission import read_submission
 

@@ -92,7 +92,7 @@ def over_baselines(
     cases: CasesOption = None,
     out_path: OutOption = None,
 ):
-    """Agents over baselines on all cases, with a verdict on each target."""
+    """Agents over baselines, with a verdict on each target."""
     from fowt_env.training.reports.scores import agent_counts, agent_scores, scores_markdown
 
     output(out_path)
@@ -160,7 +160,7 @@ def bound(
     plot: Annotated[str | None, typer.Option(help="Picture of all controllers and Pareto fronts.")] = None,
     out_path: OutOption = None,
 ):
-    """Share of the performance limit of linear control that each reaches."""
+    """Share of the limit of linear control that each reaches."""
     from fowt_env.training.reports.bound_scores import bound_fractions, bound_markdown, read_bound
     from fowt_env.training.reports.score_plots import plot_fractions
 
@@ -187,7 +187,10 @@ trip is no failure here; the last table counts them."""
 @scores.command(epilog=FAULTS_EXAMPLES)
 @reported
 def faults(results: FoldersArgument, cases: CasesOption = None, out_path: OutOption = None):
-    """Which controllers survive which faults, with motions, loads and trips."""
+    """Which controllers survive which faults.
+
+    With the largest motions and loads, and the trips.
+    """
     from fowt_env.training.reports.survival import survival, survival_markdown
 
     output(out_path)

@@ -144,7 +144,10 @@ def training(
     steps: Annotated[int, typer.Option(help="Steps of PPO that are timed.")] = 50_000,
     out_path: Annotated[str, typer.Option("--out", help="CSV to write.")] = "results/benchmark/training.csv",
 ):
-    """Time PPO on each kind of vector environment, and print the time of physics, torch and Python."""
+    """Time PPO on each kind of vector environment.
+
+    With the times of physics, torch and Python apart.
+    """
     from fowt_env.training.benchmarks.speed import write_csv
     from fowt_env.training.benchmarks.training import benchmark_training
 

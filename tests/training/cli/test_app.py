@@ -381,8 +381,10 @@ def test_no_folder_is_made_outside_of_the_working_folder(words, tmp_path, monkey
 def test_a_folder_made_in_the_working_folder_is_announced(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     _, stderr = fowt("simulate", "--duration", "1", "--out", "a/b/run.csv")
-    assert "makes the folder a/b" in stderr and len(pd.read_csv("a/b/run.csv")) == 11
-    assert "makes the folder" not in fowt("simulate", "--duration", "1", "--out", "a/b/run.csv")[1]
+    assert "made the folder a/b" in stderr and len(pd.read_csv("a/b/run.csv")) == 11
+    assert "made the folder" not in fowt("simulate", "--duration", "1", "--out", "a/b/run.csv")[1]
+    _, stderr = fowt("evaluate", "--controllers", "pie", "--out", "c", code=2)
+    assert "made the folder" not in stderr
     assert output(str(tmp_path.parent / "results"), folder=True)  # the last part may be new anywhere
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match=r"--out 'file/run.csv': cannot be written: 'file' is a file"):
