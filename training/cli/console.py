@@ -125,11 +125,17 @@ def reported(command):
             # of a controller or a library, not the command's own
             fail(f"ended early by {type(error).__name__}: {error}", EXIT_STOPPED)
         finally:
-            for folder in new_folders:
-                if folder.is_dir():
-                    note(f"made the folder {folder}")
+            announce_folders()
 
     return run
+
+
+def announce_folders():
+    """Say once which of the folders that were missing have been made."""
+    for folder in new_folders:
+        if folder.is_dir():
+            note(f"made the folder {folder}")
+    new_folders.clear()
 
 
 @contextmanager
@@ -152,7 +158,8 @@ def _show_warning(message, *where):
 
 
 def fail(message, code):
-    """Print the message in red on stderr and end with the exit code."""
+    """Print the message in red on stderr, as its last line, and end with the exit code."""
+    announce_folders()
     err.print(f"[red][bold]Error:[/bold] {escape(str(message))}[/red]", soft_wrap=True, highlight=False)
     raise typer.Exit(code)
 

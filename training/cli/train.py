@@ -9,7 +9,17 @@ import typer
 from fowt_env.errors import InputError
 from fowt_env.training.cli.arguments import parse_pairs
 from fowt_env.training.cli.benchmark import benchmarks
-from fowt_env.training.cli.console import EXIT_INTERRUPTED, app, note, out, output, progress_bar, reported
+from fowt_env.training.cli.console import (
+    EXIT_INTERRUPTED,
+    announce_folders,
+    app,
+    err,
+    note,
+    out,
+    output,
+    progress_bar,
+    reported,
+)
 from fowt_env.training.cli.tables import figure, print_table
 
 LINE_EVERY = 10.0  # s between lines of progress without a terminal
@@ -70,7 +80,12 @@ def train(
         )
         run = Training(settings, folder)
     with progress_bar("training", None, every=LINE_EVERY) as update:
-        finished = run.run(lambda done, total, text: update(done, f"{done:,} of {total:,}, {text}", total))
+
+        def report(done, total, text):
+            update(done, text if err.is_terminal else f"{done:,} of {total:,}, {text}", total)
+
+        finished = run.run(report)
+    announce_folders()
     if run.rows:
         _print_validations(run)
     place = shlex.quote(str(folder))

@@ -282,15 +282,15 @@ def session(engine, jobs=1, address=None):
 
 def _start(ray, options):
     """Connect to Ray. Raises: InputError in one line, whatever Ray raises and says."""
-    _, error = attempt(lambda: ray.init(log_to_driver=False, logging_level="error", **options))
-    if error is None:
-        return
-    attempt(ray.shutdown)  # of what has been started of it
-    what = f"no cluster at {options['address']!r}" if "address" in options else "Ray does not start"
-    reason = " ".join(str(error).split())[:LONGEST_REASON]
-    raise InputError(
-        f"engine = 'ray': {what} ({type(error).__name__}: {reason}); without Ray: engine 'processes'"
-    ) from None
+    try:
+        ray.init(log_to_driver=False, logging_level="error", **options)
+    except Exception as error:
+        attempt(ray.shutdown)  # of what has been started of it
+        what = f"no cluster at {options['address']!r}" if "address" in options else "Ray does not start"
+        reason = " ".join(str(error).split())[:LONGEST_REASON]
+        raise InputError(
+            f"engine = 'ray': {what} ({type(error).__name__}: {reason}); without Ray: engine 'processes'"
+        ) from None
 
 
 def _ray_module():

@@ -92,9 +92,8 @@ class CheckpointCallback(BaseCallback):
             self._reported = now
             total = self.training.settings["steps"]
             rate = (self.num_timesteps - self._first) / max(now - self._begin, 1e-9)
-            hold = self.training.settings["decisions"]["hold"]
             left = seconds_text((total - self.num_timesteps) / max(rate, 1e-9))
-            parts = [f"{rate:.0f} decisions/s ({rate * hold:.0f} env steps/s)"]
+            parts = [f"{rate:.0f} decisions/s"]
             returns = [episode["r"] for episode in self.model.ep_info_buffer]
             if returns:
                 parts.append(f"return {np.mean(returns):.1f}")
