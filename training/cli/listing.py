@@ -25,11 +25,8 @@ WINDS = {  # kind -> (form on the command line, what it is); a test holds the ki
     ),
     "series": ("wind.csv, wind.parquet", "a table with columns time (s) and speed (m/s)"),
     "uniform": ("wind.wnd, wind.hh", "OpenFAST's uniform wind file: speed, direction, shear over time"),
-    "bts": (
-        '{"kind": "bts", "path": "wind.bts"}',
-        "TurbSim's full-field box, met by the blades point by point",
-    ),
-    "mann": ('{"kind": "mann", "speed": 18}', "full-field Mann turbulence (needs the extra mann)"),
+    "bts": ("wind.bts", "TurbSim's full-field box, met by the blades point by point"),
+    "mann": ("mann:18:B", "full-field Mann turbulence (needs the extra mann)"),
     "box": ("in Python alone", "a full-field box of your own arrays"),
 }
 FAULTS = {  # kind -> what happens; a test holds them to those of simulate

@@ -50,8 +50,8 @@ def simulate(
     wind: Annotated[
         str,
         typer.Option(
-            help="m/s; KIND:SPEED[:CLASS] as ntm:18:B or eog:18; a file: .csv of time and speed, .wnd, .hh;"
-            " JSON (also of the full-field kinds bts, mann and box); or none. See fowt list winds."
+            help="m/s; KIND:SPEED[:CLASS] as ntm:18:B, eog:18 or (full-field) mann:18:B; a file: .csv of time"
+            " and speed, .bts, .wnd, .hh; JSON, as of kind box; or none. See fowt list winds."
         ),
     ] = "18",
     sea: Annotated[
