@@ -9,6 +9,7 @@ is what the function of that name in TABLES returns. A test fails while either i
 """
 
 import re
+from collections import Counter
 from functools import partial
 from pathlib import Path
 
@@ -326,54 +327,98 @@ def with_tables(page, text):
 def cli_page():
     """The reference of the command line as markdown."""
     root = typer.main.get_command(app)
-    head = (
-        "# Command line\n\n"
-        "Written by `python docs/tools/reference_pages.py` from the commands;"
-        " `--help` says the same.\n\n"
-        "Exit codes: 0 done; 1 a run stopped, or a check failed; 2 an argument cannot be used; 130"
-        " interrupted.\n"
-    )
-    return head + "".join(_commands(root, "fowt"))
-
-
-def _commands(command, name):
-    """Sections of a command's subcommands, in the order in which they are listed."""
-    for key, inner in command.commands.items():
-        if inner.hidden:
-            continue
-        full = f"{name} {key}"
-        if hasattr(inner, "commands"):
-            yield f"\n## `{full}`\n\n{_plain(inner.help)}\n"
-            yield from _commands(inner, full)
-        else:
-            yield _section(inner, full)
-
-
-def _section(command, name):
-    """Heading, purpose, parameters and examples of one command."""
-    level = "##" if name.count(" ") == 1 else "###"
-    arguments = [p for p in command.params if p.param_type_name == "argument"]
-    wanted = "".join(f" {p.name.upper()}" if p.required else f" [{p.name.upper()}]" for p in arguments)
-    lines = [f"\n{level} `{name}`", _plain(command.help), f"```\n{name}{wanted} [OPTIONS]\n```"]
-    rows = [_parameter(p) for p in command.params if p.name != "help"]
-    if rows:
-        lines.append(markdown(("parameter", "default", "meaning"), rows))
-    if command.epilog:
-        lines.append(_examples(command.epilog))
+    shared = _shared([list(_inner(command)) for command in root.commands.values() if not command.hidden])
+    lines = [
+        "# Command line",
+        "Written by `python docs/tools/reference_pages.py` from the commands; `--help` says the same.",
+        "Exit codes: 0 done; 1 a run stopped, or a check failed; 2 an argument cannot be used;"
+        " 130 interrupted.",
+        "New folders are made in the working folder alone, and announced. Ranges include their"
+        " end: `--winds 4:24:1` has 24, `--seeds 1:6:1` has 6.",
+        "## Options of several commands",
+        _options_table(shared),
+    ]
+    for group, names in root.by_group().items():
+        lines.append(f"## {group}")
+        lines += [text for name in names for text in _sections(root.commands[name], f"fowt {name}", shared)]
     return "\n\n".join(lines) + "\n"
 
 
+def _inner(command):
+    """The command, or those of a group."""
+    return (
+        (c for c in command.commands.values() if not c.hidden) if hasattr(command, "commands") else (command,)
+    )
+
+
+def _entries(command):
+    """[(names, default, meaning)] of a command's parameters that are shown."""
+    return [_parameter(p) for p in command.params if p.name != "help" and not getattr(p, "hidden", False)]
+
+
+def _shared(families):
+    """Entries of options that commands of two or more families, lists of commands, have alike, in order."""
+    count = Counter(
+        entry
+        for family in families
+        for entry in dict.fromkeys(e for command in family for e in _entries(command))
+    )
+    return [entry for entry, times in count.items() if times > 1 and entry[0].startswith("--")]
+
+
+def _sections(command, name, shared):
+    """Sections of a command, or of a group with its commands."""
+    if not hasattr(command, "commands"):
+        return [_section(command, name, shared, "###")]
+    inner = {key: each for key, each in command.commands.items() if not each.hidden}
+    own = [entry for entry in _shared([[each] for each in inner.values()]) if entry not in shared]
+    lines = [f"### `{name}`", _plain(command.help)] + ([_options_table(own)] if own else [])
+    return [
+        *lines,
+        *(_section(each, f"{name} {key}", [*shared, *own], "####") for key, each in inner.items()),
+    ]
+
+
+def _section(command, name, shared, level):
+    """Heading, purpose, parameters and examples of one command."""
+    arguments = [p for p in command.params if p.param_type_name == "argument"]
+    wanted = "".join(f" {p.name.upper()}" if p.required else f" [{p.name.upper()}]" for p in arguments)
+    lines = [f"{level} `{name}{wanted}`", _plain(command.help)]
+    entries = _entries(command)
+    own = [entry for entry in entries if entry not in shared]
+    also = [f"`{entry[0].split()[0]}`" for entry in entries if entry in shared]
+    if own:
+        lines.append(_options_table(own))
+    if also:
+        lines.append(f"Also {', '.join(also)}.")
+    if command.epilog:
+        lines.append(_examples(command.epilog))
+    return "\n\n".join(lines)
+
+
 def _parameter(parameter):
-    """(names, default, meaning) of an option or argument."""
+    """(names, default, meaning) of an option or argument, as texts."""
     if parameter.param_type_name == "argument":
-        names = f"`{parameter.name.upper()}`"
+        names = parameter.name.upper()
     else:
-        names = " ".join(f"`{flag}`" for flag in (*parameter.opts, *parameter.secondary_opts))
+        names = " ".join((*parameter.opts, *parameter.secondary_opts))
     default, pair = parameter.default, parameter.secondary_opts
-    shown = "" if default in (None, []) else f"`{default}`"
+    shown = "" if default in (None, []) else str(default)
     if getattr(parameter, "is_flag", False):
-        shown = f"`{(parameter.opts if default else pair)[0]}`" if pair else ""
+        shown = (parameter.opts if default else pair)[0] if pair else ""
     return names, shown, _plain(parameter.help or "")
+
+
+def _options_table(entries):
+    """Table of (names, default, meaning): the default stands in brackets behind the names."""
+    rows = [
+        (
+            " ".join(f"`{name}`" for name in names.split()) + (f" (`{default}`)" if default else ""),
+            meaning,
+        )
+        for names, default, meaning in entries
+    ]
+    return markdown_table(("option (default)", "meaning"), rows)
 
 
 def _examples(epilog):
@@ -383,9 +428,9 @@ def _examples(epilog):
         text = " ".join(paragraph.split())
         example = re.fullmatch(r"\[cyan\](.*?)\[/cyan\]\s*(.*)", text)
         if example:
-            remark = f"  # {_plain(example.group(2))}" if example.group(2) else ""
+            remark = f"  {_plain(example.group(2))}" if example.group(2) else ""
             lines.append(_plain(example.group(1)) + remark)
-        elif text != "[bold]Examples[/bold]":
+        elif text not in ("[bold]Examples[/bold]", "[bold]Example[/bold]"):
             rest.append(_plain(text))
     block = "```bash\n" + "\n".join(lines) + "\n```" if lines else ""
     return "\n\n".join(part for part in (block, *rest) if part)

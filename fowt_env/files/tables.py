@@ -9,14 +9,16 @@ TABLE_SUFFIXES = (".csv", ".parquet")
 SERIES_SUFFIXES = (*TABLE_SUFFIXES, ".outb")  # of a time series, which OpenFAST's format can hold too
 
 
-def table_path(path, allowed=TABLE_SUFFIXES):
+def table_path(path, allowed=TABLE_SUFFIXES, what="output file"):
     """`path` as a Path, once its ending is known to be one of those allowed.
 
     Raises: InputError for another ending.
     """
     path = Path(path)
     if path.suffix.lower() not in allowed:
-        raise InputError(f"output file {str(path)!r}: must end with {' or '.join(allowed)}")
+        *others, last = allowed
+        endings = f"{', '.join(others)} or {last}" if others else last
+        raise InputError(f"{what} {str(path)!r}: must end with {endings}")
     return path
 
 
@@ -35,6 +37,19 @@ def write_table(frame, path):
     return path
 
 
+def read_series(path):
+    """DataFrame of a time series that write_table wrote, or of OpenFAST's binary output (.outb).
+
+    Raises: InputError if there is no such file, its ending is another, or it is broken.
+    """
+    path = table_path(path, SERIES_SUFFIXES, "file")
+    if path.suffix.lower() != ".outb":
+        return read_table(path)
+    from fowt_env.files.openfast import read_outb
+
+    return read_outb(path)
+
+
 def read_table(path):
     """DataFrame of a CSV or Parquet file that write_table wrote.
 
@@ -42,7 +57,7 @@ def read_table(path):
     """
     import pandas as pd
 
-    path = table_path(path)
+    path = table_path(path, what="file")
     if not path.is_file():
         raise InputError(f"file {str(path)!r}: not found")
     try:

@@ -4,12 +4,12 @@ from importlib import import_module
 
 from fowt_env.training.cli.console import app
 
-GROUPS = (  # modules that add their commands to the app, in the order of fowt --help
-    "simulate", "check", "evaluate", "validate", "doctor", "benchmark", "design", "plot", "report", "scores",
-    "leaderboard", "import_deck", "hydro", "train",
+MODULES = (  # that add their commands to the app; console.GROUPS has the order of fowt --help
+    "simulate", "listing", "check", "evaluate", "validate", "doctor", "benchmark", "design", "plot", "report",
+    "scores", "leaderboard", "import_deck", "hydro", "train",
 )  # fmt: skip
-for group in GROUPS:
-    import_module(f"fowt_env.training.cli.{group}")
+for module in MODULES:
+    import_module(f"fowt_env.training.cli.{module}")
 
 
 def main():

@@ -8,7 +8,7 @@ from rich.markup import escape
 
 from fowt_env.descriptions.checks import parse_whole_numbers
 from fowt_env.errors import InputError
-from fowt_env.training.cli.console import app, from_a_clone, note, out, progress_bar, reported, show
+from fowt_env.training.cli.console import app, from_a_clone, note, out, output, progress_bar, reported, show
 from fowt_env.training.cli.tables import figure, print_table
 
 benchmarks = typer.Typer(
@@ -17,25 +17,25 @@ benchmarks = typer.Typer(
 app.add_typer(benchmarks, name="benchmark")
 SPEED_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt benchmark speed[/cyan]  every kind of scene, load by load (some minutes: each kind is compiled)
+[cyan]fowt benchmark speed[/cyan]  # every kind of scene, load by load (some minutes: each kind is compiled)
 
-[cyan]fowt benchmark speed --kinds "full, standard;full, fast" --starts[/cyan]  two kinds, and start times
+[cyan]fowt benchmark speed --kinds "full, standard;full, fast" --starts[/cyan]  # two kinds, and start times
 
 [bold]File written[/bold]: speed.csv, headed by machine, versions, commit and calibration."""
 ACCURACY_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt benchmark accuracy[/cyan]  every variant, three seeds of 600 s: an hour
+[cyan]fowt benchmark accuracy[/cyan]  # every variant, three seeds of 600 s: an hour
 
-[cyan]fowt benchmark accuracy --seeds 1 --duration 100 --axes "all together"[/cyan]  a first look
+[cyan]fowt benchmark accuracy --seeds 1 --duration 100 --axes "all together"[/cyan]  # a first look
 
-[cyan]fowt benchmark accuracy --platform iea15_volturnus_s --axes levels[/cyan]  another platform's levels
+[cyan]fowt benchmark accuracy --platform iea15_volturnus_s --axes levels[/cyan]  # another platform's levels
 
 [bold]Files written[/bold]: accuracy.csv (a row as each run ends; a rerun resumes), accuracy.png."""
 
 
 COMPILE_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt benchmark compile[/cyan]  a minute or two; kernels of other runs are left as they are"""
+[cyan]fowt benchmark compile[/cyan]  # a minute or two; kernels of other runs are left as they are"""
 
 
 @benchmarks.command(name="compile", epilog=COMPILE_EXAMPLES)
@@ -43,10 +43,11 @@ COMPILE_EXAMPLES = """[bold]Examples[/bold]
 def compile_command(
     out_path: Annotated[str, typer.Option("--out", help="CSV to write.")] = "results/benchmark/compile.csv",
 ):
-    """Time what the scenes of a session cost that finds no compiled kernels: six kinds, one after another."""
+    """Time the first run of six kinds of scene: compiling."""
     from fowt_env.training.benchmarks import compile_time
     from fowt_env.training.benchmarks import speed as bench
 
+    output(out_path)
     with progress_bar("compiling", None) as update:
         table = compile_time.session(progress=lambda text, done, total: update(done, text, total))
     rows = [(row.scene, f"{row.seconds:.1f}", f"{row.processor_seconds:.1f}") for row in table.itertuples()]
@@ -66,10 +67,11 @@ def speed(
     starts: Annotated[bool, typer.Option("--starts", help="Also time the first and a later start.")] = False,
     out_path: Annotated[str, typer.Option("--out", help="CSV to write.")] = "results/benchmark/speed.csv",
 ):
-    """Time each kind of scene: a step, the closed loop, simulate end to end, and each load."""
+    """Time simulate on each kind of scene, load by load."""
     from fowt_env.training.benchmarks import speed as bench
 
     names = None if kinds is None else [name.strip() for name in kinds.split(";") if name.strip()]
+    output(out_path)
     with progress_bar("benchmark", None) as update:
         table = bench.speed(
             names,
@@ -89,13 +91,13 @@ def speed(
 
 STABILITY_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt benchmark stability[/cyan]  every part on small counts: some minutes
+[cyan]fowt benchmark stability[/cyan]  # every part on small counts: some minutes
 
-[cyan]fowt benchmark stability --cases 100000 --steps 10000000 --hostile 3000[/cyan]  as documented: an hour
+[cyan]fowt benchmark stability --cases 100000 --steps 10000000 --hostile 3000[/cyan]  # as documented: an hour
 
-[cyan]fowt benchmark stability --parts map,extremes[/cyan]  two parts; the report joins those of the folder
+[cyan]fowt benchmark stability --parts map,extremes[/cyan]  # two parts; the report joins those of the folder
 
-[cyan]fowt benchmark stability --replay results/stability/failures/case_0000.json[/cyan]  a failure again
+[cyan]fowt benchmark stability --replay results/stability/failures/case_0000.json[/cyan]  # a failure again
 
 [bold]Files written[/bold]: PART.json, failures/case_NNNN.json, robustness.md, robustness/PART.csv."""
 
@@ -103,7 +105,7 @@ STABILITY_EXAMPLES = """[bold]Examples[/bold]
 @benchmarks.command(epilog=ACCURACY_EXAMPLES)
 @reported
 def accuracy(
-    seeds: Annotated[str, typer.Option(help="1,2,3 or 1:6:1.")] = "1,2,3",
+    seeds: Annotated[str, typer.Option(help="1,2,3 or 1:6:1 (6 included).")] = "1,2,3",
     duration: Annotated[float, typer.Option(help="Length of each run, s.")] = 600.0,
     finest: Annotated[float, typer.Option(help="Step of the reference, s.")] = 0.00625,
     axes: Annotated[
@@ -122,12 +124,15 @@ def accuracy(
         str | None, typer.Option(help="CSV of another platform, whose points are drawn beside these.")
     ] = None,
 ):
-    """Measure error against run time over integrators, steps, rotor models and wave sums."""
+    """Measure error against run time.
+
+    Over integrators, steps, rotor models and wave sums.
+    """
     from fowt_env.training.benchmarks import accuracy as study
     from fowt_env.training.validation.openfast_cases import box_wind
 
     chosen = None if axes is None else study.select([name.strip() for name in axes.split(",")])
-    folder = Path(out_folder)
+    folder = Path(output(out_folder, folder=True))
     name = "accuracy" if platform == study.PLATFORM else f"accuracy_{platform}"
     if box and platform != study.PLATFORM:
         raise InputError(
@@ -165,7 +170,14 @@ def accuracy(
     note("wrote " + ", ".join(map(str, files)))
 
 
-@benchmarks.command()
+EVALUATION_EXAMPLES = """[bold]Examples[/bold]
+
+[cyan]fowt benchmark evaluation[/cyan]  # 21 runs of the suite above_rated with pi
+
+[cyan]fowt benchmark evaluation --count 7 --controller lqr --ray[/cyan]  # another controller, and Ray"""
+
+
+@benchmarks.command(epilog=EVALUATION_EXAMPLES)
 @reported
 def evaluation(
     count: Annotated[int, typer.Option(help="Runs that are timed.")] = 21,
@@ -176,10 +188,14 @@ def evaluation(
         str, typer.Option("--out", help="CSV to write.")
     ] = "results/benchmark/evaluation.csv",
 ):
-    """Time the runs of an evaluation on one core, and with --ray the overhead of distributing them."""
+    """Time the runs of an evaluation on one core.
+
+    With --ray also the overhead of distributing them.
+    """
     from fowt_env.training.benchmarks import evaluation as study
     from fowt_env.training.benchmarks import speed as bench
 
+    output(out_path)
     with progress_bar("timing runs", None):
         table = study.evaluation_cost(count, suite, controller)
         tables = [table, study.ray_cost(controller=controller, suite=suite)] if with_ray else [table]
@@ -203,7 +219,10 @@ def stability(
     report: Annotated[str | None, typer.Option(help="Report; default: robustness.md in --out.")] = None,
     replay: Annotated[str | None, typer.Option(help="Run a stored case again, nothing else.")] = None,
 ):
-    """Stress-test the simulator: steps, random scenes, adversarial actions, extremes, long runs."""
+    """Stress-test the simulator (from a clone).
+
+    Steps, random scenes, adversarial actions, extremes, long runs.
+    """
     with from_a_clone("benchmark stability"):
         from fowt_env.training.studies.robustness import study as stress
         from fowt_env.training.studies.robustness.random_cases import replay as run_again
@@ -214,6 +233,8 @@ def stability(
         raise typer.Exit(1 if outcome.failure else 0)
     chosen = None if parts is None else [name.strip() for name in parts.split(",") if name.strip()]
     sizes = stress.Sizes(cases=cases, steps=steps, hostile_steps=hostile, seed=seed)
+    output(out_folder, folder=True)
+    output(report, "--report")
     with progress_bar("stability", None) as update:
         results = stress.study(
             out_folder, chosen, sizes, progress=lambda text, done, total: update(done, text, total)

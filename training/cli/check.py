@@ -13,9 +13,9 @@ from fowt_env.training.cli.tables import figure, print_table
 
 CHECK_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt check mine.toml[/cyan]  weight against buoyancy, stability, pretension, rest, natural periods
+[cyan]fowt check mine.toml[/cyan]  # weight against buoyancy, stability, pretension, rest, natural periods
 
-[cyan]fowt check oc3_hywind --json[/cyan]  the same for a program
+[cyan]fowt check oc3_hywind --json[/cyan]  # the same for a program
 
 [bold]Exit code[/bold]: 0 if everything fits, 1 if something does not, 2 if the file cannot be read."""
 
@@ -27,7 +27,10 @@ def check(
     option: OptionOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON in SI units and degrees.")] = False,
 ):
-    """Check a platform: figures at rest without wind, natural periods, and what does not fit."""
+    """Check a platform: weight, stability, natural periods.
+
+    Prints what it is at rest without wind, and what in its file does not fit together.
+    """
     from fowt_env.analysis.check import check_platform
 
     found = check_platform(platform, **parse_pairs(option, "option"))

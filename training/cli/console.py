@@ -1,8 +1,10 @@
 """What the commands of fowt share: the application, messages on stderr, exit codes, progress."""
 
 import functools
+import time
 import warnings
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -16,23 +18,74 @@ from rich.progress import (
     TextColumn,
     TimeElapsedColumn,
 )
+from typer.core import TyperGroup
 
 from fowt_env.errors import ControllerError, InputError, SimulationStopped
 from fowt_env.training.cli.tables import figure, print_table
 
 EXIT_STOPPED, EXIT_INPUT, EXIT_INTERRUPTED = 1, 2, 130
 STUDIES = "fowt_env.training.studies"  # left out of the wheel
-out = Console()
-err = Console(stderr=True)
+out = Console(emoji=False)  # a controller module:Name: is no picture
+err = Console(stderr=True, emoji=False)
+GROUPS = {  # of fowt --help: heading -> its commands, in the order in which they are shown
+    "Run": ("simulate", "trim", "plot", "animate", "check", "import", "hydro"),
+    "Design": ("linearize", "design"),
+    "Evaluate": ("evaluate", "report", "scores", "leaderboard"),
+    "Train": ("train", "export-policy"),
+    "Set up": ("list", "doctor", "warmup", "cache"),
+    "Develop": ("validate", "paper", "benchmark"),
+}
+START = (  # lines of fowt --help for those who have never used it
+    ("fowt simulate --wind 18 --plot run.png", "one run: statistics and a picture"),
+    ("fowt list", "names: platforms, seas, controllers"),
+    ("fowt evaluate --controllers pi,lqr", "compare controllers"),
+    ("fowt COMMAND --help", "options, and examples to copy"),
+)
+
+
+class Overview(TyperGroup):
+    """The commands in their groups, a line each, so that all of them fit on one screen."""
+
+    def format_help(self, ctx, formatter):
+        """Print the help of the whole command."""
+        out.print(f"[bold]fowt[/bold]  {self.help}  [dim](--version)[/dim]\n", highlight=False)
+        width = max(len(command) for command, _ in START)
+        for command, text in START:
+            out.print(f"  [cyan]{command:{width}}[/cyan]  # {text}", highlight=False)
+        names = max(map(len, self.commands))
+        headings = max(map(len, GROUPS))
+        for group, commands in self.by_group().items():
+            out.print()
+            for number, command in enumerate(commands):
+                heading = group if number == 0 else ""
+                text = summary_of(self.commands[command])
+                line = f"[bold]{heading:{headings}}[/bold]  [cyan]{command:{names}}[/cyan]  # {escape(text)}"
+                out.print(line, highlight=False)
+
+    def by_group(self):
+        """{heading: names of its commands}; those of no group stand with the last."""
+        found = {group: [name for name in names if name in self.commands] for group, names in GROUPS.items()}
+        known = {name for names in GROUPS.values() for name in names}
+        found[list(GROUPS)[-1]] += [
+            name for name, command in self.commands.items() if name not in known and not command.hidden
+        ]
+        return {group: names for group, names in found.items() if names}
+
+
+def summary_of(command):
+    """First paragraph of a command's help, without its full stop."""
+    return " ".join((command.help or "").split("\n\n")[0].split()).removesuffix(".")
+
+
+new_folders: list[Path] = []  # that the command under way may make
 app = typer.Typer(
     name="fowt",
+    cls=Overview,
     no_args_is_help=True,
     add_completion=False,
     rich_markup_mode="rich",
     pretty_exceptions_enable=False,
-    help="Floating wind turbines under control: simulate, compare controllers, find operating points.",
-    epilog="Start with  [bold]fowt simulate --wind 18 --plot run.png[/bold] ,"
-    " and see  [bold]fowt COMMAND --help[/bold]  for examples.",
+    help="Floating wind turbines: simulate, control, compare, train.",
 )
 
 
@@ -53,6 +106,7 @@ def reported(command):
 
     @functools.wraps(command)
     def run(*args, **kwargs):
+        new_folders.clear()
         try:
             with warnings.catch_warnings():
                 warnings.showwarning = _show_warning
@@ -65,10 +119,23 @@ def reported(command):
             fail(error, EXIT_INPUT)
         except KeyboardInterrupt:
             fail("interrupted", EXIT_INTERRUPTED)
-        except (SystemExit, GeneratorExit) as error:  # of a controller or a library, not the command's own
+        except (SystemExit, GeneratorExit) as error:
+            if isinstance(error.__context__, BrokenPipeError):  # whoever reads our output has read enough
+                raise typer.Exit(EXIT_STOPPED) from None
+            # of a controller or a library, not the command's own
             fail(f"ended early by {type(error).__name__}: {error}", EXIT_STOPPED)
+        finally:
+            announce_folders()
 
     return run
+
+
+def announce_folders():
+    """Say once which of the folders that were missing have been made."""
+    for folder in new_folders:
+        if folder.is_dir():
+            note(f"made the folder {folder}")
+    new_folders.clear()
 
 
 @contextmanager
@@ -91,7 +158,8 @@ def _show_warning(message, *where):
 
 
 def fail(message, code):
-    """Print the message in red on stderr and end with the exit code."""
+    """Print the message in red on stderr, as its last line, and end with the exit code."""
+    announce_folders()
     err.print(f"[red][bold]Error:[/bold] {escape(str(message))}[/red]", soft_wrap=True, highlight=False)
     raise typer.Exit(code)
 
@@ -101,17 +169,50 @@ def note(message):
     err.print(f"[dim]{escape(message)}[/dim]", soft_wrap=True, highlight=False)
 
 
+def output(path, option="--out", folder=False):
+    """The path that an option names, None for None, once what is written there has a folder or may make one.
+
+    A missing folder may be made in the working folder alone; elsewhere it must exist, but for the last part
+    of an option that names a folder. None is made here; `reported` says at the end which have been.
+    Raises: InputError naming option, path and the folder that is missing.
+    """
+    if path is None:
+        return None
+    place = Path(path) if folder else Path(path).parent
+    if place.is_dir():
+        return path
+    if place.exists():
+        raise InputError(f"{option} {str(path)!r}: cannot be written: {str(place)!r} is a file, not a folder")
+    inside = place.resolve().is_relative_to(Path.cwd())
+    if not inside and not (folder and place.parent.is_dir()):
+        missing = place.parent if folder else place
+        raise InputError(
+            f"{option} {str(path)!r}: cannot be written: there is no folder {str(missing)!r}; make it"
+            " first: folders are made in the working folder alone"
+        )
+    new_folders.append(place)
+    return path
+
+
+LINE_EVERY = 30.0  # s between two lines of progress where there is no terminal for a bar
+
+
 @contextmanager
-def progress_bar(description, total):
+def progress_bar(description, total, every=LINE_EVERY):
     """A bar on stderr that disappears when done; yields update(done, text=None, total=None).
 
-    A compilation meanwhile is announced above the bar.
+    Without a terminal (a file, a pipe, a batch job) it is a line each `every` seconds. A compilation
+    meanwhile is announced above the bar.
     """
     from fowt_env.plant.compile.announcement import compilation_announced
 
     def say(text):
         err.print(f"[yellow]{text}[/yellow]", soft_wrap=True, highlight=False)
 
+    if not err.is_terminal:
+        with compilation_announced(say):
+            yield _lines(description, total, every)
+        return
     columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TaskProgressColumn())
     bar = Progress(*columns, TimeElapsedColumn(), console=err, transient=True)
     with bar, compilation_announced(say):
@@ -123,9 +224,31 @@ def progress_bar(description, total):
         yield update
 
 
-PlatformOption = Annotated[str, typer.Option(help="Platform: a built-in name or a path to a TOML file.")]
+def _lines(description, total, every):
+    """update(done, text=None, total=None) that prints a line on stderr when `every` seconds have passed."""
+    began = said = time.monotonic()
+    whole = total
+
+    def update(done, text=None, total=None):
+        nonlocal said, whole
+        now, whole = time.monotonic(), total or whole
+        if now - said >= every:
+            said = now
+            share = f", {100.0 * done / whole:.0f} %" if whole else ""
+            note(f"{now - began:.0f} s{share}: {text or description}")
+
+    return update
+
+
+RANGE = "a list (8,12,18) or START:STOP:STEP, STOP included"
+PlatformOption = Annotated[
+    str, typer.Option(help="Platform: a name of fowt list platforms, or a path to a TOML file.")
+]
 OptionOption = Annotated[
-    list[str] | None, typer.Option("--option", metavar="KEY=VALUE", help="Scene option; repeatable.")
+    list[str] | None,
+    typer.Option(
+        "--option", metavar="KEY=VALUE", help="Option of the scene, of fowt list options; repeatable."
+    ),
 ]
 RotorOption = Annotated[
     str | None, typer.Option(help="Rotor model: bem, lookup or table; default: that of the fidelity.")

@@ -1,6 +1,8 @@
 """The commands of linear design: fowt linearize and fowt design."""
 
 import json
+import shlex
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -8,77 +10,118 @@ import typer
 
 from fowt_env.descriptions.checks import parse_numbers, parse_whole_numbers
 from fowt_env.errors import InputError
+from fowt_env.files.tables import table_path
 from fowt_env.training.cli.arguments import parse_pairs
-from fowt_env.training.cli.console import app, note, out, progress_bar, reported, show
+from fowt_env.training.cli.console import (
+    RANGE,
+    PlatformOption,
+    app,
+    note,
+    out,
+    output,
+    progress_bar,
+    reported,
+    show,
+)
+from fowt_env.training.cli.tables import print_table
 
-design = typer.Typer(no_args_is_help=True, rich_markup_mode="rich", help="Tune controllers.")
+design = typer.Typer(
+    no_args_is_help=True, rich_markup_mode="rich", help="Design and tune controllers, and find their limits."
+)
 app.add_typer(design, name="design")
 
 LINEARIZE_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt linearize --winds 18[/cyan]  modes with periods and damping at one wind
+[cyan]fowt linearize --winds 18[/cyan]  # modes with periods and damping at one wind
 
-[cyan]fowt linearize --winds 4:25:1 --out modes.csv[/cyan]  the sweep, cut-in to cut-out
+[cyan]fowt linearize --winds 4:25:1 --out modes.csv[/cyan]  # the sweep, cut-in to cut-out
 
-[cyan]fowt linearize --out study[/cyan]  a folder: tables, models, pole map, damping and Bode plots
+[cyan]fowt linearize --out study[/cyan]  # a folder: tables, models, pole map, damping and Bode plots
 
-[cyan]fowt linearize --winds 18 --out model.npz[/cyan]  the matrices, for other tools
+[cyan]fowt linearize --winds 18 --out model.mat[/cyan]  # the matrices, for MATLAB and Simulink (write_mat)
+
+[cyan]fowt linearize --winds 12:24:2 --out models.npz[/cyan]  # those of several winds, as arrays
+
+In Python, fowt_env.linearize(scene).to_statespace() is the same model as a control.StateSpace.
 
 Modes are those of the plant with torque and blade pitch held. A right-half-plane zero from blade pitch to
 rotor speed bounds how fast any pitch controller on speed alone may be. Below rated the blade pitch rests on
 its minimum: the zeros and Bode plots of blade pitch leave those winds out."""
 PI_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt design pi --omega 0.2 --zeta 0.7 --out my.json[/cyan]  the published aim, on this rotor
+[cyan]fowt design pi --omega 0.2 --zeta 0.7 --out my.json[/cyan]  # the published aim, on this rotor
 
-[cyan]fowt evaluate --controllers gspi_oc3,design:my.json --cases ntm_18[/cyan]  score it
+[cyan]fowt evaluate --controllers gspi_oc3,design:my.json --cases ntm_18[/cyan]  # score it
 
 slope: rotor acceleration per blade pitch; KP, KI, omega, zeta: of the rotor loop at that wind;
 platform_zeta: damping of platform pitch under these gains, without viscous drag, negative where unstable."""
 BOUND_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt design bound --wind 18[/cyan]  the performance limit of linear control, at 18 m/s
+[cyan]fowt design bound --wind 18[/cyan]  # the performance limit of linear control, at 18 m/s
 
-[cyan]fowt design bound --out bound.csv --plot bound.png[/cyan]  all winds above rated
+[cyan]fowt design bound --out bound.csv --plot bound.png[/cyan]  # all winds above rated
 
-[cyan]fowt design bound --wind 18 --information measured,measured_pitch_only[/cyan]  what torque is worth
+[cyan]fowt design bound --wind 18 --information measured,measured_pitch_only[/cyan]  # what torque is worth
 
-[cyan]fowt design bound --wind 18 --previews 5 --information full,full_preview_5[/cyan]  5 s of wind ahead
+[cyan]fowt design bound --wind 18 --previews 5 --information full,full_preview_5[/cyan]  # 5 s of wind ahead
 
 Deviations are shown over those of gspi_oc3 on the same model, at no more pitch travel and power deviation.
 Information: full (plant, wind and waves), measured (five sensors with their noise) or speed (rotor speed and
 blade pitch); with _preview_T where the wind is known T s ahead, with _pitch_only without torque."""
 ZEROS_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt design zeros[/cyan]  OC3-Hywind, whole winds above rated
+[cyan]fowt design zeros[/cyan]  # OC3-Hywind, whole winds above rated
 
-[cyan]fowt design zeros --platform nrel5mw_oc4_semi --out zeros.csv[/cyan]  another platform, as a table
+[cyan]fowt design zeros --platform nrel5mw_oc4_semi --out zeros.csv[/cyan]  # another platform, as a table
 
 A zero in the right half plane, near the platform's own pitch, is where holding the rotor speed with the
 blades takes the thrust that damps the platform: no feedback of rotor speed alone can be faster. pi: damping
 ratios of platform pitch (or of the rotor, where that is less) and of surge under pi; drag is left out."""
 TUNE_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt design tune pi_tuned[/cyan]  three factors on the published gains, 40 settings tried
+[cyan]fowt design tune pi_tuned[/cyan]  # three factors on the published gains, 40 settings tried
 
-[cyan]fowt design tune rosco_float --jobs 2 --keep[/cyan]  and put what it finds into controllers/tuned.toml
+[cyan]fowt design tune rosco_float --jobs 2 --keep[/cyan]  # and put what it finds into controllers/tuned.toml
 
 Cost: mean of rotor-speed and platform-pitch deviation over gspi_oc3's, over the lifetime, and penalties
 beyond the limits of the suite, for energy below 99.5 % and for failed or tripped runs. Written:
 OUT/tune_NAME.csv, a row per setting as soon as it has run."""
 FRONT_EXAMPLES = """[bold]Example[/bold]
 
-[cyan]fowt design front --runs sweep.csv --bound bound.csv --plot front.png[/cyan]  lqr beside the limit"""
+[cyan]fowt design front --runs sweep.csv --bound bound.csv --plot front.png[/cyan]  # lqr beside the limit
+
+The tables are those of fowt design lqr-sweep --vary ... --out and fowt design bound --out."""
 LQR_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt design lqr[/cyan]  the shipped settings against gspi_oc3 on validation seeds
+[cyan]fowt design lqr[/cyan]  # the settings and their defaults
 
-[cyan]fowt design lqr --vary share=0.3,0.5,0.7 --out sweep.csv[/cyan]  from rotor speed to platform pitch
+[cyan]fowt design lqr --setting travel=0.8 --out my.json[/cyan]  # a design with less blade-pitch travel
 
-[cyan]fowt design lqr --setting travel=0.8 --out my.json[/cyan]  save one, to be run as design:my.json
+[cyan]fowt simulate --controller design:my.json --wind ntm:18:B[/cyan]  # run it
 
 share is that of platform pitch in what is minimised, the rest is rotor speed; travel, power, torque and shaft
-are limits, see LQGSettings in controllers/lqr/design.py."""
+are limits, see LQGSettings in controllers/lqr/design.py. Many values at once: fowt design lqr-sweep."""
+SWEEP_EXAMPLES = """[bold]Examples[/bold]
+
+[cyan]fowt design lqr-sweep[/cyan]  # the shipped settings against gspi_oc3 on validation seeds
+
+[cyan]fowt design lqr-sweep --vary share=0.3,0.5,0.7 --out sweep.csv[/cyan]  # three designs
+
+[cyan]fowt design front --runs sweep.csv --bound bound.csv[/cyan]  # beside the performance limit"""
+SETTINGS = {  # of LQGSettings, in words
+    "share": "of platform pitch in what is minimised; the rest: rotor speed",
+    "share_growth": "of the share, per m/s",
+    "travel": "limit of blade-pitch travel, over that of gspi_oc3",
+    "travel_cap": "limit of the same, deg/s",
+    "travel_near_rated": "limit of the same at the lowest design wind, deg/s",
+    "power": "limit of the power's deviation, over that of gspi_oc3",
+    "torque": "limit of the generator torque's deviation, of rated",
+    "shaft": "limit of the shaft torque's deviation, over that of gspi_oc3",
+    "shaft_near_rated": "limit of the same at the lowest design wind, of rated torque",
+    "speed_integral": "cost of the integral of the rotor speed",
+    "torque_rate": "cost of the torque's rate",
+    "schedule_time": "s, over which the operating wind follows the estimate",
+}
 
 
 def save_lqr(settings, path, platform="oc3_hywind"):
@@ -120,18 +163,22 @@ def _balanced(table):
 @app.command(epilog=LINEARIZE_EXAMPLES)
 @reported
 def linearize(
-    platform: Annotated[str, typer.Option(help="Platform: a name or a path.")] = "oc3_hywind",
+    platform: PlatformOption = "oc3_hywind",
     winds: Annotated[
         str | None,
-        typer.Option(help="Winds, m/s: 12,18 or START:STOP:STEP; default: whole ones to cut-out."),
+        typer.Option(help=f"Winds, m/s: {RANGE}; default: whole ones to cut-out."),
     ] = None,
     out_path: Annotated[
         str | None,
-        typer.Option("--out", help="Modes: .csv, .parquet; models: .json, .npz; with plots: a folder."),
+        typer.Option(
+            "--out",
+            help="Modes: .csv, .parquet; models: .json, .npz, of one wind .mat; all, with plots: a folder.",
+        ),
     ] = None,
 ):
-    """Print modes and right-half-plane zeros of the floating turbine over the wind."""
+    """Linear models over the wind: modes, zeros, matrices."""
     from fowt_env.controllers.lqr.design import design_winds
+    from fowt_env.files.matlab import write_mat
     from fowt_env.files.tables import TABLE_SUFFIXES, write_table
     from fowt_env.training.design.sweeps import (
         MODEL_SUFFIXES,
@@ -143,10 +190,13 @@ def linearize(
     )
 
     suffix = "" if out_path is None else Path(out_path).suffix.lower()
-    if suffix and suffix not in (*TABLE_SUFFIXES, *MODEL_SUFFIXES):
-        allowed = ", ".join((*TABLE_SUFFIXES, *MODEL_SUFFIXES))
+    if suffix and suffix not in (*TABLE_SUFFIXES, *MODEL_SUFFIXES, ".mat"):
+        allowed = ", ".join((*TABLE_SUFFIXES, *MODEL_SUFFIXES, ".mat"))
         raise InputError(f"--out {out_path}: must be a folder or end with {allowed}")
+    output(out_path, folder=not suffix)
     scene, speeds, _ = _scene_and_winds(platform, winds, design_winds)
+    if suffix == ".mat" and len(speeds) > 1:
+        raise InputError(f"--out {out_path}: a .mat holds the model of one wind, as --winds 18")
     with progress_bar("linearising", len(speeds)) as update:
         models = models_over(scene, speeds, lambda done, total: update(done, total=total))
     modes, zeros = mode_table(models), zero_table(models)
@@ -165,6 +215,8 @@ def linearize(
         return
     if suffix in TABLE_SUFFIXES:
         written = [write_table(modes, out_path)]
+    elif suffix == ".mat":
+        written = [write_mat(next(iter(models.values())), out_path)]
     elif suffix:
         written = [save_models(models, out_path)]
     else:
@@ -183,12 +235,15 @@ def pi(
     ] = "loop",
     winds: Annotated[
         str | None,
-        typer.Option(help="Winds, m/s: 12,18 or START:STOP:STEP; default: whole ones above rated."),
+        typer.Option(help=f"Winds, m/s: {RANGE}; default: whole ones above rated."),
     ] = None,
-    platform: Annotated[str, typer.Option(help="Platform: a name or a path.")] = "oc3_hywind",
+    platform: PlatformOption = "oc3_hywind",
     out_path: Annotated[str | None, typer.Option("--out", help="Design: .json.")] = None,
 ):
-    """Gains of a scheduled PI from a specified frequency and damping ratio, and the platform's damping."""
+    """Gains of a scheduled PI from frequency and damping of the rotor loop.
+
+    With the damping of the platform's pitch that they leave.
+    """
     import pandas as pd
 
     from fowt_env.controllers.design.pi import design_pi
@@ -196,6 +251,7 @@ def pi(
     from fowt_env.controllers.lqr.design import winds_above_rated
     from fowt_env.training.design.sweeps import models_over
 
+    output(out_path)
     scene, speeds, winds = _scene_and_winds(platform, winds, winds_above_rated)
     with progress_bar("linearising", len(speeds)) as update:
         models = models_over(scene, speeds, lambda done, total: update(done, total=total))
@@ -221,7 +277,7 @@ def pi(
 @reported
 def bound(
     wind: Annotated[
-        str | None, typer.Option(help="Winds above rated, m/s: 12,18 or START:STOP:STEP; default: even ones.")
+        str | None, typer.Option(help=f"Winds above rated, m/s: {RANGE}; default: even ones.")
     ] = None,
     information: Annotated[
         str | None, typer.Option(help="What the feedback knows, comma-separated; default: the usual (below).")
@@ -236,20 +292,25 @@ def bound(
     sea: Annotated[
         str | None, typer.Option(help="Sea of every wind, as fowt simulate takes it; default: the suites'.")
     ] = None,
-    platform: Annotated[str, typer.Option(help="Platform: a name or a path.")] = "oc3_hywind",
+    platform: PlatformOption = "oc3_hywind",
     out_path: Annotated[str | None, typer.Option("--out", help="Pareto fronts: .csv or .parquet.")] = None,
     plot: Annotated[str | None, typer.Option(help="Plot of the Pareto fronts, e.g. bound.png.")] = None,
 ):
-    """Find the performance limit: least rotor-speed and platform-pitch deviations of linear feedback."""
+    """Performance limit of linear feedback.
+
+    The least deviations of rotor speed and platform pitch that any linear feedback can reach.
+    """
     import fowt_env
     from fowt_env.descriptions.sea_state import sea_state_of
-    from fowt_env.files.tables import table_path, write_table
+    from fowt_env.files.tables import write_table
     from fowt_env.training.cli.arguments import parse_sea
     from fowt_env.training.design.bound_control import noise_of
     from fowt_env.training.design.linear_bound import INFORMATION, PLOTTED, bound_table, rounded
 
     if out_path is not None:
         table_path(out_path)
+    output(out_path)
+    output(plot, "--plot")
     speeds = None if wind is None else parse_numbers(wind, "wind")
     scene = fowt_env.build_scene(platform, wind=18.0 if speeds is None else speeds[0])
     with progress_bar("designing", None) as update:
@@ -283,20 +344,24 @@ def bound(
 @design.command(epilog=ZEROS_EXAMPLES)
 @reported
 def zeros(
-    platform: Annotated[str, typer.Option(help="Platform: a name or a path.")] = "oc3_hywind",
+    platform: PlatformOption = "oc3_hywind",
     winds: Annotated[
         str | None,
-        typer.Option(help="Winds above rated, m/s: 12,18 or START:STOP:STEP; default: whole ones."),
+        typer.Option(help=f"Winds above rated, m/s: {RANGE}; default: whole ones."),
     ] = None,
     out_path: Annotated[str | None, typer.Option("--out", help="Table: .csv or .parquet.")] = None,
 ):
-    """Show where right-half-plane zeros from blade pitch to rotor speed bind, and what pi makes of it."""
+    """Where right-half-plane zeros limit control by blade pitch.
+
+    From blade pitch to rotor speed, and the damping under pi.
+    """
     from fowt_env.controllers.lqr.design import winds_above_rated
-    from fowt_env.files.tables import table_path, write_table
+    from fowt_env.files.tables import write_table
     from fowt_env.training.design.sweeps import zeros_over
 
     if out_path is not None:
         table_path(out_path)
+    output(out_path)
     # the linear model of "reference" within 1e-3, at a tenth of the time
     scene, speeds, _ = _scene_and_winds(platform, winds, winds_above_rated, fidelity="standard")
     with progress_bar("linearising", None) as update:
@@ -309,15 +374,17 @@ def zeros(
 @design.command(epilog=FRONT_EXAMPLES)
 @reported
 def front(
-    runs: Annotated[str, typer.Option(help="Table of fowt design lqr --out.")],
+    runs: Annotated[str, typer.Option(help="Table of fowt design lqr-sweep --out.")],
     bound_path: Annotated[str, typer.Option("--bound", help="Table of fowt design bound --out.")],
     out_path: Annotated[str | None, typer.Option("--out", help="Ratios: .csv or .parquet.")] = None,
     plot: Annotated[str | None, typer.Option(help="Plot of the Pareto fronts, e.g. front.png.")] = None,
 ):
-    """Simulated designs over gspi_oc3, beside the performance limit, and the fraction of it they reach."""
+    """Simulated designs beside the performance limit."""
     from fowt_env.files.tables import read_table, write_table
     from fowt_env.training.design.linear_bound import INFORMATION, PLOTTED, ratio_table
 
+    output(out_path)
+    output(plot, "--plot")
     fronts = read_table(bound_path)
     table = ratio_table(read_table(runs), fronts)
     show(table, "over gspi_oc3; of_bound: 1 on the limit")
@@ -330,37 +397,64 @@ def front(
         note(f"wrote {plot}")
 
 
+SettingOption = Annotated[
+    list[str] | None, typer.Option(metavar="SETTING=VALUE", help="A setting of fowt design lqr; repeats.")
+]
+
+
 @design.command(epilog=LQR_EXAMPLES)
 @reported
 def lqr(
+    setting: SettingOption = None,
+    platform: PlatformOption = "oc3_hywind",
+    out_path: Annotated[str | None, typer.Option("--out", help="The design, .json.")] = None,
+    vary: Annotated[list[str] | None, typer.Option(hidden=True)] = None,
+):
+    """Design an LQG controller with settings of your own, and save it."""
+    from fowt_env.controllers.lqr.design import LQGSettings
+
+    if vary or (out_path is not None and not out_path.lower().endswith(".json")):
+        given = f"--vary {vary[0]}" if vary else f"--out {out_path}"
+        raise InputError(f"{given}: fowt design lqr saves one design as .json; for a sweep: lqr-sweep")
+    fixed = parse_pairs(setting, "setting")
+    chosen, default = asdict(LQGSettings().changed(**fixed)), asdict(LQGSettings())
+    rows = [(name, f"{value:g}", f"{default[name]:g}", SETTINGS[name]) for name, value in chosen.items()]
+    headings = ("setting", "value", "default", "what it is")
+    print_table(out, headings, rows, "settings of lqr", left=(0, 3), prose=(3,))
+    if out_path is None:
+        return
+    output(out_path)
+    with progress_bar("designing", None):
+        path = save_lqr(fixed, out_path, platform)
+    note(f"wrote {path}; next: fowt simulate --controller {shlex.quote(f'design:{path}')} --wind ntm:18:B")
+
+
+@design.command(name="lqr-sweep", epilog=SWEEP_EXAMPLES)
+@reported
+def lqr_sweep(
     vary: Annotated[
         list[str] | None, typer.Option(metavar="SETTING=A,B,C", help="Setting and its values; repeats.")
     ] = None,
-    setting: Annotated[
-        list[str] | None, typer.Option(metavar="SETTING=VALUE", help="A setting for all variants; repeats.")
-    ] = None,
+    setting: SettingOption = None,
     cases: Annotated[str, typer.Option(help="Cases or suites.")] = "ntm_14,ntm_18,ntm_22",
-    seeds: Annotated[str, typer.Option(help="Validation seeds, 1000 and above.")] = "1001,1002",
-    platform: Annotated[str, typer.Option(help="Platform: a name or a path.")] = "oc3_hywind",
-    out_path: Annotated[
-        str | None, typer.Option("--out", help="All runs: .csv; or, without runs, the design: .json.")
-    ] = None,
+    seeds: Annotated[
+        str, typer.Option(help="Validation seeds, 1000 and above: 1001,1002 or 1001:1006:1 (1006 included).")
+    ] = "1001,1002",
+    platform: PlatformOption = "oc3_hywind",
+    out_path: Annotated[str | None, typer.Option("--out", help="All runs, .csv.")] = None,
 ):
-    """Sweep the settings of lqr on validation seeds, beside gspi_oc3; or save one design (--out .json)."""
+    """Run designs of lqr over values of its settings, beside gspi_oc3."""
     from fowt_env.training.design.sweeps import SHOWN, sweep
 
-    fixed = parse_pairs(setting, "setting")
-    if out_path is not None and out_path.lower().endswith(".json"):
-        if vary:
-            raise InputError(f"--vary {vary[0]}: a design has one value per setting; use --setting")
-        note(f"wrote {save_lqr(fixed, out_path, platform)}")
-        return
-    variants = [fixed]
+    if out_path is not None:
+        table_path(out_path, (".csv",))
+    variants = [parse_pairs(setting, "setting")]
     for pair in vary or ():
         name, _, values = pair.partition("=")
         numbers = parse_numbers(values, f"setting {name}")
         variants = [variant | {name: number} for variant in variants for number in numbers]
     numbers = parse_whole_numbers(seeds, "seeds")
+    output(out_path)
     with progress_bar("simulating", None) as update:
         table = sweep(
             variants,
@@ -384,8 +478,10 @@ def tune_command(
     ],
     budget: Annotated[int, typer.Option(help="Settings that are tried.")] = 40,
     suite: Annotated[str, typer.Option(help="Suite whose cases are run.")] = "above_rated",
-    platform: Annotated[str, typer.Option(help="Platform: a name or a path.")] = "oc3_hywind",
-    seeds: Annotated[str, typer.Option(help="Validation seeds, 1000 or more.")] = "1001,1002",
+    platform: PlatformOption = "oc3_hywind",
+    seeds: Annotated[
+        str, typer.Option(help="Validation seeds, 1000 or more: 1001,1002 or 1001:1006:1 (1006 included).")
+    ] = "1001,1002",
     preview: Annotated[str, typer.Option(help="Wind ahead: exact, or a lidar by its name.")] = "exact",
     jobs: Annotated[int, typer.Option(help="Worker processes.")] = 1,
     engine: Annotated[str, typer.Option(help="Where the runs go: processes or ray.")] = "processes",
@@ -395,7 +491,10 @@ def tune_command(
     ] = False,
     out_folder: Annotated[str, typer.Option("--out", help="Folder of the table.")] = "results/tune",
 ):
-    """Search the settings of a baseline: one objective, one set of seeds and limits for all of them."""
+    """Search the settings of a built-in controller.
+
+    One objective, one set of seeds and limits for all of them.
+    """
     from fowt_env.training.design.tune import tune, write_tuned
     from fowt_env.training.evaluation.engines import session
 
@@ -405,6 +504,7 @@ def tune_command(
     asked = {"suite": suite, "seeds": numbers, "jobs": jobs, "engine": engine, "address": address}
     asked |= {} if platform == "oc3_hywind" else {"platform": platform}
     asked |= {} if preview == "exact" else {"preview": preview}
+    output(out_folder, folder=True)
     with progress_bar(f"tuning {name}", budget) as update, session(engine, jobs, address):
 
         def report(number, row):

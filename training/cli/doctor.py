@@ -12,13 +12,13 @@ from fowt_env.training.cli.console import app, reported
 
 DOCTOR_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt doctor[/cyan]  all of it; the self-test compiles kernels if it must, up to a minute
+[cyan]fowt doctor[/cyan]  # all of it; the self-test compiles kernels if it must, up to a minute
 
-[cyan]fowt doctor --no-test[/cyan]  versions, optional parts and the cache alone
+[cyan]fowt doctor --no-test[/cyan]  # versions, optional parts and the cache alone
 
 [bold]Exit code[/bold]: 0 if versions and the self-test's figures (unless left out) are right, 1 if not."""
 
-out = Console()
+out = Console(emoji=False)
 
 
 @app.command(epilog=DOCTOR_EXAMPLES)
@@ -26,7 +26,10 @@ out = Console()
 def doctor(
     test: Annotated[bool, typer.Option("--test/--no-test", help="Run the self-test.")] = True,
 ):
-    """Check this installation: versions, optional parts, kernel cache, a short run with known figures."""
+    """Check this installation.
+
+    Versions, optional parts, the cache of compiled kernels, and a short run with known results.
+    """
     _print_versions()
     _print_extras()
     faults = [package.advice for package in requirements.versions() if not package.fits]

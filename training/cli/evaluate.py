@@ -1,5 +1,6 @@
 """fowt evaluate: controllers on the cases of a suite."""
 
+import json
 from pathlib import Path
 from typing import Annotated
 
@@ -11,29 +12,34 @@ from fowt_env.errors import InputError, unknown
 from fowt_env.files.tables import write_table
 from fowt_env.training.cli.console import (
     EXIT_INTERRUPTED,
+    EXIT_STOPPED,
     app,
     err,
     fail,
     note,
     out,
+    output,
     progress_bar,
     reported,
 )
 from fowt_env.training.cli.tables import print_table, table_width
 
+MOST_CASES = 12  # whose conditions are printed
 EVALUATE_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt evaluate --suite above_rated --controllers pi,pi_land --jobs 2[/cyan]  the headline comparison
+[cyan]fowt evaluate --suite above_rated --controllers pi,pi_land --jobs 2[/cyan]  # the headline comparison
 
-[cyan]fowt evaluate --controllers pi --cases above_rated[/cyan]  the PI of Eq. (8), 12 to 24 m/s, one seed
+[cyan]fowt evaluate --controllers pi --cases above_rated[/cyan]  # the PI of Eq. (8), 12 to 24 m/s, one seed
 
 [cyan]fowt evaluate --controllers pi,pi_land --cases ntm_18,paper_18 --seeds 1,2,3 --jobs 2[/cyan]
 
-[cyan]fowt evaluate --suite mysuite.toml --controllers pi,mymodule:Mine --baseline pi[/cyan]  your own cases
+[cyan]fowt evaluate --suite mysuite.toml --controllers pi,mymodule:Mine --baseline pi[/cyan]  # your own cases
 
-[cyan]fowt evaluate --suite above_rated --platform nrel5mw_oc4_semi --out results/oc4[/cyan]  another platform
+[cyan]fowt evaluate --suite above_rated --platform nrel5mw_oc4_semi --out results/oc4[/cyan]
 
-[cyan]fowt evaluate --suite above_rated --sensors exact --out results/exact[/cyan]  without noise and delay
+[cyan]fowt evaluate --suite above_rated --sensors exact --out results/exact[/cyan]  # without noise and delay
+
+[cyan]fowt evaluate --controllers pi,mymodule:Mine --out results/mine --retry-failed[/cyan]  # what failed
 
 [bold]Files written[/bold]: runs/CONTROLLER/CASE_seedN.parquet, results.csv (a row per run), leaderboard.json
 (means, intervals, paired differences, versions), manifest.json (the settings), summary.csv (means by
@@ -62,7 +68,9 @@ def evaluate_command(
     ] = None,
     seeds: Annotated[
         str | None,
-        typer.Option(help="1,2,3 or 1:6:1, same for each controller. Default: the suite's, else 1."),
+        typer.Option(
+            help="1,2,3 or 1:6:1 (6 included), the same for each controller. Default: the suite's, else 1."
+        ),
     ] = None,
     duration: Annotated[
         float | None, typer.Option(help="Length of each run, s. Default: the suite's, else 660.")
@@ -85,16 +93,23 @@ def evaluate_command(
     time_limit: Annotated[
         float, typer.Option(help="Wall-clock seconds after which a run fails; 0: never.")
     ] = 3600.0,
+    retry_failed: Annotated[
+        bool, typer.Option("--retry-failed", help="Do runs of the folder again that failed.")
+    ] = False,
     out_folder: Annotated[
         str, typer.Option("--out", help="Folder for what is written.")
     ] = "results/evaluation",
     plot: Annotated[bool, typer.Option("--plot/--no-plot", help="Make the plots.")] = True,
 ):
-    """Score controllers on load cases: a leaderboard with intervals, metrics by case, the runs, and plots."""
+    """Compare controllers on load cases: a leaderboard.
+
+    With intervals, metrics by case, the time series of all runs, and plots.
+    """
+    from fowt_env.training.evaluation.engines import WorkersLost
     from fowt_env.training.evaluation.evaluate import evaluate, summary
     from fowt_env.training.reports.terminal import chosen_cases, write_leaderboard
 
-    folder = Path(out_folder)
+    folder = Path(output(out_folder, folder=True))
     chosen = chosen_cases(suite, cases, platform)
     numbers = None if seeds is None else parse_whole_numbers(seeds, "seeds")
     if baseline is not None and baseline not in (names := [name.strip() for name in controllers.split(",")]):
@@ -121,17 +136,34 @@ def evaluate_command(
                 address=address,
                 time_limit=time_limit or None,
                 sensors=sensors,
+                retry_failed=retry_failed,
                 **({} if preview == "exact" else {"preview": preview}),
             )
         except KeyboardInterrupt:
             place = f"in {folder / 'results.csv'}; the same command continues with the others"
             fail(f"interrupted; the {finished} finished runs are {place}", EXIT_INTERRUPTED)
+        except WorkersLost as error:
+            fail(error, EXIT_STOPPED)
+    _print_conditions(folder, suite)
     board = write_leaderboard(table, folder, baseline)
     means = summary(table)
     write_table(means, folder / "summary.csv")
     _print_evaluation(table, means, board)
     plots = _evaluation_plots(table, board, folder) if plot else []
     note(f"wrote results.csv, leaderboard.json, summary.csv, runs/ and {len(plots)} plots in {folder}")
+
+
+def _print_conditions(folder, suite):
+    """Print wind, sea, event and length of each case of a results folder; of many, where they are listed."""
+    from fowt_env.training.evaluation.conditions import described_texts
+
+    cases = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))["cases"]
+    if len(cases) > MOST_CASES:
+        note(f"wind and sea of the {len(cases)} cases: fowt list cases {suite or ''}".rstrip())
+        return
+    rows = [(name, *described_texts(about), f"{about['duration']:g}") for name, about in cases.items()]
+    print_table(out, ("case", "wind", "sea", "s"), rows, left=(0, 1, 2), prose=(1, 2))
+    out.print()
 
 
 def _print_evaluation(table, means, board):

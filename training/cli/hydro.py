@@ -8,14 +8,14 @@ import typer
 
 from fowt_env.descriptions.checks import check_number, parse_numbers
 from fowt_env.errors import InputError
-from fowt_env.training.cli.console import app, note, out, progress_bar, reported
+from fowt_env.training.cli.console import RANGE, app, note, out, output, progress_bar, reported
 from fowt_env.training.cli.tables import print_table
 
 EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt hydro semi.gdf --depth 200 --out hydro.npz[/cyan]  0.05 to 3 rad/s, waves from -180 to 180 deg
+[cyan]fowt hydro semi.gdf --depth 200 --out hydro.npz[/cyan]  # 0.05 to 3 rad/s, waves from -180 to 180 deg
 
-[cyan]fowt hydro spar.stl --depth 320 --omega 0.1:2.5:0.1 --heading 0[/cyan]  fewer of both
+[cyan]fowt hydro spar.stl --depth 320 --omega 0.1:2.5:0.1 --heading 0[/cyan]  # fewer of both
 
 In the platform file: [potential_flow] coefficients = "hydro.npz" and displaced_volume, which is printed.
 A problem takes a second with 3000 panels; there are six and one per heading at each frequency."""
@@ -29,23 +29,27 @@ def hydro(
     out_file: Annotated[Path, typer.Option("--out", help="Coefficients to write (.npz).")] = Path(
         "hydro.npz"
     ),
-    omega: Annotated[
-        str, typer.Option(help="Frequencies, rad/s: a list or START:STOP:STEP.")
-    ] = "0.05:3:0.05",
-    heading: Annotated[str, typer.Option(help="Directions of travel of the waves, deg.")] = "-180:180:30",
+    omega: Annotated[str, typer.Option(help=f"Frequencies, rad/s: {RANGE}.")] = "0.05:3:0.05",
+    heading: Annotated[
+        str, typer.Option(help=f"Directions of travel of the waves, deg: {RANGE}.")
+    ] = "-180:180:30",
     density: Annotated[float, typer.Option(help="Of the water, kg/m3.")] = 1025.0,
     gravity: Annotated[float, typer.Option(help="m/s2.")] = 9.80665,
     lid: Annotated[
         bool, typer.Option("--lid/--no-lid", help="Close the inner water plane (irregular frequencies).")
     ] = True,
 ):
-    """Compute added mass, damping, wave excitation and hydrostatics of a hull with Capytaine."""
+    """Wave loads of a hull from its panel mesh, by Capytaine.
+
+    Computes added mass, damping, wave excitation and hydrostatics.
+    """
     from fowt_env.analysis.panel_method import solve_mesh
     from fowt_env.descriptions.potential_flow import coefficient_arrays
     from fowt_env.files.atomic import replacing
 
     if out_file.suffix != ".npz":
         raise InputError(f"--out {str(out_file)!r}: must end with .npz")
+    output(out_file)
     check_number("--depth", depth, 0.0, low_open=True)
     with progress_bar("solving", None) as update:
         body = solve_mesh(

@@ -6,18 +6,18 @@ import typer
 from rich.markup import escape
 
 from fowt_env.errors import InputError
-from fowt_env.training.cli.console import app, note, out, reported
+from fowt_env.training.cli.console import app, note, out, output, reported
 from fowt_env.training.cli.tables import print_table
 
 EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt import deck/5MW_OC4Semi.fst --out my_semi[/cyan]  platform.toml, turbine, coefficients and report.md
+[cyan]fowt import deck/5MW_OC4Semi.fst --out my_semi[/cyan]  # platform.toml, turbine, coefficients and report.md
 
-[cyan]fowt import deck.fst --out mine --discon tuned_DISCON.IN[/cyan]  another controller than the deck's
+[cyan]fowt import deck.fst --out mine --discon tuned_DISCON.IN[/cyan]  # another controller than the deck's
 
-[cyan]fowt import --elastodyn ED.dat --aerodyn AD15.dat --hydrodyn HD.dat --mooring MAP.dat --out mine[/cyan]  without an .fst
+[cyan]fowt import --elastodyn ED.dat --aerodyn AD15.dat --hydrodyn HD.dat --mooring MAP.dat --out mine[/cyan]  # without an .fst
 
-[cyan]fowt simulate --platform my_semi/platform.toml --wind 14[/cyan]  what comes next
+[cyan]fowt simulate --platform my_semi/platform.toml --wind 14[/cyan]  # what comes next
 
 docs/guides/import.md says what is read, what is approximated and what is refused."""  # noqa: E501
 
@@ -48,7 +48,7 @@ def import_command(
     ] = None,
     overwrite: Annotated[bool, typer.Option(help="Replace the files of an earlier import.")] = False,
 ) -> None:
-    """Convert a deck of OpenFAST or FAST 8 to a platform and turbine of this project."""
+    """Convert an OpenFAST or FAST 8 deck to a platform file."""
     from fowt_env.files.openfast_deck.importer import import_deck
 
     parts = {
@@ -59,6 +59,7 @@ def import_command(
         raise InputError(
             "fowt import: needs an .fst file, or part files such as --elastodyn, --aerodyn, --hydrodyn"
         )
+    output(out_path, folder=True)
     report = import_deck(
         deck, out_path, parts=parts, search=search or (), discon=discon, name=name, replace_files=overwrite
     )

@@ -5,12 +5,10 @@ from typing import Annotated
 
 import typer
 
-from fowt_env.training.cli.console import app, note, out, progress_bar, reported
+from fowt_env.training.cli.console import app, note, out, output, progress_bar, reported
 from fowt_env.training.cli.tables import print_table
 
-board_app = typer.Typer(
-    help="A standing board: add submissions, judge them, show what came of it.", no_args_is_help=True
-)
+board_app = typer.Typer(help="Keep a standing board of submitted controllers.", no_args_is_help=True)
 app.add_typer(board_app, name="leaderboard")
 
 BoardOption = Annotated[Path, typer.Option("--board", help="Folder of the board.")]
@@ -24,7 +22,7 @@ ADD_EXAMPLES = """A submission is a folder with card.toml and the controller tha
     information = ["generator_speed", "blade_pitch"]
     tuning = "gains by hand, seeds 1001 to 1004"
 
-[cyan]fowt leaderboard add my_controller[/cyan]  into ./board, which is made with the package's own
+[cyan]fowt leaderboard add my_controller[/cyan]  # into ./board, which is made with the package's own
 controllers if there is none"""
 
 
@@ -38,13 +36,17 @@ def add_command(
         typer.Option(help="Of a board that is made: a name or a path, to which the suites are scaled."),
     ] = None,
 ):
-    """Check submissions and copy them into the board; none of their code is run."""
+    """Check submissions and copy them into the board.
+
+    None of their code is run.
+    """
     from fowt_env.training.board.folder import SETTINGS, Board, new_board
     from fowt_env.training.board.submission import read_submission
 
     for folder in submissions:
         read_submission(folder)
     if not (board / SETTINGS).exists():
+        output(board, "--board", folder=True)
         made = new_board(board, platform=platform)
         first = ", ".join(each.name for each in made.submissions())
         note(f"made the board {board} with the controllers of the package: {first}")
@@ -53,9 +55,9 @@ def add_command(
         note(f"added {name}; judge it with: fowt leaderboard run --board {board}")
 
 
-RUN_EXAMPLES = """[cyan]fowt leaderboard run --jobs 2[/cyan]  all submissions on the public seeds
+RUN_EXAMPLES = """[cyan]fowt leaderboard run --jobs 2[/cyan]  # all submissions on the public seeds
 
-[cyan]fowt leaderboard run --secret seeds.txt --private private --trust-code[/cyan]  on the organiser's
+[cyan]fowt leaderboard run --secret seeds.txt --private private --trust-code[/cyan]  # on the organiser's
 seeds too
 
 Python files run only with [bold]--trust-code[/bold], each in a process of its own, with your user's
@@ -83,6 +85,7 @@ def run_command(
     from fowt_env.training.board.page import write_board
 
     holder = Board(board)
+    output(private, "--private", folder=True)
     with progress_bar("judging", None) as update:
 
         def report(done, total, text):
@@ -93,7 +96,10 @@ def run_command(
     note(f"wrote {', '.join(path.name for path in written)} in {board}")
 
 
-@board_app.command(name="show")
+SHOW_EXAMPLES = """[cyan]fowt leaderboard show[/cyan]  # the board in ./board, its first regime"""
+
+
+@board_app.command(name="show", epilog=SHOW_EXAMPLES)
 @reported
 def show_command(
     board: BoardOption = Path("board"),

@@ -6,29 +6,33 @@ from typing import Annotated
 import typer
 
 from fowt_env.errors import InputError, unknown
-from fowt_env.training.cli.console import app, note, reported
+from fowt_env.training.cli.console import app, note, output, reported
 
 PLOTS = ("series", "spectra", "boxes", "raos", "schedule")
 PLOT_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt plot series run.csv[/cyan]  stacked time series, into series.png
+[cyan]fowt plot series run.csv[/cyan]  # stacked time series, into series.png
 
-[cyan]fowt plot spectra pi.csv lqr.csv --skip 100 --out spectra.png[/cyan]  two runs over each other
+[cyan]fowt plot spectra pi.csv lqr.csv --skip 100 --out spectra.png[/cyan]  # two runs over each other
 
-[cyan]fowt plot boxes results/demo/runs/*/ntm_18_seed1.parquet --out boxes.png[/cyan]  a box for each run
+[cyan]fowt plot series openfast.outb run.csv[/cyan]  # a run of OpenFAST beside one of fowt simulate
 
-[cyan]fowt plot raos waves.parquet --skip 100[/cyan]  motion per metre of wave, of a run in irregular waves
+[cyan]fowt plot boxes results/demo/runs/*/ntm_18_seed1.parquet --out boxes.png[/cyan]  # a box for each run
 
-[cyan]fowt plot schedule steady.csv[/cyan]  operating points that fowt trim --out wrote
+[cyan]fowt plot raos waves.parquet --skip 100[/cyan]  # motion per metre of wave, of a run in irregular waves
 
-Runs are files of fowt simulate --out and of an evaluation's runs folder (.csv, .parquet)."""
+[cyan]fowt plot schedule steady.csv[/cyan]  # operating points that fowt trim --out wrote
+
+Runs are files of fowt simulate --out, of an evaluation's runs folder, and .outb of OpenFAST."""
 
 
 @app.command(epilog=PLOT_EXAMPLES)
 @reported
 def plot(
     kind: Annotated[str, typer.Argument(help="series, spectra, boxes, raos or schedule.")],
-    files: Annotated[list[str], typer.Argument(help="Tables, .csv or .parquet; one line or box for each.")],
+    files: Annotated[
+        list[str], typer.Argument(help="Runs, .csv, .parquet or .outb; one line or box for each.")
+    ],
     out_path: Annotated[
         str | None, typer.Option("--out", help="Picture: .png, .svg, .pdf ...; default: KIND.png.")
     ] = None,
@@ -38,15 +42,18 @@ def plot(
         str, typer.Option(help="Whose natural period of platform pitch the spectra mark; or none.")
     ] = "oc3_hywind",
 ):
-    """Plot saved runs: time series, spectra, box plots, response to waves; or the steady schedule."""
-    from fowt_env.files.tables import read_table
+    """Plot saved runs: time series, spectra, box plots.
+
+    Also the response to waves, and the steady schedule of a table of fowt trim.
+    """
+    from fowt_env.files.tables import read_series
 
     if kind not in PLOTS:
         raise unknown("kind of plot", kind, PLOTS)
-    frames = {name: read_table(path) for name, path in _names(files).items()}
+    out_path = f"{kind}.png" if out_path is None else output(out_path)
+    frames = {name: read_series(path) for name, path in _names(files).items()}
     if len(frames) == 1:  # nothing to tell apart
         frames = {"": next(iter(frames.values()))}
-    out_path = f"{kind}.png" if out_path is None else out_path
     _draw(kind, frames, out_path, title, skip, platform)
     note(f"wrote {out_path}")
 

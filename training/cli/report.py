@@ -7,11 +7,11 @@ import typer
 
 from fowt_env.descriptions.checks import parse_whole_numbers
 from fowt_env.training.cli.arguments import parse_pairs, parse_sea, parse_wind
-from fowt_env.training.cli.console import OptionOption, app, note, progress_bar, reported
+from fowt_env.training.cli.console import OptionOption, app, note, output, progress_bar, reported
 
 REPORT_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt report results/demo[/cyan]  results/demo/report.html
+[cyan]fowt report results/demo[/cyan]  # results/demo/report.html
 
 [cyan]fowt report results/suite --cases ntm_12,ntm_24 --seeds 1,2 --rate 5 --out page.html[/cyan]
 
@@ -29,7 +29,8 @@ def report(
         str | None, typer.Option(help="Cases with time series, comma-separated; default: up to 64 runs.")
     ] = None,
     seeds: Annotated[
-        str | None, typer.Option(help="Seeds whose time series go in: 1,2; default: the first.")
+        str | None,
+        typer.Option(help="Seeds whose time series go in: 1,2 or 1:6:1 (6 included); default: the first."),
     ] = None,
     rate: Annotated[
         float | None, typer.Option(help="Samples per second of the time series; default: 2 or less.")
@@ -39,9 +40,13 @@ def report(
     ] = None,
     schedule: Annotated[bool, typer.Option("--schedule/--no-schedule", help="Show it.")] = True,
 ):
-    """Make one HTML page of an evaluation: leaderboard, Pareto and box plots, time series, spectra."""
+    """One HTML page of an evaluation, to be read offline.
+
+    Leaderboard, Pareto and box plots, time series and spectra.
+    """
     from fowt_env.training.reports.html_page import write_report
 
+    output(out_path)
     names = None if cases is None else [name.strip() for name in cases.split(",") if name.strip()]
     with progress_bar("report", None) as update:
         path = write_report(
@@ -59,7 +64,7 @@ def report(
 
 ANIMATE_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt animate gust.gif[/cyan]  OC3 and land gains in an extreme operating gust at 18 m/s
+[cyan]fowt animate gust.gif[/cyan]  # OC3 and land gains in an extreme operating gust at 18 m/s
 
 [cyan]fowt animate run.mp4 --controllers pi --wind ntm:14:B --sea jonswap:4:9 --duration 120[/cyan]"""
 
@@ -69,13 +74,13 @@ ANIMATE_EXAMPLES = """[bold]Examples[/bold]
 def animate(
     out_path: Annotated[str, typer.Argument(help="The animation: .gif or .mp4.")],
     controllers: Annotated[
-        str, typer.Option(help="One to four, comma-separated; see fowt list.")
+        str, typer.Option(help="One to four, comma-separated; see fowt list controllers.")
     ] = "pi,pi_land",
     platform: Annotated[str, typer.Option(help="Platform: a name or a path.")] = "oc3_hywind",
     wind: Annotated[
-        str, typer.Option(help="As for fowt simulate.")
+        str, typer.Option(help="As of fowt simulate --help.")
     ] = '{"kind": "eog", "speed": 18, "start": 20}',
-    sea: Annotated[str, typer.Option(help="As for fowt simulate.")] = "jonswap:4:10",
+    sea: Annotated[str, typer.Option(help="As of fowt simulate --help.")] = "jonswap:4:10",
     duration: Annotated[float, typer.Option(help="Length of the runs, s.")] = 80.0,
     seed: Annotated[int, typer.Option(help="Seed of wind and waves.")] = 0,
     speed: Annotated[float, typer.Option(help="How many times faster than real time.")] = 5.0,
@@ -85,12 +90,15 @@ def animate(
     fidelity: Annotated[str, typer.Option(help="reference, standard or fast.")] = "standard",
     option: OptionOption = None,
 ):
-    """Write an animation of one or several controllers in the same wind and waves, side by side."""
+    """Animate controllers side by side, as .gif or .mp4.
+
+    All of them meet the same wind and waves.
+    """
     import fowt_env
     from fowt_env.visual.animation import animate as animate_runs
     from fowt_env.visual.animation import animation_path
 
-    path = animation_path(out_path)  # a wrong ending should not cost a run
+    path = animation_path(output(out_path, "OUT_PATH"))  # a wrong ending should not cost a run
     names = list(dict.fromkeys(name.strip() for name in controllers.split(",") if name.strip()))
     options = {"duration": max(700.0, duration), **parse_pairs(option, "option")}
     scene = fowt_env.build_scene(

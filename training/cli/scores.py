@@ -6,12 +6,12 @@ import typer
 
 from fowt_env.errors import InputError
 from fowt_env.training.cli.arguments import parse_sea, parse_wind
-from fowt_env.training.cli.console import app, note, out, progress_bar, reported
+from fowt_env.training.cli.console import app, note, out, output, progress_bar, reported
 
 scores = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode="rich",
-    help="Score agents over baselines, case by case, against the performance limit, in faults, in a gust.",
+    help="Compare agents with baselines, from saved evaluations.",
 )
 app.add_typer(scores, name="scores")
 
@@ -70,13 +70,15 @@ OutOption = Annotated[
 ]
 BASELINES_EXAMPLES = """[bold]Examples[/bold]
 
+[cyan]fowt evaluate --controllers policy:ppo_lqr,gspi_oc3,rosco_float --out results/rl[/cyan]
+
 [cyan]fowt scores baselines results/rl --against gspi_oc3,rosco_float --out results/rl/scores[/cyan]
 
 [cyan]fowt scores baselines results/rl --group lqr=policy:ppo_lqr,policy:ppo_lqr_seed1[/cyan]
 
-Each figure: ratio of lifetime means on the same runs, its 95 % interval, and its verdict against the aims:
+Each figure: ratio of lifetime means on the same runs, its 95 % interval, and its verdict against the targets:
 missed, first, then (or met), with * where that is no chance finding (p at most 0.05 after Holm's correction
-for all aims). Failed and tripped runs count with the worst figures of all controllers on their case."""
+for all targets). Failed and tripped runs count with the worst figures of all controllers on their case."""
 
 
 @scores.command(name="baselines", epilog=BASELINES_EXAMPLES)
@@ -90,9 +92,10 @@ def over_baselines(
     cases: CasesOption = None,
     out_path: OutOption = None,
 ):
-    """Compare agents with baselines over all cases, with a verdict on each aim."""
+    """Agents over baselines, with a verdict on each target."""
     from fowt_env.training.reports.scores import agent_counts, agent_scores, scores_markdown
 
+    output(out_path)
     table = _runs(results, cases)
     chosen = _names(against), _groups(group), _names(agents)
     found, counts = agent_scores(table, *chosen), agent_counts(table, *chosen)
@@ -103,11 +106,11 @@ CASES_EXAMPLES = """[bold]Examples[/bold]
 
 [cyan]fowt evaluate --suite shifted --controllers policy:ppo_lqr,gspi_oc3 --out results/shifted[/cyan]
 
-[cyan]fowt scores cases results/shifted --out results/shifted/scores[/cyan]  every shifted plant by itself
+[cyan]fowt scores cases results/shifted --out results/shifted/scores[/cyan]  # every shifted plant by itself
 
-[cyan]fowt scores cases results/gusts --figures "RotSpeed_max_[rpm],PtfmPitch_max_[deg]"[/cyan]  any metric
+[cyan]fowt scores cases results/gusts --figures "RotSpeed_max_[rpm],PtfmPitch_max_[deg]"[/cyan]  # any metric
 
-[cyan]fowt scores cases results/sea_states --each[/cyan]  one row per sea state"""
+[cyan]fowt scores cases results/sea_states --each[/cyan]  # one row per sea state"""
 
 
 @scores.command(name="cases", epilog=CASES_EXAMPLES)
@@ -124,9 +127,13 @@ def by_cases(
     each: Annotated[bool, typer.Option("--each", help="Every case by itself, winds too.")] = False,
     out_path: OutOption = None,
 ):
-    """Compare agents with one baseline on each kind of case (its winds together), and count what failed."""
+    """Agents over one baseline, on each kind of case.
+
+    The winds of a kind together; failed runs are counted.
+    """
     from fowt_env.training.reports.scores import by_kind, figures_named, kinds_markdown
 
+    output(out_path)
     table, chosen = _runs(results, cases), figures_named(_names(figures))
     found, counts = by_kind(table, against, _groups(group), _names(agents), chosen, each)
     _shown(kinds_markdown(found, counts), {"": found, "counts": counts}, out_path)
@@ -153,10 +160,12 @@ def bound(
     plot: Annotated[str | None, typer.Option(help="Picture of all controllers and Pareto fronts.")] = None,
     out_path: OutOption = None,
 ):
-    """Print the fraction of the performance limit of linear control each controller reaches, per wind."""
+    """Share of the limit of linear control that each reaches."""
     from fowt_env.training.reports.bound_scores import bound_fractions, bound_markdown, read_bound
     from fowt_env.training.reports.score_plots import plot_fractions
 
+    output(out_path)
+    output(plot, "--plot")
     fronts = read_bound(table_path)
     found = bound_fractions(_runs(results, cases), fronts, _groups(group), _names(agents))
     _shown(bound_markdown(found), {"": found}, out_path)
@@ -178,9 +187,13 @@ trip is no failure here; the last table counts them."""
 @scores.command(epilog=FAULTS_EXAMPLES)
 @reported
 def faults(results: FoldersArgument, cases: CasesOption = None, out_path: OutOption = None):
-    """Print which controllers survive which faults, with the largest motions and loads and the trips."""
+    """Which controllers survive which faults.
+
+    With the largest motions and loads, and the trips.
+    """
     from fowt_env.training.reports.survival import survival, survival_markdown
 
+    output(out_path)
     found = survival(_runs(results, cases))
     _shown(survival_markdown(found), {"": found}, out_path)
 
@@ -195,21 +208,22 @@ GUST_EXAMPLES = """[bold]Examples[/bold]
 def gust(
     plot: Annotated[str, typer.Argument(help="The picture.")],
     controllers: Annotated[
-        str, typer.Option(help="Comma-separated; see fowt list.")
+        str, typer.Option(help="Comma-separated; see fowt list controllers.")
     ] = "gspi_oc3,rosco_float,lqr",
     wind: Annotated[
-        str, typer.Option(help="As for fowt simulate.")
+        str, typer.Option(help="As of fowt simulate --help.")
     ] = '{"kind": "eog", "speed": 18, "class": "B", "start": 200}',
-    sea: Annotated[str, typer.Option(help="As for fowt simulate.")] = "jonswap:4:10",
+    sea: Annotated[str, typer.Option(help="As of fowt simulate --help.")] = "jonswap:4:10",
     seed: Annotated[int, typer.Option(help="Seed of the waves.")] = 1,
     start: Annotated[float, typer.Option(help="First second that is shown.")] = 190.0,
     end: Annotated[float, typer.Option(help="Last second, where the runs end.")] = 280.0,
     fidelity: Annotated[str, typer.Option(help="reference, standard or fast.")] = "standard",
 ):
-    """Draw the time series of one gust under several controllers into one picture."""
+    """One picture of a gust under several controllers."""
     import fowt_env
     from fowt_env.training.reports.score_plots import plot_gust
 
+    output(plot, "PLOT")
     names = list(dict.fromkeys(_names(controllers)))
     if not 0.0 <= start < end:
         raise InputError(f"start = {start:g} s: must be 0 or more and below end = {end:g} s")

@@ -1,22 +1,22 @@
-"""fowt simulate, trim and list: one run, operating points, names."""
+"""fowt simulate and trim: one run, and operating points."""
 
 from typing import Annotated
 
 import typer
-from rich.columns import Columns
-from rich.markup import escape
 
 from fowt_env.descriptions.checks import parse_numbers
-from fowt_env.errors import SimulationStopped, unknown
+from fowt_env.errors import SimulationStopped
 from fowt_env.files.tables import SERIES_SUFFIXES, table_path, write_table
 from fowt_env.training.cli.arguments import parse_fault, parse_pairs, parse_protection, parse_sea, parse_wind
 from fowt_env.training.cli.console import (
+    RANGE,
     OptionOption,
     PlatformOption,
     RotorOption,
     app,
     note,
     out,
+    output,
     progress_bar,
     reported,
 )
@@ -25,19 +25,21 @@ from fowt_env.training.cli.tables import figure, print_table
 ROUNDING = 1e-9  # a standard deviation below this fraction of the mean is none
 SIMULATE_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt simulate --wind 18 --sea paper_wind_wave --plot run.png[/cyan]  steady wind, irregular sea
+[cyan]fowt simulate --wind 18 --sea paper_wind_wave --plot run.png[/cyan]  # steady wind, irregular sea
 
-[cyan]fowt simulate --wind ntm:18:B --seed 3 --controller pi_land --out run.csv[/cyan]  turbulence, land gains
+[cyan]fowt simulate --wind ntm:18:B --seed 3 --controller gspi_oc3 --out run.csv[/cyan]  # turbulence
 
-[cyan]fowt simulate --wind none --sea regular:3:5 --controller none --start zero[/cyan]  waves alone
+[cyan]fowt simulate --wind none --sea regular:3:5 --controller none --start zero[/cyan]  # waves alone
 
-[cyan]fowt simulate --wind none --start zero --controller none --initial PtfmSurge=10[/cyan]  free decay
+[cyan]fowt simulate --wind none --start zero --controller none --initial PtfmSurge=10[/cyan]  # free decay
 
-[cyan]fowt simulate --wind '{"kind": "etm", "speed": 18, "class": "A"}'[/cyan]  any wind, as JSON
+[cyan]fowt simulate --wind '{"kind": "etm", "speed": 18, "class": "A"}'[/cyan]  # any wind, as JSON
 
-[cyan]fowt simulate --controller ipc --option pitch=individual[/cyan]  a pitch for each blade
+[cyan]fowt simulate --controller policy:ppo_lqr --wind ntm:16:B[/cyan]  # a trained agent
 
-[cyan]fowt simulate --wind 18 --fault grid_loss:100 --protection turbine[/cyan]  a fault, and trips"""
+[cyan]fowt simulate --controller ipc --option pitch=individual[/cyan]  # a pitch for each blade
+
+[cyan]fowt simulate --wind 18 --fault grid_loss:100 --protection turbine[/cyan]  # a fault, and trips"""
 OF_BLADES = ("RootMyc1_[kN-m]", "LSSTipMys_[kN-m]", "LSSTipMzs_[kN-m]")  # of scenes that have them
 
 
@@ -48,14 +50,23 @@ def simulate(
     wind: Annotated[
         str,
         typer.Option(
-            help="m/s, KIND:SPEED[:CLASS] (ntm:18:B), JSON, a .csv of time and speed, a .wnd or .hh, or none."
+            help="m/s; KIND:SPEED[:CLASS] as ntm:18:B, eog:18 or (full-field) mann:18:B; a file: .csv of time"
+            " and speed, .bts, .wnd, .hh; JSON, as of kind box; or none. See fowt list winds."
         ),
     ] = "18",
     sea: Annotated[
-        str, typer.Option(help="Name, jonswap:HS:TP[:GAMMA], regular:H:T, JSON, or none (still water).")
+        str,
+        typer.Option(
+            help="Name of fowt list seas, jonswap:HS:TP[:GAMMA], regular:H:T, JSON, or none (still water)."
+        ),
     ] = "none",
     controller: Annotated[
-        str, typer.Option(help="Name, module:Name, design:FILE or none (constant command).")
+        str,
+        typer.Option(
+            help="Name of fowt list controllers, policy:NAME of fowt list agents, policy:FILE.npz,"
+            " design:FILE.json, module:Name of your own. none: rotor speed and blade pitch held (at rest"
+            " without wind); constant: torque and blade pitch held, the rotor turns freely."
+        ),
     ] = "pi",
     duration: Annotated[float, typer.Option(help="Length of the run, s.")] = 600.0,
     dt: Annotated[float | None, typer.Option(help="Physics step, s; default: that of the fidelity.")] = None,
@@ -84,12 +95,14 @@ def simulate(
     out_path: Annotated[str | None, typer.Option("--out", help="Series: .csv, .parquet or .outb.")] = None,
     plot: Annotated[str | None, typer.Option(help="Stacked plot of the run, e.g. run.png.")] = None,
 ):
-    """Simulate one run, print its statistics, and save its time series and plot."""
+    """Simulate one run: statistics, time series and a plot."""
     import fowt_env
 
     if out_path is not None:
         table_path(out_path, SERIES_SUFFIXES)  # a wrong ending should not cost a run
     options = {"duration": max(700.0, duration), **parse_pairs(option, "option")}
+    output(out_path)
+    output(plot, "--plot")
     scene = fowt_env.build_scene(
         platform,
         wind=parse_wind(wind),
@@ -176,11 +189,11 @@ def _print_channels(frame, title):
 
 TRIM_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt trim[/cyan]  the floating turbine from cut-in to cut-out
+[cyan]fowt trim[/cyan]  # the floating turbine from cut-in to cut-out
 
-[cyan]fowt trim --winds 8,11.4,18 --fixed --out steady.csv[/cyan]  fixed platform, into a file
+[cyan]fowt trim --winds 8,11.4,18 --fixed --out steady.csv[/cyan]  # fixed platform, into a file
 
-[cyan]fowt trim --plot schedule.png[/cyan]  the steady schedule as a picture"""
+[cyan]fowt trim --plot schedule.png[/cyan]  # the steady schedule as a picture"""
 TRIM_CHANNELS = (
     "RotSpeed",
     "BldPitch1",
@@ -198,20 +211,22 @@ TRIM_CHANNELS = (
 @reported
 def trim(
     platform: PlatformOption = "oc3_hywind",
-    winds: Annotated[str, typer.Option(help="Steady winds, m/s: 8,11.4,18 or START:STOP:STEP.")] = "4:24:1",
+    winds: Annotated[str, typer.Option(help=f"Steady winds, m/s: {RANGE}.")] = "4:24:1",
     fixed: Annotated[bool, typer.Option("--fixed", help="Fix the platform.")] = False,
     rotor: RotorOption = None,
     option: OptionOption = None,
     out_path: Annotated[str | None, typer.Option("--out", help="All channels: .csv or .parquet.")] = None,
     plot: Annotated[str | None, typer.Option(help="Plot of the schedule, e.g. schedule.png.")] = None,
 ):
-    """Print the steady operating point over wind speed."""
+    """Steady operating points over the wind speed."""
     import pandas as pd
 
     import fowt_env
 
     if out_path is not None:
         table_path(out_path)
+    output(out_path)
+    output(plot, "--plot")
     speeds = parse_numbers(winds, "winds")
     options = parse_pairs(option, "option")
     rows = []
@@ -236,46 +251,3 @@ def trim(
 
         plot_schedule(points, plot, title)
         note(f"wrote {plot}")
-
-
-@app.command(name="list")
-@reported
-def list_names(
-    kind: Annotated[
-        str, typer.Argument(help="platforms, turbines, seas, controllers, agents, suites or cases; or all.")
-    ] = "all",
-):
-    """List the names that the other commands accept."""
-    from fowt_env.controllers import CONTROLLERS
-    from fowt_env.controllers.policy.controller import shipped_agents
-    from fowt_env.descriptions.builtin import names
-    from fowt_env.training.evaluation.cases import all_cases, read_suite, suite_names
-
-    known = {
-        "platforms": lambda: names("platforms"),
-        "turbines": lambda: names("turbines"),
-        "seas": lambda: names("sea_states"),
-        "controllers": lambda: list(CONTROLLERS),
-        "agents": lambda: [f"policy:{name}" for name in shipped_agents()],
-        "suites": lambda: [f"{suite} ({len(read_suite(suite).cases)} cases)" for suite in suite_names()],
-        "cases": lambda: list(all_cases()),
-    }
-    if kind != "all" and kind not in known:
-        raise unknown("kind of name", kind, ("all", *known))
-    for heading in known if kind == "all" else (kind,):
-        out.print(f"[bold]{heading}[/bold]")
-        if heading == "controllers":
-            _print_controllers(CONTROLLERS)
-            continue
-        out.print(Columns(map(escape, known[heading]()), padding=(0, 3), expand=False), highlight=False)
-
-
-def _print_controllers(factories):
-    """Print the controllers: name, what each is, and what it uses."""
-    from fowt_env.controllers import information
-
-    rows = [
-        (name, factory.__doc__.splitlines()[0], ", ".join(information(name)))
-        for name, factory in factories.items()
-    ]
-    print_table(out, ("name", "what it is", "what it uses"), rows, prose=(1, 2))

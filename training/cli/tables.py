@@ -13,6 +13,8 @@ from rich.cells import cell_len
 from rich.text import Text
 
 GAP = "  "
+BREAK = "\u200b"  # where a long word of prose may go on in the next line
+LONG_WORD = re.compile(r"\S{17,}")
 
 
 def table_width(console):
@@ -35,7 +37,10 @@ def print_table(console, headings, rows, title=None, keys=1, left=(0,), prose=()
     red    numbers of the rows that are red
     """
     width = table_width(console)
-    columns = [[row[i].split("\n") for row in rows] for i in range(len(headings))]
+    columns = [
+        [(_breakable(row[i]) if i in prose else row[i]).split("\n") for row in rows]
+        for i in range(len(headings))
+    ]
     heads = [heading.split("\n") for heading in headings]
     if _total(map(_size, heads, columns)) > (width or float("inf")):
         heads = [
@@ -62,7 +67,7 @@ def _print_lines(console, cells, ways, style):
     for line in range(max(map(len, cells))):
         texts = []
         for lines, (size, left) in zip(cells, ways, strict=True):
-            text = lines[line] if line < len(lines) else ""
+            text = (lines[line] if line < len(lines) else "").replace(BREAK, "")
             padding = " " * (size - cell_len(text))
             texts.append(text + padding if left else padding + text)
         console.print(Text(GAP.join(texts).rstrip(), style=style), soft_wrap=True)
@@ -89,11 +94,22 @@ def _filled(words, size):
     size = max([size, *map(cell_len, words)])
     lines = [words[0]]
     for word in words[1:]:
-        if cell_len(lines[-1]) + 1 + cell_len(word) <= size:
-            lines[-1] += f" {word}"
+        gap = "" if lines[-1].endswith(BREAK) else " "
+        if cell_len(lines[-1]) + len(gap) + cell_len(word) <= size:
+            lines[-1] += gap + word
         else:
             lines.append(word)
     return lines
+
+
+def _breakable(text):
+    """Text whose long words, such as paths, have BREAK after each slash and underscore."""
+    return LONG_WORD.sub(lambda match: re.sub(r"([/_])(?=\w)", rf"\1{BREAK}", match.group()), text)
+
+
+def _words(text):
+    """Words of a text, parted at spaces and at each BREAK, which stays."""
+    return [word for word in re.split(rf"\s+|(?<={BREAK})", text) if word]
 
 
 def _folded(heads, columns, prose, width):
@@ -106,14 +122,19 @@ def _folded(heads, columns, prose, width):
         widest = max(able, key=lambda i: _size([""], columns[i]))
         size = _size([""], columns[widest]) - 1
         columns[widest] = [
-            _filled(" ".join(lines).split(), size) if lines[0] else lines for lines in columns[widest]
+            _filled(_words(_joined(lines)), size) if lines[0] else lines for lines in columns[widest]
         ]
     return columns
 
 
+def _joined(lines):
+    """The text of which these are the lines."""
+    return " ".join(lines).replace(f"{BREAK} ", BREAK)
+
+
 def _least(column):
     """Width of the longest word of a column."""
-    return max(cell_len(word) for lines in column for line in lines for word in (line.split() or [""]))
+    return max(cell_len(word) for lines in column for line in lines for word in (_words(line) or [""]))
 
 
 def _blocks(sizes, keys, width):

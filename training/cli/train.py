@@ -1,5 +1,6 @@
 """The commands of learning: train, export-policy, benchmark training."""
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -8,26 +9,44 @@ import typer
 from fowt_env.errors import InputError
 from fowt_env.training.cli.arguments import parse_pairs
 from fowt_env.training.cli.benchmark import benchmarks
-from fowt_env.training.cli.console import EXIT_INTERRUPTED, app, note, out, progress_bar, reported
+from fowt_env.training.cli.console import (
+    EXIT_INTERRUPTED,
+    announce_folders,
+    app,
+    err,
+    note,
+    out,
+    output,
+    progress_bar,
+    reported,
+)
+from fowt_env.training.cli.tables import figure, print_table
 
+LINE_EVERY = 10.0  # s between lines of progress without a terminal
+WRITTEN = ("best.npz", "last.npz", "validation.csv", "learning_curve.png")
 TRAIN_EXAMPLES = """[bold]Examples[/bold]
+
+[cyan]fowt train --steps 20000 --out runs/first[/cyan]  # a first try
 
 [cyan]fowt train --algo ppo --steps 4000000 --seed 0 --out runs/ppo_0[/cyan]
 
-[cyan]fowt train --out runs/ppo_0 --resume[/cyan]  go on after Ctrl-C, kill or a crash
+[cyan]fowt train --out runs/ppo_0 --resume[/cyan]  # go on after Ctrl-C, kill or a crash
 
 [cyan]fowt train --set environment.observation=preview --set environment.reward.pitch_travel=20[/cyan]
 
 [bold]Steps[/bold] are decisions of the agent, each several control periods (decisions.hold).
-[bold]Files written[/bold]: settings.yml, versions.json, checkpoints/, validation.csv, best.npz, last.npz,
-learning_curve.png, tensorboard/. A policy runs as  fowt evaluate --controllers policy:runs/ppo_0/best.npz"""
+[bold]Files written[/bold]: best.npz, last.npz (policies), validation.csv, learning_curve.png, settings.yml,
+versions.json, checkpoints/, tensorboard/. A policy runs as the controller policy:runs/ppo_0/best.npz.
+Without a terminal a line of progress is printed every 10 s."""
 
 
 @app.command(epilog=TRAIN_EXAMPLES)
 @reported
 def train(
     algo: Annotated[str, typer.Option(help="ppo, sac or tqc.")] = "ppo",
-    task: Annotated[str, typer.Option(help="Task of training/rl/ALGO.yml.")] = "above_rated",
+    task: Annotated[
+        str, typer.Option(help="Settings of training/rl/ALGO.yml: above_rated, ...")
+    ] = "above_rated",
     seed: Annotated[int, typer.Option(help="Random seed of networks and episodes.")] = 0,
     steps: Annotated[int | None, typer.Option(help="Decisions; default 2000000, or as before.")] = None,
     out_folder: Annotated[str | None, typer.Option("--out", help="Folder of the run.")] = None,
@@ -40,10 +59,15 @@ def train(
         list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a setting; repeatable.")
     ] = None,
 ):
-    """Train an agent with stable-baselines3, validate it as it learns, keep the best."""
+    """Train an agent with stable-baselines3 (PPO, SAC, TQC).
+
+    It is validated as it learns and at the end; best.npz is the policy that scored best.
+    """
     from fowt_env.training.rl.train import Training, resolve
 
     folder = Path(out_folder or f"runs/{task}_{algo}_{seed}")
+    if not resume:
+        output(folder, folder=True)
     if resume:
         if change:
             raise InputError("--set: a resumed run keeps its settings; only --steps may grow")
@@ -55,18 +79,51 @@ def train(
             algo, task, seed, 2_000_000 if steps is None else steps, parse_pairs(change, "set")
         )
         run = Training(settings, folder)
-    with progress_bar("training", None) as update:
-        finished = run.run(lambda done, total, text: update(done, text, total))
+    with progress_bar("training", None, every=LINE_EVERY) as update:
+
+        def report(done, total, text):
+            update(done, text if err.is_terminal else f"{done:,} of {total:,}, {text}", total)
+
+        finished = run.run(report)
+    announce_folders()
     if run.rows:
-        last = run.rows[-1]
-        shown = ", ".join(f"{key} {value:.4g}" for key, value in last.items())
-        note(f"last validation: {shown}")
-    note(f"{'finished' if finished else 'stopped with a checkpoint'}: {folder}")
+        _print_validations(run)
+    place = shlex.quote(str(folder))
     if not finished:
+        note(f"stopped with a checkpoint: {folder}; next: fowt train --resume --out {place}")
         raise typer.Exit(EXIT_INTERRUPTED)
+    note(f"finished: {folder} ({', '.join(name for name in WRITTEN if (folder / name).exists())})")
+    policy = folder / next(name for name in ("best.npz", "last.npz") if (folder / name).exists())
+    platform = run.settings["environment"].get("platform")
+    words = ["--controllers", f"policy:{policy},{run.reference_name}"]
+    words += [] if platform is None else ["--suite", "above_rated", "--platform", str(platform)]
+    words += ["--baseline", run.reference_name, "--out", f"results/{folder.name}"]
+    note(f"next: fowt evaluate {shlex.join(words)}")
 
 
-@app.command()
+def _print_validations(run):
+    """Print the best and the last validation of a Training, and what the score means."""
+    best, last = run.best(), run.rows[-1]
+    chosen = {"best": best} | ({} if last is best else {"last": last})
+    ratios = ("rotor_speed_std_ratio", "platform_pitch_std_ratio", "blade_pitch_travel_ratio", "failed")
+    headings = ("validation", "decisions", "score", *ratios)
+    rows = [
+        (name, f"{row['decisions']:,}", *(figure(row[key]) for key in ("score", *ratios)))
+        for name, row in chosen.items()
+    ]
+    print_table(out, headings, rows, f"over {run.reference_name}, whose score is 1; less is better")
+
+
+EXPORT_EXAMPLES = """[bold]Examples[/bold]
+
+[cyan]fowt export-policy runs/ppo_0 --out mine.npz --trust-zip[/cyan]  # of a run of your own
+
+[cyan]fowt evaluate --controllers policy:mine.npz,pi[/cyan]  # compare it
+
+fowt train writes best.npz and last.npz by itself: this is for a run that was stopped."""
+
+
+@app.command(epilog=EXPORT_EXAMPLES)
 @reported
 def export_policy(
     folder: Annotated[str, typer.Argument(help="Folder of a run of fowt train.")],
@@ -75,11 +132,12 @@ def export_policy(
         bool, typer.Option("--trust-zip", help="Load the checkpoint, which executes code from it.")
     ] = False,
 ):
-    """Write the policy of a run's newest checkpoint as a plain array file."""
+    """Turn a training run's checkpoint into a policy file."""
     from fowt_env.training.rl.export import export_run
 
     if Path(out_path).suffix != ".npz":
         raise InputError(f"--out {out_path!r}: must end with .npz")
+    output(out_path)
     if not trust_zip:
         raise InputError(
             f"{folder}: loading a stable-baselines3 checkpoint executes code from it; if it is yours, or you"
@@ -89,17 +147,26 @@ def export_policy(
     note(f"wrote {export_run(folder, out_path)}")
 
 
-@benchmarks.command()
+TRAINING_EXAMPLES = """[bold]Example[/bold]
+
+[cyan]fowt benchmark training --envs 16 --steps 20000[/cyan]  # a first look"""
+
+
+@benchmarks.command(epilog=TRAINING_EXAMPLES)
 @reported
 def training(
     envs: Annotated[int, typer.Option(help="Environments in a batch.")] = 64,
     steps: Annotated[int, typer.Option(help="Steps of PPO that are timed.")] = 50_000,
     out_path: Annotated[str, typer.Option("--out", help="CSV to write.")] = "results/benchmark/training.csv",
 ):
-    """Time PPO on each kind of vector environment, and print the time of physics, torch and Python."""
+    """Time PPO on each kind of vector environment.
+
+    With the times of physics, torch and Python apart.
+    """
     from fowt_env.training.benchmarks.speed import write_csv
     from fowt_env.training.benchmarks.training import benchmark_training
 
+    output(out_path)
     with progress_bar("training speed", None) as update:
         table = benchmark_training(envs, steps, progress=lambda done, total, kind: update(done, kind, total))
     out.print(table.round(3).to_string(index=False), highlight=False)

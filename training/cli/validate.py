@@ -11,6 +11,7 @@ from fowt_env.training.cli.console import (
     from_a_clone,
     note,
     out,
+    output,
     progress_bar,
     reported,
 )
@@ -19,13 +20,13 @@ from fowt_env.training.cli.tables import figure, print_table
 
 VALIDATE_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt validate --case decays,steady[/cyan]  the quick ones
+[cyan]fowt validate --case decays,steady[/cyan]  # the quick ones
 
-[cyan]fowt validate[/cyan]  every figure against OpenFAST
+[cyan]fowt validate[/cyan]  # every figure against OpenFAST
 
-[cyan]fowt validate --platform iea15_volturnus_s[/cyan]  another platform's
+[cyan]fowt validate --platform iea15_volturnus_s[/cyan]  # another platform's
 
-[cyan]fowt validate --case all --bts turbsim_18mps.bts[/cyan]  with the cheaper choices, from the full box
+[cyan]fowt validate --case all --bts turbsim_18mps.bts[/cyan]  # with the cheaper choices, from the full box
 
 [bold]Files written[/bold]: validation.csv and validation.md (every figure with its verdict), and plots."""
 
@@ -58,7 +59,10 @@ def validate(
     bts: Annotated[str | None, typer.Option(help="Full TurbSim box instead of the stored region.")] = None,
     plot: Annotated[bool, typer.Option("--plot/--no-plot", help="Make the plots.")] = True,
 ):
-    """Compare this plant with OpenFAST on the same cases: every figure with its verdict, and plots."""
+    """Compare the plant with OpenFAST (from a clone).
+
+    The same cases in both: every figure with its verdict, and plots.
+    """
     from fowt_env.training.validation.report import write_validation_report
     from fowt_env.training.validation.validate import PLATFORMS, validate_cases
 
@@ -69,6 +73,7 @@ def validate(
         names = list(PLATFORMS[platform]()[0])
     if out_folder is None:
         out_folder = "results/validation" + ("" if platform == "oc3_hywind" else f"/{platform}")
+    output(out_folder, folder=True)
     with progress_bar("validating", None) as update:
         study = validate_cases(
             names,
@@ -93,11 +98,11 @@ def validate(
 
 PAPER_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt paper LC5[/cyan]  one load case of the 1:50 model
+[cyan]fowt paper LC5[/cyan]  # one load case of the 1:50 model
 
-[cyan]fowt paper all[/cyan]  LC1 to LC12 with the paper's claims checked
+[cyan]fowt paper all[/cyan]  # LC1 to LC12 with the paper's claims checked
 
-[cyan]fowt paper full_scale[/cyan]  decays, regular wave, wind and waves at full scale
+[cyan]fowt paper full_scale[/cyan]  # decays, regular wave, wind and waves at full scale
 
 [bold]Files written[/bold]: runs/CASE.parquet, statistics.csv, paper.md (claims and tables), and plots."""
 
@@ -109,11 +114,15 @@ def paper(
     out_folder: Annotated[str, typer.Option("--out", help="Folder for what is written.")] = "results/paper",
     plot: Annotated[bool, typer.Option("--plot/--no-plot", help="Make the plots.")] = True,
 ):
-    """Run the paper's load cases and check its claims."""
+    """Run the source paper's load cases (from a clone).
+
+    And check its claims.
+    """
     with from_a_clone("paper"):
         from fowt_env.training.studies.paper.load_cases import run_paper, statistics, wanted_cases
         from fowt_env.training.studies.paper.report import write_paper_report
 
+    output(out_folder, folder=True)
     names = wanted_cases(case)
     with progress_bar("paper", None) as update:
         study = run_paper(names, lambda text, done, total: update(done, f"paper: {text}", total))

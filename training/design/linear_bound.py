@@ -217,7 +217,7 @@ def ratio_table(runs, bound=None):
     needed = ("case", "variant", "seed", *RATIOS.values())
     missing = [name for name in needed if name not in runs]
     if missing:
-        raise InputError(f"runs: column {missing[0]!r} is missing; make the table with fowt design lqr --out")
+        raise InputError(f"runs: column {missing[0]!r} is missing; fowt design lqr-sweep --out makes it")
     means = runs.groupby(["case", "variant"], sort=False)[list(RATIOS.values())].mean()
     rows = []
     for (case, variant), mean in means.iterrows():

@@ -37,7 +37,12 @@ NO_WORKERS = (
     f"worker processes died {ATTEMPTS} times (out of memory, killed, or started by a program without"
     " `if __name__ == '__main__':`); {} runs are left: the same command continues with them"
 )
+LONGEST_REASON = 200  # characters of what Ray says
 DONE, RAISED, UNREADABLE = "done", "raised", "unreadable"  # what an answer of a worker is
+
+
+class WorkersLost(RuntimeError):
+    """Worker processes that cannot be started; what was done before is kept."""
 
 
 def outcomes(function, tasks, jobs=1, engine="processes", address=None, limit=None, lost=None):
@@ -47,8 +52,8 @@ def outcomes(function, tasks, jobs=1, engine="processes", address=None, limit=No
              at the address, or a local one of `jobs` workers
     limit    seconds that a task should take at most: a worker that dies later on it is not tried again
     lost     lost(task, reason) is the outcome of a task on which workers die; None: RuntimeError
-    Raises: InputError for an unknown engine, jobs < 1, or tasks that cannot be sent; RuntimeError where
-    workers cannot be started.
+    Raises: InputError for an unknown engine, jobs < 1, tasks that cannot be sent, or a Ray that does not
+    start; WorkersLost where workers cannot be started.
     """
     if engine not in ENGINES:
         raise unknown("engine", engine, ENGINES)
@@ -107,7 +112,7 @@ def _processes(function, tasks, indices, jobs, limit, lost):
                     unborn += not worker.ready
                     if unborn == ATTEMPTS:
                         left = queue.left + sum(other.at_work for other in workers)
-                        raise RuntimeError(NO_WORKERS.format(left))
+                        raise WorkersLost(NO_WORKERS.format(left))
                 elif worker.ready:
                     worker.index = None
                     yield index, _outcome(answer, tasks[index], lost)
@@ -253,7 +258,7 @@ def session(engine, jobs=1, address=None):
     """Context that stays connected to Ray, so that several evaluations inside share its warm workers.
 
     Does nothing for other engines, nor where this process is connected already.
-    Raises: InputError where Ray is not installed.
+    Raises: InputError where Ray is not installed, does not start or cannot be reached.
     """
     if engine != "ray":
         yield
@@ -268,11 +273,24 @@ def session(engine, jobs=1, address=None):
         options = {"num_cpus": jobs, "include_dashboard": False}
         if NICENESS not in os.environ:  # Ray's own choice, 15, waits for whatever else the machine does
             options["_system_config"] = {"worker_niceness": 0}
-    ray.init(log_to_driver=False, logging_level="error", **options)
+    _start(ray, options)
     try:
         yield
     finally:
         ray.shutdown()
+
+
+def _start(ray, options):
+    """Connect to Ray. Raises: InputError in one line, whatever Ray raises and says."""
+    try:
+        ray.init(log_to_driver=False, logging_level="error", **options)
+    except Exception as error:
+        attempt(ray.shutdown)  # of what has been started of it
+        what = f"no cluster at {options['address']!r}" if "address" in options else "Ray does not start"
+        reason = " ".join(str(error).split())[:LONGEST_REASON]
+        raise InputError(
+            f"engine = 'ray': {what} ({type(error).__name__}: {reason}); without Ray: engine 'processes'"
+        ) from None
 
 
 def _ray_module():

@@ -70,6 +70,7 @@ def evaluate(
     address=None,
     time_limit=TIME_LIMIT,
     sensors=None,
+    retry_failed=False,
     **options,
 ):
     """DataFrame with one row per controller, case and seed, and the columns COLUMNS.
@@ -89,6 +90,7 @@ def evaluate(
     time_limit    seconds of wall clock after which a run fails; None: none. With jobs = 1 it is heard in the
                   main thread alone, and not by C code that never returns; with more, the worker is ended
     sensors       name of the sensor chain of all cases, "exact" for none; None: each case's own
+    retry_failed  whether failed runs of a results folder are done again, also with changed code
     options       further options of simulate: dt, control_dt, output_dt, start, preview
     A run that the protection ended (the case's trip) has status "tripped", the reason, and metrics of what it
     was. Failed runs have status "failed", the reason, and NaN metrics; so have those of a controller that
@@ -107,7 +109,8 @@ def evaluate(
     runs = _plan(controllers, _sensed(_case_list(cases), sensors), suite, *given, options)
     _check_controllers(controllers, runs)
     if folder is not None:
-        with open_results(folder, _settings(controllers, runs, suite, options), COLUMNS) as results:
+        again = {run.key for run in runs} if retry_failed else ()
+        with open_results(folder, _settings(controllers, runs, suite, options), COLUMNS, again) as results:
             pending = [run for run in runs if run.key not in results.rows]
             _go(pending, len(runs), jobs, progress, engine, address, results.add)
             return results.table()

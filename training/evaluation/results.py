@@ -29,7 +29,7 @@ from fowt_env.files.tables import write_table
 from fowt_env.training.evaluation import provenance
 from fowt_env.training.evaluation.guard import printable
 from fowt_env.training.evaluation.locks import locked
-from fowt_env.training.evaluation.run_case import STATUSES
+from fowt_env.training.evaluation.run_case import FAILED, STATUSES
 
 FORMAT = 3  # of the folder; raised when files or their meaning change
 MANIFEST = {  # what each key of manifest.json holds, beside its format
@@ -138,12 +138,14 @@ class ResultsFolder:
 
     settings: {"suite", "options", "cases" {name: description}, "seeds", "controllers" {label: code}}.
     Controllers, cases and seeds may be added to a folder; anything else must be as it was.
+    again: keys (controller, case, seed) of runs that count as not done where they failed.
     """
 
-    def __init__(self, folder, settings, columns):
+    def __init__(self, folder, settings, columns, again=()):
         self.given = Path(folder)  # for messages
         self.folder = self.given.absolute()  # of here, wherever a controller goes
         self.columns = list(columns)
+        self.again = frozenset(again)
         self.settings = settings
         self.rows = {}  # (controller, case, seed) -> row
         self.written = 0.0
@@ -165,7 +167,8 @@ class ResultsFolder:
             key = row["controller"], row["case"], row["seed"]
             if run_file(self.folder / "runs", *key) != path:
                 raise InputError(f"{str(path)!r} holds the run {', '.join(map(str, key))}: remove it")
-            self.rows[key] = row
+            if row["status"] != FAILED or key not in self.again:
+                self.rows[key] = row
         parts = {key: dict(self.settings[key]) for key in ("cases", "controllers")}
         seeds = list(self.settings["seeds"])
         if old is not None:
@@ -226,11 +229,14 @@ class ResultsFolder:
                 )
         for label, code in self.settings["controllers"].items():
             before = old["controllers"].get(label, code)
-            if before != code and any(key[0] == label for key in self.rows):
+            done = [row["status"] for key, row in self.rows.items() if key[0] == label]
+            if before != code and done:
                 place = run_file(self.given / "runs", label, "", 0).parent
+                failed = ", or use --retry-failed" if set(done) == {FAILED} else ""
                 raise InputError(
                     f"results folder {str(self.given)!r}: the code of controller {label!r} has changed since"
-                    f" its runs there; remove {str(place)!r} to run them again, or choose another folder"
+                    f" its runs there; remove {str(place)!r} to run them again, or choose another"
+                    f" folder{failed}"
                 )
 
     def _refused(self, why):
@@ -269,12 +275,12 @@ def _short(value):
 
 
 @contextmanager
-def open_results(folder, settings, columns):
+def open_results(folder, settings, columns, again=()):
     """ResultsFolder, locked against other processes while the block runs; results.csv is written at its end.
 
     Raises: InputError where the folder is in use, or holds runs of another version or other settings.
     """
-    results = ResultsFolder(folder, settings, columns)
+    results = ResultsFolder(folder, settings, columns, again)
     with locked(results.folder, f"results folder {str(folder)!r}", "another evaluation is writing to it"):
         results._open()
         try:

@@ -42,6 +42,18 @@ class ValidationCallback(BaseCallback):
         return True
 
 
+class Validation(EvalCallback):
+    """EvalCallback that can also validate the policy as it stands, whatever its count of calls."""
+
+    def now(self):
+        """Validate the present policy; the rhythm of the validations stays as it is."""
+        calls, self.n_calls = self.n_calls, 0
+        try:
+            self._on_step()
+        finally:
+            self.n_calls = calls
+
+
 class CheckpointCallback(BaseCallback):
     """Checkpoints between an update and the next rollout, progress, and the stop that was asked for."""
 
@@ -80,21 +92,22 @@ class CheckpointCallback(BaseCallback):
             self._reported = now
             total = self.training.settings["steps"]
             rate = (self.num_timesteps - self._first) / max(now - self._begin, 1e-9)
-            hold = self.training.settings["decisions"]["hold"]
             left = seconds_text((total - self.num_timesteps) / max(rate, 1e-9))
+            parts = [f"{rate:.0f} decisions/s"]
             returns = [episode["r"] for episode in self.model.ep_info_buffer]
-            shown = f"{np.mean(returns):.1f}" if returns else "-"
-            text = f"{rate:.0f} decisions/s ({rate * hold:.0f} env steps/s), return {shown}, {left} left"
-            if self.training.rows:
-                text += f", score {self.training.rows[-1]['score']:.3f}"
-            self.report(self.num_timesteps, total, text)
+            if returns:
+                parts.append(f"return {np.mean(returns):.1f}")
+            best = self.training.best()
+            if best is not None:
+                parts.append(f"best score {best['score']:.3f}")
+            self.report(self.num_timesteps, total, ", ".join([*parts, f"{left} left"]))
         return True
 
 
 def callbacks(training, validation_env, validation_callback, checkpoint_callback):
-    """[EvalCallback on the validation episodes, CheckpointCallback] of a training.rl.train.Training."""
+    """[Validation on its episodes, CheckpointCallback] of a training.rl.train.Training."""
     every = max(1, training.settings["validation"]["every"] // training.env.num_envs)
-    evaluation = EvalCallback(
+    evaluation = Validation(
         validation_env,
         callback_after_eval=validation_callback,
         n_eval_episodes=validation_env.num_envs,

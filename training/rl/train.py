@@ -414,6 +414,9 @@ class Training:
         from fowt_env.training.rl.callbacks import CheckpointCallback, Stopped, ValidationCallback, callbacks
 
         model = self.model
+        say = report or (lambda done, total, text: None)
+        self.reference_name = self.settings["validation"].get("reference", REFERENCE)
+        say(model.num_timesteps, self.settings["steps"], f"scoring the reference {self.reference_name}")
         self.reference = baseline_figures(self.settings)
         self.kinds = validation_episodes(self.settings)[1]
         model.set_logger(configure(str(self.folder / "tensorboard"), ["tensorboard"]))
@@ -435,6 +438,8 @@ class Training:
                     model.learn(left, callback=listeners, reset_num_timesteps=state is None)
                 except Stopped:
                     finished = False
+                if finished and (not self.rows or self.rows[-1]["decisions"] != model.num_timesteps):
+                    self.evaluation.now()
         if finished:
             self.save()
         self.export("last.npz")
@@ -559,6 +564,10 @@ class Training:
         np.random.set_state(state["numpy"])
         self.rows = state["rows"]
         return model, state
+
+    def best(self):
+        """Row of the validation with the least score; None before the first one."""
+        return min(self.rows, key=lambda row: row["score"], default=None)
 
     def export(self, name):
         """Path of the present policy written as a plain array file in the run folder."""

@@ -1,19 +1,25 @@
 import json
 import os
 import re
+import shlex
 import subprocess
 import sys
 
 import numpy as np
 import pandas as pd
 import pytest
+import typer
 from command_line import fowt
+from typer.testing import CliRunner
 
 import fowt_env
 from fowt_env.descriptions.checks import parse_numbers
 from fowt_env.errors import InputError, SimulationStopped
 from fowt_env.plant.compile.announcement import COMPILING_MESSAGE
+from fowt_env.training.cli import console
+from fowt_env.training.cli.app import app
 from fowt_env.training.cli.arguments import parse_pairs, parse_sea, parse_wind
+from fowt_env.training.cli.console import GROUPS, output
 
 SHORT = ("--duration", "10", "--wind", "18")
 
@@ -298,24 +304,100 @@ def test_trim_prints_the_operating_points_of_trim(tmp_path):
 @pytest.mark.installation
 def test_list_names_everything_that_the_other_commands_take():
     stdout, _ = fowt("list")
+    assert "platforms" in stdout and "--platform" in stdout
+    stdout, _ = fowt("list", "all")
     for name in ("oc3_hywind", "paper_wind_wave", "pi_land", "above_rated", "ntm_18"):
         assert name in stdout
     assert "oc3_hywind" not in fowt("list", "controllers")[0]
 
 
 @pytest.mark.installation
-@pytest.mark.parametrize("command", ["simulate", "evaluate", "trim", "plot"])
-def test_help_shows_examples_whose_options_exist(command):
-    stdout, _ = fowt(command, "--help")
-    assert "Examples" in stdout
-    options = set(re.findall(r"│ +\*? *(--[a-z-]+)", stdout))
-    used = set(re.findall(r"--[a-z-]+", stdout[stdout.index("Examples") :]))
-    assert used and used <= options
+def test_every_command_has_examples_that_can_be_parsed():
+    root = typer.main.get_command(app)
+    commands, missing, seen = [("fowt", root)], [], 0
+    while commands:
+        name, command = commands.pop()
+        inner = getattr(command, "commands", {})
+        commands += [(f"{name} {key}", each) for key, each in inner.items() if not each.hidden]
+        examples = re.findall(r"\[cyan\](fowt .*?)\[/cyan\]", command.epilog or "", re.S)
+        if not inner and not examples:
+            missing.append(name)
+        for example in examples:
+            words, called = shlex.split(example)[1:], root
+            while hasattr(called, "commands"):
+                called = called.commands[words.pop(0)]
+            called.make_context(called.name, words)  # raises where an option or argument is none
+            seen += 1
+    assert not missing and seen > 60
+
+
+def test_help_fits_one_screen_and_has_every_command_in_a_group():
+    result = CliRunner().invoke(app, ["--help"], env={"COLUMNS": "80", "NO_COLOR": "1"})
+    lines = result.stdout.splitlines()
+    assert len(lines) <= 38 and max(map(len, lines)) <= 80
+    root = typer.main.get_command(app)
+    grouped = [name for names in GROUPS.values() for name in names]
+    assert len(set(grouped)) == len(grouped) and set(root.commands) <= set(grouped)
+    listed = [re.search(rf"(^| ) {name}  ", result.stdout, re.M) for name in root.commands]
+    assert all(listed)
+
+
+def test_what_reads_only_the_first_lines_of_a_list_is_no_error():
+    code = "import sys; from fowt_env.training.cli.app import main; main()"
+    command = f"{shlex.quote(sys.executable)} -c '{code}' list metrics | head -1"
+    done = subprocess.run(command, shell=True, capture_output=True, text=True)
+    assert done.stdout.startswith("metrics") and "Error" not in done.stderr
 
 
 @pytest.mark.installation
 def test_version_is_that_of_the_package():
     assert fowt("--version")[0].strip() == fowt_env.__version__
+
+
+# ------------------------------------------------------------------ where files go
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("simulate", "--duration", "1", "--plot", "{}/new/run.png"),
+        ("simulate", "--duration", "1", "--out", "{}/new/run.csv"),
+        ("trim", "--winds", "18", "--out", "{}/new/trim.csv"),
+        ("linearize", "--winds", "18", "--out", "{}/new/deeper"),
+        ("design", "bound", "--wind", "18", "--plot", "{}/new/bound.png"),
+        ("evaluate", "--controllers", "pi", "--cases", "steady_16", "--out", "{}/new/deeper"),
+        ("export-policy", "run", "--out", "{}/new/p.npz"),
+        ("animate", "{}/new/gust.gif"),
+    ],
+)
+def test_no_folder_is_made_outside_of_the_working_folder(words, tmp_path, monkeypatch):
+    (tmp_path / "work").mkdir()
+    monkeypatch.chdir(tmp_path / "work")
+    _, stderr = fowt(*(word.format(tmp_path) for word in words), code=2)
+    assert f"there is no folder '{tmp_path}/new'; make it first" in stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["work"] and not list((tmp_path / "work").iterdir())
+
+
+def test_a_folder_made_in_the_working_folder_is_announced(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    _, stderr = fowt("simulate", "--duration", "1", "--out", "a/b/run.csv")
+    assert "made the folder a/b" in stderr and len(pd.read_csv("a/b/run.csv")) == 11
+    assert "made the folder" not in fowt("simulate", "--duration", "1", "--out", "a/b/run.csv")[1]
+    _, stderr = fowt("evaluate", "--controllers", "pie", "--out", "c", code=2)
+    assert "made the folder" not in stderr
+    assert output(str(tmp_path.parent / "results"), folder=True)  # the last part may be new anywhere
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match=r"--out 'file/run.csv': cannot be written: 'file' is a file"):
+        output("file/run.csv")
+
+
+def test_without_a_terminal_progress_is_a_line_now_and_then(monkeypatch, capsys):
+    clock = iter([0.0, 1.0, 11.0, 12.0, 25.0])
+    monkeypatch.setattr(console.time, "monotonic", lambda: next(clock))
+    with console.progress_bar("training", None, every=10.0) as update:
+        for done in (1, 2, 3, 4):
+            update(done, f"step {done}", 8)
+    assert capsys.readouterr().err.splitlines() == ["11 s, 25 %: step 2", "25 s, 50 %: step 4"]
 
 
 # ------------------------------------------------------------------ what users type

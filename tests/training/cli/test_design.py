@@ -4,6 +4,8 @@ import json
 
 import numpy as np
 import pandas as pd
+import pytest
+import scipy.io
 from command_line import fowt
 
 
@@ -24,9 +26,17 @@ def test_linearize_writes_the_table_of_modes_or_a_folder_of_everything(tmp_path)
     assert all(path.name in stderr for path in folder.iterdir())
 
 
+def test_linearize_writes_the_model_of_one_wind_for_matlab(tmp_path):
+    out = tmp_path / "m.mat"
+    fowt("linearize", "--winds", "18", "--out", str(out))
+    assert scipy.io.loadmat(out)["A"].shape == (14, 14)
+    _, stderr = fowt("linearize", "--winds", "12,18", "--out", str(tmp_path / "n.mat"), code=2)
+    assert "a .mat holds the model of one wind" in stderr
+
+
 def test_linearize_refuses_other_endings_before_it_starts(tmp_path):
-    _, stderr = fowt("linearize", "--winds", "18", "--out", str(tmp_path / "m.mat"), code=2)
-    assert "must be a folder or end with .csv, .parquet, .json, .npz" in " ".join(stderr.split())
+    _, stderr = fowt("linearize", "--winds", "18", "--out", str(tmp_path / "m.xls"), code=2)
+    assert "must be a folder or end with .csv, .parquet, .json, .npz, .mat" in " ".join(stderr.split())
 
 
 def test_a_designed_pi_is_saved_and_simulated_by_its_file(tmp_path):
@@ -42,13 +52,18 @@ def test_a_designed_pi_is_saved_and_simulated_by_its_file(tmp_path):
 
 def test_a_designed_lqr_is_saved_with_its_settings(tmp_path):
     path = tmp_path / "lq.json"
-    fowt("design", "lqr", "--setting", "share=0.6", "--out", str(path))
+    stdout, stderr = fowt("design", "lqr", "--setting", "share=0.6", "--out", str(path))
     saved = json.loads(path.read_text())
     assert saved["settings"]["lqg"]["share"] == 0.6
     assert saved["command"] == "fowt design lqr --setting share=0.6"
     assert len(saved["settings"]["models"]) == 22
-    _, stderr = fowt("design", "lqr", "--vary", "pitch_rate=1,2", "--out", str(path), code=2)
-    assert "a design has one value per setting" in " ".join(stderr.split())
+    assert "design:" in stderr and "0.6" in stdout.split("share")[1]
+
+
+@pytest.mark.parametrize("words", [("--vary", "share=0.3,0.5"), ("--out", "sweep.csv")])
+def test_the_former_sweep_of_lqr_names_the_command_that_it_has_become(words):
+    _, stderr = fowt("design", "lqr", *words, code=2)
+    assert words[1] in stderr and "for a sweep: lqr-sweep" in stderr
 
 
 def test_bound_writes_and_front_reads_its_fronts(tmp_path):
@@ -69,16 +84,16 @@ def test_bound_writes_and_front_reads_its_fronts(tmp_path):
 
 
 def test_a_sweep_of_settings_refuses_seeds_for_scoring_and_settings_that_there_are_not():
-    _, stderr = fowt("design", "lqr", "--seeds", "1,2", code=2)
+    _, stderr = fowt("design", "lqr-sweep", "--seeds", "1,2", code=2)
     assert "seeds = [1, 2]: tune on seeds of 1000 and above" in " ".join(stderr.split())
-    _, stderr = fowt("design", "lqr", "--vary", "torque_rat=1,2", code=2)
+    _, stderr = fowt("design", "lqr-sweep", "--vary", "torque_rat=1,2", code=2)
     assert "unknown setting of lqr 'torque_rat'. Did you mean 'torque_rate'" in " ".join(stderr.split())
 
 
 def test_a_sweep_of_settings_shows_and_writes_every_variant_beside_gspi(tmp_path):
     path = tmp_path / "sweep.csv"
     words = ("--vary", "travel=1,0.6", "--cases", "steady_16", "--seeds", "1001", "--out", str(path))
-    stdout, _ = fowt("design", "lqr", *words)
+    stdout, _ = fowt("design", "lqr-sweep", *words)
     table = pd.read_csv(path)
     assert list(table["variant"]) == ["gspi_oc3", "{'travel': 1.0}", "{'travel': 0.6}"]
     assert all(name in stdout for name in table["variant"])

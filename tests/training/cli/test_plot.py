@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 from command_line import fowt
 
+from fowt_env.files.tables import read_series, write_table
 from fowt_env.training.cli.plot import _names
 
 pytest.importorskip("matplotlib", reason="matplotlib is not installed: the extra `plot` is missing")
@@ -39,6 +40,17 @@ def test_every_kind_is_one_call_on_saved_runs(kind, tmp_path, monkeypatch):
     assert (tmp_path / f"{kind}.png").read_bytes().startswith(PNG)
 
 
+def test_an_outb_is_plotted_as_the_same_run_in_a_csv(tmp_path):
+    frame = pd.read_csv(run(tmp_path / "run.csv"))
+    write_table(frame, tmp_path / "same.outb")
+    pd.testing.assert_frame_equal(read_series(tmp_path / "same.outb"), frame, rtol=1e-9)
+    out = tmp_path / "picture.png"
+    fowt("plot", "series", str(tmp_path / "same.outb"), str(tmp_path / "run.csv"), "--out", str(out))
+    assert out.read_bytes().startswith(PNG)
+    _, stderr = fowt("plot", "series", str(tmp_path / "nothing.outb"), code=2)
+    assert "nothing.outb" in stderr and "no such file" in stderr
+
+
 def test_runs_are_named_by_what_tells_them_apart():
     files = ["out/runs/pi/ntm_18_seed1.parquet", "out/runs/lqr/ntm_18_seed1.parquet"]
     assert list(_names(files)) == ["pi", "lqr"]
@@ -61,7 +73,7 @@ def test_trim_plots_the_schedule_and_plot_does_so_from_its_table(tmp_path):
     [
         (("pie", "run.csv"), "unknown kind of plot 'pie'"),
         (("series", "nothing.csv"), "nothing.csv"),
-        (("series", "run.txt"), "run.txt"),
+        (("series", "run.txt"), "file 'run.txt': must end with .csv, .parquet or .outb"),
         (("series", "run.csv", "run.csv"), "each must be given once"),
         (("schedule", "run.csv"), "needs a column"),
         (("series", "run.csv", "--out", "run.what"), "unknown ending"),

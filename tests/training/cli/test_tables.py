@@ -1,5 +1,6 @@
 """Tables of the command line: every figure stands in full, at 80 columns and in a pipe, in every command."""
 
+import json
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -123,7 +124,7 @@ def design_lqr_command(monkeypatch, tmp_path):
 
     table = frame_of(sweeps.SHOWN, 2, case=["ntm_18"] * 2, variant=["gspi_oc3", "{'pitch_rate': 8.0}"])
     monkeypatch.setattr(sweeps, "sweep", lambda *a, **k: table)
-    return ["design", "lqr"], texts_of(table)
+    return ["design", "lqr-sweep"], texts_of(table)
 
 
 def validate_command(monkeypatch, tmp_path):
@@ -227,7 +228,15 @@ def test_list_breaks_texts_between_words_and_nowhere_else(width):
     printed = printed_by("list", "controllers")
     wanted = [word for name in CONTROLLERS for word in (name, CONTROLLERS[name].__doc__.split()[0])]
     assert_whole(printed, wanted, width)
-    assert all(word in printed for name in CONTROLLERS for word in information(name))
+    found = json.loads(printed_by("list", "controllers", "--json"))
+    used = {row["name"]: row["measurements and models"].split(", ") for row in found}
+    assert used == {name: list(information(name)) for name in CONTROLLERS}
+
+
+def test_a_path_in_prose_is_broken_after_a_slash_and_nothing_is_lost(monkeypatch, capsys):
+    rows = [["x", "see OpenFAST/r-test_of_a_long_name now"]]
+    lines = lines_of(monkeypatch, capsys, 20, ["n", "source"], rows, prose=(1,))
+    assert lines[2:] == ["x  see OpenFAST/", "   r-test_of_a_long_", "   name now"]
 
 
 def test_a_constant_has_no_deviation_and_a_small_one_is_not_lost(monkeypatch):

@@ -1,5 +1,8 @@
 """The commands of learning: clear refusals, and a run from the command line."""
 
+import re
+import shlex
+
 import pandas as pd
 import pytest
 from typer.testing import CliRunner
@@ -7,6 +10,7 @@ from typer.testing import CliRunner
 pytest.importorskip("stable_baselines3")
 
 from fowt_env.training.benchmarks.training import VECTOR_ENVS
+from fowt_env.training.cli import train as cli_train
 from fowt_env.training.cli.app import app
 from fowt_env.training.cli.console import EXIT_INPUT, EXIT_INTERRUPTED
 from fowt_env.training.rl import callbacks
@@ -40,6 +44,30 @@ def test_a_run_ends_goes_on_and_its_checkpoint_becomes_a_policy_on_request_only(
     done = call("export-policy", folder, "--out", tmp_path / "p.npz", "--trust-zip")
     assert done.exit_code == 0 and "warning" in done.output
     assert (tmp_path / "p.npz").stat().st_size == pytest.approx((folder / "last.npz").stat().st_size, abs=50)
+
+
+def test_a_run_is_validated_at_its_end_and_the_command_that_it_prints_works(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(cli_train, "LINE_EVERY", 0.0)
+    monkeypatch.setattr(callbacks, "REPORT_EVERY", 0.0)
+    done = train("run of mine", 64, "--set", "validation.every=1000000")
+    assert done.exit_code == 0, done.output
+    table = pd.read_csv(tmp_path / "run of mine" / "validation.csv")
+    assert list(table["decisions"]) == [64]
+    said = " ".join(done.output.split())
+    assert "scoring the reference lqr" in said and "decisions/s" in said and " left" in said
+    assert "return -" not in said and "made the folder run of mine" in said
+    assert f"{table['score'][0]:.4g}" in said and "over lqr, whose score is 1" in said
+    (command,) = re.findall(r"next: (fowt evaluate .*)", done.stderr)
+    assert "policy:run of mine/best.npz,lqr" in command and "--baseline lqr" in command
+    short = ("--cases", "steady_16", "--duration", "15", "--skip", "5", "--no-plot")
+    result = call(*shlex.split(command)[1:], *short)
+    assert result.exit_code == 0, result.output
+    scored = pd.read_csv(tmp_path / "results" / "run of mine" / "results.csv")
+    assert (scored["status"] == "ok").all() and set(scored["controller"]) == {
+        "policy:run of mine/best.npz",
+        "lqr",
+    }
 
 
 def test_an_interrupted_run_ends_with_a_checkpoint_its_own_exit_code_and_goes_on(tmp_path, monkeypatch):

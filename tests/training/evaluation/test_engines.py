@@ -2,10 +2,12 @@
 
 import os
 import signal
+import sys
 import threading
 import time
 from importlib.util import find_spec
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -14,7 +16,7 @@ import pytest
 from fowt_env.controllers import make
 from fowt_env.errors import InputError
 from fowt_env.training.evaluation.cases import Case
-from fowt_env.training.evaluation.engines import outcomes
+from fowt_env.training.evaluation.engines import outcomes, session
 from fowt_env.training.evaluation.evaluate import evaluate
 
 GUSTY = Case(
@@ -90,6 +92,26 @@ def test_rosco_in_worker_processes_gives_the_bits_of_one_process():
 
 def niceness(task):
     return os.nice(0)
+
+
+@pytest.mark.parametrize(
+    ("address", "what"), [(None, "Ray does not start"), ("10.0.0.1:6379", "no cluster at '10.0.0.1:6379'")]
+)
+def test_a_ray_that_does_not_start_is_one_line_with_its_reason(address, what, monkeypatch):
+    said = "The current node timed out during startup.\n\nThis could happen because " + 99 * "of GCS "
+    ended = []
+
+    def init(**options):
+        raise Exception(said)  # as Ray does
+
+    ray = SimpleNamespace(is_initialized=lambda: False, init=init, shutdown=lambda: ended.append(1))
+    monkeypatch.setitem(sys.modules, "ray", ray)
+    with pytest.raises(InputError, match=what) as caught, session("ray", 1, address):
+        pass
+    message = str(caught.value)
+    assert "timed out during startup. This could" in message and "engine 'processes'" in message
+    assert "\n" not in message and len(message) < 400 and ended == [1]
+    assert caught.value.__suppress_context__
 
 
 @pytest.mark.slow

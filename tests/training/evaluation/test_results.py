@@ -56,6 +56,32 @@ def went(folder, *arguments, **options):
     return table, [(row["controller"], row["case"], row["seed"]) for row in made]
 
 
+class Repaired(Broken):
+    """Keeps the command of the start."""
+
+    def reset(self, measurement):
+        self.command = measurement.generator_torque, measurement.blade_pitch
+
+    def act(self, measurement):
+        return self.command
+
+
+def test_failed_runs_are_repeated_on_request_alone_also_with_changed_code(tmp_path):
+    went(tmp_path, {"pi": "pi", "mine": Broken()}, [CALM, WINDY])
+    with pytest.raises(InputError, match="or use --retry-failed"):
+        went(tmp_path, {"mine": Repaired()}, [CALM])
+    assert not went(tmp_path, {"pi": "pi", "mine": Broken()}, [CALM, WINDY])[1]
+    table, made = went(tmp_path, {"pi": "pi", "mine": Broken()}, [CALM], retry_failed=True)
+    assert made == [("mine", "calm", 1)] and len(table) == 4  # the other case was not asked for
+    changed = {"pi": "pi", "mine": Repaired()}
+    with pytest.raises(InputError, match="has changed"):  # its run in the other case would be of other code
+        went(tmp_path, changed, [CALM], retry_failed=True)
+    table, made = went(tmp_path, changed, [CALM, WINDY], retry_failed=True)
+    assert made == [("mine", "calm", 1), ("mine", "windy", 1)]
+    assert (table["status"] == "ok").all() and len(table) == 4
+    assert not went(tmp_path, changed, [CALM, WINDY], retry_failed=True)[1]
+
+
 def test_a_folder_holds_every_run_its_row_and_what_was_asked_for(tmp_path):
     table, made = went(tmp_path, {"pi": "pi", "broken": Broken(), "odd": Misshapen()}, [CALM], seeds=(1, 2))
     assert len(made) == 6 and (table["status"] == "ok").tolist() == [True, False, False] * 2

@@ -87,7 +87,8 @@ def test_a_run_leaves_settings_versions_checkpoint_policies_table_and_plot(tmp_p
     assert [p.name for p in (folder / "checkpoints").iterdir()] == [checkpoint.name]
     for name in ("best.npz", "last.npz", "validation.csv", "learning_curve.png"):
         assert (folder / name).stat().st_size > 100
-    assert len(run.rows) == 2 and all(np.isfinite(row["score"]) for row in run.rows)
+    assert [row["decisions"] for row in run.rows] == [64, 128, run.model.num_timesteps]  # and at the end
+    assert all(np.isfinite(row["score"]) for row in run.rows) and run.best() in run.rows
     assert any((folder / "tensorboard").iterdir())
 
 
