@@ -43,7 +43,7 @@ from fowt_env.training.reports.page_words import (
     provenance,
 )
 from fowt_env.training.reports.terminal import platform_pitch_period
-from fowt_env.training.reports.verdict import TESTED, tested_metrics, verdict
+from fowt_env.training.reports.verdict import TESTED, corrected_p, verdict
 from fowt_env.visual.time_series import PANELS, SPECTRA, TIME, frequency_marks, spectrum
 
 NO_METRIC = (*KEY, *WORDS, "stopped_[s]", "scored_[s]", WEIGHT)
@@ -395,7 +395,7 @@ def _board_rows(board, case):
                 "gaps": {name: gap.mean for name, gap in gaps.items() if other},
                 "gap_intervals": _intervals(gaps) if other else {},
                 "percent": {name: gap.percent for name, gap in gaps.items() if other},
-                "p": tested_metrics(entry) if other and case == ALL_CASES else {},
+                "p": corrected_p(entry) if other and case == ALL_CASES else {},
             }
         )
     return rows

@@ -23,7 +23,7 @@ SHOWN = 5  # sentences that stand open
 CHANGED = 0.05  # percent, below which a difference reads as none
 
 
-def tested_metrics(entry):
+def corrected_p(entry):
     """{metric: p-value} of a LeaderboardEntry over TESTED, corrected for their number (Holm); {}: no test."""
     gaps = {name: entry.difference.get(name) for name in TESTED}
     adjusted = holm([math.nan if gap is None or gap.p is None else gap.p for gap in gaps.values()])
@@ -50,7 +50,7 @@ def verdict(board, seeds, least_seeds):
     if not others:
         return "<p>No verdict: a single controller was evaluated, so that there is nothing to compare.</p>"
     baseline = next((e for e in board.controllers if e.controller == board.baseline), None)
-    tested = {entry.controller: tested_metrics(entry) for entry in others}
+    tested = {entry.controller: corrected_p(entry) for entry in others}
     level = 1.0 - (0.95 if board.interval is None else board.interval.level)
     name = f"<b>{html.escape(board.baseline)}</b>"
     if any(tested.values()):
