@@ -41,13 +41,15 @@ STYLE = """
 --accent:#0a63b0;--lost:#b3261e;--better:#0a5ea8;--worse:#a8480a}
 @media (prefers-color-scheme:dark){:root{--page:#11151b;--ink:#e6eaf0;--soft:#9aa6b5;--line:#2c3540;
 --head:#191f27;--accent:#6cb4f0;--lost:#ff8a80;--better:#7cc0f7;--worse:#f5a55a}}
-body{font:15px/1.45 system-ui,sans-serif;margin:2rem auto;max-width:80rem;padding:0 1rem;color:var(--ink);
+body{font:15px/1.45 system-ui,sans-serif;margin:2rem auto;max-width:90rem;padding:0 1rem;color:var(--ink);
 background:var(--page);overflow-wrap:anywhere}
 a{color:var(--accent)}
-.scroll{overflow-x:auto;margin:.6rem 0 1.4rem;border-right:1px solid var(--line)}
+.scroll{overflow-x:auto;margin:.6rem 0 1.4rem;background:
+linear-gradient(to left,var(--page) 40%,transparent) right/3rem 100% no-repeat local,
+linear-gradient(to left,color-mix(in srgb,var(--soft) 45%,transparent),transparent) right/1.1rem 100% no-repeat}
 table{border-collapse:collapse;font-variant-numeric:tabular-nums;min-width:100%}
 th,td{padding:.25rem .6rem;border-bottom:1px solid var(--line);text-align:right;white-space:nowrap}
-th{background:var(--head);vertical-align:bottom}
+th{border-bottom:2px solid var(--line);vertical-align:bottom}td code{white-space:nowrap}
 td.text,th.text{text-align:left;white-space:normal;min-width:7rem}
 th button{font:inherit;color:inherit;background:none;border:0;padding:0;cursor:help;text-align:inherit;
 text-decoration:underline dotted;text-underline-offset:.2em}

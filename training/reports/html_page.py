@@ -292,7 +292,12 @@ def _packed(values, start, step, pool):
 
 def _rounded(values):
     """Floats with six digits, NaN as None: what JSON can hold."""
-    return [float(f"{value:.6g}") if np.isfinite(value) else None for value in values]
+    return [float(f"{v:.6g}") if v is not None and np.isfinite(v) else None for v in values]
+
+
+def _rounded_items(values):
+    """The mapping with its floats rounded, without those that are None."""
+    return {name: float(f"{value:.6g}") for name, value in values.items() if value is not None}
 
 
 def _platform_of(manifest):
@@ -390,11 +395,11 @@ def _board_rows(board, case):
                 "tripped": part.tripped,
                 "rank": entry.rank,
                 "beyond": entry.beyond,
-                "values": {name: figure.mean for name, figure in figures.items()},
+                "values": _rounded_items({name: figure.mean for name, figure in figures.items()}),
                 "intervals": _intervals(figures),
-                "gaps": {name: gap.mean for name, gap in gaps.items() if other},
+                "gaps": _rounded_items({name: gap.mean for name, gap in gaps.items() if other}),
                 "gap_intervals": _intervals(gaps) if other else {},
-                "percent": {name: gap.percent for name, gap in gaps.items() if other},
+                "percent": _rounded_items({name: gap.percent for name, gap in gaps.items() if other}),
                 "p": corrected_p(entry) if other and case == ALL_CASES else {},
             }
         )
@@ -403,7 +408,8 @@ def _board_rows(board, case):
 
 def _intervals(figures):
     """{metric: [low, high]} of those that have an interval."""
-    return {n: [f.low, f.high] for n, f in figures.items() if f.low is not None and f.high is not None}
+    known = {name: (f.low, f.high) for name, f in figures.items() if None not in (f.low, f.high)}
+    return {name: _rounded(ends) for name, ends in known.items()}
 
 
 def _board(table, board_file, metrics):
@@ -474,10 +480,7 @@ def _page_data(table, board_file, manifest, runs, schedule):
     shown = [metric["name"] for metric in metrics]
     good = table[table["status"] == OK]
     points = [
-        [
-            *(row[key] for key in ("controller", "case", "seed")),
-            dict(zip(names, _rounded([row[name] for name in names]), strict=True)),
-        ]
+        [*(row[key] for key in KEY), _rounded([row[name] for name in names])]
         for row in good.to_dict("records")
     ]
     labels = {channel: label.replace("\n", " ") for label, channel in PAGE_PANELS}
@@ -509,6 +512,7 @@ def _page_data(table, board_file, manifest, runs, schedule):
         "board": board,
         "remarks": {case: _remark(table, board_file, case) for case in [ALL_CASES, *cases]},
         "pareto": list(PARETO_AXES),
+        "columns": names,
         "runs": points,
         "quantiles": runs["quantiles"],
         "pool": runs["pool"],

@@ -156,6 +156,7 @@ def lost_runs(table):
     for row in table[table["status"] != OK].to_dict("records"):
         at = row.get("stopped_[s]")
         when = f" at {at:.1f} s" if is_number(at) and at == at else ""
+        when = "" if when in row["reason"] else when
         reason = f": {row['reason']}" if row["reason"] else ""
         lost.append((row["controller"], row["case"], int(row["seed"]), f"{row['status']}{when}{reason}"))
     return lost
@@ -168,7 +169,7 @@ def lost_list(lost, runs):
         for who, case, seed, text in lost
     )
     summary = f'<summary class="bad">{len(lost)} of {counted(runs, "run")} failed or tripped</summary>'
-    return f"<details open>{summary}<ul>{items}</ul></details>" if lost else ""
+    return f'<details open>{summary}<ul class="lost" tabindex="0">{items}</ul></details>' if lost else ""
 
 
 def provenance(folder, table, manifest, board_file):

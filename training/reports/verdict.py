@@ -20,7 +20,6 @@ OBSERVED = (
     "GenPwr_capped_mean_[kW]",
 )
 SHOWN = 5  # sentences that stand open
-CHANGED = 0.05  # percent, below which a difference reads as none
 
 
 def corrected_p(entry):
@@ -31,10 +30,11 @@ def corrected_p(entry):
 
 
 def percent_text(percent):
-    """ "+9.2 %", "+34 %": one decimal below ten, none above; a true minus sign and no break."""
-    size = f"{abs(percent):.{1 if abs(percent) < 9.95 else 0}f}"
-    sign = "" if float(size) == 0.0 else "+" if percent > 0.0 else "\N{MINUS SIGN}"
-    return f"{sign}{size}\N{NO-BREAK SPACE}%"
+    """ "+34 %", "+9.2 %", "+0.03 %": two digits below ten, a true minus sign and no break before the unit."""
+    size = abs(percent)
+    text = f"{size:.{0 if size >= 9.95 else 1 if size >= 0.095 else 2}f}"
+    sign = "±" if float(text) == 0.0 else "+" if percent > 0.0 else "\N{MINUS SIGN}"
+    return f"{sign}{text if sign != '±' else '0'}\N{NO-BREAK SPACE}%"
 
 
 def verdict(board, seeds, least_seeds):
@@ -98,9 +98,8 @@ def _sentence(entry, tested, level):
 
 
 def _gap(name, percent, kind="", star=""):
-    """HTML of one difference; "no change" where it rounds to nothing."""
-    text = percent_text(percent) if abs(percent) >= CHANGED else "±0\N{NO-BREAK SPACE}%"
-    words = f"{html.escape(short_name(name))} {text}{star}"
+    """HTML of one difference."""
+    words = f"{html.escape(short_name(name))} {percent_text(percent)}{star}"
     return f'<span class="{kind}">{words}</span>' if kind else words
 
 

@@ -88,6 +88,8 @@ def test_cases_without_a_description_or_with_a_strange_one_still_have_a_row():
 def test_lost_runs_have_the_time_and_the_reason():
     lost = lost_runs(table(["a"], "tripped", f"overspeed {EVIL}"))
     assert lost[0] == ("pi", "a", 1, f"tripped at 41.2 s: overspeed {EVIL}")
+    told = lost_runs(table(["a"], "tripped", "overspeed trip at 41.2 s"))
+    assert told[0][3] == "tripped: overspeed trip at 41.2 s"  # the time once
     text = lost_list(lost, 3)
     assert "3 of 3 runs failed or tripped" in text and "<img" not in text
     assert lost_list([], 3) == ""

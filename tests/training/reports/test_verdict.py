@@ -37,7 +37,7 @@ def test_gains_and_costs_are_named_where_they_are_significant():
     found = {SPEED: (-45.2, 0.001), TRAVEL: (115.0, 0.002), PITCH: (-3.4, 0.4), POWER: (0.01, 0.9)}
     text = verdict(board(("mypid", found, 0)), 6, 4)
     assert f"mypid: rotor-speed std {MINUS}45 %* for pitch travel +115 %*; not significant: " in words(text)
-    assert f"platform-pitch std {MINUS}3.4 %, capped power ±0 %." in words(text)
+    assert f"platform-pitch std {MINUS}3.4 %, capped power +0.01 %." in words(text)
     assert f'<span class="better">rotor-speed std {MINUS}45' in text
     assert '<span class="worse">pitch travel +115' in text
     assert "paired by case and seed" in text
@@ -92,7 +92,14 @@ def test_without_something_to_compare_the_verdict_says_why():
 
 
 @pytest.mark.parametrize(
-    ("percent", "text"), [(9.94, "+9.9 %"), (9.96, "+10 %"), (-0.04, "0.0 %"), (-960.3, f"{MINUS}960 %")]
+    ("percent", "text"),
+    [
+        (9.94, "+9.9 %"),
+        (9.96, "+10 %"),
+        (-0.04, f"{MINUS}0.04 %"),
+        (0.004, "±0 %"),
+        (-960.3, f"{MINUS}960 %"),
+    ],
 )
 def test_percentages_have_two_digits_or_the_whole_number(percent, text):
     assert words(percent_text(percent)) == text

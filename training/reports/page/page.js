@@ -62,6 +62,7 @@ function showTip(target) {
   explained = target;
   target.setAttribute("aria-describedby", "tip");
   const [at, own] = [target.getBoundingClientRect(), tip.getBoundingClientRect()];
+  if (at.bottom < 0 || at.top > window.innerHeight) { hideTip(); return; }
   const below = at.bottom + 6 + own.height < window.innerHeight;
   tip.style.left = `${Math.max(8, Math.min(at.left, window.innerWidth - own.width - 8))}px`;
   tip.style.top = `${below ? at.bottom + 6 : Math.max(8, at.top - own.height - 6)}px`;
@@ -83,7 +84,8 @@ for (const [kind, show] of [["pointerover", true], ["focusin", true], ["click", 
 }
 $("tip").addEventListener("pointerleave", hideTip);
 document.addEventListener("keydown", (event) => { if (event.key === "Escape") hideTip(); });
-window.addEventListener("scroll", hideTip, { passive: true });
+// what is explained moves, and its explanation with it
+document.addEventListener("scroll", () => { if (explained) showTip(explained); }, { passive: true, capture: true });
 
 // ---- tables that scroll ------------------------------------------------------------------------
 function markScrolling(outer) {
@@ -107,12 +109,13 @@ function figure(value) {
   if (value === null || value === undefined) return "–";
   if (value === 0) return "0";
   const size = Math.abs(value);
-  if (size >= 1e6 || size < 1e-3) return value.toExponential(2);
-  return size >= 1000 ? value.toFixed(0) : value.toPrecision(size >= 100 ? 4 : 3);
+  const text = size >= 1e6 || size < 1e-3 ? size.toExponential(2) : size >= 1000 ? size.toFixed(0) : size.toPrecision(size >= 100 ? 4 : 3);
+  return `${value < 0 ? "\u2212" : ""}${text}`;
 }
 function percentage(percent) {
-  const size = Math.abs(percent).toFixed(Math.abs(percent) < 9.95 ? 1 : 0);
-  return `${Number(size) === 0 ? "" : percent > 0 ? "+" : "\u2212"}${size} %`;
+  const size = Math.abs(percent);
+  const text = size.toFixed(size >= 9.95 ? 0 : size >= 0.095 ? 1 : 2);
+  return Number(text) === 0 ? "±0 %" : `${percent > 0 ? "+" : "\u2212"}${text} %`;
 }
 
 function gapOf(row, metric) {
@@ -121,7 +124,7 @@ function gapOf(row, metric) {
   if (percent === null || percent === undefined) return null;
   const p = row.p[metric.name];
   const [tested, sure] = [p !== undefined, p !== undefined && p <= DATA.alpha];
-  const way = Math.abs(percent) < 0.05 ? 0 : Math.sign(percent) * metric.better;
+  const way = Math.abs(percent) < 0.005 ? 0 : Math.sign(percent) * metric.better;
   const judged = way && (sure || !tested);
   const word = way > 0 ? "better" : "worse";
   const found = sure ? `significant, corrected p = ${p.toPrecision(2)}` : tested ? `not significant, corrected p = ${p.toPrecision(2)}` : "not tested";
@@ -154,7 +157,9 @@ function sortedRows() {
 function headerCell(key, label, unit, about) {
   const cell = element("th");
   const button = element("button");
-  button.append(element("span", label, "label"), element("span", order.key === key ? (order.down ? "▾" : "▴") : "", "arrow"), element("span", unit || "\u00a0", "unit"));
+  button.append(element("span", label, "label"));
+  if (order.key === key) button.append(element("span", order.down ? "\u00a0▾" : "\u00a0▴", "arrow"));
+  button.append(element("span", unit || "\u00a0", "unit"));
   button.type = "button";
   explain(button, about);
   button.addEventListener("click", () => {
@@ -347,9 +352,10 @@ function drawBoxes() {
   const traces = DATA.controllers.map((controller, i) => {
     const look = { type: "box", name: plain(controller), marker: { color: colour(i), size: 4 }, line: { width: 1.5 }, offsetgroup: String(i) };
     if (kind === "metric") {
-      const points = DATA.runs.filter((run) => run[0] === controller && run[3][name] != null);
+      const place = DATA.columns.indexOf(name);
+      const points = DATA.runs.filter((run) => run[0] === controller && run[3][place] !== null);
       return {
-        ...look, x: points.map((run) => plain(run[1])), y: points.map((run) => run[3][name]), boxpoints: "all", jitter: 0.35, pointpos: 0,
+        ...look, x: points.map((run) => plain(run[1])), y: points.map((run) => run[3][place]), boxpoints: "all", jitter: 0.35, pointpos: 0,
         text: points.map((run) => `seed ${run[2]}`),
       };
     }
