@@ -439,15 +439,16 @@ function drawSpectra() {
     .map((panel) => ({ ...panel, power: true, low, y: { type: "log", exponentformat: "power", dtick: 2 } }));
   const { traces, shape } = panels(entries, "spectra", axes);
   const marks = [...((Object.values(entries).find((run) => run.marks.length) || {}).marks || [])].sort((a, b) => a[1] - b[1]);
+  const height = 140 + 190 * Math.max(1, axes.length);
   $("spectra-about").textContent = axes.length
     ? `Power spectral density of ${$("series-case").value}, seed ${$("series-seed").value}, as chosen above.${marks.length ? " Vertical lines: the frequencies named at the top." : ""}`
     : "No run that is shown has enough scored samples for a spectrum.";
   draw("spectra-plot", traces, {
-    ...shape, height: 120 + 190 * Math.max(1, axes.length), hovermode: "x", margin: { l: 64, r: 16, t: 70, b: 48 },
-    xaxis: { type: "log", title: { text: "frequency (Hz)" }, range: [Math.log10(0.005), Math.log10(0.5)], tickvals: [0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1], anchor: axes.length > 1 ? `y${axes.length}` : "y" },
-    legend: { orientation: "h", yref: "container", yanchor: "top", y: 1, x: 0 },
+    ...shape, height, hovermode: "x", margin: { l: 64, r: 16, t: narrow() ? 54 : 38, b: 48 },
+    xaxis: { type: "log", title: { text: "frequency (Hz)", standoff: 8 }, range: [Math.log10(0.005), Math.log10(0.5)], tickvals: [0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1], anchor: axes.length > 1 ? `y${axes.length}` : "y" },
+    legend: { orientation: "h", yanchor: "top", y: -72 / (height - 100), x: 0 },
     shapes: marks.map((mark, i) => ({ type: "line", xref: "x", yref: "paper", x0: mark[1], x1: mark[1], y0: 0, y1: 1, line: { width: 1.2, dash: DASHES[i % 3], color: css("--soft") } })),
-    annotations: marks.map((mark, i) => ({ xref: "x", yref: "paper", x: Math.log10(mark[1]), y: 1, yshift: 15 * (i % 2), yanchor: "bottom", showarrow: false, text: plain(mark[0]), font: { size: 11, color: css("--soft") } })),
+    annotations: marks.map((mark, i) => ({ xref: "x", yref: "paper", x: Math.log10(mark[1]), y: 1, yshift: 15 * (i % (narrow() ? 3 : 2)), yanchor: "bottom", showarrow: false, text: plain(mark[0]), font: { size: 11, color: css("--soft") } })),
   });
 }
 
