@@ -46,7 +46,8 @@ background:var(--page);overflow-wrap:anywhere}
 a{color:var(--accent)}
 .scroll{overflow-x:auto;margin:.6rem 0 1.4rem;background:
 linear-gradient(to left,var(--page) 40%,transparent) right/3rem 100% no-repeat local,
-linear-gradient(to left,color-mix(in srgb,var(--soft) 45%,transparent),transparent) right/1.1rem 100% no-repeat}
+linear-gradient(to left,color-mix(in srgb,var(--soft) 45%,transparent),transparent)
+right/1.1rem 100% no-repeat}
 table{border-collapse:collapse;font-variant-numeric:tabular-nums;min-width:100%}
 th,td{padding:.25rem .6rem;border-bottom:1px solid var(--line);text-align:right;white-space:nowrap}
 th{border-bottom:2px solid var(--line);vertical-align:bottom}td code{white-space:nowrap}
