@@ -15,6 +15,9 @@ from fowt_env.files.atomic import replacing
 from fowt_env.files.tables import read_table, write_table
 from fowt_env.training.board.judge import inputs_of, package_version
 from fowt_env.training.evaluation.leaderboard import leaderboard
+from fowt_env.training.evaluation.metrics import better
+from fowt_env.training.reports.metric_words import about_metric
+from fowt_env.training.reports.page_policy import content_policy
 
 FIGURES = {  # heading: metric whose ratio to the baseline is shown
     "rotor speed": "RotSpeed_std_[rpm]",
@@ -33,13 +36,29 @@ CANNOT = (
     "Whether code read files or the network of the organiser's machine while it ran.",
     "Submissions that differ in name alone.",
 )
-POLICY = "default-src 'none'; style-src 'unsafe-inline'"
 STYLE = """
-body{font:15px/1.45 system-ui,sans-serif;margin:2rem auto;max-width:75rem;padding:0 1rem;color:#1b2430}
-table{border-collapse:collapse;margin:.6rem 0 1.4rem;font-variant-numeric:tabular-nums}
-th,td{padding:.25rem .6rem;border-bottom:1px solid #d7dde4;text-align:right;white-space:nowrap}
-th{background:#f2f5f8}td.text,th.text{text-align:left;white-space:normal}
-.small{color:#5b6773;font-size:13px}.lost{color:#b3261e}h2{margin-top:2.2rem}
+:root{color-scheme:light dark;--page:#fff;--ink:#1b2430;--soft:#5b6773;--line:#d7dde4;--head:#f2f5f8;
+--accent:#0a63b0;--lost:#b3261e;--better:#0a5ea8;--worse:#a8480a}
+@media (prefers-color-scheme:dark){:root{--page:#11151b;--ink:#e6eaf0;--soft:#9aa6b5;--line:#2c3540;
+--head:#191f27;--accent:#6cb4f0;--lost:#ff8a80;--better:#7cc0f7;--worse:#f5a55a}}
+body{font:15px/1.45 system-ui,sans-serif;margin:2rem auto;max-width:90rem;padding:0 1rem;color:var(--ink);
+background:var(--page);overflow-wrap:anywhere}
+a{color:var(--accent)}
+.scroll{overflow-x:auto;margin:.6rem 0 1.4rem;background:
+linear-gradient(to left,var(--page) 40%,transparent) right/3rem 100% no-repeat local,
+linear-gradient(to left,color-mix(in srgb,var(--soft) 45%,transparent),transparent)
+right/1.1rem 100% no-repeat}
+table{border-collapse:collapse;font-variant-numeric:tabular-nums;min-width:100%}
+th,td{padding:.25rem .6rem;border-bottom:1px solid var(--line);text-align:right;white-space:nowrap}
+th{border-bottom:2px solid var(--line);vertical-align:bottom}td code{white-space:nowrap}
+td.text,th.text{text-align:left;white-space:normal;min-width:7rem}
+th button{font:inherit;color:inherit;background:none;border:0;padding:0;cursor:help;text-align:inherit;
+text-decoration:underline dotted;text-underline-offset:.2em}
+[popover]{max-width:min(26rem,90vw);padding:.7rem 1rem;border:1px solid var(--line);border-radius:8px;
+background:var(--head);color:var(--ink)}
+.small{color:var(--soft);font-size:13px}.lost{color:var(--lost)}h2{margin-top:2.2rem}
+.better{color:var(--better);font-weight:600}.worse{color:var(--worse);font-weight:600}
+@media print{.scroll{overflow:visible}table{font-size:8pt}th,td{padding:.1rem .2rem}}
 """
 
 
@@ -177,20 +196,23 @@ def _page(judged, frame, history):
     """HTML text of the page."""
     board = judged.board
     title, baseline = html.escape(board.settings.title), html.escape(board.settings.baseline)
+    policy = content_policy(styles=[STYLE])
     seeds = ", ".join(map(str, board.settings.seeds))
     parts = [
         '<!doctype html><html lang="en"><head><meta charset="utf-8">',
-        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">',
+        f'<meta http-equiv="Content-Security-Policy" content="{policy}">',
+        '<meta name="viewport" content="width=device-width, initial-scale=1">',
         f"<title>{title}</title><style>{STYLE}</style></head><body><h1>{title}</h1>",
         f"<p>Judged {judged.when} with {html.escape(package_version())}; baseline"
         f" <b>{baseline}</b>; public seeds {seeds}. {_secret(judged)}</p>",
-        "<p class=small>Ratios are of lifetime means over the baseline's on the same wind and waves, less is"
-        " better but for energy (power up to rated). In brackets: 95 % interval of the score; * a difference"
-        " from the baseline whose p-value, after Holm's correction over the row, is at most 0.05. Ranks:"
-        " first"
-        " those within every limit, then those beyond one, then those with failed or tripped runs, which"
-        " count"
-        " as the worst of all.</p>",
+        "<details open><summary>How to read it</summary><p class=small>Ratios are of lifetime means over the"
+        " baseline's on the same wind and waves, less is better but for energy (power up to rated). In"
+        " brackets: 95 % interval of the score; * significant: the p-value, after Holm's correction over the"
+        ' row, is at most 0.05, and the difference <span class="better">✓ better</span> or <span'
+        ' class="worse">✗ worse</span>. Ranks: first those within every limit, then those beyond one, then'
+        " those with failed or tripped runs, which count as the worst of all. A heading explains its metric."
+        " Wide tables scroll sideways.</p></details>",
+        *_explanations(),
     ]
     for regime in board.settings.regime:
         parts.append(f"<h2>{html.escape(regime.name)}</h2>")
@@ -222,7 +244,33 @@ def _table(headings, rows, texts=()):
         return "".join(f"<{tag}{mark}>{cell}</{tag}>" for mark, cell in zip(marked, row, strict=True))
 
     lines = [f"<tr>{cells(headings, 'th')}</tr>", *(f"<tr>{cells(row, 'td')}</tr>" for row in rows)]
-    return "<table>" + "".join(lines) + "</table>"
+    return f'<div class="scroll" tabindex="0"><table>{"".join(lines)}</table></div>'
+
+
+def _explanations():
+    """Popovers that say what the metrics are, which open from their headings without a script."""
+    return [
+        f'<div popover id="metric-{number}"><b>{heading}</b>, ratio to the baseline.'
+        f" {html.escape(about_metric(metric))}</div>"
+        for number, (heading, metric) in enumerate(FIGURES.items())
+    ]
+
+
+def _explained_headings():
+    """Headings of FIGURES as buttons, explained on a touch or a key, and to a pointer that rests there."""
+    return [
+        f'<button popovertarget="metric-{number}" title="{html.escape(about_metric(metric))}">'
+        f"{heading}</button>"
+        for number, (heading, metric) in enumerate(FIGURES.items())
+    ]
+
+
+def ratio_text(ratio, metric, significant):
+    """HTML of a ratio, marked as better or worse where that is significant."""
+    if not significant:
+        return _number(ratio)
+    word, mark = ("better", "✓") if (ratio - 1.0) * better(metric) > 0.0 else ("worse", "✗")
+    return f'<span class="{word}">{_number(ratio)} * {mark}</span>'
 
 
 def _ranking(rows, judged):
@@ -239,11 +287,12 @@ def _ranking(rows, judged):
         shown.append([
             str(row["rank"]), html.escape(row["name"]), html.escape(row["information"]),
             f'<span class="lost">{lost} of {row["runs"]}</span>' if lost else f"0 of {row['runs']}",
-            *(_number(row[figure]) + ("*" if sure[figure] <= 1.0 - LEVEL else "") for figure in FIGURES),
+            *(ratio_text(row[figure], FIGURES[figure], sure[figure] <= 1.0 - LEVEL) for figure in FIGURES),
             score, *([_number(row["score_secret"])] if judged.secret else []),
         ])  # fmt: skip
     last = ["score", *(["score, secret seeds"] if judged.secret else [])]
-    return _table(["rank", "controller", "is given", "failed or tripped", *FIGURES, *last], shown, (1, 2))
+    first = ["rank", "controller", "is given", "failed or tripped"]
+    return _table([*first, *_explained_headings(), *last], shown, (1, 2))
 
 
 def _beyond(rows):
@@ -278,7 +327,7 @@ def _submissions(judged):
         card = each.card
         name = html.escape(card.name)
         if card.url.startswith(("https://", "http://")):
-            name = f'<a href="{html.escape(card.url)}" rel="nofollow">{name}</a>'
+            name = f'<a href="{html.escape(card.url)}" rel="nofollow noreferrer">{name}</a>'
         texts = (
             card.author,
             card.licence,

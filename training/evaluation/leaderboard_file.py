@@ -19,11 +19,16 @@ class _Part(BaseModel):
 
 
 class Statistic(_Part):
-    """A mean or a difference with the ends of its interval; null where there is none."""
+    """A mean or a difference with the ends of its interval; null where there is none.
+
+    Of a difference also percent, of the baseline's mean, and its two-sided p-value.
+    """
 
     mean: FiniteNumber | None
     low: FiniteNumber | None = None
     high: FiniteNumber | None = None
+    percent: FiniteNumber | None = None
+    p: Annotated[float, Field(ge=0, le=1)] | None = None
 
 
 class Figures(_Part):

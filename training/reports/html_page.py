@@ -10,49 +10,54 @@ pip install "fowt-env[report]".
 import base64
 import html
 import json
-import platform as machine
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from string import Template
 
 import numpy as np
 
-from fowt_env.descriptions.checks import check_number
+from fowt_env.descriptions.checks import check_number, is_number
 from fowt_env.descriptions.files import parse_json
 from fowt_env.errors import InputError, unknown
 from fowt_env.files.atomic import replacing
 from fowt_env.files.tables import read_table
-from fowt_env.training.evaluation.bootstrap import lifetime_means
+from fowt_env.training.evaluation.bootstrap import LEAST_SEEDS, LEVEL, lifetime_means
 from fowt_env.training.evaluation.evaluate import run_file
 from fowt_env.training.evaluation.failures import failures_as_worst
 from fowt_env.training.evaluation.leaderboard_file import check_leaderboard
 from fowt_env.training.evaluation.metrics import better, mean_exponent
 from fowt_env.training.evaluation.results_table import KEY, WEIGHT, WORDS, case_shares, read_results
 from fowt_env.training.evaluation.run_case import OK, TRIPPED
-from fowt_env.training.evaluation.seeds import ranges
+from fowt_env.training.reports.metric_words import SHORT, about_metric, short_name
+from fowt_env.training.reports.page_policy import content_policy
+from fowt_env.training.reports.page_words import (
+    case_conditions,
+    conditions_table,
+    conditions_text,
+    counted,
+    described_cases,
+    lost_list,
+    lost_runs,
+    numbers_text,
+    page_lead,
+    page_title,
+    provenance,
+)
+from fowt_env.training.reports.terminal import platform_pitch_period
+from fowt_env.training.reports.verdict import TESTED, corrected_p, verdict
 from fowt_env.visual.time_series import PANELS, SPECTRA, TIME, frequency_marks, spectrum
 
 NO_METRIC = (*KEY, *WORDS, "stopped_[s]", "scored_[s]", WEIGHT)
-# columns that the leaderboard shows at once, those of them that the table has
-PAGE_METRICS = (
-    "RotSpeed_std_[rpm]",
-    "PtfmPitch_std_[deg]",
-    "blade_pitch_travel_[deg/s]",
-    "torque_travel_[kN-m/s]",
-    "RotTorq_DEL_[kN-m]",
-    "TwrBsMyt_DEL_[kN-m]",
-    "GenPwr_capped_mean_[kW]",
-    "GenPwr_max_[kW]",
-)
-PARETO_AXES = ("PtfmPitch_std_[deg]", "RotSpeed_std_[rpm]", "blade_pitch_travel_[deg/s]")  # across, up, size
+PAGE_METRICS = tuple(SHORT)  # that the leaderboard shows at once, those of them that the table has
+PARETO_AXES = ("RotSpeed_std_[rpm]", "PtfmPitch_std_[deg]", "blade_pitch_travel_[deg/s]")  # across, up, size
 ALL_CASES = ""
-MEAN, DIFFERENCE = "mean", "difference"
+TORQUE = ("generator\ntorque (kN m)", "GenTq_[kN-m]")
+PAGE_PANELS = PANELS if TORQUE[1] in dict(map(reversed, PANELS)) else (*PANELS[:4], TORQUE, *PANELS[4:])
 # what the shown size allows; stated on the page
 DISPLAY_RATE = 2.0  # Hz
 MAX_POINTS = 3000  # of one drawn series
-MAX_SERIES_RUNS = 64  # whose time series are in the page, unless cases are named
+MAX_SERIES_RUNS = 120  # whose time series are in the page, unless cases or seeds are named
 SPECTRUM_RANGE = (0.002, 1.0)  # Hz
-SPECTRUM_SPAN = 1e-7  # of the peak: what lies lower is not drawn
+SPECTRUM_SPAN = 1e-6  # of the peak, down to which the axis reaches
 PERCENTILES = (1.0, 25.0, 50.0, 75.0, 99.0)
 SAMPLED_CHANNELS = (  # channels whose samples have boxes
     "RotSpeed_[rpm]",
@@ -82,9 +87,9 @@ def write_report(
     folder     holds results.csv (or metrics.csv) and runs/<controller>/<case>_seed<n>.parquet; its
                leaderboard.json and manifest.json are used where they are there
     out        the page; None: report.html in the folder
-    cases      names of the cases whose time series go into the page; None: evenly chosen ones, so that
-               at most MAX_SERIES_RUNS runs do
-    seeds      whose time series go in; None: the first of each case
+    cases      names of the cases whose time series go into the page; None: all
+    seeds      whose time series go in; None: all. With neither named at most MAX_SERIES_RUNS runs do: the
+               first seed of each case (of evenly chosen cases, if those are too many), then the further ones
     rate       samples per second of the drawn series, means over their interval; None: DISPLAY_RATE, or
                what MAX_POINTS allow
     platform   whose steady schedule is shown; None: that of the manifest's cases, else oc3_hywind; where its
@@ -107,15 +112,17 @@ def write_report(
     board_file, manifest = _leaderboard(folder / "leaderboard.json"), _json_file(folder / "manifest.json")
     say = progress or (lambda done, total, text: None)
     chosen = _chosen_runs(table, cases, seeds)
-    runs = _read_runs(folder, table, chosen, rate, say)
+    runs = _read_runs(folder, table, chosen, described_cases(manifest), rate, say)
     point = _schedule(platform, _platform_of(manifest), say) if schedule else None
-    data = _page_data(table, board_file, runs, point)
+    data = _page_data(table, board_file, manifest, runs, point)
     texts = _page_texts(folder, table, manifest, board_file, data, runs, point)
     page = Path(__file__).parent / "page"
     scripts = {"plotly": plotly_script, "script": (page / "page.js").read_text(encoding="utf-8")}
+    policy = content_policy(scripts.values(), dynamic_styles=True)  # plotly.js sets styles as it draws
     style = (page / "page.css").read_text(encoding="utf-8")
     template = Template((page / "page.html").read_text(encoding="utf-8"))
-    text = template.substitute(texts, style=style, data=_embedded_json(data), **scripts)
+    fixed = {"policy": policy, "style": style, "data": _embedded_json(data)}
+    text = template.substitute(texts, **fixed, **scripts)
     with replacing(out) as temporary:
         temporary.write_text(text, encoding="utf-8")
     return out
@@ -158,27 +165,34 @@ def _chosen_runs(table, cases, seeds):
     for seed in seeds or ():
         if seed not in there:
             raise unknown("seed of the results", seed, there)
-    if seeds is None:
-        first = table.groupby("case")["seed"].transform("min")
-        table = table[table["seed"] == first]
-    else:
+    if cases is not None:
+        table = table[table["case"].isin(cases)]
+    if seeds is not None:
         table = table[table["seed"].isin(seeds)]
-    if cases is None:
-        per_case = max(table.groupby("case").size())
-        capacity = max(1, MAX_SERIES_RUNS // per_case)
-        if len(known) > capacity:
-            kept = np.unique(np.linspace(0, len(known) - 1, capacity).round().astype(int))
-            known = [known[i] for i in kept]
-        cases = known
-    return table[table["case"].isin(cases)]
+    if cases is not None or seeds is not None:
+        return table
+    # one group of runs for each case and seed: the first seed of every case, the second, ...
+    turn = table.groupby("case")["seed"].rank(method="dense")
+    groups = [rows.index for _, rows in table.groupby([turn, table["case"].map(known.index)])]
+    firsts = groups[: len(known)]
+    capacity = max(1, MAX_SERIES_RUNS // max(map(len, firsts)))
+    if len(firsts) > capacity:
+        kept = np.unique(np.linspace(0, len(firsts) - 1, capacity).round().astype(int))
+        groups = [firsts[i] for i in kept]
+    total = np.cumsum([len(group) for group in groups])
+    most = max(1, int(np.searchsorted(total, MAX_SERIES_RUNS, side="right")))
+    return table.loc[[index for group in groups[:most] for index in group]]
 
 
-def _read_runs(folder, table, chosen, rate, say):
-    """{"series": {case: {seed: {controller: drawn run}}}, "quantiles": ..., "rate": Hz drawn, "missing": n}.
+def _read_runs(folder, table, chosen, about, rate, say):
+    """{"series": {case: {seed: {controller: drawn run}}}, "pool", "quantiles", "rates" in Hz, "missing": n}.
 
     Every run is read once: its samples count in the boxes, and if it is a chosen one it is drawn.
+    about: {case: mapping} of the manifest. pool: codes of the drawn series, each once, in which a series has
+    its place.
     """
-    drawn = set(chosen.index)
+    drawn, pool = set(chosen.index), {}
+    periods = {case: _pitch_period(each.get("platform")) for case, each in about.items()}
     series, samples, rates, missing = {}, {}, [], 0
     for number, (index, row) in enumerate(table.iterrows()):
         say(number, len(table), f"reading {row['controller']}, {row['case']}, seed {row['seed']}")
@@ -187,14 +201,14 @@ def _read_runs(folder, table, chosen, rate, say):
         if frame is None or TIME not in frame.columns or len(frame) < 2:
             missing += 1
             continue
-        skip = _skipped(row, frame)
+        skip = _skipped(row, frame, about.get(row["case"], {}))
         kept = frame[frame[TIME] >= frame[TIME].iloc[0] + skip - 1e-9]
         if row["status"] == "ok" and len(kept):
             for channel in (name for name in SAMPLED_CHANNELS if name in frame.columns):
                 cell = samples.setdefault(channel, {}).setdefault((row["controller"], row["case"]), [])
                 cell.append(kept[channel].to_numpy())
         if index in drawn:
-            run, used = _drawn_run(frame, skip, rate)
+            run, used = _drawn_run(frame, skip, rate, periods.get(row["case"]), pool)
             rates.append(used)
             series.setdefault(row["case"], {}).setdefault(str(row["seed"]), {})[row["controller"]] = run
     quantiles = {}
@@ -202,17 +216,28 @@ def _read_runs(folder, table, chosen, rate, say):
         for (controller, case), parts in cells.items():
             values = np.percentile(np.concatenate(parts), PERCENTILES)
             quantiles.setdefault(channel, {}).setdefault(controller, []).append([case, *_rounded(values)])
-    return {"series": series, "quantiles": quantiles, "rates": sorted(set(rates)), "missing": missing}
+    rest = {"pool": list(pool), "rates": sorted(set(rates)), "missing": missing}
+    return {"series": series, "quantiles": quantiles, **rest}
 
 
-def _skipped(row, frame):
-    """Seconds at the start of a run that were not scored; 0 where the table does not say."""
+def _pitch_period(platform):
+    """Natural period (s) in platform pitch of a platform's file; None: none, or no such file here."""
+    try:
+        return platform_pitch_period(str(platform))
+    except InputError:
+        return None
+
+
+def _skipped(row, frame, about):
+    """Seconds at the start of a run that are not scored: the manifest's, else what the table implies."""
+    if is_number(about.get("skip")):
+        return float(max(0.0, about["skip"]))
     scored = row.get("scored_[s]", float("nan"))
     length = frame[TIME].iloc[-1] - frame[TIME].iloc[0]
     return float(max(0.0, length - scored)) if row["status"] == "ok" and scored == scored else 0.0
 
 
-def _drawn_run(frame, skip, rate):
+def _drawn_run(frame, skip, rate, pitch_period, pool):
     """({"series", "spectra", "marks", "start", "skip"} of one run, samples per second that are drawn)."""
     time = frame[TIME].to_numpy(dtype=float)
     step = (time[-1] - time[0]) / (len(time) - 1)
@@ -220,11 +245,11 @@ def _drawn_run(frame, skip, rate):
     block = max(1, round(1.0 / (wanted * step)))
     if rate is None:
         block = max(block, -(-len(time) // MAX_POINTS))
-    present = [channel for _, channel in PANELS if channel in frame.columns]
+    present = [channel for _, channel in PAGE_PANELS if channel in frame.columns]
     series = {}
     for channel in present:
         values = _block_means(frame[channel].to_numpy(dtype=float), block)
-        series[channel] = _packed(values, time[0] + 0.5 * (block - 1) * step, block * step)
+        series[channel] = _packed(values, time[0] + 0.5 * (block - 1) * step, block * step, pool)
     scored = frame[time >= time[0] + skip - 1e-9]
     spectra = {}
     for _, channel, _ in SPECTRA:
@@ -232,10 +257,13 @@ def _drawn_run(frame, skip, rate):
             frequency, density = spectrum(scored[TIME], scored[channel])
             inside = (frequency >= SPECTRUM_RANGE[0]) & (frequency <= SPECTRUM_RANGE[1])
             if inside.any() and density[inside].max() > 0.0:
-                floor = density[inside].max() * SPECTRUM_SPAN
-                logs = np.log10(np.maximum(density[inside], floor))
-                spectra[channel] = _packed(logs, frequency[inside][0], frequency[1] - frequency[0])
-    marks = [[f"{name} {at:.3g} Hz", float(at)] for name, at in frequency_marks(scored)] if spectra else []
+                logs = np.full(inside.sum(), np.nan)
+                np.log10(density[inside], out=logs, where=density[inside] > 0.0)
+                spectra[channel] = _packed(logs, frequency[inside][0], frequency[1] - frequency[0], pool)
+    marks = []
+    if spectra:
+        found = frequency_marks(scored, pitch_period)
+        marks = [[f"{name} {at:.3g} Hz", float(at)] for name, at in found]
     run = {"series": series, "spectra": spectra, "marks": marks, "start": float(time[0]), "skip": skip}
     return run, float(f"{1.0 / (block * step):.4g}")
 
@@ -247,20 +275,29 @@ def _block_means(values, block):
     return values[: len(values) // block * block].reshape(-1, block).mean(axis=1)
 
 
-def _packed(values, start, step):
-    """Evenly spaced values as base64 of 16-bit codes between their bounds; code 0 is a missing value."""
+def _packed(values, start, step, pool):
+    """Evenly spaced values as 16-bit codes between their bounds, in base64 in a pool; code 0 is missing.
+
+    pool: {codes: place}, to which they are added; the weather of all controllers is there once.
+    """
     finite = np.isfinite(values)
     low, high = (float(values[finite].min()), float(values[finite].max())) if finite.any() else (0.0, 0.0)
     span = high - low
     codes = np.zeros(len(values), dtype="<u2")
     codes[finite] = 1 + (np.rint((values[finite] - low) / span * 65534.0) if span > 0.0 else 0)
     text = base64.b64encode(codes.tobytes()).decode("ascii")
-    return {"codes": text, "low": low, "high": high, "start": float(start), "step": float(step)}
+    place = pool.setdefault(text, len(pool))
+    return {"codes": place, "low": low, "high": high, "start": float(start), "step": float(step)}
 
 
 def _rounded(values):
     """Floats with six digits, NaN as None: what JSON can hold."""
-    return [float(f"{value:.6g}") if np.isfinite(value) else None for value in values]
+    return [float(f"{v:.6g}") if v is not None and np.isfinite(v) else None for v in values]
+
+
+def _rounded_items(values):
+    """The mapping with its floats rounded, without those that are None."""
+    return {name: float(f"{value:.6g}") for name, value in values.items() if value is not None}
 
 
 def _platform_of(manifest):
@@ -298,19 +335,20 @@ def _schedule(asked, own, say):
 
 
 def _metric_columns(table):
-    """[{name, label, unit, headline, better}] of the table's metrics, the headline ones first."""
+    """[{name, label, unit, headline, better, about}] of the table's metrics, the headline ones first."""
     names = [name for name in table.columns if name not in NO_METRIC and table[name].notna().any()]
     first = [name for name in PAGE_METRICS if name in names]
     columns = []
     for name in [*first, *(name for name in names if name not in first)]:
-        label, _, unit = name.partition("_[")
+        _, _, unit = name.partition("_[")
         columns.append(
             {
                 "name": name,
-                "label": label.replace("_", " "),
+                "label": short_name(name),
                 "unit": unit.removesuffix("]"),
                 "headline": name in first or not first,
                 "better": better(name),
+                "about": f"{about_metric(name)} ({name})",
             }
         )
     return columns
@@ -335,16 +373,20 @@ def _means(table, metrics, case):
     return rows
 
 
-def _board_rows(board, what, case):
-    """Leaderboard rows of a LeaderboardFile: means or paired differences, with their intervals."""
+def _board_rows(board, case):
+    """Leaderboard rows of a LeaderboardFile: means and paired differences, with their intervals.
+
+    p: {metric: p-value} of the tested differences, corrected for their number; {} where none is tested.
+    """
     rows = []
     for entry in board.controllers:
         part = entry if case == ALL_CASES else entry.cases.get(case)
         if part is None:
             continue
-        figures = dict(part.metrics if what == MEAN else part.difference)
-        if entry.score and case == ALL_CASES and what == MEAN:
+        figures, gaps = dict(part.metrics), part.difference
+        if entry.score and case == ALL_CASES:
             figures["score"] = entry.score
+        other = entry.controller != board.baseline
         rows.append(
             {
                 "controller": entry.controller,
@@ -353,99 +395,136 @@ def _board_rows(board, what, case):
                 "tripped": part.tripped,
                 "rank": entry.rank,
                 "beyond": entry.beyond,
-                "values": {name: figure.mean for name, figure in figures.items()},
-                "intervals": {
-                    name: [figure.low, figure.high]
-                    for name, figure in figures.items()
-                    if figure.low is not None and figure.high is not None
-                },
+                "values": _rounded_items({name: figure.mean for name, figure in figures.items()}),
+                "intervals": _intervals(figures),
+                "gaps": _rounded_items({name: gap.mean for name, gap in gaps.items() if other}),
+                "gap_intervals": _intervals(gaps) if other else {},
+                "percent": _rounded_items({name: gap.percent for name, gap in gaps.items() if other}),
+                "p": corrected_p(entry) if other and case == ALL_CASES else {},
             }
         )
     return rows
 
 
+def _intervals(figures):
+    """{metric: [low, high]} of those that have an interval."""
+    known = {name: (f.low, f.high) for name, f in figures.items() if None not in (f.low, f.high)}
+    return {name: _rounded(ends) for name, ends in known.items()}
+
+
 def _board(table, board_file, metrics):
-    """({view: {case: rows}}, {view: title}) of the leaderboard, from leaderboard.json where it is there."""
+    """{case: rows} of the leaderboard, from leaderboard.json where it is there."""
     cases = [ALL_CASES, *dict.fromkeys(table["case"])]
     if board_file is None:
-        return {MEAN: {case: _means(table, metrics, case) for case in cases}}, {MEAN: "means"}
-    views = {
-        what: {case: _board_rows(board_file, what, case) for case in cases} for what in (MEAN, DIFFERENCE)
-    }
-    difference = "no differences: all have failed runs"
-    if board_file.baseline is not None:
-        difference = f"differences to {board_file.baseline}"
-    return views, {MEAN: "means", DIFFERENCE: difference}
+        return {case: _means(table, metrics, case) for case in cases}
+    return {case: _board_rows(board_file, case) for case in cases}
+
+
+def _least_seeds(board_file):
+    """Number of seeds from which on there are intervals and tests."""
+    known = board_file is not None and board_file.interval is not None
+    return board_file.interval.least_seeds if known else LEAST_SEEDS
 
 
 def _remark(table, board_file, case):
-    """What the figures of the leaderboard are, in a sentence or two."""
+    """What the rows of the leaderboard are made of, in a line."""
     part = table if case == ALL_CASES else table[table["case"] == case]
-    seeds, cases = sorted(set(part["seed"])), part["case"].nunique()
-    text = f"{len(part)} runs, {cases} {'case' if cases == 1 else 'cases'}, "
-    text += f"{'seed' if len(seeds) == 1 else 'seeds'} {_numbers(seeds)}. "
-    interval = None if board_file is None else board_file.interval
-    if interval is not None and len(seeds) >= interval.least_seeds:
-        text += f"Small print: {100 * interval.level:g} % intervals ({interval.method}). "
-    else:
-        text += "Means over the lifetime; a run that failed or tripped has the worst figures of its case. "
-        why = "there is no leaderboard.json"
-        if interval is not None:
-            count = "a single seed" if len(seeds) == 1 else f"{len(seeds)} seeds"
-            why = f"{count} of the {interval.least_seeds} that one needs"
-        text += f"No intervals: {why}. "
-    return text + "Click a heading to sort; the best figure of a column is in colour."
+    seeds = sorted(set(part["seed"]))
+    text = f"{counted(len(part), 'run')}, {counted(part['case'].nunique(), 'case')}, "
+    text += f"{'seed' if len(seeds) == 1 else 'seeds'} {numbers_text(seeds)}."
+    if board_file is None:
+        return f"{text} Means only: the folder has no leaderboard.json with intervals and differences."
+    if len(seeds) < _least_seeds(board_file):
+        count = "a single seed" if len(seeds) == 1 else f"{len(seeds)} seeds"
+        return f"{text} No intervals and no tests: {count} of the {_least_seeds(board_file)} they need."
+    if case != ALL_CASES and board_file.baseline is not None:
+        return f"{text} Differences are tested over all cases together, not case by case."
+    return text
 
 
-def _numbers(values):
-    """1, 2, 3, 7 as "1 to 3, 7"."""
-    texts = (str(a) if a == b else f"{a} to {b}" if b > a + 1 else f"{a}, {b}" for a, b in ranges(values))
-    return ", ".join(texts)
+def _fine_print(board_file):
+    """HTML of what stands under the question mark of the leaderboard."""
+    lines = ["Choose a heading to sort by it; it also says what the metric is. Bold: the best of a column."]
+    if board_file is None:
+        lines.append(
+            "Means over the lifetime; a run that failed or tripped has the worst values of its case."
+        )
+        return "".join(f"<p>{line}</p>" for line in lines)
+    level = LEVEL if board_file.interval is None else board_file.interval.level
+    names = ", ".join(short_name(name) for name in TESTED)
+    if board_file.baseline is not None:
+        lines += [
+            f"Differences are paired: each run against that of {html.escape(board_file.baseline)} in the same"
+            " wind and waves.",
+            "* significant: without a real difference, one as large would be found with a probability of at"
+            f" most {1.0 - level:.2g} (p-value with Holm's correction over the {len(TESTED)} tested metrics:"
+            f" {names})."
+            " Without a star a difference may be chance; it is not shown to be none.",
+            '<span class="better">✓ better</span> and <span class="worse">✗ worse</span> than the baseline;'
+            " grey: tested and not significant; regular weight: not tested.",
+        ]
+    if board_file.interval is not None:
+        lines.append(f"Intervals: {100 * level:g} %, {html.escape(board_file.interval.method)}.")
+    return "".join(f"<p>{line}</p>" for line in lines)
 
 
-def _page_data(table, board_file, runs, schedule):
+def _page_data(table, board_file, manifest, runs, schedule):
     """Mapping that the page's script reads."""
     metrics = _metric_columns(table)
     names = [metric["name"] for metric in metrics]
-    views, titles = _board(table, board_file, names)
-    score = {"name": "score", "label": "score", "unit": "", "headline": True, "better": -1}
-    if any(row["values"].get("score") is not None for row in views[MEAN][ALL_CASES]):
+    board = _board(table, board_file, names)
+    about = "Score of the suite: weighted mean of metrics over the baseline's. Less is better."
+    score = {"name": "score", "label": "score", "unit": "", "headline": True, "better": -1, "about": about}
+    if any(row["values"].get("score") is not None for row in board[ALL_CASES]):
         metrics = [score, *metrics]
     shown = [metric["name"] for metric in metrics]
-    good = table[table["status"] == "ok"]
+    good = table[table["status"] == OK]
     points = [
-        [
-            *(row[key] for key in ("controller", "case", "seed")),
-            dict(zip(names, _rounded([row[name] for name in names]), strict=True)),
-        ]
+        [*(row[key] for key in KEY), _rounded([row[name] for name in names])]
         for row in good.to_dict("records")
     ]
-    labels = {channel: label.replace("\n", " ") for label, channel in PANELS}
+    labels = {channel: label.replace("\n", " ") for label, channel in PAGE_PANELS}
     cases = list(dict.fromkeys(table["case"]))
     ranked = board_file is not None and all(entry.rank is not None for entry in board_file.controllers)
     first = ("rank",) if ranked else ()
     sortable = {*first, *shown, "controller"}
     shares = dict(zip(cases, map(float, case_shares(table, cases)), strict=True))
+    shares = shares if len(set(shares.values())) > 1 else None
+    conditions = case_conditions(table, manifest, shares)
+    units = {metric["name"]: f"{metric['label']} ({metric['unit']})" for metric in metrics if metric["unit"]}
+    seeds = table.groupby("case", sort=False)["seed"].unique()
+    lost = {}
+    for who, case, seed, text in lost_runs(table):
+        lost.setdefault(case, {}).setdefault(str(seed), {})[who] = text
     return {
         "controllers": list(dict.fromkeys(table["controller"])),
         "ranked": ranked,
         "baseline": None if board_file is None else board_file.baseline,
-        "shares": shares if len(set(shares.values())) > 1 else None,
+        "alpha": 1.0
+        - (LEVEL if board_file is None or board_file.interval is None else board_file.interval.level),
+        "shares": shares,
         "cases": cases,
+        "seeds": {case: sorted(map(int, each)) for case, each in seeds.items()},
+        "conditions": {row["case"]: conditions_text(row) for row in conditions},
+        "lost": lost,
         "metrics": metrics,
-        "sort": next(name for name in (*first, "score", PARETO_AXES[1], "controller") if name in sortable),
-        "views": titles,
-        "board": views,
+        "sort": next(name for name in (*first, "score", PARETO_AXES[0], "controller") if name in sortable),
+        "board": board,
         "remarks": {case: _remark(table, board_file, case) for case in [ALL_CASES, *cases]},
         "pareto": list(PARETO_AXES),
+        "columns": names,
         "runs": points,
         "quantiles": runs["quantiles"],
+        "pool": runs["pool"],
         "series": runs["series"],
-        "panels": [{"label": label.replace("\n", "<br>"), "channel": channel} for label, channel in PANELS],
+        "panels": [
+            {"label": label.replace("\n", "<br>"), "channel": channel} for label, channel in PAGE_PANELS
+        ],
         "spectra": [
             {"label": f"{label}<br>({unit}²/Hz)", "channel": channel} for label, channel, unit in SPECTRA
         ],
-        "titles": {**{name: name.replace("_", " ") for name in names}, **labels},
+        "span": SPECTRUM_SPAN,
+        "titles": {**{name: units.get(name, name.replace("_", " ")) for name in names}, **labels},
         "schedule": None if schedule is None or "missing" in schedule else schedule,
     }
 
@@ -458,118 +537,51 @@ def _embedded_json(data):
 
 def _page_texts(folder, table, manifest, board_file, data, runs, schedule):
     """{placeholder: HTML} of what the page says in words; every name is escaped."""
-    suite = manifest.get("suite")
-    suite = suite.get("name") if isinstance(suite, dict) else suite
-    title = f"{suite or folder.resolve().name}: evaluation of controllers"
-    controllers, all_cases = data["controllers"], len(data["cases"])
-    lead = f"{len(controllers)} controllers on {all_cases} cases: {', '.join(controllers)}"
-    failed = table[table["status"] != OK]
-    lost = failed.itertuples()
-    items = "".join(
-        f"<li>{html.escape(text)}</li>"
-        for text in (f"{r.status}: {r.controller}, {r.case}, seed {r.seed}: {r.reason}" for r in lost)
-    )
-    summary = f'<summary class="bad">{len(failed)} failed or tripped runs</summary>'
-    failures = f"<details open>{summary}<ul>{items}</ul></details>"
-    section = ""
-    if schedule and "missing" in schedule:
-        why = html.escape(schedule["missing"])
-        section = (
-            '<section id="schedule"><div class="heading"><h2>Steady schedule</h2></div><p class="remark">'
-            f"Not shown: {why}. Give another with --platform, or none with --no-schedule.</p></section>"
-        )
-    elif schedule:
-        where = html.escape(schedule["platform"])
-        section = (
-            '<section id="schedule"><div class="heading"><h2>Steady schedule</h2></div><p class="remark">'
-            f"Operating points of {where} in steady wind and still water, the platform floating.</p>"
-            '<div class="plot" id="schedule-plot"></div></section>'
-        )
+    all_cases = len(data["cases"])
+    series = "The samples are means over 1/rate seconds; the files under runs/ hold every sample."
+    shown = sum(len(each) for each in runs["series"].values())
+    known = sum(map(len, data["seeds"].values()))
     rates = " or ".join(f"{rate:g}" for rate in runs["rates"]) or "no"
-    series = (
-        "Drag to zoom, double click to go back, click a name to hide it."
-        f" {len(runs['series'])} of {all_cases} cases are in this page, at {rates} samples per second (means"
-        " over that interval); the files under runs/ hold every sample. Shaded: the start that is not scored."
+    scope = (
+        f"{shown} of {known} combinations of case and seed are in this page, at {rates} samples per second."
     )
+    if shown < known:
+        scope += " Others: fowt report FOLDER --cases NAME --seeds 1,2."
     if runs["missing"]:
-        series += f" {runs['missing']} of {len(table)} runs have no time series in the folder."
-    spectra = (
-        "Of the case and seed chosen above, the scored part of the run, from all samples of its file: Welch's"
-        " estimate, Hann windows of a third of the record. Dashed: wave peak and 1P of the first controller."
-    )
-    winds = "Means over the seeds of each case; below, in small print, the ratio to the baseline's."
-    if data["shares"] is not None:
-        winds += " Below the name of a case stands its share of the lifetime."
-    remarks = {"series_remark": series, "spectra_remark": spectra, "winds_remark": winds}
-    texts = {"title": title, "lead": lead, **remarks}
+        scope += f" {counted(runs['missing'], 'run')} of {len(table)} have no time series in the folder."
+    texts = {
+        "title": page_title(manifest, data["cases"]),
+        "lead": page_lead(table, manifest),
+        "controllers": ", ".join(data["controllers"]),
+        "series_remark": f"{scope} {series}",
+        "case_count": counted(all_cases, "case"),
+    }
     return {
         **{name: html.escape(text) for name, text in texts.items()},
-        "failures": failures if len(failed) else "",
-        "schedule_section": section,
-        "schedule_link": '<a href="#schedule">Schedule</a>' if schedule else "",
-        "provenance": _provenance(table, manifest, board_file),
+        "verdict": verdict(board_file, table["seed"].nunique(), _least_seeds(board_file)),
+        "fine_print": _fine_print(board_file),
+        "conditions": conditions_table(case_conditions(table, manifest, data["shares"])),
+        "failures": lost_list(lost_runs(table), len(table)),
+        "schedule_section": _schedule_section(schedule),
+        "schedule_link": '<a href="#schedule">Steady schedule</a>' if schedule else "",
+        "provenance": provenance(folder, table, manifest, board_file),
     }
 
 
-def _provenance(table, manifest, board_file):
-    """Rows of the table of provenance."""
-    facts = {}
-    if manifest:
-        suite = manifest.get("suite")
-        if isinstance(suite, dict):
-            suite = " ".join(str(suite[key]) for key in ("name", "version") if key in suite)
-        facts |= {"suite": suite, "created": manifest.get("created"), "plant sources": manifest.get("plant")}
-        facts |= _case_facts(manifest)
-        for key in ("versions", "options", "controllers"):
-            if isinstance(manifest.get(key), dict):
-                facts[key] = ", ".join(
-                    f"{name} {_brief(name, value)}" for name, value in manifest[key].items()
-                )
-    else:
-        facts["evaluation"] = "the folder has no manifest.json: the versions that made its runs are not known"
-    if board_file is not None and board_file.baseline is not None:
-        facts["baseline"] = board_file.baseline
-    facts["seeds"] = _numbers(sorted(set(table["seed"])))
-    facts["cases"] = ", ".join(dict.fromkeys(table["case"]))
-    if "scored_[s]" in table.columns:
-        lengths = sorted(table["scored_[s]"].dropna().unique())
-        facts["scored"] = ", ".join(f"{value:g} s" for value in lengths)
-    packages = ("fowt-env", "numpy", "scipy", "pandas", "plotly")
-    made = ", ".join(f"{name} {_version(name)}" for name in packages)
-    facts["page made by"] = f"{made}, Python {machine.python_version()}"
-    return "".join(
-        f"<tr><th>{html.escape(name)}</th><td>{html.escape(str(value))}</td></tr>"
-        for name, value in facts.items()
-        if value not in (None, "")
+def _schedule_section(schedule):
+    """HTML of the section of the steady schedule, or of why it is not there; "" for none."""
+    if not schedule:
+        return ""
+    where = html.escape(schedule["platform"])
+    body = (
+        f'<p class="remark">Operating points of {where} in steady wind and still water, the platform'
+        " floating.</p>"
+        '<div class="plot" id="schedule-plot"></div>'
     )
-
-
-def _case_facts(manifest):
-    """{"trip", "sensors", "site"} of a manifest's cases and suite, as texts."""
-    cases = manifest.get("cases")
-    cases = [case for case in (cases.values() if isinstance(cases, dict) else ()) if isinstance(case, dict)]
-    facts = {}
-    for key in ("trip", "sensors"):
-        found = dict.fromkeys(str(case[key]) for case in cases if case.get(key) is not None)
-        facts[key] = " or ".join(found)
-    suite = manifest.get("suite")
-    site = suite.get("site") if isinstance(suite, dict) else None
-    if isinstance(site, dict):
-        facts["site"] = f"Weibull A = {site.get('A')} m/s, k = {site.get('k')} ({site.get('source')})"
-    return facts
-
-
-def _brief(label, value):
-    """A manifest's value in a few characters: a controller's name, where it has another, and its hash."""
-    if not isinstance(value, dict):
-        return str(value)
-    words = [str(item) for key, item in value.items() if not (key == "name" and item == label)]
-    return f"({', '.join(words)})"
-
-
-def _version(name):
-    """Version of an installed package, or "unknown"."""
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return "unknown"
+    if "missing" in schedule:
+        why = html.escape(schedule["missing"])
+        body = (
+            f'<p class="remark">Not shown: {why}. Give another with --platform, or none with'
+            " --no-schedule.</p>"
+        )
+    return f'<section id="schedule"><div class="heading"><h2>Steady schedule</h2></div>{body}</section>'

@@ -290,7 +290,7 @@ def evaluation_plots(table, board, folder):
         paths += [folder / f"timeseries_{name}.png", folder / f"spectra_{name}.png"]
         title = f"{case}, seed {seed}"
         plot_runs(runs, paths[-2], title)
-        period = _platform_pitch_period(about["platform"])
+        period = platform_pitch_period(about["platform"])
         plot_spectra(runs, paths[-1], title, about["skip"], platform_pitch_period=period)
         boxes[case] = {name: _scored_rows(frame, about["skip"]) for name, frame in runs.items()}
     paths.append(folder / "boxes.png")
@@ -304,7 +304,7 @@ def _scored_rows(frame, skip):
     return frame.loc[frame[TIME] >= skip, columns]
 
 
-def _platform_pitch_period(platform):
+def platform_pitch_period(platform):
     """Natural period (s) in platform pitch that a platform's file states, or None."""
     description = platform if isinstance(platform, Platform) else read_platform(platform)
     return description.published.get("natural_periods", {}).get("pitch")

@@ -6,7 +6,7 @@ import pytest
 from fowt_env.errors import InputError
 from fowt_env.training.board.folder import Board
 from fowt_env.training.board.judge import check_figures, judge
-from fowt_env.training.board.page import board_rows, write_board
+from fowt_env.training.board.page import FIGURES, board_rows, ratio_text, write_board
 from fowt_env.training.evaluation.results import read_row, run_file, write_run
 
 SUITE = """
@@ -108,6 +108,10 @@ def test_page_table_and_history(board, judged):
     assert "1003" not in text and "1003" not in history.read_text()
     for name in ("http://", "https://", "<script"):
         assert name not in text
+    assert "script-src 'none'" in text and "unsafe" not in text.partition("</head>")[0]
+    for number in range(len(FIGURES)):  # each metric is explained where its heading asks for it
+        assert text.count(f'popovertarget="metric-{number}"') == 1
+        assert text.count(f'popover id="metric-{number}"') == 1
     before = pd.read_csv(history)
     write_board(judged)
     assert len(pd.read_csv(history)) == len(before) == 2
@@ -115,6 +119,13 @@ def test_page_table_and_history(board, judged):
     assert len(rows) == 2 and len(rows[0]) == len(headings)
     with pytest.raises(InputError, match="unknown regime"):
         board_rows(board.folder, "gusts")
+
+
+def test_a_ratio_is_called_better_or_worse_by_its_metric_and_only_if_significant():
+    speed, energy = FIGURES["rotor speed"], FIGURES["energy"]
+    assert ratio_text(0.8, speed, False) == "0.800"
+    assert "better" in ratio_text(0.8, speed, True) and "0.800 * ✓" in ratio_text(0.8, speed, True)
+    assert "worse" in ratio_text(0.8, energy, True) and "better" in ratio_text(1.2, energy, True)
 
 
 def test_figures_that_are_not_those_of_the_series_are_refused(board, judged):

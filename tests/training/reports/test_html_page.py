@@ -1,3 +1,5 @@
+import base64
+import contextlib
 import json
 import re
 import shutil
@@ -14,6 +16,7 @@ from fowt_env.errors import InputError  # noqa: E402
 from fowt_env.training.cli import app as cli  # noqa: E402
 from fowt_env.training.cli.console import EXIT_INPUT  # noqa: E402
 from fowt_env.training.evaluation.evaluate import run_file  # noqa: E402
+from fowt_env.training.reports import html_page  # noqa: E402
 from fowt_env.training.reports.html_page import SCHEDULE_WINDS, write_report  # noqa: E402
 
 EVIL = "<img src=x onerror=alert(1)></script>&"
@@ -87,12 +90,11 @@ def data_of(page):
     return json.loads(re.search(r'id="data">(.*?)</script>', text, re.DOTALL).group(1))
 
 
-def decoded(packed):
-    """The values of a packed series, as the page's script decodes them."""
-    import base64
-
-    codes = np.frombuffer(base64.b64decode(packed["codes"]), dtype="<u2").astype(float)
-    return packed["low"] + (codes - 1.0) * (packed["high"] - packed["low"]) / 65534.0
+def decoded(packed, pool):
+    """The values of a packed series, as the page's script decodes them; NaN where there is none."""
+    codes = np.frombuffer(base64.b64decode(pool[packed["codes"]]), dtype="<u2").astype(float)
+    values = packed["low"] + (codes - 1.0) * (packed["high"] - packed["low"]) / 65534.0
+    return np.where(codes == 0, np.nan, values)
 
 
 def test_the_page_holds_everything_and_asks_nothing_of_a_network(folder, tmp_path):
@@ -113,7 +115,7 @@ def test_names_are_shown_and_never_read_as_markup(folder, tmp_path):
 def test_means_are_over_the_lifetime_with_failed_runs_as_the_worst_of_their_case(folder, tmp_path):
     table = write_folder(tmp_path)
     data = data_of(write_report(folder, tmp_path / "page.html", schedule=False))
-    rows = {row["controller"]: row for row in data["board"]["mean"][""]}
+    rows = {row["controller"]: row for row in data["board"][""]}
     speeds = table[table["controller"] == "busy"]["RotSpeed_std_[rpm]"]
     worst = table[table["case"] == "ntm_18"]["RotSpeed_std_[rpm]"].max()
     expected = np.sqrt((speeds.fillna(worst) ** 2).mean())
@@ -129,35 +131,72 @@ def test_drawn_series_are_block_means_and_spectra_keep_the_peak(folder, tmp_path
     frame = run(0, 1)
     means = frame["RotSpeed_[rpm]"].to_numpy()[:1200].reshape(-1, 5).mean(axis=1)
     assert (packed["step"], packed["start"]) == (pytest.approx(0.5), pytest.approx(0.2))
-    np.testing.assert_allclose(decoded(packed), means, atol=np.ptp(means) / 65534.0)
+    np.testing.assert_allclose(decoded(packed, data["pool"]), means, atol=np.ptp(means) / 65534.0)
     assert drawn["skip"] == pytest.approx(SKIP)
     power = drawn["spectra"]["Wave1Elev_[m]"]
-    values = decoded(power)
+    values = decoded(power, data["pool"])
     assert power["start"] + power["step"] * values.argmax() == pytest.approx(0.1, abs=power["step"])
+    assert values.min() < values.max() - 9.0  # far below the peak it falls on: no floor
+    weather = {run["series"]["Wave1Elev_[m]"]["codes"] for run in data["series"]["ntm_14"]["1"].values()}
+    assert len(weather) == 1  # the same for all, and in the page once
 
 
-def test_the_first_seed_of_each_case_is_drawn_unless_others_are_named(folder, tmp_path):
-    data = data_of(write_report(folder, tmp_path / "a.html", schedule=False))
-    assert {case: list(seeds) for case, seeds in data["series"].items()} == {case: ["1"] for case in CASES}
-    data = data_of(write_report(folder, tmp_path / "b.html", cases=["ntm_18"], seeds=[2], schedule=False))
-    assert {case: list(seeds) for case, seeds in data["series"].items()} == {"ntm_18": ["2"]}
+def test_every_seed_is_drawn_and_beyond_the_most_runs_the_first_of_each_case(folder, tmp_path, monkeypatch):
+    def drawn(name, **settings):
+        data = data_of(write_report(folder, tmp_path / name, schedule=False, **settings))
+        return {case: list(seeds) for case, seeds in data["series"].items()}, data
+
+    assert drawn("a.html")[0] == {case: ["1", "2"] for case in CASES}
+    one, data = drawn("b.html", cases=["ntm_18"], seeds=[2])
+    assert one == {"ntm_18": ["2"]} and data["seeds"] == {case: [1, 2] for case in CASES}
     assert len(data["quantiles"]["RotSpeed_[rpm]"]["calm"]) == 2  # boxes have every case all the same
+    for most, expected in (
+        (9, {"ntm_14": ["1", "2"], "ntm_18": ["1"]}),
+        (8, {case: ["1"] for case in CASES}),
+        (5, {"ntm_14": ["1"]}),
+    ):
+        monkeypatch.setattr(html_page, "MAX_SERIES_RUNS", most)
+        assert drawn(f"{most}.html")[0] == expected
+
+
+def test_the_page_has_the_torque_and_the_start_that_is_not_scored_of_a_lost_run_too(folder, tmp_path):
+    copy = tmp_path / "copy"
+    shutil.copytree(folder, copy)
+    cases = {case: {"platform": "oc3_hywind", "skip": 30.0} for case in CASES}
+    (copy / "manifest.json").write_text(json.dumps({"cases": cases}))
+    data = data_of(write_report(copy, schedule=False))
+    channels = [panel["channel"] for panel in data["panels"]]
+    assert channels.index("GenTq_[kN-m]") < channels.index("GenPwr_[kW]") and len(set(channels)) == len(
+        channels
+    )
+    runs = data["series"]["ntm_18"]["2"]
+    assert {name: run["skip"] for name, run in runs.items()} == dict.fromkeys(CONTROLLERS, 30.0)
+    assert data["lost"] == {"ntm_18": {"2": {"busy": f"failed: lost {EVIL}"}}}
+    marks = {text.rsplit(" ", 2)[0]: at for text, at in runs["calm"]["marks"]}
+    assert marks["platform pitch"] == pytest.approx(1.0 / 29.9, rel=0.02)  # of the platform's file
+    assert marks["wave peak"] == pytest.approx(0.1, abs=0.02)
+    assert marks["1P"] == pytest.approx(12.0 / 60.0, rel=0.01)
 
 
 def test_a_leaderboard_file_gives_its_intervals_and_differences(folder, tmp_path):
     copy = tmp_path / "copy"
     shutil.copytree(folder, copy)
-    figure = {"RotSpeed_std_[rpm]": {"mean": 0.25, "low": 0.2, "high": 0.3}}
-    part = {"runs": 4, "failed": 0, "metrics": figure, "difference": figure}
+    name = "RotSpeed_std_[rpm]"
+    figure = {name: {"mean": 0.25, "low": 0.2, "high": 0.3}}
+    gap = {name: {"mean": -0.1, "low": -0.2, "high": -0.05, "percent": -28.6, "p": 0.004}}
+    part = {"runs": 4, "failed": 0, "metrics": figure, "difference": gap}
     score = {"mean": 0.9, "low": 0.8, "high": 1.0}
     entries = [{"controller": "calm", **part, "score": score, "cases": {"ntm_14": part}}]
     board = {"baseline": "busy", "interval": {"level": 0.95, "method": "bootstrap"}, "controllers": entries}
     (copy / "leaderboard.json").write_text(json.dumps(board))
     data = data_of(write_report(copy, schedule=False))
-    row = data["board"]["mean"][""][0]
-    assert row["intervals"] == {"RotSpeed_std_[rpm]": [0.2, 0.3], "score": [0.8, 1.0]}
-    assert data["views"]["difference"] == "differences to busy" and data["sort"] == "score"
-    assert data["board"]["mean"]["ntm_18"] == []
+    row = data["board"][""][0]
+    assert row["intervals"] == {name: [0.2, 0.3], "score": [0.8, 1.0]}
+    assert row["percent"] == {name: -28.6} and row["gap_intervals"] == {name: [-0.2, -0.05]}
+    assert row["p"] == {name: pytest.approx(0.004)} and data["board"]["ntm_14"][0]["p"] == {}
+    assert data["baseline"] == "busy" and data["sort"] == "score"
+    assert data["board"]["ntm_18"] == []
+    assert "rotor-speed std \N{MINUS SIGN}29" in (copy / "report.html").read_text(encoding="utf-8")
     (copy / "leaderboard.json").write_text('{"rows": []}')
     why = "leaderboard.json' is not of this version .baseline is missing.*controllers is missing"
     with pytest.raises(InputError, match=why):
@@ -229,20 +268,31 @@ def browser():
         browser.close()
 
 
-@pytest.fixture
-def opened(browser, folder, tmp_path):
-    """The page in an offline browser; no message of its console may be left at the end."""
-    context = browser.new_context(offline=True)
+@contextlib.contextmanager
+def offline_page(browser, path, **settings):
+    """A page in an offline browser, whose console must stay empty: no error, no script refused."""
+    context = browser.new_context(offline=True, **settings)
     page = context.new_page()
     page.set_default_timeout(15_000)
     messages = []
     page.on("console", lambda message: messages.append(message.text))
     page.on("pageerror", lambda error: messages.append(str(error)))
-    page.goto(write_report(folder, tmp_path / "page.html", schedule=False).as_uri())
+    page.goto(path.as_uri())
     page.wait_for_selector("#series-plot .scatterlayer path.js-line")
     yield page
     context.close()
     assert messages == []
+
+
+@pytest.fixture(scope="module")
+def page_file(folder, tmp_path_factory):
+    return write_report(folder, tmp_path_factory.mktemp("page") / "page.html", schedule=False)
+
+
+@pytest.fixture
+def opened(browser, page_file):
+    with offline_page(browser, page_file) as page:
+        yield page
 
 
 def data_of_opened(page):
@@ -278,7 +328,8 @@ def test_another_case_and_another_theme_change_what_is_drawn(opened):
     opened.select_option("#series-case", "ntm_18")
     opened.wait_for_function(f"{drawn} !== {json.dumps(before)}")
     shown = opened.evaluate("document.getElementById('series-plot').data.map(line => line.y)")
-    expected = decoded(data_of_opened(opened)["series"]["ntm_18"]["1"]["calm"]["series"]["RotSpeed_[rpm]"])
+    data = data_of_opened(opened)
+    expected = decoded(data["series"]["ntm_18"]["1"]["calm"]["series"]["RotSpeed_[rpm]"], data["pool"])
     assert any(len(y) == len(expected) and np.allclose(y, expected, atol=1e-9) for y in shown)
     light = opened.evaluate("getComputedStyle(document.body).backgroundColor")
     opened.click("#theme")
@@ -296,3 +347,98 @@ def test_zooming_narrows_the_time_axis_of_every_panel(opened):
     opened.wait_for_function("document.getElementById('series-plot').layout.xaxis.range[0] > 10")
     low, high = opened.evaluate("document.getElementById('series-plot').layout.xaxis.range")
     assert 20.0 < low < 50.0 < high < 90.0
+
+
+def test_a_difference_has_its_percentage_its_mark_and_its_star_in_the_table(browser, folder, tmp_path):
+    """Significant: star and mark; tested and not significant: neither; not tested: the mark alone."""
+    copy = tmp_path / "copy"
+    shutil.copytree(folder, copy)
+    speed, pitch, other = "RotSpeed_std_[rpm]", "PtfmPitch_std_[deg]", "novelty_[-]"
+    base = {"mean": 0.5}
+    gaps = {
+        speed: {"mean": -0.2, "percent": -40.0, "p": 0.001},
+        pitch: {"mean": 0.1, "percent": 20.0, "p": 0.4},
+        "blade_pitch_travel_[deg/s]": {"mean": 0.1, "percent": 50.0},
+    }
+    part = {"runs": 4, "failed": 0, "metrics": dict.fromkeys((*gaps, other), base)}
+    entries = [
+        {"controller": "calm", "rank": 1, **part, "difference": {}},
+        {"controller": EVIL, "rank": 2, **part, "difference": gaps},
+    ]
+    (copy / "leaderboard.json").write_text(json.dumps({"baseline": "calm", "controllers": entries}))
+    with offline_page(browser, write_report(copy, schedule=False)) as page:
+        cells = page.locator("#table tbody tr").nth(1).locator("td .gap")
+        assert cells.all_inner_texts() == ["\N{MINUS SIGN}40 % * ✓", "+20 %", "+50 % ✗"]
+        assert [each.get_attribute("class") for each in cells.all()] == [
+            "gap better sure",
+            "gap",
+            "gap worse",
+        ]
+        page.select_option("#table-view", "differences")
+        assert page.locator("#table tbody tr").nth(0).locator("td .gap").first.inner_text() == "baseline"
+        page.select_option("#table-case", "ntm_14")  # which the file has nothing of
+        assert page.locator("#table tbody td").count() == 0
+
+
+def test_a_metric_is_explained_to_pointer_and_keyboard_and_the_explanation_can_be_left(opened):
+    tip = opened.locator("#tip")
+    assert tip.is_hidden()
+    heading = opened.locator('#table th[data-key="RotSpeed_std_[rpm]"] button')
+    heading.hover()
+    assert re.search("Rotor speed: standard deviation. Unit: rpm. Less is better.", tip.inner_text())
+    opened.mouse.move(5, 5)
+    assert tip.is_hidden()
+    heading.focus()
+    assert tip.is_visible() and heading.get_attribute("aria-describedby") == "tip"
+    opened.keyboard.press("Escape")
+    assert tip.is_hidden() and heading.get_attribute("aria-describedby") is None
+    opened.locator("#wind-table th [data-tip]").first.focus()
+    assert "seeds 1, 2" in tip.inner_text()
+
+
+def test_the_pareto_plot_has_the_axes_of_the_png_and_names_its_line_only_if_there_is_one(opened):
+    titles = opened.evaluate(
+        "['xaxis', 'yaxis'].map(k => document.getElementById('pareto-plot').layout[k].title.text)"
+    )
+    assert titles[0].startswith("rotor speed") and titles[1].startswith("platform pitch")
+    calm = opened.evaluate("document.getElementById('pareto-plot').data.find(trace => trace.name === 'calm')")
+    means = data_of_opened(opened)["board"][""][0]["values"]
+    assert calm["x"] == [means["RotSpeed_std_[rpm]"]] and calm["y"] == [means["PtfmPitch_std_[deg]"]]
+    line = "document.getElementById('pareto-plot').data.some(trace => trace.name === 'Pareto front')"
+    assert opened.evaluate(line)  # "calm" turns most evenly, the last one pitches least
+    assert "dotted line" in opened.locator("#pareto-remark").inner_text()
+    # of a single controller there is no front
+    opened.evaluate("DATA.board[''] = DATA.board[''].slice(0, 1); drawPareto()")
+    assert not opened.evaluate(line)
+    assert "dotted line" not in opened.locator("#pareto-remark").inner_text()
+
+
+def test_a_lost_run_is_seen_with_its_reason_where_its_series_ends(opened):
+    assert f"busy, ntm_18, seed 2: failed: lost {EVIL}" in opened.locator("#leaderboard li").all_inner_texts()
+    assert opened.locator("#series-lost li").count() == 0
+    opened.select_option("#series-case", "ntm_18")
+    opened.select_option("#series-seed", "2")
+    assert opened.locator("#series-lost li").all_inner_texts() == [f"busy: failed: lost {EVIL}"]
+    assert "busy (lost)" in opened.locator("#series-plot .legendtext").all_text_contents()
+
+
+def test_what_slips_in_as_markup_is_not_run(browser, page_file, tmp_path):
+    """The policy's hashes, tried with a page into which a script and a handler were written."""
+    path = tmp_path / "page.html"
+    text = page_file.read_text(encoding="utf-8")
+    attack = '<script>window.struck = 1</script><img src="x" onerror="window.struck = 2"></body>'
+    path.write_text(text.replace("</body>", attack), encoding="utf-8")
+    context = browser.new_context(offline=True)
+    page = context.new_page()
+    page.goto(path.as_uri())
+    page.wait_for_selector("#series-plot .scatterlayer path.js-line")  # its own scripts run
+    assert page.evaluate("window.struck") is None
+    context.close()
+
+
+def test_nothing_is_wider_than_a_telephone_and_a_wide_table_says_that_it_scrolls(browser, page_file):
+    with offline_page(browser, page_file, viewport={"width": 390, "height": 800}) as page:
+        assert page.evaluate("document.documentElement.scrollWidth") <= 390
+        assert page.locator("#leaderboard .hint").is_visible()
+        page.evaluate("document.querySelector('#leaderboard .scroll > div').scrollLeft = 1e6")
+        page.wait_for_selector("#leaderboard .scroll:not(.more)")

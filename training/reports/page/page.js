@@ -12,7 +12,7 @@ const plain = (text) => String(text).replace(/&/g, "&amp;").replace(/</g, "&lt;"
 
 function decode(packed) {
   // 16-bit steps between low and high; the lowest code stands for a missing value
-  const bytes = Uint8Array.from(atob(packed.codes), (c) => c.charCodeAt(0));
+  const bytes = Uint8Array.from(atob(DATA.pool[packed.codes]), (c) => c.charCodeAt(0));
   const codes = new Uint16Array(bytes.buffer);
   const step = (packed.high - packed.low) / 65534;
   return Array.from(codes, (code) => (code === 0 ? null : packed.low + (code - 1) * step));
@@ -32,22 +32,107 @@ function layout(more) {
   }
   return merged;
 }
+let paper = false; // a printer's page is narrower than most windows
 const CONFIG = { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["select2d", "lasso2d"] };
-const draw = (id, traces, shape) => Plotly.react($(id), traces, layout(shape), CONFIG);
+const draw = (id, traces, shape) => Plotly.react($(id), traces, layout(paper ? { ...shape, width: 680 } : shape), CONFIG);
+const narrow = () => !paper && $("pareto-plot").clientWidth < 560;
 
 function fill(select, values, texts) {
   select.replaceChildren(...values.map((value, i) => new Option((texts || values)[i], value)));
 }
+function element(tag, text, kind) {
+  const made = document.createElement(tag);
+  if (text !== undefined) made.textContent = text;
+  if (kind) made.className = kind;
+  return made;
+}
+function explain(target, text) {
+  // what stands under a pointer, a finger or the keyboard's focus is explained by its data-tip
+  target.dataset.tip = text;
+  if (!target.matches("button, a, select, [tabindex]")) target.tabIndex = 0;
+  return target;
+}
+
+// ---- explanations ------------------------------------------------------------------------------
+let explained = null;
+function showTip(target) {
+  const tip = $("tip");
+  tip.textContent = target.dataset.tip;
+  tip.hidden = false;
+  explained = target;
+  target.setAttribute("aria-describedby", "tip");
+  const [at, own] = [target.getBoundingClientRect(), tip.getBoundingClientRect()];
+  if (at.bottom < 0 || at.top > window.innerHeight) { hideTip(); return; }
+  const below = at.bottom + 6 + own.height < window.innerHeight;
+  tip.style.left = `${Math.max(8, Math.min(at.left, window.innerWidth - own.width - 8))}px`;
+  tip.style.top = `${below ? at.bottom + 6 : Math.max(8, at.top - own.height - 6)}px`;
+}
+function hideTip() {
+  if (explained) explained.removeAttribute("aria-describedby");
+  explained = null;
+  $("tip").hidden = true;
+}
+for (const [kind, show] of [["pointerover", true], ["focusin", true], ["click", true], ["pointerout", false], ["focusout", false]]) {
+  document.addEventListener(kind, (event) => {
+    const target = event.target.closest && event.target.closest("[data-tip]");
+    if (target && show) showTip(target);
+    else if (show && kind === "click") hideTip();
+    else if (!show && target && !target.contains(event.relatedTarget)) {
+      if (kind === "focusout" || (event.relatedTarget !== $("tip") && document.activeElement !== target)) hideTip();
+    }
+  });
+}
+$("tip").addEventListener("pointerleave", hideTip);
+document.addEventListener("keydown", (event) => { if (event.key === "Escape") hideTip(); });
+// what is explained moves, and its explanation with it
+document.addEventListener("scroll", () => { if (explained) showTip(explained); }, { passive: true, capture: true });
+
+// ---- tables that scroll ------------------------------------------------------------------------
+function markScrolling(outer) {
+  const inner = outer.firstElementChild;
+  const hidden = inner.scrollWidth - inner.clientWidth;
+  outer.classList.toggle("wide", hidden > 2);
+  outer.classList.toggle("more", hidden - inner.scrollLeft > 2);
+}
+for (const outer of document.querySelectorAll(".scroll")) {
+  outer.append(element("p", "scroll sideways for more columns ↔", "hint"));
+  outer.firstElementChild.addEventListener("scroll", () => markScrolling(outer), { passive: true });
+  new ResizeObserver(() => markScrolling(outer)).observe(outer.firstElementChild.firstElementChild);
+  new ResizeObserver(() => markScrolling(outer)).observe(outer);
+}
 
 // ---- leaderboard -------------------------------------------------------------------------------
 const order = { key: DATA.sort, down: false };
+const MEANS = "means", GAPS = "differences";
 
 function figure(value) {
   if (value === null || value === undefined) return "–";
   if (value === 0) return "0";
   const size = Math.abs(value);
-  if (size >= 1e6 || size < 1e-3) return value.toExponential(2);
-  return size >= 1000 ? value.toFixed(0) : value.toPrecision(size >= 100 ? 4 : 3);
+  const text = size >= 1e6 || size < 1e-3 ? size.toExponential(2) : size >= 1000 ? size.toFixed(0) : size.toPrecision(size >= 100 ? 4 : 3);
+  return `${value < 0 ? "\u2212" : ""}${text}`;
+}
+function percentage(percent) {
+  const size = Math.abs(percent);
+  const text = size.toFixed(size >= 9.95 ? 0 : size >= 0.095 ? 1 : 2);
+  return Number(text) === 0 ? "±0 %" : `${percent > 0 ? "+" : "\u2212"}${text} %`;
+}
+
+function gapOf(row, metric) {
+  // {text, kind, tip} of a difference; better and worse are told by a mark beside the colour
+  const percent = row.percent && row.percent[metric.name];
+  if (percent === null || percent === undefined) return null;
+  const p = row.p[metric.name];
+  const [tested, sure] = [p !== undefined, p !== undefined && p <= DATA.alpha];
+  const way = Math.abs(percent) < 0.005 ? 0 : Math.sign(percent) * metric.better;
+  const judged = way && (sure || !tested);
+  const word = way > 0 ? "better" : "worse";
+  const found = sure ? `significant, corrected p = ${p.toPrecision(2)}` : tested ? `not significant, corrected p = ${p.toPrecision(2)}` : "not tested";
+  return {
+    text: `${percentage(percent)}${sure ? " *" : ""}${judged ? (way > 0 ? " ✓" : " ✗") : ""}`,
+    kind: `gap${judged ? ` ${word}` : ""}${sure ? " sure" : ""}`,
+    tip: `${percentage(percent)} against ${DATA.baseline}: ${judged ? `${word}, ` : ""}${found}`,
+  };
 }
 
 function shownColumns() {
@@ -55,8 +140,10 @@ function shownColumns() {
 }
 
 function sortedRows() {
-  const rows = [...DATA.board[$("table-view").value][$("table-case").value]];
-  const value = (row) => (order.key === "controller" ? row.controller : order.key === "failed" ? row.failed + row.tripped : order.key === "rank" ? row.rank : row.values[order.key]);
+  const rows = [...DATA.board[$("table-case").value]];
+  const shown = $("table-view").value === GAPS ? "percent" : "values";
+  const own = { controller: (row) => row.controller, failed: (row) => row.failed + row.tripped, rank: (row) => row.rank };
+  const value = own[order.key] || ((row) => (shown === "percent" && row.controller === DATA.baseline ? 0 : row[shown][order.key]));
   rows.sort((a, b) => {
     const [x, y] = [value(a), value(b)];
     if (x === null || x === undefined) return 1; // missing figures last, whichever the direction
@@ -67,25 +154,19 @@ function sortedRows() {
   return rows;
 }
 
-function headerCell(key, label, unit, hint) {
-  const cell = document.createElement("th");
-  const button = document.createElement("button");
-  const arrow = document.createElement("span");
-  arrow.className = "arrow";
-  arrow.textContent = order.key === key ? (order.down ? "▾" : "▴") : "";
-  button.append(label, arrow);
-  if (unit !== undefined) {
-    const line = document.createElement("span");
-    line.className = "unit";
-    line.textContent = unit || "\u00a0";
-    button.append(line);
-  }
+function headerCell(key, label, unit, about) {
+  const cell = element("th");
+  const button = element("button");
+  button.append(element("span", label, "label"));
+  if (order.key === key) button.append(element("span", order.down ? "\u00a0▾" : "\u00a0▴", "arrow"));
+  button.append(element("span", unit || "\u00a0", "unit"));
   button.type = "button";
-  button.title = hint;
+  explain(button, about);
   button.addEventListener("click", () => {
     order.down = order.key === key ? !order.down : false;
     order.key = key;
     drawTable();
+    $("table").querySelector(`th[data-key="${CSS.escape(key)}"] button`).focus({ preventScroll: true });
   });
   if (order.key === key) cell.setAttribute("aria-sort", order.down ? "descending" : "ascending");
   cell.dataset.key = key;
@@ -96,120 +177,129 @@ function headerCell(key, label, unit, hint) {
 
 function bestOf(metric, rows) {
   const values = rows.map((row) => row.values[metric.name]).filter((value) => value !== null && value !== undefined);
-  if (!metric.better || values.length < 2 || $("table-view").value !== "mean") return null;
+  if (!metric.better || values.length < 2) return null;
   return metric.better > 0 ? Math.max(...values) : Math.min(...values);
+}
+
+function figureCell(row, metric, best) {
+  const cell = element("td");
+  const value = row.values[metric.name];
+  const gap = row.percent ? gapOf(row, metric) : null;
+  const intervals = $("intervals").checked;
+  const gaps = $("table-view").value === GAPS;
+  const range = intervals && (gaps ? row.gap_intervals : row.intervals || {})[metric.name];
+  if (gaps && row.controller === DATA.baseline) cell.append(element("span", "baseline", "gap"));
+  else if (gaps) {
+    cell.append(gap ? element("span", gap.text, gap.kind) : element("span", "–", "gap"));
+    const absolute = row.gaps[metric.name];
+    if (absolute !== null && absolute !== undefined) cell.append(element("span", `${absolute > 0 ? "+" : ""}${figure(absolute)}`, "range"));
+  } else {
+    cell.append(element("span", figure(value), value !== null && value !== undefined && value === best ? "best" : ""));
+    if (gap) cell.append(element("span", gap.text, gap.kind));
+  }
+  if (gap) cell.title = gap.tip;
+  if (range) cell.append(element("span", `${figure(range[0])} … ${figure(range[1])}`, "range"));
+  return cell;
 }
 
 function drawTable() {
   const columns = shownColumns();
   const rows = sortedRows();
-  const head = document.createElement("tr");
-  head.append(headerCell("controller", "controller", "", "sort by name"), headerCell("failed", "lost", "runs", "failed and tripped runs of all runs"));
-  if (DATA.ranked) head.append(headerCell("rank", "rank", "", "runs lost and limits passed first, then the score"));
-  for (const metric of columns) head.append(headerCell(metric.name, metric.label, metric.unit, metric.name));
+  const head = element("tr");
+  head.append(headerCell("controller", "controller", "", "Choose to sort by name."), headerCell("failed", "lost", "runs", "Runs that failed or tripped, of all runs. They count with the worst values of their case."));
+  if (DATA.ranked) head.append(headerCell("rank", "rank", "", "First those whose runs all ended well within the limits, then those beyond a limit, then those that lost runs; within each by score, else as evaluated."));
+  for (const metric of columns) head.append(headerCell(metric.name, metric.label, metric.unit, metric.about));
+  hideTip();
+  $("table").classList.toggle("every", $("all-columns").checked);
   $("table").tHead.replaceChildren(head);
   const best = Object.fromEntries(columns.map((metric) => [metric.name, bestOf(metric, rows)]));
   $("table").tBodies[0].replaceChildren(...rows.map((row) => {
-    const line = document.createElement("tr");
-    const name = document.createElement("td");
-    const swatch = document.createElement("span");
-    swatch.className = "swatch";
+    const line = element("tr");
+    const name = element("td");
+    const swatch = element("span", undefined, "swatch");
     swatch.style.background = colour(DATA.controllers.indexOf(row.controller));
     name.append(swatch, row.controller);
-    const failed = document.createElement("td");
-    failed.textContent = `${row.failed + row.tripped} of ${row.runs}`;
-    failed.title = `${row.failed} failed, ${row.tripped} tripped`;
-    if (row.failed + row.tripped) failed.className = "bad";
+    const failed = element("td", `${row.failed + row.tripped} of ${row.runs}`);
+    if (row.failed + row.tripped) {
+      failed.className = "bad";
+      failed.append(element("span", [row.failed && `${row.failed} failed`, row.tripped && `${row.tripped} tripped`].filter(Boolean).join(", "), "range bad"));
+    }
     line.append(name, failed);
-    if (row.beyond && row.beyond.length) {
-      const text = document.createElement("span");
-      text.className = "range bad";
-      text.textContent = "beyond a limit";
-      text.title = row.beyond.join("; ");
-      name.append(text);
-    }
-    if (DATA.ranked) {
-      const rank = document.createElement("td");
-      rank.textContent = row.rank;
-      line.append(rank);
-    }
-    for (const metric of columns) {
-      const cell = document.createElement("td");
-      const value = row.values[metric.name];
-      cell.textContent = figure(value);
-      if (value !== null && value !== undefined && value === best[metric.name]) cell.className = "best";
-      const range = row.intervals && row.intervals[metric.name];
-      if (range) {
-        const text = document.createElement("span");
-        text.className = "range";
-        text.textContent = `${figure(range[0])} … ${figure(range[1])}`;
-        cell.append(text);
-      }
-      line.append(cell);
-    }
+    if (row.beyond && row.beyond.length) name.append(element("span", `beyond a limit: ${row.beyond.join("; ")}`, "range bad"));
+    if (DATA.ranked) line.append(element("td", row.rank));
+    for (const metric of columns) line.append(figureCell(row, metric, best[metric.name]));
     return line;
   }));
+  if (!rows.length) $("table").tBodies[0].append(element("tr"));
   $("table-remark").textContent = DATA.remarks[$("table-case").value];
+  const legend = [];
+  if (DATA.baseline !== null && rows.some((row) => Object.values(row.percent || {}).some((value) => value !== null))) {
+    legend.push(element("span", `Percentages: against ${DATA.baseline}.`), element("span", "✓ better", "better"), element("span", "✗ worse", "worse"));
+    if (rows.some((row) => Object.values(row.p).length)) legend.push(element("span", `* significant (p ≤ ${Number(DATA.alpha.toPrecision(2))})`));
+  }
+  $("table-legend").replaceChildren(...legend);
 }
 
-// ---- wind by wind ------------------------------------------------------------------------------
+// ---- case by case ------------------------------------------------------------------------------
 function drawWinds() {
   const metric = DATA.metrics.find((each) => each.name === $("wind-what").value);
-  const value = (controller, name) => {
-    const row = DATA.board.mean[name].find((each) => each.controller === controller);
-    return row ? row.values[metric.name] : null;
-  };
-  const cell = (tag, text, lower) => {
-    const made = document.createElement(tag);
-    made.textContent = text;
-    if (lower !== undefined) {
-      const line = document.createElement("span");
-      line.className = tag === "th" ? "unit" : "range";
-      line.textContent = lower;
-      made.append(line);
-    }
+  const rowOf = (controller, name) => DATA.board[name].find((each) => each.controller === controller);
+  const cell = (tag, text, lower, kind) => {
+    const made = element(tag, text);
+    if (lower !== undefined) made.append(element("span", lower, kind));
     return made;
   };
-  const share = (name) => (DATA.shares && DATA.shares[name] !== undefined ? `${(100 * DATA.shares[name]).toFixed(1)} %` : "\u00a0");
-  const head = document.createElement("tr");
-  const columns = [[ALL, "all", "lifetime"], ...DATA.cases.map((name) => [name, name, share(name)])];
-  head.append(cell("th", "controller", metric.unit), ...columns.map(([, text, lower]) => cell("th", text, lower)));
+  const share = (name) => (DATA.shares && DATA.shares[name] !== undefined ? `${(100 * DATA.shares[name]).toFixed(1)} % of time` : "\u00a0");
+  const head = element("tr");
+  const first = cell("th", "controller", metric.unit, "unit");
+  head.append(first, cell("th", "all cases", "lifetime mean", "unit"), ...DATA.cases.map((name) => {
+    const made = cell("th", undefined, share(name), "unit");
+    made.prepend(explain(element("span", name), DATA.conditions[name]));
+    return made;
+  }));
   $("wind-table").tHead.replaceChildren(head);
-  $("wind-table").tBodies[0].replaceChildren(...DATA.board.mean[ALL].map(({ controller }) => {
-    const line = document.createElement("tr");
-    line.append(cell("td", controller), ...columns.map(([name]) => {
-      const [own, base] = [value(controller, name), DATA.baseline === null ? null : value(DATA.baseline, name)];
-      const ratio = own != null && base && controller !== DATA.baseline ? (own / base).toFixed(3) : "\u00a0";
-      return cell("td", figure(own), ratio);
+  $("wind-table").tBodies[0].replaceChildren(...DATA.board[ALL].map(({ controller }) => {
+    const line = element("tr");
+    line.append(cell("td", controller), ...[ALL, ...DATA.cases].map((name) => {
+      const row = rowOf(controller, name);
+      const gap = row && row.percent ? gapOf(row, metric) : null;
+      return cell("td", figure(row ? row.values[metric.name] : null), gap ? gap.text : "\u00a0", gap ? gap.kind : "gap");
     }));
     return line;
   }));
+  const against = DATA.baseline === null ? "" : ` Below: the difference from ${DATA.baseline}; single cases are not tested, so none of theirs has a star.`;
+  $("wind-remark").textContent = `${metric.about} Means over the seeds of each case.${against}`;
 }
 
 // ---- Pareto ------------------------------------------------------------------------------------
+const PLACES = ["top center", "bottom center", "middle right", "middle left", "top right", "bottom right", "top left", "bottom left"];
+
+function placeLabels(marks, width, height) {
+  // for each mark {x, y, r, text} in pixels the place of its name that covers least of what is there
+  const taken = marks.map(({ x, y, r }) => [x - r, y - r, x + r, y + r]);
+  const overlap = (a, b) => Math.max(0, Math.min(a[2], b[2]) - Math.max(a[0], b[0])) * Math.max(0, Math.min(a[3], b[3]) - Math.max(a[1], b[1]));
+  return marks.map(({ x, y, r, text }) => {
+    const [w, h] = [7.2 * text.length + 4, 16];
+    const boxes = PLACES.map((place) => {
+      const [down, side] = place.split(" ");
+      const left = side === "center" ? x - w / 2 : side === "right" ? x + (down === "middle" ? r : 0.7 * r) + 2 : x - w - (down === "middle" ? r : 0.7 * r) - 2;
+      const top = down === "middle" ? y - h / 2 : down === "top" ? y - h - (side === "center" ? r : 0.7 * r) - 1 : y + (side === "center" ? r : 0.7 * r) + 1;
+      return [left, top, left + w, top + h];
+    });
+    const outside = (box) => Math.max(0, -box[0]) + Math.max(0, box[2] - width) + Math.max(0, -box[1]) + Math.max(0, box[3] - height);
+    const cost = boxes.map((box) => taken.reduce((sum, other) => sum + overlap(box, other), 0) + 40 * outside(box));
+    const best = cost.indexOf(Math.min(...cost));
+    taken.push(boxes[best]);
+    return PLACES[best];
+  });
+}
+
 function drawPareto() {
   const [across, up, size] = DATA.pareto;
-  const rows = DATA.board.mean[$("table-case").value].filter((row) => row.values[across] != null && row.values[up] != null);
+  const known = (value) => value !== null && value !== undefined;
+  const rows = DATA.board[$("table-case").value].filter((row) => known(row.values[across]) && known(row.values[up]));
   const most = Math.max(1e-12, ...rows.map((row) => row.values[size] || 0));
-  const traces = rows.map((row) => ({
-    type: "scatter", mode: "markers+text", name: plain(row.controller), text: [plain(row.controller)], textposition: "top center",
-    x: [row.values[across]], y: [row.values[up]], textfont: { size: 13 }, showlegend: false, cliponaxis: false,
-    marker: {
-      color: colour(DATA.controllers.indexOf(row.controller)), opacity: 0.85, line: { color: css("--card"), width: 1 },
-      size: [Math.max(5, 42 * Math.sqrt(Math.max(0, row.values[size] || 0) / most))],
-    },
-    hovertemplate: `<b>${plain(row.controller)}</b><br>platform pitch std %{x:.4g} deg<br>rotor speed std %{y:.4g} rpm<br>`
-      + `blade-pitch travel ${figure(row.values[size])} deg/s<extra></extra>`,
-  }));
-  const front = rows.filter((a) => !rows.some((b) => b !== a && b.values[across] <= a.values[across] && b.values[up] <= a.values[up]
-    && (b.values[across] < a.values[across] || b.values[up] < a.values[up])));
-  front.sort((a, b) => a.values[across] - b.values[across]);
-  const [x, y] = [[], []];
-  front.forEach((row, i) => {
-    if (i) { x.push(row.values[across]); y.push(front[i - 1].values[up]); }
-    x.push(row.values[across]); y.push(row.values[up]);
-  });
-  traces.unshift({ type: "scatter", mode: "lines", x, y, hoverinfo: "skip", showlegend: false, line: { dash: "dot", width: 1.5, color: css("--soft") } });
+  const radius = (row) => Math.max(2.5, (narrow() ? 13 : 19) * Math.sqrt(Math.max(0, row.values[size] || 0) / most));
   const range = (key) => {
     const values = rows.map((row) => row.values[key]);
     const [low, high] = [Math.min(...values), Math.max(...values)];
@@ -217,9 +307,42 @@ function drawPareto() {
     const pad = 0.22 * (high - low) || 0.2 * Math.abs(high) || 1;
     return [Math.max(0, low - pad), high + pad];
   };
+  const [xs, ys] = [range(across), range(up)];
+  const [width, height] = [(paper ? 680 : $("pareto-plot").clientWidth) - 80, 430 - 64];
+  const places = placeLabels(rows.map((row) => ({
+    x: (width * (row.values[across] - xs[0])) / (xs[1] - xs[0]), y: height * (1 - (row.values[up] - ys[0]) / (ys[1] - ys[0])), r: radius(row), text: row.controller,
+  })), width, height);
+  const line = (row, key, name, unit) => {
+    const range = row.intervals && row.intervals[key];
+    return `${name} ${figure(row.values[key])}${range ? ` [${figure(range[0])}, ${figure(range[1])}]` : ""} ${unit}<br>`;
+  };
+  const traces = rows.map((row, i) => ({
+    type: "scatter", mode: "markers+text", name: plain(row.controller), text: [plain(row.controller)], textposition: places[i],
+    x: [row.values[across]], y: [row.values[up]], textfont: { size: 13 }, showlegend: false, cliponaxis: false,
+    marker: {
+      color: colour(DATA.controllers.indexOf(row.controller)), opacity: 0.8, line: { color: css("--card"), width: 1 },
+      size: [2 * radius(row)],
+    },
+    hovertemplate: `<b>${plain(row.controller)}</b><br>${line(row, across, "rotor-speed std", "rpm")}${line(row, up, "platform-pitch std", "deg")}`
+      + `pitch travel ${figure(row.values[size])} deg/s<extra></extra>`,
+  }));
+  const front = rows.filter((a) => !rows.some((b) => b !== a && b.values[across] <= a.values[across] && b.values[up] <= a.values[up]
+    && (b.values[across] < a.values[across] || b.values[up] < a.values[up])));
+  front.sort((a, b) => a.values[across] - b.values[across]);
+  if (front.length > 1) {
+    const points = { x: front.map((row) => row.values[across]), y: front.map((row) => row.values[up]) };
+    traces.unshift({ type: "scatter", mode: "lines", name: "Pareto front", ...points, hoverinfo: "skip", showlegend: false, line: { dash: "dot", shape: "hv", width: 1.5, color: css("--soft") } });
+  }
+  const where = $("table-case").value === ALL ? "lifetime means over all cases" : `means of ${$("table-case").value}`;
+  const names = front.map((row) => row.controller).join(", ");
+  const found = front.length > 1 ? ` No controller lies below and to the left of the dotted line (${names}).`
+    : rows.length > 1 && front.length ? ` ${names} is least in both.` : "";
+  $("pareto-remark").textContent = rows.length
+    ? `Less is better on both axes: ${where}, for the case chosen in the leaderboard. The area of a mark is the pitch travel.${found} Intervals are shown on hover; whether a difference is significant is said above.`
+    : "No controller has both standard deviations here.";
   draw("pareto-plot", traces, {
-    height: 430, xaxis: { title: { text: "platform pitch, standard deviation (deg)" }, range: range(across) },
-    yaxis: { title: { text: "rotor speed, standard deviation (rpm)" }, range: range(up) },
+    height: 430, xaxis: { title: { text: "rotor speed, standard deviation (rpm)" }, range: xs },
+    yaxis: { title: { text: "platform pitch, standard deviation (deg)" }, range: ys },
   });
 }
 
@@ -229,9 +352,10 @@ function drawBoxes() {
   const traces = DATA.controllers.map((controller, i) => {
     const look = { type: "box", name: plain(controller), marker: { color: colour(i), size: 4 }, line: { width: 1.5 }, offsetgroup: String(i) };
     if (kind === "metric") {
-      const points = DATA.runs.filter((run) => run[0] === controller && run[3][name] != null);
+      const place = DATA.columns.indexOf(name);
+      const points = DATA.runs.filter((run) => run[0] === controller && run[3][place] !== null);
       return {
-        ...look, x: points.map((run) => plain(run[1])), y: points.map((run) => run[3][name]), boxpoints: "all", jitter: 0.35, pointpos: 0,
+        ...look, x: points.map((run) => plain(run[1])), y: points.map((run) => run[3][place]), boxpoints: "all", jitter: 0.35, pointpos: 0,
         text: points.map((run) => `seed ${run[2]}`),
       };
     }
@@ -243,7 +367,7 @@ function drawBoxes() {
     ? "One point per run that ended well; the box spans the quartiles over the seeds."
     : "All samples of the scored part of each case, its seeds pooled: quartiles, whiskers from the 1st to the 99th percentile.";
   draw("box-plot", traces, {
-    height: 440, boxmode: "group", xaxis: { type: "category", categoryorder: "array", categoryarray: DATA.cases.map(plain) },
+    height: 410, boxmode: "group", margin: { l: 64, r: 16, t: 16, b: 30 }, xaxis: { type: "category", categoryorder: "array", categoryarray: DATA.cases.map(plain) },
     yaxis: { title: { text: plain(DATA.titles[name]) } },
   });
 }
@@ -255,29 +379,40 @@ function panels(entries, field, axes) {
   // {traces, layout} of stacked panels; a channel that is the same for all controllers is drawn once
   const shape = {};
   const traces = [];
-  const gap = 0.012;
+  const gap = 0.02;
   const height = (1 - gap * (axes.length - 1)) / axes.length;
   const named = new Set();
+  const lost = lostRuns();
   axes.forEach((axis, number) => {
     const suffix = number ? String(number + 1) : "";
     const top = 1 - number * (height + gap);
-    shape[`yaxis${suffix}`] = { domain: [Math.max(0, top - height), top], title: { text: axis.label, font: { size: 11 }, standoff: 8 }, ...axis.y };
     const held = DATA.controllers.map((controller, i) => [controller, i, entries[controller]]).filter(([, , run]) => run && run[field][axis.channel]);
     const same = held.length > 1 && held.every(([, , run]) => ["codes", "low", "high"].every((key) => run[field][axis.channel][key] === held[0][2][field][axis.channel][key]));
+    let most = 0;
     for (const [controller, i, run] of same ? held.slice(0, 1) : held) {
       const packed = run[field][axis.channel];
       const y = decode(packed);
+      most = Math.max(most, packed.high);
+      const label = `${plain(controller)}${lost[controller] ? " (lost)" : ""}`;
       traces.push({
         type: "scatter", mode: "lines", xaxis: "x", yaxis: `y${suffix}`,
         x: y.map((_, k) => packed.start + k * packed.step), y: axis.power ? y.map((v) => (v === null ? null : 10 ** v)) : y,
-        name: same ? "all controllers" : plain(controller), legendgroup: same ? "all" : String(i), showlegend: !named.has(same ? "all" : i),
+        name: same ? "all controllers" : label, legendgroup: same ? "all" : String(i), showlegend: !named.has(same ? "all" : i),
         line: { width: 1.2, color: same ? css("--soft") : colour(i) }, hovertemplate: "%{y:.4g}",
       });
       named.add(same ? "all" : i);
+      if (field === "series" && lost[controller] && !same && y.length) {
+        const last = packed.start + (y.length - 1) * packed.step;
+        traces.push({ type: "scatter", mode: "markers", x: [last], y: [y[y.length - 1]], xaxis: "x", yaxis: `y${suffix}`, showlegend: false, legendgroup: String(i),
+          marker: { symbol: "x", size: 9, color: css("--bad") }, hovertemplate: `${plain(controller)}: ${plain(lost[controller])}<extra></extra>` });
+      }
     }
+    const axisOf = axis.power ? { range: [axis.low(most), most + 0.6] } : {};
+    shape[`yaxis${suffix}`] = { domain: [Math.max(0, top - height), top], title: { text: axis.label, font: { size: 11 }, standoff: 8 }, nticks: 5, ...axis.y, ...axisOf };
   });
   return { traces, shape };
 }
+const lostRuns = () => (DATA.lost[$("series-case").value] || {})[$("series-seed").value] || {};
 
 function drawSeries() {
   const entries = chosen();
@@ -285,56 +420,75 @@ function drawSeries() {
   const { traces, shape } = panels(entries, "series", axes);
   const skips = Object.values(entries).map((run) => run.skip).filter((skip) => skip > 0);
   const start = Math.min(...Object.values(entries).map((run) => run.start));
+  const end = start + Math.max(0, ...skips);
+  const about = DATA.conditions[$("series-case").value];
+  $("series-about").textContent = `${$("series-case").value}: ${about}.${skips.length ? " Shaded: the start, which is not scored." : ""}`;
+  $("series-lost").replaceChildren(...Object.entries(lostRuns()).map(([controller, text]) => element("li", `${controller}: ${text}`)));
   draw("series-plot", traces, {
     ...shape, height: 90 + 118 * Math.max(1, axes.length), hovermode: "x",
     xaxis: { title: { text: "time (s)" }, anchor: axes.length > 1 ? `y${axes.length}` : "y" },
-    shapes: skips.length ? [{ type: "rect", xref: "x", yref: "paper", x0: start, x1: start + Math.max(...skips), y0: 0, y1: 1, fillcolor: css("--soft"), opacity: 0.09, line: { width: 0 } }] : [],
+    shapes: skips.length ? [{ type: "rect", xref: "x", yref: "paper", x0: start, x1: end, y0: 0, y1: 1, layer: "below", fillcolor: css("--shade"), opacity: 0.16, line: { width: 0 } }] : [],
   });
 }
 
+const DASHES = ["dash", "dot", "dashdot"];
 function drawSpectra() {
   const entries = chosen();
+  const low = (most) => most + Math.log10(DATA.span);
   const axes = DATA.spectra.filter((panel) => Object.values(entries).some((run) => run.spectra[panel.channel]))
-    .map((panel) => ({ ...panel, power: true, y: { type: "log", exponentformat: "power" } }));
+    .map((panel) => ({ ...panel, power: true, low, y: { type: "log", exponentformat: "power", dtick: 2 } }));
   const { traces, shape } = panels(entries, "spectra", axes);
-  const marks = (Object.values(entries)[0] || {}).marks || [];
+  const marks = [...((Object.values(entries).find((run) => run.marks.length) || {}).marks || [])].sort((a, b) => a[1] - b[1]);
+  const height = 140 + 190 * Math.max(1, axes.length);
+  $("spectra-about").textContent = axes.length
+    ? `Power spectral density of ${$("series-case").value}, seed ${$("series-seed").value}, as chosen above.${marks.length ? " Vertical lines: the frequencies named at the top." : ""}`
+    : "No run that is shown has enough scored samples for a spectrum.";
   draw("spectra-plot", traces, {
-    ...shape, height: 100 + 190 * Math.max(1, axes.length), hovermode: "x", margin: { l: 64, r: 16, t: 44, b: 48 },
-    xaxis: { type: "log", title: { text: "frequency (Hz)" }, range: [Math.log10(0.005), Math.log10(0.5)], tickvals: [0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1], anchor: axes.length > 1 ? `y${axes.length}` : "y" },
-    legend: { orientation: "h", yanchor: "bottom", y: 1.05, x: 0 },
-    shapes: marks.map((mark) => ({ type: "line", xref: "x", yref: "paper", x0: mark[1], x1: mark[1], y0: 0, y1: 1, line: { width: 1, dash: "dash", color: css("--soft") } })),
-    annotations: marks.map((mark) => ({ xref: "x", yref: "paper", x: Math.log10(mark[1]), y: 1, yanchor: "bottom", showarrow: false, text: plain(mark[0]), font: { size: 11, color: css("--soft") } })),
+    ...shape, height, hovermode: "x", margin: { l: 64, r: 16, t: narrow() ? 54 : 38, b: 48 },
+    xaxis: { type: "log", title: { text: "frequency (Hz)", standoff: 8 }, range: [Math.log10(0.005), Math.log10(0.5)], tickvals: [0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1], anchor: axes.length > 1 ? `y${axes.length}` : "y" },
+    legend: { orientation: "h", yanchor: "top", y: -72 / (height - 100), x: 0 },
+    shapes: marks.map((mark, i) => ({ type: "line", xref: "x", yref: "paper", x0: mark[1], x1: mark[1], y0: 0, y1: 1, line: { width: 1.2, dash: DASHES[i % 3], color: css("--soft") } })),
+    annotations: marks.map((mark, i) => ({ xref: "x", yref: "paper", x: Math.log10(mark[1]), y: 1, yshift: 15 * (i % (narrow() ? 3 : 2)), yanchor: "bottom", showarrow: false, text: plain(mark[0]), font: { size: 11, color: css("--soft") } })),
   });
 }
 
 function drawSchedule() {
   if (!DATA.schedule) return;
   const shape = {};
-  const across = 3;
+  const across = narrow() ? 2 : 3;
   const down = Math.ceil(DATA.schedule.panels.length / across);
   const traces = DATA.schedule.panels.map((panel, i) => {
     const suffix = i ? String(i + 1) : "";
     const [column, row] = [i % across, Math.floor(i / across)];
     const [left, top] = [column / across + 0.04, 1 - row / down];
-    shape[`xaxis${suffix}`] = { domain: [left, (column + 1) / across - 0.01], anchor: `y${suffix}`, title: row === down - 1 ? { text: "wind (m/s)" } : undefined };
-    shape[`yaxis${suffix}`] = { domain: [top - 1 / down + 0.11, top - 0.05], anchor: `x${suffix}` };
+    shape[`xaxis${suffix}`] = { domain: [left, (column + 1) / across - 0.01], anchor: `y${suffix}`, title: row === down - 1 ? { text: "wind (m/s)", standoff: 6 } : undefined };
+    shape[`yaxis${suffix}`] = { domain: [top - 1 / down + (row === down - 1 ? 0 : 0.09), top - 0.06], anchor: `x${suffix}` };
     return { type: "scatter", mode: "lines+markers", x: DATA.schedule.wind, y: panel.values, xaxis: `x${suffix}`, yaxis: `y${suffix}`, showlegend: false, line: { width: 2, color: colour(0) }, marker: { size: 4 }, hovertemplate: "%{x:g} m/s: %{y:.5g}<extra></extra>" };
   });
   const annotations = DATA.schedule.panels.map((panel, i) => ({
-    xref: "paper", yref: "paper", x: (i % across) / across + 0.04, y: 1 - Math.floor(i / across) / down - 0.045, xanchor: "left", yanchor: "bottom", showarrow: false, text: `<b>${plain(panel.label)}</b>`, font: { size: 12 },
+    xref: "paper", yref: "paper", x: (i % across) / across + 0.04, y: 1 - Math.floor(i / across) / down - 0.055, xanchor: "left", yanchor: "bottom", showarrow: false, text: `<b>${plain(panel.label)}</b>`, font: { size: narrow() ? 10 : 12 },
   }));
-  draw("schedule-plot", traces, { ...shape, height: 200 * down + 60, annotations, margin: { l: 30, r: 10, t: 10, b: 50 } });
+  draw("schedule-plot", traces, { ...shape, height: 200 * down + 40, annotations, margin: { l: 30, r: 10, t: 6, b: 44 } });
 }
 
 // ---- the page ----------------------------------------------------------------------------------
 function chooseSeeds() {
-  fill($("series-seed"), Object.keys(DATA.series[$("series-case").value] || {}));
+  // every seed of the case; those whose series are not in the file cannot be chosen
+  const there = DATA.series[$("series-case").value] || {};
+  const before = $("series-seed").value;
+  const seeds = DATA.seeds[$("series-case").value].map(String);
+  fill($("series-seed"), seeds, seeds.map((seed) => (there[seed] ? seed : `${seed} (not in this page)`)));
+  for (const option of $("series-seed").options) option.disabled = !there[option.value];
+  $("series-seed").value = there[before] ? before : seeds.find((seed) => there[seed]);
 }
 function drawAll() {
   drawTable(); drawWinds(); drawPareto(); drawBoxes(); drawSeries(); drawSpectra(); drawSchedule();
 }
+function setTheme(isDark) {
+  document.documentElement.dataset.theme = isDark ? "dark" : "light";
+}
 fill($("table-case"), [ALL, ...DATA.cases], ["all cases", ...DATA.cases]);
-for (const [kind, title, names] of [["samples", "samples of a channel", Object.keys(DATA.quantiles)], ["metric", "metrics of the runs", DATA.metrics.map((m) => m.name)]]) {
+for (const [kind, title, names] of [["samples", "samples of a channel", Object.keys(DATA.quantiles)], ["metric", "metrics of the runs", DATA.metrics.map((m) => m.name).filter((name) => name !== "score")]]) {
   if (!names.length) continue;
   const group = document.createElement("optgroup");
   group.label = title;
@@ -343,14 +497,22 @@ for (const [kind, title, names] of [["samples", "samples of a channel", Object.k
 }
 const compared = DATA.metrics.filter((metric) => metric.name !== "score");
 fill($("wind-what"), compared.map((metric) => metric.name), compared.map((metric) => DATA.titles[metric.name] || metric.label));
-fill($("table-view"), Object.keys(DATA.views), Object.values(DATA.views));
-$("table-view").parentElement.hidden = Object.keys(DATA.views).length < 2;
+fill($("table-view"), DATA.baseline === null ? [MEANS] : [MEANS, GAPS], DATA.baseline === null ? undefined : ["means", `differences from ${DATA.baseline}`]);
+$("table-view").parentElement.hidden = $("table-view").options.length < 2;
+$("intervals").parentElement.hidden = !DATA.board[ALL].some((row) => row.intervals && Object.keys(row.intervals).length);
 fill($("series-case"), Object.keys(DATA.series));
-chooseSeeds();
-document.documentElement.dataset.theme = matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light";
-$("theme").addEventListener("click", () => { document.documentElement.dataset.theme = dark() ? "light" : "dark"; drawAll(); });
+for (const section of ["series", "spectra"]) $(section).hidden = !Object.keys(DATA.series).length;
+if (Object.keys(DATA.series).length) chooseSeeds();
+const darkness = matchMedia("(prefers-color-scheme: dark)");
+setTheme(darkness.matches);
+darkness.addEventListener("change", () => { setTheme(darkness.matches); drawAll(); });
+$("theme").addEventListener("click", () => { setTheme(!dark()); drawAll(); });
+let shownTheme = null;
+window.addEventListener("beforeprint", () => { shownTheme = dark(); paper = true; setTheme(false); drawAll(); });
+window.addEventListener("afterprint", () => { paper = false; setTheme(shownTheme); drawAll(); });
 $("table-case").addEventListener("change", () => { drawTable(); drawPareto(); });
 $("table-view").addEventListener("change", drawTable);
+$("intervals").addEventListener("change", drawTable);
 $("all-columns").addEventListener("change", drawTable);
 $("wind-what").addEventListener("change", drawWinds);
 $("box-what").addEventListener("change", drawBoxes);

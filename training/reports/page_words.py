@@ -1,0 +1,234 @@
+"""What a report page says in words: title, conditions of the cases, lost runs, provenance.
+
+All of it comes from a results folder, which may be of another's making: every text is escaped here.
+"""
+
+import html
+import platform as machine
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from fowt_env.descriptions.checks import is_number
+from fowt_env.errors import InputError
+from fowt_env.training.evaluation.conditions import sea_text, wind_text
+from fowt_env.training.evaluation.run_case import OK
+from fowt_env.training.evaluation.seeds import ranges
+
+NAMED_CASES = 3  # up to which a title has the names of the cases
+WIND_KINDS = {
+    "ntm": "normal turbulence (NTM)",
+    "etm": "extreme turbulence (ETM)",
+    "eog": "extreme operating gust (EOG)",
+    "edc": "extreme direction change (EDC)",
+    "ecd": "coherent gust with direction change (ECD)",
+    "ews": "extreme wind shear (EWS)",
+    "ewm": "extreme wind speed (EWM)",
+    "mann": "Mann turbulence box",
+}
+
+
+def numbers_text(values):
+    """1, 2, 3, 7 as "1 to 3, 7"."""
+    texts = (str(a) if a == b else f"{a} to {b}" if b > a + 1 else f"{a}, {b}" for a, b in ranges(values))
+    return ", ".join(texts)
+
+
+def counted(count, noun):
+    """ "1 case", "2 cases"."""
+    return f"{count} {noun}{'' if count == 1 else 's'}"
+
+
+def described_cases(manifest):
+    """{case: mapping} of a manifest; what is no mapping is left out."""
+    cases = manifest.get("cases")
+    found = cases.items() if isinstance(cases, dict) else ()
+    return {name: case for name, case in found if isinstance(case, dict)}
+
+
+def page_title(manifest, cases):
+    """What was evaluated: the platform, and the suite or the cases by name or number."""
+    about = described_cases(manifest)
+    platforms = {str(about[name].get("platform")) for name in cases if name in about} - {"None"}
+    where = f" on {Path(next(iter(platforms))).stem}" if len(platforms) == 1 else ""
+    where = f" on {len(platforms)} platforms" if len(platforms) > 1 else where
+    suite = manifest.get("suite")
+    if isinstance(suite, dict) and suite.get("name"):
+        what = f"suite {suite['name']}" + (f", version {suite['version']}" if "version" in suite else "")
+    elif isinstance(suite, str) and suite:
+        what = f"suite {suite}"
+    else:
+        what = ", ".join(cases) if len(cases) <= NAMED_CASES else counted(len(cases), "load case")
+    return f"Controllers{where}: {what}"
+
+
+def page_lead(table, manifest):
+    """The size of an evaluation in one line."""
+    seeds = sorted(set(table["seed"]))
+    parts = [counted(table["controller"].nunique(), "controller"), counted(table["case"].nunique(), "case")]
+    parts += [f"{'seed' if len(seeds) == 1 else 'seeds'} {numbers_text(seeds)}", counted(len(table), "run")]
+    if isinstance(manifest.get("created"), str):
+        parts.append(f"evaluated {manifest['created'][:10]}")
+    return " · ".join(parts)
+
+
+def case_conditions(table, manifest, shares=None):
+    """[{heading: text}] of the cases of a table in its order: what each was run in.
+
+    shares: {case: share of the lifetime}, or None. A case that the manifest does not describe has its seeds.
+    """
+    about, rows = described_cases(manifest), []
+    for name, runs in table.groupby("case", sort=False):
+        case, row = about.get(name), {"case": name}
+        if case is not None:
+            row |= {"wind": _wind(case.get("wind")), "sea": _sea(case.get("sea")), "events": _events(case)}
+            row["platform"] = Path(str(case.get("platform"))).stem
+            row["duration (s)"], row["scored from (s)"] = map(
+                _number, (case.get("duration"), case.get("skip"))
+            )
+            row["sensors"] = str(case.get("sensors", ""))
+        row["seeds"] = numbers_text(sorted(set(runs["seed"])))
+        if shares is not None:
+            row["share of the lifetime"] = f"{100.0 * shares[name]:.1f} %"
+        rows.append(row)
+    return rows
+
+
+def conditions_text(row):
+    """The conditions of one case as a sentence, for the places where only its name stands."""
+    parts = [row.get(key) for key in ("wind", "sea", "events")]
+    if row.get("duration (s)"):
+        parts.append(f"{row['duration (s)']} s, scored from {row.get('scored from (s)') or 0} s")
+    parts += [f"{row['sensors']} sensors" if row.get("sensors") else None, f"seeds {row['seeds']}"]
+    return "; ".join(filter(None, parts))
+
+
+def conditions_table(rows):
+    """HTML of a table of case_conditions, without columns that no case fills or a platform all share."""
+    headings = list(dict.fromkeys(heading for row in rows for heading in row))
+    kept = [name for name in headings if any(row.get(name) for row in rows)]
+    if len({row.get("platform") for row in rows}) == 1 and "platform" in kept:
+        kept.remove("platform")
+    head = "".join(f'<th scope="col">{html.escape(name)}</th>' for name in kept)
+    body = "".join(
+        "<tr>" + "".join(f"<td>{html.escape(row.get(name) or '–')}</td>" for name in kept) + "</tr>"
+        for row in rows
+    )
+    return f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody>"
+
+
+def _wind(wind):
+    """Text of a manifest's wind, with the name of its kind spelt out."""
+    text = wind_text(wind)
+    kind = text.partition(" ")[0].rstrip(",")
+    return WIND_KINDS.get(kind, kind) + text[len(kind) :]
+
+
+def _sea(sea):
+    """Text of a manifest's sea, with its peak enhancement."""
+    try:
+        text = sea_text(sea)
+    except InputError:
+        return str(sea)
+    gamma = sea.get("gamma") if isinstance(sea, dict) else None
+    return f"{text}, gamma {gamma:g}" if is_number(gamma) and "Hs" in text else text
+
+
+def _events(case):
+    """Text of what is out of the ordinary in a manifest's case, "" for nothing."""
+    parts = ["parked"] if case.get("parked") else []
+    fault = case.get("fault")
+    if isinstance(fault, dict):
+        parts.append(f"{str(fault.get('kind')).replace('_', ' ')} at {_number(fault.get('time'))} s")
+    for key in ("shift", "displaced", "initial"):
+        if isinstance(case.get(key), dict):
+            changes = (f"{name.replace('_', ' ')} {_number(value)}" for name, value in case[key].items())
+            parts.append(f"{key} {', '.join(changes)}")
+    return ", ".join(parts)
+
+
+def _number(value):
+    return f"{value:g}" if is_number(value) else "" if value is None else str(value)
+
+
+def lost_runs(table):
+    """[(controller, case, seed, text)] of the runs that failed or tripped, with when and why."""
+    lost = []
+    for row in table[table["status"] != OK].to_dict("records"):
+        at = row.get("stopped_[s]")
+        when = f" at {at:.1f} s" if is_number(at) and at == at else ""
+        when = "" if when in row["reason"] else when
+        reason = f": {row['reason']}" if row["reason"] else ""
+        lost.append((row["controller"], row["case"], int(row["seed"]), f"{row['status']}{when}{reason}"))
+    return lost
+
+
+def lost_list(lost, runs):
+    """HTML of the list of lost runs, "" for none."""
+    items = "".join(
+        f"<li><b>{html.escape(who)}</b>, {html.escape(case)}, seed {seed}: {html.escape(text)}</li>"
+        for who, case, seed, text in lost
+    )
+    summary = f'<summary class="bad">{len(lost)} of {counted(runs, "run")} failed or tripped</summary>'
+    return f'<details open>{summary}<ul class="lost" tabindex="0">{items}</ul></details>' if lost else ""
+
+
+def provenance(folder, table, manifest, board_file):
+    """Rows of the table of provenance, as HTML."""
+    facts = {"folder": folder.resolve().name}
+    if manifest:
+        suite = manifest.get("suite")
+        if isinstance(suite, dict):
+            suite = " ".join(str(suite[key]) for key in ("name", "version") if key in suite)
+        facts |= {"suite": suite, "created": manifest.get("created"), "plant sources": manifest.get("plant")}
+        facts |= _case_facts(manifest)
+        for key in ("versions", "options", "controllers"):
+            if isinstance(manifest.get(key), dict):
+                facts[key] = ", ".join(
+                    f"{name} {_brief(name, value)}" for name, value in manifest[key].items()
+                )
+    else:
+        facts["evaluation"] = "the folder has no manifest.json: the versions that made its runs are not known"
+    if board_file is not None and board_file.baseline is not None:
+        facts["baseline"] = board_file.baseline
+    if "scored_[s]" in table.columns:
+        lengths = sorted(table["scored_[s]"].dropna().unique())
+        facts["scored"] = ", ".join(f"{value:g} s" for value in lengths)
+    packages = ("fowt-env", "numpy", "scipy", "pandas", "plotly")
+    made = ", ".join(f"{name} {_version(name)}" for name in packages)
+    facts["page made by"] = f"{made}, Python {machine.python_version()}"
+    return "".join(
+        f'<tr><th scope="row">{html.escape(name)}</th><td>{html.escape(str(value))}</td></tr>'
+        for name, value in facts.items()
+        if value not in (None, "")
+    )
+
+
+def _case_facts(manifest):
+    """{"trip", "site"} of a manifest's cases and suite, as texts."""
+    found = dict.fromkeys(
+        f"{_number(case['trip'])} times rated rotor speed"
+        for case in described_cases(manifest).values()
+        if case.get("trip") is not None
+    )
+    facts = {"overspeed trip": " or ".join(found)}
+    suite = manifest.get("suite")
+    site = suite.get("site") if isinstance(suite, dict) else None
+    if isinstance(site, dict):
+        facts["site"] = f"Weibull A = {site.get('A')} m/s, k = {site.get('k')} ({site.get('source')})"
+    return facts
+
+
+def _brief(label, value):
+    """A manifest's value in a few characters: a controller's name, where it has another, and its hash."""
+    if not isinstance(value, dict):
+        return str(value)
+    words = [str(item) for key, item in value.items() if not (key == "name" and item == label)]
+    return f"({', '.join(words)})"
+
+
+def _version(name):
+    """Version of an installed package, or "unknown"."""
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return "unknown"

@@ -1,0 +1,114 @@
+"""The outcome of an evaluation in sentences, from the paired statistics of its leaderboard.
+
+A difference is called better or worse only if it is significant; with too few seeds for a test the sentences
+say so and give what was observed.
+"""
+
+import html
+import math
+
+from fowt_env.training.evaluation.bootstrap import holm
+from fowt_env.training.evaluation.metrics import better
+from fowt_env.training.reports.metric_words import short_name
+from fowt_env.training.reports.terminal import LEADERBOARD
+
+TESTED = tuple(metric for _, metric, _, _, different in LEADERBOARD if different)
+OBSERVED = (
+    "RotSpeed_std_[rpm]",
+    "PtfmPitch_std_[deg]",
+    "blade_pitch_travel_[deg/s]",
+    "GenPwr_capped_mean_[kW]",
+)
+SHOWN = 5  # sentences that stand open
+
+
+def corrected_p(entry):
+    """{metric: p-value} of a LeaderboardEntry over TESTED, corrected for their number (Holm); {}: no test."""
+    gaps = {name: entry.difference.get(name) for name in TESTED}
+    adjusted = holm([math.nan if gap is None or gap.p is None else gap.p for gap in gaps.values()])
+    return {name: float(p) for name, p in zip(gaps, adjusted, strict=True) if math.isfinite(p)}
+
+
+def percent_text(percent):
+    """ "+34 %", "+9.2 %", "+0.03 %": two digits below ten, a true minus sign and no break before the unit."""
+    size = abs(percent)
+    text = f"{size:.{0 if size >= 9.95 else 1 if size >= 0.095 else 2}f}"
+    sign = "±" if float(text) == 0.0 else "+" if percent > 0.0 else "\N{MINUS SIGN}"
+    return f"{sign}{text if sign != '±' else '0'}\N{NO-BREAK SPACE}%"
+
+
+def verdict(board, seeds, least_seeds):
+    """HTML of the verdict over a LeaderboardFile (None: there is none); every name is escaped.
+
+    seeds: how many the evaluation has; least_seeds: from how many on differences are tested.
+    """
+    if board is None:
+        return "<p>No verdict: without leaderboard.json nothing has been compared pair by pair.</p>"
+    others = [entry for entry in board.controllers if entry.controller != board.baseline]
+    if board.baseline is None:
+        return "<p>No verdict: every controller has failed or tripped runs, so that there is no baseline.</p>"
+    if not others:
+        return "<p>No verdict: a single controller was evaluated, so that there is nothing to compare.</p>"
+    baseline = next((e for e in board.controllers if e.controller == board.baseline), None)
+    tested = {entry.controller: corrected_p(entry) for entry in others}
+    level = 1.0 - (0.95 if board.interval is None else board.interval.level)
+    name = f"<b>{html.escape(board.baseline)}</b>"
+    if any(tested.values()):
+        head = f"Against {name}, paired by case and seed; * significant (p ≤ {level:.2g}, Holm-corrected)."
+    else:
+        count = "A single seed" if seeds == 1 else f"{seeds} seeds"
+        head = f"{count}: no difference is tested (that needs {least_seeds} seeds). Observed against {name}:"
+    if baseline is not None and baseline.failed + baseline.tripped:
+        head += f" The baseline itself lost runs ({_lost(baseline)}), which flatters the others."
+    items = [f"<li>{_sentence(entry, tested[entry.controller], level)}</li>" for entry in others]
+    text = f"<p>{head}</p><ul>{''.join(items[:SHOWN])}</ul>"
+    if items[SHOWN:]:
+        more = f"<summary>{len(items) - SHOWN} more</summary><ul>{''.join(items[SHOWN:])}</ul>"
+        text += f"<details>{more}</details>"
+    return text
+
+
+def _sentence(entry, tested, level):
+    """HTML of what is known of one controller."""
+    gaps = {
+        name: entry.difference[name].percent
+        for name in (tested or OBSERVED)
+        if name in entry.difference and entry.difference[name].percent is not None
+    }
+    sure = {name: percent for name, percent in gaps.items() if tested.get(name, 1.0) <= level}
+    good = [_gap(n, p, "better", "*") for n, p in sure.items() if better(n) * p > 0.0]
+    bad = [_gap(n, p, "worse", "*") for n, p in sure.items() if better(n) * p < 0.0]
+    rest = [_gap(name, percent) for name, percent in gaps.items() if name not in sure]
+    name = f"<b>{html.escape(entry.controller)}</b>"
+    if not gaps:
+        text = f"{name}: no difference is known"
+    elif not tested:
+        text = f"{name}: {', '.join(rest)} (not tested)"
+    elif good or bad:
+        text = f"{name}: " + " for ".join(filter(None, (_joined(good), _joined(bad))))
+        text += " (better)" if not bad else " (worse)" if not good else ""
+        text += f"; not significant: {', '.join(rest)}" if rest else ""
+    else:
+        text = f"{name}: no significant difference ({', '.join(rest)})"
+    if entry.failed + entry.tripped:
+        text += f'; <span class="bad">{_lost(entry)}</span>, counted as the worst of their case'
+    if entry.beyond:
+        text += f'; <span class="bad">beyond a limit: {html.escape("; ".join(entry.beyond))}</span>'
+    return text + "."
+
+
+def _gap(name, percent, kind="", star=""):
+    """HTML of one difference."""
+    words = f"{html.escape(short_name(name))} {percent_text(percent)}{star}"
+    return f'<span class="{kind}">{words}</span>' if kind else words
+
+
+def _joined(parts):
+    """ "a, b and c"."""
+    return " and ".join(filter(None, (", ".join(parts[:-1]), *parts[-1:])))
+
+
+def _lost(entry):
+    """ "1 failed and 2 tripped of 12 runs"."""
+    counts = ((entry.failed, "failed"), (entry.tripped, "tripped"))
+    return " and ".join(f"{count} {what}" for count, what in counts if count) + f" of {entry.runs} runs"
