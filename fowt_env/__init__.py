@@ -18,6 +18,7 @@ if TYPE_CHECKING:  # the names below, for editors and type checkers
     from fowt_env.errors import InputError as InputError
     from fowt_env.errors import PlantWarning as PlantWarning
     from fowt_env.errors import SimulationStopped as SimulationStopped
+    from fowt_env.plant.compile.notice import set_quiet as set_quiet
     from fowt_env.plant.user_loads import Force as Force
     from fowt_env.plant.user_loads import Motion as Motion
     from fowt_env.scene.build import build_scene as build_scene
@@ -41,6 +42,7 @@ _PUBLIC = {
     "Force": "fowt_env.plant.user_loads",
     "Motion": "fowt_env.plant.user_loads",
     "load_kernel": "fowt_env.scene.user_loads",
+    "set_quiet": "fowt_env.plant.compile.notice",
     "InputError": "fowt_env.errors",
     "SimulationStopped": "fowt_env.errors",
     "PlantWarning": "fowt_env.errors",

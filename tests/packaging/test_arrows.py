@@ -13,7 +13,7 @@ ROOT = Path(fowt_env.__file__).resolve().parent.parent
 LAYERS = (
     "errors", "caches", "folders", "registration", "plant", "descriptions", "weather", "scene", "files",
     "analysis",
-    "control", "initial_conditions", "simulation", "visual", "envs", "controllers", "training",
+    "control", "initial_conditions", "simulation", "visual", "envs", "warmup", "controllers", "training",
     "training.evaluation", "training.design", "training.rl", "training.reports", "training.board",
     "training.validation",
     "training.benchmarks", "training.studies", "training.cli",

@@ -2,7 +2,10 @@
 
 import os
 import platform
+import re
+import shutil
 import sys
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -10,10 +13,11 @@ from typing import NamedTuple
 
 import numba
 
-from fowt_env.folders import cache_root
+from fowt_env.folders import cache_root, distrust
 from fowt_env.plant.compile.announcement import compilation_announced, kernels_compiled
 from fowt_env.plant.compile.decorators import CACHE_FOLDER, own_folders
 
+BOX_NAME = re.compile(r"[0-9a-f]{24}\.npz")  # of a box of wind (training/evaluation/wind_boxes.py)
 TEST_DURATION = 60.0  # s
 # Last row of reference_run(). They guard an installation, not the physics (tests do that): a part that is
 # compiled wrongly or a data file that is not the shipped one moves them far beyond the tolerance.
@@ -71,11 +75,65 @@ def cache_state():
     written = os.access(CACHE_FOLDER, os.W_OK | os.X_OK)
     size, others = 0, 0
     try:
-        size = sum(path.stat().st_size for path in CACHE_FOLDER.rglob("*") if path.is_file())
+        size = _bytes(CACHE_FOLDER)
         others = sum(path != CACHE_FOLDER for path in own_folders(CACHE_FOLDER.parent))
     except OSError:
         pass  # gone, or not ours to read: then there is nothing to count
     return CacheState(CACHE_FOLDER, True, written, kernels_compiled(), size / 1e6, others)
+
+
+class CachePart(NamedTuple):
+    """Something that is kept on disk and can be made again."""
+
+    what: str  # "this version", "other versions" (of compiled kernels) or "wind boxes"
+    paths: list[Path]  # folders, or files of wind
+    megabytes: float
+
+
+def cache_parts() -> list[CachePart]:
+    """CacheParts of this user: of what lies in the cache folder those that this package made; [] without one."""
+    root = cache_root()
+    if root is None:
+        return []
+    kernels, boxes = root / "kernels", root / "wind_boxes"
+    folders = own_folders(kernels) if _ours(kernels) else []
+    files = [path for path in boxes.glob("*.npz") if BOX_NAME.fullmatch(path.name)] if _ours(boxes) else []
+    found = {
+        "this version": [path for path in folders if path == CACHE_FOLDER],
+        "other versions": [path for path in folders if path != CACHE_FOLDER],
+        "wind boxes": [path for path in files if path.is_file() and not path.is_symlink()],
+    }
+    return [
+        CachePart(what, paths, sum(map(_bytes, paths)) / 1e6) for what, paths in found.items()
+    ]
+
+
+def remove(parts: list[CachePart]) -> list[Path]:
+    """Remove parts of the cache; the paths that are still there."""
+    for path in (path for part in parts for path in part.paths):
+        if path.is_dir():
+            shutil.rmtree(path, ignore_errors=True)
+        else:
+            with suppress(OSError):
+                path.unlink()
+    return [path for part in parts for path in part.paths if path.exists()]
+
+
+def _ours(folder):
+    """Whether a folder is there and nobody else could have put things into it."""
+    try:
+        return folder.is_dir() and not distrust(folder)
+    except OSError:
+        return False
+
+
+def _bytes(path):
+    """Size of a file, or of all files in a folder; of what another process removes meanwhile nothing."""
+    total = 0
+    for file in (path, *path.rglob("*")):
+        with suppress(OSError):
+            total += file.stat().st_size if file.is_file() else 0
+    return total
 
 
 def reference_run():

@@ -1,4 +1,4 @@
-"""Telling that kernels are being compiled: the one long wait that a user meets, and only once."""
+"""For a command that says by itself that kernels are compiled: the one long wait that a user meets, and only once."""
 
 from contextlib import contextmanager
 
@@ -6,8 +6,7 @@ import numba
 from numba.core import event
 
 from fowt_env.plant.compile.decorators import CACHE_FOLDER
-
-COMPILING_MESSAGE = "compiling kernels (first run of this kind of scene only, 5 s to 1 min) ..."
+from fowt_env.plant.compile.notice import COMPILING_MESSAGE, own, told_otherwise
 
 
 class _Once(event.Listener):
@@ -20,8 +19,7 @@ class _Once(event.Listener):
         self.say = say
 
     def on_start(self, event):
-        module = event.data["dispatcher"].py_func.__module__ or ""
-        if self.say is not None and module.startswith("fowt_env."):
+        if self.say is not None and own(event):
             say, self.say = self.say, None
             say(COMPILING_MESSAGE)
 
@@ -31,11 +29,15 @@ class _Once(event.Listener):
 
 @contextmanager
 def compilation_announced(say):
-    """Within the block, the first kernel that has to be compiled makes say(text) be called, once."""
+    """Within the block, the first kernel that has to be compiled makes say(text) be called, once.
+
+    Nothing else is printed about it there, and nothing at all for None.
+    """
     listener = _Once(say)
     event.register("numba:compile", listener)
     try:
-        yield
+        with told_otherwise():
+            yield
     finally:
         event.unregister("numba:compile", listener)
 

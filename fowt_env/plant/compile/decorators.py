@@ -29,9 +29,12 @@ from numba.core.ccallback import CFunc  # noqa: E402
 from fowt_env.folders import cache_root, distrust, make_private  # noqa: E402
 from fowt_env.plant.compile.disk_cache import KernelCache  # noqa: E402
 from fowt_env.plant.compile.linked import LinkedDispatcher  # noqa: E402
+from fowt_env.plant.compile.notice import NOTICE  # noqa: E402, F401  # listens from here on
 from fowt_env.plant.compile.sources import imported_at_top  # noqa: E402
 
 KEEP_CACHES = 4  # folders of older sources kept, so that switching branches does not recompile
+DAY = 86400.0  # s; what was used within it may be in use still
+UNUSED = 30 * DAY  # s after which a folder of older sources goes, however few there are
 MARKER = "made_by_fowt_env"  # a file in each folder that this module makes, and may therefore remove
 OWN_NAME = re.compile("[0-9a-f]{16}")
 PLANT = Path(__file__).absolute().parents[1]
@@ -57,14 +60,12 @@ def own_folders(kernels):
 
 
 def _drop_oldest(folder):
-    """Remove what is older than KEEP_CACHES folders beside this one, unless a process may still use it."""
-    others = sorted(
-        (path for path in own_folders(folder.parent) if path != folder), key=lambda path: path.stat().st_mtime
-    )
-    day_ago = time.time() - 86400.0
-    for old in others[: max(0, len(others) - KEEP_CACHES)]:
-        if old.stat().st_mtime < day_ago:
-            shutil.rmtree(old, ignore_errors=True)
+    """Remove folders beside this one, unless a process may still use them: the KEEP_CACHES last used stay a month."""
+    now = time.time()
+    used = {path: path.stat().st_mtime for path in own_folders(folder.parent) if path != folder}
+    for place, (path, last) in enumerate(sorted(used.items(), key=lambda item: -item[1])):
+        if now - last > (DAY if place >= KEEP_CACHES else UNUSED):
+            shutil.rmtree(path, ignore_errors=True)
 
 
 def _places(folder):

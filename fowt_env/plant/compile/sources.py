@@ -6,6 +6,7 @@ as long; the project has no relative imports, and none in a condition that a ker
 """
 
 import re
+from functools import cache
 
 MODULE = r"(fowt_env(?:\.\w+)*)"
 STATEMENT = re.compile(rf"^(?:from {MODULE} import (\([^)]*\)|.*)|import {MODULE})", re.MULTILINE)
@@ -24,13 +25,22 @@ def imported_at_top(path, root, but):
         if path in found or but in path.parents:
             continue
         found.add(path)
-        for source, names, module in STATEMENT.findall(path.read_text(encoding="utf-8")):
-            inner = NAME.findall(COMMENT.sub("", names))
-            for dotted in (source or module, *(f"{source}.{name}" for name in inner)):
-                left += _files(dotted, root)
+        left += _imported(path, root)
     return sorted(found)
 
 
+@cache  # some twenty modules with kernels of their own import much the same
+def _imported(path, root):
+    """Sources that the statements of one source name."""
+    found = []
+    for source, names, module in STATEMENT.findall(path.read_text(encoding="utf-8")):
+        inner = NAME.findall(COMMENT.sub("", names))
+        for dotted in (source or module, *(f"{source}.{name}" for name in inner)):
+            found += _files(dotted, root)
+    return tuple(found)
+
+
+@cache
 def _files(module, root):
     """Source of a module; nothing for what is no module. The packages around it give it no name to use."""
     place = root.joinpath(*module.split("."))

@@ -1,0 +1,169 @@
+"""What users are told while kernels are compiled, wherever they call from; and compiling itself a seventh faster.
+
+Nothing is printed, and no thread runs, unless kernels of this project are compiled: those on disk are silent. The
+environment variable FOWT_QUIET and set_quiet switch it off. It goes to stderr alone: two lines, the second
+at the end, and between them on a terminal and in Jupyter a line that counts. How many kernels are left is not
+known before the last one is compiled, so what is shown is how many are done.
+"""
+
+import atexit
+import gc
+import multiprocessing
+import os
+import sys
+import threading
+import time
+from contextlib import contextmanager, suppress
+
+from numba.core import event
+
+COMPILING_MESSAGE = "compiling kernels (first run of this kind of scene only, 5 s to 1 min) ..."
+NAME = "fowt_env: "
+DELAY = 1.0  # s of compiling after which the user is told: a kernel or two take less
+PAUSE = 2.0  # s without compiling after which it counts as ended
+REDRAW = 0.2  # s
+# While kernels are compiled numba makes millions of objects that stay, over which Python's collector goes again and
+# again: a seventh of the time at its usual threshold of some hundreds.
+COLLECT_AFTER = 200_000
+
+
+def own(compiled):
+    """Whether an event of numba is about a kernel of this project, and not a helper of numba's or a user's."""
+    return (compiled.data["dispatcher"].py_func.__module__ or "").startswith("fowt_env.")
+
+
+def _in_jupyter():
+    shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
+    return type(shell).__name__ == "ZMQInteractiveShell"
+
+
+def _redraws(stream):
+    """Whether a line on the stream can be written over: not in rich's live displays, which wait for its end."""
+    if type(stream).__name__ == "FileProxy":
+        return False
+    with suppress(Exception):
+        return stream.isatty() or _in_jupyter()
+    return False
+
+
+class Notice(event.Listener):
+    """Listens to numba, under whose lock for compiling it is called: by one thread at a time."""
+
+    def __init__(self):
+        self.quiet = False  # by set_quiet
+        self.held = 0  # contexts in which somebody else says it
+        self.depth = 0  # of kernels that are being compiled for kernels
+        self.count = 0  # compiled since `began`
+        self.spent = 0.0  # s, by those at the top
+        self.started = self.ended = 0.0  # of the last one at the top
+        self.thread = None
+        self.stop = threading.Event()
+        self.writing = threading.Lock()
+        self.drawn = 0  # characters of the line that counts
+        self.thresholds = None
+
+    def on_start(self, compiled):
+        """Numba begins with a kernel."""
+        if not own(compiled):
+            return
+        self.depth += 1
+        if self.depth > 1:
+            return
+        self.started = time.monotonic()
+        found = gc.get_threshold()
+        if 0 < found[0] < COLLECT_AFTER:
+            self.thresholds = found
+            gc.set_threshold(COLLECT_AFTER, *found[1:])
+        if self.thread is None or not self.thread.is_alive():  # it does not live on in a fork
+            self._begin()
+
+    def on_end(self, compiled):
+        """Numba has ended with it, or failed."""
+        if not own(compiled):
+            return
+        self.count += 1
+        self.depth -= 1
+        if self.depth > 0:
+            return
+        self.ended = time.monotonic()
+        self.spent += self.ended - self.started
+        if self.thresholds is not None:
+            gc.set_threshold(*self.thresholds)
+            self.thresholds = None
+        with self.writing:
+            self._erase()  # the next thing on the terminal may be the user's own
+
+    def _begin(self):
+        self.count, self.spent = 0, 0.0
+        if self.quiet or self.held or os.environ.get("FOWT_QUIET", "0") not in ("", "0"):
+            return
+        if multiprocessing.parent_process() is not None:  # which says it
+            return
+        self.stop.clear()
+        self.thread = threading.Thread(target=self._watch, name="fowt_env compiling", daemon=True)
+        self.thread.start()
+
+    def _watch(self):
+        """Tell the user, from a thread of its own: half the wait is one call of LLVM's."""
+        told = False
+        while not self.stop.wait(REDRAW):
+            now = time.monotonic()
+            working = self.depth > 0
+            spent = self.spent + (now - self.started if working else 0.0)
+            if not told and spent >= DELAY and not self.held:
+                told = True
+                self._write(f"{NAME}{COMPILING_MESSAGE}\n")
+            elif told and working:
+                self._draw(f"{NAME}{self.count} kernels compiled, {spent:.0f} s ")
+            if not working and now - self.ended > PAUSE:
+                break
+        if told:
+            self._write(f"{NAME}{self.count} kernels compiled in {self.spent:.0f} s\n")
+
+    def _write(self, text):
+        with self.writing:
+            self._erase()
+            self._put(text)
+
+    def _draw(self, text):
+        with self.writing:
+            if self.depth > 0 and _redraws(sys.stderr):
+                self._put("\r" + text.ljust(self.drawn))
+                self.drawn = len(text)
+
+    def _erase(self):
+        if self.drawn:
+            self._put("\r" + " " * self.drawn + "\r")
+            self.drawn = 0
+
+    @staticmethod
+    def _put(text):
+        with suppress(Exception):  # no stderr, or one that is closed: nothing to fail for
+            sys.stderr.write(text)
+            sys.stderr.flush()
+
+    def close(self):
+        """End the thread: at the interpreter's end one that writes could stop it."""
+        self.stop.set()
+        if self.thread is not None and self.thread.is_alive():
+            self.thread.join(2.0)
+
+
+NOTICE = Notice()
+event.register("numba:compile", NOTICE)
+atexit.register(NOTICE.close)
+
+
+def set_quiet(quiet: bool = True) -> None:
+    """None. Whether this process is silent while it compiles kernels, as with the variable FOWT_QUIET=1."""
+    NOTICE.quiet = bool(quiet)
+
+
+@contextmanager
+def told_otherwise():
+    """Context in which the caller says that kernels are compiled."""
+    NOTICE.held += 1
+    try:
+        yield
+    finally:
+        NOTICE.held -= 1

@@ -1,0 +1,47 @@
+"""fowt warmup: compile the usual kinds of scene ahead."""
+
+from typing import Annotated
+
+import typer
+
+from fowt_env.training.cli.console import PlatformOption, app, err, note, out, progress_bar, reported
+from fowt_env.training.cli.tables import print_table
+
+WARMUP_EXAMPLES = """[bold]Examples[/bold]
+
+[cyan]fowt warmup[/cyan]  runs and the environment of OC3-Hywind, so that later ones start at once
+
+[cyan]fowt warmup --kinds standard,vector,linear --jobs 2[/cyan]  other kinds, the later ones side by side
+
+[cyan]fowt warmup --kinds all[/cyan]  standard, environment, vector, steady, linear, fast and reference"""
+
+
+@app.command(epilog=WARMUP_EXAMPLES)
+@reported
+def warmup(
+    platform: PlatformOption = "oc3_hywind",
+    kinds: Annotated[str, typer.Option(help="Kinds of scene, with commas, or all.")] = "standard,environment",
+    jobs: Annotated[int, typer.Option(help="Processes; each needs about 1 GB.")] = 1,
+):
+    """Compile the kernels of the usual kinds of scene ahead, where they are not on disk yet."""
+    from fowt_env.warmup import KINDS
+    from fowt_env.warmup import warmup as compile_kinds
+
+    names = list(KINDS) if kinds == "all" else [name.strip() for name in kinds.split(",") if name.strip()]
+    total = len(dict.fromkeys(names))
+    if not err.is_terminal:
+        note(f"compiling {total} kinds of scene: {', '.join(names)}")
+    with progress_bar("compiling", total) as update:
+
+        def show(kind, done, kernels):
+            update(done, f"{kind}: {kernels} kernels" if kernels else kind)
+            if not err.is_terminal and done > show.done:
+                note(f"{done} of {total}: {kind}")
+            show.done = done
+
+        show.done = 0
+        table = compile_kinds(platform, names, jobs, show)
+    rows = [
+        (row.kind, KINDS[row.kind][0], str(row.kernels), f"{row.seconds:.1f}") for row in table.itertuples()
+    ]
+    print_table(out, ("kind", "what it is for", "compiled", "s"), rows, f"{platform}", left=(0, 1))
