@@ -1,4 +1,5 @@
-# Targets work from a fresh clone with only Python 3.11 and make; the environment is made once.
+# Targets work from a fresh clone with only Python 3.11 to 3.13 and make; the environment is made once.
+# Another Python than 3.11: make PYTHON=python3.13 VENV=.venv313 test
 PYTHON ?= python3.11
 VENV ?= .venv
 BIN := $(VENV)/bin

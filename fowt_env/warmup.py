@@ -101,7 +101,7 @@ def warmup(
 
     platform  a built-in name or the path of a TOML file
     kinds     names of KINDS; what they share is compiled with the first
-    jobs      processes: with more than one, the first kind is compiled here and the others beside each other
+    jobs      processes: with more than one, the first kind is compiled here, then the others side by side
     progress  called with (kind, kinds done, kernels compiled) in a process that compiles
 
     Raises: InputError before anything is compiled for an unknown kind or jobs below 1, and for a platform that

@@ -32,7 +32,8 @@ def doctor(
     """
     _print_versions()
     _print_extras()
-    faults = [package.advice for package in requirements.versions() if not package.fits]
+    needed = [package for package in requirements.versions() if package.name != "Python"]
+    faults = [package.advice for package in needed if not package.fits]
     if not faults:
         try:
             from fowt_env.training.cli import (
@@ -40,6 +41,7 @@ def doctor(
             )
         except ImportError as error:  # numba's own, where NumPy is too new for it
             faults = [str(error)]
+    _print_notebook()
     if faults:
         for fault in faults:
             out.print(f"[red]{escape(fault)}[/red]", soft_wrap=True, highlight=False)
@@ -80,6 +82,18 @@ def _print_extras():
             state = "[yellow]another version[/yellow]"
         advice = "" if "green" in state else f': pip install "{requirements.DISTRIBUTION}[{extra}]"'
         out.print(f"  {extra:14} {state}  {escape(names + advice)}", highlight=False, soft_wrap=True)
+    if any(package.version is None for packages in extras.values() for package in packages):
+        advice = f'  all but docs and hydro: pip install "{requirements.DISTRIBUTION}[all]"'
+        out.print(escape(advice), highlight=False, soft_wrap=True)
+
+
+def _print_notebook():
+    """A line on whether a notebook that uses this Python can show progress."""
+    if requirements.installed("ipykernel") and not requirements.installed("ipywidgets"):
+        advice = (
+            'Jupyter is here without ipywidgets, which progress bars need: pip install "fowt-env[notebook]"'
+        )
+        out.print(f"  [yellow]{escape(advice)}[/yellow]", highlight=False, soft_wrap=True)
 
 
 def _named(package):

@@ -91,7 +91,7 @@ class CachePart(NamedTuple):
 
 
 def cache_parts() -> list[CachePart]:
-    """CacheParts of this user: of what lies in the cache folder those that this package made; [] without one."""
+    """CacheParts of this user, of what this package made; [] without a cache folder."""
     root = cache_root()
     if root is None:
         return []
@@ -103,9 +103,7 @@ def cache_parts() -> list[CachePart]:
         "other versions": [path for path in folders if path != CACHE_FOLDER],
         "wind boxes": [path for path in files if path.is_file() and not path.is_symlink()],
     }
-    return [
-        CachePart(what, paths, sum(map(_bytes, paths)) / 1e6) for what, paths in found.items()
-    ]
+    return [CachePart(what, paths, sum(map(_bytes, paths)) / 1e6) for what, paths in found.items()]
 
 
 def remove(parts: list[CachePart]) -> list[Path]:

@@ -40,6 +40,22 @@ def requirements() -> dict[str, list[Package]]:
     return found
 
 
+def installed(name: str) -> bool:
+    """Whether a distribution is installed, in any version."""
+    return _found(name).version is not None
+
+
+def _python() -> Package:
+    """This Python, beside the versions that the package is tested with."""
+    from importlib import metadata
+
+    try:
+        needed = metadata.metadata(DISTRIBUTION).get("Requires-Python", "")
+    except metadata.PackageNotFoundError:
+        needed = ""
+    return Package("Python", platform.python_version(), needed)
+
+
 def versions() -> list[Package]:
     """Python, this package and what it cannot do without."""
     from fowt_env import __version__
@@ -49,7 +65,7 @@ def versions() -> list[Package]:
     except InputError:
         needed = [_found(name) for name in ("numpy", "scipy", "numba", "gymnasium", "pandas")]
     needed = [_found("numba", NUMBA) if package.name == "numba" else package for package in needed]
-    head = [Package(DISTRIBUTION, __version__), Package("Python", platform.python_version())]
+    head = [Package(DISTRIBUTION, __version__), _python()]
     return [*head, *needed, _found("llvmlite")]
 
 

@@ -1,4 +1,4 @@
-"""For a command that says by itself that kernels are compiled: the one long wait that a user meets, and only once."""
+"""For commands that say by themselves that kernels are compiled, the one long wait that a user meets."""
 
 from contextlib import contextmanager
 

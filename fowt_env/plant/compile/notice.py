@@ -1,9 +1,9 @@
-"""What users are told while kernels are compiled, wherever they call from; and compiling itself a seventh faster.
+"""What users are told while kernels are compiled, wherever they call from, and a slower collector meanwhile.
 
-Nothing is printed, and no thread runs, unless kernels of this project are compiled: those on disk are silent. The
-environment variable FOWT_QUIET and set_quiet switch it off. It goes to stderr alone: two lines, the second
-at the end, and between them on a terminal and in Jupyter a line that counts. How many kernels are left is not
-known before the last one is compiled, so what is shown is how many are done.
+Nothing is printed, and no thread runs, unless kernels of this project are compiled: those on disk are
+silent. The environment variable FOWT_QUIET and set_quiet switch it off. It goes to stderr alone: two lines,
+the second at the end, and between them on a terminal and in Jupyter a line that counts. How many kernels are
+left is not known before the last one is compiled, so what is shown is how many are done.
 """
 
 import atexit
@@ -22,13 +22,13 @@ NAME = "fowt_env: "
 DELAY = 1.0  # s of compiling after which the user is told: a kernel or two take less
 PAUSE = 2.0  # s without compiling after which it counts as ended
 REDRAW = 0.2  # s
-# While kernels are compiled numba makes millions of objects that stay, over which Python's collector goes again and
-# again: a seventh of the time at its usual threshold of some hundreds.
+# While kernels are compiled numba makes millions of objects that stay, over which Python's collector goes
+# again and again: a seventh of the time at its usual threshold of some hundreds.
 COLLECT_AFTER = 200_000
 
 
 def own(compiled):
-    """Whether an event of numba is about a kernel of this project, and not a helper of numba's or a user's."""
+    """Whether an event of numba is about a kernel of this project, not one of numba's or a user's."""
     return (compiled.data["dispatcher"].py_func.__module__ or "").startswith("fowt_env.")
 
 
