@@ -104,8 +104,8 @@ def warmup(
     jobs      processes: with more than one, the first kind is compiled here, then the others side by side
     progress  called with (kind, kinds done, kernels compiled) in a process that compiles
 
-    Raises: InputError before anything is compiled for an unknown kind or jobs below 1, and for a platform that
-    cannot be read.
+    Raises: InputError before anything is compiled for an unknown kind or jobs below 1, and for a platform
+    that cannot be read.
     """
     if not kinds:
         raise InputError("kinds = []: name at least one")

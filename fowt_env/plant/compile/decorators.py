@@ -60,7 +60,7 @@ def own_folders(kernels):
 
 
 def _drop_oldest(folder):
-    """Remove folders beside this one that were not used for a day or, of the KEEP_CACHES last used, a month."""
+    """Remove folders beside this one unused for a day or, of the KEEP_CACHES last used, a month."""
     now = time.time()
     used = {path: path.stat().st_mtime for path in own_folders(folder.parent) if path != folder}
     for place, (path, last) in enumerate(sorted(used.items(), key=lambda item: -item[1])):

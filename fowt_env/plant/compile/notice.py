@@ -38,7 +38,7 @@ def _in_jupyter():
 
 
 def _redraws(stream):
-    """Whether a line on the stream can be written over: not in rich's live displays, which wait for its end."""
+    """Whether a line can be written over: not in rich's live displays, which wait for its end."""
     if type(stream).__name__ == "FileProxy":
         return False
     with suppress(Exception):
