@@ -82,7 +82,7 @@ def _print_extras():
             state = "[yellow]another version[/yellow]"
         advice = "" if "green" in state else f': pip install "{requirements.DISTRIBUTION}[{extra}]"'
         out.print(f"  {extra:14} {state}  {escape(names + advice)}", highlight=False, soft_wrap=True)
-    apart = ("docs", "hydro")  # which `all` leaves out
+    apart = "docs hydro".split()  # which `all` leaves out
     if any(one.version is None for name, found in extras.items() if name not in apart for one in found):
         advice = f'  all but docs and hydro: pip install "{requirements.DISTRIBUTION}[all]"'
         out.print(escape(advice), highlight=False, soft_wrap=True)

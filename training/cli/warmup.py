@@ -23,7 +23,7 @@ def warmup(
     kinds: Annotated[str, typer.Option(help="Kinds of scene, with commas, or all.")] = "standard,environment",
     jobs: Annotated[int, typer.Option(help="Processes; each needs about 1 GB.")] = 1,
 ):
-    """Compile the kernels of the usual kinds of scene ahead, where they are not on disk yet."""
+    """Compile kernels of the usual scenes ahead."""
     from fowt_env.warmup import KINDS
     from fowt_env.warmup import warmup as compile_kinds
 
