@@ -131,7 +131,9 @@ def test_disabled_autoreset_leaves_the_resets_to_the_caller():
     for row in actions(2, 3):
         observations, _, _, truncated, _ = env.step(row)
     assert truncated.all()
-    with pytest.raises(ResetNeeded, match="environment 0 has ended"):
+    with pytest.raises(
+        ResetNeeded, match=r"environment 0: the episode ended \(end of its duration\) at 0\.2"
+    ):
         env.step(np.zeros((3, 2)))
     kept, _ = env.reset(options={"reset_mask": np.array([True, False, True])})
     assert np.array_equal(kept[1], observations[1]) and not np.array_equal(kept[0], observations[0])
