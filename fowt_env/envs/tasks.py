@@ -141,7 +141,7 @@ def varies(spec):
 
 
 def draw_weather(where, wind, sea, rng):
-    """(wind, sea) of an episode, drawn from ranges or a mixture with a numpy Generator. Raises: InputError."""
+    """(wind, sea) of an episode, drawn from ranges or a mixture with a Generator. Raises: InputError."""
     weathers = _check_mixture(where, wind, sea) if is_mixture(wind) else ((1.0, wind, sea),)
     for _, air, water in weathers:
         _check_weather(where, air, water)
