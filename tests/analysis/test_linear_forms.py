@@ -10,7 +10,6 @@ from fowt_env.errors import InputError
 from fowt_env.plant.measurement import Measurement
 from fowt_env.plant.state import STATE_INDEX
 
-
 SECOND_ORDER = 1e-5  # m/s: 5 mm/s of surge rate times 1e-3 rad of platform pitch, about what is left out
 
 
