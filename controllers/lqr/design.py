@@ -18,7 +18,7 @@ import numpy as np
 from scipy.linalg import expm, solve_discrete_are
 from scipy.optimize import least_squares
 
-from fowt_env.analysis.linear_model import linearize
+from fowt_env.analysis.linear_model import linearize, sampled
 from fowt_env.analysis.reduced_model import with_pitch_lag, without_inertia, without_memory
 from fowt_env.analysis.trim import without_fluctuations
 from fowt_env.analysis.trim_cache import plant_key, water_key
@@ -240,15 +240,6 @@ def design_models(scene):
     return _MODELS.get(
         key, lambda: tuple(design_model(scene, speed) for speed in design_winds(scene.turbine))
     )
-
-
-def sampled(a, b, dt):
-    """(exp(A dt), integral of exp(A s) ds B) for inputs held over dt."""
-    n, m = b.shape
-    block = np.zeros((n + m, n + m))
-    block[:n, :n], block[:n, n:] = a, b
-    both = expm(block * dt)
-    return both[:n, :n], both[:n, n:]
 
 
 def sampled_noise(a, q, dt):

@@ -1,20 +1,24 @@
 """Linear models of a scene about an operating point, by central differences of the nonlinear plant."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import pi
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import expm
 
 from fowt_env.analysis.trim import AZIMUTHS, trim, without_fluctuations
 from fowt_env.analysis.wave_excitation import fit_wave_filter, wave_force
+from fowt_env.descriptions.checks import is_number
+from fowt_env.descriptions.sea_state import sea_state_of
 from fowt_env.errors import InputError, unknown
-from fowt_env.plant.channels import N_FIXED, Out, measure, record
+from fowt_env.plant.channels import FIXED_CHANNELS, N_FIXED, Out, measure, record
 from fowt_env.plant.compile.decorators import entry, inlined_kernel
 from fowt_env.plant.compile.handle import data_of, model_of
 from fowt_env.plant.dynamics import evaluate_loads, loads_of, respond
-from fowt_env.plant.measurement import Measure
+from fowt_env.plant.measurement import Measure, Measurement
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.state import MOTIONS, STATE_INDEX, STATES, State, pose_of
 from fowt_env.scene.actuators import linear_actuator
@@ -53,6 +57,71 @@ RECORDED = {  # output: column of the output row, SI
 }
 
 
+# what a state is measured as: the same quantity, or for velocities in body axes the rate of the position
+MEASURED_AS = dict(zip(VELOCITIES, (f"{name}_rate" for name in MOTIONS), strict=True)) | {
+    name: name for name in (*MOTIONS, "rotor_speed", "blade_pitch")
+}
+MEASURED_AS["generator_torque_in_force"] = "generator_torque"
+COLUMNS = {  # what it is recorded as, by simulate
+    "surge": "PtfmSurge", "sway": "PtfmSway", "heave": "PtfmHeave",
+    "roll": "PtfmRoll", "platform_pitch": "PtfmPitch", "yaw": "PtfmYaw",
+    **dict(zip(VELOCITIES, (f"Ptfm{kind}V{axis}i" for kind in "TR" for axis in "xyz"), strict=True)),
+    "rotor_speed": "RotSpeed", "blade_pitch": "BldPitch1", "generator_torque_in_force": "GenTq",
+}  # fmt: skip
+UNITS = {  # of states, inputs and outputs, SI
+    "surge": "m", "sway": "m", "heave": "m", "roll": "rad", "platform_pitch": "rad", "yaw": "rad",
+    "vx": "m/s", "vy": "m/s", "vz": "m/s", "wx": "rad/s", "wy": "rad/s", "wz": "rad/s",
+    "rotor_speed": "rad/s", "generator_speed": "rad/s", "blade_pitch": "rad", "pitch_rate": "rad/s",
+    "platform_pitch_rate": "rad/s", "nacelle_acceleration": "m/s2", "nacelle_velocity": "m/s",
+    "generator_torque_in_force": "N m", "generator_torque": "N m", "blade_pitch_command": "rad",
+    "wind_speed": "m/s", "wave_elevation": "m", "power": "W", "rotor_thrust": "N",
+    "tower_base_moment": "N m",
+    **{name: "m" for name in TOWER}, **{f"{name}_rate": "m/s" for name in TOWER},
+}  # fmt: skip
+
+
+def sampled(a, b, dt):
+    """(exp(A dt), integral of exp(A s) ds B) for inputs held over dt."""
+    n, m = b.shape
+    block = np.zeros((n + m, n + m))
+    block[:n, :n], block[:n, n:] = a, b
+    both = expm(block * dt)
+    return both[:n, :n], both[:n, n:]
+
+
+def _python_control(where):
+    """The module control. Raises: InputError that names the extra to install."""
+    try:
+        import control
+    except ImportError as error:
+        raise InputError(f'{where} needs python-control ({error}): pip install "fowt-env[design]"') from error
+    return control
+
+
+@dataclass(frozen=True)
+class DiscreteModel:
+    """x[k+1] = A x[k] + B u[k], y[k] = C x[k] + D u[k] of a LinearModel whose inputs are held over dt (s).
+
+    The states are those of the LinearModel at the instants k dt, and so are names and units.
+    """
+
+    A: np.ndarray
+    B: np.ndarray
+    C: np.ndarray
+    D: np.ndarray
+    dt: float
+    states: tuple
+    inputs: tuple
+    outputs: tuple
+
+    def to_statespace(self):
+        """control.StateSpace in discrete time. Raises: InputError that names the extra to install."""
+        return _python_control("to_statespace").ss(
+            self.A, self.B, self.C, self.D, self.dt, states=list(self.states), inputs=list(self.inputs),
+            outputs=list(self.outputs), name="fowt_sampled",
+        )  # fmt: skip
+
+
 @dataclass(frozen=True)
 class LinearModel:
     """dx/dt = A dx + B du + E df, dy = C dx + D du + F df about an operating point, azimuth-averaged (SI).
@@ -62,6 +131,10 @@ class LinearModel:
     are plant.state.STATES; those of dynamic inflow follow, wake_1 and so on, those of a tower that bends, its
     deflections (TOWER) and their rates (tower_fore_aft_rate and so on), then those of ACTUATOR_STATES where
     the plant has them, and last those of a body with radiation memory, radiation_1 and so on.
+
+    All are deviations from the operating point, whose states are `equilibrium` and whose inputs are
+    `equilibrium_inputs`; state() makes them from what is measured. Velocities (vx to wz) are those of the
+    body origin in body axes, the field of a Measurement that each is measured as is in MEASURED_AS.
     """
 
     A: np.ndarray
@@ -98,6 +171,114 @@ class LinearModel:
         return np.array([self.point.state[row_of[n]] if n in row_of else 0.0 for n in self.states])
 
     @property
+    def equilibrium(self):
+        """pandas.Series (m,) of the states at the operating point, by name; units has their units."""
+        import pandas as pd
+
+        return pd.Series(self.x0, index=list(self.states), name="equilibrium")
+
+    @property
+    def equilibrium_inputs(self):
+        """pandas.Series (3,) of the inputs at the operating point, by name; the wind of none is NaN."""
+        import pandas as pd
+
+        torque, blade_pitch = self.point.command[:2]
+        wind = np.nan if self.point.wind_speed is None else self.point.wind_speed
+        return pd.Series([torque, blade_pitch, wind], index=list(self.inputs), name="equilibrium")
+
+    @property
+    def units(self):
+        """{name: unit} of the states, inputs and outputs, SI; "" for those of memory and wake."""
+        known = UNITS | {name: "N" for name in self.outputs if name.startswith("fairlead_tension_")}
+        return {name: known.get(name, "") for name in (*self.states, *self.inputs, *self.outputs)}
+
+    @property
+    def fields(self):
+        """Fields of a Measurement that state() reads: what a controller declares as its information."""
+        return tuple(dict.fromkeys(MEASURED_AS[name] for name in self._observed))
+
+    @property
+    def _observed(self):
+        """The states. Raises: InputError where some are not measured."""
+        hidden = [name for name in self.states if name not in MEASURED_AS]
+        if hidden:
+            raise InputError(
+                f"state: {', '.join(hidden[:4])}{' ...' if len(hidden) > 4 else ''}: are not measured; take"
+                " the model without them (without_memory for radiation and wake, without_inertia for the"
+                " pitch drive, in fowt_env.analysis.reduced_model), or an estimator"
+            )
+        return self.states
+
+    @cached_property
+    def _from_measurement(self):
+        """(places in a Measurement, (m, m) matrix, (m,) equilibrium) of state()."""
+        places = [int(Measure[MEASURED_AS[name].upper()]) for name in self._observed]
+        return places, self._turning(euler=True), self.x0
+
+    @cached_property
+    def _from_frame(self):
+        """(columns of a run's DataFrame, (m, m) matrix times the factors to SI, (m,) equilibrium)."""
+        channels = {channel.name: channel for channel in FIXED_CHANNELS}
+        found = [channels[COLUMNS[name]] for name in self._observed]
+        columns = [channel.column for channel in found]
+        return columns, self._turning(euler=False) / [channel.scale for channel in found], self.x0
+
+    def _turning(self, euler):
+        """(m, m) from what is measured to the states: velocities into body axes at the operating point.
+
+        euler: angular velocities are given as rates of the Euler angles, else by inertial axes.
+        """
+        turn = np.eye(len(self.states))
+        pose = pose_of(self.point.state)
+        body = np.array(
+            [[pose.r11, pose.r12, pose.r13], [pose.r21, pose.r22, pose.r23], [pose.r31, pose.r32, pose.r33]]
+        ).T
+        first, roll, pitch = self.index("vx"), *self.point.state[[State.ROLL, State.PLATFORM_PITCH]]
+        turn[first : first + 3, first : first + 3] = body
+        turn[first + 3 : first + 6, first + 3 : first + 6] = (
+            [
+                [1.0, 0.0, -np.sin(pitch)],
+                [0.0, np.cos(roll), np.sin(roll) * np.cos(pitch)],
+                [0.0, -np.sin(roll), np.cos(roll) * np.cos(pitch)],
+            ]
+            if euler
+            else body
+        )
+        return turn
+
+    def state(self, measured):
+        """(m,) deviation of the states from the operating point, from what is measured.
+
+        measured: a Measurement (a controller has to declare `fields`), or a row of the DataFrame that
+        simulate returns, as a mapping of columns; of a whole DataFrame (rows, m).
+        Velocities are turned into body axes at the operating point's attitude, right to first order.
+        Raises: InputError where the model has states that are not measured, or a column is missing.
+        """
+        if isinstance(measured, Measurement):
+            places, turn, rest = self._from_measurement
+            return turn @ np.array([measured[place] for place in places]) - rest
+        columns, turn, rest = self._from_frame
+        if not isinstance(measured, Mapping) and not hasattr(measured, "loc"):
+            raise InputError(
+                f"state: {type(measured).__name__}: must be a Measurement, or a row or all of a run"
+            )
+        try:
+            values = [np.asarray(measured[column], dtype=float) for column in columns]
+        except KeyError as error:
+            raise InputError(f"state: the row has no column {error}") from None
+        return (turn @ np.array(values)).T - rest
+
+    def discretize(self, dt):
+        """DiscreteModel whose inputs are held over dt (s), by the matrix exponential (zero-order hold).
+
+        Raises: InputError unless dt is positive.
+        """
+        if not is_number(dt) or not dt > 0.0:
+            raise InputError(f"dt = {dt!r}: must be a positive number of seconds")
+        a, b = sampled(self.A, self.B, float(dt))
+        return DiscreteModel(a, b, self.C, self.D, float(dt), self.states, self.inputs, self.outputs)
+
+    @property
     def pitch_rests(self):
         """Whether the blade pitch rests on a limit: below rated, where no controller moves it."""
         drive, pitch = self.scene.turbine.pitch_drive, self.point.state[State.BLADE_PITCH]
@@ -132,20 +313,36 @@ class LinearModel:
                 result[i, :, j] = self.C @ np.linalg.solve(1j * w * eye - self.A, b) + d
         return result
 
-    def to_statespace(self):
+    def to_statespace(self, waves=None, inputs=None, outputs=None, name=None):
         """control.StateSpace with named states, inputs and outputs (SI).
 
-        Its last input, wave_elevation, is the elevation at the hull's mean place wave_filter.lead
-        seconds ahead: the force of waves at depth is not a causal function of the elevation. The states
-        wave_1 ... are those of the filter, whose errors wave_filter.errors lists by band.
-        Raises: InputError that names the extra to install.
+        waves: whether it has the force of waves; None: where the scene has a sea. It then has a last input,
+        wave_elevation, the elevation at the hull's mean place wave_filter.lead seconds ahead: the force of
+        waves at depth is not a causal function of the elevation. The states wave_1 ... are those of the
+        filter, whose errors wave_filter.errors lists by band; no input of the turbine moves them, so design
+        on the model without them.
+        inputs, outputs: names of those to keep, each one or several; None: all. To index a StateSpace of
+        python-control instead keeps them too, but plots then call it "fowt$indexed".
+        name: of the system, in titles of plots; None: "fowt", of a part "INPUTS to OUTPUTS".
+        Raises: InputError for unknown names, and that names the extra to install.
         """
-        try:
-            import control
-        except ImportError as error:
-            raise InputError(
-                f'to_statespace needs python-control ({error}): pip install "fowt-env[design]"'
-            ) from error
+        control = _python_control("to_statespace")
+        if waves is None:
+            waves = sea_state_of(self.scene.sea).height > 0.0
+        a, b, c, d, states = self._with_waves() if waves else (self.A, self.B, self.C, self.D, self.states)
+        every = (*self.inputs, "wave_elevation") if waves else self.inputs
+        into, out = chosen("input", inputs, every), chosen("output", outputs, self.outputs)
+        if name is None:
+            whole = inputs is None and outputs is None
+            name = "fowt" if whole else f"{', '.join(into)} to {', '.join(out)}"
+        columns, rows = [every.index(i) for i in into], [self.outputs.index(o) for o in out]
+        return control.ss(
+            a, b[:, columns], c[rows], d[np.ix_(rows, columns)], states=list(states), inputs=list(into),
+            outputs=list(out), name=name,
+        )  # fmt: skip
+
+    def _with_waves(self):
+        """(A, B, C, D, states) with the wave filter behind the plant and the elevation as last input."""
         waves = self.wave_filter
         n, m = len(self.states), waves.B.size
         a = np.zeros((n + m, n + m))
@@ -154,16 +351,18 @@ class LinearModel:
         b[:n, :-1], b[n:, -1] = self.B, waves.B
         c = np.hstack([self.C, self.F @ waves.C])
         d = np.hstack([self.D, np.zeros((len(self.outputs), 1))])
-        return control.ss(
-            a,
-            b,
-            c,
-            d,
-            states=[*self.states, *(f"wave_{i + 1}" for i in range(m))],
-            inputs=[*self.inputs, "wave_elevation"],
-            outputs=list(self.outputs),
-            name="fowt",
-        )
+        return a, b, c, d, (*self.states, *(f"wave_{i + 1}" for i in range(m)))
+
+
+def chosen(kind, names, known):
+    """Tuple of names, one or several given, all known ones for None. Raises: InputError for unknown ones."""
+    if names is None:
+        return tuple(known)
+    names = (names,) if isinstance(names, str) else tuple(names)
+    for name in names:
+        if name not in known:
+            raise unknown(kind, name, known)
+    return names
 
 
 def plant_states(scene):

@@ -1,10 +1,19 @@
 """Gymnasium environments of fowt_env, their tasks, and their tables."""
 
 from fowt_env.envs.env import FowtEnv
-from fowt_env.envs.safety import SafetyLayer
+from fowt_env.envs.safety import SafetyCosts, SafetyLayer
 from fowt_env.envs.snapshot import Snapshot
 from fowt_env.envs.tables import task_tables
 from fowt_env.envs.tasks import TASKS, Task
 from fowt_env.envs.vector_env import FowtVectorEnv
 
-__all__ = ["TASKS", "FowtEnv", "FowtVectorEnv", "SafetyLayer", "Snapshot", "Task", "task_tables"]
+__all__ = [
+    "TASKS",
+    "FowtEnv",
+    "FowtVectorEnv",
+    "SafetyCosts",
+    "SafetyLayer",
+    "Snapshot",
+    "Task",
+    "task_tables",
+]

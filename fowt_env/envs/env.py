@@ -1,9 +1,9 @@
 """The Gymnasium environment: a task, a scene and the compiled control period, glued together."""
 
 import inspect
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import contextmanager
-from copy import copy, deepcopy
+from copy import deepcopy
 from dataclasses import replace
 from math import pi
 from pathlib import Path
@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import gymnasium
 import numpy as np
 import numpy.typing as npt
-from gymnasium.error import ResetNeeded
+from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 
 from fowt_env.analysis.trim_cache import cached_trim, interpolated_trim, plant_key
 from fowt_env.control import (
@@ -60,13 +60,15 @@ from fowt_env.envs.rewards import (
     REWARD_TERMS,
     Reference,
     build_scales,
+    check_own_reward,
     check_weights,
+    paid,
     weight_array,
 )
 from fowt_env.envs.sensors import check_sensors, draw_sensors, reading_scales
 from fowt_env.envs.snapshot import CARRIED, DATA_CARRIED, Snapshot
 from fowt_env.envs.tables import task_tables
-from fowt_env.envs.tasks import TASKS, Episode, Task, check_offset, task_of
+from fowt_env.envs.tasks import TASKS, Episode, Task, draw_offsets, draw_weather, is_mixture, task_of, varies
 from fowt_env.errors import InputError, unknown
 from fowt_env.initial_conditions import INITIAL
 from fowt_env.plant.channels import DEG_PER_RAD
@@ -78,7 +80,6 @@ from fowt_env.plant.sensing import new_past
 from fowt_env.plant.state import N_COMMANDS, Command, State
 from fowt_env.scene.actuators import rest_actuators
 from fowt_env.scene.build import build_scene
-from fowt_env.scene.channel_names import channel_name
 from fowt_env.scene.options import OPTIONS
 from fowt_env.scene.scene import Scene
 from fowt_env.simulation import check_duration, steps_in
@@ -86,9 +87,14 @@ from fowt_env.weather.preview import exact_preview
 
 SMALL_SEA = {"kind": "regular", "H": 1e-3, "T": 10.0}  # of a scene whose first draw happens to have no waves
 SHORTEST_WEATHER = 600.0  # s of random wind and sea: turbulence intensity is defined over 10 min
+CLOSED = "the environment was closed: make another"
 StepResult = tuple[np.ndarray, float, bool, bool, dict[str, Any]]
 REFERENCE_SHUTDOWN = Reference._fields.index("shutdown")
 REWARD_KEYS = tuple(f"reward/{name}" for name in REWARD_TERMS)
+# attributes that hold what a kernel reads and writes: made anew in a copy, and filled from a Snapshot
+COMPILED = (
+    "_view", "_baseline", "_estimator", "_baseline_law", "_estimator_law", "_config", "_episode", "_handle",
+)  # fmt: skip
 
 
 class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
@@ -104,7 +110,9 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     baseline      compiled controller, by name, that the residual mode adds to; lqr goes on from the sum, so
                   that what is added in every period is an addition to its rates
     observation   channel names in place of the task's; "default" among them stands for the task's
-    reward        {term: weight} in place of single weights of the task
+    reward        {term: weight} in place of single weights of the task, or a function (info, measurement)
+                  that returns it, from the info of the step, with each named term, and the Measurement
+                  at its end (SI, true motions)
     dt            physics step, s (None: that of the scene's integrator); control_dt: time between
                   actions, s, a multiple of dt
     duration      s of an episode; None: the task's
@@ -128,7 +136,8 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     Where the mean wind is drawn, the operating point is linear between exact ones 0.25 m/s apart: right
     to 0.05 m of surge and 0.03 deg of blade pitch, in the cells next to rated wind to 0.9 m and 0.6 deg.
     reset(options=...) takes "wind", "sea", "weather_seed", "offsets" and "shutdown" in place of what is
-    drawn; the info of reset has them under "episode", and given as options they replay the episode. Weather
+    drawn, wind, sea and offsets as ranges too, drawn with the environment's generator; the info of reset
+    has what was drawn under "episode", and given as options it replays the episode. Weather
     never compiles anything anew: an environment whose task has a sea takes any sea, None for still water, but
     one built in still water takes none; neither is a box of full-field wind exchanged for another wind. What
     is refused leaves the environment as it was, in its episode.
@@ -140,12 +149,29 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
     An episode is terminated by failure: rotor speed beyond the turbine file's overspeed, capsize
     (platform pitch beyond 80 deg) or a state that is not finite; info["termination"] has the reason. It
-    is truncated at the end of its duration.
+    is truncated at the end of its duration, by the environment itself: how many steps that takes follows from
+    duration and control_dt, so spec.max_episode_steps is None. gymnasium.make(..., max_episode_steps=n) ends
+    episodes earlier.
 
     In a task with `shutdown` the baseline operates the turbine, within reset, for the time that is drawn. The
     episode begins where the stop is signalled; its duration counts the operation too.
 
     A picture shows one control period, so that 30 of them a second are three times real time.
+    gymnasium.make(..., render_mode="rgb_array_list") collects them.
+
+    copy.deepcopy and pickle give an independent environment in the same instant: both then give the same bits
+    for the same actions, and the same episodes after them. A copy shares what is never written, such as the
+    scene; a pickle holds it (some 13 MB at fidelity "standard", most of it the rotor's table). A window of
+    render mode "human" and the traces of pictures so far stay with the original.
+
+    Plants that differ between environments (domain randomisation) are settings: platform, turbine, sensors,
+    with nominal_plant for what controllers know. fowt_env.training.rl.randomisation.randomised draws lists of
+    such settings of OC3-Hywind from named distributions, for gymnasium.make(name, **settings) or
+    make_vec(name, n, per_env=list).
+
+    Constraints and several objectives: SafetyCosts adds info["cost"] as Safety-Gymnasium has it. The reward
+    vector of MO-Gymnasium is [info["reward/" + term] for term in terms], from a gymnasium.Wrapper whose
+    step returns it and whose reward_space is a Box of the terms' ranges (REWARD_TERMS).
 
     info of each step: "time" (s), "saturated_actions", "torque_limited", "reward/<term>" for each term before
     weighting; at a reset and at the end of an episode "events" too: {name: count} of what the plant met
@@ -164,7 +190,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         action_mode: str = "direct",
         baseline: str = "pi",
         observation: Sequence[str] | None = None,
-        reward: Mapping[str, float] | None = None,
+        reward: Mapping[str, float] | Callable[[dict[str, Any], Measurement], float] | None = None,
         dt: float | None = None,
         control_dt: float = 0.1,
         duration: float | None = None,
@@ -200,6 +226,8 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self._view: Any = None
         turbine = _turbine_of(platform, options.get("turbine"))
         task = task_of(task, turbine)
+        self._own_reward = check_own_reward("reward", reward) if callable(reward) else None
+        reward = None if callable(reward) else reward
         task = _adapted(task, rotor, observation, reward, duration, wind, sea, wind_preview)
         self.task = task
         self.action_mode = action_mode
@@ -246,7 +274,8 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (n_actions(mode),), np.float32)
         low, high = self._config.observation_map.low, self._config.observation_map.high
         self.observation_space = gymnasium.spaces.Box(low.astype(np.float32), high.astype(np.float32))
-        self._running = False
+        self._running, self._closed = False, False
+        self._end = ""  # why the last episode ended, and when
         # what a snapshot must agree with: the same numbers then mean the same
         observed = (self.scene.weather_kind, task.observation, task.wind_preview)
         nominal_key = None if self._nominal is None else plant_key(self._nominal)
@@ -262,11 +291,39 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
     def twin(self) -> "FowtEnv":
         """Another environment of the same settings, before its first reset; shares what is never written."""
-        other = copy(self)
+        other = object.__new__(type(self))
+        other.__dict__.update(self.__dict__)
         other._np_random = other._np_random_seed = None
-        other._running = False
+        other._running, other._closed, other._end = False, False, ""
         other._view = None
         other._build(ACTION_MODES[self.action_mode], self._config.per_control)
+        return other
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What a copy is made from: the attributes less the compiled ones, and a Snapshot."""
+        kept = {name: value for name, value in self.__dict__.items() if name not in COMPILED}
+        return kept | {
+            "_per_control": self._config.per_control,
+            "_snapshot": None if self._handle is None else self.get_state(),
+        }
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Become a copy."""
+        state = dict(state)
+        per_control, snapshot = state.pop("_per_control"), state.pop("_snapshot")
+        self.__dict__.update(state)
+        self._view = None
+        self._build(ACTION_MODES[self.action_mode], per_control)
+        if snapshot is not None:
+            self._restore(snapshot)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> "FowtEnv":
+        """An independent environment in the same instant, which shares what is never written."""
+        for shared in (self.scene, self._nominal, self.task, self._kind, self._sensors, self.observed):
+            memo[id(shared)] = shared
+        other = object.__new__(type(self))
+        memo[id(self)] = other
+        other.__setstate__(deepcopy(self.__getstate__(), memo))
         return other
 
     def _build(self, mode, per_control):
@@ -341,10 +398,16 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         """(observation, info) at the start of a new episode.
 
         options: "wind", "sea", "weather_seed", "offsets" ({channel: added to the operating point}) in
-        place of what is drawn; "exact_start": whether the operating point is exact (it is where the wind
-        is given) or interpolated. Raises: InputError for other keys and values that cannot be used; the
-        environment is then as it was before.
+        place of what is drawn; "exact_start": whether the operating point is exact (it is where one wind
+        is given) or interpolated. wind, sea and offsets may be ranges (low, high), the wind a mixture and the
+        sea {"kind": "joint"}, as in a Task; drawn after what the task draws, with the same generator. A sea
+        that is not given is the task's, for the wind that the task drew.
+
+        Raises: InputError for other keys and values that cannot be used; the environment is then as it was
+        before. ClosedEnvironmentError after close().
         """
+        if self._closed:
+            raise ClosedEnvironmentError(CLOSED)
         with kept_if_refused([self]):
             planned = self._plan(seed, options)
         return self._begin(planned)
@@ -352,7 +415,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     def _plan(self, seed, options):
         """Start of a new episode, drawn with the generator; nothing else changes. Raises as reset."""
         super().reset(seed=seed)
-        episode = _with_options(self.task.draw(self.np_random), options)
+        episode = _with_options(self.task.draw(self.np_random), options, self.np_random)
         scene = self.scene.with_weather(episode.wind, episode.sea, episode.weather_seed)
         check_duration(scene, self.task.duration)
         find = cached_trim if episode.exact_start else interpolated_trim
@@ -363,7 +426,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
     def _begin(self, planned):
         """(observation, info) at the start of the episode that was planned."""
-        self._running = False  # until all of it has worked
+        self._running, self._end = False, ""  # until all of it has worked
         self._enter(planned.scene, planned.nominal)
         run = self._episode
         run.x[:] = planned.state
@@ -421,7 +484,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     def step(self, action: npt.ArrayLike) -> StepResult:
         """(observation, reward, terminated, truncated, info) after one control period."""
         if not self._running:
-            raise ResetNeeded("call reset() first: no episode is running")
+            raise self._standing()
         try:
             requested = np.array(action, dtype=np.float64)  # a copy: steady types, whatever was given
         except (TypeError, ValueError):
@@ -433,6 +496,14 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             raise InputError(f"action = {action!r}: must be finite")
         return self._result(status, reward)
 
+    def _standing(self):
+        """The error of a step without a running episode."""
+        if self._closed:
+            return ClosedEnvironmentError(CLOSED)
+        if self._end:
+            return ResetNeeded(f"{self._end}: call reset()")
+        return ResetNeeded("call reset() first: no episode is running")
+
     def step_physical(self, torque: float, *blade_pitch: float) -> StepResult:
         """As step, under a generator torque (N m) and blade pitch (rad), applied as simulate does.
 
@@ -440,7 +511,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         follow it as far as their limits allow.
         """
         if not self._running:
-            raise ResetNeeded("call reset() first: no episode is running")
+            raise self._standing()
         command = np.empty(self._episode.u.shape)
         if len(blade_pitch) not in (1, command.size - 1):
             many = "one" if command.size == N_COMMANDS else f"one, or {command.size - 1}"
@@ -465,10 +536,23 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             info["termination"] = self._reason(status)
         if terminated or truncated:
             info["events"] = self._events()
-            self._running = False
+            self._finish(status)
+        if self._own_reward is not None:
+            reward = self._own(info)
         if self.render_mode == "human":
             self.render()
         return run.observation.copy(), reward, terminated, truncated, info
+
+    def _finish(self, status):
+        """End the episode; says why and when in what a further step raises."""
+        self._running = False
+        # the words before the explanation in brackets
+        why = "end of its duration" if status == RUNNING else self._reason(status).partition(" (")[0]
+        self._end = f"the episode ended ({why}) at {self._episode.counts[STEP] * self.dt:.1f} s"
+
+    def _own(self, info):
+        """Reward of the user's function for the step of this info."""
+        return paid(self._own_reward, info, self.true_measurement())
 
     def _reason(self, status):
         """Why an episode was terminated, with the user load that caused it, if one did."""
@@ -491,11 +575,19 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         found = [getattr(run, name) for name in CARRIED] + [getattr(run.data, name) for name in DATA_CARRIED]
         arrays = [None if array is None else array.copy() for array in found]
         generator = None if self._np_random is None else self._np_random.bit_generator.state
-        return Snapshot(self._kind, self.scene, tuple(arrays), self._running, generator, self._np_random_seed)
+        return Snapshot(
+            self._kind, self.scene, tuple(arrays), self._running, generator, self._np_random_seed, self._end
+        )
 
     def set_state(self, snapshot: Snapshot) -> None:
         """Go on from a Snapshot. Raises: InputError for one from an environment of other settings."""
+        if self._closed:
+            raise ClosedEnvironmentError(CLOSED)
         self._check_snapshot(snapshot)
+        self._restore(snapshot)
+
+    def _restore(self, snapshot):
+        """Go on from a Snapshot of these settings."""
         if snapshot.scene is not self.scene or self._handle is None:
             self._enter(snapshot.scene, self._nominal_in(snapshot.scene))
         run, data = self._episode, self._episode.data
@@ -506,7 +598,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
                 array[:] = saved
         for name in DATA_CARRIED:
             getattr(data, name)[:] = next(arrays)
-        self._running = snapshot.running
+        self._running, self._end = snapshot.running and not self._closed, snapshot.end
         if snapshot.generator is None:
             self._np_random = None
         else:
@@ -571,6 +663,16 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         time, values = self._foresee(self.scene, tuple(preview_times))
         return whole_view(reading, [float(np.interp(reading[0], time, row)) for row in values])
 
+    def true_measurement(self) -> Measurement:
+        """Measurement of all fields now (SI), of the true motions whatever the sensors show.
+
+        Where every blade has a pitch of its own it has blades, a BladeMeasurement.
+        """
+        if self._handle is None:
+            raise ResetNeeded("call reset() first: nothing has been measured yet")
+        values = self._episode.measurement.tolist()
+        return whole_view(values) if self.individual else Measurement(*values)
+
     @property
     def design_scene(self) -> Scene:
         """Scene that controllers may be designed on: the nominal plant, else the true one."""
@@ -597,8 +699,13 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         Without a render mode it warns, as Gymnasium's own environments do, and returns None.
         """
         if self.render_mode is None:
-            gymnasium.logger.warn("render() needs a render_mode: FowtEnv(..., render_mode='rgb_array')")
+            gymnasium.logger.warn(
+                "render() needs a render_mode: gymnasium.make(..., render_mode='rgb_array'),"
+                " or 'rgb_array_list' or 'human'"
+            )
             return None
+        if self._closed:
+            raise ClosedEnvironmentError(CLOSED)
         from fowt_env.visual.rendering import View
 
         row = self.channels()
@@ -613,7 +720,8 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         return None
 
     def close(self) -> None:
-        """Close the window of render mode "human"."""
+        """Close the window of render mode "human"; reset and step then raise ClosedEnvironmentError."""
+        self._running, self._closed = False, True
         if self._view is not None:
             self._view.close()
             self._view = None
@@ -736,14 +844,14 @@ def _moved(scene, state, command, offsets):
     return x, u
 
 
-def _with_options(drawn, options):
-    """The drawn Episode with what reset's options give in place of it."""
+def _with_options(drawn, options, rng):
+    """The drawn Episode with what reset's options give in place of it, ranges drawn with rng."""
     changes = {}
     for key, value in (options or {}).items():
         if key not in Episode._fields:
             raise unknown("option of reset", key, Episode._fields)
         if key == "offsets":
-            value = {channel_name(name): check_offset(name, offset) for name, offset in value.items()}
+            value = draw_offsets(value, rng)
         if key == "wind":
             value = wind_of(value)
             if value is None:
@@ -752,5 +860,9 @@ def _with_options(drawn, options):
             value = sea_of(value)
         changes[key] = value
     if "wind" in changes:
-        changes.setdefault("exact_start", True)
+        changes.setdefault("exact_start", not varies(changes["wind"]))
+    if any(varies(changes.get(key)) for key in ("wind", "sea")):
+        wind = changes.get("wind", drawn.wind)
+        sea = changes.get("sea", None if is_mixture(wind) else drawn.sea)
+        changes["wind"], changes["sea"] = draw_weather("options", wind, sea, rng)
     return drawn._replace(**changes)

@@ -3,9 +3,10 @@
 To add one: a kernel, a line in REWARD_TERMS and one in fill_terms. reward = sum of weight * term.
 """
 
+import inspect
 from collections.abc import Mapping
 from enum import IntEnum
-from math import exp, hypot, inf, isfinite, log, pi
+from math import exp, hypot, inf, isfinite, log, nan, pi
 from typing import NamedTuple
 
 import numpy as np
@@ -223,6 +224,31 @@ def check_weights(where, weights):
             raise InputError(f"{where}: weight of {name} = {weight!r}: must be a finite number >= 0")
         checked[name] = float(weight)
     return checked
+
+
+def check_own_reward(where, function):
+    """The function of a reward of the user's own. Raises: InputError unless it takes (info, measurement)."""
+    try:
+        inspect.signature(function).bind({}, None)
+    except TypeError as error:
+        raise InputError(f"{where} = {function!r}: must take (info, measurement): {error}") from None
+    except ValueError:  # a builtin that tells nobody what it takes
+        pass
+    return function
+
+
+def paid(function, info, measurement):
+    """The number that a user's function of info and Measurement returns. Raises: InputError for others."""
+    value = function(info, measurement)
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = nan
+    if not isfinite(number):
+        raise InputError(
+            f"reward = {function!r}: returned {value!r} at {measurement.time:g} s: must be a finite number"
+        )
+    return number
 
 
 def weight_array(weights):

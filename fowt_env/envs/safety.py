@@ -1,13 +1,53 @@
-"""A guard over an agent: a known controller takes over where rotor or platform move too fast."""
+"""Safe learning: costs of passing limits, and a guard that takes over from an agent."""
 
 from math import isfinite, pi
+from typing import Any
 
 import gymnasium
 
 from fowt_env.control import check_pitches, known_scene
-from fowt_env.errors import InputError
+from fowt_env.descriptions.checks import is_number
+from fowt_env.errors import InputError, unknown
+from fowt_env.plant.measurement import Measure, Measurement
 
 AHEAD = 1.0  # s: the rotor speed is checked where it will be, since feathering takes its time
+
+
+class SafetyCosts(gymnasium.Wrapper):
+    """FowtEnv whose info says which limits each step passed, in the convention of Safety-Gymnasium.
+
+    env       a FowtEnv, wrapped or not
+    limits    {field of Measurement: the largest absolute value that costs nothing, SI}, as rotor_speed=1.4
+              (rad/s), platform_pitch=0.1 (rad), nacelle_acceleration=2.0 (m/s2)
+
+    info of each step has "cost_<field>" of each limit, 1.0 where the true motion at the end of the step is
+    beyond it and else 0.0, and "cost", their sum. The reward is left as it is.
+
+    Raises: InputError for unknown fields and limits that are not positive numbers.
+    """
+
+    def __init__(self, env: gymnasium.Env, **limits: float) -> None:
+        super().__init__(env)
+        if not limits:
+            raise InputError("SafetyCosts: give a limit, such as rotor_speed=1.4 (rad/s)")
+        known = [name for name in Measurement._fields if name != "time"]
+        for name, limit in limits.items():
+            if name not in known:
+                raise unknown("limit of SafetyCosts", name, known)
+            if not is_number(limit) or not limit > 0.0:
+                raise InputError(f"{name} = {limit!r}: must be a finite number above 0")
+        self.limits = {name: float(limit) for name, limit in limits.items()}
+
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """As the environment's, with the costs in info."""
+        result = self.env.step(action)
+        reached = self.env.unwrapped.true_measurement()  # type: ignore[attr-defined] # of a FowtEnv
+        costs = {
+            f"cost_{name}": float(abs(reached[Measure[name.upper()]]) > limit)
+            for name, limit in self.limits.items()
+        }
+        result[-1].update(costs, cost=sum(costs.values()))
+        return result
 
 
 class SafetyLayer(gymnasium.Wrapper):

@@ -24,3 +24,4 @@ class Snapshot(NamedTuple):
     running: bool
     generator: Mapping[str, Any] | None  # state of the random generator; None before the first draw
     seed: int | None  # that the generator was made from
+    end: str = ""  # why and when the episode ended

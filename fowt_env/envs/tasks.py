@@ -88,7 +88,7 @@ class Task:
             set_field(self, "shutdown", _range(f"{where}: shutdown", self.shutdown, 0.0, self.duration))
         for name in set(self.observation) & set(STOP_CHANNELS) if self.shutdown is None else ():
             raise InputError(f"{where}: observation: {name!r}: needs a task with shutdown")
-        if _is_mixture(self.wind):
+        if is_mixture(self.wind):
             set_field(self, "wind", _check_mixture(where, self.wind, self.sea))
         set_field(self, "wind", wind_of(self.wind))
         set_field(self, "sea", sea_of(self.sea))
@@ -98,16 +98,11 @@ class Task:
     @property
     def weathers(self):
         """Tuple of (share, wind, sea) that an episode draws from; one alone where wind is no mixture."""
-        return self.wind if _is_mixture(self.wind) else ((1.0, self.wind, self.sea),)
+        return self.wind if is_mixture(self.wind) else ((1.0, self.wind, self.sea),)
 
     def draw(self, rng):
         """Episode drawn with a numpy Generator; the same generator state gives the same episode."""
-        chosen = self.weathers
-        i = 0
-        if len(chosen) > 1:
-            shares = np.array([share for share, _, _ in chosen])
-            i = int(rng.choice(len(chosen), p=shares / shares.sum()))
-        wind, sea = _weather(*chosen[i][1:], lambda low, high: float(rng.uniform(low, high)))
+        wind, sea = _drawn(self.weathers, rng)
         seed = int(rng.integers(*self.weather_seeds))
         offsets = {name: float(rng.uniform(*bounds)) for name, bounds in self.offsets.items()}
         shutdown = None if self.shutdown is None else float(rng.uniform(*self.shutdown))
@@ -125,6 +120,44 @@ class Task:
             return True
         ends = [_weather(wind, None, pick)[0] for _, wind, _ in self.weathers for pick in (_lowest, _highest)]
         return len({nominal_speed(wind) for wind in ends}) == 1
+
+
+def _drawn(weathers, rng):
+    """(wind, sea) of one of some (share, wind, sea), numbers drawn from its ranges."""
+    i = 0
+    if len(weathers) > 1:
+        shares = np.array([share for share, _, _ in weathers])
+        i = int(rng.choice(len(weathers), p=shares / shares.sum()))
+    return _weather(*weathers[i][1:], lambda low, high: float(rng.uniform(low, high)))
+
+
+def varies(spec):
+    """Whether a wind or sea leaves something to be drawn: a range, a mixture, the sea of a joint table."""
+    if isinstance(spec, dict):
+        if spec.get("kind") in SAMPLED:
+            return False
+        return spec.get("kind") == "joint" or any(isinstance(value, tuple) for value in spec.values())
+    return type(spec) is tuple or (type(spec) is list and is_mixture(spec))  # a WindSeries is a tuple too
+
+
+def draw_weather(where, wind, sea, rng):
+    """(wind, sea) of an episode, drawn from ranges or a mixture with a Generator. Raises: InputError."""
+    weathers = _check_mixture(where, wind, sea) if is_mixture(wind) else ((1.0, wind, sea),)
+    for _, air, water in weathers:
+        _check_weather(where, air, water)
+    return _drawn(weathers, rng)
+
+
+def draw_offsets(offsets, rng):
+    """{channel: offset} of {channel: offset or (low, high)}, in the channels' units. Raises: InputError."""
+    drawn = {}
+    for name, value in {channel_name(name): value for name, value in offsets.items()}.items():
+        if isinstance(value, tuple | list):
+            low, high = _check_offsets("options", {name: value})[name]
+            drawn[name] = float(rng.uniform(low, high))
+        else:
+            drawn[name] = check_offset(name, value)
+    return drawn
 
 
 def _lowest(low, high):
@@ -149,7 +182,7 @@ def _weather(wind, sea, pick):
     return wind, sea
 
 
-def _is_mixture(wind):
+def is_mixture(wind):
     """Whether a wind is a list of weathers: (low, high) holds numbers, a mixture triples."""
     return isinstance(wind, tuple | list) and any(isinstance(entry, tuple | list) for entry in wind)
 
@@ -368,7 +401,7 @@ def scaled_task(task: Task, turbine: Turbine) -> Task:
     if not same:
         speed = turbine.rated_rotor_speed / ROTOR_SPEED
         travel = drive.rate_limit / PITCH_RATE / speed
-        if _is_mixture(task.wind):
+        if is_mixture(task.wind):
             wind = tuple((share, _scaled_wind(air, winds), sea) for share, air, sea in task.wind)
         else:
             wind = _scaled_wind(task.wind, winds)

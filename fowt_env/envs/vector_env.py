@@ -9,11 +9,11 @@ import gymnasium
 import numba
 import numpy as np
 import numpy.typing as npt
-from gymnasium.error import ResetNeeded
+from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
-from fowt_env.envs.env import REWARD_KEYS, FowtEnv, kept_if_refused
+from fowt_env.envs.env import CLOSED, REWARD_KEYS, FowtEnv, kept_if_refused
 from fowt_env.envs.episode import N_COUNTS, RUNNING, SHOWN_COUNTS, STEP
 from fowt_env.envs.episode_batch import act_all, act_all_parallel, thread_limit
 from fowt_env.envs.rewards import N_TERMS
@@ -24,6 +24,10 @@ from fowt_env.plant.compile.handle import Handle
 AUTORESET_MODES = {mode.value: mode for mode in AutoresetMode}
 INFO_KEYS = (*REWARD_KEYS, "time")  # those of every step that are float64
 INFO_MASKS = tuple(f"_{key}" for key in INFO_KEYS)
+# attributes that a copy makes anew: compiled ones, and rows that it fills from those of its environments
+COMPILED = (
+    "_baseline_law", "_estimator_law", "_observations", "_counts", "_terms", "_handles", "_listed",
+)  # fmt: skip
 
 
 class FowtVectorEnv(gymnasium.vector.VectorEnv):
@@ -38,7 +42,9 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
     threads          of the compiled call; None: as many as numba uses, at most num_envs
     per_env          settings of single environments: num_envs dicts that are put over the common settings.
                      All environments must have the same spaces and the same loads (one compiled kind):
-                     wind, sea, platform, turbine, task and reward may differ, rotor and options seldom
+                     wind, sea, platform, turbine, task and reward may differ, rotor and options seldom.
+                     Domain randomisation, with fowt_env.training.rl.randomisation.randomised:
+                     gymnasium.make_vec(name, n, per_env=randomised({"plants": 8}, n, seed))
     settings         of all environments, see FowtEnv
 
     One environment of the batch gives the same bits as a FowtEnv with its seed and its actions, whatever
@@ -49,6 +55,10 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
     episode as options of a reset.
 
     envs are the single environments; what moves one of them on its own must go through call().
+
+    A reward that is a function is called in Python for one environment after the other, some 5 microseconds
+    each beside its own time. copy.deepcopy and pickle give an independent batch that goes on from here, as of
+    a FowtEnv.
 
     An action that is not finite is refused for all before any environment moves.
     """
@@ -94,8 +104,29 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         self._last = np.array([env._last for env in self.envs])
         self._dt = np.array([env.dt for env in self.envs])
         self._ended = np.zeros(num_envs, dtype=bool)  # waiting for the reset of the next step
+        self._own_rewards = [i for i, env in enumerate(self.envs) if env._own_reward is not None]
         self._handles = None
         self._listed = [None] * num_envs  # handles in the compiled list, for comparison
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What a copy is made from: the attributes less what is compiled and the rows."""
+        return {name: value for name, value in self.__dict__.items() if name not in COMPILED}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Become a copy."""
+        self.__dict__.update(state)
+        first = self.envs[0]
+        self._baseline_law, self._estimator_law = first._baseline_law, first._estimator_law
+        filled = [(e._episode.observation, e._episode.counts, e._episode.terms) for e in self.envs]
+        self._share_rows()
+        self._handles, self._listed = None, [None] * self.num_envs
+        for i, (observation, counts, terms) in enumerate(filled):
+            self._observations[i], self._counts[i], self._terms[i] = observation, counts, terms
+            env = self.envs[i]
+            if env._handle is not None:
+                env._handle = Handle(env._config, env._episode)
+                if not self.closed:
+                    self._renew(i)
 
     def _share_rows(self):
         """Make the arrays that the outside reads rows of common ones."""
@@ -117,7 +148,10 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         """(observations, infos) at the start of new episodes, of all or of options["reset_mask"] (n,) bool.
 
         Raises: InputError, also for what FowtEnv.reset refuses; all are then as they were before.
+        ClosedEnvironmentError after close().
         """
+        if self.closed:
+            raise ClosedEnvironmentError(CLOSED)
         n = self.num_envs
         if seed is None or isinstance(seed, int | np.integer):
             seeds = [None if seed is None else int(seed) + i for i in range(n)]
@@ -188,10 +222,15 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """(observations, rewards, terminations, truncations, infos) after one control period of each."""
         if self._handles is None:
+            if self.closed:
+                raise ClosedEnvironmentError(CLOSED)
             raise ResetNeeded("call reset() first: no episode is running")
         resets = self._ended.nonzero()[0]
         if len(resets) and self.autoreset_mode == AutoresetMode.DISABLED:
-            raise ResetNeeded(f"environment {resets[0]} has ended: reset it with options['reset_mask']")
+            i = int(resets[0])
+            raise ResetNeeded(
+                f"environment {i}: {self.envs[i]._end}: call reset(options={{'reset_mask': ...}})"
+            )
         active = ~self._ended
         self._act(actions, active)
         statuses = self._statuses
@@ -205,9 +244,12 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         ended = terminations | truncations
         infos = {}
         over = ended.any()
+        for i in self._own_rewards:
+            if active[i]:
+                rewards[i] = self.envs[i]._own(self.last_info(i))
         if over:
             for i in np.flatnonzero(ended):
-                self.envs[i]._running = False
+                self.envs[i]._finish(statuses[i])
             if self.autoreset_mode == AutoresetMode.SAME_STEP:
                 infos = self._finals(ended)
                 active &= ~ended
@@ -305,6 +347,12 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
             env.set_state(snapshot)
             self._ended[i] = not snapshot.running
             self._renew(i)
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Close the environments; reset and step then raise ClosedEnvironmentError."""
+        self._handles = None
+        for env in self.envs:
+            env.close()
 
     def call(
         self, name: str, *args: Any, indices: Sequence[int] | None = None, **kwargs: Any

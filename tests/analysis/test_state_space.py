@@ -53,7 +53,7 @@ def test_small_steps_move_the_nonlinear_plant_as_predicted(model, number, change
     inputs = np.zeros((4, time.size))
     inputs[number] = change
     row = model.output_index(output)
-    predicted = control.forced_response(model.to_statespace(), time, inputs).outputs[row]
+    predicted = control.forced_response(model.to_statespace(waves=True), time, inputs).outputs[row]
     miss, size = np.abs(found - np.asarray(predicted)), np.abs(np.asarray(predicted))
     assert miss.max() < 0.03 * size.max()
 
@@ -63,7 +63,7 @@ def test_the_wave_filter_gives_the_exact_response_within_its_stated_error(model,
     control = pytest.importorskip("control")
     omega = 2.0 * np.pi / period
     exact = model.response([omega], ("wave_elevation",))[0, :, 0]
-    fitted = control.frequency_response(model.to_statespace(), [omega]).complex[:, 3, 0]
+    fitted = control.frequency_response(model.to_statespace(waves=True), [omega]).complex[:, 3, 0]
     fitted = fitted * np.exp(1j * omega * model.wave_filter.lead)
     for name in ("surge", "platform_pitch"):
         i = model.output_index(name)

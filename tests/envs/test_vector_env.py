@@ -131,11 +131,13 @@ def test_disabled_autoreset_leaves_the_resets_to_the_caller():
     for row in actions(2, 3):
         observations, _, _, truncated, _ = env.step(row)
     assert truncated.all()
-    with pytest.raises(ResetNeeded, match="environment 0 has ended"):
+    with pytest.raises(
+        ResetNeeded, match=r"environment 0: the episode ended \(end of its duration\) at 0\.2"
+    ):
         env.step(np.zeros((3, 2)))
     kept, _ = env.reset(options={"reset_mask": np.array([True, False, True])})
     assert np.array_equal(kept[1], observations[1]) and not np.array_equal(kept[0], observations[0])
-    with pytest.raises(ResetNeeded, match="environment 1 has ended"):
+    with pytest.raises(ResetNeeded, match="environment 1: the episode ended"):
         env.step(np.zeros((3, 2)))
     for mask in (np.zeros(3, dtype=bool), np.ones(2, dtype=bool), [True] * 3, np.ones(3)):
         with pytest.raises(InputError, match="reset_mask"):

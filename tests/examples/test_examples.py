@@ -27,6 +27,7 @@ CLAIMS = {  # example: what its output must match, and the files it must write
     "13_resume": (r"called again: 2 runs made, 4 in the table(.|\n)*resumed: finished", ["resume"]),
     "14_tune": (r"least mean of both deviations: omega 0\.(12|2) rad/s", []),
     "15_record_video": (r"200 pictures of 960 x 640\nwrote ", ["video"]),
+    "17_state_feedback": (r"stable: True(.|\n)*state_feedback +rotor speed std 0\.[0-4]", []),
     "16_what_if": (r"same bits\nreward of an episode", []),
 }
 NEEDS = {  # example: modules without which its claims are not met
@@ -35,6 +36,7 @@ NEEDS = {  # example: modules without which its claims are not met
     "12_ray": ("ray",),
     "13_resume": ("stable_baselines3", "matplotlib"),
     "15_record_video": ("pygame", "moviepy"),
+    "17_state_feedback": ("control",),
 }
 SLOW = ("12_ray", "13_resume")  # they start Ray, and torch
 TRAINED = "10_train_small_agent"  # takes minutes: tests/examples has its test
@@ -91,6 +93,16 @@ def test_a_look_ahead_pays(tmp_path, monkeypatch, capsys):
         r"PI alone (-?[0-9.]+), with a look ahead (-?[0-9.]+)", capsys.readouterr().out
     ).groups()
     assert float(planned) > float(alone)
+
+
+def test_an_lqr_beats_the_reference_in_rotor_speed_and_platform_pitch(tmp_path, monkeypatch, capsys):
+    pytest.importorskip("control")
+    monkeypatch.chdir(tmp_path)
+    runpy.run_path(str(FOLDER / "17_state_feedback.py"), run_name="__main__")
+    shown = capsys.readouterr().out
+    rows = re.findall(r"rotor speed std ([0-9.]+) rpm, platform pitch std ([0-9.]+) deg", shown)
+    (speed, tilt), (own_speed, own_tilt) = [tuple(map(float, row)) for row in rows]
+    assert own_speed < 0.6 * speed and own_tilt < 0.8 * tilt
 
 
 def test_without_its_library_an_example_says_what_to_install(tmp_path, monkeypatch, capsys):

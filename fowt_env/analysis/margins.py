@@ -1,0 +1,285 @@
+"""Stability margins of a linear model under a linear controller, with the loop broken at the plant's input.
+
+With G from the inputs that the controller moves to what it reads, and its law u = K y, the sensitivity there
+is S = (I - K G)^-1 and the loop transfer L = -K G. An input that is broken alone, the others closed, has
+1 + L_i = 1/S_ii. Sources: Skogestad and Postlethwaite, Multivariable Feedback Control, 2nd ed. (2005),
+sections 2.4 and 6.2 (margins, peak of S); Seiler, Packard and Gahinet, An introduction to disk margins, IEEE
+Control Systems 40(5), 2020.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import atan, degrees, inf, pi
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.optimize import brentq, minimize_scalar
+
+from fowt_env.analysis.linear_model import LinearModel, chosen
+from fowt_env.errors import InputError
+
+MOVED = ("generator_torque", "blade_pitch_command")  # inputs that a controller may move
+LOWEST, HIGHEST = 1e-4, 1e3  # rad/s, of the search
+PER_DECADE = 400  # frequencies; about each pole there are more
+AROUND_POLE = np.linspace(-4.0, 4.0, 41)  # in units of its real part
+TOLERANCE = 1e-10  # rad/s over rad/s, of a crossing
+
+
+class LinearLaw(NamedTuple):
+    """dx/dt = A x + B y, u = C x + D y: a controller that reads y and moves inputs u of the plant."""
+
+    A: np.ndarray  # (n, n)
+    B: np.ndarray  # (n, r)
+    C: np.ndarray  # (m, n)
+    D: np.ndarray  # (m, r)
+    outputs: tuple[str, ...]  # (r) that it reads: outputs or states of the LinearModel
+    inputs: tuple[str, ...]  # (m) of the LinearModel that it moves
+
+
+class LoopMargins(NamedTuple):
+    """Margins of one input, broken alone, the others closed; inf where no frequency limits it."""
+
+    gain: float  # smallest factor above 1 on the loop's gain that makes it unstable
+    gain_reduction: float  # largest factor below 1 that does; 0: none
+    phase: float  # deg of lag or lead, whichever is less, that make it unstable
+    delay: float  # s that make it unstable
+    modulus: float  # least |1 + L|: distance of the Nyquist curve from -1
+    gain_frequency: float  # rad/s, of each
+    gain_reduction_frequency: float
+    phase_frequency: float
+    delay_frequency: float
+    modulus_frequency: float
+
+
+@dataclass(frozen=True)
+class Margins:
+    """What margins() returns."""
+
+    stable: bool  # the closed loop; where it is not, the rest says what separates it from another state
+    loops: dict[str, LoopMargins]  # by input
+    sensitivity_peak: float  # Ms: largest singular value of S over frequency, inputs scaled as by least_size
+    peak_frequency: float  # rad/s
+    disk: float  # alpha: radius of the symmetric disk margin, 1 over the largest singular value of (S - T)/2
+
+    @property
+    def modulus(self) -> float:
+        """1/Ms, for one input the least distance of the Nyquist curve from -1."""
+        return 1.0 / self.sensitivity_peak
+
+    @property
+    def gain(self) -> float:
+        """Smallest gain margin of the inputs, each broken alone."""
+        return min(loop.gain for loop in self.loops.values())
+
+    @property
+    def phase(self) -> float:
+        """Smallest phase margin (deg) of the inputs, each broken alone."""
+        return min(loop.phase for loop in self.loops.values())
+
+    @property
+    def disk_gain(self) -> tuple[float, float]:
+        """(low, high) factors that all inputs may have at once, each its own."""
+        half = 0.5 * self.disk
+        if half >= 1.0:
+            return 0.0, inf
+        return (1.0 - half) / (1.0 + half), (1.0 + half) / (1.0 - half)
+
+    @property
+    def disk_phase(self) -> float:
+        """Largest phase (deg) that all inputs may have at once, each its own."""
+        return degrees(2.0 * atan(0.5 * self.disk))
+
+
+def linear_law(
+    model: LinearModel,
+    controller: Any,
+    outputs: str | Sequence[str] | None = None,
+    inputs: str | Sequence[str] | None = None,
+) -> LinearLaw:
+    """LinearLaw of a controller in any of its forms, see margins. Raises: InputError."""
+    if isinstance(controller, LinearLaw):
+        return controller
+    known = (*model.outputs, *(name for name in model.states if name not in model.outputs))
+    if all(hasattr(controller, name) for name in ("A", "B", "C", "D", "input_labels", "output_labels")):
+        if getattr(controller, "dt", 0) not in (0, None):
+            raise InputError("controller: is in discrete time; margins are those of a continuous one")
+        read = chosen("output", controller.input_labels if outputs is None else outputs, known)
+        moved = chosen("input", controller.output_labels if inputs is None else inputs, MOVED)
+        matrices = tuple(np.atleast_2d(np.asarray(getattr(controller, n), dtype=float)) for n in "ABCD")
+    elif isinstance(controller, tuple) and len(controller) == 2:
+        read = chosen("output", "generator_speed" if outputs is None else outputs, known)
+        moved = chosen("input", "blade_pitch_command" if inputs is None else inputs, MOVED)
+        proportional, integral = (np.array([[float(value)]]) for value in controller)
+        matrices = (np.zeros((1, 1)), np.ones((1, 1)), integral, proportional)
+    else:
+        try:
+            gain = np.atleast_2d(np.asarray(controller, dtype=float))
+        except (TypeError, ValueError):
+            raise InputError(
+                f"controller = {controller!r}: must be a control.StateSpace, (KP, KI) or a matrix of gains"
+            ) from None
+        read = chosen("output", model.states if outputs is None else outputs, known)
+        moved = chosen(
+            "input", MOVED[-len(gain) :] if inputs is None else inputs,
+            MOVED,
+        )  # fmt: skip
+        matrices = (np.zeros((0, 0)), np.zeros((0, gain.shape[1])), np.zeros((len(gain), 0)), gain)
+    shape = (len(moved), len(read))
+    if matrices[3].shape != shape:
+        raise InputError(
+            f"controller: is {' x '.join(map(str, matrices[3].shape))}: must be {shape[0]} x {shape[1]},"
+            f" from {', '.join(read)} to {', '.join(moved)}"
+        )
+    return LinearLaw(*matrices, outputs=read, inputs=moved)
+
+
+def margins(
+    model: LinearModel,
+    controller: Any,
+    outputs: str | Sequence[str] | None = None,
+    inputs: str | Sequence[str] | None = None,
+) -> Margins:
+    """Margins of a LinearModel under a linear controller, in continuous time.
+
+    controller: the law u = K y of deviations with the sign that it has on the turbine (the gain of an LQR,
+    u = -K x, is given as -K), as
+
+        (KP, KI)             gains of a PI law, by default from generator speed to blade pitch: s, -
+        a matrix (m, r)      gains, by default from all states to the blade pitch, or with m = 2 to generator
+                             torque and blade pitch
+        a control.StateSpace from outputs or states of the model to its inputs, by its labels
+        a LinearLaw
+
+    outputs, inputs: names of what it reads (outputs or states) and moves, in place of these.
+    A controller of a sampled system lags by half its period and by its computation: compare the delay margin.
+    Raises: InputError for names that the model has not, other shapes, and a controller in discrete time.
+    """
+    law = linear_law(model, controller, outputs, inputs)
+    plant = _plant_of(model, law)
+    a = closed_loop(plant, law)
+    sensitivity = _sensitivity(plant, law)
+    poles = np.r_[np.linalg.eigvals(a), np.linalg.eigvals(model.A), np.linalg.eigvals(law.A)]
+    grid = _frequencies(poles)
+    values = sensitivity(grid)
+    eye = np.eye(len(law.inputs))
+
+    def peak(w):
+        return least_size(sensitivity(np.array([w])))[0]
+
+    def skewed(w):
+        return least_size(sensitivity(np.array([w])) - 0.5 * eye)[0]
+
+    most, where = _largest(peak, grid, least_size(values))
+    skew, _ = _largest(skewed, grid, least_size(values - 0.5 * eye))  # (S - T)/2 = S - I/2
+    loops = {}
+    for i, name in enumerate(law.inputs):
+        loops[name] = _loop_margins(
+            lambda w, i=i: 1.0 / sensitivity(np.array([w]))[0, i, i] - 1.0, grid, 1.0 / values[:, i, i] - 1.0
+        )
+    stable = bool(np.linalg.eigvals(a).real.max() < 0.0)
+    return Margins(stable, loops, float(most), float(where), float(1.0 / skew))
+
+
+def least_size(matrices: np.ndarray) -> np.ndarray:
+    """(k,) least of the largest singular values of D M D^-1 over diagonal D, of M (k, m, m) with m = 1 or 2.
+
+    So units of the inputs do not matter, and it is the structured singular value of factors that each input
+    has of its own. Of two inputs the product of the singular values is |det M| whatever D, so that the larger
+    is least where the sum of their squares is: with entries beside the diagonal of the same size.
+    """
+    if matrices.shape[-1] == 1:
+        return np.abs(matrices[:, 0, 0])
+    b, c = matrices[:, 0, 1], matrices[:, 1, 0]
+    size = np.sqrt(np.abs(b) * np.abs(c))
+    scaled = matrices.copy()
+    scaled[:, 0, 1], scaled[:, 1, 0] = size * np.exp(1j * np.angle(b)), size * np.exp(1j * np.angle(c))
+    return np.linalg.norm(scaled, 2, axis=(1, 2))
+
+
+def _plant_of(model, law):
+    """(A, B, C, D) of the model from what the law moves to what it reads."""
+    columns = [model.inputs.index(name) for name in law.inputs]
+    rows, direct = [], []
+    for name in law.outputs:
+        if name in model.outputs:
+            i = model.outputs.index(name)
+            rows.append(model.C[i])
+            direct.append(model.D[i, columns])
+        else:
+            rows.append(np.eye(len(model.states))[model.index(name)])
+            direct.append(np.zeros(len(columns)))
+    return model.A, model.B[:, columns], np.array(rows), np.array(direct)
+
+
+def closed_loop(plant: tuple, law: LinearLaw) -> np.ndarray:
+    """(n + k, n + k) system matrix of a plant (A, B, C, D) and a law that reads its outputs."""
+    a, b, c, d = plant
+    # u = N (Dk C x + Ck xk) with N = (I - Dk D)^-1
+    inverse = np.linalg.inv(np.eye(b.shape[1]) - law.D @ d)
+    by_plant, by_law = inverse @ law.D @ c, inverse @ law.C
+    above = np.hstack([a + b @ by_plant, b @ by_law])
+    return np.vstack([above, np.hstack([law.B @ (c + d @ by_plant), law.A + law.B @ d @ by_law])])
+
+
+def _sensitivity(plant, law):
+    """Function of frequencies (k,) that returns S (k, m, m)."""
+    a, b, c, d = plant
+    m = b.shape[1]
+
+    def response(matrices, s):
+        a, b, c, d = matrices
+        if not len(a):
+            return np.broadcast_to(d, (len(s), *d.shape))
+        left = s[:, None, None] * np.eye(len(a)) - a
+        return c @ np.linalg.solve(left, np.broadcast_to(b, (len(s), *b.shape))) + d
+
+    def sensitivity(omega):
+        s = 1j * np.asarray(omega)
+        return np.linalg.inv(np.eye(m) - response(law[:4], s) @ response((a, b, c, d), s))
+
+    return sensitivity
+
+
+def _frequencies(poles):
+    """Increasing frequencies (rad/s) of the search, closer about each pole."""
+    decades = np.log10(HIGHEST / LOWEST)
+    found = [np.logspace(np.log10(LOWEST), np.log10(HIGHEST), int(decades * PER_DECADE) + 1)]
+    for pole in poles:
+        found.append(abs(pole.imag) + AROUND_POLE * max(abs(pole.real), 1e-9))
+    grid = np.unique(np.concatenate(found))
+    return grid[(grid >= LOWEST) & (grid <= HIGHEST)]
+
+
+def _largest(function: Callable[[float], float], grid, values):
+    """(largest value, frequency) of a function known on a grid, refined about its peak."""
+    k = int(np.argmax(values))
+    low, high = grid[max(k - 1, 0)], grid[min(k + 1, len(grid) - 1)]
+    found = minimize_scalar(
+        lambda w: -function(w), bounds=(low, high), method="bounded", options={"xatol": TOLERANCE * high}
+    )
+    return (-found.fun, found.x) if -found.fun > values[k] else (values[k], grid[k])
+
+
+def _crossings(function, grid, values):
+    """Frequencies at which a real function, known on a grid, changes its sign."""
+    places = np.flatnonzero(np.diff(np.signbit(values)))
+    return [brentq(function, grid[k], grid[k + 1], xtol=TOLERANCE * grid[k], rtol=1e-13) for k in places]
+
+
+def _loop_margins(loop: Callable[[float], complex], grid, values):
+    """LoopMargins of a loop transfer L, a function of frequency with its values on a grid."""
+    gains = []  # (factor, frequency) of each crossing of the negative real axis
+    for w in _crossings(lambda w: loop(w).imag, grid, values.imag):
+        value = loop(w)
+        if value.real < 0.0:
+            gains.append((1.0 / abs(value), w))
+    phases = []  # (lag in (0, 360) deg that puts it at -1, frequency) of each crossing of the unit circle
+    for w in _crossings(lambda w: abs(loop(w)) - 1.0, grid, np.abs(values) - 1.0):
+        phases.append(((degrees(np.angle(loop(w))) + 180.0) % 360.0, w))
+    up = min((g for g in gains if g[0] > 1.0), default=(inf, inf))
+    down = max((g for g in gains if g[0] < 1.0), default=(0.0, 0.0))
+    phase = min(((min(lag, 360.0 - lag), w) for lag, w in phases), default=(inf, inf))
+    delay = min(((lag * pi / 180.0 / w, w) for lag, w in phases), default=(inf, inf))
+    inverse, where = _largest(lambda w: 1.0 / abs(1.0 + loop(w)), grid, 1.0 / np.abs(1.0 + values))
+    found = (up[0], down[0], phase[0], delay[0], 1.0 / inverse, up[1], down[1], phase[1], delay[1], where)
+    return LoopMargins(*(float(value) for value in found))
