@@ -27,6 +27,7 @@ from fowt_env.descriptions.checks import check_number
 from fowt_env.descriptions.faults import BLADE_FAULTS, STOP_FAULTS, Fault, read_faults
 from fowt_env.descriptions.protection import Protection, TripLimit, read_protection
 from fowt_env.descriptions.sensors import SensorChain, sensors_of
+from fowt_env.descriptions.ratings import ratings
 from fowt_env.descriptions.units import RPM
 from fowt_env.errors import (
     ControllerInputError,
@@ -219,7 +220,8 @@ def simulate(
     attrs["torque_limited"]: time (s) for which the generator torque was not the commanded one.
     attrs["tripped"]: time (s) at which the protection stopped the turbine, or None; attrs["trip"]: the trip
     that did, as "overspeed"; attrs["stop"]: "normal" or "emergency" where the turbine was being stopped at
-    the end, by a trip or a fault, else None.
+    the end, by a trip or a fault, else None; attrs["ratings"]: rated rotor speed, overspeed, rated power and
+    rated wind speed of the turbine (descriptions.ratings), which plots mark.
 
     Warns (PlantWarning) once of commands that can hardly be in N m and rad; and at the end of a run whose
     loads were less accurate for its events, whose rotor is beyond the overspeed, or whose torque was limited
@@ -495,6 +497,7 @@ class _Loop:
         frame.attrs["tripped"] = tripped if known else None
         frame.attrs["trip"] = Trip(int(watch[Watch.TRIP])).name.lower() if known else None
         frame.attrs["stop"] = Stop(stop).name.lower() if stop >= 0 else None
+        frame.attrs["ratings"] = ratings(self.scene.turbine)
         return frame
 
     def out_of_bounds(self, attrs):

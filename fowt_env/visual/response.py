@@ -4,18 +4,33 @@ As in time_series.py every function returns a matplotlib Figure and, if given a 
 Needs matplotlib: pip install "fowt-env[plot]".
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from scipy.signal import csd, welch
 
 from fowt_env.errors import InputError
-from fowt_env.visual.style import COLOURS, INK, new_figure, save_figure, style_axes
+from fowt_env.visual.style import (
+    COLOURS,
+    INK,
+    SOFT,
+    UNSCORED,
+    head,
+    line_style,
+    new_figure,
+    save_figure,
+    short_names,
+    style_axes,
+)
 from fowt_env.visual.time_series import TIME, named_runs
 
 WAVE = "Wave1Elev_[m]"
 WIND = "Wind_[m/s]"  # column of `fowt trim --out`
 WHISKERS = (1.0, 99.0)  # percentiles
 HATCHES = ("", "/////", "....", "xxxx")  # of boxes, for each further round of colours
-ENERGETIC = 0.02  # of the peak of the wave spectrum: an RAO is shown where the waves have more
+ENERGETIC = 0.02  # of the peak of the wave spectrum: an RAO is estimated where the waves have more
+COHERENT = 0.5  # above it an RAO is drawn solid
+RAO_RANGE = (0.015, 0.3)  # Hz: from below the resonances of spars and semi-submersibles to the end of waves
 BOXES = (
     ("rotor speed\n(rpm)", "RotSpeed_[rpm]"),
     ("power\n(kW)", "GenPwr_[kW]"),
@@ -33,10 +48,10 @@ SCHEDULE = (
     ("platform pitch (deg)", "PtfmPitch_[deg]"),
 )
 MOTION_CHANNELS = (
-    ("surge\n(m/m)", "PtfmSurge_[m]"),
-    ("heave\n(m/m)", "PtfmHeave_[m]"),
-    ("platform pitch\n(deg/m)", "PtfmPitch_[deg]"),
-    ("fairlead tension\n(kN/m)", "FAIRTEN1_[kN]"),
+    ("surge (m/m)", "PtfmSurge_[m]"),
+    ("heave (m/m)", "PtfmHeave_[m]"),
+    ("platform pitch (deg/m)", "PtfmPitch_[deg]"),
+    ("fairlead tension (kN/m)", "FAIRTEN1_[kN]"),
 )
 
 
@@ -60,13 +75,14 @@ def _shown(panels, frames, what):
     return shown
 
 
-def _legend(figure, axes, labels):
-    """One legend below all panels, where there are names to tell apart."""
-    if any(labels):
-        handles, names = axes.get_legend_handles_labels()
-        figure.legend(
-            handles, names, loc="outside lower center", ncols=min(6, len(names)), fontsize=8, frameon=False
-        )
+def _head(figure, places, names, title):
+    """Title and one legend above all panels, from the handles that any of them has."""
+    texts, handles = short_names(names), {}
+    for axes in places:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            handles.setdefault(label, handle)
+    shown = [name for name in names if name and name in handles]
+    head(figure, title, [handles[name] for name in shown], [texts[name] for name in shown])
 
 
 def plot_boxes(cases, path=None, title=None, skip=0.0):
@@ -111,15 +127,18 @@ def plot_boxes(cases, path=None, title=None, skip=0.0):
         axes.set_ylabel(name, fontsize=8, color=INK)
         named = list(kept) != [""]
         axes.set_xticks(np.arange(len(kept)) if named else [], list(kept) if named else [], fontsize=8)
+        axes.grid(False, axis="x")
+        axes.ticklabel_format(axis="y", useOffset=False)
         axes.set_xlim(-0.6, len(kept) - 0.4)
-    _legend(figure, places[0], labels)
-    if title:
-        figure.suptitle(title, fontsize=11, color=INK)
+    _head(figure, places, labels, title)
     return save_figure(figure, path)
 
 
-def plot_schedule(points, path=None, title=None):
-    """Steady operating points over wind speed, of one table or {label: table} as `fowt trim --out` writes."""
+def plot_schedule(points, path=None, title=None, *, rated_wind=None):
+    """Figure of steady operating points over wind speed, of one table or {label: table} as `fowt trim` writes.
+
+    rated_wind: m/s, marked by a line; None: not marked.
+    """
     tables = points if isinstance(points, dict) else {"": points}
     for label, table in tables.items():
         if WIND not in table.columns or len(table) < 2:
@@ -131,15 +150,30 @@ def plot_schedule(points, path=None, title=None):
             if channel in table.columns:
                 order = np.argsort(table[WIND].to_numpy())
                 line = table[WIND].to_numpy()[order], table[channel].to_numpy()[order]
-                axes.plot(
-                    *line, color=COLOURS[number % len(COLOURS)], linewidth=1.3, marker="o", ms=3, label=label
-                )
+                axes.plot(*line, linewidth=1.3, marker="o", ms=3, label=label, **line_style(number))
+        if rated_wind is not None:
+            axes.axvline(rated_wind, color=SOFT, linewidth=0.9, linestyle=(0, (5, 3)), zorder=1)
         axes.set_title(name, fontsize=9, color=INK, loc="left")
         axes.set_xlabel("wind (m/s)", fontsize=8, color=INK)
-    _legend(figure, places[0], list(tables))
-    if title:
-        figure.suptitle(title, fontsize=11, color=INK)
+        axes.ticklabel_format(axis="y", useOffset=False)
+    if rated_wind is not None:
+        for axes in places[: min(3, len(places))]:
+            axes.annotate(
+                f"rated {rated_wind:g} m/s", (rated_wind, 1.0), xycoords=("data", "axes fraction"),
+                xytext=(3, -8), textcoords="offset points", fontsize=7, color=SOFT,
+            )  # fmt: skip
+    _head(figure, places, list(tables), title)
     return save_figure(figure, path)
+
+
+class _Estimate(NamedTuple):
+    """Welch's estimates of a response to waves, (n,) each."""
+
+    frequency: np.ndarray  # Hz
+    amplitude: np.ndarray  # per metre of wave
+    phase: np.ndarray  # rad in (-pi, pi], by which it leads the wave
+    coherence: np.ndarray
+    energetic: np.ndarray  # whether the waves have energy there
 
 
 def response_operator(frame, channel, skip=0.0, segment=None):
@@ -151,6 +185,13 @@ def response_operator(frame, channel, skip=0.0, segment=None):
     segment: seconds per window; None: an eighth of the record.
     Raises: InputError for a missing channel, a record without waves, or uneven times.
     """
+    found = _estimate(frame, channel, skip, segment)
+    inside = found.energetic
+    return found.frequency[inside], found.amplitude[inside], found.coherence[inside]
+
+
+def _estimate(frame, channel, skip, segment):
+    """_Estimate at all frequencies above zero; arguments and errors as of response_operator."""
     for name in (TIME, WAVE, channel):
         if name not in frame.columns:
             raise InputError(f"response operator: the run has no column {name!r}")
@@ -170,39 +211,74 @@ def response_operator(frame, channel, skip=0.0, segment=None):
     frequency, power = welch(wave, **settings)
     _, answer = welch(motion, **settings)
     _, cross = csd(wave, motion, **settings)
-    inside = power > ENERGETIC * power.max()
     with np.errstate(invalid="ignore", divide="ignore"):
         coherence = np.abs(cross) ** 2 / (power * answer)
-    return frequency[inside], (np.abs(cross) / power)[inside], coherence[inside]
+        amplitude = np.abs(cross) / power
+    found = _Estimate(frequency, amplitude, np.angle(cross), coherence, power > ENERGETIC * power.max())
+    return _Estimate(*(values[1:] for values in found))
 
 
-def plot_raos(runs, path=None, title=None, skip=0.0, segment=None):
-    """Response amplitude operators of motions and tension, estimated from {label: frame} or one frame.
+def wrapped(degrees):
+    """The same angles (n,) in [-180, 180) deg."""
+    return (np.asarray(degrees) + 180.0) % 360.0 - 180.0
 
-    Solid where the coherence is above one half, faint below: there other things than waves move it.
+
+def broken_at_wraps(x, degrees):
+    """(x, wrapped angles, deg) of a line that is interrupted wherever the angle passes +-180 deg."""
+    x, angle = np.asarray(x, dtype=float), wrapped(degrees)
+    jumps = np.flatnonzero(np.abs(np.diff(angle)) > 180.0) + 1
+    return np.insert(x, jumps, np.nan), np.insert(angle, jumps, np.nan)
+
+
+def plot_raos(runs, path=None, title=None, skip=0.0, segment=None, platform_pitch_period=None):
+    """Figure of amplitude, phase and coherence of motions and tension over the waves, from {label: frame}.
+
+    Solid where the waves have energy and the coherence is above one half, faint elsewhere: there other things
+    than waves move it. Phases are those by which a response leads the wave, in [-180, 180) deg. A line marks
+    the platform-pitch resonance if its period is given (s); one frame may stand for {"": frame}.
     """
     runs = named_runs(runs if isinstance(runs, dict) else {"": runs})
     panels = _shown(MOTION_CHANNELS, list(runs.values()), "run")
-    figure, places = _grid(panels, min(2, len(panels)), 4.6, 2.4)
-    for axes, (name, channel) in zip(places, panels, strict=True):
+    figure = new_figure(3.4 * len(panels) + 0.4, 6.4)
+    grid = figure.subplots(3, len(panels), sharex=True, squeeze=False, height_ratios=(2.0, 1.2, 0.8))
+    for column, (name, channel) in enumerate(panels):
+        highest = 0.0
         for number, (label, frame) in enumerate(runs.items()):
             if channel not in frame.columns:
                 continue
-            frequency, amplitude, coherence = response_operator(frame, channel, skip, segment)
-            colour = COLOURS[number % len(COLOURS)]
-            axes.plot(frequency, amplitude, color=colour, linewidth=1.0, alpha=0.3)
-            axes.plot(
-                frequency,
-                np.where(coherence > 0.5, amplitude, np.nan),
-                color=colour,
-                linewidth=1.6,
-                marker=".",
-                label=label,
-            )
-        axes.set_ylabel(name, fontsize=8, color=INK)
-        axes.set_ylim(bottom=0.0)
-        axes.set_xlabel("wave frequency (Hz)", fontsize=8, color=INK)
-    _legend(figure, places[0], list(runs))
-    if title:
-        figure.suptitle(title, fontsize=11, color=INK)
+            found = _estimate(frame, channel, skip, segment)
+            good = found.energetic & (found.coherence > COHERENT)
+            highest = max(highest, found.amplitude[found.energetic].max())
+            style, degrees = line_style(number), np.degrees(found.phase)
+            for kept, look in ((found.energetic, {"lw": 0.9, "alpha": 0.3}), (good, {"lw": 1.5, "label": label})):
+                shown = np.where(kept, found.amplitude, np.nan)
+                grid[0, column].plot(found.frequency, shown, **look, **style)
+                shown = np.where(kept, degrees, np.nan)
+                grid[1, column].plot(*broken_at_wraps(found.frequency, shown), **look, **style)
+            grid[2, column].plot(found.frequency, found.coherence, linewidth=1.1, **style)
+            quiet = ~found.energetic
+        for axes in grid[:, column]:
+            style_axes(axes)
+            axes.fill_between(
+                found.frequency, 0, 1, where=quiet, step="mid", color=UNSCORED, zorder=0, linewidth=0,
+                transform=axes.get_xaxis_transform(),
+            )  # fmt: skip
+            if platform_pitch_period is not None:
+                axes.axvline(1.0 / platform_pitch_period, color=SOFT, linewidth=0.9, linestyle="--", zorder=1)
+        grid[0, column].set_title(name, fontsize=9, color=INK, loc="left")
+        grid[0, column].set_ylim(0.0, 1.08 * highest)
+        grid[1, column].set_ylim(-180.0, 180.0)
+        grid[1, column].set_yticks(range(-180, 181, 90))
+        grid[2, column].set_ylim(0.0, 1.0)
+        grid[2, column].set_xlabel("frequency (Hz)", fontsize=8, color=INK)
+    for axes, text in zip(grid[:, 0], ("amplitude", "phase (deg)", "coherence"), strict=True):
+        axes.set_ylabel(text, fontsize=8.5, color=INK)
+    grid[0, 0].set_xlim(*RAO_RANGE)
+    if platform_pitch_period is not None:
+        grid[0, 0].annotate(
+            "platform-pitch resonance", (1.0 / platform_pitch_period, 0.02), xycoords=("data", "axes fraction"),
+            xytext=(3, 0), textcoords="offset points", fontsize=7, color=SOFT, rotation=90,
+        )  # fmt: skip
+    figure.align_ylabels(grid[:, 0])
+    _head(figure, grid[0], list(runs), title or "Response per metre of wave amplitude (grey: waves without energy)")
     return save_figure(figure, path)

@@ -8,8 +8,20 @@ import numpy as np
 from scipy.signal import welch
 
 from fowt_env.descriptions.checks import check_number
+from fowt_env.descriptions.ratings import OVERSPEED, RATED_POWER, RATED_SPEED
 from fowt_env.errors import InputError
-from fowt_env.visual.style import COLOURS, INK, new_figure, save_figure, style_axes
+from fowt_env.visual.style import (
+    FAINT,
+    INK,
+    SOFT,
+    UNSCORED,
+    head,
+    line_style,
+    new_figure,
+    save_figure,
+    short_names,
+    style_axes,
+)
 
 TIME = "Time_[s]"
 
@@ -19,15 +31,23 @@ PANELS = (
     ("wave\n(m)", "Wave1Elev_[m]"),
     ("rotor speed\n(rpm)", "RotSpeed_[rpm]"),
     ("blade pitch\n(deg)", "BldPitch1_[deg]"),
+    ("generator\ntorque (kN m)", "GenTq_[kN-m]"),
     ("power\n(kW)", "GenPwr_[kW]"),
     ("platform pitch\n(deg)", "PtfmPitch_[deg]"),
     ("surge\n(m)", "PtfmSurge_[m]"),
     ("fairlead\ntension (kN)", "FAIRTEN1_[kN]"),
 )
+MARKED = {  # channel: lines across its panel, as (text, rating)
+    "RotSpeed_[rpm]": (("rated", RATED_SPEED), ("trip", OVERSPEED)),
+    "GenPwr_[kW]": (("rated", RATED_POWER),),
+}
+STEADY = 1e-6  # of its mean: what varies less is shown as constant
 SPECTRA = (
+    ("wind", "Wind1VelX_[m/s]", "(m/s)"),
     ("wave elevation", "Wave1Elev_[m]", "m"),
     ("platform pitch", "PtfmPitch_[deg]", "deg"),
     ("rotor speed", "RotSpeed_[rpm]", "rpm"),
+    ("tower-base moment", "TwrBsMyt_[kN-m]", "(kN m)"),
 )
 
 
@@ -42,54 +62,104 @@ def named_runs(runs):
 
 
 def _lines(runs, channel):
-    """[(legend text, colour, frame)] of a channel; one line for all where the runs agree (the weather)."""
-    name = channel.split("_[")[0]
+    """[(label, style, frame)] of a channel; one without a label where all runs agree (the weather)."""
     having = [
-        (index, label, frame) for index, (label, frame) in enumerate(runs.items()) if channel in frame.columns
+        (number, label, frame) for number, (label, frame) in enumerate(runs.items()) if channel in frame.columns
     ]
     if len(having) > 1:
         first = having[0][2]
         if all(f[channel].equals(first[channel]) and f[TIME].equals(first[TIME]) for _, _, f in having[1:]):
-            return [(f"{name} · all", INK, first)]
-    return [
-        (f"{name} · {label}" if label else name, COLOURS[index % len(COLOURS)], frame)
-        for index, label, frame in having
-    ]
+            return [(None, {"color": INK, "linestyle": "-"}, first)]
+    return [(label, line_style(number), frame) for number, label, frame in having]
 
 
-def plot_run(frame, path=None, title=None):
-    """Stacked time series of one run: wind, wave, rotor, blade pitch, power, motions, mooring."""
-    return plot_runs({"": frame}, path=path, title=title)
+def _named_head(figure, rows, runs, title):
+    """Title and legend of a column of panels: each run's name once."""
+    texts, handles = short_names(runs), {}
+    for axes in rows:
+        for line in axes.lines:
+            handles.setdefault(line.get_label(), line)
+    named = {label: handles[label] for label in runs if label in handles}
+    head(figure, title, list(named.values()), [texts[label] for label in named])
 
 
-def plot_runs(runs, path=None, title=None):
-    """Stacked time series of several runs over each other, {label: frame}."""
+def plot_run(frame, path=None, title=None, *, skip=0.0, ratings=None):
+    """Figure of the stacked time series of one run: wind, wave, rotor, actuators, power, motions, mooring.
+
+    skip, ratings: as for plot_runs.
+    """
+    return plot_runs({"": frame}, path=path, title=title, skip=skip, ratings=ratings)
+
+
+def plot_runs(runs, path=None, title=None, *, skip=0.0, ratings=None):
+    """Figure of the stacked time series of several runs over each other, {label: frame}.
+
+    skip      s from the start that are not scored: shaded
+    ratings   {name: value} of descriptions.ratings.ratings, drawn as lines across rotor speed and power;
+              None: those that the first frame carries in attrs["ratings"], as simulate leaves them
+    """
     runs = named_runs(runs)
+    check_number("skip", skip, 0.0)
     panels = [panel for panel in PANELS if any(panel[1] in frame.columns for frame in runs.values())]
     if not panels:
         wanted = ", ".join(channel for _, channel in PANELS)
         raise InputError(f"nothing to plot: none of {wanted} is in the run")
-    figure = new_figure(9.0, 0.9 + 1.15 * len(panels))
+    first = next(iter(runs.values()))
+    ratings = first.attrs.get("ratings", {}) if ratings is None else ratings
+    figure = new_figure(9.0, 0.9 + 1.1 * len(panels))
     rows = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
     for axes, (label, channel) in zip(rows, panels, strict=True):
         style_axes(axes)
-        for text, colour, frame in _lines(runs, channel):
-            axes.plot(frame[TIME], frame[channel], color=colour, linewidth=0.9, label=text)
+        lines = _lines(runs, channel)
+        for text, style, frame in lines:
+            axes.plot(frame[TIME], frame[channel], linewidth=0.9, label=text, **style)
+        _fit(axes, [frame[channel] for _, _, frame in lines])
+        for text, rating in MARKED.get(channel, ()):
+            if rating in ratings:
+                _mark_level(axes, text, ratings[rating])
+        if skip > 0.0:
+            axes.axvspan(first[TIME].iloc[0], first[TIME].iloc[0] + skip, color=UNSCORED, zorder=0, linewidth=0)
         axes.set_ylabel(label, fontsize=8, color=INK)
         axes.margins(x=0.0)
-        axes.legend(
-            loc="upper left",
-            bbox_to_anchor=(1.005, 1.0),
-            borderaxespad=0.0,
+    if skip > 0.0:
+        rows[0].annotate(
+            "not scored",
+            (first[TIME].iloc[0], 1.0),
+            xycoords=("data", "axes fraction"),
+            xytext=(3, -9),
+            textcoords="offset points",
             fontsize=7,
-            frameon=False,
-            handlelength=1.2,
+            color=SOFT,
         )
     rows[-1].set_xlabel("time (s)", fontsize=9, color=INK)
     figure.align_ylabels(rows)
-    if title:
-        figure.suptitle(title, fontsize=11, color=INK)
+    _named_head(figure, rows, runs, title)
     return save_figure(figure, path)
+
+
+def _fit(axes, series):
+    """Ticks in full, and a range for what is constant up to rounding."""
+    axes.ticklabel_format(axis="y", useOffset=False)
+    low, high = min(values.min() for values in series), max(values.max() for values in series)
+    if high - low <= STEADY * max(abs(low), abs(high)):
+        middle, half = 0.5 * (low + high), max(0.05 * abs(low), 0.5)
+        axes.set_ylim(middle - half, middle + half)
+
+
+def _mark_level(axes, text, level):
+    """A dashed line at a level of a panel, named at its right end."""
+    axes.axhline(level, color=SOFT, linewidth=0.9, linestyle=(0, (5, 3)), zorder=1)
+    axes.annotate(
+        f"{text}\n{level:.4g}",
+        (1.0, level),
+        xycoords=("axes fraction", "data"),
+        xytext=(4, 0),
+        textcoords="offset points",
+        fontsize=7,
+        va="center",
+        color=SOFT,
+        annotation_clip=False,
+    )
 
 
 def spectrum(time, value, segment=None):
@@ -108,52 +178,63 @@ def spectrum(time, value, segment=None):
 
 
 def plot_spectra(runs, path=None, title=None, skip=0.0, platform_pitch_period=None):
-    """Spectra of wave, platform pitch and rotor speed of {label: frame} or of one frame.
+    """Figure of the power spectral densities of SPECTRA of {label: frame} or of one frame.
 
-    Vertical lines mark the wave peak, 1P (mean rotor speed of the first run) and, if its period
-    is given (s), the platform-pitch natural frequency. The first `skip` seconds are left out.
+    A channel that every run lacks or holds constant has no panel. Vertical lines mark the wave peak, 1P (mean
+    rotor speed of the first run) and, if its period is given (s), the platform-pitch natural frequency. The
+    first `skip` seconds are left out.
     """
     runs = named_runs(runs if isinstance(runs, dict) else {"": runs})
     runs = named_runs({label: f[f[TIME] >= f[TIME].iloc[0] + skip] for label, f in runs.items()})
-    shown = [entry for entry in SPECTRA if any(entry[1] in frame.columns for frame in runs.values())]
-    if not shown:
+    if not any(entry[1] in frame.columns for entry in SPECTRA for frame in runs.values()):
         raise InputError(f"nothing to plot: none of {', '.join(entry[1] for entry in SPECTRA)} is in the run")
-    figure = new_figure(9.0, 0.9 + 2.1 * len(shown))
+    shown = [entry for entry in SPECTRA if any(_varies(frame.get(entry[1])) for frame in runs.values())]
+    if not shown:
+        raise InputError(f"nothing to plot: {', '.join(entry[1] for entry in SPECTRA)} are constant")
+    figure = new_figure(9.0, 0.9 + 1.7 * len(shown))
     rows = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
     marks = frequency_marks(next(iter(runs.values())), platform_pitch_period)
     for axes, (label, channel, unit) in zip(rows, shown, strict=True):
         style_axes(axes)
         top = 0.0
-        for text, colour, frame in _lines(runs, channel):
+        for text, style, frame in _lines(runs, channel):
             frequency, density = spectrum(frame[TIME], frame[channel])
-            axes.plot(frequency[1:], density[1:], color=colour, linewidth=1.1, label=text)
+            axes.plot(frequency[1:], density[1:], linewidth=1.1, label=text, **style)
             top = max(top, density[1:].max())
-        if top > 0.0:  # a constant channel has no logarithm
-            axes.set_yscale("log")
-            axes.set_ylim(top * 1e-6, top * 4.0)
+        axes.set_yscale("log")
+        axes.set_ylim(top * 1e-6, top * 4.0)
         for number, (_, at) in enumerate(marks):
-            axes.axvline(at, color=INK, linewidth=0.9, linestyle=("--", ":", "-.")[number % 3])
-        axes.set_ylabel(f"{label}\n({unit}²/Hz)", fontsize=8, color=INK)
-        axes.legend(loc="upper right", fontsize=7, frameon=False)
-    for number, (name, at) in enumerate(sorted(marks, key=lambda mark: mark[1])):
+            axes.axvline(at, color=SOFT, linewidth=0.9, linestyle=("--", ":", "-.")[number % 3], zorder=1)
+        axes.set_ylabel(f"{label}\n{unit}²/Hz", fontsize=8, color=INK)
+        axes.grid(True, which="minor", axis="x", color=FAINT, linewidth=0.3)
+    near = ""
+    for name, at in sorted(marks, key=lambda mark: mark[1]):
+        near = "" if near else "\n"  # neighbours at two heights
         rows[0].annotate(
-            f"{name} {at:.3g} Hz",
+            f"{name} {at:.3g} Hz{near}",
             (at, 1.0),
             xycoords=("data", "axes fraction"),
-            xytext=(0, 3 + 10 * (number % 2)),  # neighbours at two heights
+            xytext=(0, 3),
             textcoords="offset points",
-            fontsize=7,
+            fontsize=7.5,
             ha="center",
             color=INK,
             annotation_clip=False,
         )
     rows[-1].set_xscale("log")
     rows[-1].set_xlim(0.005, 0.5)
+    ticks = (0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5)
+    rows[-1].set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+    rows[-1].set_xticks([], minor=True)
     rows[-1].set_xlabel("frequency (Hz)", fontsize=9, color=INK)
     figure.align_ylabels(rows)
-    if title:
-        figure.suptitle(title, fontsize=11, color=INK)
+    _named_head(figure, rows, runs, title)
     return save_figure(figure, path)
+
+
+def _varies(series):
+    """Whether a column is there and is more than constant up to rounding."""
+    return series is not None and np.ptp(series) > STEADY * np.abs(series).max()
 
 
 def frequency_marks(frame, platform_pitch_period=None):

@@ -8,10 +8,14 @@ import numpy as np
 
 from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.errors import InputError
-from fowt_env.visual.style import COLOURS, INK, new_figure, save_figure, style_axes
+from fowt_env.visual.response import broken_at_wraps
+from fowt_env.visual.style import COLOURS, FAINT, INK, SOFT, new_figure, save_figure, style_axes
 
-MODE_NAMES = ("surge", "sway", "heave", "roll", "platform_pitch", "yaw", "rotor_speed")
-MODE_MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+MODE_NAMES = ("surge", "sway", "heave", "roll", "platform_pitch", "yaw", "rotor_speed", "blade_pitch", "other")
+MODE_MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", "*")
+OF_REAL_POLES = ("rotor_speed", "blade_pitch", "surge", "sway", "heave", "roll", "platform_pitch", "yaw")
+REAL = 1e-6  # rad/s: a pole of less imaginary part is real
+FASTEST = 2.0  # 1/s: poles that decay faster are of actuators
 SLOW = 0.4  # rad/s: below it surge, platform pitch and heave, above it yaw
 FREQUENCIES = np.geomspace(0.01, 4.0, 400)  # rad/s
 BODE = (  # input, output, title, factor to the unit shown, unit
@@ -19,6 +23,7 @@ BODE = (  # input, output, title, factor to the unit shown, unit
     ("generator_torque", "rotor_speed", "torque to rotor speed", 1e3 / RPM, "rpm/(kN m)"),
     ("wind_speed", "platform_pitch", "wind to platform pitch", 1.0 / DEGREE, "deg/(m/s)"),
 )
+DECADES = 2.5  # of gain in every Bode plot, so that slopes compare
 WIND = "wind_[m/s]"
 TRAVEL = {"cmap": "coolwarm", "vmin": 0.5, "vmax": 1.5}  # colours of the travel's ratio: white at 1
 
@@ -35,50 +40,88 @@ def _wind_colours(winds):
 
 
 def plot_poles(models, path=None, title=None):
-    """Pole map over the wind of {wind: LinearModel}, whole and near the origin; colour by wind."""
+    """Figure of the poles over the wind of {wind: LinearModel}, whole and near the origin; colour by wind.
+
+    Poles of oscillations have the mark of their mode; real ones, of the rotor speed and of actuators, lie on
+    the real axis. What decays faster than FASTEST lies outside and is named with its value.
+    """
     if not models:
         raise InputError("nothing to plot: no linear models were given")
     colours, scale = _wind_colours(list(models))
-    found = [(wind, mode) for wind, model in models.items() for mode in model.modes()]
-    figure = new_figure(11.0, 4.8)
+    found = [(wind, *pole) for wind, model in models.items() for pole in _poles(model)]
+    figure = new_figure(11.5, 5.2)
     panels = figure.subplots(1, 2)
+    beyond = [(name, pole) for _, name, pole in found if pole.real < -FASTEST]
     for axes, slow in zip(panels, (False, True), strict=True):
         style_axes(axes)
-        shown = [(w, m) for w, m in found if not slow or m.frequency < SLOW]
-        for wind, mode in shown:
-            mark = MODE_MARKERS[MODE_NAMES.index(mode.name)]
-            place = (-mode.damping_ratio * mode.frequency, 2.0 * np.pi / mode.period)
-            axes.scatter(
-                *place, marker=mark, s=36, color=colours[wind], edgecolor=INK, linewidth=0.3, zorder=3
-            )
+        shown = [entry for entry in found if entry[2].real >= -FASTEST and (not slow or abs(entry[2]) < SLOW)]
+        for wind, name, pole in shown:
+            style = {"color": colours[wind], "edgecolor": INK, "linewidth": 0.4, "s": 34, "clip_on": False}
+            axes.scatter(pole.real, pole.imag, marker=MODE_MARKERS[MODE_NAMES.index(name)], zorder=3, **style)
         _damping_lines(axes)
         axes.set_xlabel("real part (1/s)", fontsize=9, color=INK)
+    names = {name for _, name, _ in found}
     for name, mark in zip(MODE_NAMES, MODE_MARKERS, strict=True):
-        if name in {mode.name for _, mode in found}:
-            panels[0].scatter([], [], marker=mark, color="#888888", label=name.replace("_", " "))
-    panels[0].legend(fontsize=8, frameon=False, loc="center left", bbox_to_anchor=(0.02, 0.55))
+        if name in names and name not in {far for far, _ in beyond}:
+            panels[0].scatter([], [], marker=mark, color=SOFT, label=name.replace("_", " "))
+    handles, labels = panels[0].get_legend_handles_labels()
     panels[0].set_ylabel("imaginary part (rad/s)", fontsize=9, color=INK)
-    panels[1].set_title(f"slower than {SLOW:g} rad/s", fontsize=9, color=INK)
-    panels[0].set_title("all", fontsize=9, color=INK)
-    figure.colorbar(scale, ax=panels, label="wind (m/s)", pad=0.01)
-    figure.suptitle(
-        title or "poles, torque and blade pitch held; grey: damping ratio", fontsize=10, color=INK
-    )
+    panels[0].set_title(f"all slower than {FASTEST:g} 1/s", fontsize=9, color=INK, loc="left")
+    panels[1].set_title(f"slower than {SLOW:g} rad/s", fontsize=9, color=INK, loc="left")
+    if beyond:
+        texts = sorted({f"{name.replace('_', ' ')} at {pole.real:.3g} 1/s" for name, pole in beyond})
+        panels[0].set_title(f"outside: {', '.join(texts[:3])}", fontsize=8, color=SOFT, loc="right")
+    bar = figure.colorbar(scale, ax=panels, pad=0.01)
+    _quiet_bar(bar, "wind (m/s)")
+    figure.legend(
+        handles, labels, loc="outside upper center", ncols=len(labels), fontsize=8.5, frameon=False,
+        labelcolor=INK, title=title or "Poles with torque and blade pitch held; grey lines: damping ratio",
+        title_fontproperties={"size": 11},
+    )  # fmt: skip
     return save_figure(figure, path)
+
+
+def _poles(model):
+    """[(name, pole rad/s)] of all poles of a LinearModel with an imaginary part of at least 0.
+
+    Oscillations have the names of model.modes(); a real pole that of the state of MODE_NAMES or ACTUATORS
+    which dies out with it, by the participation of the states.
+    """
+    values, vectors = np.linalg.eig(model.A)
+    left = np.linalg.inv(vectors)
+    modes = {complex(-m.damping_ratio * m.frequency, 2.0 * np.pi / m.period): m.name for m in model.modes()}
+    entries = []
+    for number, value in enumerate(values):
+        if value.imag > REAL:
+            nearest = min(modes, key=lambda pole: abs(pole - value))
+            entries.append((modes[nearest], complex(value)))
+        elif abs(value.imag) <= REAL:
+            share = np.abs(vectors[:, number] * left[number])
+            places = [(share[i], name) for i, name in enumerate(model.states) if name in OF_REAL_POLES]
+            entries.append((max(places)[1], complex(value.real)))
+    return entries
+
+
+def _quiet_bar(bar, label):
+    bar.set_label(label, fontsize=9, color=INK)
+    bar.ax.tick_params(labelsize=8, colors=INK)
+    bar.outline.set_visible(False)
 
 
 def _damping_lines(axes):
     """Lines of equal damping ratio behind the poles, within the limits that these have set."""
     low, high = min(1.08 * axes.dataLim.x0, -1e-3), 1.08 * axes.dataLim.y1
     axes.set_xlim(low, max(-0.04 * low, 1.08 * axes.dataLim.x1))
-    axes.set_ylim(0.0, high)
-    for damping in (0.02, 0.05, 0.1, 0.2, 0.3):
+    axes.set_ylim(-0.02 * high, high)
+    axes.axhline(0.0, color=INK, linewidth=0.8, zorder=1)
+    for damping in (0.02, 0.05, 0.1, 0.2, 0.3, 0.5):
         slope = np.sqrt(1.0 - damping**2) / damping
         axes.plot([0.0, low], [0.0, -slope * low], color="#BBBBBB", linewidth=0.9, zorder=1)
-        end = (low, -slope * low) if -slope * low < high else (-high / slope, high)
+        over = -slope * low >= high
         axes.annotate(
-            f"{damping:g}", end, fontsize=7, color="#777777", xytext=(2, -9), textcoords="offset points"
-        )
+            f"{damping:g}", (-high / slope, high) if over else (low, -slope * low), fontsize=7, color=SOFT,
+            xytext=(0, 2) if over else (3, 3), textcoords="offset points", ha="center" if over else "left",
+        )  # fmt: skip
     axes.axvline(0.0, color=INK, linewidth=0.8)
 
 
@@ -112,14 +155,15 @@ def plot_damping(models, path=None, title=None):
 
 
 def plot_bode(models, path=None, title=None):
-    """Gain and phase of BODE for {wind: LinearModel}: what pitch, torque and wind do to rotor and platform.
+    """Figure of gain and phase of BODE for {wind: LinearModel}: what pitch, torque and wind do to rotor and platform.
 
-    Blade pitch is shown where it is free to move: not at winds where it rests on its limit.
+    Phases are in [-180, 180) deg. Blade pitch is shown where it is free to move: not at winds where it
+    rests on its limit.
     """
     if not models:
         raise InputError("nothing to plot: no linear models were given")
     colours, scale = _wind_colours(list(models))
-    figure = new_figure(12.0, 5.6)
+    figure = new_figure(12.0, 5.8)
     panels = figure.subplots(2, len(BODE), sharex=True)
     for column, (source, output, name, factor, unit) in enumerate(BODE):
         gain, phase = panels[:, column]
@@ -128,28 +172,26 @@ def plot_bode(models, path=None, title=None):
             if source == "blade_pitch_command" and model.pitch_rests:
                 continue
             gain.loglog(FREQUENCIES, np.abs(response), color=colours[wind], linewidth=1.0)
-            angle = np.degrees(np.unwrap(np.angle(response)))
-            angle -= 360.0 * np.ceil((angle[-1] - 135.0) / 360.0)  # high frequencies agree, lags differ
-            phase.semilogx(FREQUENCIES, angle, color=colours[wind], linewidth=1.0)
-        gain.set_title(name, fontsize=9, color=INK)
-        gain.set_ylabel(unit, fontsize=8, color=INK)
-        phase.set_ylabel("phase (deg)", fontsize=8, color=INK)
+            line = broken_at_wraps(FREQUENCIES, np.degrees(np.angle(response)))
+            phase.semilogx(*line, color=colours[wind], linewidth=1.0)
+        gain.set_title(name, fontsize=9.5, color=INK, loc="left")
+        gain.set_ylabel(f"gain ({unit})", fontsize=8.5, color=INK)
         phase.set_xlabel("frequency (rad/s)", fontsize=9, color=INK)
-        phase.yaxis.set_major_locator(_right_angles())
+        phase.set_ylim(-180.0, 180.0)
+        phase.set_yticks(range(-180, 181, 90))
         for axes in (gain, phase):
             style_axes(axes)
+            axes.grid(True, which="minor", axis="x", color=FAINT, linewidth=0.3)
             axes.set_xlim(FREQUENCIES[0], FREQUENCIES[-1])
-    figure.colorbar(scale, ax=panels, label="wind (m/s)", pad=0.01)
+        if gain.lines:
+            top = max(line.get_ydata().max() for line in gain.lines)
+            gain.set_ylim(top * 10.0**-DECADES, 1.6 * top)
+    panels[1, 0].set_ylabel("phase (deg)", fontsize=8.5, color=INK)
+    figure.align_ylabels(panels[:, 0])
+    _quiet_bar(figure.colorbar(scale, ax=panels, pad=0.01), "wind (m/s)")
     if title:
-        figure.suptitle(title, fontsize=10, color=INK)
+        figure.suptitle(title, fontsize=11, color=INK)
     return save_figure(figure, path)
-
-
-def _right_angles():
-    """Ticks at multiples of 90 degrees."""
-    from matplotlib.ticker import MultipleLocator
-
-    return MultipleLocator(90.0)
 
 
 def plot_bound(table, names, points=None, path=None, title=None):
@@ -198,7 +240,7 @@ def plot_bound(table, names, points=None, path=None, title=None):
         axes.set_title(f"{wind:g} m/s", fontsize=9, color=INK)
     if points is not None:
         bar = figure.colorbar(drawn, ax=places, pad=0.01)
-        bar.set_label("blade-pitch travel over that of gspi_oc3", fontsize=8)
+        _quiet_bar(bar, "mean blade-pitch rate over that of gspi_oc3")
     return finish_bound(figure, places, len(winds), path, title)
 
 

@@ -4,11 +4,50 @@ import numpy as np
 
 from fowt_env.errors import InputError
 from fowt_env.training.evaluation.failures import failures_as_worst
-from fowt_env.visual.style import COLOURS, INK, new_figure, save_figure, style_axes
+from fowt_env.visual.style import (
+    COLOURS,
+    FAINT,
+    INK,
+    SOFT,
+    head,
+    new_figure,
+    save_figure,
+    short_names,
+    style_axes,
+)
+
+
+TITLES = {
+    "RotSpeed_mean_[rpm]": "rotor speed, mean (rpm)",
+    "RotSpeed_std_[rpm]": "rotor speed, std (rpm)",
+    "overspeed_[%]": "greatest rotor speed above rated (%)",
+    "GenPwr_capped_mean_[kW]": "power counted up to rated, mean (kW)",
+    "GenPwr_std_[kW]": "power, std (kW)",
+    "GenPwr_max_[kW]": "power, greatest (kW)",
+    "PtfmPitch_mean_[deg]": "platform pitch, mean (deg)",
+    "PtfmPitch_std_[deg]": "platform pitch, std (deg)",
+    "PtfmPitch_max_[deg]": "platform pitch, greatest (deg)",
+    "blade_pitch_travel_[deg/s]": "mean blade-pitch rate (deg/s)",
+    "torque_travel_[kN-m/s]": "mean torque rate (kN m/s)",
+    "RotTorq_DEL_[kN-m]": "shaft torque, fatigue load (kN m)",
+    "NcIMUTAxs_rms_[m/s^2]": "nacelle acceleration, rms (m/s²)",
+    "FAIRTEN_max_[kN]": "mooring tension, greatest (kN)",
+    "TwrBsMyt_DEL_[kN-m]": "tower base, fatigue load (kN m)",
+}
+UPRIGHT = 6  # characters of a case's name that fit below a group of marks without being turned
+ROOM = 0.6  # of the distance between two cases that the marks of one may take
+
+
+def metric_title(name):
+    """What a metric is, with its unit: of TITLES, else made of its name."""
+    if name in TITLES:
+        return TITLES[name]
+    text, _, unit = name.rpartition("_[")
+    return f"{text.replace('_', ' ')} ({unit[:-1].replace('-', ' ')})" if text else name.replace("_", " ")
 
 
 def plot_evaluation(table, metrics, path=None, title=None):
-    """One panel per metric: each case on the x axis, one line per controller, spread over seeds.
+    """Figure with one panel per metric: a group of marks for each case, one mark per controller.
 
     table      the DataFrame of training.evaluation.evaluate.evaluate; failed and tripped runs have the worst
                figures of their case, and are counted
@@ -17,126 +56,187 @@ def plot_evaluation(table, metrics, path=None, title=None):
     metrics = [name for name in metrics if name in table.columns]
     if not metrics or table.empty:
         raise InputError("nothing to plot: the table has no rows or none of the metrics")
-    columns = min(3, len(metrics))
-    rows = -(-len(metrics) // columns)
-    figure = new_figure(4.0 * columns, 0.9 + 2.2 * rows)
-    panels = list(figure.subplots(rows, columns, sharex=True, squeeze=False).flat)
     cases = list(dict.fromkeys(table["case"]))
     controllers = list(dict.fromkeys(table["controller"]))
+    columns = min(3 if len(cases) * len(controllers) <= 40 else 2, len(metrics))
+    rows = -(-len(metrics) // columns)
+    figure = new_figure((12.5 if columns > 1 else 6.5), 1.0 + 1.9 * rows)
+    panels = list(figure.subplots(rows, columns, sharex=True, squeeze=False).flat)
     counted = failures_as_worst(table)
+    step = ROOM / max(len(controllers), 4)
+    per_case = 12.0 * 72.0 / columns / max(1, len(cases)) / 4.5  # characters
+    turned = max(map(len, cases)) > max(UPRIGHT, per_case)
     for axes, name in zip(panels, metrics, strict=False):
         style_axes(axes)
+        axes.grid(False, axis="x")
         for index, controller in enumerate(controllers):
             groups = counted[counted["controller"] == controller].groupby("case")[name]
             mean, low, high = (getattr(groups, what)().reindex(cases) for what in ("mean", "min", "max"))
-            offset = 0.12 * (index - 0.5 * (len(controllers) - 1))
+            offset = step * (index - 0.5 * (len(controllers) - 1))
             axes.errorbar(
                 np.arange(len(cases)) + offset,
                 mean,
                 yerr=np.array([mean - low, high - mean]),
                 color=COLOURS[index % len(COLOURS)],
-                marker="o",
+                marker=MARKS[index % len(MARKS)],
                 markersize=4,
-                linewidth=1.0,
-                capsize=2,
+                linestyle="none",  # cases have no order
+                elinewidth=1.0,
+                capsize=0,
                 label=controller,
             )
-        axes.set_title(name.replace("_", " "), fontsize=8, color=INK, loc="left")
-        axes.set_xticks(np.arange(len(cases)), cases, rotation=45, ha="right", fontsize=7)
-        axes.tick_params(axis="x", labelbottom=True)
+        for edge in np.arange(0.5, len(cases) - 1):
+            axes.axvline(edge, color=FAINT, linewidth=0.8, zorder=0)
+        axes.set_title(metric_title(name), fontsize=9, color=INK, loc="left")
+        rotation = {"rotation": 90} if turned else {}
+        axes.set_xticks(np.arange(len(cases)), cases, fontsize=8, **rotation)
+        axes.set_xlim(-0.5, len(cases) - 0.5)
+        axes.ticklabel_format(axis="y", useOffset=False)
+        axes.tick_params(axis="x", labelbottom=True, length=0)
     for axes in panels[len(metrics) :]:
         axes.set_visible(False)
     failed = int((table["status"] != "ok").sum())
-    figure.legend(
-        *panels[0].get_legend_handles_labels(),
-        loc="outside lower center",
-        ncols=len(controllers),
-        fontsize=8,
-        frameon=False,
-        title=f"{failed} of {len(table)} runs failed or tripped: the worst of their case" if failed else None,
-        title_fontsize=8,
-    )
-    if title:
-        figure.suptitle(title, fontsize=11, color=INK)
+    texts = short_names(controllers)
+    heading = [title] if title else []
+    if failed:
+        heading.append(f"{failed} of {len(table)} runs failed or tripped: the worst of their case")
+    handles = panels[0].get_legend_handles_labels()[0]
+    head(figure, "; ".join(heading), handles, [texts[name] for name in controllers])
     return save_figure(figure, path)
 
 
 PARETO_METRICS = ("RotSpeed_std_[rpm]", "PtfmPitch_std_[deg]", "blade_pitch_travel_[deg/s]", "overspeed_[%]")
-LARGEST_MARK = 900.0  # points squared, of the controller that travels most
+LARGEST_MARK = 420.0  # points squared, of the controller that travels most
+SMALLEST_MARK = 16.0
+REFERENCE = "reference"  # gid of the lines through the baseline
+MARKS = ("o", "s", "^", "D", "v", "P", "X", "*")  # one more than colours: 56 pairs
 
 
 def plot_pareto(board, path=None, title=None):
-    """Rotor-speed against platform-pitch deviation of each controller; the mark's area is its pitch travel.
+    """Figure of rotor-speed std (x) against platform-pitch std (y) of each controller over the baseline's.
 
-    board: mapping of a leaderboard. Bars are its intervals, or, with too few seeds for
-    one, lines without ends the range over the seeds; the stepped line joins the controllers that no other
-    betters in both deviations. The legend gives travel and greatest overspeed.
+    board: mapping of a leaderboard. Bars are the intervals of the paired ratios, from the runs that both
+    finished; where there are none, or no baseline, see below. The mark's area is its mean blade-pitch rate. The
+    stepped line joins the controllers that no other betters in both. Without a baseline the axes
+    are rpm and deg, the bars the intervals of the means, or, with too few seeds for one, lines without ends
+    the range over the seeds.
     """
-    entries = []
+    kept = []
     for entry in board["controllers"]:
         figures = [entry["metrics"][name] for name in PARETO_METRICS]
         if all(np.isfinite([figure["mean"] for figure in figures])) and figures[0]["mean"] > 0.0:
-            entries.append((entry["controller"], entry["failed"] + entry["tripped"], figures))
-    if not entries:
+            kept.append((entry, figures))
+    if not kept:
         raise InputError("nothing to plot: no controller has finished a run")
-    figure = new_figure(9.0, 5.6)
+    base = next((figures for entry, figures in kept if entry["controller"] == board.get("baseline")), None)
+    places = [_place(entry, figures, base, board.get("baseline")) for entry, figures in kept]
+    figure = new_figure(9.0, 5.8)
     axes = figure.subplots()
     style_axes(axes)
-    axes.margins(0.12)
-    points = np.array([[f["mean"] for f in figures[:3]] for _, _, figures in entries])
-    areas = np.maximum(LARGEST_MARK * points[:, 2] / max(points[:, 2].max(), 1e-9), 4.0)
-    front = _undominated(points[:, :2])
+    points = np.array([point for point, _, _ in places])
+    rates = np.array([figures[2]["mean"] for _, figures in kept])
+    areas = np.maximum(LARGEST_MARK * rates / max(rates.max(), 1e-9), SMALLEST_MARK)
+    front = _undominated(points)
     if len(front) > 1:
         axes.step(*front.T, where="post", color=INK, linewidth=0.8, linestyle=":", zorder=1)
+    if base is not None:
+        for line in (axes.axvline, axes.axhline):
+            line(1.0, color=SOFT, linewidth=0.9, linestyle=(0, (5, 3)), zorder=1, gid=REFERENCE)
+    names = short_names([entry["controller"] for entry, _ in kept])
     marks, drawn = [], set()
-    for number, ((name, failed, figures), (x, y, travel)) in enumerate(zip(entries, points, strict=True)):
+    for number, ((entry, figures), (point, bars, kind)) in enumerate(zip(kept, places, strict=True)):
         colour = COLOURS[number % len(COLOURS)]
         square = number // len(COLOURS) % 2  # its area is the whole box of its size, a circle's pi/4 of it
-        for low, high, cap in (("low", "high", 2), ("seed_low", "seed_high", 0)):
-            bars = np.array([[[f["mean"] - f[low]], [f[high] - f["mean"]]] for f in figures[:2]])
-            if np.isfinite(bars).all():
-                bars = np.maximum(bars, 0.0)  # rounding
-                style = {"color": colour, "linewidth": 1.0, "capsize": cap, "zorder": 2}
-                axes.errorbar(x, y, xerr=bars[0], yerr=bars[1], **style)
-                drawn.add(low)
-                break
-        lost = f", {failed} lost" if failed else ""
+        if bars is not None:
+            style = {"color": colour, "linewidth": 1.0, "capsize": 0 if kind == "seeds" else 2, "zorder": 2}
+            axes.errorbar(*point, xerr=bars[0], yerr=bars[1], **style)
+            drawn.add(kind)
+        lost = entry["failed"] + entry["tripped"]
+        text = f"{names[entry['controller']]}: {rates[number]:.3f} deg/s, {figures[3]['worst']:.0f} %"
         marks.append(
             axes.scatter(
-                [x],
-                [y],
-                s=[areas[number] * (np.pi / 4.0 if square else 1.0)],
+                *point,
+                s=areas[number] * (np.pi / 4.0 if square else 1.0),
                 marker="s" if square else "o",
                 color=colour,
-                alpha=0.55,
-                edgecolor=colour,
+                alpha=0.6,
+                edgecolor=INK,
+                linewidth=0.6,
                 zorder=3,
-                label=f"{name}: {travel:.3f} deg/s, {figures[3]['worst']:.0f} %{lost}",
+                label=text + (f", {lost} lost" if lost else ""),
             )
         )
-    axes.set_xlabel("standard deviation of rotor speed (rpm)", fontsize=9, color=INK)
-    axes.set_ylabel("standard deviation of platform pitch (deg)", fontsize=9, color=INK)
+    over = "" if base is None else f" over that of {names[board['baseline']]}"
+    unit = ("", "") if base is not None else (" (rpm)", " (deg)")
+    axes.set_xlabel(f"rotor-speed standard deviation{over}{unit[0]}", fontsize=9, color=INK)
+    axes.set_ylabel(f"platform-pitch standard deviation{over}{unit[1]}", fontsize=9, color=INK)
+    axes.margins(0.1)
+    if base is not None:
+        _absolute_axes(axes, base[0]["mean"], base[1]["mean"])
     legend = figure.legend(
         handles=marks,
         loc="outside right upper",
         fontsize=8,
         frameon=False,
-        title="pitch travel, greatest overspeed",
+        title="mean blade-pitch rate (area of a mark),\ngreatest overspeed",
         title_fontsize=8,
         alignment="left",
     )
     for handle in legend.legend_handles:
         handle.set_sizes([40.0])
-    level = round(100 * board["interval"]["level"])
-    cases = len(board["cases"])
-    text = f"means over {cases} case{'' if cases == 1 else 's'}; area of a mark: pitch travel"
-    text += f"; bars: {level} % intervals" if "low" in drawn else ""
-    text += "; lines: range over the seeds, too few for an interval" if "seed_low" in drawn else ""
-    axes.set_title(text, fontsize=8, color=INK, loc="left")
-    if title:
-        figure.suptitle(title, fontsize=11, color=INK)
-    _label_marks(figure, axes, [name for name, _, _ in entries], points[:, :2], areas)
+    level, cases, seeds = round(100 * board["interval"]["level"]), len(board["cases"]), len(board.get("seeds", ()))
+    text = f"means over {cases} case{'' if cases == 1 else 's'}"
+    text += f"; bars: {level} % intervals of the paired ratio" if "ratio" in drawn else ""
+    text += f"; bars: {level} % intervals" if "mean" in drawn else ""
+    text += "; lines: range over the seeds, too few for an interval" if "seeds" in drawn else ""
+    text += f"; {seeds} seed{'' if seeds == 1 else 's'}: no interval" if base is not None and not drawn else ""
+    figure.suptitle(f"{title}\n{text}" if title else text, fontsize=9, color=INK, x=0.01, ha="left")
+    _label_marks(figure, axes, [names[entry["controller"]] for entry, _ in kept], points, areas, places)
     return save_figure(figure, path)
+
+
+def _absolute_axes(axes, speed, pitch):
+    """The same scales in rpm and deg, on the top and on the right."""
+    top = axes.secondary_xaxis("top", functions=(lambda x: x * speed, lambda x: x / speed))
+    right = axes.secondary_yaxis("right", functions=(lambda y: y * pitch, lambda y: y / pitch))
+    for other, name, set_label in (
+        (top, "rotor speed, std (rpm)", top.set_xlabel),
+        (right, "platform pitch, std (deg)", right.set_ylabel),
+    ):
+        other.tick_params(colors=SOFT, labelsize=7)
+        set_label(name, fontsize=8, color=SOFT)
+        for spine in other.spines.values():
+            spine.set_visible(False)
+
+
+def _place(entry, figures, base, baseline):
+    """(point (2,), bars (2, 2, 1) or None, "ratio", "mean" or "seeds") of a controller."""
+    if base is not None and entry["controller"] == baseline:
+        return np.ones(2), None, ""
+    if base is not None:
+        gaps = [entry["difference"][name] for name in PARETO_METRICS[:2]]
+        shares = [0.01 * gap["percent"] for gap in gaps]
+        if np.isfinite(shares).all():
+            point = 1.0 + np.array(shares)
+            ends = [_ratio_ends(gap, share) for gap, share in zip(gaps, shares, strict=True)]
+            if not np.isfinite(ends).all():
+                return point, None, ""
+            bars = [[[at - low], [high - at]] for at, (low, high) in zip(point, ends, strict=True)]
+            return point, np.maximum(bars, 0.0), "ratio"  # rounding
+        return np.array([f["mean"] / b["mean"] for f, b in zip(figures[:2], base[:2], strict=True)]), None, ""
+    point = np.array([figure["mean"] for figure in figures[:2]])
+    for low, high, kind in (("low", "high", "mean"), ("seed_low", "seed_high", "seeds")):
+        bars = np.array([[[f["mean"] - f[low]], [f[high] - f["mean"]]] for f in figures[:2]])
+        if np.isfinite(bars).all():
+            return point, np.maximum(bars, 0.0), kind
+    return point, None, ""
+
+
+def _ratio_ends(gap, share):
+    """(low, high) of 1 + difference/baseline; a ratio of deviations is never negative."""
+    if gap["low"] != gap["low"] or gap["mean"] == 0.0:
+        return (np.nan, np.nan) if gap["low"] != gap["low"] else (1.0, 1.0)
+    return tuple(max(0.0, 1.0 + share * gap[end] / gap["mean"]) for end in ("low", "high"))
 
 
 def _undominated(points):
@@ -145,33 +245,53 @@ def _undominated(points):
     return np.array(sorted(map(tuple, kept)))
 
 
-def _label_marks(figure, axes, names, points, areas):
-    """Write each name beside its mark, where it covers no other mark or name if there is such a place."""
+def _label_marks(figure, axes, names, points, areas, places):
+    """Write each name beside its mark, where it covers no mark, bar or other name if there is such a place."""
+    from matplotlib.patheffects import withStroke
+
     figure.draw_without_rendering()  # settles the layout, and with it where the marks are
-    size = 8.0
-    per_point = figure.dpi / 72.0
-    centres = axes.transData.transform(points) / per_point  # in points
-    radii = 0.5 * np.sqrt(areas)
-    taken = [
-        (x - r, y - r, x + r, y + r) for (x, y), r in zip(centres, radii, strict=True)
-    ]  # boxes, in points
+    size, per_point = 8.0, figure.dpi / 72.0
+
+    def placed(where):
+        return axes.transData.transform(where) / per_point
+
+    centres, radii = placed(points), 0.5 * np.sqrt(areas)
+    taken = [(x - r, y - r, x + r, y + r) for (x, y), r in zip(centres, radii, strict=True)]  # in points
+    for point, (_, bars, _) in zip(points, places, strict=True):
+        if bars is not None:
+            low, high = placed([point - bars[:, 0, 0], point + bars[:, 1, 0]])
+            x, y = placed([point])[0]
+            taken += [(low[0], y - 1.0, high[0], y + 1.0), (x - 1.0, low[1], x + 1.0, high[1])]
+    for line in axes.lines:  # of the baseline
+        x, y = line.get_xdata(), line.get_ydata()
+        if len(x) == 2 and line.get_gid() == REFERENCE:
+            whole = axes.get_window_extent().extents / per_point
+            (at_x, at_y), (low_x, low_y, high_x, high_y) = placed([(1.0, 1.0)])[0], whole
+            taken.append((at_x - 1, low_y, at_x + 1, high_y) if x[0] == x[1] else (low_x, at_y - 1, high_x, at_y + 1))
+    frame = axes.get_window_extent().extents / per_point
 
     def overlap(one, other):
         wide = min(one[2], other[2]) - max(one[0], other[0])
         high = min(one[3], other[3]) - max(one[1], other[1])
         return max(0.0, wide) * max(0.0, high)
 
+    def spoilt(place):
+        inside = overlap(place, frame)
+        area = (place[2] - place[0]) * (place[3] - place[1])
+        return sum(overlap(place, other) for other in taken) + 20.0 * (area - inside)
+
     for name, point, (x, y), r in zip(names, points, centres, radii, strict=True):
-        width, height = 0.6 * size * len(name), 1.2 * size
-        places = []
-        for way in (1.0, 2.2, 3.6):
-            for dx, dy in ((1, 1), (-1, 1), (1, -1), (-1, -1), (0, 1), (0, -1)):
-                gap = 0.75 * r * way + 2.0 if dx else r * way + 2.0
+        width, height = 0.58 * size * len(name), 1.25 * size
+        options = []
+        for way in (0.0, 10.0, 22.0, 36.0, 52.0, 70.0):
+            for dx, dy in ((1, 1), (-1, 1), (1, -1), (-1, -1), (0, 1), (0, -1), (1, 0), (-1, 0)):
+                gap = (0.75 * r if dx and dy else r) + 2.5 + way * (0.7 if dx and dy else 1.0)
                 left = x + dx * gap - (width if dx < 0 else 0.0 if dx else 0.5 * width)
-                low = y + dy * gap - (height if dy < 0 else 0.0)
-                places.append((left, low, left + width, low + height))
-        best = min(places, key=lambda place: sum(overlap(place, other) for other in taken))
-        taken.append(best)
+                low = y + dy * gap - (height if dy < 0 else 0.0 if dy else 0.5 * height)
+                options.append((left, low, left + width, low + height, way))
+        best = min(options, key=lambda place: spoilt(place) + 0.15 * place[4])
+        taken.append(best[:4])
+        leader = {"arrowstyle": "-", "color": SOFT, "linewidth": 0.6, "shrinkA": 0, "shrinkB": float(r)}
         axes.annotate(
             name,
             point,
@@ -180,4 +300,7 @@ def _label_marks(figure, axes, names, points, areas):
             fontsize=size,
             color=INK,
             annotation_clip=False,
+            arrowprops=leader if best[4] > 0.0 else None,
+            path_effects=[withStroke(linewidth=2.0, foreground="white")],
+            zorder=5,
         ).set_in_layout(False)

@@ -4,12 +4,14 @@ import json
 from dataclasses import replace
 
 from fowt_env.descriptions.platform import Platform, read_platform
+from fowt_env.descriptions.ratings import ratings
 from fowt_env.errors import unknown
 from fowt_env.files.tables import read_table
 from fowt_env.training.evaluation.bootstrap import holm
 from fowt_env.training.evaluation.cases import Limits, Score, named_cases, read_suite
 from fowt_env.training.evaluation.leaderboard import leaderboard
 from fowt_env.training.evaluation.results import file_name, run_file, write_json
+from fowt_env.training.evaluation.scaling import turbine_of
 from fowt_env.training.evaluation.seeds import ranges
 from fowt_env.training.reports.evaluation_plots import plot_evaluation, plot_pareto
 from fowt_env.visual.response import BOXES, plot_boxes
@@ -289,7 +291,7 @@ def evaluation_plots(table, board, folder):
         name = file_name(case)
         paths += [folder / f"timeseries_{name}.png", folder / f"spectra_{name}.png"]
         title = f"{case}, seed {seed}"
-        plot_runs(runs, paths[-2], title)
+        plot_runs(runs, paths[-2], title, skip=about["skip"], ratings=ratings(turbine_of(about["platform"])))
         period = platform_pitch_period(about["platform"])
         plot_spectra(runs, paths[-1], title, about["skip"], platform_pitch_period=period)
         boxes[case] = {name: _scored_rows(frame, about["skip"]) for name, frame in runs.items()}
