@@ -23,7 +23,7 @@ BODE = (  # input, output, title, factor to the unit shown, unit
     ("generator_torque", "rotor_speed", "torque to rotor speed", 1e3 / RPM, "rpm/(kN m)"),
     ("wind_speed", "platform_pitch", "wind to platform pitch", 1.0 / DEGREE, "deg/(m/s)"),
 )
-DECADES = 2.5  # of gain in every Bode plot, so that slopes compare
+DECADES = 3.0  # of gain in every Bode plot, so that slopes compare
 WIND = "wind_[m/s]"
 TRAVEL = {"cmap": "coolwarm", "vmin": 0.5, "vmax": 1.5}  # colours of the travel's ratio: white at 1
 
@@ -56,9 +56,10 @@ def plot_poles(models, path=None, title=None):
         style_axes(axes)
         shown = [entry for entry in found if entry[2].real >= -FASTEST and (not slow or abs(entry[2]) < SLOW)]
         for wind, name, pole in shown:
-            style = {"color": colours[wind], "edgecolor": INK, "linewidth": 0.4, "s": 34, "clip_on": False}
+            style = {"color": colours[wind], "edgecolor": INK, "linewidth": 0.4, "s": 34}
             axes.scatter(pole.real, pole.imag, marker=MODE_MARKERS[MODE_NAMES.index(name)], zorder=3, **style)
-        _damping_lines(axes)
+        turning = [pole for _, _, pole in shown if pole.imag > 0.0 or not slow]
+        _damping_lines(axes, min(p.real for p in turning), max(p.imag for p in turning))
         axes.set_xlabel("real part (1/s)", fontsize=9, color=INK)
     names = {name for _, name, _ in found}
     for name, mark in zip(MODE_NAMES, MODE_MARKERS, strict=True):
@@ -66,11 +67,13 @@ def plot_poles(models, path=None, title=None):
             panels[0].scatter([], [], marker=mark, color=SOFT, label=name.replace("_", " "))
     handles, labels = panels[0].get_legend_handles_labels()
     panels[0].set_ylabel("imaginary part (rad/s)", fontsize=9, color=INK)
-    panels[0].set_title(f"all slower than {FASTEST:g} 1/s", fontsize=9, color=INK, loc="left")
-    panels[1].set_title(f"slower than {SLOW:g} rad/s", fontsize=9, color=INK, loc="left")
+    panels[0].set_title(f"all slower than {FASTEST:g} 1/s", fontsize=9, color=INK, loc="left", pad=16)
+    panels[1].set_title("near the origin", fontsize=9, color=INK, loc="left", pad=16)
     if beyond:
         texts = sorted({f"{name.replace('_', ' ')} at {pole.real:.3g} 1/s" for name, pole in beyond})
-        panels[0].set_title(f"outside: {', '.join(texts[:3])}", fontsize=8, color=SOFT, loc="right")
+        panels[0].annotate(
+            f"further left: {', '.join(texts[:3])}", (0.01, 0.06), xycoords="axes fraction", fontsize=8, color=SOFT
+        )
     bar = figure.colorbar(scale, ax=panels, pad=0.01)
     _quiet_bar(bar, "wind (m/s)")
     figure.legend(
@@ -108,21 +111,26 @@ def _quiet_bar(bar, label):
     bar.outline.set_visible(False)
 
 
-def _damping_lines(axes):
-    """Lines of equal damping ratio behind the poles, within the limits that these have set."""
-    low, high = min(1.08 * axes.dataLim.x0, -1e-3), 1.08 * axes.dataLim.y1
-    axes.set_xlim(low, max(-0.04 * low, 1.08 * axes.dataLim.x1))
-    axes.set_ylim(-0.02 * high, high)
+def _damping_lines(axes, left, top):
+    """Limits that reach the real part `left` and the imaginary part `top`, and lines of equal damping ratio."""
+    low, high = min(1.1 * left, -1e-3), 1.1 * max(top, 1e-2)
+    axes.set_xlim(low, -0.05 * low)
+    axes.set_ylim(-0.03 * high, high)
     axes.axhline(0.0, color=INK, linewidth=0.8, zorder=1)
-    for damping in (0.02, 0.05, 0.1, 0.2, 0.3, 0.5):
+    axes.axvline(0.0, color=INK, linewidth=0.8, zorder=1)
+    named = 0.0
+    for damping in (0.5, 0.3, 0.2, 0.1, 0.05, 0.02):
         slope = np.sqrt(1.0 - damping**2) / damping
         axes.plot([0.0, low], [0.0, -slope * low], color="#BBBBBB", linewidth=0.9, zorder=1)
         over = -slope * low >= high
+        place = (-high / slope, high) if over else (low, -slope * low)
+        if over and place[0] - named < 0.045 * -low and named:
+            continue  # no room for its name
+        named = place[0] if over else named
         axes.annotate(
-            f"{damping:g}", (-high / slope, high) if over else (low, -slope * low), fontsize=7, color=SOFT,
-            xytext=(0, 2) if over else (3, 3), textcoords="offset points", ha="center" if over else "left",
+            f"{damping:g}", place, fontsize=7, color=SOFT, xytext=(0, 3) if over else (3, 3),
+            textcoords="offset points", ha="center" if over else "left", annotation_clip=False,
         )  # fmt: skip
-    axes.axvline(0.0, color=INK, linewidth=0.8)
 
 
 def plot_damping(models, path=None, title=None):
@@ -175,7 +183,7 @@ def plot_bode(models, path=None, title=None):
             line = broken_at_wraps(FREQUENCIES, np.degrees(np.angle(response)))
             phase.semilogx(*line, color=colours[wind], linewidth=1.0)
         gain.set_title(name, fontsize=9.5, color=INK, loc="left")
-        gain.set_ylabel(f"gain ({unit})", fontsize=8.5, color=INK)
+        gain.set_ylabel(f"gain, {unit}", fontsize=8.5, color=INK)
         phase.set_xlabel("frequency (rad/s)", fontsize=9, color=INK)
         phase.set_ylim(-180.0, 180.0)
         phase.set_yticks(range(-180, 181, 90))
