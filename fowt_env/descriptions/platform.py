@@ -145,6 +145,26 @@ class Member(Record):
         return self
 
 
+class Shape(Record):
+    """A straight part of the hull for pictures alone: round, or a box of a horizontal axis. It has no loads.
+
+    For hulls whose loads come from elsewhere, as a radiation database or a cylinder of the same drag.
+    """
+
+    start: Vector3  # m, body axes
+    end: Vector3
+    diameter: Positive | None = None  # m
+    section: tuple[Positive, Positive] | None = None  # m, width and height of a box
+
+    @model_validator(mode="after")
+    def _one_section(self):
+        if math.dist(self.start, self.end) < 1e-6:
+            raise ValueError(f"start = {list(self.start)}: must not be end")
+        if (self.diameter is None) == (self.section is None):
+            raise ValueError("diameter: must be given where section is not, and only there")
+        return self
+
+
 class Tower(Record):
     """Tower as one rigid body, with the taper that its drag needs, and how it bends where that is known."""
 
@@ -192,6 +212,7 @@ class Platform(Record):
     potential_flow: PotentialFlow | None = None
     additional: AdditionalLoads | None = None
     members: tuple[Member, ...] = ()
+    shapes: tuple[Shape, ...] = ()  # drawn in place of hull and members
     lines: tuple[Line, ...] = ()
     options: dict = Field(default_factory=dict)  # defaults of build_scene's options
     published: dict = Field(default_factory=dict)  # figures that tests compare with
@@ -299,7 +320,7 @@ def read_platform(name_or_path: str | Path) -> Platform:
         group, found = validate(_MooringFile, {"mooring": data.pop("mooring")}, origin)
         problems += found
         data["lines"] = group.mooring.lines() if group else ()
-    for key in ("lines", "members"):
+    for key in ("lines", "members", "shapes"):
         if isinstance(data.get(key), list):
             data[key] = tuple(data[key])
     if "potential_flow" in data:

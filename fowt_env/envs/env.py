@@ -119,6 +119,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     wind, sea     in place of the task's, ranges included (None: the task's)
     wind_preview  look-ahead times (s) of the channel wind_preview
     render_mode   None, "rgb_array" (render() returns a picture) or "human" (every step shows one in a window)
+    render_size   pixels (width, height) of it; None: (960, 640)
     fidelity      level of build_scene: "reference", "standard" or "fast"
     sensors       the name of a chain of sensors ("standard"), a SensorChain, or {"noise": standard deviation
                   of white noise on every reading, as a fraction of the channel's scale; "delay": control
@@ -198,6 +199,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         sea: Any = None,
         wind_preview: Sequence[float] | None = None,
         render_mode: str | None = None,
+        render_size: Sequence[int] | None = None,
         fidelity: str = "standard",
         sensors: str | SensorChain | Mapping[str, Any] | None = None,
         nominal_plant: Mapping[str, Any] | None = None,
@@ -206,9 +208,10 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         if render_mode is not None:
             if render_mode not in self.metadata["render_modes"]:
                 raise unknown("render_mode", render_mode, self.metadata["render_modes"])
-            from fowt_env.visual.rendering import load_pygame  # nobody else pays for it
+            from fowt_env.visual.rendering import check_size, load_pygame  # nobody else pays for it
 
             load_pygame()
+            check_size("render_size", render_size)
         if action_mode not in ACTION_MODES:
             raise unknown("action_mode", action_mode, ACTION_MODES)
         mode = ACTION_MODES[action_mode]
@@ -224,6 +227,8 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
                 raise unknown("setting of FowtEnv", key, {*OPTIONS, "loads", *SETTINGS})
         self.render_mode = render_mode
         self._view: Any = None
+        self._reward: float | None = None  # of the last step of the episode
+        self.render_size = render_size
         turbine = _turbine_of(platform, options.get("turbine"))
         task = task_of(task, turbine)
         self._own_reward = check_own_reward("reward", reward) if callable(reward) else None
@@ -448,6 +453,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             "wind_speed": self.scene.wind_speed,
             "episode": deepcopy(planned.episode._asdict()),
         }
+        self._reward = None
         if self.render_mode == "human":
             self.render()
         return run.observation.copy(), info
@@ -526,6 +532,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     def _result(self, status, reward):
         """What step returns, from the status and reward of a control period."""
         run = self._episode
+        self._reward = reward
         step = int(run.counts[STEP])
         info = dict(zip(REWARD_KEYS, run.terms.tolist(), strict=True))
         info["time"] = step * self.dt
@@ -694,7 +701,9 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         return dict(zip((channel.name for channel in scene.channels), values, strict=True))
 
     def render(self) -> np.ndarray | None:
-        """Picture of the present instant, (640, 960, 3) uint8; None in mode "human", which shows it.
+        """Picture of the present instant, (height, width, 3) uint8; None in mode "human", which shows it.
+
+        It has the last action and reward of the episode; render_size sets width and height.
 
         Without a render mode it warns, as Gymnasium's own environments do, and returns None.
         """
@@ -706,14 +715,16 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             return None
         if self._closed:
             raise ClosedEnvironmentError(CLOSED)
-        from fowt_env.visual.rendering import View
+        from fowt_env.visual.rendering import SIZE, Agent, View
 
         row = self.channels()
         if self._view is None:
-            self._view = View([self.scene])
+            speed = self.metadata["render_fps"] * self.control_dt
+            size = SIZE if self.render_size is None else tuple(self.render_size)
+            self._view = View([self.scene], size=size, speed=speed)
         elif self._view.panels[0].scene is not self.scene:
             self._view.enter(self.scene)
-        self._view.draw([row])
+        self._view.draw([row], Agent(tuple(self._episode.action.tolist()), self._reward))
         if self.render_mode == "rgb_array":
             return self._view.array()
         self._view.show(self.metadata["render_fps"])

@@ -13,7 +13,8 @@ import numpy as np
 from fowt_env.descriptions.checks import check_number
 from fowt_env.errors import InputError
 from fowt_env.files.atomic import replacing
-from fowt_env.visual.rendering import AT_REST, LOOSE, RGB_COLOURS, TIGHT, TRACES, YELLOW, View
+from fowt_env.visual.rendering import AT_REST, LOOSE, RGB_COLOURS, TIGHT, TRACES, WINDOW, YELLOW, View
+from fowt_env.visual.style import short_names
 
 SUFFIXES = (".gif", ".mp4")
 MOST_RUNS = 4
@@ -28,7 +29,8 @@ DRAWN = (
     "Azimuth",
     "RotSpeed",
 )
-GIF_COLOURS = 128
+GIF_COLOURS = 64  # a palette that keeps files small; the sky has few shades anyway
+MOST_STILL = 2.0  # windows: shorter animations show all of their time throughout
 # small or rare in a picture, but to be kept in the palette: this many rows of the sample are given to them
 KEY_COLOURS = (*RGB_COLOURS, YELLOW, LOOSE, AT_REST, TIGHT)
 SWATCH = 160
@@ -56,7 +58,10 @@ def animate(scene, runs, path, *, speed=4.0, fps=20, size=(960, 540), start=0.0,
     end = max(track.time[-1] for track in tracks)
     check_number("start", start, tracks[0].time[0], end, high_open=True)
     times = np.arange(start, end, 0.01 * pause * speed)
-    view = View([scene] * len(tracks), labels=None if list(runs) == [""] else list(runs), size=tuple(size))
+    span = (float(start), float(end)) if end - start <= MOST_STILL * WINDOW else None
+    limits = {trace.channel: _limits(tracks, trace.channel, start) for trace in TRACES}
+    labels = None if list(runs) == [""] else list(short_names(runs).values())
+    view = View([scene] * len(tracks), labels, tuple(size), speed=speed, span=span, limits=limits)
 
     def pictures():
         for number, time in enumerate(times):
@@ -79,11 +84,17 @@ def animation_path(path):
     return path
 
 
+def _limits(tracks, channel, start):
+    """(least, greatest) value of a channel of all tracks from a time on."""
+    kept = [track.values[channel][track.time >= start] for track in tracks]
+    return min(values.min() for values in kept), max(values.max() for values in kept)
+
+
 class _Track:
     """The channels of one run that are drawn, at any time; after its end it stands still."""
 
     def __init__(self, label, frame):
-        wanted = dict.fromkeys((*DRAWN, *(channel for _, channel, *_ in TRACES)))
+        wanted = dict.fromkeys((*DRAWN, *(trace.channel for trace in TRACES)))
         columns = {name.partition("_[")[0]: name for name in frame.columns}
         missing = [name for name in wanted if name not in columns]
         if missing or len(frame) < 2:

@@ -7,9 +7,11 @@ a running environment and a finished run. Needs pygame: pip install "fowt-env[re
 import os
 from collections import deque
 from math import cos, pi, radians, sin
+from typing import NamedTuple
 
 import numpy as np
 
+from fowt_env.descriptions.ratings import OVERSPEED, RATED_POWER, RATED_SPEED, ratings
 from fowt_env.errors import InputError
 from fowt_env.plant.hydro.waves import ramp_factor
 from fowt_env.plant.mooring import catenary, line_shape
@@ -17,13 +19,17 @@ from fowt_env.plant.mooring import catenary, line_shape
 SIZE = (960, 640)  # pixels of a view
 FPS = 30
 WINDOW = 60.0  # s of a trace
-SAMPLING = 2  # the side view is drawn this much larger and then averaged
+SIDES = (160, 4000)  # pixels: least and greatest side of a view
+SAMPLING = 3  # the side view is drawn this much larger and then averaged
+LETTERS = 4  # and so is writing: a font's hinting would misplace small letters
 DEPTH_SHIFT = 0.28  # cabinet projection: how far a metre across the wind is shifted, so that the rotor shows
 LINE_POINTS = 81
 MOST_TENSIONS = 4  # that are written out; of more lines, the least and the largest
-LEAST_SEA = 0.4  # rotor radii of water shown below a flat hull
+LEAST_SEA = 0.55  # rotor radii of water shown below a flat hull
 SPLASH = 0.1  # of the draft: what is seen from boats is yellow from there up
-WAVE_STEP = 10  # pixels of the enlarged picture between points of the sea surface
+WAVE_STEP = 9  # pixels of the enlarged picture between points of the sea surface
+LEAST_BLADE = 0.0055, 0.0022  # of the picture's height: least half width of a drawn blade at root and tip
+FIRST_WINDOWS = (15.0, 30.0, WINDOW)  # s shown while a run is young
 
 INK, SOFT, FAINT, CARD, PAGE = (
     (30, 38, 50),
@@ -41,17 +47,45 @@ SEABED, CREST, STEEL, YELLOW, WHITE = (
     (240, 190, 40),
     (246, 247, 249),
 )
+LEVEL = (120, 128, 140)  # of lines across a strip
 RGB_COLOURS = ((0, 114, 178), (213, 94, 0), (0, 158, 115), (204, 121, 167))
 LOOSE, AT_REST, TIGHT = (90, 170, 230), (250, 236, 150), (220, 50, 40)  # of a line, by its tension
 
-# label, channel, unit, format, smallest height of the panel
+class Trace(NamedTuple):
+    """A strip of live values."""
+
+    label: str
+    channel: str
+    unit: str
+    form: str
+    least: float  # smallest height of the strip
+    levels: tuple = ()  # (text, rating) of the lines across it, which are always in sight
+
+
 TRACES = (
-    ("wind", "Wind1VelX", "m/s", ".1f", 2.0),
-    ("rotor speed", "RotSpeed", "rpm", ".2f", 1.0),
-    ("blade pitch", "BldPitch1", "deg", ".1f", 2.0),
-    ("power", "GenPwr", "kW", ".0f", 500.0),
-    ("platform pitch", "PtfmPitch", "deg", ".2f", 1.0),
+    Trace("wind", "Wind1VelX", "m/s", ".1f", 4.0),
+    Trace("rotor speed", "RotSpeed", "rpm", ".2f", 2.0, (("rated", RATED_SPEED), ("trip", OVERSPEED))),
+    Trace("blade pitch", "BldPitch1", "deg", ".1f", 4.0),
+    Trace("generator torque", "GenTq", "kN m", ".1f", 4.0),
+    Trace("power", "GenPwr", "kW", ".0f", 1000.0, (("rated", RATED_POWER),)),
+    Trace("platform pitch", "PtfmPitch", "deg", ".2f", 3.0),
 )
+
+
+class Agent(NamedTuple):
+    """What an environment's picture shows of its agent."""
+
+    action: tuple  # the last, each in [-1, 1]
+    reward: float | None  # of the last step; None before the first
+
+
+def check_size(name, size):
+    """Raises: InputError unless size is None or two whole numbers within SIDES."""
+    if size is None:
+        return
+    sides = tuple(size) if isinstance(size, tuple | list) else ()
+    if len(sides) != 2 or not all(isinstance(n, int) and SIDES[0] <= n <= SIDES[1] for n in sides):
+        raise InputError(f"{name} = {size!r}: must be (width, height), whole numbers in [{SIDES[0]}, {SIDES[1]}]")
 
 
 def load_pygame():
@@ -63,6 +97,32 @@ def load_pygame():
         raise InputError(f'rendering needs pygame ({error}): pip install "fowt-env[render]"') from error
     pygame.font.init()
     return pygame
+
+
+class Writer:
+    """Writing at any size, evenly spaced: set large, then averaged down. Texts are kept, as most repeat."""
+
+    MOST = 600  # texts kept
+
+    def __init__(self, pygame, zoom=1.0):
+        self.pygame, self.zoom = pygame, zoom
+        self._fonts, self._kept = {}, {}
+
+    def render(self, text, height, colour):
+        """Surface with the text, which must not be empty, `height` pixels per line."""
+        key = text, height, colour
+        if key not in self._kept:
+            if not text:
+                raise ValueError("no text: pygame cannot scale an empty picture")
+            if len(self._kept) >= self.MOST:
+                self._kept.clear()
+            size = max(6, round(height * self.zoom))
+            if size not in self._fonts:
+                self._fonts[size] = self.pygame.font.Font(None, LETTERS * size)
+            large = self._fonts[size].render(text, True, colour)
+            shape = max(1, large.get_width() // LETTERS), max(1, large.get_height() // LETTERS)
+            self._kept[key] = self.pygame.transform.smoothscale(large, shape)
+        return self._kept[key]
 
 
 class PlatformPose:
@@ -130,6 +190,31 @@ def tension_colour(tension, at_rest):
     return tuple(round(a + fraction * (b - a)) for a, b in zip(AT_REST, other, strict=True))
 
 
+class _Part(NamedTuple):
+    """A round part of a hull."""
+
+    start: tuple
+    end: tuple
+    diameter: tuple  # at both
+
+
+def _outline(points):
+    """The corners of the convex hull of points (n, 2), in order."""
+    ordered = sorted(map(tuple, points))
+    sides = []
+    for run in (ordered, ordered[::-1]):
+        chain = []
+        for x, y in run:
+            while len(chain) > 1 and (
+                (chain[-1][0] - chain[-2][0]) * (y - chain[-2][1])
+                <= (chain[-1][1] - chain[-2][1]) * (x - chain[-2][0])
+            ):
+                chain.pop()
+            chain.append((x, y))
+        sides += chain[:-1]
+    return sides
+
+
 class TurbinePanel:
     """The side view of one turbine: x to the right (downwind), z up, to scale."""
 
@@ -150,8 +235,8 @@ class TurbinePanel:
         self._water = pygame.Surface(self.inner, pygame.SRCALPHA)
         self._disc = pygame.Surface(self.inner, pygame.SRCALPHA)
         self._pixels = np.arange(-WAVE_STEP, width + 2 * WAVE_STEP, WAVE_STEP)
-        small, large = round(0.026 * height), round(0.034 * height)
-        self._fonts = pygame.font.Font(None, small), pygame.font.Font(None, large)
+        self._writer = Writer(pygame)
+        self._small, self._large = max(11, round(0.026 * size[1])), max(13, round(0.034 * size[1]))
         self.enter(scene)
 
     def enter(self, scene):
@@ -180,20 +265,21 @@ class TurbinePanel:
         across = (points[:, 0] + DEPTH_SHIFT * points[:, 1] - self.left) * self.scale
         return np.column_stack([across, (self.top - points[:, 2]) * self.scale])
 
-    def draw(self, row, label=None):
-        """The picture of a row of channels, at its final size."""
+    def draw(self, row, label=None, colour=None, speed=None):
+        """The picture of a row of channels, at its final size: a chip of `colour` and `label`, time and speed."""
         pygame, canvas = self.pygame, self._canvas
         pose = PlatformPose(row)
         canvas.blit(self._sky, (0, 0))
         self._hull(canvas, pose)
         self._sea_over(canvas, row["Time"])
         for number, (points, tension) in enumerate(mooring_shapes(self.scene, pose)):
-            colour = tension_colour(tension, self.tension_at_rest[number])
-            pygame.draw.lines(canvas, colour, False, self.pixels(points), 2 * SAMPLING)
+            tint = tension_colour(tension, self.tension_at_rest[number])
+            pygame.draw.lines(canvas, tint, False, self.pixels(points), 2 * SAMPLING)
         self._rotor(canvas, pose, row)
         self._wind(canvas, row)
-        self._words(canvas, row, label)
-        return pygame.transform.smoothscale(canvas, self.size)
+        picture = pygame.transform.smoothscale(canvas, self.size)
+        self._words(picture, row, label, colour, speed)
+        return picture
 
     def _tapered(self, canvas, pose, heights, diameters, colour):
         """A shaded body of revolution about the platform's axis."""
@@ -237,6 +323,35 @@ class TurbinePanel:
                 top = int(np.argmax(heights))
                 self._cylinder(canvas, pose, np.array([cut, ends[top]]), (wide, diameters[top]), YELLOW)
 
+    def _shapes(self, canvas, pose, shapes, draft):
+        """The shapes of a hull as its file gives them for pictures, farthest first."""
+        for shape in sorted(shapes, key=lambda shape: -(shape.start[1] + shape.end[1])):
+            if shape.diameter is not None:
+                self._members(canvas, pose, [_Part(shape.start, shape.end, (shape.diameter,) * 2)], draft)
+            else:
+                self._beam(canvas, pose, shape, draft)
+
+    def _beam(self, canvas, pose, shape, draft):
+        """A straight box: what is seen of it from the side and, of its far half, from above."""
+        start, end = np.array(shape.start), np.array(shape.end)
+        width, height = shape.section
+        along = (end - start) / np.linalg.norm(end - start)
+        across = np.array([-along[1], along[0], 0.0]) * 0.5 * width / np.hypot(*along[:2])
+        up, limit = np.array([0.0, 0.0, 0.5 * height]), -SPLASH * draft
+        middle = 0.5 * (start[2] + end[2])
+        layers = [(-1.0, 1.0, STEEL if middle < limit else YELLOW)]
+        share = (limit - middle) / (0.5 * height)
+        if -1.0 < share < 1.0:
+            layers = [(-1.0, share, STEEL), (share, 1.0, YELLOW)]
+        for low, high, colour in layers:
+            corners = [p + side * across + z * up for p in (start, end) for side in (-1, 1) for z in (low, high)]
+            seen = self.pixels(pose.inertial(corners))
+            self.pygame.draw.polygon(canvas, [round(0.85 * c) for c in colour], _outline(seen))
+            near = sorted((-1, 1), key=lambda side: (start + side * across)[1])[0]
+            face = [(start, low), (end, low), (end, high), (start, high)]
+            front = self.pixels(pose.inertial([p + near * across + z * up for p, z in face]))
+            self.pygame.draw.polygon(canvas, colour, front)
+
     def _box(self, canvas, pose, draft, volume):
         """A box of this draft and displaced volume, of a hull that has no shape in its file."""
         half, deck = 0.5 * np.sqrt(volume / draft), 0.5 * draft
@@ -252,9 +367,12 @@ class TurbinePanel:
             self._tapered(canvas, pose, z, diameter, STEEL)
             splash = np.array([max(z[0], -SPLASH * abs(z[0])), z[-1]])
             self._tapered(canvas, pose, splash, np.interp(splash, z, diameter), YELLOW)
+        elif platform.shapes:
+            self._shapes(canvas, pose, platform.shapes, platform.draft)
         elif not platform.members:
             self._box(canvas, pose, platform.draft, platform.potential_flow.volume)
-        self._members(canvas, pose, platform.members, platform.draft)
+        if not platform.shapes:
+            self._members(canvas, pose, platform.members, platform.draft)
         heights = np.array([tower.base_height, tower.top_height])
         self._tapered(canvas, pose, heights, np.array([tower.base_diameter, tower.top_diameter]), WHITE)
 
@@ -287,12 +405,12 @@ class TurbinePanel:
         pygame.draw.polygon(canvas, (226, 230, 235), self.pixels(pose.inertial(nacelle)))
         pygame.draw.polygon(canvas, (140, 150, 162), self.pixels(pose.inertial(nacelle)), SAMPLING)
         turn, pitch = radians(row["Azimuth"]), radians(row["BldPitch1"])
+        least = self.inner[1] * np.array(LEAST_BLADE)
         for number in range(rotor.blades):
-            outline = self.pixels(
-                pose.inertial(hub + self._blade(turn + 2.0 * pi * number / rotor.blades, pitch))
-            )
+            blade = hub + self._blade(turn + 2.0 * pi * number / rotor.blades, pitch)
+            outline = self._thick(self.pixels(pose.inertial(blade)), least)
             pygame.draw.polygon(canvas, (250, 251, 252), outline)
-            pygame.draw.polygon(canvas, (70, 84, 102), outline, SAMPLING)
+            pygame.draw.lines(canvas, (70, 84, 102), True, outline, SAMPLING - 1)
         centre = self.pixels(pose.inertial(hub))[0]
         pygame.draw.circle(canvas, (200, 206, 214), centre, max(3.0, 0.035 * radius * self.scale))
 
@@ -308,6 +426,26 @@ class TurbinePanel:
         tip = self.scene.turbine.rotor.tip_radius * e_r
         return np.vstack([axis + 0.3 * width, tip, (axis - 0.7 * width)[::-1]])
 
+    @staticmethod
+    def _thick(outline, least):
+        """A blade's outline in pixels, widened where it is narrower than twice `least` (2,), root and tip.
+
+        Seen edge-on a blade to scale is a hair that a small picture loses.
+        """
+        count = len(outline) // 2
+        one, tip, other = outline[:count], outline[count], outline[: count : -1]
+        middle, half = 0.5 * (one + other), 0.5 * (one - other)
+        along = tip - middle[0]
+        length = np.hypot(*along)
+        if length < 1.0:
+            return outline
+        across = np.array([-along[1], along[0]]) / length
+        reach = half @ across
+        wanted = np.linspace(least[0], least[1], count)
+        side = -1.0 if reach.sum() < 0.0 else 1.0  # one for all: a twisted blade would cross itself
+        wide = (side * np.maximum(side * reach, wanted))[:, None] * across
+        return np.vstack([middle + wide, tip, (middle - wide)[::-1]])
+
     def _wind(self, canvas, row):
         """An arrow at hub height whose length is the wind speed."""
         pygame, rotor = self.pygame, self.scene.turbine.rotor
@@ -319,15 +457,28 @@ class TurbinePanel:
             back = tip - np.sign(speed) * 1.6 * head
             pygame.draw.line(canvas, RGB_COLOURS[0], (x, y), (back, y), 3 * SAMPLING)
             pygame.draw.polygon(canvas, RGB_COLOURS[0], [(tip, y), (back, y - head), (back, y + head)])
-        text = self._fonts[0].render(f"{speed:.1f} m/s", True, RGB_COLOURS[0])
-        canvas.blit(text, (x, y + 1.2 * head))
+        self._wind_text = f"{speed:.1f} m/s", x / SAMPLING, (y + 1.2 * head) / SAMPLING
 
-    def _words(self, canvas, row, label):
-        time = self._fonts[1].render(f"{row['Time']:.1f} s", True, INK)
-        margin = round(0.02 * self.inner[1])
-        canvas.blit(time, (self.inner[0] - time.get_width() - margin, margin))
+    def _words(self, picture, row, label, colour, speed):
+        """Write time, label and wind onto the finished picture: letters are averaged on their own."""
+        text, x, y = self._wind_text
+        picture.blit(self._writer.render(text, self._small, RGB_COLOURS[0]), (x, y + 2))
+        margin = round(0.02 * self.size[1])
+        time = self._writer.render(f"{row['Time']:.1f} s", self._large, INK)
+        picture.blit(time, (self.size[0] - time.get_width() - margin, margin))
+        if speed is not None:
+            words = self._writer.render(f"{speed:.3g} x real time", self._small, SOFT)
+            place = self.size[0] - words.get_width() - margin, margin + 1.2 * self._large
+            picture.blit(words, place)
         if label:
-            canvas.blit(self._fonts[1].render(label, True, INK), (margin, margin))
+            name = self._writer.render(label, self._large, INK)
+            chip = 0
+            if colour is not None:
+                chip = round(0.75 * self._large)
+                box = self.pygame.Rect(margin, margin + 1, chip, round(0.6 * self._large))
+                self.pygame.draw.rect(picture, colour, box, border_radius=2)
+                chip += margin // 2
+            picture.blit(name, (margin + chip, margin))
 
 
 class MooringPanel:
@@ -335,15 +486,15 @@ class MooringPanel:
 
     def __init__(self, pygame, scene, size):
         self.pygame, self.size = pygame, size
-        self._font = pygame.font.Font(None, 17)
+        self._writer = Writer(pygame)
         mooring = scene.model.mooring
         ends = mooring.anchor[:, 0] + DEPTH_SHIFT * mooring.anchor[:, 1]
         self.depth = float(-mooring.anchor[:, 2].min())
         height = scene.turbine.rotor.hub_height
         low, high = min(ends.min(), -height), max(ends.max(), height)
-        self.scale = min((size[0] - 24) / (high - low), (size[1] - 46) / (self.depth + 1.1 * height))
+        self.scale = min((size[0] - 24) / (high - low), (size[1] - 62) / (self.depth + 1.1 * height))
         self.middle = 0.5 * (low + high)
-        self.level = size[1] - 26 - self.depth * self.scale
+        self.level = size[1] - 42 - self.depth * self.scale
 
     def pixels(self, points):
         """(n, 2) pixels of inertial points (n, 3)."""
@@ -374,18 +525,45 @@ class MooringPanel:
         shown = ", ".join(texts)
         if len(texts) > MOST_TENSIONS:
             shown = f"{min(texts, key=int)} to {max(texts, key=int)}"
-        words = self._font.render(f"fairlead tensions {shown} kN", True, SOFT)
-        picture.blit(words, (10, self.size[1] - 18))
+        words = self._writer.render(f"fairlead tension: {shown} kN", 16, SOFT)
+        picture.blit(words, (10, self.size[1] - 34))
+        tension_key(pygame, picture, self._writer, (10, self.size[1] - 16), self.size[0] - 20)
         return picture
 
 
-class TracePanel:
-    """Strips of the last WINDOW seconds of some channels, of one or several runs."""
+def tension_key(pygame, picture, writer, place, width):
+    """Draw what the colours of lines mean: tension over that at rest, from a half to one and a half."""
+    (x, y), ends = place, (0.5, 1.5)
+    left = writer.render("tension / at rest: 0.5", 15, SOFT)
+    right = writer.render("1.5", 15, SOFT)
+    picture.blit(left, (x, y))
+    begin, end = x + left.get_width() + 6, x + min(width, 300) - right.get_width() - 6
+    for column in range(begin, end):
+        share = ends[0] + (ends[1] - ends[0]) * (column - begin) / max(1, end - begin - 1)
+        pygame.draw.line(picture, tension_colour(share, 1.0), (column, y + 2), (column, y + 8))
+    pygame.draw.rect(picture, SOFT, (begin - 1, y + 1, end - begin + 2, 9), 1)
+    picture.blit(right, (end + 6, y))
 
-    def __init__(self, pygame, size, runs=1, labels=()):
+
+def nice_range(low, high):
+    """(low, high, step) that enclose the two on round numbers, with about three steps."""
+    rough = (high - low) / 3.0
+    power = 10.0 ** np.floor(np.log10(rough))
+    step = next(power * m for m in (1.0, 2.0, 2.5, 5.0, 10.0) if power * m >= rough * 0.999)
+    return np.floor(low / step + 1e-9) * step, np.ceil(high / step - 1e-9) * step, step
+
+
+class TracePanel:
+    """Strips of the last WINDOW seconds of some channels, of one or several runs, with their scales.
+
+    levels: {rating: value} of the lines across them. span: (begin, end) s that is shown throughout; None:
+    what is past, up to WINDOW. limits: {channel: (low, high)} of the values to come, so that scales rest.
+    """
+
+    def __init__(self, pygame, size, runs=1, levels=None, span=None, limits=None):
         self.pygame, self.size = pygame, size
-        self.labels = labels
-        self._font, self._bold = pygame.font.Font(None, 18), pygame.font.Font(None, 20)
+        self.levels, self.span, self.limits = levels or {}, span, limits or {}
+        self._writer = Writer(pygame, min(1.0, max(0.72, size[0] / 330.0, size[1] / 700.0)))
         self.histories = [deque() for _ in range(runs)]
 
     def clear(self):
@@ -401,55 +579,137 @@ class TracePanel:
         for history, row in zip(self.histories, rows, strict=True):
             if history and row["Time"] == history[-1][0]:
                 history.pop()
-            history.append((row["Time"], *(row[channel] for _, channel, *_ in TRACES)))
-            while history[0][0] < row["Time"] - WINDOW:
+            history.append((row["Time"], *(row[trace.channel] for trace in TRACES)))
+            while self.span is None and history[0][0] < row["Time"] - WINDOW:
                 history.popleft()
+
+    def _times(self, data):
+        """(begin, end) of the time axis."""
+        if self.span is not None:
+            return self.span
+        first, last = data[0][0, 0], data[0][-1, 0]
+        window = next((w for w in FIRST_WINDOWS if last - first <= w), WINDOW)
+        return max(first, last - window), max(first, last - window) + window
+
+    def scale(self, trace, values):
+        """(low, high, step) of a strip: encloses its values, its levels and its limits, on round numbers."""
+        levels = [self.levels[rating] for _, rating in trace.levels if rating in self.levels]
+        ends = [*levels, *self.limits.get(trace.channel, ()), values.min(), values.max()]
+        low, high = min(ends), max(ends)
+        spare = max(0.0, trace.least - (high - low)) / 2.0
+        return nice_range(low - spare, high + spare)
 
     def draw(self):
         """The picture of the traces."""
-        pygame = self.pygame
+        pygame, write = self.pygame, self._writer.render
         picture = pygame.Surface(self.size)
         picture.fill(CARD)
-        strip = self.size[1] / len(TRACES)
+        foot = round(16 * self._writer.zoom)
+        strip = (self.size[1] - foot) / len(TRACES)
+        head = round(20 * self._writer.zoom)
         data = [np.array(history) for history in self.histories]
-        end = max(WINDOW, data[0][-1, 0])
-        for number, (label, _, unit, form, least) in enumerate(TRACES):
+        begin, end = self._times(data)
+        gutter = round(42 * self._writer.zoom)
+        for number, trace in enumerate(TRACES):
             top = number * strip
             shown = np.concatenate([history[:, 1 + number] for history in data])
-            middle, half = 0.5 * (shown.max() + shown.min()), 0.5 * max(float(np.ptp(shown)) * 1.1, least)
-            box = pygame.Rect(10, round(top + 24), self.size[0] - 20, round(strip - 32))
-            pygame.draw.rect(picture, PAGE, box, border_radius=3)
+            low, high, step = self.scale(trace, shown)
+            box = pygame.Rect(gutter, round(top + head), self.size[0] - gutter - 10, round(strip - head - 7))
+            pygame.draw.rect(picture, PAGE, box)
+
+            def height(value, box=box, low=low, high=high):
+                return box.bottom - 1 - (box.height - 2) * (value - low) / (high - low)
+
+            ticks = np.arange(low, high + 0.5 * step, step)
+            for tick in ticks if box.height > 26 * self._writer.zoom else ticks[[0, -1]]:
+                y = round(height(tick))
+                pygame.draw.line(picture, FAINT, (box.left, y), (box.right, y))
+                text = write(f"{tick:.6g}", 14, SOFT)
+                place = min(max(y - text.get_height() // 2, box.top), box.bottom - text.get_height())
+                if len(ticks) <= 4 or tick in (ticks[0], ticks[-1]):
+                    picture.blit(text, (gutter - text.get_width() - 4, place))
+            for name, rating in trace.levels:
+                if rating in self.levels:
+                    y = round(height(self.levels[rating]))
+                    for x in range(box.left, box.right, 8):
+                        pygame.draw.line(picture, LEVEL, (x, y), (min(x + 4, box.right), y))
             for index, history in reversed(list(enumerate(data))):
-                x = box.left + box.width * (history[:, 0] - end + WINDOW) / WINDOW
-                y = box.bottom - box.height * (history[:, 1 + number] - middle + half) / (2.0 * half)
+                x = box.left + (box.width - 1) * (history[:, 0] - begin) / (end - begin)
                 if len(x) > 1:
-                    line = np.column_stack([x, y])
-                    pygame.draw.aalines(picture, RGB_COLOURS[index % len(RGB_COLOURS)], False, line)
-                    pygame.draw.aalines(picture, RGB_COLOURS[index % len(RGB_COLOURS)], False, line + (0, 1))
-            picture.blit(self._font.render(f"{label} ({unit})", True, SOFT), (10, top + 7))
+                    line = np.column_stack([x, height(history[:, 1 + number])])
+                    colour = RGB_COLOURS[index % len(RGB_COLOURS)]
+                    pygame.draw.aalines(picture, colour, False, line)
+                    pygame.draw.aalines(picture, colour, False, line + (0, 1))
+            text = write(f"{trace.label} ({trace.unit})", 16, SOFT)
+            picture.blit(text, (10, top + 5))
+            label_end = 10 + text.get_width()
             right = self.size[0] - 10
             for index, history in reversed(list(enumerate(data))):
-                text = self._bold.render(
-                    format(history[-1, 1 + number], form), True, RGB_COLOURS[index % len(RGB_COLOURS)]
-                )
+                colour = RGB_COLOURS[index % len(RGB_COLOURS)]
+                text = write(format(history[-1, 1 + number], trace.form), 18, colour)
                 right -= text.get_width()
-                picture.blit(text, (right, top + 6))
+                picture.blit(text, (right, top + 3))
                 right -= 12
+            known = [f"{name} {self.levels[rating]:.4g}" for name, rating in trace.levels if rating in self.levels]
+            text = write(", ".join(known) or " ", 14, LEVEL)
+            if label_end + 8 + text.get_width() <= right:
+                picture.blit(text, (label_end + 8, top + 6))
+        words = write(f"{begin:.0f} s", 14, SOFT)
+        picture.blit(words, (gutter, self.size[1] - foot))
+        words = write(f"{end:.0f} s", 14, SOFT)
+        picture.blit(words, (self.size[0] - 10 - words.get_width(), self.size[1] - foot))
+        return picture
+
+
+class AgentPanel:
+    """The last action, each entry a bar about zero, and the reward of the step."""
+
+    NAMES = {2: ("torque", "blade pitch"), 4: ("torque", "blade 1", "blade 2", "blade 3")}
+
+    def __init__(self, pygame, width):
+        self.pygame, self.width = pygame, width
+        self._writer = Writer(pygame)
+
+    def draw(self, agent):
+        """The picture of an Agent."""
+        pygame, write = self.pygame, self._writer.render
+        names = self.NAMES.get(len(agent.action), [f"action {n + 1}" for n in range(len(agent.action))])
+        picture = pygame.Surface((self.width, 18 * (len(names) + 1) + 10), pygame.SRCALPHA)
+        pygame.draw.rect(picture, (*CARD, 225), picture.get_rect(), border_radius=4)
+        left, right = 86, self.width - 46
+        for number, (name, value) in enumerate(zip(names, agent.action, strict=True)):
+            y = 6 + 18 * number
+            picture.blit(write(name, 16, SOFT), (8, y + 2))
+            pygame.draw.rect(picture, PAGE, (left, y + 2, right - left, 11))
+            middle = 0.5 * (left + right)
+            tip = middle + 0.5 * (right - left) * min(max(value, -1.0), 1.0)
+            bar = pygame.Rect(round(min(middle, tip)), y + 2, max(1, round(abs(tip - middle))), 11)
+            pygame.draw.rect(picture, RGB_COLOURS[0], bar)
+            pygame.draw.line(picture, SOFT, (middle, y), (middle, y + 14))
+            text = write(f"{value:+.2f}", 16, INK)
+            picture.blit(text, (self.width - 8 - text.get_width(), y + 2))
+        y = 6 + 18 * len(names)
+        reward = "-" if agent.reward is None else f"{agent.reward:+.3f}"
+        picture.blit(write("reward", 16, SOFT), (8, y + 2))
+        text = write(reward, 16, INK)
+        picture.blit(text, (self.width - 8 - text.get_width(), y + 2))
         return picture
 
 
 class View:
     """What a render mode shows: side views of one or several runs beside each other, traces and mooring.
 
-    scenes: one per run; labels: their names, or None. Rows of channels are given to draw().
+    scenes: one per run; labels: their names, or None. speed: how many times faster than real time it is
+    shown; None: not said. span, limits: as for TracePanel. Rows of channels are given to draw().
     """
 
-    def __init__(self, scenes, labels=None, size=SIZE):
+    def __init__(self, scenes, labels=None, size=SIZE, *, speed=None, span=None, limits=None):
         self.pygame = pygame = load_pygame()
-        self.size = size
+        self.size, self.speed = size, speed
         self.labels = labels or [None] * len(scenes)
+        self.colours = RGB_COLOURS if labels else (None,)
         width, height = size
-        side = round(0.345 * width) if len(scenes) == 1 else round(0.28 * width)
+        side = round(0.345 * width) if len(scenes) == 1 else round(0.3 * width)
         each = (width - side) // len(scenes)
         self.panels = [TurbinePanel(pygame, scene, (each - 1, height)) for scene in scenes]
         self.places = [number * each for number in range(len(scenes))]
@@ -457,7 +717,9 @@ class View:
         moored = scenes[0].model.mooring is not None and len(scenes) == 1
         below = round(0.28 * height) if moored else 0
         self.mooring = MooringPanel(pygame, scenes[0], (side, below)) if moored else None
-        self.traces = TracePanel(pygame, (side, height - below), len(scenes))
+        levels = ratings(scenes[0].turbine)
+        self.traces = TracePanel(pygame, (side, height - below), len(scenes), levels, span, limits)
+        self.agent = AgentPanel(pygame, min(240, self.right - 20))
         self.canvas = pygame.Surface(size)
         self._window = self._clock = None
 
@@ -466,16 +728,22 @@ class View:
         self.panels[0].enter(scene)
         self.traces.clear()
 
-    def draw(self, rows):
-        """pygame Surface of one row of channels per run."""
+    def draw(self, rows, agent=None):
+        """pygame Surface of one row of channels per run, and of the Agent of the first, if there is one."""
         self.traces.add(rows)
         self.canvas.fill(FAINT)
-        for panel, x, row, label in zip(self.panels, self.places, rows, self.labels, strict=True):
-            self.canvas.blit(panel.draw(row, label), (x, 0))
+        for number, (panel, x, row, label) in enumerate(
+            zip(self.panels, self.places, rows, self.labels, strict=True)
+        ):
+            last = number == len(self.panels) - 1
+            colour = self.colours[number % len(self.colours)]
+            self.canvas.blit(panel.draw(row, label, colour, self.speed if last else None), (x, 0))
         self.canvas.blit(self.traces.draw(), (self.right, 0))
         if self.mooring is not None:
             picture = self.mooring.draw(rows[0], self.panels[0].scene, self.panels[0].tension_at_rest)
             self.canvas.blit(picture, (self.right, self.size[1] - self.mooring.size[1]))
+        if agent is not None:
+            self.canvas.blit(self.agent.draw(agent), (10, 10))
         return self.canvas
 
     def array(self):
