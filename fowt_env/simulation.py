@@ -26,8 +26,8 @@ from fowt_env.control import (
 from fowt_env.descriptions.checks import check_number
 from fowt_env.descriptions.faults import BLADE_FAULTS, STOP_FAULTS, Fault, read_faults
 from fowt_env.descriptions.protection import Protection, TripLimit, read_protection
-from fowt_env.descriptions.sensors import SensorChain, sensors_of
 from fowt_env.descriptions.ratings import ratings
+from fowt_env.descriptions.sensors import SensorChain, sensors_of
 from fowt_env.descriptions.units import RPM
 from fowt_env.errors import (
     ControllerInputError,

@@ -30,9 +30,12 @@ DRAWN = (
     "RotSpeed",
 )
 GIF_COLOURS = 64  # a palette that keeps files small; the sky has few shades anyway
+CLEAR = GIF_COLOURS - 1  # place in the palette that means: as in the picture before
+UNSEEN = 6  # of 255: smaller changes of a pixel wait until they have added up
 MOST_STILL = 2.0  # windows: shorter animations show all of their time throughout
 # small or rare in a picture, but to be kept in the palette: this many rows of the sample are given to them
-KEY_COLOURS = (*RGB_COLOURS, YELLOW, LOOSE, AT_REST, TIGHT)
+SHADE = (178, 141, 30)  # of yellow, away from the light
+KEY_COLOURS = (*RGB_COLOURS, YELLOW, SHADE, LOOSE, AT_REST, TIGHT)
 SWATCH = 160
 
 
@@ -110,24 +113,52 @@ class _Track:
 
 
 def _write_gif(pictures, path, pause):
-    """Write pictures as a looping GIF that share one palette: of the first picture and KEY_COLOURS."""
+    """Write pictures as a looping GIF of one palette: that of the first picture and KEY_COLOURS.
+
+    A frame holds what has changed: elsewhere it is transparent, which packs to nothing.
+    """
     try:
-        from PIL import Image
+        from PIL import GifImagePlugin, Image
     except ImportError as error:
         raise InputError(f'a GIF needs pillow ({error}): pip install "fowt-env[render]"') from error
-    first = Image.fromarray(next(pictures))
+    shown = next(pictures)
     swatches = np.repeat(np.array(KEY_COLOURS, dtype=np.uint8), SWATCH // len(KEY_COLOURS), axis=0)
-    sample = np.vstack(
-        [np.asarray(first), np.broadcast_to(swatches[:, None], (len(swatches), first.width, 3))]
-    )
-    palette = Image.fromarray(sample).quantize(GIF_COLOURS, method=Image.Quantize.MEDIANCUT)
-    reduced = (
-        Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE)
-        for picture in chain([np.asarray(first)], pictures)
-    )
-    next(reduced).save(
-        path, format="GIF", save_all=True, append_images=reduced, duration=10 * pause, loop=0, optimize=False
-    )
+    sample = np.vstack([shown, np.broadcast_to(swatches[:, None], (len(swatches), shown.shape[1], 3))])
+    palette = Image.fromarray(sample).quantize(CLEAR, method=Image.Quantize.MEDIANCUT)
+    entries = (palette.getpalette() + [0] * 768)[:768]
+    settings = {"duration": 10 * pause, "loop": 0}
+
+    def reduced(picture):
+        return np.array(Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE))
+
+    def image(places):
+        found = Image.frombytes("P", places.shape[::-1], places.tobytes())
+        found.putpalette(entries)
+        return found
+
+    first = reduced(shown)
+    whole = image(first)
+    whole.info = dict(settings)
+    with open(path, "wb") as file:
+        for block in GifImagePlugin.getheader(whole, info=settings)[0]:
+            file.write(block)
+        for block in GifImagePlugin.getdata(whole, **settings):
+            file.write(block)
+        shown, before = shown.astype(np.int16), first
+        for picture in pictures:
+            places = reduced(picture)
+            gap = np.abs(picture - shown).max(axis=2)
+            changed = (places != before) & (gap > UNSEEN)
+            before, shown = np.where(changed, places, before), np.where(changed[..., None], picture, shown)
+            rows, columns = (np.flatnonzero(changed.any(axis=axis)) for axis in (1, 0))
+            if not rows.size:  # a picture has at least one pixel
+                rows = columns = np.zeros(1, dtype=int)
+            box = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
+            part = image(np.where(changed, places, CLEAR).astype(np.uint8)[box])
+            corner = int(columns[0]), int(rows[0])
+            for block in GifImagePlugin.getdata(part, corner, **settings, transparency=CLEAR, disposal=1):
+                file.write(block)
+        file.write(b";")
 
 
 def _write_mp4(pictures, path, pause):

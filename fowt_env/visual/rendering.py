@@ -51,6 +51,7 @@ LEVEL = (120, 128, 140)  # of lines across a strip
 RGB_COLOURS = ((0, 114, 178), (213, 94, 0), (0, 158, 115), (204, 121, 167))
 LOOSE, AT_REST, TIGHT = (90, 170, 230), (250, 236, 150), (220, 50, 40)  # of a line, by its tension
 
+
 class Trace(NamedTuple):
     """A strip of live values."""
 
@@ -85,7 +86,9 @@ def check_size(name, size):
         return
     sides = tuple(size) if isinstance(size, tuple | list) else ()
     if len(sides) != 2 or not all(isinstance(n, int) and SIDES[0] <= n <= SIDES[1] for n in sides):
-        raise InputError(f"{name} = {size!r}: must be (width, height), whole numbers in [{SIDES[0]}, {SIDES[1]}]")
+        raise InputError(
+            f"{name} = {size!r}: must be (width, height), whole numbers in [{SIDES[0]}, {SIDES[1]}]"
+        )
 
 
 def load_pygame():
@@ -344,7 +347,9 @@ class TurbinePanel:
         if -1.0 < share < 1.0:
             layers = [(-1.0, share, STEEL), (share, 1.0, YELLOW)]
         for low, high, colour in layers:
-            corners = [p + side * across + z * up for p in (start, end) for side in (-1, 1) for z in (low, high)]
+            corners = [
+                p + side * across + z * up for p in (start, end) for side in (-1, 1) for z in (low, high)
+            ]
             seen = self.pixels(pose.inertial(corners))
             self.pygame.draw.polygon(canvas, [round(0.85 * c) for c in colour], _outline(seen))
             near = sorted((-1, 1), key=lambda side: (start + side * across)[1])[0]
@@ -433,7 +438,7 @@ class TurbinePanel:
         Seen edge-on a blade to scale is a hair that a small picture loses.
         """
         count = len(outline) // 2
-        one, tip, other = outline[:count], outline[count], outline[: count : -1]
+        one, tip, other = outline[:count], outline[count], outline[:count:-1]
         middle, half = 0.5 * (one + other), 0.5 * (one - other)
         along = tip - middle[0]
         length = np.hypot(*along)
@@ -650,7 +655,9 @@ class TracePanel:
                 right -= text.get_width()
                 picture.blit(text, (right, top + 3))
                 right -= 12
-            known = [f"{name} {self.levels[rating]:.4g}" for name, rating in trace.levels if rating in self.levels]
+            known = [
+                f"{name} {self.levels[rating]:.4g}" for name, rating in trace.levels if rating in self.levels
+            ]
             text = write(", ".join(known) or " ", 14, LEVEL)
             if label_end + 8 + text.get_width() <= right:
                 picture.blit(text, (label_end + 8, top + 6))

@@ -250,7 +250,10 @@ def plot_raos(runs, path=None, title=None, skip=0.0, segment=None, platform_pitc
             good = found.energetic & (found.coherence > COHERENT)
             highest = max(highest, found.amplitude[found.energetic].max())
             style, degrees = line_style(number), np.degrees(found.phase)
-            for kept, look in ((found.energetic, {"lw": 0.9, "alpha": 0.3}), (good, {"lw": 1.5, "label": label})):
+            for kept, look in (
+                (found.energetic, {"lw": 0.9, "alpha": 0.3}),
+                (good, {"lw": 1.5, "label": label}),
+            ):
                 shown = np.where(kept, found.amplitude, np.nan)
                 grid[0, column].plot(found.frequency, shown, **look, **style)
                 shown = np.where(kept, degrees, np.nan)
@@ -280,5 +283,10 @@ def plot_raos(runs, path=None, title=None, skip=0.0, segment=None, platform_pitc
             xytext=(3, 0), textcoords="offset points", fontsize=7, color=SOFT, rotation=90,
         )  # fmt: skip
     figure.align_ylabels(grid[:, 0])
-    _head(figure, grid[0], list(runs), title or "Response per metre of wave amplitude (grey: waves without energy)")
+    _head(
+        figure,
+        grid[0],
+        list(runs),
+        title or "Response per metre of wave amplitude (grey: waves without energy)",
+    )
     return save_figure(figure, path)

@@ -64,7 +64,9 @@ def named_runs(runs):
 def _lines(runs, channel):
     """[(label, style, frame)] of a channel; one without a label where all runs agree (the weather)."""
     having = [
-        (number, label, frame) for number, (label, frame) in enumerate(runs.items()) if channel in frame.columns
+        (number, label, frame)
+        for number, (label, frame) in enumerate(runs.items())
+        if channel in frame.columns
     ]
     if len(having) > 1:
         first = having[0][2]
@@ -118,7 +120,9 @@ def plot_runs(runs, path=None, title=None, *, skip=0.0, ratings=None):
             if rating in ratings:
                 _mark_level(axes, text, ratings[rating])
         if skip > 0.0:
-            axes.axvspan(first[TIME].iloc[0], first[TIME].iloc[0] + skip, color=UNSCORED, zorder=0, linewidth=0)
+            axes.axvspan(
+                first[TIME].iloc[0], first[TIME].iloc[0] + skip, color=UNSCORED, zorder=0, linewidth=0
+            )
         axes.set_ylabel(label, fontsize=8, color=INK)
         axes.margins(x=0.0)
     if skip > 0.0:

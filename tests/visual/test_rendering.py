@@ -26,7 +26,7 @@ WEATHER = {"wind": 18.0, "sea": {"kind": "jonswap", "Hs": 5.0, "Tp": 10.0}}
 REST = dict.fromkeys(
     ("PtfmSurge", "PtfmSway", "PtfmHeave", "PtfmRoll", "PtfmPitch", "PtfmYaw", "Azimuth", "BldPitch1"), 0.0
 )
-ROW = REST | {"Time": 0.0, "Wind1VelX": 18.0, "RotSpeed": 12.1, "GenPwr": 5000.0}
+ROW = REST | {"Time": 0.0, "Wind1VelX": 18.0, "RotSpeed": 12.1, "GenPwr": 5000.0, "GenTq": 43.1}
 
 
 @pytest.fixture(scope="module")
@@ -256,6 +256,29 @@ def test_a_gif_shows_the_runs_beside_each_other(scene, runs, tmp_path):
         assert (np.abs(last - colour).max(axis=2) < 12).sum() > 20
 
 
+def test_a_gif_holds_changes_alone_and_shows_what_was_drawn(tmp_path):
+    """Frames after the first are small boxes, and put together they are the pictures, in its palette."""
+    from PIL import Image
+
+    from fowt_env.visual.animation import UNSEEN, _write_gif
+
+    still = np.full((60, 80, 3), 240, dtype=np.uint8)
+    pictures = [still.copy() for _ in range(5)]
+    for number, picture in enumerate(pictures):
+        picture[20:24, 10 * number : 10 * number + 8] = RGB_COLOURS[0]
+    pictures.insert(3, pictures[2])  # nothing moves
+    _write_gif(iter(pictures), tmp_path / "a.gif", 10)
+    with Image.open(tmp_path / "a.gif") as image:
+        assert image.n_frames == 6
+        for number, picture in enumerate(pictures):
+            image.seek(number)
+            if number:
+                left, top, right, bottom = image.dispose_extent
+                assert (bottom - top) * (right - left) <= 4 * 18
+            seen = np.asarray(image.convert("RGB")).astype(int)
+            assert np.abs(seen - picture).max() <= UNSEEN + 10
+
+
 def test_an_mp4_has_a_picture_per_step(scene, runs, tmp_path):
     imageio_ffmpeg = pytest.importorskip("imageio_ffmpeg", reason="imageio-ffmpeg is not installed")
     path = animate(scene, {"": runs["pi"]}, tmp_path / "one.mp4", speed=2.0, fps=10, size=(480, 320))
@@ -282,6 +305,96 @@ def test_animations_that_cannot_be_made_are_named(scene, runs, tmp_path, argumen
     with pytest.raises(InputError, match="needs at least two rows"):
         animate(scene, {"cut": runs["pi"][["Time_[s]"]]}, tmp_path / "a.gif")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "above", "below"),
+    [("iea15_volturnus_s", 4, 12), ("nrel5mw_iti_barge", 1, 1)],
+)
+def test_shapes_stand_for_hulls_whose_loads_have_none(name, above, below):
+    """Of every column that the file gives the middle above the water is yellow; water is beside the hull."""
+    scene = fowt_env.build_scene(name, rotor="table")
+    view = View([scene])
+    view.draw([ROW])
+    panel, picture, shapes = view.panels[0], view.array().astype(int), scene.platform.shapes
+
+    def colour(point):
+        x, y = panel.pixels([point])[0] / rendering.SAMPLING
+        return picture[round(y), round(x)]
+
+    assert sum(shape.end[2] > 0.0 for shape in shapes) >= above and len(shapes) <= below
+    for shape in shapes:
+        start, end = np.array(shape.start), np.array(shape.end)
+        if end[2] > 0.0 and (shape.section or shape.diameter > 2.0):
+            at = 0.5 * (start + end)
+            red, green, blue = colour((*at[:2], 3.0))
+            assert red > green > 1.5 * blue, shape
+    red, green, blue = colour((-90.0, 0.0, 2.0))
+    assert blue > red
+
+
+def test_the_same_row_gives_the_same_picture(scene):
+    pictures = []
+    for _ in range(2):
+        view = View([scene], ["a name"], speed=3.0)
+        view.draw([ROW], rendering.Agent((0.5, -1.0), 1.5))
+        pictures.append(view.array().tobytes())
+    assert pictures[0] == pictures[1]
+
+
+def test_the_agent_s_bars_show_its_action_and_the_reward_changes_the_picture(still):
+    panel = View([still]).agent
+    pygame = panel.pygame
+
+    def blue(action):
+        picture = pygame.surfarray.array3d(panel.draw(rendering.Agent(action, 0.0))).astype(int)
+        return int((np.abs(picture - np.array(RGB_COLOURS[0])).max(axis=2) < 5).sum())
+
+    assert blue((1.0, 0.0)) > 1.8 * blue((0.5, 0.0)) > 1.5 * blue((0.25, 0.0))
+    some, other = (
+        pygame.image.tobytes(panel.draw(rendering.Agent((0.0, 0.0), r)), "RGB") for r in (1.0, 2.0)
+    )
+    assert some != other
+
+
+def test_an_environment_s_picture_has_its_size_action_and_reward(monkeypatch):
+    shown = []
+    draw = View.draw
+    monkeypatch.setattr(
+        View, "draw", lambda view, rows, agent=None: (shown.append(agent), draw(view, rows, agent))
+    )
+    env = FowtEnv(render_mode="rgb_array", render_size=(480, 320), **QUICK, **WEATHER)
+    env.reset(seed=1)
+    assert env.render().shape == (320, 480, 3) and shown[-1].reward is None
+    reward = env.step(np.array([0.25, -0.5]))[1]
+    env.render()
+    assert shown[-1].action == (0.25, -0.5) and shown[-1].reward == reward
+    assert env._view.speed == pytest.approx(3.0)  # 30 pictures of 0.1 s a second
+    env.close()
+    with pytest.raises(InputError, match=r"render_size = \(10, 320\): must be \(width, height\)"):
+        FowtEnv(render_mode="rgb_array", render_size=(10, 320), **QUICK, **WEATHER)
+
+
+def test_scales_hold_the_rated_and_the_trip_line_and_do_not_blow_up_small_changes(still):
+    traces = View([still]).traces
+    speed = next(trace for trace in rendering.TRACES if trace.channel == "RotSpeed")
+    low, high, step = traces.scale(speed, np.array([12.0, 12.1]))
+    assert low <= 12.0 and high >= traces.levels["overspeed_[rpm]"] > 15.0
+    wind = next(trace for trace in rendering.TRACES if trace.channel == "Wind1VelX")
+    low, high, step = traces.scale(wind, np.array([18.0, 18.01]))
+    assert high - low >= wind.least and low % step == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_blade_seen_edge_on_keeps_a_width_and_its_outline_does_not_cross_itself(still):
+    panel = TurbinePanel(rendering.load_pygame(), still, (300, 300))
+    count = 20
+    middle = np.column_stack([np.zeros(count), np.linspace(0.0, 200.0, count)])
+    twisted = 0.01 * np.linspace(1.0, -1.0, count)[:, None] * np.array([[1.0, 0.0]])
+    outline = np.vstack([middle + twisted, [[0.0, 210.0]], (middle - twisted)[::-1]])
+    thick = panel._thick(outline, np.array([4.0, 1.0]))
+    width = thick[:count, 0] - thick[:count:-1, 0]
+    assert np.abs(width) == pytest.approx(2.0 * np.linspace(4.0, 1.0, count), rel=0.02)
+    assert len(set(np.sign(width))) == 1
 
 
 @pytest.mark.parametrize("make", [floaters.semi, floaters.tension_leg], ids=["semi", "tension leg"])

@@ -66,6 +66,27 @@ def test_a_schedule_has_a_line_per_table_and_only_panels_with_data():
     np.testing.assert_array_equal(shown[0].lines[1].get_ydata(), schedule(1.0)["RotSpeed_[rpm]"])
 
 
+def test_the_schedule_marks_rated_wind():
+    figure = plot_schedule(schedule(), rated_wind=11.4)
+    shown = [axes for axes in figure.axes if axes.get_visible()]
+    assert all(axes.lines[-1].get_xdata()[0] == 11.4 for axes in shown)
+    assert any("11.4" in text.get_text() for axes in shown for text in axes.texts)
+
+
+def test_raos_have_phase_within_half_a_turn_and_coherence_from_below_the_platform_s_resonance():
+    late = run()
+    late["PtfmSurge_[m]"] = np.roll(late["PtfmSurge_[m]"], 120)  # 12 s: more than a turn at 0.1 Hz
+    figure = plot_raos(late, platform_pitch_period=30.0)
+    amplitude, phase, coherence = (figure.axes[row * 2] for row in range(3))
+    angles = np.concatenate([line.get_ydata() for line in phase.lines if len(line.get_ydata()) > 2])
+    angles = angles[np.isfinite(angles)]
+    assert np.abs(angles).max() <= 180.0 and np.ptp(angles) > 270.0  # it does pass the ends
+    for line in phase.lines:  # and no line is drawn from one end to the other
+        assert not (np.abs(np.diff(line.get_ydata())) > 180.0).any()
+    assert amplitude.get_xlim()[0] < 1.0 / 30.0
+    assert coherence.get_ylim() == (0.0, 1.0) and figure.get_suptitle()
+
+
 def test_every_plot_is_written_where_it_is_asked_for(tmp_path):
     plot_raos({"a": run(), "b": run(noise=1.0)}, tmp_path / "rao.png", "RAO")
     plot_boxes({"calm": {"": run()}}, tmp_path / "boxes.png")

@@ -23,6 +23,7 @@ def run(shift=0.0, n=6001):
             "Wave1Elev_[m]": 2.0 * np.cos(2.0 * np.pi * t / 10.0),
             "RotSpeed_[rpm]": 12.0 + 0.3 * np.sin(2.0 * np.pi * t / 30.0 + shift),
             "BldPitch1_[deg]": 15.0 + np.sin(0.2 * t + shift),
+            "GenTq_[kN-m]": np.full(n, 43.09),
             "GenPwr_[kW]": 5000.0 + 50.0 * np.sin(0.2 * t + shift),
             "PtfmPitch_[deg]": 2.0 + np.sin(2.0 * np.pi * t / 30.0 + shift),
             "PtfmSurge_[m]": 12.0 + np.sin(0.05 * t + shift),
@@ -38,7 +39,7 @@ def test_stacked_plot_has_a_labelled_panel_per_channel(tmp_path):
     assert len(figure.axes) == len(time_series.PANELS)
     for axes, (label, channel) in zip(figure.axes, time_series.PANELS, strict=True):
         assert axes.get_ylabel() == label and "(" in label  # the unit
-        assert axes.get_legend().get_texts()[0].get_text() == channel.split("_[")[0]
+        assert axes.get_legend() is None
         np.testing.assert_array_equal(axes.lines[0].get_ydata(), run()[channel])
 
 
@@ -49,10 +50,62 @@ def test_a_run_without_a_channel_has_no_panel_for_it():
 
 def test_overlay_draws_each_run_and_the_common_weather_once(tmp_path):
     figure = time_series.plot_runs({"pi": run(), "pi_land": run(1.0)}, tmp_path / "both.svg")
-    texts = {axes.get_ylabel(): [t.get_text() for t in axes.get_legend().get_texts()] for axes in figure.axes}
-    assert texts["wave\n(m)"] == ["Wave1Elev · all"]
-    assert texts["rotor speed\n(rpm)"] == ["RotSpeed · pi", "RotSpeed · pi_land"]
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == ["pi", "pi_land"]
+    lines = {axes.get_ylabel(): len(axes.lines) for axes in figure.axes}
+    assert lines["wave\n(m)"] == 1 and lines["rotor speed\n(rpm)"] == 2
     assert (tmp_path / "both.svg").read_text(encoding="utf-8").startswith("<?xml")
+
+
+def test_rated_and_trip_are_lines_and_what_is_not_scored_is_shaded():
+    ratings = {"rated_rotor_speed_[rpm]": 12.1, "overspeed_[rpm]": 15.73, "rated_power_[kW]": 5000.0}
+    frame = run()
+    plain = time_series.plot_run(frame)
+    frame.attrs["ratings"] = ratings
+    figure = time_series.plot_run(frame, skip=60.0)
+    for axes, before in zip(figure.axes, plain.axes, strict=True):
+        levels = [line.get_ydata()[0] for line in axes.lines[1:]]
+        channel = next(channel for label, channel in time_series.PANELS if label == axes.get_ylabel())
+        expected = {"RotSpeed_[rpm]": [12.1, 15.73], "GenPwr_[kW]": [5000.0]}.get(channel, [])
+        assert levels == expected and len(before.lines) == 1
+        assert axes.patches[-1].get_x() == 0.0 and axes.patches[-1].get_width() == 60.0
+    assert time_series.plot_run(frame, ratings={}).axes[2].lines[1:] == []
+
+
+def test_names_lose_what_does_not_tell_them_apart():
+    from fowt_env.visual.style import LONGEST_NAME, short_names
+
+    names = short_names(["lqr", "policy:ppo_lqr", "mypid:MyPID", "design:gains/mine.json", "x" * 60])
+    assert list(names.values())[:4] == ["lqr", "ppo_lqr", "MyPID", "mine"]
+    assert len(names["x" * 60]) <= LONGEST_NAME
+    assert short_names(["a:Law", "b:Law"]) == {"a:Law": "a:Law", "b:Law": "b:Law"}
+
+
+def test_a_notebook_shows_a_figure_as_a_picture_without_pyplot():
+    picture, size = time_series.plot_run(run())._repr_png_()
+    assert picture.startswith(PNG) and size["width"] == 864
+
+
+def test_a_constant_channel_is_a_flat_line_in_full_numbers():
+    figure = time_series.plot_run(run().assign(**{"GenTq_[kN-m]": 43.09 + 7e-15 * np.arange(6001)}))
+    axes = next(ax for ax in figure.axes if "torque" in ax.get_ylabel())
+    low, high = axes.get_ylim()
+    assert high - low > 1.0
+
+
+def test_spectra_have_one_legend_above_and_no_panel_for_what_is_constant():
+    frames = {"pi": run(), "lqr": run(1.0)}
+    figure = time_series.plot_spectra(frames)
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == ["pi", "lqr"]
+    assert all(axes.get_legend() is None for axes in figure.axes)
+    assert figure.axes[0].get_ylabel().startswith("wind")
+    steady = {name: frame.assign(**{"Wind1VelX_[m/s]": 18.0}) for name, frame in frames.items()}
+    assert len(time_series.plot_spectra(steady).axes) == len(figure.axes) - 1
+    tower = {
+        name: frame.assign(**{"TwrBsMyt_[kN-m]": frame["RotSpeed_[rpm]"]}) for name, frame in frames.items()
+    }
+    assert len(time_series.plot_spectra(tower).axes) == len(figure.axes) + 1
 
 
 def test_spectrum_holds_the_variance_and_peaks_at_the_period():

@@ -77,17 +77,29 @@ def _draw(kind, frames, path, title, skip, platform):
     """Write the picture of a kind."""
     from fowt_env.visual import response, time_series
 
+    known = None if platform.lower() == "none" else platform
     if kind == "series":
-        time_series.plot_runs(frames, path, title)
+        levels = {} if known is None else _ratings(known)
+        time_series.plot_runs(frames, path, title, skip=skip, ratings=levels)
     elif kind == "spectra":
-        period = None if platform.lower() == "none" else _platform_pitch_period(platform)
+        period = known and _platform_pitch_period(known)
         time_series.plot_spectra(frames, path, title, skip, platform_pitch_period=period)
     elif kind == "boxes":
         response.plot_boxes({"": frames}, path, title, skip)
     elif kind == "raos":
-        response.plot_raos(frames, path, title, skip)
+        period = known and _platform_pitch_period(known)
+        response.plot_raos(frames, path, title, skip, platform_pitch_period=period)
     else:
-        response.plot_schedule(frames, path, title)
+        wind = known and _ratings(known)["rated_wind_speed_[m/s]"]
+        response.plot_schedule(frames, path, title, rated_wind=wind)
+
+
+def _ratings(platform):
+    """descriptions.ratings.ratings of a platform's turbine."""
+    from fowt_env.descriptions.ratings import ratings
+    from fowt_env.training.evaluation.scaling import turbine_of
+
+    return ratings(turbine_of(platform))
 
 
 def _platform_pitch_period(platform):

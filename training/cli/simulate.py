@@ -249,5 +249,5 @@ def trim(
     if plot is not None:
         from fowt_env.visual.response import plot_schedule
 
-        plot_schedule(points, plot, title)
+        plot_schedule(points, plot, title, rated_wind=scene.turbine.rated_wind_speed)
         note(f"wrote {plot}")

@@ -11,7 +11,17 @@ from fowt_env.errors import InputError
 from fowt_env.visual.response import broken_at_wraps
 from fowt_env.visual.style import COLOURS, FAINT, INK, SOFT, new_figure, save_figure, style_axes
 
-MODE_NAMES = ("surge", "sway", "heave", "roll", "platform_pitch", "yaw", "rotor_speed", "blade_pitch", "other")
+MODE_NAMES = (
+    "surge",
+    "sway",
+    "heave",
+    "roll",
+    "platform_pitch",
+    "yaw",
+    "rotor_speed",
+    "blade_pitch",
+    "other",
+)
 MODE_MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", "*")
 OF_REAL_POLES = ("rotor_speed", "blade_pitch", "surge", "sway", "heave", "roll", "platform_pitch", "yaw")
 REAL = 1e-6  # rad/s: a pole of less imaginary part is real
@@ -72,7 +82,11 @@ def plot_poles(models, path=None, title=None):
     if beyond:
         texts = sorted({f"{name.replace('_', ' ')} at {pole.real:.3g} 1/s" for name, pole in beyond})
         panels[0].annotate(
-            f"further left: {', '.join(texts[:3])}", (0.01, 0.06), xycoords="axes fraction", fontsize=8, color=SOFT
+            f"further left: {', '.join(texts[:3])}",
+            (0.01, 0.06),
+            xycoords="axes fraction",
+            fontsize=8,
+            color=SOFT,
         )
     bar = figure.colorbar(scale, ax=panels, pad=0.01)
     _quiet_bar(bar, "wind (m/s)")

@@ -16,7 +16,6 @@ from fowt_env.visual.style import (
     style_axes,
 )
 
-
 TITLES = {
     "RotSpeed_mean_[rpm]": "rotor speed, mean (rpm)",
     "RotSpeed_std_[rpm]": "rotor speed, std (rpm)",
@@ -184,12 +183,18 @@ def plot_pareto(board, path=None, title=None):
     )
     for handle in legend.legend_handles:
         handle.set_sizes([40.0])
-    level, cases, seeds = round(100 * board["interval"]["level"]), len(board["cases"]), len(board.get("seeds", ()))
+    level, cases, seeds = (
+        round(100 * board["interval"]["level"]),
+        len(board["cases"]),
+        len(board.get("seeds", ())),
+    )
     text = f"means over {cases} case{'' if cases == 1 else 's'}"
     text += f"; bars: {level} % intervals of the paired ratio" if "ratio" in drawn else ""
     text += f"; bars: {level} % intervals" if "mean" in drawn else ""
     text += "; lines: range over the seeds, too few for an interval" if "seeds" in drawn else ""
-    text += f"; {seeds} seed{'' if seeds == 1 else 's'}: no interval" if base is not None and not drawn else ""
+    text += (
+        f"; {seeds} seed{'' if seeds == 1 else 's'}: no interval" if base is not None and not drawn else ""
+    )
     figure.suptitle(f"{title}\n{text}" if title else text, fontsize=9, color=INK, x=0.01, ha="left")
     _label_marks(figure, axes, [names[entry["controller"]] for entry, _ in kept], points, areas, places)
     return save_figure(figure, path)
@@ -267,7 +272,9 @@ def _label_marks(figure, axes, names, points, areas, places):
         if len(x) == 2 and line.get_gid() == REFERENCE:
             whole = axes.get_window_extent().extents / per_point
             (at_x, at_y), (low_x, low_y, high_x, high_y) = placed([(1.0, 1.0)])[0], whole
-            taken.append((at_x - 1, low_y, at_x + 1, high_y) if x[0] == x[1] else (low_x, at_y - 1, high_x, at_y + 1))
+            taken.append(
+                (at_x - 1, low_y, at_x + 1, high_y) if x[0] == x[1] else (low_x, at_y - 1, high_x, at_y + 1)
+            )
     frame = axes.get_window_extent().extents / per_point
 
     def overlap(one, other):

@@ -90,6 +90,25 @@ def test_plots_show_every_mode_and_leave_out_a_pitch_that_rests(models):
     bode = plot_bode(models).axes
     assert len(bode[0].lines) == 2  # blade pitch: above rated only
     assert len(bode[1].lines) == 3
+    figure = plot_bode(models)
+    phases = [axes for axes in figure.axes if axes.get_ylim() == (-180.0, 180.0)]
+    assert len(phases) == 3
+    for line in (line for axes in phases for line in axes.lines):
+        angle = line.get_ydata()
+        assert np.nanmax(np.abs(angle)) <= 180.0 and not (np.abs(np.diff(angle)) > 180.0).any()
+    real = [
+        value.real
+        for model in models.values()
+        for value in np.linalg.eigvals(model.A)
+        if abs(value.imag) < 1e-9
+    ]
+    slow = sorted(value for value in real if value > -2.0)
+    drawn = sorted(
+        c.get_offsets()[0][0]
+        for c in poles.collections
+        if len(c.get_offsets()) and c.get_offsets()[0][1] == 0.0
+    )
+    assert drawn == pytest.approx(slow) and len(slow) >= len(models)  # the rotor speed's own
     damping = plot_damping(models).axes[1]
     every = [mode for model in models.values() for mode in model.modes()]
     surge = [mode.damping_ratio for mode in every if mode.name == "surge"]

@@ -4,6 +4,8 @@ import pytest
 
 pytest.importorskip("matplotlib", reason="matplotlib is not installed: the extra `plot` is missing")
 
+from matplotlib.text import Text  # noqa: E402
+
 from fowt_env.errors import InputError  # noqa: E402
 from fowt_env.training.reports import evaluation_plots  # noqa: E402
 
@@ -46,7 +48,7 @@ def test_pareto_marks_have_areas_in_the_ratio_of_pitch_travel_and_names_that_do_
     assert sizes[3] / sizes[0] == pytest.approx(4.0)
     assert sizes[8] / sizes[0] == pytest.approx(9.0 * np.pi / 4.0)  # a square: all of its box
     figure.draw_without_rendering()
-    boxes = [text.get_window_extent() for text in axes.texts]
+    boxes = [Text.get_window_extent(text) for text in axes.texts]  # without its leader
     assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
     assert (tmp_path / "pareto.png").stat().st_size > 10_000
 
@@ -63,12 +65,13 @@ def test_a_pareto_plot_has_bars_for_intervals_and_the_range_of_the_seeds_where_t
         figure.update(seed_low=0.8 * figure["mean"], seed_high=1.2 * figure["mean"])
 
     def drawn():
-        axes = evaluation_plots.plot_pareto(board).axes[0]
+        figure = evaluation_plots.plot_pareto(board)
+        axes = figure.axes[0]
         ends = np.concatenate(
             [line.vertices for part in axes.containers for bar in part[2] for line in bar.get_paths()]
         )
         caps = sum(len(part[1]) for part in axes.containers)
-        return ends[:, 0].min(), ends[:, 0].max(), caps, axes.get_title(loc="left")
+        return ends[:, 0].min(), ends[:, 0].max(), caps, figure.get_suptitle()
 
     low, high, caps, title = drawn()
     assert (low, high) == pytest.approx((0.8, 1.2)) and caps == 0
@@ -78,3 +81,46 @@ def test_a_pareto_plot_has_bars_for_intervals_and_the_range_of_the_seeds_where_t
     low, high, caps, title = drawn()
     assert (low, high) == pytest.approx((0.9, 1.1)) and caps == 4
     assert "bars: 95 % intervals" in title and "range" not in title
+
+
+def test_pareto_ratios_are_paired_with_the_baseline_and_never_negative():
+    board = pareto_board({"base": (1.0, 0.9, 0.1), "x": (0.5, 0.45, 0.2)}) | {
+        "baseline": "base",
+        "seeds": [1, 2],
+    }
+    for entry in board["controllers"]:
+        half = {"mean": -0.5, "percent": -40.0, "low": -2.0, "high": 0.1}  # of the runs that both finished
+        entry["difference"] = dict.fromkeys(evaluation_plots.PARETO_METRICS, half)
+    figure = evaluation_plots.plot_pareto(board)
+    axes = figure.axes[0]
+    points = [mark.get_offsets()[0].tolist() for mark in axes.collections if hasattr(mark, "get_sizes")]
+    assert points == [[1.0, 1.0], [0.6, 0.6]]  # not 0.5: the difference says by how much
+    (container,) = axes.containers
+    ends = np.concatenate([line.vertices for bar in container[2] for line in bar.get_paths()])
+    assert ends.min() == 0.0 and ends.max() == pytest.approx(1.0 + 0.4 * 0.1 / 0.5)
+    assert "rotor-speed" in axes.get_xlabel() and "platform-pitch" in axes.get_ylabel()
+    for entry in board["controllers"]:
+        for gap in entry["difference"].values():
+            gap.update(low=np.nan, high=np.nan)
+    figure = evaluation_plots.plot_pareto(board)
+    assert not figure.axes[0].containers and "2 seeds: no interval" in figure.get_suptitle()
+
+
+def test_evaluation_plot_joins_no_cases_and_says_metrics_in_words():
+    table = pd.DataFrame(
+        {
+            "controller": ["a", "b"] * 3,
+            "case": list("xxyyzz"),
+            "seed": 1,
+            "status": "ok",
+            "RotSpeed_std_[rpm]": 1.0,
+        }
+    )
+    figure = evaluation_plots.plot_evaluation(table, ["RotSpeed_std_[rpm]"])
+    (axes,) = figure.axes
+    assert axes.get_title(loc="left") == "rotor speed, std (rpm)"
+    assert all(part.lines[0].get_linestyle() == "None" for part in axes.containers)
+    assert {label.get_rotation() for label in axes.get_xticklabels()} == {0.0}
+    reach = np.concatenate([part.lines[0].get_xdata() for part in axes.containers])
+    assert np.abs(reach - np.round(reach)).max() < 0.5 * evaluation_plots.ROOM
+    assert evaluation_plots.metric_title("GenPwr_min_[kW]") == "GenPwr min (kW)"
