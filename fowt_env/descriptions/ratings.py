@@ -11,7 +11,7 @@ RATED_SPEED, OVERSPEED, RATED_POWER, RATED_WIND = (
 
 
 def ratings(turbine):
-    """{name: float} of a Turbine: rated rotor speed and overspeed (rpm), electrical power (kW), wind (m/s)."""
+    """{name: float} of a Turbine: rated rotor speed, overspeed (rpm), power (kW), wind (m/s)."""
     drive = turbine.drivetrain
     return {
         RATED_SPEED: turbine.rated_rotor_speed / RPM,

@@ -269,7 +269,7 @@ class TurbinePanel:
         return np.column_stack([across, (self.top - points[:, 2]) * self.scale])
 
     def draw(self, row, label=None, colour=None, speed=None):
-        """The picture of a row of channels, at its final size: a chip of `colour` and `label`, time and speed."""
+        """The picture of a row of channels, at its final size, with a chip of `colour`, `label` and `speed`."""
         pygame, canvas = self.pygame, self._canvas
         pose = PlatformPose(row)
         canvas.blit(self._sky, (0, 0))
@@ -633,7 +633,7 @@ class TracePanel:
                 place = min(max(y - text.get_height() // 2, box.top), box.bottom - text.get_height())
                 if len(ticks) <= 4 or tick in (ticks[0], ticks[-1]):
                     picture.blit(text, (gutter - text.get_width() - 4, place))
-            for name, rating in trace.levels:
+            for _, rating in trace.levels:
                 if rating in self.levels:
                     y = round(height(self.levels[rating]))
                     for x in range(box.left, box.right, 8):

@@ -135,7 +135,7 @@ def plot_boxes(cases, path=None, title=None, skip=0.0):
 
 
 def plot_schedule(points, path=None, title=None, *, rated_wind=None):
-    """Figure of steady operating points over wind speed, of one table or {label: table} as `fowt trim` writes.
+    """Figure of steady operating points over wind speed, of one table or {label: table} of `fowt trim`.
 
     rated_wind: m/s, marked by a line; None: not marked.
     """
@@ -231,7 +231,7 @@ def broken_at_wraps(x, degrees):
 
 
 def plot_raos(runs, path=None, title=None, skip=0.0, segment=None, platform_pitch_period=None):
-    """Figure of amplitude, phase and coherence of motions and tension over the waves, from {label: frame}.
+    """Figure of amplitude, phase and coherence of responses to waves over frequency, from {label: frame}.
 
     Solid where the waves have energy and the coherence is above one half, faint elsewhere: there other things
     than waves move it. Phases are those by which a response leads the wave, in [-180, 180) deg. A line marks
@@ -279,8 +279,9 @@ def plot_raos(runs, path=None, title=None, skip=0.0, segment=None, platform_pitc
     grid[0, 0].set_xlim(*RAO_RANGE)
     if platform_pitch_period is not None:
         grid[0, 0].annotate(
-            "platform-pitch resonance", (1.0 / platform_pitch_period, 0.02), xycoords=("data", "axes fraction"),
-            xytext=(3, 0), textcoords="offset points", fontsize=7, color=SOFT, rotation=90,
+            "platform-pitch resonance", (1.0 / platform_pitch_period, 0.02),
+            xycoords=("data", "axes fraction"), xytext=(3, 0), textcoords="offset points",
+            fontsize=7, color=SOFT, rotation=90,
         )  # fmt: skip
     figure.align_ylabels(grid[:, 0])
     _head(

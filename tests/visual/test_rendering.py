@@ -326,7 +326,7 @@ def test_shapes_stand_for_hulls_whose_loads_have_none(name, above, below):
     for shape in shapes:
         start, end = np.array(shape.start), np.array(shape.end)
         if end[2] > 0.0 and (shape.section or shape.diameter > 2.0):
-            at = 0.5 * (start + end)
+            at = 0.75 * start + 0.25 * end  # of a beam: beside the tower
             red, green, blue = colour((*at[:2], 3.0))
             assert red > green > 1.5 * blue, shape
     red, green, blue = colour((-90.0, 0.0, 2.0))
@@ -421,7 +421,7 @@ def test_members_are_drawn_where_they_are(make):
 
 def test_a_hull_without_a_shape_is_a_box_of_its_draft():
     potential = read_platform("nrel5mw_iti_barge")
-    scene = fowt_env.build_scene(potential.model_copy(update={"members": ()}))
+    scene = fowt_env.build_scene(potential.model_copy(update={"members": (), "shapes": ()}))
     view = View([scene])
     view.draw([ROW])
     panel, picture = view.panels[0], view.array()

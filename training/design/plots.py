@@ -101,8 +101,8 @@ def plot_poles(models, path=None, title=None):
 def _poles(model):
     """[(name, pole rad/s)] of all poles of a LinearModel with an imaginary part of at least 0.
 
-    Oscillations have the names of model.modes(); a real pole that of the state of MODE_NAMES or ACTUATORS
-    which dies out with it, by the participation of the states.
+    Oscillations have the names of model.modes(); a real pole that of the state of OF_REAL_POLES that
+    participates most in it.
     """
     values, vectors = np.linalg.eig(model.A)
     left = np.linalg.inv(vectors)
@@ -126,7 +126,7 @@ def _quiet_bar(bar, label):
 
 
 def _damping_lines(axes, left, top):
-    """Limits that reach the real part `left` and the imaginary part `top`, and lines of equal damping ratio."""
+    """Set limits that reach the real part `left` and the imaginary part `top`; draw lines of damping."""
     low, high = min(1.1 * left, -1e-3), 1.1 * max(top, 1e-2)
     axes.set_xlim(low, -0.05 * low)
     axes.set_ylim(-0.03 * high, high)
@@ -177,7 +177,7 @@ def plot_damping(models, path=None, title=None):
 
 
 def plot_bode(models, path=None, title=None):
-    """Figure of gain and phase of BODE for {wind: LinearModel}: what pitch, torque and wind do to rotor and platform.
+    """Figure of gain and phase of BODE for {wind: LinearModel}: from pitch, torque and wind to the motions.
 
     Phases are in [-180, 180) deg. Blade pitch is shown where it is free to move: not at winds where it
     rests on its limit.

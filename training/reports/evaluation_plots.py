@@ -114,11 +114,11 @@ MARKS = ("o", "s", "^", "D", "v", "P", "X", "*")  # one more than colours: 56 pa
 def plot_pareto(board, path=None, title=None):
     """Figure of rotor-speed std (x) against platform-pitch std (y) of each controller over the baseline's.
 
-    board: mapping of a leaderboard. Bars are the intervals of the paired ratios, from the runs that both
-    finished; where there are none, or no baseline, see below. The mark's area is its mean blade-pitch rate. The
-    stepped line joins the controllers that no other betters in both. Without a baseline the axes
-    are rpm and deg, the bars the intervals of the means, or, with too few seeds for one, lines without ends
-    the range over the seeds.
+    board: mapping of a leaderboard. Bars are the intervals of the paired ratios, from the runs that
+    both finished; with too few seeds there are none. The mark's area is its mean blade-pitch rate. The
+    stepped line joins the controllers that no other betters in both. Without a baseline the axes are rpm
+    and deg, and the bars the intervals of the means or, with too few seeds for one, lines without ends
+    over the range of the seeds.
     """
     kept = []
     for entry in board["controllers"]:
@@ -251,7 +251,7 @@ def _undominated(points):
 
 
 def _label_marks(figure, axes, names, points, areas, places):
-    """Write each name beside its mark, where it covers no mark, bar or other name if there is such a place."""
+    """Write each name beside its mark, where it covers no mark, bar or other name if such a place exists."""
     from matplotlib.patheffects import withStroke
 
     figure.draw_without_rendering()  # settles the layout, and with it where the marks are
