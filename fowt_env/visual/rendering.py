@@ -269,7 +269,7 @@ class TurbinePanel:
         return np.column_stack([across, (self.top - points[:, 2]) * self.scale])
 
     def draw(self, row, label=None, colour=None, speed=None):
-        """The picture of a row of channels, at its final size, with a chip of `colour`, `label` and `speed`."""
+        """The picture of a row of channels, at its final size, with `label`, its `colour` and `speed`."""
         pygame, canvas = self.pygame, self._canvas
         pose = PlatformPose(row)
         canvas.blit(self._sky, (0, 0))
