@@ -279,6 +279,19 @@ def test_a_gif_holds_changes_alone_and_shows_what_was_drawn(tmp_path):
             assert np.abs(seen - picture).max() <= UNSEEN + 10
 
 
+def test_what_rests_within_a_gif_s_frame_packs_to_nothing(tmp_path):
+    """Two opposite corners change in every frame; the texture between them is not written again."""
+    from fowt_env.visual.animation import _write_gif
+
+    texture = np.where(np.random.default_rng(1).random((120, 160, 1)) < 0.5, 60, 200).astype(np.uint8)
+    pictures = [np.repeat(texture, 3, axis=2) for _ in range(8)]
+    for number, picture in enumerate(pictures):
+        picture[:4, :4] = picture[-4:, -4:] = RGB_COLOURS[number % 2]
+    for name, kept in (("one", pictures[:1]), ("all", pictures)):
+        _write_gif(iter(kept), tmp_path / f"{name}.gif", 10)
+    assert (tmp_path / "all.gif").stat().st_size < 2 * (tmp_path / "one.gif").stat().st_size
+
+
 def test_an_mp4_has_a_picture_per_step(scene, runs, tmp_path):
     imageio_ffmpeg = pytest.importorskip("imageio_ffmpeg", reason="imageio-ffmpeg is not installed")
     path = animate(scene, {"": runs["pi"]}, tmp_path / "one.mp4", speed=2.0, fps=10, size=(480, 320))
