@@ -532,7 +532,6 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     def _result(self, status, reward):
         """What step returns, from the status and reward of a control period."""
         run = self._episode
-        self._reward = reward
         step = int(run.counts[STEP])
         info = dict(zip(REWARD_KEYS, run.terms.tolist(), strict=True))
         info["time"] = step * self.dt
@@ -546,6 +545,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             self._finish(status)
         if self._own_reward is not None:
             reward = self._own(info)
+        self._reward = reward
         if self.render_mode == "human":
             self.render()
         return run.observation.copy(), reward, terminated, truncated, info
