@@ -27,7 +27,7 @@ if TYPE_CHECKING:  # the names below, for editors and type checkers
     from fowt_env.scene.user_loads import load_kernel as load_kernel
     from fowt_env.simulation import simulate as simulate
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _PUBLIC = {
     "build_scene": "fowt_env.scene.build",
