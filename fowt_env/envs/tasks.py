@@ -10,6 +10,7 @@ from fowt_env.descriptions.sea_state import joint_sea_state, joint_tables, sea_o
 from fowt_env.descriptions.turbine import Turbine
 from fowt_env.descriptions.units import DEGREE
 from fowt_env.descriptions.wind import read_wind, wind_of
+from fowt_env.display import html_table
 from fowt_env.envs.observations import STANDARD, STOP_CHANNELS, check_channels
 from fowt_env.envs.rewards import check_weights
 from fowt_env.errors import InputError, unknown
@@ -68,6 +69,24 @@ class Task:
     # None: nothing is to be stopped, and the agent has it from the start
     shutdown: tuple | None = None
     weather_seeds: tuple = (0, LARGEST_SEED)  # range (low, below) from which an episode's weather is drawn
+
+    def _repr_html_(self):
+        """What a notebook shows: weather, observation, and the weights of the reward."""
+        rows = [
+            *(
+                (
+                    f"weather {share:g}" if len(self.weathers) > 1 else "weather",
+                    f"{wind}; sea: {sea or 'still water'}",
+                )
+                for share, wind, sea in self.weathers
+            ),
+            ("episode", f"{self.duration:g} s"),
+            ("observation", ", ".join(self.observation)),
+            ("reward", ", ".join(f"{weight:g} {term}" for term, weight in self.weights.items() if weight)),
+            ("blade pitch", "{:g} to {:g} deg".format(*self.blade_pitch)),
+            ("start", ", ".join(f"{name} {low:g} to {high:g}" for name, (low, high) in self.offsets.items())),
+        ]
+        return html_table(f"Task {self.name}", (), rows)
 
     def __post_init__(self):
         if not isinstance(self.name, str) or not self.name:

@@ -10,6 +10,7 @@ import numpy as np
 from fowt_env.descriptions.checks import check_whole_number, short
 from fowt_env.descriptions.platform import Platform
 from fowt_env.descriptions.turbine import Turbine
+from fowt_env.display import html_table
 from fowt_env.errors import InputError
 from fowt_env.plant.blade_pitches import N_BLADE_LOAD
 from fowt_env.plant.channels import Channel, channels, put_hub_wind, scales
@@ -27,7 +28,7 @@ from fowt_env.plant.rotor_substeps import N_SAMPLE
 from fowt_env.plant.state import BLADES, N_COMMANDS, N_INDIVIDUAL_COMMANDS, Block, State, state_blocks
 from fowt_env.plant.user_loads import user_data_size
 from fowt_env.scene.actuators import drive_states
-from fowt_env.scene.options import default_step, least_lag
+from fowt_env.scene.options import OPTIONS, default_step, least_lag
 from fowt_env.scene.parts import hydro_in_waves, wake_states
 from fowt_env.scene.radiation_fit import memory_for_step
 from fowt_env.scene.tower import tower_frequency, tower_states
@@ -251,6 +252,22 @@ class Scene:
             f"Scene({self.platform.name!r}, wind={self.wind!r}, sea={self.sea!r}, seed={self.seed},"
             f" rotor={self.rotor!r})"
         )
+
+    def _repr_html_(self):
+        """What a notebook shows: the scene's parts, and each option that is not the default."""
+        rows = [
+            ("platform", self.label or self.platform.name),
+            ("turbine", f"{self.turbine.name}, rated {self.turbine.torque_law.rated_power / 1e6:.3g} MW"),
+            ("water depth", f"{self.platform.environment.water_depth:g} m"),
+            ("wind", "none" if self.wind is None else short(self.wind)),
+            ("sea", "still water" if self.sea is None else short(self.sea)),
+            ("seed", str(self.seed)),
+            ("rotor model", self.rotor),
+            ("physics step", f"{self.dt:g} s"),
+            ("states", str(self.n_state)),
+            *((name, str(value)) for name, value in self.options.items() if value != OPTIONS.get(name, (None,))[0]),
+        ]
+        return html_table("Scene", (), rows)
 
 
 def check_scene(scene: Any) -> None:

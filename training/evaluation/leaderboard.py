@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fowt_env.display import html_table
 from fowt_env.errors import unknown
 from fowt_env.training.evaluation.bootstrap import (
     LEAST_SEEDS,
@@ -26,6 +27,12 @@ from fowt_env.training.evaluation.run_case import OK, TRIPPED
 
 BASELINES = ("gspi_oc3", "pi")  # the first of these that was evaluated, unless one is named
 POSITIVE = np.array([never_negative(name) for name in METRICS])
+SHOWN = {  # what a notebook shows of a leaderboard: {heading: metric}
+    "rotor-speed std (rpm)": "RotSpeed_std_[rpm]",
+    "platform-pitch std (deg)": "PtfmPitch_std_[deg]",
+    "blade-pitch travel (deg/s)": "blade_pitch_travel_[deg/s]",
+    "tower-base DEL (kN m)": "TwrBsMyt_DEL_[kN-m]",
+}
 MOST_OF_REFERENCE = 1e6  # larger differences, as multiples of the baseline's own value, get no percentage
 EXPONENTS = np.array([mean_exponent(name) for name in METRICS])
 METHOD = (
@@ -167,6 +174,30 @@ def _named(estimate, low, high, **more):
     }
 
 
+class Leaderboard(dict):
+    """What leaderboard() returns: a plain mapping that a notebook shows as a table."""
+
+    def _repr_html_(self):
+        """Ranks, the means of SHOWN with paired differences from the baseline, and the score."""
+        rows = []
+        for entry in self["controllers"]:
+            cells = []
+            for metric in SHOWN.values():
+                mean, difference = entry["metrics"][metric]["mean"], entry["difference"].get(metric, {})
+                percent = difference.get("percent")
+                cells.append("-" if mean is None or not np.isfinite(mean) else f"{mean:.3g}")
+                if percent is not None and np.isfinite(percent) and entry["controller"] != self["baseline"]:
+                    cells[-1] += f" ({percent:+.1f} %)"
+            score = entry["score"] and entry["score"]["mean"]
+            ended = f"{entry['runs'] - entry['failed'] - entry['tripped']} of {entry['runs']}"
+            shown = "-" if score is None or not np.isfinite(score) else f"{score:.3f}"
+            rows.append((entry["rank"], entry["controller"], ended, *cells, shown))
+        title = f"Leaderboard, {len(self['cases'])} case(s), {len(self['seeds'])} seed(s)"
+        if self["baseline"] is not None:
+            title += f"; differences from {self['baseline']}"
+        return html_table(title, ("rank", "controller", "runs ended well", *SHOWN, "score"), rows)
+
+
 def leaderboard(table, baseline=None, score=None, cases=None, limits=None):
     """Mapping of plain values: how the controllers of an evaluation's table compare.
 
@@ -210,20 +241,20 @@ def leaderboard(table, baseline=None, score=None, cases=None, limits=None):
         }
         entries.append(entry)
     entries.sort(key=_rank_key)
-    return {
-        "baseline": baseline,
-        "interval": {
+    return Leaderboard(
+        baseline=baseline,
+        interval={
             "level": LEVEL,
             "method": METHOD,
             "resamples": RESAMPLES,
             "least_seeds": LEAST_SEEDS,
         },
-        "unchecked": [] if limits is None or limits.baseline in grid.controllers else list(limits.relative),
-        "cases": grid.cases,
-        "shares": dict(zip(grid.cases, map(float, grid.shares), strict=True)),
-        "seeds": [int(seed) for seed in grid.seeds],
-        "controllers": [{"rank": rank} | entry for rank, entry in enumerate(entries, 1)],
-    }
+        unchecked=[] if limits is None or limits.baseline in grid.controllers else list(limits.relative),
+        cases=grid.cases,
+        shares=dict(zip(grid.cases, map(float, grid.shares), strict=True)),
+        seeds=[int(seed) for seed in grid.seeds],
+        controllers=[{"rank": rank} | entry for rank, entry in enumerate(entries, 1)],
+    )
 
 
 def _rank_key(entry):
