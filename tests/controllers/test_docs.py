@@ -1,4 +1,4 @@
-"""docs/reference/controllers.md against the controllers that there are."""
+"""The pages of the controllers against the controllers that there are."""
 
 import re
 import tomllib
@@ -10,28 +10,28 @@ from fowt_env import build_scene, simulate
 from fowt_env.controllers import CONTROLLERS, make
 from fowt_env.controllers.tuned import TUNED
 
-TEXT = (Path(__file__).resolve().parents[2] / "docs" / "reference" / "controllers.md").read_text(
-    encoding="utf-8"
-)
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+TEXT = (DOCS / "reference" / "controllers.md").read_text(encoding="utf-8")
+RESULTS = (DOCS / "results" / "controllers.md").read_text(encoding="utf-8")
 
 
-def rows(heading):
+def rows(text, heading):
     """{first cell: cells} of the table below a heading."""
-    part = TEXT.split(f"\n## {heading}")[1].split("\n## ")[0]
+    part = text.split(f"\n## {heading}")[1].split("\n## ")[0]
     lines = [line.strip("| ").split(" | ") for line in part.splitlines() if line.startswith("|")]
     return {cells[0].strip("`"): cells for cells in lines[2:]}
 
 
 def test_every_controller_is_documented_and_no_other():
-    assert set(rows("The built-in ones")) == set(CONTROLLERS)
+    assert set(rows(TEXT, "The built-in ones")) == set(CONTROLLERS)
 
 
 def test_the_documented_tuning_is_the_stored_one():
     held = tomllib.loads(TUNED.read_text(encoding="utf-8"))
-    told = rows("One search for all of them")
-    assert set(told) == set(held)
+    printed = rows(RESULTS, "Tuning")
+    assert set(printed) == set(held)
     keys = ("rotor_speed_ratio", "platform_pitch_ratio", "travel_ratio", "shaft_ratio", "cost")
-    for name, cells in told.items():
+    for name, cells in printed.items():
         figures = [held[name]["figures"][key] for key in keys]
         assert [float(cell) for cell in cells[2:]] == pytest.approx(figures, abs=6e-4), name
 

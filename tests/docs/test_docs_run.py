@@ -11,7 +11,7 @@ import pytest
 from doc_pages import DOCS, NUMBER, assert_printed, blocks, fowt
 
 EXTRAS = tomllib.loads((DOCS.parent / "pyproject.toml").read_text())["project"]["optional-dependencies"]
-SETUP = re.compile(r"(python3\.11 -m venv|\. \.venv|pip install)\b")
+SETUP = re.compile(r"(python3 -m venv|\. \.venv|pip install)\b")
 
 
 def run_blocks(page_blocks, folder):
@@ -79,6 +79,14 @@ def test_every_block_of_a_page_runs(folder, page):
     found = blocks(page)
     assert found
     run_blocks(found, folder)
+
+
+@pytest.mark.parametrize("page", ["guides/from-gymnasium.md", "tutorials/first-agent.md"])
+def test_every_program_of_a_page_runs(folder, page):
+    """Its commands train agents and evaluate, which others test."""
+    programs = [block for block in blocks(page) if block.language in ("python", "text")]
+    assert len(programs) > 1
+    run_blocks(programs, folder)
 
 
 @pytest.mark.parametrize("page", ["tutorials/getting-started.md", "guides/faq.md", "index.md"])
