@@ -1,6 +1,6 @@
 """What a notebook shows of objects: tables in HTML, with names that cannot become code."""
 
-from fowt_env import build_scene
+from fowt_env import build_scene, trim
 from fowt_env.display import html_table
 from fowt_env.envs.tasks import TASKS
 from fowt_env.training.evaluation.evaluate import evaluate
@@ -35,3 +35,12 @@ def test_a_leaderboard_shows_differences_of_all_but_the_baseline():
         [(True, False), (False, True)],
         [(False, True), (True, False)],
     )
+
+
+def test_an_operating_point_shows_values_with_units_and_meanings():
+    point = trim(build_scene(wind=18.0, fidelity="standard"))
+    text = point._repr_html_()
+    assert "Operating point at 18 m/s, platform floating" in text
+    row = next(row for row in text.split("<tr>") if ">RotSpeed<" in row)
+    assert any(">FAIRTEN1<" in row and ">kN<" in row for row in text.split("<tr>"))
+    assert ">12.1<" in row and ">rpm<" in row and ">rotor speed<" in row

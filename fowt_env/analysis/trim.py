@@ -9,6 +9,8 @@ from scipy.optimize import brentq
 
 from fowt_env.analysis.equilibrium import check_equilibrium, evaluated, label, unbalanced
 from fowt_env.analysis.statics import mean_derivative
+from fowt_env.descriptions.channel_meanings import channel_meaning
+from fowt_env.display import html_table
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.aero.load import settled_wake
 from fowt_env.plant.aero.wind import wind_now
@@ -22,7 +24,7 @@ from fowt_env.plant.rollout import output_row
 from fowt_env.plant.state import Command, State, pose_of
 from fowt_env.plant.tilt import rotor_pose
 from fowt_env.scene.actuators import rest_actuators
-from fowt_env.scene.channel_names import channel_name
+from fowt_env.scene.channel_names import channel_name, channel_unit
 from fowt_env.scene.scene import Scene, check_scene
 from fowt_env.weather.excitation import still_excitation
 from fowt_env.weather.wind import make_series
@@ -81,6 +83,16 @@ class OperatingPoint(Mapping):
         return OperatingPoint(
             dict(self._values), self.state.copy(), self.command.copy(), self.wind_speed, self.platform
         )
+
+    def _repr_html_(self):
+        """What a notebook shows: each channel with its unit and meaning."""
+        wind = "without wind" if self.wind_speed is None else f"at {self.wind_speed:g} m/s"
+        rows = [
+            (name, float(value), channel_unit(name), channel_meaning(name))
+            for name, value in self._values.items()
+        ]
+        title = f"Operating point {wind}, platform {self.platform}"
+        return html_table(title, ("channel", "value", "unit", "meaning"), rows)
 
     def __repr__(self):
         shown = ("RotSpeed", "BldPitch1", "GenPwr", "RotThrust", "PtfmSurge", "PtfmPitch")

@@ -20,3 +20,8 @@ def channel_name(name: Any) -> Any:
     if UNITS.get(bare, unit) != unit:
         raise InputError(f"channel {name!r}: {bare} is in {UNITS[bare]}: must be {bare}_[{UNITS[bare]}]")
     return bare
+
+
+def channel_unit(name: str) -> str:
+    """Unit of a channel by its bare name; "" for the loads of a user, which other parts know."""
+    return "kN" if name.startswith(("FAIRTEN", "ANCHTEN")) else UNITS.get(name, "")

@@ -265,7 +265,7 @@ class Scene:
             ("rotor model", self.rotor),
             ("physics step", f"{self.dt:g} s"),
             ("states", str(self.n_state)),
-            *((name, str(value)) for name, value in self.options.items() if value != OPTIONS.get(name, (None,))[0]),
+            *((name, str(value)) for name, value in self.options.items() if value != _default(name)),
         ]
         return html_table("Scene", (), rows)
 
@@ -277,6 +277,11 @@ def check_scene(scene: Any) -> None:
             f"scene = {short(scene)}: must be a Scene, a platform in its wind and sea:"
             " build_scene('oc3_hywind', wind='ntm:18:B', sea='jonswap:4:9')"
         )
+
+
+def _default(name):
+    """Default of an option, None where its fidelity decides it."""
+    return OPTIONS[name][0] if name in OPTIONS else None
 
 
 def _replaced(part, path, value):
