@@ -9,6 +9,8 @@ from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.scene.build import build_scene
 
 os.environ.setdefault("SDL_VIDEODRIVER", "dummy")  # windows of render mode "human" without a display
+# what programs print is compared: not that they also had to compile, which only a first run does
+os.environ.setdefault("FOWT_QUIET", "1")
 # workers of pytest-xdist have the width of its terminal set, which the command's console would keep for good
 os.environ.pop("COLUMNS", None)
 

@@ -61,6 +61,7 @@ def test_a_process_that_fails_is_named(kinds, monkeypatch):
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_after_it_the_same_kinds_compile_nothing(tmp_path):
     """Among them the run that README begins with."""
     environment = os.environ | {"FOWT_CACHE_DIR": str(tmp_path)}
