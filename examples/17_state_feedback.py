@@ -58,7 +58,9 @@ def main():
         print('python-control is missing: pip install "fowt-env[design]"')
         return
     sea = {"kind": "jonswap", "Hs": 4.0, "Tp": 9.0}
-    scene = fowt_env.build_scene(wind={"kind": "ntm", "speed": 18.0, "class": "B"}, sea=sea)
+    scene = fowt_env.build_scene(
+        wind={"kind": "ntm", "speed": 18.0, "class": "B"}, sea=sea, fidelity="standard"
+    )
     model = fowt_env.linearize(scene)
     gain = design(model)
 

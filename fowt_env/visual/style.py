@@ -21,18 +21,18 @@ def new_figure(width, height):
 
     Raises: InputError that names the extra to install.
     """
-    return _figure_class()(figsize=(width, height), layout="constrained", facecolor="white")
-
-
-@cache
-def _figure_class():
-    """Figure that brings its own picture: without pyplot IPython has no way to make one."""
     try:
         from matplotlib.figure import Figure
     except ImportError as error:
         raise InputError(f'plots need matplotlib ({error}): pip install "fowt-env[plot]"') from error
+    return _shown(Figure)(figsize=(width, height), layout="constrained", facecolor="white")
 
-    class NotebookFigure(Figure):
+
+@cache
+def _shown(figure_class):
+    """Matplotlib's Figure that brings its own picture: without pyplot IPython has no way to make one."""
+
+    class NotebookFigure(figure_class):
         def _repr_png_(self):
             """(PNG, size on the page), as IPython asks for."""
             picture = BytesIO()
