@@ -9,13 +9,14 @@ Control Systems 40(5), 2020.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import atan, degrees, inf, pi
+from math import atan, degrees, inf
 from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
 from fowt_env.analysis.linear_model import LinearModel, chosen
+from fowt_env.descriptions.units import DEGREE
 from fowt_env.errors import InputError
 
 MOVED = ("generator_torque", "blade_pitch_command")  # inputs that a controller may move
@@ -279,7 +280,7 @@ def _loop_margins(loop: Callable[[float], complex], grid, values):
     up = min((g for g in gains if g[0] > 1.0), default=(inf, inf))
     down = max((g for g in gains if g[0] < 1.0), default=(0.0, 0.0))
     phase = min(((min(lag, 360.0 - lag), w) for lag, w in phases), default=(inf, inf))
-    delay = min(((lag * pi / 180.0 / w, w) for lag, w in phases), default=(inf, inf))
+    delay = min(((lag * DEGREE / w, w) for lag, w in phases), default=(inf, inf))
     inverse, where = _largest(lambda w: 1.0 / abs(1.0 + loop(w)), grid, 1.0 / np.abs(1.0 + values))
     found = (up[0], down[0], phase[0], delay[0], 1.0 / inverse, up[1], down[1], phase[1], delay[1], where)
     return LoopMargins(*(float(value) for value in found))
