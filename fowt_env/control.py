@@ -315,8 +315,8 @@ def _failure(controller, method, error, time):
     place = f", {Path(inside[-1].filename).name} line {inside[-1].lineno}" if inside else ""
     try:
         text = _lacking(error) or str(error)
-    except Exception:  # an exception may be a controller's own, and so may be its text
-        text = ""
+    except (Exception, SystemExit, GeneratorExit):  # it may be a controller's own, and so may be its text
+        text = "its message cannot be read"
     said = f": {text}" if text else ""
     return ControllerError(
         f"controller {controller!r} raised {type(error).__name__} in {method}() at t = {time:.3f} s{place}"

@@ -1,9 +1,9 @@
 """The style that all figures share: colours, axes, writing."""
 
-from functools import cache
 from io import BytesIO
 from pathlib import Path
 
+from fowt_env.caches import cached
 from fowt_env.errors import InputError
 from fowt_env.files.atomic import replacing
 
@@ -28,7 +28,7 @@ def new_figure(width, height):
     return _shown(Figure)(figsize=(width, height), layout="constrained", facecolor="white")
 
 
-@cache
+@cached(1)
 def _shown(figure_class):
     """Matplotlib's Figure that brings its own picture: without pyplot IPython has no way to make one."""
 

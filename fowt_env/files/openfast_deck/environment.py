@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
+from fowt_env.descriptions.wind_files import read_uniform_wind
 from fowt_env.errors import InputError
-from fowt_env.files.openfast import read_uniform_wind
 from fowt_env.files.openfast_deck.parser import PartFile, bare
 
 

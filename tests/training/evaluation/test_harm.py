@@ -50,7 +50,8 @@ FAILURES = {
     stub_plant.Closes: "GeneratorExit",
     stub_plant.Interrupts: "KeyboardInterrupt",
     stub_plant.Unborn: "SystemExit: 3",
-    stub_plant.Mute: "Odd, whose message cannot be read (SystemExit)",
+    stub_plant.Mute: "controller 'Mute' raised Odd in act() at t = 1.100 s, stub_plant.py line 127: its message"
+    " cannot be read",
     stub_plant.Smuggles: r"FileNotFoundError: none\udcff\x1b[31m \u202efound",
     stub_plant.Floods: "controller 'Floods' returned [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, ...] at t = 0.000 s:"
     " act()"
