@@ -88,7 +88,7 @@ PROGRAMS = ("guides/from-control-design.md", "guides/from-gymnasium.md", "tutori
 def test_every_program_of_a_page_runs(folder, page):
     """Its commands train agents and evaluate, which others test."""
     if page == "guides/from-control-design.md":
-        pytest.importorskip("control", reason="python-control is not installed: the extra `design` is missing")
+        pytest.importorskip("control", reason="the extra `design` is missing")
     programs = [block for block in blocks(page) if block.language in ("python", "text")]
     assert len(programs) > 1
     run_blocks(programs, folder)
