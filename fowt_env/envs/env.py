@@ -110,9 +110,9 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     baseline      compiled controller, by name, that the residual mode adds to; lqr goes on from the sum, so
                   that what is added in every period is an addition to its rates
     observation   channel names in place of the task's; "default" among them stands for the task's
-    reward        {term: weight} in place of single weights of the task, or a function (info, measurement)
-                  that returns it, from the info of the step, with each named term, and the Measurement
-                  at its end (SI, true motions)
+    reward        {term: weight} in place of single weights of the task, or a function (info) or (info,
+                  measurement) that returns it, from the info of the step, with each named term, and the
+                  Measurement at its end (SI, true motions)
     dt            physics step, s (None: that of the scene's integrator); control_dt: time between
                   actions, s, a multiple of dt
     duration      s of an episode; None: the task's

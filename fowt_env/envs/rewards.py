@@ -4,7 +4,7 @@ To add one: a kernel, a line in REWARD_TERMS and one in fill_terms. reward = sum
 """
 
 import inspect
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from enum import IntEnum
 from math import exp, hypot, inf, isfinite, log, nan, pi
 from typing import NamedTuple
@@ -226,15 +226,32 @@ def check_weights(where, weights):
     return checked
 
 
+class OfInfo(NamedTuple):
+    """A user's reward that takes the info of a step alone."""
+
+    function: Callable
+
+    def __call__(self, info, measurement):
+        return self.function(info)
+
+
 def check_own_reward(where, function):
-    """The function of a reward of the user's own. Raises: InputError unless it takes (info, measurement)."""
+    """A user's reward as a function of (info, measurement), of which it may take the first alone.
+
+    Raises: InputError where it takes neither one nor both.
+    """
     try:
-        inspect.signature(function).bind({}, None)
-    except TypeError as error:
-        raise InputError(f"{where} = {function!r}: must take (info, measurement): {error}") from None
+        signature = inspect.signature(function)
     except ValueError:  # a builtin that tells nobody what it takes
-        pass
-    return function
+        return function
+    for taken, result in (({}, None), function), (({},), OfInfo(function)):
+        try:
+            signature.bind(*taken)
+        except TypeError as error:
+            reason = error
+        else:
+            return result
+    raise InputError(f"{where} = {function!r}: must take (info) or (info, measurement): {reason}")
 
 
 def paid(function, info, measurement):

@@ -1,5 +1,7 @@
 """Options of reset, what ended and closed environments answer, and rewards and costs of one's own."""
 
+import pickle
+
 import gymnasium
 import numpy as np
 import pytest
@@ -126,6 +128,10 @@ def test_closed_environments_say_so():
             use()
 
 
+def of_power(info):
+    return 2.0 * info["reward/power"]
+
+
 def own(info, measurement):
     return info["reward/power"] - abs(measurement.platform_pitch_rate) - 10.0 * ("termination" in info)
 
@@ -157,9 +163,19 @@ def test_a_batch_pays_what_single_environments_pay(mode):
     assert rewards[0] == 0.0 if mode == "NextStep" else rewards[0] != 0.0
 
 
+def test_a_reward_may_take_the_info_alone():
+    env = FowtEnv(**QUICK, reward=lambda info: 2.0 * info["reward/power"])
+    env.reset(seed=1)
+    for step in (env, pickle.loads(pickle.dumps(FowtEnv(**QUICK, reward=of_power)))):
+        step.reset(seed=1)
+        _, reward, _, _, info = step.step((0.0, 0.0))
+        assert reward == 2.0 * info["reward/power"]
+
+
 def test_reward_functions_that_cannot_be_used_are_refused():
-    with pytest.raises(InputError, match=r"must take \(info, measurement\)"):
-        FowtEnv(**QUICK, reward=lambda info: 1.0)
+    for function in (lambda: 1.0, lambda info, measurement, action: 1.0):
+        with pytest.raises(InputError, match=r"must take \(info\) or \(info, measurement\)"):
+            FowtEnv(**QUICK, reward=function)
     for value in (None, "much", float("nan"), [1.0, 2.0]):
         env = FowtEnv(**QUICK, reward=lambda info, measurement, value=value: value)
         env.reset(seed=1)
