@@ -163,6 +163,11 @@ class LinearModel:
             raise unknown("output", name, self.outputs)
         return self.outputs.index(name)
 
+    def __repr__(self):
+        """Its size and where it holds, not the numbers of its matrices."""
+        size = f"{len(self.states)} states, {len(self.inputs)} inputs, {len(self.outputs)} outputs"
+        return f"LinearModel({size}, at {self.point!r})"
+
     @property
     def x0(self):
         """(m,) the states at the operating point."""

@@ -115,3 +115,9 @@ def test_parts_are_chosen_by_name_and_named_after_it(model):
     assert model.to_statespace(inputs="wind_speed", name="gusts").name == "gusts"
     with pytest.raises(InputError, match="unknown output 'speed'"):
         model.to_statespace(outputs="speed")
+
+
+def test_a_model_shows_its_size_and_operating_point_not_its_matrices(model):
+    shown = repr(model)
+    assert shown.startswith("LinearModel(14 states, 3 inputs, 15 outputs, at OperatingPoint(RotSpeed 12.1")
+    assert "array" not in shown and len(shown) < 250

@@ -39,7 +39,7 @@ def hydro(
         bool, typer.Option("--lid/--no-lid", help="Close the inner water plane (irregular frequencies).")
     ] = True,
 ):
-    """Wave loads of a hull from its panel mesh, by Capytaine.
+    """Wave loads of a hull from its panel mesh (Capytaine).
 
     Computes added mass, damping, wave excitation and hydrostatics.
     """

@@ -335,6 +335,8 @@ def test_help_fits_one_screen_and_has_every_command_in_a_group():
     result = CliRunner().invoke(app, ["--help"], env={"COLUMNS": "80", "NO_COLOR": "1"})
     lines = result.stdout.splitlines()
     assert len(lines) <= 38 and max(map(len, lines)) <= 80
+    heads = ("fowt ", " ", *(f"{group} " for group in GROUPS))
+    assert all(not line or line.startswith(heads) for line in lines)  # no description wraps
     root = typer.main.get_command(app)
     grouped = [name for names in GROUPS.values() for name in names]
     assert len(set(grouped)) == len(grouped) and set(root.commands) <= set(grouped)
