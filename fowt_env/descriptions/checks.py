@@ -86,16 +86,17 @@ def check_one_of(key, value, choices):
 
 
 def parse_numbers(text, what):
-    """List of numbers from "1,2,5" or "3:25:1" (start:stop:step, stop included)."""
+    """List of numbers from "1,2,5" or "3:25:1" (start:stop:step, stop included; without a step it is 1)."""
     if ":" in text:
         parts = [parse_number(part) for part in text.split(":")]
+        parts = [*parts, 1.0] if len(parts) == 2 else parts
         start, stop, step = parts if len(parts) == 3 else (None, None, None)
         if None in (start, stop, step) or step <= 0.0 or stop < start or (stop - start) / step > 10_000:
-            raise InputError(f"{what} = {text!r}: must be START:STOP:STEP with STEP > 0 and STOP >= START")
+            raise InputError(f"{what} = {text!r}: must be START:STOP[:STEP] with STEP > 0 and STOP >= START")
         return [start + step * i for i in range(math.floor((stop - start) / step + 1e-9) + 1)]
     values = [parse_number(part) for part in text.split(",") if part.strip()]
     if not values or None in values:
-        raise InputError(f"{what} = {text!r}: must be numbers separated by commas, or START:STOP:STEP")
+        raise InputError(f"{what} = {text!r}: must be numbers separated by commas, or START:STOP[:STEP]")
     return values
 
 

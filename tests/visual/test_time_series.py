@@ -165,3 +165,12 @@ def test_plotting_leaves_pyplot_alone():
         "assert 'matplotlib.pyplot' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_the_plots_can_be_imported_from_the_folder_and_no_other_name():
+    import fowt_env.visual
+
+    assert fowt_env.visual.plot_run is time_series.plot_run
+    assert all(callable(getattr(fowt_env.visual, name)) for name in fowt_env.visual.__all__)
+    with pytest.raises(AttributeError, match="plot_rum"):
+        _ = fowt_env.visual.plot_rum

@@ -240,7 +240,7 @@ def _lines(description, total, every):
     return update
 
 
-RANGE = "a list (8,12,18) or START:STOP:STEP, STOP included"
+RANGE = "a list (8,12,18) or START:STOP[:STEP], STOP included"
 PlatformOption = Annotated[
     str, typer.Option(help="Platform: a name of fowt list platforms, or a path to a TOML file.")
 ]

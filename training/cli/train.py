@@ -92,6 +92,9 @@ def train(
     if not finished:
         note(f"stopped with a checkpoint: {folder}; next: fowt train --resume --out {place}")
         raise typer.Exit(EXIT_INTERRUPTED)
+    steps, done = run.settings["steps"], run.rows[-1]["decisions"]
+    if done > steps:
+        note(f"{done:,} decisions for --steps {steps:,}: the algorithm takes whole rollouts")
     note(f"finished: {folder} ({', '.join(name for name in WRITTEN if (folder / name).exists())})")
     policy = folder / next(name for name in ("best.npz", "last.npz") if (folder / name).exists())
     platform = run.settings["environment"].get("platform")

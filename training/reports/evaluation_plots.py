@@ -111,15 +111,16 @@ REFERENCE = "reference"  # gid of the lines through the baseline
 MARKS = ("o", "s", "^", "D", "v", "P", "X", "*")  # one more than colours: 56 pairs
 
 
-def plot_pareto(board, path=None, title=None):
+def plot_pareto(board, path=None, title=None, order=()):
     """Figure of rotor-speed std (x) against platform-pitch std (y) of each controller over the baseline's.
 
     board: mapping of a leaderboard. Bars are the intervals of the paired ratios, from the runs that
     both finished; with too few seeds there are none. The mark's area is its mean blade-pitch rate. The
     stepped line joins the controllers that no other betters in both. Without a baseline the axes are rpm
     and deg, and the bars the intervals of the means or, with too few seeds for one, lines without ends
-    over the range of the seeds.
+    over the range of the seeds. order: controllers as other plots have them, whose colours are then the same.
     """
+    order = list(dict.fromkeys([*order, *(entry["controller"] for entry in board["controllers"])]))
     kept = []
     for entry in board["controllers"]:
         figures = [entry["metrics"][name] for name in PARETO_METRICS]
@@ -143,7 +144,8 @@ def plot_pareto(board, path=None, title=None):
             line(1.0, color=SOFT, linewidth=0.9, linestyle=(0, (5, 3)), zorder=1, gid=REFERENCE)
     names = short_names([entry["controller"] for entry, _ in kept])
     marks, drawn = [], set()
-    for number, ((entry, figures), (point, bars, kind)) in enumerate(zip(kept, places, strict=True)):
+    for place, ((entry, figures), (point, bars, kind)) in enumerate(zip(kept, places, strict=True)):
+        number = order.index(entry["controller"])
         colour = COLOURS[number % len(COLOURS)]
         square = number // len(COLOURS) % 2  # its area is the whole box of its size, a circle's pi/4 of it
         if bars is not None:
@@ -151,18 +153,18 @@ def plot_pareto(board, path=None, title=None):
             axes.errorbar(*point, xerr=bars[0], yerr=bars[1], **style)
             drawn.add(kind)
         lost = entry["failed"] + entry["tripped"]
-        text = f"{names[entry['controller']]}: {rates[number]:.3f} deg/s, {figures[3]['worst']:.0f} %"
+        text = f"{names[entry['controller']]}: {rates[place]:.3f} deg/s, {figures[3]['worst']:.0f} %"
         marks.append(
             axes.scatter(
                 *point,
-                s=areas[number] * (np.pi / 4.0 if square else 1.0),
+                s=areas[place] * (np.pi / 4.0 if square else 1.0),
                 marker="s" if square else "o",
                 color=colour,
                 alpha=0.6,
                 edgecolor=INK,
                 linewidth=0.6,
                 zorder=3,
-                label=text + (f", {lost} lost" if lost else ""),
+                label=text + (f", {lost} failed or tripped" if lost else ""),
             )
         )
     over = "" if base is None else f" over that of {names[board['baseline']]}"

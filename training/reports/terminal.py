@@ -277,7 +277,7 @@ def evaluation_plots(table, board, folder):
     if good.empty:
         return []
     paths = [folder / "pareto.png", folder / "metrics.png"]
-    plot_pareto(board, paths[0])
+    plot_pareto(board, paths[0], order=table["controller"].unique())
     names = [name for _, name, _ in PRINTED_METRICS]
     plot_evaluation(table, names, paths[1], "Mean over seeds, with their range")
     boxes = {}

@@ -123,7 +123,7 @@ def test_a_wind_series_file_drives_the_run(tmp_path):
         (("evaluate", "--engine", "rai"), "ray"),
         (("evaluate", "--seeds", "1.5"), "whole numbers"),
         (("evaluate", "--skip", "700"), "skip = 700"),
-        (("trim", "--winds", "24:4:1"), "START:STOP:STEP"),
+        (("trim", "--winds", "24:4:1"), "START:STOP[:STEP]"),
         (("trim", "--winds", ""), "winds"),
         (("list", "platfroms"), "platforms"),
     ],
@@ -451,12 +451,13 @@ def test_a_wind_series_needs_two_columns_of_numbers(tmp_path, content):
 def test_numbers_and_pairs():
     assert parse_numbers("4:24:0.1", "winds")[-1] == pytest.approx(24.0)
     assert parse_numbers("8,11.4", "winds") == [8.0, 11.4]
+    assert parse_numbers("1:4", "seeds") == [1.0, 2.0, 3.0, 4.0]
     assert parse_pairs(["a=1.5", "b=true", "c=swl", "d=x=y"], "option") == {
         "a": 1.5,
         "b": True,
         "c": "swl",
         "d": "x=y",
     }
-    for text in ("", "a", "1:2", "1:2:0", "2:1:1", "0:1:1e-9"):
+    for text in ("", "a", "1:", "1:2:", "1:2:3:4", "1:2:0", "2:1:1", "0:1:1e-9"):
         with pytest.raises(InputError):
             parse_numbers(text, "winds")
