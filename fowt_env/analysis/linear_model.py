@@ -154,6 +154,9 @@ class LinearModel:
     def index(self, name):
         """Row of a state. Raises: InputError for an unknown name."""
         if name not in self.states:
+            for state, field in MEASURED_AS.items():
+                if field == name and state in self.states:
+                    raise InputError(f"{name!r} is a field of Measurement: its state is {state!r}")
             raise unknown("state", name, self.states)
         return self.states.index(name)
 

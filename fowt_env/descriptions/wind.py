@@ -304,6 +304,8 @@ def read_wind(spec):
     if isinstance(spec, WindSpec):
         return spec
     spec = wind_of(spec)
+    if isinstance(spec, list | tuple | set) or spec is None:
+        raise InputError(f"wind = {short(spec)}: must be {FORMS}")
     if not isinstance(spec, dict):
         spec = {"kind": "steady", "speed": SPEED.read("wind", spec)}
     if "kind" not in spec:

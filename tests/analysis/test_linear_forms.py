@@ -74,6 +74,13 @@ def test_fields_are_what_state_reads(model):
     assert np.isfinite(model.state(Measurement(**hidden, **shown))).all()
 
 
+def test_a_field_of_a_measurement_leads_to_its_state(model):
+    with pytest.raises(InputError, match=r"'surge_rate' is a field of Measurement: its state is 'vx'"):
+        model.index("surge_rate")
+    with pytest.raises(InputError, match="unknown state 'surg'"):
+        model.index("surg")
+
+
 def test_states_that_are_not_measured_are_named():
     scene = fowt_env.build_scene("iea15_volturnus_s", wind=18.0, fidelity="standard")
     model = fowt_env.linearize(scene)

@@ -130,7 +130,7 @@ REFUSED = {  # mistake: (what is done with a scene, error, what the answer has t
     "negative wind": (built(wind=-5), InputError, "wind = -5.0 [0, 100] m/s"),
     "wind of 1000": (built(wind=1000), InputError, "wind = 1000.0 [0, 100] m/s"),
     "wind nan": (built(wind=np.nan), InputError, "wind = nan"),
-    "wind in a list": (built(wind=[18]), InputError, "wind = [18]: must be a number"),
+    "wind in a list": (built(wind=[18]), InputError, "wind = [18]: KIND:SPEED[:CLASS]"),
     "wind without kind": (built(wind={"speed": 18}), InputError, "wind.kind " + " ".join(ALL_KINDS)),
     "turbulence class D": (built(wind="ntm:18:D"), InputError, "wind.class 'D' A, A+, B, C"),
     "kind of others": (built(wind={"kind": "turbsim"}), InputError, "'turbsim' called 'bts' .bts file"),

@@ -343,7 +343,7 @@ def test_mean_of_a_gust_is_the_wind_before_it():
         (float("inf"), "wind = inf"),
         (True, "wind = True number"),
         ("18 m/s", "wind = '18 m/s' KIND:SPEED ntm bts box mann"),
-        ([18.0, 19.0], "wind number"),
+        ([18.0, 19.0], "wind KIND:SPEED"),
         ({"speed": 18.0}, "wind.kind missing steady"),
         ({"kind": "steedy", "speed": 18.0}, "'steedy' Did you mean 'steady'"),
         ({"kind": 3}, "wind.kind 3 steady"),
