@@ -166,7 +166,7 @@ def test_an_environment_crosses_to_other_processes():
     env.reset(seed=1)
     there = cloudpickle.loads(cloudpickle.dumps(env))
     assert there.step((0.0, 0.0))[1] == env.step((0.0, 0.0))[1]
-    batch = AsyncVectorEnv([lambda: env, lambda: env])
+    batch = AsyncVectorEnv([lambda: copy.deepcopy(env)] * 2)  # which closes one that it makes to look at
     try:
         observations, _ = batch.reset(seed=[4, 4])
         assert np.array_equal(observations[0], env.reset(seed=4)[0])
