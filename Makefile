@@ -1,6 +1,7 @@
 # Targets work from a fresh clone with only Python 3.11 to 3.13 and make; the environment is made once.
-# Another Python than 3.11: make PYTHON=python3.13 VENV=.venv313 test
-PYTHON ?= python3.11
+# The first of these that runs is taken. Another: make PYTHON=python3.13 VENV=.venv313 test
+PYTHON ?= $(firstword $(foreach name,python3.11 python3.12 python3.13 python3,$(shell \
+	$(name) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' 2>/dev/null && echo $(name))))
 VENV ?= .venv
 BIN := $(VENV)/bin
 PROJECT := pyproject.toml constraints.txt
@@ -17,11 +18,12 @@ help:
 	@echo "make test-all    all tests: make test, make test-rest (the other ones) and make test-nightly (the longest)"
 	@echo "make test-quick  all but the slow ones, as after an edit: minutes once their kernels are compiled"
 	@echo "make coverage    what the quick tests reach of what users touch; pages in htmlcov"
-	@echo "make lint        ruff and mypy;  make format: let ruff mend what it can"
+	@echo "make lint        ruff and mypy;  make format: let ruff fix what it can"
 	@echo "make docs        the documentation site, in site/"
 	@echo "make clean       remove results and build leftovers (the environment stays; rm -r $(VENV) removes it)"
 
 $(BIN)/python:
+	@test -n "$(PYTHON)" || { echo "needs Python 3.11, 3.12 or 3.13: make PYTHON=/path/to/python3.12" >&2; exit 1; }
 	$(PYTHON) -m venv $(VENV)
 
 $(VENV)/.installed-plot: $(PROJECT) | $(BIN)/python
