@@ -50,8 +50,6 @@ NO_METRIC = (*KEY, *WORDS, "stopped_[s]", "scored_[s]", WEIGHT)
 PAGE_METRICS = tuple(SHORT)  # that the leaderboard shows at once, those of them that the table has
 PARETO_AXES = ("RotSpeed_std_[rpm]", "PtfmPitch_std_[deg]", "blade_pitch_travel_[deg/s]")  # across, up, size
 ALL_CASES = ""
-TORQUE = ("generator\ntorque (kN m)", "GenTq_[kN-m]")
-PAGE_PANELS = PANELS if TORQUE[1] in dict(map(reversed, PANELS)) else (*PANELS[:4], TORQUE, *PANELS[4:])
 # what the shown size allows; stated on the page
 DISPLAY_RATE = 2.0  # Hz
 MAX_POINTS = 3000  # of one drawn series
@@ -245,7 +243,7 @@ def _drawn_run(frame, skip, rate, pitch_period, pool):
     block = max(1, round(1.0 / (wanted * step)))
     if rate is None:
         block = max(block, -(-len(time) // MAX_POINTS))
-    present = [channel for _, channel in PAGE_PANELS if channel in frame.columns]
+    present = [channel for _, channel in PANELS if channel in frame.columns]
     series = {}
     for channel in present:
         values = _block_means(frame[channel].to_numpy(dtype=float), block)
@@ -483,7 +481,7 @@ def _page_data(table, board_file, manifest, runs, schedule):
         [*(row[key] for key in KEY), _rounded([row[name] for name in names])]
         for row in good.to_dict("records")
     ]
-    labels = {channel: label.replace("\n", " ") for label, channel in PAGE_PANELS}
+    labels = {channel: label.replace("\n", " ") for label, channel in PANELS}
     cases = list(dict.fromkeys(table["case"]))
     ranked = board_file is not None and all(entry.rank is not None for entry in board_file.controllers)
     first = ("rank",) if ranked else ()
@@ -517,9 +515,7 @@ def _page_data(table, board_file, manifest, runs, schedule):
         "quantiles": runs["quantiles"],
         "pool": runs["pool"],
         "series": runs["series"],
-        "panels": [
-            {"label": label.replace("\n", "<br>"), "channel": channel} for label, channel in PAGE_PANELS
-        ],
+        "panels": [{"label": label.replace("\n", "<br>"), "channel": channel} for label, channel in PANELS],
         "spectra": [
             {"label": f"{label}<br>({unit}²/Hz)", "channel": channel} for label, channel, unit in SPECTRA
         ],
