@@ -64,6 +64,14 @@ def parse_json(text):
         raise ValueError("it is nested too deeply") from None
 
 
+def json_text(where, text):
+    """Value of a text that is JSON. Raises: InputError naming where it stands, and why it is none."""
+    try:
+        return parse_json(text)
+    except ValueError as error:
+        raise InputError(f"{where} = {short(text)}: not valid JSON: {error}") from None
+
+
 def _finite(text):
     value = float(text)
     if not math.isfinite(value):

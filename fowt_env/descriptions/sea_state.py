@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import model_validator
 
 from fowt_env.descriptions.checks import check_number, is_number, parse_number, short
-from fowt_env.descriptions.files import DATA, locate, parse_json, raise_problems, read_toml
+from fowt_env.descriptions.files import DATA, json_text, locate, raise_problems, read_toml
 from fowt_env.descriptions.records import (
     FloatArray,
     NonNegative,
@@ -249,10 +249,7 @@ def sea_of(spec):
     if text.lower() in ("none", "still"):
         return None
     if text.startswith("{"):
-        try:
-            return parse_json(text)
-        except ValueError as error:
-            raise InputError(f"sea = {short(text)}: not valid JSON: {error}") from None
+        return json_text("sea", text)
     kind, *rest = text.split(":")
     if kind not in TEXT_KEYS:
         return spec

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fowt_env.descriptions.checks import check_number, check_whole_number, parse_number, refusal, short
-from fowt_env.descriptions.files import parse_json
+from fowt_env.descriptions.files import json_text
 from fowt_env.descriptions.iec import REFERENCE_SPEED, TURBULENCE_INTENSITY
 from fowt_env.descriptions.wind_files import TABLES, UNIFORM, read_uniform_wind, read_wind_table
 from fowt_env.errors import InputError, unknown
@@ -256,10 +256,7 @@ def wind_of(spec: Any) -> Any:
     if number is not None:
         return number
     if text.startswith("{"):
-        try:
-            return parse_json(text)
-        except ValueError as error:
-            raise InputError(f"wind = {short(text)}: not valid JSON: {error}") from None
+        return json_text("wind", text)
     if is_wind_file(text):
         path = Path(text).expanduser()
         if path.suffix.lower() == BOX:
