@@ -12,6 +12,7 @@ from scipy.linalg import expm
 from fowt_env.analysis.trim import AZIMUTHS, trim, without_fluctuations
 from fowt_env.analysis.wave_excitation import fit_wave_filter, wave_force
 from fowt_env.descriptions.checks import is_number
+from fowt_env.descriptions.measurements import MEASURED as FIELDS
 from fowt_env.descriptions.sea_state import sea_state_of
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.channels import FIXED_CHANNELS, N_FIXED, Out, measure, record
@@ -69,12 +70,9 @@ COLUMNS = {  # what it is recorded as, by simulate
     "rotor_speed": "RotSpeed", "blade_pitch": "BldPitch1", "generator_torque_in_force": "GenTq",
 }  # fmt: skip
 UNITS = {  # of states, inputs and outputs, SI
-    "surge": "m", "sway": "m", "heave": "m", "roll": "rad", "platform_pitch": "rad", "yaw": "rad",
-    "vx": "m/s", "vy": "m/s", "vz": "m/s", "wx": "rad/s", "wy": "rad/s", "wz": "rad/s",
-    "rotor_speed": "rad/s", "generator_speed": "rad/s", "blade_pitch": "rad", "pitch_rate": "rad/s",
-    "platform_pitch_rate": "rad/s", "nacelle_acceleration": "m/s2", "nacelle_velocity": "m/s",
-    "generator_torque_in_force": "N m", "generator_torque": "N m", "blade_pitch_command": "rad",
-    "wind_speed": "m/s", "wave_elevation": "m", "power": "W", "rotor_thrust": "N",
+    **{field: measured.unit for field, measured in FIELDS.items()},
+    **{name: FIELDS[field].unit for name, field in MEASURED_AS.items()},
+    "pitch_rate": "rad/s", "blade_pitch_command": "rad", "power": "W", "rotor_thrust": "N",
     "tower_base_moment": "N m",
     **{name: "m" for name in TOWER}, **{f"{name}_rate": "m/s" for name in TOWER},
 }  # fmt: skip
