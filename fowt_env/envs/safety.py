@@ -41,7 +41,8 @@ class SafetyCosts(gymnasium.Wrapper):
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """As the environment's, with the costs in info."""
         result = self.env.step(action)
-        reached = self.env.unwrapped.true_measurement()  # type: ignore[attr-defined] # of a FowtEnv
+        plant: Any = self.env.unwrapped
+        reached = plant.true_measurement()
         costs = {
             f"cost_{name}": float(abs(reached[Measure[name.upper()]]) > limit)
             for name, limit in self.limits.items()

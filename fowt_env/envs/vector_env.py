@@ -455,7 +455,7 @@ def _shorten_spinning():
     """Have idle threads sleep soon, unless the user has decided on that; read when numba starts its threads.
 
     GNU's OpenMP, which runs them on Linux, lets an idle thread spin for milliseconds: best between steps on a
-    quiet machine, ruinous beside other programs (docs, performance.md). This many turns are some 50
+    quiet machine, ruinous beside other programs (performance.md). This many turns are some 50
     microseconds, longer than what lies between two steps.
     """
     if "OMP_WAIT_POLICY" not in os.environ:
