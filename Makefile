@@ -32,7 +32,7 @@ $(VENV)/.installed-plot: $(PROJECT) | $(BIN)/python
 
 $(VENV)/.installed-dev: $(PROJECT) | $(BIN)/python
 	$(INSTALL) ".[dev]"
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --no-deps rosco capytaine xarray
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --no-deps rosco capytaine hipersim xarray
 	@touch $@ $(VENV)/.installed-plot
 
 # its cases share one kind of scene, which two processes would both compile

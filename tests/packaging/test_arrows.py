@@ -11,8 +11,8 @@ import fowt_env
 ROOT = Path(fowt_env.__file__).resolve().parent.parent
 # from the ground up; a layer imports itself and what stands before it
 LAYERS = (
-    "errors", "caches", "folders", "display", "registration", "plant", "descriptions", "weather", "scene",
-    "files", "analysis",
+    "errors", "caches", "folders", "layout", "display", "registration", "plant", "descriptions", "weather",
+    "scene", "files", "analysis",
     "control", "initial_conditions", "simulation", "visual", "envs", "warmup", "controllers", "training",
     "training.evaluation", "training.design", "training.rl", "training.reports", "training.board",
     "training.validation",
@@ -77,7 +77,7 @@ def test_the_page_for_contributors_lists_the_layers():
     lists = r"Within `fowt_env` it is (.*?); within `training` it is (.*?)\. "
     simulator, training = re.search(lists, text, re.S).groups()
     # but for the last, what all may import
-    apart = ("errors", "caches", "folders", "display", "registration", "controllers")
+    apart = ("errors", "caches", "folders", "layout", "display", "registration", "controllers")
     inside = [name for name in LAYERS if name not in apart and name.partition(".")[0] != "training"]
     assert re.findall(r"`(\w+)`", simulator) == inside[::-1]
     inside = [name.partition(".")[2] for name in LAYERS if name.startswith("training.")]

@@ -1,11 +1,10 @@
-"""What users install: the built files hold everything, and a bare environment runs the README's example.
+"""What users install: each form of the sources gives the same wheel, and that runs without them.
 
-Needs a package index for the dependencies of the empty environment, as `pip install fowt-env` does.
+The bare environment needs a package index for its dependencies, as `pip install fowt-env` does.
 """
 
 import os
 import re
-import shutil
 import subprocess
 import sys
 import tarfile
@@ -13,6 +12,9 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from distributions import FORMS, repository, run, sources, wheel_of
+
+from fowt_env.training.evaluation.provenance import controller_code, plant_code
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = {"fowt_env": "fowt_env", "controllers": "fowt_env/controllers", "training": "fowt_env/training"}
@@ -31,31 +33,19 @@ SHIPPED = {  # one of each kind of file that is no source
 pytestmark = pytest.mark.slow
 
 
-def run(*command, **options):
-    done = subprocess.run([str(part) for part in command], capture_output=True, text=True, **options)
-    assert done.returncode == 0, f"{command}\n{done.stdout[-3000:]}\n{done.stderr[-3000:]}"
-    return done.stdout
-
-
 @pytest.fixture(scope="module")
 def built(tmp_path_factory):
-    """(sdist, wheel) built from a copy of the sources, the wheel out of the sdist."""
-    folder = tmp_path_factory.mktemp("build")
-    source = folder / "source"
-    leave = shutil.ignore_patterns("__pycache__", "*.egg-info")
-    for package in PACKAGES:
-        shutil.copytree(ROOT / package, source / package, ignore=leave, symlinks=True)
-    for path in ROOT.iterdir():
-        if path.is_file() and not path.name.startswith("."):
-            shutil.copy(path, source)
-    run(sys.executable, "-m", "build", "--no-isolation", "--outdir", folder / "dist", source)
-    (sdist,) = (folder / "dist").glob("*.tar.gz")
-    (wheel,) = (folder / "dist").glob("*.whl")
-    return sdist, wheel
+    """Return {form: (sources, wheel)}."""
+    folder = tmp_path_factory.mktemp("built")
+    origin, found = repository(folder / "origin"), {}
+    for form in FORMS:
+        place = sources(form, origin, folder)
+        found[form] = place, wheel_of(place, folder / "wheels" / form)
+    return found
 
 
 def package_files():
-    """Paths of the package's files, code and data, as they are installed: its links as folders."""
+    """Return the paths of the package's files, code and data, as they are installed."""
     return {
         f"{place}/{path.relative_to(ROOT / folder).as_posix()}"
         for folder, place in PACKAGES.items()
@@ -64,20 +54,65 @@ def package_files():
     }
 
 
-def test_sdist_and_wheel_hold_the_package_without_the_studies_and_the_licence(built):
-    sdist, wheel = built
-    with tarfile.open(sdist) as archive:
-        in_sdist = {name.partition("/")[2] for name in archive.getnames()}
-    in_wheel = set(zipfile.ZipFile(wheel).namelist())
+@pytest.mark.parametrize("form", FORMS)
+def test_each_form_of_the_sources_gives_a_wheel_with_the_package_without_the_studies(form, built):
+    in_wheel = set(zipfile.ZipFile(built[form][1]).namelist())
     wanted = {path for path in package_files() if not path.startswith(LEFT_OUT)}
-    assert wanted < package_files()
-    assert wanted - in_sdist == set()
+    assert wanted < package_files() and wanted >= SHIPPED
     assert {path for path in in_wheel if ".dist-info/" not in path} == wanted
     tops = {path.partition("/")[0] for path in in_wheel}
     assert len(tops) == 2 and "fowt_env" in tops  # and what pip needs to know of it
-    assert SHIPPED <= in_wheel
     assert any(name.endswith("LICENSE") for name in in_wheel)
     assert not any(name.endswith(".pth") or ".data/" in name for name in in_wheel)
+
+
+def test_the_sdist_has_the_pages_and_the_versions_that_they_name_and_no_tests(built):
+    with tarfile.open(built["sdist"][0]) as archive:
+        names = {name.partition("/")[2] for name in archive.getnames()}
+    assert {"constraints.txt", "docs/index.md", "examples/01_simulate.py", "CHANGELOG.md"} <= names
+    assert not [name for name in names if name.startswith(("tests", "docs/joss", "training/studies"))]
+
+
+def test_sources_without_a_package_are_not_built(built, tmp_path):
+    """As a ZIP of symbolic links had, which installed without a word."""
+    place = tmp_path / "sources"
+    zipfile.ZipFile(built["zip"][0].parent / "archive.zip").extractall(place)
+    (place / "controllers").rename(tmp_path / "controllers")
+    (place / "controllers").write_text("../controllers")
+    with pytest.raises(AssertionError, match="the sources are incomplete: without controllers"):
+        wheel_of(place, tmp_path / "wheel")
+
+
+CODES = """
+import fowt_env.controllers, fowt_env.training
+from fowt_env.training.evaluation.provenance import controller_code, plant_code
+print(fowt_env.__file__, fowt_env.controllers.__file__)
+print(plant_code(), *(controller_code(name)["code"] for name in ("pi", "policy:ppo_lqr")))
+"""
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("form", (*FORMS, "editable"))
+def test_each_form_runs_the_self_test_and_an_agent_where_the_sources_are_not(form, built, tmp_path):
+    """On the libraries of these tests, and with their kernels, which the same sources have."""
+    run(sys.executable, "-m", "venv", "--without-pip", tmp_path / "venv")
+    python = tmp_path / "venv" / "bin" / "python"
+    (own,) = (tmp_path / "venv" / "lib").glob("python*/site-packages")
+    libraries = [path for path in sys.path if path.endswith(("site-packages", "dist-packages"))]
+    (own / "libraries.pth").write_text("\n".join(libraries))
+    pip = (sys.executable, "-m", "pip", "--python", python, "install", "--quiet", "--no-deps")
+    what = ("--editable", built["clone"][0]) if form == "editable" else (built[form][1],)
+    run(*pip, "--no-build-isolation", "--ignore-installed", *what)
+    variables = {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}
+    options = {"cwd": tmp_path, "env": variables}
+    places, codes = run(python, "-c", CODES, **options).splitlines()
+    assert places.count(str(built["clone"][0] if form == "editable" else tmp_path)) == 2
+    assert codes.split() == [plant_code(), *(controller_code(c)["code"] for c in ("pi", "policy:ppo_lqr"))]
+    fowt = tmp_path / "venv" / "bin" / "fowt"
+    run(fowt, "doctor", **options)
+    words = ("--controller", "policy:ppo_lqr", "--wind", "18", "--duration", "20", "--out", "run.csv")
+    run(fowt, "simulate", *words, **options)
+    assert (tmp_path / "run.csv").stat().st_size > 1e4
 
 
 def readme_example(duration):
@@ -89,7 +124,7 @@ def readme_example(duration):
 
 
 def test_the_wheel_runs_the_readme_example_in_an_empty_environment_without_torch(built, tmp_path):
-    _, wheel = built
+    _, wheel = built["sdist"]
     run(sys.executable, "-m", "venv", tmp_path / "venv")
     python = tmp_path / "venv" / "bin" / "python"
     environment = {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}
