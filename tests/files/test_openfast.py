@@ -80,7 +80,9 @@ def test_a_turning_wind_keeps_its_speed_between_the_rows(tmp_path):
 def test_a_wind_file_is_an_argument_of_the_command_line_and_drives_a_scene(tmp_path):
     path = write(tmp_path, "! time speed ...\n" + STILL + "100.0 12.0 0 0 0 0 0 0 ! the end\n")
     path = path.rename(tmp_path / "wind.hh")
-    frame = fowt_env.simulate(fowt_env.build_scene(wind=parse_wind(str(path)), rotor="table"), duration=2.0)
+    frame = fowt_env.simulate(
+        fowt_env.build_scene(wind=parse_wind(str(path)), rotor="table", fidelity="reference"), duration=2.0
+    )
     np.testing.assert_allclose(frame["Wind1VelX_[m/s]"], 12.0)
 
 
@@ -112,7 +114,9 @@ def test_a_missing_wind_file_is_named(tmp_path):
 
 @pytest.fixture(scope="module")
 def run():
-    return fowt_env.simulate(fowt_env.build_scene(wind=18.0, rotor="table"), duration=5.0)
+    return fowt_env.simulate(
+        fowt_env.build_scene(wind=18.0, rotor="table", fidelity="reference"), duration=5.0
+    )
 
 
 @pytest.fixture(scope="module")

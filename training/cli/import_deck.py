@@ -6,7 +6,8 @@ import typer
 from rich.markup import escape
 
 from fowt_env.errors import InputError
-from fowt_env.training.cli.console import app, note, out, output, reported
+from fowt_env.training.cli.check import print_faults
+from fowt_env.training.cli.console import EXIT_STOPPED, app, note, out, output, reported
 from fowt_env.training.cli.tables import print_table
 
 EXAMPLES = """[bold]Examples[/bold]
@@ -19,7 +20,10 @@ EXAMPLES = """[bold]Examples[/bold]
 
 [cyan]fowt simulate --platform my_semi/platform.toml --wind 14[/cyan]  # what comes next
 
-docs/guides/import.md says what is read, what is approximated and what is refused."""  # noqa: E501
+docs/guides/import.md says what is read, what is approximated and what is refused.
+
+[bold]Exit code[/bold]: 0 if everything fits, 1 if the files are written but something in them does not fit (as fowt check),
+2 if the deck cannot be imported."""  # noqa: E501
 
 Part = Annotated[str | None, typer.Option(help="This part file, in place of the one that the .fst names.")]
 
@@ -47,8 +51,12 @@ def import_command(
         typer.Option(help="Folder in which files that the deck names are looked for as well; repeatable."),
     ] = None,
     overwrite: Annotated[bool, typer.Option(help="Replace the files of an earlier import.")] = False,
+    check: Annotated[
+        bool, typer.Option(help="Look at the imported platform at rest, as fowt check does.")
+    ] = True,
 ) -> None:
     """Convert an OpenFAST or FAST 8 deck to a platform file."""
+    from fowt_env.analysis.check import check_platform
     from fowt_env.files.openfast_deck.importer import import_deck
 
     parts = {
@@ -74,7 +82,27 @@ def import_command(
         prose=(0, 1),
     )
     out.print()
+    if report.contradictions:
+        print_table(
+            out,
+            ("the deck", "what follows"),
+            report.contradictions,
+            "Where the deck contradicts itself",
+            left=(0, 1),
+            prose=(0, 1),
+        )
+        out.print()
     for line in report.suggestions:
         out.print(escape(line), soft_wrap=True, highlight=False)
-    note(f"wrote {out_path}/platform.toml, turbine/ and report.md")
-    note(f"next: fowt simulate --platform {out_path}/platform.toml --wind 14")
+    platform = f"{out_path}/platform.toml"
+    note(f"wrote {platform}, turbine/ and report.md")
+    if check:
+        try:
+            faults = check_platform(platform).faults
+        except InputError as error:
+            faults = (f"It cannot be checked: {error}",)
+        print_faults(faults)
+        if faults:
+            note(f"the files are kept; fowt check {platform} says more")
+            raise typer.Exit(EXIT_STOPPED)
+    note(f"next: fowt simulate --platform {platform} --wind 14")

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fowt_env.files.openfast_deck.keys import differences
 from fowt_env.files.openfast_deck.parser import PartFile, bare, locate, words_of
 
 MOST_AIRFOILS = 1000
@@ -31,7 +32,7 @@ class AeroDyn:
     notes: tuple  # (what the deck has, what the plant has)
 
 
-def read_aerodyn(path, folders=()):
+def read_aerodyn(path, folders=(), blades=3):
     """AeroDyn of an AeroDyn 15 file, with the blade file and polars that it names. Raises: InputError."""
     file = PartFile(path, "AeroDyn")
     if not file.has("NumAFfiles"):
@@ -47,7 +48,7 @@ def read_aerodyn(path, folders=()):
     ]
     moment = file.flag("UseBlCm", default=True)
     mode = file.whole("AFTabMod", default=1)
-    blade_file, blade = _blade(file, folders)
+    blade_file, blade = _blade(file, folders, blades)
     files = _airfoil_files(file, count, folders)
     numbers = [int(row["blafid"]) for row in blade]
     for i, (number, row) in enumerate(zip(numbers, blade, strict=True)):
@@ -56,9 +57,10 @@ def read_aerodyn(path, folders=()):
                 f"BlAFID = {row['blafid']:g} of node {i + 1}: must be from 1 to NumAFfiles = {count}"
             )
     names = _names(files, numbers)
-    polars, tables = {}, {}
+    polars, tables, parts = {}, {}, []
     for number, name in names.items():
         polar = PartFile(files[number - 1], "polar")
+        parts.append(polar)
         polars[name], tables[name] = _polar(polar, columns, moment, mode)
     heights = file.table("NumTwrNds", high=10_000)
     tower = np.array([[cells[key] for key in ("twrelev", "twrdiam", "twrcd")] for _, cells in heights
@@ -67,6 +69,7 @@ def read_aerodyn(path, folders=()):
         raise file.refusal("TwrElev must increase from row to row", heights[0][0])
     if (tower[:, 1:] < 0.0).any():
         raise file.refusal("TwrDiam and TwrCd must be >= 0", heights[0][0])
+    notes = [row for part in (file, blade_file, *parts) for row in differences(part)]
     return AeroDyn(
         file=file,
         blade_file=blade_file,
@@ -81,7 +84,7 @@ def read_aerodyn(path, folders=()):
         air_density=file.number("AirDens", default=None, low=0.0, high=1e4),
         tower=tower,
         tower_loads=file.flag("TwrAero", default=True),
-        notes=tuple(_notes(file)),
+        notes=tuple(notes),
     )
 
 
@@ -92,12 +95,16 @@ def _has(file, cells, names):
     return True
 
 
-def _blade(file, folders):
-    """(file, rows) of the blade."""
+def _blade(file, folders, blades):
+    """(file, rows) of the blade of a rotor with this number of them."""
     path = file.other("ADBlFile(1)", "ADBlFile", folders=folders)
     if path is None:
         raise file.wrong("ADBlFile(1)", "unused", "the blade file")
-    blade = PartFile(path, "blade")
+    for i in (2, 3):
+        other = file.text(f"ADBlFile({i})", default=None)
+        if other not in (None, file.text("ADBlFile(1)", "ADBlFile")) and i <= blades:
+            raise file.wrong(f"ADBlFile({i})", other, "the file of blade 1: blades are alike")
+    blade = PartFile(path, "AeroDyn blade")
     rows = blade.table("NumBlNds", default=0, high=10_000)
     if len(rows) < 2:
         raise blade.refusal("NumBlNds must be at least 2")
@@ -151,8 +158,6 @@ def _polar(file, columns, moment, mode):
     heads = []  # line of NumAlf, Reynolds number
     reynolds = None
     for line, text in enumerate(file.lines):
-        if text.lstrip().startswith("!"):
-            continue
         words = words_of(text[:400])
         if len(words) >= 2 and words[1].lower() == "re":
             reynolds = words[0]
@@ -168,7 +173,7 @@ def _polar(file, columns, moment, mode):
     rows = []
     for number in range(line + 1, len(file.lines)):
         text = file.lines[number]
-        if not text.strip() or text.lstrip().startswith("!"):
+        if not text.strip():
             continue
         words = words_of(text[:2000])
         try:
@@ -197,39 +202,3 @@ def _polar(file, columns, moment, mode):
         )
     polar[0, 0], polar[-1, 0] = -FULL, FULL
     return polar, (taken + 1, len(heads), reynolds)
-
-
-def _notes(file):
-    """What AeroDyn does in this deck and the plant does not, or otherwise."""
-    wake = file.whole("WakeMod", "Wake_Mod", default=1)
-    if wake == 0:
-        yield "no induction (Wake_Mod 0)", "blade-element momentum theory: induction is there"
-    if wake == 3:
-        yield "free vortex wake (OLAF)", "blade-element momentum theory"
-    if wake == 2 or (wake == 1 and file.whole("DBEMT_Mod", default=0) > 0 and file.has("Wake_Mod")):
-        yield "dynamic wake (DBEMT)", "quasi-steady induction; the option dynamic_inflow has a dynamic one"
-    unsteady = (
-        file.whole("UA_Mod", default=0) if file.has("UA_Mod") else file.whole("AFAeroMod", default=1) - 1
-    )
-    if unsteady > 0:
-        yield "unsteady airfoil aerodynamics", "quasi-steady polars"
-    if file.whole("TwrPotent", default=0) != 0:
-        yield "potential flow around the tower", "no influence of the tower on the wind"
-    if (
-        file.whole("TwrShadow", default=0, high=9) != 0
-        if not _is_flag(file, "TwrShadow")
-        else file.flag("TwrShadow")
-    ):
-        yield "tower shadow", "no influence of the tower on the wind"
-    if file.flag("Buoyancy", default=False):
-        yield "buoyancy of blades and tower", "none"
-    if file.flag("NacelleDrag", default=False):
-        yield "drag of the nacelle", "none"
-    if file.flag("TFinAero", default=False):
-        yield "tail fin", "none"
-
-
-def _is_flag(file, key):
-    """Whether a key has True or False, as older versions write it."""
-    found = file.find(key)
-    return found is not None and bare(found[1][0]).lower()[:1] in ("t", "f", ".")

@@ -11,6 +11,7 @@ import numpy as np
 from fowt_env.descriptions.rotor_mass import rotor_mass_properties
 from fowt_env.descriptions.units import RPM
 from fowt_env.files.openfast_deck.hydrodyn import is_old
+from fowt_env.files.openfast_deck.rosco_files import DISCON
 
 NEAR = 0.05  # m, of the outermost blade stations from hub and tip: line loads fall to zero there
 OVERSPEED = 1.3  # of the rated speed: failure threshold of the environment, a choice of this project
@@ -343,7 +344,7 @@ def turbine_rows(deck, name):
         "": [
             Row("name", name),
             Row("source", f"imported from {deck.name}"),
-            *([Row("discon", control.discon.name, "of the controller rosco")] if control.discon else []),
+            *([Row("discon", DISCON, "of the controller rosco")] if control.discon else []),
             Row("rated_rotor_speed_rpm", rated / RPM, f"{why.get('rated_speed', '')} over GBRatio"),
             Row("rated_wind_speed", control.rated_wind_speed or 11.4, why.get("rated_wind_speed", "a guess")),
             Row("cut_in_wind_speed", control.cut_in_wind_speed, why.get("cut_in_wind_speed", "usual value")),

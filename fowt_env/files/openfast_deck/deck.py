@@ -8,6 +8,7 @@ from fowt_env.files.openfast_deck.aerodyn import AeroDyn, read_aerodyn
 from fowt_env.files.openfast_deck.elastodyn import ElastoDyn, read_elastodyn
 from fowt_env.files.openfast_deck.environment import Inflow, Sea, read_inflow, read_sea
 from fowt_env.files.openfast_deck.hydrodyn import HydroDyn, read_hydrodyn
+from fowt_env.files.openfast_deck.keys import differences
 from fowt_env.files.openfast_deck.mooring import read_mooring
 from fowt_env.files.openfast_deck.parser import PartFile
 from fowt_env.files.openfast_deck.servodyn import Control, read_control
@@ -46,6 +47,7 @@ class Deck:
     elastodyn: ElastoDyn
     aerodyn: AeroDyn
     hydrodyn: HydroDyn
+    water: PartFile  # SeaState's file, or HydroDyn's, which was it before OpenFAST 4
     mooring: PartFile | None
     lines: tuple
     sea: Sea
@@ -71,7 +73,7 @@ def read_deck(fst=None, parts=None, folders=(), discon=None):
             if name in parts or not _switched_on(main, name):
                 continue
             try:
-                path = main.other(key, folders=folders, default=None)
+                path = main.other(key, f"{key}(1)", folders=folders, default=None)  # (1): OpenFAST 5
             except InputError:
                 if name != "inflow":  # the wind is a suggestion
                     raise
@@ -86,24 +88,26 @@ def read_deck(fst=None, parts=None, folders=(), discon=None):
     # FAST 8 finds files beside the .fst as well
     folders = (*folders, *({main.path.parent} if main is not None else ()))
     elastodyn = read_elastodyn(parts["elastodyn"], folders)
-    aerodyn = read_aerodyn(parts["aerodyn"], folders)
+    aerodyn = read_aerodyn(parts["aerodyn"], folders, elastodyn.blades)
     water = PartFile(
         parts.get("seastate", parts["hydrodyn"]), "SeaState" if "seastate" in parts else "HydroDyn"
     )
     site = _site(main, elastodyn, aerodyn, water)
     hydrodyn = read_hydrodyn(parts["hydrodyn"], (site.water_density, site.water_depth, 0.0), folders)
-    mooring, lines, notes = None, [], []
+    notes = [] if main is None else differences(main)
+    mooring, lines = None, []
     if "mooring" in parts:
         kind = (
             None
             if main is None or "mooring" in given
             else {1: 1, 3: 3}.get(main.whole("CompMooring", default=0))
         )
-        mooring, lines, notes = read_mooring(
+        mooring, lines, more = read_mooring(
             kind, parts["mooring"], site.water_depth, site.water_density, site.gravity
         )
+        notes += more
     else:
-        notes = [("no mooring system", "none: the platform drifts")]
+        notes.append(("no mooring system", "none: the platform drifts"))
     for line in lines:
         if not -site.water_depth * (1.0 + 1e-3) - 0.1 <= line.anchor[2] <= 0.0:
             raise mooring.refusal(
@@ -120,6 +124,7 @@ def read_deck(fst=None, parts=None, folders=(), discon=None):
         raise elastodyn.file.wrong(
             "PtfmRefzt", reference, "0 with potential flow: WAMIT's origin at still water"
         )
+    sea = read_sea(water)
     return Deck(
         name=(main.path if main is not None else parts["elastodyn"]).stem,
         fst=main,
@@ -127,12 +132,13 @@ def read_deck(fst=None, parts=None, folders=(), discon=None):
         elastodyn=elastodyn,
         aerodyn=aerodyn,
         hydrodyn=hydrodyn,
+        water=water,
         mooring=mooring,
         lines=tuple(lines),
-        sea=read_sea(water),
+        sea=sea,
         inflow=inflow,
         control=control,
-        notes=tuple(notes),
+        notes=(*sea.notes, *inflow.notes, *notes),
         files=tuple(([] if main is None else [main.path]) + list(parts.values())),
     )
 

@@ -12,6 +12,7 @@ import numpy as np
 from fowt_env.descriptions.records import validate
 from fowt_env.descriptions.rotor_mass import BladeMass, blade_mass
 from fowt_env.descriptions.tower_modes import TowerBending
+from fowt_env.files.openfast_deck.keys import differences
 from fowt_env.files.openfast_deck.parser import PartFile
 
 MASS = {"low": 0.0, "high": 1e12}  # kg
@@ -44,6 +45,7 @@ class ElastoDyn:
     platform_products: tuple  # PtfmXYIner, PtfmYZIner, PtfmXZIner, kg m2
     gravity: float | None  # of FAST 8, where it stands here
     flexible: tuple  # names of degrees of freedom that are on and that the plant does not have
+    notes: tuple  # (what the deck has, what the plant has)
 
     def __getitem__(self, key):
         return self.values[key.lower()]
@@ -60,7 +62,6 @@ FLEXIBLE = {
     "TwSSDOF1": "first side-to-side tower mode",
     "TwSSDOF2": "second side-to-side tower mode",
 }
-HELD = ("PtfmSgDOF", "PtfmSwDOF", "PtfmHvDOF", "PtfmRDOF", "PtfmPDOF", "PtfmYDOF", "GenDOF")
 
 
 def read_elastodyn(path, folders=()):
@@ -110,17 +111,19 @@ def read_elastodyn(path, folders=()):
         raise file.wrong("TowerHt", values["towerht"], f"> TowerBsHt = {values['towerbsht']:g}")
     if values["overhang"] > 0.0:
         raise file.wrong("OverHang", values["overhang"], "<= 0: downwind rotors cannot be represented")
-    tower, bending = _tower(file, folders, values)
+    tower_file, tower, bending = _tower(file, folders, values)
+    blade_file, blade = _blade(file, folders, values)
     return ElastoDyn(
         file=file,
         values=values,
         blades=blades,
-        blade=_blade(file, folders, values),
+        blade=blade,
         tower=tower,
         bending=bending,
         platform_products=tuple(file.number(f"Ptfm{name}Iner", default=0.0) for name in ("XY", "YZ", "XZ")),
         gravity=file.number("Gravity", default=None, low=0.0, open_low=True),
         flexible=tuple(what for key, what in FLEXIBLE.items() if file.flag(key, default=False)),
+        notes=tuple(row for part in (file, blade_file, tower_file) for row in differences(part)),
     )
 
 
@@ -158,7 +161,7 @@ def _span(length, nodes, place, density):
 
 
 def _blade(file, folders, values):
-    """BladeMass of the blade file, with the mass at the tip."""
+    """(file, BladeMass) of the blade file, with the mass at the tip."""
     path = file.other("BldFile(1)", "BldFile", folders=folders)
     if path is None:
         raise file.wrong("BldFile(1)", "unused", "the blade file: the masses of the rotor are in it")
@@ -168,16 +171,15 @@ def _blade(file, folders, values):
         if name not in (None, first) and i <= file.whole("NumBl"):
             raise file.wrong(f"BldFile({i})", name, "the file of blade 1: blades are alike")
     nodes = file.whole("BldNodes", default=50, **NODES)
-    place, density = _distributed(
-        PartFile(path, "blade"), "NBlInpSt", "BlFract", ("BMassDen", "kg/m", "AdjBlMs")
-    )
+    part = PartFile(path, "ElastoDyn blade")
+    place, density = _distributed(part, "NBlInpSt", "BlFract", ("BMassDen", "kg/m", "AdjBlMs"))
     tip = values["tiprad"]
     blade = blade_mass(place, density, values["hubrad"], tip, nodes)
-    return BladeMass(np.append(blade.radius, tip), np.append(blade.mass, values["tipmass"]))
+    return part, BladeMass(np.append(blade.radius, tip), np.append(blade.mass, values["tipmass"]))
 
 
 def _tower(file, folders, values):
-    """(Span, TowerBending or None) of the tower file."""
+    """(file, Span, TowerBending or None) of the tower file."""
     path = file.other("TwrFile", folders=folders)
     if path is None:
         raise file.wrong("TwrFile", "unused", "the tower file: the mass of the tower is in it")
@@ -185,7 +187,7 @@ def _tower(file, folders, values):
     tower = PartFile(path, "tower")
     place, density = _distributed(tower, "NTwInpSt", "HtFract", ("TMassDen", "kg/m", "AdjTwMa"))
     span = _span(values["towerht"] - values["towerbsht"], nodes, place, density)
-    return span, _bending(tower, nodes, values["yawbrmass"])
+    return tower, span, _bending(tower, nodes, values["yawbrmass"])
 
 
 def _bending(tower, nodes, top_mass):

@@ -1,10 +1,14 @@
 """Site, sea and wind of a deck: SeaState or the part of HydroDyn that it was, and InflowWind."""
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 from fowt_env.descriptions.wind_files import read_uniform_wind
 from fowt_env.errors import InputError
+from fowt_env.files.openfast_deck.keys import differences
 from fowt_env.files.openfast_deck.parser import PartFile, bare
+
+LEAST_CUT = (0.5, 4.0)  # times the peak frequency: 0.5 % of the variance of a JONSWAP sea lie beyond
 
 
 @dataclass(frozen=True)
@@ -13,6 +17,7 @@ class Sea:
 
     suggestion: dict | None  # sea argument of a scene
     words: str
+    notes: tuple = ()  # (what the deck has, what the plant has)
 
 
 @dataclass(frozen=True)
@@ -22,26 +27,20 @@ class Inflow:
     suggestion: float | None
     shear_exponent: float | None
     words: str
+    notes: tuple = ()  # (what the deck has, what the plant has)
 
 
 def read_sea(file):
     """Sea of SeaState's file, or of HydroDyn's of FAST 8. Raises: InputError."""
-    current = file.one_of(
-        "CurrMod", (0, 1), "WvCrntMod", default=0, why="2, a user's current, cannot be represented"
-    )
+    current = file.one_of("CurrMod", (0, 1), default=0, why="2, a user's current, cannot be represented")
     more = []
     if current == 1:
         speeds = {key: file.number(key, default=0.0) for key in ("CurrSSV0", "CurrNSV0", "CurrDIV")}
         if any(speeds.values()):
-            listed = ", ".join(f"{key} {value:g} m/s" for key, value in speeds.items())
-            more.append(f"current ({listed}): give it with the option current")
-    for key, what in (("WvDiffQTF", "difference"), ("WvSumQTF", "sum")):
-        if file.flag(key, default=False):
-            more.append(f"second-order wave kinematics of {what} frequencies ({key}): left out")
-    if file.whole("WaveDirMod", default=0) != 0:
-        more.append("short-crested waves (WaveDirMod): long-crested here")
-    if file.whole("ConstWaveMod", default=0) != 0:
-        more.append("a constrained wave (ConstWaveMod): left out")
+            listed = [f"{key} {value:g} m/s" for key, value in speeds.items()]
+            for key in ("CurrSSDir", "CurrNSRef", "CurrNSDir", "CurrDIDir"):
+                listed.append(f"{key} {file.text(key, default='0')}")
+            more.append(f"current ({', '.join(listed)}): give it with the option current")
     found = file.find("WaveMod")
     kind = bare(found[1][0]).lower() if found else "0"
     heading = file.number("WaveDir", default=0.0) if kind not in ("0", "6") else 0.0
@@ -53,12 +52,18 @@ def read_sea(file):
         if kind == "2":
             peak = file.number("WavePkShp", default=None, low=1.0, high=7.0)
             suggestion = {"kind": "jonswap", "Hs": height, "Tp": period}
+            words = f"JONSWAP, Hs {height:g} m, Tp {period:g} s"
             if peak is not None:
                 suggestion["gamma"] = peak
-            words = f"JONSWAP, Hs {height:g} m, Tp {period:g} s"
+                words += f", gamma {peak:g}"
         else:
             suggestion = {"kind": "regular", "H": height, "T": period}
             words = f"regular waves, H {height:g} m, T {period:g} s"
+        low, high = file.number("WvLowCOff", default=0.0), file.number("WvHiCOff", default=math.inf)
+        if kind == "2":
+            middle = 2.0 * math.pi / max(period, 1e-6)  # frequency of the peak
+            if low > LEAST_CUT[0] * middle or high < LEAST_CUT[1] * middle:
+                more.append(f"cut off below {low:g} and above {high:g} rad/s (WvLowCOff, WvHiCOff): not here")
         if heading:
             suggestion["heading"] = heading
             words += f", heading {heading:g} deg"
@@ -66,12 +71,17 @@ def read_sea(file):
         names = {"3": "white noise", "4": "a user's spectrum", "5": "external elevations",
                  "6": "external kinematics", "7": "a user's components"}  # fmt: skip
         words = f"{names.get(kind[:1], 'a kind of its own')} (WaveMod {kind}): give a sea of your own"
-    return Sea(suggestion, "; ".join([words, *more]))
+    return Sea(suggestion, "; ".join([words, *more]), tuple(differences(file)))
 
 
 def read_inflow(path, folders=()):
     """Inflow of an InflowWind file."""
     file = PartFile(path, "InflowWind")
+    return replace(_inflow(file, folders), notes=tuple(differences(file)))
+
+
+def _inflow(file, folders):
+    """Inflow without notes."""
     kind = file.whole("WindType")
     if kind == 1:
         speed = file.number("HWindSpeed", low=0.0, high=100.0)
@@ -88,6 +98,11 @@ def read_inflow(path, folders=()):
             exponent = read_uniform_wind(name)["shear_exponent"]
         except InputError as error:
             return Inflow(None, None, f"uniform wind that cannot be taken over: {error}")
-        return Inflow(None, exponent, f"uniform wind of {name.name}, which --wind takes as it is")
+        height = file.number("RefHt_Uni", "RefHt", default=0.0)
+        return Inflow(
+            None,
+            exponent,
+            f"uniform wind of {name.name} at {height:g} m, which --wind takes at the hub's height",
+        )
     names = {3: "TurbSim", 4: "Bladed", 5: "HAWC", 6: "user-defined", 7: "Bladed"}
     return Inflow(None, None, f"{names.get(kind, 'unknown')} (WindType {kind}): give the wind with --wind")

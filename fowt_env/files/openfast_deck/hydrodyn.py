@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fowt_env.files.openfast_deck.keys import differences
 from fowt_env.files.openfast_deck.parser import PartFile, bare, locate, number_of, words_of
 
 MOST = 10_000  # joints, members
@@ -76,7 +77,7 @@ def read_hydrodyn(path, site, folders=()):
     file = PartFile(path, "HydroDyn")
     notes = []
     mode = file.one_of("PotMod", (0, 1), why="2, fluid impulse theory, cannot be represented")
-    potential = _potential(file, folders, notes) if mode == 1 else None
+    potential = _potential(file, folders) if mode == 1 else None
     growth = file.table("NMGDepths", high=MOST)
     if any(cells.get("mgthck", 0.0) != 0.0 for _, cells in growth):
         raise file.refusal(
@@ -109,34 +110,16 @@ def read_hydrodyn(path, site, folders=()):
         fills=tuple(_fills(file, rows, site)),
         second_order={key: value for key, value in second.items() if value and mode == 1},
         memory=file.whole("RdtnMod", default=1) if mode == 1 else 0,
-        notes=tuple(notes),
+        notes=(*notes, *differences(file)),
         sources={},
     )
 
 
-def _potential(file, folders, notes):
+def _potential(file, folders):
     """PotentialFiles of a file with PotMod 1."""
     bodies = file.whole("NBody", default=1, low=1)
     if bodies != 1:
         raise file.wrong("NBody", bodies, "1: floaters of several bodies cannot be represented")
-    if file.whole("NAddDOF", default=0) != 0:
-        raise file.wrong(
-            "NAddDOF", file.whole("NAddDOF"), "0: further degrees of freedom cannot be represented"
-        )
-    for key in ("PtfmRefxt", "PtfmRefyt", "PtfmRefzt", "PtfmRefztRot", "PtfmRefY"):
-        if file.number(key, default=0.0) != 0.0:
-            raise file.wrong(
-                key, file.number(key), "0: the coefficients must be about the tower axis at still water"
-            )
-    if file.whole("PtfmYMod", default=0) != 0:
-        notes.append(("wave loads that follow large platform yaw (PtfmYMod 1)", "wave loads about zero yaw"))
-    if file.whole("ExctnMod", default=1) == 0:
-        notes.append(("no wave excitation (ExctnMod 0)", "wave excitation: it is there in waves"))
-    if file.whole("ExctnDisp", default=0) != 0:
-        notes.append(("wave excitation at the displaced position (ExctnDisp)", "see the scene's options"))
-    for key in ("PtfmSgF", "PtfmSwF", "PtfmHvF", "PtfmRF", "PtfmPF", "PtfmYF"):
-        if not file.flag(key, default=True):
-            raise file.wrong(key, "False", "True: all six hydrodynamic forces")
     name = file.text("PotFile")
     root = _wamit_root(name, (file.path.parent, *folders))
     if root is None:
@@ -172,25 +155,19 @@ def _members(file, site, notes, potential):
         place = tuple(cells[f"joint{axis}i"] for axis in "xyz")
         if max(map(abs, place)) > 1e4:
             raise file.refusal(f"joint {cells['jointid']:g}: must be within 10 km of the body", line)
-        joints[int(cells["jointid"])] = (place, int(cells["jointaxid"]))
-        if cells.get("jointovrlp", 0.0) != 0.0:
-            notes.append(
-                (f"overlap removed at joint {cells['jointid']:g} (JointOvrlp)", "members overlap there")
-            )
+        joints[_new(file, line, joints, cells["jointid"], "joint")] = (place, int(cells["jointaxid"]))
     sections = {}
     for line, cells in file.table("NPropSets", "NPropSetsCyl", high=MOST):
         _need(file, line, cells, ("propsetid", "propd", "propthck"))
         if not (0.0 < cells["propd"] <= 1e3 and 0.0 <= cells["propthck"] <= 0.5 * cells["propd"] + 1e-9):
             raise file.refusal("PropD must be > 0 and PropThck from 0 to its half", line)
-        sections[int(cells["propsetid"])] = (cells["propd"], cells["propthck"])
+        number = _new(file, line, sections, cells["propsetid"], "property set")
+        sections[number] = (cells["propd"], cells["propthck"])
     axial = {}
     for line, cells in file.table("NAxCoef", high=MOST):
         _need(file, line, cells, ("axcoefid", "axcd", "axca", "axcp"))
-        axial[int(cells["axcoefid"])] = tuple(cells[name] for name in ("axcd", "axca", "axcp"))
-        if cells.get("axfdmod", 0.0) != 0.0:
-            notes.append(
-                ("low-passed or one-sided axial drag (AxFDMod)", "axial drag of the present velocity")
-            )
+        number = _new(file, line, axial, cells["axcoefid"], "axial coefficient")
+        axial[number] = tuple(cells[name] for name in ("axcd", "axca", "axcp"))
     coefficients = _Coefficients(file)
     bare_members = []
     for line, cells in rows:
@@ -200,7 +177,7 @@ def _members(file, site, notes, potential):
             cells,
             ("memberid", "mjointid1", "mjointid2", "mpropsetid1", "mpropsetid2", "mcoefmod"),
         )
-        number = int(cells["memberid"])
+        number = _new(file, line, [row[1] for row in bare_members], cells["memberid"], "member")
         if cells.get("msecgeom", 1.0) not in (0.0, 1.0):
             raise file.refusal(f"member {number}: MSecGeom must be 1, a circular section", line)
         ends = [_looked_up(file, line, joints, cells[f"mjointid{i}"], "joint") for i in (1, 2)]
@@ -211,7 +188,12 @@ def _members(file, site, notes, potential):
             raise file.refusal(f"member {number}: its joints are at one place", line)
         text = cells.get("proppot", "False").lower()
         inside = potential and (text[:1] == "t" or text.startswith(".t") or text == "1")
-        bare_members.append((line, number, ends, props, int(cells["mcoefmod"]), inside))
+        model = int(cells["mcoefmod"])
+        if not inside:
+            coefficients.check_buoyancy(line, number, model, cells.get("mhstlmod", 1.0))
+        if props[0][0] != props[1][0]:
+            notes += coefficients.of_taper(number, model, inside)
+        bare_members.append((line, number, ends, props, model, inside))
     faces = _faces(bare_members, axial, notes)
     found = []
     for line, number, ends, props, model, inside in bare_members:
@@ -239,6 +221,13 @@ def _need(file, line, cells, names):
     for name in names:
         if name not in cells:
             raise file.refusal(f"the column {name} is missing", line - 1)
+
+
+def _new(file, line, known, number, what):
+    """The whole number of a row that no row above has. Raises: InputError."""
+    if number != int(number) or int(number) in known:
+        raise file.refusal(f"{what} {number:g}: must be a whole number, of one row alone", line)
+    return int(number)
 
 
 def _looked_up(file, line, known, number, what):
@@ -307,12 +296,49 @@ class _Coefficients:
             (cells for _, cells in file.table("NCoefDpth", "NCoefDpthCyl", high=MOST)),
             key=lambda cells: cells.get("dpth", 0.0),
         )
-        self.member = {
-            int(cells["memberid"]): cells
-            for _, cells in file.table("NCoefMembers", "NCoefMembersCyl", high=MOST)
-            if "memberid" in cells
-        }
-        self.simple = None
+        self.member = {}
+        for line, cells in file.table("NCoefMembers", "NCoefMembersCyl", high=MOST):
+            _need(file, line, cells, ("memberid",))
+            self.member[_new(file, line, self.member, cells["memberid"], "coefficients of member")] = cells
+        self._simple = None
+
+    @property
+    def simple(self):
+        """{column: value} of the coefficients of all members alike."""
+        if self._simple is None:
+            self._simple = self.file.headed("SimplCd", 1)[0][1]
+        return self._simple
+
+    def _listed(self, model, number, name):
+        """[(column, value)] of all that the table of a model has of a coefficient, for a member."""
+        if model == 1:
+            rows, columns = [self.simple], [f"simpl{name}"]
+        elif model == 2:
+            rows, columns = self.depth, [f"dpth{name}"]
+        else:
+            rows, columns = [self.member.get(number, {})], [f"member{name}{i}" for i in (1, 2)]
+        return [(column, row[column]) for row in rows for column in columns if column in row]
+
+    def check_buoyancy(self, line, number, model, switch):
+        """Raises: InputError for a member whose buoyancy is not that of its volume (Cb, MHstLMod 0)."""
+        if switch == 0.0:
+            raise self.file.refusal(
+                f"member {number}: MHstLMod = 0: must be 1 or 2: a member outside of the potential-flow body"
+                " has its buoyancy here",
+                line,
+            )
+        for column, value in self._listed(model, number, "cb"):
+            if value != 1.0:
+                raise self.file.refusal(f"member {number}: its {column} = {value:g}: must be 1", line)
+
+    def of_taper(self, number, model, inside):
+        """[(what the deck has, what is here)] of the coefficients along a member that tapers."""
+        neutral = {"axcd": 0.0} if inside else {"axcd": 0.0, "axca": 0.0, "axcp": 1.0}
+        for name, usual in neutral.items():
+            for column, value in self._listed(model, number, name):
+                if value != usual:
+                    yield f"loads along the taper of member {number} ({column} {value:g})", "left out"
+                    break
 
     def breaks(self, model, z1, z2):
         """Fractions of a member's length where depth-dependent coefficients bend."""
@@ -325,8 +351,6 @@ class _Coefficients:
     def at(self, line, number, model, z, t):
         """{cd, ca, cp} at height z and fraction t of the member's length."""
         if model == 1:
-            if self.simple is None:
-                self.simple = self.file.headed("SimplCd", 1)[0][1]
             values = {name: self.simple.get(f"simpl{name}") for name in ("cd", "ca", "cp")}
         elif model == 2:
             values = {name: self._of_depth(f"dpth{name}", -z) for name in ("cd", "ca", "cp")}

@@ -1,7 +1,5 @@
 """A deck turned into a folder of this project's files, checked by reading them back."""
 
-import re
-import shutil
 import tempfile
 from dataclasses import replace
 from pathlib import Path
@@ -18,6 +16,7 @@ from fowt_env.files.openfast_deck.conversion import platform_rows, stations, tur
 from fowt_env.files.openfast_deck.deck import read_deck
 from fowt_env.files.openfast_deck.output import blade_text, polar_text, toml_text, tower_text
 from fowt_env.files.openfast_deck.report import make_report, markdown
+from fowt_env.files.openfast_deck.rosco_files import DISCON, PERFORMANCE, discon_text
 
 UNITS = "SI units (kg, m, s, N, rad) unless a key says otherwise (_deg, _rpm, _deg_per_s)."
 COEFFICIENTS = "hydro.npz"
@@ -52,12 +51,13 @@ def import_deck(
     name = name or folder.resolve().name
     if folder.exists() and not folder.is_dir():
         raise InputError(f"folder {str(folder)!r} is a file; must be a folder, or not there yet")
-    if (folder / "platform.toml").exists() and not replace_files:
-        raise InputError(f"folder {str(folder)!r} has a platform.toml already: give another, or --overwrite")
     deck = read_deck(fst, parts, search, discon)
     body = _coefficients(deck, excitation)
     report = make_report(deck, name, body)
     texts = _texts(deck, name, head)
+    there = [file for file in (*texts, COEFFICIENTS, "report.md") if (folder / file).exists()]
+    if there and not replace_files:
+        raise InputError(f"folder {str(folder)!r} has a {there[0]} already: give another, or --overwrite")
     with tempfile.TemporaryDirectory(prefix="fowt-import-") as temporary:
         trial = Path(temporary)
         _write(trial, deck, texts, body, markdown(report))
@@ -90,7 +90,7 @@ def _texts(deck, name, head):
              ("HydroDyn", deck.hydrodyn.file)]  # fmt: skip
     named = [f"{kind} {file.path.name}" for kind, file in files if file is not None]
     if deck.control.discon is not None:
-        named.append(f"DISCON.IN {deck.control.discon.name}")
+        named.append(f"DISCON.IN {deck.control.discon.path.name}")
     title = [f"Imported from the OpenFAST deck {deck.name} by fowt import. {UNITS}",
              "Origin on the tower axis at still water; x downwind, z up, y to the left looking downwind.",
              "Beside each figure: the file and the keys that it is from. Files: " + ", ".join(named) + ".",
@@ -113,20 +113,16 @@ def _texts(deck, name, head):
             f"Tower of {deck.elastodyn.file.text('TwrFile')}: mass density in kg/m, stiffness (EI) in N m2.",
             *head,
         ])  # fmt: skip
+    control = deck.control
+    if control.discon is not None:
+        texts[f"turbine/{DISCON}"] = discon_text(control.discon, control.performance)
+    if control.performance is not None:
+        texts[f"turbine/{PERFORMANCE}"] = control.performance.text
     for airfoil, polar in deck.aerodyn.polars.items():
         texts[f"turbine/polars/{airfoil}.csv"] = polar_text(
             polar, [f"{airfoil} of {deck.aerodyn.file.path.name}; alpha in degrees.", *head]
         )
     return texts
-
-
-def _discon(control):
-    """Content of the deck's DISCON.IN, its table of the rotor named as it lies beside the copy."""
-    content = control.discon.read_bytes()
-    if control.performance is None:
-        return content
-    beside = b'"' + control.performance.name.encode() + b'"'
-    return re.sub(rb"(?m)^[^!\n]*(?=!\s*PerfFileName)", lambda _: beside + b"      ", content)
 
 
 def _write(folder, deck, texts, body, report):
@@ -135,12 +131,6 @@ def _write(folder, deck, texts, body, report):
     if body is not None:
         with replacing(folder / COEFFICIENTS) as path, path.open("wb") as file:
             np.savez_compressed(file, **coefficient_arrays(body))
-    if deck.control.discon is not None:
-        with replacing(folder / "turbine" / deck.control.discon.name) as path:
-            path.write_bytes(_discon(deck.control))
-    if deck.control.performance is not None:
-        with replacing(folder / "turbine" / deck.control.performance.name) as path:
-            shutil.copyfile(deck.control.performance, path)
     for name, text in {"report.md": report, **dict(reversed(texts.items()))}.items():
         with replacing(folder / name) as path:
             path.write_text(text, encoding="utf-8")

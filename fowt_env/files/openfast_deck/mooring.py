@@ -1,9 +1,11 @@
 """Mooring lines of MAP++'s and MoorDyn's files: from anchors to the vessel, without points between."""
 
 import math
+import re
 from dataclasses import dataclass
 
-from fowt_env.files.openfast_deck.parser import PartFile, bare, number_of, words_of
+from fowt_env.files.openfast_deck.keys import differences
+from fowt_env.files.openfast_deck.parser import PartFile, bare, number_of, same_key, words_of
 
 MOST_LINES = 1000
 ANCHORS = ("fix", "fixed", "anchor", "fixedpoint")
@@ -28,15 +30,23 @@ def read_map(path, depth, density, gravity):
     """(PartFile, lines, notes) of a MAP++ file. Raises: InputError."""
     file = PartFile(path, "MAP++")
     types, nodes, rows, angles, notes = {}, {}, [], [], []
-    section = ""
+    file.entries, section = {}, ""
     for number, text in enumerate(file.lines):
         words = words_of(text[:2000])
-        if not words or words[0].startswith(("!", "#", "(")):
+        if not words or words[0].startswith("("):
             continue
         if words[0].startswith(_SECTION) or (len(words) > 1 and set(words[0]) == {"-"}):
             section = text.lower()
             continue
         head = words[0].lower()
+        if words[0].startswith(("!", "#")):
+            if "solver" in section or not section:
+                continue
+            raise file.refusal(
+                f"{text.strip()[:40]!r}: MAP++ has no comments in this table, where OpenFAST takes it for a"
+                " row: must be removed",
+                number,
+            )
         if head in ("linetype", "node", "line", "option"):
             continue
         if "dictionary" in section:
@@ -45,15 +55,23 @@ def read_map(path, depth, density, gravity):
                 raise file.refusal("must be LineType, Diam, MassDenInAir, EA, CB", number, "line type")
             diameter, mass, stiffness, friction = figures
             wet = _wet_weight(file, number, words[0], mass, diameter, density, gravity)
-            types[head] = (wet, _positive(file, number, "EA", stiffness), max(friction, 0.0))
+            name = _new(file, number, types, words[0], "line type")
+            types[name] = (wet, _positive(file, number, "EA", stiffness), max(friction, 0.0))
         elif "node" in section:
-            nodes[bare(words[0])] = (number, *_node(file, number, words, depth))
+            name = _new(file, number, nodes, bare(words[0]), "node")
+            nodes[name] = (number, *_node(file, number, words, depth))
+            if name != str(len(nodes)):
+                raise file.refusal(f"node {words[0]}: must be {len(nodes)}: MAP++ counts its rows", number)
+            if nodes[name][1] in FAIRLEADS:
+                _check_fairlead(file, number, words, 5, ("M", "B", "FX", "FY", "FZ"))
         elif "line prop" in section:
             rows.append((number, words))
         elif "solver" in section and head == "repeat":
             angles += [number_of(word) for word in words[1:]]
             if None in angles or len(angles) > 360:
                 raise file.refusal("repeat: must be angles in degrees", number)
+        elif "solver" in section:
+            file.entries[head] = (words[0], number, words[1:] or ["True"])
     lines = []
     for number, words in rows[:MOST_LINES]:
         if len(words) < 5:
@@ -66,16 +84,18 @@ def read_map(path, depth, density, gravity):
             if name not in nodes:
                 raise file.refusal(f"line {words[0]}: node {name!r} is not there", number)
             ends.append(nodes[name])
-        for flag in (word.lower() for word in words[5:]):
+        for i, flag in enumerate(map(str.lower, words[5:]), 6):
             if "linear" in flag:
                 notes.append((f"line {words[0]} as a linear spring", "an elastic catenary of the same line"))
             if "omit" in flag:
                 notes.append((f"line {words[0]} without contact with the sea bed", "with contact"))
+            if number_of(flag) is None:
+                file.entries.setdefault(flag, (words[i - 1], number, words[i : i + 1] or ["True"]))
         lines.append(_line(file, number, words[0], ends, length, types[words[1].lower()], words[1]))
     _check_count(file, lines)
     turned = [_turned(line, angle) for angle in angles for line in lines]
     _check_count(file, lines + turned)
-    return file, lines + turned, notes
+    return file, lines + turned, [*notes, *differences(file)]
 
 
 def _node(file, number, words, depth):
@@ -84,7 +104,8 @@ def _node(file, number, words, depth):
         raise file.refusal("must be Node, Type, X, Y, Z", number, "node")
     kind = words[1].lower()
     place = [number_of(word.lstrip("#")) for word in words[2:4]]
-    z = -depth if words[4].lower() == "depth" else number_of(words[4].lstrip("#"))
+    on_bed = any(mark in words[4].lower() for mark in _ON_BED)
+    z = -depth if on_bed else number_of(words[4].lstrip("#"))
     if None in (*place, z) or max(map(abs, (*place, z))) > 1e5:
         raise file.refusal(f"node {words[0]}: its place must be numbers, Z also 'depth'", number)
     return kind, (*place, z)
@@ -149,55 +170,80 @@ def _check_count(file, lines):
         raise file.refusal(f"has {len(lines)} lines; allowed: at most {MOST_LINES}")
 
 
+_SECTIONS = (  # a section of MoorDyn, and what its header may have, in the order of MoorDyn's own tests
+    ("types", ("line dictionary", "line types")),
+    ("rod types", ("rod dictionary", "rod types")),
+    ("bodies", ("bodies", "body list", "body properties")),
+    ("rods", ("rods", "rod list", "rod properties")),
+    ("points", ("points", "connection properties", "node properties", "point properties", "point list")),
+    ("lines", ("lines", "line properties", "line list")),
+    ("external loads", ("external loads",)),
+    ("control", ("control",)),
+    ("failure", ("failure",)),
+    ("options", ("options",)),
+    ("output", ("output",)),
+)
+_REFUSED = ("bodies", "rods", "external loads", "control", "failure")
+_COUNTS = ("ntypes", "nconnects", "nlines", "npoints", "nconns")  # of version 1
+_ON_BED = ("seabed", "ground", "floor", "depth")
+
+
+def _moordyn_rows(file):
+    """Rows (section, line from 0, words) of a MoorDyn file, without the two lines that name columns."""
+    section, heads = None, 0
+    for number, text in enumerate(file.lines):
+        words = words_of(text[:2000])
+        if not words:
+            continue
+        if _SECTION in text:
+            lower = text.lower()
+            section = next((name for name, marks in _SECTIONS if any(mark in lower for mark in marks)), None)
+            heads = 0 if section in ("options", "output") else 2
+        elif len(words) > 1 and words[1].lower() in _COUNTS:
+            continue
+        elif heads:
+            heads -= 1
+        elif section is not None:
+            yield section, number, words
+
+
 def read_moordyn(path, depth, density, gravity):
     """(PartFile, lines, notes) of a MoorDyn file, version 1 or 2. Raises: InputError."""
     file = PartFile(path, "MoorDyn")
-    types, points, rows = {}, {}, []
-    section = ""
-    for number, text in enumerate(file.lines):
-        words = words_of(text[:2000])
-        if not words or words[0].startswith("("):
-            continue
-        if words[0].startswith(_SECTION):
-            section = text.lower()
-            continue
-        head = words[0].lower()
-        if head in (
-            "name",
-            "linetype",
-            "type",
-            "node",
-            "id",
-            "point",
-            "line",
-            "typename",
-            "rodid",
-            "bodyid",
-            "key",
-        ):
-            continue
-        if len(words) > 1 and words[1].lower() in ("ntypes", "nconnects", "nlines", "npoints", "nconns"):
-            continue
-        if "line type" in section or "line dict" in section:
-            types[head] = _moordyn_type(file, number, words, density, gravity)
-        elif any(name in section for name in ("rod", "bodies", "body")) and "output" not in section:
-            if "type" not in section and "dict" not in section:
-                raise file.refusal(
-                    "bodies and rods cannot be represented: this section must be empty", number
-                )
-        elif "point" in section or "connection" in section or "node" in section:
-            points[bare(words[0]).lower()] = (number, *_node(file, number, _without_attachment(words), depth))
-        elif "line" in section and "option" not in section and "need" not in section:
-            rows.append((number, words))
-        elif "failure" in section or "control" in section:
-            raise file.refusal("failure and control of lines cannot be represented: must be empty", number)
+    of = {name: [] for name, _ in _SECTIONS}
+    for section, number, words in _moordyn_rows(file):
+        if section in _REFUSED:
+            raise file.refusal(f"{section} cannot be represented: this section must be empty", number)
+        of[section].append((number, words))
+    notes = [
+        (
+            "dynamic lines (MoorDyn): drag, added mass, damping and inertia of the lines",
+            "quasi-static catenaries",
+        )
+    ]
+    notes += _moordyn_options(file, of["options"], depth, density, gravity)
+    gravity = file.number("g", "gravity", default=gravity, low=0.0, high=100.0, open_low=True)
+    density = file.number("rhoW", "rho", default=density, low=0.0, high=1e5)
+    types, points = {}, {}
+    for number, words in of["types"]:
+        name = _new(file, number, types, words[0], "line type")
+        types[name] = _moordyn_type(file, number, words, density, gravity)
+    for number, words in of["points"]:
+        name = _new(file, number, points, bare(words[0]), "point")
+        points[name] = (number, *_node(file, number, _without_attachment(words), depth))
+        if points[name][1] in FAIRLEADS:
+            _check_fairlead(file, number, words, 5, ("M", "V"))
+            if len(words) > 9:  # version 1
+                _check_fairlead(file, number, words, 7, ("FX", "FY", "FZ"))
+            _keep_columns(file, number, words, -2 if len(words) < 12 else 10, ("CdA", "CA"))
     old = any("nodeanch" in text.lower() or "nodefair" in text.lower() for text in file.lines)
-    lines = []
-    for number, words in rows[:MOST_LINES]:
+    lines, known = [], {}
+    for number, words in of["lines"][:MOST_LINES]:
         # version 1: Line LineType UnstrLen NumSegs NodeAnch NodeFair; version 2: ID LineType A B UnstrLen
         places = (2, 4, 5) if old else (4, 2, 3)
         if len(words) < 6:
             raise file.refusal("must be ID, LineType, AttachA, AttachB, UnstrLen, NumSegs", number, "line")
+        known[_new(file, number, known, words[0], "line")] = number
         if words[1].lower() not in types:
             raise file.refusal(f"line {words[0]}: unknown line type {words[1]!r}", number)
         length = _positive(file, number, "UnstrLen", number_of(words[places[0]]))
@@ -211,10 +257,58 @@ def read_moordyn(path, depth, density, gravity):
             ends.append(points[name.lower()])
         lines.append(_line(file, number, words[0], ends, length, types[words[1].lower()], words[1]))
     _check_count(file, lines)
-    notes = [
-        ("dynamic lines (MoorDyn): drag, added mass and inertia of the lines", "quasi-static catenaries")
-    ]
-    return file, lines, notes
+    return file, lines, [*notes, *differences(file)]
+
+
+def _moordyn_options(file, rows, depth, density, gravity):
+    """Rows of the report on the site that MoorDyn has of its own; entries of the file become its options."""
+    file.entries = {}
+    for number, words in rows:
+        if len(words) < 2:
+            raise file.refusal("must be a value and the name of an option", number, "option")
+        file.entries[same_key(words[1])] = (words[1], number, words[:1])
+        file.places[same_key(words[1])] = (number, words[:1])
+    found = file.find("WtrDpth", "depth", "WaterDepth")
+    if found is not None and re.search("[a-df-z]", bare(found[1][0]).lower()):
+        yield f"bathymetry from a file (WtrDpth {bare(found[1][0])[:60]})", f"a flat bed at {depth:g} m"
+    elif found is not None:
+        own = file.number("WtrDpth", "depth", "WaterDepth", low=0.0, open_low=True)
+        if abs(own - depth) > 1e-6 * depth:
+            raise file.wrong("WtrDpth", own, f"{depth:g}, the depth of the site", "depth", "WaterDepth")
+    for key, also, site in (("g", "gravity", gravity), ("rhoW", "rho", density)):
+        own = file.number(key, also, default=site, low=0.0, high=1e5, open_low=True)
+        if own != site:
+            yield (
+                f"{key} {own:g} of MoorDyn and {site:g} of the site",
+                f"{own:g} in the weight of the lines in water, {site:g} elsewhere",
+            )
+
+
+def _new(file, number, known, name, what):
+    """A name in small letters that no row above has. Raises: InputError."""
+    if name.lower() in known:
+        raise file.refusal(f"{what} {name}: must be of one row alone", number)
+    return name.lower()
+
+
+def _check_fairlead(file, number, words, place, names):
+    """Raises: InputError for a point of the vessel with a mass, a volume or a force of its own."""
+    for name, word in zip(names, words[place:], strict=False):
+        value = number_of(word)
+        if value:
+            raise file.refusal(
+                f"point {words[0]} on the vessel: {name} = {value:g}: must be 0: give its mass and buoyancy"
+                " to the platform",
+                number,
+            )
+
+
+def _keep_columns(file, number, words, place, names):
+    """Put values of a row into the columns of the file, for the report."""
+    for name, word in zip(names, words[place:], strict=False):
+        value = number_of(word)
+        if value is not None:
+            file.columns.setdefault(name.lower(), []).append((number, value))
 
 
 def _without_attachment(words):
@@ -234,17 +328,20 @@ def _moordyn_type(file, number, words, density, gravity):
     """(wet weight, EA, friction) of a row of line types."""
     if len(words) < 4:
         raise file.refusal("must be Name, Diam, MassDen, EA", number, "line type")
-    stiffness = number_of(words[3].partition("|")[0])
+    stiffness = number_of(words[3])
     if stiffness is None:
         raise file.refusal(
-            f"line type {words[0]}: EA = {words[3][:60]}: must be a number, not a curve",
+            f"line type {words[0]}: EA = {words[3][:60]}: must be one number, not a curve",
             number,
         )
-    if "|" in words[3]:
-        raise file.refusal(f"line type {words[0]}: EA = {words[3][:60]}: must be one number", number)
     diameter, mass = (number_of(word) for word in words[1:3])
     if diameter is None or mass is None:
         raise file.refusal(f"line type {words[0]}: Diam and MassDen must be numbers", number)
+    if len(words) > 9:  # version 2
+        if number_of(words[5]) is None:
+            raise file.refusal(f"line type {words[0]}: EI = {words[5][:60]}: must be a number", number)
+        _keep_columns(file, number, words, 5, ("EI",))
+        _keep_columns(file, number, words, 10, ("Cl",))
     wet = _wet_weight(file, number, words[0], mass, diameter, density, gravity)
     return wet, _positive(file, number, "EA", stiffness), 0.0
 

@@ -2,6 +2,9 @@
 
 A key is the first word of a line that is not a value, after at least one that is. Letters of either case;
 `BldFile(1)` and `BldFile1` are the same key. Errors name the file, the line, the key and what is allowed.
+
+A part file keeps what it has beside what is asked of it: `entries`, its lines that set a key, and `columns`
+of the tables that were read. keys.py says which of these change nothing here.
 """
 
 import math
@@ -17,6 +20,12 @@ _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eEdD][-+]?\d+)?")
 _KEY = re.compile(r"[A-Za-z_]\w*(\(\d+\))?")
 _TRUE, _FALSE = ("true", "t", ".true.", ".t."), ("false", "f", ".false.", ".f.")
 REQUIRED = object()  # mark of a key that a file must have
+COMMENT = re.compile("[!#%]")  # begins what NWTC_IO.f90 (ReadLine) drops, also between quotes
+COMMENTED = (  # kinds of files that OpenFAST reads without their comments (ProcessComFile)
+    "AeroDyn", "AeroDyn blade", "ElastoDyn blade", "HydroDyn", "InflowWind", "MoorDyn", "SeaState",
+    "ServoDyn", "polar",
+)  # fmt: skip
+_TITLES = 2  # lines at the top of a part file, whatever they say
 
 
 def number_of(word):
@@ -33,13 +42,24 @@ def bare(word):
     return word.strip("\"'").strip() if word[:1] in "\"'" else word
 
 
-def _same(key):
+def same_key(key):
     """A key as it is looked up."""
     return key.lower().replace("(", "").replace(")", "")
 
 
+def truth_of(word):
+    """The truth value that a word means, or None; a number is none."""
+    text = word.lower()
+    return True if text in _TRUE else False if text in _FALSE else None
+
+
 def _is_value(word):
-    return word[:1] in "\"'@" or number_of(word) is not None or word.lower() in (*_TRUE, *_FALSE, "default")
+    return (
+        word[:1] in "\"'@"
+        or number_of(word) is not None
+        or truth_of(word) is not None
+        or word.lower() == "default"
+    )
 
 
 def words_of(line):
@@ -62,8 +82,30 @@ def _key_of(words):
     return None
 
 
+def _in_outputs(line, words, before):
+    """Whether a line belongs to a list of output channels, which ends with END."""
+    if not words:
+        return before
+    head = bare(words[0]).lower()
+    if words[0].startswith("---"):
+        return "output channels" in line.lower()
+    return head == "outlist" or (before and not head.startswith("end"))
+
+
+def _sets(words, place):
+    """Whether a line with a key at this place sets it, rather than names columns or says something."""
+    ends = place + 1 == len(words) or words[place + 1][0] in "-\u2013!"
+    return "-" not in words[:place] and (_is_value(words[0]) or (place == 1 and ends))
+
+
 class PartFile:
-    """A part file: its lines, and the place of every key."""
+    """A part file: its lines without comments, the place of every key, and what was read of its tables.
+
+    lines     texts; of the kinds in COMMENTED what is in front of a mark of comment
+    places    {key: (line from 0, values)}
+    entries   {key: (name as in the file, line, values)} of the lines that set a key, not of lists of outputs
+    columns   {column in small letters: [(line, value)]} of the tables that were read
+    """
 
     def __init__(self, path, kind):
         """path: the file. kind: "ElastoDyn" ..., for messages. Raises: InputError if it cannot be read."""
@@ -71,14 +113,23 @@ class PartFile:
         self.lines = _text(self.path, kind).splitlines()
         if len(self.lines) > MAX_ROWS:
             raise self.refusal(f"has {len(self.lines)} lines; allowed: at most {MAX_ROWS}")
-        self.places = {}
+        if kind in COMMENTED:
+            self.lines = [COMMENT.split(line, maxsplit=1)[0].rstrip() for line in self.lines]
+        self.places, self.entries, self.columns = {}, {}, {}
+        outputs = False
         for number, line in enumerate(self.lines):
             words = words_of(line[:2000])
+            outputs = _in_outputs(line, words, outputs)
             place = _key_of(words)
-            if place is not None:
-                values = [word for word in words[:place] if word not in ("!", "-")]
-                if values:
-                    self.places.setdefault(_same(words[place]), (number, values))
+            if place is None:
+                continue
+            values = [word for word in words[:place] if word not in ("!", "-")]
+            if not values:
+                continue
+            key = same_key(words[place])
+            self.places.setdefault(key, (number, values))
+            if not outputs and number >= _TITLES and _sets(words, place):
+                self.entries.setdefault(key, (words[place], number, values))
 
     # ------------------------------------------------------------------ messages
 
@@ -104,8 +155,8 @@ class PartFile:
     def find(self, key, *also):
         """(line from 0, values) of the first of some names of a key, or None."""
         for name in (key, *also):
-            if _same(name) in self.places:
-                return self.places[_same(name)]
+            if same_key(name) in self.places:
+                return self.places[same_key(name)]
         return None
 
     def has(self, key, *also):
@@ -161,8 +212,8 @@ class PartFile:
         text = bare(word).lower()
         if text == "default" and default is not REQUIRED:
             return default
-        if text in _TRUE or text in _FALSE:
-            return text in _TRUE
+        if truth_of(text) is not None:
+            return truth_of(text)
         if number_of(text) is not None:
             return number_of(text) != 0.0
         raise self.refusal(f"{key} = {word[:60]}: must be True or False", line)
@@ -244,7 +295,10 @@ class PartFile:
                 not rows and words[0].startswith(("(", "[", "-")) and number_of(words[0]) is None
             ):
                 continue
-            rows.append((number, self._cells(number, words, columns, texts, key)))
+            cells = self._cells(number, words, columns, texts, key)
+            rows.append((number, cells))
+            for name, value in cells.items():
+                self.columns.setdefault(name, []).append((number, value))
             if len(rows) == count:
                 return rows
         raise self.refusal(f"{count} rows are announced, {len(rows)} are there", line - 1, key)
@@ -256,7 +310,7 @@ class PartFile:
             if name in texts:
                 cells[name] = word
                 continue
-            value = number_of(word)
+            value = number_of(word) if truth_of(word) is None else float(truth_of(word))
             if value is None and name in OPTIONAL_COLUMNS:
                 break  # the rest is a comment
             if value is None:
@@ -281,7 +335,8 @@ class PartFile:
 # columns that only newer versions have, behind those that every version has
 OPTIONAL_COLUMNS = (
     "axfdmod", "axvncoff", "axfdlofsc", "blcb", "blcenbn", "blcenbt", "blcpn", "blcpt", "blcan", "blcat",
-    "blcam", "twrti", "twrcb", "twrcp", "twrca",
+    "blcam", "twrti", "twrcb", "twrcp", "twrca", "simplmcf", "dpthmcf", "membermcf",
+    "fdmod", "vncoffa", "vncoffb", "fdlofsca", "fdlofscb",
 )  # fmt: skip
 
 

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fowt_env.files.markdown import markdown_table
+from fowt_env.files.openfast_deck.consistency import contradictions
 from fowt_env.files.openfast_deck.conversion import ballast, hub_place, mass_properties, rotor_mass
 from fowt_env.files.openfast_deck.hydrodyn import is_old
 
@@ -17,11 +18,12 @@ TOWER_OPTIONS = {  # what a degree of freedom's name begins with: the option of 
 
 
 class Report(NamedTuple):
-    """Rows of three tables: figures (name, value), differences (deck, here), sources (part, file)."""
+    """Rows of tables: figures (name, value), differences (deck, here), contradictions, files."""
 
     title: str
     figures: list
     differences: list
+    contradictions: list  # (what the deck says, what follows)
     files: list
     suggestions: list
 
@@ -32,6 +34,7 @@ def make_report(deck, name, body=None):
         title=f"{name}: imported from {deck.name}",
         figures=list(_figures(deck, body)),
         differences=list(dict.fromkeys(_differences(deck))),
+        contradictions=list(contradictions(deck, body)),
         files=[(path.name,) for path in deck.files],
         suggestions=[f"Sea of the deck: {deck.sea.words}.", f"Wind of the deck: {deck.inflow.words}."],
     )
@@ -77,6 +80,7 @@ def _differences(deck):
     for what in deck.elastodyn.flexible:
         option = next((option for word, option in TOWER_OPTIONS.items() if what.startswith(word)), None)
         yield what, f"rigid; with the option {option} as in the deck" if bends and option else "rigid"
+    yield from deck.elastodyn.notes
     if any(deck.elastodyn.platform_products):
         names = "PtfmXYIner, PtfmYZIner, PtfmXZIner"
         yield f"products of inertia of the platform ({names})", "left out: its principal axes are the body's"
@@ -128,6 +132,18 @@ def _differences(deck):
     yield from deck.control.notes
 
 
+def _contradictions(report):
+    """Lines of report.md on where the deck contradicts itself; none where it does not."""
+    if not report.contradictions:
+        return []
+    return [
+        "## Where the deck contradicts itself",
+        "",
+        markdown_table(("the deck", "what follows"), report.contradictions),
+        "",
+    ]
+
+
 def markdown(report):
     """Text of report.md."""
     parts = [
@@ -143,6 +159,7 @@ def markdown(report):
         "",
         markdown_table(("in the deck", "here"), report.differences),
         "",
+        *_contradictions(report),
         "## Wind and sea",
         "",
         *(f"- {line}" for line in report.suggestions),

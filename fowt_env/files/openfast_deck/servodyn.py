@@ -9,7 +9,9 @@ from pathlib import Path
 
 from fowt_env.descriptions.units import RPM
 from fowt_env.errors import InputError
+from fowt_env.files.openfast_deck.keys import differences
 from fowt_env.files.openfast_deck.parser import PartFile, bare, locate, number_of, words_of
+from fowt_env.files.openfast_deck.rosco_files import Performance
 
 
 @dataclass(frozen=True)
@@ -31,8 +33,8 @@ class Control:
     gains: dict = field(default_factory=dict)  # set: (KP in s, KI, pitch in rad at which they are halved)
     sources: dict = field(default_factory=dict)
     notes: tuple = ()
-    discon: Path | None = None  # copied beside the turbine, with the table that it names
-    performance: Path | None = None
+    discon: PartFile | None = None  # written beside the turbine, with the table that it names
+    performance: Performance | None = None
 
     @property
     def rated_power(self):
@@ -64,9 +66,16 @@ def read_control(path, gear_ratio, discon=None, folders=(), air_density=1.225, r
         servo = PartFile(path, "ServoDyn")
         efficiency = servo.number("GenEff", default=100.0, low=1.0, high=100.0) / 100.0
         sources["generator_efficiency"] = servo.source("GenEff")
-        notes += list(_left_out(servo))
+        notes += differences(servo)
     chosen = Path(discon) if discon is not None else None
-    if chosen is None and servo is not None and servo.whole("VSContrl", default=0) != 1:
+    mode = 5 if servo is None else servo.whole("VSContrl", default=5)
+    if chosen is None and mode not in (1, 3, 4, 5):
+        raise servo.wrong(
+            "VSContrl", mode, "1, 3, 4 or 5: give the DISCON.IN of another torque law with --discon"
+        )
+    if mode in (3, 4) or (chosen is not None and mode != 5):
+        notes.append((f"generator torque by another law (VSContrl {mode})", "that of DISCON.IN"))
+    if chosen is None and servo is not None and mode != 1:
         chosen = None if _is_legacy(servo) else _optional(servo, "DLL_InFile", folders)
         if chosen is not None and not _is_rosco(PartFile(chosen, "DISCON.IN")) and 96.0 < gear_ratio < 98.0:
             chosen = None  # the legacy controller of the NREL 5 MW turbine reads none
@@ -74,7 +83,7 @@ def read_control(path, gear_ratio, discon=None, folders=(), air_density=1.225, r
         control = _rosco(chosen, efficiency, air_density, radius, folders)
     elif servo is None:
         control = _legacy(None, efficiency, gear_ratio)
-    elif servo.whole("VSContrl", default=0) == 1:
+    elif mode == 1:
         control = _simple(servo, efficiency)
     else:
         control = _legacy(servo, efficiency, gear_ratio)
@@ -98,27 +107,6 @@ def _optional(file, key, folders):
     if name.lower() in ("", "none", "unused"):
         return None
     return locate(name, (file.path.parent, *folders))
-
-
-def _left_out(file):
-    """What ServoDyn has and the plant does not."""
-    for key, what in (
-        ("NumBStC", "blades"),
-        ("NumNStC", "nacelle"),
-        ("NumTStC", "tower"),
-        ("NumSStC", "platform"),
-    ):
-        if file.whole(key, default=0):
-            yield f"structural controllers (tuned mass dampers) of the {what} ({key})", "none"
-    for key, what in (("CompNTMD", "nacelle"), ("CompTTMD", "tower")):
-        if file.flag(key, default=False):
-            yield f"tuned mass damper of the {what} ({key})", "none"
-    if file.whole("YCMode", default=0):
-        yield "nacelle-yaw control (YCMode)", "the nacelle does not yaw"
-    if file.whole("HSSBrMode", default=0):
-        yield "shaft brake (HSSBrMode)", "none"
-    if file.whole("CCmode", default=0):
-        yield "cable control (CCmode)", "mooring lines of constant length"
 
 
 def _legacy(servo, efficiency, gear_ratio):
@@ -193,11 +181,10 @@ def _rosco(path, efficiency, air_density, radius, folders):
         ),
     }
     notes = list(_rosco_notes(file))
-    performance = _optional(file, "PerfFileName", folders)
-    if performance is not None:
-        PartFile(performance, "rotor performance")  # of a text's size, as it is copied
+    table = _optional(file, "PerfFileName", folders)
+    performance = None if table is None else Performance(table)
     winds = _values(file, "WE_FOPoles_v") or _values(file, "PS_WindSpeeds") or []
-    wind, how = _rated_wind(file, torque * speed, air_density, radius, folders)
+    wind, how = _rated_wind(file, torque * speed, air_density, radius, performance)
     sources = {
         "rated_torque": source("VS_RtTq"), "rated_speed": source("PC_RefSpd"),
         "region2_constant": source("VS_Rgn2K"),
@@ -219,7 +206,7 @@ def _rosco(path, efficiency, air_density, radius, folders):
     control = Control(
         efficiency, torque, speed, law, low, high,
         file.number("PC_MaxRat", low=0.0, high=10.0, open_low=True),
-        rated_wind_speed=wind, sources=sources, notes=tuple(notes), discon=file.path,
+        rated_wind_speed=wind, sources=sources, notes=tuple(notes), discon=file,
         performance=performance, second_order=_pitch_drive(file),
     )  # fmt: skip
     if len(winds) > 1 and 0.0 < winds[0] < wind < winds[-1]:
@@ -262,35 +249,16 @@ def _rosco_notes(file):
         yield "individual pitch control (IPC_ControlMode)", "collective pitch"
 
 
-def _rated_wind(file, power, air_density, radius, folders):
+def _rated_wind(file, power, air_density, radius, performance):
     """(m/s, where it is from): of ROSCO's own tables, or of power and the largest power coefficient."""
     ramp = _values(file, "IPC_Vramp")
     if ramp and len(ramp) > 1 and 5.0 < ramp[1] < 30.0:
         return ramp[1], file.source("IPC_Vramp, its second value")
     largest, name = 0.45, "a power coefficient of 0.45"
-    table = _optional(file, "PerfFileName", folders)
-    if table is not None:
-        found = _largest_power_coefficient(table)
-        if found is not None:
-            largest, name = found, f"the largest power coefficient {found:.3f} of {table.name}"
+    if performance is not None and (found := performance.largest_power_coefficient) is not None:
+        largest, name = found, f"the largest power coefficient {found:.3f} of {performance.name}"
     reach = file.number("WE_BladeRadius", default=radius, low=0.0, open_low=True)
     if reach is None:
         return 11.4, "a guess: no radius is known"
     speed = (power / (0.5 * air_density * math.pi * reach**2 * largest)) ** (1.0 / 3.0)
     return min(max(speed, 5.0), 20.0), f"rated power at {name}"
-
-
-def _largest_power_coefficient(path):
-    """Largest value of the first table of ROSCO's rotor performance file, or None."""
-    file = PartFile(path, "rotor performance")
-    best, inside = None, False
-    for text in file.lines:
-        if "power coefficient" in text.lower():
-            inside = True
-        elif "thrust coefficient" in text.lower():
-            break
-        elif inside and not text.lstrip().startswith("#"):
-            values = [number_of(word) for word in text.split()]
-            good = [value for value in values if value is not None and value < 0.6]
-            best = max([*good, best or 0.0])
-    return best if best and best > 0.2 else None

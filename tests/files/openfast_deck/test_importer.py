@@ -1,10 +1,12 @@
-"""A deck becomes a platform and turbine: masses in closed form, HydroDyn's tables, moorings, refusals."""
+"""A deck becomes a platform and turbine: masses in closed form, HydroDyn's tables, moorings, refusals.
+
+Expected values are worked out here from what the manuals of OpenFAST's modules say of their keys."""
 
 import math
 
 import numpy as np
 import pytest
-from small_deck import HYDRODYN, NAMES, write_deck
+from small_deck import HYDRODYN, NAMES, ROTOR_TABLE, write_deck
 
 from fowt_env.descriptions.platform import read_platform
 from fowt_env.descriptions.turbine import read_turbine
@@ -14,6 +16,7 @@ from fowt_env.files.openfast_deck.deck import read_deck
 from fowt_env.files.openfast_deck.hydrodyn import read_hydrodyn
 from fowt_env.files.openfast_deck.importer import import_deck
 from fowt_env.files.openfast_deck.mooring import read_mooring
+from fowt_env.plant.drivetrain import build_drivetrain
 
 
 @pytest.fixture(scope="module")
@@ -36,18 +39,26 @@ def refused(folder, **changes):
 # --------------------------------------------------------------------------- masses and geometry
 
 
-def test_rotor_has_the_mass_properties_of_its_uniform_blades_and_hub(imported):
+def of_blade(power, about):
+    """Moment of the mass of a blade, kg m^power: 260 to 140 kg/m over 50 m, 150 kg at its tip."""
+    places = np.polynomial.Polynomial([-about, 1.0]) ** power
+    along = (places * np.polynomial.Polynomial([260.0, -120.0 / 50.0])).integ()
+    return along(50.0) - along(0.0) + 150.0 * places(50.0)
+
+
+def test_rotor_has_the_mass_properties_of_its_tapered_blades_with_their_tips_and_hub(imported):
     rotor, cone = imported[1].rotor, math.radians(3.0)
-    blade = 200.0 * 50.0  # kg/m times m, AdjBlMs 2
-    first, second = 200.0 * (52.0**2 - 2.0**2) / 2.0, 200.0 * (52.0**3 - 2.0**3) / 3.0
-    assert rotor.mass == pytest.approx(3e4 + 3 * blade)
-    assert rotor.cm_offset == pytest.approx((-3e4 - 3 * first * math.sin(cone)) / 6e4, rel=1e-6)
+    blade, first, second = (of_blade(power, about=-2.0) for power in range(3))  # about the rotor centre
+    mass = 3e4 + 3 * blade
+    assert (blade, mass) == pytest.approx((10150.0, 60450.0))
+    assert rotor.mass == pytest.approx(mass)
+    assert rotor.cm_offset == pytest.approx((-3e4 - 3 * first * math.sin(cone)) / mass, rel=1e-6)
     assert rotor.inertia == pytest.approx(2e5 + 3 * second * math.cos(cone) ** 2, rel=1e-5)
     across = 1.5 * second * math.cos(cone) ** 2 + 3 * second * math.sin(cone) ** 2 + 3e4
-    assert rotor.inertia_diameter == pytest.approx(across - 6e4 * rotor.cm_offset**2, rel=1e-5)
+    assert rotor.inertia_diameter == pytest.approx(across - mass * rotor.cm_offset**2, rel=1e-5)
     assert rotor.blade_mass == pytest.approx(blade)
-    assert rotor.blade_first_moment == pytest.approx(200.0 * 50.0**2 / 2.0, rel=1e-9)
-    assert rotor.blade_second_moment == pytest.approx(200.0 * 50.0**3 / 3.0, rel=1e-3)  # BldNodes lumps
+    assert rotor.blade_first_moment == pytest.approx(of_blade(1, about=0.0), rel=1e-5)  # BldNodes lumps
+    assert rotor.blade_second_moment == pytest.approx(of_blade(2, about=0.0), rel=1e-5)
     assert rotor.cone == pytest.approx(cone)
     assert rotor.shaft_tilt == pytest.approx(math.radians(5.0))
 
@@ -64,30 +75,40 @@ def test_nacelle_inertia_is_about_its_own_centre_of_mass(imported):
     assert (nacelle.cm_downwind, nacelle.cm_left, nacelle.cm_height) == (2.0, 0.5, 81.5)
 
 
+def test_the_generator_s_inertia_is_of_its_own_shaft_and_counts_with_the_square_of_the_gear_ratio(imported):
+    turbine = imported[1]
+    assert turbine.drivetrain.generator_inertia == 500.0
+    shaft = build_drivetrain(turbine)
+    assert shaft.inertia_row == pytest.approx(turbine.rotor.inertia + 90.0**2 * 500.0)
+
+
 def test_tower_has_the_mass_of_its_taper_with_the_yaw_bearing_at_its_top(imported):
     tower = imported[0].tower
-    # 3000 to 1000 kg/m over 70 m: moments about the base, and 5000 kg at the top
-    mass = 2000.0 * 70.0 + 5000.0
-    first = 3000.0 * 70.0**2 / 2 - 2000.0 * 70.0**2 / 3 + 5000.0 * 70.0
-    second = 3000.0 * 70.0**3 / 3 - 2000.0 * 70.0**3 / 4 + 5000.0 * 70.0**2
+    # 3300 to 1100 kg/m (AdjTwMa 1.1) over 70 m: moments about the base, and 5000 kg at the top
+    mass = 2200.0 * 70.0 + 5000.0
+    first = 3300.0 * 70.0**2 / 2 - 2200.0 * 70.0**2 / 3 + 5000.0 * 70.0
+    second = 3300.0 * 70.0**3 / 3 - 2200.0 * 70.0**3 / 4 + 5000.0 * 70.0**2
     assert tower.mass == pytest.approx(mass)
     assert tower.cm_height == pytest.approx(10.0 + first / mass, rel=1e-5)
     assert tower.inertia[0] == pytest.approx(second - first**2 / mass, rel=1e-5)
     assert (tower.base_diameter, tower.top_diameter) == (6.0, 4.0)
-    assert tower.drag_coefficient == pytest.approx(0.5)
+    # in even wind the load of the deck's tower: Simpson's rule is exact for two straight lines' product
+    load = sum(35.0 / 6.0 * (d0 * c0 + (d0 + d1) * (c0 + c1) + d1 * c1)
+               for (d0, c0), (d1, c1) in (((6.0, 0.7), (5.6, 0.4)), ((5.6, 0.4), (4.0, 0.6))))  # fmt: skip
+    assert tower.drag_coefficient == pytest.approx(load / (5.0 * 70.0), rel=1e-5)
 
 
 def test_tower_bends_with_the_shapes_damping_and_factors_of_its_file(imported):
     platform, _, report, folder = imported
     modes = platform.tower.modes
-    assert modes.height_fraction == (0.0, 1.0) and modes.mass_density == (3000.0, 1000.0)
+    assert modes.height_fraction == (0.0, 1.0) and modes.mass_density == pytest.approx((3300.0, 1100.0))
     assert modes.fore_aft_stiffness == (2e12, 1e12)  # AdjFASt 2
-    assert modes.side_side_stiffness == (3e12, 1e12)
+    assert modes.side_side_stiffness == pytest.approx((2.7e12, 0.9e12))  # AdjSSSt 0.9
     assert modes.fore_aft == ((0.8, 0.4, -0.1, -0.2, 0.1), (20.0, -10.0, -5.0, -3.0, -1.0))
     assert modes.side_side == ((0.7, 0.3, 0.0, 0.0, 0.0), (-9.0, 4.0, 3.0, 2.0, 1.0))
     assert modes.fore_aft_damping == (0.01, 0.02) and modes.side_side_damping == (0.03, 0.04)
-    assert modes.fore_aft_tuner == (1.0, 1.1) and modes.side_side_tuner is None
-    assert (modes.top_mass, modes.elements) == (5000.0, 400)
+    assert modes.fore_aft_tuner == (1.0, 1.1) and modes.side_side_tuner == (0.95, 1.05)
+    assert (modes.top_mass, modes.elements) == (5000.0, 300)
     assert "TwrFADmp" in (folder / "platform.toml").read_text()
     assert not any("tower mode" in what for what, _ in report.differences)  # the deck has them off
 
@@ -112,33 +133,61 @@ def test_a_shape_that_is_not_1_at_the_top_is_refused_with_its_file(tmp_path):
     assert "tower.dat" in text and "fore_aft.1: adds up to 1.1" in text
 
 
+def tank(density, radius, bottom, level, x=0.0, y=0.0):
+    """(mass, centre, inertia about it along x, y and z) of water in an upright cone; radius (m) over z."""
+
+    def total(density_over_z):
+        along = (density * math.pi * density_over_z).integ()
+        return along(level) - along(bottom)
+
+    z = np.polynomial.Polynomial([0.0, 1.0])
+    mass = total(radius**2)
+    centre = total(radius**2 * z) / mass
+    across = total(radius**4 / 4.0 + radius**2 * (z - centre) ** 2)
+    return mass, (x, y, centre), (across, across, total(radius**4 / 2.0))
+
+
+PLATFORM = 6.0e6, (0.4, -0.3, -30.0), (2.0e9, 2.1e9, 1.5e8)
+# inside of the steel: the column has 4.5 m, the one beside it 2.5 m at its foot and 2.75 m 20 m above
+COLUMN = np.polynomial.Polynomial([4.5])
+BESIDE = np.polynomial.Polynomial([2.5 + 0.25 * 16.0 / 20.0, 0.25 / 20.0])
+WATER = tank(1100.0, COLUMN, -20.0, -5.0), tank(1300.0, BESIDE, -16.0, -7.0, 8.0, -6.0)
+
+
 def test_water_in_members_is_ballast_with_its_own_inertia(imported):
-    ballast = imported[0].ballast
-    water = 1100.0 * math.pi * 4.5**2 * 15.0  # from -20 to -5 m, 0.5 m of steel around it
-    mass = 6.0e6 + water
-    centre = (6.0e6 * -30.0 + water * -12.5) / mass
-    own = water * (4.5**2 / 4.0 + 15.0**2 / 12.0)
-    apart = 6.0e6 * (-30.0 - centre) ** 2 + water * (-12.5 - centre) ** 2
+    ballast, bodies = imported[0].ballast, (PLATFORM, *WATER)
+    mass = sum(body[0] for body in bodies)
+    centre = [sum(body[0] * body[1][axis] for body in bodies) / mass for axis in range(3)]
     assert ballast.mass == pytest.approx(mass)
-    assert ballast.cm_depth == pytest.approx(-centre)
-    assert ballast.inertia == pytest.approx(
-        (2.0e9 + own + apart, 2.1e9 + own + apart, 1.5e8 + 0.5 * water * 4.5**2), rel=1e-8
-    )
+    assert (ballast.cm_downwind, ballast.cm_left, -ballast.cm_depth) == pytest.approx(centre)
+    for axis, inertia in enumerate(ballast.inertia):
+        about = sum(
+            own[axis] + part * sum((at[k] - centre[k]) ** 2 for k in range(3) if k != axis)
+            for part, at, own in bodies
+        )
+        assert inertia == pytest.approx(about, rel=1e-8)
 
 
 def test_old_hydrodyn_has_water_on_the_axis_and_its_moment_in_the_additional_stiffness(tmp_path):
-    old = HYDRODYN.replace("1    NBody     \n", "").replace("1    NBody\n", "")
-    moment = 1100.0 * math.pi * 4.5**2 * 15.0 * 9.81 * 12.5
-    rows = f"0 0 0 {moment} 0 0\n0 0 0 0 {moment} 0\n0 0 0 0 0 9.0e7"
-    old = old.replace("0 0 0 0 0 0\n0 0 0 0 0 0\n0 0 0 0 0 9.0e7", rows)
+    """The deck gives what the weight of water restores, of which the coupling with yaw is of its offset."""
+    old = HYDRODYN.replace("1    NBody\n", "")
+    weights = [(9.81 * mass, *centre) for mass, centre, _ in WATER]
+    roll = -sum(weight * z for weight, _, _, z in weights)
+    yaw_roll = sum(weight * x for weight, x, _, _ in weights)
+    yaw_pitch = sum(weight * y for weight, _, y, _ in weights)
+    old = old.replace("0 0 0 7.0e5 0 0\n", f"0 0 0 {7e5 + roll} 0 {yaw_roll}\n")
+    old = old.replace("2.0e4 0 0 0 8.0e5 0\n", f"2.0e4 0 0 0 {8e5 + roll} {yaw_pitch}\n")
     import_deck(write_deck(tmp_path, HydroDyn=old), tmp_path / "out")
     platform = read_platform(tmp_path / "out" / "platform.toml")
-    stiffness = np.array(platform.additional.stiffness)
-    assert stiffness[5, 5] == 9.0e7
-    assert np.abs(stiffness[:5]).max() == 0.0
-    water = 1100.0 * math.pi * 4.5**2 * 15.0
-    assert platform.ballast.inertia[2] == pytest.approx(1.5e8, rel=1e-9)
-    assert platform.ballast.mass == pytest.approx(6.0e6 + water)
+    assert np.array(platform.additional.stiffness) == pytest.approx(STIFFNESS, rel=1e-6, abs=1e-3)
+    mass = 6.0e6 + sum(water[0] for water in WATER)
+    assert platform.ballast.mass == pytest.approx(mass)
+    # on their axes: about them the water has no inertia of its own
+    centre = [
+        (6.0e6 * PLATFORM[1][k] + sum(water[0] * water[1][k] for water in WATER)) / mass for k in (0, 1)
+    ]
+    apart = sum(body[0] * sum((body[1][k] - centre[k]) ** 2 for k in (0, 1)) for body in (PLATFORM, *WATER))
+    assert platform.ballast.inertia[2] == pytest.approx(1.5e8 + apart, rel=1e-8)
 
 
 def test_the_report_s_masses_are_those_of_the_files(imported):
@@ -147,6 +196,8 @@ def test_the_report_s_masses_are_those_of_the_files(imported):
     total = platform.ballast.mass + platform.tower.mass + turbine.nacelle.mass + turbine.rotor.mass
     assert figures["mass, total"] == f"{total:,.1f} kg".replace(",", " ")
     assert figures["mass, total"] in (folder / "report.md").read_text()
+    lift = f"{(1027.0 * 7000.0 - total) / 1e3:,.1f} t".replace(",", " ")
+    assert figures["buoyancy less weight, which lines and members hold"] == lift
 
 
 # --------------------------------------------------------------------------- aerodynamics
@@ -161,6 +212,13 @@ def test_blade_has_the_nodes_of_aerodyn_with_the_outermost_just_inside(imported)
     assert blade.polars["one"][:, 1] == pytest.approx([0.0, 0.4, 0.0])  # the first of two tables
 
 
+@pytest.mark.parametrize(("flag", "moment"), [("True", (0.03, -0.05, 0.03)), ("False", (0.0, 0.0, 0.0))])
+def test_the_pitching_moment_of_polars_is_used_where_aerodyn_does(tmp_path, flag, moment):
+    import_deck(write_deck(tmp_path, AeroDyn=[("True     UseBlCm", f"{flag} UseBlCm")]), tmp_path / "out")
+    turbine = read_turbine(tmp_path / "out" / "turbine" / "turbine.toml")
+    assert turbine.blade.polars["one"][:, 3] == pytest.approx(moment)
+
+
 def test_the_middle_table_of_a_polar_is_taken_where_aerodyn_interpolates(tmp_path):
     path = write_deck(tmp_path, AeroDyn=[("1        InCol_Alfa", "2 AFTabMod\n1 InCol_Alfa")])
     import_deck(path, tmp_path / "out")
@@ -170,49 +228,128 @@ def test_the_middle_table_of_a_polar_is_taken_where_aerodyn_interpolates(tmp_pat
 
 
 def test_a_polar_of_any_file_name_has_a_plain_name_here(tmp_path):
-    path = write_deck(tmp_path, AeroDyn=[('"foils/One.dat"', '"#1, thick.dat"')])
-    (tmp_path / NAMES["polar"]).rename(tmp_path / "#1, thick.dat")
+    path = write_deck(tmp_path, AeroDyn=[('"foils/One.dat"', '"1, thick.dat"')])
+    (tmp_path / NAMES["polar"]).rename(tmp_path / "1, thick.dat")
     import_deck(path, tmp_path / "out")
     turbine = read_turbine(tmp_path / "out" / "turbine" / "turbine.toml")
-    assert set(turbine.blade.polars) == {"_1__thick"}
+    assert set(turbine.blade.polars) == {"1__thick"}
 
 
-def test_the_rotor_table_goes_along_and_discon_names_it_beside_itself(tmp_path):
-    path = write_deck(tmp_path, DISCON=[("45.0      ! VS_MinOMSpd", '"Foils/Cp.txt" ! PerfFileName - table')])
-    (tmp_path / "Foils" / "Cp.txt").write_text("# Power coefficient\n0.1 0.4\n# Thrust coefficient\n0.5\n")
+PERFORMANCE = """# a rotor, and words that are nobody's business
+# Pitch angle vector (deg)
+0.0 5.0
+# TSR vector (-)
+7.0 8.0 9.0
+# Wind speed vector (m/s)
+10.0
+
+# Power coefficient
+0.40 0.30
+0.42 0.31
+0.41 0.29
+
+# Thrust coefficient
+0.8 0.6
+0.8 0.6
+0.8 0.6
+
+# Torque coefficient
+0.05 0.04
+0.05 0.04
+0.05 0.04
+"""
+NAMED = [("45.0      ! VS_MinOMSpd", '"../table.txt" ! PerfFileName - table')]
+
+
+def test_the_rotor_table_goes_along_under_a_name_of_ours_and_discon_names_it(tmp_path):
+    (tmp_path / "deck").mkdir()
+    path = write_deck(tmp_path / "deck", DISCON=NAMED)
+    (tmp_path / "table.txt").write_text(PERFORMANCE)  # outside of the deck's folder
     import_deck(path, tmp_path / "out")
-    discon = (tmp_path / "out" / "turbine" / "DISCON.IN").read_text()
-    assert '"Cp.txt"      ! PerfFileName' in discon
-    assert (tmp_path / "out" / "turbine" / "Cp.txt").is_file()
+    folder = tmp_path / "out" / "turbine"
+    assert '"rotor_performance.txt"      ! PerfFileName - table' in (folder / "DISCON.IN").read_text()
+    written = (folder / "rotor_performance.txt").read_text()
+    assert [line.split() for line in written.split("\n") if line and line[0] != "#"] == [
+        line.split() for line in PERFORMANCE.split("\n") if line and line[0] != "#"
+    ]
+    assert len(written.split("\n")) == len(PERFORMANCE.split("\n"))  # ROSCO counts them
+    assert "business" not in written
     # without the least speed it starts at 30 % of the rated one
-    turbine = read_turbine(tmp_path / "out" / "turbine" / "turbine.toml")
+    turbine = read_turbine(folder / "turbine.toml")
     assert turbine.torque_law.cut_in_speed == pytest.approx(0.3 * 130.0)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["PRIVATE KEY abc", "# Power coefficient\nPRIVATE KEY abc\n", PERFORMANCE.replace("0.29", ""),
+     "0.1 0.2\n", "# Power coefficient\n", "# PRIVATE KEY abc\n"],
+)  # fmt: skip
+def test_a_file_that_is_no_rotor_table_is_refused_without_a_word_of_it(tmp_path, text):
+    (tmp_path / "deck").mkdir()
+    path = write_deck(tmp_path / "deck", DISCON=NAMED)
+    (tmp_path / "table.txt").write_text(text)
+    with pytest.raises(InputError, match="table.txt") as caught:
+        import_deck(path, tmp_path / "out")
+    assert "PRIVATE" not in str(caught.value) and not (tmp_path / "out").exists()
+
+
+def test_of_discon_only_entries_and_comments_go_along_under_a_name_of_ours(tmp_path):
+    path = write_deck(
+        tmp_path,
+        ServoDyn=[('"DISCON.IN"     DLL_InFile', '"../turbine.toml" DLL_InFile')],
+        DISCON=[("! Controller parameter input file", "PRIVATE KEY abc\n! a comment")],
+    )
+    (tmp_path / NAMES["DISCON"]).rename(tmp_path.parent / "turbine.toml")
+    import_deck(path, tmp_path / "out")
+    folder = tmp_path / "out" / "turbine"
+    text = (folder / "DISCON.IN").read_text()
+    assert text.startswith("!\n! a comment\n") and "30000.0   ! VS_RtTq" in text
+    assert read_turbine(folder / "turbine.toml").name == "out"
 
 
 # --------------------------------------------------------------------------- hydrodynamics
 
 
-def test_coefficients_keep_wamit_s_figures(imported):
-    body, site = imported[0].potential_flow, imported[0].environment
+def test_coefficients_have_their_dimension_by_wamitulen_density_and_gravity(imported):
+    """Added mass with rho L^k, damping with rho L^k omega, forces with rho g L^m, as WAMIT's manual says."""
+    body, density, weight, length = imported[0].potential_flow, 1027.0, 1027.0 * 9.81, 2.0
     assert body.volume == 7000.0
-    assert body.centre_of_buoyancy == (0.1, 0.0)
-    assert np.diag(body.added_mass_infinite) == pytest.approx([0.9 * 1025.0] * 6)
-    assert body.damping[1, 2, 2] == pytest.approx(1025.0 * 0.6 * 0.2 * 0.6 * math.exp(-0.6), rel=1e-6)
-    assert body.excitation[2, 2, 3] == pytest.approx(
-        site.water_density * site.gravity * (4.0 + 0.5j), rel=1e-6
-    )
+    assert body.centre_of_buoyancy == (0.1, -0.2)
+    omega = np.array([0.2, 0.6, 1.0, 1.6])
+    assert body.omega == pytest.approx(omega)
+    for i, j in [(k, k) for k in range(1, 7)] + [(1, 5), (5, 1)]:
+        scale = density * length ** (3 + (i > 3) + (j > 3))
+        place = i - 1, j - 1
+        assert body.added_mass_infinite[place] == pytest.approx(0.1 * i * j * scale)
+        assert body.added_mass_zero[place] == pytest.approx(0.12 * i * j * scale)
+        assert body.added_mass[:, *place] == pytest.approx((0.1 * i * j + 0.1 * omega) * scale)
+        damping = 0.05 * i * j * omega * np.exp(-omega) * scale * omega
+        assert body.damping[:, *place] == pytest.approx(damping, rel=1e-6)
+    for i in range(1, 7):
+        scale = weight * length ** (2 + (i > 3))
+        assert body.excitation[:, 2, i - 1] == pytest.approx((i * omega + 0.5j) * scale, rel=1e-6)
+    assert body.stiffness[2, 2] == pytest.approx(20.0 * weight * length**2)
+    assert body.stiffness[2, 4] == body.stiffness[4, 2] == pytest.approx(1.5 * weight * length**3)
+    assert body.stiffness[3, 3] == pytest.approx(-1250.0 * weight * length**4)
+
+
+STIFFNESS = np.diag([4e3, 5e3, 6e3, 7e5, 8e5, 9e7])
+STIFFNESS[0, 4] = STIFFNESS[4, 0] = 2e4
 
 
 def test_additional_matrices_are_hydrodyn_s(imported):
     extra = imported[0].additional
-    assert extra.preload == (1.0, 2.0, 3.0, 0.0, 0.0, 0.0)
-    assert extra.stiffness[5][5] == 9.0e7
-    assert extra.linear_damping[0][0] == 1.0e5
-    assert extra.quadratic_damping is None
+    assert extra.preload == (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
+    assert np.array_equal(extra.stiffness, STIFFNESS)
+    assert np.array_equal(extra.linear_damping, np.diag([1e5, 2e5, 3e5, 4e6, 5e6, 6e6]))
+    quadratic = np.diag([4e4, 3e4, 2e4, 7e6, 6e6, 5e6])
+    quadratic[0, 4], quadratic[4, 0] = -5e4, -7e4
+    assert np.array_equal(extra.quadratic_damping, quadratic)
 
 
 def test_coefficients_over_depth_split_a_member_where_they_bend(imported):
-    column = [member for member in imported[0].members if member.potential_flow]
+    beside, *column = (member for member in imported[0].members if member.potential_flow)
+    assert beside.drag_coefficient == (0.6, 0.6)  # SimplCd
     assert [member.start[2] for member in column] == pytest.approx([10.0, 0.0, -10.0], abs=1e-12)
     assert [member.drag_coefficient for member in column] == [(0.5, 0.5), (0.5, 1.5), (1.5, 1.5)]
 
@@ -222,10 +359,12 @@ def test_axial_drag_of_a_joint_goes_by_the_sum_of_its_areas_and_half_of_its_coef
     assert not disc.potential_flow
     assert disc.drag_coefficient == (2.0, 3.0)
     assert disc.added_mass_coefficient == (0.5, 0.7)
+    assert disc.pressure_coefficient == (0.6, 0.8)
     # rho A v^2 / 4 in HydroDyn: the ring of 20 m less the column of 10 m above, the full disc below
     assert disc.axial_drag_coefficient == pytest.approx((0.5 * 8.0 * (1.0 - 0.25), 0.5 * 8.0))
     # the column is in the potential-flow body: it takes no added mass from the disc
-    assert disc.axial_added_mass_coefficient == pytest.approx((1.0, 1.0))
+    assert disc.axial_added_mass_coefficient == pytest.approx((0.9, 0.9))
+    assert disc.axial_pressure_coefficient == pytest.approx((0.8, 0.8))
 
 
 def test_members_without_a_potential_flow_body_have_all_their_loads(tmp_path):
@@ -236,8 +375,13 @@ def test_members_without_a_potential_flow_body_have_all_their_loads(tmp_path):
     assert platform.additional is None  # which HydroDyn has with potential flow alone
     assert not any(member.potential_flow for member in platform.members)
     disc = platform.members[-1]
-    assert disc.axial_added_mass_coefficient == pytest.approx((1.0 - 0.5**3, 1.0))
-    assert disc.axial_pressure_coefficient == pytest.approx((0.75, 1.0))
+    assert disc.axial_added_mass_coefficient == pytest.approx((0.9 * (1.0 - 0.5**3), 0.9))
+    assert disc.axial_pressure_coefficient == pytest.approx((0.8 * 0.75, 0.8))
+    beside, column = platform.members[0], platform.members[1:-1]
+    assert beside.added_mass_coefficient == pytest.approx((1.1, 1.1))  # SimplCa, SimplCp
+    assert beside.pressure_coefficient == pytest.approx((0.9, 0.9))
+    assert [member.added_mass_coefficient for member in column] == [(1.2, 1.2), (1.2, 1.3), (1.3, 1.3)]
+    assert [member.pressure_coefficient for member in column] == [(0.85, 0.85), (0.85, 0.75), (0.75, 0.75)]
 
 
 # --------------------------------------------------------------------------- moorings, wind, sea
@@ -250,7 +394,7 @@ def test_lines_of_map_are_repeated_and_weigh_what_they_do_in_water(imported):
         assert math.hypot(*line.anchor[:2]) == pytest.approx(400.0)
         assert math.degrees(math.atan2(line.anchor[1], line.anchor[0])) % 360.0 == pytest.approx(azimuth)
         assert line.anchor[2] == -200.0
-        assert line.wet_weight == pytest.approx((100.0 - 1025.0 * math.pi * 0.05**2) * 9.81)
+        assert line.wet_weight == pytest.approx((100.0 - 1027.0 * math.pi * 0.05**2) * 9.81)
         assert line.seabed_friction == 0.7
 
 
@@ -275,9 +419,9 @@ def test_a_repetition_by_zero_doubles_the_lines(tmp_path):
 def test_site_wind_and_sea_are_those_of_the_deck(imported):
     platform, _, report, _ = imported
     site = platform.environment
-    assert (site.gravity, site.water_density, site.air_density) == (9.81, 1025.0, 1.2)
+    assert (site.gravity, site.water_density, site.air_density) == (9.81, 1027.0, 1.2)
     assert (site.water_depth, site.shear_exponent) == (200.0, 0.11)
-    assert "Hs 6 m, Tp 10 s, heading 15 deg" in report.suggestions[0]
+    assert "Hs 6 m, Tp 10 s, gamma 2.5, heading 15 deg" in report.suggestions[0]
     assert "12 m/s at 80 m" in report.suggestions[1]
 
 
@@ -293,6 +437,19 @@ def test_a_deck_is_imported_without_its_wind(tmp_path, part, old, new, said):
     report = import_deck(write_deck(tmp_path, **{part: [(old, new)]}), tmp_path / "out")
     assert said in report.suggestions[1]
     assert read_platform(tmp_path / "out" / "platform.toml").environment.shear_exponent == 0.14
+
+
+@pytest.mark.parametrize(
+    ("part", "key", "value", "figure"),
+    [
+        ("SeaState", "WtrDens", 1030.0, "water_density"),
+        ("SeaState", "WtrDpth", 190.0, "water_depth"),
+        ("AeroDyn", "AirDens", 1.3, "air_density"),
+    ],
+)
+def test_a_module_s_own_figure_of_the_site_counts_before_that_of_the_fst(tmp_path, part, key, value, figure):
+    deck = read_deck(write_deck(tmp_path, **{part: [(f'"default"  {key}', f"{value}  {key}")]}))
+    assert getattr(deck.site, figure) == value
 
 
 def test_fast_8_has_its_site_in_its_modules(tmp_path):
@@ -319,7 +476,7 @@ def test_a_deck_may_be_given_by_its_parts(tmp_path):
     kinds = ("ElastoDyn", "AeroDyn", "HydroDyn", "SeaState", "MoorDyn", "ServoDyn")
     parts = {name: tmp_path / NAMES[kind] for name, kind in zip(names, kinds, strict=True)}
     deck = read_deck(parts=parts)
-    assert mass_properties(deck)["rotor"] == pytest.approx(6e4)
+    assert mass_properties(deck)["rotor"] == pytest.approx(60450.0)
     assert len(deck.lines) == 3
     assert deck.site.gravity == 9.80665
     with pytest.raises(InputError, match="hydrodyn \\(HydroFile\\)"):
@@ -343,6 +500,33 @@ def test_torque_law_and_pitch_drive_are_rosco_s(imported):
     assert turbine.drivetrain.mesh_loss == pytest.approx(0.02)
     assert (folder / "turbine" / "DISCON.IN").is_file()
     assert turbine.discon == str(folder / "turbine" / "DISCON.IN")
+
+
+def test_servodyn_s_own_torque_law_is_on_the_high_speed_shaft_in_si(tmp_path):
+    """VSContrl 1: speeds in rpm, the constant of region 2 in N m/rpm^2, the slip in percent."""
+    path = write_deck(tmp_path, ServoDyn=[("5     VSContrl", "1     VSContrl")])
+    import_deck(path, tmp_path / "out")
+    turbine = read_turbine(tmp_path / "out" / "turbine" / "turbine.toml")
+    law, speed = turbine.torque_law, 1200.0 * 2.0 * math.pi / 60.0
+    assert (law.rated_torque, law.slip_percent) == (31000.0, 8.5)
+    assert law.rated_speed == pytest.approx(speed)
+    assert law.region2_constant * speed**2 == pytest.approx(0.02 * 1200.0**2)
+    assert law.rated_power == pytest.approx(31000.0 * speed)
+    assert math.degrees(turbine.pitch_drive.rate_limit) == pytest.approx(7.0)
+    assert turbine.drivetrain.generator_efficiency == 0.93
+
+
+@pytest.mark.parametrize(("table", "best"), [(ROTOR_TABLE, 0.47), (None, 0.45)])
+def test_the_rated_wind_has_rated_power_at_the_best_power_coefficient(tmp_path, table, best):
+    """Where DISCON.IN says none: P = rho / 2 pi R^2 Cp v^3, with a usual coefficient if there is no table.
+
+    The table has one of 0.99 too, which no rotor can have."""
+    path = write_deck(tmp_path, DISCON=[("8.8 11.0  ! IPC_Vramp", '"Cp.txt" ! PerfFileName')])
+    if table is not None:
+        (tmp_path / "Cp.txt").write_text(table)
+    import_deck(path, tmp_path / "out")
+    wind = read_turbine(tmp_path / "out" / "turbine" / "turbine.toml").rated_wind_speed
+    assert 0.5 * 1.2 * math.pi * 52.0**2 * best * wind**3 == pytest.approx(3e4 * 130.0, rel=1e-6)
 
 
 def test_the_pitch_actuator_of_rosco_is_the_second_drive_of_the_turbine(tmp_path):
@@ -395,8 +579,8 @@ def test_the_legacy_controller_of_the_5_mw_turbine_is_known_by_its_library(tmp_p
         ("MAP", "1 fix    400", "1 Connect 400", ("connect", "points between lines")),
         ("MAP", "chain  0.1  100.0", "chain  0.5  100.0", ("chain", "must be > 0")),
         ("AeroDyn", "1        NumAFfiles", "1        StallMod", ("AeroDyn 14",)),
-        ("polar", "-180.0 0.0 0.02 0.00\n   0.0 0.4", "-90.0 0.0 0.02 0.00\n   0.0 0.4", ("-180 to 180",)),
-        ("blade", "1.0 0.5 0.0 100.0", "0.0 0.5 0.0 100.0", ("blade.dat", "increase")),
+        ("polar", "-180.0 0.0 0.02 0.03\n   0.0 0.4", "-90.0 0.0 0.02 0.03\n   0.0 0.4", ("-180 to 180",)),
+        ("blade", "1.0 0.5 0.0 70.0", "0.0 0.5 0.0 70.0", ("blade.dat", "increase")),
     ],
 )  # fmt: skip
 def test_what_cannot_be_represented_is_refused_by_file_line_and_key(tmp_path, part, old, new, expected):
@@ -417,6 +601,15 @@ def test_a_folder_with_a_platform_is_replaced_only_when_asked(imported, tmp_path
     with pytest.raises(InputError, match="has a platform.toml already"):
         import_deck(path, tmp_path / "out")
     import_deck(path, tmp_path / "out", replace_files=True)
+
+
+def test_no_file_of_a_folder_is_replaced_by_an_import_that_is_not_asked_to(tmp_path):
+    path, notes = write_deck(tmp_path), tmp_path / "out" / "report.md"
+    notes.parent.mkdir()
+    notes.write_text("my own")
+    with pytest.raises(InputError, match="has a report.md already"):
+        import_deck(path, tmp_path / "out")
+    assert notes.read_text() == "my own" and [*notes.parent.iterdir()] == [notes]
 
 
 def test_members_need_joints_and_sections_that_are_there(tmp_path):
