@@ -3,13 +3,18 @@
 board.toml            seeds, limits, and the suites of each regime
 suites/*.toml         copies of the suites, taken when the board was made: a later version changes no board
 submissions/NAME/     what was added
-runs/                 results folders of the public seeds, one for each suite and kind of preview
+runs/                 results folders of the public seeds, one for each suite, kind of preview and drawing
 history.csv           a row for every submission, regime and judging
 board.csv, index.html what was judged last
 """
 
+import hashlib
 import json
+import os
+import re
+import secrets
 import shutil
+import sys
 import time
 from pathlib import Path
 from typing import Annotated
@@ -21,15 +26,17 @@ from fowt_env.descriptions.records import Positive, Record, validate
 from fowt_env.descriptions.turbine import Turbine
 from fowt_env.errors import InputError
 from fowt_env.files.atomic import replacing
-from fowt_env.training.board.isolated import TimeLimits
-from fowt_env.training.board.submission import CARD, read_submission
+from fowt_env.training.board.files import copy_files
+from fowt_env.training.board.isolated import ProcessLimits
+from fowt_env.training.board.submission import CARD, NAME, alike, read_submission
 from fowt_env.training.evaluation.cases import FOLDER as SUITES
 from fowt_env.training.evaluation.cases import Seeds, Suite, read_suite
 from fowt_env.training.evaluation.scaling import turbine_of
-from fowt_env.training.evaluation.seeds import TEST
+from fowt_env.training.evaluation.seeds import DRAWN, LEAST_SECRET, new_secret_seeds
 
 SETTINGS = "board.toml"
 DEFAULT_PLATFORM = "oc3_hywind"  # of the suites
+SALT = re.compile("salt [0-9a-f]{32,}")
 ENTRIES = Path(__file__).parent / "entries"  # cards of the package's own controllers
 REGIMES = (  # name, suites: of a new board
     ("in distribution", ("above_rated",)),
@@ -68,8 +75,7 @@ class Board:
         if not path.is_file():
             raise InputError(
                 f"board {str(folder)!r}: has no {SETTINGS}: make one with fowt leaderboard add, or give"
-                f" another"
-                " --board"
+                " another --board"
             )
         self.settings, problems = validate(BoardFile, read_toml(path, "board"))
         raise_problems(f"board {str(folder)!r}", problems)
@@ -94,24 +100,39 @@ class Board:
         return turbine_of(self.settings.platform or DEFAULT_PLATFORM)
 
     @property
-    def limits(self) -> TimeLimits:
+    def limits(self) -> ProcessLimits:
         """Limits of controllers that run in a process of their own."""
         s = self.settings
-        return TimeLimits(prepare=s.prepare_limit, call=s.call_limit, memory=s.memory)
+        return ProcessLimits(prepare=s.prepare_limit, call=s.call_limit, memory=s.memory)
 
     def submissions(self) -> list:
-        """Submissions of the board, by name."""
+        """Sound submissions of the board, by name."""
+        return self.read()[0]
+
+    def read(self) -> tuple[list, dict[str, str]]:
+        """(sound submissions, {folder: why it is left out}), by name.
+
+        Names that no submission has, as that of a copy which is being made, are passed over.
+        """
+        sound, left_out = {}, {}
         folder = self.folder / "submissions"
-        return (
-            [read_submission(path) for path in sorted(folder.iterdir()) if path.is_dir()]
-            if folder.is_dir()
-            else []
-        )
+        paths = [path for path in folder.iterdir() if NAME.fullmatch(path.name)] if folder.is_dir() else []
+        for path in sorted(paths, key=lambda path: (path.name != self.settings.baseline, path.name)):
+            try:
+                found = read_submission(path)
+                if found.name != path.name:
+                    raise InputError(f"is called {found.name!r} in its {CARD}")
+                if other := sound.get(alike(found.name)):
+                    raise InputError(f"has nearly the name of {other.name!r}")
+                sound[alike(found.name)] = found
+            except InputError as error:
+                left_out[path.name] = str(error)
+        return sorted(sound.values(), key=lambda each: each.name), left_out
 
     def add(self, source: Path | str) -> str:
         """Copy a submission into the board; its name. Nothing of it is run.
 
-        Raises: InputError where it is not sound, or one of another content has its name.
+        Raises: InputError where it is not sound, or one of another content has its name or nearly its name.
         """
         submission = read_submission(source)
         place = self.folder / "submissions" / submission.name
@@ -122,10 +143,16 @@ class Board:
                 f"submission {submission.name!r}: the board has another one of this name, which is kept: give"
                 f" {CARD} another name"
             )
+        for other in self.submissions():
+            if alike(other.name) == alike(submission.name):
+                raise InputError(
+                    f"submission {submission.name!r}: the board has {other.name!r}, which readers would take"
+                    f" for it: give {CARD} another name"
+                )
         place.parent.mkdir(parents=True, exist_ok=True)
         waiting = place.with_name(f".{submission.name}-{time.monotonic_ns()}")
         try:
-            shutil.copytree(source, waiting, ignore=shutil.ignore_patterns("__pycache__"))
+            copy_files(source, waiting)
             waiting.rename(place)
         except BaseException:
             shutil.rmtree(waiting, ignore_errors=True)
@@ -149,7 +176,7 @@ def new_board(
     seeds = read_suite(REGIMES[0][1][0]).seeds
     (folder / "suites").mkdir(parents=True, exist_ok=True)
     lines = [
-        f'title = "{title}"',
+        f"title = {json.dumps(title)}",
         'baseline = "gspi_oc3"',
         f"seeds = {list(seeds)} # public",
         "call_limit = 0.1 # s",
@@ -169,20 +196,53 @@ def new_board(
     return board
 
 
-def read_seeds(path: Path | str) -> tuple[int, ...]:
-    """The organiser's secret seeds: a text file of whole numbers, a line each. Raises: InputError."""
-    path = Path(path)
-    if not path.is_file():
-        raise InputError(f"secret seeds {str(path)!r}: there is no such file")
-    words = path.read_text(encoding="utf-8").split()
-    if not words or not all(word.isdigit() for word in words):
-        raise InputError(f"secret seeds {str(path)!r}: must hold whole numbers, one a line")
+def write_secret_seeds(path: Path | str, count: int) -> str:
+    """SHA-256 of a new file of secret seeds, which this user alone may read; the hash may be published.
+
+    Its salt makes the hash say nothing of the seeds.
+    Raises: InputError where there is a file already, or for a count below 1.
+    """
+    if count < 1:
+        raise InputError(f"count = {count}: must be at least 1")
+    lines = [f"salt {secrets.token_hex(32)}", *map(str, new_secret_seeds(count))]
+    content = ("\n".join(lines) + "\n").encode()
+    try:
+        handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+    except OSError as error:
+        raise InputError(f"secret seeds {str(path)!r}: cannot be written: {error.strerror}") from None
+    with os.fdopen(handle, "wb") as file:
+        file.write(content)
+    return hashlib.sha256(content).hexdigest()
+
+
+def read_seeds(path: Path | str) -> tuple[tuple[int, ...], str]:
+    """(the organiser's secret seeds, SHA-256 of their file), of a file of write_secret_seeds.
+
+    path: "-" for standard input, so that no other process can read from the command where the file lies.
+    Raises: InputError, also for a file without a salt and for seeds that can be found by trying.
+    """
+    where = f"secret seeds {str(path)!r}"
+    if str(path) == "-":
+        content = sys.stdin.buffer.read()
+    elif Path(path).is_file():
+        content = Path(path).read_bytes()
+    else:
+        raise InputError(f"{where}: there is no such file; fowt leaderboard seeds makes one")
+    first, *lines = content.decode("ascii", "replace").split("\n")
+    words = [line.strip() for line in lines if line.strip()]
+    if not SALT.fullmatch(first.strip()):
+        raise InputError(
+            f"{where}: must begin with a line of 'salt' and 32 hexadecimal digits or more, without which its"
+            " hash would give the seeds away; fowt leaderboard seeds makes such a file"
+        )
+    if not words or not all(word.isdecimal() and len(word) < 20 for word in words):
+        raise InputError(f"{where}: must hold whole numbers, one a line, behind the salt")
     seeds = tuple(int(word) for word in words)
     if len(set(seeds)) < len(seeds):
-        raise InputError(f"secret seeds {str(path)!r}: a seed stands there twice")
-    for seed in seeds:
-        if seed in TEST:
-            raise InputError(
-                f"secret seeds {str(path)!r}: {seed} is a published one: take seeds from {TEST.stop} on"
-            )
-    return seeds
+        raise InputError(f"{where}: a seed stands there twice")
+    if not all(LEAST_SECRET <= seed < DRAWN.stop for seed in seeds):
+        raise InputError(
+            f"{where}: {min(seeds)} to {max(seeds)}: must be from 2**40, below which a seed is found by"
+            " trying, to 2**63 - 1"
+        )
+    return seeds, hashlib.sha256(content).hexdigest()

@@ -1,17 +1,18 @@
 """A controller in a process of its own, which is given its readings and nothing else.
 
-The process has a copy of the submission's folder, an empty home folder, none of the caller's environment
-variables but those in KEPT, and a limit of memory. Its answers are two numbers or a text of fixed form:
-they are
-not unpickled, so that nothing which it sends runs code here. It starts anew for every run, so that nothing
-carries over from one run to the next. It is no jail: it may read whatever this user may read, and open
-connections
-(docs: what a board cannot detect).
+The process has a copy of the submission's folder, an empty home folder, its own copy of the kernels that it
+compiled beforehand, none of the caller's environment variables but those in KEPT, and limits of memory,
+files, processes and processor time. A supervisor (supervisor.py) ends what it leaves behind. Its answers are
+two numbers or the name of an exception: they are not unpickled, so that nothing which it sends runs code
+here, and none of its words are kept. It starts anew for every run. It is no jail: it may read whatever this
+user may read, and open connections, unless it is started within a container (docs/guides/leaderboard.md).
 """
 
+import builtins
+import hashlib
+import json
 import os
 import pickle
-import resource
 import select
 import shutil
 import struct
@@ -20,29 +21,41 @@ import sys
 import tempfile
 import time
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from fowt_env.control import CheckedController
-from fowt_env.errors import ControllerError
+from fowt_env.errors import ControllerError, InputError
+from fowt_env.folders import cache_root, make_private
+from fowt_env.training.board import supervisor
+from fowt_env.training.board.files import copy_files, digest_of
 
 KEPT = ("PATH", "LANG", "LC_ALL", "PYTHONPATH", "NUMBA_DISABLE_JIT")
 LENGTH = struct.Struct("<q")
 COMMAND = struct.Struct("<dd")
 OK, ERROR = b"k", b"e"
-LONGEST_ANSWER = 4096  # bytes
+LONGEST_ANSWER = 100  # bytes
 START, PREPARE, RESET, ACT = "start", "prepare", "reset", "act"
+FOLDER = "{folder}"  # in `within`: the process's folder
+LIMITS = {"FSIZE": 2 * 10**8, "NPROC": 256, "NOFILE": 256, "CORE": 0}  # bytes; beyond the user's own; files
+PATIENCE = 10.0  # s that the supervisor has to end what is left
+WARM_UP = 1.0  # s of simulated time in which a submission compiles what it needs
+# what an exception may be called: a name of a submission's own could say anything
+KNOWN_ERRORS = {name for name, kind in vars(builtins).items() if isinstance(kind, type)} | {
+    "ControllerError", "InputError", "LinAlgError",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
-class TimeLimits:
-    """Wall-clock seconds and memory that a controller has. A call beyond its limit ends the run as failed."""
+class ProcessLimits:
+    """What a controller may use. A call beyond its limit ends the run as failed."""
 
     start: float = 120.0  # s, to import and make it; kernels may be compiled
     prepare: float = 300.0  # s
-    call: float = 0.1  # s, one call of act() or reset()
+    call: float = 0.1  # s, one call of act()
     memory: float = 4e9  # bytes of address space
+    processor: float = 7200.0  # s of processor time of a run
 
 
 @dataclass(frozen=True)
@@ -55,7 +68,21 @@ class IsolatedFactory:
     name: str
     information: tuple[str, ...]
     preview_times: tuple[float, ...]
-    limits: TimeLimits
+    limits: ProcessLimits = ProcessLimits()
+    digest: str = ""  # of the folder's files, which must still have it as a run begins; "": any
+    within: tuple[str, ...] = ()  # command that the process is started by, as that of a container
+    kernels: str = ""  # folder of what it compiled, of which each process has a copy; "": none
+    keeps: bool = False  # whether `kernels` becomes what a process of it leaves
+    log: str = ""  # file for the slowest call of each run; "": none
+
+    @property
+    def content_key(self) -> str:
+        """Hash of what shapes a run of it beside the sources of this package."""
+        parts = (
+            *(self.digest, self.file, self.attribute, self.name, self.information, self.preview_times),
+            *(asdict(self.limits), self.within),
+        )
+        return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
 
     def __call__(self, turbine: Any, control_dt: float) -> "CheckedController":
         """The controller for a turbine and control period (s)."""
@@ -65,7 +92,8 @@ class IsolatedFactory:
 class IsolatedController:
     """What the simulator sees of a controller that runs in another process.
 
-    Raises: ControllerError where the process ends, fails, or takes longer than its limits.
+    Raises: ControllerError where the process ends, fails, or takes longer than its limits; InputError where
+    the submission's files are not those of its digest.
     """
 
     def __init__(self, factory: IsolatedFactory, turbine: Any, control_dt: float) -> None:
@@ -83,17 +111,19 @@ class IsolatedController:
     def reset(self, measurement: Any) -> None:
         """A new process, prepared and reset."""
         self.close()
-        limits = self.factory.limits
-        self.process = _Process(self.factory)
-        self._ask(START, (self.factory, self.turbine, self.control_dt), limits.start)
+        factory, limits = self.factory, self.factory.limits
+        self.process = _Process(factory)
+        self._ask(START, (factory.file, factory.attribute, self.turbine, self.control_dt), limits.start)
         self._ask(PREPARE, self.known, limits.prepare)
         self._ask(RESET, measurement, limits.prepare)
 
     def act(self, measurement: Any) -> tuple[float, float]:
         """(generator torque N m, blade pitch rad) as the process answers."""
         began = time.perf_counter()
-        answer = self._ask(ACT, measurement, self.factory.limits.call, float(measurement.time))
-        self.slowest = max(self.slowest, time.perf_counter() - began)
+        try:
+            answer = self._ask(ACT, measurement, self.factory.limits.call, float(measurement.time))
+        finally:
+            self.slowest = max(self.slowest, time.perf_counter() - began)
         if len(answer) != COMMAND.size:
             raise self._fault("its process sent no pair of numbers")
         return COMMAND.unpack(answer)
@@ -110,66 +140,110 @@ class IsolatedController:
             raise self._fault(f"its process ended in {what}()", moment) from None
         if kind != OK:
             self.close()
-            text = answer.decode("utf-8", "replace")
-            raise self._fault(f"{what}() raised {text}", moment)
+            name = answer.decode("ascii", "replace")
+            name = name if name in KNOWN_ERRORS else "an exception of its own"
+            raise self._fault(f"{what}() raised {name}", moment)
         return answer
 
     def _fault(self, why, moment=0.0):
         return ControllerError(f"controller {self.name!r}: {why}", self.name, moment, None)
 
     def close(self) -> None:
-        """End the process, if there is one."""
-        if self.process is not None:
-            self.process.close()
-            self.process = None
+        """End the process, if there is one, and note its slowest call."""
+        process, self.process = self.process, None
+        if process is None:
+            return
+        process.close()
+        if self.factory.log and self.slowest:
+            with open(self.factory.log, "a", encoding="utf-8") as file:
+                file.write(f"{self.name},{self.factory.content_key},{self.slowest:.6f}\n")
+        self.slowest = 0.0
 
     def __del__(self) -> None:
         with suppress(Exception):
             self.close()
 
 
+def warmed_up(factory: IsolatedFactory, scenes: Any, key: str) -> IsolatedFactory:
+    """The factory with kernels that it compiled in short runs of scenes, none of which has any weather.
+
+    Runs of the board begin with copies of these, so that nothing which one writes is there in another.
+    scenes: called for the scenes where they are needed; key: what tells these, and the plant, apart.
+    """
+    root = cache_root()
+    if root is None:
+        return factory
+    name = hashlib.sha256(f"{factory.content_key}/{key}".encode()).hexdigest()[:24]
+    place = root / "submissions" / name
+    made = replace(factory, kernels=str(place))
+    if not place.is_dir():
+        import fowt_env
+
+        make_private(place)
+        for scene in scenes():
+            with suppress(ControllerError, InputError):  # its judged runs will fail as well, and say so
+                fowt_env.simulate(scene, replace(made, keeps=True, log=""), duration=WARM_UP)
+    return made
+
+
 class _Process:
-    """A started process with two pipes of its own, beside stdout and stderr, which go nowhere."""
+    """A started process, asked through its standard input and output."""
 
     def __init__(self, factory):
-        self.folder = tempfile.mkdtemp(prefix="fowt-submission-")
-        work = Path(self.folder, "work")
-        shutil.copytree(factory.folder, work, ignore=shutil.ignore_patterns("__pycache__"))
-        theirs_in, self.to = os.pipe()
-        self.back, theirs_out = os.pipe()
-        environment = {key: os.environ[key] for key in KEPT if key in os.environ}
-        # kernels that it compiles are kept apart from those that this process runs
-        environment |= {
-            "HOME": self.folder,
-            "FOWT_CACHE_DIR": str(_cache_folder(factory)),
-            "OMP_NUM_THREADS": "1",
-        }
-        memory = int(factory.limits.memory)
+        supervisor.prctl(supervisor.DUMPABLE, 0)  # this process knows the weather: its memory is no file
+        self.factory = factory
+        self.folder = Path(tempfile.mkdtemp(prefix="fowt-submission-"))
         try:
-            self.process = subprocess.Popen(
-                [sys.executable, "-m", __name__, str(theirs_in), str(theirs_out)],
-                pass_fds=(theirs_in, theirs_out),
-                cwd=work,
-                env=environment,
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL,
-                start_new_session=True,  # so that what it starts itself ends with it
-                preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (memory, memory)),
-            )
-        finally:
-            os.close(theirs_in)
-            os.close(theirs_out)
+            self._start(factory)
+        except BaseException:
+            shutil.rmtree(self.folder, ignore_errors=True)
+            raise
+
+    def _start(self, factory):
+        work, kernels = self.folder / "work", self.folder / "cache"
+        copy_files(factory.folder, work)
+        if factory.digest and digest_of(work) != factory.digest:
+            raise InputError(f"submission {factory.name!r}: its files have changed since it was read")
+        if factory.kernels and os.path.isdir(factory.kernels):
+            shutil.copytree(factory.kernels, kernels, symlinks=True)
+        kernels.mkdir(mode=0o700, exist_ok=True)
+        environment = {key: os.environ[key] for key in KEPT if key in os.environ}
+        environment |= {"HOME": str(self.folder), "TMPDIR": str(self.folder), "FOWT_CACHE_DIR": str(kernels)}
+        environment |= {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL", "NUMBA")}
+        limits = LIMITS | {"AS": int(factory.limits.memory), "CPU": int(factory.limits.processor)}
+        within = [part.replace(FOLDER, str(self.folder)) for part in factory.within]
+        watched = [str(os.getpid()), str(self.folder), json.dumps(limits), *within]
+        self.process = subprocess.Popen(
+            [sys.executable, "-I", "-S", supervisor.__file__, *watched, sys.executable, "-m", __name__],
+            bufsize=0,
+            cwd=work,
+            env=environment,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+        self.to, self.back = self.process.stdin.fileno(), self.process.stdout.fileno()
+        os.set_blocking(self.to, False)
 
     def ask(self, content, limit):
         """(OK or ERROR, bytes) of its answer. Raises: TimeoutError after `limit` s; OSError, EOFError."""
         deadline = time.monotonic() + limit
-        _write(self.to, LENGTH.pack(len(content)) + content)
+        self._write(LENGTH.pack(len(content)) + content, deadline)
         head = self._read(1 + LENGTH.size, deadline)
         (length,) = LENGTH.unpack(head[1:])
         if not 0 <= length <= LONGEST_ANSWER or head[:1] not in (OK, ERROR):
             raise EOFError
         return head[:1], self._read(length, deadline)
+
+    def _write(self, content, deadline):
+        content = memoryview(content)
+        while content:
+            left = deadline - time.monotonic()
+            if left <= 0.0 or not select.select([], [self.to], [], left)[1]:
+                raise TimeoutError
+            with suppress(BlockingIOError):
+                content = content[os.write(self.to, content) :]
 
     def _read(self, count, deadline):
         found = b""
@@ -184,53 +258,47 @@ class _Process:
         return found
 
     def close(self):
-        """Kill it and whatever it started, and remove its folder."""
-        for handle in (self.to, self.back):
-            with suppress(OSError):
-                os.close(handle)
+        """End it and whatever it started, keep its kernels where that is asked for, and remove its folder."""
         with suppress(OSError):
-            os.killpg(self.process.pid, 9)
-        self.process.wait()
+            self.process.stdin.close()
+        self.process.stdout.close()
+        self.process.terminate()
+        try:
+            self.process.wait(PATIENCE)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+        if self.factory.keeps:
+            shutil.rmtree(self.factory.kernels, ignore_errors=True)
+            with suppress(OSError):
+                shutil.move(self.folder / "cache", self.factory.kernels)
         shutil.rmtree(self.folder, ignore_errors=True)
-
-
-def _cache_folder(factory):
-    """Folder of the kernels that a submission compiles: beside those of this user, one for each name."""
-    from fowt_env.folders import cache_root
-
-    root = cache_root()
-    return (Path(tempfile.gettempdir()) if root is None else root) / "submissions" / factory.name
-
-
-def _write(handle, content):
-    while content:
-        content = content[os.write(handle, content) :]
 
 
 # ------------------------------------------------------------------------------- in the other process
 
 
-def serve(incoming: int, outgoing: int) -> None:
-    """Answer what comes in until the pipe is closed: the main loop of the other process."""
+def serve() -> None:
+    """Answer what comes in until it is closed: the main loop of the other process.
+
+    Standard input and output are then those of a process that has neither, as a controller may print.
+    """
+    incoming, outgoing, nothing = os.dup(0), os.dup(1), os.open(os.devnull, os.O_RDWR)
+    os.dup2(nothing, 0)
+    os.dup2(nothing, 1)
     controller = None
-    with os.fdopen(incoming, "rb", buffering=0) as source:
+    with os.fdopen(incoming, "rb") as source:
         while head := source.read(LENGTH.size):
-            what, content = pickle.loads(_all_of(source, LENGTH.unpack(head)[0]))
+            what, content = pickle.loads(source.read(*LENGTH.unpack(head)))
             try:
                 controller, answer = _done(what, content, controller)
                 kind = OK
             except BaseException as error:  # SystemExit too: the run is told why it fails
                 own = error.__cause__ if isinstance(error, ControllerError) else None  # the controller's
-                error = error if own is None else own
-                kind, answer = ERROR, f"{type(error).__name__}: {error}".encode()[:LONGEST_ANSWER]
-            _write(outgoing, kind + LENGTH.pack(len(answer)) + answer)
-
-
-def _all_of(source, count):
-    content = b""
-    while len(content) < count:
-        content += source.read(count - len(content))
-    return content
+                kind, answer = ERROR, type(error if own is None else own).__name__.encode()[:LONGEST_ANSWER]
+            content = kind + LENGTH.pack(len(answer)) + answer
+            while content:
+                content = content[os.write(outgoing, content) :]
 
 
 def _done(what, content, controller):
@@ -246,14 +314,13 @@ def _done(what, content, controller):
     return controller, b""
 
 
-def _made(factory, turbine, control_dt):
-    """The controller that the file in the working folder makes."""
+def _made(file, attribute, turbine, control_dt):
+    """The controller that a file in the working folder makes."""
     from fowt_env.control import make
 
     sys.path.insert(0, os.getcwd())
-    module = factory.file.removesuffix(".py")
-    return make(f"{module}:{factory.attribute}", turbine, control_dt)
+    return make(f"{file.removesuffix('.py')}:{attribute}", turbine, control_dt)
 
 
 if __name__ == "__main__":
-    serve(int(sys.argv[1]), int(sys.argv[2]))
+    serve()

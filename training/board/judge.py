@@ -1,35 +1,45 @@
 """Judging: every submission run anew on the board's suites, every figure computed from the time series.
 
-Submissions bring no results. Controllers of Python files run in processes of their own
-(training.board.isolated);
-the organiser's secret seeds are in none of the files that the page is made of, but for their number and
-the hash
-of their file, with which the organiser can prove later which they were.
+Submissions bring no results. A run is kept under a key of all that shapes it, so that those of another
+content, card or limit are never shown. Controllers of Python files run in processes of their own
+(training.board.isolated); the organiser's secret seeds are in none of the files that the page is made of, but
+for their number and the hash of their file, with which the organiser can prove later which they were.
 """
 
 import hashlib
+import json
+import os
+import secrets
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 import fowt_env
-from fowt_env.control import make
-from fowt_env.errors import InputError
+from fowt_env.control import EXACT, known_scene, make
+from fowt_env.errors import InputError, muted, unknown
 from fowt_env.files.tables import read_table
 from fowt_env.scene.build import build_scene
+from fowt_env.training.board.files import digest_of
 from fowt_env.training.board.folder import Board, read_seeds
+from fowt_env.training.board.isolated import warmed_up
 from fowt_env.training.board.submission import PYTHON_FILE
+from fowt_env.training.evaluation.cases import described
 from fowt_env.training.evaluation.evaluate import evaluate
+from fowt_env.training.evaluation.guard import printable
 from fowt_env.training.evaluation.metrics import METRICS
+from fowt_env.training.evaluation.provenance import controller_code, plant_code
 from fowt_env.training.evaluation.results import run_file
 from fowt_env.training.evaluation.results_table import KEY
-from fowt_env.training.evaluation.run_case import run_metrics
+from fowt_env.training.evaluation.run_case import CONTROL_DT, REFERENCE, SHORTEST_CASE_WEATHER, run_metrics
+from fowt_env.training.evaluation.seeds import with_drawn_seeds
+from fowt_env.training.evaluation.wind_boxes import cached_box
 from fowt_env.weather.wind_field import is_field
 
 RELATIVE = 1e-9  # to which figures computed anew agree with those of the rows
+CALLS = "slowest_calls.csv"  # of a results folder: name, key, s of each run in a process of its own
 
 
 @dataclass
@@ -38,65 +48,201 @@ class Judged:
 
     board: Board
     submissions: list
-    public: dict[str, pd.DataFrame]  # suite -> table of evaluate, whose figures are those of the series
+    public: dict[str, pd.DataFrame] = field(default_factory=dict)  # suite -> table of evaluate
     secret: dict[str, pd.DataFrame] = field(default_factory=dict)
     seeds_hash: str = ""  # of the file of secret seeds
+    drawn: str = ""  # hash that the public seeds were drawn from; "": they are the board's
     when: str = ""
+    left_out: dict[str, str] = field(default_factory=dict)  # {submission, or "submission, suite": why}
+    slowest: dict[tuple[str, str], float] = field(default_factory=dict)  # {(suite, name): s of a call}
+
+    @property
+    def shown(self) -> list:
+        """Submissions that were run on a suite or more."""
+        names = {name for table in self.public.values() for name in table["controller"]}
+        return [each for each in self.submissions if each.name in names]
 
 
-def judge(board, jobs=1, secret=None, private=None, trust_code=False, progress=None):
-    """Judged of all submissions of a Board.
+def judge(
+    board, jobs=1, secret=None, private=None, trust_code=False, progress=None, draw_seeds=None, within=()
+):
+    """Judged of all submissions of a Board that can be run, and why the others cannot.
 
-    secret    file of the organiser's seeds, whose runs are kept in the folder `private`
-    progress  called as progress(done, total, text)
+    secret      file of the organiser's seeds ("-": standard input); private: folder for the runs of these
+    progress    called as progress(done, total, text)
+    draw_seeds  hash from which the public seeds are drawn, as many as the board lists; None: those
+    within      words of a command in which Python files are run, as that of a container
     Raises: InputError where a Python file is among the submissions and trust_code is not set, where seeds
-    are given without a folder for their runs, or where figures differ from those of the series.
+    are given without a folder for their runs, or where the baseline is missing or cannot be run.
     """
-    submissions = board.submissions()
+    submissions, left_out = board.read()
+    baseline, names = board.settings.baseline, [each.name for each in submissions]
     if not submissions:
         raise InputError(f"board {str(board.folder)!r}: has no submissions: fowt leaderboard add FOLDER")
+    if baseline not in names:
+        why = f" ({left_out[baseline]})" if baseline in left_out else ""
+        raise InputError(f"{unknown('baseline among the submissions', baseline, names)}{why}")
     code = [each.name for each in submissions if each.kind == PYTHON_FILE]
     if code and not trust_code:
         raise InputError(
             f"submissions {', '.join(code)}: hold Python code of their authors, which judging runs: read it,"
             " then give --trust-code (each runs in a process of its own, with this user's rights)"
         )
+    processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    if code and jobs > processors:
+        raise InputError(
+            f"jobs = {jobs}: the calls of Python files are timed by the clock, and this machine has"
+            f" {processors} processors: give at most that many"
+        )
     if (secret is None) != (private is None):
         raise InputError("secret seeds: need a folder for their runs (--private), which is not the board's")
     if private is not None and Path(private).resolve().is_relative_to(board.folder.resolve()):
         raise InputError(f"private = {str(private)!r}: must lie outside of the board's folder")
-    made = Judged(board, submissions, {}, when=time.strftime("%Y-%m-%d"))
-    rounds = [(board.settings.seeds, board.folder / "runs", made.public)]
+    made = Judged(board, submissions, when=time.strftime("%Y-%m-%d"), left_out=left_out)
+    suites = [board.suite(name) for regime in board.settings.regime for name in regime.suites]
+    suites = [replace(suite, seeds=tuple(board.settings.seeds)) for suite in suites]
+    public = suites
+    if draw_seeds is not None:
+        public = [with_drawn_seeds(suite, draw_seeds) for suite in suites]
+        made.drawn = public[0].drawn["hash"]
+    rounds = [(public, board.folder / "runs", made.public)]
     if secret is not None:
-        rounds.append((read_seeds(secret), Path(private), made.secret))
-        made.seeds_hash = hashlib.sha256(Path(secret).read_bytes()).hexdigest()
-    for seeds, folder, tables in rounds:
-        for regime in board.settings.regime:
-            for suite in regime.suites:
-                tables[suite] = _suite_table(board, submissions, suite, seeds, folder, jobs, progress)
+        seeds, made.seeds_hash = read_seeds(secret)
+        rounds.append(([_unordered(suite, seeds) for suite in suites], Path(private), made.secret))
+    factories = _factories(submissions, board.limits, tuple(within), suites)
+    for judged, folder, tables in rounds:
+        for suite in judged:
+            tables[suite.name] = _suite_table(made, factories, suite, folder, jobs, progress)
+    for each in submissions:
+        if digest_of(each.folder) != each.digest:
+            raise InputError(f"submission {each.name!r}: its files have changed while the board was judged")
     return made
 
 
-def _suite_table(board, submissions, name, seeds, folder, jobs, progress):
-    """Table of a suite: all submissions, each with its kind of preview."""
-    suite = board.suite(name)
-    parts = []
-    for preview in sorted({each.card.preview for each in submissions}):
-        controllers = {
-            each.name: each.controller(board.limits) for each in submissions if each.card.preview == preview
-        }
-        place = Path(folder) / f"{name}-v{suite.version}-{preview}"
+def _unordered(suite, seeds):
+    """A Suite of secret seeds, whose runs come in an order that no controller can know."""
+    order = list(seeds)
+    cases = [
+        case if case.seeds is None else replace(case, seeds=tuple(seeds[: len(case.seeds)]))
+        for case in suite.cases
+    ]
+    for part in (order, cases):
+        secrets.SystemRandom().shuffle(part)
+    return replace(suite, seeds=tuple(order), cases=tuple(cases))
 
-        def say(done, total, _, what=f"{name}, {preview}"):
+
+def _factories(submissions, limits, within, suites):
+    """{name: what evaluate is given}; Python files with the kernels that they have compiled beforehand."""
+    found = {each.name: each.controller(limits) for each in submissions}
+    for each in submissions:
+        if each.kind == PYTHON_FILE:
+            factory = replace(found[each.name], within=within)
+            cases = _kinds(suites) if "plant_model" in factory.information else _kinds(suites)[:1]
+            key = json.dumps([plant_code(), [described(case) for case, _ in cases]])
+            found[each.name] = warmed_up(factory, lambda cases=cases: (_quiet(*case) for case in cases), key)
+    return found
+
+
+def _kinds(suites):
+    """[(Case, seed)] of suites: one of each kind of scene that a controller is prepared for."""
+    found = {}
+    for suite in suites:
+        for case in suite.cases:
+            if not case.parked:
+                about = described(case)
+                weather = case.wind is None, is_field(case.wind), case.sea is None
+                kind = json.dumps([about["platform"], about["options"], weather], sort_keys=True)
+                found.setdefault(kind, (case, suite.seeds[0]))
+    return list(found.values())
+
+
+class _Asking:
+    """What known_scene is asked for."""
+
+    name, information = "board", ("plant_model",)
+
+
+def _quiet(case, seed):
+    """Scene of a Case as a controller is prepared for it: no wind and no waves of a run."""
+    options = {"duration": SHORTEST_CASE_WEATHER, **case.options}
+    wind = cached_box(case.wind, case.platform, seed, options) if is_field(case.wind) else case.wind
+    with muted():
+        return known_scene(build_scene(case.platform, wind=wind, sea=case.sea, **options), _Asking)
+
+
+def _suite_table(made, factories, suite, folder, jobs, progress):
+    """Table of a suite: all submissions that can be run on it, each with its kind of preview."""
+    parts = []
+    drawn = "" if suite.drawn is None else f"-{suite.drawn['hash'][:12]}"
+    for preview in sorted({each.card.preview for each in made.submissions}):
+        place = Path(folder) / f"{suite.name}-v{suite.version}-{preview}{drawn}"
+        place.mkdir(parents=True, exist_ok=True)
+        labelled, names = {}, {}
+        for each in made.submissions:
+            if each.card.preview == preview:
+                controller = factories[each.name]
+                if each.kind == PYTHON_FILE:
+                    controller = replace(controller, log=str(place.absolute() / CALLS))
+                label = f"{each.name}.{_key(each, controller)}"
+                labelled[label], names[label] = controller, each.name
+
+        def say(done, total, _, what=f"{suite.name}, {preview}"):
             if progress is not None:
                 progress(done, total, f"{what}: {done} of {total} runs")
 
-        options = {} if preview == "exact" else {"preview": preview}
-        table = evaluate(controllers, suite, seeds=seeds, jobs=jobs, folder=place, progress=say, **options)
-        table = table[table["controller"].isin(controllers)]
+        options = {} if preview == EXACT else {"preview": preview}
+        table, refused = _run(labelled, suite, place, jobs=jobs, progress=say, **options)
+        for label, why in refused.items():
+            name = names[label]
+            if name == made.board.settings.baseline:
+                raise InputError(why)
+            made.left_out[f"{name}, {suite.name}"] = why
+        if table is not None:
+            shown = table["controller"].map(names | {REFERENCE: REFERENCE})
+            parts.append(table.assign(controller=shown))
+            _note_slowest(made, suite, place / CALLS, labelled, names)
+    return pd.concat(parts, ignore_index=True).drop_duplicates(KEY)  # each kind of preview has a reference
+
+
+def _key(submission, controller):
+    """Hash of all that shapes the runs of a submission beside suite, seeds and plant."""
+    parts = [submission.digest, controller_code(controller)["code"]]
+    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:16]
+
+
+def _run(labelled, suite, place, **options):
+    """(table of evaluate or None, {label: why it cannot be run}) of {label: controller}."""
+    try:
+        table = evaluate(labelled, suite, folder=place, **options)
+        table = table[table["controller"].isin([*labelled, REFERENCE]) & table["seed"].isin(_seeds(suite))]
         check_figures(table, place, suite)
-        parts.append(table)
-    return pd.concat(parts, ignore_index=True)
+        return table, {}
+    except InputError as error:
+        if len(labelled) == 1:
+            return None, dict.fromkeys(labelled, printable(str(error)))
+    parts, refused = [], {}
+    for label, controller in labelled.items():  # what one of them cannot do must not keep the others
+        table, why = _run({label: controller}, suite, place, **options)
+        parts += [] if table is None else [table]
+        refused |= why
+    return (pd.concat(parts, ignore_index=True) if parts else None), refused
+
+
+def _seeds(suite):
+    return {*suite.seeds, *(seed for case in suite.cases for seed in case.seeds or ())}
+
+
+def _note_slowest(made, suite, path, labelled, names):
+    """Put the slowest call of each Python file among the runs of a results folder into made.slowest."""
+    if not path.is_file():
+        return
+    calls = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines()]
+    for label, controller in labelled.items():
+        key = getattr(controller, "content_key", None)
+        found = [float(seconds) for _, other, seconds in calls if other == key]
+        if found:
+            place = suite.name, names[label]
+            made.slowest[place] = max(made.slowest.get(place, 0.0), *found)
 
 
 def check_figures(table, folder, suite):
@@ -126,7 +272,7 @@ def inputs_of(submission, turbine):
     """What a submission is given: its declared inputs, or those of the built-in controller or policy."""
     if submission.kind == PYTHON_FILE:
         return tuple(submission.card.information)
-    return tuple(make(submission.controller(None), turbine, 0.1).information)
+    return tuple(make(submission.controller(None), turbine, CONTROL_DT).information)
 
 
 def package_version():

@@ -1,6 +1,7 @@
 """What a judged board is shown as: one HTML page that asks nothing of a network, a CSV and a history.
 
-Every text of a submission is escaped, and its address is a link only where it begins with http.
+Every text of a submission is escaped, characters that cannot be seen or that turn the direction of writing
+among them, and its address is a link only where it begins with http.
 """
 
 import html
@@ -29,11 +30,12 @@ FIGURES = {  # heading: metric whose ratio to the baseline is shown
 }
 PER_WIND = ("rotor speed", "platform pitch", "travel")
 MODEL, PREVIEW = "plant_model", "wind_preview"
+FORMULA = ("=", "+", "-", "@", "\t", "\r")  # with which a spreadsheet begins to compute
 PLANT = {"rotor_speed", "generator_speed", "blade_pitch", "generator_torque", "time"}
 CANNOT = (
-    "Whether a controller has learned the public seeds: compare its score on the secret ones.",
+    "Whether a controller recognises seeds that are listed: compare its score on drawn or secret ones.",
     "What was tuned on which seeds and with what budget: that is the author's word.",
-    "Whether code read files or the network of the organiser's machine while it ran.",
+    "Whether code read files or the network of the organiser's machine, unless it ran in a container.",
     "Submissions that differ in name alone.",
 )
 STYLE = """
@@ -62,6 +64,18 @@ background:var(--head);color:var(--ink)}
 """
 
 
+def escaped(text):
+    """HTML of a text of a submission: escaped, and what cannot be printed as its Python escape."""
+    words = (c if c.isprintable() else " " if c.isspace() else ascii(c)[1:-1] for c in str(text))
+    return html.escape("".join(words))
+
+
+def cell(text):
+    """A text of a submission for a CSV file, in which no spreadsheet takes it for a formula."""
+    text = "".join(c if c.isprintable() else " " if c.isspace() else ascii(c)[1:-1] for c in text)
+    return f"'{text}" if text.lstrip().startswith(FORMULA) else text
+
+
 def information_class(submission, turbine):
     """What a submission is given, in one of a few words that rows are compared within."""
     used = set(inputs_of(submission, turbine))
@@ -81,15 +95,15 @@ def information_class(submission, turbine):
 def board_frame(judged):
     """DataFrame of a Judged: a row for each suite and submission, in the order of the ranks.
 
-    Columns: regime, suite, version, rank, name, author, licence, information, runs, failed, tripped, for
-    each of
-    FIGURES its ratio to the baseline's and p-value, score with its interval, score_secret, beyond (limits
-    passed).
+    Columns: regime, suite, version, rank (none without a score), name, author, licence, information, runs,
+    failed (also those that lost power), tripped, for each of FIGURES its ratio to the baseline's and p-value,
+    score with its interval, score_secret, beyond (limits passed), slowest_call_[s] (of a Python file, by the
+    clock; NaN for others).
     """
     rows = []
     board = judged.board
-    classes = {each.name: information_class(each, board.turbine) for each in judged.submissions}
-    cards = {each.name: each.card for each in judged.submissions}
+    classes = {each.name: information_class(each, board.turbine) for each in judged.shown}
+    cards = {each.name: each.card for each in judged.shown}
     for regime in board.settings.regime:
         for name in regime.suites:
             suite = board.suite(name)
@@ -98,9 +112,10 @@ def board_frame(judged):
             for entry in public.values():
                 who = entry["controller"]
                 row = {"regime": regime.name, "suite": name, "version": suite.version, "rank": entry["rank"]}
-                row |= {"name": who, "author": cards[who].author, "licence": cards[who].licence}
+                row |= {"name": who, "author": cell(cards[who].author), "licence": cell(cards[who].licence)}
                 row |= {"information": classes[who]}
                 row |= {key: entry[key] for key in ("runs", "failed", "tripped")}
+                row["failed"] += entry["lost_power"]
                 for heading, metric in FIGURES.items():
                     found = entry["difference"][metric]
                     row[heading] = 1.0 + found["percent"] / 100.0
@@ -108,6 +123,7 @@ def board_frame(judged):
                 row |= _score_columns(entry)
                 row["score_secret"] = _score_columns(secret[who])["score"] if who in secret else np.nan
                 row["beyond"] = "; ".join(entry["beyond"])
+                row["slowest_call_[s]"] = judged.slowest.get((name, who), np.nan)
                 rows.append(row)
     return pd.DataFrame(rows)
 
@@ -126,14 +142,8 @@ def _score_columns(entry):
 
 
 def write_board(judged):
-    """Paths written in the board's folder: index.html, board.csv, history.csv.
-
-    Raises: InputError where the baseline was not judged.
-    """
+    """Paths written in the board's folder: index.html, board.csv, history.csv."""
     folder = judged.board.folder
-    names = [each.name for each in judged.submissions]
-    if judged.board.settings.baseline not in names:
-        raise unknown("baseline among the submissions", judged.board.settings.baseline, names)
     frame = board_frame(judged)
     history = _history(folder / "history.csv", frame, judged)
     paths = folder / "index.html", folder / "board.csv", folder / "history.csv"
@@ -146,9 +156,8 @@ def write_board(judged):
 
 
 def _history(path, frame, judged):
-    """DataFrame of what the history holds and, in place of rows of the same day and digest, of this
-    judging."""
-    digests = {each.name: each.digest for each in judged.submissions}
+    """DataFrame of the history and, in place of its rows of the same day and digest, of this judging."""
+    digests = {each.name: each.digest for each in judged.shown}
     here = frame[["suite", "version", "name", "rank", "score", "failed", "tripped"]].assign(
         date=judged.when, package=package_version(), digest=frame["name"].map(digests)
     )
@@ -173,16 +182,21 @@ def board_rows(folder, regime=None):
     if regime not in names:
         raise unknown("regime", regime, names)
     frame = frame[frame["regime"] == regime]
-    headings = ["suite", "rank", "name", "information", "failed or tripped", *FIGURES, "score"]
+    headings = ["suite", "rank", "name", "information", "lost runs", *FIGURES, "score"]
     rows = [
         [
-            *(row["suite"], str(row["rank"]), row["name"], row["information"]),
+            *(row["suite"], _rank_text(row["rank"]), row["name"], row["information"]),
             str(row["failed"] + row["tripped"]),
             *(_number(row[figure]) for figure in (*FIGURES, "score")),
         ]
         for row in frame.to_dict("records")
     ]
     return f"{regime}: ratios to the baseline, lifetime means", headings, rows
+
+
+def _rank_text(rank):
+    """Text of a rank; "-" where there is none, of a suite without a score."""
+    return "-" if pd.isna(rank) else f"{rank:.0f}"
 
 
 def _number(value, digits=3):
@@ -197,22 +211,23 @@ def _page(judged, frame, history):
     board = judged.board
     title, baseline = html.escape(board.settings.title), html.escape(board.settings.baseline)
     policy = content_policy(styles=[STYLE])
-    seeds = ", ".join(map(str, board.settings.seeds))
     parts = [
         '<!doctype html><html lang="en"><head><meta charset="utf-8">',
         f'<meta http-equiv="Content-Security-Policy" content="{policy}">',
         '<meta name="viewport" content="width=device-width, initial-scale=1">',
         f"<title>{title}</title><style>{STYLE}</style></head><body><h1>{title}</h1>",
         f"<p>Judged {judged.when} with {html.escape(package_version())}; baseline"
-        f" <b>{baseline}</b>; public seeds {seeds}. {_secret(judged)}</p>",
+        f" <b>{baseline}</b>; {_public(judged)}. {_secret(judged)}</p>",
         "<details open><summary>How to read it</summary><p class=small>Ratios are of lifetime means over the"
         " baseline's on the same wind and waves, less is better but for energy (power up to rated). In"
         " brackets: 95 % interval of the score; * significant: the p-value, after Holm's correction over the"
         ' row, is at most 0.05, and the difference <span class="better">✓ better</span> or <span'
         ' class="worse">✗ worse</span>. Ranks: first those within every limit, then those beyond one, then'
-        " those with failed or tripped runs, which count as the worst of all. A heading explains its metric."
-        " Wide tables scroll sideways.</p></details>",
+        " those that lost runs (failed, tripped, or with less than half of the reference's energy); within"
+        " each by the score, in which a lost run counts ten times the reference's figures. A heading explains"
+        " its metric. Wide tables scroll sideways.</p></details>",
         *_explanations(),
+        *_left_out(judged),
     ]
     for regime in board.settings.regime:
         parts.append(f"<h2>{html.escape(regime.name)}</h2>")
@@ -227,6 +242,23 @@ def _page(judged, frame, history):
     listed = "".join(f"<li>{line}</li>" for line in CANNOT)
     parts.append(f"<h2>What this board cannot detect</h2><ul>{listed}</ul></body></html>")
     return "\n".join(parts)
+
+
+def _public(judged):
+    """Words for the public seeds."""
+    if not judged.drawn:
+        seeds = ", ".join(map(str, judged.board.settings.seeds))
+        return f"public seeds {seeds}, which are for development and which a controller may recognise"
+    count = len(judged.board.settings.seeds)
+    return f"{count} public seeds of each suite, drawn from <code>{judged.drawn}</code>"
+
+
+def _left_out(judged):
+    """List of the submissions that were not run, and why."""
+    if not judged.left_out:
+        return []
+    lines = (f"<li><b>{escaped(who)}</b>: {escaped(why)}</li>" for who, why in judged.left_out.items())
+    return [f"<p class=lost>Left out:</p><ul class=small>{''.join(lines)}</ul>"]
 
 
 def _secret(judged):
@@ -285,13 +317,15 @@ def _ranking(rows, judged):
         if np.isfinite(row["score_low"]):
             score += f" <span class=small>[{row['score_low']:.3f}, {row['score_high']:.3f}]</span>"
         shown.append([
-            str(row["rank"]), html.escape(row["name"]), html.escape(row["information"]),
+            _rank_text(row["rank"]), html.escape(row["name"]), html.escape(row["information"]),
             f'<span class="lost">{lost} of {row["runs"]}</span>' if lost else f"0 of {row['runs']}",
             *(ratio_text(row[figure], FIGURES[figure], sure[figure] <= 1.0 - LEVEL) for figure in FIGURES),
-            score, *([_number(row["score_secret"])] if judged.secret else []),
+            score, _number(row["slowest_call_[s]"], 4),
+            *([_number(row["score_secret"])] if judged.secret else []),
         ])  # fmt: skip
-    last = ["score", *(["score, secret seeds"] if judged.secret else [])]
-    first = ["rank", "controller", "is given", "failed or tripped"]
+    calls = f"slowest call, s (limit {judged.board.settings.call_limit:g})"
+    last = ["score", calls, *(["score, secret seeds"] if judged.secret else [])]
+    first = ["rank", "controller", "is given", "lost runs"]
     return _table([*first, *_explained_headings(), *last], shown, (1, 2))
 
 
@@ -323,11 +357,11 @@ def _per_wind(judged, name):
 def _submissions(judged):
     """Table of the cards."""
     rows = []
-    for each in judged.submissions:
+    for each in judged.shown:
         card = each.card
-        name = html.escape(card.name)
+        name = escaped(card.name)
         if card.url.startswith(("https://", "http://")):
-            name = f'<a href="{html.escape(card.url)}" rel="nofollow noreferrer">{name}</a>'
+            name = f'<a href="{escaped(card.url)}" rel="nofollow noreferrer">{name}</a>'
         texts = (
             card.author,
             card.licence,
@@ -336,7 +370,7 @@ def _submissions(judged):
             card.description,
             card.tuning,
         )
-        rows.append([name, *map(html.escape, texts), f"<code>{each.digest}</code>"])
+        rows.append([name, *map(escaped, texts), f"<code>{each.digest[:16]}</code>"])
     headings = ["name", "author", "licence", "kind", "inputs", "description", "tuning", "files"]
     return "<h2>Submissions</h2>" + _table(headings, rows, range(8))
 
@@ -345,10 +379,11 @@ def _history_table(history):
     """Table of the scores over the judgings, newest first."""
     rows = []
     for row in history.sort_values("date", ascending=False, kind="stable").to_dict("records"):
-        words = [row[key] for key in ("date", "suite", "version", "name", "package", "rank")]
+        words = [row[key] for key in ("date", "suite", "version", "name", "package")]
+        words.append(_rank_text(row["rank"]))
         lost = int(row["failed"] + row["tripped"])
         rows.append([*(html.escape(str(word)) for word in words), _number(row["score"]), str(lost)])
-    headings = ["date", "suite", "version", "controller", "judged with", "rank", "score", "failed or tripped"]
+    headings = ["date", "suite", "version", "controller", "judged with", "rank", "score", "lost runs"]
     return (
         "<h2>History</h2><details><summary>all judgings</summary>"
         + _table(headings, rows, (0, 1, 3, 4))

@@ -1,5 +1,4 @@
-"""A submission to a standing board: a folder with a card and, unless it names a built-in controller, its
-code.
+"""A submission to a standing board: a folder with a card and the controller that it names.
 
     my_controller/
         card.toml            who made it, what it is given, under what licence
@@ -9,7 +8,6 @@ A policy file holds arrays and runs no code. A Python file is code: `fowt leader
 --trust-code is given, and then in a process of its own (training.board.isolated).
 """
 
-import hashlib
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,18 +15,23 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator
 
-from fowt_env.control import PRIVILEGED_INPUTS
+from fowt_env.control import EXACT, PRIVILEGED_INPUTS
 from fowt_env.controllers import CONTROLLERS
 from fowt_env.controllers.policy.network_file import read_policy
 from fowt_env.descriptions.files import raise_problems, read_toml
+from fowt_env.descriptions.lidar import lidars
 from fowt_env.descriptions.records import Positive, Record, validate
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.measurement import Measurement
+from fowt_env.training.board.files import digest_of
+from fowt_env.training.evaluation.faults import PARKED
 
 CARD = "card.toml"
 BUILT_IN, POLICY_FILE, PYTHON_FILE = "built-in", "policy file", "Python file"
 NAME = re.compile(r"[a-z0-9][a-z0-9_-]{0,49}")
-LARGEST_FOLDER = 50e6  # bytes
+RESERVED = (PARKED,)  # of turbines without a controller
+MOST_TIMES, FURTHEST = 100, 60.0  # preview_times, and s ahead: a judge keeps a series for each of them
+LONGEST_TEXT = 2000  # characters of each text of a card
 INPUTS = (*Measurement._fields, *PRIVILEGED_INPUTS)
 
 
@@ -45,7 +48,7 @@ class Card(Record):
     information    what the controller is given: fields of Measurement and PRIVILEGED_INPUTS; read from the
                    controller itself where it is a built-in one or a policy file
     preview_times  s ahead at which it is given the wind, rising; with "wind_preview" in information
-    preview        "exact", or the lidar preset through which it sees the wind ahead
+    preview        "exact", or the lidar preset (fowt list lidars) through which it sees the wind ahead
     tuning         what was tuned or trained, on which seeds, with which budget
     """
 
@@ -55,7 +58,7 @@ class Card(Record):
     controller: str
     information: Annotated[tuple[str, ...], BeforeValidator(_tuple)] | None = None
     preview_times: Annotated[tuple[Positive, ...], BeforeValidator(_tuple)] = ()
-    preview: str = "exact"
+    preview: str = EXACT
     description: str = ""
     tuning: str = ""
     url: str = ""
@@ -68,17 +71,18 @@ class Submission:
     card: Card
     folder: Path
     kind: str  # BUILT_IN, POLICY_FILE or PYTHON_FILE
-    digest: str  # of all its files
+    digest: str  # SHA-256 of all its files
 
     @property
     def name(self) -> str:
         """What the board calls it."""
         return self.card.name
 
-    def controller(self, time_limits: Any) -> Any:
+    def controller(self, limits: Any, **options: Any) -> Any:
         """What evaluate is given: a name, or a factory of controllers in a process of their own.
 
-        time_limits: training.board.isolated.TimeLimits of a Python file.
+        limits: training.board.isolated.ProcessLimits of a Python file; options: further fields of its
+        IsolatedFactory.
         """
         if self.kind == BUILT_IN:
             return self.card.controller
@@ -89,8 +93,13 @@ class Submission:
         file, _, attribute = self.card.controller.partition(":")
         return IsolatedFactory(
             str(self.folder.absolute()), file, attribute, self.name, tuple(self.card.information or ()),
-            self.card.preview_times, time_limits,
+            self.card.preview_times, limits, self.digest, **options,
         )  # fmt: skip
+
+
+def alike(name: str) -> str:
+    """A name with what readers confuse made one: names of a board differ in it."""
+    return name.replace("-", "_")
 
 
 def read_submission(folder: Path | str) -> Submission:
@@ -112,13 +121,20 @@ def read_submission(folder: Path | str) -> Submission:
             f"name = {card.name!r}: must be 1 to 50 lower-case letters, digits, '_' or '-', a letter or"
             f" digit first"
         )
+    if card.name in RESERVED:
+        problems.append(f"name = {card.name!r}: is reserved")
     for key in ("author", "licence"):
         if not getattr(card, key).strip():
             problems.append(f"{key} = '': must not be empty")
+    for key in ("author", "licence", "controller", "description", "tuning", "url"):
+        if len(getattr(card, key)) > LONGEST_TEXT:
+            problems.append(f"{key}: has more than {LONGEST_TEXT} characters")
+    if card.preview not in (EXACT, *lidars()):
+        problems.append(f"preview: {unknown('preview', card.preview, (EXACT, *lidars()))}")
     kind = _kind(card, folder, problems)
     _check_information(card, kind, problems)
     raise_problems(where, problems)
-    return Submission(card, folder, kind, _digest(folder))
+    return Submission(card, folder, kind, digest_of(folder))
 
 
 def _kind(card, folder, problems):
@@ -164,36 +180,10 @@ def _check_information(card, kind, problems):
     for name in card.information:
         if name not in INPUTS:
             problems.append(f"information: {unknown('input', name, INPUTS)}")
+    times = f"preview_times = [{', '.join(f'{time:g}' for time in card.preview_times[:9])}]"
     if bool(card.preview_times) != ("wind_preview" in card.information):
-        problems.append(
-            f"preview_times = {list(card.preview_times)}: must be given with 'wind_preview' in information,"
-            f" and"
-            " only then"
-        )
+        problems.append(f"{times}: must be given with 'wind_preview' in information, and only then")
     if list(card.preview_times) != sorted(set(card.preview_times)):
-        problems.append(f"preview_times = {list(card.preview_times)}: must rise")
-
-
-def files_of(folder: Path) -> list[Path]:
-    """Sorted files of a submission's folder. Raises: InputError for links and for too large a folder."""
-    found = []
-    for path in sorted(folder.rglob("*")):
-        if path.is_symlink() or not (path.is_file() or path.is_dir()):
-            raise InputError(f"submission {str(folder)!r}: {str(path)!r} is a link or no plain file")
-        if path.is_file() and "__pycache__" not in path.parts:
-            found.append(path)
-    size = sum(path.stat().st_size for path in found)
-    if size > LARGEST_FOLDER:
-        raise InputError(
-            f"submission {str(folder)!r}: {size / 1e6:.0f} MB: at most {LARGEST_FOLDER / 1e6:.0f} MB are"
-            f" allowed"
-        )
-    return found
-
-
-def _digest(folder):
-    """Hash of the names and contents of a submission's files."""
-    digest = hashlib.sha256()
-    for path in files_of(folder):
-        digest.update(str(path.relative_to(folder)).encode() + b"\0" + path.read_bytes() + b"\0")
-    return digest.hexdigest()[:16]
+        problems.append(f"{times}: must rise")
+    if len(card.preview_times) > MOST_TIMES or max(card.preview_times, default=0.0) > FURTHEST:
+        problems.append(f"preview_times: must be at most {MOST_TIMES} times of at most {FURTHEST:g} s")

@@ -1,5 +1,6 @@
 """fowt leaderboard: a standing board of submitted controllers, judged anew by whoever holds it."""
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -55,15 +56,34 @@ def add_command(
         note(f"added {name}; judge it with: fowt leaderboard run --board {board}")
 
 
-RUN_EXAMPLES = """[cyan]fowt leaderboard run --jobs 2[/cyan]  # all submissions on the public seeds
+SEEDS_EXAMPLES = """[cyan]fowt leaderboard seeds seeds.txt[/cyan]  # publish the SHA-256 that it prints, and
+keep the file"""
 
-[cyan]fowt leaderboard run --secret seeds.txt --private private --trust-code[/cyan]  # on the organiser's
-seeds too
 
-Python files run only with [bold]--trust-code[/bold], each in a process of its own, with your user's
-rights: read
-them first, or judge in a container. The same command goes on where it was stopped. Written: index.html,
-board.csv, history.csv and runs/ in the board's folder; runs of secret seeds in the folder --private."""
+@board_app.command(name="seeds", epilog=SEEDS_EXAMPLES)
+@reported
+def seeds_command(
+    path: Annotated[Path, typer.Argument(help="File that is made; only you can read it.")],
+    count: Annotated[int, typer.Option(help="How many seeds.")] = 6,
+):
+    """Draw an organiser's secret seeds, which are too large to be found by trying, with a salt."""
+    from fowt_env.training.board.folder import write_secret_seeds
+
+    digest = write_secret_seeds(path, count)
+    out.print(digest, highlight=False)
+    note(f"wrote {count} seeds to {path}; publish the SHA-256 above, which says nothing of them")
+
+
+RUN_EXAMPLES = """[cyan]fowt leaderboard run --jobs 2[/cyan]  # all submissions on the board's seeds
+
+[cyan]fowt leaderboard run --draw-seeds $COMMIT[/cyan]  # seeds from a commit
+
+[cyan]fowt leaderboard run --secret seeds.txt --private private --trust-code[/cyan]  # secret seeds too
+
+Python files run only with [bold]--trust-code[/bold], each in a process of its own, with your user's rights:
+read them first, or run them in a container with [bold]--within[/bold] (docs/guides/leaderboard.md). The same
+command goes on where it was stopped. Written: index.html, board.csv, history.csv and runs/ in the board's
+folder; runs of secret seeds in the folder --private."""
 
 
 @board_app.command(name="run", epilog=RUN_EXAMPLES)
@@ -71,13 +91,23 @@ board.csv, history.csv and runs/ in the board's folder; runs of secret seeds in 
 def run_command(
     board: BoardOption = Path("board"),
     jobs: Annotated[int, typer.Option(help="Worker processes.")] = 1,
+    draw_seeds: Annotated[
+        str | None,
+        typer.Option(
+            "--draw-seeds", help="Hash from which the public seeds are drawn, in place of the board's."
+        ),
+    ] = None,
     secret: Annotated[
-        Path | None, typer.Option(help="File of the organiser's seeds, one a line, from 1000 on.")
+        Path | None, typer.Option(help="File of fowt leaderboard seeds; - reads standard input.")
     ] = None,
     private: Annotated[Path | None, typer.Option(help="Folder for the runs of the secret seeds.")] = None,
     trust_code: Annotated[
         bool, typer.Option("--trust-code", help="Run submissions that are Python files.")
     ] = False,
+    within: Annotated[
+        str | None,
+        typer.Option(help="Command that starts each Python file, as of a container; {folder}: its folder."),
+    ] = None,
 ):
     """Run every submission on the board's frozen suites and write its page."""
     from fowt_env.training.board.folder import Board
@@ -86,13 +116,16 @@ def run_command(
 
     holder = Board(board)
     output(private, "--private", folder=True)
+    words = shlex.split(within or "")
     with progress_bar("judging", None) as update:
 
         def report(done, total, text):
             update(done, text, total)
 
-        judged = judge(holder, jobs, secret, private, trust_code, report)
+        judged = judge(holder, jobs, secret, private, trust_code, report, draw_seeds, words)
     written = write_board(judged)
+    for name, why in judged.left_out.items():
+        note(f"left out: {name}: {why}")
     note(f"wrote {', '.join(path.name for path in written)} in {board}")
 
 

@@ -1,11 +1,16 @@
 """Submissions and boards: what is refused, and that adding one runs nothing of it."""
 
+import hashlib
+import io
+import stat
+
 import pytest
 
 from fowt_env.controllers.policy.controller import AGENTS
 from fowt_env.errors import InputError
-from fowt_env.training.board.folder import Board, new_board, read_seeds
-from fowt_env.training.board.submission import LARGEST_FOLDER, read_submission
+from fowt_env.training.board.files import LARGEST_FOLDER, digest_of
+from fowt_env.training.board.folder import Board, new_board, read_seeds, write_secret_seeds
+from fowt_env.training.board.submission import read_submission
 
 CARD = {
     "name": "mine",
@@ -14,6 +19,9 @@ CARD = {
     "controller": "mine.py:Mine",
     "information": ["generator_speed"],
 }
+
+
+FAR = {"information": ["wind_preview"]}
 
 
 def write(folder, source="raise SystemExit('was run')", **changes):
@@ -48,6 +56,12 @@ def test_a_sound_card_is_read_and_nothing_is_run(tmp_path):
         ({"information": ["wind_preview"], "preview_times": [2.0, 1.0]}, "must rise"),
         ({"information": ["wind_preview"], "preview_times": [-1.0]}, "preview_times"),
         ({"colour": "red"}, "colour"),
+        ({"name": "parked"}, "name = 'parked': is reserved"),
+        ({"preview": "../../../../escaped"}, "unknown preview '../../../../escaped'"),
+        ({"preview": "nonsense"}, "unknown preview 'nonsense'"),
+        (FAR | {"preview_times": [0.5 * i for i in range(1, 102)]}, "at most 100 times of at most 60 s"),
+        (FAR | {"preview_times": [60.5]}, "at most 100 times of at most 60 s"),
+        ({"description": "x" * 2001}, "description: has more than 2000"),
     ],
 )
 def test_a_wrong_card_is_refused_by_key_and_value(tmp_path, changes, words):
@@ -90,27 +104,70 @@ def test_added_submissions_are_kept_and_never_replaced(tmp_path):
     assert not list((tmp_path / "board" / "submissions").glob(".*"))
 
 
+def test_names_that_readers_take_for_each_other_are_refused(tmp_path):
+    board = new_board(tmp_path / "board")
+    board.add(write(tmp_path / "a", name="one_more"))
+    with pytest.raises(InputError, match="the board has 'one_more', which readers would take for it"):
+        board.add(write(tmp_path / "b", name="one-more"))
+
+
+def test_the_digest_tells_files_apart_whatever_is_in_them(tmp_path):
+    """Two files are not one that holds both, and a moved one is another."""
+    digests = set()
+    for number, files in enumerate(
+        ({"a": "x", "b": "y"}, {"a": "x\0b\0y"}, {"a": "xb1 1 y"}, {"c/a": "x", "b": "y"})
+    ):
+        for name, text in files.items():
+            path = tmp_path / str(number) / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text)
+        digests.add(digest_of(tmp_path / str(number)))
+    assert len(digests) == 4 and all(len(digest) == 64 for digest in digests)
+
+
 def test_a_folder_without_a_board_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"has no board\.toml"):
         Board(tmp_path)
 
 
+SALT = "salt " + "0f" * 32
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", "whole numbers"),
-        ("1001 x", "whole numbers"),
-        ("1001\n1001", "twice"),
-        ("5", "is a published one"),
+        ("", "must begin with a line of 'salt'"),
+        (f"{2**61}\n", "must begin with a line of 'salt'"),
+        ("salt 0123456789abcdef\n", "must begin with a line of 'salt'"),
+        (f"{SALT}\n", "whole numbers"),
+        (f"{SALT}\n{2**61} x", "whole numbers"),
+        (f"{SALT}\n{2**61}\n{2**61}", "twice"),
+        (f"{SALT}\n{2**61}\n{2**40 - 1}", "must be from 2..40"),
+        (f"{SALT}\n{2**63}", "must be from 2..40"),
     ],
 )
-def test_secret_seeds_are_checked(tmp_path, text, words):
+def test_secret_seeds_that_could_be_found_are_refused(tmp_path, text, words):
     path = tmp_path / "seeds.txt"
     path.write_text(text)
     with pytest.raises(InputError, match=words):
         read_seeds(path)
-    path.write_text("1001\n1002\n")
-    assert read_seeds(path) == (1001, 1002)
+
+
+def test_a_file_of_secret_seeds_is_new_private_and_salted(tmp_path, monkeypatch):
+    one, other = tmp_path / "seeds.txt", tmp_path / "other.txt"
+    digest = write_secret_seeds(one, 6)
+    seeds, again = read_seeds(one)
+    assert digest == again == hashlib.sha256(one.read_bytes()).hexdigest()
+    assert len(seeds) == 6 and min(seeds) >= 2**62 and max(seeds) < 2**63
+    assert stat.S_IMODE(one.stat().st_mode) == 0o600
+    other.write_text("\n".join(["salt " + "ab" * 32, *map(str, seeds)]))
+    assert read_seeds(other)[0] == seeds and read_seeds(other)[1] != digest
+    with pytest.raises(InputError, match="cannot be written: File exists"):
+        write_secret_seeds(one, 6)
+    with pytest.raises(InputError, match="no such file"):
+        read_seeds(tmp_path / "none.txt")
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(one.read_bytes())))
+    assert read_seeds("-") == (seeds, digest)
 
 
 def test_a_policy_file_tells_its_inputs_itself(tmp_path):

@@ -1,0 +1,106 @@
+"""Runs one command under limits and ends whatever it leaves behind.
+
+    python supervisor.py PARENT FOLDER LIMITS COMMAND...
+
+Of the standard library alone, so that it starts in some 20 ms and holds nothing that is worth reading.
+Processes whose own parent has ended become children of this one, so that none gets away by leaving its
+session. Where PARENT, a process id, has ended too, FOLDER is removed. LIMITS: {name of resource: value} as
+JSON.
+"""
+
+import ctypes
+import json
+import os
+import resource
+import shutil
+import signal
+import sys
+from contextlib import suppress
+
+PDEATHSIG, DUMPABLE, SUBREAPER = 1, 4, 36  # of prctl, which only Linux has
+
+
+def prctl(option: int, value: int) -> None:
+    """Set an attribute of this process where the system has such a thing."""
+    with suppress(AttributeError, OSError):
+        ctypes.CDLL(None).prctl(option, value, 0, 0, 0)
+
+
+def children() -> list[int]:
+    """Process ids of the children of this process; [] without /proc."""
+    found, me = [], os.getpid()
+    with suppress(OSError):
+        for name in filter(str.isdigit, os.listdir("/proc")):
+            with suppress(OSError, ValueError), open(f"/proc/{name}/stat", "rb") as file:
+                if int(file.read().rpartition(b")")[2].split()[1]) == me:
+                    found.append(int(name))
+    return found
+
+
+def tasks() -> int:
+    """How many threads of this user run."""
+    count = 0
+    with suppress(OSError):
+        for name in filter(str.isdigit, os.listdir("/proc")):
+            with suppress(OSError):
+                if os.stat(f"/proc/{name}").st_uid == os.getuid():
+                    count += len(os.listdir(f"/proc/{name}/task"))
+    return count
+
+
+def limit(limits: dict[str, int]) -> None:
+    """Set {name of resource: value}; NPROC, which counts all that the user runs, beyond what runs already."""
+    for name, value in limits.items():
+        number = getattr(resource, f"RLIMIT_{name}", None)
+        if number is not None:
+            value += tasks() if name == "NPROC" else 0
+            most = resource.getrlimit(number)[1]
+            value = value if most == resource.RLIM_INFINITY else min(value, most)
+            with suppress(ValueError, OSError):
+                resource.setrlimit(number, (value, value))
+
+
+def supervise(parent: int, folder: str, limits: dict[str, int], command: list[str]) -> None:
+    """Run the command until it, this process or the parent is to end; then end all that is left of it."""
+    prctl(SUBREAPER, 1)
+    prctl(PDEATHSIG, signal.SIGTERM)
+    first = 0
+
+    def end(*_):
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        while True:
+            with suppress(OSError):
+                os.killpg(first, signal.SIGKILL)
+            for child in children():
+                with suppress(OSError):
+                    os.kill(child, signal.SIGKILL)
+            try:
+                os.wait()  # children of what ends here come to this process, and are ended in the next round
+            except ChildProcessError:
+                break
+        if os.getppid() != parent:
+            shutil.rmtree(folder, ignore_errors=True)
+        os._exit(0)
+
+    first = os.fork()
+    if first == 0:
+        try:
+            os.setsid()
+            prctl(PDEATHSIG, signal.SIGKILL)
+            limit(limits)
+            os.execvp(command[0], command)
+        finally:
+            os._exit(127)
+    signal.signal(signal.SIGTERM, end)
+    nothing = os.open(os.devnull, os.O_RDWR)
+    os.dup2(nothing, 0)  # so that the other end hears when the command closes its own
+    os.dup2(nothing, 1)
+    if os.getppid() != parent:
+        end()
+    while os.wait()[0] != first:
+        pass
+    end()
+
+
+if __name__ == "__main__":
+    supervise(int(sys.argv[1]), sys.argv[2], json.loads(sys.argv[3]), sys.argv[4:])
