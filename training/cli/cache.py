@@ -15,7 +15,7 @@ cache = typer.Typer(
 app.add_typer(cache, name="cache")
 CLEAR_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt cache clear[/cyan]  compiled kernels of other versions
+[cyan]fowt cache clear[/cyan]  compiled kernels of other versions, and those of a leaderboard's submissions
 
 [cyan]fowt cache clear --all[/cyan]  this version's too: the next run compiles them again
 
@@ -45,10 +45,10 @@ def clear(
     wind_boxes: Annotated[bool, typer.Option("--wind-boxes", help="Full-field wind too.")] = False,
     yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")] = False,
 ):
-    """Remove compiled kernels of other versions; what this package did not make stays."""
+    """Remove compiled kernels of other versions and of submissions; what this package did not make stays."""
     from fowt_env.training.cli import health
 
-    wanted = ["other versions", *["this version"] * every, *["wind boxes"] * wind_boxes]
+    wanted = ["other versions", "submissions", *["this version"] * every, *["wind boxes"] * wind_boxes]
     parts = [part for part in health.cache_parts() if part.what in wanted and part.paths]
     if not parts:
         note("nothing to remove")

@@ -39,12 +39,17 @@ def check(
     else:
         rows = [(name, figure(value), unit) for name, value, unit in _figures(found)]
         print_table(out, ("at rest", "value", "unit"), rows, str(platform), left=(0, 2))
-        for fault in found.faults:
-            out.print(f"[yellow]{escape(fault)}[/yellow]", soft_wrap=True, highlight=False)
-        if not found.faults:
-            out.print("[green]everything fits[/green]")
+        print_faults(found.faults)
     if found.faults:
         raise typer.Exit(EXIT_STOPPED)
+
+
+def print_faults(faults):
+    """Print the sentences on what does not fit, or that everything does."""
+    for fault in faults:
+        out.print(f"[yellow]{escape(fault)}[/yellow]", soft_wrap=True, highlight=False)
+    if not faults:
+        out.print("[green]everything fits[/green]")
 
 
 def _figures(found):

@@ -201,21 +201,14 @@ LINE_EVERY = 30.0  # s between two lines of progress where there is no terminal 
 def progress_bar(description, total, every=LINE_EVERY):
     """A bar on stderr that disappears when done; yields update(done, text=None, total=None).
 
-    Without a terminal (a file, a pipe, a batch job) it is a line each `every` seconds. A compilation
-    meanwhile is announced above the bar.
+    Without a terminal (a file, a pipe, a batch job) it is a line each `every` seconds.
     """
-    from fowt_env.plant.compile.announcement import compilation_announced
-
-    def say(text):
-        err.print(f"[yellow]{text}[/yellow]", soft_wrap=True, highlight=False)
-
     if not err.is_terminal:
-        with compilation_announced(say):
-            yield _lines(description, total, every)
+        yield _lines(description, total, every)
         return
     columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TaskProgressColumn())
     bar = Progress(*columns, TimeElapsedColumn(), console=err, transient=True)
-    with bar, compilation_announced(say):
+    with bar:
         task = bar.add_task(description, total=total)
 
         def update(done, text=None, total=None):

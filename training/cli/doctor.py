@@ -117,7 +117,7 @@ def _print_cache(state):
 def _self_test(health):
     """SelfTest, printed."""
     _heading("self-test")
-    result = health.self_test(lambda text: out.print(f"  [yellow]{text}[/yellow]", highlight=False))
+    result = health.self_test()
     for name, expected in health.EXPECTED.items():
         text = f"{name.replace('_', ' '):16} {result.found[name]:12.5f}   expected {expected:12.5f}"
         out.print(f"  {escape(text)}", highlight=False)

@@ -41,6 +41,8 @@ EVALUATE_EXAMPLES = """[bold]Examples[/bold]
 
 [cyan]fowt evaluate --controllers pi,mymodule:Mine --out results/mine --retry-failed[/cyan]  # what failed
 
+[cyan]fowt evaluate --suite above_rated --draw-seeds $COMMIT --out results/drawn[/cyan]  # seeds from a commit
+
 [bold]Files written[/bold]: runs/CONTROLLER/CASE_seedN.parquet, results.csv (a row per run), leaderboard.json
 (means, intervals, paired differences, versions), manifest.json (the settings), summary.csv (means by
 case), pareto.png, metrics.png, boxes.png, timeseries_CASE.png, spectra_CASE.png. The same command
@@ -70,6 +72,13 @@ def evaluate_command(
         str | None,
         typer.Option(
             help="1,2,3 or 1:6:1 (6 included), the same for each controller. Default: the suite's, else 1."
+        ),
+    ] = None,
+    draw_seeds: Annotated[
+        str | None,
+        typer.Option(
+            "--draw-seeds",
+            help="Hash, as of the commit in which entries are fixed, from which the suite's seeds are drawn.",
         ),
     ] = None,
     duration: Annotated[
@@ -107,11 +116,16 @@ def evaluate_command(
     """
     from fowt_env.training.evaluation.engines import WorkersLost
     from fowt_env.training.evaluation.evaluate import evaluate, summary
+    from fowt_env.training.evaluation.seeds import with_drawn_seeds
     from fowt_env.training.reports.terminal import chosen_cases, write_leaderboard
 
     folder = Path(output(out_folder, folder=True))
     chosen = chosen_cases(suite, cases, platform)
     numbers = None if seeds is None else parse_whole_numbers(seeds, "seeds")
+    if draw_seeds is not None:
+        if suite is None or seeds is not None:
+            raise InputError("--draw-seeds: draws the seeds of a --suite, and leaves no choice of --seeds")
+        chosen = with_drawn_seeds(chosen, draw_seeds)
     if baseline is not None and baseline not in (names := [name.strip() for name in controllers.split(",")]):
         raise unknown("baseline among --controllers", baseline, names)
     finished = 0
@@ -150,6 +164,8 @@ def evaluate_command(
     write_table(means, folder / "summary.csv")
     _print_evaluation(table, means, board)
     plots = _evaluation_plots(table, board, folder) if plot else []
+    if draw_seeds is not None:
+        note(f"seeds drawn from {chosen.drawn['hash']}: {chosen.drawn['rule']}")
     note(f"wrote results.csv, leaderboard.json, summary.csv, runs/ and {len(plots)} plots in {folder}")
 
 
@@ -167,7 +183,7 @@ def _print_conditions(folder, suite):
 
 
 def _print_evaluation(table, means, board):
-    """Print metrics by case and the leaderboard, and on stderr what failed, tripped or has no valid score."""
+    """Print metrics by case and the leaderboard, and on stderr lost runs and what has no valid score."""
     from fowt_env.training.reports.terminal import leaderboard_rows, summary_rows
 
     width = table_width(out) or float("inf")
@@ -175,18 +191,14 @@ def _print_evaluation(table, means, board):
     print_table(out, headings, rows, keys=2, left=(0, 1), red=_places(failures))
     out.print()
     title, headings, rows, remarks = leaderboard_rows(board, width)
-    print_table(
-        out, headings, rows, title, red=_places(e["failed"] + e["tripped"] for e in board["controllers"])
-    )
+    print_table(out, headings, rows, title, red=_places(entry["lost"] for entry in board["controllers"]))
     for remark in remarks:
         out.print(remark, markup=False, highlight=False, soft_wrap=True)
     for row in table[table["status"] != "ok"].to_dict("records"):
         run = f"{row['controller']}, {row['case']}, seed {row['seed']}"
-        err.print(
-            f"[red]{row['status']}: {escape(run)}: {escape(row['reason'])}[/red]",
-            soft_wrap=True,
-            highlight=False,
-        )
+        reason = row["reason"].removeprefix(f"{row['status']}: ")
+        text = f"[red]{row['status']}: {escape(run)}: {escape(reason)}[/red]"
+        err.print(text, soft_wrap=True, highlight=False)
     eventful = table[table["events"] != ""]
     if len(eventful):
         note(f"{len(eventful)} of {len(table)} runs had rare numerical events: column events of results.csv")

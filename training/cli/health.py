@@ -14,10 +14,10 @@ from typing import NamedTuple
 import numba
 
 from fowt_env.folders import cache_root, distrust
-from fowt_env.plant.compile.announcement import compilation_announced, kernels_compiled
-from fowt_env.plant.compile.decorators import CACHE_FOLDER, own_folders
+from fowt_env.plant.compile.decorators import CACHE_FOLDER, kernels_compiled, own_folders
 
 BOX_NAME = re.compile(r"[0-9a-f]{24}\.npz")  # of a box of wind (training/evaluation/wind_boxes.py)
+SUBMISSION_NAME = re.compile(r"[0-9a-f]{24}")  # of a submission's kernels (training/board/isolated.py)
 TEST_DURATION = 60.0  # s
 # Last row of reference_run(). They guard an installation, not the physics (tests do that): a part that is
 # compiled wrongly or a data file that is not the shipped one moves them far beyond the tolerance.
@@ -85,7 +85,7 @@ def cache_state():
 class CachePart(NamedTuple):
     """Something that is kept on disk and can be made again."""
 
-    what: str  # "this version", "other versions" (of compiled kernels) or "wind boxes"
+    what: str  # "this version", "other versions" (of compiled kernels), "wind boxes" or "submissions"
     paths: list[Path]  # folders, or files of wind
     megabytes: float
 
@@ -95,13 +95,18 @@ def cache_parts() -> list[CachePart]:
     root = cache_root()
     if root is None:
         return []
-    kernels, boxes = root / "kernels", root / "wind_boxes"
+    kernels, boxes, submissions = root / "kernels", root / "wind_boxes", root / "submissions"
     folders = own_folders(kernels) if _ours(kernels) else []
     files = [path for path in boxes.glob("*.npz") if BOX_NAME.fullmatch(path.name)] if _ours(boxes) else []
     found = {
         "this version": [path for path in folders if path == CACHE_FOLDER],
         "other versions": [path for path in folders if path != CACHE_FOLDER],
         "wind boxes": [path for path in files if path.is_file() and not path.is_symlink()],
+        "submissions": [
+            path
+            for path in (submissions.iterdir() if _ours(submissions) else ())
+            if SUBMISSION_NAME.fullmatch(path.name) and path.is_dir() and not path.is_symlink()
+        ],
     }
     return [CachePart(what, paths, sum(map(_bytes, paths)) / 1e6) for what, paths in found.items()]
 
@@ -143,10 +148,9 @@ def reference_run():
     return simulate(scene, "pi", duration=TEST_DURATION, start="zero")
 
 
-def self_test(say=None):
-    """SelfTest of reference_run; say(text) is called if kernels have to be compiled for it."""
-    with compilation_announced(say):
-        reference_run()  # compiles what is not compiled
+def self_test():
+    """Return the SelfTest of reference_run, timed once its kernels are compiled."""
+    reference_run()
     start = perf_counter()
     last = reference_run().iloc[-1]
     seconds = perf_counter() - start

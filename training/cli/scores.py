@@ -78,7 +78,7 @@ BASELINES_EXAMPLES = """[bold]Examples[/bold]
 
 Each figure: ratio of lifetime means on the same runs, its 95 % interval, and its verdict against the targets:
 missed, first, then (or met), with * where that is no chance finding (p at most 0.05 after Holm's correction
-for all targets). Failed and tripped runs count with the worst figures of all controllers on their case."""
+for all targets). A lost run counts ten times the baseline's figures in the same case and seed."""
 
 
 @scores.command(name="baselines", epilog=BASELINES_EXAMPLES)

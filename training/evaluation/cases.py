@@ -5,7 +5,6 @@ A suite is a TOML file of the folder suites, or the user's own. One `[[case]]` m
 in its wind and picks the row of its sea's table.
 """
 
-import functools
 from collections import Counter
 from dataclasses import dataclass, field, replace
 from math import exp
@@ -14,6 +13,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
+from fowt_env.caches import cached
 from fowt_env.descriptions.checks import is_number, plain_number, short
 from fowt_env.descriptions.faults import Fault
 from fowt_env.descriptions.files import locate, raise_problems, read_toml
@@ -187,7 +187,10 @@ class ScoreTerm(Record):
 
 
 class Score(Record):
-    """A number per controller: the weighted mean of metric/baseline, over relative power; less is better."""
+    """A number per controller: the weighted mean of metric/baseline, over relative power; less is better.
+
+    baseline: the controller whose runs without protection are the reference.
+    """
 
     baseline: str
     term: tuple[ScoreTerm, ...]
@@ -198,7 +201,8 @@ class Limits(Record):
     """What a controller must not exceed; beyond one it ranks below those within all of them.
 
     run: {metric: greatest value in any run}. lifetime: {metric: greatest mean over the lifetime}. relative:
-    {metric: greatest ratio of its mean over the lifetime to that of `baseline` on the same runs}.
+    {metric: greatest ratio of its mean over the lifetime to that of the reference on the same runs}.
+    baseline: the controller whose runs without protection are the reference, as the score's.
     """
 
     run: dict[str, NonNegative] = {}
@@ -250,6 +254,14 @@ class Suite:
     site: Site | None = None
     limits: Limits = Limits()
     weights: dict = field(default_factory=dict)  # {case: share of the lifetime}; {}: every case alike
+    drawn: dict | None = None  # the hash that its seeds come from, and how (seeds.py); None: they are listed
+
+    @property
+    def reference(self):
+        """Name of the controller whose runs its score and relative limits are over; None: it has none."""
+        if self.score is not None:
+            return self.score.baseline
+        return self.limits.baseline if self.limits.relative else None
 
 
 def lifetime_weights(cases, site):
@@ -300,7 +312,7 @@ def read_suite(name_or_path, platform=None):
     return _read(path, platform)
 
 
-@functools.cache
+@cached(64)
 def _built_in(name, platform):
     return _read(FOLDER / f"{name}.toml", platform)
 
@@ -325,6 +337,9 @@ def _read(path, platform=None):
     if not file.case:
         problems.append("case is missing: at least one [[case]] is needed")
     problems += _metric_problems(file)
+    if file.score is not None and file.limits.relative and file.limits.baseline != file.score.baseline:
+        own, other = file.limits.baseline, file.score.baseline
+        problems.append(f"limits.baseline = {own!r}: must be that of the score, {other!r}")
     for case in cases:
         duration, skip = case.duration or file.duration, file.skip if case.skip is None else case.skip
         if not duration > skip:

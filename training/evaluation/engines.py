@@ -18,7 +18,7 @@ from multiprocessing import connection
 
 from fowt_env.descriptions.checks import check_whole_number
 from fowt_env.errors import InputError, unknown
-from fowt_env.plant.compile.announcement import kernels_compiled
+from fowt_env.plant.compile.decorators import kernels_compiled
 from fowt_env.training.evaluation.guard import (
     GRACE,
     LIMIT_CODE,

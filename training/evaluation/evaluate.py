@@ -11,6 +11,7 @@ is a row with its reason, and the others go on. With jobs > 1 a script needs the
 import csv
 import io
 import socket
+import warnings
 from contextlib import closing
 from dataclasses import replace
 from functools import partial
@@ -22,12 +23,12 @@ import pyarrow.parquet as pq
 import fowt_env
 from fowt_env.controllers import make
 from fowt_env.descriptions.checks import check_number, check_whole_number, plain_number
-from fowt_env.errors import InputError
+from fowt_env.errors import InputError, PlantWarning, level_outside
 from fowt_env.files.atomic import replacing
 from fowt_env.files.tables import write_table
 from fowt_env.training.evaluation.cases import Case, Suite, check_sensors, described, named_cases
 from fowt_env.training.evaluation.engines import outcomes
-from fowt_env.training.evaluation.failures import failures_as_worst
+from fowt_env.training.evaluation.failures import KINDS, known_figures, lost_counts, with_lost_power
 from fowt_env.training.evaluation.faults import PARKED
 from fowt_env.training.evaluation.guard import attempt
 from fowt_env.training.evaluation.metrics import METRICS, metrics
@@ -37,9 +38,8 @@ from fowt_env.training.evaluation.results_table import KEY
 from fowt_env.training.evaluation.run_case import (
     COLUMNS,
     CONTROL_DT,
-    OK,
+    REFERENCE,
     SHORTEST_CASE_WEATHER,
-    TRIPPED,
     Run,
     lost_row,
     scored,
@@ -71,6 +71,7 @@ def evaluate(
     time_limit=TIME_LIMIT,
     sensors=None,
     retry_failed=False,
+    reference=True,
     **options,
 ):
     """DataFrame with one row per controller, case and seed, and the columns COLUMNS.
@@ -91,12 +92,18 @@ def evaluate(
                   main thread alone, and not by C code that never returns; with more, the worker is ended
     sensors       name of the sensor chain of all cases, "exact" for none; None: each case's own
     retry_failed  whether failed runs of a results folder are done again, also with changed code
+    reference     whose runs are the reference of scores and limits: the name of a controller, True for that
+                  of the Suite (none without a score or relative limits), False for none. They are done as
+                  rows of the name "reference", without trip and protection, so that they have figures
     options       further options of simulate: dt, control_dt, output_dt, start, preview
     A run that the protection ended (the case's trip) has status "tripped", the reason, and metrics of what it
-    was. Failed runs have status "failed", the reason, and NaN metrics; so have those of a controller that
-    cannot be prepared, as where its library is missing, that calls sys.exit, or whose worker process dies
-    three times. Column events: rare numerical events of the run and how often each came. A parked turbine has
-    no controller: such a case is run once, under the name "parked".
+    was; one with less than half of the energy of the reference "lost power" (failures.with_lost_power).
+    Failed runs have status "failed", the reason, and NaN metrics; so have those of a controller that cannot
+    be prepared, as where its library is missing, that calls sys.exit, or whose worker process dies three
+    times.
+    Column events: rare numerical events of the run and how often each came; warning: of commands that can
+    hardly be in N m and rad, which is also given (PlantWarning) once per controller. A parked turbine has no
+    controller: such a case is run once, under the name "parked".
     Raises: InputError for settings that no run could use.
     """
     if folder is not None:
@@ -105,6 +112,10 @@ def evaluate(
         runs_folder = Path(folder) / "runs"
     controllers = _labelled(controllers)
     suite = cases if isinstance(cases, Suite) else None
+    if reference is True:
+        reference = suite.reference if suite is not None else None
+    if reference:
+        controllers = {REFERENCE: reference, **controllers}  # first, so that an interrupted one has it
     given = (duration, skip, seeds, runs_folder, time_limit)
     runs = _plan(controllers, _sensed(_case_list(cases), sensors), suite, *given, options)
     _check_controllers(controllers, runs)
@@ -113,13 +124,24 @@ def evaluate(
         with open_results(folder, _settings(controllers, runs, suite, options), COLUMNS, again) as results:
             pending = [run for run in runs if run.key not in results.rows]
             _go(pending, len(runs), jobs, progress, engine, address, results.add)
-            return results.table()
+            table = results.table()
+        _warn(table, controllers)
+        return table
     with _RowFile(out) as row_file:
         rows = _go(runs, len(runs), jobs, progress, engine, address, row_file.append)
     table = pd.DataFrame([rows[run.key] for run in runs], columns=list(COLUMNS))
+    table = with_lost_power(table, {run.case.name for run in runs if run.case.fault is not None})
+    _warn(table, controllers)
     if out is not None:
         write_table(table, out)
     return table
+
+
+def _warn(table, controllers):
+    """Warn (PlantWarning) once of each of the controllers whose runs were warned of."""
+    warned = table[(table["warning"] != "") & table["controller"].isin(list(controllers))]
+    for text in warned.groupby("controller", sort=False)["warning"].first():
+        warnings.warn(text, PlantWarning, stacklevel=level_outside())
 
 
 def planned(
@@ -167,8 +189,9 @@ def _labelled(controllers):
         controllers = labelled
     for label in controllers:
         check_name("controllers: the name", label)
-    if PARKED in controllers:
-        raise InputError(f"controllers: the name {PARKED!r} is that of turbines without one")
+    for taken, what in ((PARKED, "turbines without one"), (REFERENCE, "the suite's reference")):
+        if taken in controllers:
+            raise InputError(f"controllers: the name {taken!r} is that of {what}")
     return controllers
 
 
@@ -275,6 +298,8 @@ def _settings(controllers, runs, suite, options):
             part = getattr(suite, key)
             about[key] = None if part is None else part.model_dump()
         about["weights"] = dict(suite.weights)
+        if suite.drawn is not None:
+            about["drawn"] = dict(suite.drawn)
     return {
         "suite": about,
         "options": options,
@@ -364,28 +389,21 @@ class _RowFile:
 def mean_ratios(table, over, columns):
     """DataFrame by controller: mean over the runs of each column over what controller `over` has in the same.
 
-    NaN where a run of either failed or tripped.
+    NaN where a run of either was lost.
     """
-    ended_well = table["status"] == OK
-    values = (
-        table[list(columns)]
-        .where(ended_well, axis=0)
-        .set_index(pd.MultiIndex.from_frame(table[KEY]))
-        .sort_index()
-    )
+    values = known_figures(table, columns).set_index(KEY)[list(columns)].sort_index()
     base, names = values.loc[over], dict.fromkeys(table["controller"])
     return pd.DataFrame({name: (values.loc[name] / base).mean(skipna=False) for name in names}).T
 
 
 def summary(table):
-    """DataFrame by controller and case: runs, those that failed or tripped, metrics' means over the seeds.
+    """DataFrame by controller and case: runs, lost ones by kind, metrics' means over the seeds.
 
-    A run that failed or tripped has the worst figures of its case (failures.py).
+    Means are over the runs that ended well, NaN where there is none.
     """
-    groups = failures_as_worst(table).groupby(["controller", "case"], sort=False)
-    lost = {
-        "failed": lambda status: int((~status.isin((OK, TRIPPED))).sum()),
-        "tripped": lambda status: int((status == TRIPPED).sum()),
-    }
+    groups = known_figures(table[table["controller"] != REFERENCE]).groupby(
+        ["controller", "case"], sort=False
+    )
+    lost = {name: lambda statuses, name=name: lost_counts(statuses)[name] for name in KINDS}
     counts = groups["status"].agg(runs="size", **lost)
     return counts.join(groups[list(METRICS)].mean()).reset_index()

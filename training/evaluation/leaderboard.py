@@ -19,13 +19,18 @@ from fowt_env.training.evaluation.bootstrap import (
     p_values,
     resample_weights,
 )
-from fowt_env.training.evaluation.failures import failures_as_worst
+from fowt_env.training.evaluation.failures import (
+    BASELINES,
+    PENALTY,
+    known_figures,
+    lost_counts,
+    penalties,
+)
 from fowt_env.training.evaluation.faults import PARKED
 from fowt_env.training.evaluation.metrics import METRICS, mean_exponent, never_negative
 from fowt_env.training.evaluation.results_table import case_shares
-from fowt_env.training.evaluation.run_case import OK, TRIPPED
+from fowt_env.training.evaluation.run_case import OK, REFERENCE, TRIPPED
 
-BASELINES = ("gspi_oc3", "pi")  # the first of these that was evaluated, unless one is named
 POSITIVE = np.array([never_negative(name) for name in METRICS])
 SHOWN = {  # what a notebook shows of a leaderboard: {heading: metric}
     "rotor-speed std (rpm)": "RotSpeed_std_[rpm]",
@@ -40,7 +45,8 @@ METHOD = (
     " loads by their S-N exponents; percentile bootstrap over seeds, each with all its cases, widened for n"
     " seeds by sqrt(n/(n-1)) and by Student's t with n-1 degrees of freedom over the normal; of the logarithm"
     f" where a figure cannot be negative; none below {LEAST_SEEDS} seeds; differences are paired by case and"
-    " seed; a failed or tripped run has the worst figures of all controllers on its case"
+    " seed; runs that failed, tripped or lost power have no figures, and count in a score"
+    f" {PENALTY:g} times the reference's, which is the suite's baseline without protection"
 )
 
 
@@ -59,59 +65,68 @@ def default_baseline(controllers, baseline=None, failed=()):
     return next((name for name in BASELINES if name in able), next(iter(able), None))
 
 
-class _Grid:
-    """Metrics of a table by controller, case and seed; NaN where a run was not made.
+class _Runs:
+    """The runs of a table by controller, case and seed; those of the reference aside.
 
-    Runs that failed or tripped have the worst of their case (failures.py). lost: those of them without a
-    figure, since no controller has one.
+    Everything that is made of a controller comes from its own runs, the reference's and those of whom it is
+    compared with, on its own cases and seeds: whoever else is in the table changes none of it.
     """
 
     def __init__(self, table):
-        self.controllers = list(dict.fromkeys(table["controller"]))
-        self.cases = list(dict.fromkeys(table["case"]))
-        self.seeds = sorted(set(table["seed"]))
-        self.runs = np.zeros((len(self.controllers), len(self.cases), len(self.seeds)), dtype=bool)
-        self.failed, self.tripped = self.runs.copy(), self.runs.copy()
-        self.values = np.full((*self.runs.shape, len(METRICS)), np.nan)
-        self.shares = case_shares(table, self.cases)
-        figures = failures_as_worst(table)[list(METRICS)].to_numpy(dtype=np.float64)
-        places = [
-            {name: number for number, name in enumerate(axis)}
-            for axis in (self.controllers, self.cases, self.seeds)
-        ]
-        for number, key in enumerate(zip(table["controller"], table["case"], table["seed"], strict=True)):
-            at = tuple(place[name] for place, name in zip(places, key, strict=True))
-            status = table["status"].iloc[number]
-            self.runs[at], self.tripped[at] = True, status == TRIPPED
-            self.failed[at] = status not in (OK, TRIPPED)
-            self.values[at] = figures[number]
-        self.lost = (self.failed | self.tripped)[..., None] & ~np.isfinite(self.values)
+        self.table = table.reset_index(drop=True)
+        self.controllers = [name for name in dict.fromkeys(table["controller"]) if name != REFERENCE]
+        self.has_reference = bool((table["controller"] == REFERENCE).any())
+        figures = known_figures(self.table)[list(METRICS)].to_numpy(dtype=np.float64)
+        self.figures = np.vstack([figures, np.full(len(METRICS), np.nan)])  # the last one: of no run
+        keys = zip(table["controller"], table["case"], table["seed"], strict=True)
+        self.places = {key: number for number, key in enumerate(keys)}
 
-    def parts(self, number, base, cases=slice(None)):
-        """_Part of a controller (its number) over some cases, beside another (its number; None: none)."""
-        at = number, cases
-        other = np.full_like(self.values[at], np.nan) if base is None else self.values[base, cases]
-        lost = self.lost[at] | (False if base is None else self.lost[base, cases])
-        return _Part(
-            self.values[at], other, self.runs[at], self.failed[at], self.tripped[at], lost, self.shares[cases]
-        )
+    def part(self, name, base=None):
+        """_Part of a controller, beside another (None: none)."""
+        own = self.table[self.table["controller"] == name]
+        cases, seeds = list(dict.fromkeys(own["case"])), sorted(set(own["seed"]))
+        index = {
+            who: np.array([[self.places.get((who, case, seed), -1) for seed in seeds] for case in cases])
+            for who in (name, base, REFERENCE)
+        }
+        values, other, reference = (self.figures[index[who]] for who in (name, base, REFERENCE))
+        statuses = np.append(self.table["status"].to_numpy(dtype=object), OK)[index[name]]
+        runs = index[name] >= 0
+        if base is None:
+            other = np.full_like(values, np.nan)
+        return _Part(cases, values, other, reference, runs, statuses, case_shares(own, cases))
 
 
 class _Part(NamedTuple):
-    """What is known of a controller over some cases; arrays (cases, seeds[, metrics]), shares (cases,)."""
+    """What is known of a controller over some cases; arrays (cases, seeds[, metrics]), shares (cases,).
 
+    values and base are NaN where a run was lost or not made.
+    """
+
+    cases: list
     values: np.ndarray
     base: np.ndarray
+    reference: np.ndarray
     runs: np.ndarray
-    failed: np.ndarray
-    tripped: np.ndarray
-    lost: np.ndarray
+    statuses: np.ndarray
     shares: np.ndarray
+
+    def case(self, number):
+        """The _Part of one of its cases."""
+        chosen = slice(number, number + 1)
+        parts = (each[chosen] for each in self[:-1])
+        return _Part(*parts, np.ones(1))
+
+    @property
+    def lost(self):
+        """(cases, seeds) whether a run was made and lost."""
+        return self.runs & (self.statuses != OK)
 
     @property
     def nothing(self):
-        """(metrics,) whether a run with a share has failed without a figure: there is then no mean."""
-        return self.lost[self.shares > 0.0].any(axis=(0, 1))
+        """Whether all runs of a case with a share were lost: there is then no mean over the lifetime."""
+        whole = self.runs.any(axis=1) & ~(self.runs & ~self.lost).any(axis=1)
+        return bool((whole & (self.shares > 0.0)).any())
 
 
 def _means(values, weights, shares, chosen=slice(None)):
@@ -122,7 +137,7 @@ def _means(values, weights, shares, chosen=slice(None)):
 def _figures(part, resampled):
     """(estimate, low, high), each (metrics,), of the lifetime means of a _Part."""
     estimate = _means(part.values, np.ones((1, part.values.shape[1])), part.shares)[0]
-    estimate[part.nothing] = np.nan
+    estimate[:] = np.nan if part.nothing else estimate
     seeds = int(np.isfinite(part.values).any(axis=(0, 2)).sum())
     return estimate, *interval(estimate, resampled, seeds, POSITIVE)
 
@@ -130,7 +145,8 @@ def _figures(part, resampled):
 def _differences(part, weights, own_resampled, tested):
     """Arrays (metrics,) of the paired difference of a _Part from its base: estimate, low, ... , p.
 
-    own_resampled: resampled means of all its runs. tested: whether p is among them (NaN: too few seeds).
+    own_resampled: resampled means of all its runs. tested: whether p is among them (NaN: too few seeds, or
+    lost runs: the others are then no fair sample).
     """
     known = np.isfinite(part.values)
     there = known & np.isfinite(part.base)
@@ -150,7 +166,7 @@ def _differences(part, weights, own_resampled, tested):
     pairs = there.sum(axis=(0, 1)).astype(float)
     found = {"estimate": gap, "low": low, "high": high, "percent": percent, "pairs": pairs}
     if tested:
-        enough = seeds >= LEAST_SEEDS
+        enough = seeds >= LEAST_SEEDS and not part.lost.any()
         found["p"] = p_values([(resampled - gap, seeds)] if enough else [], -gap)
     return found
 
@@ -161,7 +177,7 @@ def _seed_range(part):
     values = part.values[used]
     alone = np.eye(values.shape[1])
     means = np.where(np.isfinite(values).all(axis=0), _means(values, alone, part.shares[used]), np.nan)
-    there = np.isfinite(means) & ~part.nothing
+    there = np.isfinite(means) & (not part.nothing)
     ends = np.where(there, means, np.inf).min(axis=0), np.where(there, means, -np.inf).max(axis=0)
     return tuple(np.where(there.any(axis=0), end, np.nan) for end in ends)
 
@@ -189,13 +205,15 @@ class Leaderboard(dict):
                 if percent is not None and np.isfinite(percent) and entry["controller"] != self["baseline"]:
                     cells[-1] += f" ({percent:+.1f} %)"
             score = entry["score"] and entry["score"]["mean"]
-            ended = f"{entry['runs'] - entry['failed'] - entry['tripped']} of {entry['runs']}"
+            ended = f"{entry['runs'] - entry['lost']} of {entry['runs']}"
             shown = "-" if score is None or not np.isfinite(score) else f"{score:.3f}"
-            rows.append((entry["rank"], entry["controller"], ended, *cells, shown))
+            rank = [] if entry["rank"] is None else [entry["rank"]]
+            rows.append((*rank, entry["controller"], ended, *cells, shown))
         title = f"Leaderboard, {len(self['cases'])} case(s), {len(self['seeds'])} seed(s)"
         if self["baseline"] is not None:
             title += f"; differences from {self['baseline']}"
-        return html_table(title, ("rank", "controller", "runs ended well", *SHOWN, "score"), rows)
+        first = ("rank",) if any(entry["rank"] is not None for entry in self["controllers"]) else ()
+        return html_table(title, (*first, "controller", "runs ended well", *SHOWN, "score"), rows)
 
 
 def leaderboard(table, baseline=None, score=None, cases=None, limits=None):
@@ -207,40 +225,47 @@ def leaderboard(table, baseline=None, score=None, cases=None, limits=None):
     cases      names of the cases that count; None: all
     limits     training.evaluation.cases.Limits of a suite, or None
     Means are lifetime means (METHOD); the shares of the cases stand in the table's column weight_[-].
-    Runs that failed or tripped have the worst figures of their case (failures.py).
+    Lost runs (failures.py) have no figures, but count in the score.
     Keys: baseline (None: every controller has failed runs), interval (level, method, resamples,
-    least_seeds), unchecked (metrics whose relative limits need a controller that was not run), cases, shares
-    {case: share}, seeds, controllers: a list of mappings with rank, controller, runs, failed, tripped,
-    metrics {metric: mean, low, high, seed_low, seed_high, worst}, difference {metric: mean, low, high,
-    percent, pairs, p}, beyond (a text for each limit passed), score (mean, low, high, valid, why; None
-    without one), cases {case: runs, failed, tripped, metrics, difference}. seed_low and
-    seed_high are the range over the seeds of the lifetime mean, worst the greatest over all runs; percent the
-    mean difference over the baseline's mean of the same runs, p its two-sided p-value (not case by case).
+    least_seeds), penalty (times the reference's figures that a lost run counts), unchecked (metrics whose
+    relative limits need the runs of a reference), cases, shares {case: share}, seeds, controllers: a list of
+    mappings with rank (None without a score), controller, runs, lost and of these failed, tripped,
+    lost_power, metrics {metric: mean, low, high, seed_low, seed_high, worst}, difference {metric: mean, low,
+    high, percent, pairs, p}, beyond (a text for each limit passed), score (mean, low, high, valid, why; None
+    without one), cases {case: runs, ..., metrics, difference}. seed_low and seed_high are the range over the
+    seeds of the lifetime mean, worst the greatest over all runs; percent the mean difference over the
+    baseline's mean of the same runs, p its two-sided p-value (not case by case, nor of a controller with lost
+    runs).
     The list is in the order of the ranks: those whose runs all ended well and within the limits, those
-    beyond a limit, those with failed or tripped runs; within each by score, else as in the table.
+    beyond a limit, those with lost runs; within each by score, else as in the table.
     Raises: InputError for a baseline that was not evaluated.
     """
     if cases is not None:
         table = table[table["case"].isin(cases)]
-    grid = _Grid(table)
-    lost = [name for name, failed in zip(grid.controllers, grid.failed, strict=True) if failed.any()]
+    runs = _Runs(table)
+    own = table[table["controller"] != REFERENCE]
+    unusable = own[~own["status"].isin((OK, TRIPPED))]
     baseline = default_baseline(
-        [name for name in grid.controllers if name != PARKED] or grid.controllers, baseline, lost
+        [name for name in runs.controllers if name != PARKED] or runs.controllers,
+        baseline,
+        set(unusable["controller"]),
     )
-    weights = resample_weights(max(1, len(grid.seeds)))
-    base = None if baseline is None else grid.controllers.index(baseline)
+    drawn = {}  # weights of resamples, by number of seeds
     entries = []
-    for number, name in enumerate(grid.controllers):
-        entry = {"controller": name, **_entry(grid.parts(number, base), weights, tested=True)}
-        entry["beyond"] = [] if limits is None else _beyond(limits, grid, number)
-        entry["score"] = None if score is None else _score(score, grid, number, weights, entry["beyond"])
-        entry["cases"] = {
-            case: _entry(grid.parts(number, base, slice(i, i + 1))._replace(shares=np.ones(1)), weights)
-            for i, case in enumerate(grid.cases)
-            if grid.runs[number, i].any()
-        }
+    for name in runs.controllers:
+        part = runs.part(name, baseline)
+        count = part.values.shape[1]
+        if count not in drawn:
+            drawn[count] = resample_weights(count)
+        weights = drawn[count]
+        entry = {"controller": name, **_entry(part, weights, tested=True)}
+        entry["beyond"] = [] if limits is None else _beyond(limits, part)
+        entry["score"] = None if score is None else _score(score, part, weights, entry["beyond"])
+        entry["cases"] = {case: _entry(part.case(i), weights) for i, case in enumerate(part.cases)}
         entries.append(entry)
     entries.sort(key=_rank_key)
+    ranked = any(_known_score(entry) for entry in entries)
+    names = list(dict.fromkeys(own["case"]))
     return Leaderboard(
         baseline=baseline,
         interval={
@@ -249,19 +274,25 @@ def leaderboard(table, baseline=None, score=None, cases=None, limits=None):
             "resamples": RESAMPLES,
             "least_seeds": LEAST_SEEDS,
         },
-        unchecked=[] if limits is None or limits.baseline in grid.controllers else list(limits.relative),
-        cases=grid.cases,
-        shares=dict(zip(grid.cases, map(float, grid.shares), strict=True)),
-        seeds=[int(seed) for seed in grid.seeds],
-        controllers=[{"rank": rank} | entry for rank, entry in enumerate(entries, 1)],
+        penalty=PENALTY,
+        unchecked=[] if limits is None or runs.has_reference else list(limits.relative),
+        cases=names,
+        shares=dict(zip(names, map(float, case_shares(own, names)), strict=True)),
+        seeds=sorted({int(seed) for seed in own["seed"]}),
+        controllers=[{"rank": rank if ranked else None} | entry for rank, entry in enumerate(entries, 1)],
     )
+
+
+def _known_score(entry):
+    """Whether an entry has a score."""
+    score = entry["score"]
+    return score is not None and score["mean"] is not None and bool(np.isfinite(score["mean"]))
 
 
 def _rank_key(entry):
     """What entries are ranked by: less is better."""
-    score = entry["score"] and entry["score"]["mean"]
-    known = score is not None and np.isfinite(score)
-    return entry["failed"] + entry["tripped"] > 0, bool(entry["beyond"]), not known, score if known else 0.0
+    known = _known_score(entry)
+    return entry["lost"] > 0, bool(entry["beyond"]), not known, entry["score"]["mean"] if known else 0.0
 
 
 def _entry(part, weights, tested=False):
@@ -273,81 +304,80 @@ def _entry(part, weights, tested=False):
     worst = np.where(np.isfinite(filled), filled, np.nan)
     return {
         "runs": int(part.runs.sum()),
-        "failed": int(part.failed.sum()),
-        "tripped": int(part.tripped.sum()),
+        "lost": int(part.lost.sum()),
+        **lost_counts(part.statuses[part.runs]),
         "metrics": _named(estimate, low, high, seed_low=least, seed_high=greatest, worst=worst),
         "difference": _named(**_differences(part, weights, resampled, tested)),
     }
 
 
-def _beyond(limits, grid, number):
-    """Texts "figure = value, allowed value" of the Limits that a controller passes.
+def _beyond(limits, part):
+    """Texts "figure = value, allowed value" of the Limits passed in runs that were not lost.
 
     A figure that all runs lack is no part of the suite; one that some lack is not within its limit.
     """
     found = []
-    one = np.ones((1, len(grid.seeds)))
-    part = grid.parts(number, None)
+    one = np.ones((1, part.values.shape[1]))
 
     def check(name, value, limit, what=""):
         if not value <= limit:
             found.append(f"{name}{what} = {value:g}, allowed {limit:g}")
 
     for name, limit in limits.run.items():
-        values = part.values[..., METRICS.index(name)][part.runs]
+        values = part.values[..., METRICS.index(name)][part.runs & ~part.lost]
         if values.size:
             check(name, values.max(), limit)
-    means = np.where(part.nothing, np.nan, _means(part.values, one, part.shares)[0])
+    if part.nothing:
+        return found
+    means = _means(part.values, one, part.shares)[0]
     for name, limit in limits.lifetime.items():
         check(name, means[METRICS.index(name)], limit, " over the lifetime")
-    if limits.baseline in grid.controllers:
-        pair = grid.parts(number, grid.controllers.index(limits.baseline))
-        there = np.isfinite(pair.values) & np.isfinite(pair.base)
-        own, base = (
-            _means(np.where(there, v, np.nan), one, pair.shares)[0] for v in (pair.values, pair.base)
-        )
+    there = np.isfinite(part.values) & np.isfinite(part.reference)
+    if there.any():
+        pair = (np.where(there, values, np.nan) for values in (part.values, part.reference))
+        own, base = (_means(values, one, part.shares)[0] for values in pair)
         with np.errstate(all="ignore"):
-            ratios = np.where(pair.nothing, np.nan, own / base)
+            ratios = own / base
         for name, limit in limits.relative.items():
             check(name, ratios[METRICS.index(name)], limit, f" over {limits.baseline}")
     return found
 
 
-def _score(score, grid, number, weights, beyond):
-    """{"mean", "low", "high", "valid", "why"} of a controller by a Score; figures are None with a reason."""
-    nothing = {"mean": None, "low": None, "high": None, "valid": False}
-    if score.baseline not in grid.controllers:
-        return nothing | {"why": f"needs the controller {score.baseline!r} in the evaluation"}
-    place = grid.controllers.index(score.baseline)
-    part = grid.parts(number, place)
-    paired = np.isfinite(part.values) & np.isfinite(part.base)
-    if not paired.any():
-        return nothing | {"why": "no run in common with the baseline"}
-    own, base = (np.where(paired, values, np.nan) for values in (part.values, part.base))
+def _score(score, part, weights, beyond):
+    """{"mean", "low", "high", "valid", "why"} of a controller by a Score; figures are None with a reason.
 
+    A lost run counts the penalties of the reference's figures; so does a figure that a run lacks and the
+    reference has. A case and seed in which the reference has no figure counts for nobody.
+    """
     named = list(dict.fromkeys([term.metric for term in score.term] + ([score.power] if score.power else [])))
     chosen = [METRICS.index(name) for name in named]
+    base = np.where(part.runs[..., None], part.reference[..., chosen], np.nan)
+    own = part.values[..., chosen]
+    directions = [1 if name == score.power else -1 for name in named]
+    own = np.where(np.isfinite(own), own, penalties(base, directions))
+    paired = np.isfinite(own) & np.isfinite(base)
+    if not paired.any():
+        why = f"no run of the reference, which is {score.baseline!r} without protection"
+        return {"mean": None, "low": None, "high": None, "valid": False, "why": why}
+    own, base = (np.where(paired, values, np.nan) for values in (own, base))
+    exponents = EXPONENTS[chosen]
 
     def value(weights):
-        ratios = _means(own, weights, part.shares, chosen) / _means(base, weights, part.shares, chosen)
-        ratio = dict(zip(named, ratios.T, strict=True))
+        means = (lifetime_means(values, weights, part.shares, exponents) for values in (own, base))
+        ratio = dict(zip(named, np.divide(*means).T, strict=True))
         total = sum(term.weight * ratio[term.metric] for term in score.term)
         total = total / sum(term.weight for term in score.term)
         return (total if score.power is None else total / ratio[score.power])[:, None]
 
     with np.errstate(all="ignore"):
-        estimate = value(np.ones((1, len(grid.seeds))))[0]
-        if part.nothing[chosen].any():
-            estimate[:] = np.nan
+        estimate = value(np.ones((1, weights.shape[1])))[0]
         seeds = int(paired.any(axis=(0, 2)).sum())
         positive = all(never_negative(term.metric) for term in score.term)
         low, high = interval(estimate, value(weights), seeds, positive)
     why = [
-        f"{count} {what} run{'' if count == 1 else 's'}{whose}"
-        for at, whose in ((number, ""), (place, f" of {score.baseline!r}"))
-        for what, count in (("failed", grid.failed[at].sum()), ("tripped", grid.tripped[at].sum()))
-        if count and (whose == "" or at != number)
-    ]
-    why += beyond
+        f"{count} run{'' if count == 1 else 's'} {what.replace('_', ' ')}"
+        for what, count in lost_counts(part.statuses[part.runs]).items()
+        if count
+    ] + beyond
     figures = {"mean": float(estimate[0]), "low": float(low[0]), "high": float(high[0])}
     return figures | {"valid": not why, "why": "; ".join(why)}

@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from fowt_env.descriptions.records import validate
 from fowt_env.errors import InputError
+from fowt_env.training.evaluation.failures import KINDS, lost_text
 
 WholeNumber = Annotated[int, Field(ge=0, le=10**9)]
 FiniteNumber = Annotated[float, Field(ge=-1e300, le=1e300)]
@@ -37,8 +38,19 @@ class Figures(_Part):
     runs: WholeNumber
     failed: WholeNumber
     tripped: WholeNumber = 0
+    lost_power: WholeNumber = 0
     metrics: dict[str, Statistic]
     difference: dict[str, Statistic]
+
+    @property
+    def lost(self):
+        """Number of runs that did not end well."""
+        return self.failed + self.tripped + self.lost_power
+
+    @property
+    def lost_text(self):
+        """Text "1 failed, 2 tripped" of these, "" for none."""
+        return lost_text({name: getattr(self, name) for name in KINDS})
 
 
 class LeaderboardEntry(Figures):
@@ -64,6 +76,7 @@ class LeaderboardFile(_Part):
 
     baseline: str | None
     interval: Interval | None = None
+    penalty: FiniteNumber | None = None
     controllers: list[LeaderboardEntry]
 
 

@@ -9,32 +9,32 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import fowt_env
-from fowt_env.training.evaluation.sources import imported_files
+from fowt_env.layout import FOLDERS, PACKAGE, installed_path, module_path
+from fowt_env.training.evaluation.sources import imported_files, in_order
 
 PACKAGES = ("numpy", "numba", "scipy", "pandas", "rainflow", "rosco", "hipersim")
 NO_FIGURES = ("fowt_env", "python", "pandas")  # of the versions: compared otherwise, or shaping no figure
-PACKAGE = Path(fowt_env.__file__).absolute().parent
-CONTROLLERS = PACKAGE / "controllers"
-RUN = PACKAGE / "training" / "evaluation" / "run_case.py"  # what it imports shapes a run
+CONTROLLERS = FOLDERS["controllers"]
+RUN = FOLDERS["training"] / "evaluation" / "run_case.py"  # what it imports shapes a run
 ALWAYS = (CONTROLLERS / "constant.py",)  # of the controllers, what a run without any of them needs
 INSTALLED = {"site-packages", "dist-packages"}
 
 
-def _digest(paths):
-    """Hash of files, by their order and contents."""
-    digest = hashlib.sha256()
+def _digest(paths, key=""):
+    """Hash of files, by their order and contents, and of a key."""
+    digest = hashlib.sha256(key.encode())
     for path in paths:
         digest.update(Path(path).read_bytes())
     return digest.hexdigest()[:16]
 
 
 def plant_files():
-    """Sorted files that shape a run: sources that it imports and data, but for the controllers'."""
+    """Return the files that shape a run, in order: sources that it imports and data, not the controllers'."""
 
     def inside(path):
         return _package_of(path) in ("simulator", "training") or path in ALWAYS
 
-    return sorted([*imported_files([RUN], [PACKAGE.parent], inside), *_data(PACKAGE / "data")])
+    return in_order([*imported_files([RUN], [PACKAGE.parent], inside), *_data(PACKAGE / "data")])
 
 
 def plant_code():
@@ -56,7 +56,8 @@ def controller_code(controller):
 
     A name of CONTROLLERS: its module, what it imports of this project, and the data of the package
     controllers; "design:FILE", "policy:NAME": the file and all controllers; "module:Name", a class or an
-    object: the file that it comes from, and what that imports from its own folder and this project.
+    object: the file that it comes from, and what that imports from its own folder and this project; of an
+    object with a content_key (a text) that too, as where its file only starts another program.
     """
     from fowt_env.controllers import CONTROLLERS
     from fowt_env.controllers.design import saved_files
@@ -67,7 +68,9 @@ def controller_code(controller):
             controller if inspect.isroutine(controller) or inspect.isclass(controller) else type(controller)
         )
         name = f"{kind.__module__}:{kind.__qualname__}"
-        return {"name": name, "code": _digest(_user_files(kind.__module__))}
+        key = getattr(controller, "content_key", "")
+        code = _digest(_user_files(kind.__module__), key if isinstance(key, str) else "")
+        return {"name": name, "code": code}
     if ":" not in controller:
         files = _package_files(CONTROLLERS.get(controller))
     elif controller.startswith(saved_files.DESIGN_PREFIX):
@@ -83,7 +86,7 @@ def _package_files(factory):
     """Files that a factory of the package controllers depends on; those of all controllers for any other."""
     start = getattr(factory, "__module__", None) or ""
     if start.startswith("fowt_env.controllers."):
-        starts = [PACKAGE.parent.joinpath(*start.split(".")).with_suffix(".py")]
+        starts = [module_path(start).with_suffix(".py")]
     else:
         starts = list(CONTROLLERS.rglob("*.py"))
     return [*_with_own(starts, [PACKAGE.parent]), *sorted(_data(CONTROLLERS))]
@@ -135,12 +138,12 @@ def _with_own(files, roots):
             return path in known or _package_of(path) == package and path != registry
 
         files |= set(imported_files(files, roots, inside))
-    return sorted(files)
+    return in_order(files)
 
 
 def _located(path):
-    """A file's one path: within this package as it is imported, whose folders may be links; else resolved."""
-    return path if path.is_relative_to(PACKAGE) else path.resolve()
+    """Return a file's one path: of this package as it is imported, which may be by a link; else resolved."""
+    return path.resolve() if installed_path(path) is None else path
 
 
 def _package_of(path):
@@ -148,9 +151,10 @@ def _package_of(path):
 
     visual draws what was computed: environments import it, and it shapes no run.
     """
-    if not path.is_relative_to(PACKAGE):
+    place = installed_path(path)
+    if place is None:
         return None
-    part = path.relative_to(PACKAGE).parts[0]
+    part = place.relative_to(PACKAGE).parts[0]
     return part if part in ("controllers", "training", "visual") else "simulator"
 
 

@@ -27,11 +27,12 @@ from fowt_env.errors import InputError
 from fowt_env.files.atomic import remove_leftovers, replacing
 from fowt_env.files.tables import write_table
 from fowt_env.training.evaluation import provenance
+from fowt_env.training.evaluation.failures import with_lost_power
 from fowt_env.training.evaluation.guard import printable
 from fowt_env.training.evaluation.locks import locked
 from fowt_env.training.evaluation.run_case import FAILED, STATUSES
 
-FORMAT = 3  # of the folder; raised when files or their meaning change
+FORMAT = 4  # of the folder; raised when files or their meaning change
 MANIFEST = {  # what each key of manifest.json holds, beside its format
     "fowt_env": str, "plant": str, "versions": dict, "created": str, "suite": dict | None, "options": dict,
     "cases": dict, "seeds": list, "controllers": dict,
@@ -40,7 +41,14 @@ ROW_KEY = b"fowt_env.row"
 TABLE_EVERY = 2.0  # s between rewritings of results.csv while runs go on
 PLAIN_NAME = re.compile(r"[a-z0-9_][a-z0-9_.-]{0,99}")  # of a file that no other name's can be taken for
 LONGEST_NAME = 500
-TEXTS = ("controller", "case", "status", "reason", "events")  # of a row; its other columns are numbers
+TEXTS = (
+    "controller",
+    "case",
+    "status",
+    "reason",
+    "events",
+    "warning",
+)  # of a row; its other columns are numbers
 
 
 def run_file(folder, label, case, seed):
@@ -88,7 +96,7 @@ def read_row(path):
         raise InputError(
             f"{str(path)!r} is no run of an evaluation ({error!s:.300}); remove it to run it again"
         ) from None
-    row["reason"] = printable(row["reason"])
+    row |= {name: printable(row[name]) for name in ("reason", "warning")}
     return {key: float("nan") if value is None else value for key, value in row.items()}
 
 
@@ -259,7 +267,9 @@ class ResultsFolder:
         order = sorted(
             self.rows, key=lambda key: (places[0].get(key[1], 1e9), key[2], places[1].get(key[0], 1e9), key)
         )
-        return pd.DataFrame([self.rows[key] for key in order], columns=self.columns)
+        table = pd.DataFrame([self.rows[key] for key in order], columns=self.columns)
+        faulty = {name for name, case in self.manifest["cases"].items() if case.get("fault") is not None}
+        return with_lost_power(table, faulty) if len(table) else table
 
     def write(self):
         """Write results.csv."""
@@ -270,7 +280,9 @@ class ResultsFolder:
 def _short(value):
     """Text of a setting for a message."""
     if isinstance(value, dict) and "name" in value:
-        return f"{value['name']!r} version {value.get('version')}"
+        drawn = value.get("drawn")
+        seeds = f" with seeds drawn from {drawn['hash'][:12]}" if isinstance(drawn, dict) else ""
+        return f"{value['name']!r} version {value.get('version')}{seeds}"
     return str(value)
 
 

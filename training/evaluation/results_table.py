@@ -7,9 +7,10 @@ import pandas as pd
 
 from fowt_env.errors import InputError, unknown
 from fowt_env.training.evaluation.faults import PARKED
+from fowt_env.training.evaluation.run_case import REFERENCE
 
 KEY = ["controller", "case", "seed"]  # what tells runs apart
-WORDS = ["status", "reason", "events"]  # columns of text beside those of KEY
+WORDS = ["status", "reason", "events", "warning"]  # columns of text beside those of KEY
 WEIGHT = "weight_[-]"  # share of a run's case in the lifetime; NaN, or no such column: every case alike
 TABLES = ("results.csv", "metrics.csv")  # of a folder: the first that is there
 
@@ -22,7 +23,7 @@ def read_results(paths, needed=(), cases=None, parked=True):
     cases    names of the cases to keep; None: all
     parked   whether the runs of parked turbines are kept, which have no controller
     A figure that is missing or infinite is NaN; columns of other words are left out. A run that several of
-    the tables hold counts once.
+    the tables hold counts once. The runs of the reference are left out: they are no controller's.
     Raises: InputError for what is no such table, for an unknown case, and where two tables hold the same run
     with other figures.
     """
@@ -35,6 +36,7 @@ def read_results(paths, needed=(), cases=None, parked=True):
     if len(twice):
         name, case, seed = twice.iloc[0][KEY]
         raise InputError(f"results: {name} on {case}, seed {seed}, is there twice with different figures")
+    table = table[table["controller"] != REFERENCE]
     if not parked:
         table = table[table["controller"] != PARKED]
     if cases is not None:

@@ -32,11 +32,13 @@ from fowt_env.training.evaluation.wind_boxes import cached_box
 from fowt_env.weather.wind import GUSTS
 from fowt_env.weather.wind_field import is_field
 
-STATUSES = OK, TRIPPED, FAILED = ("ok", "tripped", "failed")
+STATUSES = OK, TRIPPED, FAILED, LOST_POWER = ("ok", "tripped", "failed", "lost power")
+REFERENCE = "reference"  # in place of a controller's name: the suite's baseline, with nothing that stops it
 CONTROL_DT = 0.1  # s, simulate's own
 SHORTEST_CASE_WEATHER = 700.0  # s of wind and waves: shorter runs see the start of the same realisation
 COLUMNS = (
-    *("controller", "case", "seed", "status", "reason", "events", "stopped_[s]", "scored_[s]", "weight_[-]"),
+    *("controller", "case", "seed", "status", "reason", "events", "warning"),
+    *("stopped_[s]", "scored_[s]", "weight_[-]"),
     *METRICS,
 )
 
@@ -61,6 +63,11 @@ class Run:
         """What tells runs of one evaluation apart."""
         return self.label, self.case.name, self.seed
 
+    @property
+    def protected(self):
+        """Whether trips may stop the turbine: not the reference's, which has to have figures."""
+        return not (self.case.parked or self.label == REFERENCE)
+
 
 def scored(run):
     """(row, time series or None) of one run; one that fails has its reason instead of metrics.
@@ -81,18 +88,19 @@ def scored(run):
         parts = perturbed_parts(case.shift, case.platform)
         scene = fowt_env.build_scene(wind=wind, sea=case.sea, seed=run.seed, **options | parts)
 
-    trip = None if case.parked else case.trip
-    protection = None if case.parked else case.protection
+    trip = case.trip if run.protected else None
+    protection = case.protection if run.protected else None
+    stop = run.label != REFERENCE and case.fault is None and trip is None and protection is None
 
     def work():
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", PlantWarning)  # the row's events say the same
+            warnings.simplefilter("ignore", PlantWarning)  # the row's events and warning say the same
             frame = fowt_env.simulate(
                 scene,
                 controller=run_controller(run, nominal),
                 duration=run.duration,
                 initial=_start(case, scene),
-                stop_overspeed=case.fault is None and trip is None and protection is None,
+                stop_overspeed=stop,
                 grid_loss=0.0 if case.parked else None,
                 trip=trip,
                 protection=protection,
@@ -158,6 +166,7 @@ def _row(run, status, frame):
     """Row of a run without reason and figures."""
     row = dict.fromkeys(COLUMNS, float("nan"))
     row |= {"controller": run.label, "case": run.case.name, "seed": run.seed, "status": status, "reason": ""}
+    row["warning"] = "" if frame is None else frame.attrs.get("doubtful_commands", "")
     counts = {} if frame is None else frame.attrs.get("events", {})
     row["events"] = "; ".join(f"{name} {count}" for name, count in counts.items() if count)
     row["scored_[s]"], row["weight_[-]"] = run.duration - run.skip, run.weight

@@ -4,10 +4,11 @@ import ast
 from pathlib import Path
 
 from fowt_env.caches import cached
+from fowt_env.layout import FOLDERS, PACKAGE, installed_path
 
 
 def imported_files(starts, roots, inside):
-    """Sorted paths of the files `starts` and of the Python files that they import, directly or not.
+    """Return the files `starts` and the Python files that they import, directly or not, in order.
 
     roots    folders that top-level modules lie in; the first that has one counts
     inside   inside(path) -> whether a file belongs to them: others are neither in it nor followed
@@ -24,7 +25,12 @@ def imported_files(starts, roots, inside):
                 left += _module_files(folder, name)
             else:
                 left += next(filter(None, (_module_files(root, name) for root in roots)), [])
-    return sorted(found)
+    return in_order(found)
+
+
+def in_order(paths):
+    """Return files sorted by their paths, those of this package by the paths they have once installed."""
+    return sorted(paths, key=lambda path: installed_path(path) or path)
 
 
 @cached(4096)
@@ -49,6 +55,8 @@ def _module_files(folder, name):
     """Files of a dotted module beneath a folder, those of its packages included, as far as there are any."""
     files = [folder / "__init__.py"] if not name and (folder / "__init__.py").is_file() else []
     for part in filter(None, name.split(".")):
+        if folder == PACKAGE and part in FOLDERS:
+            folder = FOLDERS[part].parent
         package, module = folder / part / "__init__.py", folder / f"{part}.py"
         if package.is_file() or module.is_file():
             files.append(package if package.is_file() else module)

@@ -3,7 +3,8 @@
 import numpy as np
 
 from fowt_env.errors import InputError
-from fowt_env.training.evaluation.failures import failures_as_worst
+from fowt_env.training.evaluation.failures import known_figures, lost_text
+from fowt_env.training.evaluation.run_case import OK
 from fowt_env.visual.style import (
     COLOURS,
     FAINT,
@@ -22,7 +23,7 @@ TITLES = {
     "overspeed_[%]": "greatest rotor speed above rated (%)",
     "GenPwr_capped_mean_[kW]": "power counted up to rated, mean (kW)",
     "GenPwr_std_[kW]": "power, std (kW)",
-    "GenPwr_max_[kW]": "power, greatest (kW)",
+    "GenPwr_max_[kW]": "greatest power (kW)",
     "PtfmPitch_mean_[deg]": "platform pitch, mean (deg)",
     "PtfmPitch_std_[deg]": "platform pitch, std (deg)",
     "PtfmPitch_max_[deg]": "platform pitch, greatest (deg)",
@@ -48,8 +49,7 @@ def metric_title(name):
 def plot_evaluation(table, metrics, path=None, title=None):
     """Figure with one panel per metric: a group of marks for each case, one mark per controller.
 
-    table      the DataFrame of training.evaluation.evaluate.evaluate; failed and tripped runs have the worst
-               figures of their case, and are counted
+    table      the DataFrame of training.evaluation.evaluate.evaluate; lost runs are left out, and counted
     metrics    column names; marks are the mean over the seeds, bars reach from least to greatest
     """
     metrics = [name for name in metrics if name in table.columns]
@@ -61,7 +61,7 @@ def plot_evaluation(table, metrics, path=None, title=None):
     rows = -(-len(metrics) // columns)
     figure = new_figure((12.5 if columns > 1 else 6.5), 1.0 + 1.9 * rows)
     panels = list(figure.subplots(rows, columns, sharex=True, squeeze=False).flat)
-    counted = failures_as_worst(table)
+    known = known_figures(table, metrics)
     step = ROOM / max(len(controllers), 4)
     per_case = 12.0 * 72.0 / columns / max(1, len(cases)) / 4.5  # characters
     turned = max(map(len, cases)) > max(UPRIGHT, per_case)
@@ -69,13 +69,13 @@ def plot_evaluation(table, metrics, path=None, title=None):
         style_axes(axes)
         axes.grid(False, axis="x")
         for index, controller in enumerate(controllers):
-            groups = counted[counted["controller"] == controller].groupby("case")[name]
+            groups = known[known["controller"] == controller].groupby("case")[name]
             mean, low, high = (getattr(groups, what)().reindex(cases) for what in ("mean", "min", "max"))
             offset = step * (index - 0.5 * (len(controllers) - 1))
             axes.errorbar(
                 np.arange(len(cases)) + offset,
                 mean,
-                yerr=np.array([mean - low, high - mean]),
+                yerr=np.maximum([mean - low, high - mean], 0.0),  # a mean of equal figures is rounded
                 color=COLOURS[index % len(COLOURS)],
                 marker=MARKS[index % len(MARKS)],
                 markersize=4,
@@ -94,11 +94,11 @@ def plot_evaluation(table, metrics, path=None, title=None):
         axes.tick_params(axis="x", labelbottom=True, length=0)
     for axes in panels[len(metrics) :]:
         axes.set_visible(False)
-    failed = int((table["status"] != "ok").sum())
+    lost = int((table["status"] != OK).sum())
     texts = short_names(controllers)
     heading = [title] if title else []
-    if failed:
-        heading.append(f"{failed} of {len(table)} runs failed or tripped: the worst of their case")
+    if lost:
+        heading.append(f"{lost} of {len(table)} runs were lost and are left out")
     handles = panels[0].get_legend_handles_labels()[0]
     head(figure, "; ".join(heading), handles, [texts[name] for name in controllers])
     return save_figure(figure, path)
@@ -115,8 +115,9 @@ def plot_pareto(board, path=None, title=None, order=()):
     """Figure of rotor-speed std (x) against platform-pitch std (y) of each controller over the baseline's.
 
     board: mapping of a leaderboard. Bars are the intervals of the paired ratios, from the runs that
-    both finished; with too few seeds there are none. The mark's area is its mean blade-pitch rate. The
-    stepped line joins the controllers that no other betters in both. Without a baseline the axes are rpm
+    both finished; with too few seeds there are none. The mark's area is its mean blade-pitch rate; that of a
+    controller with lost runs is hollow, and of the others. The stepped line joins the controllers without
+    lost runs that no other betters in both. Without a baseline the axes are rpm
     and deg, and the bars the intervals of the means or, with too few seeds for one, lines without ends
     over the range of the seeds. order: controllers as other plots have them, whose colours are then the same.
     """
@@ -136,7 +137,8 @@ def plot_pareto(board, path=None, title=None, order=()):
     points = np.array([point for point, _, _ in places])
     rates = np.array([figures[2]["mean"] for _, figures in kept])
     areas = np.maximum(LARGEST_MARK * rates / max(rates.max(), 1e-9), SMALLEST_MARK)
-    front = _undominated(points)
+    whole = [not entry["lost"] for entry, _ in kept]  # a controller that lost runs betters nobody
+    front = _undominated(points[whole])
     if len(front) > 1:
         axes.step(*front.T, where="post", color=INK, linewidth=0.8, linestyle=":", zorder=1)
     if base is not None:
@@ -152,19 +154,18 @@ def plot_pareto(board, path=None, title=None, order=()):
             style = {"color": colour, "linewidth": 1.0, "capsize": 0 if kind == "seeds" else 2, "zorder": 2}
             axes.errorbar(*point, xerr=bars[0], yerr=bars[1], **style)
             drawn.add(kind)
-        lost = entry["failed"] + entry["tripped"]
-        text = f"{names[entry['controller']]}: {rates[place]:.3f} deg/s, {figures[3]['worst']:.0f} %"
+        text = f"{names[entry['controller']]}: {rates[place]:.3f} deg/s, {figures[3]['mean']:.0f} %"
         marks.append(
             axes.scatter(
                 *point,
                 s=areas[place] * (np.pi / 4.0 if square else 1.0),
                 marker="s" if square else "o",
-                color=colour,
+                facecolor="none" if entry["lost"] else colour,
                 alpha=0.6,
-                edgecolor=INK,
-                linewidth=0.6,
+                edgecolor=colour if entry["lost"] else INK,
+                linewidth=1.2 if entry["lost"] else 0.6,
                 zorder=3,
-                label=text + (f", {lost} failed or tripped" if lost else ""),
+                label=text + (f", {lost_text(entry)}" if entry["lost"] else ""),
             )
         )
     over = "" if base is None else f" over that of {names[board['baseline']]}"
@@ -179,7 +180,7 @@ def plot_pareto(board, path=None, title=None, order=()):
         loc="outside right upper",
         fontsize=8,
         frameon=False,
-        title="mean blade-pitch rate (area of a mark),\ngreatest overspeed",
+        title="mean blade-pitch rate (area of a mark),\noverspeed; hollow: lost runs",
         title_fontsize=8,
         alignment="left",
     )

@@ -22,11 +22,11 @@ from fowt_env.files.atomic import replacing
 from fowt_env.files.tables import read_table
 from fowt_env.training.evaluation.bootstrap import LEAST_SEEDS, LEVEL, lifetime_means
 from fowt_env.training.evaluation.evaluate import run_file
-from fowt_env.training.evaluation.failures import failures_as_worst
+from fowt_env.training.evaluation.failures import known_figures, lost_counts, lost_text
 from fowt_env.training.evaluation.leaderboard_file import check_leaderboard
 from fowt_env.training.evaluation.metrics import better, mean_exponent
 from fowt_env.training.evaluation.results_table import KEY, WEIGHT, WORDS, case_shares, read_results
-from fowt_env.training.evaluation.run_case import OK, TRIPPED
+from fowt_env.training.evaluation.run_case import OK
 from fowt_env.training.reports.metric_words import SHORT, about_metric, short_name
 from fowt_env.training.reports.page_policy import content_policy
 from fowt_env.training.reports.page_words import (
@@ -353,22 +353,27 @@ def _metric_columns(table):
 
 
 def _means(table, metrics, case):
-    """Leaderboard rows from the table alone: lifetime means, failed and tripped runs as the worst."""
+    """Leaderboard rows from the table alone: lifetime means of the runs that ended well."""
     rows = []
-    part = failures_as_worst(table if case == ALL_CASES else table[table["case"] == case], metrics)
+    part = known_figures(table if case == ALL_CASES else table[table["case"] == case], metrics)
     exponents = np.array([mean_exponent(name) for name in metrics])
     for controller, group in part.groupby("controller", sort=False):
         cases = list(dict.fromkeys(group["case"]))
         by_case = (group[metrics] ** exponents).groupby(group["case"]).mean().reindex(cases).to_numpy()
         shares = np.ones(1) if case != ALL_CASES else case_shares(group, cases)
         means = lifetime_means(by_case[:, None] ** (1.0 / exponents), np.ones((1, 1)), shares, exponents)[0]
-        lost = {
-            "failed": int((~group["status"].isin((OK, TRIPPED))).sum()),
-            "tripped": int((group["status"] == TRIPPED).sum()),
-        }
-        values = dict(zip(metrics, _rounded(means), strict=True))
-        rows.append({"controller": controller, "runs": len(group), **lost, "values": values})
+        whole = set(group.loc[group["status"] == OK, "case"]) == set(cases)  # else no lifetime is known
+        values = dict(zip(metrics, _rounded(means if whole else np.full_like(means, np.nan)), strict=True))
+        rows.append(
+            {"controller": controller, "runs": len(group), **_lost(group["status"]), "values": values}
+        )
     return rows
+
+
+def _lost(statuses):
+    """{"lost": how many of some runs were, "lost_text": of which kinds}."""
+    counts = lost_counts(statuses)
+    return {"lost": sum(counts.values()), "lost_text": lost_text(counts)}
 
 
 def _board_rows(board, case):
@@ -389,8 +394,8 @@ def _board_rows(board, case):
             {
                 "controller": entry.controller,
                 "runs": part.runs,
-                "failed": part.failed,
-                "tripped": part.tripped,
+                "lost": part.lost,
+                "lost_text": part.lost_text,
                 "rank": entry.rank,
                 "beyond": entry.beyond,
                 "values": _rounded_items({name: figure.mean for name, figure in figures.items()}),
@@ -442,11 +447,12 @@ def _remark(table, board_file, case):
 
 def _fine_print(board_file):
     """HTML of what stands under the question mark of the leaderboard."""
-    lines = ["Choose a heading to sort by it; it also says what the metric is. Bold: the best of a column."]
+    lines = [
+        "Choose a heading to sort by it; it also says what the metric is. Bold: the best of a column, among"
+        " controllers that lost no run."
+    ]
     if board_file is None:
-        lines.append(
-            "Means over the lifetime; a run that failed or tripped has the worst values of its case."
-        )
+        lines.append("Means over the lifetime, of the runs that ended well.")
         return "".join(f"<p>{line}</p>" for line in lines)
     level = LEVEL if board_file.interval is None else board_file.interval.level
     names = ", ".join(short_name(name) for name in TESTED)

@@ -151,14 +151,15 @@ def _number(value):
 
 
 def lost_runs(table):
-    """[(controller, case, seed, text)] of the runs that failed or tripped, with when and why."""
+    """[(controller, case, seed, text)] of the runs that failed, tripped or lost power, with when and why."""
     lost = []
     for row in table[table["status"] != OK].to_dict("records"):
         at = row.get("stopped_[s]")
         when = f" at {at:.1f} s" if is_number(at) and at == at else ""
         when = "" if when in row["reason"] else when
-        reason = f": {row['reason']}" if row["reason"] else ""
-        lost.append((row["controller"], row["case"], int(row["seed"]), f"{row['status']}{when}{reason}"))
+        text = f"{row['status']}{when}: {row['reason']}" if row["reason"] else f"{row['status']}{when}"
+        text = row["reason"] if row["reason"].startswith(f"{row['status']}:") else text  # no word twice
+        lost.append((row["controller"], row["case"], int(row["seed"]), text))
     return lost
 
 
@@ -168,7 +169,7 @@ def lost_list(lost, runs):
         f"<li><b>{html.escape(who)}</b>, {html.escape(case)}, seed {seed}: {html.escape(text)}</li>"
         for who, case, seed, text in lost
     )
-    summary = f'<summary class="bad">{len(lost)} of {counted(runs, "run")} failed or tripped</summary>'
+    summary = f'<summary class="bad">{len(lost)} of {counted(runs, "run")} lost</summary>'
     return f'<details open>{summary}<ul class="lost" tabindex="0">{items}</ul></details>' if lost else ""
 
 

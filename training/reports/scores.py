@@ -6,8 +6,9 @@
 Each ratio is of one metric of an agent over that of a baseline in the same wind and waves, each of them a
 mean over the lifetime: every case by its share of it (column weight_[-] of the table; without one all
 alike). Several training seeds of one configuration make a group, whose interval resamples training and
-weather seeds (training.evaluation.bootstrap). A run that failed or tripped has the worst figures of all
-controllers on its case (training.evaluation.failures).
+weather seeds (training.evaluation.bootstrap). A lost run of an agent counts PENALTY times the baseline's
+figures in the same case and seed (training.evaluation.failures); where the baseline lost its run there is no
+ratio.
 """
 
 import re
@@ -25,10 +26,9 @@ from fowt_env.files.markdown import markdown_table
 from fowt_env.files.tables import write_table
 from fowt_env.plant.measurement import SENSOR_FIELDS
 from fowt_env.training.evaluation.bootstrap import LEAST_SEEDS, LEVEL, crossed_ratio, holm
-from fowt_env.training.evaluation.failures import failures_as_worst
+from fowt_env.training.evaluation.failures import KINDS, lost_counts, penalised
 from fowt_env.training.evaluation.metrics import METRICS, mean_exponent, never_negative
 from fowt_env.training.evaluation.results_table import KEY, case_shares
-from fowt_env.training.evaluation.run_case import OK, TRIPPED
 
 __all__ = ["COUNTS", "FIGURES", "Figure", "agent_counts", "agent_scores", "by_kind"]
 
@@ -70,7 +70,7 @@ class Figure:
 
         sure: for each of the aims, whether the hypothesis that the ratio equals it is rejected, after
         correction for all those that are tested (agent_scores). "then, first*": the ratio reaches the second
-        aim, and surely the first. "failed" where runs failed or tripped.
+        aim, and surely the first. "failed" where runs were lost.
         """
         if self.first is None or not np.isfinite(ratio):
             return ""
@@ -151,39 +151,34 @@ def agent_scores(table, baselines, groups=None, agents=None, figures=FIGURES):
     baseline, figure, metric, ratio (of the lifetime means, its mean over the training seeds), low, high (NaN
     for too few seeds: training.evaluation.bootstrap.crossed_ratio), p_first, p_then (two-sided p-values of
     the ratio being the aim), holm_first, holm_then (the same, corrected for all aims of all figures over this
-    baseline), pairs (runs with a ratio), runs, failed, tripped, training_seeds, verdict (Figure.verdict, sure
-    where a corrected p-value is at most 1 - LEVEL). Where the baseline's figure is 0 there is no ratio.
+    baseline), pairs (runs with a ratio), runs, failed, tripped, lost_power, training_seeds, verdict
+    (Figure.verdict, sure where a corrected p-value is at most 1 - LEVEL). Where the baseline's figure is 0
+    there is no ratio.
     Raises: InputError for labels that were not run, or where agent and baseline have no run in common.
     """
-    return _scores(failures_as_worst(table), baselines, grouped(table, baselines, groups, agents), figures)
+    return _scores(table, baselines, grouped(table, baselines, groups, agents), figures)
 
 
 def _scores(table, baselines, chosen, figures):
-    """agent_scores of {name: labels}, of a table in which failures count as worst already."""
-    runs = table.set_index(KEY).sort_index()
+    """agent_scores of {name: labels}."""
+    over = {name: penalised(table, name).set_index(KEY).sort_index() for name in baselines}
     cases, seeds = list(dict.fromkeys(table["case"])), sorted(set(table["seed"]))
     shares = case_shares(table, cases)
     rows = []
     for name, labels in chosen.items():
-        made = runs.loc[list(labels)]
-        counts = {"runs": len(made), **_lost(made), "training_seeds": len(labels)}
-        for baseline in baselines:
+        made = table[table["controller"].isin(labels)]
+        counts = {"runs": len(made), **lost_counts(made["status"]), "training_seeds": len(labels)}
+        for baseline, runs in over.items():
             found = [_ratio_row(runs, labels, baseline, cases, seeds, shares, figure) for figure in figures]
             if not any(row["pairs"] for row in found):
                 raise InputError(f"{name} and {baseline}: no run of both has a figure")
             corrected = holm([p for row in found for p in (row["p_first"], row["p_then"])])
             for figure, row, pair in zip(figures, found, corrected.reshape(-1, 2), strict=True):
                 sure = [p <= 1.0 - LEVEL for p in pair]
-                verdict = figure.verdict(row["ratio"], sure, counts["failed"] + counts["tripped"])
+                verdict = figure.verdict(row["ratio"], sure, sum(counts[kind] for kind in KINDS))
                 row |= {"holm_first": pair[0], "holm_then": pair[1], **counts, "verdict": verdict}
                 rows.append({"agent": name, "baseline": baseline} | row)
     return pd.DataFrame(rows)
-
-
-def _lost(runs):
-    """{"failed", "tripped"}: how many of some runs did."""
-    tripped = int((runs["status"] == TRIPPED).sum())
-    return {"failed": int((runs["status"] != OK).sum()) - tripped, "tripped": tripped}
 
 
 def _ratio_row(runs, labels, baseline, cases, seeds, shares, figure):
@@ -202,9 +197,9 @@ def _ratio_row(runs, labels, baseline, cases, seeds, shares, figure):
 def agent_counts(table, baselines, groups=None, agents=None):
     """DataFrame: per agent, group and baseline its runs, those that failed, those past a constraint.
 
-    Columns: agent, inputs (as the function has them), runs, failed, tripped, the names of COUNTS (runs in
-    which it was passed at least once), past any of them, largest overspeed (%), verdict ("met" where nothing
-    failed, tripped or was passed). The figures are the runs' own.
+    Columns: agent, inputs (as the function has them), runs, failed, tripped, lost_power, the names of COUNTS
+    (runs in which it was passed at least once), past any of them, largest overspeed (%), verdict ("met" where
+    no run was lost and nothing passed). The figures are the runs' own.
     """
     return _counts(table, grouped(table, baselines, groups, agents) | {name: (name,) for name in baselines})
 
@@ -215,11 +210,11 @@ def _counts(table, chosen):
     for name, labels in chosen.items():
         here = table[table["controller"].isin(labels)]
         row = {"agent": name, "inputs": "; ".join(dict.fromkeys(map(inputs, labels))), "runs": len(here)}
-        row |= _lost(here)
+        row |= lost_counts(here["status"])
         row |= {text: int((here[metric] > 0).sum()) for text, metric in COUNTS.items()}
         row[PAST_ANY] = int((here[list(COUNTS.values())] > 0).any(axis=1).sum())
         row["largest overspeed (%)"] = float(here["overspeed_[%]"].max())
-        row["verdict"] = "missed" if row["failed"] or row["tripped"] or row[PAST_ANY] else "met"
+        row["verdict"] = "missed" if row[PAST_ANY] or any(row[kind] for kind in KINDS) else "met"
         rows.append(row)
     return pd.DataFrame(rows)
 
@@ -254,13 +249,12 @@ def by_kind(table, baseline, groups=None, agents=None, figures=FIGURES, each=Fal
     there. The correction of the p-values is for the figures of one kind.
     """
     chosen = grouped(table, [baseline], groups, agents)
-    penalised, scores, counts = failures_as_worst(table), [], []
+    scores, counts = [], []
     for kind, here in table.groupby(table["case"] if each else table["case"].map(kind_of), sort=False):
         counts.append(_counts(here, chosen | {baseline: (baseline,)}).assign(kind=kind))
         for name, labels in chosen.items():
             try:
-                part = penalised.loc[here.index]
-                scores.append(_scores(part, [baseline], {name: labels}, figures).assign(kind=kind))
+                scores.append(_scores(here, [baseline], {name: labels}, figures).assign(kind=kind))
             except (InputError, KeyError):  # none was made or nobody has a figure, which the counts say
                 blank = {"agent": name, "baseline": baseline, "kind": kind, "pairs": 0, "verdict": ""}
                 scores.append(pd.DataFrame([blank | {"figure": figure.name} for figure in figures]))
@@ -323,11 +317,12 @@ def kinds_markdown(scores, counts, figures=None):
         wide.columns = [f"`{agent}`" for agent in names]
         parts.append(frame_markdown(wide))
     parts += _remark(scores)
-    columns = counts[["failed", "tripped", PAST_ANY, "runs"]].to_numpy()
-    shown = counts.assign(text=[f"{lost + trips} / {past} of {runs}" for lost, trips, past, runs in columns])
+    lost = counts[list(KINDS)].sum(axis=1)
+    columns = zip(lost, counts[PAST_ANY], counts["runs"], strict=True)
+    shown = counts.assign(text=[f"{missing} / {past} of {runs}" for missing, past, runs in columns])
     agents = list(dict.fromkeys(counts["agent"]))
     wide = shown.pivot(index="kind", columns="agent", values="text").loc[kinds, agents]
-    wide.index.name = "failed or tripped / past a constraint"
+    wide.index.name = "lost / past a constraint"
     wide.columns = [f"`{agent}`" for agent in agents]
     parts.append(frame_markdown(wide))
     return "\n".join(parts)

@@ -9,8 +9,10 @@ from fowt_env.errors import unknown
 from fowt_env.files.tables import read_table
 from fowt_env.training.evaluation.bootstrap import holm
 from fowt_env.training.evaluation.cases import Limits, Score, named_cases, read_suite
+from fowt_env.training.evaluation.failures import KINDS, lost_text
 from fowt_env.training.evaluation.leaderboard import leaderboard
 from fowt_env.training.evaluation.results import file_name, run_file, write_json
+from fowt_env.training.evaluation.run_case import OK, REFERENCE
 from fowt_env.training.evaluation.scaling import turbine_of
 from fowt_env.training.evaluation.seeds import ranges
 from fowt_env.training.reports.evaluation_plots import plot_evaluation, plot_pareto
@@ -24,7 +26,7 @@ PRINTED_METRICS = (
     ("over-\nspeed\nmax\n%", "overspeed_[%]", ".1f"),
     ("power\ncapped\nmean\nkW", "GenPwr_capped_mean_[kW]", ".0f"),
     ("power\n\nstd\nkW", "GenPwr_std_[kW]", ".0f"),
-    ("power\n\nmax\nkW", "GenPwr_max_[kW]", ".0f"),
+    ("great-\nest\npower\nkW", "GenPwr_max_[kW]", ".0f"),
     ("ptfm\npitch\nmean\ndeg", "PtfmPitch_mean_[deg]", ".2f"),
     ("ptfm\npitch\nstd\ndeg", "PtfmPitch_std_[deg]", ".3f"),
     ("ptfm\npitch\nmax\ndeg", "PtfmPitch_max_[deg]", ".2f"),
@@ -51,11 +53,11 @@ DROPPED_FIRST = (
 
 
 def summary_rows(means, width):
-    """(headings, rows of texts, failures per row) of what evaluate.summary gives.
+    """(headings, rows of texts, lost runs per row) of what evaluate.summary gives.
 
     Columns are dropped until headings and values, two spaces between them, take at most `width` characters.
     """
-    lost = list(means["failed"] + means["tripped"])
+    lost = list(means[list(KINDS)].sum(axis=1))
     columns = [
         ("controller", list(means["controller"])),
         ("case", list(means["case"])),
@@ -121,12 +123,10 @@ LEADERBOARD = (
     ("pitch travel\ndeg/s", "blade_pitch_travel_[deg/s]", ".3f", False, True),
     ("torque travel\nkN m/s", "torque_travel_[kN-m/s]", ".3f", False, True),
     ("shaft DEL\nkN m", "RotTorq_DEL_[kN-m]", ".0f", False, True),
-    ("tower DEL\nMN m", "TwrBsMyt_DEL_[kN-m]", ".1f", False, True),
+    ("tower DEL\nkN m", "TwrBsMyt_DEL_[kN-m]", ".0f", False, True),
     ("capped power\nkW", "GenPwr_capped_mean_[kW]", ".0f", False, True),
-    ("power max\nMW", "GenPwr_max_[kW]", ".2f", False, False),
+    ("greatest power\nkW", "GenPwr_max_[kW]", ".0f", False, False),
 )
-LEADERBOARD_SCALES = {"TwrBsMyt_DEL_[kN-m]": 1e-3, "GenPwr_max_[kW]": 1e-3}
-WORST_RUN = ("GenPwr_max_[kW]",)  # of which the table has the greatest of all runs
 # left out one by one where the terminal is narrow; what is spent stays beside the deviations
 LEADERBOARD_DROPS = ("GenPwr_max_[kW]", "TwrBsMyt_DEL_[kN-m]", "GenPwr_capped_mean_[kW]")
 
@@ -199,20 +199,16 @@ def no_interval(board):
 def _remarks(board, intervals):
     """Lines below the leaderboard: on intervals, failed runs and the baseline."""
     lines = [] if intervals else [no_interval(board)]
-    lost = {
-        entry["controller"]: " and ".join(
-            f"{_counted(entry[what], 'run')} {what}" for what in ("failed", "tripped") if entry[what]
-        )
-        for entry in board["controllers"]
-    }
-    lost = {name: text for name, text in lost.items() if text}
+    lost = {entry["controller"]: lost_text(entry) for entry in board["controllers"] if entry["lost"]}
     if lost:
         texts = "; ".join(f"{name}: {text}" for name, text in lost.items())
-        lines.append(f"{texts}: counted with the worst figures of all controllers on that case, ranked last")
+        scored = any(entry["score"] for entry in board["controllers"])
+        counts = f"; a score counts them {board['penalty']:g} times the reference's" if scored else ""
+        lines.append(f"runs lost by {texts}: without figures here{counts}; listed last")
     if board["baseline"] is None and board["controllers"]:
         lines.append("no paired differences: every controller has failed runs")
     if board["baseline"] in lost:
-        lines.append(f"baseline {board['baseline']}: {lost[board['baseline']]}, which flatters the others")
+        lines.append(f"differences from {board['baseline']} are of the runs that it did not lose")
     for entry in board["controllers"]:
         if entry["beyond"]:
             lines.append(f"{entry['controller']} is beyond a limit: {'; '.join(entry['beyond'])}")
@@ -227,9 +223,9 @@ def _counted(count, noun):
 
 
 def _runs_text(entry):
-    """ "6/6" of a controller's runs, with the numbers of those that failed and tripped."""
-    lost = "".join(f", {entry[what]} {what}" for what in ("failed", "tripped") if entry[what])
-    return f"{entry['runs'] - entry['failed'] - entry['tripped']}/{entry['runs']}{lost}"
+    """ "6/6" of a controller's runs, with the numbers of those that were lost."""
+    lost = f", {lost_text(entry)}" if entry["lost"] else ""
+    return f"{entry['runs'] - entry['lost']}/{entry['runs']}{lost}"
 
 
 def _seeds(seeds):
@@ -245,21 +241,18 @@ def _ranges(seeds):
 def _cell(entry, metric, form, with_interval, with_difference, sure):
     """Text of one figure: mean [low, high] difference %, "*" where that is sure."""
     figure, gap = entry["metrics"][metric], entry["difference"][metric]
-    scale = LEADERBOARD_SCALES.get(metric, 1.0)
     if figure["mean"] != figure["mean"]:
         return "-"
-    if metric in WORST_RUN:
-        return format(scale * figure["worst"], form)
-    text = format(scale * figure["mean"], form)
+    text = format(figure["mean"], form)
     if with_interval and figure["low"] == figure["low"]:
-        text += f" [{format(scale * figure['low'], form)}, {format(scale * figure['high'], form)}]"
+        text += f" [{format(figure['low'], form)}, {format(figure['high'], form)}]"
     if with_difference and gap["percent"] == gap["percent"]:
         text += f" {gap['percent']:+.1f}%{'*' if sure else ' '}"
     return text
 
 
 def _score_text(score):
-    """Text of a score; in brackets where a limit is passed."""
+    """Text of a score; in brackets where a limit is passed or a run was lost."""
     if score is None or score["mean"] is None:
         return "-"
     return f"{score['mean']:.3f}" if score["valid"] else f"({score['mean']:.3f})"
@@ -273,7 +266,8 @@ def evaluation_plots(table, board, folder):
     and spectra, of the first seed of each case that succeeded.
     """
     manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
-    good = table[table["status"] == "ok"]
+    table = table[table["controller"] != REFERENCE]
+    good = table[table["status"] == OK]
     if good.empty:
         return []
     paths = [folder / "pareto.png", folder / "metrics.png"]

@@ -53,13 +53,13 @@ def verdict(board, seeds, least_seeds):
     tested = {entry.controller: corrected_p(entry) for entry in others}
     level = 1.0 - (0.95 if board.interval is None else board.interval.level)
     name = f"<b>{html.escape(board.baseline)}</b>"
-    if any(tested.values()):
+    if any(tested.values()) or seeds >= least_seeds:
         head = f"Against {name}, paired by case and seed; * significant (p ≤ {level:.2g}, Holm-corrected)."
     else:
         count = "A single seed" if seeds == 1 else f"{seeds} seeds"
         head = f"{count}: no difference is tested (that needs {least_seeds} seeds). Observed against {name}:"
-    if baseline is not None and baseline.failed + baseline.tripped:
-        head += f" The baseline itself lost runs ({_lost(baseline)}), which flatters the others."
+    if baseline is not None and baseline.lost:
+        head += f" The baseline itself lost runs ({_lost(baseline)}), of which there are no differences."
     items = [f"<li>{_sentence(entry, tested[entry.controller], level)}</li>" for entry in others]
     text = f"<p>{head}</p><ul>{''.join(items[:SHOWN])}</ul>"
     if items[SHOWN:]:
@@ -90,8 +90,8 @@ def _sentence(entry, tested, level):
         text += f"; not significant: {', '.join(rest)}" if rest else ""
     else:
         text = f"{name}: no significant difference ({', '.join(rest)})"
-    if entry.failed + entry.tripped:
-        text += f'; <span class="bad">{_lost(entry)}</span>, counted as the worst of their case'
+    if entry.lost:
+        text += f'; <span class="bad">{_lost(entry)}</span>, of which there are no figures'
     if entry.beyond:
         text += f'; <span class="bad">beyond a limit: {html.escape("; ".join(entry.beyond))}</span>'
     return text + "."
@@ -109,6 +109,5 @@ def _joined(parts):
 
 
 def _lost(entry):
-    """ "1 failed and 2 tripped of 12 runs"."""
-    counts = ((entry.failed, "failed"), (entry.tripped, "tripped"))
-    return " and ".join(f"{count} {what}" for count, what in counts if count) + f" of {entry.runs} runs"
+    """ "1 failed, 2 tripped of 12 runs"."""
+    return f"{entry.lost_text} of {entry.runs} runs"

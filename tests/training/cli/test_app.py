@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 import fowt_env
 from fowt_env.descriptions.checks import parse_numbers
 from fowt_env.errors import InputError, SimulationStopped
-from fowt_env.plant.compile.announcement import COMPILING_MESSAGE
+from fowt_env.plant.compile.notice import COMPILING_MESSAGE
 from fowt_env.training.cli import console
 from fowt_env.training.cli.app import app
 from fowt_env.training.cli.arguments import parse_pairs, parse_sea, parse_wind
@@ -157,7 +157,7 @@ def test_a_stopped_run_gives_its_reason_and_its_rows(tmp_path, monkeypatch):
 def test_compiling_is_announced_once_and_only_when_it_happens(tmp_path):
     code = "from fowt_env.training.cli.app import main; main()"
     arguments = ["simulate", "--duration", "1", "--wind", "none", "--controller", "none"]
-    environment = os.environ | {"FOWT_CACHE_DIR": str(tmp_path), "COLUMNS": "200"}
+    environment = os.environ | {"FOWT_CACHE_DIR": str(tmp_path), "COLUMNS": "200", "FOWT_QUIET": "0"}
     options = {"env": environment, "capture_output": True}
     said = []
     for _ in range(2):
@@ -234,6 +234,18 @@ class BreaksDown:
         if measurement.time > 8.0:
             raise ZeroDivisionError("it broke down")
         return self.command
+class Degrees(BreaksDown):
+    def act(self, measurement):
+        return self.command[0], 57.3 * self.command[1]
+class Unmade(BreaksDown):
+    def __init__(self):
+        self.gain = 1.0 + "a"  # Unmade
+class Unprepared(BreaksDown):
+    def prepare(self, scene):
+        self.rated = scene.turbine.rated_sped  # Unprepared
+class Misread(BreaksDown):
+    def act(self, measurement):
+        return 0.0, measurement.generator_sped  # Misread
 """
 
 
@@ -241,14 +253,52 @@ def test_evaluate_says_which_runs_failed_and_why_and_scores_the_others(tmp_path,
     monkeypatch.chdir(tmp_path)
     (tmp_path / "broken_law.py").write_text(BREAKS_DOWN)
     stdout, stderr = fowt(
-        "evaluate", "--controllers", "pi,broken_law:BreaksDown", "--cases", "steady_16",
-        "--duration", "15", "--skip", "5", "--no-plot", "--out", "out",
+        "evaluate", "--controllers", "pi,broken_law:BreaksDown,broken_law:Degrees", "--cases", "ntm_18",
+        "--seeds", "1,2,3", "--duration", "15", "--skip", "5", "--out", "out",
     )  # fmt: skip
-    assert "failed: broken_law:BreaksDown, steady_16, seed 1: " in stderr and "it broke down" in stderr
-    assert "0/1" in stdout and "1/1" in stdout
+    assert "failed: broken_law:BreaksDown, ntm_18, seed 1: " in stderr and "it broke down" in stderr
+    assert "0/3" in stdout and "3/3" in stdout
+    assert stderr.count("controller 'broken_law:Degrees': commanded blade pitch") == 1
     table = pd.read_csv(tmp_path / "out" / "results.csv").set_index("controller")
-    assert table["status"].to_dict() == {"pi": "ok", "broken_law:BreaksDown": "failed"}
-    assert table.loc["pi", "RotSpeed_mean_[rpm]"] > 5.0
+    assert table["status"]["broken_law:BreaksDown"].tolist() == ["failed"] * 3
+    assert table["status"]["pi"].tolist() == ["ok"] * 3 and (table["RotSpeed_mean_[rpm]"]["pi"] > 5.0).all()
+    for name in ("pareto", "metrics", "boxes", "timeseries_ntm_18", "spectra_ntm_18"):
+        assert (tmp_path / "out" / f"{name}.png").is_file()
+
+
+@pytest.mark.parametrize(
+    ("law", "words"),
+    [
+        ("Unmade", "raised TypeError when it was made, broken_law.py line {}: unsupported operand"),
+        ("Unprepared", "raised AttributeError in prepare(), broken_law.py line {}: "),
+        (
+            "Misread",
+            "raised AttributeError in act() at t = 0.000 s, broken_law.py line {}: a measurement has no",
+        ),
+    ],
+)
+def test_an_error_in_a_law_is_one_line_with_its_place_in_simulate_and_in_evaluate(
+    law, words, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "broken_law.py").write_text(BREAKS_DOWN)
+    monkeypatch.delitem(sys.modules, "broken_law", raising=False)
+    lines = BREAKS_DOWN.split("\n")
+    line = 1 + next(i for i, text in enumerate(lines) if f"# {law}" in text)
+    said = f"controller 'broken_law:{law}' {words.format(line)}"
+    calm = ("--duration", "5", "--out")
+    _, stderr = fowt("simulate", "--controller", f"broken_law:{law}", "--wind", "16", *calm, "x.csv", code=1)
+    assert said in stderr and "Traceback" not in stderr
+    words = ("--controllers", f"broken_law:{law}", "--cases", "steady_16", "--skip", "1", "--no-plot")
+    _, stderr = fowt("evaluate", *words, *calm, "out")
+    assert said in stderr
+
+
+def test_a_law_whose_module_cannot_be_read_is_one_line(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "unreadable_law.py").write_text("import math\nx = mth.pi\n")
+    _, stderr = fowt("simulate", "--controller", "unreadable_law:Law", "--duration", "5", code=1)
+    assert "raised NameError when it was imported, unreadable_law.py line 2: name 'mth'" in stderr
 
 
 def test_evaluate_without_matplotlib_has_its_tables_and_names_the_extra(tmp_path, monkeypatch):
@@ -297,7 +347,9 @@ def test_trim_prints_the_operating_points_of_trim(tmp_path):
     assert "RotThrust" in stdout
     table = pd.read_csv(out)
     assert table["Wind_[m/s]"].tolist() == [8.0, 18.0]
-    point = fowt_env.trim(fowt_env.build_scene("oc3_hywind", wind=18.0), platform="floating")
+    point = fowt_env.trim(
+        fowt_env.build_scene("oc3_hywind", wind=18.0), platform="floating"
+    )
     assert table["RotThrust_[kN]"][1] == pytest.approx(point["RotThrust"], rel=1e-9)
 
 

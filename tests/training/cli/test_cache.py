@@ -7,12 +7,12 @@ from fowt_env.plant.compile.decorators import MARKER
 from fowt_env.training.cli import health
 from fowt_env.training.cli.app import app
 
-THIS, OTHER, FOREIGN = "0" * 16, "1" * 16, "2" * 16
+THIS, OTHER, FOREIGN, SUBMISSION = "0" * 16, "1" * 16, "2" * 16, "b" * 24
 
 
 @pytest.fixture
 def root(tmp_path, monkeypatch):
-    """A cache with this version, another, a folder of somebody's, two boxes and a file of the user's."""
+    """A cache with this version, another, a submission's kernels, two boxes, and what others put there."""
     monkeypatch.setenv("FOWT_CACHE_DIR", str(tmp_path))
     tmp_path.chmod(0o700)
     for name in (THIS, OTHER, FOREIGN):
@@ -25,7 +25,11 @@ def root(tmp_path, monkeypatch):
     boxes.mkdir()
     for name in (f"{'a' * 24}.npz", "mine.npz"):
         (boxes / name).write_bytes(b"0" * 3_000_000)
-    for folder in (tmp_path / "kernels", boxes):
+    for name in (SUBMISSION, "mine"):
+        folder = tmp_path / "submissions" / name / "kernels"
+        folder.mkdir(parents=True)
+        (folder / "kernel.nbi").write_bytes(b"0" * 2_000_000)
+    for folder in (tmp_path / "kernels", boxes, tmp_path / "submissions"):
         folder.chmod(0o700)
     monkeypatch.setattr(health, "CACHE_FOLDER", tmp_path / "kernels" / THIS)
     return tmp_path
@@ -37,10 +41,13 @@ def fowt(*words, **options):
 
 def left(root):
     """Names of what is in the cache."""
-    return {path.name for folder in ("kernels", "wind_boxes") for path in (root / folder).iterdir()}
+    return {
+        path.name for folder in ("kernels", "wind_boxes", "submissions") for path in (root / folder).iterdir()
+    }
 
 
-ALL = {THIS, OTHER, FOREIGN, f"{'a' * 24}.npz", "mine.npz"}
+ALL = {THIS, OTHER, FOREIGN, f"{'a' * 24}.npz", "mine.npz", SUBMISSION, "mine"}
+OLD = {OTHER, SUBMISSION}
 
 
 def test_it_shows_folder_versions_and_sizes(root):
@@ -50,15 +57,15 @@ def test_it_shows_folder_versions_and_sizes(root):
         line.rsplit(None, 2)[0].strip(): line.rsplit(None, 2)[1:] for line in text.splitlines() if " " in line
     }
     assert rows["this version"] == ["1", "1.0"] and rows["other versions"] == ["1", "1.0"]
-    assert rows["wind boxes"] == ["1", "3.0"]
+    assert rows["wind boxes"] == ["1", "3.0"] and rows["submissions"] == ["1", "2.0"]
 
 
 @pytest.mark.parametrize(
     "words, gone",
     [
-        ((), {OTHER}),
-        (("--all", "--yes"), {OTHER, THIS}),
-        (("--wind-boxes", "--yes"), {OTHER, f"{'a' * 24}.npz"}),
+        ((), OLD),
+        (("--all", "--yes"), OLD | {THIS}),
+        (("--wind-boxes", "--yes"), OLD | {f"{'a' * 24}.npz"}),
     ],
 )
 def test_it_removes_what_is_named_and_nothing_else(root, words, gone):

@@ -78,7 +78,7 @@ def test_the_cache_is_measured_and_other_versions_counted(tmp_path, monkeypatch)
         (tmp_path / name).mkdir()
         (tmp_path / name / decorators.MARKER).touch()
     monkeypatch.setattr(health, "CACHE_FOLDER", folder)
-    monkeypatch.setattr("fowt_env.plant.compile.announcement.CACHE_FOLDER", folder)
+    monkeypatch.setattr(decorators, "CACHE_FOLDER", folder)
     state = health.cache_state()
     assert (state.folder, state.others) == (folder, 1)
     assert state.read and state.written and state.compiled
@@ -88,7 +88,7 @@ def test_the_cache_is_measured_and_other_versions_counted(tmp_path, monkeypatch)
 
 def test_a_cache_that_cannot_be_used_is_told_with_what_to_do(monkeypatch):
     monkeypatch.setattr(health, "CACHE_FOLDER", None)
-    monkeypatch.setattr("fowt_env.plant.compile.announcement.CACHE_FOLDER", None)
+    monkeypatch.setattr(decorators, "CACHE_FOLDER", None)
     assert not health.cache_state().read
     assert "FOWT_CACHE_DIR to a folder" in doctor("--no-test")
 

@@ -5,10 +5,19 @@ import pandas as pd
 import pytest
 
 from fowt_env.envs import FowtEnv
-from fowt_env.errors import InputError
-from fowt_env.training.evaluation.cases import Case, all_cases, named_cases, read_suite
+from fowt_env.errors import InputError, PlantWarning
+from fowt_env.training.evaluation.cases import (
+    Case,
+    Score,
+    ScoreTerm,
+    Suite,
+    all_cases,
+    named_cases,
+    read_suite,
+)
 from fowt_env.training.evaluation.evaluate import COLUMNS, evaluate, mean_ratios, summary
 from fowt_env.training.evaluation.faults import Fault
+from fowt_env.training.evaluation.leaderboard import leaderboard
 from fowt_env.training.evaluation.metrics import METRICS
 
 GUSTY = Case(
@@ -79,6 +88,13 @@ class Unusable(Frozen):
     def fail_in(self, moment):
         if moment == self.moment:
             raise InputError(f"no library in {moment}")
+
+
+class Degrees(Frozen):
+    """Blade pitch in degrees."""
+
+    def act(self, measurement):
+        return self.command[0], np.degrees(self.command[1])
 
 
 @pytest.mark.installation
@@ -189,6 +205,56 @@ def test_an_interrupted_evaluation_leaves_its_finished_rows(tmp_path):
     with pytest.raises(KeyboardInterrupt):
         evaluate("pi", [CALM], seeds=(1, 2, 3), out=out, progress=interrupt, **SHORT)
     assert pd.read_csv(out)["seed"].tolist() == [1, 2]
+
+
+STOPPED = {"duration": 60.0, "skip": 30.0}
+
+
+def test_a_stopped_turbine_has_lost_power_and_its_units_are_warned_of_once():
+    with pytest.warns(PlantWarning, match="'Degrees': commanded blade pitch .* commands are") as warned:
+        table = evaluate({"pi": "pi", "degrees": Degrees()}, [GUSTY], seeds=(1, 2), **STOPPED)
+    assert len([each for each in warned if issubclass(each.category, PlantWarning)]) == 1
+    rows = table.set_index(["controller", "seed"])
+    assert rows.loc["degrees", "status"].tolist() == ["lost power"] * 2
+    assert rows.loc["pi", "status"].tolist() == ["ok"] * 2 and (rows.loc["pi", "warning"] == "").all()
+    assert "less than half of the" in rows.loc[("degrees", 1), "reason"]
+    entries = {entry["controller"]: entry for entry in leaderboard(table)["controllers"]}
+    assert entries["degrees"]["lost_power"] == entries["degrees"]["lost"] == 2
+    assert np.isnan(entries["degrees"]["difference"]["RotSpeed_std_[rpm]"]["percent"])
+    means = summary(table).set_index("controller")
+    assert means.loc["degrees", "lost_power"] == 2 and np.isnan(means.loc["degrees", "RotSpeed_std_[rpm]"])
+
+
+def test_the_reference_of_a_suite_runs_to_its_end_where_its_law_as_an_entry_trips(tmp_path):
+    rule = Score(baseline="pi", term=(ScoreTerm(metric="RotSpeed_std_[rpm]", weight=1.0),))
+    case = replace(GUSTY, trip=1.01)
+    suite = Suite("mine", 1, "d", "s", "rotor-averaged", (1, 2), 20.0, 5.0, (case,), score=rule)
+    table = evaluate("pi,pi_land", suite, folder=tmp_path)
+    rows = table.set_index(["controller", "seed"])
+    assert list(dict.fromkeys(table["controller"])) == ["reference", "pi", "pi_land"]
+    assert rows.loc["pi", "status"].tolist() == ["tripped"] * 2
+    assert rows.loc["reference", "status"].tolist() == ["ok"] * 2
+    free = evaluate("pi", replace(suite, cases=(replace(case, trip=None),)), reference=False)
+    own, free = (frame[list(METRICS)] for frame in (rows.loc["reference"], free.set_index("seed")))
+    pd.testing.assert_frame_equal(own, free, check_exact=True)
+    board = leaderboard(table, score=rule)
+    assert [entry["controller"] for entry in board["controllers"]] == ["pi", "pi_land"]
+    assert all(np.isfinite(entry["score"]["mean"]) for entry in board["controllers"])
+    again = evaluate(
+        "pi_land", suite, folder=tmp_path, progress=lambda done, total, row: done < total and 1 / 0
+    )
+    pd.testing.assert_frame_equal(again, table)
+    with pytest.raises(InputError, match="'reference' is that of the suite's reference"):
+        evaluate({"reference": "pi"}, [CALM], **SHORT)
+
+
+@pytest.mark.slow
+def test_worker_processes_warn_of_units_once_for_each_controller():
+    controllers = {"one": Degrees(), "two": Degrees()}
+    with pytest.warns(PlantWarning) as warned:
+        table = evaluate(controllers, [GUSTY], seeds=(1, 2, 3), jobs=2, **SHORT)
+    assert (table["warning"] != "").all()
+    assert len([each for each in warned if issubclass(each.category, PlantWarning)]) == 2
 
 
 @pytest.mark.slow

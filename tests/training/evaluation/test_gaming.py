@@ -11,9 +11,10 @@ from fowt_env.training.evaluation import bootstrap
 from fowt_env.training.evaluation import leaderboard as board_module
 from fowt_env.training.evaluation.cases import Case, Limits, read_suite
 from fowt_env.training.evaluation.evaluate import COLUMNS, evaluate
-from fowt_env.training.evaluation.failures import failures_as_worst
+from fowt_env.training.evaluation.failures import PENALTY, penalised, with_lost_power
 from fowt_env.training.evaluation.leaderboard import leaderboard
 from fowt_env.training.evaluation.metrics import METRICS, better
+from fowt_env.training.evaluation.run_case import REFERENCE
 from fowt_env.training.reports.scores import agent_scores
 
 
@@ -37,13 +38,15 @@ TYPICAL = dict.fromkeys(METRICS, 1.0) | {
 def table(**controllers):
     """An evaluation of the headline suite: {name: function of (wind, seed) that changes typical figures}.
 
-    A figure "status" is that of the run; with "failed" it has none of the others.
+    A figure "status" is that of the run; with "failed" it has none of the others. The reference has the
+    typical figures, and so has gspi_oc3.
     """
     rows = []
     for case in HEADLINE.cases:
         for seed in range(1, 7):
             gusty = 1.0 + 0.02 * case.wind["speed"] + 0.05 * seed
-            for name, change in {"gspi_oc3": lambda wind, seed: {}, **controllers}.items():
+            typical = dict.fromkeys((REFERENCE, "gspi_oc3"), lambda wind, seed: {})
+            for name, change in {**typical, **controllers}.items():
                 row = {
                     metric: value * (gusty if metric in (SPEED, LEAN) else 1.0)
                     for metric, value in TYPICAL.items()
@@ -69,11 +72,17 @@ def ratios(runs, agent):
     return agent_scores(runs, ["gspi_oc3"], agents=[agent]).set_index("figure")["ratio"]
 
 
+def scores(runs):
+    """{controller: score} on the leaderboard of the headline suite."""
+    board = leaderboard(runs, score=HEADLINE.score, limits=HEADLINE.limits)
+    return {entry["controller"]: entry["score"]["mean"] for entry in board["controllers"]}
+
+
 def good(wind, seed):
     return {SPEED: 0.8, LEAN: 0.7}
 
 
-@pytest.mark.parametrize("status", ["failed", "tripped"])
+@pytest.mark.parametrize("status", ["failed", "tripped", "lost power"])
 def test_a_run_that_is_given_up_where_it_goes_badly_gains_nothing(status):
     def gives_up(wind, seed):
         return good(wind, seed) | ({"status": status} if seed > 3 else {})
@@ -82,6 +91,12 @@ def test_a_run_that_is_given_up_where_it_goes_badly_gains_nothing(status):
     assert ranks(runs)["honest"] < ranks(runs)["gspi_oc3"] < ranks(runs)["gamer"]
     assert (ratios(runs, "gamer") >= ratios(runs, "honest") - 1e-12).drop("energy").all()
     assert ratios(runs, "gamer")["rotor-speed std"] > 0.9  # not the 0.8 of the runs that it likes
+    assert scores(runs)["gamer"] > scores(runs)["gspi_oc3"] == 1.0 > scores(runs)["honest"]
+    entry = next(
+        each for each in leaderboard(runs)["controllers"] if each["controller"] == "gamer"
+    )  # what is shown is of the runs that it likes, and is not tested
+    assert entry["lost"] == 21 and entry["metrics"][SPEED]["mean"] < 1.3
+    assert all(np.isnan(gap["p"]) for gap in entry["difference"].values())
     verdicts = agent_scores(runs, ["gspi_oc3"], agents=["gamer"])["verdict"]
     assert set(verdicts) == {"failed"}
 
@@ -119,10 +134,11 @@ def test_bad_winds_are_not_trimmed_away():
     assert ratios(runs, "gamer")["rotor-speed std"] > 1.3  # an interquartile mean of these would be 0.8
 
 
-def test_a_figure_that_only_the_gamer_lacks_is_the_worst_one():
+def test_a_figure_that_only_the_gamer_lacks_counts_as_lost():
     runs = table(honest=good, gamer=good)
     runs.loc[runs["controller"] == "gamer", SPEED] = np.nan
-    assert ranks(runs)["honest"] < ranks(runs)["gamer"] and ratios(runs, "gamer")["rotor-speed std"] > 1.0
+    assert ranks(runs)["honest"] < ranks(runs)["gamer"]
+    assert ratios(runs, "gamer")["rotor-speed std"] == pytest.approx(PENALTY)
 
 
 def test_a_parked_turbine_earns_its_calm_with_all_its_energy():
@@ -132,35 +148,105 @@ def test_a_parked_turbine_earns_its_calm_with_all_its_energy():
     assert ratios(runs, "parks")["energy"] < 0.01
 
 
-def test_nobody_gains_by_a_baseline_that_trips_or_where_all_fail():
-    def falls(wind, seed):
-        return {"status": "tripped"} if wind == 12.0 and seed == 1 else {}
+def gives_up_once(wind, seed):
+    return good(wind, seed) | ({"status": "tripped"} if wind == 12.0 and seed == 1 else {})
 
-    runs = table(honest=good, gamer=lambda wind, seed: good(wind, seed) | falls(wind, seed))
-    base = runs["controller"] == "gspi_oc3"
-    runs.loc[base & (runs["case"] == "ntm_12") & (runs["seed"] == 1), "status"] = "tripped"
-    assert ranks(runs) == {"honest": 1, "gamer": 2, "gspi_oc3": 3}  # by their scores, the last two
-    at = (runs["case"] == "ntm_18") & (runs["seed"] == 2)
+
+def scored(runs, name):
+    """Score of a controller, with its interval, as bytes: equal where they are equal to the last bit."""
+    (entry,) = (
+        each
+        for each in leaderboard(runs, score=HEADLINE.score, limits=HEADLINE.limits)["controllers"]
+        if each["controller"] == name
+    )
+    return np.array([entry["score"][key] for key in ("mean", "low", "high")]).tobytes(), entry["beyond"]
+
+
+@pytest.mark.parametrize("name", ["honest", "gamer"])
+def test_a_score_is_the_same_to_the_bit_whoever_else_is_in_the_folder(name):
+    """Also beside one that is five times as bad, one that fails, and one with other cases and more seeds."""
+    sandbag = dict.fromkeys((SPEED, LEAN, TRAVEL, TORQUE, SHAFT, "TwrBsMyt_DEL_[kN-m]"), 5.0)
+    others = {
+        "sandbag": lambda wind, seed: sandbag,
+        "wreck": lambda wind, seed: {"status": "failed"},
+        "quits": lambda wind, seed: sandbag | {"status": "tripped"},
+    }
+    runs = table(honest=good, gamer=gives_up_once, **others)
+    alone = runs[runs["controller"].isin([name, REFERENCE])]
+    expected = scored(alone, name)
+    assert scored(runs, name) == expected
+    more = runs[runs["controller"].isin(["sandbag", "gspi_oc3", REFERENCE])]
+    more = pd.concat([more.assign(seed=more["seed"] + 6), more.assign(case=more["case"] + "_b")])
+    assert scored(pd.concat([more, runs], ignore_index=True), name) == expected
+    tripped = runs.copy()  # the published baseline as an entry, which is no reference
+    tripped.loc[tripped["controller"] == "gspi_oc3", "status"] = "tripped"
+    assert scored(tripped, name) == expected
+
+
+def test_a_lost_run_counts_a_fixed_multiple_of_the_reference():
+    runs = table(
+        fails=lambda wind, seed: {"status": "failed"}, trips=lambda wind, seed: {"status": "tripped"}
+    )
+    found = scores(runs)
+    assert found["fails"] == pytest.approx(PENALTY**2, rel=1e-12)  # over a tenth of the energy
+    assert found["trips"] == found["fails"] and found["gspi_oc3"] == 1.0
+
+
+# the worst ratios to the reference of runs that ended well, of laws with limit cycles and commands that swing
+JUST_ALIVE = {
+    SPEED: 1.5, LEAN: 6.7, TRAVEL: 43.0, SHAFT: 9.7, "TwrBsMyt_DEL_[kN-m]": 3.9, "FAIRTEN_DEL_[kN]": 1.1,
+    ENERGY: 0.85,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("given_up", [{12.0}, {24.0}, {12.0, 14.0, 16.0, 18.0, 20.0, 22.0, 24.0}])
+def test_giving_up_pays_for_nobody_however_bad_its_run_would_be(given_up):
+    for seeds in (1, 6):
+        runs = table(
+            endures=lambda wind, seed: dict(JUST_ALIVE),
+            quits=lambda wind, seed: (
+                {"status": "failed"}
+                if wind in given_up and seed <= seeds  # noqa: B023
+                else dict(JUST_ALIVE)
+            ),
+        )
+        assert scores(runs)["quits"] > scores(runs)["endures"] > 10.0
+
+
+def test_a_reference_without_a_figure_counts_for_nobody_and_without_one_there_is_no_score():
+    runs = table(honest=good, gamer=gives_up_once)
+    at = (runs["controller"] == REFERENCE) & (runs["case"] == "ntm_12") & (runs["seed"] == 1)
     runs.loc[at, ["status", *METRICS]] = ["failed", *[np.nan] * len(METRICS)]
-    counted = failures_as_worst(runs)
-    assert counted.loc[at, SPEED].nunique() == 1  # the worst of the other seeds
-    runs.loc[runs["case"] == "ntm_18", ["status", *METRICS]] = ["failed", *[np.nan] * len(METRICS)]
+    found = scores(runs)
+    assert found["gamer"] == found["honest"] and ranks(runs)["gamer"] == 3  # its run is lost all the same
+    board = leaderboard(runs[runs["controller"] != REFERENCE], score=HEADLINE.score, limits=HEADLINE.limits)
+    for entry in board["controllers"]:
+        assert (
+            entry["rank"] is None and entry["score"]["mean"] is None and "reference" in entry["score"]["why"]
+        )
+    assert board["unchecked"] == list(HEADLINE.limits.relative)
+
+
+def test_a_lifetime_without_one_of_its_winds_has_no_figures_but_a_score():
+    runs = table(
+        honest=good, gamer=lambda wind, seed: {"status": "failed"} if wind == 18.0 else good(wind, seed)
+    )
     board = leaderboard(runs, baseline="gspi_oc3", score=HEADLINE.score)
-    for entry in board["controllers"]:  # a lifetime without one of its winds is none
-        assert np.isnan(entry["metrics"][SPEED]["mean"]) and np.isnan(entry["score"]["mean"])
+    entry = next(each for each in board["controllers"] if each["controller"] == "gamer")
+    for figure in (entry["metrics"][SPEED], entry["difference"][SPEED]):
+        assert np.isnan(figure["mean"])
+    assert entry["cases"]["ntm_12"]["metrics"][SPEED]["mean"] > 0.0
+    assert entry["score"]["mean"] > 1.0 and entry["score"]["why"] == "6 runs failed"
 
 
-def test_a_single_controller_that_fails_has_the_worst_of_its_own_runs():
-    runs = table(alone=lambda wind, seed: {"status": "failed"} if seed == 6 else {})
-    runs = runs[runs["controller"] == "alone"]
-    counted = failures_as_worst(runs).set_index(["case", "seed"])
-    for name in (SPEED, ENERGY, "PtfmPitch_mean_[deg]"):
-        known = counted.loc["ntm_12"].loc[1:5, name]
-        expected = known.min() if better(name) > 0 else known.max()
-        assert counted.loc[("ntm_12", 6), name] == expected
-
-
-def test_the_worst_is_the_least_of_what_more_is_better_of():
+def test_what_counts_in_place_of_a_lost_run_is_worse_whatever_the_sign():
+    runs = table(gamer=lambda wind, seed: {"status": "failed"})
+    for sign in (1.0, -1.0):
+        for name in (SPEED, ENERGY):
+            runs.loc[runs["controller"] == "gspi_oc3", name] = sign * 2.0
+        counted = penalised(runs, "gspi_oc3").groupby("controller")[[SPEED, ENERGY]].mean()
+        assert counted.loc["gamer", SPEED] > counted.loc["gspi_oc3", SPEED] == sign * 2.0
+        assert counted.loc["gamer", ENERGY] < counted.loc["gspi_oc3", ENERGY] == sign * 2.0
     assert [better(name) for name in (SPEED, SHAFT, ENERGY, "energy_[kWh]", "GenPwr_max_[kW]")] == [
         -1,
         -1,
@@ -169,9 +255,27 @@ def test_the_worst_is_the_least_of_what_more_is_better_of():
         -1,
     ]
     assert better("Wind1VelX_std_[m/s]") == better("PtfmPitch_mean_[deg]") == better("GenTq_min_[kN-m]") == 0
-    runs = table(weak=lambda wind, seed: {ENERGY: 0.9}, gamer=lambda wind, seed: {"status": "failed"})
-    counted = failures_as_worst(runs).groupby("controller")[ENERGY].mean()
-    assert counted["gamer"] == counted["weak"] < counted["gspi_oc3"]
+    assert np.isnan(
+        penalised(runs, "gspi_oc3").set_index("controller").loc["gamer", "PtfmPitch_mean_[deg]"]
+    ).all()
+
+
+def test_a_turbine_that_stands_still_has_lost_power_unless_a_fault_took_it():
+    calm = dict.fromkeys((SPEED, LEAN, TRAVEL, TORQUE, SHAFT), 0.02)
+    runs = table(
+        honest=good,
+        stands=lambda wind, seed: calm | {ENERGY: 0.0, "energy_[kWh]": 0.49},
+        derated=lambda wind, seed: calm | {"energy_[kWh]": 0.51},
+    )
+    statuses = with_lost_power(runs).groupby("controller")["status"].unique().str[0]
+    assert statuses["stands"] == "lost power" and set(statuses.drop("stands")) == {"ok"}
+    assert ranks(with_lost_power(runs))["stands"] == 4
+    spared = with_lost_power(runs, faulty=["ntm_12"]).groupby("case")["status"].nunique()
+    assert spared["ntm_12"] == 1 and spared["ntm_14"] == 2
+    without = runs[runs["controller"] != REFERENCE]
+    lost = with_lost_power(without)
+    assert (lost["status"] == "lost power").sum() == 42 and "of gspi_oc3" in lost["reason"].max()
+    assert with_lost_power(without[without["controller"] != "gspi_oc3"])["status"].eq("ok").all()
 
 
 # ------------------------------------------------------------------ real runs
@@ -220,6 +324,7 @@ def test_a_controller_that_raises_when_the_rotor_is_off_ends_below_its_honest_tw
         duration=60.0,
         skip=10.0,
         seeds=(1001, 1002),
+        reference="gspi_oc3",
     )
     lost = runs[runs["controller"] == "quitter"]
     assert (lost["status"] == "failed").any() and "enough of this" in " ".join(lost["reason"])

@@ -19,6 +19,7 @@ import fowt_env
 from fowt_env.descriptions.platform import read_platform
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.errors import InputError
+from fowt_env.layout import PACKAGE, installed_path, module_path
 from fowt_env.training.cli import app as cli
 from fowt_env.training.cli.console import EXIT_STOPPED
 from fowt_env.training.evaluation import engines, guard, provenance, results
@@ -254,7 +255,7 @@ def test_two_objects_of_one_class_need_names(plant):
 def written_row(tmp_path, **changes):
     """Path of a run file whose row has been changed."""
     row = dict.fromkeys(COLUMNS, 1.5) | {"controller": "pi", "case": "calm", "seed": 1, "status": "ok"}
-    row = row | {"reason": "", "events": ""} | changes
+    row = row | {"reason": "", "events": "", "warning": ""} | changes
     row = {name: value for name, value in row.items() if value is not Ellipsis}
     return write_run(None, row, tmp_path / "runs" / "pi" / "calm_seed1.parquet")
 
@@ -265,6 +266,7 @@ def written_row(tmp_path, **changes):
         {"controller": ["x"]}, {"controller": None}, {"controller": "a\x1bb"}, {"case": 5}, {"case": ...},
         {"seed": "1"}, {"seed": 1.0}, {"seed": True}, {"seed": -1}, {"seed": 2**63}, {"seed": None},
         {"status": "fine"}, {"status": ...}, {"reason": 5}, {"reason": None}, {"events": {}},
+        {"warning": None},
         {"scored_[s]": "long"}, {METRICS[0]: [1.0]}, {METRICS[0]: True}, {METRICS[0]: 10**400},
     ],
 )  # fmt: skip
@@ -356,7 +358,7 @@ print(*{sys.modules[name].__file__ for name in {*names, "fowt_env.controllers.co
 
 
 def test_what_a_run_imports_is_in_the_hash_of_the_plant_and_what_people_look_at_is_not(tmp_path):
-    environment = os.environ | {"PYTHONPATH": str(provenance.PACKAGE.parent)}
+    environment = os.environ | {"PYTHONPATH": str(PACKAGE.parent)}
     done = subprocess.run(
         [sys.executable, "-c", USED], env=environment, cwd=tmp_path, capture_output=True, text=True
     )
@@ -364,12 +366,12 @@ def test_what_a_run_imports_is_in_the_hash_of_the_plant_and_what_people_look_at_
     files = {str(path) for path in provenance.plant_files()}
     # of the program above, of agents, and of controllers, whose own hash has it
     others = (
-        "training/evaluation/cases.py", "training/evaluation/scaling.py", "envs/decisions.py",
-        "analysis/reduced_model.py",
+        "training.evaluation.cases", "training.evaluation.scaling", "envs.decisions",
+        "analysis.reduced_model",
     )  # fmt: skip
-    used = set(done.stdout.split()) - {str(provenance.PACKAGE / name) for name in others}
+    used = set(done.stdout.split()) - {str(module_path(f"fowt_env.{name}")) + ".py" for name in others}
     assert used <= files and len(used) > 40
-    names = {path.relative_to(provenance.PACKAGE).as_posix() for path in provenance.plant_files()}
+    names = {installed_path(path).relative_to(PACKAGE).as_posix() for path in provenance.plant_files()}
     data = "data/platforms/oc3_hywind.toml"
     assert {data, "training/evaluation/metrics.py", "training/evaluation/faults.py"} <= names
     looks = ("visual", "training/cli", "training/reports", "controllers/pi")
@@ -413,7 +415,7 @@ def test_an_edit_of_a_text_or_a_plot_voids_no_results_and_one_of_what_shapes_a_r
 
     assert changed_by(*LOOKS) == set()
     pi = {"pi", "pi_land", "pi_land_power", "pi_tuned", "pi_unscheduled", "own:Law", "policy:agent.npz"}
-    after_law = changed_by("controllers/pi.py")
+    after_law = changed_by("fowt_env/controllers/pi.py")
     assert pi <= after_law and not {"plant", "constant"} & after_law
     assert "plant" in changed_by("fowt_env/scene/build.py")
 
@@ -465,7 +467,7 @@ def test_a_users_controller_depends_on_those_of_the_package_that_it_builds_on(tm
     (tmp_path / "built.py").write_text(text)
     monkeypatch.syspath_prepend(str(tmp_path))
     files = set(provenance._user_files("built")) - {tmp_path / "built.py"}
-    names = {path.relative_to(provenance.PACKAGE).as_posix() for path in files}
+    names = {installed_path(path).relative_to(PACKAGE).as_posix() for path in files}
     law = {"controllers/lqr/law.py", "controllers/lqr/design.py"}
     assert law | {"analysis/linear_model.py"} <= names
     assert "controllers/rosco.py" not in names and "controllers/__init__.py" not in names

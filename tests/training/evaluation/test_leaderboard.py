@@ -8,16 +8,23 @@ from fowt_env.errors import InputError
 from fowt_env.training.evaluation.bootstrap import case_means, interval, resample_weights
 from fowt_env.training.evaluation.cases import Limits, Score, ScoreTerm
 from fowt_env.training.evaluation.evaluate import COLUMNS
+from fowt_env.training.evaluation.failures import PENALTY
 from fowt_env.training.evaluation.leaderboard import leaderboard
 from fowt_env.training.evaluation.metrics import METRICS, never_negative
+from fowt_env.training.evaluation.run_case import REFERENCE
 
 TRAVEL = "blade_pitch_travel_[deg/s]"  # a plain mean over the lifetime, of which less is better
 SPEED_SCORE = Score(baseline="pi", term=(ScoreTerm(metric=TRAVEL, weight=1.0),))
 
 
-def table(figures):
-    """Table of {(controller, case, seed): value of every metric, or None for a failed run}."""
+def table(figures, reference=None):
+    """Table of {(controller, case, seed): value of every metric, or None for a failed run}.
+
+    reference: the controller whose figures the reference has, too.
+    """
     rows = []
+    theirs = {(REFERENCE, *key): value for (name, *key), value in figures.items() if name == reference}
+    figures = figures | theirs
     for (controller, case, seed), value in figures.items():
         row = dict.fromkeys(COLUMNS, np.nan) | {"controller": controller, "case": case, "seed": seed}
         row |= {"status": "ok" if value is not None else "failed", "reason": ""}
@@ -96,7 +103,8 @@ def test_intervals_cover_the_truth_about_as_often_as_they_say(seeds):
 
 def test_fewer_than_four_seeds_have_no_interval_and_no_verdict():
     for seeds, there in ((2, False), (3, False), (4, True)):
-        board = leaderboard(table(noisy({"pi": 0.0, "x": 0.5}, 2, range(seeds))), score=SPEED_SCORE)
+        runs = table(noisy({"pi": 0.0, "x": 0.5}, 2, range(seeds)), "pi")
+        board = leaderboard(runs, score=SPEED_SCORE)
         x = entry(board, "x")
         for figure in (x["metrics"][TRAVEL], x["difference"][TRAVEL], x["score"]):
             assert np.isfinite(figure["mean"])
@@ -117,7 +125,7 @@ def test_figures_that_cannot_be_negative_have_intervals_above_zero():
 def test_a_score_of_deviations_has_an_interval_above_zero():
     scattered = {("x", "a", seed): value for seed, value in enumerate([0.001, 0.5, 3.0, 0.01])}
     figures = scattered | {("pi", "a", seed): 1.0 for seed in range(4)}
-    score = entry(leaderboard(table(figures), score=SPEED_SCORE), "x")["score"]
+    score = entry(leaderboard(table(figures, "pi"), score=SPEED_SCORE), "x")["score"]
     assert 0.0 < score["low"] < score["mean"] < score["high"]
 
 
@@ -125,9 +133,7 @@ def test_whatever_is_not_ok_counts_as_failed():
     frame = table({("pi", "a", 1): 1.0, ("pi", "a", 2): None})
     frame.loc[1, "status"] = "timeout"
     found = entry(leaderboard(frame), "pi")
-    assert (
-        found["failed"] == 1 and found["metrics"][TRAVEL]["mean"] == 1.0
-    )  # the worst of those that went well
+    assert found["failed"] == 1 and found["metrics"][TRAVEL]["mean"] == 1.0  # of those that went well
 
 
 def test_a_count_that_is_mostly_zero_has_an_interval_from_zero_on():
@@ -143,16 +149,17 @@ def test_the_range_over_the_seeds_is_that_of_the_means_over_all_cases():
     assert (figure["seed_low"], figure["seed_high"]) == (1.5, 3.5)
 
 
-def test_a_controller_with_a_failed_run_stands_last_with_the_worst_figures_of_its_case():
+def test_a_controller_with_a_failed_run_stands_last_with_the_figures_of_the_others():
     figures = {("bad", "a", seed): 0.5 for seed in range(4)} | {("bad", "b", seed): 0.5 for seed in range(4)}
     figures |= {key: 1.0 for key in [(name, c, s) for name in ("pi", "x") for c in "ab" for s in range(4)]}
     figures["bad", "b", 3] = None
     board = leaderboard(table(figures))
     assert [item["controller"] for item in board["controllers"]] == ["pi", "x", "bad"]
     bad = entry(board, "bad")
-    assert (bad["failed"], bad["runs"], bad["metrics"][TRAVEL]["mean"]) == (1, 8, (7 * 0.5 + 1.0) / 8)
-    assert bad["difference"][TRAVEL]["mean"] == pytest.approx(-0.5 * 7 / 8)
-    assert bad["difference"][TRAVEL]["pairs"] == 8 and bad["cases"]["b"]["failed"] == 1
+    assert (bad["failed"], bad["lost"], bad["runs"], bad["metrics"][TRAVEL]["mean"]) == (1, 1, 8, 0.5)
+    assert bad["difference"][TRAVEL]["mean"] == -0.5 and np.isnan(bad["difference"][TRAVEL]["p"])
+    assert bad["difference"][TRAVEL]["pairs"] == 7 and bad["cases"]["b"]["failed"] == 1
+    assert np.isfinite(entry(board, "x")["difference"][TRAVEL]["p"])
     assert entry(board, "x")["difference"][TRAVEL]["percent"] == 0.0
 
 
@@ -169,10 +176,12 @@ def test_a_share_of_what_rounding_left_of_nothing_is_not_given():
     assert gap["mean"] == pytest.approx(0.01) and not np.isfinite(np.float64(gap["percent"] or np.nan))
 
 
-def test_a_controller_without_a_finished_run_has_the_worst_figures_and_harms_no_other():
+def test_a_controller_without_a_finished_run_has_no_figures_and_harms_no_other():
     figures = {("pi", "a", 1): 1.0, ("pi", "a", 2): 3.0, ("x", "a", 1): None, ("x", "a", 2): None}
     board = leaderboard(table(figures))
-    assert entry(board, "x")["metrics"][TRAVEL]["mean"] == 3.0
+    for part in (entry(board, "x"), entry(board, "x")["cases"]["a"]):
+        assert np.isnan([value for figure in part["metrics"].values() for value in figure.values()]).all()
+        assert np.isnan(part["difference"][TRAVEL]["mean"])
     assert entry(board, "pi")["metrics"][TRAVEL]["mean"] == pytest.approx(2.0)
 
 
@@ -222,7 +231,7 @@ def scored(x, limits=None, power=None):
         term=(ScoreTerm(metric=TRAVEL, weight=3.0), ScoreTerm(metric="PtfmPitch_std_[deg]", weight=1.0)),
         power=power,
     )
-    frame = table({("pi", "a", 1): 2.0, ("pi", "a", 2): 2.0, ("x", "a", 1): 2.0, ("x", "a", 2): 2.0})
+    frame = table({("pi", "a", 1): 2.0, ("pi", "a", 2): 2.0, ("x", "a", 1): 2.0, ("x", "a", 2): 2.0}, "pi")
     for name, value in x.items():
         frame.loc[frame["controller"] == "x", name] = value
     board = leaderboard(frame, score=rule, limits=Limits(run=limits or {}))
@@ -244,7 +253,7 @@ def test_a_passed_limit_makes_a_score_invalid_and_says_which():
 
 
 def test_one_run_beyond_a_limit_is_enough_however_low_the_mean():
-    frame = table({("pi", "a", seed): 1.0 for seed in range(6)})
+    frame = table({("pi", "a", seed): 1.0 for seed in range(6)}, "pi")
     frame.loc[3, "rotor_speed_beyond_[s]"] = 2.5  # the mean is 1.25
     rules = {"score": SPEED_SCORE, "limits": Limits(run={"rotor_speed_beyond_[s]": 2.0})}
     score = entry(leaderboard(frame, **rules), "pi")["score"]
@@ -258,19 +267,43 @@ def test_one_run_beyond_a_limit_is_enough_however_low_the_mean():
 def test_a_suites_score_is_the_ratio_of_the_means_over_the_cases():
     base = {("pi", "a", 1): 1.0, ("pi", "a", 2): 3.0, ("pi", "b", 1): 5.0}
     own = {("x", "a", 1): 1.0, ("x", "a", 2): 1.0, ("x", "b", 1): 7.0}
-    score = entry(leaderboard(table(base | own), score=SPEED_SCORE), "x")["score"]
+    score = entry(leaderboard(table(base | own, "pi"), score=SPEED_SCORE), "x")["score"]
     # (1 + 7) / (2 + 5); not the mean of the cases' ratios, nor of the runs', nor the worst case
     assert score["mean"] == pytest.approx(8.0 / 7.0)
-    # of a run that the baseline lacks nothing is counted
-    score = entry(leaderboard(table(base | own | {("x", "b", 2): 60.0}), score=SPEED_SCORE), "x")["score"]
+    # of a run that the reference lacks nothing is counted
+    more = table(base | own | {("x", "b", 2): 60.0}, "pi")
+    score = entry(leaderboard(more, score=SPEED_SCORE), "x")["score"]
     assert score["mean"] == pytest.approx(8.0 / 7.0)
 
 
-def test_a_score_needs_its_baseline_and_is_not_valid_without_all_runs_of_both():
+def test_a_score_needs_its_reference_and_is_not_valid_without_all_runs():
     rule = Score(baseline="gspi_oc3", term=(ScoreTerm(metric=TRAVEL, weight=1.0),))
-    board = leaderboard(table({("pi", "a", 1): 1.0}), score=rule)
-    assert entry(board, "pi")["score"]["mean"] is None and "gspi_oc3" in entry(board, "pi")["score"]["why"]
-    for lost, why in (("x", "1 failed run"), ("pi", "1 failed run of 'pi'")):
-        figures = {(name, "a", seed): 1.0 for name in ("pi", "x") for seed in (1, 2)} | {(lost, "a", 2): None}
-        score = entry(leaderboard(table(figures), score=SPEED_SCORE), "x")["score"]
-        assert score["mean"] == 1.0 and not score["valid"] and score["why"] == why
+    board = leaderboard(table({("gspi_oc3", "a", 1): 1.0}), score=rule)
+    found = entry(board, "gspi_oc3")["score"]
+    assert found["mean"] is None and "reference" in found["why"] and "gspi_oc3" in found["why"]
+    figures = {(name, "a", seed): 1.0 for name in ("pi", "x", REFERENCE) for seed in (1, 2)}
+    board = leaderboard(table(figures | {("x", "a", 2): None, ("pi", "a", 1): None}), score=SPEED_SCORE)
+    for name in ("pi", "x"):  # the baseline as an entry is one like any other
+        score = entry(board, name)["score"]
+        assert score["mean"] == (1.0 + PENALTY) / 2.0
+        assert not score["valid"] and score["why"] == "1 run failed"
+
+
+def test_ranks_are_by_scores_and_without_scores_there_are_none():
+    figures = {(name, "a", seed): value for name, value in (("pi", 2.0), ("x", 1.0)) for seed in range(4)}
+    for runs, rule, ranks in (
+        (table(figures, "pi"), SPEED_SCORE, [1, 2]),
+        (table(figures), None, [None, None]),
+        (table(figures), SPEED_SCORE, [None, None]),  # no reference
+    ):
+        board = leaderboard(runs, score=rule)
+        assert [item["rank"] for item in board["controllers"]] == ranks
+        assert (">rank</th>" in board._repr_html_()) == (ranks[0] is not None)
+        assert [item["controller"] for item in board["controllers"]] == (
+            ["x", "pi"] if ranks[0] else ["pi", "x"]
+        )
+
+
+def test_the_reference_is_no_entry_and_no_baseline():
+    board = leaderboard(table({("x", "a", 1): 1.0, ("y", "b", 2): 1.0}, "x"))
+    assert [item["controller"] for item in board["controllers"]] == ["x", "y"] and board["baseline"] == "x"

@@ -8,7 +8,7 @@ from fowt_env.errors import InputError
 from fowt_env.files.tables import write_table
 from fowt_env.training.evaluation.evaluate import COLUMNS
 from fowt_env.training.evaluation.metrics import METRICS
-from fowt_env.training.evaluation.results_table import KEY, read_results
+from fowt_env.training.evaluation.results_table import KEY, WEIGHT, case_shares, read_results
 
 
 def runs(controllers=("agent", "rival"), cases=("ntm_18",), seeds=(1, 2)):
@@ -18,7 +18,7 @@ def runs(controllers=("agent", "rival"), cases=("ntm_18",), seeds=(1, 2)):
         for seed in seeds:
             for name in controllers:
                 row = dict.fromkeys(COLUMNS, 0.0) | {"controller": name, "case": case, "seed": seed}
-                row |= {"status": "ok", "reason": "", "events": ""}
+                row |= {"status": "ok", "reason": "", "events": "", "warning": ""}
                 rows.append(row | {metric: len(rows) + 0.125 * i for i, metric in enumerate(METRICS)})
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
@@ -67,6 +67,15 @@ def test_cases_are_chosen_by_name_and_parked_turbines_left_out(tmp_path):
     assert set(read_results(file, cases=["ntm_14"])["case"]) == {"ntm_14"}
     with pytest.raises(InputError, match="unknown case of the evaluation 'ntm_19'"):
         read_results(file, cases=["ntm_19"])
+
+
+def test_the_share_of_a_case_is_its_weight_however_many_runs_of_it_there_are():
+    table = pd.concat([runs(cases=("ntm_14",), seeds=range(5)), runs(cases=("ntm_18", "eog"), seeds=(1,))])
+    table[WEIGHT] = table["case"].map({"ntm_14": 0.3, "ntm_18": 0.1, "eog": 0.2})
+    assert case_shares(table, ["eog", "ntm_14", "ntm_18"]) == pytest.approx([1 / 3, 1 / 2, 1 / 6])
+    assert case_shares(table, ["ntm_14", "ntm_18"]) == pytest.approx([3 / 4, 1 / 4])
+    for unknown in (table.drop(columns=WEIGHT), *(table.assign(**{WEIGHT: w}) for w in (np.nan, 0.0))):
+        assert case_shares(unknown, ["eog", "ntm_14", "ntm_18"]) == pytest.approx([1 / 3] * 3)
 
 
 @pytest.mark.parametrize(

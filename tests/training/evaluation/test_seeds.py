@@ -1,5 +1,6 @@
 """Training, validation and test never share a realisation of wind and waves."""
 
+import hashlib
 import shlex
 import tomllib
 from dataclasses import replace
@@ -15,7 +16,18 @@ from fowt_env.envs.tasks import LARGEST_SEED, TASKS
 from fowt_env.errors import InputError
 from fowt_env.training.design import sweeps, tune
 from fowt_env.training.evaluation.cases import FOLDER, read_suite, suite_names
-from fowt_env.training.evaluation.seeds import PURPOSES, TEST, TRAINING, VALIDATION, ranges, seeds_for
+from fowt_env.training.evaluation.seeds import (
+    DRAWING_RULE,
+    DRAWN,
+    PURPOSES,
+    TEST,
+    TRAINING,
+    VALIDATION,
+    drawn_seeds,
+    ranges,
+    seeds_for,
+    with_drawn_seeds,
+)
 from fowt_env.training.rl.train import ALGORITHMS, environment_settings, resolve, validation_episodes
 
 ROBUST = "above_rated_robust"
@@ -29,6 +41,39 @@ def test_the_ranges_cover_every_seed_once():
     for one, other in combinations(PURPOSES.values(), 2):
         assert max(one.start, other.start) >= min(one.stop, other.stop)
     assert sum(len(seeds) for seeds in PURPOSES.values()) == LARGEST_SEED
+
+
+HASH = "0123456789abcdef0123456789abcdef01234567"
+
+
+def test_drawn_seeds_follow_the_rule_that_is_published_with_them():
+    """Here with the tools of another program: anybody can draw them again."""
+    seeds = drawn_seeds(HASH, "above_rated", 2, 3)
+    for i, seed in enumerate(seeds):
+        first = hashlib.sha256(f"{HASH}/above_rated/2/{i}".encode()).hexdigest()[:16]
+        assert seed == 2**62 + int(first, 16) // 4
+    assert "SHA-256 of 'HASH/SUITE/VERSION/i'" in DRAWING_RULE
+    assert drawn_seeds(HASH.upper(), "above_rated", 2, 6)[:3] == seeds
+    others = drawn_seeds(HASH, "above_rated", 3, 3) + drawn_seeds(HASH, "gusts", 2, 3)
+    assert len({*seeds, *others}) == 9 and all(seed in DRAWN for seed in seeds)
+    assert all(purpose.stop < DRAWN.start for purpose in PURPOSES.values())
+
+
+@pytest.mark.parametrize("source", ["", "main", "v0.2.0", HASH[:39], HASH[:-1] + "g", HASH + "\n"])
+def test_seeds_are_drawn_from_a_whole_hash_alone(source):
+    with pytest.raises(InputError, match="40 to 128 hexadecimal digits"):
+        drawn_seeds(source, "above_rated", 2, 3)
+
+
+@pytest.mark.parametrize("name", suite_names())
+def test_no_listed_seed_is_left_in_a_suite_of_drawn_ones(name):
+    listed = read_suite(name)
+    drawn = with_drawn_seeds(listed, HASH)
+    assert drawn.drawn == {"hash": HASH, "rule": DRAWING_RULE} and listed.drawn is None
+    for before, after in zip((listed, *listed.cases), (drawn, *drawn.cases), strict=True):
+        assert len(after.seeds or ()) == len(before.seeds or ()) and all(
+            seed in DRAWN for seed in after.seeds or ()
+        )
 
 
 @pytest.mark.parametrize("name", suite_names())
@@ -84,7 +129,7 @@ def test_the_command_of_each_shipped_agent_keeps_its_seeds_apart(card):
 def test_the_environment_draws_its_weather_from_the_range_of_its_task():
     task = replace(TASKS["above_rated"], weather_seeds=(500, 502))
     env = FowtEnv(task, rotor="table", wave_components=5, duration=1.0, wind=18.0)
-    drawn = {env.reset(seed=seed)[1]["episode"]["weather_seed"] for seed in range(12)}
+    drawn = {env.reset(seed=seed)[1]["sampled"]["weather_seed"] for seed in range(12)}
     assert drawn == {500, 501}
 
 

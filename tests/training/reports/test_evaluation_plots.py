@@ -12,7 +12,7 @@ from fowt_env.training.reports import evaluation_plots  # noqa: E402
 PNG = b"\x89PNG\r\n\x1a\n"
 
 
-def test_evaluation_plot_draws_failed_runs_as_the_worst_of_their_case_and_says_so(tmp_path):
+def test_evaluation_plot_leaves_lost_runs_out_and_says_so(tmp_path):
     table = pd.DataFrame(
         {
             "controller": ["a", "a", "b", "b"],
@@ -24,8 +24,18 @@ def test_evaluation_plot_draws_failed_runs_as_the_worst_of_their_case_and_says_s
     )
     figure = evaluation_plots.plot_evaluation(table, ["PtfmPitch_std_[deg]"], tmp_path / "metrics.png")
     assert (tmp_path / "metrics.png").read_bytes().startswith(PNG)
-    assert "1 of 4 runs failed or tripped" in figure.legends[0].get_title().get_text()
-    np.testing.assert_array_equal(figure.axes[0].containers[0].lines[0].get_ydata(), [1.0, 2.0])
+    assert "1 of 4 runs were lost and are left out" in figure.legends[0].get_title().get_text()
+    drawn = [part.lines[0].get_ydata() for part in figure.axes[0].containers]
+    np.testing.assert_array_equal(np.array(drawn, dtype=float), [[1.0, 2.0], [3.0, np.nan]])
+
+
+@pytest.mark.parametrize("status", ["ok", "failed"])
+def test_runs_of_one_figure_are_drawn_although_their_mean_is_rounded(status):
+    figures = {"controller": "a", "case": "c", "seed": [1, 2, 3], "status": status, "reason": "", "x": 0.1}
+    assert np.mean([0.1, 0.1, 0.1]) > 0.1
+    figure = evaluation_plots.plot_evaluation(pd.DataFrame(figures), ["x"])
+    (mark,) = figure.axes[0].containers[0].lines[0].get_ydata()
+    assert np.isfinite(mark) == (status == "ok")
 
 
 def pareto_board(controllers):
@@ -34,7 +44,8 @@ def pareto_board(controllers):
     for name, (speed, pitch, travel) in controllers.items():
         values = dict(zip(evaluation_plots.PARETO_METRICS, (speed, pitch, travel, 20.0), strict=True))
         figures = {key: figure | {"mean": value, "worst": value} for key, value in values.items()}
-        entries.append({"controller": name, "failed": 0, "tripped": 0, "metrics": figures})
+        counts = dict.fromkeys(("lost", "failed", "tripped", "lost_power"), 0)
+        entries.append({"controller": name, **counts, "metrics": figures})
     return {"controllers": entries, "cases": ["a"], "interval": {"level": 0.95}}
 
 
@@ -51,6 +62,17 @@ def test_pareto_marks_have_areas_in_the_ratio_of_pitch_travel_and_names_that_do_
     boxes = [Text.get_window_extent(text) for text in axes.texts]  # without its leader
     assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
     assert (tmp_path / "pareto.png").stat().st_size > 10_000
+
+
+def test_a_controller_with_lost_runs_is_hollow_and_betters_nobody():
+    board = pareto_board({"a": (1.0, 1.0, 0.1), "b": (1.2, 0.8, 0.1), "gamer": (0.5, 0.5, 0.1)})
+    board["controllers"][2].update(lost=2, tripped=2)
+    axes = evaluation_plots.plot_pareto(board).axes[0]
+    marks = [mark for mark in axes.collections if hasattr(mark, "get_sizes")]
+    assert [len(mark.get_facecolor()) for mark in marks] == [1, 1, 0]
+    (front,) = (line for line in axes.lines if line.get_linestyle() == ":")
+    assert list(zip(*front.get_data(), strict=True)) == [(1.0, 1.0), (1.2, 0.8)]
+    assert marks[2].get_label().endswith(", 2 tripped")
 
 
 def test_a_pareto_plot_of_failures_alone_is_refused():

@@ -112,15 +112,14 @@ def test_names_are_shown_and_never_read_as_markup(folder, tmp_path):
     assert data_of(tmp_path / "page.html")["controllers"] == list(CONTROLLERS)
 
 
-def test_means_are_over_the_lifetime_with_failed_runs_as_the_worst_of_their_case(folder, tmp_path):
+def test_means_are_over_the_lifetime_and_the_runs_that_ended_well(folder, tmp_path):
     table = write_folder(tmp_path)
     data = data_of(write_report(folder, tmp_path / "page.html", schedule=False))
     rows = {row["controller"]: row for row in data["board"][""]}
-    speeds = table[table["controller"] == "busy"]["RotSpeed_std_[rpm]"]
-    worst = table[table["case"] == "ntm_18"]["RotSpeed_std_[rpm]"].max()
-    expected = np.sqrt((speeds.fillna(worst) ** 2).mean())
+    speeds = table[table["controller"] == "busy"].groupby("case")["RotSpeed_std_[rpm]"]
+    expected = np.sqrt(speeds.apply(lambda each: (each**2).mean()).mean())
     assert rows["busy"]["values"]["RotSpeed_std_[rpm]"] == pytest.approx(expected, rel=1e-5)
-    assert (rows["busy"]["failed"], rows["busy"]["tripped"], rows["busy"]["runs"]) == (1, 0, 4)
+    assert (rows["busy"]["lost"], rows["busy"]["lost_text"], rows["busy"]["runs"]) == (1, "1 failed", 4)
     assert "novelty_[-]" in [metric["name"] for metric in data["metrics"]]  # metrics of other versions
 
 
@@ -231,7 +230,7 @@ def test_the_schedule_is_the_steady_point_of_each_wind(folder, tmp_path):
     assert result.exit_code == 0, result.stderr
     schedule = data_of(page)["schedule"]
     panels = {panel["label"]: panel["values"] for panel in schedule["panels"]}
-    point = fowt_env.trim(fowt_env.build_scene("oc3_hywind", wind=18.0))
+    point = fowt_env.trim(fowt_env.build_scene("oc3_hywind", wind=18.0, fidelity="reference"))
     at = SCHEDULE_WINDS.index(18.0)
     assert panels["blade pitch (deg)"][at] == pytest.approx(point["BldPitch1"], rel=1e-5)
     assert panels["thrust (kN)"][at] == pytest.approx(point["RotThrust"], rel=1e-5)
@@ -378,6 +377,41 @@ def test_a_difference_has_its_percentage_its_mark_and_its_star_in_the_table(brow
         assert page.locator("#table tbody tr").nth(0).locator("td .gap").first.inner_text() == "baseline"
         page.select_option("#table-case", "ntm_14")  # which the file has nothing of
         assert page.locator("#table tbody td").count() == 0
+
+
+def test_a_law_that_lost_runs_is_best_in_nothing_and_a_wreck_sets_no_scale(browser, folder, tmp_path):
+    copy = tmp_path / "copy"
+    shutil.copytree(folder, copy)
+    figure = {"RotSpeed_std_[rpm]": {"mean": 0.5}, "PtfmPitch_std_[deg]": {"mean": 0.5}}
+    wreck = {name: {"mean": 0.001} for name in figure}
+    gap = {name: {"mean": -0.4, "percent": -80.0} for name in figure}
+    entries = [
+        {"controller": "calm", "runs": 4, "failed": 0, "metrics": figure, "difference": {}},
+        {"controller": EVIL, "runs": 4, "failed": 0, "metrics": figure, "difference": {}},
+        {"controller": "busy", "runs": 4, "failed": 0, "lost_power": 2, "metrics": wreck, "difference": gap},
+    ]
+    (copy / "leaderboard.json").write_text(json.dumps({"baseline": "calm", "controllers": entries}))
+    path = run_file(copy / "runs", "busy", "ntm_18", 2)
+    frame = pd.read_parquet(path)
+    frame.loc[frame.index[-100:], "RotSpeed_[rpm]"] = 0.0
+    frame.to_parquet(path)
+    with offline_page(browser, write_report(copy, schedule=False)) as page:
+        names = page.locator("#table thead th button .label").all_inner_texts()
+        assert "rank" not in names and names[1] == "lost"
+        rows = page.locator("#table tbody tr")
+        assert [rows.nth(i).locator(".best").count() for i in range(3)] == [2, 2, 0]
+        assert "2 lost power" in rows.nth(2).inner_text() and "✓" not in rows.nth(2).inner_text()
+        ends = "document.getElementById('pareto-plot').layout.xaxis.range"
+        assert page.evaluate(ends)[0] > 0.1
+        assert "1 off scale: busy" in page.locator("#pareto-remark").inner_text()
+        page.select_option("#series-case", "ntm_18")
+        page.select_option("#series-seed", "2")
+        low, high = page.evaluate("document.getElementById('series-plot').layout.yaxis3.range")
+        assert 11.0 < low < high < 13.0  # of the rotor speed, which is at rest at the end of the wreck
+        notes = page.evaluate(
+            "document.getElementById('series-plot').layout.annotations.map(each => each.text)"
+        )
+        assert "1 off scale: busy" in notes
 
 
 def test_a_metric_is_explained_to_pointer_and_keyboard_and_the_explanation_can_be_left(opened):

@@ -91,7 +91,7 @@ def test_lost_runs_have_the_time_and_the_reason():
     told = lost_runs(table(["a"], "tripped", "overspeed trip at 41.2 s"))
     assert told[0][3] == "tripped: overspeed trip at 41.2 s"  # the time once
     text = lost_list(lost, 3)
-    assert "3 of 3 runs failed or tripped" in text and "<img" not in text
+    assert "3 of 3 runs lost" in text and "<img" not in text
     assert lost_list([], 3) == ""
 
 

@@ -6,6 +6,7 @@ import pytest
 
 from fowt_env.errors import InputError
 from fowt_env.training.evaluation.evaluate import COLUMNS
+from fowt_env.training.evaluation.failures import PENALTY
 from fowt_env.training.evaluation.metrics import METRICS, mean_exponent
 from fowt_env.training.reports.scores import (
     COUNTS,
@@ -105,15 +106,24 @@ def test_an_agent_with_a_failed_run_reaches_no_aim():
     assert set(scores["agent"]) == {"failed"} and scores["other", "rotor-speed std"] == "then*"
 
 
-def test_failed_runs_are_counted_and_have_the_worst_figures_of_their_case():
+def test_failed_runs_are_counted_and_cost_a_multiple_of_the_baselines_figures():
     runs = table({"agent": [0.5, 0.5, 0.5]})
     fail(runs, "agent", 2)
     scores, counts = agent_scores(runs, ["base"]), agent_counts(runs, ["base"])
     assert (scores["pairs"] == 3).all() and (scores["runs"] == 3).all() and (scores["failed"] == 1).all()
     travel = scores.set_index("figure").loc["blade-pitch travel"]
-    assert travel["ratio"] == pytest.approx((0.5 + 1.0 + 3.0) / 6.0)  # not the 0.5 of those that went well
+    assert travel["ratio"] == pytest.approx((0.5 + 1.0 + PENALTY * 3.0) / 6.0)  # not 0.5, of the others
+    assert scores.set_index("figure").loc["energy", "ratio"] == pytest.approx(
+        (0.5 + 1.0 + 3.0 / PENALTY) / 6.0
+    )
+    other = table({"agent": [0.5, 0.5, 0.5], "sandbag": [5.0, 5.0, 5.0]})
+    fail(other, "agent", 2)
+    beside = agent_scores(other, ["base"], agents=["agent"]).reset_index(drop=True)
+    pd.testing.assert_frame_equal(beside, scores, check_exact=True)
     assert list(counts["agent"]) == ["agent", "base"] and list(counts["failed"]) == [1, 0]
     assert list(counts["verdict"]) == ["missed", "met"]
+    fail(runs, "base", 1)  # a run that the baseline lost has no ratio
+    assert (agent_scores(runs, ["base"])["pairs"] == 2).all()
     for name in ("agent", "base"):
         for seed in range(3):
             fail(runs, name, seed)

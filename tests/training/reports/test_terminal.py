@@ -9,8 +9,10 @@ from fowt_env.errors import InputError
 from fowt_env.training.evaluation.evaluate import COLUMNS
 from fowt_env.training.evaluation.leaderboard import leaderboard
 from fowt_env.training.evaluation.metrics import METRICS
+from fowt_env.training.reports.metric_words import SHORT
 from fowt_env.training.reports.terminal import (
     DROPPED_FIRST,
+    LEADERBOARD,
     LEADERBOARD_DROPS,
     PRINTED_METRICS,
     chosen_cases,
@@ -19,12 +21,14 @@ from fowt_env.training.reports.terminal import (
     summary_rows,
 )
 
+POWER = "GenPwr_max_[kW]"
+
 
 def means():
     """Two summary rows, the second of them without a successful run."""
     rows = [
-        {"controller": name, "case": "ntm_18", "runs": 3, "failed": failed, "tripped": 0}
-        for name, failed in (("pi", 0), ("x", 3))
+        {"controller": name, "case": "ntm_18", "runs": 3, "failed": failed, "tripped": 0, "lost_power": lost}
+        for name, failed, lost in (("pi", 0, 0), ("x", 1, 2))
     ]
     frame = pd.DataFrame(rows)
     for name in METRICS:
@@ -73,11 +77,11 @@ def test_the_leaderboard_says_how_many_runs_went_well_and_of_which_seeds():
     )
     (pi, x) = (dict(zip(headings, row, strict=True)) for row in rows)
     assert (pi["runs"], x["runs"]) == ("6/6", "0/6, 6 failed")
-    assert x["rotor speed std\nrpm"].startswith("1.900 [1.900, 1.900] +")  # the worst of pi's
-    assert len(remarks) == 1 and "x: 6 runs failed" in remarks[0] and "ranked last" in remarks[0]
+    assert set(row for heading, row in x.items() if "\n" in heading) == {"-"}  # nothing made up
+    assert remarks == ["runs lost by x: 6 failed: without figures here; listed last"]
 
 
-def test_a_row_has_means_with_intervals_the_largest_power_and_differences_to_the_baseline():
+def test_a_row_has_means_with_intervals_and_differences_to_the_baseline():
     both = board([1, 2, 3, 4, 5], x="ok", factor=0.5)
     _, headings, (pi, x), _ = leaderboard_rows(both)
     place = {heading.replace("\n", " "): number for number, heading in enumerate(headings)}
@@ -87,14 +91,20 @@ def test_a_row_has_means_with_intervals_the_largest_power_and_differences_to_the
         0.5 * np.sqrt(np.mean((1.0 + 0.1 * np.arange(1, 6)) ** 2))  # of deviations the squares are averaged
     )
     assert not any("%" in text or "*" in text for text in pi)  # the baseline has none to itself
-    largest = [
-        row[place["power max MW"]] for row in leaderboard_rows(board([1, 2, 9], x="ok", factor=1e4))[2]
-    ]
-    assert largest == ["0.00", "19.00"]  # of the worst run
-    tower = both["controllers"][0]["metrics"]["TwrBsMyt_DEL_[kN-m]"]
-    tower["mean"] = 22_700.0
-    _, _, (pi, _), _ = leaderboard_rows(both)
-    assert pi[place["tower DEL MN m"]] == "22.7"
+
+
+def test_one_name_has_one_figure_and_one_unit_in_all_tables():
+    """The greatest power is the mean of the runs' greatest, in the metric's own unit."""
+    both = board([1, 2, 9], x="ok", factor=1e3)
+    _, headings, (_, x), _ = leaderboard_rows(both)
+    place = {heading.replace("\n", " "): number for number, heading in enumerate(headings)}
+    assert (
+        x[place["greatest power kW"]] == "1400" == f"{both['controllers'][1]['metrics'][POWER]['mean']:.0f}"
+    )
+    for heading, metric, *_ in (*LEADERBOARD, *PRINTED_METRICS):
+        unit = metric.rpartition("_[")[2][:-1].replace("m/s^2", "m/s²")
+        assert heading.split("\n")[-1].replace(" ", "") == unit.replace("-", "")
+    assert SHORT[POWER] == "greatest power"
 
 
 def test_few_seeds_have_neither_interval_nor_star_and_the_remark_says_so_once():
@@ -107,19 +117,20 @@ def test_few_seeds_have_neither_interval_nor_star_and_the_remark_says_so_once():
     assert leaderboard_rows(board([1, 2, 3, 4], x="ok"))[3] == []
 
 
-def test_a_controller_that_failed_in_bad_weather_pays_for_it_and_its_row_says_failed():
+def test_a_controller_that_failed_in_bad_weather_is_not_said_to_be_better_and_its_row_says_failed():
     both = board([1, 2, 3, 4, 5], x="ok", factor=0.5)
     _, headings, (_, row), _ = leaderboard_rows(both)
     assert sum("-50.0%*" in text for text in row) == 7
     lost = board([1, 2, 3, 4, 5], x="ok", factor=0.5, lost=5)
     _, headings, (_, row), remarks = leaderboard_rows(lost)
     assert row[headings.index("runs")] == "4/5, 1 failed"
-    assert not any("-50.0%" in text for text in row) and "x: 1 run failed: counted with" in remarks[0]
+    assert not any("*" in text for text in row) and sum("-50.0% " in text for text in row) == 7
+    assert remarks[0] == "runs lost by x: 1 failed: without figures here; listed last"
 
 
 def test_a_baseline_that_failed_is_said_to_have():
     _, _, _, remarks = leaderboard_rows(board([1, 2, 3, 4, 5], x="ok", lost=5, baseline="x"))
-    assert remarks[-1] == "baseline x: 1 run failed, which flatters the others"
+    assert remarks[-1] == "differences from x are of the runs that it did not lose"
     title, _, _, remarks = leaderboard_rows(board([1, 2], pi="failed"))
     assert "difference" not in title
     assert remarks[-1] == "no paired differences: every controller has failed runs"

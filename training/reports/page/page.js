@@ -125,7 +125,7 @@ function gapOf(row, metric) {
   const p = row.p[metric.name];
   const [tested, sure] = [p !== undefined, p !== undefined && p <= DATA.alpha];
   const way = Math.abs(percent) < 0.005 ? 0 : Math.sign(percent) * metric.better;
-  const judged = way && (sure || !tested);
+  const judged = way && !row.lost && (sure || !tested);
   const word = way > 0 ? "better" : "worse";
   const found = sure ? `significant, corrected p = ${p.toPrecision(2)}` : tested ? `not significant, corrected p = ${p.toPrecision(2)}` : "not tested";
   return {
@@ -142,9 +142,10 @@ function shownColumns() {
 function sortedRows() {
   const rows = [...DATA.board[$("table-case").value]];
   const shown = $("table-view").value === GAPS ? "percent" : "values";
-  const own = { controller: (row) => row.controller, failed: (row) => row.failed + row.tripped, rank: (row) => row.rank };
+  const own = { controller: (row) => row.controller, lost: (row) => row.lost, rank: (row) => row.rank };
   const value = own[order.key] || ((row) => (shown === "percent" && row.controller === DATA.baseline ? 0 : row[shown][order.key]));
   rows.sort((a, b) => {
+    if (!own[order.key] && !a.lost !== !b.lost) return a.lost ? 1 : -1; // figures of other runs than the others' come last
     const [x, y] = [value(a), value(b)];
     if (x === null || x === undefined) return 1; // missing figures last, whichever the direction
     if (y === null || y === undefined) return -1;
@@ -176,7 +177,7 @@ function headerCell(key, label, unit, about) {
 }
 
 function bestOf(metric, rows) {
-  const values = rows.map((row) => row.values[metric.name]).filter((value) => value !== null && value !== undefined);
+  const values = rows.filter((row) => !row.lost).map((row) => row.values[metric.name]).filter((value) => value !== null && value !== undefined);
   if (!metric.better || values.length < 2) return null;
   return metric.better > 0 ? Math.max(...values) : Math.min(...values);
 }
@@ -194,7 +195,7 @@ function figureCell(row, metric, best) {
     const absolute = row.gaps[metric.name];
     if (absolute !== null && absolute !== undefined) cell.append(element("span", `${absolute > 0 ? "+" : ""}${figure(absolute)}`, "range"));
   } else {
-    cell.append(element("span", figure(value), value !== null && value !== undefined && value === best ? "best" : ""));
+    cell.append(element("span", figure(value), !row.lost && value !== null && value !== undefined && value === best ? "best" : ""));
     if (gap) cell.append(element("span", gap.text, gap.kind));
   }
   if (gap) cell.title = gap.tip;
@@ -206,7 +207,7 @@ function drawTable() {
   const columns = shownColumns();
   const rows = sortedRows();
   const head = element("tr");
-  head.append(headerCell("controller", "controller", "", "Choose to sort by name."), headerCell("failed", "lost", "runs", "Runs that failed or tripped, of all runs. They count with the worst values of their case."));
+  head.append(headerCell("controller", "controller", "", "Choose to sort by name."), headerCell("lost", "lost", "runs", "Runs that failed, tripped or lost power (less than half of the reference's energy), of all runs. They have no figures here; a score counts them as far worse than the reference."));
   if (DATA.ranked) head.append(headerCell("rank", "rank", "", "First those whose runs all ended well within the limits, then those beyond a limit, then those that lost runs; within each by score, else as evaluated."));
   for (const metric of columns) head.append(headerCell(metric.name, metric.label, metric.unit, metric.about));
   hideTip();
@@ -219,12 +220,12 @@ function drawTable() {
     const swatch = element("span", undefined, "swatch");
     swatch.style.background = colour(DATA.controllers.indexOf(row.controller));
     name.append(swatch, row.controller);
-    const failed = element("td", `${row.failed + row.tripped} of ${row.runs}`);
-    if (row.failed + row.tripped) {
-      failed.className = "bad";
-      failed.append(element("span", [row.failed && `${row.failed} failed`, row.tripped && `${row.tripped} tripped`].filter(Boolean).join(", "), "range bad"));
+    const lost = element("td", `${row.lost} of ${row.runs}`);
+    if (row.lost) {
+      lost.className = "bad";
+      lost.append(element("span", row.lost_text, "range bad"));
     }
-    line.append(name, failed);
+    line.append(name, lost);
     if (row.beyond && row.beyond.length) name.append(element("span", `beyond a limit: ${row.beyond.join("; ")}`, "range bad"));
     if (DATA.ranked) line.append(element("td", row.rank));
     for (const metric of columns) line.append(figureCell(row, metric, best[metric.name]));
@@ -297,17 +298,21 @@ function placeLabels(marks, width, height) {
 function drawPareto() {
   const [across, up, size] = DATA.pareto;
   const known = (value) => value !== null && value !== undefined;
-  const rows = DATA.board[$("table-case").value].filter((row) => known(row.values[across]) && known(row.values[up]));
-  const most = Math.max(1e-12, ...rows.map((row) => row.values[size] || 0));
-  const radius = (row) => Math.max(2.5, (narrow() ? 13 : 19) * Math.sqrt(Math.max(0, row.values[size] || 0) / most));
+  const every = DATA.board[$("table-case").value].filter((row) => known(row.values[across]) && known(row.values[up]));
+  const whole = every.filter((row) => !row.lost); // a controller that lost runs betters nobody, and sets no scale
   const range = (key) => {
-    const values = rows.map((row) => row.values[key]);
+    const values = (whole.length ? whole : every).map((row) => row.values[key]);
     const [low, high] = [Math.min(...values), Math.max(...values)];
     if (!values.length) return [0, 1];
     const pad = 0.22 * (high - low) || 0.2 * Math.abs(high) || 1;
     return [Math.max(0, low - pad), high + pad];
   };
   const [xs, ys] = [range(across), range(up)];
+  const inside = (value, ends) => value >= ends[0] && value <= ends[1];
+  const rows = every.filter((row) => inside(row.values[across], xs) && inside(row.values[up], ys));
+  const off = every.filter((row) => !rows.includes(row)).map((row) => row.controller);
+  const most = Math.max(1e-12, ...rows.map((row) => row.values[size] || 0));
+  const radius = (row) => Math.max(2.5, (narrow() ? 13 : 19) * Math.sqrt(Math.max(0, row.values[size] || 0) / most));
   const [width, height] = [(paper ? 680 : $("pareto-plot").clientWidth) - 80, 430 - 64];
   const places = placeLabels(rows.map((row) => ({
     x: (width * (row.values[across] - xs[0])) / (xs[1] - xs[0]), y: height * (1 - (row.values[up] - ys[0]) / (ys[1] - ys[0])), r: radius(row), text: row.controller,
@@ -320,13 +325,14 @@ function drawPareto() {
     type: "scatter", mode: "markers+text", name: plain(row.controller), text: [plain(row.controller)], textposition: places[i],
     x: [row.values[across]], y: [row.values[up]], textfont: { size: 13 }, showlegend: false, cliponaxis: false,
     marker: {
-      color: colour(DATA.controllers.indexOf(row.controller)), opacity: 0.8, line: { color: css("--card"), width: 1 },
+      color: colour(DATA.controllers.indexOf(row.controller)), opacity: 0.8, symbol: row.lost ? "circle-open" : "circle",
+      line: row.lost ? { width: 2 } : { color: css("--card"), width: 1 },
       size: [2 * radius(row)],
     },
     hovertemplate: `<b>${plain(row.controller)}</b><br>${line(row, across, "rotor-speed std", "rpm")}${line(row, up, "platform-pitch std", "deg")}`
       + `pitch travel ${figure(row.values[size])} deg/s<extra></extra>`,
   }));
-  const front = rows.filter((a) => !rows.some((b) => b !== a && b.values[across] <= a.values[across] && b.values[up] <= a.values[up]
+  const front = whole.filter((a) => !whole.some((b) => b !== a && b.values[across] <= a.values[across] && b.values[up] <= a.values[up]
     && (b.values[across] < a.values[across] || b.values[up] < a.values[up])));
   front.sort((a, b) => a.values[across] - b.values[across]);
   if (front.length > 1) {
@@ -338,7 +344,7 @@ function drawPareto() {
   const found = front.length > 1 ? ` No controller lies below and to the left of the dotted line (${names}).`
     : rows.length > 1 && front.length ? ` ${names} is least in both.` : "";
   $("pareto-remark").textContent = rows.length
-    ? `Less is better on both axes: ${where}, for the case chosen in the leaderboard. The area of a mark is the pitch travel.${found} Intervals are shown on hover; whether a difference is significant is said above.`
+    ? `Less is better on both axes: ${where}, for the case chosen in the leaderboard. The area of a mark is the pitch travel${rows.length > whole.length ? "; hollow: of the runs that were not lost" : ""}.${off.length ? ` ${off.length} off scale: ${off.join(", ")}.` : ""}${found} Intervals are shown on hover; whether a difference is significant is said above.`
     : "No controller has both standard deviations here.";
   draw("pareto-plot", traces, {
     height: 430, xaxis: { title: { text: "rotor speed, standard deviation (rpm)" }, range: xs },
@@ -383,16 +389,24 @@ function panels(entries, field, axes) {
   const height = (1 - gap * (axes.length - 1)) / axes.length;
   const named = new Set();
   const lost = lostRuns();
+  const annotations = [];
   axes.forEach((axis, number) => {
     const suffix = number ? String(number + 1) : "";
     const top = 1 - number * (height + gap);
     const held = DATA.controllers.map((controller, i) => [controller, i, entries[controller]]).filter(([, , run]) => run && run[field][axis.channel]);
     const same = held.length > 1 && held.every(([, , run]) => ["codes", "low", "high"].every((key) => run[field][axis.channel][key] === held[0][2][field][axis.channel][key]));
-    let most = 0;
+    const sound = held.filter(([controller]) => !lost[controller]); // lost runs set no scale
+    const ends = (sound.length ? sound : held).map(([, , run]) => run[field][axis.channel]);
+    const [least, most] = [Math.min(...ends.map((packed) => packed.low)), Math.max(...ends.map((packed) => packed.high))];
+    const pad = 0.06 * (most - least) || 1;
+    const off = axis.power ? [] : held.filter(([, , run]) => run[field][axis.channel].low < least - pad || run[field][axis.channel].high > most + pad);
+    if (off.length) {
+      annotations.push({ xref: "paper", yref: `y${suffix} domain`, x: 1, y: 1, xanchor: "right", yanchor: "top", showarrow: false,
+        text: plain(`${off.length} off scale: ${off.map(([controller]) => controller).join(", ")}`), font: { size: 10, color: css("--soft") } });
+    }
     for (const [controller, i, run] of same ? held.slice(0, 1) : held) {
       const packed = run[field][axis.channel];
       const y = decode(packed);
-      most = Math.max(most, packed.high);
       const label = `${plain(controller)}${lost[controller] ? " (lost)" : ""}`;
       traces.push({
         type: "scatter", mode: "lines", xaxis: "x", yaxis: `y${suffix}`,
@@ -407,17 +421,17 @@ function panels(entries, field, axes) {
           marker: { symbol: "x", size: 9, color: css("--bad") }, hovertemplate: `${plain(controller)}: ${plain(lost[controller])}<extra></extra>` });
       }
     }
-    const axisOf = axis.power ? { range: [axis.low(most), most + 0.6] } : {};
+    const axisOf = axis.power ? { range: [axis.low(most), most + 0.6] } : off.length ? { range: [least - pad, most + pad] } : {};
     shape[`yaxis${suffix}`] = { domain: [Math.max(0, top - height), top], title: { text: axis.label, font: { size: 11 }, standoff: 8 }, nticks: 5, ...axis.y, ...axisOf };
   });
-  return { traces, shape };
+  return { traces, shape, annotations };
 }
 const lostRuns = () => (DATA.lost[$("series-case").value] || {})[$("series-seed").value] || {};
 
 function drawSeries() {
   const entries = chosen();
   const axes = DATA.panels.filter((panel) => Object.values(entries).some((run) => run.series[panel.channel]));
-  const { traces, shape } = panels(entries, "series", axes);
+  const { traces, shape, annotations } = panels(entries, "series", axes);
   const skips = Object.values(entries).map((run) => run.skip).filter((skip) => skip > 0);
   const start = Math.min(...Object.values(entries).map((run) => run.start));
   const end = start + Math.max(0, ...skips);
@@ -425,7 +439,7 @@ function drawSeries() {
   $("series-about").textContent = `${$("series-case").value}: ${about}.${skips.length ? " Shaded: the start, which is not scored." : ""}`;
   $("series-lost").replaceChildren(...Object.entries(lostRuns()).map(([controller, text]) => element("li", `${controller}: ${text}`)));
   draw("series-plot", traces, {
-    ...shape, height: 90 + 118 * Math.max(1, axes.length), hovermode: "x",
+    ...shape, annotations, height: 90 + 118 * Math.max(1, axes.length), hovermode: "x",
     xaxis: { title: { text: "time (s)" }, anchor: axes.length > 1 ? `y${axes.length}` : "y" },
     shapes: skips.length ? [{ type: "rect", xref: "x", yref: "paper", x0: start, x1: end, y0: 0, y1: 1, layer: "below", fillcolor: css("--shade"), opacity: 0.16, line: { width: 0 } }] : [],
   });
