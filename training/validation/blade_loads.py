@@ -6,10 +6,9 @@ also with `bem` without it. Blades as masses are those of the turbine file.
 """
 
 import numpy as np
-import pandas as pd
 
 from fowt_env.descriptions.units import DEGREE, RPM
-from fowt_env.training.validation.openfast_cases import _path
+from fowt_env.training.validation.openfast_cases import table
 
 PLATFORM = "iea15_volturnus_s"
 REFERENCE = f"{PLATFORM}/blade_loads.csv.gz"
@@ -35,7 +34,7 @@ def turn(rotor, wind, shear, rotor_speed, pitches, **options):
 
     scene = build_scene(
         PLATFORM, wind={"kind": "steady", "speed": wind}, rotor=rotor, shear_exponent=shear,
-        pitch="individual", hydrodynamics=False, mooring=False, **options,
+        pitch="individual", hydrodynamics=False, mooring=False, **{"fidelity": "reference"} | options,
     )  # fmt: skip
     body = scene.model.rigid_body._replace(platform_fixed=True, rotor_fixed=True)
     scene = scene.with_model(rigid_body=body)
@@ -54,8 +53,7 @@ def turn(rotor, wind, shear, rotor_speed, pitches, **options):
 
 def blades(study):
     """Steady wind, platform held: means of the moments 2 %, first (tower: also third) harmonics 5 %."""
-    table = pd.read_csv(_path(study.folder, REFERENCE), comment="#")
-    for case, rows in table.groupby("case", sort=False):
+    for case, rows in table(REFERENCE, study.folder).groupby("case", sort=False):
         first = rows.iloc[0]
         state = (
             float(first["wind_mps"]),

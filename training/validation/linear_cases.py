@@ -10,10 +10,9 @@ and yaw are held.
 """
 
 import numpy as np
-import pandas as pd
 
 from fowt_env.descriptions.units import DEGREE
-from fowt_env.training.validation.openfast_cases import _path
+from fowt_env.training.validation.openfast_cases import table
 
 PLATFORM = "iea15_volturnus_s"
 WINDS = (13.0, 15.0, 18.0, 21.0, 24.0)  # m/s, constant generator torque in OpenFAST's models
@@ -173,14 +172,15 @@ def linear(study):
     from fowt_env.analysis.linear_model import linearize
     from fowt_env.scene.build import build_scene
 
-    poles = pd.read_csv(_path(study.folder, f"{PLATFORM}/linear_poles.csv.gz"), comment="#")
-    gains = pd.read_csv(_path(study.folder, f"{PLATFORM}/linear_responses.csv.gz"), comment="#")
+    poles = table(f"{PLATFORM}/linear_poles.csv.gz", study.folder)
+    gains = table(f"{PLATFORM}/linear_responses.csv.gz", study.folder)
     platform, turbine = old_deck()
     for wind in WINDS:
         study.say(f"linear model at {wind:g} m/s")
         scene = build_scene(
             platform, wind={"kind": "steady", "speed": wind}, turbine=turbine, rotor="bem", skewed_wake=True,
             shear_exponent=SHEAR, radiation="state_space",
+            fidelity="reference",
         )  # fmt: skip
         model = linearize(with_linearised_drag(scene))
         theirs = poles[np.isclose(poles["wind_mps"], wind)].iloc[0]

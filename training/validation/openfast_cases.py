@@ -27,6 +27,7 @@ COLUMNS = {  # column of a reference file: (OpenFAST channel as simulate names i
     "aero_thrust_N": ("RtFldFxh_[N]", 1.0),
     "aero_thrust_kN": ("RtFldFxh_[N]", 1e3),
     "aero_torque_kNm": ("RtFldMxh_[N-m]", 1e3),
+    "aero_torque_Nm": ("RtFldMxh_[N-m]", 1.0),
     "fair_tension1_kN": ("FAIRTEN1_[kN]", 1.0),
     "fair_tension2_kN": ("FAIRTEN2_[kN]", 1.0),
     "fair_tension3_kN": ("FAIRTEN3_[kN]", 1.0),
@@ -60,12 +61,17 @@ def _path(folder, name):
     return path
 
 
+def table(name, folder=None):
+    """DataFrame of a file of the references, as it is. Raises: InputError if absent."""
+    return pd.read_csv(_path(folder, name), comment="#")
+
+
 def reference(case, folder=None, place=""):
     """DataFrame of a reference run, columns named as simulate names them. Raises: InputError if absent.
 
     place: folder of the run in the folder of all references.
     """
-    frame = pd.read_csv(_path(folder, f"{place}/{case}.csv.gz" if place else f"{case}.csv.gz"), comment="#")
+    frame = table(f"{place}/{case}.csv.gz" if place else f"{case}.csv.gz", folder)
     values = {}
     for name in frame.columns:
         channel, factor = COLUMNS[name]
@@ -75,18 +81,18 @@ def reference(case, folder=None, place=""):
 
 def steady_reference(folder=None):
     """DataFrame of the steady curve, one row per wind speed (columns as in the file)."""
-    return pd.read_csv(_path(folder, "steady.csv.gz"), comment="#")
+    return table("steady.csv.gz", folder)
 
 
 def hub_wind(folder=None):
     """Wind specification of the recorded hub wind, blown uniformly."""
-    frame = pd.read_csv(_path(folder, "wind_hub_18mps.csv.gz"), comment="#")
+    frame = table("wind_hub_18mps.csv.gz", folder)
     return {"kind": "series", "time": frame["time_s"].to_numpy(), "speed": frame["u_mps"].to_numpy()}
 
 
 def wave_components(folder=None):
     """Sea specification of the recorded wave components (there omega t + phase, here minus both)."""
-    frame = pd.read_csv(_path(folder, "waves_hs7.5_tp10.csv.gz"), comment="#")
+    frame = table("waves_hs7.5_tp10.csv.gz", folder)
     return {
         "kind": "components",
         "omega": frame["omega_rad_s"].to_numpy(),
@@ -125,10 +131,12 @@ class ReferenceRun:
     controlled: bool = False
     initial: dict = field(default_factory=dict)
     options: dict = field(default_factory=dict)
-    platform: str = PLATFORM
+    platform: object = PLATFORM  # name, or function that returns the description
     controller: object = "openfast_oc3"  # name, or function of (folder) -> controller
     output_dt: float = 0.1  # of the reference file
     place: str = ""  # folder of the reference file in that of all of them
+    held: bool = False  # platform and rotor speed
+    before: float = 0.0  # s that this plant runs before the reference begins, its wake settling
 
     def theirs(self, folder=None):
         """DataFrame of OpenFAST's run. Raises: InputError if absent."""
@@ -148,19 +156,22 @@ class ReferenceRun:
         sea = self.sea(folder) if callable(self.sea) else self.sea
         controller = options.pop("controller", self.controller)
         scene = build_scene(
-            self.platform,
+            self.platform() if callable(self.platform) else self.platform,
             wind=wind,
             sea=sea,
             rotor=rotor,
-            **{"duration": max(700.0, self.duration), **self.options, **options},
+            **{"fidelity": "reference", "duration": max(700.0, self.duration), **self.options, **options},
         )
+        if self.held:
+            body = scene.model.rigid_body._replace(platform_fixed=True, rotor_fixed=True)
+            scene = scene.with_model(rigid_body=body)
         dt = self.dt if dt is None else dt
-        return simulate(
+        frame = simulate(
             scene,
             controller=(controller(folder) if callable(controller) else controller)
             if self.controlled
             else None,
-            duration=self.duration,
+            duration=self.before + self.duration,
             dt=dt,
             control_dt=dt,
             output_dt=self.output_dt,
@@ -168,6 +179,10 @@ class ReferenceRun:
             initial=self.initial,
             progress=progress,
         )
+        if self.before:
+            frame = frame[frame["Time_[s]"] >= self.before - 1e-6].reset_index(drop=True)
+            frame["Time_[s]"] -= self.before
+        return frame
 
 
 def _start(rotor_speed, blade_pitch):

@@ -23,6 +23,7 @@ LABELS = {
     "BldPitch1_[deg]": "blade pitch\n(deg)",
     "GenPwr_[kW]": "power\n(kW)",
     "RtFldFxh_[N]": "thrust\n(N)",
+    "RtFldMxh_[N-m]": "torque\n(N m)",
     "FAIRTEN1_[kN]": "tension 1\n(kN)",
     "FAIRTEN2_[kN]": "tension 2\n(kN)",
     "Wave1Elev_[m]": "wave\n(m)",
@@ -44,6 +45,12 @@ VOLTURNUS_PLOTS = {
     "float_steady_18mps": (TURNING, (0.0, 600.0), False),
     "turb_18mps_Hs7.5_uniform": (TURNING, (100.0, 400.0), True),
     "turb_18mps_Hs7.5_uniform_tower": (BENDING, (100.0, 200.0), True),
+    "wake_pitch_step": (("RtFldFxh_[N]", "RtFldMxh_[N-m]"), (10.0, 100.0), False),
+    "wake_wind_step_18mps": (("RtFldFxh_[N]", "RtFldMxh_[N-m]"), (10.0, 100.0), False),
+}
+OC4_PLOTS = {
+    "waves_Hs7.5": (PLANE, (100.0, 400.0), True),
+    "waves_Hs7.5_qtf": (PLANE, (100.0, 400.0), True),
 }
 OC3_PLOTS = {  # case -> (channels, seconds shown); spectra of the same channels where asked for
     "float_steady_8mps": (OPERATING, (0.0, 600.0), False),
@@ -55,7 +62,7 @@ OC3_PLOTS = {  # case -> (channels, seconds shown); spectra of the same channels
     "turb_18mps_Hs7.5_uniform_flex": (BENDING, (100.0, 200.0), True),
     "turb_18mps_Hs7.5_box": (OPERATING, (100.0, 400.0), True),
 }
-PLOTS = {"oc3_hywind": OC3_PLOTS, "iea15_volturnus_s": VOLTURNUS_PLOTS}
+PLOTS = {"oc3_hywind": OC3_PLOTS, "iea15_volturnus_s": VOLTURNUS_PLOTS, "nrel5mw_oc4_semi": OC4_PLOTS}
 HERE, THERE = "fowt_env", "OpenFAST"
 COST_PLOTS = {  # file -> (title, {legend: run})
     "costs_rotor": (

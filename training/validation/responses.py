@@ -110,7 +110,7 @@ def periods(name, study):
     from fowt_env.simulation import simulate
 
     study.say("natural periods")
-    scene = without_drag(build_scene(name))
+    scene = without_drag(build_scene(name, fidelity="reference"))
     point = trim(scene)
     initial = {
         channel: point[channel.split("_[")[0]] + OFFSET for group in DECAYING for channel in group.values()
@@ -146,7 +146,7 @@ def rao(name, study):
     known = body.coefficients["excitation_omega"]
     omega = OMEGA[(OMEGA >= known[0]) & (known[-1] >= OMEGA)]  # the plant has no force beyond its table
     waves = sea(omega)
-    scene = without_drag(build_scene(name, sea=waves, duration=END))
+    scene = without_drag(build_scene(name, sea=waves, duration=END, fidelity="reference"))
     frame = simulate(scene, None, duration=END, dt=STEP, output_dt=0.1)
     modes = body.natural_modes()
     slow = [complex(ratio * w / np.sqrt(1.0 - ratio**2), w) for w, ratio in modes.values()]

@@ -65,6 +65,21 @@ def ringing(time, value, low, high):
     return float(found[0] / (2.0 * np.pi)), float(found[1])
 
 
+def recovery(time, value, step, settled):
+    """(level before, level after, overshoot, its time) of a series that a step at `step` s upsets.
+
+    The level after is the mean from `settled` on. The overshoot is how far the series goes beyond it, with
+    its sign, and its time (s) the integral of the deviation from there on over the overshoot: the time
+    constant of an exponential.
+    """
+    before, after = value[time < step].mean(), value[time >= settled].mean()
+    first = np.flatnonzero(time >= step)[0]
+    deviation = value[first:] - after
+    top = int(np.argmax(deviation * np.sign(after - before)))
+    area = np.trapezoid(deviation[top:], time[first + top :])
+    return before, after, deviation[top], area / deviation[top]
+
+
 def normalised_rms(value, reference):
     """Rms of the difference over the standard deviation of the reference."""
     value, reference = np.asarray(value), np.asarray(reference)

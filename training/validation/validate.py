@@ -136,7 +136,8 @@ def add_decay(study, case, channel, duration, period, decrement, rms, cycles=4, 
     centre = theirs[channel][time > 0.5 * duration].mean()
     mine, wanted = ours[channel].to_numpy(), theirs[channel].to_numpy()
     periods = [decay_period(time, value, centre, cycles) for value in (wanted, mine)]
-    study.add(case, f"period, first {cycles} cycles", "s", *periods, allowed=period)
+    counts = "cycle" if cycles == 1 else f"{cycles} cycles"
+    study.add(case, f"period, first {counts}", "s", *periods, allowed=period)
     for cycle in counted:
         both = [decay_decrement(time, value, centre, cycle) for value in (wanted, mine)]
         words = {1: "first", 2: "second", 3: "third"}[cycle]
@@ -155,7 +156,7 @@ def steady(study):
         wind = row["wind_mps"]
         case = f"steady_{wind:g}mps"
         study.say(case)
-        point = trim(build_scene(PLATFORM, wind=wind), platform="fixed")
+        point = trim(build_scene(PLATFORM, wind=wind, fidelity="reference"), platform="fixed")
         study.add(case, "RotSpeed", "rpm", row["rotor_speed_rpm"], point["RotSpeed"], allowed=0.2)
         study.add(case, "BldPitch1", "deg", row["blade_pitch_deg"], point["BldPitch1"], allowed=0.2)
         thrust, torque = 1e-3 * point["RtFldFxh"], 1e-3 * point["RtFldMxh"]
@@ -285,9 +286,9 @@ def _barge():
 
 
 def _oc4():
-    from fowt_env.training.validation import responses
+    from fowt_env.training.validation import oc4, responses
 
-    return responses.groups("nrel5mw_oc4_semi"), {}
+    return {**responses.groups("nrel5mw_oc4_semi"), **oc4.GROUPS}, oc4.RUNS
 
 
 PLATFORMS = {  # name -> function that returns (groups, runs)

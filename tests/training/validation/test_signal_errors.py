@@ -10,6 +10,7 @@ from fowt_env.training.validation.signal_errors import (
     decay_period,
     harmonics,
     normalised_rms,
+    recovery,
     ringing,
 )
 
@@ -31,6 +32,14 @@ def test_period_and_decrement_of_a_damped_cosine_are_found(period, decrement):
 def test_a_record_of_too_few_cycles_is_refused():
     with pytest.raises(InputError, match="9 are needed"):
         decay_period(TIME, decay(120.0, 0.1, 0.0), 0.0)
+
+
+def test_an_overshoot_that_fades_exponentially_has_its_size_and_time_constant():
+    after = np.maximum(TIME - 20.0, 0.0)
+    value = 5.0 - (TIME > 20.0) * (2.0 + 0.8 * np.exp(-after / 7.0))  # falls beyond its new level
+    before, last, overshoot, time = recovery(TIME, value, 20.0, 150.0)
+    assert (before, last) == pytest.approx((5.0, 3.0), abs=1e-6)
+    assert (overshoot, time) == pytest.approx((-0.8, 7.0), rel=0.02)  # a sample after the step
 
 
 def test_harmonics_are_exact_beside_a_slow_transient():

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import series_figures as figures
 
 from fowt_env.analysis.trim import trim
 from fowt_env.controllers import CONTROLLERS
@@ -86,10 +87,10 @@ def error_of(row, study):
     (channel,) = [name for name in theirs if name.startswith(row.quantity.split(",")[0].split(" ")[0] + "_[")]
     mine, wanted = ours[channel].to_numpy()[chosen], theirs[channel].to_numpy()[chosen]
     if "standard deviation" in row.quantity:
-        return 100.0 * (mine.std() / wanted.std() - 1.0)
+        return figures.deviation(mine, wanted)
     if "without mean" in row.quantity:
         mine, wanted = mine - mine.mean(), wanted - wanted.mean()
-    return 100.0 * float(np.sqrt(((mine - wanted) ** 2).sum() / ((wanted - wanted.mean()) ** 2).sum()))
+    return figures.rms(mine, wanted)
 
 
 def failed(study, *exceptions):
@@ -114,16 +115,7 @@ def anew(row, frame):
     channel, _, duration = DECAYS[row.case]
     time, theirs = frame[TIME].to_numpy(), reference(row.case)
     value = frame[channel].to_numpy() - theirs[channel][time > 0.5 * duration].mean()
-    after = np.flatnonzero(np.diff(np.sign(value)))  # last sample before each zero crossing
-    if row.quantity.startswith("period"):
-        share = value[after] / (value[after] - value[after + 1])
-        return ((time[after] + 0.1 * share)[8] - (time[after] + 0.1 * share)[0]) / 4.0
-    first = (
-        2 * (1 if "first" in row.quantity else 3) - 2
-    )  # of the half cycles, the first one has begun before t = 0
-    parts = np.split(value, after + 1)
-    peaks = [part[np.abs(part).argmax()] for part in parts[first : first + 4]]
-    return np.log(abs(peaks[1] - peaks[0]) / abs(peaks[3] - peaks[2]))
+    return figures.of_decay(row.quantity, time, value)
 
 
 # --------------------------------------------------------------------------- quick
@@ -131,7 +123,7 @@ def anew(row, frame):
 
 @pytest.mark.installation
 def test_total_mass_and_displacement_are_the_decks():
-    platform, scene = read_platform(PLATFORM), build_scene(PLATFORM)
+    platform, scene = read_platform(PLATFORM), build_scene(PLATFORM, fidelity="reference")
     assert scene.model.rigid_body.mass == pytest.approx(platform.published["total_mass"], abs=1.0)
     assert trim(scene)["FAIRTEN1"] == pytest.approx(911.4, rel=2e-3)
 
@@ -192,7 +184,7 @@ def test_the_tip_node_of_aerodyn_explains_its_thrust_and_torque_to_3e_5_at_every
     width = 0.5 * (rotor.tip_radius - rotor.radius[-1])
     plain, explained = [], []
     for row in steady_reference().to_dict("records"):
-        scene = build_scene(PLATFORM, wind=row["wind_mps"])
+        scene = build_scene(PLATFORM, wind=row["wind_mps"], fidelity="reference")
         x = np.zeros(scene.n_state)
         x[State.ROTOR_SPEED] = np.radians(6.0 * row["rotor_speed_rpm"])
         x[State.BLADE_PITCH] = np.radians(row["blade_pitch_deg"])

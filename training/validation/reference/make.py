@@ -1,10 +1,11 @@
 """Makes the compact reference series of this folder from the full OpenFAST outputs: make.py SOURCE_FOLDER.
 
-Only the columns that are compared, every 0.1 s, with a header that says how the run was made. The box of
-wind is cut to the region that rotor and tower meet, and rounded (see box()).
+Only the columns that are compared, every 0.1 s, with a header that says how the run was made and the SHA-256
+of the full output. The box of wind is cut to the region that rotor and tower meet, and rounded (see box()).
 """
 
 import gzip
+import hashlib
 import lzma
 import sys
 from pathlib import Path
@@ -80,6 +81,20 @@ CASES = {  # case -> (columns, settings)
 }
 
 
+def sha256(path):
+    """SHA-256 of a file, or of the list of names and SHA-256 of a folder's files."""
+    path = Path(path)
+    if path.is_dir():
+        lines = [f"{sha256(part)} {part.name}\n" for part in sorted(path.iterdir())]
+        return hashlib.sha256("".join(lines).encode()).hexdigest()
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def sources(*paths):
+    """Lines of a head: SHA-256 and name of each file that figures are from."""
+    return [f"sha256 {sha256(path)} {Path(path).name}" for path in paths]
+
+
 def write(path, comment, frame):
     """Gzipped CSV with comment lines, the same bytes whenever it is made."""
     text = "".join(f"# {line}\n" for line in comment) + frame.to_csv(index=False)
@@ -95,21 +110,25 @@ def series(source):
         for name in columns:  # a motion that stays below 1e-9 of the others is rounding of the solver
             if np.abs(frame[name]).max() < 1e-7:
                 frame[name] = 0.0
-        write(HERE / f"{case}.csv.gz", (FLEXIBLE if case.endswith("_flex") else MODEL, settings), frame)
+        model = FLEXIBLE if case.endswith("_flex") else MODEL
+        write(HERE / f"{case}.csv.gz", (model, settings, *sources(source / f"{case}.csv.gz")), frame)
 
 
 def inputs(source):
     """The steady curve, the wind and the wave components."""
-    steady = pd.read_csv(source / "steady_operating_points.csv")
+    path = source / "steady_operating_points.csv"
+    steady = pd.read_csv(path)
     columns = ["wind_mps", "rotor_speed_rpm", "blade_pitch_deg", "aero_thrust_kN", "aero_torque_kNm"]
     settings = "platform and tower locked, uniform steady wind, DISCON of OC3-Hywind; means of the last 50 s"
-    write(HERE / "steady.csv.gz", (MODEL, settings), steady[columns])
-    wind = pd.read_csv(source / "wind_hub_18mps.csv.gz")
+    write(HERE / "steady.csv.gz", (MODEL, settings, *sources(path)), steady[columns])
+    path = source / "wind_hub_18mps.csv.gz"
+    wind = pd.read_csv(path)
     settings = "u at the hub point of the TurbSim box (Kaimal, 18 m/s, class B, seed 180018), shift included"
-    write(HERE / "wind_hub_18mps.csv.gz", (settings,), wind[wind["time_s"] <= 601.0])
-    waves = pd.read_csv(source / "waves_hs7.5_tp10.csv")
+    write(HERE / "wind_hub_18mps.csv.gz", (settings, *sources(path)), wind[wind["time_s"] <= 601.0])
+    path = source / "waves_hs7.5_tp10.csv"
+    waves = pd.read_csv(path)
     settings = "JONSWAP Hs 7.5 m Tp 10 s gamma 3.3; eta(0, t) = sum amplitude cos(omega t + phase), to +x"
-    write(HERE / "waves_hs7.5_tp10.csv.gz", (settings,), waves[waves["amplitude_m"] > 0.0])
+    write(HERE / "waves_hs7.5_tp10.csv.gz", (settings, *sources(path)), waves[waves["amplitude_m"] > 0.0])
 
 
 # region of the box: columns within this of the axis, rows up to this height, seconds

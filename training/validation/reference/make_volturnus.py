@@ -1,10 +1,10 @@
 """Makes the compact reference series of iea15_volturnus_s/: make_volturnus.py SERIES_FOLDER [LINEAR_FOLDER].
 
-SERIES_FOLDER has the OpenFAST outputs of the rigid IEA 15 MW on VolturnUS-S, LINEAR_FOLDER the
-linearisation files (lin_NN.A.lin: operating point NN, azimuth A) that ROSCO's repository holds. Series
-keep the columns that are compared, every 0.1 s or 0.2 s, with a header that says how the run was made;
-the steady winds are reduced to means over whole turns in axes that do not turn; of the linear models
-remain poles and frequency responses.
+SERIES_FOLDER has the OpenFAST outputs of the rigid IEA 15 MW on VolturnUS-S (make_openfast.py, VOLTURNUS),
+LINEAR_FOLDER the linearisation files (lin_NN.A.lin: operating point NN, azimuth A) of NREL/ROSCO fc11f43,
+Examples/Test_Cases/IEA-15-240-RWT/IEA-15-240-RWT-UMaineSemi/linearizations. Series keep the columns that are
+compared, every 0.1 s or 0.2 s, with a header that says how the run was made; the steady winds are reduced to
+means over whole turns in axes that do not turn; of the linear models remain poles and frequency responses.
 """
 
 import sys
@@ -16,7 +16,7 @@ import pandas as pd
 from fowt_env.descriptions.units import RPM
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-from make import write
+from make import sources, write
 
 HERE = Path(__file__).resolve().parent / "iea15_volturnus_s"
 PLANE = ["surge_m", "heave_m", "pitch_deg"]
@@ -100,7 +100,22 @@ def series(source):
         frame = full.iloc[::every].copy()
         for name in columns:
             frame[name] = rounded(frame[name])
-        write(HERE / f"{case}.csv.gz", (BENDING if case in BENDING_CASES else MODEL, settings), frame)
+        model = BENDING if case in BENDING_CASES else MODEL
+        write(HERE / f"{case}.csv.gz", (model, settings, *sources(source / f"{case}.csv.gz")), frame)
+
+
+def wave_forces(source):
+    """What a sea pushes with: first order, and difference frequencies of the full QTF, every 2 s."""
+    path = source / "waves_Hs7.5_qtf.csv.gz"
+    columns = ["wave_elev_m", "excitation_Fx_N", "excitation_Fz_N", "excitation_My_Nm", "second_order_Fx_N",
+               "second_order_My_Nm"]  # fmt: skip
+    full = pd.read_csv(path, usecols=["time_s", *columns])[["time_s", *columns]]
+    every = round(2.0 / (full["time_s"][1] - full["time_s"][0]))
+    settings = (
+        f"{CASES['waves_Hs7.5_qtf'][2]}; HydroDyn's forces at the undisplaced place (B1WvsF1, B1WvsF2),"
+        " differences of frequency up to 0.737863 rad/s"
+    )
+    write(HERE / "wave_forces.csv.gz", (MODEL, settings, *sources(path)), full.iloc[::every])
 
 
 def whole_turns(time, rpm):
@@ -139,9 +154,23 @@ def steady(source):
         " the rotor (z up when blade 1 is); root moments of the structure (with weight and inertia): means,"
         " and cos and sin parts over the azimuth of blade 1 (0: up)"
     )
-    write(HERE / "steady.csv.gz", (MODEL, settings), pd.DataFrame(rows).map(
+    paths = [source / f"steady_{case}_fixed.csv.gz" for case in STEADY]
+    write(HERE / "steady.csv.gz", (MODEL, settings, *sources(*paths)), pd.DataFrame(rows).map(
         lambda v: float(f"{v:.6g}") if isinstance(v, float) else v
     ))  # fmt: skip
+
+
+def sheared(source):
+    """Rotor loads in sheared wind at azimuths of one turn."""
+    path = source / "steady_12mps_shear_fixed.csv.gz"
+    columns = ["time_s", "azimuth_deg", "aero_thrust_N", "aero_torque_Nm", "aero_My_Nm", "aero_Mz_Nm"]
+    frame = pd.read_csv(path, usecols=columns)[columns]
+    kept = frame[(frame["time_s"] >= 30.0) & (frame["time_s"] < 37.9)].iloc[::26]  # every 0.65 s
+    settings = (
+        "platform and tower held, steady 12 m/s at 150 m with a power law of 0.14, 7.56 rpm, blade pitch 6.3"
+        " deg; loads about the rotor centre, x along the shaft, axes turn with the rotor"
+    )
+    write(HERE / "rotor_in_shear.csv.gz", (MODEL, settings, *sources(path)), kept)
 
 
 BLADE_CASES = ("12mps_shear", "12mps_pitches")
@@ -175,7 +204,8 @@ def blade_loads(source):
         " moments over whole turns after 15 s: mean, cos and sin parts of the first and third harmonic over"
         " the azimuth of blade 1 (0: up)"
     )
-    write(HERE / "blade_loads.csv.gz", (MODEL, settings), pd.DataFrame(rows).map(
+    paths = [source / f"steady_{case}_fixed.csv.gz" for case in BLADE_CASES]
+    write(HERE / "blade_loads.csv.gz", (MODEL, settings, *sources(*paths)), pd.DataFrame(rows).map(
         lambda v: float(f"{v:.6g}") if isinstance(v, float) else v
     ))  # fmt: skip
 
@@ -184,7 +214,9 @@ if __name__ == "__main__":
     HERE.mkdir(exist_ok=True)
     folder = Path(sys.argv[1])
     series(folder)
+    wave_forces(folder)
     steady(folder)
+    sheared(folder)
     blade_loads(folder)
     if len(sys.argv) > 2:
         from reduce_linear import responses

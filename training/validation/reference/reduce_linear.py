@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from make import write
+from make import sources, write
 
 RAD_PER_S = np.array([0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 0.8])  # of the responses
 PLATFORM = ("surge", "heave", "pitch")
@@ -170,7 +170,8 @@ def responses(source, folder):
                         }
                     )  # fmt: skip
     model = (
-        "OpenFAST (2021-02), IEA 15 MW on VolturnUS-S of ROSCO's test cases: surge, heave, platform pitch,"
+        "OpenFAST (2021-02), IEA 15 MW on VolturnUS-S of NREL/ROSCO fc11f43 (Examples/Test_Cases, 240"
+        " linearisation files): surge, heave, platform pitch,"
         " generator, first fore-aft tower mode; mean of the azimuths, tower held afterwards"
         " (reduce_linear.py)"
     )
@@ -183,8 +184,8 @@ def responses(source, folder):
     def shown(rows):
         return pd.DataFrame(rows).map(lambda v: float(f"{v:.6g}") if isinstance(v, float) else v)
 
-    write(folder / "linear_poles.csv.gz", (model, settings), shown(poles))
+    write(folder / "linear_poles.csv.gz", (model, settings, *sources(source)), shown(poles))
     settings = (
         "responses of rotor speed (rad/s) and platform pitch (rad) to hub wind (m/s) and blade pitch (rad)"
     )
-    write(folder / "linear_responses.csv.gz", (model, settings), shown(gains))
+    write(folder / "linear_responses.csv.gz", (model, settings, *sources(source)), shown(gains))

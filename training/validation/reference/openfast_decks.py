@@ -1,0 +1,512 @@
+"""Inputs of OpenFAST v5.0.0 from the public decks of VolturnUS-S and of the OC4 semi-submersible.
+
+Decks are those of NOTICE: IEAWindSystems/IEA-15-240-RWT ac5248a (with the DISCON.IN of NREL/ROSCO fc11f43),
+old-NWTC/FAST 0badc8d with the turbine of NREL/ROSCO fc11f43. Figures are carried over by their keys; what a
+run changes is an argument of the writer. make_openfast.py runs what is written here.
+"""
+
+import re
+import shutil
+from math import pi
+from pathlib import Path
+
+import numpy as np
+
+OPENFAST = "OpenFAST v5.0.0 (2895884d2be01862173c88d70f86b358d2f1a50a)"
+MOTIONS = ("PtfmSurge", "PtfmSway", "PtfmHeave", "PtfmRoll", "PtfmPitch", "PtfmYaw")
+BLADES = (1, 2, 3)
+
+# keys of v5 in the order in which they are read, each with its default; what begins with "-" is a headline
+GLUE = """
+- control; Echo False; AbortLevel "FATAL"; TMax 0; DT 0.025; ModCoupling 1; InterpOrder 2; NumCrctn 0;
+RhoInf 1.0; ConvTol 1e-6; MaxConvIter 20; DT_UJac 99999; UJacSclFact 1e6;
+- features; NRotors 1; CompElast 1; CompInflow 0; CompAero 0; CompServo 0; CompSeaSt 1; CompHydro 1;
+CompSub 0; CompMooring 1; CompIce 0; CompSoil 0; MHK 0; MirrorRotor F;
+- environment; Gravity 9.81; AirDens 1.225; WtrDens 1025; KinVisc 1.464e-05; SpdSound 335; Patm 103500;
+Pvap 1700; WtrDpth 200; MSL2SWL 0;
+- files; EDFile "ED.dat"; BDBldFile(1) "unused"; BDBldFile(2) "unused"; BDBldFile(3) "unused";
+InflowFile "IW.dat"; AeroFile "AD.dat"; ServoFile "SV.dat"; SeaStFile "SS.dat"; HydroFile "HD.dat";
+SubFile "unused"; MooringFile "mooring.dat"; IceFile "unused"; SoilFile "unused";
+- output; SumPrint False; SttsTime 100; ChkptTime 99999; DT_Out 0.1; TStart 0; OutFileFmt 1; TabDelim True;
+OutFmt "ES16.8E2";
+- linearisation; Linearize False; CalcSteady False; TrimCase 3; TrimTol 0.001; TrimGain 0.01; Twr_Kdmp 0;
+Bld_Kdmp 0; NLinTimes 2; LinTimes 30, 60; LinInputs 1; LinOutputs 1; LinOutJac False; LinOutMod False;
+- pictures; WrVTK 0; VTK_type 2; VTK_fields False; VTK_fps 15
+"""
+ELASTODYN = """
+- control; Echo False; Method 3; DT "default";
+- degrees of freedom; FlapDOF1 False; FlapDOF2 False; EdgeDOF False; PitchDOF False; TeetDOF False;
+DrTrDOF False; GenDOF False; YawDOF False; TwFADOF1 False; TwFADOF2 False; TwSSDOF1 False; TwSSDOF2 False;
+PtfmSgDOF True; PtfmSwDOF True; PtfmHvDOF True; PtfmRDOF True; PtfmPDOF True; PtfmYDOF True;
+- start; OoPDefl 0; IPDefl 0; BlPitch(1) 0; BlPitch(2) 0; BlPitch(3) 0; TeetDefl 0; Azimuth 0; RotSpeed 0;
+NacYaw 0; TTDspFA 0; TTDspSS 0; PtfmSurge 0; PtfmSway 0; PtfmHeave 0; PtfmRoll 0; PtfmPitch 0; PtfmYaw 0;
+- turbine; NumBl; TipRad; HubRad; PreCone(1); PreCone(2); PreCone(3); HubCM; UndSling; Delta3; AzimB1Up;
+OverHang; ShftGagL; ShftTilt; NacCMxn; NacCMyn; NacCMzn; NcIMUxn; NcIMUyn; NcIMUzn; Twr2Shft; TowerHt;
+TowerBsHt; PtfmCMxt; PtfmCMyt; PtfmCMzt; PtfmRefxt 0; PtfmRefyt 0; PtfmRefzt;
+- mass; TipMass(1); TipMass(2); TipMass(3); PBrIner(1) 0; PBrIner(2) 0; PBrIner(3) 0; BlPIner(1) 0;
+BlPIner(2) 0; BlPIner(3) 0; HubMass; HubIner; HubIner_Teeter 0; GenIner; NacMass; NacYIner; YawBrMass;
+PtfmMass; PtfmRIner; PtfmPIner; PtfmYIner; PtfmXYIner 0; PtfmYZIner 0; PtfmXZIner 0;
+- blade; BldNodes; BldFile1 "blade_ed.dat"; BldFile2 "blade_ed.dat"; BldFile3 "blade_ed.dat";
+- teeter; TeetMod; TeetDmpP; TeetDmp; TeetCDmp; TeetSStP; TeetHStP; TeetSSSp; TeetHSSp;
+- yaw friction; YawFrctMod 0; M_CSmax 0; M_FCSmax 0; M_MCSmax 0; M_CD 0; M_FCD 0; M_MCD 0; sig_v 0;
+sig_v2 0; OmgCut 0;
+- drivetrain; GBoxEff; GBRatio; DTTorSpr; DTTorDmp;
+- furling; Furling False; FurlFile "unused";
+- tower; TwrNodes; TwrFile "tower.dat";
+- output; SumPrint True; OutFile 1; TabDelim True; OutFmt "ES16.8E2"; TStart 0; DecFact 1; NTwGages 0;
+TwrGagNd 0; NBlGages 2; BldGagNd 5, 9
+"""
+SEASTATE = """
+Echo False;
+- environment; WtrDens "default"; WtrDpth "default"; MSL2SWL "default";
+- grid; X_HalfWidth 5; Y_HalfWidth 5; Z_Depth "default"; NX 2; NY 2; NZ 15;
+- waves; WaveMod 0; WaveStMod 0; WvCrntMod 0; WaveTMax 720; WaveDT 0.2; WaveHs 0; WaveTp 10;
+WavePkShp "default"; WvLowCOff 0.0; WvHiCOff 6.0; WaveDir 0; WaveDirMod 0; WaveDirSpread 1; WaveNDir 1;
+WaveDirRange 90; WaveSeed(1) 1234567; WaveSeed(2) RANLUX; WaveNDAmp False; WvKinFile "waves.txt";
+- second order; WvDiffQTF False; WvSumQTF False; WvLowCOffD 0; WvHiCOffD; WvLowCOffS 0.3; WvHiCOffS 3.2;
+- constrained; ConstWaveMod 0; CrestHmax 1; CrestTime 60; CrestXi 0; CrestYi 0;
+- current; CurrMod 0; CurrSSV0 0; CurrSSDir "default"; CurrNSRef 20; CurrNSV0 0; CurrNSDir 0; CurrDIV 0;
+CurrDIDir 0;
+- diffraction of members; MCFD 0;
+- output; SeaStSum False; OutSwtch 2; OutFmt "ES16.8E2"; OutSFmt "A15"; NWaveElev 1; WaveElevxi 0;
+WaveElevyi 0; NWaveKin 0; WaveKinxi 0; WaveKinyi 0; WaveKinzi 0;
+- channels; "Wave1Elev"; END
+"""
+INFLOW = """
+- steady wind (kind 1) or the uniform one of a file (kind 2); Echo False; WindType 1; PropagationDir 0;
+VFlowAng 0; VelInterpCubic False; NWindVel 1; WindVxiList 0; WindVyiList 0; WindVziList 150;
+- steady; HWindSpeed 0; RefHt 150; PLExp 0;
+- uniform; Filename_Uni "wind.wnd"; RefHt_Uni 150; RefLength 241.94;
+- boxes; FileName_BTS "unused";
+- boxes; FilenameRoot "unused"; TowerFile False;
+- boxes; FileName_u "unused"; FileName_v "unused"; FileName_w "unused"; nx 64; ny 32; nz 32; dx 16; dy 3;
+dz 3; RefHt_Hawc 150;
+- boxes; ScaleMethod 1; SFx 1; SFy 1; SFz 1; SigmaFx 12; SigmaFy 8; SigmaFz 2;
+- boxes; URef 8; WindProfile 0; PLExp_Hawc 0; Z0 0; XOffset 0;
+- lidar; SensorType 0; NumPulseGate 0; PulseSpacing 30; NumBeam 0; FocalDistanceX 0; FocalDistanceY 0;
+FocalDistanceZ 0; RotorApexOffsetPos 0 0 0; URefLid 17; MeasurementInterval 0.25; LidRadialVel False;
+ConsiderHubMotion 1;
+- output; SumPrint False; OutList; "Wind1VelX"; END
+"""
+FLOATING = """
+Echo False;
+- platform; PotMod 1; ExctnMod 1; ExctnDisp 0; ExctnCutOff 10; PtfmYMod 0; PtfmRefY 0; PtfmYCutOff 0.01;
+NExctnHdg 36; RdtnMod 1; RdtnTMax 60; RdtnDT "default"; NBody 1; NBodyMod 1; PotFile "HydroData/body";
+WAMITULEN 1; PtfmRefxt 0; PtfmRefyt 0; PtfmRefzt 0; PtfmRefztRot 0; PtfmVol0; PtfmCOBxt 0; PtfmCOByt 0;
+NAddDOF 0;
+- second order; MnDrift 0; NewmanApp 0; DiffQTF 0; SumQTF 0;
+- additional; AddF0 0; - 0; - 0; - 0; - 0; - 0
+"""
+SIMPLE = """
+- strip theory; WaveDisp 0; AMMod 0; HstMod 0
+"""
+MATRICES = ("AddCLin", "AddBLin", "AddBQuad")
+HYDRO_OUTPUT = """
+- output; HDSum True; OutAll False; OutSwtch 2; OutFmt "ES16.8E2"; OutSFmt "A15";
+- channels; "B1WvsF1xi"; "B1WvsF1zi"; "B1WvsM1yi"; "B1WvsF2xi"; "B1WvsM2yi"; "HydroFxi"; "HydroFzi";
+"HydroMyi"; END
+"""
+ELASTO_CHANNELS = (
+    *MOTIONS, "RotSpeed", "GenSpeed", "BldPitch1", "RotThrust", "RotTorq", "NcIMUTAxs", "TwrBsMyt",
+    "TwrBsMxt", "TwrBsFxt", "Azimuth", "TTDspFA", "TTDspSS", "RootMxc1", "RootMyc1", "RootMyc2", "RootMyc3",
+    "YawBrMyp", "YawBrMzp", "OoPDefl1", "IPDefl1", "LSSTipMya", "LSSTipMza",
+)  # fmt: skip
+AERO_CHANNELS = ("RtFldFxh", "RtFldMxh", "RtFldFyh", "RtFldFzh", "RtFldMyh", "RtFldMzh")
+
+
+def value_of(text, key):
+    """Text of the value before a key of a deck, None where the deck has no such key."""
+    bare = re.escape(key).replace(r"\(", r"\(?").replace(r"\)", r"\)?")
+    found = re.search(rf"^[ \t]*(\"[^\"\n]*\"|[^\s\"]+)[ \t]+{bare}(?=\s|$)", text, re.M)
+    return None if found is None else found[1]
+
+
+def filled(layout, deck="", **settings):
+    """Text of an input file: of each key of the layout the setting, else the default, else the deck's value.
+
+    Raises: KeyError for a setting that the layout lacks, and for a key without any value.
+    """
+    settings = {name.replace("__", "(") + (")" if "__" in name else ""): v for name, v in settings.items()}
+    lines, used = [], set()
+    for line in (part.strip() for part in layout.replace("\n", " ").split(";")):
+        key, _, default = line.partition(" ")
+        if key == "-" or line.startswith('"') or line == "END":
+            lines.append(line if not default or not default[0].isdigit() else default)
+            continue
+        value = settings.get(key, default or value_of(deck, key))
+        if key in settings:
+            used.add(key)
+        if value is None and key != "OutList":
+            raise KeyError(key)
+        lines.append(f"{'' if value is None else value} {key}")
+    if unknown := set(settings) - used:
+        raise KeyError(f"no such key: {sorted(unknown)}")
+    return "\n".join(lines) + "\n"
+
+
+def put(text, **values):
+    """Deck text with the value before each key replaced, where the key comes first."""
+    for name, value in values.items():
+        key = re.escape(name.replace("__", "(") + (")" if "__" in name else ""))
+        text, count = re.subn(
+            rf"^[ \t]*(\"[^\"\n]*\"|[^\s\"]+)([ \t]+{key}(?=\s|$))",
+            lambda found, value=value: f"{value}{found[2]}", text, count=1, flags=re.M,
+        )  # fmt: skip
+        if not count:
+            raise KeyError(name)
+    return text
+
+
+def with_channels(text, channels):
+    """Deck text with its first list of channels replaced, and cut after it."""
+    head = text[: text.index("\n", text.index("OutList")) + 1]
+    return head + "".join(f'"{name}"\n' for name in channels) + "END\n"
+
+
+def matrix(name, entries):
+    """Six rows of a 6x6 matrix of HydroDyn; entries {(i, j) from 1: value}."""
+    rows = [" ".join(repr(float(entries.get((i, j), 0.0))) for j in range(1, 7)) for i in range(1, 7)]
+    return "\n".join([f"{rows[0]} {name}", *rows[1:]]) + "\n"
+
+
+def table(key, rows):
+    """Text of a table of HydroDyn: the number of rows, two headlines, the rows."""
+    return f"- table\n{len(rows)} {key}\n-\n-\n" + "".join(f"{row}\n" for row in rows)
+
+
+def members_text(axial=(), joints=(), sections=(), coefficients=(), members=(), fills=()):
+    """Text of HydroDyn's strip theory, all tables of it in v5's order."""
+    return "".join([
+        table("NAxCoef", axial or ["1 0 0 1 0 0 1"]),
+        table("NJoints", joints),
+        table("NPropSetsCyl", sections),
+        table("NPropSetsRec", ()),
+        "- simple\n-\n-\n" + "0 " * 14 + "\n",
+        "- simple, rectangular\n-\n-\n" + "0 " * 18 + "\n",
+        table("NCoefDpthCyl", ()),
+        table("NCoefDpthRec", ()),
+        table("NCoefMembersCyl", coefficients),
+        table("NCoefMembersRec", ()),
+        table("NMembers", members),
+        table("NFillGroups", fills),
+        table("NMGDepths", ()),
+        table("NMOutputs", ()),
+        "- joints\n0 NJOutputs\n0 JOutLst\n",
+    ])  # fmt: skip
+
+
+def write_elastodyn(folder, deck, case, **files):
+    """Writes ED.dat of a run: rigid but for what the case switches on; blade and tower files beside it."""
+    tower, blades = case.get("tower", 0), bool(case.get("blades"))
+    pitches = case.get("pitches", (case.get("pitch", 0),) * 3)
+    held = {f"Ptfm{k}DOF": False for k in ("Sg", "Sw", "Hv", "R", "P", "Y")} if case.get("fixed") else {}
+    text = filled(
+        ELASTODYN, deck, FlapDOF1=blades, FlapDOF2=blades, EdgeDOF=blades, GenDOF=bool(case.get("control")),
+        TwFADOF1=tower > 0, TwFADOF2=tower > 1, TwSSDOF1=tower > 0, TwSSDOF2=tower > 1,
+        RotSpeed=case.get("rpm", 0), **{f"BlPitch__{k}": pitches[k - 1] for k in BLADES}, **held,
+        **{name: case[name] for name in MOTIONS if name in case},
+    )  # fmt: skip
+    channels = "".join(f'"{name}"\n' for name in ELASTO_CHANNELS)
+    (folder / "ED.dat").write_text(f"v5\n-\n{text}OutList\n{channels}END\n")
+    for name, source in files.items():
+        shutil.copy(source, folder / f"{name}.dat")
+
+
+def write_sea(folder, case, components, **grid):
+    """Writes SS.dat, and the file of wave components where the case has them."""
+    settings = {"WvHiCOffD": 0.737863, **grid}
+    if kind := case.get("sea"):
+        settings |= {"WaveMod": "1P0.0", "WaveHs": kind[0], "WaveTp": kind[1]}
+    elif case.get("waves"):
+        rows = components.to_numpy()
+        lines = [f"{omega:.10g} {2.0 * amplitude:.10g} 0 {phase:.8g}" for omega, amplitude, phase in rows]
+        (folder / "waves.txt").write_text("components\n" + "\n".join(lines) + "\n")
+        settings |= {"WaveMod": 7, "WaveHs": 1}
+    (folder / "SS.dat").write_text("v5\n-\n" + filled(SEASTATE, **settings))
+
+
+def write_glue(folder, case, **settings):
+    """Writes model.fst of a run."""
+    aero = 2 if case.get("wind") is not None else 0
+    text = filled(
+        GLUE, TMax=case["t"], DT=case.get("dt", 0.025), DT_Out=case.get("dtout", 0.1),
+        CompInflow=1 if aero else 0, CompAero=aero,
+        CompServo=1 if case.get("control") or case.get("pitch_to") is not None else 0, **settings,
+    )  # fmt: skip
+    (folder / "model.fst").write_text(f"v5\n-\n{text}")
+
+
+def end_nodes(text, inside=0.05):
+    """AeroDyn blade with a node more just inside root and tip, where AeroDyn has loads without induction."""
+    lines = text.rstrip("\n").split("\n")
+    first = next(k for k, line in enumerate(lines) if "NumBlNds" in line)
+    count = int(lines[first].split()[0])
+    rows = [[float(v) for v in line.split()] for line in lines[first + 3 : first + 3 + count]]
+
+    def between(a, b, span):
+        share = (span - a[0]) / (b[0] - a[0])
+        row = [u + share * (v - u) for u, v in zip(a, b, strict=True)]
+        row[6] = (a if share < 0.5 else b)[6]  # the polar
+        return row
+
+    root = between(rows[0], rows[1], rows[0][0] + inside)
+    tip = between(rows[-2], rows[-1], rows[-1][0] - inside)
+    rows = [rows[0], root, *rows[1:-1], tip, rows[-1]]
+    body = [" ".join(f"{v:.12g}" if k != 6 else str(int(v)) for k, v in enumerate(row)) for row in rows]
+    lines[first] = lines[first].replace(str(count), str(count + 2), 1)
+    return "\n".join(lines[: first + 3] + body) + "\n"
+
+
+class Volturnus:
+    """IEA 15 MW on VolturnUS-S: potential flow, a matrix of quadratic drag, MAP++, quasi-steady polars."""
+
+    def __init__(self, decks):
+        root = Path(decks) / "iea15_volturnus_s"
+        self.own = root / "OpenFAST" / "IEA-15-240-RWT-UMaineSemi"
+        self.rotor = root / "OpenFAST" / "IEA-15-240-RWT"
+        self.name = "IEA-15-240-RWT-UMaineSemi"
+        tests = root / "rosco_v2.10_deck" / "Examples" / "Test_Cases" / "IEA-15-240-RWT"
+        self.discon = tests / self.name / f"{self.name}_DISCON.IN"
+
+    def inputs(self, case):
+        """Paths of the files of the deck that a run takes figures from."""
+        paths = [self.own / f"{self.name}_{part}.dat" for part in ("ElastoDyn", "ElastoDyn_tower")]
+        paths.append(self.rotor / "IEA-15-240-RWT_ElastoDyn_blade.dat")
+        if not case.get("fixed"):
+            body = [self.own / "HydroData" / f"{self.name}{end}" for end in (".1", ".3", ".hst", ".12d")]
+            paths += [self.own / f"{self.name}_MAP.dat", *(body if case.get("qtf") else body[:3])]
+        if case.get("wind") is not None:
+            paths += [self.own / f"{self.name}_AeroDyn15.dat", self.rotor / "Airfoils",
+                      self.rotor / "IEA-15-240-RWT_AeroDyn15_blade.dat"]  # fmt: skip
+        if case.get("control"):
+            paths += [self.discon, self.rotor / "Cp_Ct_Cq.IEA15MW.txt"]
+        if case.get("control") or case.get("pitch_to") is not None:
+            paths.append(self.own / f"{self.name}_ServoDyn.dat")
+        return paths
+
+    def read(self, part):
+        return (self.own / f"{self.name}_{part}.dat").read_text()
+
+    def write(self, folder, case, components=None, hub_wind=None, rosco="libdiscon.so"):
+        """Writes all inputs of a run; rosco: path of its library."""
+        folder.mkdir(parents=True)
+        write_elastodyn(
+            folder, self.read("ElastoDyn"), case, tower=self.own / f"{self.name}_ElastoDyn_tower.dat",
+            blade_ed=self.rotor / "IEA-15-240-RWT_ElastoDyn_blade.dat",
+        )  # fmt: skip
+        (folder / "HydroData").mkdir()
+        for end in (".1", ".3", ".hst", ".12d"):
+            shutil.copy(self.own / "HydroData" / f"{self.name}{end}", folder / "HydroData" / f"body{end}")
+        drag = {
+            (1, 1): 9.23e5, (2, 2): 9.23e5, (3, 3): 2.30e6, (4, 4): 1.68e10, (5, 5): 1.68e10,
+            (6, 6): 4.80e10, (1, 5): -8.92e6, (5, 1): -8.92e6, (2, 4): 8.92e6, (4, 2): 8.92e6,
+        }  # fmt: skip
+        wet = bool(case.get("sea") or case.get("waves"))
+        platform = filled(FLOATING, PtfmVol0=20206.34889, DiffQTF=case.get("qtf", 0), ExctnMod=int(wet))
+        added = "".join(matrix(name, drag if name == "AddBQuad" else {}) for name in MATRICES)
+        strips = filled(SIMPLE) + members_text()
+        (folder / "HD.dat").write_text(f"v5\n-\n{platform}{added}{strips}" + filled(HYDRO_OUTPUT))
+        write_sea(folder, case, components)
+        lines = re.sub(r"(850\.00\s+1\s+2)", r"\1 tension_fair", self.read("MAP"))
+        # MoorDyn's file of the deck has the anchors at 837.6 m
+        (folder / "mooring.dat").write_text(lines.replace("-837.800", "-837.600").replace("ˆ", "^"))
+        self._write_wind(folder, case, hub_wind)
+        self._write_servodyn(folder, case, rosco)
+        held = {"CompSeaSt": 0, "CompHydro": 0, "CompMooring": 0} if case.get("fixed") else {}
+        write_glue(folder, case, **held)
+
+    def _write_wind(self, folder, case, hub_wind):
+        """Writes AD.dat with its blade and airfoils, IW.dat and the uniform wind of a file."""
+        text = self.read("AeroDyn15").replace("../IEA-15-240-RWT/Airfoils", "Airfoils")
+        text = text.replace("../IEA-15-240-RWT/IEA-15-240-RWT_AeroDyn15_blade.dat", "blade_ad.dat")
+        text = put(text, TwrPotent=0, TwrShadow=0, DBEMT_Mod=case.get("dbemt", 0), UA_Mod=0, AoA34=False)
+        text = re.sub(r"^\S+\s+Buoyancy\s.*\n", "", text, flags=re.M)
+        start, end = text.index("TwrElev"), text.index("======", text.index("TwrElev"))
+        rows = text[start:end].strip("\n").split("\n")
+        rows = rows[:2] + [f"{row} 0 0" for row in rows[2:]]
+        text = with_channels(text[:start] + "\n".join(rows) + "\n" + text[end:], AERO_CHANNELS)
+        (folder / "AD.dat").write_text(text)
+        blade = (self.rotor / "IEA-15-240-RWT_AeroDyn15_blade.dat").read_text()
+        (folder / "blade_ad.dat").write_text(end_nodes(blade))
+        (folder / "Airfoils").mkdir()
+        for polar in (self.rotor / "Airfoils").iterdir():  # coordinates are for acoustics and pictures alone
+            text = re.sub(r"^\S+(\s+NumCoords)", r"0\1", polar.read_text(), flags=re.M)
+            (folder / "Airfoils" / polar.name).write_text(text)
+        wind, kind = case.get("wind") or 0.0, 1
+        if not isinstance(wind, (int, float)):
+            rows = hub_wind.to_numpy() if wind == "hub_wind" else wind
+            lines = [f"{time:.4f} {speed:.6f} 0 0 0 0 0 0" for time, speed in rows]
+            head = "! time speed direction vertical shear shear shear gust"
+            (folder / "wind.wnd").write_text("\n".join([head, *lines]) + "\n")
+            wind, kind = 0.0, 2
+        text = filled(INFLOW, WindType=kind, HWindSpeed=wind, PLExp=case.get("shear", 0.0))
+        (folder / "IW.dat").write_text(f"v5\n-\n{text}")
+
+    def _write_servodyn(self, folder, case, rosco):
+        """Writes SV.dat: ROSCO's library, or a pitch manoeuvre of all blades ("pitch_to" degrees at 20 s)."""
+        control, target = 5 if case.get("control") else 0, case.get("pitch_to")
+        text = put(self.read("ServoDyn"), PCMode=control, VSContrl=control, DLL_FileName=f'"{rosco}"',
+                   DLL_InFile='"DISCON.IN"', DLL_DT="0.025" if control else '"default"')  # fmt: skip
+        if target is not None:
+            text = put(text, **{f"TPitManS__{k}": 20.0 for k in BLADES},
+                       **{f"PitManRat__{k}": 2.0 for k in BLADES},
+                       **{f"BlPitchF__{k}": target for k in BLADES})  # fmt: skip
+        neutral = {"PitNeut": case.get("pitch", 0), "PitSpr": 0, "PitDamp": 0}  # held without a controller
+        springs = "".join(f"{value} {name}({k})\n" for name, value in neutral.items() for k in BLADES)
+        text = re.sub(r"^(.*\sTPCOn\s.*\n)", lambda found: found[1] + springs, text, count=1, flags=re.M)
+        (folder / "SV.dat").write_text(with_channels(text, ("GenTq", "GenPwr")))
+        if control:
+            text = re.sub(r'^"[^"]*"(\s*! PerfFileName)', r'"Cp_Ct_Cq.txt"\1', self.discon.read_text(),
+                          flags=re.M)  # fmt: skip
+            (folder / "DISCON.IN").write_text(text)
+            shutil.copy(self.rotor / "Cp_Ct_Cq.IEA15MW.txt", folder / "Cp_Ct_Cq.txt")
+
+
+def section(text, key):
+    """Rows (lists of words) of a table of HydroDyn's old format, below the line with its number of rows."""
+    lines = text.split("\n")
+    at = next(k for k, line in enumerate(lines) if re.match(rf"\s*\d+\s+{key}(\s|$)", line))
+    count = int(lines[at].split()[0])
+    rows = lines[at + 1 :]
+    while not rows[0].lstrip().startswith("("):
+        rows = rows[1:]
+    return [row.split("!")[0].split() for row in rows[1 : count + 1]]
+
+
+class Oc4:
+    """NREL 5 MW on the OC4 semi-submersible: potential flow, drag of 25 members, water in six of them."""
+
+    gravity, density = 9.80665, 1025.0
+    division = {"1": "2.5", "2": "2.0", "3": "3.0", "4": "6.0"}  # m, of the strips by the set of sections
+
+    def __init__(self, decks):
+        self.own = Path(decks) / "nrel5mw_oc4_semi" / "CertTest" / "5MW_Baseline"
+        self.name = "NRELOffshrBsline5MW_OC4DeepCwindSemi"
+        turbine = Path(decks) / "nrel5mw_turbine" / "Examples" / "Test_Cases" / "NREL-5MW"
+        self.blade = turbine / "NRELOffshrBsline5MW_Blade.dat"
+        data = Path(__file__).resolve().parents[3] / "fowt_env" / "data" / "platforms"
+        self.excitation = data / "nrel5mw_oc4_semi.npz"
+
+    def inputs(self, case):
+        """Paths of the files that a run takes figures from; the deck has no .3: excitation of the package."""
+        parts = ["ElastoDyn", "ElastoDyn_Tower", "HydroDyn", "MoorDyn" if case.get("moordyn") else "MAP"]
+        paths = [self.own / f"{self.name}_{part}.dat" for part in parts]
+        ends = (".1", ".hst", ".12d") if case.get("qtf") else (".1", ".hst")
+        paths += [self.own / "HydroData" / f"marin_semi{end}" for end in ends]
+        return [*paths, self.blade, self.excitation]
+
+    def read(self, part):
+        return (self.own / f"{self.name}_{part}.dat").read_text()
+
+    def write(self, folder, case, components=None, **_):
+        """Writes all inputs of a run."""
+        folder.mkdir(parents=True)
+        write_elastodyn(folder, self.read("ElastoDyn"), case, blade_ed=self.blade,
+                        tower=self.own / f"{self.name}_ElastoDyn_Tower.dat")  # fmt: skip
+        (folder / "HydroData").mkdir()
+        for end in (".1", ".hst", ".12d"):
+            shutil.copy(self.own / "HydroData" / f"marin_semi{end}", folder / "HydroData" / f"body{end}")
+        (folder / "HydroData" / "body.3").write_text(self._excitation_text())
+        (folder / "HD.dat").write_text(self._hydrodyn(case))
+        # 2 m along the waves, which no component is shorter than 9 m in; all members are within 29 m and 20 m
+        grid = {"X_HalfWidth": 60, "NX": 31, "Y_HalfWidth": 40, "NY": 2, "Z_Depth": 24, "NZ": 15}
+        write_sea(folder, case, components, WaveDT=0.1, **(case.get("grid") or grid))
+        text = self._moordyn() if case.get("moordyn") else self.read("MAP").replace("ˆ", "^")
+        (folder / "mooring.dat").write_text(text)
+        write_glue(folder, case, Gravity=self.gravity, CompMooring=3 if case.get("moordyn") else 1)
+
+    def _excitation_text(self):
+        """WAMIT's .3 of the arrays of the package, about heading 0: at the periods of the .1, linear between.
+
+        Period, heading, mode, size, phase, real and imaginary part.
+        """
+        with np.load(self.excitation) as arrays:
+            known, heading, force = (arrays[k] for k in ("excitation_omega", "heading", "excitation"))
+        near = np.abs(np.degrees(heading)) < 21.0
+        radiation = (self.own / "HydroData" / "marin_semi.1").read_text()
+        texts = [line.split()[0] for line in radiation.split("\n") if line.strip()]
+        rows, unit = [], self.density * self.gravity
+        for text in dict.fromkeys(texts):
+            if float(text) <= 0.0:
+                continue
+            omega = 2.0 * pi / float(text)
+            for b, beside in zip(np.degrees(heading[near]), force[:, near].swapaxes(0, 1), strict=True):
+                for mode, x in enumerate(beside.T / unit, 1):
+                    x = np.interp(omega, known, x.real) + 1j * np.interp(omega, known, x.imag)
+                    size, phase = abs(x), np.degrees(np.angle(x))
+                    rows.append(f"{text} {b:.6f} {mode} {size:.8e} {phase:.6f} {x.real:.8e} {x.imag:.8e}")
+        return "\n".join(rows) + "\n"
+
+    def ballast(self, text):
+        """[(mass, height of its centre)] of the water in members: kg, m."""
+        joints = {row[0]: float(row[3]) for row in section(text, "NJoints")}
+        sizes = {row[0]: float(row[1]) - 2.0 * float(row[2]) for row in section(text, "NPropSets")}
+        members = {row[0]: row for row in section(text, "NMembers")}
+        found = []
+        for number, *rest in section(text, "NFillGroups"):
+            names, level = rest[: int(number)], float(rest[int(number)])
+            for name in names:
+                row = members[name]
+                bottom, top = sorted(joints[joint] for joint in row[1:3])
+                height = min(level, top) - bottom
+                found.append((self.density * 0.25 * pi * sizes[row[3]] ** 2 * height, bottom + 0.5 * height))
+        return found
+
+    def _hydrodyn(self, case):
+        """Text of HD.dat: the members of the deck with their drag, and its water, which moves with them."""
+        text = self.read("HydroDyn")
+        wet = bool(case.get("sea") or case.get("waves"))
+        platform = filled(FLOATING, text, DiffQTF=case.get("qtf", 0), ExctnMod=int(wet))
+        # the old HydroDyn had the water's weight not move; the deck makes up for it by a stiffness
+        restored = -sum(self.gravity * mass * height for mass, height in self.ballast(text))
+        stiffness = float(re.search(r"^\s+0\s+0\s+0\s+([1-9]\d+)\s+0\s+0\s*$", text, re.M)[1]) - restored
+        added = matrix("AddCLin", {(4, 4): stiffness, (5, 5): stiffness})
+        added += matrix("AddBLin", {}) + matrix("AddBQuad", {})
+        drag = case.get("drag", 1.0)
+        axial = [
+            f"{name} {drag * float(cd):g} {ca} {cp} 0 0 1" for name, cd, ca, cp in section(text, "NAxCoef")
+        ]
+        # members above the water are left out, and strips are as long as the waves allow: a solution of all
+        # node accelerations, their number squared, is what a run takes; a node is at the still water level
+        joints = [row[:6] for row in section(text, "NJoints")]
+        dry = {row[0] for row in joints if float(row[3]) >= 0.0}
+        members = [row for row in section(text, "NMembers") if not dry.issuperset(row[1:3])]
+        met = {joint for row in members for joint in row[1:3]}
+        coefficients = []
+        for row in section(text, "NCoefMembers"):
+            if any(row[0] == member[0] for member in members):
+                cd = [f"{drag * float(v):g}" for v in row[1:5]]
+                coefficients.append(" ".join([row[0], *cd, *row[5:13], *"0000", *row[13:21], *"1111"]))
+        # cylinder, no turn, division, member table, no hydrostatics of its own
+        rows = [" ".join([*r[:5], "1 0", self.division[r[3]], r[6], "1", r[7]]) for r in members]
+        strips = members_text(
+            axial, [" ".join(row) for row in joints if row[0] in met],
+            [" ".join(row[:3]) for row in section(text, "NPropSets")], coefficients, rows,
+            [" ".join(row) for row in section(text, "NFillGroups")],
+        )  # fmt: skip
+        return f"v5\n-\n{platform}{added}" + filled(SIMPLE) + strips + filled(HYDRO_OUTPUT)
+
+    def _moordyn(self):
+        """MoorDyn v2 text of the deck's MoorDyn file."""
+        text = self.read("MoorDyn")
+
+        def rows(name, count):
+            lines = text[text.index(name) :].split("\n")
+            return [line.split() for line in lines[4 : 4 + count]]
+
+        kind = rows("LINE TYPES", 1)[0]
+        points = [[*row[:7], row[10], row[11]] for row in rows("CONNECTION PROPERTIES", 6)]
+        lines = [[row[0], row[1], row[4], row[5], row[2], row[3], "-"] for row in rows("LINE PROPERTIES", 3)]
+        can, cat, cdn, cdt = kind[5:9]
+        parts = {
+            "LINE TYPES": [[*kind[:5], "0", cdn, can, cdt, cat]],
+            "POINTS": points,
+            "LINES": lines,
+            "OPTIONS": [["0.002", "dtM"], ["3.0e6", "kbot"], ["3.0e5", "cbot"], ["2.0", "dtIC"],
+                        ["60.0", "TmaxIC"], ["4.0", "CdScaleIC"], ["0.001", "threshIC"]],
+        }  # fmt: skip
+        out = "--- MoorDyn\nv2\n"
+        for name, table_rows in parts.items():
+            out += f"---- {name} ----\n" + ("" if name == "OPTIONS" else "-\n-\n")
+            out += "".join(" ".join(row) + "\n" for row in table_rows)
+        return out + "---- OUTPUTS ----\nFairTen1\nFairTen2\nFairTen3\nEND\n------- end\n"
