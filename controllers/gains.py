@@ -197,8 +197,9 @@ def platform_frequency(scene, motion):
     """Undamped natural frequency (rad/s) of a platform motion about a scene's trim in rated wind.
 
     motion: State.SURGE ... State.YAW; the frequency is that of the mode in which it has the greatest share.
-    From the accelerations that small displacements give; whatever has states of its own (a wake, the memory
-    of radiated waves) is held. Remembered per plant.
+    From the accelerations that small displacements give, with a tower that bends where it comes to rest under
+    them; whatever else has states of its own (a wake, the memory of radiated waves) is held. Remembered per
+    plant.
     Raises: InputError as trim, and where nothing restores the motion.
     """
     values, shares = _MODES.get((plant_key(scene), water_key(scene)), lambda: _modes(scene))
@@ -232,7 +233,15 @@ def _modes(scene):
         x[entry] = keep
         return (found[0] - found[1]) / (2.0 * step)
 
-    stiffness = np.array([rates(i, step)[State.VX : State.VX + 6] for i, step in enumerate(POSITION_STEPS)]).T
+    tower = {block.name: range(block.offset, block.offset + block.size) for block in scene.blocks}
+    bent, bending = (tower.get(name, ()) for name in ("tower_deflection", "tower_velocity"))
+    moved = [*zip(range(6), POSITION_STEPS, strict=True), *((i, POSITION_STEPS[0]) for i in bent)]
+    speeds = [*range(State.VX, State.VX + 6), *bending]
+    stiffness = np.array([rates(i, step)[speeds] for i, step in moved]).T
+    if bent:  # its top goes with the platform
+        stiffness = stiffness[:6, :6] - stiffness[:6, 6:] @ np.linalg.solve(
+            stiffness[6:, 6:], stiffness[6:, :6]
+        )
     kinematics = np.array([rates(State.VX + i, 1e-5)[:6] for i in range(6)]).T
     values, vectors = np.linalg.eig(kinematics @ stiffness)
     arm = 0.5 * scene.platform.draft

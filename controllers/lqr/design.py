@@ -2,8 +2,8 @@
 
 Per wind speed: surge, platform pitch, rotor and pitch actuator in the plane, the rotor-averaged wind as a
 second-order filter fitted to its Kaimal spectrum, the waves of the site's sea as one resonance acting with
-the hull's force at the spectrum's peak. The controls are the rates of torque and blade-pitch command. The
-memory of radiated waves acts as the added mass and the damping of the platform's pitch
+the hull's force at the spectrum's peak. The controls are the rates of torque and blade-pitch command.
+Radiation memory, a tower that bends and other internal states have no state here but act on those that have
 (analysis/reduced_model.py); what that leaves out, the estimator takes as a moment on the platform.
 
 Winds, travels and moments that were found for the NREL 5 MW turbine are scaled to others: winds by the
@@ -19,7 +19,7 @@ from scipy.linalg import expm, solve_discrete_are
 from scipy.optimize import least_squares
 
 from fowt_env.analysis.linear_model import linearize, sampled
-from fowt_env.analysis.reduced_model import with_pitch_lag, without_inertia, without_memory
+from fowt_env.analysis.reduced_model import residualised, with_pitch_lag
 from fowt_env.analysis.trim import without_fluctuations
 from fowt_env.analysis.trim_cache import plant_key, water_key
 from fowt_env.analysis.wave_excitation import wave_force
@@ -28,7 +28,7 @@ from fowt_env.descriptions.checks import check_number
 from fowt_env.descriptions.iec import ntm_sigma
 from fowt_env.descriptions.nrel5mw import HUB_HEIGHT, RATED_WIND, ROTOR_SPEED, TIP_RADIUS
 from fowt_env.descriptions.sea_state import joint_sea_state, sea_state_of
-from fowt_env.errors import unknown
+from fowt_env.errors import InputError, unknown
 from fowt_env.weather.turbulence import amplitudes
 
 SITE = "gulf_of_maine_normal"  # joint sea states, as in the named suites
@@ -189,10 +189,16 @@ def scene_at(scene, speed):
 
 def design_model(scene, speed):
     """DesignModel of a scene's plant at a wind speed, m/s."""
-    model = with_pitch_lag(without_inertia(without_memory(linearize(scene_at(scene, speed)))))
+    try:
+        sea = sea_state_of(joint_sea_state(SITE, min(float(speed), LAST_SEA_WIND)))
+    except InputError as error:
+        name = scene.turbine.name
+        raise InputError(
+            f"no design of lqr, mpc and relatives for turbine {name!r} in wind of {speed:g} m/s: {error}"
+        ) from error
+    model = with_pitch_lag(residualised(linearize(scene_at(scene, speed))))
     rows = [model.index(name) for name in PLANT]
     sensors = [model.output_index(name) for name in SENSORS]
-    sea = sea_state_of(joint_sea_state(SITE, min(float(speed), LAST_SEA_WIND)))
     peak = 2.0 * pi / sea.Tp
     force = wave_force(scene, model.point.state, [peak])[0]
     a, b = np.zeros((N_STATE, N_STATE)), np.zeros((N_STATE, 2))

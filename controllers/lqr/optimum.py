@@ -237,8 +237,8 @@ def limits(settings, wind, baseline, turbine):
 def optimal_gain(loop, settings, start=None):
     """(gain (2, N_FEEDBACK), its Deviations, logarithms of the multipliers) for LQGSettings at a wind.
 
-    start: multipliers of a neighbouring wind. Where the limits cannot all be met, the gain after
-    ROUNDS rounds.
+    start: multipliers of a neighbouring wind. Where the limits cannot all be met in ROUNDS rounds, the gain
+    of that round in which the limit most exceeded is exceeded least: the search then swings without an end.
     """
     rated, baseline, wind = loop.turbine.rated_rotor_speed, loop.baseline(), loop.model.wind
     limited = limits(settings, wind, baseline, loop.turbine)
@@ -248,6 +248,7 @@ def optimal_gain(loop, settings, start=None):
     integral = settings.speed_integral / (0.5 * rated) ** 2
     multipliers = np.zeros(len(LIMITED)) if start is None else start
     steps, before = np.full(len(LIMITED), STEP), np.zeros(len(LIMITED))
+    least, nearest = np.inf, None
     for _ in range(ROUNDS):
         prices = dict(zip(LIMITED, np.exp(multipliers) / wanted**2, strict=True))
         gain = loop.gain(aims | prices, integral, settings.torque_rate / 0.05**2)
@@ -255,11 +256,13 @@ def optimal_gain(loop, settings, start=None):
         excess = np.log(np.array([getattr(reached, name) for name in LIMITED]) / wanted)
         slack = (excess < 0.0) & (multipliers <= LOWEST)
         if np.all((np.abs(excess) < TOLERANCE) | slack):
-            break
+            return gain, reached, multipliers
+        if excess.max() < least:
+            least, nearest = excess.max(), (gain, reached, multipliers)
         steps *= np.where(excess * before < 0.0, SHORTER, LONGER)
         before = excess
         multipliers = np.clip(multipliers + np.clip(steps * excess, -LARGEST, LARGEST), LOWEST, HIGHEST)
-    return gain, reached, multipliers
+    return nearest
 
 
 def optimal_gains(models, settings, turbine, dt):

@@ -2,9 +2,10 @@
 
 Every period the coming half minute is predicted: platform and waves by the linear models of
 controllers/lqr/design.py, the rotor's loads by its table of coefficients, the wind as its filter expects
-it or, where the wind ahead is shown, as that. One Newton step (plan.py) improves the plan of torque and
-blade-pitch rates; where it would pass a limit OSQP takes that step instead. The rates hold until the next
-period. An integral of the rotor speed's error leaves it without offset.
+it. A wind ahead that is shown replaces that or, where it errs, corrects it (ahead.py). One Newton step
+(plan.py) improves the plan of torque and blade-pitch rates; where it would pass a limit OSQP takes that step
+instead. The rates hold until the next period. An integral of the rotor speed's error leaves it without
+offset.
 """
 
 from enum import IntEnum
@@ -24,6 +25,7 @@ from fowt_env.controllers.lqr.design import (
 from fowt_env.controllers.lqr.design import WIND as ESTIMATED_WIND
 from fowt_env.controllers.lqr.estimator import ROTOR, estimate
 from fowt_env.controllers.lqr.law import LQR, WindEstimator, speed_integral
+from fowt_env.controllers.mpc.ahead import LearntShare
 from fowt_env.controllers.mpc.model import COMMAND, INTEGRAL, SPEED, TORQUE, WindModel, cost_rows, wind_model
 from fowt_env.controllers.mpc.plan import FILTER, grid_of, newton_step, shifted, work_of
 from fowt_env.controllers.mpc.rotor_table import rotor_table
@@ -112,25 +114,34 @@ _MODELS = Cache(
 class MPC:
     """Predictive law of an MPCSettings; prepare(scene) before reset.
 
-    preview: whether it is shown the wind ahead. nonlinear: whether the rotor's loads are those of its table;
+    preview: whether it is shown the wind ahead. exact: whether that is the wind itself; a preview that errs
+    corrects what the estimate foretells. nonlinear: whether the rotor's loads are those of its table;
     else they are linear in the operating wind. constrained: whether plans mind limits; what is applied does.
     Attribute unsolved: plans since reset for which OSQP found no solution, and the LQ feedback acted instead.
     """
 
     def __init__(
-        self, turbine, control_dt, settings=None, name="mpc", preview=False, nonlinear=True, constrained=True
+        self,
+        turbine,
+        control_dt,
+        settings=None,
+        name="mpc",
+        preview=False,
+        nonlinear=True,
+        constrained=True,
+        exact=True,
     ):
         self.name, self.turbine, self.control_dt = name, turbine, check_control_dt(control_dt)
         self.settings = MPCSettings() if settings is None else settings
-        self.nonlinear, self.constrained = bool(nonlinear), bool(constrained)
+        self.nonlinear, self.constrained, self.exact = bool(nonlinear), bool(constrained), bool(exact)
         self.information = LQR.information
+        self.every = max(1, round(PERIOD / self.control_dt))
         self.preview_times = ()
         if preview:
             self.information = (*LQR.information, "wind_preview")
-            periods = round(self.settings.preview_time / PERIOD)
-            self.preview_times = tuple(PERIOD * i for i in range(periods + 1))
+            periods = round(self.settings.preview_time / self.period)
+            self.preview_times = tuple(self.period * i for i in range(periods + 1))
         self.estimator = WindEstimator(turbine, self.control_dt)
-        self.every = max(1, round(PERIOD / self.control_dt))
         self.curve = build_torque_curve(turbine.torque_law)
         self.grid = grid_of(self.settings, self.period)
         self.rows = cost_rows(turbine.rated_rotor_speed)
@@ -213,6 +224,7 @@ class MPC:
         self.command = np.array([torque, pitch])
         self.plan = np.zeros(2 * len(self.grid.ends))
         self.work = work_of(self.grid)
+        self.share = LearntShare(len(self.preview_times), self._slow) if self.preview_times else None
         self.calls = self.unsolved = 0
 
     def act(self, measurement):
@@ -226,20 +238,34 @@ class MPC:
         move(estimated, self.parameters, self.memory, self.curve, self.command)
         return float(self.command[0]), float(self.command[1])
 
+    @property
+    def _slow(self):
+        """Factor per period by which what is learnt of the wind ahead is forgotten."""
+        return exp(-self.period / self.settings.schedule_time)
+
     def _ahead(self, measurement):
-        """Wind ahead less the operating wind, and one entry more as its filter expects it; () without it."""
+        """(n, 2) states of the wind's filter ahead, less the operating wind; (0, 2) without a preview."""
         if not self.preview_times:
-            return np.zeros(0)
-        seen, memory = np.array(measurement.wind_preview, dtype=np.float64), self.memory
-        decay = exp(-self.period / self.settings.schedule_time)
-        error = self.estimator.memory[ESTIMATED_WIND + 1] - seen[0]
-        memory[Memory.BIAS] = decay * memory[Memory.BIAS] + (1.0 - decay) * error
-        ahead = np.empty(len(seen) + 1)
-        ahead[:-1] = seen + memory[Memory.BIAS] - memory[Memory.OPERATING_WIND]
-        a = self._model()[0].A
-        first, second = a[FILTER, FILTER], a[FILTER + 1, FILTER + 1]
-        ahead[-1] = (first + second) * ahead[-2] - first * second * ahead[-3]
-        return ahead
+            return np.zeros((0, 2))
+        seen, estimated = np.array(measurement.wind_preview, dtype=np.float64), self.estimator.memory
+        now, decay = estimated[ESTIMATED_WIND + 1], self._slow
+        bias = decay * self.memory[Memory.BIAS] + (1.0 - decay) * (now - seen[0])
+        self.memory[Memory.BIAS] = bias
+        model, wind = self._model()
+        a = model.A[FILTER : FILTER + 2, FILTER : FILTER + 2]
+        if self.exact:
+            ahead = seen + bias - wind
+            ahead = np.r_[ahead, (a[0, 0] + a[1, 1]) * ahead[-1] - a[0, 0] * a[1, 1] * ahead[-2]]
+            # the filter's first state is the one that leads from each wind to the next
+            return np.column_stack([(ahead[1:] - a[1, 1] * ahead[:-1]) / a[1, 0], ahead[:-1]])
+        ahead = np.empty((len(seen), 2))
+        ahead[0] = estimated[ESTIMATED_WIND : ESTIMATED_WIND + 2] - wind
+        for k in range(1, len(seen)):
+            ahead[k] = a @ ahead[k - 1]
+        expected = wind + ahead[:, 1]
+        differing = seen + bias - expected
+        # a change of the wind that lasts, as its slow part does, is one of both states
+        return ahead + (self.share.learn(now, expected, differing) * differing)[:, None]
 
     def _model(self):
         """(WindModel, wind m/s) of the operating wind, within those of the models."""
@@ -284,8 +310,11 @@ class MPC:
         old = np.zeros_like(self.plan)
         shifted(self.plan, self.grid, old)
         step = np.zeros_like(old)
+        gain = model.K.copy()
+        if len(ahead) and self.exact:  # what the wind asks for comes from the plan alone
+            gain[:, FILTER : FILTER + 2] = 0.0
         kept = newton_step(
-            model, wind, self.table, self.nonlinear, self.rows, references, end, ahead, limits, units,
+            model, gain, wind, self.table, self.nonlinear, self.rows, references, end, ahead, limits, units,
             self.grid, old, work, step,
         )  # fmt: skip
         if self.constrained and not kept:
@@ -297,15 +326,9 @@ class MPC:
             self.plan = np.zeros_like(old)
         else:
             self.plan = old + step
-        u = self.plan[:2] - model.K @ x if not len(ahead) else self.plan[:2] - self._gain(model) @ x
+        u = self.plan[:2] - gain @ x
         self.memory[Memory.TORQUE_RATE] = min(max(u[0], -rate), rate) * torque
         self.memory[Memory.PITCH_RATE] = min(max(u[1], -drive.rate_limit), drive.rate_limit)
-
-    @staticmethod
-    def _gain(model):
-        gain = model.K.copy()
-        gain[:, FILTER : FILTER + 2] = 0.0
-        return gain
 
     def __getstate__(self):
         """Without the solver, which is made anew: each solution starts from what it is given."""
@@ -323,8 +346,9 @@ def mpc_preview(turbine, control_dt):
 
 
 def mpc_lidar(turbine, control_dt):
-    """mpc_preview with a look-ahead of 3 s, which lidars on the nacelle give up to cut-out wind."""
-    return MPC(turbine, control_dt, PREVIEW.changed(preview_time=LIDAR_HORIZON), "mpc_lidar", preview=True)
+    """mpc that corrects its wind by a preview of 3 s that errs, as nacelle lidars give up to cut-out wind."""
+    settings = MPCSettings(preview_time=LIDAR_HORIZON)
+    return MPC(turbine, control_dt, settings, "mpc_lidar", preview=True, exact=False)
 
 
 def lq_preview(turbine, control_dt):

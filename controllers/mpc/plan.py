@@ -1,10 +1,10 @@
 """One Newton step of the optimal control problem: prediction, its slopes over the moves, quadratic program.
 
-Moves are u = -K x + c with the LQ gain K and corrections c that are constant over blocks, so that c = 0 is
-the plan where no limit is met and the rotor's loads are linear (Rossiter, Kouvaritakis and Rice, Automatica
-34, 1998). Rotor loads are those of the table: the linear model takes what they differ by as a further input.
-One step is taken per period, from the plan before (real-time iteration: Diehl, Bock and Schloeder, SIAM J.
-Control Optim. 43, 2005).
+Moves are u = -K x + c with corrections c that are constant over blocks. With the LQ gain as K, c = 0 is the
+plan where no limit is met, no other wind is ahead than the filter's and the rotor's loads are linear
+(Rossiter, Kouvaritakis and Rice, Automatica 34, 1998). Rotor loads are those of the table: the linear model
+takes what they differ by as a further input. One step is taken per period, from the plan before (real-time
+iteration: Diehl, Bock and Schloeder, SIAM J. Control Optim. 43, 2005).
 """
 
 from enum import IntEnum
@@ -120,16 +120,18 @@ def _extra_loads(model, wind, table, x, loads, excess, gain):
 
 @kernel
 def _foresee(model, wind, table, nonlinear, ahead, grid, moves, work, closed):
-    """Fill the states under the moves, from the first, and their slopes over the moves."""
+    """Fill the states under the moves, from the first, and their slopes over the moves.
+
+    ahead: (n, 2) states of the wind's filter at the first n periods, less the operating wind.
+    """
     n, width = N_FEEDBACK, len(moves)
     x, s = work.states, work.slopes
     excess, gain, by_load = work.excess, work.gain, work.by_load
     excess[:] = 0.0
     s[0] = 0.0
     for k in range(len(grid.block_of)):
-        if k < len(ahead) - 1:  # the wind that is known, and the filter's state that leads to the next of it
-            x[k, WIND] = ahead[k]
-            x[k, FILTER] = (ahead[k + 1] - model.A[WIND, WIND] * ahead[k]) / model.A[WIND, FILTER]
+        if k < len(ahead):
+            x[k, FILTER], x[k, WIND] = ahead[k, 0], ahead[k, 1]
         first = 2 * grid.block_of[k]
         used = first + 2
         if nonlinear:
@@ -242,16 +244,12 @@ def _limit(limits, units, grid, moves, work, gain):
 
 @entry
 def newton_step(
-    model, wind, table, nonlinear, rows, references, end, ahead, limits, units, grid, moves, work, step
+    model, gain, wind, table, nonlinear, rows, references, end, ahead, limits, units, grid, moves, work, step
 ):
     """Fill work about the plan `moves` and step (moves,) with the best change where no limit binds.
 
-    Returns whether that keeps all limits. The state now is work.states[0].
+    Returns whether that keeps all limits. The state now is work.states[0], the feedback -gain x.
     """
-    gain = model.K.copy()
-    if len(ahead) > 0:  # what the wind asks for comes from the plan alone
-        gain[:, FILTER] = 0.0
-        gain[:, WIND] = 0.0
     closed = model.A - model.B @ gain
     _foresee(model, wind, table, nonlinear, ahead, grid, moves, work, closed)
     _condense(model, rows, references, end, grid, moves, work, gain)

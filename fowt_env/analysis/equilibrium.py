@@ -57,9 +57,10 @@ def check_equilibrium(scene, rest, start, slope, fresh_slope):
     heave, roll, platform_pitch = float(rest[State.HEAVE]), rest[State.ROLL], rest[State.PLATFORM_PITCH]
     upright = cos(platform_pitch) * cos(roll)  # vertical component of the tower axis
     tilt = degrees(acos(upright))
-    if impossible := _impossible(scene, heave, upright, tilt):
+    if impossible := impossible_place(scene, heave, upright):
+        places = " and ".join(impossible.values())
         raise InputError(
-            f"{label(scene)}: its loads balance only with {' and '.join(impossible)} ({_place(rest)})."
+            f"{label(scene)}: its loads balance only with {places} ({_place(rest)})."
             f" {_sentences(causes_of(scene, start))}".rstrip()
         )
     odd = {}
@@ -104,23 +105,26 @@ def label(scene):
     return f"platform {scene.label!r} {wind}"
 
 
-def _impossible(scene, heave, upright, tilt):
-    """List of what cannot be where the platform rests, in words."""
+def impossible_place(scene, heave, upright):
+    """{what is beyond its bounds: text} of a platform's place that no platform can have.
+
+    heave: m; upright: vertical component of the tower axis. Keys: "bed", "air", "tower base", "tilt".
+    """
     hull, depth = scene.platform.hull, scene.platform.environment.water_depth
     across = sqrt(max(1.0 - upright * upright, 0.0))
     width = 0.0 if hull is None else hull.diameter[0]
     keel = heave - upright * scene.platform.draft - 0.5 * across * width
     base_height = scene.platform.tower.base_height
     base = heave + upright * base_height
-    found = []
+    found = {}
     if keel < -depth:
-        found.append(f"its keel {-depth - keel:.3g} m below the sea bed")
+        found["bed"] = f"its keel {-depth - keel:.3g} m below the sea bed"
     if keel > 0.0:
-        found.append(f"its keel {keel:.3g} m above the water")
+        found["air"] = f"its keel {keel:.3g} m above the water"
     if base < 0.0 < base_height:
-        found.append(f"its tower base {-base:.3g} m under water")
-    if tilt > degrees(CAPSIZE):
-        found.append(f"its tower {tilt:.3g} deg from upright")
+        found["tower base"] = f"its tower base {-base:.3g} m under water"
+    if (tilt := acos(upright)) > CAPSIZE:
+        found["tilt"] = f"its tower {degrees(tilt):.3g} deg from upright"
     return found
 
 

@@ -11,7 +11,7 @@ from scipy.linalg import expm
 
 from fowt_env.analysis.trim import AZIMUTHS, trim, without_fluctuations
 from fowt_env.analysis.wave_excitation import fit_wave_filter, wave_force
-from fowt_env.descriptions.checks import is_number
+from fowt_env.descriptions.checks import check_number, is_number, short
 from fowt_env.descriptions.measurements import MEASURED as FIELDS
 from fowt_env.descriptions.sea_state import sea_state_of
 from fowt_env.errors import InputError, unknown
@@ -210,8 +210,7 @@ class LinearModel:
         if hidden:
             raise InputError(
                 f"state: {', '.join(hidden[:4])}{' ...' if len(hidden) > 4 else ''}: are not measured; take"
-                " the model without them (without_memory for radiation and wake, without_inertia for the"
-                " pitch drive, in fowt_env.analysis.reduced_model), or an estimator"
+                " the model without them (residualised of fowt_env.analysis.reduced_model), or an estimator"
             )
         return self.states
 
@@ -527,8 +526,11 @@ def steady_parts(scene, point):
     return {"rigid_body": body, "actuator": linear_actuator(scene.model.actuator)}
 
 
-def linearize(scene, operating_point=None):
-    """LinearModel of a scene about an operating point (default: its floating trim).
+def linearize(scene, operating_point=None, *, wind=None):
+    """Return the LinearModel of a scene about an operating point (default: its floating trim).
+
+    wind: mean hub wind of that trim (m/s) in place of the scene's own; a controller's `prepare` takes the
+    models over the wind with it.
 
     The wind input moves the hub wind with its shear; waves are flat, and their small force comes in by
     wave_force. Drag has no linear part at rest in still water, so viscous damping is absent there.
@@ -538,10 +540,15 @@ def linearize(scene, operating_point=None):
     without deadband and friction, within which it would not move at all. blade_pitch is that of all blades
     together, also where each has its own: multiblade.py has the rest.
 
-    Raises: InputError if the scene has any.
+    Raises: InputError if the scene has any, for a wind in a scene without aerodynamics, and for a wind beside
+    an operating point, which has its own.
     """
     check_scene(scene)
     check_linear(scene)
+    if wind is not None:
+        if operating_point is not None:
+            raise InputError(f"wind = {short(wind)}: the operating point has its own wind; name one of them")
+        scene = scene.with_weather(wind=check_number("wind", wind, 0.0))
     point = trim(scene) if operating_point is None else operating_point
     parts = steady_parts(scene, point)
     body = parts["rigid_body"]

@@ -1,25 +1,31 @@
-"""Linear models as designs of controllers take them: no memory of waves or wake, blades that lag.
+"""Linear models as designs of controllers take them: the states of the rigid bodies alone, blades that lag.
 
-The states of the memory, z, follow the motion x by z' = A_zz z + A_zx x + B_z u + E_z f. At a frequency w
-they are a complex gain times x, u and f, whose real part acts with x and whose imaginary part, over w, with
-dx/dt.
-So the force of the memory becomes the added mass and the damping of that frequency, exactly there and nearly
-about it, and the model has the rigid body's states alone. The wake of dynamic inflow follows at once.
+The other states z follow the rigid bodies' x by z' = A_zz z + A_zx x + B_z u + E_z f. To cut them off would
+leave out what they pass on (a tower that bends, all of the rotor's thrust on the platform), so they are
+residualised (Kokotovic, Khalil and O'Reilly, Singular Perturbation Methods in Control, 1986):
 
-Blades that follow their command at once are no state: designs give them LEAST_LAG. A drive with inertia is to
-them the lag that trails a slow command as far, and a generator that lags follows at once.
+A tower that bends, the wake of dynamic inflow, a pitch drive with inertia and a generator that lags are where
+they come to rest under x, u and f: z = -A_zz^-1 (A_zx x + B_z u + E_z f). The tower is then a static spring
+without velocity, which moves the mass of its top with the platform; the drive is the lag that trails a
+slow command as far.
+
+Radiation memory decays as slowly as the platform moves. At a frequency w its states are a complex gain times
+x, u and f, whose real part acts with x and whose imaginary part, over w, with dx/dt. So its force becomes the
+added mass and the damping of that frequency, exactly there and nearly about it.
+
+Blades that follow their command at once are no state: designs give them LEAST_LAG.
 """
 
 from dataclasses import replace
 
 import numpy as np
 
-from fowt_env.analysis.linear_model import ACTUATOR_STATES, MEMORY, VELOCITIES, WAKE
-from fowt_env.plant.state import MOTIONS
+from fowt_env.analysis.linear_model import MEMORY, VELOCITIES
+from fowt_env.errors import InputError
+from fowt_env.plant.state import MOTIONS, STATES
 
 LEAST_LAG = 0.05  # s, of a pitch drive that has none
-ADDED = tuple(name for name, _ in ACTUATOR_STATES.values())
-TORQUE = ACTUATOR_STATES["generator_torque"][0]
+SETTLES = 1e-6  # 1/s, slowest decay of a state that is taken where it comes to rest
 NAMES = ("platform_pitch", "surge", "heave")  # of modes that may be the platform's pitch, the likeliest first
 FAR = 0.3  # of the undamped frequency, within which its mode is
 
@@ -32,38 +38,6 @@ def with_pitch_lag(model):
     a[blade], b[blade] = 0.0, 0.0
     a[blade, blade], b[blade, model.inputs.index("blade_pitch_command")] = -1.0 / LEAST_LAG, 1.0 / LEAST_LAG
     return replace(model, A=a, B=b)
-
-
-def without_inertia(model):
-    """The LinearModel with a first-order lag of the blades and none of the torque; itself where it is so."""
-    lagging = [i for i, name in enumerate(model.states) if name in ADDED]
-    if not lagging:
-        return model
-    kept = [i for i in range(len(model.states)) if i not in lagging]
-    a, b, d = model.A.copy(), model.B.copy(), model.D.copy()
-    blade, lag = model.index("blade_pitch"), model.scene.turbine.pitch_drive.lag
-    if "pitch_rate" in model.states:
-        a[blade], b[blade] = 0.0, 0.0
-        a[blade, blade] = -1.0 / lag
-        b[blade, model.inputs.index("blade_pitch_command")] = 1.0 / lag
-    if TORQUE in model.states:
-        torque, command = model.index(TORQUE), model.inputs.index("generator_torque")
-        b[:, command] += a[:, torque]
-        d[:, command] += model.C[:, torque]
-    return replace(
-        model,
-        A=a[np.ix_(kept, kept)],
-        B=b[kept],
-        C=model.C[:, kept],
-        D=d,
-        E=model.E[kept],
-        states=tuple(model.states[i] for i in kept),
-    )
-
-
-def memory_states(model):
-    """Indices of the states of a LinearModel that belong to the memory of radiated waves."""
-    return [i for i, name in enumerate(model.states) if name.startswith(MEMORY)]
 
 
 def platform_frequency(model):
@@ -88,6 +62,7 @@ def platform_mode(model):
 
 def _undamped(model):
     """Frequency (rad/s) of restoring and mass alone in which the pitch has its largest share."""
+    model = _settled(model)  # the mass on a tower that bends is the platform's too
     positions = [model.index(name) for name in MOTIONS]
     speeds = [model.index(name) for name in VELOCITIES]
     kinematics, stiffness = model.A[np.ix_(positions, speeds)], model.A[np.ix_(speeds, positions)]
@@ -98,62 +73,69 @@ def _undamped(model):
     return float(np.sqrt(max(-values[chosen].real, 1e-6)))
 
 
-def without_wake(model):
-    """The LinearModel whose wake follows at once, the quasi-steady one; itself without dynamic inflow."""
-    wake = [i for i, name in enumerate(model.states) if name.startswith(WAKE)]
-    if not wake:
-        return model
-    kept = [i for i in range(len(model.states)) if i not in wake]
-    own = model.A[np.ix_(wake, wake)]
-    by_state, by_input, by_force = (
-        -np.linalg.solve(own, part) for part in (model.A[np.ix_(wake, kept)], model.B[wake], model.E[wake])
-    )
-    into, out = model.A[np.ix_(kept, wake)], model.C[:, wake]
-    return replace(
-        model,
-        A=model.A[np.ix_(kept, kept)] + into @ by_state,
-        B=model.B[kept] + into @ by_input,
-        E=model.E[kept] + into @ by_force,
-        C=model.C[:, kept] + out @ by_state,
-        D=model.D + out @ by_input,
-        F=model.F + out @ by_force,
-        states=tuple(model.states[i] for i in kept),
-    )
+def residualised(model, omega=None):
+    """Return the LinearModel with the states of plant.state.STATES alone; itself where it has no others.
 
-
-def without_memory(model, omega=None):
-    """The LinearModel with added mass and damping for its memory of radiated waves, and without_wake.
-
-    omega: rad/s, where both are exact; None: platform_frequency(model).
+    omega: rad/s, where added mass and damping of radiation memory are exact; None: platform_frequency of the
+    model without its other internal states.
+    Raises: InputError where some of those do not come to rest by themselves.
     """
-    model = without_wake(model)
-    memory = memory_states(model)
+    model = _settled(model)
+    memory = [name for name in model.states if name not in STATES]
     if not memory:
         return model
-    omega = platform_frequency(model) if omega is None else float(omega)
-    kept = [i for i in range(len(model.states)) if i not in memory]
-    response = np.linalg.inv(1j * omega * np.eye(len(memory)) - model.A[np.ix_(memory, memory)])
+    return _following(model, memory, platform_frequency(model) if omega is None else float(omega))
+
+
+def _settled(model):
+    """The LinearModel whose states besides STATES and radiation memory are where they come to rest."""
+    names = [name for name in model.states if name not in STATES and not name.startswith(MEMORY)]
+    return _following(model, names, 0.0)
+
+
+def _following(model, names, omega):
+    """The LinearModel whose states of these names follow the others as at omega, rad/s; 0: at rest."""
+    if not names:
+        return model
+    gone = [model.index(name) for name in names]
+    kept = [i for i in range(len(model.states)) if i not in gone]
+    own = model.A[np.ix_(gone, gone)]
+    if omega == 0.0:
+        _check_settling(own, names)
+    response = np.linalg.inv(1j * omega * np.eye(len(gone)) - own)
 
     def moved(drive):
-        """(with the value, with its rate) of the memory's states per what drives them."""
+        """(with the value, with its rate) of the states that go per what drives them."""
         gain = response @ drive
-        return gain.real, gain.imag / omega
+        return gain.real, gain.imag / omega if omega else np.zeros_like(drive)
 
-    by_state, by_rate = moved(model.A[np.ix_(memory, kept)])
-    into, out = model.A[np.ix_(kept, memory)], model.C[:, memory]
-    # the inputs change slowly beside the platform: what their rates do to the memory is left out
+    by_state, by_rate = moved(model.A[np.ix_(gone, kept)])
+    into, out = model.A[np.ix_(kept, gone)], model.C[:, gone]
+    # the inputs change slowly beside the platform: what their rates do to these states is left out
     inertia = np.linalg.inv(np.eye(len(kept)) - into @ by_rate)
     rates = {
         "A": inertia @ (model.A[np.ix_(kept, kept)] + into @ by_state),
-        "B": inertia @ (model.B[kept] + into @ moved(model.B[memory])[0]),
-        "E": inertia @ (model.E[kept] + into @ moved(model.E[memory])[0]),
+        "B": inertia @ (model.B[kept] + into @ moved(model.B[gone])[0]),
+        "E": inertia @ (model.E[kept] + into @ moved(model.E[gone])[0]),
     }
     read = model.C[:, kept] + out @ by_state
     return replace(
         model,
         states=tuple(model.states[i] for i in kept),
         C=read + out @ by_rate @ rates["A"],
-        D=model.D + out @ (moved(model.B[memory])[0] + by_rate @ rates["B"]),
-        F=model.F + out @ (moved(model.E[memory])[0] + by_rate @ rates["E"]),
+        D=model.D + out @ (moved(model.B[gone])[0] + by_rate @ rates["B"]),
+        F=model.F + out @ (moved(model.E[gone])[0] + by_rate @ rates["E"]),
         **rates,
     )
+
+
+def _check_settling(own, names):
+    """Raise InputError unless states of this system matrix come to rest while all others are held."""
+    values, vectors = np.linalg.eig(own)
+    slowest = np.argmax(values.real)
+    if values[slowest].real > -SETTLES:
+        name = names[np.argmax(np.abs(vectors[:, slowest]))]
+        raise InputError(
+            f"linear model: state {name!r} does not come to rest by itself (it goes with"
+            f" exp({values[slowest].real:.2g} s^-1 t)): a design that does not keep it would not hold"
+        )

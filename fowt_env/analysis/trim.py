@@ -18,15 +18,13 @@ from fowt_env.plant.channels import to_units
 from fowt_env.plant.compile.decorators import entry
 from fowt_env.plant.compile.handle import data_of, model_of
 from fowt_env.plant.drivetrain import build_torque_curve, generator_torque
-from fowt_env.plant.hydro.load import BandedStrips
-from fowt_env.plant.hydro.member_series import no_series
 from fowt_env.plant.rollout import output_row
 from fowt_env.plant.state import Command, State, pose_of
 from fowt_env.plant.tilt import rotor_pose
 from fowt_env.scene.actuators import rest_actuators
 from fowt_env.scene.channel_names import channel_name, channel_unit
+from fowt_env.scene.parts import still_hydro
 from fowt_env.scene.scene import Scene, check_scene
-from fowt_env.weather.excitation import still_excitation
 from fowt_env.weather.wind import make_series
 from fowt_env.weather.wind_field import steady_field
 
@@ -101,22 +99,14 @@ class OperatingPoint(Mapping):
 
 
 def without_fluctuations(scene, wind_speed=None):
-    """The scene in steady mean wind and flat water: same types, so nothing is compiled anew."""
+    """The scene in steady mean wind and flat water: same types, so nothing is compiled anew.
+
+    Nothing of its waves is left in it. A box of wind becomes its mean over time, which is its own.
+    """
     parts = {}
     aero, hydro = scene.model.aero, scene.model.hydro
     if hydro is not None and hydro.waves is not None:
-        # one component of no height stands for flat water: summing them all would only take longer
-        waves = hydro.waves
-        one = {
-            name: getattr(waves, name)[:1].copy() for name in waves._fields if np.ndim(getattr(waves, name))
-        }
-        parts["hydro.waves"] = waves._replace(**one | {"amplitude": np.zeros(1), "velocity": np.zeros(1)})
-        if hydro.members is not None:
-            parts["hydro.members.series"] = no_series()
-        parts["hydro.excitation"] = still_excitation(hydro.excitation)
-        if isinstance(hydro.strips, BandedStrips):
-            bands = hydro.strips.bands
-            parts["hydro.strips.bands"] = bands._replace(weight=np.zeros_like(bands.weight))
+        parts["hydro"] = still_hydro(hydro, scene.platform, scene.options)
     if aero is not None:
         speed = scene.wind_speed if wind_speed is None else wind_speed
         if aero.field is not None:

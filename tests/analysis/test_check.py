@@ -56,7 +56,7 @@ def test_metacentric_height_is_that_of_the_waterplane(oc3, platform):
 
 
 def test_periods_are_those_of_the_linear_model(oc3):
-    known = natural_periods(fowt_env.build_scene("oc3_hywind"))
+    known = natural_periods(fowt_env.build_scene("oc3_hywind", fidelity="reference"))
     for motion, period in known.items():  # the linear model's rotor is free to turn, which roll feels
         assert oc3.periods[motion.replace("platform_", "platform ")] == pytest.approx(period, rel=2e-3)
 
@@ -92,11 +92,11 @@ def test_a_tension_leg_platform_rests_on_its_tendons():
 
 @pytest.mark.parametrize("wind", [8.0, 11.4, 24.0])
 def test_a_tension_leg_platform_finds_its_rest_in_wind(wind):
-    point = fowt_env.trim(fowt_env.build_scene(tension_leg(), wind=wind, rotor="table"))
+    point = fowt_env.trim(fowt_env.build_scene(tension_leg(), wind=wind, rotor="table", fidelity="reference"))
     assert abs(point["PtfmPitch"]) < 0.5 and 0.5 < point["PtfmSurge"] < 6.0
     # tendons of this length set down by the square of the drift
     drop = 0.5 * point["PtfmSurge"] ** 2 / TENDON[0]
-    calm = fowt_env.trim(fowt_env.build_scene(tension_leg()))["PtfmHeave"]
+    calm = fowt_env.trim(fowt_env.build_scene(tension_leg(), fidelity="reference"))["PtfmHeave"]
     assert point["PtfmHeave"] == pytest.approx(calm - drop, abs=0.01)
 
 
@@ -159,12 +159,12 @@ def test_the_added_mass_is_that_of_the_modes_own_frequency():
 def test_members_and_lines_in_wrong_places_are_named():
     low = semi().members[0].model_copy(update={"start": (14.4, 25.0, -220.0)})
     with pytest.warns(fowt_env.PlantWarning, match="ember 1 reaches down to z = -220 m, below the sea bed"):
-        fowt_env.build_scene(semi(members=(low, *semi().members[1:])))
+        fowt_env.build_scene(semi(members=(low, *semi().members[1:])), fidelity="reference")
     inside = Line(
         anchor=(-60.0, 0.0, -200.0), fairlead=(70.0, 0.0, -14.0), length=300.0, wet_weight=1e3, EA=1e9
     )
     with pytest.warns(fowt_env.PlantWarning, match="he anchor of line 1 is nearer to the tower axis"):
-        fowt_env.build_scene(semi(lines=(inside,)))
+        fowt_env.build_scene(semi(lines=(inside,)), fidelity="reference")
 
 
 def test_one_platform_is_warned_of_once():
@@ -173,8 +173,8 @@ def test_one_platform_is_warned_of_once():
         for member, (x, y) in zip(semi().members[:3], ((1.0, 0.0), (2.0, 0.0), (3.0, 0.0)), strict=True)
     )
     with pytest.warns(fowt_env.PlantWarning, match="ll 3 members lie above the water"):
-        fowt_env.build_scene(semi(members=dry, lines=()))
-    fowt_env.build_scene(semi(members=dry, lines=()))
+        fowt_env.build_scene(semi(members=dry, lines=()), fidelity="reference")
+    fowt_env.build_scene(semi(members=dry, lines=()), fidelity="reference")
 
 
 # the command
@@ -224,17 +224,21 @@ def test_built_in_platforms_fit(name):
 def test_a_spar_of_members_has_the_wave_force_of_its_strips():
     fixed = {"kinematics_position": "fixed", "surface": "swl", "stretching": "none", "strip_length": 1.0}
     omega = np.array([0.9, 0.3, 0.6, 1.5])
-    strips = wave_force(fowt_env.build_scene("oc3_hywind", **fixed), np.zeros(15), omega)
-    members = wave_force(fowt_env.build_scene(spar(), **fixed), np.zeros(15), omega)
+    strips = wave_force(
+        fowt_env.build_scene("oc3_hywind", **{"fidelity": "reference"} | fixed), np.zeros(15), omega
+    )
+    members = wave_force(
+        fowt_env.build_scene(spar(), **{"fidelity": "reference"} | fixed), np.zeros(15), omega
+    )
     for columns in (slice(0, 3), slice(3, 6)):
         scale = np.abs(strips[:, columns]).max(axis=1)
         assert (np.abs(members[:, columns] - strips[:, columns]).max(axis=1) < 1e-3 * scale).all()
 
 
 def test_planar_scenes_need_members_on_both_sides():
-    fowt_env.build_scene(semi(), planar=True)
+    fowt_env.build_scene(semi(), planar=True, fidelity="reference")
     with pytest.raises(fowt_env.InputError, match="member from .* has no mirror image"):
-        fowt_env.build_scene(semi(members=semi().members[1:]), planar=True)
+        fowt_env.build_scene(semi(members=semi().members[1:]), planar=True, fidelity="reference")
 
 
 def test_other_weather_keeps_the_types_of_members():

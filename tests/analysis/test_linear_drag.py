@@ -32,7 +32,7 @@ OMEGA = np.linspace(0.2, 4.0, 800)
 
 @pytest.fixture(scope="module")
 def scene():
-    return build_scene("oc3_hywind")
+    return build_scene("oc3_hywind", fidelity="reference")
 
 
 def random_seas(scene, count=24):
@@ -107,7 +107,7 @@ def test_the_damping_is_the_mean_drag_on_a_hull_that_moves_slowly(scene):
 
 
 def test_damping_is_symmetric_positive_and_alike_to_all_sides_in_waves_from_all():
-    scene = build_scene("oc3_hywind")
+    scene = build_scene("oc3_hywind", fidelity="reference")
     motion = HullMotion(0.0, np.diag([0.04, 0.04, 0.0, 0.0, 0.0, 0.0]))
     damping = linear_drag(scene, state(), OMEGA, None, motion).damping
     np.testing.assert_allclose(damping, damping.T, rtol=1e-12, atol=1e-6)
@@ -131,7 +131,7 @@ def test_motion_with_the_waves_takes_from_the_relative_velocity(scene):
 
 def test_the_part_of_a_current_is_that_of_the_plant_at_rest():
     """at_rest against differences of the strips' own drag in the current."""
-    scene = build_scene("oc3_hywind", current={"speed": 0.8})
+    scene = build_scene("oc3_hywind", current={"speed": 0.8}, fidelity="reference")
     hydro = scene.model.hydro
     found = linear_drag(scene, state(), OMEGA, None)
     np.testing.assert_allclose(found.damping, found.at_rest)
@@ -190,7 +190,7 @@ def test_without_water_there_is_no_drag(bare_scene):
 
 def test_a_spar_of_members_has_the_linear_drag_of_its_strips(scene):
     fixed = {"kinematics_position": "fixed", "surface": "swl", "stretching": "none", "strip_length": 1.0}
-    members = build_scene(floaters.spar(), **fixed)
+    members = build_scene(floaters.spar(), **{"fidelity": "reference"} | fixed)
     waves = np.zeros((OMEGA.size, 6), complex)
     waves[:, 0], waves[:, 4] = 0.3j * OMEGA, 0.004
     for motion in (AT_REST, HullMotion(waves, np.diag([0.04, 0.02, 0.01, 1e-5, 1e-5, 0.0]))):
@@ -203,7 +203,7 @@ def test_a_spar_of_members_has_the_linear_drag_of_its_strips(scene):
 
 def test_leaning_members_have_the_drag_of_the_plant_s_slope():
     """In a current, still water and no motion the gain is the slope of the plant's own load."""
-    current = build_scene(floaters.semi(), current={"speed": 0.8, "heading": 30.0})
+    current = build_scene(floaters.semi(), current={"speed": 0.8, "heading": 30.0}, fidelity="reference")
     found = linear_drag(current, np.zeros(15), OMEGA, None)
     data = current.data()
     handle = current.handle(data)
@@ -227,10 +227,12 @@ def test_a_quadratic_damping_matrix_takes_the_gain_of_its_motion(scene):
     platform = floaters.semi(
         additional=AdditionalLoads(quadratic_damping=tuple(map(tuple, quadratic.tolist())))
     )
-    plain = linear_drag(build_scene(floaters.semi()), np.zeros(15), OMEGA, None)
+    plain = linear_drag(build_scene(floaters.semi(), fidelity="reference"), np.zeros(15), OMEGA, None)
     deviation = np.array([0.5, 0.2, 0.3, 0.01, 0.02, 0.03])
     motion = HullMotion(0.0, np.diag(deviation**2))
-    more = linear_drag(build_scene(platform), np.zeros(15), OMEGA, None, motion).damping
-    less = linear_drag(build_scene(floaters.semi()), np.zeros(15), OMEGA, None, motion).damping
+    more = linear_drag(build_scene(platform, fidelity="reference"), np.zeros(15), OMEGA, None, motion).damping
+    less = linear_drag(
+        build_scene(floaters.semi(), fidelity="reference"), np.zeros(15), OMEGA, None, motion
+    ).damping
     assert more - less == pytest.approx(quadratic * np.sqrt(8.0 / np.pi) * deviation, rel=1e-9, abs=1e-3)
     assert not plain.damping.any()

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from fowt_env import build_scene, linearize
-from fowt_env.analysis.reduced_model import LEAST_LAG, platform_frequency, with_pitch_lag, without_memory
+from fowt_env.analysis.reduced_model import LEAST_LAG, platform_frequency, residualised, with_pitch_lag
+from fowt_env.errors import InputError
 
 
 @pytest.fixture(scope="module")
@@ -37,13 +38,13 @@ def remembering(model):
 
 @pytest.mark.parametrize("omega", [0.05, 0.22, 0.7])
 def test_the_response_at_the_frequency_is_exact(remembering, omega):
-    reduced = without_memory(remembering, omega)
+    reduced = residualised(remembering, omega)
     assert len(reduced.states) == 14
     assert reduced.response(omega) == pytest.approx(remembering.response(omega), rel=1e-9)
 
 
 def test_about_the_platforms_frequency_the_response_is_near(model, remembering):
-    reduced = without_memory(remembering)
+    reduced = residualised(remembering)
     row = remembering.output_index("platform_pitch")
     for omega in np.array([0.8, 1.2]) * platform_frequency(remembering):
         exact = remembering.response(omega)[0, row]
@@ -55,8 +56,8 @@ def test_about_the_platforms_frequency_the_response_is_near(model, remembering):
         )
 
 
-def test_a_model_without_memory_and_with_a_lag_is_left_as_it_is(model):
-    assert without_memory(model) is model
+def test_a_model_residualised_and_with_a_lag_is_left_as_it_is(model):
+    assert residualised(model) is model
     assert with_pitch_lag(model) is model
 
 
@@ -76,3 +77,14 @@ def test_blades_that_follow_at_once_lag_by_the_least_lag():
     omega, row = 0.2, model.output_index("rotor_speed")
     lagged, whole = model.response(omega)[0, row, command], plain.response(omega)[0, row, command]
     assert lagged * (1.0 + 1j * omega * LEAST_LAG) == pytest.approx(whole * (1.0 + 0.2j * omega), rel=1e-4)
+
+
+@pytest.mark.parametrize("rate", [0.0, 0.01])
+def test_a_state_that_does_not_come_to_rest_by_itself_is_named(model, rate):
+    n = len(model.states)
+    a = np.zeros((n + 1, n + 1))
+    a[:n, :n], a[n, n], a[n, 0] = model.A, rate, 1.0
+    more = {name: np.pad(getattr(model, name), ((0, 1), (0, 0))) for name in ("B", "E")}
+    grown = replace(model, A=a, C=np.pad(model.C, ((0, 0), (0, 1))), states=(*model.states, "wake_1"), **more)
+    with pytest.raises(InputError, match="state 'wake_1' does not come to rest by itself"):
+        residualised(grown)

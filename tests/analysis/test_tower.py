@@ -5,12 +5,13 @@ import pytest
 
 from fowt_env import build_scene
 from fowt_env.analysis.linear_model import TOWER, linearize, natural_periods
+from fowt_env.analysis.reduced_model import platform_frequency, residualised
 from fowt_env.analysis.statics import Evaluation
 from fowt_env.analysis.tower_frequencies import bending
 from fowt_env.analysis.trim import _Steady, trim, without_fluctuations
 from fowt_env.initial_conditions import initial_state
 from fowt_env.plant.model import LoadCache
-from fowt_env.plant.state import MOTIONS, State
+from fowt_env.plant.state import MOTIONS, STATES, State
 from fowt_env.scene.mass import top_mass_matrix
 
 
@@ -91,3 +92,16 @@ def test_the_linear_model_has_openfast_s_frequency_of_the_tower(scene):
     assert list(periods) == [*MOTIONS, *TOWER[:2]]
     at_rest = scene.platform.published["natural_periods"]["pitch"]
     assert periods["platform_pitch"] == pytest.approx(at_rest, rel=0.03)
+
+
+def test_a_model_of_rigid_bodies_answers_to_the_wind_as_the_one_whose_tower_bends(scene):
+    """Within 5 %: the square of a frequency over the tower's, and radiation memory beside its frequency."""
+    model = linearize(scene)
+    reduced, own = residualised(model), platform_frequency(model)
+    assert reduced.states == STATES
+    assert own == pytest.approx(platform_frequency(reduced), rel=0.02)  # with the mass on the tower
+    for omega in (0.5 * own, 1.5 * own, 0.5):
+        found, whole = (one.response(omega, ("wind_speed",))[0, :, 0] for one in (reduced, model))
+        for name in ("rotor_speed", "platform_pitch", "nacelle_velocity", "nacelle_acceleration"):
+            row = model.output_index(name)
+            assert abs(found[row] / whole[row] - 1.0) < 0.05, (omega, name)

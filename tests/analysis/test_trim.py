@@ -114,7 +114,13 @@ def test_tower_base_carries_the_weight_above_it(at_rest, platform, turbine):
 )
 def test_fixed_platform_works_where_openfast_does(wind, rotor_speed, blade_pitch, thrust, storm_scene):
     scene = fowt_env.build_scene(
-        "oc3_hywind", wind=wind, sea=storm_scene.sea, duration=60.0, wave_components=60, shear_exponent=0.0
+        "oc3_hywind",
+        wind=wind,
+        sea=storm_scene.sea,
+        duration=60.0,
+        wave_components=60,
+        shear_exponent=0.0,
+        fidelity="reference",
     )
     point = trim(scene, platform="fixed")
     assert np.all(point.state[: State.AZIMUTH] == 0.0)
@@ -125,9 +131,13 @@ def test_fixed_platform_works_where_openfast_does(wind, rotor_speed, blade_pitch
 
 def test_rotor_stands_in_still_air_and_is_feathered_in_a_gale(storm_scene):
     options = dict(sea=storm_scene.sea, duration=60.0, wave_components=60)
-    calm_air = trim(fowt_env.build_scene("oc3_hywind", wind=0.0, **options), platform="fixed")
+    calm_air = trim(
+        fowt_env.build_scene("oc3_hywind", wind=0.0, **{"fidelity": "reference"} | options), platform="fixed"
+    )
     assert calm_air["RotSpeed"] == 0.0 and calm_air["BldPitch1"] == 0.0
-    gale = trim(fowt_env.build_scene("oc3_hywind", wind=40.0, **options), platform="fixed")
+    gale = trim(
+        fowt_env.build_scene("oc3_hywind", wind=40.0, **{"fidelity": "reference"} | options), platform="fixed"
+    )
     assert gale["RotSpeed"] == 0.0 and gale["BldPitch1"] == pytest.approx(90.0, rel=1e-12)
 
 
@@ -139,7 +149,7 @@ def test_a_scene_without_fluctuations_keeps_its_types(storm_scene):
 
 
 def test_spar_without_moorings_floats_higher_where_it_is(platform):
-    scene = fowt_env.build_scene("oc3_hywind", mooring=False)
+    scene = fowt_env.build_scene("oc3_hywind", mooring=False, fidelity="reference")
     point = trim(scene)
     # the lines' 1.607 MN go: 4.8 m of cylinder and taper come out of the water
     assert 3.5 < point["PtfmHeave"] < 5.0
@@ -175,7 +185,7 @@ def edited(folder, key, value):
 def complaint(path, wind=None):
     """(what the trim of a platform file does: "refused" or "warned", its one message)."""
     sea = None if wind is None else {"kind": "regular", "H": 0.1, "T": 2.0}
-    scene = fowt_env.build_scene(path, wind=wind, sea=sea)
+    scene = fowt_env.build_scene(path, wind=wind, sea=sea, fidelity="reference")
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         try:
@@ -269,7 +279,7 @@ def test_a_place_is_judged_by_keel_tower_base_tilt_and_heave(offsets, kind, word
 def test_runs_and_episodes_are_refused_as_their_trim_is(tmp_path):
     path = edited(tmp_path, "length", "800.0")
     with pytest.raises(InputError, match="keel 1.63 m below the sea bed"):
-        fowt_env.simulate(fowt_env.build_scene(path), duration=1.0)
+        fowt_env.simulate(fowt_env.build_scene(path, fidelity="reference"), duration=1.0)
     env = FowtEnv(platform=path)
     for wind in (None, {"kind": "steady", "speed": 18.0}):  # interpolated and exact trims
         with pytest.raises(InputError, match="m below the sea bed and its tower base"):
@@ -283,7 +293,7 @@ def test_a_platform_is_warned_of_once_whatever_the_wind(tmp_path, warned):
         env = FowtEnv(platform=path)
         for seed in range(3):
             env.reset(seed=seed)
-        trim(fowt_env.build_scene(path))
+        trim(fowt_env.build_scene(path, fidelity="reference"))
     assert len(caught) == 1
 
 
@@ -304,10 +314,14 @@ def test_built_in_platforms_rest_without_a_warning(name, warned):
     period = 2.0 if platform.potential_flow is None else 8.0  # within the coefficients of all
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        trim(fowt_env.build_scene(name))
+        trim(fowt_env.build_scene(name, fidelity="reference"))
         for share in (0.5, 1.0, 1.6):
             sea = {"kind": "regular", "H": 0.1, "T": period}
-            trim(fowt_env.build_scene(name, wind=share * rated, sea=sea, skewed_wake=False))
+            trim(
+                fowt_env.build_scene(
+                    name, wind=share * rated, sea=sea, skewed_wake=False, fidelity="reference"
+                )
+            )
 
 
 def test_operating_point_is_a_mapping_that_names_what_it_has(at_rest, still_scene):

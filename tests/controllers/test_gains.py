@@ -101,3 +101,10 @@ def test_a_rotor_that_never_reaches_rated_torque_is_refused(scene):
     )
     with pytest.raises(InputError, match="does not reach rated torque"):
         derived_gains(weak, 0.2)
+
+
+def test_on_a_tower_that_bends_the_platform_pitches_as_slowly():
+    """With the mass of nacelle and rotor; radiation memory is held, which makes it 3 % quicker."""
+    scene = build_scene("iea15_volturnus_s", wind=18.0, fidelity="fast", tower="modes")
+    period = 2.0 * np.pi / platform_pitch_frequency(scene)
+    assert period == pytest.approx(scene.platform.published["natural_periods"]["pitch"], rel=0.05)

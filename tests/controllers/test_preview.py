@@ -129,7 +129,7 @@ def test_of_a_full_field_it_sees_the_rotor_average():
 
 
 def test_a_run_without_wind_or_preparation_is_refused():
-    still = build_scene("oc3_hywind")
+    still = build_scene("oc3_hywind", fidelity="reference")
     with pytest.raises(InputError, match="needs a scene with wind"):
         make("preview", still.turbine, DT).prepare(still)
     with pytest.raises(InputError, match=r"call prepare\(scene\)"):

@@ -12,7 +12,17 @@ import pytest
 
 from fowt_env import build_scene, simulate
 from fowt_env.controllers import make
-from fowt_env.controllers.rosco import ENTRY, Discon, Rosco, RoscoSettings, find_library, pitch_gains
+from fowt_env.controllers.rosco import (
+    ENTRY,
+    Discon,
+    Rosco,
+    RoscoSettings,
+    _table,
+    deck,
+    find_library,
+    pitch_gains,
+    poles,
+)
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.errors import InputError
 from fowt_env.plant.measurement import Measurement
@@ -53,6 +63,31 @@ def test_the_proportional_gain_is_negative_over_the_whole_schedule(scene):
     proportional, integral = pitch_gains(scene.turbine)
     assert (proportional < 0.0).all() and (integral < 0.0).all()
     assert proportional[0] == -0.006275604
+
+
+def test_the_estimator_and_the_torque_loop_are_those_of_roscos_own_deck(turbine):
+    """DISCON.IN of ROSCO's Test_Cases/NREL-5MW, written by its toolbox 2.10.1 from the OpenFAST files.
+
+    Within 0.5 %: the blades' inertia in its deck is that of another table of masses (0.4 %).
+    """
+    found = deck(turbine, 1.225, _table(turbine, 1.225), RoscoSettings())
+    assert found["WE_Jtot"] == pytest.approx(43702538.057, rel=5e-3)
+    assert found["VS_KP"] == pytest.approx(-6.97771e2, rel=5e-3)
+    assert found["VS_KI"] == pytest.approx(-1.04507e2, rel=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("wind", "pole"), [(4.738, -0.02601), (8.214, -0.04509), (17.293, -0.1422), (24.093, -0.4133)]
+)
+def test_the_poles_are_those_of_roscos_own_deck(turbine, wind, pole):
+    """WE_FOPoles of the same file; that turbine has constant power above rated, which adds P/(omega^2 J).
+
+    Within 5 %: its best tip-speed ratio is 7.50 and ours 7.68, and the slopes come from unlike tables.
+    """
+    ours = np.interp(wind, *poles(turbine, 1.225, _table(turbine, 1.225)))
+    if wind > turbine.rated_wind_speed:
+        ours += 43093.55 * 97.0 / (1.267109 * 43702538.057)
+    assert ours == pytest.approx(pole, rel=0.05)
 
 
 @needs_library
@@ -216,6 +251,22 @@ def test_the_individual_variant_switches_a_decks_own_gains_on_and_nothing_else(t
     lines = ["2   ! IPC_ControlMode - x" if "IPC_ControlMode" in x else x for x in discon.text.splitlines()]
     path.write_text("\n".join(lines))
     assert not Discon(path, individual=True).switched  # 1P and 2P, as the file has it
+
+
+@needs_library
+def test_the_feedback_of_a_deck_is_given_the_slope_of_the_platforms_pitch_rate(scene, discon):
+    """A rate that rises by 0.004 rad/s a second reaches the library as 0.004 rad/s2."""
+    controller = Rosco(discon, 0.1)
+    controller.prepare(scene)  # of which a deck of its own takes no more than the turbine
+    rated = RATED._replace(
+        rotor_speed=0.79168, generator_speed=0.79168, generator_torque=1.9e7, blade_pitch=0.25
+    )
+    controller.reset(rated)
+    seen = []
+    for k in range(1, 5):
+        controller.act(rated._replace(time=0.1 * k, platform_pitch_rate=0.004 * 0.1 * k))
+        seen.append(controller._swap[82])
+    assert seen == pytest.approx([0.004] * 4, rel=1e-5)
 
 
 def test_the_feedback_of_a_deck_needs_no_more_than_sensors_have():

@@ -15,7 +15,7 @@ from scipy.optimize import least_squares
 
 from fowt_env.analysis.linear_drag import HullMotion, elevation_spectrum, linear_drag, with_drag
 from fowt_env.analysis.linear_model import linearize
-from fowt_env.analysis.reduced_model import with_pitch_lag, without_inertia, without_memory
+from fowt_env.analysis.reduced_model import residualised, with_pitch_lag
 from fowt_env.analysis.wave_excitation import wave_force
 from fowt_env.controllers.gains import with_gains
 from fowt_env.controllers.lqr.design import LAST_SEA_WIND, SENSORS, SITE, TURBULENCE_CLASS, scene_at
@@ -104,7 +104,7 @@ class BoundPlant:
         if sea is None:
             sea = joint_sea_state(SITE, min(self.wind_speed, LAST_SEA_WIND))
         self.sea = sea_state_of(sea)
-        model = with_pitch_lag(without_inertia(without_memory(linearize(scene_at(scene, wind)))))
+        model = with_pitch_lag(residualised(linearize(scene_at(scene, wind))))
         if model.pitch_rests:
             raise InputError(
                 f"wind = {wind:g}: the blade pitch rests on its limit there, and no controller moves it"

@@ -5,10 +5,10 @@
 Every setting runs on the cases of a suite, on validation seeds (1000 and above, on which no suite is scored),
 through the suite's sensors and behind its trip. Its cost is the mean of the lifetime deviations of rotor
 speed and platform pitch over those of gspi_oc3 on the same runs, plus PENALTY times what it lies beyond the
-suite's limits and beyond LIMITS, in fractions of them, plus LOST times the fraction of failed and tripped
-runs. The settings of now come first, then up to half of the budget spread evenly (Sobol), then Nelder and
-Mead's method from the best. A row of OUT/tune_NAME.csv is written for each setting as soon as it is known, so
-that an interrupted search leaves what it tried.
+suite's limits and beyond LIMITS, in fractions of them, plus LOST times the fraction of lost runs. The
+settings of now come first, then up to half of the budget spread evenly (Sobol), then Nelder and Mead's method
+from the best. A row of OUT/tune_NAME.csv is written for each setting as soon as it is known, so that an
+interrupted search leaves what it tried.
 """
 
 from collections.abc import Callable, Mapping
@@ -37,11 +37,11 @@ from fowt_env.scene.build import build_scene
 from fowt_env.training.evaluation.bootstrap import lifetime_means
 from fowt_env.training.evaluation.cases import read_suite
 from fowt_env.training.evaluation.evaluate import evaluate
-from fowt_env.training.evaluation.failures import failures_as_worst
+from fowt_env.training.evaluation.failures import penalised, with_lost_power
 from fowt_env.training.evaluation.leaderboard import EXPONENTS
 from fowt_env.training.evaluation.metrics import METRICS, better
 from fowt_env.training.evaluation.results_table import case_shares
-from fowt_env.training.evaluation.run_case import CONTROL_DT, OK
+from fowt_env.training.evaluation.run_case import CONTROL_DT, OK, REFERENCE
 from fowt_env.training.evaluation.seeds import VALIDATION
 
 BASELINE = "gspi_oc3"
@@ -115,8 +115,8 @@ def _mpc_preview(settings, turbine, control_dt):
 
 
 def _mpc_lidar(settings, turbine, control_dt):
-    changed = PREVIEW.changed(preview_time=LIDAR_HORIZON, **settings)
-    return MPC(turbine, control_dt, changed, "mpc_lidar", preview=True)
+    changed = MPCSettings(preview_time=LIDAR_HORIZON, **settings)
+    return MPC(turbine, control_dt, changed, "mpc_lidar", preview=True, exact=False)
 
 
 def _of(record, ranges):
@@ -157,7 +157,7 @@ def spaces():
         "floating_feedback": Space(feedback, tuned("floating_feedback"), _feedback),
         "lqr": Space(_LQR, _of(LQGSettings(), _LQR), _lqr),
         "mpc": Space(_MPC, _of(MPCSettings(), _MPC), _mpc),
-        "mpc_lidar": Space(_MPC, _of(PREVIEW, _MPC), _mpc_lidar),
+        "mpc_lidar": Space(_MPC, _of(MPCSettings(), _MPC), _mpc_lidar),
         "mpc_preview": Space(_MPC, _of(PREVIEW, _MPC), _mpc_preview),
         "pi_tuned": Space(factors, tuned("pi_tuned"), _pi),
         "rosco_float": Space(rosco, tuned("rosco_float"), _rosco),
@@ -174,13 +174,17 @@ class Objective:
             )
         self.suite, self.seeds, self.engine = read_suite(suite, platform), tuple(seeds), engine
         self.turbine = build_scene(self.suite.cases[0].platform).turbine
-        self.base = evaluate(BASELINE, self.suite, seeds=self.seeds, **engine)
+        self.base = evaluate(BASELINE, self.suite, seeds=self.seeds, reference=BASELINE, **engine)
 
     def __call__(self, controller):
         """{"cost", FIGURES over the baseline's, "lost", "beyond"} of a controller."""
-        runs = evaluate({"candidate": controller}, self.suite, seeds=self.seeds, **self.engine)
-        table = failures_as_worst(pd.concat([self.base, runs], ignore_index=True))
-        own, base = (self._means(table[table["controller"] == name]) for name in ("candidate", BASELINE))
+        made = evaluate(
+            {"candidate": controller}, self.suite, seeds=self.seeds, reference=False, **self.engine
+        )
+        table = with_lost_power(pd.concat([self.base, made], ignore_index=True))
+        runs = table[table["controller"] == "candidate"]
+        table = penalised(table, REFERENCE)
+        own, base = (self._means(table[table["controller"] == name]) for name in ("candidate", REFERENCE))
         ratio = own / base
         lost = float((runs["status"] != OK).mean())
         excess = 0.0

@@ -23,7 +23,7 @@ GOOD = {"KP": 0.006, "KI": 0.0009, "gain_schedule_pitch": 0.11}
 
 @pytest.fixture(scope="module")
 def windy():
-    return build_scene("oc3_hywind", wind=18.0)
+    return build_scene("oc3_hywind", wind=18.0, fidelity="reference")
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +61,7 @@ def test_a_saved_lqr_has_the_same_bits_as_the_one_designed(lqr_file, windy, turb
 def test_a_saved_lqr_does_not_follow_a_changed_plant(lqr_file, turbine):
     loaded = make(f"design:{lqr_file}", turbine, 0.1)
     before = loaded.parameters.copy()
-    loaded.prepare(build_scene("oc3_hywind", wind=18.0, mooring=False))
+    loaded.prepare(build_scene("oc3_hywind", wind=18.0, mooring=False, fidelity="reference"))
     np.testing.assert_array_equal(loaded.parameters, before)
 
 

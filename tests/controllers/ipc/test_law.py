@@ -218,14 +218,37 @@ def test_the_lag_is_that_of_the_drive_at_one_turn():
     assert lead_time(other, 0.1) == pytest.approx(-np.angle(answer) / SPEED + 0.05)
 
 
-def test_the_rosco_library_turns_the_blades_the_same_way():
+@pytest.fixture(scope="module")
+def library():
+    """(law, the rest of a measurement) of rosco_ipc in wind of 18 m/s, where its cyclic pitch is whole."""
     pytest.importorskip("rosco", reason="needs the ROSCO library: pip install --no-deps rosco")
     law = make("rosco_ipc", TURBINE, DT)
     law.prepare(build_scene("oc3_hywind", wind=18.0, fidelity="fast"))
-    start = STILL._replace(wind_speed=18.0)
+    return law, STILL._replace(wind_speed=18.0)
+
+
+def run_library(library, load, seconds):
+    """As run, from equal pitches."""
+    law, start = library
     blades = np.zeros(len(BladeMeasure))
     blades[BladeMeasure.BLADE_PITCH_1 : BladeMeasure.BLADE_PITCH_1 + 3] = MEAN
     law.reset(whole_view([*start, *blades]))
-    rows = run(law, steady(1.5e6, -0.8e6), seconds=100.0, measured=start)
+    return run(law, load, seconds=seconds, measured=start)
+
+
+def test_the_rosco_library_turns_the_blades_the_same_way(library):
+    rows = run_library(library, steady(1.5e6, -0.8e6), 100.0)
     assert np.abs(rows[-1, :2]).max() < 0.1 * 0.8e6
     assert rows[-1, 2:] == pytest.approx([1.5e6 / -slope_at(MEAN), -0.8e6 / -slope_at(MEAN)], rel=0.1)
+
+
+def test_the_offset_of_the_rosco_library_keeps_tilt_and_yaw_apart(library):
+    """A moment that turns with the blades, behind a drive and half a control period that lag by 18 deg.
+
+    Measured: 0.066 of the tilt moment, what is left being the library's own; 0.107 without an offset, 0.284
+    with one the other way.
+    """
+    for load, other in ((steady(1.5e6, 0.0), 1), (steady(0.0, 1.5e6), 0)):
+        rows = run_library(library, load, 6.0)
+        assert np.abs(rows[:, other]).max() < 0.08 * 1.5e6
+        assert np.abs(rows[-1, 1 - other]) < 0.1 * 1.5e6

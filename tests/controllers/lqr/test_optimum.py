@@ -35,7 +35,7 @@ SETTINGS = LQGSettings()
 
 @pytest.fixture(scope="module")
 def loops():
-    scene = build_scene("oc3_hywind", wind=18.0)
+    scene = build_scene("oc3_hywind", wind=18.0, fidelity="reference")
     return {wind: SampledLoop(design_model(scene, wind), scene.turbine, 0.1) for wind in (12, 14, 18, 24)}
 
 
@@ -146,7 +146,7 @@ def test_noise_of_two_percent_of_the_channels_costs_little_travel(loops):
 
 
 def test_below_the_lowest_wind_its_gains_hold(loops):
-    scene = build_scene("oc3_hywind", wind=18.0)
+    scene = build_scene("oc3_hywind", wind=18.0, fidelity="reference")
     models = [design_model(scene, wind) for wind in (10, 11, 12, 13)]
     gains = optimal_gains(models, SETTINGS, scene.turbine, 0.1)
     np.testing.assert_array_equal(gains[0], gains[2])

@@ -11,8 +11,11 @@ from fowt_env import build_scene, simulate  # noqa: E402
 from fowt_env.controllers import make  # noqa: E402
 from fowt_env.controllers.mpc import solver  # noqa: E402
 from fowt_env.controllers.mpc.law import MPC, PERIOD, Memory  # noqa: E402
+from fowt_env.controllers.mpc.model import COMMAND, SPEED, TORQUE  # noqa: E402
+from fowt_env.controllers.mpc.plan import LIMITED, RATED_BLOCKS  # noqa: E402
 from fowt_env.controllers.mpc.settings import MPCSettings  # noqa: E402
 from fowt_env.controllers.mpc.solver import Program  # noqa: E402
+from fowt_env.descriptions.units import DEGREE  # noqa: E402
 from fowt_env.errors import InputError  # noqa: E402
 from fowt_env.training.evaluation.cases import named_cases  # noqa: E402
 from fowt_env.training.evaluation.metrics import metrics  # noqa: E402
@@ -26,7 +29,9 @@ def steady(wind, **options):
 def turbulent(wind, seed, duration):
     """The case of a suite in normal turbulence."""
     (case,) = named_cases(f"ntm_{wind}")
-    return build_scene(case.platform, wind=case.wind, sea=case.sea, seed=seed, duration=duration)
+    return build_scene(
+        case.platform, wind=case.wind, sea=case.sea, seed=seed, duration=duration, fidelity="reference"
+    )
 
 
 @pytest.mark.parametrize("wind", [12.0, 14.0, 18.0, 24.0])
@@ -72,6 +77,22 @@ def test_limits_hold_in_an_extreme_gust():
     fastest = {key: one["RotSpeed_[rpm]"].max() / 12.1 for key, one in found.items()}
     assert 1.1 < fastest[True] < fastest[False] - 0.005
     assert fastest[True] < 1.3
+
+
+def test_the_plan_has_the_turbines_limits_less_the_trim():
+    """Below rated, where the trim's torque is not the rated one: the rows of the program, made absolute."""
+    scene = steady(10.5)
+    law = MPC(scene.turbine, 0.1)
+    simulate(scene, law, duration=2.0)
+    trim, work = law._model()[0].trim, law.work
+    assert trim[TORQUE] < 0.95
+    for block, k in enumerate(law.grid.ends):
+        first = 2 * RATED_BLOCKS + len(LIMITED) * block
+        for place, (state, unit) in enumerate(((TORQUE, 0.05), (COMMAND, DEGREE), (SPEED, 0.05 * 1.267109))):
+            base = trim[state] + work.states[k, state]
+            low, high = (unit * bound[first + place] + base for bound in (work.low, work.high))
+            assert low == pytest.approx((0.5, 0.0, trim[SPEED] - 1.267109)[place], abs=1e-4)
+            assert high == pytest.approx((1.1, np.pi / 2.0, 1.15 * 1.267109)[place], rel=1e-4)
 
 
 def test_the_lq_feedback_acts_where_nothing_is_solved(monkeypatch):

@@ -28,7 +28,7 @@ TURBINE = read_turbine("nrel5mw")
 SETTINGS = MPCSettings(horizon=10.0)
 WIDE = np.tile([-1e9, 1e9], 5)
 UNITS = np.array([0.05, 0.0035, 0.05, 0.0175, 0.063])
-NOWHERE = np.zeros(0)
+NOWHERE = np.zeros((0, 2))
 
 
 @pytest.fixture(scope="module")
@@ -46,6 +46,14 @@ def state(seed, size=1.0):
     return size * scale * np.random.default_rng(seed).standard_normal(N_FEEDBACK)
 
 
+def gain_of(model, ahead):
+    """The LQ gain, without the wind where that is known ahead."""
+    gain = model.K.copy()
+    if len(ahead):
+        gain[:, FILTER : WIND + 1] = 0.0
+    return gain
+
+
 def solved(model, table, x, moves, nonlinear, ahead=NOWHERE, limits=WIDE):
     """(step, whether limits are kept, Work) of newton_step about moves."""
     grid, work = grid_of(SETTINGS, PERIOD), None
@@ -53,8 +61,8 @@ def solved(model, table, x, moves, nonlinear, ahead=NOWHERE, limits=WIDE):
     work.states[0] = x
     step, rows = np.zeros_like(moves), cost_rows(TURBINE.rated_rotor_speed)
     kept = newton_step(
-        model, 14.0, table, nonlinear, rows, np.zeros(8), np.zeros(N_FEEDBACK), ahead, limits, UNITS, grid,
-        moves, work, step,
+        model, gain_of(model, ahead), 14.0, table, nonlinear, rows, np.zeros(8), np.zeros(N_FEEDBACK), ahead,
+        limits, UNITS, grid, moves, work, step,
     )  # fmt: skip
     return step, kept, work
 
@@ -62,15 +70,12 @@ def solved(model, table, x, moves, nonlinear, ahead=NOWHERE, limits=WIDE):
 def plain_cost(model, table, x, moves, nonlinear, ahead):
     """Cost of a plan by simulating it, one array at a time."""
     rated = TURBINE.rated_rotor_speed
-    grid, gain = grid_of(SETTINGS, PERIOD), model.K.copy()
-    if len(ahead):
-        gain[:, FILTER : WIND + 1] = 0.0
+    grid, gain = grid_of(SETTINGS, PERIOD), gain_of(model, ahead)
     rows, total, loads = cost_rows(rated)[:6], 0.0, np.empty(8)
     for k, block in enumerate(grid.block_of):
-        if k < len(ahead) - 1:
+        if k < len(ahead):
             x = x.copy()
-            x[WIND] = ahead[k]
-            x[FILTER] = (ahead[k + 1] - model.A[WIND, WIND] * ahead[k]) / model.A[WIND, FILTER]
+            x[[FILTER, WIND]] = ahead[k]
         u = moves[2 * block : 2 * block + 2] - gain @ x
         if k > 0:
             total += model.weights[:6] @ (rows @ x) ** 2
@@ -112,7 +117,7 @@ def test_the_gradient_is_that_of_the_simulated_cost(model, nonlinear, foreseen):
     """Central differences over each move; the table's slopes are those of its own nodes, hence 2 %."""
     wind, table = model
     rng = np.random.default_rng(3)
-    ahead = np.cumsum(rng.normal(0.0, 0.4, 9)) if foreseen else NOWHERE
+    ahead = np.cumsum(rng.normal(0.0, 0.4, (8, 2)), axis=0) if foreseen else NOWHERE
     x, grid = state(3), grid_of(SETTINGS, PERIOD)
     moves = rng.normal(0.0, 0.003, 2 * len(grid.ends))
     _, _, work = solved(wind, table, x, moves, nonlinear, ahead)

@@ -35,7 +35,7 @@ PITCH = Information("two, no torque", SENSORS[:2], torque=False)
 
 @pytest.fixture(scope="module")
 def plant():
-    return BoundPlant(build_scene("oc3_hywind", wind=18.0), 18.0)
+    return BoundPlant(build_scene("oc3_hywind", wind=18.0, fidelity="reference"), 18.0)
 
 
 @pytest.fixture(scope="module")

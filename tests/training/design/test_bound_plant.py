@@ -20,7 +20,7 @@ from fowt_env.weather.turbulence import turbulence
 
 @pytest.fixture(scope="module")
 def windy():
-    return build_scene("oc3_hywind", wind=18.0)
+    return build_scene("oc3_hywind", wind=18.0, fidelity="reference")
 
 
 @pytest.fixture(scope="module")
@@ -92,7 +92,7 @@ def test_still_water_has_drag_of_the_platform_s_own_motion_alone(windy, plant):
 
 def test_a_pitch_drive_without_lag_counts_as_a_quick_one(plant):
     """OpenFAST's own turbine has none; its closed loop is nearly that of the other."""
-    quick = BoundPlant(build_scene("oc3_hywind_openfast", wind=18.0), 18.0)
+    quick = BoundPlant(build_scene("oc3_hywind_openfast", wind=18.0, fidelity="reference"), 18.0)
     assert quick.turbine.pitch_drive.time_constant == 0.0
     theirs, own = (baseline_deviations(each, each.true) for each in (plant, quick))
     assert own.platform_pitch == pytest.approx(theirs.platform_pitch, rel=0.05)
@@ -101,7 +101,7 @@ def test_a_pitch_drive_without_lag_counts_as_a_quick_one(plant):
 
 def test_what_has_no_limit_is_named(windy, plant):
     with pytest.raises(InputError, match="the turbine sweeps .* IEC 61400-1, which holds above 200 m2"):
-        small = build_scene("liu_1_50", wind=2.0)
+        small = build_scene("liu_1_50", wind=2.0, fidelity="reference")
         BoundPlant(small, 2.0)
     with pytest.raises(InputError, match="the blade pitch rests on its limit there"):
         BoundPlant(windy, 10.0)

@@ -23,7 +23,7 @@ from fowt_env.training.design.plots import plot_bound
 
 @pytest.fixture(scope="module")
 def windy():
-    return build_scene("oc3_hywind", wind=18.0)
+    return build_scene("oc3_hywind", wind=18.0, fidelity="reference")
 
 
 def test_bad_wishes_are_named(windy):

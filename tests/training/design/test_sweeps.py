@@ -22,7 +22,7 @@ from fowt_env.training.design.sweeps import (
 
 @pytest.fixture(scope="module")
 def models():
-    return models_over(build_scene("oc3_hywind", wind=8.0), (8.0, 13.0, 20.0))
+    return models_over(build_scene("oc3_hywind", wind=8.0, fidelity="reference"), (8.0, 13.0, 20.0))
 
 
 def test_modes_are_those_of_the_system_matrix(models):

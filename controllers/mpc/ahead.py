@@ -1,0 +1,40 @@
+"""Prediction of the wind from the estimate at the rotor and from a preview that errs.
+
+The estimate errs least for the coming seconds, a lidar further on. So the filter's prediction e(k) of the
+wind k periods ahead is corrected by a share of what the preview p(k) differs from it,
+
+w(k) = e(k) + g(k) (p(k) - e(k)),    g(k) = E[(v - e(k)) (p(k) - e(k))] / E[(p(k) - e(k))^2],
+
+which errs least of all such w: v is the wind that came, by the estimate at that time. Both means are learnt
+while running, each k by itself, so that a preview without information ends up with no share.
+"""
+
+import numpy as np
+
+DOUBT = 1.0  # m/s, difference of preview and prediction that is held against the preview before any was seen
+
+
+class LearntShare:
+    """Shares g of a preview for 0 to n - 1 periods ahead, learnt with a factor of forgetting per period."""
+
+    def __init__(self, count, decay):
+        self.decay = decay
+        self.along = np.zeros(count - 1)  # of g(1) and later; g(0) is zero: v is the estimate
+        self.square = np.full(count - 1, DOUBT**2)
+        self.expected = np.full((count - 1, count), np.nan)  # m/s, of the latest instants, latest first
+        self.differing = np.full((count - 1, count), np.nan)
+
+    def learn(self, estimate, expected, differing):
+        """Return g (n,), learnt from earlier predictions for now, and keep those of now.
+
+        estimate: of the wind now, m/s; expected (n,): e, m/s; differing (n,): p - e, m/s.
+        """
+        came, differed = estimate - np.diagonal(self.expected, 1), np.diagonal(self.differing, 1)
+        due = np.isfinite(differed)
+        new = 1.0 - self.decay
+        self.along[due] += new * ((came * differed)[due] - self.along[due])
+        self.square[due] += new * (differed[due] ** 2 - self.square[due])
+        for kept, latest in ((self.expected, expected), (self.differing, differing)):
+            kept[1:] = kept[:-1].copy()
+            kept[0] = latest
+        return np.r_[0.0, np.clip(self.along / self.square, 0.0, 1.0)]
