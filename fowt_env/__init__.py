@@ -6,7 +6,11 @@ Its import registers the environments at Gymnasium. Public names are loaded on f
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from fowt_env.registration import register_environments
+from fowt_env.layout import check_packages
+
+check_packages()  # ahead of what only an installation has
+
+from fowt_env.registration import register_environments  # noqa: E402
 
 if TYPE_CHECKING:  # the names below, for editors and type checkers
     from fowt_env.analysis.linear_model import linearize as linearize

@@ -1,7 +1,8 @@
 """What is computed once and kept in memory: every such cache is bounded, and clear_caches empties them all.
 
 Kept are values that follow from their keys alone and are never written to: tables of blades, trims, design
-models, spectra. So a value that was dropped costs its computation again and changes no figure.
+models, spectra. So a value that was dropped costs its computation again and changes no figure. Not among them
+is what plant/compile keeps of this package's own sources, a hash of each.
 """
 
 from collections import OrderedDict

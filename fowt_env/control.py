@@ -39,6 +39,7 @@ import sys
 import traceback
 import warnings
 from collections.abc import Callable, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from math import isfinite, nan, pi
 from pathlib import Path
@@ -73,6 +74,7 @@ from fowt_env.plant.sensing import GIVEN, HIDDEN
 from fowt_env.plant.state import N_COMMANDS, N_INDIVIDUAL_COMMANDS
 from fowt_env.weather.lidar import lidar_preview
 from fowt_env.weather.preview import Preview, check_times, exact_preview
+from fowt_env.weather.wind_field import profile_field
 
 CATALOGUE = "fowt_env.controllers"
 PRIVILEGED_INPUTS = {  # what a controller may be given beyond Measurement
@@ -178,19 +180,19 @@ class CheckedController:
         self.preview_times = tuple(getattr(controller, "preview_times", ()))
 
     def prepare(self, scene: Any) -> None:
-        """Hand the scene of the coming run to the controller inside, where it asks for it."""
+        """Hand the scene of the coming run to the controller inside, where it asks for it.
+
+        Raises: ControllerError for whatever that raises.
+        """
         if hasattr(self.controller, "prepare"):
-            self.controller.prepare(scene)
+            with _named_failure(self.name, "in prepare()"):
+                self.controller.prepare(scene)
 
     def reset(self, measurement: Measurement) -> None:
         """Reset the controller inside. Raises: ControllerError for whatever that raises."""
         given = self._given(measurement)
-        try:
+        with _named_failure(self.name, "in reset()", float(measurement.time)):
             self.controller.reset(given)
-        except (ControllerError, InputError, SimulationStopped):
-            raise
-        except Exception as error:
-            raise _failure(self.name, "reset", error, float(measurement.time)) from error
 
     def _given(self, measurement):
         """The part of a Measurement that the controller declares."""
@@ -203,12 +205,12 @@ class CheckedController:
         Raises: ControllerError naming the controller, the time and what it returned or raised.
         """
         given = self._given(measurement)
-        try:
+        try:  # no context manager: this is called at every control period
             returned = self.controller.act(given)
         except (ControllerError, InputError, SimulationStopped):
             raise
         except Exception as error:
-            raise _failure(self.name, "act", error, float(measurement.time)) from error
+            raise _failure(self.name, "in act()", error, float(measurement.time)) from error
         try:
             values = np.asarray(returned)
             size = N_INDIVIDUAL_COMMANDS if self.individual else N_COMMANDS
@@ -245,7 +247,7 @@ class CommandUnits:
         self._turning = TURNING * turbine.rated_rotor_speed
         self._needed = max(1, round(1.0 / control_dt))
         self._count = 0
-        self.warned = False
+        self.said = ""  # the warning, once there was one
 
     def see(self, torque: float, blade_pitch: float, rotor_speed: float) -> None:
         """Take note of the command (N m, rad) of one control period at a rotor speed (rad/s)."""
@@ -270,20 +272,18 @@ class CommandUnits:
 
     def warn(self, torque: float, blade_pitch: float) -> None:
         """Say what was commanded, once."""
-        if self.warned:
+        if self.said:
             return
-        self.warned = True
         if not -pi <= blade_pitch <= pi:
             said = f"blade pitch {blade_pitch:.3g} rad = {blade_pitch / DEGREE:.0f} deg"
         else:
             share = 100.0 * torque / self._rated
             said = f"generator torque {torque:.4g} N m, {share:.3g} % of the rated {self._rated:.0f} N m"
-        warnings.warn(
+        self.said = (
             f"{self._who}: commanded {said}; commands are (generator torque in N m on the high-speed shaft,"
-            " blade pitch in rad)",
-            PlantWarning,
-            stacklevel=level_outside(),
+            " blade pitch in rad)"
         )
+        warnings.warn(self.said, PlantWarning, stacklevel=level_outside())
 
 
 class FunctionController:
@@ -307,10 +307,24 @@ class FunctionController:
         return self.function(measurement)
 
 
-def _failure(controller, method, error, time):
-    """ControllerError that says where and when a controller in Python raised an error."""
+@contextmanager
+def _named_failure(controller, what, time=None):
+    """Context in which what a controller in Python raises becomes a ControllerError that says where."""
+    try:
+        yield
+    except (ControllerError, InputError, SimulationStopped):
+        raise
+    except Exception as error:
+        raise _failure(controller, what, error, time) from error
+
+
+def _failure(controller, what, error, time):
+    """ControllerError that says where and when (None: before the run) a controller raised an error.
+
+    what: what it was doing, as "in act()".
+    """
     frames = traceback.extract_tb(error.__traceback__)[1:]  # the first is the caller's own
-    own = [frame for frame in frames if frame.filename != __file__]
+    own = [frame for frame in frames if frame.filename != __file__ and "importlib" not in frame.filename]
     inside = [frame for frame in own if frame.filename == own[0].filename]  # not a library that it calls
     place = f", {Path(inside[-1].filename).name} line {inside[-1].lineno}" if inside else ""
     try:
@@ -318,11 +332,11 @@ def _failure(controller, method, error, time):
     except (Exception, SystemExit, GeneratorExit):  # it may be a controller's own, and so may be its text
         text = "its message cannot be read"
     said = f": {text}" if text else ""
+    when = "" if time is None else f" at t = {time:.3f} s"
     return ControllerError(
-        f"controller {controller!r} raised {type(error).__name__} in {method}() at t = {time:.3f} s{place}"
-        f"{said}",
+        f"controller {controller!r} raised {type(error).__name__} {what}{when}{place}{said}",
         controller=controller,
-        time=time,
+        time=0.0 if time is None else time,
         returned=None,
     )
 
@@ -672,14 +686,22 @@ class Known:
 def known_scene(scene: Any, controller: Any) -> Any:
     """What a controller's prepare is given of a scene: its plant in steady rated wind, or its turbine alone.
 
-    The plant is in still water, with the seed 0; nothing of the run's weather can be read from it.
+    The plant is in still water, with the seed 0; nothing of the run's weather can be read from it. In place
+    of a box of wind, whose mean over time is the seed's, stands the power law of the site.
     """
     if "plant_model" not in controller.information:
         return Known(scene.turbine, controller.name)
-    if scene.model.aero is None:
+    aero, turbine = scene.model.aero, scene.turbine
+    if aero is None:
         return replace(without_fluctuations(scene), sea=None, seed=0)
-    speed = float(scene.turbine.rated_wind_speed)
-    return replace(without_fluctuations(scene, speed), wind=speed, sea=None, seed=0, wind_speed=speed)
+    speed = float(turbine.rated_wind_speed)
+    known = replace(without_fluctuations(scene, speed), wind=speed, sea=None, seed=0, wind_speed=speed)
+    if aero.field is None:
+        return known
+    shear = scene.options["shear_exponent"]
+    shear = scene.platform.environment.shear_exponent if shear is None else shear
+    hub, diameter = turbine.rotor.hub_height, 2.0 * turbine.rotor.tip_radius
+    return known.with_model({"aero.field": profile_field(speed, shear, hub, diameter)})
 
 
 def _shown(value: Any) -> str:
@@ -715,7 +737,8 @@ def make(controller: Any, turbine: Any, control_dt: float) -> Any:
     law itself: f(measurement) -> (torque, blade pitch). Compiled controllers come back as they are, others
     inside a CheckedController.
     Raises: InputError for unknown names (with a suggestion), paths that cannot be imported, agents and
-    designs that cannot be used, and objects without reset and act.
+    designs that cannot be used, and objects without reset and act; ControllerError for what a module or a
+    factory of the user raises, with its line.
     """
     control_dt = check_control_dt(control_dt)
     name = None
@@ -749,6 +772,10 @@ def _imported(path):
         module = importlib.import_module(module_name)
     except ImportError as error:
         raise InputError(f"controller {path!r}: cannot import {module_name!r}: {error}") from error
+    except InputError:
+        raise
+    except Exception as error:
+        raise _failure(path, "when it was imported", error, None) from error
     finally:
         sys.path.remove("")
     if not hasattr(module, attribute):
@@ -785,7 +812,8 @@ def _called(factory, name, turbine, control_dt):
             signature.bind(*arguments)
         except TypeError:
             continue
-        return factory(*arguments)
+        with _named_failure(str(name or getattr(factory, "__name__", factory)), "when it was made"):
+            return factory(*arguments)
     raise InputError(
         f"controller {name or factory!r}: must take (turbine, control_dt) or no arguments, or be a function"
         f" of the measurement alone, not {signature}"

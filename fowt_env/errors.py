@@ -13,6 +13,13 @@ class InputError(ValueError):
     """A description, option or argument that cannot be used; raised before anything runs."""
 
 
+class KeywordError(InputError, TypeError):
+    """An InputError for a keyword that a function does not have, for which Python raises a TypeError.
+
+    Libraries that try keywords, as TorchRL does with `frameskip`, know its wording and leave the keyword out.
+    """
+
+
 class ControllerInputError(InputError):
     """An InputError that a controller raised while it was prepared, reset or asked: it alone is at fault."""
 
@@ -76,14 +83,24 @@ def unknown(kind: str, name: object, known: Iterable[object], command: str | Non
 
     Of more than MOST_LISTED names it lists the NEAREST, their number, and the command that prints them all.
     """
+    return InputError(f"unknown {kind} {name!r}.{_nearest(name, known, command)}")
+
+
+def unknown_keyword(function: str, name: str, known: Iterable[object]) -> KeywordError:
+    """Return the KeywordError for a keyword that a function does not have, with the nearest known one."""
+    return KeywordError(f"{function}() got an unexpected keyword argument {name!r}.{_nearest(name, known)}")
+
+
+def _nearest(name: object, known: Iterable[object], command: str | None = None) -> str:
+    """Return the end of a message on an unknown name: which known ones are near it."""
     names = sorted(str(k) for k in known)
     close = difflib.get_close_matches(str(name), names, n=1)
     hint = f" Did you mean {close[0]!r}?" if close else ""
     if len(names) <= MOST_LISTED:
-        return InputError(f"unknown {kind} {name!r}.{hint} Known: {', '.join(names)}")
+        return f"{hint} Known: {', '.join(names)}"
     near = ", ".join(difflib.get_close_matches(str(name), names, n=NEAREST, cutoff=0.0))
     all_of_them = "" if command is None else f"; all: {command}"
-    return InputError(f"unknown {kind} {name!r}.{hint} Nearest of {len(names)}: {near}{all_of_them}")
+    return f"{hint} Nearest of {len(names)}: {near}{all_of_them}"
 
 
 class ControllerError(RuntimeError):

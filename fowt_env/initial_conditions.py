@@ -1,9 +1,10 @@
 """State and command that a run begins with."""
 
-from math import pi
+from math import cos, pi
 
 import numpy as np
 
+from fowt_env.analysis.equilibrium import impossible_place
 from fowt_env.analysis.trim import trim
 from fowt_env.descriptions.checks import check_number, refusal
 from fowt_env.descriptions.units import DEGREE, RPM
@@ -45,6 +46,9 @@ def initial_state(
     with the rotor speed and blade pitch of that wind on a fixed platform. initial: {channel: absolute value},
     named PtfmPitch or PtfmPitch_[deg]; BldPitch1 is that of all blades where they have one pitch, and of the
     first where each has its own; TTDspFA and TTDspSS bend the tower in its first modes alone.
+    Raises: InputError for what is no channel or number, and for a place that the platform cannot have: below
+    the sea bed; with wind also out of the water, with the tower base under water, or with the rotor's back to
+    the wind.
     """
     if start not in STARTS:
         raise unknown("start", start, STARTS)
@@ -73,6 +77,8 @@ def initial_state(
         raise InputError(
             f"initial['PtfmPitch'] = {x[State.PLATFORM_PITCH] / DEGREE:g}: must be inside (-90, 90) deg"
         )
+    if initial:
+        _check_place(scene, x)
     if rates:  # given in inertial axes, kept in body axes
         inertial = np.zeros(6)
         for index, value in rates.items():
@@ -91,3 +97,23 @@ def initial_state(
         u[Command.BLADE_PITCH + blade] = x[index]
     rest_actuators(scene.model, x, u)
     return x, u
+
+
+def _check_place(scene, x):
+    """Raises: InputError where a platform cannot be at the place of a state, or no rotor can work there."""
+    blown = scene.model.aero is not None
+    if scene.model.hydro is not None:
+        upright = cos(x[State.PLATFORM_PITCH]) * cos(x[State.ROLL])
+        found = impossible_place(scene, float(x[State.HEAVE]), float(upright))
+        found = [text for what, text in found.items() if what == "bed" or blown and what != "tilt"]
+        if found:
+            heave, lean = x[State.HEAVE], x[State.PLATFORM_PITCH] / DEGREE
+            raise InputError(
+                f"initial: the run of platform {scene.label!r} would begin with {' and '.join(found)}"
+                f" (PtfmHeave = {heave:.4g} m, PtfmPitch = {lean:.3g} deg)"
+            )
+    if blown and cos(x[State.YAW]) <= 0.0:
+        raise InputError(
+            f"initial['PtfmYaw'] = {x[State.YAW] / DEGREE:g}: must be inside (-90, 90) deg with wind: the"
+            " rotor would have its back to it"
+        )

@@ -217,6 +217,7 @@ def simulate(
     Columns have their unit in the name, as in OpenFAST's files: frame["RotSpeed_[rpm]"];
     frame.filter(like="RotSpeed") finds one without it. attrs["events"] of the DataFrame: {name: count} of
     what the plant met outside its usual range (fowt_env.plant.events), of those that happened.
+    attrs["doubtful_commands"]: the warning about commands that can hardly be in N m and rad, "" for none.
     attrs["torque_limited"]: time (s) for which the generator torque was not the commanded one.
     attrs["tripped"]: time (s) at which the protection stopped the turbine, or None; attrs["trip"]: the trip
     that did, as "overspeed"; attrs["stop"]: "normal" or "emergency" where the turbine was being stopped at
@@ -491,6 +492,7 @@ class _Loop:
         frame.attrs["torque_limited"] = float(np.count_nonzero(values[:-1, Out.GENTQLIM]) * period)
         if self.compiled and self.units.is_little(self.u[Command.GENERATOR_TORQUE]):
             self.units.see_run(values[:, Out.GENTQ] * 1e3, values[:, Out.ROTSPEED] * RPM, period)
+        frame.attrs["doubtful_commands"] = self.units.said
         watch = self.guard.watch
         tripped, stop = float(watch[Watch.TRIPPED_AT]), int(watch[Watch.STOP])
         known = not isinf(tripped)
@@ -513,7 +515,7 @@ class _Loop:
                 " there, protection='turbine' stops the turbine)"
             )
         limited = attrs["torque_limited"]
-        if limited >= max(1.0, LIMITED * duration) and not self.units.warned:
+        if limited >= max(1.0, LIMITED * duration) and not self.units.said:
             law = turbine.torque_law
             found.append(
                 f"the generator torque was limited for {limited:.4g} of {duration:.4g} s: controller"

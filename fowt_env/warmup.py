@@ -8,7 +8,6 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 import pandas as pd
-from numba.core import event
 
 from fowt_env.descriptions.checks import check_whole_number
 from fowt_env.errors import InputError, unknown
@@ -73,24 +72,6 @@ KINDS: dict[str, tuple[str, Callable[[str], object]]] = {  # name: what it is, a
 USUAL = ("standard", "environment")
 
 
-class _Count(event.Listener):
-    """How many kernels of this project have been compiled."""
-
-    def __init__(self, said):
-        self.count, self.said = 0, said
-
-    def on_start(self, compiled):
-        """Nothing to count yet."""
-
-    def on_end(self, compiled):
-        """One more."""
-        from fowt_env.plant.compile.notice import own
-
-        if own(compiled):
-            self.count += 1
-            self.said(self.count)
-
-
 def warmup(
     platform: str = "oc3_hywind",
     kinds: Sequence[str] = USUAL,
@@ -139,17 +120,19 @@ def warmup(
 
 def _compiled(platform, kind, done, progress):
     """Row of a kind that is compiled in this process."""
-    from fowt_env.plant.compile.notice import told_otherwise
+    from fowt_env.plant.compile.notice import compilation_reported
 
-    begin, counter = time.perf_counter(), _Count(lambda count: progress(kind, done, count))
-    event.register("numba:compile", counter)
-    try:
-        with told_otherwise():
-            KINDS[kind][1](platform)
-    finally:
-        event.unregister("numba:compile", counter)
-    progress(kind, done + 1, counter.count)
-    return kind, counter.count, time.perf_counter() - begin
+    begin, compiled = time.perf_counter(), 0
+
+    def said(count):
+        nonlocal compiled
+        compiled = count
+        progress(kind, done, count)
+
+    with compilation_reported(said):
+        KINDS[kind][1](platform)
+    progress(kind, done + 1, compiled)
+    return kind, compiled, time.perf_counter() - begin
 
 
 CHILD = """

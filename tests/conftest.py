@@ -82,23 +82,25 @@ def turbine(platform):
 @pytest.fixture(scope="session")
 def bare_scene():
     """The turbine in empty space: gravity and its own inertia only."""
-    return build_scene("oc3_hywind", hydrodynamics=False, mooring=False)
+    return build_scene("oc3_hywind", hydrodynamics=False, mooring=False, fidelity="reference")
 
 
 @pytest.fixture(scope="session")
 def still_scene():
     """Still water, no aerodynamics."""
-    return build_scene("oc3_hywind")
+    return build_scene("oc3_hywind", fidelity="reference")
 
 
 @pytest.fixture(scope="session")
 def wave_scene():
     """Regular waves H = 3 m, T = 5 s, no aerodynamics."""
-    return build_scene("oc3_hywind", sea={"kind": "regular", "H": 3.0, "T": 5.0})
+    return build_scene("oc3_hywind", sea={"kind": "regular", "H": 3.0, "T": 5.0}, fidelity="reference")
 
 
 @pytest.fixture(scope="session")
 def storm_scene():
     """Steady 18 m/s and a random sea."""
     sea = {"kind": "jonswap", "Hs": 6.0, "Tp": 10.0, "gamma": 3.3}
-    return build_scene("oc3_hywind", wind=18.0, sea=sea, seed=3, duration=60.0, wave_components=60)
+    return build_scene(
+        "oc3_hywind", wind=18.0, sea=sea, seed=3, duration=60.0, wave_components=60, fidelity="reference"
+    )

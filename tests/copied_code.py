@@ -1,27 +1,21 @@
-"""A copy of the sources, for the tests that edit them."""
+"""A copy of the sources as they are installed, for the tests that edit them."""
 
-from pathlib import Path
+from fowt_env.layout import FOLDERS, PACKAGE, installed_path
 
-import fowt_env
-
-ROOT = Path(fowt_env.__file__).resolve().parent.parent
-PACKAGES = ("fowt_env", "controllers", "training")
-LOOKS = ("fowt_env/visual", "training/cli", "training/reports")  # what people read and look at
+SOURCES = (PACKAGE, *FOLDERS.values())
+LOOKS = ("fowt_env/visual", "fowt_env/training/cli", "fowt_env/training/reports")  # what people look at
 SUFFIXES = {".py", ".toml", ".csv"}
 
 
 def copied_code(folder):
-    """Folder with a copy of the sources and of descriptions, inside a folder."""
+    """Return a folder, inside this one, that has fowt_env with a copy of sources and descriptions."""
     code = folder / "code"
-    for path in (path for package in PACKAGES for path in (ROOT / package).rglob("*")):
-        if path.suffix not in SUFFIXES or "reference" in path.relative_to(ROOT).parts:
-            continue
-        copy = code / path.relative_to(ROOT)
-        copy.parent.mkdir(parents=True, exist_ok=True)
-        copy.write_bytes(path.read_bytes())
-    for package in PACKAGES[1:]:
-        if not (code / "fowt_env" / package).exists():
-            (code / "fowt_env" / package).symlink_to(code / package, target_is_directory=True)
+    for path in {path for source in SOURCES for path in source.rglob("*")}:
+        place = installed_path(path).relative_to(PACKAGE.parent)
+        if path.suffix in SUFFIXES and "reference" not in place.parts:
+            copy = code / place
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            copy.write_bytes(path.read_bytes())
     return code
 
 

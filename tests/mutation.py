@@ -261,7 +261,7 @@ class Samples:
         provenance.versions = lambda: {"python": "3.11", "numpy": "2.0"}
         folder = self.folder / "results"
         row = dict.fromkeys(COLUMNS, 1.5) | {"controller": "pi", "case": "calm", "seed": 1, "status": "ok"}
-        row |= {"reason": "", "events": ""}
+        row |= {"reason": "", "events": "", "warning": ""}
         frame = pd.DataFrame({"Time_[s]": 0.1 * np.arange(30), "RotSpeed_[rpm]": 12.0 + np.zeros(30)})
         case = {"name": "calm", "wind": 16.0, "sea": None, "platform": "oc3_hywind", "duration": 3.0}
         settings = {

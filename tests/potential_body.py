@@ -1,16 +1,14 @@
 """A potential-flow body of made-up smooth coefficients, and seas, for tests."""
 
-from dataclasses import replace
-from pathlib import Path
-
 import numpy as np
 
+from fowt_env.descriptions.platform import read_platform
 from fowt_env.descriptions.potential_flow import DifferenceQtf, PotentialFlow
 from fowt_env.descriptions.sea_state import sea_state_of
+from fowt_env.training.validation.openfast_cases import table
 from fowt_env.weather.waves import build_waves
 
 SITE = dict(depth=200.0, density=1025.0, gravity=9.81)
-REFERENCE = Path(__file__).parent / "reference" / "volturnus_waves.npz"
 SIZE = np.array([3e6, 3e6, 5e6, 4e7, 4e7, 6e6])
 
 
@@ -57,34 +55,10 @@ def sea_of(spec, duration=100.0, seed=0):
 
 
 def reference():
-    """{name: array} of an OpenFAST run in waves and of its body; `source` says what they are."""
-    with np.load(REFERENCE, allow_pickle=False) as file:
-        return {name: file[name] for name in file.files}
+    """DataFrame of the forces that OpenFAST has on VolturnUS-S in waves, every 2 s."""
+    return table("iea15_volturnus_s/wave_forces.csv.gz")
 
 
-def volturnus(found):
-    """PotentialFlow of the reference file: heading 0, and the motions that it has."""
-    excitation = np.zeros((found["body_omega"].size, 1, 6), dtype=complex)
-    excitation[:, 0, [0, 2, 4]] = found["body_excitation"]
-    value = np.zeros((1, *found["qtf_value"].shape[:2], 6), dtype=complex)
-    value[0, :, :, [0, 4]] = np.moveaxis(found["qtf_value"], -1, 0)
-    return replace(
-        made_up_body(),
-        excitation_omega=found["body_omega"],
-        heading=np.zeros(1),
-        excitation=excitation,
-        difference_qtf=replace(
-            made_up_body().difference_qtf, omega=found["qtf_omega"], heading=np.zeros((1, 2)), value=value
-        ),
-    )
-
-
-def reference_sea(found):
-    """Its sea as users give it."""
-    omega, amplitude, phase = found["components"].T
-    return {
-        "kind": "components",
-        "omega": omega,
-        "amplitude": amplitude,
-        "phase": -np.radians(phase),  # the components' phase is of a cos(w t + phase)
-    }
+def volturnus():
+    """PotentialFlow of VolturnUS-S, the coefficients that OpenFAST had too."""
+    return read_platform("iea15_volturnus_s").potential_flow

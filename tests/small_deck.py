@@ -1,4 +1,6 @@
-"""A small deck of OpenFAST for tests: a cylinder on three lines with a turbine of plain figures."""
+"""A small deck of OpenFAST for tests: a cylinder on three lines with a turbine of plain figures.
+
+No figure that the import takes is zero, one or its default where it can be another, and no two are alike."""
 
 import numpy as np
 
@@ -25,7 +27,7 @@ a small deck
 ---------------------- ENVIRONMENTAL CONDITIONS --------------------------------
 9.81   Gravity - m/s^2
 1.2    AirDens - kg/m^3
-1025   WtrDens - kg/m^3
+1027   WtrDens - kg/m^3
 200    WtrDpth - m
 0      MSL2SWL - m
 ---------------------- INPUT FILES ---------------------------------------------
@@ -59,13 +61,13 @@ False  TeetDOF   - teeter
 2.0    Twr2Shft  - m
 80     TowerHt   - m
 10     TowerBsHt - m
-0      PtfmCMxt  - m
-0      PtfmCMyt  - m
+0.4    PtfmCMxt  - m
+-0.3   PtfmCMyt  - m
 -30    PtfmCMzt  - m
 0      PtfmRefzt - m
-0      TipMass(1) - kg
-0      TipMass(2) - kg
-0      TipMass(3) - kg
+150    TipMass(1) - kg
+150    TipMass(2) - kg
+150    TipMass(3) - kg
 3.D4   HubMass   - kg
 2.0E5  HubIner   - kg m2
 500    GenIner   - kg m2
@@ -83,18 +85,18 @@ False  TeetDOF   - teeter
 98     GBoxEff   - %
 90     GBRatio   - ratio
 False  Furling   - no
-400    TwrNodes  - nodes
+300    TwrNodes  - nodes
 "tower.dat"  TwrFile - tower
 """
 
 BLADE = """------- BLADE -------
-uniform
+falls to the tip
 2    NBlInpSt - stations
 2.0  AdjBlMs  - factor
 BlFract PitchAxis StrcTwst BMassDen FlpStff EdgStff
 (-) (-) (deg) (kg/m) (Nm^2) (Nm^2)
-0.0 0.5 0.0 100.0 1e9 1e9
-1.0 0.5 0.0 100.0 1e9 1e9
+0.0 0.5 0.0 130.0 1e9 1e9
+1.0 0.5 0.0 70.0 1e9 1e9
 """
 
 TOWER = """------- TOWER -------
@@ -106,11 +108,11 @@ falls from 3000 to 1000 kg/m
 4.0  TwrSSDmp(2)
 1.0  FAStTunr(1) - factors on the stiffness of modes
 1.1  FAStTunr(2)
-1.0  SSStTunr(1)
-1.0  SSStTunr(2)
-1.0  AdjTwMa  - factor
+0.95 SSStTunr(1)
+1.05 SSStTunr(2)
+1.1  AdjTwMa  - factor
 2.0  AdjFASt  - factor
-1.0  AdjSSSt  - factor
+0.9  AdjSSSt  - factor
 HtFract TMassDen TwFAStif TwSSStif
 (-) (kg/m) (Nm^2) (Nm^2)
 0.0 3000.0 1e12 3e12
@@ -153,11 +155,12 @@ True     TwrAero   - tower loads
 "foils/One.dat"  AFNames - letters of another case
 True     UseBlCm
 "ad_blade.dat"  ADBlFile(1)
-2        NumTwrNds
+3        NumTwrNds
 TwrElev TwrDiam TwrCd
 (m) (m) (-)
-10.0 6.0 0.5
-80.0 4.0 0.5
+10.0 6.0 0.7
+45.0 5.6 0.4
+80.0 4.0 0.6
 """
 
 AERODYN_BLADE = """------- AERODYN BLADE -------
@@ -180,22 +183,21 @@ POLAR = """! AirfoilInfo
 False InclUAdata
 3  NumAlf ! rows
 ! Alpha Cl Cd Cm
--180.0 0.0 0.02 0.00
+-180.0 0.0 0.02 0.03
    0.0 0.4 0.01 -0.05
- 180.0 0.0 0.02 0.00
+ 180.0 0.0 0.02 0.03
 ! ---- table 2
 5.0  Re
 0    UserProp
 False InclUAdata
 3  NumAlf ! rows
--180.0 0.0 0.03 0.00
-   0.0 0.5 0.01 -0.05
- 180.0 0.0 0.03 0.00
+-180.0 0.0 0.03 0.02
+   0.0 0.5 0.01 -0.06
+ 180.0 0.0 0.03 0.02
 """
 
-ZEROS = "0 0 0 0 0 0\n" * 5
-HYDRODYN = f"""------- HydroDyn Input File -------
-a cylinder and a disc below it
+HYDRODYN = """------- HydroDyn Input File -------
+a cylinder, a disc below it and a column beside it
 1    PotMod    - potential flow
 1    ExctnMod
 0    ExctnDisp
@@ -203,14 +205,14 @@ a cylinder and a disc below it
 1    NBody
 1    NBodyMod
 "water/float"  PotFile
-1    WAMITULEN
+2.0  WAMITULEN
 0    PtfmRefxt
 0    PtfmRefyt
 0    PtfmRefzt
 0    PtfmRefztRot
 7000.0  PtfmVol0
 0.1  PtfmCOBxt
-0    PtfmCOByt
+-0.2 PtfmCOByt
 0    MnDrift
 0    NewmanApp
 0    DiffQTF
@@ -218,54 +220,70 @@ a cylinder and a disc below it
 1.0  AddF0 - preload
 2.0
 3.0
-0
-0
-0
-0 0 0 0 0 0 AddCLin
-0 0 0 0 0 0
-0 0 0 0 0 0
-0 0 0 0 0 0
-0 0 0 0 0 0
+4.0
+5.0
+6.0
+4.0e3 0 0 0 2.0e4 0 AddCLin
+0 5.0e3 0 0 0 0
+0 0 6.0e3 0 0 0
+0 0 0 7.0e5 0 0
+2.0e4 0 0 0 8.0e5 0
 0 0 0 0 0 9.0e7
 1.0e5 0 0 0 0 0 AddBLin
-{ZEROS}0 0 0 0 0 0 AddBQuad
-{ZEROS}2  NAxCoef
+0 2.0e5 0 0 0 0
+0 0 3.0e5 0 0 0
+0 0 0 4.0e6 0 0
+0 0 0 0 5.0e6 0
+0 0 0 0 0 6.0e6
+4.0e4 0 0 0 -5.0e4 0 AddBQuad
+0 3.0e4 0 0 0 0
+0 0 2.0e4 0 0 0
+0 0 0 7.0e6 0 0
+-7.0e4 0 0 0 6.0e6 0
+0 0 0 0 0 5.0e6
+2  NAxCoef
 AxCoefID AxCd AxCa AxCp AxFDMod AxVnCOff AxFDLoFSc
 (-) (-) (-) (-) (-) (-) (-)
 1 0.0 0.0 1.0 0 0.0 1.0
-2 8.0 1.0 1.0 0 0.0 1.0
-3  NJoints
+2 8.0 0.9 0.8 0 0.0 1.0
+5  NJoints
 JointID Jointxi Jointyi Jointzi JointAxID JointOvrlp [of joints]
 (-) (m) (m) (m) (-) (switch)
 1 0.0 0.0 10.0 1 0
 2 0.0 0.0 -20.0 2 0
 3 0.0 0.0 -22.0 2 0
-2  NPropSets
+4 8.0 -6.0 4.0 1 0
+5 8.0 -6.0 -16.0 1 0
+4  NPropSets
 PropSetID PropD PropThck
 (-) (m) (m)
 1 10.0 0.5 ! column
 2 20.0 0.5 ! disc
+3 6.0 0.25 ! column beside it, at its top
+4 6.0 0.5 ! and at its foot
 SimplCd SimplCdMG SimplCa SimplCaMG SimplCp SimplCpMG
 (-) (-) (-) (-) (-) (-)
-0.6 0.6 1.0 1.0 1.0 1.0
+0.6 0.65 1.1 1.15 0.9 0.95
 2  NCoefDpth
 Dpth DpthCd DpthCdMG DpthCa DpthCaMG DpthCp DpthCpMG
 (m) (-) (-) (-) (-) (-) (-)
-0.0 0.5 0 1.0 0 1.0 0
-10.0 1.5 0 1.0 0 1.0 0
+0.0 0.5 0 1.2 0 0.85 0
+10.0 1.5 0 1.3 0 0.75 0
 1  NCoefMembers
 MemberID MemberCd1 MemberCd2 MemberCa1 MemberCa2 MemberCp1 MemberCp2
 (-) (-) (-) (-) (-) (-) (-)
-2 2.0 3.0 0.5 0.7 1.0 1.0
-2  NMembers
+2 2.0 3.0 0.5 0.7 0.6 0.8
+3  NMembers
 MemberID MJointID1 MJointID2 MPropSetID1 MPropSetID2 MDivSize MCoefMod MHstLMod PropPot [models]
 (-) (-) (-) (-) (-) (m) (switch) (switch) (flag)
+3 4 5 3 4 1.0 1 1 TRUE ! column beside it, from its top
 1 1 2 1 1 1.0 2 1 TRUE ! column
 2 2 3 2 2 1.0 3 1 FALSE ! disc
-1  NFillGroups
+2  NFillGroups
 FillNumM FillMList FillFSLoc FillDens
 (-) (-) (m) (kg/m^3)
 1 1 -5.0 1100.0
+1 3 -7.0 1300.0
 0  NMGDepths
 """
 
@@ -277,9 +295,12 @@ irregular waves
 2     WaveMod
 6.0   WaveHs
 10.0  WaveTp
-"default"  WavePkShp
+2.5        WavePkShp
 15.0  WaveDir
 0     CurrMod
+0.3   CurrSSV0
+0.2   CurrNSV0
+0.1   CurrDIV
 """
 
 MAP = """---------------------- LINE DICTIONARY ----------
@@ -333,8 +354,12 @@ SERVODYN = """------- SERVODYN INPUT FILE -------
 ROSCO
 5     PCMode
 5     VSContrl
-95.0  GenEff
-8.0   PitManRat(1)
+93.0  GenEff
+1200  VS_RtGnSp - rpm
+31000 VS_RtTq
+0.02  VS_Rgn2K - N m/rpm^2
+8.5   VS_SlPc
+7.0   PitManRat(1)
 0     NumBStC
 0     YCMode
 0     HSSBrMode
@@ -376,6 +401,27 @@ steady
 0.11  PLexp
 """
 
+ROTOR_TABLE = """# table of a rotor, which DISCON.IN may name
+# Pitch angle vector (deg)
+0.0 5.0
+# TSR vector (-)
+7.0 8.0 9.0
+# Wind speed vector (m/s)
+10.0
+# Power coefficient
+0.40 0.30
+0.47 0.31
+0.41 0.99
+# Thrust coefficient
+0.8 0.6
+0.9 0.6
+0.7 0.6
+# Torque coefficient
+0.057 0.04
+0.059 0.04
+0.046 0.04
+"""
+
 TEXTS = {
     "OpenFAST": OPENFAST, "ElastoDyn": ELASTODYN, "blade": BLADE, "tower": TOWER, "AeroDyn": AERODYN,
     "AeroDyn blade": AERODYN_BLADE, "polar": POLAR, "HydroDyn": HYDRODYN, "SeaState": SEA, "MAP": MAP,
@@ -404,13 +450,17 @@ def write_deck(folder, **changes):
 def write_wamit(folder):
     """Coefficients of a body whose added mass and damping are plain functions of frequency."""
     folder.mkdir(exist_ok=True)
+    pairs = [(i, i) for i in range(1, 7)] + [(1, 5), (5, 1)]
     rows = [
-        f"{period} {i} {i} {0.9 if period == 0.0 else 1.0}" for period in (-1.0, 0.0) for i in range(1, 7)
+        f"{period} {i} {j} {0.1 * i * j * (1.0 - 0.2 * period)}" for period in (0.0, -1.0) for i, j in pairs
     ]
     excitation = []
     for omega in (0.2, 0.6, 1.0, 1.6):
         period = 2.0 * np.pi / omega
-        rows += [f"{period} {i} {i} {1.0 + 0.1 * omega} {0.2 * omega * np.exp(-omega)}" for i in range(1, 7)]
+        rows += [
+            f"{period} {i} {j} {0.1 * i * j + 0.1 * omega} {0.05 * i * j * omega * np.exp(-omega)}"
+            for i, j in pairs
+        ]
         excitation += [
             f"{period} {heading} {i} 1.0 0.0 {i * omega} {0.5 * heading / 90.0}"
             for heading in (-90.0, 0.0, 90.0)
@@ -418,6 +468,6 @@ def write_wamit(folder):
         ]
     (folder / "float.1").write_text("\n".join(rows) + "\n")
     (folder / "float.3").write_text("\n".join(excitation) + "\n")
-    stiffness = {(3, 3): 80.0, (4, 4): -2e4, (5, 5): -2e4}
+    stiffness = {(3, 3): 20.0, (3, 5): 1.5, (5, 3): 1.5, (4, 4): -1250.0, (5, 5): -1200.0}
     lines = [f"{i} {j} {stiffness.get((i, j), 0.0)}" for i in range(1, 7) for j in range(1, 7)]
     (folder / "float.hst").write_text("\n".join(lines) + "\n")

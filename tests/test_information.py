@@ -3,10 +3,12 @@
 import copy
 import pickle
 
+import numba
 import numpy as np
 import pandas as pd
 import pytest
 from naive.sensors import NaiveSensors
+from potential_body import made_up_body
 
 import fowt_env
 from fowt_env.control import (
@@ -20,6 +22,7 @@ from fowt_env.control import (
 )
 from fowt_env.controllers import CONTROLLERS
 from fowt_env.descriptions.measurements import measurement_rows
+from fowt_env.descriptions.platform import read_platform
 from fowt_env.descriptions.sensors import Sensor, SensorChain, built_in_chains
 from fowt_env.errors import ControllerError, InputError, SimulationStopped
 from fowt_env.plant.compile.decorators import control_kernel
@@ -251,6 +254,84 @@ def test_prepare_is_given_the_plant_without_its_weather_where_it_is_declared(sto
     assert not waves.amplitude.any() and len(waves.omega) == 1
 
 
+NTM, JONSWAP = "ntm:18:B", {"kind": "jonswap", "Hs": 4.0, "Tp": 9.0}
+OTHER_SEA = {"kind": "jonswap", "Hs": 7.5, "Tp": 12.0, "gamma": 2.0, "heading": 20.0, "ramp": 15.0}
+IN_PLANE, OBLIQUE = OTHER_SEA | {"heading": 180.0}, OTHER_SEA | {"heading": 60.0}
+SHORT_CRESTED = {"omega": [0.5, 0.7], "amplitude": [1.0, 0.5], "heading": [0.0, 30.0]}
+OWN_WIND = {"kind": "series", "time": [0.0, 5.0, 9.0, 300.0], "speed": [12.0, 14.0, 13.0, 12.0]}
+SEMI, SPAR = "iea15_volturnus_s", "oc3_hywind"
+KNOWN_KINDS = {  # platform, the wind and sea of two runs, options
+    "reference": (SPAR, (NTM, NTM), (JONSWAP, OTHER_SEA), {"fidelity": "reference"}),
+    "standard": (SPAR, (NTM, NTM), (JONSWAP, OTHER_SEA), {}),
+    "fast": (SPAR, (NTM, NTM), (JONSWAP, OTHER_SEA), {"fidelity": "fast"}),
+    "other waves": (SPAR, (18.0, 15.0), ("regular:3:5", "pierson_moskowitz:4"), {}),
+    "white noise": (SPAR, (18.0, 18.0), (JONSWAP, {"kind": "components", "omega": [0.3, 0.5, 0.9],
+                    "amplitude": [0.1, 0.1, 0.1]}), {}),
+    "short crests": (SPAR, (18.0, 18.0), (SHORT_CRESTED | {"kind": "components", "phase": [0.3, 2.0]},
+                     SHORT_CRESTED | {"kind": "components", "phase": [1.0, 1.5]}), {}),
+    "diffraction": (SPAR, (NTM, NTM), (JONSWAP, OTHER_SEA), {"diffraction": "maccamy_fuchs"}),
+    "diffraction by the plain sum": (SPAR, (NTM, NTM), (JONSWAP, OTHER_SEA),
+                                     {"diffraction": "maccamy_fuchs", "wave_loads": "exact"}),
+    "potential flow": (SEMI, (NTM, "etm:20:A"), (JONSWAP, OTHER_SEA), {"radiation": "none"}),
+    "second order": (SPAR, (18.0, 18.0), (JONSWAP, OBLIQUE), {"second_order": "full"}),
+    "second order, newman": (SPAR, (18.0, 18.0), (JONSWAP, OBLIQUE),
+                             {"second_order": "newman", "excitation_position": "filtered"}),
+    "filtered position": (SEMI, (NTM, NTM), (JONSWAP, OTHER_SEA), {"excitation_position": "filtered",
+                                                                         "radiation": "none"}),
+    "potential flow, plain sum": (SEMI, (NTM, NTM), (JONSWAP, OTHER_SEA), {"wave_loads": "exact",
+                                                                                 "radiation": "convolution"}),
+    "members": ("nrel5mw_oc4_semi", (NTM, NTM), (JONSWAP, OTHER_SEA), {"radiation": "none",
+                "wave_components": 20}),
+    "no air": (SPAR, (None, None), (JONSWAP, OTHER_SEA), {}),
+    "no water": (SPAR, (NTM, NTM), (None, None), {"hydrodynamics": False}),
+    "gusts": (SPAR, ({"kind": "eog", "speed": 14.0, "start": 50.0}, {"kind": "edc", "speed": 18.0}),
+              (JONSWAP, OTHER_SEA), {}),
+    "own series": (SPAR, (OWN_WIND, GUST), (JONSWAP, JONSWAP), {}),
+    "box": (SPAR, ("box", "box"), (JONSWAP, OTHER_SEA), {}),
+    "box, averaged": (SPAR, ("box", "box"), (JONSWAP, OTHER_SEA), {"fidelity": "fast"}),
+    "planar": (SPAR, (NTM, NTM), (JONSWAP, IN_PLANE), {"planar": True}),
+    "every option": (SPAR, (NTM, NTM), (JONSWAP, OTHER_SEA), {"tower": "modes", "pitch": "individual",
+                     "dynamic_inflow": True, "current": 0.5, "mooring": "table", "loads": "own"}),
+}  # fmt: skip
+
+
+@fowt_env.load_kernel
+def push(parameters, motion, force):
+    force[0] = parameters[0]
+
+
+def box_of(seed):
+    """Random wind that no other seed has, of a speed of its own."""
+    draw = np.random.default_rng(seed)
+    y = np.linspace(-80.0, 80.0, 5)
+    u = 14.0 + seed + draw.normal(size=(40, 5, 5))
+    return {"kind": "box", "u": u, "y": y, "z": 90.0 + y, "dt": 0.5, "speed": 14.0 + seed, "periodic": True}
+
+
+def known_bytes(platform, wind, sea, seed, options):
+    wind = box_of(seed) if wind == "box" else wind
+    given = {"fidelity": "standard", "duration": 100.0} | options
+    if "second_order" in given:
+        body = {"hull": None, "hydro": None, "potential_flow": made_up_body(), "draft": 120.0, "options": {}}
+        platform = read_platform(platform).model_copy(update=body)
+        given |= {"radiation": "none"}
+    if "loads" in given:
+        given["loads"] = [fowt_env.Load("Push", push, [1e3])]
+    scene = fowt_env.build_scene(platform, wind=wind, sea=sea, seed=seed, **{"fidelity": "reference"} | given)
+    known = known_scene(scene, Asking(("plant_model", "wind_preview")))
+    assert numba.typeof(known.model) == numba.typeof(scene.model)  # so that nothing is compiled anew
+    return pickle.dumps(known)
+
+
+@pytest.mark.parametrize("kind", KNOWN_KINDS)
+def test_what_prepare_is_given_is_the_same_in_every_weather(kind):
+    """Its bytes: an array of a wave's phase in it would give away the seed, and with it the whole run."""
+    platform, winds, seas, options = KNOWN_KINDS[kind]
+    runs = [(winds[0], seas[0], 1), (winds[0], seas[0], 2), (winds[1], seas[1], 2)]
+    first, *others = (known_bytes(platform, *run, options) for run in runs)
+    assert len(first) > 1000 and others == [first, first]
+
+
 def test_prepare_is_given_the_turbine_alone_where_it_is_not(storm_scene):
     asking = Asking(("rotor_speed",))
     fowt_env.simulate(storm_scene, asking, duration=0.5)
@@ -366,7 +447,7 @@ def test_times_and_the_declaration_of_a_preview_go_together(gust_scene, informat
 
 def test_in_still_air_there_is_nothing_to_look_ahead_at():
     with pytest.raises(InputError, match="needs a scene with wind"):
-        run(fowt_env.build_scene("oc3_hywind"), Recorder(("wind_preview",), (1.0,)))
+        run(fowt_env.build_scene("oc3_hywind", fidelity="reference"), Recorder(("wind_preview",), (1.0,)))
 
 
 # Sensors

@@ -182,7 +182,7 @@ def test_a_trip_at_or_below_rated_is_refused(storm_scene, trip):
 def test_what_the_time_step_blows_up_is_not_called_a_capsize(platform):
     hydro = platform.hydro.model_copy(update={"drag_coefficient": 1e5})
     sea = {"kind": "regular", "H": 3.0, "T": 5.0}
-    scene = fowt_env.build_scene(platform.model_copy(update={"hydro": hydro}), sea=sea)
+    scene = fowt_env.build_scene(platform.model_copy(update={"hydro": hydro}), sea=sea, fidelity="reference")
     with pytest.raises(SimulationStopped, match="numerical blow-up"):
         run(scene, dt=0.1, duration=20.0)
 
@@ -192,12 +192,12 @@ def test_what_the_time_step_blows_up_is_not_called_a_capsize(platform):
 
 def under_water():
     """The hull's upper cylinder lies below the water plane."""
-    return fowt_env.build_scene(), {"start": "zero", "initial": {"PtfmHeave": -60.0}}
+    return fowt_env.build_scene(fidelity="reference"), {"start": "zero", "initial": {"PtfmHeave": -60.0}}
 
 
 def without_roots():
     """Polars so large that no inflow angle balances them, in air so thin that the loads stay finite."""
-    scene = fowt_env.build_scene(wind=8.0)
+    scene = fowt_env.build_scene(wind=8.0, fidelity="reference")
     elements = scene.model.aero.rotor.elements
     segment = elements.polars.segment.copy()
     segment[:, 1] = 1e160
@@ -207,7 +207,7 @@ def without_roots():
 
 def without_equilibrium():
     """Lines that shrink under tension and are too short: they have no catenary."""
-    scene = fowt_env.build_scene()
+    scene = fowt_env.build_scene(fidelity="reference")
     lines = scene.model.mooring
     shrinking = lines._replace(length=0.93 * lines.length, EA=-lines.EA)
     return scene.with_model(mooring=shrinking), {"start": "zero"}
@@ -342,11 +342,30 @@ def test_initial_velocities_are_in_inertial_axes(still_scene):
         (dict(initial={"PtfmSurge": "5"}), r"initial\['PtfmSurge'\] = '5'"),
         (dict(initial={"PtfmPitch": 95.0}), r"PtfmPitch.*= 95: must be inside \(-90, 90\)"),
         (dict(initial={"BldPitch1": 95.0}), r"BldPitch1.*= 95 deg: must be in \[0, 90\]"),
+        (
+            dict(initial={"PtfmHeave": -201.0}),
+            "begin with its keel 1 m below the sea bed .PtfmHeave = -201 m",
+        ),
     ],
 )
 def test_bad_starts_are_refused(options, message, still_scene):
     with pytest.raises(InputError, match=message):
         run(still_scene, **options)
+
+
+@pytest.mark.parametrize(
+    ("initial", "message"),
+    [
+        ({"PtfmHeave": -200.0}, "its tower base 190 m under water"),
+        ({"PtfmHeave": 121.0}, "its keel 0.9.* m above the water"),
+        ({"PtfmYaw": 180.0}, r"PtfmYaw'\] = 180: must be inside \(-90, 90\) deg with wind"),
+        ({"PtfmYaw": -90.5}, "its back to it"),
+    ],
+)
+def test_a_rotor_that_cannot_work_where_it_is_put_is_refused(initial, message, storm_scene):
+    with pytest.raises(InputError, match=message):
+        initial_state(storm_scene, initial=initial)
+    initial_state(storm_scene, initial={"PtfmYaw": 80.0, "PtfmHeave": -9.0})
 
 
 # Controllers
@@ -472,11 +491,13 @@ def test_same_seed_gives_the_same_bits(storm_scene):
     first, second = run(storm_scene, **options), run(storm_scene, **options)
     pd.testing.assert_frame_equal(first, second, check_exact=True)
     again = fowt_env.build_scene(
-        "oc3_hywind", wind=18.0, sea=storm_scene.sea, seed=3, duration=60.0, wave_components=60
+        "oc3_hywind", wind=18.0, sea=storm_scene.sea, seed=3, duration=60.0, wave_components=60,
+        fidelity="reference",
     )
     pd.testing.assert_frame_equal(first, run(again, **options), check_exact=True)
     other = fowt_env.build_scene(
-        "oc3_hywind", wind=18.0, sea=storm_scene.sea, seed=4, duration=60.0, wave_components=60
+        "oc3_hywind", wind=18.0, sea=storm_scene.sea, seed=4, duration=60.0, wave_components=60,
+        fidelity="reference",
     )
     assert not np.array_equal(first["Wave1Elev_[m]"], run(other, **options)["Wave1Elev_[m]"])
 
@@ -587,6 +608,7 @@ def test_double_frequency_comes_from_position_and_from_surface():
             kinematics_position=position,
             surface=surface,
             stretching="wheeler" if surface == "instantaneous" else "none",
+            fidelity="reference",
         )
         frame = run(scene, duration=460.0, dt=0.1, control_dt=0.1, output_dt=0.1)
         surge, surge2 = harmonics(frame, "PtfmSurge_[m]", 5.0)

@@ -71,9 +71,9 @@ def test_after_it_the_same_kinds_compile_nothing(tmp_path):
     )  # fmt: skip
     code = (
         "import fowt_env, gymnasium\n"
-        "from fowt_env.plant.compile.announcement import compilation_announced\n"
+        "from fowt_env.plant.compile.notice import compilation_reported\n"
         "said = []\n"
-        "with compilation_announced(said.append):\n"
+        "with compilation_reported(said.append):\n"
         "    sea = {'kind': 'jonswap', 'Hs': 7.5, 'Tp': 10.0, 'gamma': 3.3}\n"
         "    wind = {'kind': 'ntm', 'speed': 18.0, 'class': 'B'}\n"
         "    scene = fowt_env.build_scene('oc3_hywind', wind=wind, sea=sea, fidelity='standard')\n"

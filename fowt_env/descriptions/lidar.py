@@ -1,10 +1,10 @@
 """Nacelle lidars: where their beams look, how they average along them, how often; by name or from a file."""
 
-import functools
 from typing import Annotated
 
 from pydantic import Field, model_validator
 
+from fowt_env.caches import cached
 from fowt_env.descriptions.files import DATA, locate, raise_problems, read_toml
 from fowt_env.descriptions.records import Record, bounded, validate
 
@@ -48,7 +48,7 @@ class Lidar(Record):
         return self
 
 
-@functools.cache
+@cached(1)
 def lidars():
     """{name: Lidar} of the built-in lidars."""
     path = DATA / "lidars.toml"

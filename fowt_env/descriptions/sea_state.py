@@ -1,6 +1,5 @@
 """Sea states: waves of one kind, by name, from a mapping or a file, and tables of them against wind speed."""
 
-import functools
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -9,6 +8,7 @@ from typing import Literal
 import numpy as np
 from pydantic import model_validator
 
+from fowt_env.caches import cached
 from fowt_env.descriptions.checks import check_number, is_number, parse_number, short
 from fowt_env.descriptions.files import DATA, json_text, locate, raise_problems, read_toml
 from fowt_env.descriptions.records import (
@@ -185,7 +185,7 @@ def fully_developed_period(Hs):
     return 2.0 * math.pi * math.sqrt(Hs / (4.0 * math.sqrt(0.0081 / 5.0) * STANDARD_GRAVITY))
 
 
-@functools.cache
+@cached(1)
 def _sea_data():
     """({name: SeaState}, {name: JointTable}) of the built-in file; every table row is a named state too."""
     path = DATA / "sea_states.toml"

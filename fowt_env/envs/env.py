@@ -26,6 +26,7 @@ from fowt_env.control import (
     view_of,
     whole_view,
 )
+from fowt_env.descriptions.checks import short
 from fowt_env.descriptions.platform import Platform, read_platform
 from fowt_env.descriptions.records import RENAMED
 from fowt_env.descriptions.sea_state import sea_of, sea_state_of
@@ -69,7 +70,7 @@ from fowt_env.envs.sensors import check_sensors, draw_sensors, reading_scales
 from fowt_env.envs.snapshot import CARRIED, DATA_CARRIED, Snapshot
 from fowt_env.envs.tables import task_tables
 from fowt_env.envs.tasks import TASKS, Episode, Task, draw_offsets, draw_weather, is_mixture, task_of, varies
-from fowt_env.errors import InputError, unknown
+from fowt_env.errors import InputError, unknown, unknown_keyword
 from fowt_env.initial_conditions import INITIAL
 from fowt_env.plant.channels import DEG_PER_RAD
 from fowt_env.plant.compile.handle import Handle
@@ -138,7 +139,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     to 0.05 m of surge and 0.03 deg of blade pitch, in the cells next to rated wind to 0.9 m and 0.6 deg.
     reset(options=...) takes "wind", "sea", "weather_seed", "offsets" and "shutdown" in place of what is
     drawn, wind, sea and offsets as ranges too, drawn with the environment's generator; the info of reset
-    has what was drawn under "episode", and given as options it replays the episode. Weather
+    has what was drawn under "sampled", and given as options it replays the episode. Weather
     never compiles anything anew: an environment whose task has a sea takes any sea, None for still water, but
     one built in still water takes none; neither is a box of full-field wind exchanged for another wind. What
     is refused leaves the environment as it was, in its episode.
@@ -224,7 +225,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             if key in RENAMED:
                 raise InputError(f"setting {key!r} of FowtEnv: is called {RENAMED[key]} now")
             if key not in OPTIONS and key != "loads":
-                raise unknown("setting of FowtEnv", key, {*OPTIONS, "loads", *SETTINGS})
+                raise unknown_keyword("FowtEnv.__init__", key, {*OPTIONS, "loads", *SETTINGS})
         self.render_mode = render_mode
         self._view: Any = None
         self._reward: float | None = None  # of the last step of the episode
@@ -451,7 +452,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             **dict.fromkeys(SHOWN_COUNTS, 0),
             "events": self._events(),
             "wind_speed": self.scene.wind_speed,
-            "episode": deepcopy(planned.episode._asdict()),
+            "sampled": deepcopy(planned.episode._asdict()),
         }
         self._reward = None
         if self.render_mode == "human":
@@ -857,6 +858,8 @@ def _moved(scene, state, command, offsets):
 
 def _with_options(drawn, options, rng):
     """The drawn Episode with what reset's options give in place of it, ranges drawn with rng."""
+    if not isinstance(options, Mapping | None):
+        raise InputError(f"options = {short(options)}: must be a mapping of reset's options, or None")
     changes = {}
     for key, value in (options or {}).items():
         if key not in Episode._fields:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fowt_env.descriptions.checks import short
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.measurement import N_MEASUREMENTS, BladeMeasure, Measure
@@ -259,12 +260,11 @@ def paid(function, info, measurement):
     value = function(info, measurement)
     try:
         number = float(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         number = nan
     if not isfinite(number):
-        raise InputError(
-            f"reward = {function!r}: returned {value!r} at {measurement.time:g} s: must be a finite number"
-        )
+        at = f"{measurement.time:g} s"
+        raise InputError(f"reward = {function!r}: returned {short(value)} at {at}: must be a finite number")
     return number
 
 

@@ -10,8 +10,9 @@ from math import isfinite
 
 import numpy as np
 
+from fowt_env.descriptions.measurements import BLADES_MEASURED, MEASURED
 from fowt_env.descriptions.sensors import SensorChain, sensor_chain, sensors_of
-from fowt_env.envs.observations import BLADE_CHANNELS, observation_channels
+from fowt_env.envs.observations import observation_channels
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.measurement import N_MEASUREMENTS, BladeMeasurement, Measurement
 from fowt_env.plant.sensing import Sensors, Setting, open_chain
@@ -22,17 +23,20 @@ LONGEST_DELAY = 1000  # control periods
 
 
 def reading_scales(turbine, individual=False):
-    """(N_MEASUREMENTS,) what noise of 1 is on each field of a Measurement, SI; 0 for the time.
+    """Return what noise of 1 is on each field of a Measurement, (N_MEASUREMENTS,), SI; 0 for the time.
 
+    It is the scale of the observation channel of that name; of a field without one, that of the first channel
+    in its unit, or 1 where there is none.
     individual: with the fields of a BladeMeasurement behind them; 0 for the azimuth, which is exact.
     """
-    table = observation_channels(turbine)
-    scales = {name: table[name][0].scale for name in Measurement._fields if name in table}
-    scales["generator_speed"] = turbine.drivetrain.gear_ratio * scales["rotor_speed"]
-    scales["time"] = 0.0  # a clock, not a sensor
-    scales |= {name: table[name][0].scale for name in BLADE_CHANNELS} | {"azimuth": 0.0}
+    table = {name: entries[0] for name, entries in observation_channels(turbine).items() if entries}
+    in_unit = {entry.unit: entry.scale for entry in reversed(table.values())}
+    exact = {"time": 0.0, "azimuth": 0.0}  # clock and encoder
+    geared = {"generator_speed": turbine.drivetrain.gear_ratio * table["rotor_speed"].scale}
+    known = {name: entry.scale for name, entry in table.items()} | geared | exact
+    unit = {name: field.unit for name, field in (MEASURED | BLADES_MEASURED).items()}
     fields = Measurement._fields + (BladeMeasurement._fields if individual else ())
-    return np.array([scales[name] for name in fields])
+    return np.array([known.get(name, in_unit.get(unit[name], 1.0)) for name in fields])
 
 
 def check_sensors(given, turbine=None):

@@ -1,7 +1,7 @@
 """Many environments stepped by one compiled call: Gymnasium's vector interface without a Python loop."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from typing import Any
 
@@ -13,6 +13,7 @@ from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
+from fowt_env.descriptions.checks import short
 from fowt_env.envs.env import CLOSED, REWARD_KEYS, FowtEnv, kept_if_refused
 from fowt_env.envs.episode import N_COUNTS, RUNNING, SHOWN_COUNTS, STEP
 from fowt_env.envs.episode_batch import act_all, act_all_parallel, thread_limit
@@ -21,7 +22,6 @@ from fowt_env.envs.snapshot import Snapshot
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.compile.handle import Handle
 
-AUTORESET_MODES = {mode.value: mode for mode in AutoresetMode}
 INFO_KEYS = (*REWARD_KEYS, "time")  # those of every step that are float64
 INFO_MASKS = tuple(f"_{key}" for key in INFO_KEYS)
 # attributes that a copy makes anew: compiled ones, and rows that it fills from those of its environments
@@ -34,11 +34,12 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
     """num_envs environments, each with its own weather, random generator and, optionally, settings.
 
     num_envs         how many
-    autoreset_mode   a gymnasium.vector.AutoresetMode or its value: "NextStep" (as Gymnasium's own vector
-                     environments: the step after the last one resets, its action is ignored and its reward
-                     0), "SameStep" (the step that ends an episode returns the first observation of the
-                     next; the last one is in infos["final_obs"], its info in infos["final_info"]) or
-                     "Disabled" (reset(options={"reset_mask": mask}) is up to the caller)
+    autoreset_mode   a gymnasium.vector.AutoresetMode, its value or its name ("next_step"): "NextStep" (as
+                     Gymnasium's own vector environments: the step after the last one resets, its action is
+                     ignored and its reward 0), "SameStep" (the step that ends an episode returns the first
+                     observation of the next; the last one is in infos["final_obs"], its info in
+                     infos["final_info"]) or "Disabled" (reset(options={"reset_mask": mask}) is up to the
+                     caller)
     threads          of the compiled call; None: as many as numba uses, at most num_envs
     per_env          settings of single environments: num_envs dicts that are put over the common settings.
                      All environments must have the same spaces and the same loads (one compiled kind):
@@ -51,7 +52,7 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
     the number of threads. reset(seed=s) seeds the environments s, s + 1, ...; a list seeds each. Options of
     reset go to every environment that is reset, those of a list of num_envs dicts to one each.
 
-    infos are those of Gymnasium's SyncVectorEnv, but infos["episode"][i] is a dict, which replays the
+    infos are those of Gymnasium's SyncVectorEnv, but infos["sampled"][i] is a dict, which replays the
     episode as options of a reset.
 
     envs are the single environments; what moves one of them on its own must go through call().
@@ -74,14 +75,8 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         **settings: Any,
     ) -> None:
         self.num_envs = _count("num_envs", num_envs, 10**6)
-        if isinstance(autoreset_mode, str):
-            if autoreset_mode not in AUTORESET_MODES:
-                raise unknown("autoreset_mode", autoreset_mode, AUTORESET_MODES)
-            autoreset_mode = AUTORESET_MODES[autoreset_mode]
-        if not isinstance(autoreset_mode, AutoresetMode):
-            raise unknown("autoreset_mode", autoreset_mode, AUTORESET_MODES)
-        self.autoreset_mode = autoreset_mode
-        self.metadata = self.metadata | {"autoreset_mode": autoreset_mode}
+        self.autoreset_mode = _autoreset_mode(autoreset_mode)
+        self.metadata = self.metadata | {"autoreset_mode": self.autoreset_mode}
         if settings.get("render_mode") is not None:
             raise InputError(
                 f"render_mode = {settings['render_mode']!r}: a vector environment has no pictures"
@@ -163,6 +158,8 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         if isinstance(options, list):
             if len(options) != n:
                 raise InputError(f"options has {len(options)} entries: must be a dict or {n} of them")
+        elif not isinstance(options, Mapping | None):
+            raise InputError(f"options = {short(options)}: must be a mapping, a list of {n} of them, or None")
         else:
             options = dict(options or {})
             if "reset_mask" in options:
@@ -178,7 +175,7 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
     def _plan(self, i, seed, options):
         """Start of a new episode of one environment. Raises: InputError, which names the environment."""
         try:
-            return self.envs[i]._plan(seed, options or None)
+            return self.envs[i]._plan(seed, options)
         except InputError as error:
             raise InputError(f"environment {i}: {error}") from None
 
@@ -197,10 +194,10 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         _, info = self.envs[i]._begin(start)
         self._ended[i] = False
         self._renew(i)
-        episode = info.pop("episode")
+        sampled = info.pop("sampled")
         infos = self._add_info(infos, info, int(i))
         nothing = np.full(self.num_envs, None), np.zeros(self.num_envs, dtype=bool)
-        for key, empty, value in zip(("episode", "_episode"), nothing, (episode, True), strict=True):
+        for key, empty, value in zip(("sampled", "_sampled"), nothing, (sampled, True), strict=True):
             infos.setdefault(key, empty)[i] = value
         return infos
 
@@ -391,6 +388,16 @@ def of_one(infos: dict[str, Any], i: int, but: Sequence[str] = ()) -> dict[str, 
         else:
             own[key] = values[i].item() if isinstance(values[i], np.generic) else values[i]
     return own
+
+
+def _autoreset_mode(given):
+    """Return the AutoresetMode of a mode, its value or its name. Raises: InputError."""
+    if isinstance(given, AutoresetMode):
+        return given
+    for mode in AutoresetMode:
+        if isinstance(given, str) and mode.value.lower() == given.lower().replace("_", ""):
+            return mode
+    raise unknown("autoreset_mode", given, [mode.value for mode in AutoresetMode])
 
 
 def _count(name, value, most):

@@ -39,7 +39,7 @@ def build_scene(
     *,
     seed: int = 0,
     rotor: str | None = None,
-    fidelity: str = "reference",
+    fidelity: str = "standard",
     loads: Sequence[Load] = (),
     **options: Any,
 ) -> Scene:
@@ -57,10 +57,10 @@ def build_scene(
     seed      of everything random: the same seed gives the same bits
     rotor     "bem": blade-element momentum solved at every blade and station; "lookup": the same sweep
               from a table per station; "table": the whole rotor as one table. None: the fidelity's
-    fidelity  "reference": everything solved exactly, Runge-Kutta 4, some 20 times real time; "standard",
-              that of environments and of `fowt`: every blade and station by look-up, fast wave sums,
-              Adams-Bashforth 4 (in a box of wind with three rotor loads per step), within 1e-3 and a
-              thousand times faster; "fast": the rotor as one table
+    fidelity  "standard": every blade and station by look-up, fast wave sums, Adams-Bashforth 4 (in a box of
+              wind with three rotor loads per step), within 1e-3 of "reference" and a thousand times faster;
+              "reference": everything solved exactly, Runge-Kutta 4, some 20 times real time; "fast": the
+              rotor as one table
     loads     further loads on platform and tower, of one's own (fowt_env.Load)
     options   see OPTIONS; a platform file may set other defaults. planar: surge, heave and platform pitch
               alone move; of ntm and etm turbulence the part in the plane is kept

@@ -114,8 +114,7 @@ def hydro_in_waves(hydro, waves, platform, options):
     Raises: InputError for a sea beyond the fast path.
     """
     if waves is None:
-        site = platform.environment
-        waves = flat_waves(depth=site.water_depth, density=site.water_density, gravity=site.gravity)
+        waves = _flat_waves_of(platform)
     strips, excitation = hydro.strips, still_excitation(hydro.excitation)
     if not is_flat(waves):
         position = None if excitation is None else excitation.position
@@ -130,6 +129,26 @@ def hydro_in_waves(hydro, waves, platform, options):
         members=members_in_waves(hydro.members, waves, options),
         excitation=excitation,
     )
+
+
+def still_hydro(hydro, platform, options):
+    """Hydro of a scene with a sea in flat water: the same types, and nothing of that sea but its strip nodes.
+
+    One component of no height stands for the water, which is summed: a table would only take longer.
+    """
+    waves = _flat_waves_of(platform)
+    members = hydro.members
+    return hydro._replace(
+        waves=waves,
+        strips=strips_in_waves(hydro.strips, waves, options),
+        members=None if members is None else members._replace(series=no_series()),
+        excitation=still_excitation(hydro.excitation),
+    )
+
+
+def _flat_waves_of(platform):
+    site = platform.environment
+    return flat_waves(depth=site.water_depth, density=site.water_density, gravity=site.gravity)
 
 
 def excitation_in_waves(platform, waves, options, first_state):

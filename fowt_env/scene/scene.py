@@ -37,6 +37,8 @@ from fowt_env.scene.weather import Sea, Wind, build_weather
 from fowt_env.weather.wind import hub_series
 from fowt_env.weather.wind_field import WindBox, hub_wind
 
+UNCHANGED: Any = object()  # default of what a scene may have None of
+
 
 @dataclass(frozen=True, eq=False)
 class Scene:
@@ -186,15 +188,19 @@ class Scene:
         """Words for the load of the user's that made a run not finite with this data; None where none did."""
         return first_nonfinite_load(self.loads, data.user)
 
-    def with_weather(self, wind: Wind, sea: Sea, seed: int) -> "Scene":
-        """A copy in other weather whose model has the same types, so that nothing is compiled anew.
+    def with_weather(
+        self, wind: Wind = UNCHANGED, sea: Sea = UNCHANGED, seed: int | None = None
+    ) -> "Scene":
+        """Return the scene in another wind, sea or seed, with a model of the same types: nothing is compiled.
 
-        sea None is still water. In a scene that was built with a sea it is a wave without height: to rounding
-        the loads of a scene built in still water, in twice the time.
+        What is left out stays as it is. sea None is still water. In a scene that was built with a sea it is a
+        wave without height: to rounding the loads of a scene built in still water, in twice the time.
         Raises: InputError, also where aerodynamics, a box of wind or a sea would be gained, or the first two
         lost (build a scene for that).
         """
-        seed = check_whole_number("seed", seed, 0)
+        wind = self.wind if wind is UNCHANGED else wind
+        sea = self.sea if sea is UNCHANGED else sea
+        seed = check_whole_number("seed", self.seed if seed is None else seed, 0)
         air, waves = build_weather(wind, sea, seed, self.platform, self.turbine, self.rotor, self.options)
         aero, hydro = self.model.aero, self.model.hydro
         if (air.series is None) != (aero is None):

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from math import isfinite
-from types import CodeType, FunctionType
+from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
 import numba
@@ -76,21 +76,29 @@ def _compiled(function):
 
 
 def _meaning(function, above=()):
-    """Code, constants and outer numbers of a function and of those it calls, as plain values."""
-    code = function.__code__
-    outer = {name: function.__globals__.get(name) for name in code.co_names}
+    """Return code, constants and outer numbers of a function and of those it calls, as plain values."""
+    code, above = function.__code__, (*above, function)
     cells = (cell.cell_contents for cell in function.__closure__ or ())
-    outer |= dict(zip(code.co_freevars, cells, strict=True))
+    outer = function.__globals__ | dict(zip(code.co_freevars, cells, strict=True))
+    known = _known(outer, (*code.co_names, *code.co_freevars), above)
+    constants = [repr(constant) for constant in code.co_consts if not isinstance(constant, CodeType)]
+    return code.co_code.hex(), code.co_names, constants, known
+
+
+def _known(outer, names, above):
+    """Return the plain values of those names that a mapping has; of a module those that it has of them."""
     known = {}
-    for name, value in sorted(outer.items()):
+    for name in sorted(set(names) & outer.keys()):
+        value = outer[name]
         if isinstance(value, int | float | tuple):
             known[name] = value
         elif isinstance(value, np.ndarray):
             known[name] = value.dtype.str, value.shape, value.tobytes()
+        elif isinstance(value, ModuleType) and value not in above:
+            known[name] = _known(vars(value), names, (*above, value))
         elif isinstance(called := getattr(value, "py_func", None), FunctionType) and called not in above:
-            known[name] = _meaning(called, (*above, function))
-    constants = [repr(constant) for constant in code.co_consts if not isinstance(constant, CodeType)]
-    return code.co_code.hex(), code.co_names, constants, known
+            known[name] = _meaning(called, above)
+    return known
 
 
 def load_kernel(function: Callable[..., None]) -> LoadKernel:

@@ -24,6 +24,7 @@ from fowt_env.weather.turbulence import drawn_ntm_sigma
 
 MARGIN = 75.0  # m of platform drift against the wind that a box must still cover at the end of a run
 DISK_RADII, DISK_AZIMUTHS = 12, 36  # points of the rotor average
+PROFILE_STEP = 1.0  # m of height between the points of a steady profile
 
 
 def is_field(spec):
@@ -201,6 +202,18 @@ def steady_field(field, factor=1.0):
     """The field's mean over time as a steady wind, times a factor; same type, so nothing is compiled anew."""
     mean = field.velocity.mean(axis=0, dtype=np.float64, keepdims=True) * factor
     return field._replace(velocity=np.ascontiguousarray(mean, dtype=np.float32))
+
+
+def profile_field(speed, exponent, hub_height, rotor_diameter):
+    """WindField of a steady wind that follows the power law over the height and is alike across.
+
+    speed: m/s at the hub. Of the kernels' types, in place of any box.
+    """
+    z = np.arange(PROFILE_STEP, hub_height + rotor_diameter + PROFILE_STEP, PROFILE_STEP)
+    velocity = np.zeros((1, len(z), 2, 3))
+    velocity[0, :, :, 0] = (speed * (z / hub_height) ** exponent)[:, None]
+    side = np.array([-rotor_diameter, rotor_diameter])
+    return WindBox(velocity, side, z, 1.0, max(speed, 1.0), False, 0.0).field()
 
 
 def hub_speed(box, hub_height):

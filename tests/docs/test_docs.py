@@ -169,7 +169,7 @@ FIGURES = {  # what several pages say: {page: pattern with the figure as its gro
     },
     "validation of VolturnUS-S": {
         VALIDATION: r"\| `iea15_volturnus_s` \| [^|]+ \| (\d+) of",
-        PAPER: r"turbine (\d+) of 249",
+        PAPER: r"turbine (\d+) of 273",
     },
     "rotor speed of mpc": {
         README: r"\| `mpc` \| (\S+) %",

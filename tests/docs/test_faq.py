@@ -19,7 +19,7 @@ from fowt_env import errors
 from fowt_env.controllers import make
 from fowt_env.descriptions.platform import DATA, read_platform
 from fowt_env.envs import FowtEnv
-from fowt_env.plant.compile import announcement, decorators
+from fowt_env.plant.compile import decorators, notice
 from fowt_env.plant.compile.versions import check_numba
 from fowt_env.training.cli import app as cli
 from fowt_env.training.cli import health
@@ -96,7 +96,7 @@ def episode(**settings):
 
 @under("The first run takes a minute")
 def _(folder, monkeypatch):
-    return announcement.COMPILING_MESSAGE
+    return notice.COMPILING_MESSAGE
 
 
 @under("Every run takes a minute")
@@ -226,7 +226,7 @@ def _(folder, monkeypatch):
     monkeypatch.chdir(folder)
     monkeypatch.setattr(errors, "_said", set())  # another test of this process may have met the same
     with pytest.warns(fowt_env.PlantWarning) as caught:
-        fowt_env.build_scene("mine.toml")
+        fowt_env.build_scene("mine.toml", fidelity="reference")
     return str(caught[0].message)
 
 
@@ -344,13 +344,13 @@ def _(folder, monkeypatch):
 
 @under("A scene cannot gain wind")
 def _(folder, monkeypatch):
-    return refused(fowt_env.build_scene().with_weather, 18.0, None, 0)
+    return refused(fowt_env.build_scene(fidelity="reference").with_weather, 18.0, None, 0)
 
 
 @under("A scene cannot gain a sea")
 def _(folder, monkeypatch):
     sea = {"kind": "regular", "H": 3.0, "T": 9.0}
-    return refused(fowt_env.build_scene().with_weather, None, sea, 0)
+    return refused(fowt_env.build_scene(fidelity="reference").with_weather, None, sea, 0)
 
 
 def plain(text):

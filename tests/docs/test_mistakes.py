@@ -153,7 +153,11 @@ REFUSED = {  # mistake: (what is done with a scene, error, what the answer has t
     "fidelity": (built(fidelity="x"), InputError, "fidelity 'x' fast, reference, standard"),
     "seed": (built(seed=-1), InputError, "seed = -1 >= 0"),
     "option": (built(foo=1), InputError, "option of build_scene 'foo'"),
-    "platform": (lambda scene: fowt_env.build_scene("oc3_hywnd"), InputError, "'oc3_hywnd' 'oc3_hywind'"),
+    "platform": (
+        lambda scene: fowt_env.build_scene("oc3_hywnd", fidelity="reference"),
+        InputError,
+        "'oc3_hywnd' 'oc3_hywind'",
+    ),
     "task": (environment(task="x"), InputError, "task 'x' above_rated"),
     "reward term": (environment(reward={"x": 1}), InputError, "'x' failure"),
     "observation": (environment(observation=["x"]), InputError, "'x' Nearest of"),

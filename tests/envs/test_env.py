@@ -319,7 +319,13 @@ def test_stepping_with_the_pi_s_commands_is_simulate_bit_for_bit(settings, speed
     pi.reset(env.measurement())
     rows = channel_rows(env, lambda: env.step_physical(*pi.act(env.measurement())))
     scene = fowt_env.build_scene(
-        "oc3_hywind", wind=wind, sea=SEA, seed=7, duration=600.0, wave_components=20, **settings
+        "oc3_hywind",
+        wind=wind,
+        sea=SEA,
+        seed=7,
+        duration=600.0,
+        wave_components=20,
+        **{"fidelity": "reference"} | settings,
     )
     assert_same_bits(rows, fowt_env.simulate(scene, "pi", duration=10.0))
 
@@ -436,7 +442,7 @@ def test_an_episode_can_be_replayed_from_its_info():
     env.reset(seed=9)
     _, info = env.reset()
     first = [env.step((0.2, 0.1))[0] for _ in range(5)]
-    env.reset(seed=1234, options=info["episode"])
+    env.reset(seed=1234, options=info["sampled"])
     assert all(np.array_equal(env.step((0.2, 0.1))[0], observation) for observation in first)
 
 
@@ -482,7 +488,7 @@ def test_preview_shows_the_wind_that_comes():
         ({"observation": 3}, "observation = 3: must be a list of channel names"),
         ({"reward": {"powr": 1.0}}, "Did you mean 'power'"),
         ({"reward": 3}, "reward = 3: must be a dict of reward terms"),
-        ({"basline": "lqr"}, "setting of FowtEnv 'basline'. Did you mean 'baseline'"),
+        ({"basline": "lqr"}, "unexpected keyword argument 'basline'. Did you mean 'baseline'"),
         ({"rotor": "tabel"}, "Did you mean 'table'"),
         ({"wind": {"kind": "series", "time": [0.0, 60.0], "speed": [10.0, 12.0]}}, "wind series ends at 60"),
         ({"wave_component": 20}, "Did you mean 'wave_components'"),
@@ -506,6 +512,8 @@ def test_bad_settings_are_refused_with_the_key_and_what_is_allowed(settings, mes
         ({"offsets": {"PtfmTVxi": 1.0}}, "unknown channel"),
         ({"offsets": {"PtfmSurge": float("nan")}}, "nan"),
         ({"wind": 18.0, "offsets": {"PtfmPitch": 100.0}}, "must stay inside"),
+        ([], r"options = \[\]: must be a mapping"),
+        (0, "options = 0: must be a mapping"),
     ],
 )
 def test_bad_reset_options_are_refused_and_need_a_new_reset(options, message):

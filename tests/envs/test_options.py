@@ -24,25 +24,25 @@ def env():
 def test_ranges_are_drawn_by_seed_and_replayed(env):
     options = {"wind": NTM, "sea": {"kind": "jonswap", "Hs": (2.0, 3.0), "Tp": 9.0}}
     first, info = env.reset(seed=5, options=options)
-    drawn = info["episode"]
+    drawn = info["sampled"]
     assert 11.0 <= drawn["wind"]["speed"] <= 13.0 and 2.0 <= drawn["sea"]["Hs"] <= 3.0
     assert drawn["sea"]["Tp"] == 9.0 and drawn["exact_start"] is False
     again, info = env.reset(seed=5, options=options)
-    assert np.array_equal(first, again) and info["episode"] == drawn
+    assert np.array_equal(first, again) and info["sampled"] == drawn
     replayed, _ = env.reset(options=drawn)
     assert np.array_equal(first, replayed)
-    speeds = {env.reset(options=options)[1]["episode"]["wind"]["speed"] for _ in range(4)}
+    speeds = {env.reset(options=options)[1]["sampled"]["wind"]["speed"] for _ in range(4)}
     assert len(speeds) == 4  # the next episodes are others
 
 
 def test_a_range_draws_as_a_task_does(env):
-    speeds = [env.reset(seed=k, options={"wind": (11.0, 13.0)})[1]["episode"]["wind"] for k in range(40)]
+    speeds = [env.reset(seed=k, options={"wind": (11.0, 13.0)})[1]["sampled"]["wind"] for k in range(40)]
     assert 11.0 <= min(speeds) < 11.3 and 12.7 < max(speeds) <= 13.0
 
 
 def test_a_joint_sea_follows_the_wind_of_the_options(env):
-    low = env.reset(seed=1, options={"wind": 12.0, "sea": {"kind": "joint"}})[1]["episode"]["sea"]
-    high = env.reset(seed=1, options={"wind": 24.0, "sea": {"kind": "joint"}})[1]["episode"]["sea"]
+    low = env.reset(seed=1, options={"wind": 12.0, "sea": {"kind": "joint"}})[1]["sampled"]["sea"]
+    high = env.reset(seed=1, options={"wind": 24.0, "sea": {"kind": "joint"}})[1]["sampled"]["sea"]
     assert low["Hs"] < high["Hs"]
 
 
@@ -51,15 +51,15 @@ def test_offsets_and_mixtures_are_drawn_too(env):
     seen = set()
     for k in range(12):
         _, info = env.reset(seed=k, options={"wind": mixture, "offsets": {"PtfmPitch": (2.0, 3.0)}})
-        seen.add(info["episode"]["wind"]["kind"])
-        assert 2.0 <= info["episode"]["offsets"]["PtfmPitch"] <= 3.0
+        seen.add(info["sampled"]["wind"]["kind"])
+        assert 2.0 <= info["sampled"]["offsets"]["PtfmPitch"] <= 3.0
     assert seen == {"ntm", "steady"}
 
 
 def test_options_without_ranges_draw_as_before(env):
     """The generator gives what it gave: a sea that the options leave out is the task's."""
-    plain = env.reset(seed=9)[1]["episode"]
-    given = env.reset(seed=9, options={"wind": 18.0})[1]["episode"]
+    plain = env.reset(seed=9)[1]["sampled"]
+    given = env.reset(seed=9, options={"wind": 18.0})[1]["sampled"]
     assert given["sea"] == plain["sea"] and given["exact_start"] is True
 
 
@@ -83,8 +83,8 @@ def test_a_bad_range_is_refused_and_nothing_moves(env, options, message):
 def test_a_batch_draws_for_each_environment():
     batch = FowtVectorEnv(3, **QUICK)
     _, infos = batch.reset(seed=5, options={"wind": NTM})
-    speeds = [episode["wind"]["speed"] for episode in infos["episode"]]
-    single = FowtEnv(**QUICK).reset(seed=6, options={"wind": NTM})[1]["episode"]
+    speeds = [episode["wind"]["speed"] for episode in infos["sampled"]]
+    single = FowtEnv(**QUICK).reset(seed=6, options={"wind": NTM})[1]["sampled"]
     assert len(set(speeds)) == 3 and speeds[1] == single["wind"]["speed"]
 
 
@@ -176,7 +176,7 @@ def test_reward_functions_that_cannot_be_used_are_refused():
     for function in (lambda: 1.0, lambda info, measurement, action: 1.0):
         with pytest.raises(InputError, match=r"must take \(info\) or \(info, measurement\)"):
             FowtEnv(**QUICK, reward=function)
-    for value in (None, "much", float("nan"), [1.0, 2.0]):
+    for value in (None, "much", float("nan"), [1.0, 2.0], 10**400, -(10**5000)):
         env = FowtEnv(**QUICK, reward=lambda info, measurement, value=value: value)
         env.reset(seed=1)
         with pytest.raises(InputError, match=r"returned .* at 0\.1 s: must be a finite number"):
@@ -234,5 +234,5 @@ def test_plants_that_differ_are_settings_of_make_and_make_vec():
 def test_a_task_with_ranges_gives_what_the_same_ranges_in_options_give_in_kind():
     task = Task("mine", wind=NTM, sea=None, offsets={})
     plain = FowtEnv(task=task, **QUICK)
-    drawn = plain.reset(seed=2)[1]["episode"]["wind"]
+    drawn = plain.reset(seed=2)[1]["sampled"]["wind"]
     assert set(drawn) == set(NTM) and 11.0 <= drawn["speed"] <= 13.0

@@ -1,5 +1,7 @@
 """Degraded sensors and a plant that controllers do not know: one reading for all, and nothing else."""
 
+from collections import namedtuple
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,9 @@ from fowt_env import build_scene, simulate
 from fowt_env.control import call_law
 from fowt_env.controllers import make
 from fowt_env.controllers.lqr.law import WindEstimator
+from fowt_env.descriptions.measurements import MEASURED, Measured
 from fowt_env.envs import FowtEnv, FowtVectorEnv
+from fowt_env.envs import sensors as envs_sensors
 from fowt_env.envs.safety import SafetyLayer
 from fowt_env.envs.sensors import draw_sensors, reading_scales
 from fowt_env.errors import InputError
@@ -63,6 +67,19 @@ def test_a_reading_is_what_was_measured_before_and_noise_of_the_stated_size():
     assert env.measurement() == Measurement(*read[-1].tolist())
 
 
+def test_a_new_field_of_a_measurement_has_a_scale_without_an_observation_channel(turbine, monkeypatch):
+    """That of the channels in its unit; the scales of the others are as they were."""
+    known = dict(zip(Measurement._fields, reading_scales(turbine), strict=True))
+    longer = namedtuple("Measurement", (*Measurement._fields, "nacelle_yaw", "oil_temperature"))
+    monkeypatch.setattr(envs_sensors, "Measurement", longer)
+    for name, unit in (("nacelle_yaw", "rad"), ("oil_temperature", "K")):
+        monkeypatch.setitem(MEASURED, name, Measured(unit, "", "added by this test"))
+    scales = dict(zip(longer._fields, reading_scales(turbine), strict=True))
+    assert scales == known | {"nacelle_yaw": known["roll"], "oil_temperature": 1.0}
+    assert known["generator_speed"] == turbine.drivetrain.gear_ratio * known["rotor_speed"]
+    assert known["time"] == 0.0 and all(scale > 0.0 for name, scale in known.items() if name != "time")
+
+
 @pytest.mark.parametrize("sensors", [{"noise": 0.02}, {"delay": 3}, DEGRADED])
 def test_observation_baseline_and_estimator_are_given_the_same_reading(sensors):
     """lqr and estimator by hand, told what measurement() says: the same estimate, command and motion."""
@@ -107,9 +124,9 @@ def test_readings_repeat_with_the_weather_and_differ_in_another():
     seen, _, _ = run(env, reset_seed=7)
     again, _, _ = run(env, reset_seed=7)
     _, info = env.reset(seed=8)
-    first = env.reset(options=info["episode"])[0]
+    first = env.reset(options=info["sampled"])[0]
     assert np.array_equal(seen, again) and not np.array_equal(first, seen[0])
-    assert np.array_equal(first, env.reset(options=info["episode"])[0])
+    assert np.array_equal(first, env.reset(options=info["sampled"])[0])
 
 
 @pytest.mark.parametrize("sensors", [DEGRADED, {"noise": 0.01}])

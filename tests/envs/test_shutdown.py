@@ -66,8 +66,8 @@ def test_a_rotor_that_stands_is_paid_more_than_one_that_turns(env):
 def test_the_same_draw_gives_the_same_bits_and_replays(env):
     first, info = env.reset(seed=4)
     low, high = TASKS["shutdown"].shutdown
-    assert low <= info["episode"]["shutdown"] <= high
-    again, _ = env.reset(options=info["episode"])
+    assert low <= info["sampled"]["shutdown"] <= high
+    again, _ = env.reset(options=info["sampled"])
     np.testing.assert_array_equal(first, again)
     snapshot = env.get_state()
     after = env.step([0.0, 0.3])[0]

@@ -92,7 +92,7 @@ def test_a_mixture_runs_all_of_its_weathers_in_one_environment():
     kinds = set()
     for seed in range(12):
         _, info = env.reset(seed=seed)
-        kinds.add(info["episode"]["wind"]["kind"])
+        kinds.add(info["sampled"]["wind"]["kind"])
         assert np.all(np.isfinite(env.step([0.0, 0.0])[0]))
     assert kinds == {"ntm", "eog"}
 

@@ -41,9 +41,9 @@ def same(one, other):
 def same_infos(got, expected):
     """Whether infos equal those of a SyncVectorEnv, which spreads the episodes over nested arrays."""
     got, expected = dict(got), dict(expected)
-    episodes, spread = got.pop("episode", None), expected.pop("episode", None)
+    episodes, spread = got.pop("sampled", None), expected.pop("sampled", None)
     if episodes is not None:
-        mask = got["_episode"]
+        mask = got["_sampled"]
         assert all(of_one(spread, i) == episodes[i] for i in np.flatnonzero(mask))
         assert all(episodes[i] is None for i in np.flatnonzero(~mask))
     return same(got, expected)
@@ -103,6 +103,23 @@ def test_resets_values_and_infos_are_those_of_gymnasium_s_own_vector_environment
         assert same_infos(got[4], expected[4]), k
         ends += got[2].sum(), got[3].sum()
     assert ends[0] >= 1 and ends[1] >= 3, ends
+
+
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep", "Disabled"])
+def test_an_episode_that_fails_in_its_last_step_is_terminated_and_not_truncated(mode):
+    options = {"offsets": {"PtfmPitch": 78.0, "RotSpeed": 1.0}}  # it falls over, or turns too fast
+    single = FowtEnv(**QUICK)
+    single.reset(seed=0, options=options)
+    steps = next(k for k in range(1, 100) if single.step((0.0, 0.0))[2])
+    settings = QUICK | {"duration": round(0.1 * steps, 1)}
+    single, batch = FowtEnv(**settings), FowtVectorEnv(2, autoreset_mode=mode, threads=1, **settings)
+    single.reset(seed=0, options=options)
+    batch.reset(seed=0, options=[options, {}])
+    for _ in range(steps):
+        *_, terminated, truncated, info = single.step((0.0, 0.0))
+        *_, terminations, truncations, _ = batch.step(np.zeros((2, 2)))
+    assert (terminated, truncated) == (True, False) and "termination" in info
+    assert terminations.tolist() == [True, False] and truncations.tolist() == [False, True]
 
 
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep", "Disabled"])
@@ -181,7 +198,7 @@ def test_environments_may_have_their_own_weather_turbine_and_weights():
         ({"per_env": [{}, {"observation": ("surge",)}]}, "per_env\\[1\\]: its observation"),
         ({"per_env": [{}, {"action_mode": "residual"}]}, "per_env\\[1\\]: action_mode"),
         ({"per_env": [{}, {"mooring": False}]}, "another compiled kind than the first, in mooring"),
-        ({"autoreset_mode": "samestep"}, "Did you mean 'SameStep'"),
+        ({"autoreset_mode": "SameStap"}, "Did you mean 'SameStep'"),
         ({"threads": 0}, "threads = 0"),
         ({"num_envs": 0}, "num_envs = 0"),
     ],

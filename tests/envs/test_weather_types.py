@@ -186,7 +186,7 @@ def test_texts_are_weathers_of_tasks_and_resets():
         {"weather_seed": 3, "wind": w, "sea": s} for w, s in (("ntm:16:B", "jonswap:4:9"), (NTM, JONSWAP))
     )
     first, again = env.reset(seed=1, options=texts)[1], env.reset(seed=1, options=mappings)[1]
-    assert first["episode"] == again["episode"]
+    assert first["sampled"] == again["sampled"]
     with pytest.raises(InputError, match=r"wind = 'ntm16': must be .*ntm:18:B"):
         env.reset(options={"wind": "ntm16"})
     with pytest.raises(InputError, match="an episode needs a wind"):

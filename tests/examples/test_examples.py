@@ -8,7 +8,7 @@ from time import perf_counter
 
 import pytest
 
-from fowt_env.plant.compile.announcement import compilation_announced
+from fowt_env.plant.compile.notice import compilation_reported
 
 FOLDER = Path(__file__).resolve().parents[2] / "examples"
 LIMIT = 60.0  # s
@@ -59,7 +59,7 @@ def test_an_example_runs_within_a_minute(name, tmp_path, monkeypatch, capsys):
     monkeypatch.syspath_prepend(str(FOLDER))
     compiled = []
     start = perf_counter()
-    with compilation_announced(compiled.append):
+    with compilation_reported(compiled.append):
         runpy.run_path(str(FOLDER / f"{name}.py"), run_name="__main__")
     seconds = perf_counter() - start
     pattern, files = CLAIMS[name]

@@ -167,4 +167,6 @@ def test_a_turbine_without_blade_masses_is_refused():
     without = dict.fromkeys(("blade_mass", "blade_first_moment", "blade_second_moment"))
     turbine = turbine.model_copy(update={"rotor": turbine.rotor.model_copy(update=without)})
     with pytest.raises(InputError, match="rotor.blade_mass: is missing in the turbine 'nrel5mw'"):
-        fowt_env.build_scene(turbine=turbine, wind=14.0, pitch="individual", rotor="bem")
+        fowt_env.build_scene(
+            turbine=turbine, wind=14.0, pitch="individual", rotor="bem", fidelity="reference"
+        )

@@ -46,7 +46,9 @@ def test_units_are_those_in_the_column_names():
 def leaning_scene(platform, turbine):
     """As bare_scene with a tilted shaft, and centres of mass off the shaft and beside the plane."""
     platform, turbine = leaning(platform, turbine)
-    return fowt_env.build_scene(platform, turbine=turbine, hydrodynamics=False, mooring=False)
+    return fowt_env.build_scene(
+        platform, turbine=turbine, hydrodynamics=False, mooring=False, fidelity="reference"
+    )
 
 
 @pytest.fixture(params=["bare_scene", "leaning_scene"])
@@ -109,7 +111,7 @@ def test_platform_and_nacelle_accelerations_are_those_of_their_points(wave_scene
 
 def test_hydrodynamic_load_closes_the_momentum_balance(wave_scene, platform, turbine):
     # weight and water accelerate the five bodies; nothing else does
-    scene = fowt_env.build_scene("oc3_hywind", sea=wave_scene.sea, mooring=False)
+    scene = fowt_env.build_scene("oc3_hywind", sea=wave_scene.sea, mooring=False, fidelity="reference")
     scene = scene.with_model({"hydro.damping": type(scene.model.hydro.damping)(*(0.0,) * 7)})
     x, dx, row = moving(scene)
     R = rigid_body.rotation(*x[3:6])

@@ -2,13 +2,13 @@
 
 import ast
 import os
-import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from copied_code import copied_code
 from plant_helpers import integrate, state
 
 import fowt_env
@@ -39,7 +39,7 @@ def spring(parameters, motion, force):
 def free_body(integrator, stiffness, stiffening=0.0, damping=0.0):
     """A weightless body in empty space on that spring alone."""
     load = Load("Spring", spring, [stiffness, stiffening, damping])
-    scene = build_scene(hydrodynamics=False, mooring=False, loads=[load])
+    scene = build_scene(hydrodynamics=False, mooring=False, loads=[load], fidelity="reference")
     return scene.with_model(
         rigid_body=scene.model.rigid_body._replace(gravity=0.0), integrator=build_integrator(integrator)
     )
@@ -123,7 +123,7 @@ def test_its_default_step_is_within_half_its_limit_in_operation(name, stiffest):
 @pytest.mark.parametrize("name", INTEGRATORS)
 def test_loads_are_evaluated_as_often_as_it_says(name):
     def count(steps):
-        scene = build_scene(integrator=name)
+        scene = build_scene(integrator=name, fidelity="reference")
         data = scene.data()
         x = state(heave=-60.0)  # under water, where each evaluation is counted
         assert advance(scene.handle(data), x, np.zeros(2), 0, steps, 0.01) == RUNNING
@@ -212,16 +212,16 @@ assert 1.7 < np.log2((coarse - exact) / (half - exact)) < 2.3
 
 
 def test_a_new_integrator_is_a_row_of_one_file(tmp_path):
-    shutil.copytree(PACKAGE, tmp_path / "fowt_env", ignore=shutil.ignore_patterns("__pycache__"))
-    file = tmp_path / "fowt_env" / "plant" / "integrators.py"
+    code = copied_code(tmp_path)
+    file = code / "fowt_env" / "plant" / "integrators.py"
     text = file.read_text()
     for mark, new in (("class Method(NamedTuple)", MIDPOINT.lstrip()), ('    "heun": Method(', ROW)):
         assert text.count(mark) == 1
         text = text.replace(mark, new + mark)
     file.write_text(text)
     ran = subprocess.run(
-        [sys.executable, "-c", USE.format(folder=str(tmp_path))],
-        env=os.environ | {"PYTHONPATH": str(tmp_path), "NUMBA_DISABLE_JIT": "1"},
+        [sys.executable, "-c", USE.format(folder=str(code))],
+        env=os.environ | {"PYTHONPATH": str(code), "NUMBA_DISABLE_JIT": "1"},
         cwd=tmp_path, capture_output=True, text=True, timeout=600,
     )  # fmt: skip
     assert ran.returncode == 0, ran.stderr

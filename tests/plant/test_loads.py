@@ -103,7 +103,7 @@ def scene_less(form, name):
     given = {key.removeprefix("hydro."): value for key, value in hydro.items()}
     platform = read_platform("oc3_hywind")
     platform = platform.model_copy(update={"hydro": platform.hydro.model_copy(update=given), **beside})
-    scene = build_scene(platform, rotor="bem", wave_loads=form, **arguments)
+    scene = build_scene(platform, rotor="bem", wave_loads=form, **{"fidelity": "reference"} | arguments)
     if scene.model.hydro is None:
         return scene
     # of a body whose other coefficients are left out, so that no other load depends on it
@@ -252,7 +252,7 @@ def test_no_strength_is_the_slot_left_empty(slot, figures):
 def test_no_gravity_is_no_weight(figures, platform, turbine):
     _, found = figures
     weight = found["all"]["TOTAL"] - found["no weight"]["TOTAL"]
-    mass = build_scene().model.rigid_body.mass
+    mass = build_scene(fidelity="reference").model.rigid_body.mass
     size = mass * platform.environment.gravity
     assert np.linalg.norm(weight[:, :3], axis=1) == pytest.approx(size, rel=1e-12)
 
@@ -286,7 +286,7 @@ def test_a_scene_without_it_is_compiled_without_it(name):
 @pytest.mark.parametrize("name", WITH_STRENGTH)
 def test_each_of_its_strengths_is_in_a_form_of_the_model(name):
     models = [scene_of(form).model for form in FORMS]
-    models += [build_scene(wind=8.0, rotor=rotor).model for rotor in ROTORS]
+    models += [build_scene(wind=8.0, rotor=rotor, fidelity="reference").model for rotor in ROTORS]
     for path in LOADS[name].strength:
         assert any(part_at(model, path) is not None for model in models), path
 

@@ -1,7 +1,5 @@
 """Runs with radiation memory: decays against OpenFAST, both forms against each other, and integrators."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -12,8 +10,8 @@ from fowt_env.envs.snapshot import DATA_CARRIED
 from fowt_env.plant.rollout import advance
 from fowt_env.plant.state import STATES, State, pose_of
 from fowt_env.scene.radiation_fit import fit_radiation
+from fowt_env.training.validation.openfast_cases import reference
 
-REFERENCE = Path(__file__).parents[1] / "reference" / "volturnus_decays.npz"
 CHANNELS = {  # motion: (channel, offset, its unit)
     "surge": ("PtfmSurge_[m]", 10.0),
     "heave": ("PtfmHeave_[m]", 3.0),
@@ -33,18 +31,21 @@ def platform():
 
 @pytest.fixture(scope="module")
 def decays(platform):
-    """{(form, motion): its channel every 0.5 s}, and the reference under "openfast"."""
-    with np.load(REFERENCE) as file:
-        found = {("openfast", name): file[name].astype(float) for name in CHANNELS}
+    """{(form, motion): its channel every second}, and the reference under "openfast"."""
+    found = {}
+    for name, (channel, _) in CHANNELS.items():
+        run = reference(f"decay_{name}", place="iea15_volturnus_s")
+        every = round(1.0 / run["Time_[s]"][1])
+        found["openfast", name] = run[channel].to_numpy()[: 300 * every + 1 : every]
     scenes = {
         "state_space": build_scene(platform, fidelity="standard"),
         "convolution": build_scene(platform, fidelity="standard", radiation="convolution"),
     }
     for form, scene in scenes.items():
         for name, (channel, offset) in CHANNELS.items():
-            duration = 0.5 * (found["openfast", name].size - 1)
+            duration = found["openfast", name].size - 1.0
             initial = {channel.split("_")[0]: offset}
-            run = simulate(scene, None, duration, output_dt=0.5, start="zero", initial=initial)
+            run = simulate(scene, None, duration, output_dt=1.0, start="zero", initial=initial)
             found[form, name] = run[channel].to_numpy()
     return found
 
@@ -111,7 +112,9 @@ def test_modes_are_those_of_the_platform_alone(platform):
 
 
 def last_state(platform, integrator, dt, seconds=20.0):
-    scene = build_scene(platform, integrator=integrator, radiation="state_space").with_step(dt)
+    scene = build_scene(
+        platform, integrator=integrator, radiation="state_space", fidelity="reference"
+    ).with_step(dt)
     x, u = np.zeros(scene.n_state), np.zeros(2)
     x[State.HEAVE], x[State.PLATFORM_PITCH] = 3.0, 0.1
     assert advance(scene.handle(), x, u, 0, round(seconds / dt), dt) == 0

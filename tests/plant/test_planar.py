@@ -19,7 +19,12 @@ SEA = {"kind": "jonswap", "Hs": 6.0, "Tp": 10.0}
 def both(controller=None, duration=60.0, initial=None, **scene):
     """(planar, full) frames of the same run."""
     return [
-        simulate(build_scene(planar=planar, **scene), controller, duration=duration, initial=initial)
+        simulate(
+            build_scene(planar=planar, **{"fidelity": "reference"} | scene),
+            controller,
+            duration=duration,
+            initial=initial,
+        )
         for planar in (True, False)
     ]
 
@@ -76,7 +81,7 @@ def test_trim_and_linear_model_stay_in_the_plane():
     [("PtfmSway", 1.0), ("PtfmRoll", 0.1), ("PtfmYaw", -0.1), ("PtfmTVyi", 0.1), ("PtfmRVzi", 0.1)],
 )
 def test_offsets_out_of_the_plane_are_refused(name, value):
-    scene = build_scene(planar=True)
+    scene = build_scene(planar=True, fidelity="reference")
     with pytest.raises(InputError, match=name):
         initial_state(scene, initial={name: value})
 
@@ -85,5 +90,5 @@ def test_lines_without_a_mirror_image_are_refused():
     platform = read_platform("oc3_hywind")
     one_sided = platform.model_copy(update={"lines": platform.lines[:2]})
     with pytest.raises(InputError, match="mirror image"):
-        build_scene(one_sided, planar=True)
-    build_scene(one_sided, planar=True, mooring=False)
+        build_scene(one_sided, planar=True, fidelity="reference")
+    build_scene(one_sided, planar=True, mooring=False, fidelity="reference")

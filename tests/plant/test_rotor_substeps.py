@@ -7,7 +7,9 @@ from fowt_env import build_scene, simulate
 from fowt_env.envs import FowtEnv, FowtVectorEnv
 from fowt_env.errors import InputError
 from fowt_env.plant.integrators import build_integrator, rotor_samples
-from fowt_env.plant.rotor_substeps import BASHFORTH, build_substeps
+from fowt_env.plant.model import LoadCache
+from fowt_env.plant.rotor_substeps import BASHFORTH, build_substeps, sample_rotor
+from fowt_env.plant.state import State
 from fowt_env.training.validation.openfast_cases import box_wind
 from fowt_env.training.validation.signal_errors import normalised_rms
 
@@ -58,15 +60,30 @@ def test_only_adams_bashforth_in_a_box_samples_the_rotor_more_than_once():
         (18.0, {"fidelity": "standard"}, 0),
         (18.0, {"fidelity": "standard", "rotor_samples": 4}, 4),
     ):
-        scene = build_scene(wind=wind, duration=100.0, **options)
+        scene = build_scene(wind=wind, duration=100.0, **{"fidelity": "reference"} | options)
         assert rotor_samples(scene.model.integrator) == samples
         assert scene.data().samples.shape == (4 * samples, 7)
     assert build_integrator("abm4", 1).substeps is None and rotor_samples(None) == 0
 
 
+def test_between_two_steps_a_constant_acceleration_is_followed_exactly():
+    scene = build_scene(wind=18.0, fidelity="standard", rotor_samples=4)
+    data, dt, last = scene.data(), 0.1, 0.075  # of the samples within a step
+    rng = np.random.default_rng(2)
+    x, speed, acceleration = (0.01 * rng.normal(size=scene.n_state) for _ in range(3))
+    data.history[0], data.history[1] = speed, speed - dt * acceleration
+    for steps, bend in ((1.0, acceleration), (0.0, 0.0)):  # the first step knows of no other
+        data.cache[LoadCache.STEPS] = steps
+        sample_rotor(
+            0.0, x, np.zeros(scene.n_commands), dt, scene.model, scene.model.integrator.substeps, data
+        )
+        moved = x + last * speed + 0.5 * last**2 * bend
+        assert data.stages[2][: State.BLADE_PITCH] == pytest.approx(moved[: State.BLADE_PITCH], rel=1e-12)
+
+
 def test_samples_of_another_integrator_are_refused():
     with pytest.raises(InputError, match="rotor_samples = 3: only integrator = 'ab4'.*not 'heun'"):
-        build_scene(wind=9.0, integrator="heun", rotor_samples=3)
+        build_scene(wind=9.0, integrator="heun", rotor_samples=3, fidelity="reference")
 
 
 def test_a_step_of_standard_in_a_box_errs_by_less_than_a_thousandth_and_a_sixth_of_one_sample():
@@ -78,7 +95,7 @@ def test_a_step_of_standard_in_a_box_errs_by_less_than_a_thousandth_and_a_sixth_
         ("three", 0.1, {}),
     ):
         options |= {"duration": 300.0, "wave_components": 60, "fidelity": "standard"}
-        scene = build_scene(wind=box_wind(), sea=SEA, seed=1, **options)
+        scene = build_scene(wind=box_wind(), sea=SEA, seed=1, **{"fidelity": "reference"} | options)
         frames[name] = simulate(scene, "pi", duration=300.0, dt=dt)
     errors = {
         name: max(normalised_rms(frames[name][c], frames["exact"][c]) for c in COLUMNS)

@@ -7,7 +7,7 @@ from scipy.linalg import expm
 import fowt_env
 from fowt_env import InputError
 from fowt_env.analysis.linear_model import linearize
-from fowt_env.analysis.reduced_model import without_inertia
+from fowt_env.analysis.reduced_model import residualised
 from fowt_env.analysis.trim import trim
 from fowt_env.descriptions.turbine import PitchDrive, read_turbine
 from fowt_env.envs import FowtEnv
@@ -74,7 +74,7 @@ def test_states_follow_those_of_loads_and_rest_in_a_trim(scene):
     )
 
 
-def test_a_trim_is_that_of_a_drive_without_inertia(scene, plain_scene):
+def test_a_trim_is_that_of_a_drive_residualised(scene, plain_scene):
     with_drive, without = trim(scene), trim(plain_scene)
     assert with_drive.state[:15] == pytest.approx(without.state, rel=1e-9, abs=1e-9)
 
@@ -113,13 +113,13 @@ def test_the_linear_model_moves_as_the_plant_does(scene):
 
 
 def test_designs_take_the_drive_as_a_lag_as_long(scene, plain_scene):
-    reduced, plain = without_inertia(linearize(scene)), linearize(plain_scene)
+    reduced, plain = residualised(linearize(scene)), linearize(plain_scene)
     assert reduced.states == plain.states
     for name in ("A", "B", "C", "D", "E", "F"):
         got, wanted = getattr(reduced, name), getattr(plain, name)
         assert got == pytest.approx(wanted, rel=1e-5, abs=1e-6 * np.abs(wanted).max()), name
     assert reduced.x0 == pytest.approx(plain.x0, rel=1e-9, abs=1e-9)
-    assert without_inertia(plain) is plain
+    assert residualised(plain) is plain
 
 
 def test_the_torque_in_force_lags_and_is_what_is_shown(scene):
@@ -221,10 +221,14 @@ def test_the_lag_of_a_drive_is_that_behind_a_ramp():
 
 
 def test_a_scene_may_ask_for_the_second_drive_of_a_turbine():
-    drive = build_scene("iea15_volturnus_s", pitch_drive="second_order").turbine.pitch_drive
+    drive = build_scene(
+        "iea15_volturnus_s", pitch_drive="second_order", fidelity="reference"
+    ).turbine.pitch_drive
     assert (drive.natural_frequency, drive.damping, drive.time_constant) == (1.5708, 0.707, None)
     assert drive.rate_limit == pytest.approx(0.0349)
-    assert build_scene("iea15_volturnus_s").turbine.pitch_drive.natural_frequency is None
+    assert (
+        build_scene("iea15_volturnus_s", fidelity="reference").turbine.pitch_drive.natural_frequency is None
+    )
     bare = read_turbine("liu_1_50")
     with pytest.raises(InputError, match=r"'liu_1_50' has no \[pitch_drive.second_order\]"):
-        build_scene("oc3_hywind", turbine=bare, pitch_drive="second_order")
+        build_scene("oc3_hywind", turbine=bare, pitch_drive="second_order", fidelity="reference")

@@ -52,7 +52,7 @@ MOTIONS = ["PtfmSurge", "PtfmSway", "PtfmHeave", "PtfmRoll", "PtfmPitch", "PtfmY
 )
 def test_what_cannot_be_built_is_refused_by_name_value_and_range(arguments, words):
     with pytest.raises(InputError) as error:
-        build_scene(**arguments)
+        build_scene(**{"fidelity": "reference"} | arguments)
     for word in words:
         assert word in str(error.value)
 
@@ -70,14 +70,25 @@ def test_a_level_falls_back_to_what_the_scene_needs():
 
 
 def test_new_weather_cannot_add_or_remove_aerodynamics():
-    scene = build_scene(wind=8.0)
+    scene = build_scene(wind=8.0, fidelity="reference")
     with pytest.raises(InputError, match="aerodynamics"):
         scene.with_weather(None, None, 1)
 
 
+def test_weather_that_is_not_named_stays():
+    scene = build_scene(wind=NTM, sea=SEA, seed=3, fidelity="reference")
+    for same in (scene.with_weather(), scene.with_weather(NTM), scene.with_weather(sea=SEA, seed=3)):
+        assert (same.wind, same.sea, same.seed) == (scene.wind, scene.sea, 3)
+        assert np.array_equal(same.model.aero.wind.value, scene.model.aero.wind.value)
+        assert np.array_equal(same.model.hydro.waves.phase, scene.model.hydro.waves.phase)
+    assert scene.with_weather(sea=None).sea is None
+
+
 def test_new_weather_is_that_of_a_scene_built_with_it():
-    moved = build_scene(wind=NTM, sea=SEA, seed=1).with_weather(NTM | {"speed": 14.0}, SEA, 5)
-    built = build_scene(wind=NTM | {"speed": 14.0}, sea=SEA, seed=5)
+    moved = build_scene(wind=NTM, sea=SEA, seed=1, fidelity="reference").with_weather(
+        NTM | {"speed": 14.0}, SEA, 5
+    )
+    built = build_scene(wind=NTM | {"speed": 14.0}, sea=SEA, seed=5, fidelity="reference")
     assert np.array_equal(moved.model.aero.wind.value, built.model.aero.wind.value)
     assert np.array_equal(moved.model.hydro.waves.phase, built.model.hydro.waves.phase)
     assert moved.wind_speed == built.wind_speed == 14.0
@@ -120,18 +131,21 @@ def test_scenes_of_one_kind_share_one_compiled_run():
 @pytest.mark.parametrize("count", [2, 1000, 5.0, True])
 def test_a_number_of_stations_that_the_blade_lacks_is_refused(count):
     with pytest.raises(InputError, match="blade_stations = .*: must be a whole number from 3 to"):
-        build_scene(wind=18.0, blade_stations=count)
+        build_scene(wind=18.0, blade_stations=count, fidelity="reference")
 
 
 def test_stations_are_left_out_between_root_and_tip():
-    every = build_scene(wind=18.0).model.aero.rotor.elements.radius
-    some = build_scene(wind=18.0, blade_stations=5).model.aero.rotor.elements.radius
+    every = build_scene(wind=18.0, fidelity="reference").model.aero.rotor.elements.radius
+    some = build_scene(wind=18.0, blade_stations=5, fidelity="reference").model.aero.rotor.elements.radius
     assert some.size == 5 and some[0] == every[0] and some[-1] == every[-1]
     assert set(some) <= set(every)
 
 
 def test_strips_are_no_longer_than_asked_for():
-    fine, coarse = (build_scene(strip_length=length).model.hydro.strips.shape for length in (3.0, 12.0))
+    fine, coarse = (
+        build_scene(strip_length=length, fidelity="reference").model.hydro.strips.shape
+        for length in (3.0, 12.0)
+    )
     assert fine.nodes > coarse.nodes
     with pytest.raises(InputError, match="strip_length = 0.0: must be a number in"):
-        build_scene(strip_length=0.0)
+        build_scene(strip_length=0.0, fidelity="reference")

@@ -37,7 +37,14 @@ def platform_of(body=BODY):
 
 def scene_of(sea=JONSWAP, form="fast", body=BODY, **given):
     given = {"radiation": "none"} | given
-    return build_scene(platform_of(body), sea=sea, wave_loads=form, mooring=False, duration=100.0, **given)
+    return build_scene(
+        platform_of(body),
+        sea=sea,
+        wave_loads=form,
+        mooring=False,
+        duration=100.0,
+        **{"fidelity": "reference"} | given,
+    )
 
 
 def water(scene, t, x):
@@ -101,7 +108,7 @@ def test_a_filtered_position_has_two_states_and_keeps_its_types(form):
 
 def test_second_order_needs_a_qtf():
     with pytest.raises(InputError, match="second_order = 'full': .* has no difference-frequency QTF"):
-        build_scene(sea=JONSWAP, second_order="full")
+        build_scene(sea=JONSWAP, second_order="full", fidelity="reference")
     with pytest.raises(InputError, match="second_order = 'newman': .* has no difference-frequency QTF"):
         scene_of(body=replace(BODY, difference_qtf=None), second_order="newman")
     with pytest.raises(InputError, match="second_order = 'sum': allowed None, 'none', 'mean_drift'"):
@@ -116,7 +123,7 @@ def test_second_order_needs_a_qtf():
 
 def test_scenes_without_sea_or_potential_flow_have_none():
     assert scene_of(sea=None).model.hydro.excitation is None
-    assert build_scene(sea=JONSWAP).model.hydro.excitation is None
+    assert build_scene(sea=JONSWAP, fidelity="reference").model.hydro.excitation is None
 
 
 def test_the_linear_wave_force_is_the_excitation_turned_into_body_axes():
@@ -131,8 +138,10 @@ def test_the_linear_wave_force_is_the_excitation_turned_into_body_axes():
         exact = regular.model.hydro.excitation._replace(first=part)
         expected = add_excitation(t, pose_of(x), x, NO_LOAD, exact, np.zeros((5, 0)))
         assert np.allclose((force * np.exp(1j * omega * t)).real, np.array(expected), rtol=1e-9)
-    assert not wave_force(build_scene(hydrodynamics=False), x, [omega]).any()
-    planar = wave_force(build_scene(platform_of(), planar=True, mooring=False), np.zeros(15), [omega])
+    assert not wave_force(build_scene(hydrodynamics=False, fidelity="reference"), x, [omega]).any()
+    planar = wave_force(
+        build_scene(platform_of(), planar=True, mooring=False, fidelity="reference"), np.zeros(15), [omega]
+    )
     assert not planar[:, [1, 3, 5]].any() and planar[:, [0, 2, 4]].all()
 
 

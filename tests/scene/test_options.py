@@ -46,7 +46,8 @@ def load_of(name, wind, speed, blade_pitch, density=1.225):
     platform = read_platform("oc3_hywind")
     site = platform.environment.model_copy(update={"air_density": density})
     scene = build_scene(
-        platform.model_copy(update={"environment": site}), wind=float(wind), rotor=name, shear_exponent=0.0
+        platform.model_copy(update={"environment": site}), wind=float(wind), rotor=name, shear_exponent=0.0,
+        fidelity="reference",
     )
     aero, counters = scene.model.aero, np.zeros(N_COUNTERS)
     rows = []
@@ -77,10 +78,10 @@ def test_no_density_and_no_wind_at_rest_are_no_load(name):
 @pytest.mark.parametrize("name", ROTORS)
 def test_a_wake_is_taken_by_those_that_have_it_and_refused_by_the_others(name, option):
     if option in ROTORS[name].wake:
-        assert build_scene(wind=8.0, rotor=name, **{option: True}).rotor == name
+        assert build_scene(wind=8.0, rotor=name, **{"fidelity": "reference"} | {option: True}).rotor == name
         return
     with pytest.raises(InputError, match=f"rotor = '{name}': it has no {option}, which needs rotor = 'bem'"):
-        build_scene(wind=8.0, rotor=name, **{option: True})
+        build_scene(wind=8.0, rotor=name, **{"fidelity": "reference"} | {option: True})
 
 
 @pytest.mark.parametrize("wanted", [{"dynamic_inflow"}, {"skewed_wake"}, {"dynamic_inflow", "skewed_wake"}])
@@ -98,7 +99,7 @@ def test_the_wake_lags_no_less_than_the_step_follows():
 
 @pytest.mark.parametrize("name", ROTORS)
 def test_a_box_of_wind_is_met_by_the_blades_or_averaged(name):
-    scene = build_scene(wind=box_wind(), rotor=name, duration=100.0)
+    scene = build_scene(wind=box_wind(), rotor=name, duration=100.0, fidelity="reference")
     assert (scene.model.aero.field is not None) == ROTORS[name].full_field
 
 

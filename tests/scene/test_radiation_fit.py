@@ -183,15 +183,17 @@ def test_scenes_take_the_form_of_their_fidelity_and_put_its_states_last():
     block = standard.blocks[-1]
     assert block.name == "radiation" and block.offset + block.size == standard.n_state
     assert standard.model.hydro.radiation.first == block.offset
-    reference = build_scene("iea15_volturnus_s")
+    reference = build_scene("iea15_volturnus_s", fidelity="reference")
     assert isinstance(reference.model.hydro.radiation, ConvolutionMemory)
     assert reference.n_state == 15 and reference.model.hydro.radiation.dt == reference.dt
-    assert build_scene("iea15_volturnus_s", radiation="none").model.hydro.radiation is None
+    assert (
+        build_scene("iea15_volturnus_s", radiation="none", fidelity="reference").model.hydro.radiation is None
+    )
     assert build_scene("oc3_hywind", fidelity="standard").model.hydro.radiation is None
 
 
 def test_a_convolution_is_made_anew_for_another_step_and_nothing_else_is():
-    scene = build_scene("iea15_volturnus_s")
+    scene = build_scene("iea15_volturnus_s", fidelity="reference")
     other = scene.with_step(0.1)
     assert other.model.hydro.radiation.dt == 0.1 and scene.with_step(scene.dt) is scene
     assert other.model.hydro.radiation.whole.shape[1] == 600
@@ -202,15 +204,15 @@ def test_a_convolution_is_made_anew_for_another_step_and_nothing_else_is():
 
 def test_options_are_checked():
     with pytest.raises(InputError, match="radiation = 'fourier': allowed None, 'state_space'"):
-        build_scene("iea15_volturnus_s", radiation="fourier")
+        build_scene("iea15_volturnus_s", radiation="fourier", fidelity="reference")
     with pytest.raises(InputError, match="radiation_error"):
-        build_scene("iea15_volturnus_s", radiation_error=0.0)
+        build_scene("iea15_volturnus_s", radiation_error=0.0, fidelity="reference")
 
 
 def test_the_linear_memory_of_both_forms_has_the_response_of_the_fit(volturnus):
     fit = fit_radiation(volturnus)
     for radiation in ("state_space", "convolution"):
-        memory = linear_memory(build_scene("iea15_volturnus_s", radiation=radiation))
+        memory = linear_memory(build_scene("iea15_volturnus_s", radiation=radiation, fidelity="reference"))
         inside = np.linalg.solve(1j * 0.7 * np.eye(memory.A.shape[0]) - memory.A, memory.B)
         assert memory.C @ inside == pytest.approx(fit.response(np.array([0.7]))[0], rel=1e-9, abs=1e-3)
-    assert linear_memory(build_scene("iea15_volturnus_s", radiation="none")) is None
+    assert linear_memory(build_scene("iea15_volturnus_s", radiation="none", fidelity="reference")) is None

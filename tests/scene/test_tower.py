@@ -77,7 +77,7 @@ def test_structural_damping_is_of_the_bare_tower(uniform):
 
 
 def test_shapes_at_the_points_of_the_tower_drag_are_those_at_their_heights(uniform):
-    scene = build_scene("oc3_hywind", wind=0.0, rotor="table")
+    scene = build_scene("oc3_hywind", wind=0.0, rotor="table", fidelity="reference")
     tower = scene.platform.tower
     found = build_tower_modes(scene.platform, scene.turbine, 1, 15)
     fraction = (scene.model.aero.tower.z - tower.base_height) / (tower.top_height - tower.base_height)
@@ -165,7 +165,7 @@ def test_a_check_lists_the_frequencies_of_the_tower():
 )
 def test_an_option_that_cannot_be_is_refused(options, words):
     with pytest.raises(InputError) as caught:
-        modes_asked(build_scene("oc3_hywind", **options).options)
+        modes_asked(build_scene("oc3_hywind", **{"fidelity": "reference"} | options).options)
     assert all(word in str(caught.value) for word in words)
 
 

@@ -111,7 +111,7 @@ def test_a_scene_of_still_water_keeps_kernels_without_waves():
 
 
 def test_without_water_any_sea_is_none():
-    scene = build_scene(wind=14.0, hydrodynamics=False, mooring=False)
+    scene = build_scene(wind=14.0, hydrodynamics=False, mooring=False, fidelity="reference")
     assert scene.with_weather(14.0, JONSWAP, 1).model.hydro is None
 
 
@@ -161,7 +161,10 @@ def test_still_water_in_a_scene_with_a_sea_loads_as_a_scene_of_still_water(fidel
     Here they have the same bits. A rounding of 1e8 N over 8e6 kg is 2e-15 m/s2: room for some fifty.
     """
     options = dict(fidelity=fidelity, current=0.5, diffraction="maccamy_fuchs")
-    scenes = build_scene(**options), build_scene(sea=JONSWAP, **options).with_weather(None, None, 0)
+    scenes = (
+        build_scene(**{"fidelity": "reference"} | options),
+        build_scene(sea=JONSWAP, **{"fidelity": "reference"} | options).with_weather(None, None, 0),
+    )
     rng = np.random.default_rng(1)
     for _ in range(5):
         found = []
@@ -187,8 +190,11 @@ def test_a_trim_is_not_taken_from_strips_with_other_nodes(monkeypatch):
     monkeypatch.setattr(trim_cache, "trim", trim)
     monkeypatch.setattr(trim_cache, "_TRIMS", Cache(100))
     options = dict(wind=14.0, fidelity="standard", current=0.5)
-    still, scene = build_scene(**options), build_scene(sea=JONSWAP, **options)
-    exact = build_scene(sea=CROSSING, **options)
+    still, scene = (
+        build_scene(**{"fidelity": "reference"} | options),
+        build_scene(sea=JONSWAP, **{"fidelity": "reference"} | options),
+    )
+    exact = build_scene(sea=CROSSING, **{"fidelity": "reference"} | options)
     key = trim_cache.plant_key(scene)
     assert key == trim_cache.plant_key(still) == trim_cache.plant_key(exact)
     flat = scene.with_weather(14.0, None, 0)

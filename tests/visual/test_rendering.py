@@ -31,12 +31,12 @@ ROW = REST | {"Time": 0.0, "Wind1VelX": 18.0, "RotSpeed": 12.1, "GenPwr": 5000.0
 
 @pytest.fixture(scope="module")
 def scene():
-    return fowt_env.build_scene("oc3_hywind", seed=3, **QUICK, **WEATHER)
+    return fowt_env.build_scene("oc3_hywind", seed=3, **{"fidelity": "reference"} | QUICK, **WEATHER)
 
 
 @pytest.fixture(scope="module")
 def still():
-    return fowt_env.build_scene("oc3_hywind", wind=18.0, rotor="table")
+    return fowt_env.build_scene("oc3_hywind", wind=18.0, rotor="table", fidelity="reference")
 
 
 @pytest.fixture
@@ -326,7 +326,7 @@ def test_animations_that_cannot_be_made_are_named(scene, runs, tmp_path, argumen
 )
 def test_shapes_stand_for_hulls_whose_loads_have_none(name, above, below):
     """Of every column that the file gives the middle above the water is yellow; water is beside the hull."""
-    scene = fowt_env.build_scene(name, rotor="table")
+    scene = fowt_env.build_scene(name, rotor="table", fidelity="reference")
     view = View([scene])
     view.draw([ROW])
     panel, picture, shapes = view.panels[0], view.array().astype(int), scene.platform.shapes
@@ -413,7 +413,7 @@ def test_a_blade_seen_edge_on_keeps_a_width_and_its_outline_does_not_cross_itsel
 @pytest.mark.parametrize("make", [floaters.semi, floaters.tension_leg], ids=["semi", "tension leg"])
 def test_members_are_drawn_where_they_are(make):
     """Each column above the water is yellow where its axis is; nothing is beside the outermost."""
-    scene = fowt_env.build_scene(make())
+    scene = fowt_env.build_scene(make(), fidelity="reference")
     view = View([scene])
     view.draw([ROW])
     panel, picture = view.panels[0], view.array()
@@ -434,7 +434,9 @@ def test_members_are_drawn_where_they_are(make):
 
 def test_a_hull_without_a_shape_is_a_box_of_its_draft():
     potential = read_platform("nrel5mw_iti_barge")
-    scene = fowt_env.build_scene(potential.model_copy(update={"members": (), "shapes": ()}))
+    scene = fowt_env.build_scene(
+        potential.model_copy(update={"members": (), "shapes": ()}), fidelity="reference"
+    )
     view = View([scene])
     view.draw([ROW])
     panel, picture = view.panels[0], view.array()

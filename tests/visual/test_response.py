@@ -46,7 +46,7 @@ def test_the_response_operator_of_a_linear_system_is_its_gain():
 def test_noise_lowers_the_coherence_and_hardly_the_gain():
     _, amplitude, coherence = response_operator(run(noise=1.0), "PtfmPitch_[deg]")
     assert np.median(coherence) < 0.9
-    assert np.median(amplitude) == pytest.approx(0.5, rel=0.15)
+    assert np.median(amplitude) == pytest.approx(0.5, rel=0.05)
 
 
 def test_boxes_are_the_quartiles_of_the_samples_that_are_kept():

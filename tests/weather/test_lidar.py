@@ -342,9 +342,8 @@ def test_weights_along_the_beam_that_are_one_sided_shift_the_phase_as_in_a_box()
     gain = np.fft.rfft(seen)[10] / np.fft.rfft(wave)[10]
     cross = at_frequencies(shares(lidar, 0, SPEED, SIGMA, HUB, RADIUS, evolves=False).cross, np.array([0.05]))
     assert np.angle(gain) > 0.05
-    assert np.angle(cross[0]) == pytest.approx(
-        np.angle(gain), rel=0.15
-    )  # the wave is coherent, turbulence less
+    # the wave is coherent, turbulence less: 4.2 %
+    assert np.angle(cross[0]) == pytest.approx(np.angle(gain), rel=0.05)
 
 
 def test_the_power_law_shifts_the_estimate_by_what_the_beams_see_of_it():

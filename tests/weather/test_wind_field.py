@@ -12,7 +12,15 @@ from fowt_env.descriptions.iec import ntm_sigma
 from fowt_env.errors import InputError
 from fowt_env.plant.aero.wind_field import field_at
 from fowt_env.weather.turbulence import drawn_ntm_sigma
-from fowt_env.weather.wind_field import WindBox, hub_speed, is_field, read_box, rotor_average, steady_field
+from fowt_env.weather.wind_field import (
+    WindBox,
+    hub_speed,
+    is_field,
+    profile_field,
+    read_box,
+    rotor_average,
+    steady_field,
+)
 
 HUB, DIAMETER = 90.0, 126.0
 Y = np.linspace(-75.0, 75.0, 11)
@@ -161,7 +169,7 @@ def test_a_turbsim_file_is_read_slice_by_slice(tmp_path):
     assert read.shift == pytest.approx(box.shift)
     for given in (path, str(path)):  # the path is the wind
         assert is_field(given)
-        scene = fowt_env.build_scene("oc3_hywind", wind=given, rotor="table")
+        scene = fowt_env.build_scene("oc3_hywind", wind=given, rotor="table", fidelity="reference")
         np.testing.assert_array_equal(scene.wind.velocity, read.velocity)
 
 
@@ -171,7 +179,8 @@ def test_a_mann_box_has_the_standards_deviation_and_the_sites_shear():
     spec = {"kind": "mann", "speed": 18.0, "class": "B", "seed": 2, "dt": 0.5}
     box = read_box(spec, hub_height=HUB, rotor_diameter=DIAMETER, shear_exponent=0.14, duration=600.0)
     hub = box.at(np.arange(0.0, 600.0, 1.0), 0.0, 0.0, HUB)
-    assert hub[:, 0].std() == pytest.approx(0.14 * (0.75 * 18.0 + 5.6), rel=0.15)
+    # one point over 600 s, whose deviation varies by some 5 %
+    assert hub[:, 0].std() == pytest.approx(0.14 * (0.75 * 18.0 + 5.6), rel=0.06)
     mean = box.velocity[..., 0].mean(axis=(0, 2))
     ratio = np.interp(140.0, box.z, mean) / np.interp(90.0, box.z, mean)
     assert ratio == pytest.approx((140.0 / 90.0) ** 0.14, rel=0.03)
@@ -187,8 +196,8 @@ def scenes():
     spec = {"kind": "box", "u": np.full((120, 9, 11), 12.0), "y": Y, "z": Z - 10.0, "dt": 0.5, "speed": 12.0}
     options = {"shear_exponent": 0.0}
     return (
-        fowt_env.build_scene("oc3_hywind", wind=spec, **options),
-        fowt_env.build_scene("oc3_hywind", wind=12.0, **options),
+        fowt_env.build_scene("oc3_hywind", wind=spec, **{"fidelity": "reference"} | options),
+        fowt_env.build_scene("oc3_hywind", wind=12.0, **{"fidelity": "reference"} | options),
     )
 
 
@@ -217,7 +226,7 @@ def test_a_scene_with_a_box_takes_another_box_but_no_series():
 
 def test_the_coefficient_table_gets_the_rotor_average_of_a_box():
     spec = {"kind": "box", "u": np.full((120, 9, 11), 12.0), "y": Y, "z": Z, "dt": 0.5, "speed": 12.0}
-    scene = fowt_env.build_scene("oc3_hywind", wind=spec, rotor="table")
+    scene = fowt_env.build_scene("oc3_hywind", wind=spec, rotor="table", fidelity="reference")
     assert scene.model.aero.field is None
     assert scene.model.aero.wind.value[:, 0] == pytest.approx(12.0, abs=1e-5)
 
@@ -247,3 +256,12 @@ def test_a_turbsim_file_whose_head_cannot_be_is_refused_before_it_is_read(tmp_pa
     path.write_bytes(struct.pack(BTS_HEAD, *head) + np.full(12, 12, "<i2").tobytes())
     with pytest.raises(InputError, match=f"box.bts.*{message}"):
         read_box({"kind": "bts", "path": path}, hub_height=90.0, rotor_diameter=126.0)
+
+
+def test_a_profile_is_the_power_law_at_every_time_and_place():
+    """Linear between its points, 1 m apart: within n (1 - n) / 8 (1 m / z)^2 of it, 2.1e-5 at 27 m."""
+    field = profile_field(11.4, 0.14, HUB, DIAMETER)
+    for z in (27.3, 60.0, HUB, 152.9, 190.0):
+        for t, x, y in ((0.0, 0.0, 0.0), (500.0, 30.0, -70.0), (1e4, -30.0, 70.0)):
+            law = 11.4 * (z / HUB) ** 0.14, 0.0, 0.0
+            assert field_at(t, x, y, z, field) == pytest.approx(law, rel=2.1e-5)

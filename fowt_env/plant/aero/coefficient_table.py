@@ -68,10 +68,10 @@ class Coefficients(NamedTuple):
     force_cross: float  # B/2 t_t, on s R^2
     thrust_nn: float  # B/4 r^2 n_nn, on R^2
     thrust_nt: float  # B/2 r n_nt
-    thrust_tt: float  # B/4 n_tt
+    thrust_tt: float  # B/4 n_tt; of leaning blades n_tt + nr^2 n_nn
     torque_nn: float  # B/4 r^3 t_nn, on R^3
     torque_nt: float  # B/2 r^2 t_nt
-    torque_tt: float  # B/4 r t_tt
+    torque_tt: float  # B/4 r t_tt, likewise
     moment_cubic: float  # B/2 r^4 n_n, on s R^3
     force_cubic: float  # B/2 r^3 t_n, on s R^2
     moment_bend_gradient: float  # B/4 r^4 n_nn, on R^3
@@ -86,22 +86,22 @@ N_COEFFICIENTS = len(Coefficients._fields)
 class Leaning(NamedTuple):
     """What cone and prebend add: cross wind along the blades, forces along their radius, moments about it.
 
-    With nx, nr, turn, t_nx, x of a station's Lever (blade_shape.py), m the pitching moment and Q the moment
-    about the shaft, integrals of ...
+    With nx, nr, turn, t_nx, x of a station's Lever (blade_shape.py), t its place across the radius, m the
+    pitching moment and Q the moment about the shaft, integrals of ...
     """
 
     moment_lean: float  # -B/2 turn nr n_n, on s R^2: cross wind meets leaning blades as a gradient does
     force_lean: float  # B/2 nr t_n, on s R
-    out_gradient: float  # B/2 nr nx r n_n, on s R^2
+    out_gradient: float  # B/2 nx (nr r n_n + t t_n), on s R^2
     out_cross: float  # B/2 nr n_t
     out_lean: float  # B/2 nr nr n_n
-    roll_gradient: float  # B/2 nx r (t_nx n_n - x t_n + nx m_n), on s R^3
+    roll_gradient: float  # B/2 nx (r (t_nx n_n - x t_n + nx m_n) + t turn n_n), on s R^3
     roll_cross: float  # B/2 (t_nx n_t - x t_t + nx m_t)
     roll_lean: float  # B/2 nr (t_nx n_n - x t_n + nx m_n)
     thrust_spread: float  # B nr r nx n_n, on s R^2: cross wind that diverges
     torque_spread: float  # B nr r Q_n, on s R^3
-    thrust_both: float  # B/2 nr nx r nx n_nn, on R^2: gradient along the cross wind
-    torque_both: float  # B/2 nr nx r Q_nn, on R^3
+    thrust_both: float  # B/2 nx (nr nx r n_nn - nx t n_nt), on R^2: gradient along the cross wind
+    torque_both: float  # B/2 (nr nx r Q_nn - nx t Q_nt), on R^3
 
 
 N_LEANING = len(Leaning._fields)
@@ -279,7 +279,8 @@ def _fill_curved(theta, blade_pitch, load, lean, rotor, shape):
                 m_n, m_t, _, _, _ = _slopes(low_m / big, m / big, top_m / big, co, si, size)
                 weight = rotor.blades * rotor.weight[j] / (big * big)
                 half, quarter = 0.5 * weight, 0.25 * weight / square
-                q = nx * r  # of a gradient, in v_normal
+                # of a gradient, in v_normal: along the radius, and across it
+                q, aside = nx * r, nx * at.t / big
                 bend = nx * (r * r - MEAN_SQUARE)
                 c[0] += weight * nx * n
                 c[1] += weight * (arm * t - t_nr * n - nr * m / big)
@@ -291,10 +292,10 @@ def _fill_curved(theta, blade_pitch, load, lean, rotor, shape):
                 c[7] += half * t_t
                 c[8] += quarter * nx * q * q * n_nn
                 c[9] += 2.0 * quarter * nx * q * n_nt
-                c[10] += quarter * nx * n_tt
+                c[10] += quarter * nx * (n_tt + nr * nr * n_nn)
                 c[11] += quarter * arm * q * q * t_nn
                 c[12] += 2.0 * quarter * arm * q * t_nt
-                c[13] += quarter * arm * t_tt
+                c[13] += quarter * arm * (t_tt + nr * nr * t_nn)
                 c[14] += half * turn * q * r * r * n_n
                 c[15] += half * q * r * r * t_n
                 c[16] += quarter * turn * nx * q * r * r * n_nn
@@ -303,17 +304,17 @@ def _fill_curved(theta, blade_pitch, load, lean, rotor, shape):
                 c[19] += quarter * nx * r * r * t_nt
                 d[0] += half * turn * nr * n_n
                 d[1] += half * nr * t_n
-                d[2] += half * nr * q * n_n
+                d[2] += half * (nr * q * n_n + aside * t_n)
                 d[3] += half * nr * n_t
                 d[4] += half * nr * nr * n_n
                 about_n, about_t = t_nx * n_n - x * t_n + nx * m_n, t_nx * n_t - x * t_t + nx * m_t
-                d[5] += half * q * about_n
+                d[5] += half * (q * about_n - aside * turn * n_n)
                 d[6] += half * about_t
                 d[7] += half * nr * about_n
                 d[8] += weight * nr * r * nx * n_n
                 d[9] += weight * nr * r * (arm * t_n - t_nr * n_n - nr * m_n)
-                d[10] += 2.0 * quarter * nr * q * nx * n_nn
-                d[11] += 2.0 * quarter * nr * q * arm * t_nn
+                d[10] += 2.0 * quarter * nx * (nr * q * n_nn - aside * n_nt)
+                d[11] += 2.0 * quarter * arm * (nr * q * t_nn - aside * t_nt)
 
 
 _tables = Cache(8)  # one per set of blade elements: building takes about two seconds

@@ -27,6 +27,7 @@ from numba import types  # noqa: E402
 from numba.core.ccallback import CFunc  # noqa: E402
 
 from fowt_env.folders import cache_root, distrust, make_private  # noqa: E402
+from fowt_env.layout import PACKAGE, installed_path  # noqa: E402
 from fowt_env.plant.compile.disk_cache import KernelCache  # noqa: E402
 from fowt_env.plant.compile.linked import LinkedDispatcher  # noqa: E402
 from fowt_env.plant.compile.notice import NOTICE  # noqa: E402, F401  # listens from here on
@@ -38,14 +39,13 @@ UNUSED = 30 * DAY  # s after which a folder of older sources goes, however few t
 MARKER = "made_by_fowt_env"  # a file in each folder that this module makes, and may therefore remove
 OWN_NAME = re.compile("[0-9a-f]{16}")
 PLANT = Path(__file__).absolute().parents[1]
-PACKAGE = PLANT.parent
 
 
 def _hash(paths):
     """Hash (16 hexadecimal digits) of sources and of the versions that shape machine code."""
     digest = hashlib.sha256(f"{numba.__version__} {sys.version}".encode())
-    for path in paths:
-        digest.update(path.relative_to(PACKAGE).as_posix().encode())
+    for place, path in sorted((installed_path(path), path) for path in paths):
+        digest.update(place.relative_to(PACKAGE).as_posix().encode())
         digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
 
@@ -106,13 +106,26 @@ def _cache_folder(sources):
     return folder
 
 
-CACHE_FOLDER = _cache_folder(sorted(PLANT.rglob("*.py")))
+CACHE_FOLDER = _cache_folder(PLANT.rglob("*.py"))
+
+
+def kernels_compiled():
+    """Return whether this version's kernels are on disk already, for at least one kind of scene."""
+    if numba.config.DISABLE_JIT:
+        return True
+    return CACHE_FOLDER is not None and any(CACHE_FOLDER.rglob("*.nbi"))
 
 
 @cache
-def _outside_hash(path):
-    """Hash of a source of this package outside the plant, with all that it imports outside the plant."""
-    return _hash(imported_at_top(Path(path), PACKAGE.parent, PLANT))
+def _stamp(path):
+    """Return the hash of a source outside the plant and of all that it imports there.
+
+    "" for a source of the plant, which CACHE_FOLDER stands for; None for one that is not of this package.
+    """
+    path = Path(path)
+    if installed_path(path) is None:
+        return None
+    return "" if PLANT in path.parents else _hash(imported_at_top(path, PLANT))
 
 
 def _keep(compiled, function):
@@ -120,11 +133,9 @@ def _keep(compiled, function):
 
     A user's function is not: it may use helpers and numbers of any file.
     """
-    path = os.path.abspath(function.__code__.co_filename)
-    if CACHE_FOLDER is None or not path.startswith(f"{PACKAGE}{os.sep}"):
-        return
-    stamp = "" if path.startswith(f"{PLANT}{os.sep}") else _outside_hash(path)
-    compiled._cache = KernelCache(function, CACHE_FOLDER, stamp, isinstance(compiled, LinkedDispatcher))
+    stamp = CACHE_FOLDER and _stamp(os.path.abspath(function.__code__.co_filename))
+    if stamp is not None:
+        compiled._cache = KernelCache(function, CACHE_FOLDER, stamp, isinstance(compiled, LinkedDispatcher))
 
 
 def _decorator(linked=False, **options):

@@ -88,12 +88,15 @@ def _check(path):
 
 
 class _Locator(caching.UserProvidedCacheLocator):
-    """Where a kernel's files are: in the folder that it is given, and not where numba's settings say."""
+    """Where a kernel's files are: in the folder that it is given, and not where numba's settings say.
+
+    Named by the package, not by the path: other installations of the same sources load what one compiled.
+    """
 
     def __init__(self, function, path, folder, stamp):
         self._py_file = path
         self._lineno = function.__code__.co_firstlineno
-        self._cache_path = os.path.join(folder, self.get_suitable_cache_subpath(path))
+        self._cache_path = os.path.join(folder, function.__module__.rpartition(".")[0])
         self._stamp = stamp
 
     def get_source_stamp(self):

@@ -1,9 +1,10 @@
 """What users are told while kernels are compiled, wherever they call from, and a slower collector meanwhile.
 
 Nothing is printed, and no thread runs, unless kernels of this project are compiled: those on disk are
-silent. The environment variable FOWT_QUIET and set_quiet switch it off. It goes to stderr alone: two lines,
-the second at the end, and between them on a terminal and in Jupyter a line that counts. How many kernels are
-left is not known before the last one is compiled, so what is shown is how many are done.
+silent. The environment variable FOWT_QUIET and set_quiet switch it off. It goes to stderr alone: a line at
+the start, one at the end, and between them a line that counts. A terminal has it drawn over every REDRAW
+seconds; a log, a pipe or a notebook, which keeps each write as an output, gets one every REPEAT seconds.
+How many kernels are left is not known before the last one is compiled, so what is shown is how many are done.
 """
 
 import atexit
@@ -13,6 +14,7 @@ import os
 import sys
 import threading
 import time
+from collections.abc import Callable
 from contextlib import contextmanager, suppress
 
 from numba.core import event
@@ -21,7 +23,8 @@ COMPILING_MESSAGE = "compiling kernels (first run of this kind of scene only, 5 
 NAME = "fowt_env: "
 DELAY = 1.0  # s of compiling after which the user is told: a kernel or two take less
 PAUSE = 2.0  # s without compiling after which it counts as ended
-REDRAW = 0.2  # s
+REDRAW = 0.2  # s between counts on a terminal
+REPEAT = 15.0  # s between counts where lines stay
 # While kernels are compiled numba makes millions of objects that stay, over which Python's collector goes
 # again and again: a seventh of the time at its usual threshold of some hundreds.
 COLLECT_AFTER = 200_000
@@ -32,17 +35,12 @@ def own(compiled):
     return (compiled.data["dispatcher"].py_func.__module__ or "").startswith("fowt_env.")
 
 
-def _in_jupyter():
-    shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
-    return type(shell).__name__ == "ZMQInteractiveShell"
-
-
 def _redraws(stream):
-    """Whether a line can be written over: not in rich's live displays, which wait for its end."""
+    """Return whether a line can be written over: not in rich's live displays, which wait for its end."""
     if type(stream).__name__ == "FileProxy":
         return False
     with suppress(Exception):
-        return stream.isatty() or _in_jupyter()
+        return stream.isatty()
     return False
 
 
@@ -51,9 +49,9 @@ class Notice(event.Listener):
 
     def __init__(self):
         self.quiet = False  # by set_quiet
-        self.held = 0  # contexts in which somebody else says it
+        self.counters = []  # of the contexts in which somebody else says it
         self.depth = 0  # of kernels that are being compiled for kernels
-        self.count = 0  # compiled since `began`
+        self.count = 0  # compiled since `_begin`
         self.spent = 0.0  # s, by those at the top
         self.started = self.ended = 0.0  # of the last one at the top
         self.thread = None
@@ -83,6 +81,8 @@ class Notice(event.Listener):
             return
         self.count += 1
         self.depth -= 1
+        for counter in self.counters:
+            counter()
         if self.depth > 0:
             return
         self.ended = time.monotonic()
@@ -95,7 +95,7 @@ class Notice(event.Listener):
 
     def _begin(self):
         self.count, self.spent = 0, 0.0
-        if self.quiet or self.held or os.environ.get("FOWT_QUIET", "0") not in ("", "0"):
+        if self.quiet or self.counters or os.environ.get("FOWT_QUIET", "0") not in ("", "0"):
             return
         if multiprocessing.parent_process() is not None:  # which says it
             return
@@ -105,19 +105,23 @@ class Notice(event.Listener):
 
     def _watch(self):
         """Tell the user, from a thread of its own: half the wait is one call of LLVM's."""
-        told = False
+        told = None  # s of compiling at the last line that stays
         while not self.stop.wait(REDRAW):
             now = time.monotonic()
             working = self.depth > 0
             spent = self.spent + (now - self.started if working else 0.0)
-            if not told and spent >= DELAY and not self.held:
-                told = True
-                self._write(f"{NAME}{COMPILING_MESSAGE}\n")
-            elif told and working:
+            if told is None:
+                if spent >= DELAY and not self.counters:
+                    told = spent
+                    self._write(f"{NAME}{COMPILING_MESSAGE}\n")
+            elif working and _redraws(sys.stderr):
                 self._draw(f"{NAME}{self.count} kernels compiled, {spent:.0f} s ")
+            elif working and spent >= told + REPEAT:
+                told = spent
+                self._write(f"{NAME}{self.count} kernels compiled, {spent:.0f} s ...\n")
             if not working and now - self.ended > PAUSE:
                 break
-        if told:
+        if told is not None:
             self._write(f"{NAME}{self.count} kernels compiled in {self.spent:.0f} s\n")
 
     def _write(self, text):
@@ -127,7 +131,7 @@ class Notice(event.Listener):
 
     def _draw(self, text):
         with self.writing:
-            if self.depth > 0 and _redraws(sys.stderr):
+            if self.depth > 0:
                 self._put("\r" + text.ljust(self.drawn))
                 self.drawn = len(text)
 
@@ -160,10 +164,17 @@ def set_quiet(quiet: bool = True) -> None:
 
 
 @contextmanager
-def told_otherwise():
-    """Context in which the caller says that kernels are compiled."""
-    NOTICE.held += 1
+def compilation_reported(said: Callable[[int], object]):
+    """Context in which nothing is printed: each compiled kernel calls said(kernels compiled within it)."""
+    count = 0
+
+    def counter():
+        nonlocal count
+        count += 1
+        said(count)
+
+    NOTICE.counters.append(counter)
     try:
         yield
     finally:
-        NOTICE.held -= 1
+        NOTICE.counters.remove(counter)

@@ -8,14 +8,16 @@ as long; the project has no relative imports, and none in a condition that a ker
 import re
 from functools import cache
 
+from fowt_env.layout import module_path
+
 MODULE = r"(fowt_env(?:\.\w+)*)"
 STATEMENT = re.compile(rf"^(?:from {MODULE} import (\([^)]*\)|.*)|import {MODULE})", re.MULTILINE)
 COMMENT = re.compile("#.*")
 NAME = re.compile(r"(\w+)(?: as \w+)?")
 
 
-def imported_at_top(path, root, but):
-    """Sorted paths of a source of fowt_env, which lies in a folder `root`, and of all that it imports.
+def imported_at_top(path, but):
+    """Return the paths of a source of fowt_env and of all that it imports of this project.
 
     but: a folder whose sources are neither followed nor among them.
     """
@@ -25,23 +27,23 @@ def imported_at_top(path, root, but):
         if path in found or but in path.parents:
             continue
         found.add(path)
-        left += _imported(path, root)
-    return sorted(found)
+        left += _imported(path)
+    return found
 
 
 @cache  # some twenty modules with kernels of their own import much the same
-def _imported(path, root):
+def _imported(path):
     """Sources that the statements of one source name."""
     found = []
     for source, names, module in STATEMENT.findall(path.read_text(encoding="utf-8")):
         inner = NAME.findall(COMMENT.sub("", names))
         for dotted in (source or module, *(f"{source}.{name}" for name in inner)):
-            found += _files(dotted, root)
+            found += _files(dotted)
     return tuple(found)
 
 
 @cache
-def _files(module, root):
+def _files(module):
     """Source of a module; nothing for what is no module. The packages around it give it no name to use."""
-    place = root.joinpath(*module.split("."))
+    place = module_path(module)
     return [file for file in (place / "__init__.py", place.with_suffix(".py")) if file.is_file()]

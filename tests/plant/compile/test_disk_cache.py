@@ -10,16 +10,16 @@ from pathlib import Path
 
 import numba
 import pytest
-from copied_code import LOOKS, PACKAGES, copied_code, edit
+from copied_code import LOOKS, SOURCES, copied_code, edit
 
-import fowt_env
+from fowt_env.layout import PACKAGE, installed_path, module_path
 from fowt_env.plant.compile import disk_cache
-from fowt_env.plant.compile.announcement import COMPILING_MESSAGE, compilation_announced
-from fowt_env.plant.compile.decorators import KEEP_CACHES, MARKER, PLANT
+from fowt_env.plant.compile.decorators import KEEP_CACHES, MARKER
 from fowt_env.plant.compile.disk_cache import SharedCacheFile
+from fowt_env.plant.compile.notice import compilation_reported
 from fowt_env.plant.compile.sources import imported_at_top
 
-ROOT = Path(fowt_env.__file__).resolve().parent.parent
+ROOT = PACKAGE.parent
 SMALL = """
 from fowt_env.plant.compile.decorators import entry
 from fowt_env.plant.hydro.waves import ramp_factor
@@ -36,11 +36,11 @@ DAY = 86400.0
 DECAY = """
 import sys
 from fowt_env import build_scene, simulate
-from fowt_env.plant.compile.announcement import compilation_announced
+from fowt_env.plant.compile.notice import compilation_reported
 said = []
-with compilation_announced(said.append):
+with compilation_reported(said.append):
     frame = simulate(build_scene(), None, duration=2.0, start="zero", initial={"PtfmPitch": 5.0})
-print(frame.to_numpy().tobytes().hex()[-4000:], len(said))
+print(frame.to_numpy().tobytes().hex()[-4000:], int(bool(said)))
 """
 
 
@@ -119,18 +119,18 @@ def test_nothing_goes_that_this_package_did_not_make(tmp_path):
     assert own == list(range(100, 100 + KEEP_CACHES))  # while those that it made do go, but the newest
 
 
-def test_the_first_kernel_that_is_compiled_is_announced_once():
+def test_each_kernel_that_is_compiled_is_counted_once():
     def double(x):
         return 2.0 * x
 
     double.__module__ = "fowt_env.not_on_disk"
     said, compiled = [], numba.njit(double)
-    with compilation_announced(said.append):
+    with compilation_reported(said.append):
         assert compiled(1.0) == 2.0 and compiled(1) == 2.0
-    assert said == [COMPILING_MESSAGE]
-    with compilation_announced(said.append):
+    assert said == [1, 2]
+    with compilation_reported(said.append):
         assert compiled(2.0) == 4.0
-    assert len(said) == 1
+    assert len(said) == 2
 
 
 def test_a_folder_that_cannot_be_made_is_done_without(tmp_path):
@@ -364,8 +364,8 @@ def test_another_way_of_numba_to_keep_code_is_noticed(monkeypatch, tmp_path):
 def test_kernels_outside_the_plant_are_kept_until_what_they_import_changes(tmp_path):
     """Their sources do not shape the name of the folder."""
     code = copied_code(tmp_path)
-    (code / "training" / "numbers.py").write_text("GAIN = 1.0\n")
-    (code / "training" / "study.py").write_text(
+    (code / "fowt_env" / "training" / "numbers.py").write_text("GAIN = 1.0\n")
+    (code / "fowt_env" / "training" / "study.py").write_text(
         "from fowt_env.plant.compile.decorators import entry\nfrom fowt_env.training.numbers import GAIN\n"
         "@entry\ndef amplified(x):\n    return GAIN * x\n"
     )
@@ -375,10 +375,10 @@ def test_kernels_outside_the_plant_are_kept_until_what_they_import_changes(tmp_p
     )
     for expected in (["2.0", "0"], ["2.0", "1"]):
         assert output(start(program, tmp_path / "cache", code)) == expected
-    with (code / "training" / "cli" / "app.py").open("a") as text:
+    with (code / "fowt_env" / "training" / "cli" / "app.py").open("a") as text:
         text.write("\n# an edit of what is not compiled\n")
     assert output(start(program, tmp_path / "cache", code)) == ["2.0", "1"]
-    (code / "training" / "numbers.py").write_text("GAIN = 10.0\n")
+    (code / "fowt_env" / "training" / "numbers.py").write_text("GAIN = 10.0\n")
     for expected in (["20.0", "0"], ["20.0", "1"]):
         assert output(start(program, tmp_path / "cache", code)) == expected
     assert len(list((tmp_path / "cache" / "kernels").iterdir())) == 1
@@ -386,12 +386,13 @@ def test_kernels_outside_the_plant_are_kept_until_what_they_import_changes(tmp_p
 
 KEYS = """
 import re
-from fowt_env.plant.compile.decorators import CACHE_FOLDER, PACKAGE, PLANT, _outside_hash
+from fowt_env.layout import FOLDERS, PACKAGE, installed_path
+from fowt_env.plant.compile.decorators import CACHE_FOLDER, PLANT, _stamp
 compiled = re.compile("^@(inlined_kernel|kernel|entry|parallel_entry|control_kernel)$", re.MULTILINE)
-for room in (PACKAGE, PACKAGE / "controllers", PACKAGE / "training"):  # the last two may be links
+for room in (PACKAGE, *FOLDERS.values()):
     for path in room.rglob("*.py"):
         if PLANT not in path.parents and compiled.search(path.read_text()):
-            print(path.relative_to(PACKAGE).as_posix(), _outside_hash(str(path)))
+            print(installed_path(path).relative_to(PACKAGE).as_posix(), _stamp(str(path)))
 print("folder", CACHE_FOLDER.name)
 print("loaded")
 """
@@ -442,9 +443,8 @@ def test_kernels_of_other_sources_of_the_plant_are_never_used(tmp_path):
 def _module_files():
     """{module name: path} of the package."""
     files = {}
-    for path in (path for package in PACKAGES for path in (ROOT / package).rglob("*.py")):
-        parts = path.relative_to(ROOT).with_suffix("").parts
-        parts = parts if parts[0] == "fowt_env" else ("fowt_env", *parts)
+    for path in (path for source in SOURCES for path in source.rglob("*.py")):
+        parts = installed_path(path).relative_to(ROOT).with_suffix("").parts
         files[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
     return files
 
@@ -473,9 +473,8 @@ def test_imports_are_found_as_a_parser_finds_them(name):
         if module not in seen:
             seen.add(module)
             waiting += _imported_at_the_top(files[module], files)
-    start = PLANT.parent.joinpath(*name.split(".")).with_suffix(".py")
-    found = imported_at_top(start, PLANT.parent.parent, but=Path("nothing"))
-    found, expected = {path.resolve() for path in found}, {files[module] for module in seen}
+    start = module_path(f"fowt_env.{name}").with_suffix(".py")
+    found, expected = imported_at_top(start, but=Path("nothing")), {files[module] for module in seen}
     assert expected <= found and all(path.name == "__init__.py" for path in found - expected)
 
 
@@ -484,7 +483,7 @@ def test_the_plant_imports_nothing_of_this_project_that_could_be_compiled_into_i
     plant = {name for name in files if name.startswith("fowt_env.plant")}
     outside = set().union(*(_imported_at_the_top(files[name], files) for name in plant)) - plant
     # what raises errors, finds folders and keeps tables is Python's alone: numba could not compile it
-    assert outside == {"fowt_env.errors", "fowt_env.folders", "fowt_env.caches"}
+    assert outside == {"fowt_env.errors", "fowt_env.folders", "fowt_env.caches", "fowt_env.layout"}
 
 
 def test_broken_files_are_compiled_anew(tmp_path):

@@ -11,7 +11,7 @@ from types import SimpleNamespace
 import pytest
 
 from fowt_env.plant.compile import notice
-from fowt_env.plant.compile.notice import COLLECT_AFTER, COMPILING_MESSAGE, Notice, told_otherwise
+from fowt_env.plant.compile.notice import COLLECT_AFTER, COMPILING_MESSAGE, Notice, compilation_reported
 
 
 def kernel(module="fowt_env.plant.of_a_test"):
@@ -80,6 +80,14 @@ def test_a_terminal_counts_between_them_and_is_left_clean(watched):
     assert erased.strip() == "" and len(erased) >= len("fowt_env: 0 kernels compiled, 0 s")
 
 
+def test_a_log_gets_a_line_now_and_then_so_that_a_long_wait_does_not_look_hung(watched, monkeypatch):
+    monkeypatch.setattr(notice, "REPEAT", 0.1)
+    first, *between, last = watched(0.5).splitlines()
+    assert first == f"fowt_env: {COMPILING_MESSAGE}"
+    assert 2 <= len(between) <= 5 and all("kernels compiled, 0 s ..." in line for line in between)
+    assert last.startswith("fowt_env: 2 kernels compiled in")
+
+
 def test_a_live_display_that_waits_for_whole_lines_gets_no_counting(watched):
     class FileProxy(Terminal):
         """As rich calls what it puts in place of stderr."""
@@ -99,7 +107,7 @@ def test_it_can_be_silenced(watched, monkeypatch, how):
         monkeypatch.setattr(notice.multiprocessing, "parent_process", lambda: object())
     else:
         monkeypatch.setattr(notice, "NOTICE", told)
-        with told_otherwise():
+        with compilation_reported(lambda count: None):
             assert watched(0.2, told=told) == ""
     if how != "context":
         assert watched(0.2, told=told) == ""

@@ -36,15 +36,22 @@ def _tuples(value):
 
 def test_without_one_nothing_changes_a_bit():
     x = random_state(np.random.default_rng(1), 15, speed=2.0, turning=0.2)
-    plain, zero = (rates(build_scene(platform_with(m)), x) for m in (None, np.zeros((6, 6))))
+    plain, zero = (
+        rates(build_scene(platform_with(m), fidelity="reference"), x) for m in (None, np.zeros((6, 6)))
+    )
     assert np.array_equal(plain, zero)
-    assert build_scene(platform_with(np.zeros((6, 6)))).model.hydro.added_inertia is None
+    assert (
+        build_scene(platform_with(np.zeros((6, 6))), fidelity="reference").model.hydro.added_inertia is None
+    )
 
 
 def test_accelerations_are_those_of_the_equation_of_motion_with_that_matrix_and_its_momentum():
     """(M + A + A_0) a = (M + A) a_plain - C(A_0) nu, with the rotor row of the mass matrix eliminated."""
     x = random_state(np.random.default_rng(2), 15, speed=2.0, turning=0.2)
-    plain, heavy = build_scene(platform_with(None)), build_scene(platform_with(ROWS))
+    plain, heavy = (
+        build_scene(platform_with(None), fidelity="reference"),
+        build_scene(platform_with(ROWS), fidelity="reference"),
+    )
     a, b = rates(plain, x), rates(heavy, x)
     body = plain.model.rigid_body
     handle = plain.handle(data := plain.data())

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from plant_helpers import random_state, rates
 
-from fowt_env import build_scene
+from fowt_env import build_scene, trim
 from fowt_env.descriptions.platform import AdditionalLoads, read_platform
-from fowt_env.plant.hydro.body_matrices import BodyMatrices, build_body_matrices
+from fowt_env.plant.hydro.body_matrices import build_body_matrices
 from fowt_env.plant.state import State, pose_of
 
 RNG = np.random.default_rng(5)
@@ -24,7 +24,19 @@ def mass_like():
     return s @ a @ a.T @ s
 
 
-PART = BodyMatrices(RNG.normal(size=6) * 1e6, matrix(), matrix(), matrix(), mass_like())
+PRELOAD, ADDED = RNG.normal(size=6) * 1e6, mass_like()
+STIFFNESS, LINEAR, QUADRATIC = matrix(), matrix(), matrix()
+for damping in (LINEAR, QUADRATIC):
+    np.fill_diagonal(damping, np.abs(np.diag(damping)))
+
+
+def with_loads(**loads):
+    """OC3-Hywind in still water with AdditionalLoads."""
+    rows = {name: tuple(map(tuple, value)) if np.ndim(value) == 2 else value for name, value in loads.items()}
+    return build_scene(
+        read_platform("oc3_hywind").model_copy(update={"additional": AdditionalLoads(**rows)}),
+        fidelity="reference",
+    )
 
 
 def rotation(x):
@@ -34,9 +46,10 @@ def rotation(x):
 
 def test_accelerations_are_those_of_the_matrices_turned_from_inertial_axes():
     """Twin in plain numpy: force of (q, R v, R w), mass on the accelerations R (v' + w x v) and R w'."""
-    scene = build_scene("oc3_hywind")
-    base = read_platform("oc3_hywind").model_copy(update={"additional": AdditionalLoads(preload=(1.0,) * 6)})
-    linear = build_scene(base).with_model({"hydro.matrices": PART})
+    scene = build_scene("oc3_hywind", fidelity="reference")
+    linear = with_loads(
+        preload=PRELOAD, stiffness=STIFFNESS, linear_damping=LINEAR, quadratic_damping=QUADRATIC
+    ).with_model({"hydro.matrices.added_mass": ADDED})
     x = random_state(np.random.default_rng(2), 15, speed=2.0, turning=0.2)
     handle = scene.handle(data := scene.data())
     plain, other = rates(scene, x, handle=handle)[VELOCITY], rates(linear, x)[VELOCITY]
@@ -47,12 +60,21 @@ def test_accelerations_are_those_of_the_matrices_turned_from_inertial_axes():
     both = np.kron(np.eye(2), turn)
     v, w = x[State.VX : State.VZ + 1], x[State.WX : State.WZ + 1]
     q, rate = x[:6], both @ np.r_[v, w]
-    force = PART.constant - PART.stiffness @ q - PART.linear_damping @ rate
-    force -= PART.quadratic_damping @ (np.abs(rate) * rate)
-    force -= PART.added_mass @ np.r_[turn @ np.cross(w, v), np.zeros(3)]
-    turned = both.T @ PART.added_mass @ both
+    force = PRELOAD - STIFFNESS @ q - LINEAR @ rate - QUADRATIC @ (np.abs(rate) * rate)
+    force -= ADDED @ np.r_[turn @ np.cross(w, v), np.zeros(3)]
+    turned = both.T @ ADDED @ both
     expected = np.linalg.solve(mass + turned, mass @ plain + both.T @ force)
     assert other == pytest.approx(expected, rel=1e-9, abs=1e-12)
+
+
+def test_a_preload_moves_a_floater_to_where_its_stiffness_balances_it():
+    """K^-1 (F, M), but for the give of lines and water, a part in 10,000 of this stiffness."""
+    spring = np.diag([1e9, 1e9, 1e10, 1e14, 1e14, 1e13])
+    spring[0, 4] = spring[4, 0] = -3e10
+    preload = np.array([2e8, 0.0, 0.0, 0.0, 4e12, 0.0])
+    free, pushed = (trim(with_loads(stiffness=spring, preload=load)) for load in (np.zeros(6), preload))
+    moved = pushed.state[:6] - free.state[:6]
+    assert moved == pytest.approx(np.linalg.solve(spring, preload), rel=1e-3, abs=1e-4)
 
 
 def test_buoyancy_acts_at_the_centre_of_buoyancy_of_the_undisplaced_body():
@@ -67,4 +89,4 @@ def test_buoyancy_acts_at_the_centre_of_buoyancy_of_the_undisplaced_body():
 
 def test_a_platform_without_them_has_no_such_part():
     assert build_body_matrices(None, None, 1025.0, 9.81) is None
-    assert build_scene("oc3_hywind").model.hydro.matrices is None
+    assert build_scene("oc3_hywind", fidelity="reference").model.hydro.matrices is None

@@ -300,19 +300,26 @@ def test_integrated_force_and_moment_are_the_columns_of_the_published_table(plat
 def test_absent_option_adds_no_part():
     sea = {"kind": "regular", "H": 3.0, "T": 5.0}
     for given in ({}, {"diffraction": None}, {"diffraction": "none"}):
-        model = build_scene(sea=sea, **given).model
+        model = build_scene(sea=sea, **{"fidelity": "reference"} | given).model
         assert model.hydro.strips.diffraction is None
-    assert build_scene(sea=None, diffraction="maccamy_fuchs").model.hydro.strips.diffraction is None
+    assert (
+        build_scene(
+            sea=None, diffraction="maccamy_fuchs", fidelity="reference"
+        ).model.hydro.strips.diffraction
+        is None
+    )
     with pytest.raises(InputError, match="diffraction = 'mcf': allowed None, 'none', 'maccamy_fuchs'"):
-        build_scene(sea=sea, diffraction="mcf")
+        build_scene(sea=sea, diffraction="mcf", fidelity="reference")
 
 
 @pytest.mark.parametrize("fidelity", ["reference", "standard"])
 def test_new_weather_has_the_diffraction_of_a_scene_built_with_it(fidelity):
     sea = {"kind": "jonswap", "Hs": 5.0, "Tp": 9.0}
     options = dict(fidelity=fidelity, diffraction="maccamy_fuchs", wave_components=30)
-    moved = build_scene(sea={"kind": "jonswap", "Hs": 3.0, "Tp": 6.0}, **options).with_weather(None, sea, 3)
-    built = build_scene(sea=sea, seed=3, **options)
+    moved = build_scene(
+        sea={"kind": "jonswap", "Hs": 3.0, "Tp": 6.0}, **{"fidelity": "reference"} | options
+    ).with_weather(None, sea, 3)
+    built = build_scene(sea=sea, seed=3, **{"fidelity": "reference"} | options)
     strips = moved.model.hydro.strips
     assert np.array_equal(strips.diffraction.series, built.model.hydro.strips.diffraction.series)
     assert isinstance(strips, ExactStrips if fidelity == "reference" else BandedStrips)
@@ -338,7 +345,10 @@ def test_regular_wave_of_five_seconds_lags_more_than_the_panel_model():
     harmonics = []
     for diffraction in (None, "maccamy_fuchs"):
         scene = build_scene(
-            "oc3_hywind_openfast", sea={"kind": "regular", "H": 3.0, "T": 5.0}, diffraction=diffraction
+            "oc3_hywind_openfast",
+            sea={"kind": "regular", "H": 3.0, "T": 5.0},
+            diffraction=diffraction,
+            fidelity="reference",
         )
         frame = simulate(scene, None, duration=600.0, dt=0.05, start="zero")
         harmonics.append([first_harmonic(frame, name, 5.0) for name in ("PtfmSurge_[m]", "PtfmPitch_[deg]")])

@@ -62,7 +62,7 @@ def test_every_figure_of_a_description_has_its_power_of_the_scale():
 
 
 def test_natural_periods_grow_with_the_root_of_the_scale():
-    small, large = (natural_periods(build_scene(name)) for name in ("oc3_hywind", NAME))
+    small, large = (natural_periods(build_scene(name, fidelity="reference")) for name in ("oc3_hywind", NAME))
     for motion, period in small.items():
         assert large[motion] == pytest.approx(period * sqrt(SCALE), rel=1e-5), motion
 
@@ -98,7 +98,7 @@ def test_a_scaled_model_of_a_user_stands_in_a_folder_of_its_own(tmp_path):
     path = write(0.5, tmp_path, "half")
     platform = read_platform(path)
     assert platform.environment.water_depth == 160.0
-    assert build_scene(path, wind=8.0).turbine.rotor.tip_radius == 31.5
+    assert build_scene(path, wind=8.0, fidelity="reference").turbine.rotor.tip_radius == 31.5
 
 
 @pytest.mark.parametrize("scale", [0.0, -1.0, float("nan"), 1e9])

@@ -42,7 +42,7 @@ def verdicts(runs, natural):
 
 
 def test_the_six_computed_periods_of_table_1_are_met_within_half_a_percent():
-    periods = fowt_env.natural_periods(fowt_env.build_scene(load_cases.PLATFORM))
+    periods = fowt_env.natural_periods(fowt_env.build_scene(load_cases.PLATFORM, fidelity="reference"))
     assert periods == pytest.approx(TABLE_1, rel=0.005)
 
 
@@ -57,7 +57,7 @@ def test_only_lines_hold_the_model_and_all_of_their_parameters_are_positive(mode
 
 
 def test_the_model_floats_at_its_design_draft():
-    point = fowt_env.trim(fowt_env.build_scene(load_cases.PLATFORM))
+    point = fowt_env.trim(fowt_env.build_scene(load_cases.PLATFORM, fidelity="reference"))
     # the nacelle's offset leans it by a tenth of a degree, which lowers it a little
     assert abs(point["PtfmHeave"]) < 1e-4
 
@@ -78,7 +78,7 @@ def test_the_model_is_oc3_hywind_by_froude_but_for_what_was_identified(model):
 
 
 def test_rated_thrust_is_froude_scaled_in_lc2_with_the_one_polar_factor(model):
-    scene = fowt_env.build_scene(model, wind=3.36)
+    scene = fowt_env.build_scene(model, wind=3.36, fidelity="reference")
     point = trim_prescribed(scene, 85.6 * np.pi / 30.0, 0.0, platform="fixed")
     assert point["RtFldFxh"] == pytest.approx(703e3 / 50.0**3 * 1000.0 / 1025.0, rel=1e-4)
 
@@ -96,7 +96,7 @@ def test_the_committed_model_is_what_the_identification_gives(model):
 
 def test_a_driven_rotor_turns_the_platform_as_equation_20_says(model):
     # difference to a standing rotor: M1 nu' = -H (0, 0, 0, w_b', w_b w_z, -w_b w_y) with w_b' = 0
-    scene = fowt_env.build_scene(model, hydrodynamics=False, mooring=False)
+    scene = fowt_env.build_scene(model, hydrodynamics=False, mooring=False, fidelity="reference")
     body = scene.model.rigid_body._replace(rotor_fixed=True)
     scene = scene.with_model(rigid_body=body)
     spinning = state(vx=0.1, wy=0.2, wz=-0.3, rotor_speed=8.96)

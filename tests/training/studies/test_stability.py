@@ -1,6 +1,7 @@
 """The stability study on small counts: that it measures what it says, and that it would notice a failure."""
 
 import json
+import re
 
 import numpy as np
 import pandas as pd
@@ -217,10 +218,19 @@ def test_a_rotor_without_torque_and_pitch_runs_away_and_the_verdict_says_so(scen
     assert row["finite"] and "overspeed" in row["verdict"]
 
 
-def test_every_extreme_can_be_built():
+def test_every_extreme_has_the_wind_and_the_fault_of_its_name():
     scene = build_scene(wind=18.0, sea=CALM, fidelity="standard", duration=extremes.DURATION)
-    for case in extremes.EXTREMES.values():
-        scene.with_weather(case.wind, case.sea, 1)
+    for name, case in extremes.EXTREMES.items():
+        built = scene.with_weather(case.wind, case.sea, 1)
+        u, v = built.model.aero.wind.value[:, :2].T
+        said = {unit: float(number) for number, unit in re.findall(r"([\d.]+) (m/s|deg off)", name)}
+        if "m/s" in said:
+            assert built.wind_speed == said["m/s"], name
+        if "deg off" in said:
+            off = np.degrees(np.arctan2(v.mean(), u.mean())) - said["deg off"]
+            assert abs((off + 180.0) % 360.0 - 180.0) < 2.0, name
+        assert case.parked == name.endswith("parked"), name
+        assert f"line {case.line + 1} lost" in name if case.fault == "line loss" else case.fault in name, name
 
 
 def test_hostile_actions_are_counted_and_no_numbers_are_refused():
