@@ -11,8 +11,12 @@ import warnings
 from hashlib import sha1
 from html import escape, unescape
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
+from mkdocs.plugins import event_priority
 from mkdocs.structure.files import File
+
+from fowt_env.layout import FOLDERS, PACKAGE
 
 with warnings.catch_warnings():  # it still asks for its fonts by importlib.resources.path; mkdocs shows that
     warnings.simplefilter("ignore", DeprecationWarning)
@@ -34,16 +38,29 @@ FORMULA = re.compile(r'<(span|div) class="arithmatex">\\([(\[])(.*?)\\[)\]]</\1>
 SYMBOL = re.compile(r'<symbol id="([^"]+)"(.*?</symbol>)', re.S)
 BOX = re.compile(r'<svg([^>]*?) width="([^"]+)" height="([^"]+)" viewBox="(\S+) (\S+) (\S+) (\S+)">')
 SIZE = 18  # of a formula's letters in its drawing, to which its measures refer
+SOURCES = TemporaryDirectory(prefix="fowt-docs-")  # removed when the site is built
 TAG = re.compile(r"\\tag\{([^}]*)\}")
 
 
+@event_priority(100)  # ahead of mkdocstrings, which reads its paths then
 def on_config(config):
-    """The configuration with the examples in the contents."""
+    """Return the configuration with the examples in the contents and the sources of the API pages."""
+    config.plugins["mkdocstrings"].config.handlers["python"]["paths"] = [_installed_package()]
     (tutorials,) = (
         part["Tutorials"] for part in config.nav if isinstance(part, dict) and "Tutorials" in part
     )
     tutorials.append({"Examples": ["examples/index.md", *sorted(EXAMPLES.values())]})
     return config
+
+
+def _installed_package():
+    """Return a folder with fowt_env as it is installed, by links: mkdocstrings reads sources, not modules."""
+    place = Path(SOURCES.name, "fowt_env")
+    place.mkdir(exist_ok=True)
+    for path in (*PACKAGE.iterdir(), *FOLDERS.values()):
+        if not (place / path.name).exists():
+            (place / path.name).symlink_to(path)
+    return SOURCES.name
 
 
 def on_files(files, config):

@@ -236,14 +236,14 @@ def identify(turbine=TURBINE):
 
     def misses(logarithms):
         platform = candidate(base, above, f, np.exp(logarithms))
-        periods = natural_periods(build_scene(platform))
+        periods = natural_periods(build_scene(platform, fidelity="reference"))
         return [np.log(periods[name] / PERIODS[name]) for name in wanted]
 
     solution, _, found, text = fsolve(misses, np.log(START), xtol=1e-9, full_output=True)
     if found != 1:
         raise RuntimeError(f"the periods of Table 1 are not reached: {text}")
     platform = candidate(base, above, f, np.exp(solution))
-    return platform, natural_periods(build_scene(platform))
+    return platform, natural_periods(build_scene(platform, fidelity="reference"))
 
 
 def weakened(turbine, factor):
@@ -262,7 +262,8 @@ def polar_factor(platform):
     target = RATED_THRUST * Froude(read_platform("oc3_hywind").environment.water_density).force
 
     def excess(factor):
-        scene = build_scene(platform, wind=RATED_WIND, turbine=weakened(turbine, factor))
+        options = {"turbine": weakened(turbine, factor), "fidelity": "reference"}
+        scene = build_scene(platform, wind=RATED_WIND, **options)
         point = trim_prescribed(scene, RATED_SPEED, 0.0, platform="fixed")
         return 1e3 * point["RotThrust"] - target
 

@@ -195,7 +195,7 @@ class PaperStudy:
 
 def natural_frequencies():
     """{motion: Hz} of the 1:50 model."""
-    scene = fowt_env.build_scene(PLATFORM)
+    scene = fowt_env.build_scene(PLATFORM, fidelity="reference")
     return {motion: 1.0 / period for motion, period in fowt_env.natural_periods(scene).items()}
 
 
@@ -348,7 +348,7 @@ DECAYS = {"surge decay": ("PtfmSurge", 10.0, SURGE, 600.0), "pitch decay": ("Ptf
 
 def decay(channel, start, duration):
     """Frame of a free decay of OC3-Hywind in still water."""
-    scene = fowt_env.build_scene("oc3_hywind")
+    scene = fowt_env.build_scene("oc3_hywind", fidelity="reference")
     return fowt_env.simulate(
         scene, controller=None, duration=duration, dt=0.05, start="trim", initial={channel: start}
     )
@@ -359,6 +359,7 @@ def regular_wave(position, surface, stretching, duration=460.0):
     scene = fowt_env.build_scene(
         "oc3_hywind", sea={"kind": "regular", "H": 3.0, "T": 5.0, "ramp": 50.0}, kinematics_position=position,
         surface=surface, stretching=stretching,
+        fidelity="reference",
     )  # fmt: skip
     return fowt_env.simulate(scene, controller=None, duration=duration, dt=0.1)
 

@@ -33,7 +33,7 @@ def with_integrator(scene, name, rotor_samples=1):
 
 def free_scene():
     """The turbine in empty space without weight and without losses in the shaft."""
-    scene = build_scene(hydrodynamics=False, mooring=False)
+    scene = build_scene(hydrodynamics=False, mooring=False, fidelity="reference")
     model = scene.model
     shaft = model.drivetrain._replace(bearing_loss_coefficient=0.0, mesh_loss=0.0)
     return scene.with_model(rigid_body=model.rigid_body._replace(gravity=0.0), drivetrain=shaft)
@@ -41,7 +41,7 @@ def free_scene():
 
 def floating_scene():
     """The turbine afloat on its lines in still water without drag, damping and fluid inertia."""
-    scene = build_scene()
+    scene = build_scene(fidelity="reference")
     model = scene.model
     shape = model.hydro.strips.shape._replace(
         added_mass_coefficient=0.0, drag_coefficient=0.0, heave_added_mass=0.0
@@ -200,7 +200,7 @@ def measured_orders(duration=20.0, steps=(0.1, 0.05, 0.025), finest=0.003125):
     their first three steps from the fine run: their own starting steps are of lower order, which leaves
     an error of third order that would hide the method's.
     """
-    base = build_scene(sea={"kind": "regular", "H": 6.0, "T": 8.0})
+    base = build_scene(sea={"kind": "regular", "H": 6.0, "T": 8.0}, fidelity="reference")
     base = base.with_model({"hydro.strips.shape.drag_coefficient": 0.0})
     x0, u = initial_state(base)
     rows = np.r_[0:6, 7:13]

@@ -58,7 +58,7 @@ def jobs(scenes=SCENES, environments=True):
     """
     found = {}
     for name, options in scenes.items():
-        scene = build_scene(**options)
+        scene = build_scene(**{"fidelity": "reference"} | options)
         for integrator in INTEGRATORS:
             made = scene.with_model(integrator=build_integrator(integrator))
             found[f"{name}, {integrator}"] = ("scene", made)
