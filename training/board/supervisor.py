@@ -18,6 +18,8 @@ import sys
 from contextlib import suppress
 
 PDEATHSIG, DUMPABLE, SUBREAPER = 1, 4, 36  # of prctl, which only Linux has
+# a signal of its own: a parent with threads keeps its process id until the last of them has ended, after the signal
+PARENT_ENDED = signal.SIGHUP
 
 
 def prctl(option: int, value: int) -> None:
@@ -63,10 +65,10 @@ def limit(limits: dict[str, int]) -> None:
 def supervise(parent: int, folder: str, limits: dict[str, int], command: list[str]) -> None:
     """Run the command until it, this process or the parent is to end; then end all that is left of it."""
     prctl(SUBREAPER, 1)
-    prctl(PDEATHSIG, signal.SIGTERM)
+    prctl(PDEATHSIG, PARENT_ENDED)
     first = 0
 
-    def end(*_):
+    def end(number=0, _=None):
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
         while True:
             with suppress(OSError):
@@ -78,7 +80,7 @@ def supervise(parent: int, folder: str, limits: dict[str, int], command: list[st
                 os.wait()  # children of what ends here come to this process, and are ended in the next round
             except ChildProcessError:
                 break
-        if os.getppid() != parent:
+        if number == PARENT_ENDED or os.getppid() != parent:
             shutil.rmtree(folder, ignore_errors=True)
         os._exit(0)
 
@@ -92,6 +94,7 @@ def supervise(parent: int, folder: str, limits: dict[str, int], command: list[st
         finally:
             os._exit(127)
     signal.signal(signal.SIGTERM, end)
+    signal.signal(PARENT_ENDED, end)
     nothing = os.open(os.devnull, os.O_RDWR)
     os.dup2(nothing, 0)  # so that the other end hears when the command closes its own
     os.dup2(nothing, 1)

@@ -183,7 +183,10 @@ def test_what_a_controller_starts_ends_with_a_judge_that_is_killed(tmp_path, tem
     note, submission = str(tmp_path / "pid"), tmp_path / "submission"
     submission.mkdir()
     (submission / "mine.py").write_text(DAEMON % (note, note, note) + "while True: pass\n")
-    program = (
+    program = (  # of threads and memory, which a judge takes time to give back
+        "import threading, time, numpy\n"
+        "memory = numpy.ones(3 * 10**8)\n"
+        "for _ in range(8): threading.Thread(target=time.sleep, args=(600.0,), daemon=True).start()\n"
         "from fowt_env.training.board.isolated import IsolatedController, IsolatedFactory\n"
         f"made = IsolatedFactory({str(submission)!r}, 'mine.py', 'Mine', 'mine', (), ())\n"
         "IsolatedController(made, None, 0.1).reset(None)\n"

@@ -230,7 +230,7 @@ def test_the_schedule_is_the_steady_point_of_each_wind(folder, tmp_path):
     assert result.exit_code == 0, result.stderr
     schedule = data_of(page)["schedule"]
     panels = {panel["label"]: panel["values"] for panel in schedule["panels"]}
-    point = fowt_env.trim(fowt_env.build_scene("oc3_hywind", wind=18.0, fidelity="reference"))
+    point = fowt_env.trim(fowt_env.build_scene("oc3_hywind", wind=18.0))
     at = SCHEDULE_WINDS.index(18.0)
     assert panels["blade pitch (deg)"][at] == pytest.approx(point["BldPitch1"], rel=1e-5)
     assert panels["thrust (kN)"][at] == pytest.approx(point["RotThrust"], rel=1e-5)
@@ -305,10 +305,10 @@ def test_a_click_on_a_heading_sorts_and_a_second_one_turns_the_order_round(opene
 
     heading = opened.locator('#table th[data-key="PtfmPitch_std_[deg]"] button')
     heading.click()
-    assert names() == [EVIL, "busy", "calm"]
+    assert names() == [EVIL, "calm", "busy"]  # busy lost a run: last in either order
     assert opened.locator("#table th[aria-sort]").get_attribute("aria-sort") == "ascending"
     heading.click()
-    assert names() == ["calm", "busy", EVIL]
+    assert names() == ["calm", EVIL, "busy"]
     opened.locator('#table th[data-key="controller"] button').click()
     assert names() == [EVIL, "busy", "calm"]
 

@@ -50,7 +50,7 @@ def test_the_small_components_do_not_add_up_at_one_instant():
     [("nrel5mw_oc4_semi", ()), ("nrel5mw_iti_barge", ("PtfmSurge per metre of wave at 0.6 rad/s",))],
 )
 def test_periods_and_responses_are_those_of_the_frequency_domain_within_1_percent(platform, exceptions):
-    study = validate_cases(platform=platform)
+    study = validate_cases(["periods", "responses"], platform=platform)
     assert len(study.rows) >= 36
     for row in study.rows:
         assert row.allowed == 1.0
