@@ -60,7 +60,9 @@ coverage: $(VENV)/.installed-dev
 
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .
-	$(BIN)/mypy
+	rm -rf build/typing && mkdir -p build/typing/fowt_env
+	ln -s $(CURDIR)/fowt_env/* $(CURDIR)/controllers $(CURDIR)/training build/typing/fowt_env/
+	cd build/typing && $(abspath $(BIN))/mypy --config-file $(CURDIR)/pyproject.toml
 
 # the variable silences an advertisement of the theme's
 docs: $(VENV)/.installed-dev

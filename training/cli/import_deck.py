@@ -73,25 +73,14 @@ def import_command(
     )
     print_table(out, ("figure", "value"), report.figures, report.title, left=(0, 1))
     out.print()
-    print_table(
-        out,
-        ("in the deck", "here"),
-        report.differences,
-        "What is not as in the deck",
-        left=(0, 1),
-        prose=(0, 1),
+    tables = (
+        (("in the deck", "here"), report.differences, "What is not as in the deck"),
+        (("the deck", "what follows"), report.contradictions, "Where the deck contradicts itself"),
     )
-    out.print()
-    if report.contradictions:
-        print_table(
-            out,
-            ("the deck", "what follows"),
-            report.contradictions,
-            "Where the deck contradicts itself",
-            left=(0, 1),
-            prose=(0, 1),
-        )
-        out.print()
+    for columns, rows, title in tables:
+        if rows:
+            print_table(out, columns, rows, title, left=(0, 1), prose=(0, 1))
+            out.print()
     for line in report.suggestions:
         out.print(escape(line), soft_wrap=True, highlight=False)
     platform = f"{out_path}/platform.toml"
