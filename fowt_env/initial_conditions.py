@@ -107,13 +107,14 @@ def _check_place(scene, x):
         found = impossible_place(scene, float(x[State.HEAVE]), float(upright))
         found = [text for what, text in found.items() if what == "bed" or blown and what != "tilt"]
         if found:
-            heave, lean = x[State.HEAVE], x[State.PLATFORM_PITCH] / DEGREE
+            lean, roll = x[State.PLATFORM_PITCH] / DEGREE, x[State.ROLL] / DEGREE
             raise InputError(
                 f"initial: the run of platform {scene.label!r} would begin with {' and '.join(found)}"
-                f" (PtfmHeave = {heave:.4g} m, PtfmPitch = {lean:.3g} deg)"
+                f" (PtfmHeave = {x[State.HEAVE]:.4g} m, PtfmPitch = {lean:.3g} deg, PtfmRoll = {roll:.3g}"
+                " deg)"
             )
     if blown and cos(x[State.YAW]) <= 0.0:
         raise InputError(
-            f"initial['PtfmYaw'] = {x[State.YAW] / DEGREE:g}: must be inside (-90, 90) deg with wind: the"
-            " rotor would have its back to it"
+            f"initial['PtfmYaw'] = {x[State.YAW] / DEGREE:g}: must be within 90 deg of 0, but for whole"
+            " turns, with wind: the rotor would have its back to it"
         )

@@ -237,8 +237,8 @@ def limits(settings, wind, baseline, turbine):
 def optimal_gain(loop, settings, start=None):
     """(gain (2, N_FEEDBACK), its Deviations, logarithms of the multipliers) for LQGSettings at a wind.
 
-    start: multipliers of a neighbouring wind. Where the limits cannot all be met in ROUNDS rounds, the gain
-    of that round in which the limit most exceeded is exceeded least: the search then swings without an end.
+    start: multipliers of a neighbouring wind. Where not all limits are met within ROUNDS rounds, it is the
+    gain of the round whose largest excess is the smallest.
     """
     rated, baseline, wind = loop.turbine.rated_rotor_speed, loop.baseline(), loop.model.wind
     limited = limits(settings, wind, baseline, loop.turbine)

@@ -139,7 +139,7 @@ class MPC:
         self.preview_times = ()
         if preview:
             self.information = (*LQR.information, "wind_preview")
-            periods = round(self.settings.preview_time / self.period)
+            periods = int(self.settings.preview_time / self.period + 1e-9)  # not beyond what a lidar sees
             self.preview_times = tuple(self.period * i for i in range(periods + 1))
         self.estimator = WindEstimator(turbine, self.control_dt)
         self.curve = build_torque_curve(turbine.torque_law)

@@ -119,19 +119,22 @@ class IsolatedController:
 
     def act(self, measurement: Any) -> tuple[float, float]:
         """(generator torque N m, blade pitch rad) as the process answers."""
-        began = time.perf_counter()
-        try:
-            answer = self._ask(ACT, measurement, self.factory.limits.call, float(measurement.time))
-        finally:
-            self.slowest = max(self.slowest, time.perf_counter() - began)
+        moment = float(measurement.time)
+        answer = self._ask(ACT, measurement, self.factory.limits.call, moment)
         if len(answer) != COMMAND.size:
-            raise self._fault("its process sent no pair of numbers")
+            self.close()
+            raise self._fault("its process sent no pair of numbers", moment)
         return COMMAND.unpack(answer)
 
     def _ask(self, what, content, limit, moment=0.0):
         assert self.process is not None
+        began = time.perf_counter()
         try:
-            kind, answer = self.process.ask(pickle.dumps((what, content)), limit)
+            try:
+                kind, answer = self.process.ask(pickle.dumps((what, content)), limit)
+            finally:
+                if what == ACT:
+                    self.slowest = max(self.slowest, time.perf_counter() - began)
         except TimeoutError:
             self.close()
             raise self._fault(f"{what}() took longer than {limit:g} s", moment) from None
@@ -175,15 +178,22 @@ def warmed_up(factory: IsolatedFactory, scenes: Any, key: str) -> IsolatedFactor
         return factory
     name = hashlib.sha256(f"{factory.content_key}/{key}".encode()).hexdigest()[:24]
     place = root / "submissions" / name
-    made = replace(factory, kernels=str(place))
     if not place.is_dir():
         import fowt_env
 
-        make_private(place)
-        for scene in scenes():
-            with suppress(ControllerError, InputError):  # its judged runs will fail as well, and say so
-                fowt_env.simulate(scene, replace(made, keeps=True, log=""), duration=WARM_UP)
-    return made
+        make_private(place.parent)
+        # it gets its name once it is whole, so that one which was interrupted is made again
+        unfinished = Path(tempfile.mkdtemp(prefix=f"{name}-", dir=place.parent))
+        limits = replace(factory.limits, call=factory.limits.start)  # the first act() compiles too
+        compiling = replace(factory, kernels=str(unfinished), keeps=True, log="", limits=limits)
+        try:
+            for scene in scenes():
+                with suppress(ControllerError, InputError):  # its judged runs will fail as well, and say so
+                    fowt_env.simulate(scene, compiling, duration=WARM_UP)
+            unfinished.rename(place)
+        finally:
+            shutil.rmtree(unfinished, ignore_errors=True)
+    return replace(factory, kernels=str(place))
 
 
 class _Process:

@@ -28,6 +28,7 @@ FIGURES = {  # heading: metric whose ratio to the baseline is shown
     "shaft DEL": "RotTorq_DEL_[kN-m]",
     "tower DEL": "TwrBsMyt_DEL_[kN-m]",
 }
+LISTED = "listed"  # seeds of a judging that draws none
 PER_WIND = ("rotor speed", "platform pitch", "travel")
 MODEL, PREVIEW = "plant_model", "wind_preview"
 FORMULA = ("=", "+", "-", "@", "\t", "\r")  # with which a spreadsheet begins to compute
@@ -159,12 +160,15 @@ def _history(path, frame, judged):
     """DataFrame of the history and, in place of its rows of the same day and digest, of this judging."""
     digests = {each.name: each.digest for each in judged.shown}
     here = frame[["suite", "version", "name", "rank", "score", "failed", "tripped"]].assign(
-        date=judged.when, package=package_version(), digest=frame["name"].map(digests)
+        date=judged.when,
+        package=package_version(),
+        digest=frame["name"].map(digests),
+        seeds=judged.drawn or LISTED,
     )
     if not path.is_file():
         return here
-    key = ["date", "suite", "version", "name", "digest"]
-    both = pd.concat([read_table(path), here], ignore_index=True)
+    key = ["date", "suite", "version", "name", "digest", "seeds"]
+    both = pd.concat([read_table(path), here], ignore_index=True).fillna({"seeds": LISTED})
     return both.drop_duplicates(key, keep="last", ignore_index=True)
 
 
@@ -379,13 +383,14 @@ def _history_table(history):
     """Table of the scores over the judgings, newest first."""
     rows = []
     for row in history.sort_values("date", ascending=False, kind="stable").to_dict("records"):
-        words = [row[key] for key in ("date", "suite", "version", "name", "package")]
+        words = [row[key] for key in ("date", "suite", "version", "seeds", "name", "package")]
         words.append(_rank_text(row["rank"]))
         lost = int(row["failed"] + row["tripped"])
         rows.append([*(html.escape(str(word)) for word in words), _number(row["score"]), str(lost)])
-    headings = ["date", "suite", "version", "controller", "judged with", "rank", "score", "lost runs"]
+    headings = ["date", "suite", "version", "seeds", "controller", "judged with", "rank", "score"]
+    headings.append("lost runs")
     return (
         "<h2>History</h2><details><summary>all judgings</summary>"
-        + _table(headings, rows, (0, 1, 3, 4))
+        + _table(headings, rows, (0, 1, 3, 4, 5))
         + "</details>"
     )

@@ -98,7 +98,7 @@ class Submission:
 
 
 def alike(name: str) -> str:
-    """A name with what readers confuse made one: names of a board differ in it."""
+    """Return a name with "_" for "-"; no two names of a board are alike in it."""
     return name.replace("-", "_")
 
 

@@ -38,7 +38,7 @@ SHOWN = {  # what a notebook shows of a leaderboard: {heading: metric}
     "blade-pitch travel (deg/s)": "blade_pitch_travel_[deg/s]",
     "tower-base DEL (kN m)": "TwrBsMyt_DEL_[kN-m]",
 }
-MOST_OF_REFERENCE = 1e6  # larger differences, as multiples of the baseline's own value, get no percentage
+MOST_OF_BASELINE = 1e6  # larger differences, as multiples of the baseline's own value, get no percentage
 EXPONENTS = np.array([mean_exponent(name) for name in METRICS])
 METHOD = (
     "lifetime means: each case by its share of the lifetime, deviations by their squares, damage-equivalent"
@@ -143,7 +143,7 @@ def _figures(part, resampled):
 
 
 def _differences(part, weights, own_resampled, tested):
-    """Arrays (metrics,) of the paired difference of a _Part from its base: estimate, low, ... , p.
+    """{"estimate", "low", "high", "percent", "pairs", "p"} of a _Part less its base, each (metrics,).
 
     own_resampled: resampled means of all its runs. tested: whether p is among them (NaN: too few seeds, or
     lost runs: the others are then no fair sample).
@@ -152,8 +152,8 @@ def _differences(part, weights, own_resampled, tested):
     there = known & np.isfinite(part.base)
     pair = [np.where(there, values, np.nan) for values in (part.values, part.base)]
     one = np.ones((1, weights.shape[1]))
-    own, reference = (_means(values, one, part.shares)[0] for values in pair)
-    gap = np.where(part.nothing, np.nan, own - reference)
+    own, theirs = (_means(values, one, part.shares)[0] for values in pair)
+    gap = np.where(part.nothing, np.nan, own - theirs)
     if not np.array_equal(there, known):  # else these are the means of the pairs
         own_resampled = _means(pair[0], weights, part.shares)
     resampled = own_resampled - _means(pair[1], weights, part.shares)
@@ -161,8 +161,8 @@ def _differences(part, weights, own_resampled, tested):
     low, high = interval(gap, resampled, seeds)
     # a ratio to zero, or to what rounding left of zero, says nothing
     with np.errstate(all="ignore"):
-        measured = np.abs(gap) < MOST_OF_REFERENCE * np.abs(reference)
-        percent = 100.0 * np.divide(gap, np.abs(reference), out=np.full_like(gap, np.nan), where=measured)
+        measured = np.abs(gap) < MOST_OF_BASELINE * np.abs(theirs)
+        percent = 100.0 * np.divide(gap, np.abs(theirs), out=np.full_like(gap, np.nan), where=measured)
     pairs = there.sum(axis=(0, 1)).astype(float)
     found = {"estimate": gap, "low": low, "high": high, "percent": percent, "pairs": pairs}
     if tested:
@@ -226,7 +226,7 @@ def leaderboard(table, baseline=None, score=None, cases=None, limits=None):
     limits     training.evaluation.cases.Limits of a suite, or None
     Means are lifetime means (METHOD); the shares of the cases stand in the table's column weight_[-].
     Lost runs (failures.py) have no figures, but count in the score.
-    Keys: baseline (None: every controller has failed runs), interval (level, method, resamples,
+    Keys: baseline (None: each has runs that failed or lost power), interval (level, method, resamples,
     least_seeds), penalty (times the reference's figures that a lost run counts), unchecked (metrics whose
     relative limits need the runs of a reference), cases, shares {case: share}, seeds, controllers: a list of
     mappings with rank (None without a score), controller, runs, lost and of these failed, tripped,

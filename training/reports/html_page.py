@@ -484,7 +484,7 @@ def _page_data(table, board_file, manifest, runs, schedule):
     shown = [metric["name"] for metric in metrics]
     good = table[table["status"] == OK]
     points = [
-        [*(row[key] for key in KEY), _rounded([row[name] for name in names])]
+        [row["controller"], row["case"], str(row["seed"]), _rounded([row[name] for name in names])]
         for row in good.to_dict("records")
     ]
     labels = {channel: label.replace("\n", " ") for label, channel in PANELS}
@@ -508,7 +508,7 @@ def _page_data(table, board_file, manifest, runs, schedule):
         - (LEVEL if board_file is None or board_file.interval is None else board_file.interval.level),
         "shares": shares,
         "cases": cases,
-        "seeds": {case: sorted(map(int, each)) for case, each in seeds.items()},
+        "seeds": {case: [str(seed) for seed in sorted(each)] for case, each in seeds.items()},
         "conditions": {row["case"]: conditions_text(row) for row in conditions},
         "lost": lost,
         "metrics": metrics,

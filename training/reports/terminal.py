@@ -206,7 +206,7 @@ def _remarks(board, intervals):
         counts = f"; a score counts them {board['penalty']:g} times the reference's" if scored else ""
         lines.append(f"runs lost by {texts}: without figures here{counts}; listed last")
     if board["baseline"] is None and board["controllers"]:
-        lines.append("no paired differences: every controller has failed runs")
+        lines.append("no paired differences: every controller has runs that failed or lost power")
     if board["baseline"] in lost:
         lines.append(f"differences from {board['baseline']} are of the runs that it did not lose")
     for entry in board["controllers"]:

@@ -46,7 +46,7 @@ def verdict(board, seeds, least_seeds):
         return "<p>No verdict: without leaderboard.json nothing has been compared pair by pair.</p>"
     others = [entry for entry in board.controllers if entry.controller != board.baseline]
     if board.baseline is None:
-        return "<p>No verdict: every controller has failed or tripped runs, so that there is no baseline.</p>"
+        return "<p>No verdict: no baseline, as every controller has runs that failed or lost power.</p>"
     if not others:
         return "<p>No verdict: a single controller was evaluated, so that there is nothing to compare.</p>"
     baseline = next((e for e in board.controllers if e.controller == board.baseline), None)

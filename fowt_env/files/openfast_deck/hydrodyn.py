@@ -155,18 +155,18 @@ def _members(file, site, notes, potential):
         place = tuple(cells[f"joint{axis}i"] for axis in "xyz")
         if max(map(abs, place)) > 1e4:
             raise file.refusal(f"joint {cells['jointid']:g}: must be within 10 km of the body", line)
-        joints[_new(file, line, joints, cells["jointid"], "joint")] = (place, int(cells["jointaxid"]))
+        joints[file.new(line, joints, cells["jointid"], "joint")] = (place, int(cells["jointaxid"]))
     sections = {}
     for line, cells in file.table("NPropSets", "NPropSetsCyl", high=MOST):
         _need(file, line, cells, ("propsetid", "propd", "propthck"))
         if not (0.0 < cells["propd"] <= 1e3 and 0.0 <= cells["propthck"] <= 0.5 * cells["propd"] + 1e-9):
             raise file.refusal("PropD must be > 0 and PropThck from 0 to its half", line)
-        number = _new(file, line, sections, cells["propsetid"], "property set")
+        number = file.new(line, sections, cells["propsetid"], "property set")
         sections[number] = (cells["propd"], cells["propthck"])
     axial = {}
     for line, cells in file.table("NAxCoef", high=MOST):
         _need(file, line, cells, ("axcoefid", "axcd", "axca", "axcp"))
-        number = _new(file, line, axial, cells["axcoefid"], "axial coefficient")
+        number = file.new(line, axial, cells["axcoefid"], "axial coefficient")
         axial[number] = tuple(cells[name] for name in ("axcd", "axca", "axcp"))
     coefficients = _Coefficients(file)
     bare_members = []
@@ -177,7 +177,7 @@ def _members(file, site, notes, potential):
             cells,
             ("memberid", "mjointid1", "mjointid2", "mpropsetid1", "mpropsetid2", "mcoefmod"),
         )
-        number = _new(file, line, [row[1] for row in bare_members], cells["memberid"], "member")
+        number = file.new(line, [row[1] for row in bare_members], cells["memberid"], "member")
         if cells.get("msecgeom", 1.0) not in (0.0, 1.0):
             raise file.refusal(f"member {number}: MSecGeom must be 1, a circular section", line)
         ends = [_looked_up(file, line, joints, cells[f"mjointid{i}"], "joint") for i in (1, 2)]
@@ -221,13 +221,6 @@ def _need(file, line, cells, names):
     for name in names:
         if name not in cells:
             raise file.refusal(f"the column {name} is missing", line - 1)
-
-
-def _new(file, line, known, number, what):
-    """The whole number of a row that no row above has. Raises: InputError."""
-    if number != int(number) or int(number) in known:
-        raise file.refusal(f"{what} {number:g}: must be a whole number, of one row alone", line)
-    return int(number)
 
 
 def _looked_up(file, line, known, number, what):
@@ -299,7 +292,7 @@ class _Coefficients:
         self.member = {}
         for line, cells in file.table("NCoefMembers", "NCoefMembersCyl", high=MOST):
             _need(file, line, cells, ("memberid",))
-            self.member[_new(file, line, self.member, cells["memberid"], "coefficients of member")] = cells
+            self.member[file.new(line, self.member, cells["memberid"], "coefficients of member")] = cells
         self._simple = None
 
     @property

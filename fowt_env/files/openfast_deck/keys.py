@@ -72,6 +72,11 @@ def _all(names, value):
     return dict.fromkeys(names.split(), value)
 
 
+def _blade_element_wake(file):
+    """Whether an AeroDyn file has the switch by which DBEMT_Mod counts."""
+    return file.has("Wake_Mod") and file.whole("Wake_Mod") == 1
+
+
 def _late(deck, here="no such event: faults and stops are given to a run"):
     return Otherwise(lambda seconds: seconds >= LATE, deck, here)
 
@@ -81,7 +86,7 @@ def differences(file):
 
     Raises: InputError for a key whose value would make another machine.
     """
-    table, rows = KEYS[file.kind], []
+    table, rows, unknown = KEYS[file.kind], [], set()
     found = [(name, line, values) for name, line, values in file.entries.values()]
     found += [
         (name, line, [f"{value:g}" if isinstance(value, float) else str(value)])
@@ -92,6 +97,9 @@ def differences(file):
         form = table.known(same_key(name))
         value = " ".join(map(bare, values))
         if form is None:
+            if same_key(name) in unknown:
+                continue  # the other values of a column
+            unknown.add(same_key(name))
             rows.append((f"{name} {value[:60]} ({file.kind})".replace("  ", " "), UNKNOWN))
         elif form in table.neutral:
             rows += _row(file, name, line, values, table.neutral[form])
@@ -234,7 +242,7 @@ AERODYN = _keys(
         })
         for key in ("Wake_Mod", "WakeMod")
     },
-    DBEMT_Mod=Otherwise((0, -1), "dynamic wake", _QUASI_STEADY, when=lambda file: file.has("Wake_Mod")),
+    DBEMT_Mod=Otherwise((0, -1), "dynamic wake", _QUASI_STEADY, when=_blade_element_wake),
     UA_Mod=Otherwise(0, "unsteady airfoil aerodynamics", "quasi-steady polars"),
     AFAeroMod=Otherwise(1, "unsteady airfoil aerodynamics", "quasi-steady polars"),
     TwrPotent=Otherwise(0, "potential flow around the tower", "no influence of the tower on the wind"),
@@ -243,7 +251,12 @@ AERODYN = _keys(
     NacelleDrag=Otherwise(False, "drag of the nacelle", "none"),
     TFinAero=Otherwise(False, "tail fin", "none"),
     BEM_Mod=Otherwise(1, "momentum balance in a polar grid", "normal to each blade section (BEM_Mod 1)"),
-    Skew_Mod=Otherwise((0, -1), "skewed-wake correction", f"none; {_SKEWED}"),
+    Skew_Mod=Otherwise(
+        0,
+        "skewed-wake correction",
+        f"none; {_SKEWED}",
+        cases={"-1": ("wind across the rotor taken off", "it is there")},
+    ),
     SkewMod=Otherwise(1, "skewed-wake correction", f"none; {_SKEWED}"),
     SkewRedistr_Mod=Otherwise(("default", 1), "another skewed-wake redistribution", _SKEWED),
     **_all("SkewRedistrFactor SkewModFactor",
@@ -429,7 +442,7 @@ MAP = _keys(
     "repeat LineType Diam MassDenInAir EA CB Node Type X Y Z M B FX FY FZ Line UnstrLen NodeAnch NodeFair"
     " linear_spring omit_contact",
     {
-        OUTPUT: "help gx_pos gy_pos gz_pos gx_a_pos gy_a_pos gz_a_pos gx_force gy_force gz_force h_fair"
+        OUTPUT: "plot help gx_pos gy_pos gz_pos gx_a_pos gy_a_pos gz_a_pos gx_force gy_force gz_force h_fair"
         " h_anch v_fair v_anch h_force v_force tension_fair tension_anch x_force y_force z_force"
         " x_excursion y_excursion z_excursion azimuth altitude fair_tension anch_tension lay_length"
         " line_tension diagnostic",

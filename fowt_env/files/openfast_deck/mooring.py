@@ -55,10 +55,10 @@ def read_map(path, depth, density, gravity):
                 raise file.refusal("must be LineType, Diam, MassDenInAir, EA, CB", number, "line type")
             diameter, mass, stiffness, friction = figures
             wet = _wet_weight(file, number, words[0], mass, diameter, density, gravity)
-            name = _new(file, number, types, words[0], "line type")
+            name = file.new(number, types, words[0].lower(), "line type")
             types[name] = (wet, _positive(file, number, "EA", stiffness), max(friction, 0.0))
         elif "node" in section:
-            name = _new(file, number, nodes, bare(words[0]), "node")
+            name = file.new(number, nodes, bare(words[0]).lower(), "node")
             nodes[name] = (number, *_node(file, number, words, depth))
             if name != str(len(nodes)):
                 raise file.refusal(f"node {words[0]}: must be {len(nodes)}: MAP++ counts its rows", number)
@@ -73,7 +73,7 @@ def read_map(path, depth, density, gravity):
         elif "solver" in section:
             file.entries[head] = (words[0], number, words[1:] or ["True"])
     lines = []
-    for number, words in rows[:MOST_LINES]:
+    for number, words in rows:
         if len(words) < 5:
             raise file.refusal("must be Line, LineType, UnstrLen, NodeAnch, NodeFair", number, "line")
         if words[1].lower() not in types:
@@ -90,7 +90,8 @@ def read_map(path, depth, density, gravity):
             if "omit" in flag:
                 notes.append((f"line {words[0]} without contact with the sea bed", "with contact"))
             if number_of(flag) is None:
-                file.entries.setdefault(flag, (words[i - 1], number, words[i : i + 1] or ["True"]))
+                value = number_of(words[i]) if i < len(words) else None
+                file.columns.setdefault(flag, []).append((number, "True" if value is None else value))
         lines.append(_line(file, number, words[0], ends, length, types[words[1].lower()], words[1]))
     _check_count(file, lines)
     turned = [_turned(line, angle) for angle in angles for line in lines]
@@ -226,10 +227,10 @@ def read_moordyn(path, depth, density, gravity):
     density = file.number("rhoW", "rho", default=density, low=0.0, high=1e5)
     types, points = {}, {}
     for number, words in of["types"]:
-        name = _new(file, number, types, words[0], "line type")
+        name = file.new(number, types, words[0].lower(), "line type")
         types[name] = _moordyn_type(file, number, words, density, gravity)
     for number, words in of["points"]:
-        name = _new(file, number, points, bare(words[0]), "point")
+        name = file.new(number, points, bare(words[0]).lower(), "point")
         points[name] = (number, *_node(file, number, _without_attachment(words), depth))
         if points[name][1] in FAIRLEADS:
             _check_fairlead(file, number, words, 5, ("M", "V"))
@@ -238,12 +239,12 @@ def read_moordyn(path, depth, density, gravity):
             _keep_columns(file, number, words, -2 if len(words) < 12 else 10, ("CdA", "CA"))
     old = any("nodeanch" in text.lower() or "nodefair" in text.lower() for text in file.lines)
     lines, known = [], {}
-    for number, words in of["lines"][:MOST_LINES]:
+    for number, words in of["lines"]:
         # version 1: Line LineType UnstrLen NumSegs NodeAnch NodeFair; version 2: ID LineType A B UnstrLen
         places = (2, 4, 5) if old else (4, 2, 3)
         if len(words) < 6:
             raise file.refusal("must be ID, LineType, AttachA, AttachB, UnstrLen, NumSegs", number, "line")
-        known[_new(file, number, known, words[0], "line")] = number
+        known[file.new(number, known, words[0].lower(), "line")] = number
         if words[1].lower() not in types:
             raise file.refusal(f"line {words[0]}: unknown line type {words[1]!r}", number)
         length = _positive(file, number, "UnstrLen", number_of(words[places[0]]))
@@ -284,13 +285,6 @@ def _moordyn_options(file, rows, depth, density, gravity):
             )
 
 
-def _new(file, number, known, name, what):
-    """A name in small letters that no row above has. Raises: InputError."""
-    if name.lower() in known:
-        raise file.refusal(f"{what} {name}: must be of one row alone", number)
-    return name.lower()
-
-
 def _check_fairlead(file, number, words, place, names):
     """Raises: InputError for a point of the vessel with a mass, a volume or a force of its own."""
     for name, word in zip(names, words[place:], strict=False):
@@ -313,15 +307,9 @@ def _keep_columns(file, number, words, place, names):
 
 def _without_attachment(words):
     """The words of a point: some files have "Vessel1" or "Coupled 0 ..." alike."""
-    return (
-        [
-            words[0],
-            words[1].rstrip("0123456789") if words[1].lower() not in FAIRLEADS else words[1],
-            *words[2:],
-        ]
-        if (len(words) > 1)
-        else words
-    )
+    if len(words) < 2 or words[1].lower() in FAIRLEADS:
+        return words
+    return [words[0], words[1].rstrip("0123456789"), *words[2:]]
 
 
 def _moordyn_type(file, number, words, density, gravity):

@@ -139,6 +139,16 @@ class PartFile:
         named = "" if key is None else f"{key}: "
         return InputError(f"{self.kind} file {str(self.path)!r}{at}: {named}{what}")
 
+    def new(self, line, known, name, what):
+        """The name, or the whole number, of a row that no row above has. Raises: InputError."""
+        if not isinstance(name, str):
+            if name != int(name):
+                raise self.refusal(f"{what} {name:g}: must be a whole number", line)
+            name = int(name)
+        if name in known:
+            raise self.refusal(f"{what} {name}: must be of one row alone", line)
+        return name
+
     def wrong(self, key, value, allowed, *also):
         """InputError for a value that is not allowed."""
         found = self.find(key, *also)

@@ -130,6 +130,7 @@ def test_a_comment_in_a_table_of_map_is_refused_as_map_takes_it_for_a_row(tmp_pa
         ("HydroDyn", "ExctnMod", "0", "no wave excitation", "it is there"),
         ("HydroDyn", "WaveDisp", "1", "displaced members", "kinematics_position"),
         ("InflowWind", "PropagationDir", "20", "another direction", "along x"),
+        ("AeroDyn", "Skew_Mod", "-1", "wind across the rotor taken off", "it is there"),
         ("OpenFAST", "NewSwitch", "1", "NewSwitch 1 (OpenFAST)", "not looked at"),
     ],
 )
@@ -503,3 +504,27 @@ def test_every_key_of_the_public_decks_changes_the_files_or_the_report_or_is_ref
                 for kind, names in keys.items() for key in names.split()}  # fmt: skip
     assert still - moved == expected
     assert len(moved) > 200
+
+
+def test_each_line_of_map_is_asked_when_it_breaks(tmp_path):
+    """A flag of a line is no value of the flag before it."""
+    before = set(differences(write_deck(tmp_path)))
+    lines = "1 chain 450.0 1 2 damage_time 1e9\n2 chain 450.0 1 2 plot damage_time 100"
+    changed = write_deck(tmp_path, MAP=[("1 chain 450.0 1 2 tension_fair", lines)])
+    assert set(differences(changed)) - before == {"a line that breaks (damage_time 100)"}
+
+
+def test_lines_beyond_the_most_that_are_allowed_are_refused(tmp_path):
+    last = "3 chain 5 6 450.0 20 -"
+    many = "\n".join([last, *(last.replace("3", str(number), 1) for number in range(4, 1004))])
+    with pytest.raises(InputError, match="has 1003 lines"):
+        read_deck(write_deck(tmp_path, MoorDyn=[(last, many)], **MOORED))
+
+
+def test_a_column_that_is_not_known_is_one_row_of_the_report(tmp_path):
+    path = write_deck(tmp_path)
+    blade = tmp_path / NAMES["AeroDyn blade"]
+    head, names, units, *rows = blade.read_text().rstrip().rsplit("\n", 6)
+    blade.write_text("\n".join([head, f"{names} NewCol", f"{units} (-)", *(f"{row} 0.5" for row in rows)]))
+    found = [deck for deck, here in differences(path).items() if here == UNKNOWN]
+    assert found == ["newcol 0.5 (AeroDyn blade)"]

@@ -9,6 +9,7 @@ import sys
 import tempfile
 import time
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 import numba
@@ -132,6 +133,47 @@ def test_kernels_come_from_a_run_without_weather_and_are_those_of_each_run(tmp_p
         run(made, 2.0)
     assert (kept / "count").read_text() == "x"
     assert warmed_up(made, pytest.fail, "a").kernels == made.kernels
+
+
+def test_kernels_may_take_long_to_compile_in_the_first_call_of_act(tmp_path, monkeypatch):
+    monkeypatch.setenv("FOWT_CACHE_DIR", str(tmp_path / "cache"))
+    source = SOUND.replace(LINE, f"""import os, time
+        kernel = os.environ["FOWT_CACHE_DIR"] + "/kernel"
+        if not os.path.exists(kernel):
+            time.sleep(3.0)
+            open(kernel, "w").close()
+        {LINE}""")
+    submission = tmp_path / "submission"
+    submission.mkdir()
+    made = factory(submission, source, call=2.0)
+    with pytest.raises(ControllerError, match="took longer than 2 s"):
+        run(made, 1.0)
+    quiet = fowt_env.build_scene("oc3_hywind", wind=18.0, fidelity="reference")
+    run(warmed_up(made, lambda: [quiet], "a"), 1.0)
+
+
+def test_a_first_run_for_kernels_that_is_interrupted_is_made_again(tmp_path, monkeypatch):
+    monkeypatch.setenv("FOWT_CACHE_DIR", str(tmp_path))
+    made, asked = factory(tmp_path, SOUND), []
+
+    def interrupted():
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        warmed_up(made, interrupted, "a")
+    assert not list((tmp_path / "submissions").iterdir())
+    for _ in range(2):
+        kept = warmed_up(made, lambda: asked.append("scenes") or [], "a").kernels
+    assert asked == ["scenes"] and [kept] == [str(path) for path in (tmp_path / "submissions").iterdir()]
+
+
+def test_the_slowest_call_is_noted_where_it_is_the_one_beyond_the_limit(tmp_path):
+    log = tmp_path / "log.csv"
+    made = factory(tmp_path, SOUND.replace(LINE, "import time; time.sleep(60)"), call=1.5)
+    with pytest.raises(ControllerError, match="took longer than 1.5 s"):
+        run(replace(made, log=str(log)))
+    (line,) = log.read_text().splitlines()
+    assert 1.5 <= float(line.rpartition(",")[2]) < 5.0
 
 
 def test_a_process_that_reads_no_more_does_not_hold_the_judge(tmp_path):

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from dataclasses import replace
 
 import pandas as pd
 import pytest
@@ -148,7 +149,9 @@ def test_page_table_and_history(board, judged):
         assert text.count(f'popover id="metric-{number}"') == 1
     before = pd.read_csv(history)
     write_board(judged)
-    assert len(pd.read_csv(history)) == len(before) == 2
+    assert len(pd.read_csv(history)) == len(before) == 2 and set(before["seeds"]) == {"listed"}
+    write_board(replace(judged, drawn="0a1b"))  # of other seeds: another judging
+    assert list(pd.read_csv(history)["seeds"]) == ["listed", "listed", "0a1b", "0a1b"]
     title, headings, rows = board_rows(board.folder)
     assert len(rows) == 2 and len(rows[0]) == len(headings)
     with pytest.raises(InputError, match="unknown regime"):

@@ -133,7 +133,7 @@ def test_a_baseline_that_failed_is_said_to_have():
     assert remarks[-1] == "differences from x are of the runs that it did not lose"
     title, _, _, remarks = leaderboard_rows(board([1, 2], pi="failed"))
     assert "difference" not in title
-    assert remarks[-1] == "no paired differences: every controller has failed runs"
+    assert remarks[-1] == "no paired differences: every controller has runs that failed or lost power"
 
 
 def test_a_narrow_terminal_loses_columns_of_the_leaderboard_in_order():

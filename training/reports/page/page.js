@@ -490,7 +490,7 @@ function chooseSeeds() {
   // every seed of the case; those whose series are not in the file cannot be chosen
   const there = DATA.series[$("series-case").value] || {};
   const before = $("series-seed").value;
-  const seeds = DATA.seeds[$("series-case").value].map(String);
+  const seeds = DATA.seeds[$("series-case").value];
   fill($("series-seed"), seeds, seeds.map((seed) => (there[seed] ? seed : `${seed} (not in this page)`)));
   for (const option of $("series-seed").options) option.disabled = !there[option.value];
   $("series-seed").value = there[before] ? before : seeds.find((seed) => there[seed]);
