@@ -42,18 +42,18 @@ def add_command(
     None of their code is run.
     """
     from fowt_env.training.board.folder import SETTINGS, Board, new_board
-    from fowt_env.training.board.submission import read_submission
+    from fowt_env.training.board.submission import PYTHON_FILE, read_submission
 
-    for folder in submissions:
-        read_submission(folder)
+    kinds = [read_submission(folder).kind for folder in submissions]
     if not (board / SETTINGS).exists():
         output(board, "--board", folder=True)
         made = new_board(board, platform=platform)
         first = ", ".join(each.name for each in made.submissions())
         note(f"made the board {board} with the controllers of the package: {first}")
-    for folder in submissions:
+    for kind, folder in zip(kinds, submissions, strict=True):
         name = Board(board).add(folder)
-        note(f"added {name}; judge it with: fowt leaderboard run --board {board}")
+        trusted = " --trust-code (once you have read its Python file)" if kind == PYTHON_FILE else ""
+        note(f"added {name}; judge it with: fowt leaderboard run --board {board}{trusted}")
 
 
 SEEDS_EXAMPLES = """[cyan]fowt leaderboard seeds seeds.txt[/cyan]  # publish the SHA-256 that it prints, and
