@@ -180,6 +180,13 @@ def test_the_spectrum_has_the_sea_s_variance_and_a_sea_without_one_is_named(scen
         elevation_spectrum(SEA, np.array([50.0, 60.0]))
 
 
+def test_frequencies_need_not_be_evenly_spaced(scene):
+    uneven = np.geomspace(OMEGA[0], OMEGA[-1], OMEGA.size)
+    found, wanted = (linear_drag(scene, state(), omega, SEA) for omega in (uneven, OMEGA))
+    np.testing.assert_allclose(found.deviation, wanted.deviation, rtol=1e-3)
+    assert np.abs(found.damping - wanted.damping).max() < 1e-3 * np.abs(wanted.damping).max()
+
+
 def test_without_water_there_is_no_drag(bare_scene):
     found = linear_drag(bare_scene, np.zeros(bare_scene.n_state), OMEGA, SEA)
     assert not found.damping.any() and not found.excitation.any()
