@@ -8,6 +8,7 @@ import numba
 import numpy as np
 import pytest
 from floaters import TENDON, semi, spar, tension_leg
+from plant_helpers import state
 from typer.testing import CliRunner
 
 import fowt_env
@@ -221,14 +222,14 @@ def test_built_in_platforms_fit(name):
 # what else takes a hull of members
 
 
-def test_a_spar_of_members_has_the_wave_force_of_its_strips():
-    fixed = {"kinematics_position": "fixed", "surface": "swl", "stretching": "none", "strip_length": 1.0}
+@pytest.mark.parametrize("position", ["fixed", "instantaneous"])
+@pytest.mark.parametrize("attitude", [{}, {"roll": 0.05, "platform_pitch": 0.1, "yaw": 0.6}])
+def test_a_spar_of_members_has_the_wave_force_of_its_strips(attitude, position):
+    same = {"kinematics_position": position, "surface": "swl", "stretching": "none", "strip_length": 1.0}
     omega = np.array([0.9, 0.3, 0.6, 1.5])
-    strips = wave_force(
-        fowt_env.build_scene("oc3_hywind", **{"fidelity": "reference"} | fixed), np.zeros(15), omega
-    )
-    members = wave_force(
-        fowt_env.build_scene(spar(), **{"fidelity": "reference"} | fixed), np.zeros(15), omega
+    strips, members = (
+        wave_force(fowt_env.build_scene(hull, fidelity="reference", **same), state(**attitude), omega)
+        for hull in ("oc3_hywind", spar())
     )
     for columns in (slice(0, 3), slice(3, 6)):
         scale = np.abs(strips[:, columns]).max(axis=1)

@@ -3,6 +3,7 @@
 import floaters
 import numpy as np
 import pytest
+from naive.rigid_body import rotation
 from plant_helpers import state
 
 from fowt_env import build_scene
@@ -118,33 +119,45 @@ def test_damping_is_symmetric_positive_and_alike_to_all_sides_in_waves_from_all(
     assert linear_drag(scene, state(), OMEGA, None, AT_REST).damping.max() == 0.0
 
 
-def test_motion_with_the_waves_takes_from_the_relative_velocity(scene):
-    """A hull that goes with the water at one depth has no drag there."""
-    still = linear_drag(scene, state(), OMEGA, SEA)
+@pytest.mark.parametrize("pitch", [0.0, 0.3])
+def test_motion_with_the_waves_takes_from_the_relative_velocity(scene, pitch):
+    """A hull that goes with the water at one depth has no drag there; w = i u, body x is u cos - w sin."""
+    still = linear_drag(scene, state(platform_pitch=pitch), OMEGA, SEA)
     node = int(np.argmin(np.abs(still.z + 20.0)))
     k = OMEGA**2 / scene.platform.environment.gravity
     surge = np.zeros((OMEGA.size, 6), complex)
-    surge[:, 0] = OMEGA * np.exp(k * still.z[node])
-    moving = linear_drag(scene, state(), OMEGA, SEA, HullMotion(surge, 0.0))
+    surge[:, 0] = OMEGA * np.exp(k * still.z[node] * np.exp(-1j * pitch) - 1j * pitch)
+    moving = linear_drag(scene, state(platform_pitch=pitch), OMEGA, SEA, HullMotion(surge, 0.0))
     assert moving.deviation[node] < 0.02 * still.deviation[node]
 
 
-def test_the_part_of_a_current_is_that_of_the_plant_at_rest():
+@pytest.mark.parametrize("attitude", [{}, {"roll": 0.05, "platform_pitch": 0.1, "yaw": 0.6}])
+def test_the_part_of_a_current_is_that_of_the_plant_at_rest(attitude):
     """at_rest against differences of the strips' own drag in the current."""
     scene = build_scene("oc3_hywind", current={"speed": 0.8}, fidelity="reference")
     hydro = scene.model.hydro
-    found = linear_drag(scene, state(), OMEGA, None)
+    found = linear_drag(scene, state(**attitude), OMEGA, None)
     np.testing.assert_allclose(found.damping, found.at_rest)
     strips, kinematics = hydro.strips.shape, np.zeros((7, hydro.strips.shape.nodes))
 
     def load(**values):
-        wrench = morison_load(0.0, pose_of(state(**values)), strips, None, hydro.current, kinematics).wrench
-        return np.array([wrench.fx, wrench.my])
+        pose = pose_of(state(**attitude, **values))
+        return np.array(morison_load(0.0, pose, strips, None, hydro.current, kinematics).wrench)
 
-    for name, place in (("vx", 0), ("wy", 4)):
+    for name, place in (("vx", 0), ("vy", 1), ("wx", 3), ("wy", 4)):
         step = 1e-4
         slope = -(load(**{name: step}) - load(**{name: -step})) / (2.0 * step)
-        np.testing.assert_allclose(found.at_rest[[0, 4], place], slope, rtol=1e-3)
+        rest = np.abs(found.at_rest[:, place]).max()
+        np.testing.assert_allclose(found.at_rest[:, place], slope, rtol=1e-3, atol=1e-6 * rest)
+
+
+def test_a_hull_that_is_turned_meets_the_waves_from_another_side(scene):
+    sea = {"kind": "jonswap", "Hs": 3.0, "Tp": 9.0, "gamma": 2.0}
+    found = linear_drag(scene, state(yaw=np.radians(50.0)), OMEGA, sea_state_of(sea | {"heading": 30.0}))
+    wanted = linear_drag(scene, state(), OMEGA, sea_state_of(sea | {"heading": -20.0}))
+    for name in ("damping", "excitation"):
+        a, b = getattr(found, name), getattr(wanted, name)
+        assert np.abs(a - b).max(initial=0.0) < 1e-9 * np.abs(b).max()
 
 
 def test_axial_drag_damps_heave(scene):
@@ -178,6 +191,13 @@ def test_the_spectrum_has_the_sea_s_variance_and_a_sea_without_one_is_named(scen
         linear_drag(scene, state(), OMEGA, sea_state_of({"kind": "regular", "H": 1.0, "T": 8.0}))
     with pytest.raises(InputError, match="no frequency lies in the band"):
         elevation_spectrum(SEA, np.array([50.0, 60.0]))
+
+
+def test_frequencies_need_not_be_evenly_spaced(scene):
+    uneven = np.geomspace(OMEGA[0], OMEGA[-1], OMEGA.size)
+    found, wanted = (linear_drag(scene, state(), omega, SEA) for omega in (uneven, OMEGA))
+    np.testing.assert_allclose(found.deviation, wanted.deviation, rtol=1e-3)
+    assert np.abs(found.damping - wanted.damping).max() < 1e-3 * np.abs(wanted.damping).max()
 
 
 def test_without_water_there_is_no_drag(bare_scene):
@@ -221,18 +241,20 @@ def test_leaning_members_have_the_drag_of_the_plant_s_slope():
     assert found.damping == pytest.approx(found.at_rest, rel=1e-9)
 
 
-def test_a_quadratic_damping_matrix_takes_the_gain_of_its_motion(scene):
+@pytest.mark.parametrize("attitude", [(0.0, 0.0, 0.0), (0.05, 0.1, 0.6)])
+def test_a_quadratic_damping_matrix_takes_the_gain_of_its_motion_in_inertial_axes(attitude):
+    x = state(roll=attitude[0], platform_pitch=attitude[1], yaw=attitude[2])
+    turn = np.kron(np.eye(2), rotation(*attitude))
     quadratic = np.diag([1e5, 2e5, 3e5, 4e9, 5e9, 6e9])
     quadratic[0, 4] = -7e6
     platform = floaters.semi(
         additional=AdditionalLoads(quadratic_damping=tuple(map(tuple, quadratic.tolist())))
     )
-    plain = linear_drag(build_scene(floaters.semi(), fidelity="reference"), np.zeros(15), OMEGA, None)
+    plain = linear_drag(build_scene(floaters.semi(), fidelity="reference"), x, OMEGA, None)
     deviation = np.array([0.5, 0.2, 0.3, 0.01, 0.02, 0.03])
     motion = HullMotion(0.0, np.diag(deviation**2))
-    more = linear_drag(build_scene(platform, fidelity="reference"), np.zeros(15), OMEGA, None, motion).damping
-    less = linear_drag(
-        build_scene(floaters.semi(), fidelity="reference"), np.zeros(15), OMEGA, None, motion
-    ).damping
-    assert more - less == pytest.approx(quadratic * np.sqrt(8.0 / np.pi) * deviation, rel=1e-9, abs=1e-3)
+    more = linear_drag(build_scene(platform, fidelity="reference"), x, OMEGA, None, motion).damping
+    less = linear_drag(build_scene(floaters.semi(), fidelity="reference"), x, OMEGA, None, motion).damping
+    gained = quadratic * np.sqrt(8.0 / np.pi * (turn**2 @ deviation**2))
+    assert more - less == pytest.approx(turn.T @ gained @ turn, rel=1e-9, abs=1e-3)
     assert not plain.damping.any()

@@ -39,13 +39,16 @@ def difference_pairs(body, waves):
 
 
 def newman_pairs(body, waves):
-    """The same with sqrt(Q_ii Q_jj) for Q_ij, of its sign where both have one, and else 0; one heading."""
-    qtf, pairs = body.difference_qtf, []
-    grid = RegularGridInterpolator((qtf.omega, qtf.omega), qtf.value[0])
-    own = [grid((omega, omega)).real for omega in waves.omega]
+    """The same with sqrt(Q_ii Q_jj) for Q_ij of one heading, of its sign where both have one, and else 0."""
+    qtf, pairs, own = body.difference_qtf, [], []
+    heading = np.arctan2(waves.sin_heading, waves.cos_heading)
+    for omega, angle in zip(waves.omega, heading, strict=True):
+        row = np.argmin(np.abs(qtf.heading - angle).sum(axis=1))
+        own.append(RegularGridInterpolator((qtf.omega, qtf.omega), qtf.value[row])((omega, omega)).real)
     for i, first in enumerate(waves.omega):
         for j, second in enumerate(waves.omega):
-            like = np.where(own[i] * own[j] > 0.0, np.sign(own[i]) * np.sqrt(np.abs(own[i] * own[j])), 0.0)
+            both = (own[i] * own[j] > 0.0) & np.isclose(heading[i], heading[j])
+            like = np.where(both, np.sign(own[i]) * np.sqrt(np.abs(own[i] * own[j])), 0.0)
             phase = np.exp(-1j * (waves.phase[i] - waves.phase[j]))
             pairs.append((first - second, waves.amplitude[i] * waves.amplitude[j] * phase * like))
     return pairs

@@ -398,11 +398,11 @@ def test_of_several_distances_the_nearest_ones_that_serve_are_used():
 
 
 def test_blades_that_pass_take_shots_away():
-    """A flat blade as wide as its chord, at random azimuths, in front of beams of the preset."""
+    """A flat blade as wide as its chord, at random azimuths, before beams of presets and of upward ones."""
     turbine = scene_in().turbine
     azimuth = np.random.default_rng(0).uniform(0.0, 2.0 * np.pi, 100_000)
-    for preset in PRESETS:
-        lidar = read_lidar(preset)
+    upward = remade("four_beam_pulsed", azimuth=(0.0, 10.0), elevation=(10.0, 30.0))
+    for lidar in (*map(read_lidar, PRESETS), upward):
         slope_y, slope_z = directions(lidar)
         y, z = slope_y * lidar.behind_rotor, lidar.above_shaft + slope_z * lidar.behind_rotor
         lost = []

@@ -94,11 +94,12 @@ def test_differences_above_the_cutoff_make_no_force():
     assert np.array_equal(forces(built(UNEVEN, "full", cutoff=2.0)), forces(built(UNEVEN, "full")))
 
 
-def test_newman_takes_the_roots_of_the_diagonal():
-    pairs = naive.newman_pairs(BODY, sea_of(HARMONIC))
+@pytest.mark.parametrize("sea", [HARMONIC, TWO_HEADINGS], ids=["one heading", "two headings"])
+def test_newman_takes_the_roots_of_the_diagonal_heading_by_heading(sea):
+    pairs = naive.newman_pairs(BODY, sea_of(sea))
     signs = {np.sign(value.real[0]) for omega, value in pairs if omega == 0.0}
     assert signs == {-1.0, 1.0}  # both occur
-    assert_close(forces(built(HARMONIC, "newman")), [naive.second_order(t, pairs) for t in TIMES], 1e-5)
+    assert_close(forces(built(sea, "newman")), [naive.second_order(t, pairs) for t in TIMES], 1e-5)
 
 
 @pytest.mark.parametrize("method", ["newman", "full"])

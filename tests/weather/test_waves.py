@@ -145,6 +145,14 @@ def test_spectrum_has_its_height_peak_and_area():
     assert 4.0 * np.sqrt(m0) == pytest.approx(6.0, rel=1e-4)
 
 
+def test_the_peak_of_jonswap_is_wider_above_than_below():
+    peak, gamma = 2.0 * pi / 10.0, 3.3
+    omega = peak * np.array([1.0 - 0.07, 1.0, 1.0 + 0.09])  # a width off, where the exponent is -1/2
+    raised = jonswap(omega, 6.0, 10.0, gamma) / jonswap(omega, 6.0, 10.0, 1.0)
+    expected = (1.0 - 0.287 * np.log(gamma)) * gamma ** np.exp([-0.5, 0.0, -0.5])
+    assert np.allclose(raised, expected, rtol=1e-12, atol=0.0)
+
+
 def test_unit_gamma_is_pierson_moskowitz():
     omega = np.linspace(0.3, 3.0, 50)
     peak = 2.0 * pi / 9.0
@@ -168,6 +176,12 @@ def test_drawn_sea_follows_the_spectrum():
     density = waves.amplitude**2 / (2.0 * step)
     expected = jonswap(waves.omega, 6.0, 10.0, 3.3)
     assert np.allclose(density, expected, rtol=0.01, atol=0.0)  # what lies outside the band is returned
+
+
+def test_components_stand_in_the_middle_of_their_shares_of_the_band():
+    waves = build_waves(jonswap_sea(), **SITE, components=50)
+    edges = 2.0 * pi / 10.0 * np.linspace(0.5, 5.0, 51)
+    assert np.allclose(waves.omega, 0.5 * (edges[1:] + edges[:-1]), rtol=1e-12, atol=0.0)
 
 
 def test_elevation_has_a_quarter_of_the_significant_height_as_deviation():

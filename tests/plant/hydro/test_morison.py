@@ -8,6 +8,7 @@ from naive.rigid_body import rotation
 from plant_helpers import make_pose
 
 from fowt_env.descriptions.sea_state import SeaState
+from fowt_env.plant.hydro.load import fill_added_mass
 from fowt_env.plant.hydro.morison import Current, morison_load
 from fowt_env.plant.hydro.strip_kinematics import strip_kinematics
 from fowt_env.plant.hydro.strips import GAUSS_OFFSET, axis_surface, build_strips, wet_cell
@@ -173,6 +174,19 @@ def test_added_mass_has_the_published_entries(platform):
     assert got.s1 == pytest.approx(-4.954e8, rel=2e-4)
     assert got.s2 == pytest.approx(3.973e10, rel=2e-4)
     assert got.a33 == platform.hydro.heave_added_mass
+
+
+def test_the_matrix_of_the_added_mass_is_that_of_slices_that_take_water_across_the_axis_along(platform):
+    still = (np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
+    got = load(0.0, still, build(platform), None)
+    matrix, expected = np.ones((6, 6)), np.diag([0.0, 0.0, got.a33, 0.0, 0.0, 0.0])
+    fill_added_mass(got, matrix)
+    centre = got.s1 / got.s0
+    apart = np.sqrt(got.s2 / got.s0 - centre**2)
+    for z in (centre - apart, centre + apart):  # two slices with the same three integrals
+        moved = np.vstack([np.eye(3), np.cross(np.eye(3), [0.0, 0.0, z])])[:, :2]
+        expected += 0.5 * got.s0 * moved @ moved.T
+    assert matrix == pytest.approx(expected, rel=1e-12, abs=1e-12 * got.s2)
 
 
 def test_no_waves_equals_waves_of_no_height(platform, site):
