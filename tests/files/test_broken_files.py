@@ -47,6 +47,7 @@ def test_hundreds_of_broken_files_load_or_are_refused(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_ten_thousand_broken_files_load_or_are_refused(tmp_path):
     judged(tmp_path, FILES, seed=3)
 
