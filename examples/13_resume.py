@@ -46,7 +46,7 @@ def interrupted_training():
     settings = resolve("ppo", "above_rated", 0, STEPS, changes)
 
     def interrupt(done, total, text):
-        if done >= STEPS // 4:
+        if done >= STEPS // 4 and not run.stop:  # a second Ctrl-C ends the program at once
             signal.raise_signal(signal.SIGINT)
 
     run = Training(settings, FOLDER / "training")

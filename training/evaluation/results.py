@@ -241,10 +241,8 @@ class ResultsFolder:
             if before != code and done:
                 place = run_file(self.given / "runs", label, "", 0).parent
                 failed = ", or use --retry-failed" if set(done) == {FAILED} else ""
-                named = [each["name"] for each in (before, code)]
-                what = "the code of controller" if len(set(named)) == 1 else "{} is now {}: controller"
                 raise InputError(
-                    f"results folder {str(self.given)!r}: {what.format(*named)} {label!r} has changed since"
+                    f"results folder {str(self.given)!r}: controller {label!r} or its code has changed since"
                     f" its runs there; remove {str(place)!r} to run them again, or choose another"
                     f" folder{failed}"
                 )

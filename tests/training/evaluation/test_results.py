@@ -159,7 +159,7 @@ def test_other_settings_and_versions_are_refused_with_what_to_do(tmp_path, monke
     with monkeypatch.context() as patch:
         new = {"name": "pi", "code": "new"}
         patch.setattr("fowt_env.training.evaluation.evaluate.controller_code", lambda controller: new)
-        with pytest.raises(InputError, match="code of controller 'pi' has changed"):
+        with pytest.raises(InputError, match="controller 'pi' or its code has changed"):
             evaluate("pi", suite(), folder=tmp_path)
 
 
