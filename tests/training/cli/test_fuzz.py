@@ -100,6 +100,7 @@ def test_simulate_works_or_names_what_is_wrong(case):
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 @examples(1000)
 @given(simulate_arguments())
 def test_simulate_works_or_names_what_is_wrong_thousands_of_times(case):
@@ -186,6 +187,7 @@ def test_a_scene_is_built_or_refused_by_name(arguments):
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 @examples(5000)
 @given(SCENE)
 def test_a_scene_is_built_or_refused_by_name_thousands_of_times(arguments):

@@ -46,8 +46,17 @@ def test_default_step_keeps_a_factor_of_two_where_the_rotor_is_sampled_within_a_
     assert keeps_the_margin("full, rotor sampled thrice a step", "ab4", 100.0)
 
 
+EACH_PUSH = ("full, look-up rotor", "no mooring")  # of the map's scenes, which take half a minute each
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("name", step_limits.LIMIT_SCENES)
+@pytest.mark.parametrize(
+    "name",
+    [
+        name if name in EACH_PUSH else pytest.param(name, marks=pytest.mark.nightly)
+        for name in step_limits.LIMIT_SCENES
+    ],
+)
 def test_default_step_keeps_a_factor_of_two_on_the_whole_map(name):
     table = step_limits.stability_map([name], duration=150.0)
     assert (table["margin"] >= step_limits.MARGIN).all()
