@@ -534,6 +534,7 @@ def test_processes_that_keep_code_at_once_keep_all_of_it_under_the_right_keys(tm
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_two_processes_that_compile_at_once_give_the_same_bits_as_one_that_loads(tmp_path):
     folder = tmp_path / "cache"
     together = [start(DECAY, folder) for _ in range(2)]
