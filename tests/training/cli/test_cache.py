@@ -73,6 +73,12 @@ def test_it_removes_what_is_named_and_nothing_else(root, words, gone):
     assert left(root) == ALL - gone
 
 
+def test_kernels_that_an_interrupted_judging_left_unfinished_are_removed(root):
+    (root / "submissions" / f"{SUBMISSION}-k3_x9a2b").mkdir()
+    assert fowt("clear").exit_code == 0
+    assert left(root) == ALL - OLD
+
+
 @pytest.mark.parametrize("words", [("--all",), ("--wind-boxes",)])
 def test_it_asks_before_more_than_old_kernels_go(root, words):
     assert fowt("clear", *words, input="n\n").exit_code == 1
