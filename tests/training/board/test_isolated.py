@@ -271,8 +271,17 @@ def test_a_process_is_started_by_the_command_of_a_container(tmp_path):
     ).read_text()
 
 
+def usable(program):
+    """Whether bubblewrap is installed here and may make a container at all."""
+    try:
+        subprocess.run([program, "--unshare-all", "--ro-bind", "/", "/", "true"], check=True, timeout=60)
+    except (OSError, subprocess.SubprocessError):
+        return False
+    return True
+
+
 def bubblewrap():
-    """The command of docs/guides/leaderboard.md with this installation's folders; None where it fails."""
+    """The command of docs/guides/leaderboard.md with this installation's folders."""
     page = (Path(fowt_env.__file__).resolve().parents[1] / "docs" / "guides" / "leaderboard.md").read_text()
     command = shlex.split(re.search(r'--within "(bwrap .*?)"', page, re.DOTALL).group(1).replace("\\\n", " "))
     place = command.index("$VIRTUAL_ENV") - 1
@@ -281,18 +290,13 @@ def bubblewrap():
     command[place : place + 3] = [
         word for folder in sorted(folders) for word in ("--ro-bind", folder, folder)
     ]
-    try:
-        tried = [word.replace("{folder}", "/usr").replace("/usr/work", "/usr") for word in command]
-        subprocess.run([*tried, sys.executable, "-c", ""], check=True, timeout=60, capture_output=True)
-    except (OSError, subprocess.SubprocessError):
-        return None
     return tuple(command)
 
 
 @pytest.mark.slow
 def test_the_described_container_hides_files_processes_and_the_network(tmp_path):
     within = bubblewrap()
-    if within is None:
+    if not usable(within[0]):
         pytest.skip("bubblewrap is not installed, or may not be used here")
     secret = tmp_path / "seeds.txt"
     secret.write_text("4611686018427387905")
