@@ -60,8 +60,7 @@ coverage: $(VENV)/.installed-dev
 
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .
-	rm -rf build/typing && mkdir -p build/typing/fowt_env
-	ln -s $(CURDIR)/fowt_env/* $(CURDIR)/controllers $(CURDIR)/training build/typing/fowt_env/
+	rm -rf build/typing && $(BIN)/python -c "from fowt_env.layout import link_packages; link_packages('build/typing')"
 	cd build/typing && $(abspath $(BIN))/mypy --config-file $(CURDIR)/pyproject.toml
 
 # the variable silences an advertisement of the theme's

@@ -37,6 +37,15 @@ def check_packages():
         raise ImportError(f"{fault}: this installation is incomplete. Install it again")
 
 
+def link_packages(folder):
+    """Make a folder with links in which fowt_env lies as once installed, for tools that read its sources."""
+    place = Path(folder, PACKAGE.name)
+    place.mkdir(parents=True, exist_ok=True)
+    for path in (*PACKAGE.iterdir(), *FOLDERS.values()):
+        if not (place / path.name).exists():
+            (place / path.name).symlink_to(path)
+
+
 def installed_path(path):
     """Return the path that a source of this package has once installed; None for any other file."""
     for name, folder in FOLDERS.items():

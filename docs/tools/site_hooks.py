@@ -16,7 +16,7 @@ from tempfile import TemporaryDirectory
 from mkdocs.plugins import event_priority
 from mkdocs.structure.files import File
 
-from fowt_env.layout import FOLDERS, PACKAGE
+from fowt_env.layout import link_packages
 
 with warnings.catch_warnings():  # it still asks for its fonts by importlib.resources.path; mkdocs shows that
     warnings.simplefilter("ignore", DeprecationWarning)
@@ -45,22 +45,13 @@ TAG = re.compile(r"\\tag\{([^}]*)\}")
 @event_priority(100)  # ahead of mkdocstrings, which reads its paths then
 def on_config(config):
     """Return the configuration with the examples in the contents and the sources of the API pages."""
-    config.plugins["mkdocstrings"].config.handlers["python"]["paths"] = [_installed_package()]
+    link_packages(SOURCES.name)
+    config.plugins["mkdocstrings"].config.handlers["python"]["paths"] = [SOURCES.name]
     (tutorials,) = (
         part["Tutorials"] for part in config.nav if isinstance(part, dict) and "Tutorials" in part
     )
     tutorials.append({"Examples": ["examples/index.md", *sorted(EXAMPLES.values())]})
     return config
-
-
-def _installed_package():
-    """Return a folder with fowt_env as it is installed, by links: mkdocstrings reads sources, not modules."""
-    place = Path(SOURCES.name, "fowt_env")
-    place.mkdir(exist_ok=True)
-    for path in (*PACKAGE.iterdir(), *FOLDERS.values()):
-        if not (place / path.name).exists():
-            (place / path.name).symlink_to(path)
-    return SOURCES.name
 
 
 def on_files(files, config):
