@@ -41,14 +41,7 @@ ROW_KEY = b"fowt_env.row"
 TABLE_EVERY = 2.0  # s between rewritings of results.csv while runs go on
 PLAIN_NAME = re.compile(r"[a-z0-9_][a-z0-9_.-]{0,99}")  # of a file that no other name's can be taken for
 LONGEST_NAME = 500
-TEXTS = (
-    "controller",
-    "case",
-    "status",
-    "reason",
-    "events",
-    "warning",
-)  # of a row; its other columns are numbers
+TEXTS = ("controller", "case", "status", "reason", "events", "warning")  # of a row; all else are numbers
 
 
 def run_file(folder, label, case, seed):

@@ -43,6 +43,13 @@ def differences(path):
     return dict(make_report(read_deck(path), "x").differences)
 
 
+def row_of(folder, rows, part, key, value):
+    """The one row that a value of a key adds to those of a small deck; rows: function of a deck's path."""
+    before = set(rows(write_deck(folder)))
+    (row,) = set(rows(deck_with(folder, part, key, value))) - before
+    return row
+
+
 # --------------------------------------------------------------------------- comments
 
 
@@ -135,9 +142,7 @@ def test_a_comment_in_a_table_of_map_is_refused_as_map_takes_it_for_a_row(tmp_pa
     ],
 )
 def test_what_the_plant_does_not_have_is_said(tmp_path, part, key, value, deck, here):
-    (row,) = set(differences(deck_with(tmp_path, part, key, value)).items()) - set(
-        differences(write_deck(tmp_path)).items()
-    )
+    row = row_of(tmp_path, lambda path: differences(path).items(), part, key, value)
     assert deck in row[0] and f"{key} {value}" in row[0]
     assert here in row[1]
 
@@ -371,8 +376,7 @@ def test_a_grid_of_waves_that_does_not_reach_the_members_is_said_with_the_remedy
     ],
 )
 def test_figures_that_two_files_give_unlike_are_said(tmp_path, part, key, value, said):
-    before = set(contradictions(write_deck(tmp_path)))
-    (row,) = set(contradictions(deck_with(tmp_path, part, key, value))) - before
+    row = row_of(tmp_path, contradictions, part, key, value)
     assert row[0].startswith(said)
 
 
