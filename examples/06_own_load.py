@@ -44,7 +44,7 @@ if __name__ == "__main__":
     swell = {"fidelity": "standard", "sea": {"kind": "jonswap", "Hs": 6.0, "Tp": 14.0}}
     for name, loads in (("bare spar", ()), ("with plate", (plate,))):
         decay = simulate(
-            build_scene(loads=loads, **still), None, 120.0, start="zero", initial={"PtfmHeave": 4.0}
+            build_scene(loads=loads, **still), None, 120.0, initial={"start": "zero", "PtfmHeave": 4.0}
         )
         heave = decay["PtfmHeave_[m]"]
         waves = simulate(build_scene(loads=loads, **swell), None, 300.0)

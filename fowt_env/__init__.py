@@ -25,11 +25,11 @@ if TYPE_CHECKING:  # the names below, for editors and type checkers
     from fowt_env.plant.compile.notice import set_quiet as set_quiet
     from fowt_env.plant.user_loads import Force as Force
     from fowt_env.plant.user_loads import Motion as Motion
+    from fowt_env.run.simulation import simulate as simulate
     from fowt_env.scene.build import build_scene as build_scene
     from fowt_env.scene.scene import Scene as Scene
     from fowt_env.scene.user_loads import Load as Load
     from fowt_env.scene.user_loads import load_kernel as load_kernel
-    from fowt_env.simulation import simulate as simulate
 
 __version__ = "0.2.0"
 
@@ -38,7 +38,7 @@ _PUBLIC = {
     "Scene": "fowt_env.scene.scene",
     "trim": "fowt_env.analysis.trim",
     "OperatingPoint": "fowt_env.analysis.trim",
-    "simulate": "fowt_env.simulation",
+    "simulate": "fowt_env.run.simulation",
     "linearize": "fowt_env.analysis.linear_model",
     "natural_periods": "fowt_env.analysis.linear_model",
     "Measurement": "fowt_env.descriptions.measurements",  # which gives it its table

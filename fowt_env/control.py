@@ -61,6 +61,7 @@ from fowt_env.errors import (
     level_outside,
     unknown,
 )
+from fowt_env.loop.sensing import GIVEN, HIDDEN
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.measurement import (
     BLADE_SENSOR_FIELDS,
@@ -70,7 +71,6 @@ from fowt_env.plant.measurement import (
     BladeMeasurement,
     Measurement,
 )
-from fowt_env.plant.sensing import GIVEN, HIDDEN
 from fowt_env.plant.state import N_COMMANDS, N_INDIVIDUAL_COMMANDS
 from fowt_env.weather.lidar import lidar_preview
 from fowt_env.weather.preview import Preview, check_times, exact_preview

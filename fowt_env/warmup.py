@@ -16,8 +16,8 @@ WIND, SEA = {"kind": "ntm", "speed": 18.0}, {"kind": "jonswap", "Hs": 6.0, "Tp":
 
 
 def _simulated(platform, fidelity, **weather):
+    from fowt_env.run.simulation import simulate
     from fowt_env.scene.build import build_scene
-    from fowt_env.simulation import simulate
 
     scene = build_scene(platform, fidelity=fidelity, **weather)
     simulate(scene, "pi", duration=1.0)

@@ -31,6 +31,9 @@ from fowt_env.weather.sensor_noise import draw_noise
 
 TORQUE, PITCH = 43093.55, 0.26
 CYCLE = 0.01  # rad
+TRIP = dict.fromkeys(("overpower", "acceleration", "pitch_deviation"), False) | {
+    "overspeed": {"limit": 1.0001}
+}
 BLADE_PITCHES = ("BldPitch1_[deg]", "BldPitch2_[deg]", "BldPitch3_[deg]")
 ENV = {"task": "steady", "wind": 18.0, "duration": 3.0, "pitch": "individual"}
 
@@ -156,7 +159,7 @@ def test_a_held_command_holds_each_blade_where_it_began(scene):
 
 def test_an_emergency_stop_feathers_each_blade_from_where_it_is(scene):
     start = {"BldPitch1": 12.0, "BldPitch2": 10.0, "BldPitch3": 15.0}
-    frame = run(scene, "pi", trip=1.0001, initial=start | {"RotSpeed": 12.2}, duration=2.0)
+    frame = run(scene, "pi", protection=TRIP, initial=start | {"RotSpeed": 12.2}, duration=2.0)
     assert frame.attrs["tripped"] == 0.0
     end = frame[list(BLADE_PITCHES)].iloc[-1].to_numpy()
     np.testing.assert_allclose(end - end[0], [0.0, -2.0, 3.0], atol=1e-6)
@@ -429,7 +432,7 @@ def test_moments_of_cyclic_pitch_are_those_of_a_run_with_it(scene, tilt, yaw):
     for amplitude in (size, -size):
         # the command is held for a period, by half of which it would trail the azimuth
         law = Cyclic(0.5 * 0.01 * speed, amplitude * tilt, amplitude * yaw)
-        frame = run(still, law, start="zero", duration=4.0 * turn, dt=0.01, control_dt=0.01, output_dt=0.01)
+        frame = run(still, law, initial="zero", duration=4.0 * turn, dt=0.01, control_dt=0.01, output_dt=0.01)
         last = frame.iloc[-round(turn / 0.01) :]
         psi = np.radians(last["Azimuth_[deg]"].to_numpy())
         root = sum(

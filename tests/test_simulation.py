@@ -11,17 +11,21 @@ from naive.faults import Overridden
 from plant_helpers import random_state
 
 import fowt_env
-from fowt_env import simulation
 from fowt_env.control import CompiledController
 from fowt_env.controllers import make
 from fowt_env.controllers.constant import Constant
 from fowt_env.descriptions.faults import Fault
 from fowt_env.errors import ControllerError, InputError, SimulationStopped
-from fowt_env.initial_conditions import initial_state
+from fowt_env.loop.protection import build_guard
+from fowt_env.loop.rollout import Schedule
 from fowt_env.plant.compile.decorators import control_kernel
 from fowt_env.plant.events import EVENTS, Counter
-from fowt_env.plant.rollout import Schedule, advance
+from fowt_env.plant.rollout import advance
 from fowt_env.plant.state import State, pose_of
+from fowt_env.run import simulation
+from fowt_env.run.initial_conditions import initial_state
+from fowt_env.run.interface import build_interface
+from fowt_env.run.simulation import REPLACED
 
 ROOT = Path(__file__).resolve().parent.parent
 COLUMNS = ["PtfmSurge_[m]", "PtfmHeave_[m]", "PtfmPitch_[deg]", "PtfmYaw_[deg]"]
@@ -111,11 +115,11 @@ def test_a_command_within_the_limits_is_followed_to_the_bit(storm_scene):
 
 def test_the_generator_is_off_from_the_instant_of_the_grid_loss(storm_scene):
     for controller in (Constant(), Commands(43e3, 0.26)):
-        frame = run(storm_scene, controller=controller, duration=2.0, grid_loss=0.7)
+        frame = run(
+            storm_scene, controller=controller, duration=2.0, faults={"kind": "grid_loss", "time": 0.7}
+        )
         torque = frame["GenTq_[kN-m]"].to_numpy()
         assert (torque[:7] > 40.0).all() and (torque[7:] == 0.0).all()
-    with pytest.raises(InputError, match="grid_loss = 'now': must be a time"):
-        run(storm_scene, controller="constant", grid_loss="now")
 
 
 @pytest.mark.parametrize("kind", [Constant, Commands])
@@ -126,12 +130,20 @@ def test_a_run_goes_on_past_the_overspeed_unless_it_is_to_stop_there(storm_scene
     speed = frame["RotSpeed_[rpm]"].to_numpy()
     assert speed.max() > 1.2 * limit
     with pytest.raises(SimulationStopped, match="overspeed") as stopped:
-        run(storm_scene, **free, stop_overspeed=True)
+        run(storm_scene, **free, protection="end_at_overspeed")
     first = int(np.argmax(speed > limit))
     assert stopped.value.time == pytest.approx(frame["Time_[s]"][first])
     np.testing.assert_array_equal(stopped.value.frame.to_numpy(), frame.to_numpy()[:first])
     with pytest.raises(SimulationStopped, match="overspeed"):  # an environment ends at its last instant too
-        run(storm_scene, **free | {"duration": first * 0.1}, stop_overspeed=True)
+        run(storm_scene, **free | {"duration": first * 0.1}, protection="end_at_overspeed")
+
+
+NO_TRIPS = dict.fromkeys(("overspeed", "overpower", "acceleration", "pitch_deviation"), False)
+
+
+def overspeed(ratio):
+    """Protection that trips by overspeed alone, above a ratio of rated rotor speed."""
+    return NO_TRIPS | {"overspeed": {"limit": ratio}}
 
 
 EMERGENCY = {"gspi_oc3": "gspi_oc3", "in Python": Delegate}
@@ -140,11 +152,11 @@ EMERGENCY = {"gspi_oc3": "gspi_oc3", "in Python": Delegate}
 @pytest.mark.parametrize("kind", EMERGENCY)
 def test_a_trip_is_an_emergency_stop_at_the_instant_in_which_the_speed_is_passed(storm_scene, kind):
     """Against a wrapper that overrides the controller from a time on."""
-    controller, options = EMERGENCY[kind], {"duration": 40.0, "grid_loss": 5.0}
+    controller, options = EMERGENCY[kind], {"duration": 40.0, "faults": {"kind": "grid_loss", "time": 5.0}}
     free = run(storm_scene, controller=controller, **options)
     speed = free["RotSpeed_[rpm]"] / 12.1
     at = float(free["Time_[s]"][speed > 1.1].iloc[0])
-    tripped = run(storm_scene, controller=controller, trip=1.1, **options)
+    tripped = run(storm_scene, controller=controller, protection=overspeed(1.1), **options)
     assert tripped.attrs["tripped"] == pytest.approx(at, abs=1e-9)
     inner = make(controller, storm_scene.turbine, 0.1)
     stop = Overridden(inner, Fault(kind="emergency_stop", time=at), np.radians(90.0), 0.1)
@@ -159,7 +171,7 @@ def test_a_trip_is_an_emergency_stop_at_the_instant_in_which_the_speed_is_passed
 def test_a_trip_stays_when_the_speed_has_fallen_and_takes_the_torque(storm_scene):
     """From a rotor that starts too fast; over many compiled calls, as a progress bar has them."""
     fast = {"RotSpeed": 13.5}
-    frame = run(storm_scene, controller="pi", trip=1.1, duration=60.0, initial=fast)
+    frame = run(storm_scene, controller="pi", protection=overspeed(1.1), duration=60.0, initial=fast)
     assert frame.attrs["tripped"] == 0.0
     assert frame["RotSpeed_[rpm]"].iloc[-1] < 6.0
     assert (frame["GenTq_[kN-m]"] == 0.0).all()
@@ -168,15 +180,23 @@ def test_a_trip_stays_when_the_speed_has_fallen_and_takes_the_torque(storm_scene
 def test_without_a_trip_or_below_it_no_bit_changes(storm_scene):
     plain = run(storm_scene, controller="pi", duration=10.0)
     assert plain.attrs["tripped"] is None
-    quiet = run(storm_scene, controller="pi", duration=10.0, trip=1.5)
+    quiet = run(storm_scene, controller="pi", duration=10.0, protection=overspeed(1.5))
     pd.testing.assert_frame_equal(plain, quiet, check_exact=True)
     assert quiet.attrs["tripped"] is None
 
 
 @pytest.mark.parametrize("trip", [1.0, 0.5, -1.3, np.inf, "fast"])
 def test_a_trip_at_or_below_rated_is_refused(storm_scene, trip):
-    with pytest.raises(InputError, match="trip = .*above 1"):
-        run(storm_scene, trip=trip)
+    with pytest.raises(InputError, match="overspeed.limit = "):
+        run(storm_scene, protection={"overspeed": {"limit": trip}})
+
+
+@pytest.mark.parametrize("keyword", REPLACED)
+def test_a_replaced_keyword_says_what_replaces_it(storm_scene, keyword):
+    with pytest.raises(
+        InputError, match=f"simulate\\({keyword}=...\\) was replaced: use (protection|faults|initial)="
+    ):
+        run(storm_scene, **{keyword: 1.2})
 
 
 def test_what_the_time_step_blows_up_is_not_called_a_capsize(platform):
@@ -303,7 +323,7 @@ def test_run_starts_at_the_trim(still_scene):
 
 
 def test_zero_start_has_an_undisplaced_platform_and_the_rotor_of_that_wind(storm_scene):
-    x, u = initial_state(storm_scene, start="zero")
+    x, u = initial_state(storm_scene, "zero")
     assert np.all(x[:6] == 0.0) and np.all(x[State.VX : State.WZ + 1] == 0.0)
     fixed = fowt_env.trim(storm_scene, platform="fixed")
     assert np.array_equal(x, fixed.state) and np.array_equal(u, fixed.command)
@@ -336,7 +356,7 @@ def test_initial_velocities_are_in_inertial_axes(still_scene):
 @pytest.mark.parametrize(
     "options, message",
     [
-        (dict(start="somewhere"), "unknown start 'somewhere'.*Known: trim, zero"),
+        (dict(initial="somewhere"), "unknown start 'somewhere'.*Known: trim, zero"),
         (dict(initial={"PtfmSurg": 1.0}), "Did you mean 'PtfmSurge'"),
         (dict(initial={"PtfmSurge": float("inf")}), r"initial\['PtfmSurge'\] = inf.*finite"),
         (dict(initial={"PtfmSurge": "5"}), r"initial\['PtfmSurge'\] = '5'"),
@@ -474,9 +494,11 @@ def test_capsize_stops_the_run_and_keeps_the_rows(still_scene):
 
 def test_compiled_run_stops_on_a_command_that_is_not_a_number(storm_scene):
     x, u = initial_state(storm_scene)
-    closed = simulation._Loop(storm_scene, CompiledNan(), x, u, Schedule(0.05, 2, 2, 200, np.inf, np.inf))
+    law = CompiledNan()
+    interface = build_interface(storm_scene, law, build_guard(), None, "exact", 0.1, 100)
+    closed = simulation.Run(storm_scene, law, x, u, Schedule(0.05, 2, 2, 200), interface)
     with pytest.raises(SimulationStopped, match="command is not finite") as caught:
-        closed.go(lambda share: None)
+        closed.advance(lambda share: None)
     assert caught.value.time == pytest.approx(1.0)  # the control instant that went wrong
     frame = caught.value.frame
     assert len(frame) == 10
@@ -491,12 +513,22 @@ def test_same_seed_gives_the_same_bits(storm_scene):
     first, second = run(storm_scene, **options), run(storm_scene, **options)
     pd.testing.assert_frame_equal(first, second, check_exact=True)
     again = fowt_env.build_scene(
-        "oc3_hywind", wind=18.0, sea=storm_scene.sea, seed=3, duration=60.0, wave_components=60,
+        "oc3_hywind",
+        wind=18.0,
+        sea=storm_scene.sea,
+        seed=3,
+        duration=60.0,
+        wave_components=60,
         fidelity="reference",
     )
     pd.testing.assert_frame_equal(first, run(again, **options), check_exact=True)
     other = fowt_env.build_scene(
-        "oc3_hywind", wind=18.0, sea=storm_scene.sea, seed=4, duration=60.0, wave_components=60,
+        "oc3_hywind",
+        wind=18.0,
+        sea=storm_scene.sea,
+        seed=4,
+        duration=60.0,
+        wave_components=60,
         fidelity="reference",
     )
     assert not np.array_equal(first["Wave1Elev_[m]"], run(other, **options)["Wave1Elev_[m]"])
@@ -521,7 +553,7 @@ def test_another_process_gives_the_same_bits():
 STEPS = """
 import numpy as np, fowt_env
 from plant_helpers import random_state
-from fowt_env.plant.rollout import Schedule, advance
+from fowt_env.plant.rollout import advance
 scene = fowt_env.build_scene("oc3_hywind", wind=18.0, seed=3, duration=60.0, wave_components=20,
     sea={"kind": "jonswap", "Hs": 6.0, "Tp": 10.0, "gamma": 3.3})
 x = random_state(np.random.default_rng(6))

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fowt_env.control import CompiledController, call_law, check_control_dt, view_of, wind_ahead
+from fowt_env.control import CompiledController, call_law, check_control_dt, hidden, view_of, wind_ahead
 from fowt_env.controllers.lqr.law import WindEstimator
 from fowt_env.controllers.policy.network_file import read_policy
 from fowt_env.envs.actions import (
@@ -24,18 +24,18 @@ from fowt_env.envs.actions import (
 from fowt_env.envs.decisions import Decisions, DecisionSettings, wind_entry
 from fowt_env.envs.observations import (
     ESTIMATE_CHANNELS,
-    ESTIMATED,
-    ESTIMATES,
-    FIRST_ACTION,
     N_ACTIONS,
     PREVIEW,
     build_observation_map,
     entries,
     fill_observation,
+    fill_signals,
 )
 from fowt_env.envs.tasks import Task
 from fowt_env.errors import InputError, unknown
-from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
+from fowt_env.loop.period import hide_command
+from fowt_env.plant.drivetrain import followed_torque
+from fowt_env.plant.measurement import Measurement
 
 POLICY_PREFIX = "policy:"
 AGENTS = Path(__file__).parent / "agents"
@@ -115,15 +115,16 @@ class PolicyController:
             self._baseline_law = self._baseline.law
         self._signals = np.zeros(PREVIEW + len(preview))
         self._observation = np.zeros(len(observed), dtype=np.float32)
-        self._u, self._commanded = np.zeros(2), np.zeros(2)
+        self._u = np.zeros(2)
         self._accepted = np.zeros(N_ACTIONS)
         self._calls = 0
         self.information = self._information(names)
         own = preview if "wind_preview" in names else ()
         based = () if self._baseline is None else self._baseline.preview_times
         self.preview_times = tuple(sorted({*own, *based}))
-        self._own_leads = [self.preview_times.index(lead) for lead in own]
-        self._baseline_leads = [self.preview_times.index(lead) for lead in based]
+        self._own_leads = np.array([self.preview_times.index(lead) for lead in own], dtype=int)
+        self._baseline_leads = np.array([self.preview_times.index(lead) for lead in based], dtype=int)
+        self._hidden = None if self._baseline is None else hidden(self._baseline)
 
     def _information(self, names):
         """Measurements and extras that the agent and its baseline use, each once."""
@@ -157,7 +158,7 @@ class PolicyController:
         self._calls = 0
 
     def act(self, measurement):
-        """(generator torque, blade pitch); every `hold` calls the network decides anew."""
+        """Return (generator torque, blade pitch); every `hold` calls the network decides anew."""
         values = np.array([*measurement], dtype=np.float64)
         ahead = np.array(wind_ahead(measurement))
         decisions = self._decisions
@@ -172,35 +173,27 @@ class PolicyController:
             self._decision = self.network(decisions.features())
         self._calls += 1
         self._accepted[:] = np.clip(decisions.smooth(self._decision)[0], -1.0, 1.0)
+        command = self._u.copy()
+        hide_command(self._hidden, False, None, command)
+        reading = values if self._hidden is None else values + self._hidden
         command_of(
-            self._accepted,
-            self._actions,
-            self._baseline_law,
-            self._parameters,
-            self._memory,
-            self._baseline_reading(values, ahead),
-            self._u,
-            self._commanded,
-        )
-        return float(self._u[0]), float(self._u[1])
+            self._accepted, self._actions, self._baseline_law, self._parameters, self._memory,
+            np.concatenate([reading, ahead[self._baseline_leads]]), command,
+        )  # fmt: skip
+        limits, control_dt = self._actions.generator, self._actions.control_dt
+        self._u[0] = followed_torque(self._u[0], command[0], control_dt, limits)
+        self._u[1] = command[1]
+        return tuple(command.tolist())
 
     def _for_baseline(self, measurement):
-        """The measurement with the wind ahead at the baseline's own leads."""
+        """Return the measurement with the wind ahead at the baseline's look-ahead times."""
         ahead = wind_ahead(measurement)
         return view_of(self._baseline)([*measurement, *(ahead[i] for i in self._baseline_leads)])
 
-    def _baseline_reading(self, values, ahead):
-        """What the baseline's law reads: (N_MEASUREMENTS + its leads,)."""
-        return np.concatenate([values, ahead[self._baseline_leads]]) if self._baseline_leads else values
-
     def _observe(self, values, ahead):
         """Fill the observation from measurements (N_MEASUREMENTS,) and the wind ahead."""
-        self._signals[:N_MEASUREMENTS] = values
-        self._signals[FIRST_ACTION : FIRST_ACTION + N_ACTIONS] = self._accepted
-        if self._estimator is not None:
-            self._signals[ESTIMATES : ESTIMATES + len(ESTIMATED)] = self._estimator.memory[: len(ESTIMATED)]
-        if self._own_leads:
-            self._signals[PREVIEW:] = ahead[self._own_leads]
+        estimate = None if self._estimator is None else self._estimator.memory
+        fill_signals(values, 0.0, self._accepted, estimate, 0.0, ahead[self._own_leads], self._signals)
         fill_observation(self._signals, self._observation_map, self._observation)
 
 

@@ -23,7 +23,14 @@ from fowt_env.descriptions.records import (
     validate,
 )
 from fowt_env.descriptions.tower_modes import TowerBending, mass_problem, read_tower_modes
-from fowt_env.descriptions.turbine import Inertia, Vector3, turbine_file, turbine_names
+from fowt_env.descriptions.turbine import (
+    Inertia,
+    Turbine,
+    Vector3,
+    read_turbine,
+    turbine_file,
+    turbine_names,
+)
 from fowt_env.errors import InputError
 
 SixNumbers = tuple[Finite, Finite, Finite, Finite, Finite, Finite]
@@ -355,3 +362,10 @@ def read_platform(name_or_path: str | Path) -> Platform:
 
 class _MooringFile(Record):
     mooring: MooringSpread
+
+
+def turbine_of(platform, turbine=None):
+    """Return the Turbine of a platform, or the one that replaces it; each a name, a path or a description."""
+    if turbine is None:
+        turbine = (platform if isinstance(platform, Platform) else read_platform(platform)).turbine
+    return turbine if isinstance(turbine, Turbine) else read_turbine(turbine)

@@ -10,15 +10,19 @@ from fowt_env.descriptions.records import NonNegative, Positive, Record, bounded
 from fowt_env.descriptions.units import DEGREE
 from fowt_env.errors import InputError
 
-OWN = "turbine"  # the protection of the turbine's own file
-STOPS = ("normal", "emergency")
+TURBINE = "turbine"  # the protection of the turbine file
+END_AT_OVERSPEED = "end_at_overspeed"  # the run ends beyond the overspeed of the turbine file
+STOPS = ("normal", "emergency", "end")
 NORMAL_RATE = 0.9 * DEGREE  # rad/s
 EMERGENCY_RATE = 8.0 * DEGREE
 OFF_SPEED = 0.3
 
 
 class TripLimit(Record):
-    """A limit, how long it must be passed without a break, and the stop that follows."""
+    """Limit of a trip, how long it must be passed without a break, and the stop that follows.
+
+    stop: "normal", "emergency", or "end", which ends the run at once.
+    """
 
     limit: Positive
     time: NonNegative = 0.0  # s
@@ -65,20 +69,26 @@ class Protection(Record):
 NO_TRIPS = dict.fromkeys(("overspeed", "overpower", "acceleration", "pitch_deviation"))
 
 
-def read_protection(value: Any, own: Protection) -> Protection:
-    """Protection from what a run or case gives: None (no trips), "turbine" (own), a mapping or a Protection.
+def read_protection(value: Any, own: Protection, overspeed: float = 1.3) -> Protection:
+    """Return the Protection of a run from its setting.
 
-    A mapping has the keys of a turbine file's [protection], in place of single ones of `own`; false for no
-    trip. Raises: InputError naming the key, value and allowed range.
+    value: None (no trips), "turbine" (own, that of the turbine file), "end_at_overspeed" (the run ends at a
+    rotor speed above `overspeed`, of rated), a Protection, or a mapping of the keys of a turbine file's
+    [protection] that replace single ones of `own`; false for no trip.
+    Raises: InputError naming the key, value and allowed range.
     """
     if isinstance(value, Protection):
         return value
     if value is None:
         return own.model_copy(update=NO_TRIPS)
-    if isinstance(value, str) and value == OWN:
+    if isinstance(value, str) and value == TURBINE:
         return own
+    if isinstance(value, str) and value == END_AT_OVERSPEED:
+        return own.model_copy(update=NO_TRIPS | {"overspeed": TripLimit(limit=overspeed, stop="end")})
     if not isinstance(value, Mapping):
-        raise InputError(f"protection = {value!r}: must be {OWN!r}, a table of trips, or none")
+        raise InputError(
+            f"protection = {value!r}: must be {TURBINE!r}, {END_AT_OVERSPEED!r}, a table of trips, or none"
+        )
     problems: list[str] = []
     data, origin = to_si(dict(value), problems)
     record, found = validate(Protection, data, origin)

@@ -2,6 +2,12 @@
 
 from fowt_env.envs.env import FowtEnv
 from fowt_env.envs.safety import SafetyCosts, SafetyLayer
+from fowt_env.envs.settings import (
+    ControlSettings,
+    EpisodeSettings,
+    InterfaceSettings,
+    PlantSettings,
+)
 from fowt_env.envs.snapshot import Snapshot
 from fowt_env.envs.tables import task_tables
 from fowt_env.envs.tasks import TASKS, Task
@@ -9,8 +15,12 @@ from fowt_env.envs.vector_env import FowtVectorEnv
 
 __all__ = [
     "TASKS",
+    "ControlSettings",
+    "EpisodeSettings",
     "FowtEnv",
     "FowtVectorEnv",
+    "InterfaceSettings",
+    "PlantSettings",
     "SafetyCosts",
     "SafetyLayer",
     "Snapshot",

@@ -15,7 +15,6 @@ from fowt_env.plant.drivetrain import (
     build_drivetrain,
     build_torque_limits,
     clamp,
-    followed_torque,
 )
 from fowt_env.plant.measurement import Measure
 from fowt_env.plant.state import N_COMMANDS, N_INDIVIDUAL_COMMANDS, Command
@@ -134,43 +133,34 @@ def tracking_torque(speed, setpoint, memory, actions):
 
 
 @kernel
-def baseline_command(baseline_law, parameters, memory, measurement, command):
-    """Command of the baseline controller; without one the command stays."""
+def call_baseline(baseline_law, parameters, memory, reading, command):
+    """Call the law of the baseline; without one the command stays."""
     if baseline_law is None:
         return
-    baseline_law(parameters, memory, measurement, command)
+    baseline_law(parameters, memory, reading, command)
 
 
 @kernel
-def command_of(action, actions, baseline_law, parameters, memory, measurement, u, commanded):
-    """Set u = (generator torque N m, blade pitch or that of each blade rad) from an accepted action.
+def command_of(action, actions, baseline_law, parameters, memory, reading, command):
+    """Fill the command (generator torque N m, blade pitch or that of each blade rad) of an accepted action.
 
-    commanded (as u): filled with the command before the limits. The torque in u is what the generator reaches
-    of it; the pitch actuator limits itself.
+    reading: what the baseline's law reads; command: in force until now, as far as the law declares it.
     """
-    for i in range(u.shape[0]):
-        commanded[i] = u[i]
     if actions.mode == ActionMode.RESIDUAL:
-        baseline_command(baseline_law, parameters, memory, measurement, commanded)
+        call_baseline(baseline_law, parameters, memory, reading, command)
         if not actions.individual:
-            spread(commanded)
-        commanded[0] += action[0] * actions.residual_torque
-        for i in range(FIRST_PITCH, u.shape[0]):
-            commanded[i] += action[1] * actions.residual_pitch
+            spread(command)
+        command[0] += action[0] * actions.residual_torque
+        for i in range(FIRST_PITCH, command.shape[0]):
+            command[i] += action[1] * actions.residual_pitch
     else:
-        commanded[0] = unscale(action[0], actions.low, actions.high)
+        command[0] = unscale(action[0], actions.low, actions.high)
         for i in range(FIRST_PITCH, action.shape[0]):
-            commanded[i] = unscale(action[i], actions.pitch_low, actions.pitch_high)
+            command[i] = unscale(action[i], actions.pitch_low, actions.pitch_high)
         if actions.mode != ActionMode.INDIVIDUAL:
-            spread(commanded)
+            spread(command)
         if actions.mode == ActionMode.SETPOINT:
-            commanded[0] = tracking_torque(measurement[Measure.ROTOR_SPEED], commanded[0], memory, actions)
-    torque = u[Command.GENERATOR_TORQUE]
-    u[Command.GENERATOR_TORQUE] = followed_torque(
-        torque, commanded[Command.GENERATOR_TORQUE], actions.control_dt, actions.generator
-    )
-    for i in range(FIRST_PITCH, u.shape[0]):
-        u[i] = commanded[i]
+            command[0] = tracking_torque(reading[Measure.ROTOR_SPEED], command[0], memory, actions)
 
 
 @kernel

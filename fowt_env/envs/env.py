@@ -1,21 +1,22 @@
 """The Gymnasium environment: a task, a scene and the compiled control period, glued together."""
 
-import inspect
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import contextmanager
 from copy import deepcopy
 from dataclasses import replace
-from math import pi
+from math import inf, pi
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import gymnasium
 import numpy as np
 import numpy.typing as npt
+import pandas as pd
 from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 
 from fowt_env.analysis.trim_cache import cached_trim, interpolated_trim, plant_key
 from fowt_env.control import (
+    EXACT,
     CommandUnits,
     CompiledController,
     catalogue,
@@ -27,11 +28,10 @@ from fowt_env.control import (
     whole_view,
 )
 from fowt_env.descriptions.checks import short
-from fowt_env.descriptions.platform import Platform, read_platform
-from fowt_env.descriptions.records import RENAMED
+from fowt_env.descriptions.platform import Platform, turbine_of
+from fowt_env.descriptions.protection import read_protection
 from fowt_env.descriptions.sea_state import sea_of, sea_state_of
 from fowt_env.descriptions.sensors import SensorChain
-from fowt_env.descriptions.turbine import Turbine, read_turbine
 from fowt_env.descriptions.wind import wind_of
 from fowt_env.envs.actions import ACTION_MODES, ActionMode, build_action_map, n_actions, start_tracking
 from fowt_env.envs.episode import (
@@ -42,9 +42,9 @@ from fowt_env.envs.episode import (
     STEP,
     EpisodeConfig,
     EpisodeData,
-    Given,
     act,
     act_physical,
+    record_last,
     rewrite_observation,
     start_episode,
 )
@@ -67,23 +67,44 @@ from fowt_env.envs.rewards import (
     weight_array,
 )
 from fowt_env.envs.sensors import check_sensors, draw_sensors, reading_scales
-from fowt_env.envs.snapshot import CARRIED, DATA_CARRIED, Snapshot
+from fowt_env.envs.settings import (
+    ControlSettings,
+    EpisodeSettings,
+    InterfaceSettings,
+    PlantSettings,
+    Settings,
+    read_settings,
+)
+from fowt_env.envs.snapshot import CARRIED, Snapshot, carried, fill_carried
 from fowt_env.envs.tables import task_tables
-from fowt_env.envs.tasks import TASKS, Episode, Task, draw_offsets, draw_weather, is_mixture, task_of, varies
-from fowt_env.errors import InputError, unknown, unknown_keyword
-from fowt_env.initial_conditions import INITIAL
+from fowt_env.envs.tasks import (
+    TASKS,
+    Episode,
+    Task,
+    draw_faults,
+    draw_offsets,
+    draw_weather,
+    is_mixture,
+    task_of,
+    varies,
+)
+from fowt_env.errors import InputError, unknown
+from fowt_env.loop.interface import Interface, interface_data
+from fowt_env.loop.protection import Watch
+from fowt_env.loop.sensing import open_sensors
 from fowt_env.plant.channels import DEG_PER_RAD
 from fowt_env.plant.compile.handle import Handle
 from fowt_env.plant.events import counted
 from fowt_env.plant.measurement import Measurement
-from fowt_env.plant.rollout import STOP_REASONS, output
-from fowt_env.plant.sensing import new_past
+from fowt_env.plant.rollout import STOP_REASONS, TRIPPED, output
 from fowt_env.plant.state import N_COMMANDS, Command, State
+from fowt_env.run.initial_conditions import INITIAL
+from fowt_env.run.interface import guard_of, wind_ahead_of
+from fowt_env.run.outcome import run_frame, stop_facts, trip_name
+from fowt_env.run.simulation import check_duration, steps_in
 from fowt_env.scene.actuators import rest_actuators
 from fowt_env.scene.build import build_scene
-from fowt_env.scene.options import OPTIONS
 from fowt_env.scene.scene import Scene
-from fowt_env.simulation import check_duration, steps_in
 from fowt_env.weather.preview import exact_preview
 
 SMALL_SEA = {"kind": "regular", "H": 1e-3, "T": 10.0}  # of a scene whose first draw happens to have no waves
@@ -188,80 +209,65 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self,
         task: str | Task = "above_rated",
         platform: str | Path | Platform = "oc3_hywind",
-        rotor: str | None = None,
-        action_mode: str = "direct",
-        baseline: str = "pi",
-        observation: Sequence[str] | None = None,
-        reward: Mapping[str, float] | Callable[[dict[str, Any], Measurement], float] | None = None,
-        dt: float | None = None,
-        control_dt: float = 0.1,
-        duration: float | None = None,
-        wind: Any = None,
-        sea: Any = None,
-        wind_preview: Sequence[float] | None = None,
+        *,
+        episode: EpisodeSettings | None = None,
+        plant: PlantSettings | None = None,
+        control: ControlSettings | None = None,
+        interface: InterfaceSettings | None = None,
         render_mode: str | None = None,
         render_size: Sequence[int] | None = None,
-        fidelity: str = "standard",
-        sensors: str | SensorChain | Mapping[str, Any] | None = None,
-        nominal_plant: Mapping[str, Any] | None = None,
-        **options: Any,
+        **keywords: Any,
     ) -> None:
         if render_mode is not None:
             if render_mode not in self.metadata["render_modes"]:
                 raise unknown("render_mode", render_mode, self.metadata["render_modes"])
-            from fowt_env.visual.rendering import check_size, load_pygame  # nobody else pays for it
+            from fowt_env.visual.rendering import check_size, load_pygame  # only for pictures
 
             load_pygame()
             check_size("render_size", render_size)
-        if action_mode not in ACTION_MODES:
-            raise unknown("action_mode", action_mode, ACTION_MODES)
-        mode = ACTION_MODES[action_mode]
+        records = {"episode": episode, "plant": plant, "control": control, "interface": interface}
+        settings = read_settings(records, keywords)
+        control, options, dt = settings.control, dict(settings.plant.options), settings.plant.dt
+        if control.action_mode not in ACTION_MODES:
+            raise unknown("action_mode", control.action_mode, ACTION_MODES)
+        mode = ACTION_MODES[control.action_mode]
         if mode == ActionMode.INDIVIDUAL and options.setdefault("pitch", "individual") != "individual":
             raise InputError(
                 f"pitch = {options['pitch']!r}: action_mode = 'individual' commands the pitch of each blade,"
                 " which needs pitch = 'individual'"
             )
-        for key in options:
-            if key in RENAMED:
-                raise InputError(f"setting {key!r} of FowtEnv: is called {RENAMED[key]} now")
-            if key not in OPTIONS and key != "loads":
-                raise unknown_keyword("FowtEnv.__init__", key, {*OPTIONS, "loads", *SETTINGS})
         self.render_mode = render_mode
         self._view: Any = None
         self._reward: float | None = None  # of the last step of the episode
         self.render_size = render_size
-        turbine = _turbine_of(platform, options.get("turbine"))
-        task = task_of(task, turbine)
+        turbine = turbine_of(platform, options.get("turbine"))
+        reward = settings.episode.reward
         self._own_reward = check_own_reward("reward", reward) if callable(reward) else None
-        reward = None if callable(reward) else reward
-        task = _adapted(task, rotor, observation, reward, duration, wind, sea, wind_preview)
-        self.task = task
-        self.action_mode = action_mode
-        self.baseline = baseline
+        task = self.task = _adapted(task_of(task, turbine), settings)
+        self.action_mode, self.baseline = control.action_mode, control.baseline
+        control_dt = control.control_dt
         steps_in("duration", task.duration, control_dt, "control_dt")
-        episode = task.draw(np.random.default_rng(0))
-        sea = episode.sea
+        first = task.draw(np.random.default_rng(0))
+        sea = first.sea
         if task.has_sea and sea_state_of(sea).height == 0.0:
             sea = SMALL_SEA
-        self.scene = build_scene(
-            platform,
-            wind=episode.wind,
-            sea=sea,
-            rotor=task.rotor,
-            duration=max(task.duration, SHORTEST_WEATHER),
-            fidelity=fidelity,
-            **options,
-        )
+        common = {
+            "wind": first.wind,
+            "sea": sea,
+            "rotor": task.rotor,
+            "duration": settings.episode.weather_duration or max(task.duration, SHORTEST_WEATHER),
+            "fidelity": settings.plant.fidelity,
+        }
+        self.scene = build_scene(platform, **common, **options)
         check_duration(self.scene, task.duration)
-        self._nominal = None  # the scene of the nominal plant, where that is not the true one
-        if nominal_plant is not None:
-            parts = _nominal_parts(nominal_plant)
-            nominal_options = {**options, "turbine": parts["turbine"]}
-            length = max(task.duration, SHORTEST_WEATHER)
+        self._nominal = None  # the scene of the nominal plant, where it differs from the true one
+        if control.nominal_plant is not None:
+            parts = _nominal_parts(control.nominal_plant)
             self._nominal = build_scene(
-                parts["platform"], episode.wind, sea, rotor=task.rotor, duration=length,
-                fidelity=fidelity, **nominal_options,
-            )  # fmt: skip
+                parts["platform"], **common, **options | {"turbine": parts["turbine"]}
+            )
+        self._interface = settings.interface
+        sensors = settings.interface.sensors
         self._sensors = None if sensors is None else check_sensors(sensors, self.scene.turbine)
         self._chain = None  # (name, fields) of a sensor chain, which may lack what is asked for
         if isinstance(self._sensors, SensorChain):
@@ -270,6 +276,10 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
                 self._sensors.available + (self._sensors.available_of_blades if self.individual else ()),
             )
             _check_shown(task.observation, self._chain)
+        self._limits = None  # Protection, where there are trips or faults
+        if settings.interface.protection is not None or settings.interface.faults is not None:
+            ratio = turbine.overspeed / turbine.rated_rotor_speed
+            self._limits = read_protection(settings.interface.protection, turbine.protection, ratio)
         self.control_dt = float(control_dt)
         self.dt = min(self.scene.dt, self.control_dt) if dt is None else float(dt)
         per_control = steps_in("control_dt", control_dt, self.dt if dt is None else dt)
@@ -285,15 +295,26 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         # what a snapshot must agree with: the same numbers then mean the same
         observed = (self.scene.weather_kind, task.observation, task.wind_preview)
         nominal_key = None if self._nominal is None else plant_key(self._nominal)
+        baseline = control.baseline if isinstance(control.baseline, str) else type(control.baseline).__name__
         self._kind = (
-            self._key, action_mode, baseline, *observed, self.dt, self.control_dt, self._last,
-            (nominal_key, self._sensors),
+            self._key, self.action_mode, baseline, *observed, self.dt, self.control_dt, self._last,
+            (nominal_key, self._sensors, self._limits, repr(self._interface.preview), self._interface.record),
         )  # fmt: skip
 
     @property
     def individual(self) -> bool:
         """Whether every blade has a pitch of its own."""
         return self.scene.model.pitches is not None
+
+    @property
+    def is_protected(self) -> bool:
+        """Whether the turbine has trips or faults."""
+        return self._limits is not None
+
+    @property
+    def is_stopping(self) -> bool:
+        """Whether a trip or a fault is stopping the turbine, so that actions are ignored."""
+        return self.is_protected and bool(self._episode.link.watch[Watch.STOP] >= 0.0)
 
     def twin(self) -> "FowtEnv":
         """Another environment of the same settings, before its first reset; shares what is never written."""
@@ -302,24 +323,23 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         other._np_random = other._np_random_seed = None
         other._running, other._closed, other._end = False, False, ""
         other._view = None
-        other._build(ACTION_MODES[self.action_mode], self._config.per_control)
+        other._build(ACTION_MODES[self.action_mode], self._per_control)
         return other
 
     def __getstate__(self) -> dict[str, Any]:
         """What a copy is made from: the attributes less the compiled ones, and a Snapshot."""
         kept = {name: value for name, value in self.__dict__.items() if name not in COMPILED}
         return kept | {
-            "_per_control": self._config.per_control,
             "_snapshot": None if self._handle is None else self.get_state(),
         }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Become a copy."""
         state = dict(state)
-        per_control, snapshot = state.pop("_per_control"), state.pop("_snapshot")
+        snapshot = state.pop("_snapshot")
         self.__dict__.update(state)
         self._view = None
-        self._build(ACTION_MODES[self.action_mode], per_control)
+        self._build(ACTION_MODES[self.action_mode], self._per_control)
         if snapshot is not None:
             self._restore(snapshot)
 
@@ -349,13 +369,17 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             self._estimator = catalogue().WindEstimator(self.design_scene.turbine, self.control_dt)
             estimator_law = self._estimator.law
             hidden(self._estimator, self._chain, individual)  # refuses what the sensors do not show
-        leads, given = (), None
+        self._hidden = None  # of what is measured, for the baseline's law
         if self._baseline is not None:
-            leads = preview_leads(self._baseline)
-            given = Given(hidden(self._baseline, self._chain, individual), *self._foresee(scene, leads))
-        estimating, sensed = self._estimator is not None, self._sensors is not None
+            preview_leads(self._baseline)
+            self._hidden = hidden(self._baseline, self._chain, individual)
+        estimating = self._estimator is not None
         self._baseline_law = Handle(None, baseline_law)
         self._estimator_law = Handle(None, estimator_law)
+        self._per_control = per_control
+        # a range is drawn at each reset: these are faults of the same kinds and number
+        self._faults = draw_faults(self._interface.faults, np.random.default_rng(0))
+        interface, ahead = self._connect(scene)
         self._config = EpisodeConfig(
             model=scene.model,
             actions=build_action_map(
@@ -366,16 +390,16 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             observation_map=build_observation_map(observed, task.wind_preview),
             scales=build_scales(turbine, self.control_dt),
             weights=weight_array(task.weights),
-            overspeed=float(turbine.overspeed),
+            overspeed=float(turbine.overspeed) if interface.guard is None else inf,
             dt=self.dt,
             per_control=per_control,
-            sensors=self._drawn(scene, per_control) if sensed else None,
-            given=given,
+            interface=interface,
+            ahead=ahead,
         )
-        n = scene.n_state
-        measured = scene.n_measurements
-        measurement = np.zeros(measured)
-        reading = np.zeros(measured) if sensed else measurement
+        n, size = scene.n_state, scene.n_measurements
+        rows = None
+        if self._interface.record:
+            rows = np.zeros((self._last // per_control + 1, len(scene.channels)))
         self._episode = EpisodeData(
             data=scene.data(),
             x=np.zeros(n),
@@ -383,20 +407,40 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             memory=memory,
             estimate=self._estimator.memory if estimating else None,
             action=np.zeros(actions),
-            measurement=measurement,
-            reading=reading,
-            past=new_past(self._config.sensors.chain) if sensed else None,
+            link=interface_data(interface, n, scene.n_commands, size),
+            ahead=np.zeros(len(task.wind_preview)),
+            motion=None if ahead is None else ahead.new_memory(),
             observation=np.zeros(len(observed), dtype=np.float32),
             counts=np.zeros(N_COUNTS, dtype=np.int64),
             reference=np.zeros(len(Reference._fields)),
-            previous_measurement=np.zeros(measured),
-            dx=np.zeros(n),
-            baseline_command=np.zeros(scene.n_commands),
-            baseline_reading=reading if self._baseline is None else np.zeros(measured + len(leads)),
+            previous_measurement=np.zeros(size),
             signals=np.zeros(PREVIEW + len(task.wind_preview)),
             terms=np.zeros(N_TERMS),
+            rows=rows,
         )
         self._handle = None
+
+    def _connect(self, scene):
+        """Return (Interface, WindAhead of the observation or None) of an episode in a scene's weather."""
+        control_dt, guard, sensors = self._per_control * self.dt, None, None
+        if self._limits is not None:
+            guard = guard_of(scene, self._limits, self._faults, control_dt)
+            sensors = open_sensors(scene.n_measurements)
+        if self._sensors is not None:
+            readings = self._last // self._per_control + 1
+            scales = reading_scales(scene.turbine, self.individual)
+            sensors = draw_sensors(self._sensors, scales, self.control_dt, scene.seed, readings)
+        preview, observed, read = self._interface.preview, None, None
+        if self._baseline is not None:
+            leads = preview_leads(self._baseline)
+            read = self._wind_ahead(scene, leads, EXACT if preview is None else preview)
+        if preview is not None and self.task.wind_preview:
+            observed = self._wind_ahead(scene, self.task.wind_preview, preview)
+        return Interface(control_dt, sensors, self._hidden, read, guard), observed
+
+    def _wind_ahead(self, scene, leads, preview):
+        """Return the WindAhead of an episode at look-ahead times (s)."""
+        return wind_ahead_of(scene, leads, preview, self._per_control * self.dt, self.task.duration)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -422,18 +466,24 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         """Start of a new episode, drawn with the generator; nothing else changes. Raises as reset."""
         super().reset(seed=seed)
         episode = _with_options(self.task.draw(self.np_random), options, self.np_random)
+        faults = self._interface.faults if (options or {}).get("faults") is None else options["faults"]
+        episode = episode._replace(faults=draw_faults(faults, self.np_random))
+        if episode.faults and self._limits is None:
+            raise InputError("options['faults']: needs an environment with protection or faults (faults=())")
         scene = self.scene.with_weather(episode.wind, episode.sea, episode.weather_seed)
         check_duration(scene, self.task.duration)
         find = cached_trim if episode.exact_start else interpolated_trim
         state, command = find(scene, self._key, scene.wind_speed)
         reference = Reference(float(state[State.PLATFORM_PITCH]), float(state[State.ROTOR_SPEED]))
         state, command = _moved(scene, state, command, episode.offsets)
+        if self._limits is not None:
+            guard_of(scene, self._limits, episode.faults, self.control_dt)  # refuses what the scene lacks
         return Start(episode, scene, self._nominal_in(scene), state, command, reference)
 
     def _begin(self, planned):
         """(observation, info) at the start of the episode that was planned."""
         self._running, self._end = False, ""  # until all of it has worked
-        self._enter(planned.scene, planned.nominal)
+        self._enter(planned.scene, planned.nominal, planned.episode.faults)
         run = self._episode
         run.x[:] = planned.state
         run.u[:] = planned.command
@@ -450,7 +500,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         info = {
             "time": int(run.counts[STEP]) * self.dt,
             **dict.fromkeys(SHOWN_COUNTS, 0),
-            "events": self._events(),
+            **self._facts(),
             "wind_speed": self.scene.wind_speed,
             "sampled": deepcopy(planned.episode._asdict()),
         }
@@ -460,8 +510,9 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         return run.observation.copy(), info
 
     def _operate(self, seconds):
-        """Let the baseline have the turbine for so long; then the stop is signalled."""
-        controller = named_baseline(self.baseline, self.design_scene.turbine, self.control_dt)
+        """Operate the turbine with the baseline for so many seconds; then signal the stop."""
+        turbine = self.design_scene.turbine
+        controller = named_baseline(deepcopy(self.baseline), turbine, self.control_dt)
         leads = preview_leads(controller)
         controller.prepare(known_scene(self.design_scene, controller))
         controller.reset(self.measurement(leads))
@@ -479,12 +530,12 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         rewrite_observation(self._handle)
 
     def restart_loops(self) -> None:
-        """Start the baseline of residual mode, or the loop of set-point mode, from what is measured now.
+        """Start the baseline of residual mode, or the loop of set-point mode, from the present measurement.
 
-        For whoever took over through step_physical and hands back: the loops have not followed.
+        Call after driving with step_physical: internal controller states were not updated meanwhile.
         """
         if self._baseline is not None:
-            self._baseline.reset(view_of(self._baseline)(self._episode.baseline_reading.tolist()))
+            self._baseline.reset(view_of(self._baseline)(self._episode.link.law_reading.tolist()))
         elif self._config.actions.mode == ActionMode.SETPOINT:
             start_tracking(self._episode.memory, self.measurement(), self._config.actions)
 
@@ -537,12 +588,14 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         info = dict(zip(REWARD_KEYS, run.terms.tolist(), strict=True))
         info["time"] = step * self.dt
         info |= {key: int(run.counts[entry]) for key, entry in SHOWN_COUNTS.items()}
+        if self._limits is not None:
+            info["stopping"] = self.is_stopping
         terminated = status != RUNNING
         truncated = not terminated and step >= self._last
         if terminated:
             info["termination"] = self._reason(status)
         if terminated or truncated:
-            info["events"] = self._events()
+            info |= self._facts()
             self._finish(status)
         if self._own_reward is not None:
             reward = self._own(info)
@@ -552,8 +605,10 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         return run.observation.copy(), reward, terminated, truncated, info
 
     def _finish(self, status):
-        """End the episode; says why and when in what a further step raises."""
+        """End the episode, and keep why and when for the error of a further step."""
         self._running = False
+        if status == RUNNING and self._interface.record:
+            record_last(self._handle)
         # the words before the explanation in brackets
         why = "end of its duration" if status == RUNNING else self._reason(status).partition(" (")[0]
         self._end = f"the episode ended ({why}) at {self._episode.counts[STEP] * self.dt:.1f} s"
@@ -563,13 +618,17 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         return paid(self._own_reward, info, self.true_measurement())
 
     def _reason(self, status):
-        """Why an episode was terminated, with the user load that caused it, if one did."""
+        """Return why an episode was terminated, with the user load that caused it, if one did."""
+        reason = STOP_REASONS[status]
+        if status == TRIPPED:
+            reason = f"{trip_name(self._episode.link.watch)} ({reason})"
         fault = self.scene.first_nonfinite_load(self._episode.data)
-        return f"{STOP_REASONS[status]}: {fault}" if fault else STOP_REASONS[status]
+        return f"{reason}: {fault}" if fault else reason
 
-    def _events(self):
-        """{event: count} since the reset, of the rare events that happened (fowt_env.plant.events)."""
-        return counted(self._episode.data.counters)
+    def _facts(self):
+        """Return {"events": ...}, and with trips or faults those of stop_facts."""
+        facts = {"events": counted(self._episode.data.counters)}
+        return facts if self._limits is None else facts | stop_facts(self._episode.link.watch)
 
     def get_state(self) -> Snapshot:
         """Snapshot of all that decides how the run goes on: plant, controller, counters, weather, draws.
@@ -579,12 +638,17 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         """
         if self._handle is None:
             raise ResetNeeded("call reset() first: there is no state yet")
-        run = self._episode
-        found = [getattr(run, name) for name in CARRIED] + [getattr(run.data, name) for name in DATA_CARRIED]
-        arrays = [None if array is None else array.copy() for array in found]
+        arrays = [None if array is None else array.copy() for array in carried(self._episode)]
         generator = None if self._np_random is None else self._np_random.bit_generator.state
         return Snapshot(
-            self._kind, self.scene, tuple(arrays), self._running, generator, self._np_random_seed, self._end
+            self._kind,
+            self.scene,
+            self._faults,
+            tuple(arrays),
+            self._running,
+            generator,
+            self._np_random_seed,
+            self._end,
         )
 
     def set_state(self, snapshot: Snapshot) -> None:
@@ -596,16 +660,9 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
     def _restore(self, snapshot):
         """Go on from a Snapshot of these settings."""
-        if snapshot.scene is not self.scene or self._handle is None:
-            self._enter(snapshot.scene, self._nominal_in(snapshot.scene))
-        run, data = self._episode, self._episode.data
-        arrays = iter(snapshot.arrays)
-        for name in CARRIED:
-            array, saved = getattr(run, name), next(arrays)
-            if array is not None:
-                array[:] = saved
-        for name in DATA_CARRIED:
-            getattr(data, name)[:] = next(arrays)
+        if (snapshot.scene, snapshot.faults) != (self.scene, self._faults) or self._handle is None:
+            self._enter(snapshot.scene, self._nominal_in(snapshot.scene), snapshot.faults)
+        fill_carried(self._episode, snapshot.arrays)
         self._running, self._end = snapshot.running and not self._closed, snapshot.end
         if snapshot.generator is None:
             self._np_random = None
@@ -629,46 +686,43 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             return self._nominal
         return self._nominal.with_weather(scene.wind, scene.sea, scene.seed)
 
-    def _enter(self, scene, nominal):
+    def _enter(self, scene, nominal, faults):
         """Run in the scene's weather from now on, with new data: their size follows the wave components."""
-        self.scene, self._nominal = scene, nominal
-        self._episode = self._episode._replace(data=scene.data())
-        self._config = self._config._replace(model=scene.model)
-        if self._sensors is not None:
-            self._config = self._config._replace(sensors=self._drawn(scene, self._config.per_control))
+        self.scene, self._nominal, self._faults = scene, nominal, faults
+        config = self._config._replace(model=scene.model)
+        interface, ahead = self._connect(scene)
         if self._baseline is not None:
             self._baseline.prepare(known_scene(self.design_scene, self._baseline))
-            ahead = self._foresee(scene, self._baseline.preview_times)
-            given = Given(self._config.given.hidden, *ahead)
-            self._config = self._config._replace(parameters=self._baseline.parameters, given=given)
+            config = config._replace(parameters=self._baseline.parameters)
         if self._estimator is not None:
             self._estimator.prepare(known_scene(self.design_scene, self._estimator))
-            self._config = self._config._replace(estimator=self._estimator.parameters)
+            config = config._replace(estimator=self._estimator.parameters)
+        self._config = config._replace(interface=interface, ahead=ahead)
+        self._episode = self._episode._replace(
+            data=scene.data(),
+            link=interface_data(interface, scene.n_state, scene.n_commands, scene.n_measurements),
+            motion=None if ahead is None else ahead.new_memory(),
+        )
         self._handle = Handle(self._config, self._episode)
 
-    def _drawn(self, scene, per_control):
-        """Sensors of an episode in a scene's weather."""
-        readings = self._last // per_control + 1
-        scales = reading_scales(scene.turbine, self.individual)
-        return draw_sensors(self._sensors, scales, self.control_dt, scene.seed, readings)
-
-    @staticmethod
-    def _foresee(scene, leads):
-        """(time (k,), wind (leads, k)) of a scene as a controller of these leads (s) is given it."""
-        return exact_preview(scene, leads)[:2] if leads else (np.zeros(0), np.zeros((0, 0)))
-
     def measurement(self, preview_times: Sequence[float] = ()) -> Measurement:
-        """Measurement of all fields now (SI), as the sensors read them.
+        """Return the Measurement of all fields now (SI), as the sensors read them.
 
         Where every blade has a pitch of its own it has blades, a BladeMeasurement.
-        preview_times: increasing, s; with them it has wind_preview, the rotor-averaged wind that far ahead.
+        preview_times: increasing, s; with them it has wind_preview, the rotor-averaged wind that far ahead,
+        exact: a lidar is read by the channel wind_preview and by the baseline alone.
         """
         if self._handle is None:
             raise ResetNeeded("call reset() first: nothing has been measured yet")
-        reading = self._episode.reading.tolist()
+        reading = self._episode.link.reading.tolist()
         if not len(preview_times):
             return whole_view(reading) if self.individual else Measurement(*reading)
-        time, values = self._foresee(self.scene, tuple(preview_times))
+        if self._interface.preview not in (None, EXACT):
+            raise InputError(
+                f"preview = {self._interface.preview!r}: measurement(preview_times) has the exact wind ahead"
+                " alone; the channel wind_preview and the baseline read the lidar"
+            )
+        time, values = exact_preview(self.scene, tuple(preview_times))[:2]
         return whole_view(reading, [float(np.interp(reading[0], time, row)) for row in values])
 
     def true_measurement(self) -> Measurement:
@@ -678,7 +732,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         """
         if self._handle is None:
             raise ResetNeeded("call reset() first: nothing has been measured yet")
-        values = self._episode.measurement.tolist()
+        values = self._episode.link.measurement.tolist()
         return whole_view(values) if self.individual else Measurement(*values)
 
     @property
@@ -692,14 +746,41 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             raise ResetNeeded("call reset() first: there is no state yet")
         run, scene = self._episode, self.scene
         data = scene.data()
-        # what an evaluation at this instant has left
-        for name in ("lines", "stages", "cache", "added_mass", "user", "blades"):
-            getattr(data, name)[:] = getattr(run.data, name)
+        for name in CARRIED["data"]:
+            getattr(data, name)[...] = getattr(run.data, name)
         row = np.empty(len(scene.channels))
         time = run.counts[STEP] * self.dt
         output(scene.handle(data), run.x, run.u, time, np.zeros_like(run.x), row)
         values = scene.values(row[None, :])[0].tolist()
         return dict(zip((channel.name for channel in scene.channels), values, strict=True))
+
+    def frame(self) -> pd.DataFrame:
+        """Return the episode so far as simulate returns a run, with the same rows and attrs.
+
+        It needs the setting record. A row per control period holds the command of the period that begins
+        there; the row of the episode's end is there once the episode is truncated.
+        """
+        if not self._interface.record or self._handle is None:
+            raise InputError("frame() needs record=True, and a reset")
+        run = self._episode
+        done = int(run.counts[STEP]) // self._per_control
+        filled = done + int(not self._running and done * self._per_control >= self._last)
+        return run_frame(
+            self.scene, run.rows[:filled].copy(), run.data.counters, run.link.watch, self.control_dt
+        )
+
+    @property
+    def last_action(self) -> np.ndarray:
+        """Copy of the last accepted action (actions,)."""
+        return self._episode.action.copy()
+
+    def view(self) -> "View":
+        """Return copies of the arrays of the present instant."""
+        run = self._episode
+        found = {"state": run.x, "in_force": run.u, "baseline_memory": run.memory, "estimate": run.estimate}
+        found |= {name: getattr(run.link, name) for name in ("command", "measurement", "reading")}
+        found |= {name: getattr(run, name) for name in ("action", "ahead", "terms")}
+        return View(**{name: None if a is None else a.copy() for name, a in found.items()})
 
     def render(self) -> np.ndarray | None:
         """Picture of the present instant, (height, width, 3) uint8; None in mode "human", which shows it.
@@ -716,16 +797,16 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             return None
         if self._closed:
             raise ClosedEnvironmentError(CLOSED)
-        from fowt_env.visual.rendering import SIZE, Agent, View
+        from fowt_env.visual import rendering
 
         row = self.channels()
         if self._view is None:
             speed = self.metadata["render_fps"] * self.control_dt
-            size = SIZE if self.render_size is None else tuple(self.render_size)
-            self._view = View([self.scene], size=size, speed=speed)
+            size = rendering.SIZE if self.render_size is None else tuple(self.render_size)
+            self._view = rendering.View([self.scene], size=size, speed=speed)
         elif self._view.panels[0].scene is not self.scene:
             self._view.enter(self.scene)
-        self._view.draw([row], Agent(tuple(self._episode.action.tolist()), self._reward))
+        self._view.draw([row], rendering.Agent(tuple(self._episode.action.tolist()), self._reward))
         if self.render_mode == "rgb_array":
             return self._view.array()
         self._view.show(self.metadata["render_fps"])
@@ -738,6 +819,21 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             self._view.close()
             self._view = None
         super().close()
+
+
+class View(NamedTuple):
+    """Arrays of an environment at one instant; SI."""
+
+    state: np.ndarray  # (n_state,) fowt_env.plant.state.State
+    in_force: np.ndarray  # (n_commands,) torque and blade-pitch command in force
+    command: np.ndarray  # (n_commands,) of the last action, before faults and limits
+    measurement: np.ndarray  # true motions
+    reading: np.ndarray  # as sensors read them
+    action: np.ndarray  # last accepted action
+    ahead: np.ndarray  # (leads,) wind ahead in the observation, m/s
+    terms: np.ndarray  # of the last reward
+    baseline_memory: np.ndarray  # of the baseline law or the set-point loop
+    estimate: np.ndarray | None  # memory of the estimator
 
 
 class Start(NamedTuple):
@@ -771,35 +867,18 @@ def kept_if_refused(envs):
 FowtEnv.__doc__ = f"{FowtEnv.__doc__}\n{task_tables(TASKS['above_rated'])}"
 
 
-def _adapted(
-    task: Task,
-    rotor: Any,
-    observation: Any,
-    reward: Any,
-    duration: Any,
-    wind: Any,
-    sea: Any,
-    wind_preview: Any,
-) -> Task:
-    """The task with what the caller gave in place of its own."""
-    given = {"rotor": rotor, "duration": duration, "wind": wind, "sea": sea, "wind_preview": wind_preview}
-    changes = {name: value for name, value in given.items() if value is not None}
-    if observation is not None:
-        changes["observation"] = check_channels("observation", observation, default=task.observation)
-    if reward is not None:
-        changes["weights"] = task.weights | check_weights("reward", reward)
+def _adapted(task: Task, settings: Settings) -> Task:
+    """Return the task with the settings that replace its own."""
+    own = settings.episode
+    replaced = {"rotor": settings.plant.rotor} | {
+        name: getattr(own, name) for name in ("duration", "wind", "sea", "wind_preview")
+    }
+    changes = {name: value for name, value in replaced.items() if value is not None}
+    if own.observation is not None:
+        changes["observation"] = check_channels("observation", own.observation, default=task.observation)
+    if own.reward is not None and not callable(own.reward):
+        changes["weights"] = task.weights | check_weights("reward", own.reward)
     return replace(task, **changes)
-
-
-# settings of FowtEnv by name, those of build_scene apart
-SETTINGS = tuple(name for name in inspect.signature(FowtEnv).parameters if name != "options")
-
-
-def _turbine_of(platform, turbine):
-    """Turbine of a platform, or the one given in its place; each a name, a path or a description."""
-    if turbine is None:
-        turbine = (platform if isinstance(platform, Platform) else read_platform(platform)).turbine
-    return turbine if isinstance(turbine, Turbine) else read_turbine(turbine)
 
 
 def _check_shown(names, chain):
@@ -864,6 +943,8 @@ def _with_options(drawn, options, rng):
     for key, value in (options or {}).items():
         if key not in Episode._fields:
             raise unknown("option of reset", key, Episode._fields)
+        if key == "faults":
+            continue  # drawn after everything else
         if key == "offsets":
             value = draw_offsets(value, rng)
         if key == "wind":

@@ -1,10 +1,10 @@
 """One control period of an environment as one compiled call: command, physics, measurement, reward.
 
 Everything that a period reads is an EpisodeConfig, everything it writes EpisodeData: arrays of one
-environment, so that many environments are rows of larger ones.
+environment, so that many environments are rows of larger ones. What stands between plant and laws, and its
+order, is that of simulate (fowt_env/loop/period.py).
 """
 
-from math import isfinite
 from typing import NamedTuple
 
 import numpy as np
@@ -12,28 +12,31 @@ import numpy as np
 from fowt_env.envs.actions import ActionMap, accept, action_of, command_of
 from fowt_env.envs.observations import ObservationMap, fill_observation, fill_signals
 from fowt_env.envs.rewards import Scales, fill_terms, weighted_sum
+from fowt_env.loop.interface import Interface, InterfaceData
+from fowt_env.loop.period import all_finite, apply_command, begin_period, show_command
+from fowt_env.loop.protection import has_ended, is_stopping, stop_turbine
+from fowt_env.loop.sensing import WindAhead, read_wind_ahead
+from fowt_env.plant.aero.load import wind_of
 from fowt_env.plant.compile.decorators import entry, kernel
 from fowt_env.plant.compile.handle import by_reference, data_of, model_of
-from fowt_env.plant.drivetrain import followed_torque, torque_was_limited
 from fowt_env.plant.hydro.radiation import forget_memory
 from fowt_env.plant.measurement import Measure
 from fowt_env.plant.model import Data, LoadCache, Model
-from fowt_env.plant.rollout import NON_FINITE, OVERSPEED, RUNNING, advance_plant, observe_plant
-from fowt_env.plant.sensing import Sensors, place_of, read_preview, take_reading
+from fowt_env.plant.rollout import (
+    NON_FINITE,
+    OVERSPEED,
+    RUNNING,
+    TRIPPED,
+    advance_plant,
+    observe_plant,
+    output_plant,
+)
 from fowt_env.plant.state import Command, State
 
 BAD_ACTION = -1  # beside the statuses of rollout.py
 STEP, SATURATED, LIMITED = 0, 1, 2  # entries of EpisodeData.counts
 N_COUNTS = 3
 SHOWN_COUNTS = {"saturated_actions": SATURATED, "torque_limited": LIMITED}  # in the infos
-
-
-class Given(NamedTuple):
-    """What a baseline controller declares, and the wind ahead that it is given."""
-
-    hidden: np.ndarray  # (n_measurements,) added to a reading: fowt_env.control.hidden
-    preview_time: np.ndarray  # (k,) s; no entry: no wind ahead
-    preview: np.ndarray  # (leads, k) m/s
 
 
 @by_reference
@@ -47,11 +50,11 @@ class EpisodeConfig(NamedTuple):
     observation_map: ObservationMap
     scales: Scales
     weights: np.ndarray  # (N_TERMS,)
-    overspeed: float  # rad/s
+    overspeed: float  # rad/s, above which the episode ends
     dt: float  # s
     per_control: int  # physics steps in a control period
-    sensors: Sensors | None  # between the plant and its readers; None: readings are the measurements
-    given: Given | None  # what the baseline is given of a reading; None: there is no baseline
+    interface: Interface  # between plant, observation and baseline
+    ahead: WindAhead | None  # wind ahead in the observation; None: the exact one at the hub
 
 
 @by_reference
@@ -64,21 +67,17 @@ class EpisodeData(NamedTuple):
     memory: np.ndarray  # of the baseline law or the set-point loop
     estimate: np.ndarray | None  # memory of the estimator; None: no channel asks for it
     action: np.ndarray  # (actions,) last accepted action
-    measurement: np.ndarray  # (n_measurements,) at the present instant
-    reading: np.ndarray  # the same as sensors show it; without any the measurement itself
-    past: np.ndarray | None  # what the sensors remember: delays, low passes and integrals
+    link: InterfaceData  # measurement, readings, command
+    ahead: np.ndarray  # (leads,) wind ahead in the observation, m/s
+    motion: np.ndarray | None  # memory of the lidar that measures it; None as EpisodeConfig.ahead
     observation: np.ndarray  # (n,) float32
     # int64: physics steps done, control periods with a clipped action, those with a torque at its limits
     counts: np.ndarray
     reference: np.ndarray  # rewards.Reference of the episode
     previous_measurement: np.ndarray  # (n_measurements,) scratch from here on: one control period ago
-    dx: np.ndarray  # (n_state,)
-    baseline_command: np.ndarray  # (n_commands,) command of the last period, before the generator's limits
-    baseline_reading: (
-        np.ndarray
-    )  # (n_measurements + leads,) what the baseline is given; the reading without one
     signals: np.ndarray  # what observations are made of
     terms: np.ndarray  # (N_TERMS,) of the last period
+    rows: np.ndarray | None  # (control periods + 1, n_channels) output rows so far, SI; None: none are kept
 
 
 @kernel
@@ -89,47 +88,61 @@ def copy_into(target, source):
 
 
 @kernel
-def measure_and_sense(config, episode):
-    """Measure and read at the present instant; RUNNING, or NON_FINITE with the last measurement kept."""
-    model = config.model
+def measure_and_begin(config, episode):
+    """Measure at the present instant and begin its control period.
+
+    Returns RUNNING, TRIPPED where a trip ends the episode, or NON_FINITE with the last measurement kept.
+    """
+    model, link, interface = config.model, episode.link, config.interface
     t = episode.counts[STEP] * config.dt
-    observe_plant(model, episode.data, episode.x, episode.u, t, episode.dx, episode.measurement)
-    for value in episode.measurement:
-        if not isfinite(value):
-            copy_into(episode.measurement, episode.previous_measurement)
-            return NON_FINITE
+    observe_plant(model, episode.data, episode.x, episode.u, t, link.dx, link.measurement)
+    if not all_finite(link.measurement):
+        copy_into(link.measurement, episode.previous_measurement)
+        return NON_FINITE
     period = episode.counts[STEP] // config.per_control
-    take_reading(config.sensors, period, episode.measurement, episode.past, episode.reading)
-    give_reading(config.given, t, episode.reading, episode.baseline_reading)
-    return RUNNING
+    begin_period(period, t, episode.x, model, interface, link)
+    look_ahead(config.ahead, t, period, model, config.observation_map.preview, episode)
+    return TRIPPED if has_ended(interface.guard, link) else RUNNING
 
 
 @kernel
-def give_reading(given, t, reading, baseline_reading):
-    """Fill what the baseline is given at time t (s) from the reading."""
-    if given is None:
+def look_ahead(ahead, t, period, model, leads, episode):
+    """Fill the wind ahead of the observation: as simulate gives it, or the exact one at the hub."""
+    if ahead is None:
+        for i in range(leads.shape[0]):
+            wind = wind_of(t + leads[i], 0.0, 0.0, model.layout.hub[2], model.aero)
+            episode.ahead[i] = wind[0]
         return
-    ahead = baseline_reading.shape[0] - reading.shape[0]
-    for i in range(reading.shape[0]):
-        baseline_reading[place_of(i, ahead)] = reading[i] + given.hidden[i]
-    read_preview(t, given.preview_time, given.preview, baseline_reading)
+    velocity = episode.link.measurement[Measure.NACELLE_VELOCITY]
+    read_wind_ahead(ahead, t, period, velocity, episode.motion, episode.ahead, 0)
 
 
 @kernel
 def write_observation(config, episode):
     """Fill the observation from the present reading."""
-    t = episode.counts[STEP] * config.dt
-    observation_map = config.observation_map
+    since = episode.counts[STEP] * config.dt - episode.reference[2]
     fill_signals(
-        t, config.model, episode.x, episode.reading, episode.action, episode.estimate, episode.reference[2],
-        observation_map.preview, episode.signals,
+        episode.link.reading, episode.x[State.AZIMUTH], episode.action, episode.estimate, since,
+        episode.ahead, episode.signals,
     )  # fmt: skip
-    fill_observation(episode.signals, observation_map, episode.observation)
+    fill_observation(episode.signals, config.observation_map, episode.observation)
+
+
+@kernel
+def record_row(config, episode, rows):
+    """Fill the output row of the present control instant; rows None: nothing."""
+    if rows is None:
+        return
+    step = episode.counts[STEP]
+    output_plant(
+        config.model, episode.data, episode.x, episode.u, step * config.dt, episode.link.dx,
+        rows[step // config.per_control],
+    )  # fmt: skip
 
 
 @entry
 def start_episode(handle):
-    """Measure and observe the first instant of an episode; returns the status."""
+    """Measure and observe the first instant of an episode. Returns the status."""
     config, episode = model_of(handle), data_of(handle)
     for i in range(N_COUNTS):
         episode.counts[i] = 0
@@ -137,8 +150,9 @@ def start_episode(handle):
     episode.data.cache[LoadCache.VALID] = 0.0
     episode.data.cache[LoadCache.STEPS] = 0.0
     forget_memory(episode.data.radiation)
-    status = measure_and_sense(config, episode)
-    copy_into(episode.previous_measurement, episode.measurement)
+    copy_into(episode.link.command, episode.u)
+    status = measure_and_begin(config, episode)
+    copy_into(episode.previous_measurement, episode.link.measurement)
     action_of(episode.u, episode.x[State.ROTOR_SPEED], config.actions, episode.action)
     write_observation(config, episode)
     return status
@@ -160,34 +174,37 @@ def update_estimate(estimator_law, config, episode):
     for blade in range(blades):
         total += u[Command.BLADE_PITCH + blade]
     u[Command.BLADE_PITCH] = total / blades  # it knows one pitch
-    estimator_law(config.estimator, episode.estimate, episode.reading, u)
+    estimator_law(config.estimator, episode.estimate, episode.link.reading, u)
     u[Command.BLADE_PITCH] = first
 
 
 @kernel
+def apply_period(config, episode):
+    """Put link.command into force for a control period, and record its first instant."""
+    t = episode.counts[STEP] * config.dt
+    apply_command(t, episode.x, episode.u, config.model, episode.data, config.interface, episode.link)
+    episode.counts[LIMITED] += int(episode.data.cache[LoadCache.TORQUE_LIMITED])
+    record_row(config, episode, episode.rows)
+
+
+@kernel
 def advance_period(config, episode, estimator_law):
-    """Advance one control period under episode.u, measure, observe and reward; returns (status, reward)."""
-    torque = episode.u[Command.GENERATOR_TORQUE]
-    commanded = episode.baseline_command[Command.GENERATOR_TORQUE]
-    was_limited = torque_was_limited(torque, commanded, config.model.generator)
-    episode.counts[LIMITED] += was_limited
-    episode.data.cache[LoadCache.TORQUE_LIMITED] = 1.0 if was_limited else 0.0
-    copy_into(episode.previous_measurement, episode.measurement)
+    """Advance one control period under episode.u, measure, observe and reward. Returns (status, reward)."""
+    model, data, link = config.model, episode.data, episode.link
     first = episode.counts[STEP]
-    status = advance_plant(
-        config.model, episode.data, episode.x, episode.u, first, config.per_control, config.dt
-    )
+    copy_into(episode.previous_measurement, link.measurement)
+    status = advance_plant(model, data, episode.x, episode.u, first, config.per_control, config.dt)
     episode.counts[STEP] = first + config.per_control
     if status != NON_FINITE:
-        sensed = measure_and_sense(config, episode)
-        if sensed != RUNNING:
-            status = sensed
-    if status == RUNNING and episode.measurement[Measure.ROTOR_SPEED] > config.overspeed:
+        begun = measure_and_begin(config, episode)
+        if begun != RUNNING:
+            status = begun
+    if status == RUNNING and link.measurement[Measure.ROTOR_SPEED] > config.overspeed:
         status = OVERSPEED
     update_estimate(estimator_law, config, episode)
     write_observation(config, episode)
     fill_terms(
-        episode.measurement, episode.previous_measurement, episode.reference, status != RUNNING,
+        link.measurement, episode.previous_measurement, episode.reference, status != RUNNING,
         config.scales, episode.terms,
     )  # fmt: skip
     return status, weighted_sum(config.weights, episode.terms)
@@ -195,35 +212,49 @@ def advance_period(config, episode, estimator_law):
 
 @entry
 def act(handle, baseline_law, estimator_law, action):
-    """One control period under an action (actions,) in [-1, 1]; returns (status, reward).
+    """Advance one control period under an action (actions,) in [-1, 1]. Returns (status, reward).
 
     baseline_law, estimator_law: Handles whose data is the control kernel, or None; Python takes ten times as
-    long to hand over a kernel itself. BAD_ACTION leaves everything as it was.
+    long to pass a kernel itself. BAD_ACTION leaves everything unchanged. While the guard stops the turbine,
+    the action is ignored.
     """
     config, episode = model_of(handle), data_of(handle)
+    model, link, interface = config.model, episode.link, config.interface
     saturated = accept(action, episode.action)
     if saturated < 0:
         return BAD_ACTION, 0.0
     episode.counts[SATURATED] += saturated
-    command_of(
-        episode.action, config.actions, baseline_law.data, config.parameters, episode.memory,
-        episode.baseline_reading, episode.u, episode.baseline_command,
-    )  # fmt: skip
+    if is_stopping(interface.guard, link):
+        stop_turbine(episode.x, interface.guard, link)
+    else:
+        show_command(episode.u, interface, config.actions.individual, model.pitches, link)
+        command_of(
+            episode.action, config.actions, baseline_law.data, config.parameters, episode.memory,
+            link.law_reading, link.command,
+        )  # fmt: skip
+    apply_period(config, episode)
     return advance_period(config, episode, estimator_law.data)
 
 
 @entry
 def act_physical(handle, estimator_law, command):
-    """One control period under a physical command (n_commands,), as simulate applies it: (status, reward).
+    """Advance one control period under a command (n_commands,), as simulate applies it: (status, reward).
 
     estimator_law: as act takes it.
     """
     config, episode = model_of(handle), data_of(handle)
-    torque = episode.u[Command.GENERATOR_TORQUE]
-    copy_into(episode.baseline_command, command)
-    copy_into(episode.u, command)
-    episode.u[Command.GENERATOR_TORQUE] = followed_torque(
-        torque, command[Command.GENERATOR_TORQUE], config.actions.control_dt, config.model.generator
-    )
+    link, interface = episode.link, config.interface
+    if is_stopping(interface.guard, link):
+        stop_turbine(episode.x, interface.guard, link)
+    else:
+        copy_into(link.command, command)
+    apply_period(config, episode)
     action_of(episode.u, episode.x[State.ROTOR_SPEED], config.actions, episode.action)
     return advance_period(config, episode, estimator_law.data)
+
+
+@entry
+def record_last(handle):
+    """Fill the output row of the instant at which an episode ended."""
+    config, episode = model_of(handle), data_of(handle)
+    record_row(config, episode, episode.rows)

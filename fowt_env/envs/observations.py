@@ -12,7 +12,6 @@ import numpy as np
 
 from fowt_env.descriptions.units import DEGREE
 from fowt_env.errors import InputError, unknown
-from fowt_env.plant.aero.load import wind_of
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.measurement import (
     N_BLADE_MEASUREMENTS,
@@ -21,7 +20,7 @@ from fowt_env.plant.measurement import (
     BladeMeasurement,
     Measure,
 )
-from fowt_env.plant.state import MOTIONS, N_COMMANDS, N_INDIVIDUAL_COMMANDS, State
+from fowt_env.plant.state import MOTIONS, N_COMMANDS, N_INDIVIDUAL_COMMANDS
 
 SIN_AZIMUTH = N_MEASUREMENTS  # signals that follow the measurements
 COS_AZIMUTH = N_MEASUREMENTS + 1
@@ -271,16 +270,16 @@ def build_observation_map(observed, preview):
 
 
 @kernel
-def fill_signals(t, model, x, reading, action, estimate, shutdown, preview, signals):
-    """Fill signals (n,): what sensors read, azimuth, last action, estimates, and the hub wind at t + preview.
+def fill_signals(reading, azimuth, action, estimate, since_shutdown, ahead, signals):
+    """Fill signals (n,): readings, azimuth (rad), last action, estimates, and the wind ahead (leads,).
 
     reading: of a Measurement, and of a BladeMeasurement where there is one.
-    estimate: memory of an estimator, or None; shutdown: s, from which the turbine is to be stopped.
+    estimate: memory of an estimator, or None; since_shutdown: s, since the signal to stop.
     """
     for i in range(N_MEASUREMENTS):
         signals[i] = reading[i]
-    signals[SIN_AZIMUTH] = np.sin(x[State.AZIMUTH])
-    signals[COS_AZIMUTH] = np.cos(x[State.AZIMUTH])
+    signals[SIN_AZIMUTH] = np.sin(azimuth)
+    signals[COS_AZIMUTH] = np.cos(azimuth)
     for i in range(action.shape[0]):
         signals[FIRST_ACTION + i] = action[i]
     for i in range(N_MEASUREMENTS, reading.shape[0]):
@@ -288,11 +287,9 @@ def fill_signals(t, model, x, reading, action, estimate, shutdown, preview, sign
     if estimate is not None:
         for i in range(OF_BLADES - ESTIMATES):
             signals[ESTIMATES + i] = estimate[i]
-    signals[SINCE_SHUTDOWN] = max(t - shutdown, 0.0)
-    for i in range(preview.shape[0]):
-        ahead = t + preview[i]
-        wind = wind_of(ahead, 0.0, 0.0, model.layout.hub[2], model.aero)
-        signals[PREVIEW + i] = wind[0]
+    signals[SINCE_SHUTDOWN] = max(since_shutdown, 0.0)
+    for i in range(ahead.shape[0]):
+        signals[PREVIEW + i] = ahead[i]
 
 
 @kernel

@@ -3,25 +3,42 @@
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-# arrays of episode.EpisodeData that outlive a control period, and of plant.model.Data: those that carry
-# over, and stages, whose first row holds the wake's rates as long as the cached loads are fresh
-CARRIED = (
-    "x", "u", "memory", "estimate", "action", "measurement", "reading", "baseline_reading", "past",
-    "observation", "counts", "reference", "terms",
-)  # fmt: skip
-DATA_CARRIED = (
-    "lines", "counters", "stages", "cache", "added_mass", "user", "history", "samples", "radiation",
-    "blades", "elastic",
-)  # fmt: skip
+# arrays that outlive a control period: of episode.EpisodeData, of its InterfaceData, and of plant.model.Data
+# (stages: its first row has the wake's rates as long as the cached loads are valid)
+CARRIED = {
+    "": (
+        "x", "u", "memory", "estimate", "action", "ahead", "motion", "observation", "counts", "reference",
+        "terms", "rows",
+    ),
+    "link": ("measurement", "reading", "law_reading", "command", "past", "motion", "watch", "held"),
+    "data": (
+        "lines", "counters", "stages", "cache", "added_mass", "user", "history", "samples", "radiation",
+        "blades", "elastic",
+    ),
+}  # fmt: skip
 
 
 class Snapshot(NamedTuple):
     """What FowtEnv.get_state returns; read only."""
 
-    kind: tuple  # settings that an environment must share to go on from here
+    kind: tuple  # settings that an environment must share to continue from here
     scene: Any  # scene.Scene with the weather of the episode
-    arrays: tuple  # copies, in the order of CARRIED and DATA_CARRIED; None for what the run lacks
+    faults: tuple  # of the episode
+    arrays: tuple  # copies, in the order of CARRIED; None for what the run lacks
     running: bool
     generator: Mapping[str, Any] | None  # state of the random generator; None before the first draw
     seed: int | None  # that the generator was made from
     end: str = ""  # why and when the episode ended
+
+
+def carried(episode):
+    """Return the arrays of EpisodeData in the order of CARRIED, None for those that the run lacks."""
+    parts = {"": episode, "link": episode.link, "data": episode.data}
+    return [getattr(parts[part], name) for part, names in CARRIED.items() for name in names]
+
+
+def fill_carried(episode, arrays):
+    """Fill the arrays of EpisodeData from copies in the order of CARRIED."""
+    for array, saved in zip(carried(episode), arrays, strict=True):
+        if array is not None:
+            array[...] = saved

@@ -1,10 +1,12 @@
 """Tasks: what an episode is drawn from, what is observed and rewarded, and how long it lasts."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from fowt_env.descriptions.faults import Fault, read_faults
 from fowt_env.descriptions.nrel5mw import CUT_IN, CUT_OUT, PITCH_RATE, RATED_WIND, ROTOR_SPEED
 from fowt_env.descriptions.sea_state import joint_sea_state, joint_tables, sea_of, sea_state_of
 from fowt_env.descriptions.turbine import Turbine
@@ -14,15 +16,16 @@ from fowt_env.display import html_table
 from fowt_env.envs.observations import STANDARD, STOP_CHANNELS, check_channels
 from fowt_env.envs.rewards import check_weights
 from fowt_env.errors import InputError, unknown
-from fowt_env.initial_conditions import INITIAL
 from fowt_env.plant.aero.wind import WindSeries
 from fowt_env.plant.state import State
+from fowt_env.run.initial_conditions import INITIAL
 from fowt_env.scene.channel_names import channel_name
 from fowt_env.weather.wind import nominal_speed
 from fowt_env.weather.wind_field import is_field
 
 SITE = "gulf_of_maine_normal"
 LARGEST_SEED = 2**31  # of an episode's weather
+RANGED, FAR = ("time", "delay", "rate", "offset", "value"), 1e9  # keys of a fault that may be ranges
 SAMPLED = ("series", "steps", "components")  # kinds whose lists are data, never ranges
 OFFSETS = tuple(name for name, (index, _) in INITIAL.items() if not State.VX <= index <= State.WZ)
 
@@ -36,6 +39,7 @@ class Episode(NamedTuple):
     offsets: dict  # {channel: what is added to the operating point, in the channel's unit}
     exact_start: bool  # operating point of this very wind, or interpolated between others
     shutdown: float | None = None  # s of operation by the baseline before the agent has to stop the turbine
+    faults: tuple = ()  # descriptions.faults.Faults of the episode
 
 
 @dataclass(frozen=True)
@@ -177,6 +181,28 @@ def draw_offsets(offsets, rng):
         else:
             drawn[name] = check_offset(name, value)
     return drawn
+
+
+def draw_faults(faults, rng):
+    """Return the tuple of Faults of an episode, drawn from Faults or mappings with ranges (low, high).
+
+    Raises: InputError.
+    """
+    if faults is None or isinstance(faults, Fault | Mapping):
+        faults = () if faults is None else (faults,)
+    if isinstance(faults, str) or not isinstance(faults, Sequence):
+        return read_faults(faults)
+    drawn = []
+    for fault in faults:
+        if isinstance(fault, Mapping):
+            fault = {
+                key: float(rng.uniform(*_range(f"faults: {key}", value, -FAR, FAR)))
+                if key in RANGED and isinstance(value, tuple | list)
+                else value
+                for key, value in fault.items()
+            }
+        drawn.append(fault)
+    return read_faults(drawn)
 
 
 def _lowest(low, high):

@@ -99,6 +99,7 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         self._last = np.array([env._last for env in self.envs])
         self._dt = np.array([env.dt for env in self.envs])
         self._ended = np.zeros(num_envs, dtype=bool)  # waiting for the reset of the next step
+        self._protected = first.is_protected
         self._own_rewards = [i for i, env in enumerate(self.envs) if env._own_reward is not None]
         self._handles = None
         self._listed = [None] * num_envs  # handles in the compiled list, for comparison
@@ -255,7 +256,7 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         infos = self._infos(infos, active, terminations)
         if over:
             for i in (active & ended).nonzero()[0]:
-                infos = self._add_info(infos, {"events": self.envs[i]._events()}, int(i))
+                infos = self._add_info(infos, self.envs[i]._facts(), int(i))
         for i in resets:
             infos = self._begin(i, self._plan(i, None, None), infos)
         self._ended = ended
@@ -298,6 +299,8 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         masks[:] = shown  # a row each: a reset adds itself to some of them
         infos.update(zip(INFO_KEYS, columns, strict=True))
         infos.update(zip(INFO_MASKS, masks, strict=True))
+        if self._protected:
+            counts["stopping"] = np.array([env.is_stopping for env in self.envs]) & shown
         for key, values in counts.items():
             infos[key], infos[f"_{key}"] = values, shown.copy()
         if terminations.any():
@@ -319,10 +322,12 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         info = dict(zip(REWARD_KEYS, self._terms[i].tolist(), strict=True))
         info["time"] = float(self._counts[i, STEP] * self._dt[i])
         info |= {key: int(self._counts[i, entry]) for key, entry in SHOWN_COUNTS.items()}
+        if self._protected:
+            info["stopping"] = self.envs[i].is_stopping
         if self._statuses[i] != RUNNING:
             info["termination"] = self.envs[i]._reason(self._statuses[i])
         if self._statuses[i] != RUNNING or self._counts[i, STEP] >= self._last[i]:
-            info["events"] = self.envs[i]._events()
+            info |= self.envs[i]._facts()
         return info
 
     def get_state(self) -> tuple[Snapshot, ...]:
@@ -451,7 +456,7 @@ def _check_alike(i, env, first):
     kinds = [numba.typeof(Handle(e._config, e._episode)) for e in (first, env)]
     if kinds[0] == kinds[1]:
         return
-    models = [e.scene.model._asdict() | {"sensors": e._config.sensors} for e in (first, env)]
+    models = [e.scene.model._asdict() | e._config.interface._asdict() for e in (first, env)]
     parts = [n for n in models[0] if numba.typeof(models[0][n]) != numba.typeof(models[1][n])]
     raise InputError(
         f"per_env[{i}]: another compiled kind than the first, in {', '.join(parts)}; use the same"

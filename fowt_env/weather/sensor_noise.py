@@ -5,8 +5,8 @@ from math import exp
 import numpy as np
 
 from fowt_env.descriptions.sensors import SensorChain
+from fowt_env.loop.sensing import Sensors, Setting, open_chain
 from fowt_env.plant.measurement import N_MEASUREMENTS, BladeMeasurement, Measurement
-from fowt_env.plant.sensing import Sensors, Setting, open_chain
 
 NOISE_STREAM, BLADE_NOISE_STREAM = 3, 4  # of a run's seed: apart from that of its weather
 

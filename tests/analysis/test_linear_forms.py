@@ -26,7 +26,7 @@ def small_motion(model):
     )
     for _ in range(20):
         env.step_physical(*model.point.command)
-    return env, env._episode.x[list(STATE_INDEX)] - model.x0
+    return env, env.view().state[list(STATE_INDEX)] - model.x0
 
 
 def test_the_state_from_a_measurement_is_that_of_the_plant(model):

@@ -9,9 +9,9 @@ from fowt_env.analysis.reduced_model import platform_frequency, residualised
 from fowt_env.analysis.statics import Evaluation
 from fowt_env.analysis.tower_frequencies import bending
 from fowt_env.analysis.trim import _Steady, trim, without_fluctuations
-from fowt_env.initial_conditions import initial_state
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.state import MOTIONS, STATES, State
+from fowt_env.run.initial_conditions import initial_state
 from fowt_env.scene.mass import top_mass_matrix
 
 

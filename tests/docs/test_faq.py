@@ -199,7 +199,7 @@ def _(folder, monkeypatch):
 def _(folder, monkeypatch):
     sea = {"kind": "jonswap", "Hs": 4.0, "Tp": 9.0}
     scene = fowt_env.build_scene(sea=sea, fidelity="standard")
-    return refused(fowt_env.simulate, scene, None, duration=900.0, start="zero")
+    return refused(fowt_env.simulate, scene, None, duration=900.0, initial="zero")
 
 
 @under("A value of a platform file is refused")
@@ -248,9 +248,9 @@ def _(folder, monkeypatch):
 @under("The run stops before its end")
 def _(folder, monkeypatch):
     scene = fowt_env.build_scene(fidelity="standard")
-    start = {"PtfmRVyi": 90.0}
+    start = {"start": "zero", "PtfmRVyi": 90.0}
     return message(
-        fowt_env.SimulationStopped, fowt_env.simulate, scene, None, duration=60.0, start="zero", initial=start
+        fowt_env.SimulationStopped, fowt_env.simulate, scene, None, duration=60.0, initial=start
     )
 
 

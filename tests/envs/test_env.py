@@ -274,7 +274,7 @@ def test_residual_actions_add_to_the_baseline_within_their_limits():
     law = moved.scene.turbine.torque_law
     difference = moved.measurement().generator_torque - plain.measurement().generator_torque
     assert difference == pytest.approx(-0.2 * 0.1 * law.rated_torque, rel=1e-9)
-    assert moved._episode.u[1] - plain._episode.u[1] == pytest.approx(np.radians(2.0), rel=1e-9)
+    assert moved.view().in_force[1] - plain.view().in_force[1] == pytest.approx(np.radians(2.0), rel=1e-9)
 
 
 def channel_rows(env, commands):
@@ -344,7 +344,7 @@ def test_looking_at_channels_leaves_the_run_as_it_is():
     for _ in range(20):
         env.channels()
         assert np.array_equal(env.step((0.3, 0.1))[0], other.step((0.3, 0.1))[0])
-    assert np.array_equal(env._episode.x, other._episode.x)
+    assert np.array_equal(env.view().state, other.view().state)
     assert set(env.channels()) == {c.name for c in env.scene.channels}
 
 
@@ -450,7 +450,8 @@ def test_episodes_start_at_the_operating_point_of_their_mean_wind():
     env = quick()
     env.reset(seed=0, options=FIXED)
     point = fowt_env.trim(env.scene)
-    assert np.array_equal(env._episode.x, point.state) and np.array_equal(env._episode.u, point.command)
+    assert np.array_equal(env.view().state, point.state)
+    assert np.array_equal(env.view().in_force, point.command)
 
 
 def test_interpolated_operating_points_are_near_the_exact_ones():

@@ -5,7 +5,7 @@ import pytest
 
 from fowt_env.controllers import make
 from fowt_env.envs import FowtEnv, FowtVectorEnv
-from fowt_env.simulation import simulate
+from fowt_env.run.simulation import simulate
 
 QUICK = {"rotor": "table", "wave_components": 20, "wind": {"kind": "ntm", "speed": 18.0, "class": "B"}}
 ESTIMATES = ("estimated_wind", "estimated_platform", "estimated_waves")
@@ -37,13 +37,13 @@ def test_the_estimated_wind_follows_the_wind_under_actions_of_any_kind():
 def test_without_estimated_channels_there_is_no_estimator_and_with_them_the_plant_is_the_same():
     plain = FowtEnv(action_mode="residual", observation=("rotor_speed",), **QUICK)
     watched = FowtEnv(action_mode="residual", observation=("rotor_speed", *ESTIMATES), **QUICK)
-    assert plain._estimator is None and plain._episode.estimate is None and watched._estimator is not None
+    assert plain._estimator is None and plain.view().estimate is None and watched._estimator is not None
     plain.reset(seed=2), watched.reset(seed=2)
     for action in actions(40):
         one, reward, *_ = plain.step(action)
         other, same_reward, *_ = watched.step(action)
         assert one[0] == other[0] and reward == same_reward
-    assert np.array_equal(plain._episode.x, watched._episode.x)
+    assert np.array_equal(plain.view().state, watched.view().state)
 
 
 def test_residual_on_lqr_without_residual_is_simulate_with_lqr_bit_for_bit():
@@ -53,14 +53,15 @@ def test_residual_on_lqr_without_residual_is_simulate_with_lqr_bit_for_bit():
         env.step(np.zeros(2))
     run = env.get_state()
     env.reset(seed=3)
-    x, u = env._episode.x.copy(), env._episode.u.copy()
+    x, u = env.view().state.copy(), env.view().in_force.copy()
     law = make("lqr", env.scene.turbine, 0.1)
     law.prepare(env.scene)
     law.reset(env.measurement())
     for _ in range(200):
         env.step_physical(*law.act(env.measurement()))
-    assert np.array_equal(env._episode.x, run.arrays[0]) and np.array_equal(env._episode.u, run.arrays[1])
-    assert not np.array_equal(env._episode.x, x) and not np.array_equal(env._episode.u, u)
+    assert np.array_equal(env.view().state, run.arrays[0])
+    assert np.array_equal(env.view().in_force, run.arrays[1])
+    assert not np.array_equal(env.view().state, x) and not np.array_equal(env.view().in_force, u)
 
 
 def test_what_is_added_to_lqr_stays_in_force():
@@ -68,10 +69,10 @@ def test_what_is_added_to_lqr_stays_in_force():
     kicked, calm = (FowtEnv(**ON_LQR, **QUICK) for _ in range(2))
     kicked.reset(seed=4), calm.reset(seed=4)
     kicked.step([0.0, 1.0]), calm.step([0.0, 0.0])
-    kick = kicked._episode.u[1] - calm._episode.u[1]
+    kick = kicked.view().in_force[1] - calm.view().in_force[1]
     assert kick == pytest.approx(np.radians(kicked.task.residual_pitch), rel=1e-9)
     kicked.step([0.0, 0.0]), calm.step([0.0, 0.0])
-    assert 0.9 * kick < kicked._episode.u[1] - calm._episode.u[1] < kick
+    assert 0.9 * kick < kicked.view().in_force[1] - calm.view().in_force[1] < kick
 
 
 @pytest.mark.parametrize("settings", [ON_LQR, {"action_mode": "direct", "observation": NAMES}])

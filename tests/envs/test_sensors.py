@@ -30,10 +30,10 @@ NOMINAL = {"platform": "oc3_hywind"}
 def run(env, steps=40, seed=3, reset_seed=4, reach=1.0):
     """Observations of actions drawn with a seed, and all measurements and readings."""
     rng = np.random.default_rng(seed)
-    rows = [(env.reset(seed=reset_seed)[0], env._episode.measurement.copy(), env._episode.reading.copy())]
+    rows = [(env.reset(seed=reset_seed)[0], env.view().measurement.copy(), env.view().reading.copy())]
     for _ in range(steps):
         observation = env.step(rng.uniform(-reach, reach, 2))[0]
-        rows.append((observation, env._episode.measurement.copy(), env._episode.reading.copy()))
+        rows.append((observation, env.view().measurement.copy(), env.view().reading.copy()))
     return [np.array(column) for column in zip(*rows, strict=True)]
 
 
@@ -42,8 +42,8 @@ def test_sensors_without_noise_and_delay_change_no_bit(settings):
     plain, exact = FowtEnv(**settings, **QUICK), FowtEnv(**settings, sensors={}, **QUICK)
     for one, other in zip(run(plain), run(exact), strict=True):
         assert np.array_equal(one, other)
-    assert np.array_equal(plain._episode.x, exact._episode.x)
-    assert np.array_equal(plain._episode.u, exact._episode.u)
+    assert np.array_equal(plain.view().state, exact.view().state)
+    assert np.array_equal(plain.view().in_force, exact.view().in_force)
 
 
 def test_designing_on_the_very_plant_changes_no_bit():
@@ -98,18 +98,19 @@ def test_observation_baseline_and_estimator_are_given_the_same_reading(sensors):
         other = hand.step_physical(*law.act(hand.measurement()))[0]
         both = [np.delete(seen, [2, 3]) for seen in (observation, other)]  # the last action differs by mode
         assert np.array_equal(*both)
-        assert np.array_equal(env._episode.u, hand._episode.u)
-        assert np.array_equal(env._episode.x, hand._episode.x)
-        call_law(watch.kernel, watch.parameters, watch.memory, np.array(hand.measurement()), hand._episode.u)
-        assert np.array_equal(watch.memory, env._episode.estimate)
+        assert np.array_equal(env.view().in_force, hand.view().in_force)
+        assert np.array_equal(env.view().state, hand.view().state)
+        measured, command = np.array(hand.measurement()), hand.view().in_force
+        call_law(watch.kernel, watch.parameters, watch.memory, measured, command)
+        assert np.array_equal(watch.memory, env.view().estimate)
 
 
 def test_noise_reaches_baseline_and_estimator_but_not_the_reward():
     exact, degraded = FowtEnv(**ON_LQR, **QUICK), FowtEnv(sensors={"noise": 0.05}, **ON_LQR, **QUICK)
     exact.reset(seed=6), degraded.reset(seed=6)
-    assert not np.array_equal(exact._episode.estimate, degraded._episode.estimate)
+    assert not np.array_equal(exact.view().estimate, degraded.view().estimate)
     exact.step(np.zeros(2)), degraded.step(np.zeros(2))
-    assert exact._episode.u[1] != degraded._episode.u[1]
+    assert exact.view().in_force[1] != degraded.view().in_force[1]
     deaf = {"action_mode": "direct", "observation": ("rotor_speed",)}
     exact, degraded = FowtEnv(**deaf, **QUICK), FowtEnv(sensors={"noise": 0.05}, **deaf, **QUICK)
     exact.reset(seed=6), degraded.reset(seed=6)
@@ -260,21 +261,21 @@ def test_a_chain_by_name_gives_environment_and_run_the_same_readings():
 def test_the_baseline_is_given_what_it_declares(turbine):
     plain, told = (FowtEnv(action_mode="residual", baseline="pi", **BY_NAME, **QUICK) for _ in range(2))
     plain.reset(seed=3), told.reset(seed=3)
-    shown = np.isfinite(plain._episode.baseline_reading)
+    shown = np.isfinite(plain._episode.link.law_reading)
     names = {name for name, given in zip(Measurement._fields, shown, strict=True) if given}
     assert names == {"time", *make("pi", turbine, 0.1).information}
     plain.step([0.1, 0.2])
-    assert np.array_equal(shown, np.isfinite(plain._episode.baseline_reading))
+    assert np.array_equal(shown, np.isfinite(plain._episode.link.law_reading))
 
 
 def test_a_preview_baseline_is_given_the_wind_ahead_as_in_a_run():
     env = FowtEnv(action_mode="residual", baseline="preview", observation=("rotor_speed",), **QUICK)
     env.reset(seed=4)
-    start = dict(zip(("torque", "pitch"), env._episode.u, strict=True))
+    start = dict(zip(("torque", "pitch"), env.view().in_force, strict=True))
     pitch = []
     for _ in range(60):
         env.step(np.zeros(2))
-        pitch.append(env._episode.u[1])
+        pitch.append(env.view().in_force[1])
     law = make("preview", env.scene.turbine, 0.1)
     hand = FowtEnv(action_mode="direct", observation=("rotor_speed",), **QUICK)
     hand.reset(seed=4)

@@ -6,7 +6,7 @@ import pytest
 from fowt_env.control import make
 from fowt_env.envs import TASKS, FowtEnv
 from fowt_env.errors import InputError
-from fowt_env.simulation import simulate
+from fowt_env.run.simulation import simulate
 
 SHORT = {"task": "shutdown", "duration": 60.0, "reward": {}}
 DRAWN = {"wind": 16.0, "sea": None, "offsets": {}, "shutdown": 12.0}
@@ -50,7 +50,7 @@ def test_a_rotor_that_stands_is_paid_more_than_one_that_turns(env):
         env.reset(options=DRAWN)
         total, terminated, truncated = 0.0, False, False
         while not (terminated or truncated):
-            chosen = env.unwrapped._episode.action.copy() if action is None else action
+            chosen = env.unwrapped.view().action.copy() if action is None else action
             _, reward, terminated, truncated, info = env.step(chosen)
             weights = TASKS["shutdown"].weights
             paid = sum(weights.get(key.removeprefix("reward/"), 0.0) * value

@@ -80,7 +80,7 @@ def test_each_of_the_batch_is_the_single_environment_bit_for_bit(settings, threa
             observation, reward, _, _, info = single.step(given[k, i])
             assert np.array_equal(seen[k + 1][i], observation) and rewards[k][i] == reward
             assert all(infos[k][key][i] == value and infos[k][f"_{key}"][i] for key, value in info.items())
-        assert np.array_equal(batch.envs[i]._episode.x, single._episode.x)
+        assert np.array_equal(batch.envs[i].view().state, single.view().state)
 
 
 @pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])

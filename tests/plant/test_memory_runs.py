@@ -45,7 +45,7 @@ def decays(platform):
         for name, (channel, offset) in CHANNELS.items():
             duration = found["openfast", name].size - 1.0
             initial = {channel.split("_")[0]: offset}
-            run = simulate(scene, None, duration, output_dt=1.0, start="zero", initial=initial)
+            run = simulate(scene, None, duration, output_dt=1.0, initial={"start": "zero"} | initial)
             found[form, name] = run[channel].to_numpy()
     return found
 

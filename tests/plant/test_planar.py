@@ -7,8 +7,8 @@ from fowt_env import build_scene, simulate
 from fowt_env.analysis.linear_model import linearize
 from fowt_env.descriptions.platform import read_platform
 from fowt_env.errors import InputError
-from fowt_env.initial_conditions import initial_state
 from fowt_env.plant.state import OUT_OF_PLANE
+from fowt_env.run.initial_conditions import initial_state
 
 OFFSET = {"PtfmSurge": 8.0, "PtfmHeave": 1.5, "PtfmPitch": 5.0, "PtfmTVxi": 0.3, "PtfmRVyi": 0.2}
 IN_PLANE = ["PtfmSurge_[m]", "PtfmHeave_[m]", "PtfmPitch_[deg]", "FAIRTEN1_[kN]", "FAIRTEN2_[kN]"]

@@ -11,7 +11,7 @@ from fowt_env.controllers.constant import Constant
 from fowt_env.descriptions.faults import BLADE_FAULTS, KINDS, SENSOR_FAULTS, Fault
 from fowt_env.descriptions.protection import Protection
 from fowt_env.errors import InputError
-from fowt_env.simulation import guard_of
+from fowt_env.run.simulation import guard_of
 
 DT = 0.1
 TIME, SPEED, PITCH, TORQUE = "Time_[s]", "RotSpeed_[rpm]", "BldPitch1_[deg]", "GenTq_[kN-m]"
@@ -171,7 +171,8 @@ def test_a_fault_is_a_controller_whose_commands_are_overridden(scene, turbine, f
     fault = Fault(**fault)
     frame = run(scene, faults=fault)
     wrapped = Overridden(make("pi", turbine, DT), fault, turbine.pitch_drive.maximum, DT)
-    twin = run(scene, wrapped, grid_loss=fault.grid_loss)
+    loss = {"kind": "grid_loss", "time": fault.grid_loss}
+    twin = run(scene, wrapped, faults=None if fault.grid_loss is None else loss)
     pd.testing.assert_frame_equal(frame, twin, check_exact=True)
     assert not frame.equals(run(scene))
 
@@ -225,18 +226,6 @@ def test_an_offset_blade_is_off_and_its_encoder_does_not_show_it(scene, turbine)
     assert frame[PITCH].iloc[-1] == pytest.approx(np.degrees(0.26) + 1.5, abs=1e-6)
     assert np.degrees(held.read[-1]) == pytest.approx(np.degrees(0.26), abs=1e-6)
     assert frame.attrs["tripped"] is None
-
-
-def test_a_law_goes_on_from_its_own_command_and_not_from_what_a_fault_made_of_it(scene):
-    """lqr predicts with the command in force; a drive that is stuck does not tell it."""
-    from fowt_env.plant.protection import build_guard, break_drives, own_command  # noqa: I001
-
-    guard = build_guard(faults=[(1, 0.0, 0, -1.0, 0.0)])
-    u = np.array([1.0, 0.25])
-    break_drives(0.0, np.zeros(15), u, scene.model, guard)
-    assert u[1] == scene.turbine.pitch_drive.minimum
-    own_command(u, guard)
-    assert u.tolist() == [1.0, 0.25]
 
 
 @pytest.mark.parametrize(

@@ -149,7 +149,8 @@ def test_the_rate_limit_of_the_torque_holds_with_the_lag(scene):
 
 def test_off_the_grid_the_torque_is_gone_at_once(scene):
     torque, pitch = trim(scene).command
-    run = fowt_env.simulate(scene, Given(lambda t: (torque, pitch)), duration=1.0, grid_loss=0.5)
+    loss = {"kind": "grid_loss", "time": 0.5}
+    run = fowt_env.simulate(scene, Given(lambda t: (torque, pitch)), duration=1.0, faults=loss)
     shown = run["GenTq_[kN-m]"].to_numpy()
     assert np.all(shown[5:] == 0.0) and shown[4] == pytest.approx(1e-3 * torque)
 
@@ -184,7 +185,7 @@ def test_an_environment_goes_on_from_a_snapshot_as_it_went_on(scene):
     other.set_state(saved)
     again = [other.step(action)[0] for action in actions[10:]]
     assert np.array_equal(seen, again)
-    blade = [env.unwrapped._episode.x[15], env.unwrapped._episode.x[16]]
+    blade = [env.unwrapped.view().state[15], env.unwrapped.view().state[16]]
     assert blade[0] != 0.0 and blade[1] != 0.0
 
 

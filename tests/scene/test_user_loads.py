@@ -330,7 +330,7 @@ kernel, strength = ((one, 1e5), (other, 1e10))[int(sys.argv[1])]
 with compilation_reported(said.append):
     for loads in ((), (Load("Own", kernel, [strength]),)):
         frame = simulate(build_scene(fidelity="standard", loads=loads), None, duration=float(sys.argv[2]),
-                         start="zero", initial={"PtfmPitch": 5.0})
+                         initial={"start": "zero", "PtfmPitch": 5.0})
         print(repr(float(frame["PtfmPitch_[deg]"].iloc[-1])))
 print(int(bool(said)))
 """

@@ -15,11 +15,11 @@ import numpy as np
 import pandas as pd
 
 from fowt_env.errors import InputError, unknown
-from fowt_env.initial_conditions import initial_state
 from fowt_env.plant.integrators import INTEGRATORS
+from fowt_env.run.initial_conditions import initial_state
+from fowt_env.run.simulation import simulate
 from fowt_env.scene.build import build_scene
 from fowt_env.scene.options import FIDELITIES
-from fowt_env.simulation import simulate
 from fowt_env.training.benchmarks.speed import SEA, TURBULENCE, TimedScene, calibration, header, loop_time
 from fowt_env.training.validation.signal_errors import normalised_rms
 from fowt_env.weather.wind_field import is_field

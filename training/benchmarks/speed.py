@@ -12,7 +12,6 @@ import tempfile
 import time
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from math import inf
 from pathlib import Path
 
 import numba
@@ -26,7 +25,9 @@ from fowt_env.descriptions.platform import read_platform
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.errors import InputError, unknown
 from fowt_env.files.atomic import replacing
-from fowt_env.initial_conditions import initial_state
+from fowt_env.loop.interface import interface_data
+from fowt_env.loop.protection import build_guard
+from fowt_env.loop.rollout import Schedule, rollout
 from fowt_env.plant.aero.load import rotor_part
 from fowt_env.plant.aero.tower_drag import tower_load
 from fowt_env.plant.aero.wind import wind_now
@@ -39,11 +40,12 @@ from fowt_env.plant.hydro.load import strip_load
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.mooring import mooring_load
-from fowt_env.plant.protection import build_guard
-from fowt_env.plant.rollout import Schedule, advance, forget, observe, output, rollout
+from fowt_env.plant.rollout import advance, forget, observe, output
 from fowt_env.plant.state import Command, State, pose_of
+from fowt_env.run.initial_conditions import initial_state
+from fowt_env.run.interface import build_interface
+from fowt_env.run.simulation import HeldCommand, simulate
 from fowt_env.scene.build import build_scene
-from fowt_env.simulation import HeldCommand, reader_of, simulate
 
 PLATFORM = "oc3_hywind"
 CALIBRATION_STEPS = 10_000_000
@@ -296,21 +298,23 @@ def loop_time(scene, kind, x, u, dt, seconds, repeats=REPEATS):
     """CPU seconds of the compiled closed loop, controller at 10 Hz, with one row of output."""
     scene = scene.with_step(dt)
     controller = make("pi", scene.turbine, 0.1) if kind.controlled else HeldCommand()
-    handle, dx, m = scene.handle(), np.zeros_like(x), np.zeros(scene.n_measurements)
+    handle = scene.handle()
     rows = np.zeros((2, len(scene.channels)))  # of the first and the last instant
     last = round(seconds / dt)
-    schedule = Schedule(float(dt), round(0.1 / dt), last + 1, last, inf, inf)
-    reader = Handle(None, reader_of(scene, controller, None, EXACT, schedule))
-    guarding = Handle(None, build_guard())
+    schedule = Schedule(float(dt), round(0.1 / dt), last + 1, last)
+    interface = build_interface(scene, controller, build_guard(), None, EXACT, 0.1, round(10.0 * seconds))
+    link = interface_data(interface, len(x), len(u), scene.n_measurements)
+    linked = Handle(interface, link)
 
     def go():
         y, v = x.copy(), u.copy()
         forget(handle)
-        observe(handle, y, v, 0.0, dx, m)
-        controller.reset(Measurement(*m[:N_MEASUREMENTS].tolist()))
+        observe(handle, y, v, 0.0, link.dx, link.measurement)
+        controller.reset(Measurement(*link.measurement[:N_MEASUREMENTS].tolist()))
+        link.command[:] = v
         rollout(
-            handle, y, v, controller.law, controller.parameters, controller.memory, reader, guarding,
-            m, dx, schedule, 0, last, rows,
+            handle, y, v, controller.law, controller.parameters, controller.memory, linked, schedule, 0,
+            last, rows,
         )  # fmt: skip
 
     return median_time(go, repeats)

@@ -146,7 +146,7 @@ def reference_run():
 
     sea = {"kind": "regular", "H": 4.0, "T": 10.0}
     scene = build_scene("oc3_hywind", wind=18.0, sea=sea, fidelity="standard")
-    return simulate(scene, "pi", duration=TEST_DURATION, start="zero")
+    return simulate(scene, "pi", duration=TEST_DURATION, initial="zero")
 
 
 def self_test():

@@ -9,12 +9,18 @@ import pandas as pd
 
 import fowt_env
 from fowt_env.analysis.trim import trim
+from fowt_env.control import EXACT
 from fowt_env.controllers import make
 from fowt_env.descriptions.checks import is_number
-from fowt_env.descriptions.protection import read_protection
+from fowt_env.descriptions.faults import Fault
+from fowt_env.descriptions.platform import turbine_of
+from fowt_env.descriptions.protection import END_AT_OVERSPEED, TripLimit, read_protection
 from fowt_env.descriptions.sea_state import sea_state_of
+from fowt_env.descriptions.sensors import sensor_chain
 from fowt_env.descriptions.units import DEGREE
 from fowt_env.descriptions.wind import read_wind
+from fowt_env.envs.observations import STANDARD
+from fowt_env.envs.tasks import Task
 from fowt_env.errors import (
     ControllerError,
     ControllerInputError,
@@ -23,6 +29,7 @@ from fowt_env.errors import (
     SimulationStopped,
     muted,
 )
+from fowt_env.plant.measurement import Measurement
 from fowt_env.training.evaluation.faults import idling
 from fowt_env.training.evaluation.guard import attempt, reason_of
 from fowt_env.training.evaluation.metrics import METRICS, TIME, turbine_metrics
@@ -88,9 +95,7 @@ def scored(run):
         parts = perturbed_parts(case.shift, case.platform)
         scene = fowt_env.build_scene(wind=wind, sea=case.sea, seed=run.seed, **options | parts)
 
-    trip = case.trip if run.protected else None
-    protection = case.protection if run.protected else None
-    stop = run.label != REFERENCE and case.fault is None and trip is None and protection is None
+    ends = run.label != REFERENCE and case.fault is None
 
     def work():
         with warnings.catch_warnings():
@@ -100,11 +105,8 @@ def scored(run):
                 controller=run_controller(run, nominal),
                 duration=run.duration,
                 initial=_start(case, scene),
-                stop_overspeed=stop,
-                grid_loss=0.0 if case.parked else None,
-                trip=trip,
-                protection=protection,
-                faults=case.fault,
+                protection=protection_of(case, scene.turbine, run.protected, ends),
+                faults=faults_of(case),
                 nominal=nominal,
                 **{"sensors": case.sensors} | run.options | _degraded(run, nominal.turbine),
             )
@@ -124,6 +126,50 @@ def scored(run):
         raise error  # the run's settings
     frame, stopped = _end(error)
     return _row(run, FAILED, frame) | {"reason": reason_of(error), "stopped_[s]": stopped}, frame
+
+
+def faults_of(case):
+    """Return the faults of a Case, among them the grid that a parked turbine is not connected to."""
+    parked = (Fault(kind="grid_loss", time=0.0),) if case.parked else ()
+    return parked if case.fault is None else (case.fault, *parked)
+
+
+def environment_settings(case, duration):
+    """Return the settings of a FowtEnv in which an episode of `duration` (s) is a run of a Case.
+
+    An episode with reset(options={"weather_seed": seed}) of an environment with the residual action mode, the
+    case's controller as baseline and actions of zero gives the rows of evaluate; frame() returns them.
+    Raises: InputError for a case with another plant than its nominal one, or with a displaced start.
+    """
+    if case.shift is not None or case.displaced is not None or case.initial is not None:
+        raise InputError(f"case {case.name!r}: an environment begins at the trim of the nominal plant")
+    turbine = turbine_of(case.platform, case.options.get("turbine"))
+    chain = sensor_chain(case.sensors)
+    lacking = () if chain is None else set(Measurement._fields) - set(chain.available)
+    shown = tuple(name for name in STANDARD if name not in lacking)
+    return {
+        "task": Task(
+            name=case.name, wind=case.wind, sea=case.sea, duration=duration, offsets={}, observation=shown
+        ),
+        "platform": case.platform,
+        "sensors": case.sensors,
+        "preview": EXACT,
+        "protection": protection_of(case, turbine, not case.parked, case.fault is None),
+        "faults": faults_of(case),
+        "record": True,
+        "weather_duration": max(SHORTEST_CASE_WEATHER, duration),
+        **case.options,
+    }
+
+
+def protection_of(case, turbine, protected, ends):
+    """Return the protection of a run of a Case: its trips, or none; without any, `ends`: at the overspeed."""
+    if not protected or (case.trip is None and case.protection is None):
+        return END_AT_OVERSPEED if ends else None
+    limits = read_protection(case.protection, turbine.protection)
+    if case.trip is None:
+        return limits
+    return limits.model_copy(update={"overspeed": TripLimit(limit=case.trip)})
 
 
 def lost_row(run, reason):

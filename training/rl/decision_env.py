@@ -51,7 +51,7 @@ class DecisionVecEnv(VecEnvWrapper):
         self._decision = np.zeros_like(self.decisions.action)
 
     def _actions_in_force(self):
-        return np.array([env._episode.action for env in self.base.env.envs])
+        return np.array([env.last_action for env in self.base.env.envs])
 
     def reset(self):
         """Features (n, size) at the start of new episodes."""
@@ -81,7 +81,7 @@ class DecisionVecEnv(VecEnvWrapper):
                     last = infos[i]["terminal_observation"]
                     infos[i]["terminal_observation"] = decisions.last_features(i, last)
                 ended[i] = True
-                decisions.restart(i, observations[i], self.base.env.envs[i]._episode.action)
+                decisions.restart(i, observations[i], self.base.env.envs[i].last_action)
                 self._decision[i] = decisions.action[i]
         decisions.append(observations)
         for i in np.flatnonzero(ended):
@@ -142,7 +142,7 @@ class ValidationVecEnv(FowtSB3VecEnv):
             self._failed[i] = not infos[i]["TimeLimit.truncated"]
         self._over |= dones
         if self._clock < len(self._record):
-            row = np.array([env._episode.measurement for env in self.env.envs])[:, RECORDED_FIELDS]
+            row = np.array([env.view().measurement for env in self.env.envs])[:, RECORDED_FIELDS]
             self._record[self._clock, ~self._over] = row[~self._over]
         self._clock += 1
         return result

@@ -14,8 +14,8 @@ from time import process_time
 import numpy as np
 
 from fowt_env.files.markdown import markdown_table
+from fowt_env.run.simulation import simulate
 from fowt_env.scene.build import build_scene
-from fowt_env.simulation import simulate
 
 CASES = (
     ("oc3_hywind", 8.0), ("oc3_hywind", 12.0), ("oc3_hywind", 18.0), ("oc3_hywind", 24.0),

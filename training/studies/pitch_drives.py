@@ -18,8 +18,8 @@ from fowt_env.descriptions.platform import read_platform
 from fowt_env.descriptions.sea_state import joint_sea_state
 from fowt_env.descriptions.turbine import read_turbine, with_second_order_drive
 from fowt_env.files.markdown import markdown_table
+from fowt_env.run.simulation import simulate
 from fowt_env.scene.build import build_scene
-from fowt_env.simulation import simulate
 
 PLATFORMS = ("oc3_hywind", "iea15_volturnus_s")
 CONTROLLERS = ("pi", "gspi_oc3")

@@ -49,7 +49,7 @@ class Trained:
         mode = ACTION_MODES[self.settings["action_mode"]]
         wind = wind_entry(settings, mode, env.unwrapped.observed)
         self.decisions = Decisions(1, len(observation), settings, self.settings["control_dt"], wind)
-        self.decisions.restart(0, observation, env.unwrapped._episode.action)
+        self.decisions.restart(0, observation, env.unwrapped.last_action)
         self.periods = 0
 
     def act(self, observation):

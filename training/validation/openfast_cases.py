@@ -148,8 +148,8 @@ class ReferenceRun:
         wind None: the run's own, dt None: the deck's. controller and other arguments of build_scene may be
         among the options.
         """
+        from fowt_env.run.simulation import simulate
         from fowt_env.scene.build import build_scene
-        from fowt_env.simulation import simulate
 
         if wind is None:
             wind = self.wind(folder, bts) if callable(self.wind) else self.wind
@@ -175,8 +175,7 @@ class ReferenceRun:
             dt=dt,
             control_dt=dt,
             output_dt=self.output_dt,
-            start="zero",
-            initial=self.initial,
+            initial={"start": "zero"} | (self.initial or {}),
             progress=progress,
         )
         if self.before:

@@ -106,8 +106,8 @@ def modal_rates(time, values, guess):
 def periods(name, study):
     """Damped natural periods of small free decays against those of Cummins' equation in numpy: 1 %."""
     from fowt_env.analysis.trim import trim
+    from fowt_env.run.simulation import simulate
     from fowt_env.scene.build import build_scene
-    from fowt_env.simulation import simulate
 
     study.say("natural periods")
     scene = without_drag(build_scene(name, fidelity="reference"))
@@ -138,8 +138,8 @@ def periods(name, study):
 
 def rao(name, study):
     """Responses to small waves, 0.2 to 1.5 rad/s, against the frequency domain: amplitude 1 %."""
+    from fowt_env.run.simulation import simulate
     from fowt_env.scene.build import build_scene
-    from fowt_env.simulation import simulate
 
     study.say("responses to small waves")
     body = body_of(name)

@@ -39,7 +39,7 @@ from fowt_env import build_scene, simulate
 from fowt_env.plant.compile.notice import compilation_reported
 said = []
 with compilation_reported(said.append):
-    frame = simulate(build_scene(), None, duration=2.0, start="zero", initial={"PtfmPitch": 5.0})
+    frame = simulate(build_scene(), None, duration=2.0, initial={"start": "zero", "PtfmPitch": 5.0})
 print(frame.to_numpy().tobytes().hex()[-4000:], int(bool(said)))
 """
 
@@ -345,7 +345,7 @@ def test_numba_code_of_other_packages_is_kept_where_it_would_be_without_ours(tmp
 
 def test_ours_are_kept_in_files_made_for_several_processes_whatever_numba_is_told(tmp_path):
     code = (
-        "from fowt_env.plant.hydro.waves import ramp_factor as f\nfrom fowt_env.simulation import hold\n"
+        "from fowt_env.plant.hydro.waves import ramp_factor as f\nfrom fowt_env.run.simulation import hold\n"
         "files = [type(g._cache._cache_file).__name__ for g in (f, hold.compiled)]\n"
         "print(*files, f._cache.cache_path)\n"
     )

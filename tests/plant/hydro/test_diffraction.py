@@ -350,7 +350,7 @@ def test_regular_wave_of_five_seconds_lags_more_than_the_panel_model():
             diffraction=diffraction,
             fidelity="reference",
         )
-        frame = simulate(scene, None, duration=600.0, dt=0.05, start="zero")
+        frame = simulate(scene, None, duration=600.0, dt=0.05, initial="zero")
         harmonics.append([first_harmonic(frame, name, 5.0) for name in ("PtfmSurge_[m]", "PtfmPitch_[deg]")])
     strip, diffracted = np.array(harmonics)
     assert np.abs(strip) == pytest.approx([0.1755, 0.1034], rel=5e-3)

@@ -50,7 +50,7 @@ def test_a_stop_has_the_time_to_standstill_of_its_rows():
     row = row_of(Case("stop", 16.0, fault=Fault(kind="emergency_stop", time=10.0), trip=None))
     scene = fowt_env.build_scene("oc3_hywind", wind=16.0, fidelity="standard")
     frame = fowt_env.simulate(
-        scene, "pi", duration=60.0, faults={"kind": "emergency_stop", "time": 10.0}, stop_overspeed=False
+        scene, "pi", duration=60.0, faults={"kind": "emergency_stop", "time": 10.0}
     )
     fast = frame["Time_[s]"][frame["RotSpeed_[rpm]"].abs() > 1.21]
     assert row["status"] == "ok" and row["standstill_time_[s]"] == pytest.approx(fast.iloc[-1] - 10.0)

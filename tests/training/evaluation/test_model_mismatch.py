@@ -95,7 +95,7 @@ def test_the_run_is_on_the_shifted_plant_and_the_controller_knows_the_nominal_on
     known = fowt_env.build_scene(**weather)
     true = fowt_env.build_scene(**weather, **perturbed_parts(shift))
     assert true.turbine.pitch_drive.time_constant == 2.0 * known.turbine.pitch_drive.time_constant
-    options = {"duration": run.duration, "stop_overspeed": True}
+    options = {"duration": run.duration, "protection": "end_at_overspeed"}
     unaware = make("lqr", known.turbine, 0.1)
     same = fowt_env.simulate(true, unaware, nominal=known, **options)
     pd.testing.assert_frame_equal(frame, same, check_exact=True)

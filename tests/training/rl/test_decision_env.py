@@ -34,7 +34,7 @@ def test_a_decision_is_its_control_periods_one_by_one(mode):
     single = FowtEnv(action_mode=mode, **QUICK)
     observation, _ = single.reset(seed=5)
     seen = [observation] * 4
-    action = np.array(single._episode.action)
+    action = np.array(single.last_action)
     rng = np.random.default_rng(1)
     share = 1.0 - np.exp(-0.1 / 0.3)
     for _ in range(19):
@@ -64,14 +64,14 @@ def test_an_episode_that_fails_within_a_decision_is_paid_up_to_its_failure_only(
     env = DecisionVecEnv(base, settings)
     env.seed(0)
     env.reset()
-    held = np.array(base.env.envs[1]._episode.action)
+    held = np.array(base.env.envs[1].last_action)
     rewards, dones = None, np.zeros(2, dtype=bool)
     for _ in range(3):
         if not dones[0]:
             _, rewards, dones, infos = env.step(np.array([[-1.0, -1.0], held]))
     assert dones.tolist() == [True, False] and "overspeed" in infos[0]["termination"]
     assert rewards[0] < 0.0 < rewards[1]
-    assert base.env.envs[0]._episode.measurement[0] > 0.0  # the next episode has begun
+    assert base.env.envs[0].view().measurement[0] > 0.0  # the next episode has begun
 
 
 @pytest.mark.parametrize("shaping", [{}, {"washout": 4.0, "authority": (0.01, 0.3), "authority_time": 3.0}])

@@ -52,13 +52,13 @@ def test_environments_share_a_pool_of_plants_and_differ_within_it():
 
 def test_the_plain_task_is_not_randomised_and_the_robust_one_is():
     plain, validation_env = make_envs(small("ppo"))
-    assert {env._config.sensors for env in environments(plain)} == {None}
+    assert {env._config.interface.sensors for env in environments(plain)} == {None}
     settings = small("ppo") | {"environment": small("ppo")["environment"] | {"randomise": {"plants": 2}}}
     robust, validation_env = make_envs(settings)
     assert len({env.scene.platform.ballast.mass for env in environments(robust)}) == 2
     assert len({env._sensors["noise"] for env in environments(robust)}) == 2
     assert len({env.scene.platform.ballast.mass for env in environments(validation_env)}) == 1
-    assert {env._config.sensors for env in environments(validation_env)} == {None}
+    assert {env._config.interface.sensors for env in environments(validation_env)} == {None}
     for algo in ("ppo", "sac", "tqc"):
         assert "randomise" in resolve(algo, "above_rated_robust", 0, 1)["environment"]
         assert "randomise" not in resolve(algo, "above_rated", 0, 1)["environment"]

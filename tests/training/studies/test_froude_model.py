@@ -83,7 +83,7 @@ def test_a_closed_loop_in_waves_is_the_original_in_slower_time(pair):
     for scene, scale in zip(pair, (1.0, SCALE), strict=True):
         t = sqrt(scale)
         times = {"dt": 0.1 * t, "control_dt": 0.1 * t, "output_dt": 0.5 * t, "duration": 60.0 * t}
-        frames.append(simulate(scene, "pi", start="zero", **times))
+        frames.append(simulate(scene, "pi", initial="zero", **times))
     small, large = frames
     for column, power in (
         ("PtfmSurge_[m]", 1.0), ("PtfmHeave_[m]", 1.0), ("PtfmPitch_[deg]", 0.0), ("RotSpeed_[rpm]", -0.5),

@@ -121,8 +121,7 @@ def run_load_case(name, duration=DURATION, seed=1, progress=False, **options):
         dt=STEP,
         control_dt=0.1,
         output_dt=OUTPUT,
-        start="zero",
-        initial=initial | {"RotSpeed": case.rotor_rpm, "BldPitch1": case.blade_pitch_deg},
+        initial=initial | {"start": "zero", "RotSpeed": case.rotor_rpm, "BldPitch1": case.blade_pitch_deg},
         progress=progress,
     )
 
@@ -350,7 +349,7 @@ def decay(channel, start, duration):
     """Frame of a free decay of OC3-Hywind in still water."""
     scene = fowt_env.build_scene("oc3_hywind", fidelity="reference")
     return fowt_env.simulate(
-        scene, controller=None, duration=duration, dt=0.05, start="trim", initial={channel: start}
+        scene, controller=None, duration=duration, dt=0.05, initial={channel: start}
     )
 
 

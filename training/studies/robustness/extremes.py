@@ -11,11 +11,11 @@ from fowt_env.descriptions.checks import check_whole_number
 from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.envs import FowtEnv
 from fowt_env.errors import InputError
-from fowt_env.initial_conditions import initial_state
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
 from fowt_env.plant.mooring import Mooring
 from fowt_env.plant.rollout import RUNNING, STOP_REASONS, advance, forget, observe
 from fowt_env.plant.state import Command, State
+from fowt_env.run.initial_conditions import initial_state
 from fowt_env.scene.build import build_scene
 from fowt_env.training.evaluation.run_case import CONTROL_DT
 
@@ -297,7 +297,7 @@ def attack(env, policy, seed, steps=HOSTILE_STEPS):
         finite = finite and bool(np.all(np.isfinite(observation))) and isfinite(reward)
         if terminated:
             reasons[info["termination"]] = reasons.get(info["termination"], 0) + 1
-        elif not np.all(np.isfinite(env._episode.x)):
+        elif not np.all(np.isfinite(env.view().state)):
             finite = False
         if terminated or truncated:
             resets += 1

@@ -24,9 +24,9 @@ from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
 from fowt_env.plant.mooring import mooring_load
 from fowt_env.plant.rollout import NON_FINITE, RUNNING, STOP_REASONS, observe, status_of
 from fowt_env.plant.state import N_RIGID, Command, State, pose_of
+from fowt_env.run.simulation import hold
 from fowt_env.scene.build import build_scene
 from fowt_env.scene.options import FIDELITIES
-from fowt_env.simulation import hold
 from fowt_env.training.evaluation.run_case import CONTROL_DT
 
 DURATION = 30.0  # s of each case: three wave periods, one of platform pitch

@@ -1,11 +1,11 @@
-"""What stops a turbine and what breaks on it: trips, stops, faults of pitch drives and of sensors.
+"""Protection and faults of a turbine: trips, stops, faults of pitch drives and of sensors.
 
-All of it happens at control instants, in the order of the rollout: watch, then the stop or the law, then the
-faults of the drives; those of the sensors act on each reading. Python builds a Guard per run (build_guard).
+All of it happens at control instants, in the order of loop/period.py. Python builds a Guard per run
+(build_guard), whose memory is in InterfaceData: watch and held.
 """
 
 from enum import IntEnum
-from math import hypot, inf, isfinite, isinf, isnan, nan
+from math import hypot, inf, isfinite, isinf, isnan
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +16,6 @@ from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.compile.handle import by_reference
 from fowt_env.plant.drivetrain import clamp
 from fowt_env.plant.measurement import N_MEASUREMENTS, BladeMeasure, Measure
-from fowt_env.plant.sensing import place_of
 from fowt_env.plant.state import BLADES, Command, State, pose_of
 from fowt_env.plant.tower_modes import bend_of, nacelle_rates, turned_pose
 
@@ -46,6 +45,7 @@ class Stop(IntEnum):
     NONE = -1
     NORMAL = 0  # feathers at a normal rate; the torque falls with the rotor speed, until the generator is off
     EMERGENCY = 1  # no torque at once, feathers at the highest rate
+    END = 2  # the run ends at once
 
 
 class Failure(IntEnum):
@@ -70,7 +70,7 @@ class Part(IntEnum):
 
 
 class Watch(IntEnum):
-    """Entries of Guard.watch, the memory of a run, which outlives the calls of rollout."""
+    """Entries of InterfaceData.watch, the memory of the protection."""
 
     TRIPPED_AT = 0  # s; infinite: not yet
     TRIP = 1  # which
@@ -79,10 +79,9 @@ class Watch(IntEnum):
     SPEED = 4  # rotor speed then, rad/s
     SINCE = 5  # s, of each trip: from when its limit is passed; infinite: it is not
     TARGET = 9  # rad, of each blade: pitch that a stop commands
-    COMMAND = 12  # rad, of each blade: pitch commanded by the law or a stop, before faults
 
 
-N_WATCH = Watch.COMMAND + BLADES
+N_WATCH = Watch.TARGET + BLADES
 
 
 @by_reference
@@ -94,35 +93,33 @@ class Guard(NamedTuple):
     rates: np.ndarray  # (2,) rad in a control period, feathering of each stop
     feathered: float  # rad, where it ends
     off_speed: float  # rotor speed (rad/s) at which a normal stop takes the generator off
+    grid_loss: float  # s, time from which the generator is off the grid
     faults: np.ndarray  # (n, len(Part))
-    held: np.ndarray  # (n,) memory of the faults: pitch or reading that is held; NaN: not yet
-    watch: np.ndarray  # (N_WATCH,)
 
 
 def new_watch():
-    """Guard.watch of a turbine on which nothing has happened."""
+    """Return InterfaceData.watch of a turbine on which nothing has happened."""
     watch = np.zeros(N_WATCH)
     watch[Watch.TRIPPED_AT] = inf
     watch[Watch.STOP] = Stop.NONE
     watch[Watch.SINCE : Watch.SINCE + len(Trip)] = inf
-    watch[Watch.COMMAND :] = nan
     return watch
 
 
-def build_guard(trips=None, ordered=(inf, inf), rates=(0.0, 0.0), feathered=0.0, off_speed=0.0, faults=None):
-    """Guard of a run; without arguments nothing trips, nothing is ordered and nothing breaks."""
+def build_guard(
+    trips=None, ordered=(inf, inf), rates=(0.0, 0.0), feathered=0.0, off_speed=0.0, grid_loss=inf, faults=None
+):
+    """Return the Guard of a run; without arguments there are no trips, stops and faults."""
     if trips is None:
         trips = [(inf, 0.0, Stop.EMERGENCY)] * len(Trip)
-    rows = np.array(faults or np.zeros((0, len(Part))), dtype=np.float64)
     return Guard(
         np.array(trips, dtype=np.float64),
         np.array(ordered, dtype=np.float64),
         np.array(rates, dtype=np.float64),
         float(feathered),
         float(off_speed),
-        rows,
-        np.full(len(rows), nan),
-        new_watch(),
+        float(grid_loss),
+        np.array(faults or np.zeros((0, len(Part))), dtype=np.float64),
     )
 
 
@@ -164,35 +161,35 @@ def encoder_offset(blade, t, guard):
 
 
 @kernel
-def pitch_deviation(t, x, actuator, pitches, guard):
+def pitch_deviation(t, x, actuator, pitches, guard, command):
     """Greatest difference (rad) of encoder and command of a blade, and of that between two blades."""
     low = high = largest = 0.0
     for blade in range(pitches_of(pitches)):
-        command = clamp(guard.watch[Watch.COMMAND + blade], actuator.minimum, actuator.maximum)
-        error = pitch_of(blade, x, pitches) - encoder_offset(blade, t, guard) - command
+        wanted = clamp(command[Command.BLADE_PITCH + blade], actuator.minimum, actuator.maximum)
+        error = pitch_of(blade, x, pitches) - encoder_offset(blade, t, guard) - wanted
         low, high = (error, error) if blade == 0 else (min(low, error), max(high, error))
         largest = max(largest, abs(error))
     return max(largest, high - low)
 
 
 @kernel
-def watched(trip, t, x, dx, measurement, model, guard):
-    """What a trip watches."""
+def watched(trip, t, x, model, guard, link):
+    """Return the quantity that a trip watches."""
     if trip == Trip.OVERSPEED:
         return x[State.ROTOR_SPEED]
     if trip == Trip.OVERPOWER:
-        return measurement[Measure.GENERATOR_SPEED] * measurement[Measure.GENERATOR_TORQUE]
+        return link.measurement[Measure.GENERATOR_SPEED] * link.measurement[Measure.GENERATOR_TORQUE]
     if trip == Trip.ACCELERATION:
-        return tower_top_acceleration(x, dx, model)
-    return pitch_deviation(t, x, model.actuator, model.pitches, guard)
+        return tower_top_acceleration(x, link.dx, model)
+    return pitch_deviation(t, x, model.actuator, model.pitches, guard, link.command)
 
 
 @kernel
-def watch_turbine(t, x, dx, u, measurement, model, guard):
-    """Whether the turbine is being stopped at a control instant, at which its limits are looked at first."""
-    watch, trips = guard.watch, guard.trips
-    if isnan(watch[Watch.COMMAND]):
-        keep_command(u, guard)
+def watch_turbine(t, x, model, guard, link):
+    """Compare the turbine with its limits at a control instant, and begin the stop that follows."""
+    if guard is None:
+        return
+    watch, trips = link.watch, guard.trips
     stop = watch[Watch.STOP]
     for kind in range(guard.ordered.shape[0]):
         if t >= guard.ordered[kind] - ROUNDING:
@@ -201,7 +198,7 @@ def watch_turbine(t, x, dx, u, measurement, model, guard):
         since = Watch.SINCE + trip
         if isinf(trips[trip, Limit.VALUE]):
             continue
-        if not watched(trip, t, x, dx, measurement, model, guard) > trips[trip, Limit.VALUE]:
+        if not watched(trip, t, x, model, guard, link) > trips[trip, Limit.VALUE]:
             watch[since] = inf
             continue
         if isinf(watch[since]):
@@ -213,65 +210,74 @@ def watch_turbine(t, x, dx, u, measurement, model, guard):
                 watch[Watch.TRIPPED_AT], watch[Watch.TRIP] = t, trip
     if stop > watch[Watch.STOP]:
         if watch[Watch.STOP] < 0.0:
-            watch[Watch.TORQUE] = measurement[Measure.GENERATOR_TORQUE]
+            watch[Watch.TORQUE] = link.measurement[Measure.GENERATOR_TORQUE]
             watch[Watch.SPEED] = x[State.ROTOR_SPEED]
             for blade in range(BLADES):
                 pitch = pitch_of(blade, x, model.pitches) - encoder_offset(blade, t, guard)
                 watch[Watch.TARGET + blade] = pitch
         watch[Watch.STOP] = stop
-    return stop >= 0.0
 
 
 @kernel
-def stop_turbine(x, u, guard):
-    """Put the command of the stop under way into u: blades feathering from where they were; the torque."""
-    watch = guard.watch
+def is_stopping(guard, link):
+    """Whether the turbine is being stopped, so that the law's commands are ignored."""
+    if guard is None:
+        return False
+    return link.watch[Watch.STOP] >= 0.0
+
+
+@kernel
+def has_ended(guard, link):
+    """Whether a trip ended the run."""
+    if guard is None:
+        return False
+    return int(link.watch[Watch.STOP]) == Stop.END
+
+
+@kernel
+def off_grid(t, guard, link):
+    """Whether the generator has no torque: from the loss of the grid on, and in an emergency stop."""
+    if guard is None:
+        return False
+    return t >= guard.grid_loss or int(link.watch[Watch.STOP]) == Stop.EMERGENCY
+
+
+@kernel
+def stop_turbine(x, guard, link):
+    """Command the stop: blades feather from the pitch at which it began, the torque falls."""
+    if guard is None:
+        return
+    watch, command = link.watch, link.command
     emergency = int(watch[Watch.STOP]) == Stop.EMERGENCY
     rate = guard.rates[1] if emergency else guard.rates[0]
     for blade in range(BLADES):
         target = min(watch[Watch.TARGET + blade] + rate, guard.feathered)
         watch[Watch.TARGET + blade] = target
-        if Command.BLADE_PITCH + blade < u.shape[0]:
-            u[Command.BLADE_PITCH + blade] = target
+        if Command.BLADE_PITCH + blade < command.shape[0]:
+            command[Command.BLADE_PITCH + blade] = target
     speed = x[State.ROTOR_SPEED]
     if emergency or speed <= guard.off_speed or watch[Watch.SPEED] <= guard.off_speed:
         watch[Watch.TORQUE] = 0.0  # off the grid, and it stays so
     span = max(watch[Watch.SPEED] - guard.off_speed, ROUNDING)
     share = clamp((speed - guard.off_speed) / span, 0.0, 1.0)
-    u[Command.GENERATOR_TORQUE] = watch[Watch.TORQUE] * share
+    command[Command.GENERATOR_TORQUE] = watch[Watch.TORQUE] * share
 
 
 @kernel
-def keep_command(u, guard):
-    """Remember the pitches in u as those that law or stop commanded."""
-    for blade in range(BLADES):
-        i = Command.BLADE_PITCH + blade
-        guard.watch[Watch.COMMAND + blade] = u[i] if i < u.shape[0] else u[Command.BLADE_PITCH]
-
-
-@kernel
-def own_command(u, guard):
-    """Put the pitches that the law commanded into u, in place of what faults made of them."""
-    if guard.faults.shape[0] == 0:
+def break_drives(t, x, u, model, guard, link):
+    """Put into u what faulty pitch drives make of the commanded pitches in it."""
+    if guard is None:
         return
-    for i in range(Command.BLADE_PITCH, u.shape[0]):
-        u[i] = guard.watch[Watch.COMMAND + i - Command.BLADE_PITCH]
-
-
-@kernel
-def break_drives(t, x, u, model, guard):
-    """Keep the pitches that are commanded, and put what faulty drives make of them into u."""
-    keep_command(u, guard)
     for k in range(guard.faults.shape[0]):
         kind = kind_now(k, t, guard)
         blade, value = int(guard.faults[k, Part.PLACE]), guard.faults[k, Part.VALUE]
         i = Command.BLADE_PITCH + blade
-        if guard.faults[k, Part.BACKUP] > 0.0 and int(guard.watch[Watch.STOP]) == Stop.EMERGENCY:
+        if guard.faults[k, Part.BACKUP] > 0.0 and int(link.watch[Watch.STOP]) == Stop.EMERGENCY:
             continue
         if kind == Failure.STUCK:
-            if isnan(guard.held[k]):
-                guard.held[k] = pitch_of(blade, x, model.pitches)
-            u[i] = guard.held[k]
+            if isnan(link.held[k]):
+                link.held[k] = pitch_of(blade, x, model.pitches)
+            u[i] = link.held[k]
             halt_blade(blade, x, model.actuator, model.pitches)
         elif kind == Failure.RUNAWAY:
             u[i] = model.actuator.minimum if value < 0.0 else model.actuator.maximum
@@ -280,25 +286,24 @@ def break_drives(t, x, u, model, guard):
 
 
 @kernel
-def break_sensors(t, guard, reader):
-    """Put what faulty sensors make of a reader's reading into it; what it hides stays hidden."""
-    reading, fields = reader.reading, reader.sensors.chain.shape[1]
-    ahead = reading.shape[0] - fields
+def break_sensors(t, guard, link):
+    """Put into the reading what faulty sensors make of it; what the sensors lack stays NaN."""
+    if guard is None:
+        return
+    reading = link.reading
     for k in range(guard.faults.shape[0]):
         kind = kind_now(k, t, guard)
         field, value = int(guard.faults[k, Part.PLACE]), guard.faults[k, Part.VALUE]
-        if kind == Failure.OFFSET and fields == N_MEASUREMENTS:
+        if kind == Failure.OFFSET and reading.shape[0] == N_MEASUREMENTS:
             reading[Measure.BLADE_PITCH] -= value
         elif kind == Failure.OFFSET:
             reading[Measure.BLADE_PITCH] -= value / BLADES
-            field += N_MEASUREMENTS + BladeMeasure.BLADE_PITCH_1
-            reading[place_of(field, ahead)] -= value
-        i = place_of(field, ahead)
+            reading[N_MEASUREMENTS + BladeMeasure.BLADE_PITCH_1 + field] -= value
         if kind == Failure.BIAS:
-            reading[i] += value
+            reading[field] += value
         elif kind == Failure.FREEZE:
-            if isnan(guard.held[k]):
-                guard.held[k] = reading[i]
-            reading[i] = guard.held[k]
-        elif kind == Failure.LOSS and isfinite(reading[i]):
-            reading[i] = 0.0
+            if isnan(link.held[k]):
+                link.held[k] = reading[field]
+            reading[field] = link.held[k]
+        elif kind == Failure.LOSS and isfinite(reading[field]):
+            reading[field] = 0.0

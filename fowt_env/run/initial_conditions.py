@@ -1,6 +1,8 @@
-"""State and command that a run begins with."""
+"""State and command at the beginning of a run."""
 
+from collections.abc import Mapping
 from math import cos, pi
+from typing import Any
 
 import numpy as np
 
@@ -38,18 +40,23 @@ INITIAL = {  # channel: (state, factor to SI)
 
 
 def initial_state(
-    scene: Scene, start: str = "trim", initial: dict[str, float] | None = None
+    scene: Scene, initial: str | Mapping[str, Any] | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(state, command) that a run begins with.
+    """Return (state, command) at the beginning of a run.
 
-    start: "trim" the floating steady state in the mean wind; "zero" all states of platform and tower zero,
-    with the rotor speed and blade pitch of that wind on a fixed platform. initial: {channel: absolute value},
-    named PtfmPitch or PtfmPitch_[deg]; BldPitch1 is that of all blades where they have one pitch, and of the
+    initial: "trim" (or None), the floating steady state in the mean wind; "zero", all states of platform and
+    tower zero, with the rotor speed and blade pitch of that wind on a fixed platform; or a mapping of
+    absolute values of channels at the trim, or at {"start": "zero"}. Channels are named PtfmPitch or
+    PtfmPitch_[deg]; BldPitch1 is that of all blades where they have one pitch, and of the
     first where each has its own; TTDspFA and TTDspSS bend the tower in its first modes alone.
     Raises: InputError for what is no channel or number, and for a place that the platform cannot have: below
     the sea bed; with wind also out of the water, with the tower base under water, or with the rotor's back to
     the wind.
     """
+    if not isinstance(initial, str | Mapping | None):
+        raise InputError(f"initial = {initial!r}: must be 'trim', 'zero' or a mapping of channels")
+    values = dict(initial) if isinstance(initial, Mapping) else {"start": initial or "trim"}
+    start = values.pop("start", "trim")
     if start not in STARTS:
         raise unknown("start", start, STARTS)
     point = trim(scene, platform="floating" if start == "trim" else "fixed")
@@ -58,10 +65,10 @@ def initial_state(
     if (tower := scene.model.tower) is not None:
         known |= {"TTDspFA": (tower.first, 1.0), "TTDspSS": (tower.first + 1, 1.0)}
         deflections = slice(tower.first, tower.first + len(tower.slope))
-        if start == "zero" or any(str(name).startswith("TTDsp") for name in initial or {}):
+        if start == "zero" or any(str(name).startswith("TTDsp") for name in values):
             x[deflections] = 0.0
     rates = {}
-    for name, value in (initial or {}).items():
+    for name, value in values.items():
         key = channel_name(name)
         if key not in known:
             raise unknown("channel of initial", name, known)
@@ -77,7 +84,7 @@ def initial_state(
         raise InputError(
             f"initial['PtfmPitch'] = {x[State.PLATFORM_PITCH] / DEGREE:g}: must be inside (-90, 90) deg"
         )
-    if initial:
+    if values:
         _check_place(scene, x)
     if rates:  # given in inertial axes, kept in body axes
         inertial = np.zeros(6)

@@ -1,0 +1,92 @@
+"""The compiled loop of a whole run: control periods with a law, and output rows."""
+
+from typing import NamedTuple
+
+from fowt_env.loop.period import all_finite, apply_command, begin_period, show_command
+from fowt_env.loop.protection import has_ended, is_stopping, stop_turbine
+from fowt_env.plant.blade_pitches import spread_command
+from fowt_env.plant.compile.decorators import entry, kernel
+from fowt_env.plant.compile.handle import data_of, model_of
+from fowt_env.plant.integrators import take_step
+from fowt_env.plant.rollout import BAD_COMMAND, RUNNING, TRIPPED, observe_plant, output_plant, status_of
+
+
+class Schedule(NamedTuple):
+    """When a rollout steps, controls and records, in steps of dt from the run's beginning."""
+
+    dt: float  # s
+    per_control: int  # steps in a control period
+    per_output: int  # steps from one output row to the next
+    last: int  # step at which the run ends, with a row
+    individual: bool = False  # whether the law commands each blade, else one pitch for all
+    external: bool = False  # whether the command of each period comes from outside, after begin_command
+
+
+@kernel
+def observe_and_begin(step, model, data, x, u, interface, link, schedule):
+    """Measure at a control instant and begin its period. Returns whether the turbine is being stopped."""
+    t = step * schedule.dt
+    observe_plant(model, data, x, u, t, link.dx, link.measurement)
+    return begin_period(step // schedule.per_control, t, x, model, interface, link)
+
+
+@entry
+def begin_command(handle, x, u, linked, schedule, step):
+    """Begin the control period of a step for a controller outside; link.command then holds the one in force.
+
+    Returns whether the turbine is being stopped: the controller's command is then ignored.
+    """
+    model, data, interface, link = model_of(handle), data_of(handle), model_of(linked), data_of(linked)
+    stopping = observe_and_begin(step, model, data, x, u, interface, link, schedule)
+    if not stopping:
+        show_command(u, interface, schedule.individual, model.pitches, link)
+    return stopping
+
+
+@entry
+def rollout(handle, x, u, law, parameters, memory, linked, schedule, first, end, out):
+    """Run the closed loop over the instants first <= step < end, and at the run's last one; rows go to out.
+
+    law         compiled control law (CompiledController.law), called at every control instant
+    linked      Handle of the run's Interface and InterfaceData
+    out         (k, n_channels) of the rows to come, SI
+    Returns (status, step reached, rows written). x (n_state,), u, memory and the InterfaceData are written.
+    While the guard stops the turbine, the law is not called. With schedule.external begin_command has begun
+    the period of `first`, and no other control instant may follow before end.
+    """
+    model, data, interface, link = model_of(handle), data_of(handle), model_of(linked), data_of(linked)
+    dt, rows = schedule.dt, 0
+    for step in range(first, end + 1):
+        t = step * dt
+        ending = step == schedule.last
+        if step == end and not ending:
+            break
+        if ending or step % schedule.per_control == 0:
+            if ending or not schedule.external:
+                observe_and_begin(step, model, data, x, u, interface, link, schedule)
+            if has_ended(interface.guard, link):
+                return TRIPPED, step, rows
+        if not ending and step % schedule.per_control == 0:
+            if is_stopping(interface.guard, link):
+                stop_turbine(x, interface.guard, link)
+            else:
+                if not schedule.external:
+                    show_command(u, interface, schedule.individual, model.pitches, link)
+                    law(parameters, memory, link.law_reading, link.command)
+                if not schedule.individual:
+                    spread_command(link.command, model.pitches)
+                if not all_finite(link.command):
+                    return BAD_COMMAND, step, rows
+            apply_command(t, x, u, model, data, interface, link)
+        if ending or step % schedule.per_output == 0:
+            if rows == out.shape[0]:
+                raise IndexError("rollout: out has too few rows")
+            output_plant(model, data, x, u, t, link.dx, out[rows])
+            rows += 1
+        if ending:
+            break
+        take_step(t, x, u, dt, model, model.integrator, data)
+        status = status_of(x)
+        if status != RUNNING:
+            return status, step + 1, rows
+    return RUNNING, end, rows

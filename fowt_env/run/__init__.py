@@ -1,0 +1,1 @@
+"""One run of a scene with a controller: initial conditions, interface and simulation."""

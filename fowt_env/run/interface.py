@@ -1,0 +1,152 @@
+"""Interface of a run: protection, faults, sensors and wind ahead, from descriptions to what kernels read."""
+
+from collections.abc import Sequence
+from math import exp, inf, isfinite, radians
+from typing import Any
+
+import numpy as np
+
+from fowt_env.control import foreseen, hidden, preview_leads
+from fowt_env.descriptions.faults import BLADE_FAULTS, STOP_FAULTS, Fault
+from fowt_env.descriptions.protection import Protection
+from fowt_env.descriptions.sensors import SensorChain
+from fowt_env.errors import InputError
+from fowt_env.loop.interface import Interface
+from fowt_env.loop.protection import ROUNDING, Failure, Guard, Stop, Trip, build_guard
+from fowt_env.loop.sensing import WindAhead, no_wind_ahead
+from fowt_env.plant.measurement import BladeMeasurement, Measurement
+from fowt_env.plant.state import BLADES
+from fowt_env.scene.scene import Scene
+from fowt_env.weather.preview import Motion
+from fowt_env.weather.sensor_noise import draw_sensors
+
+FAILURES = {
+    "stuck_pitch": Failure.STUCK,
+    "pitch_runaway": Failure.RUNAWAY,
+    "pitch_offset": Failure.OFFSET,
+    "sensor_bias": Failure.BIAS,
+    "sensor_freeze": Failure.FREEZE,
+    "sensor_loss": Failure.LOSS,
+}
+
+
+def guard_of(scene: Scene, limits: Protection, faults: Sequence[Fault], control_dt: float) -> Guard:
+    """Return the Guard of a run: the trips of a protection, and the faults. Raises: InputError."""
+    turbine, drive = scene.turbine, scene.turbine.pitch_drive
+    units = {
+        Trip.OVERSPEED: turbine.rated_rotor_speed,
+        Trip.OVERPOWER: turbine.torque_law.rated_power,
+        Trip.ACCELERATION: 1.0,
+        Trip.PITCH_DEVIATION: 1.0,
+    }
+    trips = []
+    for kind, unit in units.items():
+        found = getattr(limits, kind.name.lower())
+        if found is None:
+            trips.append((inf, 0.0, Stop.EMERGENCY))
+        else:
+            trips.append((float(found.limit * unit), found.time, Stop[found.stop.upper()]))
+    ordered, rates, rows = [inf, inf], [limits.normal_rate, limits.emergency_rate], []
+    for fault in faults:
+        rows += _failures(scene, fault)
+        stop = Stop.NORMAL if fault.kind == "normal_stop" else Stop.EMERGENCY
+        if fault.kind in STOP_FAULTS or fault.delay is not None:
+            ordered[stop] = min(ordered[stop], fault.time + (fault.delay or 0.0))
+            if fault.rate is not None:
+                rates[stop] = radians(fault.rate)
+    steps = [min(rate, drive.rate_limit) * control_dt for rate in rates]
+    off_speed = limits.off_speed * turbine.rated_rotor_speed
+    losses = [fault.grid_loss for fault in faults if fault.grid_loss is not None]
+    grid_loss = min(losses, default=inf) - ROUNDING
+    return build_guard(trips, ordered, steps, drive.maximum, off_speed, grid_loss, rows)
+
+
+def _failures(scene, fault):
+    """Return the rows of Guard.faults of a Fault: (kind, time, place, value, backup)."""
+    if fault.kind not in FAILURES:
+        return []
+    kind, time = FAILURES[fault.kind], fault.time
+    individual = scene.model.pitches is not None
+    if fault.kind not in BLADE_FAULTS:
+        fields = (*Measurement._fields, *(BladeMeasurement._fields if individual else ()))
+        if fault.field not in fields:
+            raise InputError(
+                f"faults: {fault.kind}: field = {fault.field!r}: needs a scene with pitch='individual'"
+            )
+        return [(kind, time, fields.index(fault.field), fault.value or 0.0, 0.0)]
+    if fault.blades is not None and not individual:
+        raise InputError(
+            f"faults: {fault.kind}: blades = {list(fault.blades)}: needs a scene with pitch='individual'"
+        )
+    blades = range(BLADES if individual else 1)
+    if fault.blades is not None:
+        blades = [number - 1 for number in fault.blades]
+    value = radians(fault.offset or 0.0)
+    if fault.towards is not None:
+        value = -1.0 if fault.towards == "fine" else 1.0
+    return [(kind, time, blade, value, float(fault.backup)) for blade in blades]
+
+
+def build_interface(
+    scene: Scene,
+    controller: Any,
+    guard: Guard | None,
+    chain: SensorChain | None,
+    preview: Any,
+    control_dt: float,
+    periods: int,
+) -> Interface:
+    """Return the Interface of a run of so many control periods: what the controller declares, and no more.
+
+    chain None: exact sensors. Raises: InputError where the controller declares what the chain or the scene
+    does not have.
+    """
+    individual = scene.model.pitches is not None
+    available = None if chain is None else (chain.name, chain.available + chain.available_of_blades)
+    return Interface(
+        control_dt,
+        draw_sensors(chain, control_dt, scene.seed, periods + 1, individual),
+        hidden(controller, available, individual),
+        wind_ahead_of(scene, preview_leads(controller), preview, control_dt, control_dt * periods),
+        guard,
+    )
+
+
+def wind_ahead_of(scene, leads, preview, control_dt, duration) -> WindAhead:
+    """Return the WindAhead of a run at look-ahead times (s), from what simulate takes as preview."""
+    if not leads:
+        return no_wind_ahead()
+    time, values, motion = foreseen(scene, leads, preview, duration)
+    taps, weight = np.zeros((0, 0)), np.zeros(3)
+    if motion is not None:
+        taps, weight = nacelle_motion(motion, control_dt)
+    return WindAhead(time, values, taps, weight)
+
+
+def nacelle_motion(motion: Motion, control_dt: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return (taps, weight) of a WindAhead: the Motion of a preview at the control instants.
+
+    Between two instants the velocity is linear.
+    """
+    step = motion.corner * control_dt
+    weight = np.array([0.0, 0.0, 1.0])
+    if isfinite(step):
+        decay = exp(-step)
+        new = 1.0 - (1.0 - decay) / step  # exact for a ramp from one instant to the next
+        weight = np.array([decay, 1.0 - decay - new, new])
+    offsets, delays = (np.asarray(lag, dtype=float) / control_dt for lag in (motion.offset, motion.delay))
+    size = int(max(offsets.max(), 0.0)) + int(max(delays.max(), 0.0)) + 3
+    taps = np.zeros((len(delays), size))
+    for j, delay in enumerate(delays):
+        for offset, share in zip(offsets, motion.weight, strict=True):
+            for late, part in _linear(delay):
+                for later, piece in _linear(offset):
+                    taps[j, late + later] += share * part * piece
+    return taps, weight
+
+
+def _linear(lag):
+    """Return ((instants ago, weight), ...) of a lag in control periods, linear between two instants."""
+    whole = int(max(lag, 0.0))
+    part = max(lag, 0.0) - whole
+    return (whole, 1.0 - part), (whole + 1, part)
