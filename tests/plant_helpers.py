@@ -3,8 +3,8 @@
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from fowt_env.plant.advance import forget, observe
 from fowt_env.plant.measurement import N_MEASUREMENTS
-from fowt_env.plant.rollout import forget, observe
 from fowt_env.plant.state import Pose, State
 
 

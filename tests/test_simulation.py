@@ -18,9 +18,9 @@ from fowt_env.descriptions.faults import Fault
 from fowt_env.errors import ControllerError, InputError, SimulationStopped
 from fowt_env.loop.protection import build_guard
 from fowt_env.loop.rollout import Schedule
+from fowt_env.plant.advance import advance
 from fowt_env.plant.compile.decorators import control_kernel
 from fowt_env.plant.events import EVENTS, Counter
-from fowt_env.plant.rollout import advance
 from fowt_env.plant.state import State, pose_of
 from fowt_env.run import simulation
 from fowt_env.run.initial_conditions import initial_state
@@ -212,7 +212,7 @@ def test_what_the_time_step_blows_up_is_not_called_a_capsize(platform):
 
 def under_water():
     """The hull's upper cylinder lies below the water plane."""
-    return fowt_env.build_scene(fidelity="reference"), {"start": "zero", "initial": {"PtfmHeave": -60.0}}
+    return fowt_env.build_scene(fidelity="reference"), {"initial": {"start": "zero", "PtfmHeave": -60.0}}
 
 
 def without_roots():
@@ -230,7 +230,7 @@ def without_equilibrium():
     scene = fowt_env.build_scene(fidelity="reference")
     lines = scene.model.mooring
     shrinking = lines._replace(length=0.93 * lines.length, EA=-lines.EA)
-    return scene.with_model(mooring=shrinking), {"start": "zero"}
+    return scene.with_model(mooring=shrinking), {"initial": "zero"}
 
 
 def yawing():
@@ -553,7 +553,7 @@ def test_another_process_gives_the_same_bits():
 STEPS = """
 import numpy as np, fowt_env
 from plant_helpers import random_state
-from fowt_env.plant.rollout import advance
+from fowt_env.plant.advance import advance
 scene = fowt_env.build_scene("oc3_hywind", wind=18.0, seed=3, duration=60.0, wave_components=20,
     sea={"kind": "jonswap", "Hs": 6.0, "Tp": 10.0, "gamma": 3.3})
 x = random_state(np.random.default_rng(6))

@@ -27,10 +27,7 @@ from fowt_env.envs.tables import action_table, observation_table
 from fowt_env.envs.tasks import TASKS, Episode
 from fowt_env.files.atomic import replacing
 from fowt_env.files.markdown import markdown_table
-from fowt_env.plant.events import EVENTS
-from fowt_env.plant.integrators import INTEGRATORS
-from fowt_env.plant.measurement import BladeMeasurement, Measurement
-from fowt_env.plant.rollout import (
+from fowt_env.plant.advance import (
     BLOWN_UP,
     CAPSIZE,
     CAPSIZED,
@@ -40,6 +37,9 @@ from fowt_env.plant.rollout import (
     OVERSPEED,
     STOP_REASONS,
 )
+from fowt_env.plant.events import EVENTS
+from fowt_env.plant.integrators import INTEGRATORS
+from fowt_env.plant.measurement import BladeMeasurement, Measurement
 from fowt_env.registration import ENTRY_POINT, ENVIRONMENTS, OTHER_PLATFORMS
 from fowt_env.scene.loads import LOADS
 from fowt_env.training.cli.app import app

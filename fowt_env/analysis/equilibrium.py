@@ -7,9 +7,9 @@ import numpy as np
 
 from fowt_env.analysis.statics import statics
 from fowt_env.errors import InputError, warn_once
+from fowt_env.plant.advance import CAPSIZE
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.mooring import SLACK
-from fowt_env.plant.rollout import CAPSIZE
 from fowt_env.plant.state import State, pose_of
 from fowt_env.scene.geometry import in_radians
 

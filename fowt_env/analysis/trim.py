@@ -12,13 +12,13 @@ from fowt_env.analysis.statics import mean_derivative
 from fowt_env.descriptions.channel_meanings import channel_meaning
 from fowt_env.display import html_table
 from fowt_env.errors import InputError, unknown
+from fowt_env.plant.advance import output_row
 from fowt_env.plant.aero.load import settled_wake
 from fowt_env.plant.aero.wind import wind_now
 from fowt_env.plant.channels import to_units
 from fowt_env.plant.compile.decorators import entry
 from fowt_env.plant.compile.handle import data_of, model_of
 from fowt_env.plant.drivetrain import build_torque_curve, generator_torque
-from fowt_env.plant.rollout import output_row
 from fowt_env.plant.state import Command, State, pose_of
 from fowt_env.plant.tilt import rotor_pose
 from fowt_env.scene.actuators import rest_actuators

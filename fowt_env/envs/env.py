@@ -92,11 +92,11 @@ from fowt_env.errors import InputError, unknown
 from fowt_env.loop.interface import Interface, interface_data
 from fowt_env.loop.protection import Watch
 from fowt_env.loop.sensing import open_sensors
+from fowt_env.plant.advance import STOP_REASONS, TRIPPED, output
 from fowt_env.plant.channels import DEG_PER_RAD
 from fowt_env.plant.compile.handle import Handle
 from fowt_env.plant.events import counted
 from fowt_env.plant.measurement import Measurement
-from fowt_env.plant.rollout import STOP_REASONS, TRIPPED, output
 from fowt_env.plant.state import N_COMMANDS, Command, State
 from fowt_env.run.initial_conditions import INITIAL
 from fowt_env.run.interface import guard_of, wind_ahead_of

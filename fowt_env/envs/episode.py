@@ -16,13 +16,7 @@ from fowt_env.loop.interface import Interface, InterfaceData
 from fowt_env.loop.period import all_finite, apply_command, begin_period, show_command
 from fowt_env.loop.protection import has_ended, is_stopping, stop_turbine
 from fowt_env.loop.sensing import WindAhead, read_wind_ahead
-from fowt_env.plant.aero.load import wind_of
-from fowt_env.plant.compile.decorators import entry, kernel
-from fowt_env.plant.compile.handle import by_reference, data_of, model_of
-from fowt_env.plant.hydro.radiation import forget_memory
-from fowt_env.plant.measurement import Measure
-from fowt_env.plant.model import Data, LoadCache, Model
-from fowt_env.plant.rollout import (
+from fowt_env.plant.advance import (
     NON_FINITE,
     OVERSPEED,
     RUNNING,
@@ -31,6 +25,12 @@ from fowt_env.plant.rollout import (
     observe_plant,
     output_plant,
 )
+from fowt_env.plant.aero.load import wind_of
+from fowt_env.plant.compile.decorators import entry, kernel
+from fowt_env.plant.compile.handle import by_reference, data_of, model_of
+from fowt_env.plant.hydro.radiation import forget_memory
+from fowt_env.plant.measurement import Measure
+from fowt_env.plant.model import Data, LoadCache, Model
 from fowt_env.plant.state import Command, State
 
 BAD_ACTION = -1  # beside the statuses of rollout.py

@@ -4,11 +4,11 @@ from typing import NamedTuple
 
 from fowt_env.loop.period import all_finite, apply_command, begin_period, show_command
 from fowt_env.loop.protection import has_ended, is_stopping, stop_turbine
+from fowt_env.plant.advance import BAD_COMMAND, RUNNING, TRIPPED, observe_plant, output_plant, status_of
 from fowt_env.plant.blade_pitches import spread_command
 from fowt_env.plant.compile.decorators import entry, kernel
 from fowt_env.plant.compile.handle import data_of, model_of
 from fowt_env.plant.integrators import take_step
-from fowt_env.plant.rollout import BAD_COMMAND, RUNNING, TRIPPED, observe_plant, output_plant, status_of
 
 
 class Schedule(NamedTuple):

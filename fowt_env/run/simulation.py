@@ -36,12 +36,12 @@ from fowt_env.errors import (
 )
 from fowt_env.loop.interface import Interface, interface_data
 from fowt_env.loop.rollout import Schedule, begin_command, rollout
+from fowt_env.plant.advance import RUNNING, STOP_REASONS, TRIPPED
 from fowt_env.plant.channels import Out
 from fowt_env.plant.compile.decorators import control_kernel
 from fowt_env.plant.compile.handle import Handle
 from fowt_env.plant.events import harm
 from fowt_env.plant.measurement import Measurement
-from fowt_env.plant.rollout import RUNNING, STOP_REASONS, TRIPPED
 from fowt_env.plant.state import Command, State
 from fowt_env.run.initial_conditions import initial_state
 from fowt_env.run.interface import build_interface, guard_of

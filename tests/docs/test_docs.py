@@ -342,7 +342,7 @@ PLACED = re.compile(r"`(\w+)`(?: in| of)? \(?`((?:fowt_env|controllers|training)
 
 
 def test_a_name_that_a_page_puts_into_a_file_is_defined_there():
-    """As in "`rollout` in `fowt_env/plant/rollout.py`", or with the file in brackets after it."""
+    """As in "`rollout` in `fowt_env/plant/advance.py`", or with the file in brackets after it."""
     found = {place for page in LIVING for place in PLACED.findall((ROOT / page).read_text())}
     assert len(found) > 12
     assert not [(name, file) for name, file in found if name not in defined(ROOT / file)]

@@ -16,8 +16,9 @@ from fowt_env.envs.tasks import Task
 from fowt_env.errors import InputError
 from fowt_env.plant.compile.decorators import control_kernel
 from fowt_env.plant.measurement import Measure
+from fowt_env.training.evaluation.case_environment import environment_settings
 from fowt_env.training.evaluation.cases import Case
-from fowt_env.training.evaluation.run_case import Run, environment_settings, run_metrics, scored
+from fowt_env.training.evaluation.run_case import Run, run_metrics, scored
 
 STILL = {"task": "steady", "wind": 16.0, "duration": 20.0, "fidelity": "fast"}
 RUNAWAY = {"kind": "pitch_runaway", "time": 0.0, "towards": "fine"}

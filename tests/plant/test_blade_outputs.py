@@ -12,10 +12,10 @@ from fowt_env.descriptions.rotor_mass import BladeMass, rotor_mass_properties
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.errors import InputError
 from fowt_env.plant import blade_outputs
+from fowt_env.plant.advance import observe, output, output_row
 from fowt_env.plant.channels import BLADE_CHANNELS
 from fowt_env.plant.measurement import N_MEASUREMENTS
 from fowt_env.plant.model import LoadCache
-from fowt_env.plant.rollout import observe, output, output_row
 from fowt_env.plant.state import N_RIGID, State, Wrench, pose_of
 from fowt_env.plant.tower_modes import Twist
 from fowt_env.scene.mass import build_layout, build_rigid_body

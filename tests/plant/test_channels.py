@@ -4,10 +4,10 @@ from naive import rigid_body
 from plant_helpers import leaning, random_state, rates
 
 import fowt_env
+from fowt_env.plant.advance import observe, output_row
 from fowt_env.plant.channels import FIXED_CHANNELS, channels, rotor_wind, to_units
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
 from fowt_env.plant.rigid_body import gravity_load
-from fowt_env.plant.rollout import observe, output_row
 from fowt_env.plant.state import State, pose_of
 from fowt_env.scene.mass import build_layout
 from fowt_env.weather.wind_field import read_box

@@ -15,10 +15,10 @@ import fowt_env
 from fowt_env import Force, Load, Motion, build_scene, linearize, load_kernel, simulate
 from fowt_env.analysis.linear_model import STATES
 from fowt_env.descriptions.turbine import read_turbine
+from fowt_env.plant.advance import RUNNING, advance, forget, observe
 from fowt_env.plant.integrators import INTEGRATORS, START_STEPS, build_integrator
 from fowt_env.plant.measurement import N_MEASUREMENTS
 from fowt_env.plant.model import LoadCache
-from fowt_env.plant.rollout import RUNNING, advance, forget, observe
 from fowt_env.plant.state import State
 
 PACKAGE = Path(fowt_env.__file__).parent

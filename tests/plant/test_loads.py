@@ -20,8 +20,8 @@ from potential_body import made_up_body
 import fowt_env
 from fowt_env import Force, Load, build_scene, load_kernel
 from fowt_env.descriptions.platform import AdditionalLoads, Member, read_platform
+from fowt_env.plant.advance import forget, observe
 from fowt_env.plant.model import LoadCache
-from fowt_env.plant.rollout import forget, observe
 from fowt_env.plant.state import State
 from fowt_env.scene.loads import LOADS
 from fowt_env.scene.options import ROTORS

@@ -7,7 +7,7 @@ from fowt_env import build_scene, simulate
 from fowt_env.analysis.linear_model import linearize, natural_periods
 from fowt_env.descriptions.platform import read_platform
 from fowt_env.envs.snapshot import DATA_CARRIED
-from fowt_env.plant.rollout import advance
+from fowt_env.plant.advance import advance
 from fowt_env.plant.state import STATES, State, pose_of
 from fowt_env.scene.radiation_fit import fit_radiation
 from fowt_env.training.validation.openfast_cases import reference

@@ -4,11 +4,11 @@ from naive import flexible_tower
 from plant_helpers import leaning, random_state, rates, state
 
 from fowt_env import Load, build_scene, load_kernel, simulate
+from fowt_env.plant.advance import advance, forget, observe, output_row
 from fowt_env.plant.channels import Out
 from fowt_env.plant.integrators import START_STEPS
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measure
 from fowt_env.plant.model import LoadCache
-from fowt_env.plant.rollout import advance, forget, observe, output_row
 from fowt_env.plant.state import N_RIGID, State, Wrench, pose_of
 from fowt_env.plant.tower_modes import (
     TowerModes,

@@ -11,7 +11,7 @@ from fowt_env.analysis.reduced_model import residualised
 from fowt_env.analysis.trim import trim
 from fowt_env.descriptions.turbine import PitchDrive, read_turbine
 from fowt_env.envs import FowtEnv
-from fowt_env.plant.rollout import advance, output_row
+from fowt_env.plant.advance import advance, output_row
 from fowt_env.plant.state import Command, State
 from fowt_env.scene.build import build_scene
 

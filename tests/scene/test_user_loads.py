@@ -18,10 +18,10 @@ from fowt_env import Force, Load, Motion, build_scene, linearize, load_kernel, n
 from fowt_env.descriptions.platform import read_platform
 from fowt_env.envs import FowtEnv, FowtVectorEnv
 from fowt_env.errors import InputError, SimulationStopped
+from fowt_env.plant.advance import output_row
 from fowt_env.plant.hydro.morison import current_at
 from fowt_env.plant.hydro.waves import wave_kinematics
 from fowt_env.plant.model import LoadCache
-from fowt_env.plant.rollout import output_row
 from fowt_env.plant.state import State, pose_of
 
 ROOT = Path(fowt_env.__file__).resolve().parent.parent

@@ -28,6 +28,7 @@ from fowt_env.files.atomic import replacing
 from fowt_env.loop.interface import interface_data
 from fowt_env.loop.protection import build_guard
 from fowt_env.loop.rollout import Schedule, rollout
+from fowt_env.plant.advance import advance, forget, observe, output
 from fowt_env.plant.aero.load import rotor_part
 from fowt_env.plant.aero.tower_drag import tower_load
 from fowt_env.plant.aero.wind import wind_now
@@ -40,7 +41,6 @@ from fowt_env.plant.hydro.load import strip_load
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.mooring import mooring_load
-from fowt_env.plant.rollout import advance, forget, observe, output
 from fowt_env.plant.state import Command, State, pose_of
 from fowt_env.run.initial_conditions import initial_state
 from fowt_env.run.interface import build_interface

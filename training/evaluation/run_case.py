@@ -9,18 +9,13 @@ import pandas as pd
 
 import fowt_env
 from fowt_env.analysis.trim import trim
-from fowt_env.control import EXACT
 from fowt_env.controllers import make
 from fowt_env.descriptions.checks import is_number
 from fowt_env.descriptions.faults import Fault
-from fowt_env.descriptions.platform import turbine_of
 from fowt_env.descriptions.protection import END_AT_OVERSPEED, TripLimit, read_protection
 from fowt_env.descriptions.sea_state import sea_state_of
-from fowt_env.descriptions.sensors import sensor_chain
 from fowt_env.descriptions.units import DEGREE
 from fowt_env.descriptions.wind import read_wind
-from fowt_env.envs.observations import STANDARD
-from fowt_env.envs.tasks import Task
 from fowt_env.errors import (
     ControllerError,
     ControllerInputError,
@@ -29,7 +24,6 @@ from fowt_env.errors import (
     SimulationStopped,
     muted,
 )
-from fowt_env.plant.measurement import Measurement
 from fowt_env.training.evaluation.faults import idling
 from fowt_env.training.evaluation.guard import attempt, reason_of
 from fowt_env.training.evaluation.metrics import METRICS, TIME, turbine_metrics
@@ -132,34 +126,6 @@ def faults_of(case):
     """Return the faults of a Case, among them the grid that a parked turbine is not connected to."""
     parked = (Fault(kind="grid_loss", time=0.0),) if case.parked else ()
     return parked if case.fault is None else (case.fault, *parked)
-
-
-def environment_settings(case, duration):
-    """Return the settings of a FowtEnv in which an episode of `duration` (s) is a run of a Case.
-
-    An episode with reset(options={"weather_seed": seed}) of an environment with the residual action mode, the
-    case's controller as baseline and actions of zero gives the rows of evaluate; frame() returns them.
-    Raises: InputError for a case with another plant than its nominal one, or with a displaced start.
-    """
-    if case.shift is not None or case.displaced is not None or case.initial is not None:
-        raise InputError(f"case {case.name!r}: an environment begins at the trim of the nominal plant")
-    turbine = turbine_of(case.platform, case.options.get("turbine"))
-    chain = sensor_chain(case.sensors)
-    lacking = () if chain is None else set(Measurement._fields) - set(chain.available)
-    shown = tuple(name for name in STANDARD if name not in lacking)
-    return {
-        "task": Task(
-            name=case.name, wind=case.wind, sea=case.sea, duration=duration, offsets={}, observation=shown
-        ),
-        "platform": case.platform,
-        "sensors": case.sensors,
-        "preview": EXACT,
-        "protection": protection_of(case, turbine, not case.parked, case.fault is None),
-        "faults": faults_of(case),
-        "record": True,
-        "weather_duration": max(SHORTEST_CASE_WEATHER, duration),
-        **case.options,
-    }
 
 
 def protection_of(case, turbine, protected, ends):

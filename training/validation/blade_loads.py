@@ -28,7 +28,7 @@ def harmonics_of(values, azimuth):
 
 def turn(rotor, wind, shear, rotor_speed, pitches, **options):
     """{channel: harmonics_of} of a rotor held at a speed (rad/s) and three pitches (rad), in kN m."""
-    from fowt_env.plant.rollout import output_row
+    from fowt_env.plant.advance import output_row
     from fowt_env.plant.state import Command, State
     from fowt_env.scene.build import build_scene
 

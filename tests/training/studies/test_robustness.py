@@ -7,8 +7,8 @@ import pytest
 from naive import rigid_body
 from scipy.integrate import solve_ivp
 
+from fowt_env.plant.advance import RUNNING, advance
 from fowt_env.plant.integrators import INTEGRATORS
-from fowt_env.plant.rollout import RUNNING, advance
 from fowt_env.plant.state import N_RIGID, State
 from fowt_env.training.studies.robustness import (
     extremes,

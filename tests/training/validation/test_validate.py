@@ -16,9 +16,9 @@ from fowt_env.controllers import CONTROLLERS
 from fowt_env.descriptions.platform import read_platform
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.errors import InputError
+from fowt_env.plant.advance import output_row
 from fowt_env.plant.aero.blade_elements import build_blade_elements, lift_drag
 from fowt_env.plant.channels import Out
-from fowt_env.plant.rollout import output_row
 from fowt_env.plant.state import State
 from fowt_env.scene.build import build_scene
 from fowt_env.training.validation.openfast_cases import (

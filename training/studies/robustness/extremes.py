@@ -11,9 +11,9 @@ from fowt_env.descriptions.checks import check_whole_number
 from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.envs import FowtEnv
 from fowt_env.errors import InputError
+from fowt_env.plant.advance import RUNNING, STOP_REASONS, advance, forget, observe
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
 from fowt_env.plant.mooring import Mooring
-from fowt_env.plant.rollout import RUNNING, STOP_REASONS, advance, forget, observe
 from fowt_env.plant.state import Command, State
 from fowt_env.run.initial_conditions import initial_state
 from fowt_env.scene.build import build_scene

@@ -10,10 +10,10 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from fowt_env.envs import FowtEnv
+from fowt_env.plant.advance import RUNNING, advance, forget, observe
 from fowt_env.plant.integrators import INTEGRATORS, START_STEPS, Adams, build_integrator
 from fowt_env.plant.measurement import N_MEASUREMENTS
 from fowt_env.plant.model import LoadCache
-from fowt_env.plant.rollout import RUNNING, advance, forget, observe
 from fowt_env.plant.state import N_COMMANDS, N_RIGID, State
 from fowt_env.run.initial_conditions import initial_state
 from fowt_env.scene.build import build_scene

@@ -14,6 +14,7 @@ import numpy as np
 from fowt_env.controllers import make
 from fowt_env.errors import InputError, unknown
 from fowt_env.files.atomic import replacing
+from fowt_env.plant.advance import NON_FINITE, RUNNING, STOP_REASONS, observe, status_of
 from fowt_env.plant.channels import measure
 from fowt_env.plant.compile.decorators import entry, kernel
 from fowt_env.plant.compile.handle import data_of, model_of
@@ -22,7 +23,6 @@ from fowt_env.plant.hydro.hydrostatics import submerged
 from fowt_env.plant.integrators import build_integrator, rates, take_step
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measurement
 from fowt_env.plant.mooring import mooring_load
-from fowt_env.plant.rollout import NON_FINITE, RUNNING, STOP_REASONS, observe, status_of
 from fowt_env.plant.state import N_RIGID, Command, State, pose_of
 from fowt_env.run.simulation import hold
 from fowt_env.scene.build import build_scene

@@ -13,8 +13,8 @@ import pandas as pd
 
 from fowt_env.analysis.linear_model import MOTIONS, linearize
 from fowt_env.analysis.trim import OperatingPoint, trim
+from fowt_env.plant.advance import RUNNING, advance, forget
 from fowt_env.plant.integrators import INTEGRATORS, feathering
-from fowt_env.plant.rollout import RUNNING, advance, forget
 from fowt_env.plant.state import STATE_INDEX, STATES, State
 from fowt_env.scene.build import build_scene
 from fowt_env.training.studies.robustness.long_runs import with_integrator

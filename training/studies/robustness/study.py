@@ -18,8 +18,8 @@ from fowt_env.errors import unknown
 from fowt_env.files.atomic import replacing
 from fowt_env.files.markdown import markdown_table
 from fowt_env.files.tables import write_table
+from fowt_env.plant.advance import RUNNING
 from fowt_env.plant.integrators import INTEGRATORS
-from fowt_env.plant.rollout import RUNNING
 from fowt_env.training.benchmarks.speed import header
 from fowt_env.training.studies.robustness import extremes as stability_extremes
 from fowt_env.training.studies.robustness import long_runs, random_cases, step_limits, without_compiler

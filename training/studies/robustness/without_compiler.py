@@ -17,8 +17,8 @@ import numpy as np
 import fowt_env
 from fowt_env.envs import FowtEnv, FowtVectorEnv
 from fowt_env.errors import InputError
+from fowt_env.plant.advance import advance, output_row
 from fowt_env.plant.integrators import INTEGRATORS, build_integrator
-from fowt_env.plant.rollout import advance, output_row
 from fowt_env.plant.state import State
 from fowt_env.scene.build import build_scene
 

@@ -1,0 +1,59 @@
+"""What a controller is, what it reads, and from its name to a controller (protocol.py has the contract)."""
+
+from fowt_env.control.information import (
+    EXACT,
+    PRIVILEGED_INPUTS,
+    check_pitches,
+    declares_blades,
+    foreseen,
+    hidden,
+    known_scene,
+    mask,
+    preview_leads,
+)
+from fowt_env.control.making import catalogue, check_control_dt, make
+from fowt_env.control.protocol import (
+    CheckedController,
+    CompiledController,
+    Controller,
+    FunctionController,
+    call_law,
+)
+from fowt_env.control.units import CommandUnits
+from fowt_env.control.views import (
+    BladeView,
+    MeasurementView,
+    values_of_blades,
+    view_of,
+    whole_view,
+    wind_ahead,
+    with_wind_ahead,
+)
+
+__all__ = [
+    "BladeView",
+    "CheckedController",
+    "CommandUnits",
+    "CompiledController",
+    "Controller",
+    "EXACT",
+    "FunctionController",
+    "MeasurementView",
+    "PRIVILEGED_INPUTS",
+    "call_law",
+    "catalogue",
+    "check_control_dt",
+    "check_pitches",
+    "declares_blades",
+    "foreseen",
+    "hidden",
+    "known_scene",
+    "make",
+    "mask",
+    "preview_leads",
+    "values_of_blades",
+    "view_of",
+    "whole_view",
+    "wind_ahead",
+    "with_wind_ahead",
+]
