@@ -71,6 +71,7 @@ OPTIONS = {  # of reset: the value that is taken in place of the drawn one
     "offsets": "`{channel: offset}` from the operating point, in the channel's unit, for all drawn ones",
     "exact_start": "whether the operating point is exact (so where `wind` is given) or interpolated",
     "shutdown": "s of operation before the stop is signalled, in a task that has one; `None`: none",
+    "faults": "Faults or mappings of their keys, in an environment with protection or faults",
 }
 assert set(OPTIONS) == set(Episode._fields) and set(FORMULAS) == set(rewards.REWARD_TERMS)
 

@@ -120,85 +120,72 @@ COMPILED = (
 
 
 class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
-    """Floating wind turbine whose generator torque and blade pitch, or that of each blade, are commanded.
+    """Gymnasium environment of a floating wind turbine with torque and blade-pitch commands.
 
-    task          name in TASKS ("above_rated", "full_range", "steady"), scaled to the platform's turbine, or
-                  a Task, which is taken as it is
+    task          name in TASKS ("above_rated", ...), scaled to the platform's turbine, or a Task
     platform      built-in name, path or descriptions.platform.Platform
-    rotor         "bem", "lookup" or "table"; None: the task's, or else that of the fidelity
-    action_mode   "direct", "setpoint", "residual" or "individual", see the table of actions. "individual"
-                  commands the pitch of each blade, in a scene with pitch = "individual"; in such a scene the
-                  others give their one pitch to all blades
-    baseline      compiled controller, by name, that the residual mode adds to; lqr goes on from the sum, so
-                  that what is added in every period is an addition to its rates
-    observation   channel names in place of the task's; "default" among them stands for the task's
-    reward        {term: weight} in place of single weights of the task, or a function (info) or (info,
-                  measurement) that returns it, from the info of the step, with each named term, and the
-                  Measurement at its end (SI, true motions)
-    dt            physics step, s (None: that of the scene's integrator); control_dt: time between
-                  actions, s, a multiple of dt
-    duration      s of an episode; None: the task's
-    wind, sea     in place of the task's, ranges included (None: the task's)
-    wind_preview  look-ahead times (s) of the channel wind_preview
+    episode, plant, control, interface
+                  records of settings (EpisodeSettings, PlantSettings, ControlSettings, InterfaceSettings in
+                  fowt_env.envs). Every field of a record is a keyword too, as are the options of build_scene:
+                  FowtEnv(action_mode="residual", sensors="standard", loads=[...])
     render_mode   None, "rgb_array" (render() returns a picture) or "human" (every step shows one in a window)
-    render_size   pixels (width, height) of it; None: (960, 640)
-    fidelity      level of build_scene: "reference", "standard" or "fast"
-    sensors       the name of a chain of sensors ("standard"), a SensorChain, or {"noise": standard deviation
-                  of white noise on every reading, as a fraction of the channel's scale; "delay": control
-                  periods from measurement to reading}, of which either may be left out. One
-                  reading per control period is what observation, baseline and estimator are given, and
-                  measurement() returns; its noise follows from the weather's seed. Azimuth, last action and
-                  preview are exact; rewards and failures are of the true motions. None: readings are exact
-    nominal_plant {"platform": ..., "turbine": ...} as build_scene takes them (the turbine may be left out:
-                  the platform's): the plant that baseline and estimator are designed on, where it differs
-                  from the true plant, which is simulated. None: the true plant
-    options       further ones go to build_scene, loads of one's own (fowt_env.Load) among them
+    render_size   pixels (width, height) of the picture; None: (960, 640)
 
-    An episode starts at the operating point of its mean wind, moved by the task's offsets, in wind and
-    sea drawn from the task's ranges with the environment's seed: the same seed gives the same bits.
-    Where the mean wind is drawn, the operating point is linear between exact ones 0.25 m/s apart: right
-    to 0.05 m of surge and 0.03 deg of blade pitch, in the cells next to rated wind to 0.9 m and 0.6 deg.
-    reset(options=...) takes "wind", "sea", "weather_seed", "offsets" and "shutdown" in place of what is
-    drawn, wind, sea and offsets as ranges too, drawn with the environment's generator; the info of reset
-    has what was drawn under "sampled", and given as options it replays the episode. Weather
-    never compiles anything anew: an environment whose task has a sea takes any sea, None for still water, but
-    one built in still water takes none; neither is a box of full-field wind exchanged for another wind. What
-    is refused leaves the environment as it was, in its episode.
+    An episode starts at the operating point of its mean wind plus the task's offsets, in wind and sea drawn
+    from the task's ranges with the environment's seed: the same seed gives the same bits. Where the mean
+    wind is drawn, the operating point is interpolated between exact ones 0.25 m/s apart, within 0.05 m of
+    surge and 0.03 deg of blade pitch, in the cells next to rated wind within 0.9 m and 0.6 deg.
+    reset(options=...) takes "wind", "sea", "weather_seed", "offsets", "shutdown" and "faults" in place of
+    drawn values, wind, sea and offsets as ranges too; info["sampled"] of a reset has the drawn values and,
+    passed as options, replays the episode. New weather compiles no kernels: an environment whose task has a
+    sea takes any sea, None for still water; one built in still water takes none, and a box of full-field wind
+    cannot be exchanged for another wind. A refused reset leaves the environment in its episode.
 
-    An action beyond [-1, 1] counts as the nearest end, and info["saturated_actions"] counts the periods
-    in which that happened. The torque stays within the generator's range and moves at most as fast as its
-    rate limit allows, the blade pitch as its actuator does; info["torque_limited"] counts the periods in
-    which the torque was not what was commanded.
+    Actions outside [-1, 1] are clipped, and info["saturated_actions"] counts such periods. The torque stays
+    within the generator's range and rate limit, the blade pitch within its actuator's;
+    info["torque_limited"] counts periods whose torque differs from the command. "individual" commands the
+    pitch of each blade in a scene with pitch="individual", where the other action modes give one pitch to all
+    blades. In the residual mode lqr continues from the sum, so that an addition in every period is an
+    addition to its rates.
 
-    An episode is terminated by failure: rotor speed beyond the turbine file's overspeed, capsize
-    (platform pitch beyond 80 deg) or a state that is not finite; info["termination"] has the reason. It
-    is truncated at the end of its duration, by the environment itself: how many steps that takes follows from
-    duration and control_dt, so spec.max_episode_steps is None. gymnasium.make(..., max_episode_steps=n) ends
-    episodes earlier.
+    An episode is terminated by failure: rotor speed above the turbine file's overspeed, capsize (platform
+    pitch beyond 80 deg) or a state that is not finite; info["termination"] has the reason. It is truncated at
+    the end of its duration by the environment itself, so spec.max_episode_steps is None;
+    gymnasium.make(..., max_episode_steps=n) ends episodes earlier.
 
-    In a task with `shutdown` the baseline operates the turbine, within reset, for the time that is drawn. The
-    episode begins where the stop is signalled; its duration counts the operation too.
+    protection, faults, sensors and preview mean what they mean for simulate. With protection or faults the
+    overspeed of the turbine file no longer ends an episode: a trip stops the turbine, actions are ignored
+    from then on (info["stopping"]) and the episode continues to its end, as a run of a suite does; a trip
+    with the stop "end" terminates it. The last info has "tripped" (s), "trip", "stop". Faults may be drawn:
+    {"kind": "stuck_pitch", "time": (60.0, 300.0)}. With record=True frame() returns the episode as simulate
+    returns a run. fowt_env.training.evaluation.case_environment has the settings of a load case.
 
-    A picture shows one control period, so that 30 of them a second are three times real time.
+    One reading per control period serves observation, baseline and estimator, and measurement() returns it;
+    its noise follows from the weather's seed. Azimuth, last action and the exact preview have no noise;
+    rewards and failures use true motions.
+
+    In a task with `shutdown` the baseline operates the turbine within reset for the drawn time. The episode
+    begins at the signal to stop; its duration includes the operation.
+
+    A picture shows one control period: 30 pictures a second are three times real time.
     gymnasium.make(..., render_mode="rgb_array_list") collects them.
 
-    copy.deepcopy and pickle give an independent environment in the same instant: both then give the same bits
-    for the same actions, and the same episodes after them. A copy shares what is never written, such as the
-    scene; a pickle holds it (some 13 MB at fidelity "standard", most of it the rotor's table). A window of
-    render mode "human" and the traces of pictures so far stay with the original.
+    copy.deepcopy and pickle return an independent environment at the same instant: both then give the same
+    bits for the same actions, and the same later episodes. A copy shares constant parts such as the scene; a
+    pickle contains it (some 13 MB at fidelity "standard", most of it the rotor's table). The window of render
+    mode "human" stays with the original.
 
-    Plants that differ between environments (domain randomisation) are settings: platform, turbine, sensors,
-    with nominal_plant for what controllers know. fowt_env.training.rl.randomisation.randomised draws lists of
-    such settings of OC3-Hywind from named distributions, for gymnasium.make(name, **settings) or
-    make_vec(name, n, per_env=list).
+    Domain randomisation: plants differ by settings (platform, turbine, sensors, with nominal_plant for the
+    controllers' knowledge). fowt_env.training.rl.randomisation.randomised draws lists of such settings of
+    OC3-Hywind, for gymnasium.make(name, **settings) or make_vec(name, n, per_env=list).
 
     Constraints and several objectives: SafetyCosts adds info["cost"] as Safety-Gymnasium has it. The reward
-    vector of MO-Gymnasium is [info["reward/" + term] for term in terms], from a gymnasium.Wrapper whose
-    step returns it and whose reward_space is a Box of the terms' ranges (REWARD_TERMS).
+    vector of MO-Gymnasium is [info["reward/" + term] for term in terms], from a gymnasium.Wrapper whose step
+    returns it and whose reward_space is a Box of the terms' ranges (REWARD_TERMS).
 
-    info of each step: "time" (s), "saturated_actions", "torque_limited", "reward/<term>" for each term before
-    weighting; at a reset and at the end of an episode "events" too: {name: count} of what the plant met
-    outside its usual range (fowt_env.plant.events), of those that happened.
+    info of each step: "time" (s), "saturated_actions", "torque_limited", "reward/<term>" of each term before
+    weighting; at a reset and at the end of an episode "events" too: {name: count} of rare events of the plant
+    (fowt_env.plant.events).
 
     Raises: InputError for settings and actions that cannot be used.
     """

@@ -20,7 +20,7 @@ from fowt_env.descriptions.records import (
 )
 from fowt_env.descriptions.wind import NTM_SIGMA
 from fowt_env.envs.decisions import DecisionSettings
-from fowt_env.envs.env import SETTINGS
+from fowt_env.envs.settings import KEYWORDS
 from fowt_env.errors import InputError
 from fowt_env.scene.options import OPTIONS
 
@@ -118,7 +118,7 @@ def check_settings(settings, where="settings"):
 
 def environment_keys():
     """Names of all settings of the environment that a training run may change."""
-    own = [name for name in SETTINGS if name not in NOT_SET_THERE]
+    own = [name for name in ("task", "platform", *KEYWORDS) if name not in NOT_SET_THERE]
     return list(dict.fromkeys([*OF_TRAINING, *own, *OPTIONS]))
 
 
