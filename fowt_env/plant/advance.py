@@ -21,10 +21,10 @@ FASTEST, FASTEST_TURN = 100.0, 10.0  # m/s, rad/s
 STOP_REASONS = {
     NON_FINITE: "non-finite state",
     CAPSIZED: "capsize (platform pitch beyond 80 deg)",
-    OVERSPEED: "overspeed (rotor speed beyond the turbine file's limit)",
+    OVERSPEED: "overspeed (above the limit that ends the run)",
     BLOWN_UP: f"numerical blow-up (platform faster than {FASTEST:g} m/s or {FASTEST_TURN:g} rad/s): loads too"
     " stiff for the time step",
-    TRIPPED: "a trip that ends the run",
+    TRIPPED: "above the limit that ends the run",
     BAD_COMMAND: "the controller's command is not finite (what its information does not declare, it reads as"
     " NaN)",
 }

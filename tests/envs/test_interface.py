@@ -121,7 +121,7 @@ def test_a_trip_that_ends_the_run_terminates_the_episode_with_its_name():
     while not ended:
         _, reward, ended, truncated, info = env.step([0.0, -1.0])
         assert not truncated
-    assert info["termination"] == "overspeed (a trip that ends the run)" and info["trip"] == "overspeed"
+    assert info["termination"] == "overspeed (above the limit that ends the run)" and info["trip"] == "overspeed"
     assert info["tripped"] == info["time"] == pytest.approx(0.1 * len(env.frame()))
     assert reward < -50.0 and info["reward/failure"] < 0.0
 

@@ -28,7 +28,7 @@ def report(name):
 report("import")
 def run(name, law="pi", initial=None, **what):
     scene = fowt_env.build_scene(fidelity="standard", **what)
-    begin = {} if initial is None else {"start": "zero", "initial": initial}
+    begin = {} if initial is None else {"initial": {"start": "zero"} | initial}
     fowt_env.simulate(scene, law, duration=10.0, **begin)
     report(name)
 

@@ -348,7 +348,7 @@ def measure_kind(name, seconds=600.0, repeats=REPEATS, calls=CHUNK, platform=PLA
     row["simulate_x"] = float("nan")
     if not kind.parked:  # simulate starts from the running rotor
         whole = median_time(
-            lambda: simulate(scene, "pi" if kind.controlled else None, duration=seconds, start=kind.begin),
+            lambda: simulate(scene, "pi" if kind.controlled else None, duration=seconds, initial=kind.begin),
             repeats,
         )
         row["simulate_x"] = seconds / whole

@@ -110,7 +110,7 @@ def test_the_controller_commands_what_the_environment_would_do_with_its_decision
             decision = network(decisions.features())
         command = agent.act(env.measurement(agent.preview_times))
         observation, _, terminated, _, _ = env.step(decisions.smooth(decision)[0])
-        assert command == pytest.approx(tuple(env.view().in_force), rel=1e-9, abs=1e-9)
+        assert command == pytest.approx(tuple(env.view().command), rel=1e-9, abs=1e-9)
         assert not terminated
     assert np.any(decisions.action != 0.0) and (not shaping or 0.0 < decisions.authority()[0])
 
