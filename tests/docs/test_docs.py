@@ -394,6 +394,7 @@ def test_docstrings_keep_their_lists_of_names_and_their_signs():
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_the_site_is_built_without_a_warning_and_needs_no_network(tmp_path):
     pytest.importorskip("mkdocs", reason="mkdocs is not installed: the extra `docs` is missing")
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--config-file", ".mkdocs.yml"]

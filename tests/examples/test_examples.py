@@ -38,7 +38,8 @@ NEEDS = {  # example: modules without which its claims are not met
     "15_record_video": ("pygame", "moviepy"),
     "17_state_feedback": ("control",),
 }
-SLOW = ("12_ray", "13_resume")  # they start Ray, and torch
+# they start Ray, and torch
+SLOW = {"12_ray": [pytest.mark.slow], "13_resume": [pytest.mark.slow, pytest.mark.nightly]}
 TRAINED = "10_train_small_agent"  # takes minutes: tests/examples has its test
 
 
@@ -49,9 +50,7 @@ def test_every_example_is_tested_and_listed():
     assert listed == names
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.slow if name in SLOW else ()) for name in CLAIMS]
-)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=SLOW.get(name, ())) for name in CLAIMS])
 def test_an_example_runs_within_a_minute(name, tmp_path, monkeypatch, capsys):
     for module in NEEDS.get(name, ()):
         pytest.importorskip(module, reason=f"{module} is not installed: its extra is missing")

@@ -122,6 +122,7 @@ def test_free_body_keeps_energy_and_momenta_at_the_default_step(integrator):
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_free_body_keeps_energy_and_momenta_over_ten_million_steps(integrator):
     drift = long_runs.free_drift(integrator, 10_000_000)
@@ -131,6 +132,7 @@ def test_free_body_keeps_energy_and_momenta_over_ten_million_steps(integrator):
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("integrator, most", study.FLOATING_DRIFT.items())
 def test_undamped_floating_body_keeps_its_energy(integrator, most):
     # a tenth of the documented steps and of the change allowed over them
@@ -145,6 +147,7 @@ def test_memory_does_not_grow():
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_every_integrator_converges_at_its_order():
     for integrator, order in long_runs.measured_orders().items():
         assert order >= INTEGRATORS[integrator].order - study.ORDER_SLACK

@@ -265,6 +265,7 @@ def test_rest_decays_and_the_regular_wave_meet_every_figure():
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_a_tower_that_bends_rings_and_loads_its_base_as_openfast_s():
     rows = judged("tower")
     assert {row.allowed for row in rows if "frequency" in row.quantity} == {1.0}
@@ -307,6 +308,7 @@ def test_blades_one_by_one_miss_with_the_look_up_alone_what_a_skewed_wake_makes(
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_floating_under_rosco_misses_the_deviation_of_heave_at_12_mps_alone():
     if without_rosco():
         pytest.skip(without_rosco())
@@ -321,5 +323,6 @@ def test_linear_models_miss_the_damping_of_heave_alone():
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_states_of_the_radiation_memory_stay_within_1_percent_of_convolution():
     assert len(judged("memory")) == 6
