@@ -145,19 +145,6 @@ def test_wrong_input_is_named_and_leaves_no_file(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_without_matplotlib_the_message_names_the_extra():
-    code = (
-        "import sys; sys.modules['matplotlib'] = None\n"
-        "import pandas as pd\n"
-        "from fowt_env.visual import time_series\n"
-        "frame = pd.DataFrame({'Time_[s]': [0.0, 1.0], 'RotSpeed_[rpm]': [12.0, 12.0]})\n"
-        "try:\n    time_series.plot_run(frame)\n"
-        "except time_series.InputError as error:\n    print(error)\n"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert "fowt-env[plot]" in done.stdout
-
-
 def test_plotting_leaves_pyplot_alone():
     code = (
         "import sys, pandas as pd\nfrom fowt_env.visual import time_series\n"
