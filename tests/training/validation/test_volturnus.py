@@ -297,6 +297,7 @@ def test_rotor_loads_in_steady_wind_miss_small_hub_moments_alone():
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_blades_one_by_one_miss_with_the_look_up_alone_what_a_skewed_wake_makes():
     """Every figure is met by bem, which has that wake; the look-up has the loads of bem without it."""
     known = ("RootMyc1, first", "RootMyc2, first", "RootMyc3, first", "YawBrMzp, mean", "TwrBsMxt, mean")
