@@ -93,11 +93,11 @@ def test_a_tension_leg_platform_rests_on_its_tendons():
 
 @pytest.mark.parametrize("wind", [8.0, 11.4, 24.0])
 def test_a_tension_leg_platform_finds_its_rest_in_wind(wind):
-    point = fowt_env.trim(fowt_env.build_scene(tension_leg(), wind=wind, rotor="table", fidelity="reference"))
+    point = fowt_env.trim(fowt_env.build_scene(tension_leg(), wind=wind, fidelity="standard"))
     assert abs(point["PtfmPitch"]) < 0.5 and 0.5 < point["PtfmSurge"] < 6.0
     # tendons of this length set down by the square of the drift
     drop = 0.5 * point["PtfmSurge"] ** 2 / TENDON[0]
-    calm = fowt_env.trim(fowt_env.build_scene(tension_leg(), fidelity="reference"))["PtfmHeave"]
+    calm = fowt_env.trim(fowt_env.build_scene(tension_leg(), fidelity="standard"))["PtfmHeave"]
     assert point["PtfmHeave"] == pytest.approx(calm - drop, abs=0.01)
 
 

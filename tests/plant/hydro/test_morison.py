@@ -167,15 +167,6 @@ def test_drag_vanishes_when_water_moves_with_the_hull(platform):
         assert np.abs(np.array(got.wrench)).max() < 1e-9
 
 
-def test_only_the_velocity_relative_to_the_current_matters(platform):
-    strips = strips_of(platform)
-    r, R, v, _ = motion(np.random.default_rng(8))
-    stream = np.array([0.9, -0.3, 0.0])
-    moving = load(0.0, (r, R, v, np.zeros(3)), strips, None)
-    drifting = load(0.0, (r, R, v + R.T @ stream, np.zeros(3)), strips, None, Current(0.9, -0.3, 0.0))
-    assert np.allclose(moving.wrench, drifting.wrench, rtol=1e-12, atol=1e-6)
-
-
 def test_current_on_an_upright_spar_is_its_drag_integral(platform, site):
     strips = strips_of(platform)
     got = load(0.0, STILL, strips, None, Current(1.0, 0.0, 0.0))
@@ -230,22 +221,6 @@ def test_still_water_power_of_the_inertia_terms_is_third_order(platform):
         assert got @ np.r_[v, w] == pytest.approx(munk, rel=1e-4, abs=1e-3)
         tenth = np.array(load(0.0, (r, R, 0.1 * v, 0.1 * w), strips, None).wrench)
         assert tenth @ np.r_[0.1 * v, 0.1 * w] == pytest.approx(1e-3 * munk, rel=1e-4, abs=1e-6)
-
-
-def test_waves_from_the_mirror_side_give_the_mirrored_load(platform, site):
-    strips = strips_of(platform)
-    mirrored = [(om, a, e, -heading) for om, a, e, heading in SEA]
-    rng = np.random.default_rng(11)
-    flip = np.array([1, -1, 1, -1, 1, -1])
-    for _ in range(10):
-        r, R, v, w = motion(rng)
-        here = load(4.0, (r, R, v, w), strips, waves_of(SEA, site), Current(0.3, 0.5, 0.2))
-        D = np.diag(flip[:3])
-        there = load(
-            4.0, (D @ r, D @ R @ D, D @ v, -D @ w), strips, waves_of(mirrored, site), Current(0.3, -0.5, 0.2)
-        )
-        scale = np.abs(np.array(here.wrench)).max()
-        assert np.abs(np.array(there.wrench) - flip * np.array(here.wrench)).max() < 1e-12 * scale
 
 
 def test_fixed_spar_has_the_force_amplitudes_of_linear_theory(platform, site):

@@ -202,13 +202,6 @@ def test_no_hull_no_load():
     assert as_array(load).tolist() == [0.0] * 8
 
 
-def test_waves_of_vanishing_height_tend_to_still_water():
-    strips, cases = strips_for(), list(random_states(20, 4.0, seed=10))
-    still = compare(None, strips, cases)[0]
-    small = compare(waves_of("rough", Hs=1e-9), strips, cases)[0]
-    assert np.allclose(small, still, rtol=1e-7, atol=1e-2)
-
-
 def test_ramp_raises_the_waves_from_rest():
     waves = waves_of("rough", ramp=50.0)
     states = [x for _, x in random_states(5, 4.0, seed=11)]
@@ -233,13 +226,6 @@ def test_spread_seas_and_nodes_above_the_water_are_left_to_the_exact_path():
     assert can_use_bands(waves_of({**crossed, "heading": [30.0, 30.0]}), strips_for())
     assert not can_use_bands(waves_of("rough"), strips_for(stretching="none"))
     assert not can_use_bands(waves_of("rough"), strips_for(surface="swl"))
-
-
-def test_a_new_episode_differs_in_its_phases_alone():
-    strips = strips_for()
-    one, two = (build_wave_bands(waves_of("rough", seed), strips) for seed in (0, 1))
-    assert np.array_equal(one.weight, two.weight) and np.array_equal(one.number, two.number)
-    assert not np.array_equal(one.component[wave_bands.TURN], two.component[wave_bands.TURN])
 
 
 def test_wider_bands_are_more_accurate(monkeypatch):
