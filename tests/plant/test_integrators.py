@@ -140,10 +140,11 @@ for name in INTEGRATORS:
 
 
 def without_compiling(program, *paths):
-    """Run a program in a process whose kernels are plain Python."""
+    """Run a program in a process whose kernels are plain Python, with these folders to import from."""
     variables = os.environ | {"PYTHONPATH": os.pathsep.join(map(str, paths)), "NUMBA_DISABLE_JIT": "1"}
     command = [sys.executable, "-c", program]
-    ran = subprocess.run(command, env=variables, capture_output=True, text=True, timeout=600)
+    options = {"env": variables, "cwd": paths[0], "timeout": 600}
+    ran = subprocess.run(command, capture_output=True, text=True, **options)
     assert ran.returncode == 0, ran.stderr
 
 
