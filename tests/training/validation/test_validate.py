@@ -313,7 +313,9 @@ def test_wind_steps_are_within_5_percent_rms_at_every_wind_speed():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("case", ["turb_18mps_Hs7.5_uniform", "turb_18mps_Hs7.5_box"])
+@pytest.mark.parametrize(
+    "case", ["turb_18mps_Hs7.5_box", pytest.param("turb_18mps_Hs7.5_uniform", marks=pytest.mark.nightly)]
+)
 def test_the_first_minutes_of_turbulence_with_irregular_waves_are_openfasts(case):
     """Within the 10 % that are allowed over the whole records, which the next test has."""
     ours, theirs = replace(RUNS[case], duration=200.0).frame(), reference(case)
