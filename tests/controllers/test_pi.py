@@ -146,8 +146,8 @@ def test_the_schedule_halves_the_gain_at_its_pitch():
         ("KP", -0.1), ("KI", float("nan")), ("KI", 0.0), ("gain_schedule_pitch", -0.1),
         ("speed_filter_corner", float("nan")), ("pitch_rate_limit", 0.0), ("pitch_maximum", -0.1),
         ("pitch_minimum", -0.1), ("torque_rate_limit", float("inf")),
-    ],  # fmt: skip
-)
+    ],
+)  # fmt: skip
 def test_settings_that_make_no_sense_are_named(key, value):
     with pytest.raises(InputError, match=f"{key} = {value}"):
         PISettings.published(TURBINE, **{key: value})

@@ -226,8 +226,8 @@ def test_things_that_are_no_controllers_are_refused():
     [
         (float("nan"), 0.1), (4e4, float("inf")), (4e4,), (4e4, 0.1, 0.2), 4e4, None, ("40000", "0.1"),
         (4e4, None), (4e4, [0.1, 0.2]), np.zeros((2, 1)),
-    ],  # fmt: skip
-)
+    ],
+)  # fmt: skip
 def test_a_wrong_answer_names_controller_time_and_answer(answer):
     controller = make(Returning(answer), turbine(), 0.1)
     controller.reset(RATED)

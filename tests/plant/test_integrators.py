@@ -153,9 +153,7 @@ def test_loads_are_evaluated_as_often_as_it_says():
     without_compiling(COUNT, PACKAGE.parent, PACKAGE.parent / "tests")
 
 
-@pytest.mark.parametrize(
-    "name", ["ab4", pytest.param("abm4", marks=(pytest.mark.slow, pytest.mark.nightly))]
-)
+@pytest.mark.parametrize("name", ["ab4", pytest.param("abm4", marks=(pytest.mark.slow, pytest.mark.nightly))])
 def test_a_blade_pitch_that_jumps_to_its_command_leaves_the_step_its_accuracy(name):
     """Without lag each command is a jump, through which no polynomial over past derivatives goes."""
     turbine = read_turbine("nrel5mw")

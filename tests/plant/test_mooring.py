@@ -31,6 +31,7 @@ L, W, EA = 902.2, 698.094, 384.243e6
 Z_REST, X_REST = 250.0, 848.67
 LINE = (L, W, EA)
 
+
 def oc3_lines(friction=0.0, turned=0.0):
     """Line records of OC3-Hywind, the anchors turned about the vertical by an angle."""
     records = []
