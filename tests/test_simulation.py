@@ -555,7 +555,7 @@ import numpy as np, fowt_env
 from plant_helpers import random_state
 from fowt_env.plant.advance import advance
 scene = fowt_env.build_scene("oc3_hywind", wind=18.0, seed=3, duration=60.0, wave_components=20,
-    sea={"kind": "jonswap", "Hs": 6.0, "Tp": 10.0, "gamma": 3.3})
+    sea={"kind": "jonswap", "Hs": 6.0, "Tp": 10.0, "gamma": 3.3}, fidelity="reference")
 x = random_state(np.random.default_rng(6))
 status = advance(scene.handle(), x, np.array([4e4, 0.2]), 100, 3, 0.05)
 """

@@ -93,11 +93,11 @@ def test_a_tension_leg_platform_rests_on_its_tendons():
 
 @pytest.mark.parametrize("wind", [8.0, 11.4, 24.0])
 def test_a_tension_leg_platform_finds_its_rest_in_wind(wind):
-    point = fowt_env.trim(fowt_env.build_scene(tension_leg(), wind=wind, rotor="table", fidelity="reference"))
+    point = fowt_env.trim(fowt_env.build_scene(tension_leg(), wind=wind, fidelity="standard"))
     assert abs(point["PtfmPitch"]) < 0.5 and 0.5 < point["PtfmSurge"] < 6.0
     # tendons of this length set down by the square of the drift
     drop = 0.5 * point["PtfmSurge"] ** 2 / TENDON[0]
-    calm = fowt_env.trim(fowt_env.build_scene(tension_leg(), fidelity="reference"))["PtfmHeave"]
+    calm = fowt_env.trim(fowt_env.build_scene(tension_leg(), fidelity="standard"))["PtfmHeave"]
     assert point["PtfmHeave"] == pytest.approx(calm - drop, abs=0.01)
 
 
@@ -105,27 +105,18 @@ def test_a_semi_of_members_floats_upright():
     found = check_platform(semi())
     assert found.faults == ()
     assert abs(found.rest["heave"]) < 0.2 and abs(found.rest["platform pitch"]) < 0.2
-    columns = 3 * 36.0 * pi + 3.25**2 * pi
     inertia = sum(36.0 * pi * (9.0 + x * x) for x in (14.4, -28.8, 14.4)) + 0.25 * pi * 3.25**4
     still = found.statics
     height = still.buoyancy_centre[2] + inertia / still.volume - still.mass_centre[2]
     assert still.metacentric_height[1] == pytest.approx(height, rel=2e-3)
-    assert columns > 0.0
 
 
-NONSENSE = {  # key, value, words of the faults
+NONSENSE = {  # key, value, words of the faults; test_trim.py has more, which trims are refused or warned for
     "too much ballast": ("mass", "8.47e6", ("weighs 88944 kN", "9843 kN (1004 t) too heavy")),
-    "too little ballast": ("mass", "4e6", ("+51.68 m in heave", "(3466 t) too light")),
-    "diameters in dm": ("diameter", "[94.0, 94.0, 65.0, 65.0]", ("8070814 kN",)),
-    "centre of mass above the water": (
-        "cm_depth", "-89.9155", ("mass is at z = 88.5 m", "metacentric height -150 m|metacentric height -1"),
-    ),
     "lines far too short": ("length", "500.0", ("45.3 m below the sea bed", "shorter than the way")),
-    "lines too long": ("length", "1300.0", ("all mooring lines hang slack",)),
     "azimuths in radians": (
         "azimuth_deg", "[0.0, 2.0944, 4.18879]", ("look like radians", "rests 199.9 m from its place"),
     ),
-    "weight of the lines in kN": ("wet_weight", "0.698094", ("pull with 2.91 kN together",)),
     "fairleads in dm": ("fairlead_radius", "52.0", ("52 m from the tower axis", "the hull reaches 4.7 m")),
     "anchors too high": ("anchor_z", "-120.0", ("200 m above the sea bed",)),
 }  # fmt: skip
@@ -136,7 +127,7 @@ def test_what_cannot_be_meant_is_a_fault_with_figures(name, tmp_path):
     key, value, words = NONSENSE[name]
     found = " ".join(check_platform(edited(tmp_path, key, value)).faults)
     for word in words:
-        assert any(one.lower() in found.lower() for one in word.split("|")), found
+        assert word in found, found
 
 
 def test_the_added_mass_is_that_of_the_modes_own_frequency():

@@ -82,8 +82,7 @@ def test_a_field_of_a_measurement_leads_to_its_state(model):
 
 
 def test_states_that_are_not_measured_are_named():
-    scene = fowt_env.build_scene("iea15_volturnus_s", wind=18.0, fidelity="standard")
-    model = fowt_env.linearize(scene)
+    model = fowt_env.linearize(fowt_env.build_scene("iea15_volturnus_s", fidelity="standard"))
     with pytest.raises(InputError, match=r"radiation_1.*residualised"):
         model.state(Measurement(*np.zeros(len(Measurement._fields))))
 

@@ -114,14 +114,9 @@ def test_tower_base_carries_the_weight_above_it(at_rest, platform, turbine):
 )
 def test_fixed_platform_works_where_openfast_does(wind, rotor_speed, blade_pitch, thrust, storm_scene):
     scene = fowt_env.build_scene(
-        "oc3_hywind",
-        wind=wind,
-        sea=storm_scene.sea,
-        duration=60.0,
-        wave_components=60,
-        shear_exponent=0.0,
+        "oc3_hywind", wind=wind, sea=storm_scene.sea, duration=60.0, wave_components=60, shear_exponent=0.0,
         fidelity="reference",
-    )
+    )  # fmt: skip
     point = trim(scene, platform="fixed")
     assert np.all(point.state[: State.AZIMUTH] == 0.0)
     assert point["RotSpeed"] == pytest.approx(rotor_speed, rel=5e-3)
@@ -130,14 +125,8 @@ def test_fixed_platform_works_where_openfast_does(wind, rotor_speed, blade_pitch
 
 
 def test_rotor_stands_in_still_air_and_is_feathered_in_a_gale(storm_scene):
-    options = dict(sea=storm_scene.sea, duration=60.0, wave_components=60)
-    calm_air = trim(
-        fowt_env.build_scene("oc3_hywind", wind=0.0, **{"fidelity": "reference"} | options), platform="fixed"
-    )
+    calm_air, gale = (trim(storm_scene.with_weather(wind), platform="fixed") for wind in (0.0, 40.0))
     assert calm_air["RotSpeed"] == 0.0 and calm_air["BldPitch1"] == 0.0
-    gale = trim(
-        fowt_env.build_scene("oc3_hywind", wind=40.0, **{"fidelity": "reference"} | options), platform="fixed"
-    )
     assert gale["RotSpeed"] == 0.0 and gale["BldPitch1"] == pytest.approx(90.0, rel=1e-12)
 
 
@@ -308,20 +297,16 @@ def test_the_command_prints_a_warning_as_one_line(tmp_path, warned):
 
 
 @pytest.mark.parametrize("name", names("platforms"))
-def test_built_in_platforms_rest_without_a_warning(name, warned):
+def test_built_in_platforms_rest_in_wind_without_a_warning(name, warned):
     platform = read_platform(name)
     rated = read_turbine(platform.turbine).rated_wind_speed
     period = 2.0 if platform.potential_flow is None else 8.0  # within the coefficients of all
-    with warnings.catch_warnings():
+    sea = {"kind": "regular", "H": 0.1, "T": period}
+    with warnings.catch_warnings():  # without wind test_check.py has them at rest
         warnings.simplefilter("error")
-        trim(fowt_env.build_scene(name, fidelity="reference"))
         for share in (0.5, 1.0, 1.6):
-            sea = {"kind": "regular", "H": 0.1, "T": period}
-            trim(
-                fowt_env.build_scene(
-                    name, wind=share * rated, sea=sea, skewed_wake=False, fidelity="reference"
-                )
-            )
+            scene = fowt_env.build_scene(name, wind=share * rated, sea=sea, skewed_wake=False)
+            trim(scene)
 
 
 def test_operating_point_is_a_mapping_that_names_what_it_has(at_rest, still_scene):

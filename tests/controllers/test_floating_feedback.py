@@ -125,10 +125,6 @@ def left_swing(scene, controller):
     return frame["PtfmPitch_[deg]"].iloc[1000:].std()
 
 
-def test_it_damps_the_platform_in_wind(windy):
-    assert left_swing(windy, "floating_feedback") < 0.5 * left_swing(windy, "pi")
-
-
 def test_more_gain_damps_more_and_the_wrong_sign_drives_the_platform(windy):
     best = tuned("floating_feedback")
     published = PISettings.published(windy.turbine)
@@ -137,23 +133,17 @@ def test_more_gain_damps_more_and_the_wrong_sign_drives_the_platform(windy):
         for gain in (0.03, 0.01, 0.0, -0.02)
     ]
     swings = [left_swing(windy, law) for law in laws]
+    assert left_swing(windy, "floating_feedback") < 0.5 * swings[2]
     assert swings == sorted(swings) and swings[0] < 0.8 * swings[2] and swings[3] > 1.2 * swings[2]
 
 
-@pytest.mark.parametrize(
-    "key, value",
-    [
-        ("signal", "nacelle_velocty"),
-        ("pitch_gain", float("nan")),
-        ("torque_gain", inf),
-        ("high_pass", -0.1),
-        ("low_pass", 0.02),
-        ("low_pass", float("nan")),
-    ],
-)
-def test_settings_out_of_range_are_named(key, value):
-    with pytest.raises(InputError, match=key):
-        FeedbackSettings(**{key: value})
+def test_settings_out_of_range_are_named():
+    for key, value in (
+        ("signal", "nacelle_velocty"), ("pitch_gain", float("nan")), ("torque_gain", inf),
+        ("high_pass", -0.1), ("low_pass", 0.02), ("low_pass", float("nan")),
+    ):  # fmt: skip
+        with pytest.raises(InputError, match=key):
+            FeedbackSettings(**{key: value})
 
 
 def test_the_controller_of_that_name_has_the_tuned_settings():

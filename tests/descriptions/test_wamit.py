@@ -208,5 +208,6 @@ def test_hundreds_of_broken_files_are_read_or_refused(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_ten_thousand_broken_files_are_read_or_refused(tmp_path):
     broken_files(tmp_path, 10_000, seed=2)

@@ -1,6 +1,8 @@
 """What a newcomer's mistakes are answered with: each names what is wrong, and what to do."""
 
+import pkgutil
 import re
+import sys
 import warnings
 
 import numpy as np
@@ -101,6 +103,11 @@ REFUSED = {  # mistake: (what is done with a scene, error, what the answer has t
         "two finite numbers a function that makes a controller takes two arguments, (turbine, control_dt)",
     ),
     "name of an agent": (run("ppo_lqr"), InputError, "'ppo_lqr' Did you mean 'policy:ppo_lqr'"),
+    "weather that a scene lacks": (
+        lambda scene: fowt_env.build_scene(fidelity="reference").with_weather(18.0, None, 0),
+        InputError,
+        "wind = 18.0: cannot gain use build_scene",
+    ),
     "missing module": (run("nomod:X"), InputError, "'nomod:X' cannot import"),
     "duration 0": (run("pi", duration=0), InputError, "duration = 0 positive number of seconds"),
     "negative duration": (run("pi", duration=-5), InputError, "duration = -5"),
@@ -171,6 +178,11 @@ REFUSED = {  # mistake: (what is done with a scene, error, what the answer has t
     "batch of actions": (environment(lambda e: e.step(np.zeros((2, 2)))), InputError, "(2, 2) (2,)"),
     "step after the end": (environment(ended, duration=5.0), ResetNeeded, "reset()"),
 }
+EXTRAS = {  # library: a function of the package that needs it, and its arguments
+    "stable_baselines3": ("fowt_env.training.rl.train:make_algorithm", ("ppo",)),
+    "matplotlib": ("fowt_env.visual.style:new_figure", (1.0, 1.0)),
+    "pygame": ("fowt_env.visual.rendering:load_pygame", ()),
+}
 WARNED = {  # mistake: (what is done, what the warning has to say)
     "degrees": (answers(lambda m: (43093.0, 14.8)), "'Asked' blade pitch 14.8 rad = 848 deg commands are"),
     "kN m": (answers(lambda m: (43.09, 0.26)), "'Asked' torque 43.09 N m 0.1 % of the rated 43094 N m"),
@@ -206,6 +218,17 @@ def test_a_mistake_is_refused_with_what_is_wrong_and_what_to_do(mistake, scene, 
     with pytest.raises(error) as caught:
         do(scene)
     assert said(str(caught.value), words), str(caught.value)
+
+
+@pytest.mark.parametrize("library", EXTRAS)
+def test_a_library_that_is_not_installed_is_named_with_its_extra(library, monkeypatch):
+    function, arguments = EXTRAS[library]
+    function = pkgutil.resolve_name(function)
+    for loaded in [name for name in sys.modules if name.partition(".")[0] == library]:
+        monkeypatch.delitem(sys.modules, loaded)
+    monkeypatch.setitem(sys.modules, library, None)
+    with pytest.raises(InputError, match=r"""pip install ['"]fowt-env\["""):
+        function(*arguments)
 
 
 @pytest.mark.parametrize("mistake", WARNED)

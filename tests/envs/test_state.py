@@ -59,6 +59,7 @@ def test_continuing_after_restore_is_the_uninterrupted_run_bit_for_bit(settings)
 
 
 @pytest.mark.slow  # a kind of scene that nothing else compiles
+@pytest.mark.nightly
 def test_wake_states_are_part_of_a_snapshot():
     settings = {"rotor": "bem", "dynamic_inflow": True}
     env = quick(**settings, wind=18.0, sea="still")

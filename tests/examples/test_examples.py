@@ -1,10 +1,14 @@
 """Every example runs, says what it claims, and takes less than a minute once compiled."""
 
+import contextlib
+import io
 import re
 import runpy
+from functools import cache
 from math import exp, pi
 from pathlib import Path
 from time import perf_counter
+from typing import NamedTuple
 
 import pytest
 
@@ -38,7 +42,8 @@ NEEDS = {  # example: modules without which its claims are not met
     "15_record_video": ("pygame", "moviepy"),
     "17_state_feedback": ("control",),
 }
-SLOW = ("12_ray", "13_resume")  # they start Ray, and torch
+# they start Ray, and torch
+SLOW = {"12_ray": [pytest.mark.slow], "13_resume": [pytest.mark.slow, pytest.mark.nightly]}
 TRAINED = "10_train_small_agent"  # takes minutes: tests/examples has its test
 
 
@@ -49,58 +54,68 @@ def test_every_example_is_tested_and_listed():
     assert listed == names
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.slow if name in SLOW else ()) for name in CLAIMS]
-)
-def test_an_example_runs_within_a_minute(name, tmp_path, monkeypatch, capsys):
+@pytest.fixture(scope="module")
+def run_of(tmp_path_factory):
+    """Function of an example's name: the Run of it, which is made once."""
+
+    @cache
+    def run(name):
+        compiled, start, printed = [], perf_counter(), io.StringIO()
+        with pytest.MonkeyPatch.context() as patch, compilation_reported(compiled.append):
+            patch.chdir(tmp_path_factory.mktemp(name))
+            patch.syspath_prepend(str(FOLDER))
+            with contextlib.redirect_stdout(printed):
+                names = runpy.run_path(str(FOLDER / f"{name}.py"), run_name="__main__")
+            written = {path.name for path in Path("results/examples").glob("*")}
+        return Run(names, printed.getvalue(), written, None if compiled else perf_counter() - start)
+
+    return run
+
+
+class Run(NamedTuple):
+    """What an example defined, printed and wrote, and the seconds that it took, None if it had to compile."""
+
+    names: dict
+    output: str
+    written: set
+    seconds: float | None
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=SLOW.get(name, ())) for name in CLAIMS])
+def test_an_example_runs_within_a_minute(name, run_of):
     for module in NEEDS.get(name, ()):
         pytest.importorskip(module, reason=f"{module} is not installed: its extra is missing")
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.syspath_prepend(str(FOLDER))
-    compiled = []
-    start = perf_counter()
-    with compilation_reported(compiled.append):
-        runpy.run_path(str(FOLDER / f"{name}.py"), run_name="__main__")
-    seconds = perf_counter() - start
+    run = run_of(name)
     pattern, files = CLAIMS[name]
-    output = capsys.readouterr().out
-    assert re.search(pattern, output), output
-    written = {path.name for path in (tmp_path / "results" / "examples").glob("*")}
-    assert written == set(files)
-    assert compiled or seconds < LIMIT  # compiling is the first run's alone
+    assert re.search(pattern, run.output), run.output
+    assert run.written == set(files)
+    assert run.seconds is None or run.seconds < LIMIT  # compiling is the first run's alone
 
 
-def test_the_plate_brakes_the_heave_as_quadratic_drag_does(tmp_path, monkeypatch, capsys):
+def test_the_plate_brakes_the_heave_as_quadratic_drag_does(run_of):
     """Averaged over a cycle the amplitude follows dA/dt = -s A - c A^2 with c = 4 k w/(3 pi M)."""
-    monkeypatch.chdir(tmp_path)
-    found = runpy.run_path(str(FOLDER / "06_own_load.py"), run_name="__main__")
-    shown = capsys.readouterr().out
+    run = run_of("06_own_load")
     mass, frequency = 8066048.0 + 250319.0, 2.0 * pi / 30.8
     slow, start, end = 1.3e5 / (2.0 * mass), 4.0, 3.0 * 30.8
-    quick = 4.0 * found["plate"].parameters[0] * frequency / (3.0 * pi * mass)
+    quick = 4.0 * run.names["plate"].parameters[0] * frequency / (3.0 * pi * mass)
     bare = start * exp(-slow * end)
     braked = slow * bare / (slow + quick * (start - bare))
-    left = [float(value) for value in re.findall(r"up to ([0-9.]+) m", shown)]
+    left = [float(value) for value in re.findall(r"up to ([0-9.]+) m", run.output)]
     assert left == pytest.approx([bare, braked], rel=0.05)  # the lines couple heave to surge a little
-    swell = [float(value) for value in re.findall(r"swell std ([0-9.]+) m", shown)]
+    swell = [float(value) for value in re.findall(r"swell std ([0-9.]+) m", run.output)]
     assert swell[1] < swell[0]
 
 
-def test_a_look_ahead_pays(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    runpy.run_path(str(FOLDER / "16_what_if.py"), run_name="__main__")
-    alone, planned = re.search(
-        r"PI alone (-?[0-9.]+), with a look ahead (-?[0-9.]+)", capsys.readouterr().out
-    ).groups()
-    assert float(planned) > float(alone)
+def test_a_look_ahead_pays(run_of):
+    found = re.search(r"PI alone (-?[0-9.]+), with a look ahead (-?[0-9.]+)", run_of("16_what_if").output)
+    alone, planned = map(float, found.groups())
+    assert planned > alone
 
 
-def test_an_lqr_beats_the_reference_in_rotor_speed_and_platform_pitch(tmp_path, monkeypatch, capsys):
+def test_an_lqr_beats_the_reference_in_rotor_speed_and_platform_pitch(run_of):
     pytest.importorskip("control")
-    monkeypatch.chdir(tmp_path)
-    runpy.run_path(str(FOLDER / "17_state_feedback.py"), run_name="__main__")
-    shown = capsys.readouterr().out
-    rows = re.findall(r"rotor speed std ([0-9.]+) rpm, platform pitch std ([0-9.]+) deg", shown)
+    pattern = r"rotor speed std ([0-9.]+) rpm, platform pitch std ([0-9.]+) deg"
+    rows = re.findall(pattern, run_of("17_state_feedback").output)
     (speed, tilt), (own_speed, own_tilt) = [tuple(map(float, row)) for row in rows]
     assert own_speed < 0.6 * speed and own_tilt < 0.8 * tilt
 

@@ -105,7 +105,7 @@ def load(t, r, R, v, w, members, sea, site, switches, current=None, points=40):
     return total, mass
 
 
-def displaced(r, R, members, steps=(300, 200, 200)):
+def displaced(r, R, members, steps=(160, 100, 100)):
     """(V, first moment (3,)) below Z = 0 in body axes, by counting small pieces of each member."""
     volume, moment = 0.0, np.zeros(3)
     along, around, out = ((np.arange(n) + 0.5) / n for n in steps)

@@ -63,20 +63,6 @@ def anchor_tension(H, V, L, w, CB=0.0):
     return np.hypot(H, V - w * L) if V >= w * L else max(H - CB * (w * L - V), 0.0)
 
 
-def energy(H, V, L, w, EA, z_f, nodes=64):
-    """Elastic plus gravitational energy of a line without seabed friction, heights from the seabed.
-
-    U = int [T^2/(2 EA) + w z] ds + L_B H^2/(2 EA), by Gauss quadrature from the fairlead down.
-    """
-    s_up = min(L, V / w)
-    xi, weights = np.polynomial.legendre.leggauss(nodes)
-    s = 0.5 * s_up * (xi + 1)  # from the fairlead
-    V_s = V - w * s
-    z = z_f - ((np.hypot(H, V) - np.hypot(H, V_s)) / w + (V * s - w * s**2 / 2) / EA)
-    density = (H**2 + V_s**2) / (2 * EA) + w * z
-    return 0.5 * s_up * weights @ density + (L - s_up) * H**2 / (2 * EA)
-
-
 def load(position, R, anchors, fairleads, L, w, EA, CB=0.0):
     """(force, moment about the body origin) of lines, both in body axes."""
     force, moment = np.zeros(3), np.zeros(3)

@@ -45,27 +45,27 @@ def steiner(mass, r):
     return mass * (r @ r * np.eye(3) - np.outer(r, r))
 
 
-def bodies(platform, turbine, generator_mass=GENERATOR_MASS, generator_centre=GENERATOR_CENTRE):
+def bodies(platform, turbine):
     """[spar, tower, nacelle shell, generator rotor, rotor] of two descriptions."""
     ballast, tower, nacelle, rotor = platform.ballast, platform.tower, turbine.nacelle, turbine.rotor
     shaft = turbine.drivetrain
     spin_inertia = shaft.generator_inertia
     turn = rotation(0.0, rotor.shaft_tilt, 0.0)  # its first column is the shaft, downwind
     generator = Body(
-        generator_mass,
-        generator_centre,
+        GENERATOR_MASS,
+        GENERATOR_CENTRE,
         turn @ np.diag([spin_inertia, 0.7 * spin_inertia, 0.7 * spin_inertia]) @ turn.T,
         shaft.gear_ratio,
         turn[:, 0],
     )
     whole = np.array([nacelle.cm_downwind, nacelle.cm_left, nacelle.cm_height])
-    shell_mass = nacelle.mass - generator_mass
-    shell_centre = (nacelle.mass * whole - generator_mass * generator_centre) / shell_mass
+    shell_mass = nacelle.mass - GENERATOR_MASS
+    shell_centre = (nacelle.mass * whole - GENERATOR_MASS * GENERATOR_CENTRE) / shell_mass
     about_origin = (
         np.diag(nacelle.inertia)
         + steiner(nacelle.mass, whole)
         - generator.inertia
-        - steiner(generator_mass, generator_centre)
+        - steiner(GENERATOR_MASS, GENERATOR_CENTRE)
     )
     return [
         Body(

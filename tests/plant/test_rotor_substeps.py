@@ -106,22 +106,25 @@ def test_a_step_of_standard_in_a_box_errs_by_less_than_a_thousandth_and_a_sixth_
     assert errors["three"] < 1e-3 and errors["three"] < errors["one"] / 6.0, errors
 
 
-def test_environments_in_a_box_go_on_from_a_snapshot_and_agree_with_the_vector_form_bit_for_bit():
+@pytest.mark.parametrize("vector", [False, pytest.param(True, marks=(pytest.mark.slow, pytest.mark.nightly))])
+def test_environments_in_a_box_go_on_from_a_snapshot_and_agree_with_the_vector_form_bit_for_bit(vector):
     settings = {"wind": box_wind(), "sea": SEA, "fidelity": "standard", "duration": 60.0}
     actions = np.random.default_rng(0).uniform(-1.0, 1.0, (30, 2))
     env = FowtEnv(**settings)
-    together = FowtVectorEnv(2, threads=2, **settings)
     first, _ = env.reset(seed=4)
-    several, _ = together.reset(seed=[4, 5])
-    assert np.array_equal(first, several[0])
-    seen = []
+    seen, rewards = [], []
     for number, action in enumerate(actions):
         if number == 12:
             saved = env.get_state()
         observation, reward, *_ = env.step(action)
-        observations, rewards, *_ = together.step(np.stack([action, -action]))
-        assert np.array_equal(observation, observations[0]) and reward == rewards[0]
         seen.append(observation)
+        rewards.append(reward)
     env.set_state(saved)
     for action, expected in zip(actions[12:], seen[12:], strict=True):
         assert np.array_equal(env.step(action)[0], expected)
+    if vector:
+        together = FowtVectorEnv(2, threads=2, **settings)
+        assert np.array_equal(first, together.reset(seed=[4, 5])[0][0])
+        for action, observation, reward in zip(actions, seen, rewards, strict=True):
+            observations, several, *_ = together.step(np.stack([action, -action]))
+            assert np.array_equal(observation, observations[0]) and reward == several[0]

@@ -10,7 +10,6 @@ from fowt_env.analysis.linear_model import linearize
 from fowt_env.analysis.reduced_model import residualised
 from fowt_env.analysis.trim import trim
 from fowt_env.descriptions.turbine import PitchDrive, read_turbine
-from fowt_env.envs import FowtEnv
 from fowt_env.plant.advance import advance, output_row
 from fowt_env.plant.state import Command, State
 from fowt_env.scene.build import build_scene
@@ -170,23 +169,6 @@ def test_outputs_show_the_state_that_is_given(scene):
     x[17] = 1234.0
     row = output_row(scene.handle(), x, point.command, 0.0, len(scene.channels))
     assert scene.values(row[None])[0][[c.name for c in scene.channels].index("GenTq")] == pytest.approx(1.234)
-
-
-@pytest.mark.slow
-def test_an_environment_goes_on_from_a_snapshot_as_it_went_on(scene):
-    settings = {"turbine": scene.turbine, "fidelity": "fast", "task": "above_rated"}
-    env, other = (FowtEnv(**settings) for _ in range(2))
-    env.reset(seed=1)
-    other.reset(seed=1)
-    actions = np.random.default_rng(2).uniform(-1.0, 1.0, (20, 2))
-    for action in actions[:10]:
-        env.step(action)
-    saved, seen = env.get_state(), [env.step(action)[0] for action in actions[10:]]
-    other.set_state(saved)
-    again = [other.step(action)[0] for action in actions[10:]]
-    assert np.array_equal(seen, again)
-    blade = [env.unwrapped.view().state[15], env.unwrapped.view().state[16]]
-    assert blade[0] != 0.0 and blade[1] != 0.0
 
 
 # --------------------------------------------------------------------------- descriptions

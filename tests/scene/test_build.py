@@ -94,29 +94,22 @@ def test_new_weather_is_that_of_a_scene_built_with_it():
     assert moved.wind_speed == built.wind_speed == 14.0
 
 
-def test_standard_stays_within_a_thousandth_of_reference():
-    """Root-mean-square difference over the standard deviation; 60 components keep the exact run short."""
-    frames = []
-    for fidelity in ("reference", "standard"):
-        scene = build_scene(wind=NTM, sea=SEA, seed=2, wave_components=60, fidelity=fidelity)
-        frames.append(simulate(scene, "pi", duration=200.0))
-    exact, quick = frames
+@pytest.mark.parametrize(
+    "levels, options, duration, most",
+    [
+        # 60 components keep the exact run short
+        (("reference", "standard"), {"wave_components": 60}, 200.0, 1e-3),
+        (("standard", "fast"), {}, 600.0, 2e-2),
+    ],
+)
+def test_a_level_stays_near_the_one_before(levels, options, duration, most):
+    """Root-mean-square difference over the standard deviation."""
+    scenes = (build_scene(wind=NTM, sea=SEA, seed=2, fidelity=level, **options) for level in levels)
+    exact, quick = (simulate(scene, "pi", duration=duration) for scene in scenes)
     for name in (*MOTIONS, "RotSpeed", "FAIRTEN1"):
         column = next(c for c in exact.columns if c.startswith(f"{name}_["))
         error = np.sqrt(np.mean((quick[column] - exact[column]) ** 2)) / exact[column].std()
-        assert error < 1e-3, (name, error)
-
-
-def test_fast_stays_within_two_hundredths_of_standard():
-    frames = []
-    for fidelity in ("standard", "fast"):
-        scene = build_scene(wind=NTM, sea=SEA, seed=2, fidelity=fidelity)
-        frames.append(simulate(scene, "pi", duration=600.0))
-    exact, quick = frames
-    for name in (*MOTIONS, "RotSpeed", "FAIRTEN1"):
-        column = next(c for c in exact.columns if c.startswith(f"{name}_["))
-        error = np.sqrt(np.mean((quick[column] - exact[column]) ** 2)) / exact[column].std()
-        assert error < 2e-2, (name, error)
+        assert error < most, (name, error)
 
 
 def test_scenes_of_one_kind_share_one_compiled_run():

@@ -36,15 +36,10 @@ def platform_of(body=BODY):
 
 
 def scene_of(sea=JONSWAP, form="fast", body=BODY, **given):
-    given = {"radiation": "none"} | given
     return build_scene(
-        platform_of(body),
-        sea=sea,
-        wave_loads=form,
-        mooring=False,
-        duration=100.0,
-        **{"fidelity": "reference"} | given,
-    )
+        platform_of(body), sea=sea, wave_loads=form, mooring=False, duration=100.0, fidelity="reference",
+        **{"radiation": "none"} | given,
+    )  # fmt: skip
 
 
 def water(scene, t, x):
@@ -160,6 +155,7 @@ def test_the_wave_filter_fits_the_force_within_its_stated_error():
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_a_filtered_position_follows_a_trim_and_leaves_linear_models_as_they_are():
     sea = {"kind": "regular", "H": 2.0, "T": 9.0}
     undisplaced, filtered = (

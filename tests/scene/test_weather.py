@@ -161,10 +161,7 @@ def test_still_water_in_a_scene_with_a_sea_loads_as_a_scene_of_still_water(fidel
     Here they have the same bits. A rounding of 1e8 N over 8e6 kg is 2e-15 m/s2: room for some fifty.
     """
     options = dict(fidelity=fidelity, current=0.5, diffraction="maccamy_fuchs")
-    scenes = (
-        build_scene(**{"fidelity": "reference"} | options),
-        build_scene(sea=JONSWAP, **{"fidelity": "reference"} | options).with_weather(None, None, 0),
-    )
+    scenes = build_scene(**options), build_scene(sea=JONSWAP, **options).with_weather(None, None, 0)
     rng = np.random.default_rng(1)
     for _ in range(5):
         found = []
@@ -190,11 +187,7 @@ def test_a_trim_is_not_taken_from_strips_with_other_nodes(monkeypatch):
     monkeypatch.setattr(trim_cache, "trim", trim)
     monkeypatch.setattr(trim_cache, "_TRIMS", Cache(100))
     options = dict(wind=14.0, fidelity="standard", current=0.5)
-    still, scene = (
-        build_scene(**{"fidelity": "reference"} | options),
-        build_scene(sea=JONSWAP, **{"fidelity": "reference"} | options),
-    )
-    exact = build_scene(sea=CROSSING, **{"fidelity": "reference"} | options)
+    still, scene, exact = (build_scene(sea=sea, **options) for sea in (None, JONSWAP, CROSSING))
     key = trim_cache.plant_key(scene)
     assert key == trim_cache.plant_key(still) == trim_cache.plant_key(exact)
     flat = scene.with_weather(14.0, None, 0)

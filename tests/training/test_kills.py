@@ -19,7 +19,8 @@ SHARES = {"evaluate": 0.36, "ppo": 0.28, "sac": 0.12, "validate": 0.24}
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "study", ["evaluate", pytest.param("ppo", marks=pytest.mark.nightly), "sac", "validate"]
+    "study",
+    ["evaluate", *(pytest.param(name, marks=pytest.mark.nightly) for name in ("ppo", "sac", "validate"))],
 )
 def test_killed_runs_stay_readable_and_end_as_if_they_had_not_been(tmp_path, study):
     if study in ("ppo", "sac"):

@@ -59,6 +59,12 @@ def scene_in(speed=SPEED, seed=1001, **options):
     return build_scene("oc3_hywind", wind=wind, seed=seed, duration=600.0, fidelity="fast")
 
 
+def in_box(u, grid, **changes):
+    """Scene in a box of wind on a square grid (m) about the hub, slices of 0.5 s."""
+    box = {"kind": "box", "u": u, "y": grid, "z": HUB + grid, "dt": 0.5, "speed": SPEED, "periodic": True}
+    return build_scene("oc3_hywind", wind=box | changes, duration=60.0, fidelity="standard")
+
+
 def difference(scene, preset, times=(0.0, 2.0), **options):
     """(len(times), n) m/s of the lidar's preview less the exact one."""
     seen, exact = lidar_preview(scene, times, preset, **options), exact_preview(scene, times)
@@ -103,9 +109,8 @@ def test_the_disc_seen_from_a_point_has_the_mean_coherence_of_its_points():
     k = np.array([1e-4, 0.01, 0.05, 0.3])
     for distance in [0.0, 20.0, RADIUS, 80.0, *generator.uniform(0.0, 100.0, 3)]:
         mean = np.exp(-np.outer(k, np.hypot(y - distance, z))).mean(axis=1)
-        np.testing.assert_allclose(
-            disk_coherence(k, distance, RADIUS), mean, rtol=6e-3
-        )  # of squares at the rim
+        # of squares at the rim
+        np.testing.assert_allclose(disk_coherence(k, distance, RADIUS), mean, rtol=6e-3)
     rings = (np.arange(4000) + 0.5) / 4000 * RADIUS
     mean = np.mean([disk_coherence(k, r, RADIUS) for r in np.sqrt(rings * RADIUS)], axis=0)
     np.testing.assert_allclose(mean, disk_average(k * RADIUS), rtol=1e-3)
@@ -334,9 +339,7 @@ def test_weights_along_the_beam_that_are_one_sided_shift_the_phase_as_in_a_box()
     assert points(lidar).weight @ points(lidar).late > 5.0
     grid = np.linspace(-90.0, 90.0, 4)
     wave = np.sin(2.0 * np.pi * np.arange(400) / 40.0)  # 0.05 Hz
-    box = {"kind": "box", "u": 18.0 + wave[:, None, None] + np.zeros((1, 4, 4)), "y": grid, "z": 90.0 + grid}
-    box |= {"dt": 0.5, "speed": SPEED, "periodic": True}
-    scene = build_scene("oc3_hywind", wind=box, duration=60.0, fidelity="standard")
+    scene = in_box(18.0 + wave[:, None, None] + np.zeros((1, 4, 4)), grid)
     p, seen = points(lidar), np.zeros(400)
     lidar_module._look(scene.wind.field(), p.late / SPEED, p.y, 90.0 + p.z, p.weight, p.across, p.up, seen)
     gain = np.fft.rfft(seen)[10] / np.fft.rfft(wave)[10]
@@ -464,9 +467,7 @@ def test_of_a_box_it_sees_what_lies_on_its_beams(periodic, monkeypatch):
     generator = np.random.default_rng(3)
     grid = np.linspace(-90.0, 90.0, 7)
     u, v, w = generator.normal(size=(3, 200, 7, 7))
-    box = {"kind": "box", "u": 18.0 + u, "v": v, "w": w, "y": grid, "z": 90.0 + grid}
-    box |= {"dt": 0.5, "speed": SPEED, "periodic": periodic}
-    scene = build_scene("oc3_hywind", wind=box, duration=60.0, fidelity="standard")
+    scene = in_box(18.0 + u, grid, v=v, w=w, periodic=periodic)
     lidar = remade("four_beam_pulsed", distances=(130.0, 150.0))
     monkeypatch.setattr(lidar_module, "evolution", lambda *_: (0.0, 0.0))
     lidar_module.shares.cache_clear()
@@ -490,8 +491,7 @@ def test_of_a_box_it_sees_what_lies_on_its_beams(periodic, monkeypatch):
 def test_a_box_that_evolves_has_the_strength_of_one_that_does_not(monkeypatch):
     grid = np.linspace(-90.0, 90.0, 4)
     u = 18.0 + np.random.default_rng(5).normal(size=(2000, 1, 1)) + np.zeros((1, 4, 4))
-    box = {"kind": "box", "u": u, "y": grid, "z": 90.0 + grid, "dt": 0.5, "speed": SPEED, "periodic": True}
-    scene = build_scene("oc3_hywind", wind=box, duration=60.0, fidelity="standard")
+    scene = in_box(u, grid)
     lidar = remade("circular_cw", scan_period=0.0)
     _, evolved, _ = lidar_module._in_box(scene, lidar, lidar_tuning(scene, lidar), 1001)
     with monkeypatch.context() as patch:
@@ -507,15 +507,7 @@ def test_a_box_that_evolves_has_the_strength_of_one_that_does_not(monkeypatch):
 
 def test_a_box_must_hold_what_the_beams_look_at():
     grid = np.linspace(-64.0, 64.0, 5)
-    box = {
-        "kind": "box",
-        "u": np.full((200, 5, 5), 18.0),
-        "y": grid,
-        "z": 90.0 + grid,
-        "dt": 0.5,
-        "speed": SPEED,
-    }
-    scene = build_scene("oc3_hywind", wind=box | {"periodic": True}, duration=60.0, fidelity="standard")
+    scene = in_box(np.full((200, 5, 5), 18.0), grid)
     with pytest.raises(InputError, match="must hold 0.8 of what the lidar 'wide' looks at"):
         lidar_preview(scene, (1.0,), remade("circular_cw", name="wide", half_angle=25.0))
 

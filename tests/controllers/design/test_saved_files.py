@@ -66,13 +66,8 @@ def test_a_saved_lqr_does_not_follow_a_changed_plant(lqr_file, turbine):
 
 
 def test_a_saved_default_lqr_gives_the_blocks_of_the_named_one(tmp_path, windy, turbine):
-    path = save_design(
-        tmp_path / "d.json",
-        "lqr",
-        windy,
-        lqr_settings(LQGSettings(), design_models(windy)),
-        "fowt design lqr",
-    )
+    settings = lqr_settings(LQGSettings(), design_models(windy))
+    path = save_design(tmp_path / "d.json", "lqr", windy, settings, "fowt design lqr")
     named = make("lqr", turbine, 0.1)
     named.prepare(windy)
     np.testing.assert_array_equal(make(f"design:{path}", turbine, 0.1).parameters, named.parameters)
@@ -155,12 +150,9 @@ def test_the_rotor_loop_is_that_of_the_assembled_closed_loop_of_a_bare_rotor(mod
     """Platform and aerodynamic damping taken out and the lag and filter made fast, the whole plant agrees."""
     found = design_pi(models, turbine, 0.2, 0.7)
     settings = PISettings.published(
-        turbine,
-        KP=found.KP,
-        KI=found.KI,
-        gain_schedule_pitch=found.gain_schedule_pitch,
+        turbine, KP=found.KP, KI=found.KI, gain_schedule_pitch=found.gain_schedule_pitch,
         speed_filter_corner=1e4,
-    )
+    )  # fmt: skip
     model = models[19.0]
     a, names = closed_loop_matrix(model, settings)
     speed, blade = names.index("rotor_speed"), names.index("blade_pitch")

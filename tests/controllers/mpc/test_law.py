@@ -30,7 +30,7 @@ def turbulent(wind, seed, duration):
     """The case of a suite in normal turbulence."""
     (case,) = named_cases(f"ntm_{wind}")
     return build_scene(
-        case.platform, wind=case.wind, sea=case.sea, seed=seed, duration=duration, fidelity="reference"
+        case.platform, wind=case.wind, sea=case.sea, seed=seed, duration=duration, fidelity="standard"
     )
 
 

@@ -67,7 +67,6 @@ ESTIMATED = ("estimated_wind", "estimated_platform", "estimated_waves")
 @pytest.mark.parametrize(
     ("mode", "baseline", "estimated", "shaping"),
     [
-        ("residual", "gspi_oc3", (), {}),
         ("residual", "lqr", ESTIMATED, {}),
         ("residual", "lqr", ESTIMATED, {"washout": 5.0, "authority": (0.05, 0.4), "authority_time": 2.0}),
         ("direct", "gspi_oc3", ESTIMATED, {}),
@@ -86,14 +85,9 @@ def test_the_controller_commands_what_the_environment_would_do_with_its_decision
     path = write_random_policy(tmp_path / "a.npz", mode, names, preview, baseline=baseline, decisions=chosen)
     task = replace(TASKS["above_rated"], residual_pitch=3.0, setpoint=(0.9, 1.1))
     env = FowtEnv(
-        task,
-        action_mode=mode,
-        baseline=baseline,
-        observation=names,
-        wind_preview=preview,
-        duration=20.0,
+        task, action_mode=mode, baseline=baseline, observation=names, wind_preview=preview, duration=20.0,
         **QUICK,
-    )
+    )  # fmt: skip
     network = read_policy(path)[1]
     observation, _ = env.reset(seed=1)
     settings = DecisionSettings(**chosen)
@@ -126,7 +120,7 @@ def test_a_policy_runs_without_torch_or_stable_baselines3(tmp_path):
     path = write_random_policy(tmp_path / "a.npz")
     code = (
         "import sys, fowt_env\n"
-        f"scene = fowt_env.build_scene('oc3_hywind', wind=18.0, rotor='table', fidelity='standard')\n"
+        "scene = fowt_env.build_scene('oc3_hywind', wind=18.0, fidelity='standard')\n"
         f"frame = fowt_env.simulate(scene, controller='policy:{path}', duration=5.0)\n"
         "assert len(frame) >= 50\n"
         "assert not {'torch', 'stable_baselines3'} & set(sys.modules)\n"
@@ -150,7 +144,7 @@ def test_information_is_what_agent_and_baseline_see(tmp_path):
 
 def test_a_simulation_with_a_policy_repeats_bit_for_bit(tmp_path):
     path = write_random_policy(tmp_path / "a.npz")
-    scene = fowt_env.build_scene("oc3_hywind", wind=18.0, rotor="table", fidelity="standard")
+    scene = fowt_env.build_scene("oc3_hywind", wind=18.0, fidelity="standard")
     one, other = (fowt_env.simulate(scene, controller=f"policy:{path}", duration=10.0) for _ in range(2))
     assert one.equals(other)
 

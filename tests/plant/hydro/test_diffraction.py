@@ -10,9 +10,9 @@ from naive import morison as naive_strips
 from naive.morison import spar_of
 from naive.rigid_body import rotation
 from plant_helpers import make_pose
+from spar_in_waves import SEAS, STILL, motion, nodes_of, strips_of, waves_of
 
 from fowt_env import build_scene, simulate
-from fowt_env.descriptions.sea_state import sea_state_of
 from fowt_env.errors import InputError
 from fowt_env.plant.hydro.banded_strips import banded_strip_load
 from fowt_env.plant.hydro.diffraction import (
@@ -25,15 +25,14 @@ from fowt_env.plant.hydro.diffraction import (
 from fowt_env.plant.hydro.load import BandedStrips, ExactStrips
 from fowt_env.plant.hydro.morison import morison_load
 from fowt_env.plant.hydro.strip_quadrature import BLOCK, build_quadrature
-from fowt_env.plant.hydro.strips import GAUSS_OFFSET, axis_surface, build_strips, wet_cell
+from fowt_env.plant.hydro.strips import axis_surface
 from fowt_env.plant.hydro.wave_bands import band_scratch, build_band_diffraction, build_wave_bands
-from fowt_env.weather.waves import build_waves, wave_number
+from fowt_env.weather.waves import wave_number
 
 pytestmark = pytest.mark.installation
 
 MODEL_CHOICES = Path(__file__).resolve().parents[3] / "docs" / "results" / "model-choices.md"
 SWITCHES = [("instantaneous", "instantaneous", "wheeler"), ("fixed", "swl", "none")]
-STILL = (np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
 # omega, amplitude, phase, heading; the longest is felt at the seabed, the shortest has ka = 2.3 on the spar
 SEA = [
     (0.09, 0.8, 0.3, 0.0),
@@ -50,43 +49,10 @@ def site(platform):
     return platform.environment
 
 
-def strips_of(platform, position="instantaneous", surface="instantaneous", stretching="wheeler"):
-    site = platform.environment
-    return build_strips(
-        platform.hull, platform.hydro, density=site.water_density, depth=site.water_depth,
-        position=position, surface=surface, stretching=stretching,
-    )  # fmt: skip
-
-
-def waves_of(sea, site):
-    if not isinstance(sea, dict):
-        omega, amplitude, phase, heading = np.array(sea, dtype=float).T
-        sea = {"kind": "components", "omega": omega, "amplitude": amplitude, "phase": phase}
-        sea["heading"] = np.degrees(heading)
-    return build_waves(
-        sea_state_of(sea), depth=site.water_depth, density=site.water_density, gravity=site.gravity,
-        seed=0, duration=600.0,
-    )  # fmt: skip
-
-
-def motion(rng, tilt=0.08, heave=0.7):
-    # slow, so that drag does not hide the waves' inertia
-    r = rng.normal(size=3) * [9.0, 9.0, heave]
-    R = rotation(*(rng.uniform(-1.0, 1.0, 3) * [tilt, tilt, 3.0]))
-    return r, R, rng.normal(size=3) * 0.1, rng.normal(size=3) * 1e-3
-
-
-def nodes_of(strips, top):
-    """(z, weight, diameter, dA/dz) of the strips' own nodes below a surface at body z = top."""
-    rows = []
-    for section, bottom in enumerate(strips.section_bottom):
-        start, height = wet_cell(section, top, strips)
-        for cell in range(strips.cells[section]):
-            for offset in (GAUSS_OFFSET, 1.0 - GAUSS_OFFSET):
-                z = start - height * (cell + offset)
-                d = strips.diameter_bottom[section] + strips.diameter_slope[section] * (z - bottom)
-                rows.append((z, 0.5 * height, d, 0.5 * pi * d * strips.diameter_slope[section]))
-    return np.array(rows).T
+def slow_motion(rng, tilt=0.08):
+    """A motion whose drag does not hide the inertia of the waves."""
+    r, R, v, w = motion(rng, tilt)
+    return r, R, 0.1 * v, 0.02 * w
 
 
 def exact(t, moving, strips, waves, diffraction=None):
@@ -157,7 +123,7 @@ def test_exact_load_is_the_complex_sum_over_components(switches, platform, site)
     part = build_strip_diffraction(waves, strips)
     rng = np.random.default_rng(2)
     for _ in range(3):
-        t, moving = rng.uniform(0.0, 100.0), motion(rng)
+        t, moving = rng.uniform(0.0, 100.0), slow_motion(rng)
         got, plain = exact(t, moving, strips, waves, part), exact(t, moving, strips, waves)
         assert got[1:] == plain[1:]  # the added mass of the hull's own motion is left alone
         top, eta = naive_strips.surface_on_axis(t, moving[0], moving[1], SEA, spar)
@@ -178,7 +144,7 @@ def test_cut_taper_follows_the_surface(platform, site):
     rng = np.random.default_rng(3)
     expected, full, quick = [], [], []
     for t in (1.0, 2.5, 4.0):
-        moving = motion(rng, tilt=0.02)
+        moving = slow_motion(rng, tilt=0.02)
         moving[0][2] = 7.0
         top, eta = naive_strips.surface_on_axis(t, moving[0], moving[1], ONE_WAY, spar)
         assert -12.0 < top < -4.0
@@ -195,25 +161,16 @@ def test_cut_taper_follows_the_surface(platform, site):
     assert np.all(np.abs(quick - expected) < 1e-2 * size)
 
 
-FAST_SEAS = {
-    "mild": {"kind": "jonswap", "Hs": 2.5, "Tp": 7.0, "gamma": 1.0, "heading": 20.0},
-    "rough": {"kind": "jonswap", "Hs": 7.5, "Tp": 10.0, "gamma": 3.3},
-    "storm": {"kind": "jonswap", "Hs": 17.0, "Tp": 17.0, "gamma": 2.0, "heading": -130.0},
-    "regular": {"kind": "regular", "H": 3.0, "T": 5.0},
-    "swell": {"kind": "regular", "H": 6.0, "T": 20.0, "heading": 45.0},
-}
-
-
-@pytest.mark.parametrize("sea", FAST_SEAS)
+@pytest.mark.parametrize("sea", SEAS)
 def test_fast_load_is_close_to_the_exact_one(sea, platform, site):
-    strips, waves = strips_of(platform), waves_of(FAST_SEAS[sea], site)
+    strips, waves = strips_of(platform), waves_of(SEAS[sea], site)
     part = build_strip_diffraction(waves, strips)
     quadrature, fields = build_quadrature(platform.hull, strips), build_wave_bands(waves, strips)
     lane_part, scratch = build_band_diffraction(fields, quadrature), band_scratch(fields, quadrature)
     rng = np.random.default_rng(4)
     quick, full, plain = [], [], []
     while len(full) < 60:
-        t, moving = rng.uniform(0.0, 600.0), motion(rng)
+        t, moving = rng.uniform(0.0, 600.0), slow_motion(rng)
         pose = make_pose(*moving)
         if axis_surface(t, pose, strips, waves)[0] < strips.section_bottom[0] + 0.1:
             continue  # the exact path's first section may not run dry without a small step
@@ -299,30 +256,23 @@ def test_integrated_force_and_moment_are_the_columns_of_the_published_table(plat
 
 def test_absent_option_adds_no_part():
     sea = {"kind": "regular", "H": 3.0, "T": 5.0}
-    for given in ({}, {"diffraction": None}, {"diffraction": "none"}):
-        model = build_scene(sea=sea, **{"fidelity": "reference"} | given).model
-        assert model.hydro.strips.diffraction is None
-    assert (
-        build_scene(
-            sea=None, diffraction="maccamy_fuchs", fidelity="reference"
-        ).model.hydro.strips.diffraction
-        is None
-    )
+    for options in (
+        {"sea": sea}, {"sea": sea, "diffraction": None}, {"sea": sea, "diffraction": "none"},
+        {"diffraction": "maccamy_fuchs"},
+    ):  # fmt: skip
+        assert build_scene(fidelity="reference", **options).model.hydro.strips.diffraction is None
     with pytest.raises(InputError, match="diffraction = 'mcf': allowed None, 'none', 'maccamy_fuchs'"):
         build_scene(sea=sea, diffraction="mcf", fidelity="reference")
 
 
 @pytest.mark.parametrize("fidelity", ["reference", "standard"])
 def test_new_weather_has_the_diffraction_of_a_scene_built_with_it(fidelity):
-    sea = {"kind": "jonswap", "Hs": 5.0, "Tp": 9.0}
-    options = dict(fidelity=fidelity, diffraction="maccamy_fuchs", wave_components=30)
-    moved = build_scene(
-        sea={"kind": "jonswap", "Hs": 3.0, "Tp": 6.0}, **{"fidelity": "reference"} | options
-    ).with_weather(None, sea, 3)
-    built = build_scene(sea=sea, seed=3, **{"fidelity": "reference"} | options)
-    strips = moved.model.hydro.strips
-    assert np.array_equal(strips.diffraction.series, built.model.hydro.strips.diffraction.series)
-    assert isinstance(strips, ExactStrips if fidelity == "reference" else BandedStrips)
+    seas = [{"kind": "jonswap", "Hs": height, "Tp": period} for height, period in ((3.0, 6.0), (5.0, 9.0))]
+    options = {"fidelity": fidelity, "diffraction": "maccamy_fuchs", "wave_components": 30}
+    moved = build_scene(sea=seas[0], **options).with_weather(None, seas[1], 3).model.hydro.strips
+    built = build_scene(sea=seas[1], seed=3, **options).model.hydro.strips
+    assert np.array_equal(moved.diffraction.series, built.diffraction.series)
+    assert isinstance(moved, ExactStrips if fidelity == "reference" else BandedStrips)
 
 
 def test_crossing_seas_fall_back_to_the_exact_path_with_diffraction():
@@ -340,15 +290,13 @@ def first_harmonic(frame, column, period):
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_regular_wave_of_five_seconds_lags_more_than_the_panel_model():
     """OpenFAST's panels have both 9.1 deg behind its strips, 0.3 and 0.8 % longer (model-choices.md)."""
     harmonics = []
     for diffraction in (None, "maccamy_fuchs"):
         scene = build_scene(
-            "oc3_hywind_openfast",
-            sea={"kind": "regular", "H": 3.0, "T": 5.0},
-            diffraction=diffraction,
-            fidelity="reference",
+            "oc3_hywind_openfast", sea=SEAS["regular"], diffraction=diffraction, fidelity="reference"
         )
         frame = simulate(scene, None, duration=600.0, dt=0.05, initial="zero")
         harmonics.append([first_harmonic(frame, name, 5.0) for name in ("PtfmSurge_[m]", "PtfmPitch_[deg]")])

@@ -75,17 +75,6 @@ def test_slices_are_the_integral_at_any_draft_and_tilt(heave, roll, platform_pit
     assert np.abs(np.array(Q) - expected_Q).max() < 1e-4 * np.abs(whole_Q).max()
 
 
-def test_slices_agree_with_the_closed_form_where_both_apply(hull):
-    rng = np.random.default_rng(2)
-    for _ in range(30):
-        r, R = rng.normal(size=3) * [9, 9, 0.7], rotation(*(rng.uniform(-1, 1, 3) * [0.25, 0.25, 3.0]))
-        volume, Q, fallbacks = volume_and_moment(r, R, hull)
-        assert fallbacks == 0.0
-        by_slices, *slice_Q = sliced(posed(r, R), hull)
-        assert by_slices == pytest.approx(volume, rel=1e-6)
-        assert np.abs(Q - slice_Q).max() < 1e-6 * np.abs(Q).max()
-
-
 def test_load_is_continuous_where_the_fallback_takes_over(hull):
     R = rotation(0.1, 0.3, 0.0)
     reach = hull.radius * np.hypot(R[2, 0], R[2, 1]) / R[2, 2]

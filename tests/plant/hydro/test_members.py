@@ -1,6 +1,5 @@
 """Members against a plain twin, the spar's own strips, HydroDyn's convention by hand, and closed forms."""
 
-import itertools
 from math import cos, pi, radians, sin
 
 import numpy as np
@@ -9,9 +8,9 @@ from floaters import spar_members
 from naive import members as naive
 from naive.rigid_body import rotation
 from plant_helpers import make_pose
+from spar_in_waves import STILL, SWITCHES, motion, strips_of, waves_of
 
 from fowt_env.descriptions.platform import Environment, Member
-from fowt_env.descriptions.sea_state import SeaState
 from fowt_env.plant.hydro.member_buoyancy import add_member_buoyancy, displaced
 from fowt_env.plant.hydro.member_series import N_WATER, VELOCITIES, build_water_series, interpolate, no_series
 from fowt_env.plant.hydro.members import (
@@ -23,13 +22,10 @@ from fowt_env.plant.hydro.members import (
     node_loads,
 )
 from fowt_env.plant.hydro.morison import Current, morison_load
-from fowt_env.plant.hydro.strips import build_strips
 from fowt_env.plant.hydro.waves import wave_kinematics
 from fowt_env.plant.state import NO_LOAD
-from fowt_env.weather.waves import build_waves
 
 SITE = Environment(water_depth=200.0)
-SWITCHES = list(itertools.product(("instantaneous", "fixed"), ("instantaneous", "swl"), ("wheeler", "none")))
 SEA = [(0.35, 1.0, 1.0, 0.7), (0.8, 1.2, -2.0, -2.5), (1.2566, 0.4, 0.5, 3.0)]
 # a leaning taper through the surface, a level pontoon below it, a dry brace and a deep stub of a base
 HULL = (
@@ -59,22 +55,6 @@ def build(members=HULL, position="fixed", surface="swl", stretching="none", site
     )  # fmt: skip
 
 
-def waves_of(sea, site=SITE):
-    omega, amplitude, phase, heading = np.array(sea, dtype=float).T
-    state = SeaState(
-        kind="components", omega=omega, amplitude=amplitude, phase=phase, heading=np.degrees(heading)
-    )
-    return build_waves(
-        state, depth=site.water_depth, density=site.water_density, gravity=site.gravity, seed=0, duration=1.0
-    )
-
-
-def motion(rng, tilt=0.08, heave=0.7):
-    r = rng.normal(size=3) * [9.0, 9.0, heave]
-    R = rotation(*(rng.uniform(-1.0, 1.0, 3) * [tilt, tilt, 3.0]))
-    return r, R, rng.normal(size=3), rng.normal(size=3) * 0.05
-
-
 def load_of(t, motion, members, waves, current=None):
     """(wrench (6,), added mass (6, 6)) as the plant makes them."""
     pose, nodes = make_pose(*motion), members.nodes
@@ -91,7 +71,7 @@ def load_of(t, motion, members, waves, current=None):
 @pytest.mark.parametrize("switches", SWITCHES, ids="-".join)
 def test_loads_match_the_plain_twin(switches):
     rng = np.random.default_rng(4)
-    members, waves = build(HULL, *switches), waves_of(SEA)
+    members, waves = build(HULL, *switches), waves_of(SEA, SITE)
     for t in (0.0, 31.7):
         where = motion(rng)
         current = Current(0.6, -0.2, 1.0 / 7.0)
@@ -123,8 +103,7 @@ def test_one_inclined_cylinder_has_the_drag_of_hydrodyn():
         start=(0.0, 0.0, -40.0), end=end, diameter=(5.0, 5.0), drag_coefficient=(cd, cd),
         axial_drag_coefficient=(0.5 * ax_cd, 0.0), potential_flow=True,
     )  # fmt: skip
-    still = (np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
-    found, added = load_of(0.0, still, build((member,)), None, Current(speed, 0.0, 0.0))
+    found, added = load_of(0.0, STILL, build((member,)), None, Current(speed, 0.0, 0.0))
     across, along = speed * cos(lean), speed * sin(lean)
     side = cd * rho * radius * across**2 * 20.0
     plate = 0.25 * ax_cd * rho * pi * radius**2 * along**2
@@ -150,16 +129,11 @@ def test_the_heave_plates_of_oc4_damp_as_published():
     assert found[2] == pytest.approx(-0.5 * 1025.0 * 3.0 * pi * 144.0 * 4.8 * 0.25, rel=1e-12)
 
 
-@pytest.mark.parametrize(
-    "switches", [("instantaneous", "instantaneous", "wheeler"), ("fixed", "swl", "none")]
-)
+@pytest.mark.parametrize("switches", [SWITCHES[0], SWITCHES[-1]])
 def test_a_spar_of_members_has_the_loads_of_its_hull(platform, switches):
-    hull, hydro, site = platform.hull, platform.hydro, platform.environment
+    site = platform.environment
     members = build(spar_members(platform), *switches, site=site, cell=1.0)
-    strips = build_strips(
-        hull, hydro, density=site.water_density, depth=site.water_depth, position=switches[0],
-        surface=switches[1], stretching=switches[2], cell=1.0,
-    )  # fmt: skip
+    strips = strips_of(platform, *switches, cell=1.0)
     waves, rng = waves_of(SEA, site), np.random.default_rng(8)
     for t in (3.0, 50.0):
         where = motion(rng)
@@ -194,8 +168,7 @@ def test_a_sunken_cone_displaces_its_volume_and_a_dry_one_nothing():
     )
     length = float(np.linalg.norm([2.0, 1.0, 8.0]))
     bodies = build((cone,)).bodies
-    deep = make_pose(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
-    volume, qx, qy, qz = displaced(deep, bodies)
+    volume, qx, qy, qz = displaced(make_pose(*STILL), bodies)
     assert volume == pytest.approx(pi * length * (9.0 + 3.0 + 1.0) / 3.0, rel=1e-14)
     share = (9.0 + 2.0 * 3.0 + 3.0) / (4.0 * 13.0)
     centre = np.array([3.0, 1.0, -30.0]) + share * np.array([2.0, 1.0, 8.0])
@@ -244,18 +217,6 @@ def test_no_members_change_nothing():
 # the table over the record
 
 
-def random_waves(kind="jonswap", **fields):
-    state = SeaState(kind=kind, **fields)
-    return build_waves(
-        state,
-        depth=SITE.water_depth,
-        density=SITE.water_density,
-        gravity=SITE.gravity,
-        seed=3,
-        duration=200.0,
-    )
-
-
 @pytest.mark.parametrize(
     "sea, error",
     [
@@ -267,7 +228,7 @@ def random_waves(kind="jonswap", **fields):
 )
 @pytest.mark.parametrize("channels", [VELOCITIES, N_WATER])
 def test_the_table_gives_the_motion_of_the_sum_of_waves(sea, error, channels):
-    waves = random_waves(**sea)
+    waves = waves_of(sea, SITE, seed=3, duration=200.0)
     place = np.array([[3.0, 1.0, -5.0], [-20.0, 25.0, -0.4], [10.0, -7.0, -19.0]])
     series = build_water_series(waves, place, channels, 200.0)
     times = np.random.default_rng(5).uniform(0.0, 200.0, 300)
@@ -281,7 +242,7 @@ def test_the_table_gives_the_motion_of_the_sum_of_waves(sea, error, channels):
 
 
 def test_a_regular_wave_goes_on_beyond_its_table():
-    waves = random_waves("regular", H=4.0, T=7.0)
+    waves = waves_of({"kind": "regular", "H": 4.0, "T": 7.0}, SITE)
     series = build_water_series(waves, np.array([[3.0, 1.0, -5.0]]), VELOCITIES, 200.0)
     water = np.zeros(VELOCITIES)
     interpolate(12345.6, waves.ramp, series, water)
@@ -291,7 +252,7 @@ def test_a_regular_wave_goes_on_beyond_its_table():
 
 def test_components_off_any_lattice_have_no_table():
     omega = [0.5, 0.5 + 1e-5 * pi, 1.0]
-    waves = waves_of([(w, 1.0, 0.0, 0.0) for w in omega])
+    waves = waves_of([(w, 1.0, 0.0, 0.0) for w in omega], SITE)
     place = np.array([[3.0, 1.0, -5.0]])
     assert build_water_series(waves, place, VELOCITIES, 1e5).values.size == 0
     assert no_series().values.size == 0

@@ -1,23 +1,18 @@
-import itertools
-
 import numpy as np
 import pytest
 from naive import morison as naive
 from naive.morison import spar_of
-from naive.rigid_body import rotation
 from plant_helpers import make_pose
+from spar_in_waves import STILL, SWITCHES, motion, nodes_of, strips_of, waves_of
 
-from fowt_env.descriptions.sea_state import SeaState
 from fowt_env.plant.hydro.load import fill_added_mass
 from fowt_env.plant.hydro.morison import Current, morison_load
 from fowt_env.plant.hydro.strip_kinematics import strip_kinematics
-from fowt_env.plant.hydro.strips import GAUSS_OFFSET, axis_surface, build_strips, wet_cell
+from fowt_env.plant.hydro.strips import axis_surface
 from fowt_env.plant.hydro.waves import wave_kinematics
-from fowt_env.weather.waves import build_waves
 
 pytestmark = pytest.mark.installation
 
-SWITCHES = list(itertools.product(("instantaneous", "fixed"), ("instantaneous", "swl"), ("wheeler", "none")))
 # omega, amplitude, phase, heading: from kh = 0.5 (felt at the seabed) to 158 (spent above the keel)
 SEA = [
     (0.09, 0.8, 0.3, 0.0),
@@ -33,46 +28,9 @@ def site(platform):
     return platform.environment
 
 
-def build(platform, position="instantaneous", surface="instantaneous", stretching="wheeler", **options):
-    site = platform.environment
-    return build_strips(
-        platform.hull, platform.hydro, density=site.water_density, depth=site.water_depth,
-        position=position, surface=surface, stretching=stretching, **options,
-    )  # fmt: skip
-
-
-def waves_of(sea, site):
-    omega, amplitude, phase, heading = np.array(sea, dtype=float).T
-    state = SeaState(
-        kind="components", omega=omega, amplitude=amplitude, phase=phase, heading=np.degrees(heading)
-    )
-    return build_waves(
-        state, depth=site.water_depth, density=site.water_density, gravity=site.gravity, seed=0, duration=1.0
-    )
-
-
-def motion(rng, tilt=0.08, heave=0.7):
-    r = rng.normal(size=3) * [9.0, 9.0, heave]
-    R = rotation(*(rng.uniform(-1.0, 1.0, 3) * [tilt, tilt, 3.0]))
-    return r, R, rng.normal(size=3), rng.normal(size=3) * 0.05
-
-
 def load(t, motion, strips, waves, current=None):
     kin = np.zeros((7, strips.nodes))
     return morison_load(t, make_pose(*motion), strips, waves, current, kin)
-
-
-def package_nodes(strips, top):
-    """The package's own nodes below a surface at body z = top, as naive.load takes them."""
-    rows = []
-    for section, bottom in enumerate(strips.section_bottom):
-        start, height = wet_cell(section, top, strips)
-        for cell in range(strips.cells[section]):
-            for offset in (GAUSS_OFFSET, 1.0 - GAUSS_OFFSET):
-                z = start - height * (cell + offset)
-                d = strips.diameter_bottom[section] + strips.diameter_slope[section] * (z - bottom)
-                rows.append((z, 0.5 * height, d, 0.5 * np.pi * d * strips.diameter_slope[section]))
-    return np.array(rows).T
 
 
 def test_no_strips_no_load():
@@ -84,7 +42,7 @@ def test_no_strips_no_load():
 
 @pytest.mark.parametrize("switches", SWITCHES, ids="-".join)
 def test_strip_kinematics_are_the_plain_sum_at_the_nodes(switches, platform, site):
-    strips, waves = build(platform, *switches), waves_of(SEA, site)
+    strips, waves = strips_of(platform, *switches), waves_of(SEA, site)
     rng = np.random.default_rng(1)
     for _ in range(12):
         t, moving = rng.uniform(0.0, 100.0), motion(rng)
@@ -92,7 +50,7 @@ def test_strip_kinematics_are_the_plain_sum_at_the_nodes(switches, platform, sit
         top, eta = axis_surface(t, pose, strips, waves)
         kin = np.zeros((7, strips.nodes))
         keel = strip_kinematics(t, pose, top, eta, strips, waves, kin)
-        z = np.r_[package_nodes(strips, top)[0], strips.keel_z]
+        z = np.r_[nodes_of(strips, top)[0], strips.keel_z]
         r, R = (moving[0], moving[1]) if switches[0] == "instantaneous" else (np.zeros(3), np.eye(3))
         points = r + np.outer(z, R[:, 2])
         if switches[2] == "wheeler":
@@ -106,7 +64,7 @@ def test_strip_kinematics_are_the_plain_sum_at_the_nodes(switches, platform, sit
 
 @pytest.mark.parametrize("switches", SWITCHES, ids="-".join)
 def test_load_is_the_plain_integral_for_any_motion(switches, platform, site):
-    strips, waves, spar = build(platform, *switches), waves_of(SEA, site), spar_of(platform, *switches)
+    strips, waves, spar = strips_of(platform, *switches), waves_of(SEA, site), spar_of(platform, *switches)
     rng = np.random.default_rng(2)
     for _ in range(3):
         t, moving = rng.uniform(0.0, 100.0), motion(rng)
@@ -116,7 +74,7 @@ def test_load_is_the_plain_integral_for_any_motion(switches, platform, site):
             axis_surface(t, make_pose(*moving), strips, waves), (top, eta), rtol=0.0, atol=1e-8
         )
         # at the same nodes: the same sum; at many nodes: what the quadrature costs
-        for at, tolerance in ((package_nodes(strips, top), 1e-8), (None, 1e-5)):
+        for at, tolerance in ((nodes_of(strips, top), 1e-8), (None, 1e-5)):
             F, M, S = naive.load(t, *moving, SEA, spar, at=at)
             wrench = np.array(got.wrench)
             assert np.abs(wrench[:3] - F).max() < tolerance * np.abs(F).max()
@@ -126,7 +84,7 @@ def test_load_is_the_plain_integral_for_any_motion(switches, platform, site):
 
 @pytest.mark.parametrize("with_waves", [False, True])
 def test_load_in_a_current_is_the_plain_integral(with_waves, platform, site):
-    strips, spar = build(platform), spar_of(platform)
+    strips, spar = strips_of(platform), spar_of(platform)
     sea = SEA if with_waves else None
     waves = waves_of(SEA, site) if with_waves else None
     current = Current(0.8, -0.4, 1.0 / 7.0)
@@ -140,7 +98,7 @@ def test_load_in_a_current_is_the_plain_integral(with_waves, platform, site):
         t, moving = rng.uniform(0.0, 100.0), motion(rng)
         got = load(t, moving, strips, waves, current)
         top, _ = naive.surface_on_axis(t, moving[0], moving[1], sea, spar)
-        at = package_nodes(strips, top)
+        at = nodes_of(strips, top)
         F, M, _ = naive.load(t, *moving, sea, spar, current=profile, at=at)
         assert np.abs(np.array(got.wrench) - np.r_[F, M]).max() < 1e-8 * np.abs(np.r_[F, M]).max()
 
@@ -150,16 +108,15 @@ def test_drag_quadrature_converges(platform, site):
     rng = np.random.default_rng(4)
     for _ in range(10):
         t, moving = rng.uniform(0.0, 10.0), motion(rng)
-        coarse, fine, finest = (
-            np.array(load(t, moving, build(platform, cell=cell), waves).wrench) for cell in (4.0, 2.0, 0.25)
-        )
+        loads = [load(t, moving, strips_of(platform, cell=cell), waves) for cell in (4.0, 2.0, 0.25)]
+        coarse, fine, finest = (np.array(found.wrench) for found in loads)
         assert np.abs(fine - finest).max() < 1e-4 * np.abs(finest).max()
         assert np.abs(coarse - finest).max() < 1e-3 * np.abs(finest).max()
 
 
 def test_load_is_continuous_in_time(platform, site):
     # a sum that drops spent components must do so without a step
-    strips, waves = build(platform), waves_of(SEA, site)
+    strips, waves = strips_of(platform), waves_of(SEA, site)
     r, R, v, w = motion(np.random.default_rng(5))
     times = 10.0 + 1e-6 * np.arange(400)
     wrenches = np.array([load(t, (r, R, v, w), strips, waves).wrench for t in times])
@@ -168,8 +125,7 @@ def test_load_is_continuous_in_time(platform, site):
 
 
 def test_added_mass_has_the_published_entries(platform):
-    still = (np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
-    got = load(0.0, still, build(platform), None)
+    got = load(0.0, STILL, strips_of(platform), None)
     assert got.s0 == pytest.approx(7.9827e6, rel=1e-4)
     assert got.s1 == pytest.approx(-4.954e8, rel=2e-4)
     assert got.s2 == pytest.approx(3.973e10, rel=2e-4)
@@ -177,8 +133,7 @@ def test_added_mass_has_the_published_entries(platform):
 
 
 def test_the_matrix_of_the_added_mass_is_that_of_slices_that_take_water_across_the_axis_along(platform):
-    still = (np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
-    got = load(0.0, still, build(platform), None)
+    got = load(0.0, STILL, strips_of(platform), None)
     matrix, expected = np.ones((6, 6)), np.diag([0.0, 0.0, got.a33, 0.0, 0.0, 0.0])
     fill_added_mass(got, matrix)
     centre = got.s1 / got.s0
@@ -190,7 +145,7 @@ def test_the_matrix_of_the_added_mass_is_that_of_slices_that_take_water_across_t
 
 
 def test_no_waves_equals_waves_of_no_height(platform, site):
-    strips, waves = build(platform), waves_of(SEA, site)
+    strips, waves = strips_of(platform), waves_of(SEA, site)
     flat = waves._replace(amplitude=0.0 * waves.amplitude, velocity=0.0 * waves.velocity)
     rng = np.random.default_rng(6)
     for _ in range(20):
@@ -203,7 +158,7 @@ def test_no_waves_equals_waves_of_no_height(platform, site):
 
 def test_drag_vanishes_when_water_moves_with_the_hull(platform):
     # a uniform current and a hull that drifts with it, upright or heeled, no added-mass terms
-    strips = build(platform)
+    strips = strips_of(platform)
     rng = np.random.default_rng(7)
     for _ in range(10):
         r, R, _, _ = motion(rng)
@@ -212,19 +167,9 @@ def test_drag_vanishes_when_water_moves_with_the_hull(platform):
         assert np.abs(np.array(got.wrench)).max() < 1e-9
 
 
-def test_only_the_velocity_relative_to_the_current_matters(platform):
-    strips = build(platform)
-    r, R, v, _ = motion(np.random.default_rng(8))
-    stream = np.array([0.9, -0.3, 0.0])
-    moving = load(0.0, (r, R, v, np.zeros(3)), strips, None)
-    drifting = load(0.0, (r, R, v + R.T @ stream, np.zeros(3)), strips, None, Current(0.9, -0.3, 0.0))
-    assert np.allclose(moving.wrench, drifting.wrench, rtol=1e-12, atol=1e-6)
-
-
 def test_current_on_an_upright_spar_is_its_drag_integral(platform, site):
-    strips = build(platform)
-    still = (np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
-    got = load(0.0, still, strips, None, Current(1.0, 0.0, 0.0))
+    strips = strips_of(platform)
+    got = load(0.0, STILL, strips, None, Current(1.0, 0.0, 0.0))
     area = 108.0 * 9.4 + 8.0 * (9.4 + 6.5) / 2.0 + 4.0 * 6.5
     expected = 0.5 * site.water_density * platform.hydro.drag_coefficient * area
     assert got.wrench.fx == pytest.approx(expected, rel=1e-12)
@@ -232,12 +177,12 @@ def test_current_on_an_upright_spar_is_its_drag_integral(platform, site):
     z, weight, d, _ = naive.nodes(spar_of(platform), 0.0)
     quadratic = 0.5 * site.water_density * platform.hydro.drag_coefficient
     expected = quadratic * np.sum(weight * d * (1.0 + z / site.water_depth) ** 2)
-    sheared = load(0.0, still, strips, None, Current(1.0, 0.0, 1.0))
+    sheared = load(0.0, STILL, strips, None, Current(1.0, 0.0, 1.0))
     assert sheared.wrench.fx == pytest.approx(expected, rel=1e-6)
 
 
 def test_drag_takes_energy_in_still_water_whatever_the_motion(platform):
-    strips = build(platform)._replace(
+    strips = strips_of(platform)._replace(
         added_mass_coefficient=0.0, heave_added_mass=0.0, axial_drag_coefficient=1.5
     )
     rng = np.random.default_rng(9)
@@ -248,7 +193,7 @@ def test_drag_takes_energy_in_still_water_whatever_the_motion(platform):
 
 
 def test_axial_drag_slows_heave(platform, site):
-    strips = build(platform)._replace(axial_drag_coefficient=2.0)
+    strips = strips_of(platform)._replace(axial_drag_coefficient=2.0)
     area = np.pi / 4.0 * 9.4**2
     for speed in (0.5, -0.5):
         got = load(0.0, (np.zeros(3), np.eye(3), np.array([0.0, 0.0, speed]), np.zeros(3)), strips, None)
@@ -259,7 +204,7 @@ def test_axial_drag_slows_heave(platform, site):
 def test_still_water_power_of_the_inertia_terms_is_third_order(platform):
     # relative Morison is not a conservative added mass: its residual power is the Munk-type
     # integral of rho A C_A u_z (u_x w_y - u_y w_x), theory.md 5.4
-    strips = build(platform)._replace(drag_coefficient=0.0)
+    strips = strips_of(platform)._replace(drag_coefficient=0.0)
     spar = spar_of(platform)
     rng = np.random.default_rng(10)
     for _ in range(20):
@@ -278,31 +223,14 @@ def test_still_water_power_of_the_inertia_terms_is_third_order(platform):
         assert tenth @ np.r_[0.1 * v, 0.1 * w] == pytest.approx(1e-3 * munk, rel=1e-4, abs=1e-6)
 
 
-def test_waves_from_the_mirror_side_give_the_mirrored_load(platform, site):
-    strips = build(platform)
-    mirrored = [(om, a, e, -heading) for om, a, e, heading in SEA]
-    rng = np.random.default_rng(11)
-    flip = np.array([1, -1, 1, -1, 1, -1])
-    for _ in range(10):
-        r, R, v, w = motion(rng)
-        here = load(4.0, (r, R, v, w), strips, waves_of(SEA, site), Current(0.3, 0.5, 0.2))
-        D = np.diag(flip[:3])
-        there = load(
-            4.0, (D @ r, D @ R @ D, D @ v, -D @ w), strips, waves_of(mirrored, site), Current(0.3, -0.5, 0.2)
-        )
-        scale = np.abs(np.array(here.wrench)).max()
-        assert np.abs(np.array(there.wrench) - flip * np.array(here.wrench)).max() < 1e-12 * scale
-
-
 def test_fixed_spar_has_the_force_amplitudes_of_linear_theory(platform, site):
     # H = 3 m, T = 5 s, integrals to still water; OpenFAST's strips on the same spar
     openfast = {0: 1290.35e3, 4: 10264.2e3, 2: 155.21e3}
-    strips = build(platform, "fixed", "swl", "none")._replace(heave_added_mass=0.0)
+    strips = strips_of(platform, "fixed", "swl", "none")._replace(heave_added_mass=0.0)
     omega, height = 2.0 * np.pi / 5.0, 1.5
     waves = waves_of([(omega, height, 0.0, 0.0)], site)
-    still = (np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
     times = np.arange(200) * 5.0 / 200
-    wrench = np.array([load(t, still, strips, waves).wrench for t in times])
+    wrench = np.array([load(t, STILL, strips, waves).wrench for t in times])
     amplitude = 2.0 * np.abs(np.exp(-1j * omega * times) @ wrench) / times.size
     for i, expected in openfast.items():
         assert amplitude[i] == pytest.approx(expected, rel=2e-3)
@@ -317,7 +245,7 @@ def test_fixed_spar_has_the_force_amplitudes_of_linear_theory(platform, site):
 
 
 def test_load_does_not_depend_on_what_the_scratch_held(platform, site):
-    strips, waves = build(platform), waves_of(SEA, site)
+    strips, waves = strips_of(platform), waves_of(SEA, site)
     moving = make_pose(*motion(np.random.default_rng(12)))
     clean, dirty = np.zeros((7, strips.nodes)), np.full((7, strips.nodes), 1e30)
     assert morison_load(2.0, moving, strips, waves, None, clean) == morison_load(

@@ -154,6 +154,7 @@ def test_a_stopped_run_gives_its_reason_and_its_rows(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_compiling_is_announced_once_and_only_when_it_happens(tmp_path):
     code = "from fowt_env.training.cli.app import main; main()"
     arguments = ["simulate", "--duration", "1", "--wind", "none", "--controller", "none"]

@@ -184,6 +184,7 @@ class Slow:
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_an_evaluation_whose_ray_worker_is_killed_has_the_bits_of_one_that_was_not(cluster, tmp_path):
     mark = tmp_path / "process"
 

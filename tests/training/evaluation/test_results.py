@@ -296,7 +296,8 @@ def test_an_evaluation_that_was_killed_goes_on_where_it_was(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("jobs", [pytest.param(1, marks=pytest.mark.nightly), 2])
+@pytest.mark.nightly
+@pytest.mark.parametrize("jobs", [1, 2])
 def test_kills_at_random_moments_lose_and_repeat_nothing(tmp_path, jobs):
     rng = random.Random(jobs)
     delays = [rng.uniform(0.0, 0.4) for _ in range(5)]

@@ -19,6 +19,11 @@ from fowt_env.training.studies.paper import report as paper_report
 TABLE_1 = {"surge": 10.24, "sway": 10.24, "heave": 3.66, "roll": 4.27, "platform_pitch": 4.27, "yaw": 3.15}
 
 
+def study(test):
+    """Leave a claim of the paper to the nightly tests: it needs runs of all load cases."""
+    return pytest.mark.slow(pytest.mark.nightly(test))
+
+
 @pytest.fixture(scope="module")
 def model():
     return read_platform(load_cases.PLATFORM)
@@ -128,20 +133,24 @@ def test_a_static_pull_is_zero_at_rest_and_grows_with_the_offset(platform, direc
 # Claims of the figures
 
 
+@study
 def test_every_load_case_runs_and_stays_finite(runs):
     for frame in runs.values():
         assert len(frame) == round(load_cases.DURATION / load_cases.OUTPUT) + 1
         assert np.isfinite(frame.to_numpy()).all()
 
 
+@study
 def test_fig_6_surge_is_nearly_steady_in_wind_below_rated(runs, natural):
     assert verdicts(runs, natural)["LC1: surge is nearly steady"]
 
 
+@study
 def test_fig_7_surge_peaks_at_the_pitch_frequency_at_rated(runs, natural):
     assert verdicts(runs, natural)["LC2: surge spectrum peaks at the pitch frequency"]
 
 
+@study
 def test_fig_8_mean_pitch_is_largest_at_rated_and_falls_above(runs, natural):
     found = verdicts(runs, natural)
     assert found["mean pitch is largest at rated wind (LC2)"]
@@ -149,11 +158,13 @@ def test_fig_8_mean_pitch_is_largest_at_rated_and_falls_above(runs, natural):
 
 
 @pytest.mark.parametrize("where", ["surge", "pitch", "wave", "twice the wave"])
+@study
 def test_fig_9_surge_in_a_regular_wave_peaks_at(where, runs, natural):
     text = f"{where} frequency" if where.startswith("twice") else f"the {where} frequency"
     assert verdicts(runs, natural)[f"LC5: surge spectrum peaks at {text}"]
 
 
+@study
 def test_fig_10_waves_set_the_range_and_leave_the_mean(runs, natural):
     found = verdicts(runs, natural)
     assert found["LC5 to LC8: the range grows with the waves"]
@@ -161,16 +172,19 @@ def test_fig_10_waves_set_the_range_and_leave_the_mean(runs, natural):
 
 
 @pytest.mark.parametrize("where", ["pitch", "wave"])
+@study
 def test_fig_11_pitch_in_wind_and_waves_peaks_at(where, runs, natural):
     assert verdicts(runs, natural)[f"LC11: pitch spectrum peaks at the {where} frequency"]
 
 
+@study
 def test_fig_12_wind_sets_the_mean_and_waves_the_range(runs, natural):
     found = verdicts(runs, natural)
     assert found["LC9 to LC12: wind sets the mean"]
     assert found["LC10 to LC12: waves set the range"]
 
 
+@study
 def test_the_judge_sees_no_double_frequency_where_waves_act_at_rest(natural):
     # fixed position and still-water integration leave 0.05 % at twice the frequency
     frame = load_cases.run_load_case("LC5", kinematics_position="fixed", surface="swl", stretching="none")
@@ -179,11 +193,13 @@ def test_the_judge_sees_no_double_frequency_where_waves_act_at_rest(natural):
     assert not found["LC5: surge spectrum peaks at twice the wave frequency"]
 
 
+@study
 def test_the_judge_sees_no_peaks_of_the_other_case(runs, natural):
     found = verdicts({"LC11": runs["LC3"]}, natural)  # wind alone
     assert not found["LC11: pitch spectrum peaks at the wave frequency"]
 
 
+@study
 def test_the_pitch_peak_of_a_regular_wave_is_its_start(runs, natural):
     late = load_cases.settled(runs["LC5"], 300.0)
     late = late.assign(**{load_cases.TIME: late[load_cases.TIME] - 300.0})
@@ -221,6 +237,7 @@ def test_the_command_writes_series_statistics_and_claims(tmp_path):
     assert "| 9 |" in (tmp_path / "paper.md").read_text()
 
 
+@study
 def test_plots_of_a_few_cases_are_made(runs, natural, tmp_path):
     few = {name: runs[name] for name in ("LC1", "LC5")}
     for name, make in {

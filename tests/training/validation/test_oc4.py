@@ -35,6 +35,7 @@ def test_heave_of_a_hull_with_heave_plates_decays_as_with_openfasts_members():
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_decays_with_members_are_openfasts():
     study = Study(platform=oc4.PLATFORM, cases=oc4.RUNS)
     oc4.decays(study)
@@ -46,6 +47,7 @@ def test_decays_with_members_are_openfasts():
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_the_first_waves_move_a_hull_with_members_as_in_openfast():
     """Within 3 % of the deviation, where the whole record below is within 1.6 %."""
     run = replace(oc4.RUNS["waves_Hs7.5"], duration=100.0)

@@ -265,6 +265,7 @@ def test_rest_decays_and_the_regular_wave_meet_every_figure():
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_a_tower_that_bends_rings_and_loads_its_base_as_openfast_s():
     rows = judged("tower")
     assert {row.allowed for row in rows if "frequency" in row.quantity} == {1.0}
@@ -296,6 +297,7 @@ def test_rotor_loads_in_steady_wind_miss_small_hub_moments_alone():
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_blades_one_by_one_miss_with_the_look_up_alone_what_a_skewed_wake_makes():
     """Every figure is met by bem, which has that wake; the look-up has the loads of bem without it."""
     known = ("RootMyc1, first", "RootMyc2, first", "RootMyc3, first", "YawBrMzp, mean", "TwrBsMxt, mean")
@@ -307,6 +309,7 @@ def test_blades_one_by_one_miss_with_the_look_up_alone_what_a_skewed_wake_makes(
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_floating_under_rosco_misses_the_deviation_of_heave_at_12_mps_alone():
     if without_rosco():
         pytest.skip(without_rosco())
@@ -321,5 +324,6 @@ def test_linear_models_miss_the_damping_of_heave_alone():
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_states_of_the_radiation_memory_stay_within_1_percent_of_convolution():
     assert len(judged("memory")) == 6
