@@ -121,7 +121,8 @@ def test_a_trip_that_ends_the_run_terminates_the_episode_with_its_name():
     while not ended:
         _, reward, ended, truncated, info = env.step([0.0, -1.0])
         assert not truncated
-    assert info["termination"] == "overspeed (above the limit that ends the run)" and info["trip"] == "overspeed"
+    assert info["termination"] == "overspeed (above the limit that ends the run)"
+    assert info["trip"] == "overspeed"
     assert info["tripped"] == info["time"] == pytest.approx(0.1 * len(env.frame()))
     assert reward < -50.0 and info["reward/failure"] < 0.0
 
@@ -190,7 +191,7 @@ def test_copies_snapshots_and_batches_keep_trips_faults_and_lidar():
     settings = {"task": Task(name="ahead", wind=LIDAR["wind"], duration=20.0, wind_preview=LEADS,
                              observation=("rotor_speed", "wind_preview")),
                 "fidelity": "fast", "preview": "four_beam_pulsed", "protection": "turbine",
-                "faults": [RUNAWAY | {"time": (0.5, 6.0)}], "sensors": "standard"}  # fmt: skip
+                "faults": [RUNAWAY | {"time": (0.5, 6.0)}], "sensors": "standard", "record": True}  # fmt: skip
     env = FowtEnv(**settings)
     env.reset(seed=5)
     rng = np.random.default_rng(1)
