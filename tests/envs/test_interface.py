@@ -191,7 +191,8 @@ def test_copies_snapshots_and_batches_keep_trips_faults_and_lidar():
     settings = {"task": Task(name="ahead", wind=LIDAR["wind"], duration=20.0, wind_preview=LEADS,
                              observation=("rotor_speed", "wind_preview")),
                 "fidelity": "fast", "preview": "four_beam_pulsed", "protection": "turbine",
-                "faults": [RUNAWAY | {"time": (0.5, 6.0)}], "sensors": "standard", "record": True}  # fmt: skip
+                "faults": [RUNAWAY | {"time": (0.5, 6.0)}], "sensors": "standard",
+                "record": True}  # fmt: skip
     env = FowtEnv(**settings)
     env.reset(seed=5)
     rng = np.random.default_rng(1)
