@@ -7,7 +7,7 @@ would have given way, the rotor now slows and speeds up with the platform; the t
 of that.
 
 The fed-back signal passes a first-order high pass, since a mean motion needs no damping, and two equal
-first-order low passes, which leave out most of the waves. The blade-pitch part fades in over the first
+first-order low passes, which omit most of the waves. The blade-pitch part fades in over the first
 degree (the region-3 pitch) of what the PI law asks for, so that nothing is fed back below rated.
 """
 
@@ -45,7 +45,7 @@ class FeedbackSettings:
     """What is fed back and how. Raises: InputError naming the key, value and allowed range.
 
     The controller of that name takes what `fowt design tune` found; controllers/tuned.toml has it with its
-    figures.
+    values.
     """
 
     signal: str = "nacelle_velocity"
@@ -86,7 +86,7 @@ class FeedbackMemory(IntEnum):
 
 @kernel
 def band_passed(signal, parameters, memory):
-    """The signal after high pass and low passes; advances them by one period."""
+    """Return the signal after high pass and low passes; advances them by one period."""
     decay = parameters[FeedbackParameter.HIGH_DECAY]
     slow = (1.0 - decay) * signal + decay * memory[FeedbackMemory.SLOW]
     memory[FeedbackMemory.SLOW] = slow

@@ -60,7 +60,7 @@ class PowerSlope(NamedTuple):
 
 
 def gains(design_frequency, damping, inertia, rated_speed, gear_ratio, dP_dpitch):
-    """Gains that give the rotor-speed loop this frequency (rad/s) and damping ratio at zero pitch.
+    """Return the gains that give the rotor-speed loop this frequency (rad/s) and damping ratio at zero pitch.
 
     inertia: I_D about the low-speed shaft, kg m2; rated_speed: w_b0 of the rotor, rad/s; dP_dpitch:
     slope of the aerodynamic power at rated speed, W/rad, negative. theory.md, section 4.
@@ -84,9 +84,9 @@ _SLOPES = Cache(16)  # (id of the turbine, density) -> (turbine, PowerSlope)
 
 
 def power_slope(turbine, density=AIR):
-    """PowerSlope of a turbine's rotor in uniform steady wind, from its blade elements.
+    """Return the PowerSlope of a turbine's rotor in uniform steady wind, from its blade elements.
 
-    Raises: InputError where the rotor cannot reach rated torque below cut-out, or does not lose power by
+    Raises: InputError if the rotor cannot reach rated torque below cut-out, or does not lose power by
     pitching there.
     """
     found = _SLOPES.get((id(turbine), float(density)), lambda: (turbine, _power_slope(turbine, density)))
@@ -144,7 +144,7 @@ def _power_slope(turbine, density):
 
 
 def land_frequency(turbine):
-    """w0 (rad/s) of the land set of a turbine without published gains."""
+    """Return w0 (rad/s) of the land set of a turbine without published gains."""
     return LAND * turbine.rated_rotor_speed / REFERENCE_SPEED
 
 
@@ -158,7 +158,7 @@ def derived_gains(turbine, frequency, damping=DAMPING, density=AIR):
 
 
 def published_set(turbine, gain_set):
-    """PitchGains of a turbine's file by name; None where it has none, and they are to be derived.
+    """Return the PitchGains of a turbine's file by name; None where it has none, and they are to be derived.
 
     gain_set: a name in the file, or one of SETS or OTHER_NAMES, of which "floating" and "oc3" are the same.
     Raises: InputError for any other name.
@@ -173,7 +173,7 @@ def published_set(turbine, gain_set):
 
 
 def gains_of_turbine(turbine, gain_set="oc3"):
-    """PitchGains of a set: the published ones, else those of the rotor with no platform known.
+    """Return the PitchGains of a set: the published ones, else those of the rotor with no platform known.
 
     Of a floating set without published gains the frequency is FLOATING over the rated rotor speeds; of_scene
     gives that of a platform.
@@ -189,15 +189,15 @@ _MODES = Cache(64)  # (plant, water) -> eigenvalues, shares
 
 
 def platform_pitch_frequency(scene):
-    """platform_frequency of the platform's pitch."""
+    """Return platform_frequency of the platform's pitch."""
     return platform_frequency(scene, State.PLATFORM_PITCH)
 
 
 def platform_frequency(scene, motion):
-    """Undamped natural frequency (rad/s) of a platform motion about a scene's trim in rated wind.
+    """Return the undamped natural frequency (rad/s) of a platform motion about a scene's trim in rated wind.
 
     motion: State.SURGE ... State.YAW; the frequency is that of the mode in which it has the greatest share.
-    From the accelerations that small displacements give, with a tower that bends where it comes to rest under
+    From the accelerations that small displacements give, with a flexible tower where it comes to rest under
     them; whatever else has states of its own (a wake, the memory of radiated waves) is held. Remembered per
     plant.
     Raises: InputError as trim, and where nothing restores the motion.
@@ -250,7 +250,7 @@ def _modes(scene):
 
 
 def floating_frequency(scene):
-    """w0 (rad/s) of the floating set for the platform of a scene."""
+    """Return w0 (rad/s) of the floating set for the platform of a scene."""
     return min(DETUNED * platform_pitch_frequency(scene), land_frequency(scene.turbine))
 
 
@@ -258,7 +258,7 @@ _TURBINES = Cache(64)  # (id of the turbine, plant, water) -> (turbine, the one 
 
 
 def with_gains(scene):
-    """The scene's turbine with gains for its platform: itself where its file has both sets.
+    """Return the scene's turbine with gains for its platform: itself where its file has both sets.
 
     What the file lacks of SETS is added: "floating" and "land" of the published formula.
     """

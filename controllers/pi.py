@@ -124,7 +124,7 @@ class PISettings:
         return replace(self, derived="", **changes)
 
     def parameters(self, control_dt):
-        """(n,) parameter array of the law at this control period, in the order of Parameter."""
+        """Return (n,) parameter array of the law at this control period, in the order of Parameter."""
         filtered = not isinf(self.speed_filter_corner)
         head = {
             Parameter.CONTROL_DT: control_dt,
@@ -149,7 +149,7 @@ class PISettings:
 
 @kernel
 def curve_of(parameters):
-    """TorqueCurve stored in a parameter array from Parameter.CURVE on."""
+    """Return the TorqueCurve stored in a parameter array from Parameter.CURVE on."""
     i = Parameter.CURVE
     return TorqueCurve(
         parameters[i],
@@ -175,7 +175,7 @@ def schedule_gain(blade_pitch, schedule_pitch):
 
 @kernel
 def schedule_pitch_of(parameters, memory, measured_pitch):
-    """Blade pitch that sets the gain and the torque region: the last command or the measured one."""
+    """Return blade pitch that sets the gain and the torque region: the last command or the measured one."""
     if parameters[Parameter.SCHEDULE_MEASURED] > 0.5:
         low, high = parameters[Parameter.PITCH_MINIMUM], parameters[Parameter.PITCH_MAXIMUM]
         return clamp(measured_pitch, low, high)
@@ -184,7 +184,7 @@ def schedule_pitch_of(parameters, memory, measured_pitch):
 
 @kernel
 def speed_error(parameters, memory, generator_speed):
-    """Error e = w_f - w_b0 of the filtered rotor speed, rad/s; advances the filter by one period.
+    """Return the error e = w_f - w_b0 of the filtered rotor speed, rad/s; advances the filter by one period.
 
     The filter is a single pole held exactly over the period (exponential smoothing).
     """
@@ -261,7 +261,7 @@ class GainScheduled(CompiledController):
 
     @property
     def information(self):
-        """What the law is given; the plant's equations too, where its gains are derived from them."""
+        """Return what the law is given; the plant's equations too, where its gains are derived from them."""
         if self.settings.derived and "plant_model" not in self.inputs:
             return (*self.inputs, "plant_model")
         return self.inputs

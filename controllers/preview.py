@@ -69,7 +69,7 @@ class PreviewMemory(IntEnum):
 
 @kernel
 def scheduled_pitch(wind, parameters):
-    """Blade pitch (rad) times GAIN of the steady schedule at a wind (m/s); its ends are held."""
+    """Return the blade pitch (rad) times GAIN of the steady schedule at a wind (m/s); its ends are held."""
     first, last = PreviewParameter.WIND, PreviewParameter.PITCH - 1
     gain, pitch = parameters[PreviewParameter.GAIN], PreviewParameter.PITCH - PreviewParameter.WIND
     if wind <= parameters[first]:

@@ -31,7 +31,7 @@ class LiteralMemory(IntEnum):
 
 @kernel
 def literal_gain(time, parameters):
-    """Gain of the printed law, rad per rad/s of rotor speed: G (1 + t/tau_i), without the schedule."""
+    """Return gain of the printed law, rad per rad/s of rotor speed: G (1 + t/tau_i), without the schedule."""
     return parameters[Parameter.PROPORTIONAL] + parameters[Parameter.INTEGRAL] * time
 
 

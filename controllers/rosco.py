@@ -121,7 +121,7 @@ class Discon:
 
     @property
     def mode(self):
-        """Fl_Mode, which says what acceleration the library is given."""
+        """Return the Fl_Mode, which says what acceleration the library is given."""
         return int(self.values["Fl_Mode"])
 
     def texts(self, changes, table):
@@ -147,7 +147,7 @@ class Discon:
 
 
 def find_library():
-    """(path of libdiscon, [paths of the libraries that it needs]) of the installed wheel.
+    """Return (path of libdiscon, [paths of the libraries that it needs]) of the installed wheel.
 
     Raises: InputError with what to install.
     """
@@ -163,7 +163,7 @@ def find_library():
 
 
 def _load(path):
-    """The library at a path. Raises: InputError saying what is wrong with it."""
+    """Return the library at a path. Raises: InputError saying what is wrong with it."""
     try:
         library = ctypes.CDLL(str(path))
         library.DISCON.argtypes = [ctypes.c_void_p, ctypes.c_void_p, *[ctypes.c_char_p] * 3]
@@ -186,7 +186,7 @@ def _preload(paths):
 
 
 def _flush():
-    """Function that writes out what the Fortran library has buffered for standard output."""
+    """Return the function that writes out what the Fortran library has buffered for standard output."""
     for library in _needed:
         if hasattr(library, "_gfortran_flush_i4"):
             return library._gfortran_flush_i4
@@ -260,8 +260,8 @@ class Rosco:
     def reset(self, measurement):
         """Load a fresh copy of the library and start it at a Measurement.
 
-        Raises: InputError where prepare() was not called or the library does not load; ControllerError with
-        ROSCO's own words where it refuses to start.
+        Raises: InputError if prepare() was not called or the library does not load; ControllerError with
+        the message of ROSCO if it does not start.
         """
         if self._files is None:
             raise InputError(f"controller {self.name!r}: call prepare(scene) before reset(measurement)")
@@ -272,7 +272,7 @@ class Rosco:
         self._first = (measurement.time, self._call(0, measurement))
 
     def act(self, measurement):
-        """(generator torque, blade pitch or that of each blade).
+        """Return (generator torque, blade pitch or that of each blade).
 
         Raises: ControllerError with ROSCO's own words where it fails.
         """
@@ -399,7 +399,7 @@ _tables = Cache(16)  # (id of the turbine, density) -> (turbine, Table): runs of
 
 
 def _table(turbine, density):
-    """Table of a turbine's blade elements."""
+    """Return the table of a turbine's blade elements."""
     key = (id(turbine), density)
 
     def make():
@@ -410,7 +410,7 @@ def _table(turbine, density):
 
 
 def poles(turbine, density, table):
-    """(wind m/s, pole 1/s) of the rotor speed alone at its steady states, from cut-in to cut-out."""
+    """Return (wind m/s, pole 1/s) of the rotor speed alone at its steady states, from cut-in to cut-out."""
     radius = turbine.rotor.tip_radius
     scale = 0.5 * density * pi * radius**3
     inertia = _inertia(turbine)
@@ -431,7 +431,7 @@ def poles(turbine, density, table):
 
 
 def best_ratio(turbine, table):
-    """Tip-speed ratio of most power at the finest blade pitch."""
+    """Return the tip-speed ratio of most power at the finest blade pitch."""
     power = RectBivariateSpline(table.ratio, table.blade_pitch, table.cp)
     fine = np.linspace(table.ratio[0], table.ratio[-1], 2000)
     return float(fine[np.argmax(power(fine, turbine.pitch_drive.minimum)[:, 0])])
@@ -446,7 +446,7 @@ def _inertia(turbine):
 def pitch_gains(turbine, gain_set="oc3"):
     """(KP, KI), each (n,), over SCHEDULE in ROSCO's sign: blade pitch over reference less measured speed.
 
-    Raises: InputError where a proportional gain would not be negative.
+    Raises: InputError if a proportional gain would not be negative.
     """
     published = published_set(turbine, gain_set)
     schedule = 1.0 / (1.0 + SCHEDULE / published.gain_schedule_pitch)
@@ -457,7 +457,7 @@ def pitch_gains(turbine, gain_set="oc3"):
 
 
 def deck(turbine, density, table, settings):
-    """{name: value} of DISCON.IN for a turbine; values are numbers, texts or sequences of numbers."""
+    """Return {name: value} of DISCON.IN for a turbine; values are numbers, texts or sequences of numbers."""
     law, drive, ratio = turbine.torque_law, turbine.pitch_drive, turbine.drivetrain.gear_ratio
     inertia, radius = _inertia(turbine), turbine.rotor.tip_radius
     winds, pole = poles(turbine, density, table)
@@ -555,7 +555,7 @@ def individual_entries(turbine, control_dt):
 
 
 def _words(value):
-    """Text of a value of the deck."""
+    """Return the text of a value of the deck."""
     if isinstance(value, str):
         return value
     if isinstance(value, int):
@@ -564,13 +564,13 @@ def _words(value):
 
 
 def deck_text(values):
-    """DISCON.IN of a deck: a value and its name on each line."""
+    """Return DISCON.IN of a deck: a value and its name on each line."""
     lines = ["! ROSCO deck, written for one run"]
     return "\n".join([*lines, *(f"{_words(value)}   ! {name} -" for name, value in values.items()), ""])
 
 
 def table_text(table):
-    """Text of a Table as ROSCO reads it."""
+    """Return the text of a Table as ROSCO reads it."""
     lines = ["# Rotor performance", "#", "#", "# Pitch angle vector (deg)"]
     lines += [_words(table.blade_pitch / DEGREE), "# TSR vector", _words(table.ratio)]
     lines += ["# Wind speed vector", "0", ""]

@@ -14,7 +14,7 @@ TUNED = Path(__file__).parent / "tuned.toml"
 
 
 def tuned_for(name: str, turbine: Any) -> dict[str, Any]:
-    """The settings of a controller in the units of a turbine; as they are for the NREL 5 MW turbine."""
+    """Return settings of a controller in the units of a turbine; as they are for the NREL 5 MW turbine."""
     wind = turbine.rated_wind_speed / RATED_WIND
     frequency = turbine.rated_rotor_speed / ROTOR_SPEED
     factors = {
@@ -28,5 +28,5 @@ def tuned_for(name: str, turbine: Any) -> dict[str, Any]:
 
 
 def tuned(name: str) -> dict[str, Any]:
-    """{setting: value} of a controller that `fowt design tune` has tuned."""
+    """Return {setting: value} of a controller that `fowt design tune` has tuned."""
     return tomllib.loads(TUNED.read_text())[name]["settings"]

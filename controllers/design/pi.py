@@ -1,7 +1,7 @@
 """PI gains and gain schedule from a specified frequency and damping ratio, on linear models over the wind.
 
 The rotor alone, as in the published design (theory.md, Eq. (A6)): its acceleration per blade pitch is taken
-from each linear model, the aerodynamic damping of its speed is left out. What the platform makes of the
+from each linear model, the aerodynamic damping of its speed is omitted. What the platform makes of the
 gains is computed afterwards from the whole plant.
 """
 
@@ -80,7 +80,7 @@ def design_pi(models, turbine, omega, zeta, schedule="loop"):
 
 
 def _platform_damping(model, settings):
-    """Damping ratio of the platform-pitch mode of the whole plant under a PI law."""
+    """Return the damping ratio of the platform-pitch mode of the whole plant under a PI law."""
     a, names = closed_loop_matrix(model, settings)
     found = modes(a, names, model.cm_height, model.arm)
     pitching = [mode for mode in found if mode.name == "platform_pitch"]

@@ -41,7 +41,7 @@ from fowt_env.plant.drivetrain import TorqueCurve, clamp, rate_limit
 from fowt_env.plant.measurement import N_MEASUREMENTS, BladeMeasure, Measure
 from fowt_env.plant.state import BLADES, Command, State
 
-TILT_NOTCHES = 3  # at most, beside that at 3P
+TILT_NOTCHES = 3  # at most, in addition at 3P
 COEFFICIENTS = 5  # of a notch: b0, b1, b2, a1, a2
 NYQUIST_SHARE = 0.9  # of half the sampling frequency, beyond which no notch is placed
 BELOW_PLATFORM = 0.25  # of the slowest platform frequency: corner of the yaw moment of ipc_floating
@@ -113,7 +113,7 @@ N_MEMORY = CyclicMemory.FILTERS + 2 * (2 + TILT_NOTCHES)
 
 @kernel
 def notch_coefficients(frequency, damping, dt):
-    """(b0, b1, b2, a1, a2) of (s^2 + w^2)/(s^2 + 2 damping w s + w^2) at w = frequency, rad/s.
+    """Return (b0, b1, b2, a1, a2) of (s^2 + w^2)/(s^2 + 2 damping w s + w^2) at w = frequency, rad/s.
 
     Bilinear, exact at w.
     """
@@ -125,7 +125,7 @@ def notch_coefficients(frequency, damping, dt):
 
 @kernel
 def filtered(value, coefficients, memory, at, started):
-    """Output of a second-order filter; advances its two states in memory by one period.
+    """Return the output of a second-order filter; advances its two states in memory by one period.
 
     Where it has not started it rests at this value.
     """
@@ -141,7 +141,7 @@ def filtered(value, coefficients, memory, at, started):
 
 @kernel
 def without_platform(tilt, yaw, parameters, memory, started):
-    """(tilt, yaw) moment (N m) without what the platform is left alone with."""
+    """Return (tilt, yaw) moment (N m) without what the platform is left alone with."""
     for k in range(TILT_NOTCHES):
         i = CyclicParameter.NOTCHES + k * COEFFICIENTS
         c = parameters[i], parameters[i + 1], parameters[i + 2], parameters[i + 3], parameters[i + 4]
@@ -154,14 +154,14 @@ def without_platform(tilt, yaw, parameters, memory, started):
 
 @kernel
 def share_beyond(tilt, yaw, bound):
-    """Share of a moment (N m) by which its magnitude exceeds the bound; 0 within it."""
+    """Return the fraction of a moment (N m) by which its magnitude exceeds the bound; 0 within it."""
     magnitude = hypot(tilt, yaw)
     return 0.0 if magnitude <= bound else 1.0 - bound / magnitude
 
 
 @kernel
 def greatest_amplitude(mean_pitch, rotor_speed, parameters):
-    """Greatest cyclic pitch (rad) at a mean pitch (rad) and rotor speed, rad/s."""
+    """Return the greatest cyclic pitch (rad) at a mean pitch (rad) and rotor speed, rad/s."""
     p = parameters
     room = min(mean_pitch - p[Parameter.PITCH_MINIMUM], p[Parameter.PITCH_MAXIMUM] - mean_pitch)
     room = min(room, p[CyclicParameter.AMPLITUDE])
@@ -238,7 +238,7 @@ class IPC(PI):
         self.parameters, self.memory = own, np.zeros(N_MEMORY)
 
     def cyclic_settings(self, scene):
-        """The IPCSettings for a scene."""
+        """Return the IPCSettings for a scene."""
         return self.cyclic
 
     def prepare(self, scene):
@@ -269,7 +269,7 @@ class IPC(PI):
     def reset(self, measurement):
         """Start as PI.reset, each blade from its measured pitch and with no cyclic pitch.
 
-        Raises: InputError where prepare() was not called.
+        Raises: InputError if prepare() was not called.
         """
         if np.isnan(self.parameters[CyclicParameter.SLOPE]):
             raise InputError(f"controller {self.name!r}: call prepare(scene) before reset(measurement)")

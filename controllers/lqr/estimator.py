@@ -67,7 +67,7 @@ N_MEMORY = STARTED + 1
 
 @kernel
 def between(p, low, fraction, place):
-    """Entry of the blocks at `place`, between two winds."""
+    """Return the entry of the blocks at `place`, between two winds."""
     return (1.0 - fraction) * p[low + place] + fraction * p[low + BLOCK + place]
 
 

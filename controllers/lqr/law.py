@@ -5,7 +5,7 @@ the estimates moves both commands by their rates, so limits need no further care
 gains of controllers/lqr/design.py are interpolated in a slow mean of the estimated wind. Where the pitch
 rests near its minimum the torque law of theory.md, section 3, takes over.
 
-Filter and feedback go on from the command in force, whoever gave it: what the residual mode of the
+Filter and feedback continue from the command in force, whoever gave it: what the residual mode of the
 environment adds to one command stays in the next, so that it is an addition to the rates.
 """
 
@@ -121,7 +121,7 @@ def lqr_law(parameters, memory, measurement, command):
 
 
 def blocks(models, settings, turbine, dt):
-    """(n, BLOCK) trims, estimator and feedback of each wind, sampled every dt."""
+    """Return (n, BLOCK) trims, estimator and feedback of each wind, sampled every dt."""
     rows = []
     for model, gain in zip(models, optimal_gains(models, settings, turbine, dt), strict=True):
         a, b = design.sampled(model.A, model.B, dt)
@@ -214,7 +214,7 @@ class LQR(CompiledController):
     def reset(self, measurement):
         """Start the estimate at the trim whose pitch (or, at the pitch minimum, rotor speed) is measured.
 
-        Raises: InputError where prepare() was not called.
+        Raises: InputError if prepare() was not called.
         """
         if not self.prepared:
             raise InputError(f"controller {self.name!r}: call prepare(scene) before reset(measurement)")

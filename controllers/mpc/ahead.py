@@ -1,7 +1,7 @@
 """Prediction of the wind from the estimate at the rotor and from a preview that errs.
 
 The estimate errs least for the coming seconds, a lidar further on. So the filter's prediction e(k) of the
-wind k periods ahead is corrected by a share of what the preview p(k) differs from it,
+wind k periods ahead is corrected by a fraction of what the preview p(k) differs from it,
 
 w(k) = e(k) + g(k) (p(k) - e(k)),    g(k) = E[(v - e(k)) (p(k) - e(k))] / E[(p(k) - e(k))^2],
 

@@ -151,7 +151,7 @@ class MPC:
 
     @property
     def period(self):
-        """Time between plans, s: a whole number of control periods."""
+        """Return the time between plans, s: a whole number of control periods."""
         return self.every * self.control_dt
 
     def _parameters(self):
@@ -191,7 +191,7 @@ class MPC:
         )[2]
 
     def _wind_models(self, models):
-        """WindModel of arrays with a row per wind."""
+        """Return the WindModel of arrays with a row per wind."""
         lowest = next(m for m in models if m.wind >= lowest_design_wind(self.turbine))
         made = [
             wind_model(
@@ -209,7 +209,7 @@ class MPC:
     def reset(self, measurement):
         """Start at the trim whose pitch (or, at the pitch minimum, rotor speed) is measured, without a plan.
 
-        Raises: InputError where prepare() was not called.
+        Raises: InputError if prepare() was not called.
         """
         if self.table is None:
             raise InputError(f"controller {self.name!r}: call prepare(scene) before reset(measurement)")
@@ -228,7 +228,7 @@ class MPC:
         self.calls = self.unsolved = 0
 
     def act(self, measurement):
-        """(generator torque, blade pitch) for a Measurement."""
+        """Return (generator torque, blade pitch) for a Measurement."""
         values = np.array(measurement, dtype=np.float64)
         estimated = self.estimator.memory
         observe(self.estimator.parameters, estimated, values, self.command, self.parameters, self.memory)
@@ -240,7 +240,7 @@ class MPC:
 
     @property
     def _slow(self):
-        """Factor per period by which what is learnt of the wind ahead is forgotten."""
+        """Return the factor per period by which what is learnt of the wind ahead is forgotten."""
         return exp(-self.period / self.settings.schedule_time)
 
     def _ahead(self, measurement):
@@ -268,7 +268,7 @@ class MPC:
         return ahead + (self.share.learn(now, expected, differing) * differing)[:, None]
 
     def _model(self):
-        """(WindModel, wind m/s) of the operating wind, within those of the models."""
+        """Return (WindModel, wind m/s) of the operating wind, within those of the models."""
         place = self.memory[Memory.OPERATING_WIND] - self.first_wind
         count = len(self.models.trim)
         place = min(max(place, 0.0), count - 1.0)
@@ -331,7 +331,7 @@ class MPC:
         self.memory[Memory.PITCH_RATE] = min(max(u[1], -drive.rate_limit), drive.rate_limit)
 
     def __getstate__(self):
-        """Without the solver, which is made anew: each solution starts from what it is given."""
+        """Without the solver, which is recreated: each solution starts from what it is given."""
         return self.__dict__ | {"program": None}
 
 

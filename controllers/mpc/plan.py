@@ -68,7 +68,7 @@ class Work(NamedTuple):
 
 
 def grid_of(settings, period):
-    """Grid of an MPCSettings."""
+    """Return the grid of an MPCSettings."""
     total, lengths, length = round(settings.horizon / period), [], 1.0
     while sum(lengths) < total:
         if len(lengths) >= FIRST_BLOCKS:
@@ -78,7 +78,7 @@ def grid_of(settings, period):
 
 
 def work_of(grid):
-    """Work for a Grid."""
+    """Return the work for a Grid."""
     steps, moves = len(grid.block_of), 2 * len(grid.ends)
     rows = 2 * RATED_BLOCKS + len(LIMITED) * len(grid.ends)
     n = N_FEEDBACK

@@ -1,10 +1,10 @@
-"""Linear models of a rotor whose blades have pitches of their own, in multi-blade coordinates.
+"""Linear models of a rotor whose blades have individual pitch, in multi-blade coordinates.
 
 A quantity q_i of the blades i = 1, 2, 3 at the azimuths psi_i is q_i = q_0 + q_c cos psi_i + q_s sin psi_i,
 psi = 0 up: q_0 is collective, q_c tilts the load of the rotor and q_s yaws it. At each azimuth the plant is
 differentiated by these coordinates and its answers are turned into them; then the derivatives are averaged
 over the azimuth. What varies within a third of a turn, in wind with shear at three times the rotor's
-frequency, is left out.
+frequency, is omitted.
 """
 
 from math import cos, pi, sin
@@ -113,7 +113,7 @@ class _Plant:
         self.means = (np.zeros(n), turned, np.zeros(fields), np.zeros(len(MOMENTS)), np.zeros(rows))
 
     def __call__(self, x, u, force, cyclic):
-        """Rates of the states and of the cyclic ones, then the outputs."""
+        """Return the rates of the states and of the cyclic ones, then the outputs."""
         _mean_response(self.handle, x, u, force, cyclic, self.places, AZIMUTHS, *self.scratch, *self.means)
         rates, turned, measured, moments, recorded = self.means
         return np.r_[

@@ -51,13 +51,13 @@ class Evaluation:
         self.dx, self.mean = np.zeros(scene.n_state), np.zeros(scene.n_state)
 
     def at(self, x, block):
-        """(6,) wrench of an entry of LoadCache at a state."""
+        """Return (6,) wrench of an entry of LoadCache at a state."""
         mean_derivative(self.handle, x, self.u, 1, self.dx, self.mean)
         return self.data.cache[block : block + 6].copy()
 
 
 def statics(scene):
-    """Statics of a scene without fluctuations; one without water displaces nothing."""
+    """Return the statics of a scene without fluctuations; one without water displaces nothing."""
     body, site, evaluation = scene.model.rigid_body, scene.platform.environment, Evaluation(scene)
     rest = np.zeros(scene.n_state)
     water = evaluation.at(rest, LoadCache.HYDRO)

@@ -23,7 +23,7 @@ from fowt_env.weather.waves import build_waves
 
 BAND = (0.15, 2.0)  # rad/s, of the fit: periods of 3.1 to 42 s
 GRID = 150  # frequencies of the fit
-AMPLITUDE = 1e-3  # m; the force is odd in it but for drag, which is left out: first order to 1e-6
+AMPLITUDE = 1e-3  # m; the force is odd in it but for drag, which is omitted: first order to 1e-6
 PAIRS = 8  # pairs of poles: 16 states
 POLE_DAMPING = 0.5  # neighbours then overlap
 LEADS = np.arange(0.0, 12.01, 0.5)  # s, of which the best fit is taken
@@ -74,7 +74,7 @@ def wave_force(scene, state, omega):
 
 
 def _strip_forces(scene, state, omega, strips):
-    """(n, 6) complex force of the strips."""
+    """Return (n, 6) complex force of the strips."""
     result = np.zeros((omega.size, 6), dtype=complex)
     strips = strips._replace(drag_coefficient=0.0, axial_drag_coefficient=0.0)
     x = np.zeros_like(state)
@@ -102,7 +102,7 @@ def _strip_forces(scene, state, omega, strips):
 
 
 def _member_forces(scene, state, omega, members):
-    """(n, 6) complex force of the members' fluid inertia and pressure."""
+    """Return (n, 6) complex force of the members' fluid inertia and pressure."""
     site, nodes, pose = scene.platform.environment, members.nodes, pose_of(state)
     rotation = np.array([[getattr(pose, f"r{i}{j}") for j in (1, 2, 3)] for i in (1, 2, 3)])
     still = np.zeros(omega.size)
@@ -146,7 +146,7 @@ class WaveFilter:
     errors: dict
 
     def response(self, omega):
-        """(n, 6) complex force per elevation at the hull (the lead taken back)."""
+        """Return (n, 6) complex force per elevation at the hull (the lead taken back)."""
         omega = np.atleast_1d(np.asarray(omega, dtype=float))
         eye = np.eye(self.A.shape[0])
         filtered = np.array([np.linalg.solve(1j * w * eye - self.A, self.B) for w in omega])
@@ -154,7 +154,7 @@ class WaveFilter:
 
 
 def fit_wave_filter(scene, state):
-    """WaveFilter fitted to wave_force over BAND, with the lead that fits best.
+    """Return the WaveFilter fitted to wave_force over BAND, with the lead that fits best.
 
     Poles are fixed, evenly spread over the band, so the fit is linear least squares and the model stable:
     PAIRS of them for strips, BODY_PAIRS for a potential-flow body.
@@ -190,7 +190,7 @@ def fit_wave_filter(scene, state):
 
 
 def _resonators(frequencies, damping):
-    """(A, B) of second-order resonators side by side, all driven by the input."""
+    """Return (A, B) of second-order resonators side by side, all driven by the input."""
     n = len(frequencies)
     a, b = np.zeros((2 * n, 2 * n)), np.zeros(2 * n)
     for i, frequency in enumerate(frequencies):

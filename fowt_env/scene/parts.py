@@ -38,13 +38,13 @@ from fowt_env.weather.waves import flat_waves, is_flat
 
 
 def wake_states(aero):
-    """Number of states of the wake of an Aero part or None."""
+    """Return the number of states of the wake of an Aero part or None."""
     rotor = None if aero is None else aero.rotor
     return n_wake_states(rotor.elements, rotor.wake) if isinstance(rotor, (BemRotor, DynamicSections)) else 0
 
 
 def build_elements(turbine, density, count):
-    """BladeElements of a turbine with that many of its stations; None: all. Raises: InputError."""
+    """Return the BladeElements of a turbine with that many of its stations; None: all. Raises: InputError."""
     stations = chosen_stations(count, turbine)
     if stations is None or not is_curved(turbine):
         return build_blade_elements(turbine, density, stations)
@@ -52,7 +52,7 @@ def build_elements(turbine, density, count):
 
 
 def build_aero(platform, turbine, air, rotor, options):
-    """Aero part of a scene with wind."""
+    """Return the aero part of a scene with wind."""
     density = platform.environment.air_density
     elements = build_elements(turbine, density, options["blade_stations"])
     model = ROTORS[rotor].build(elements, options)
@@ -61,7 +61,7 @@ def build_aero(platform, turbine, air, rotor, options):
 
 
 def build_blade_pitches(turbine, rotor, first_state):
-    """BladePitches of a rotor whose blades have pitches of their own, with states from first_state on.
+    """Return BladePitches of a rotor whose blades have individual pitch, with states from first_state on.
 
     Raises: InputError for another number of blades, and for a rotor model that knows one pitch alone.
     """
@@ -109,7 +109,7 @@ def build_hydro(platform, waves, current, options, dt, first_state=N_RIGID):
 
 
 def hydro_in_waves(hydro, waves, platform, options):
-    """Hydro of a scene with a sea in other waves (None: still water) of the same types.
+    """Return the hydro of a scene with a sea in other waves (None: still water) of the same types.
 
     Raises: InputError for a sea beyond the fast path.
     """
@@ -178,12 +178,12 @@ def excitation_in_waves(platform, waves, options, first_state):
 
 
 def _refinement(waves):
-    """How many times as many nodes the strips take as in a sea."""
+    """Return how many times as many nodes the strips take as in a sea."""
     return STILL_REFINEMENT if is_flat(waves) else 1
 
 
 def strips_in_waves(strips, waves, options):
-    """Strips in waves (None: still water). Raises: InputError for a sea beyond the fast path."""
+    """Return the strips in waves (None: still water). Raises: InputError for a sea beyond the fast path."""
     if strips is None:
         return None
     diffracting = options["diffraction"] == "maccamy_fuchs" and waves is not None
@@ -253,7 +253,7 @@ def check_symmetry(lines, current, members=()):
 
 
 def _shape_of(member):
-    """(2, n) of a Member: what each of its ends has."""
+    """Return (2, n) of a Member: what each of its ends has."""
     flow = float(member.potential_flow)
     ends = (member.start, member.end)
     pairs = (value for name, value in member if name not in ("start", "end", "potential_flow"))
@@ -289,7 +289,7 @@ def _members(platform, options):
 
 
 def members_in_waves(members, waves, options):
-    """Members in waves (None: still water), with a table of the water's motion on the fast path."""
+    """Return members in waves (None: still water), with a table of the water's motion on the fast path."""
     if members is None:
         return None
     still = members.scratch_nodes == 0 and not members.wheeler
@@ -301,7 +301,7 @@ def members_in_waves(members, waves, options):
 
 
 def build_current(spec):
-    """Current part, or None where its speed is zero."""
+    """Return the current part, or None where its speed is zero."""
     if spec is None:
         return None
     if not isinstance(spec, dict):
@@ -320,5 +320,5 @@ def build_current(spec):
 
 
 def build_moorings(lines, wanted):
-    """Mooring part, None without lines or where none is wanted."""
+    """Return the mooring part, None without lines or where none is required."""
     return build_mooring(lines, tabulated=wanted == "table") if wanted else None

@@ -1,4 +1,4 @@
-"""Loads of one's own, compiled into the plant: a kernel, its numbers and the point where it acts."""
+"""Loads defined by the user, compiled into the plant: a kernel, its numbers and the point where it acts."""
 
 import inspect
 from collections.abc import Callable, Sequence
@@ -47,7 +47,7 @@ class LoadKernel(types.WrapperAddressProtocol):
         return self._compiled.address
 
     def signature(self) -> Any:
-        """Its numba signature."""
+        """Return the its numba signature."""
         return SIGNATURE
 
     def __call__(self, parameters: np.ndarray, motion: np.ndarray, force: np.ndarray) -> None:
@@ -61,12 +61,12 @@ class LoadKernel(types.WrapperAddressProtocol):
         return f"<load kernel {self.__module__}.{self.__qualname__}>"
 
     def fingerprint(self) -> str:
-        """Hash of what it does, the same in every process."""
+        """Return the hash of what it does, the same in every process."""
         return sha256(repr(_meaning(self.function)).encode()).hexdigest()
 
 
 def _compiled(function):
-    """The function as a numba.cfunc. Compiled anew in each process, a tenth of a second: numba's cache on
+    """Return function as a numba.cfunc. Compiled anew in each process, a tenth of a second: numba's cache on
     disk would not notice an edit of what it calls in another file."""
     try:
         return numba.cfunc(SIGNATURE, error_model="numpy")(function)
@@ -102,7 +102,7 @@ def _known(outer, names, above):
 
 
 def load_kernel(function: Callable[..., None]) -> LoadKernel:
-    """LoadKernel of a function (parameters, motion, force) that numba can compile; a decorator.
+    """Return the LoadKernel of a function (parameters, motion, force) that numba can compile; a decorator.
 
     parameters  (n,) numbers of the Load; read only
     motion      (N_MOTION + states,) what the load may depend on, indexed by Motion; read only
@@ -182,13 +182,13 @@ class Load:
             )
 
     def key(self) -> tuple:
-        """All that it does, as plain values that are the same in every process."""
+        """Return the all that it does, as plain values that are the same in every process."""
         own = self.name, self.kernel.fingerprint(), self.parameters, self.point, self.axes, self.water
         return (*own, self.states)
 
 
 def _numbers(where, key, values):
-    """The values as a tuple of floats. Raises: InputError."""
+    """Return the values as a tuple of floats. Raises: InputError."""
     try:
         listed = tuple(values)
     except TypeError:
@@ -199,7 +199,7 @@ def _numbers(where, key, values):
 
 
 def checked_loads(loads: Any, n_lines: int, planar: bool) -> tuple[Load, ...]:
-    """The loads as a tuple, each tried as plain Python in some states.
+    """Return the loads as a tuple, each tried as plain Python in some states.
 
     Raises: InputError that names the load.
     """
@@ -228,7 +228,7 @@ def checked_loads(loads: Any, n_lines: int, planar: bool) -> tuple[Load, ...]:
 
 
 def _rotation(roll, pitch, yaw):
-    """Body to inertial axes of 3-2-1 Euler angles."""
+    """Return the body to inertial axes of 3-2-1 Euler angles."""
     (s1, s2, s3), (c1, c2, c3) = np.sin([roll, pitch, yaw]), np.cos([roll, pitch, yaw])
     return np.array(
         [
@@ -240,7 +240,7 @@ def _rotation(roll, pitch, yaw):
 
 
 def _motion(load, position, rate):
-    """Motion array of a state: six positions, and velocity and angular velocity in inertial axes."""
+    """Return motion array of a state: six positions, and velocity and angular velocity in inertial axes."""
     turn = _rotation(*position[3:])
     arm = turn @ load.point
     axes = turn.T if load.axes == "body" else np.eye(3)
@@ -308,7 +308,7 @@ def build_user_loads(loads: Sequence[Load], base_height: float, first_state: int
 
 
 def first_nonfinite_load(loads: Sequence[Load], user_data: np.ndarray) -> str | None:
-    """Words for the load that first gave a number that is not finite; None where none did.
+    """Return the words for the load that first gave a number that is not finite; None where none did.
 
     user_data: what plant.user_loads.evaluate_user_loads filled.
     """

@@ -28,13 +28,13 @@ from fowt_env.plant.hydro.wave_bands import aligned, padded
 from fowt_env.weather.harmonics import pack_table, table_of
 from fowt_env.weather.second_order import build_second_order
 
-QUIET, MOST = 1e-3, 0.5  # share of a sea's energy beyond the table that is passed over, and that is refused
-SAME_HEADING = 1e-4  # rad, of headings that the figures of files cannot tell apart
+QUIET, MOST = 1e-3, 0.5  # share of a sea's energy beyond the table that is passed over, and that is rejected
+SAME_HEADING = 1e-4  # rad, of headings that the values of files cannot tell apart
 OUT_OF_PLANE = (1, 3, 5)  # sway, roll, yaw
 
 
 def build_excitation(body, waves, *, duration, fast, planar, position=None, second_order=None, cutoff=None):
-    """Excitation of a PotentialFlow in Waves; None without either.
+    """Return the excitation of a PotentialFlow in Waves; None without either.
 
     duration      s that the table of a sea that does not repeat has to cover
     fast          first order from a table; else by the sum over components
@@ -72,7 +72,7 @@ def build_excitation(body, waves, *, duration, fast, planar, position=None, seco
 
 
 def _first_order_table(waves, force, duration):
-    """TimeTable of the force (n, 6) and the elevation."""
+    """Return the TimeTable of the force (n, 6) and the elevation."""
     coefficient = np.zeros((waves.omega.size, COLUMNS - 1), dtype=complex)
     coefficient[:, :6], coefficient[:, ELEVATION] = force, waves.amplitude
     coefficient *= np.exp(-1j * waves.phase)[:, None]
@@ -131,7 +131,7 @@ def excitation_at(body, omega, heading):
 
 
 def _headings(body, heading):
-    """(left, right, share): columns of the table beside headings (n,), and the right one's share."""
+    """Return (left, right, share): columns of the table beside headings (n,), and the right one's share."""
     known = body.heading
     turned = known[0] + np.mod(heading - known[0] + SAME_HEADING, 2.0 * pi) - SAME_HEADING
     gap = float(np.diff(known).max()) if known.size > 1 else 0.0

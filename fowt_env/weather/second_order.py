@@ -26,20 +26,20 @@ from fowt_env.weather.harmonics import (
 )
 
 METHODS = ("mean_drift", "newman", "full")
-QUIET = 1e-2  # share of the sea's energy beyond the QTF's frequencies that is passed over
+QUIET = 1e-2  # fraction of the sea's energy beyond the QTF's frequencies that is passed over
 SAME_HEADING = 1e-4  # rad
 EDGE = 24  # rows beyond both ends of a table whose spline is fitted: an end's influence falls by 3.7 per row
 SAMPLES = 12  # per shortest period of a difference, of a sea whose frequencies are not evenly spaced
 
 
 def build_second_order(body, waves, method, *, duration, cutoff=None):
-    """SecondOrder of a PotentialFlow with a QTF, in Waves, by one of METHODS; None for None or "none".
+    """Return SecondOrder of a PotentialFlow with a QTF, in Waves, by one of METHODS; None for None or "none".
 
     mean_drift  the mean force alone
     newman      the diagonal of the QTF alone: |sum a_i sqrt(Q_ii) exp(i w_i t)|^2 of the positive Q_ii, less
                 the same of the negative ones
     full        all pairs
-    cutoff      rad/s: forces of differences above it are left out; None: of none
+    cutoff      rad/s: forces of differences above it are omitted; None: of none
 
     Raises: InputError for a sea whose headings or pairs of frequencies the QTF lacks.
     """
@@ -66,7 +66,7 @@ def build_second_order(body, waves, method, *, duration, cutoff=None):
 
 
 def _inside(qtf, waves):
-    """Components (n,) that the QTF covers. Warns: PlantWarning where the others have some energy."""
+    """Return components (n,) that the QTF covers. Warns: PlantWarning where the others have some energy."""
     low, high = qtf.omega[0] * (1.0 - 1e-6), qtf.omega[-1] * (1.0 + 1e-6)
     used = (waves.omega >= low) & (waves.omega <= high)
     energy = waves.amplitude**2
@@ -98,7 +98,7 @@ def _heading_groups(qtf, heading):
 
 
 def _pair(qtf, first, second):
-    """(row of the QTF, whether its two waves are exchanged) for a pair of headings."""
+    """Return (row of the QTF, whether its two waves are exchanged) for a pair of headings."""
     for row, (one, other) in enumerate(qtf.heading):
         if _same(first, one) and _same(second, other):
             return row, False
@@ -117,7 +117,7 @@ def _same(a, b):
 
 
 def _table(qtf, row, turned):
-    """(k, k, 6) of a pair of headings. What the file leaves out is the conjugate of the exchanged pair."""
+    """(k, k, 6) of a pair of headings. What the file omits is the conjugate of the exchanged pair."""
     value = qtf.value[row]
     if turned:
         return np.conj(value.transpose(1, 0, 2))
@@ -128,7 +128,7 @@ def _table(qtf, row, turned):
 
 
 def _hats(qtf, omega):
-    """(low, share): the file's frequency below each of omega (n,), and the share of the next one."""
+    """Return (low, share): the file's frequency below each of omega (n,), and the share of the next one."""
     if qtf.omega.size == 1:
         return np.zeros(omega.size, dtype=int), np.zeros(omega.size)
     low = np.clip(np.searchsorted(qtf.omega, omega, side="right") - 1, 0, qtf.omega.size - 2)
@@ -151,7 +151,7 @@ def _diagonal(qtf, omega, row):
 
 
 def _mean(qtf, omega, wave, groups):
-    """(6,) mean force: of each component with itself."""
+    """Return (6,) mean force: of each component with itself."""
     total = np.zeros(6)
     for number, (own, pairs) in enumerate(groups):
         total += np.abs(wave[own]) ** 2 @ _diagonal(qtf, omega[own], pairs[number][0])
@@ -167,7 +167,7 @@ class _Form:
 
 
 def _newman(qtf, omega, wave, groups):
-    """_Form of Newman's approximation: |positive|^2 - |negative|^2 of each force and heading."""
+    """Return _Form of Newman's approximation: |positive|^2 - |negative|^2 of each force and heading."""
     columns = np.zeros((omega.size, 2, 6, len(groups)), dtype=complex)
     for number, (own, pairs) in enumerate(groups):
         diagonal = _diagonal(qtf, omega[own], pairs[number][0])
@@ -183,7 +183,7 @@ def _newman(qtf, omega, wave, groups):
 
 
 def _full(qtf, omega, wave, groups):
-    """_Form of the full QTF: hat functions of its frequencies for each heading."""
+    """Return _Form of the full QTF: hat functions of its frequencies for each heading."""
     low, share = _hats(qtf, omega)
     high = np.minimum(low + 1, qtf.omega.size - 1)
     nodes = np.unique(np.concatenate([low, high[share > 0.0]]))
@@ -215,7 +215,7 @@ def _full(qtf, omega, wave, groups):
 
 
 def _even_table(found, form, cutoff):
-    """TimeTable of a sea of Harmonics: it repeats with the period of the differences."""
+    """Return the TimeTable of a sea of Harmonics: it repeats with the period of the differences."""
     highest = int(found.index.max())
     size = next_fast_len(2 * highest + 2)
     spectrum = np.zeros((size, form.coefficient.shape[1]), dtype=complex)
@@ -236,7 +236,7 @@ def _even_table(found, form, cutoff):
 
 
 def _uneven_table(omega, form, duration, cutoff):
-    """TimeTable of a sea whose frequencies are not evenly spaced, over the duration."""
+    """Return the TimeTable of a sea whose frequencies are not evenly spaced, over the duration."""
     spread = float(np.ptp(omega))
     if cutoff is not None and cutoff < spread:
         raise InputError(

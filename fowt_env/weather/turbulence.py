@@ -43,7 +43,7 @@ PAIR_NODES = 200  # quadrature over pair distances, quadratically denser towards
 
 @cached(1)
 def _pair_tables():
-    """Logarithms of k R, of the mean coherence of pairs, and of its gradient moment; (n,) each.
+    """Return the logarithms of k R, of the mean coherence of pairs, and of its gradient moment; (n,) each.
 
     With two points of the disk at distance d = 2 R cos(h), their midpoint lies in the overlap of two
     disks, i.e. two circular segments of half-angle h; area and second moments are elementary. That
@@ -68,7 +68,7 @@ def _pair_tables():
 
 
 def disk_average(kr):
-    """Variance of the disk average of u over the point variance, for k R = kr (any shape)."""
+    """Return the variance of the disk average of u over the point variance, for k R = kr (any shape)."""
     log_kr, mean, _ = _pair_tables()
     return np.exp(np.interp(np.log(kr), log_kr, mean))
 
@@ -83,7 +83,7 @@ def disk_gradient(kr):
 
 
 def centre_average(kr):
-    """Mean coherence of the disc's centre with its points, for k R = kr > 0 (any shape)."""
+    """Return the mean coherence of the disc's centre with its points, for k R = kr > 0 (any shape)."""
     kr = np.asarray(kr, dtype=np.float64)
     series = 1.0 - kr * (2.0 / 3.0 - 0.25 * kr)  # where the difference below loses its digits
     exact = -2.0 * (np.expm1(-kr) + kr * np.exp(-kr)) / kr**2
@@ -91,24 +91,24 @@ def centre_average(kr):
 
 
 def coherence_wave_number(frequency, speed, height):
-    """k (1/m) of the coherence exp(-k r) at frequencies (Hz)."""
+    """Return k (1/m) of the coherence exp(-k r) at frequencies (Hz)."""
     coherence_length = LENGTH_RATIO[0] * length_scale(height)
     return COHERENCE_DECAY * np.hypot(frequency / speed, COHERENCE_OFFSET / coherence_length)
 
 
 def kaimal_spectrum(frequency, speed, sigma, length):
-    """One-sided spectrum (m^2/s^2/Hz) with variance sigma^2 and scale L (m), IEC Annex B."""
+    """Return the one-sided spectrum (m^2/s^2/Hz) with variance sigma^2 and scale L (m), IEC Annex B."""
     return sigma**2 * 4.0 * length / speed / (1.0 + 6.0 * frequency * length / speed) ** (5.0 / 3.0)
 
 
 def _kaimal_below(frequency, speed, length):
-    """Share of the Kaimal variance below a frequency (the integral of kaimal_spectrum)."""
+    """Return the fraction of the Kaimal variance below a frequency (the integral of kaimal_spectrum)."""
     return 1.0 - (1.0 + 6.0 * frequency * length / speed) ** (-2.0 / 3.0)
 
 
 @cached(64)
 def amplitudes(speed, sigma, height, diameter, samples, step, average):
-    """Amplitudes (m/s) of u, v, w, vertical_shear, horizontal_shear at k/(samples step); (5, m).
+    """Return the amplitudes (m/s) of u, v, w, vertical_shear, horizontal_shear at k/(samples step); (5, m).
 
     The shears are per rotor diameter. average: "rotor", or "point" for the hub point without shears.
     The frequency bins carry the exact integral of the spectrum, scaled so that the point's standard
@@ -134,7 +134,7 @@ def amplitudes(speed, sigma, height, diameter, samples, step, average):
 
 
 def fft_length(minimum):
-    """Smallest even length with no prime factor above 5 that is at least the minimum."""
+    """Return the smallest even length with no prime factor above 5 that is at least the minimum."""
     length = 2 * ((minimum + 1) // 2)
     while True:
         rest = length
@@ -147,7 +147,7 @@ def fft_length(minimum):
 
 
 def component_generator(seed, component):
-    """Random generator of one wind component, so that leaving one out does not change the others.
+    """Return the random generator of one wind component, so that leaving one out does not change the others.
 
     seed: non-negative int or SeedSequence (which is left as it is).
     """
@@ -158,7 +158,7 @@ def component_generator(seed, component):
 
 
 def drawn_ntm_sigma(speed, turbulence_class, seed):
-    """sigma_1 (m/s) of the normal turbulence model, drawn from its log-normal distribution.
+    """Return sigma_1 (m/s) of the normal turbulence model, drawn from its log-normal distribution.
 
     A seed draws one number, its place in the distribution, from a stream of its own (SIGMA_STREAM), so that
     the phases of a seed are those that it has without. sigma_1 follows from that place and the mean wind:
@@ -173,7 +173,7 @@ def turbulence(
     """(period, value): one period of turbulence about a mean of zero, (n + 1, 5), last row = first row.
 
     Columns as in WindSeries, the shears per rotor diameter; sigma is the standard deviation (m/s) of
-    u at a point. The period returned is the one asked for (s), rounded up to a length that transforms
+    u at a point. The period returned is the one requested (s), rounded up to a length that transforms
     quickly. The phases belong to the frequencies k/period, so another period gives another wind.
     """
     samples = fft_length(int(np.ceil(period / step - 1e-9)))
@@ -205,7 +205,7 @@ def hub_turbulence(speed, sigma, *, height, diameter, period, seed, step=STEP):
 
 
 def _phasor(seed, component, count):
-    """(count,) complex numbers of size 1 and random phase."""
+    """Return (count,) complex numbers of size 1 and random phase."""
     return np.exp(1j * component_generator(seed, component).uniform(0.0, 2.0 * np.pi, count))
 
 

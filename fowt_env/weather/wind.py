@@ -1,4 +1,4 @@
-"""The wind of a scene: a time series at the reference height, built of what a user asks for.
+"""The wind of a scene: a time series at the reference height, built of a user's specification.
 
 The series is uniform over the rotor apart from the power law and two linear shears; a box of full-field
 wind (wind_field.py) takes its place where a scene has one. Frame: inertial,
@@ -35,7 +35,7 @@ def rotor_factor(exponent, height, diameter):
 
 
 def make_series(time, value, *, reference_height, reference_length, shear_exponent, period=0.0):
-    """WindSeries of samples value (n, 5) at time (n,) s; finds out whether the time is uniform."""
+    """Return the WindSeries of samples value (n, 5) at time (n,) s; finds out whether the time is uniform."""
     time, value = _kernel_array(time), _kernel_array(value)
     inverse_step = 0.0
     if time.size > 1:
@@ -56,19 +56,19 @@ def make_series(time, value, *, reference_height, reference_length, shear_expone
 
 
 def _kernel_array(values):
-    """The values as float64 of the one type that kernels are compiled for: C-contiguous and writeable."""
+    """Return values as float64 of the one type that kernels are compiled for: C-contiguous and writeable."""
     return np.require(values, np.float64, "CAW")
 
 
 def _of_kernel_types(series):
-    """A user's WindSeries with the types of every other one; itself where it has them."""
+    """Return a user's WindSeries with the types of every other one; unchanged if it has them."""
     time, value, *numbers = series
     typed = WindSeries(_kernel_array(time), _kernel_array(value), *map(float, numbers))
     return series if all(map(operator.is_, typed, series)) else typed
 
 
 def build_wind(spec, *, reference_height, rotor_diameter, shear_exponent, seed, duration):
-    """WindSeries of what a user asked for, None for no aerodynamics at all.
+    """Return the WindSeries of what a user requested, None for no aerodynamics at all.
 
     spec               None; a speed in m/s (0: still air); a dictionary with "kind", or the WindSpec that
                        read_wind made of one (kinds and keys: descriptions.wind.KINDS); a WindSeries, which is
@@ -122,7 +122,7 @@ def _even_times(period, samples):
 
 
 def nominal_speed(spec):
-    """Horizontal hub speed (m/s) that the episode starts from, for trim; spec as in build_wind.
+    """Return the horizontal hub speed (m/s) that the episode starts from, for trim; spec as in build_wind.
 
     The nominal speed of steady, turbulent and gusty wind, the first of steps; of a series the mean
     over its first 60 s, since a platform does not follow the single first sample. None gives 0.
@@ -143,7 +143,7 @@ def nominal_speed(spec):
 
 
 def mean_wind(series):
-    """Constant WindSeries that the episode starts from, for trim: the mean of a repeating series over
+    """Return constant WindSeries that the episode starts from, for trim: the mean of a repeating series over
     its period, of another over its first 60 s (before its first sample that one holds). None: None."""
     if series is None:
         return None
@@ -155,7 +155,7 @@ def mean_wind(series):
 
 
 def _opening_mean(time, value, length=OPENING):
-    """Mean of the piecewise linear value over [0, length], its ends held; exact."""
+    """Return the mean of the piecewise linear value over [0, length], constant beyond its ends; exact."""
     inside = time[(time > 0.0) & (time < length)]
     nodes = np.concatenate(([0.0], inside, [length]))
     return float(np.trapezoid(np.interp(nodes, time, value), nodes) / length)
@@ -168,14 +168,14 @@ def _blow(value, speed, direction):
 
 
 def _given(spec):
-    """Samples of the user's own series."""
+    """Return the samples of a user's series."""
     columns = [spec[key] for key in ("speed", "v", "w", "vertical_shear", "horizontal_shear")]
     zero = np.zeros(spec["time"].size)
     return spec["time"], np.stack([zero if column is None else column for column in columns], axis=1)
 
 
 def _stepped(spec):
-    """Samples of a staircase: each speed lasts `every`, then ramps to the next; the last holds."""
+    """Return the samples of a staircase: each speed lasts `every`, then ramps to the next; the last holds."""
     speeds = spec["speeds"]
     edges = spec["every"] * np.arange(1, speeds.size)
     time = np.concatenate(([0.0], np.stack([edges, edges + spec["ramp"]], axis=1).ravel()))
@@ -185,12 +185,12 @@ def _stepped(spec):
 
 
 def _is_turbulent(spec):
-    """True where the spec needs random numbers."""
+    """Return whether the spec needs random numbers."""
     return spec.kind in ("ntm", "etm") or (spec.kind == "ewm" and spec["turbulent"])
 
 
 def _turbulent(spec, height, diameter, seed, duration):
-    """(period, value) of one period of turbulence about its mean speed and direction."""
+    """Return (period, value) of one period of turbulence about its mean speed and direction."""
     drawn = _drawn(spec, height, diameter, seed, duration)
     period, value = turbulence(**drawn, average=spec["average"], shear_turbulence=spec["shear_turbulence"])
     value[:, 0] += drawn["speed"]
@@ -204,7 +204,7 @@ def _turbulent(spec, height, diameter, seed, duration):
 
 
 def _drawn(spec, height, diameter, seed, duration):
-    """Arguments of turbulence(): speed, sigma, height, diameter, period, seed. Raises: InputError."""
+    """Return arguments of turbulence(): speed, sigma, height, diameter, period, seed. Raises: InputError."""
     speed = nominal_speed(spec)
     duration = Number(0.0, 1e5, "s").read("duration", duration)
     period = spec["period"]

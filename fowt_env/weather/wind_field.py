@@ -4,7 +4,7 @@ u(X, Y, Z, t) = box(t + shift - X/U, Y, Z), trilinear in time and both coordinat
 station or the tower is. The shift is InflowWind's: half the grid width over the mean wind, so that the
 wind upstream by half a width is known at the start. Outside the grid: below it the wind falls linearly to
 zero at the still-water level, as in InflowWind without tower points; beside and above it the edge's wind
-holds (read_box refuses grids that do not hold the rotor).
+holds (read_box rejects grids that do not hold the rotor).
 
 Sources of boxes: TurbSim files (turbsim.py), the user's arrays, Mann turbulence (hipersim).
 """
@@ -28,7 +28,7 @@ PROFILE_STEP = 1.0  # m of height between the points of a steady profile
 
 
 def is_field(spec):
-    """Whether a wind specification asks for a box of full-field wind."""
+    """Return whether a wind specification asks for a box of full-field wind."""
     spec = wind_of(spec)
     kind = spec.get("kind") if isinstance(spec, dict) else None
     return isinstance(spec, WindBox) or (isinstance(kind, str) and kind in FIELD_KINDS)
@@ -52,19 +52,19 @@ class WindBox:
 
     @property
     def usable(self):
-        """Seconds of a run that the box covers, drift of MARGIN metres included; inf if it repeats."""
+        """Return seconds of a run that the box covers, drift of MARGIN metres included; inf if it repeats."""
         if self.periodic:
             return float("inf")
         return (self.velocity.shape[0] - 1) * self.dt - self.shift - MARGIN / self.speed
 
     def at(self, time, X, Y, Z):
-        """(n, 3) m/s at times (n,) and points, for tables and tests; one call of field_at each."""
+        """Return (n, 3) m/s at times (n,) and points, for tables and tests; one call of field_at each."""
         field = self.field()
         points = np.broadcast_arrays(*(np.atleast_1d(np.asarray(p, dtype=float)) for p in (time, X, Y, Z)))
         return np.array([field_at(*point, field) for point in zip(*points, strict=True)])
 
     def field(self):
-        """WindField of the box."""
+        """Return the WindField of the box."""
         dy, dz = self.y[1] - self.y[0], self.z[1] - self.z[0]
         return WindField(
             np.require(self.velocity, np.float32, "CAW"),  # the one type that kernels are compiled for
@@ -80,7 +80,7 @@ class WindBox:
 
 
 def read_box(spec, *, hub_height, rotor_diameter, shear_exponent=0.0, seed=0, duration=600.0):
-    """WindBox of a specification with "kind" bts, box or mann (or of a WindBox: itself).
+    """Return the WindBox of a specification with "kind" bts, box or mann (or of a WindBox: itself).
 
     bts   path; periodic (None: as the file says); shift (s, None: half the grid width over the mean wind)
     box   u (n_time, n_z, n_y) m/s, optionally v and w; y, z (m); dt (s); speed (m/s)
@@ -102,7 +102,7 @@ def read_box(spec, *, hub_height, rotor_diameter, shear_exponent=0.0, seed=0, du
 
 
 def _values(spec):
-    """Checked values of every key of a specification."""
+    """Return the checked values of every key of a specification."""
     kind = spec["kind"]
     keys = FIELD_KINDS[kind]
     for key in spec:
@@ -118,7 +118,7 @@ def _values(spec):
 
 
 def _even(name, line):
-    """A grid line as float64, evenly increasing. Raises: InputError."""
+    """Return a grid line as float64, evenly increasing. Raises: InputError."""
     steps = np.diff(line)
     if line.size < 2 or not steps.min() > 0.0 or np.ptp(steps) > 1e-3 * steps.mean():
         raise InputError(f"wind.{name}: must be at least 2 evenly increasing numbers (m)")
@@ -199,13 +199,13 @@ _MAKERS = {"bts": _from_bts, "box": _from_arrays, "mann": _from_mann}
 
 
 def steady_field(field, factor=1.0):
-    """The field's mean over time as a steady wind, times a factor; same type, so nothing is compiled anew."""
+    """The field's mean over time as a steady wind, times a factor; same type, so nothing is recompiled."""
     mean = field.velocity.mean(axis=0, dtype=np.float64, keepdims=True) * factor
     return field._replace(velocity=np.ascontiguousarray(mean, dtype=np.float32))
 
 
 def profile_field(speed, exponent, hub_height, rotor_diameter):
-    """WindField of a steady wind that follows the power law over the height and is alike across.
+    """Return the WindField of a steady wind that follows the power law over the height and is alike across.
 
     speed: m/s at the hub. Of the kernels' types, in place of any box.
     """
@@ -217,14 +217,14 @@ def profile_field(speed, exponent, hub_height, rotor_diameter):
 
 
 def hub_speed(box, hub_height):
-    """Mean horizontal wind (m/s) of the box at the hub."""
+    """Return the mean horizontal wind (m/s) of the box at the hub."""
     field = steady_field(box.field())
     u, v, _ = field_at(0.0, 0.0, 0.0, float(hub_height), field)
     return float(np.hypot(u, v))
 
 
 def hub_wind(box, hub_height):
-    """(time, value (n, 3)): u, v, w of the box at the hub, X = Y = 0."""
+    """Return (time, value (n, 3)): u, v, w of the box at the hub, X = Y = 0."""
     field, count = box.field(), box.velocity.shape[0]
     time = np.arange(count) * box.dt - box.shift
     return time, np.array([field_at(t, 0.0, 0.0, float(hub_height), field) for t in time])
@@ -256,7 +256,7 @@ def _average(field, hub_height, radius, weight, azimuths, value):
 
 
 def rotor_average(box, hub_height, rotor_diameter, weights="area", chord=None):
-    """(time, value): the box averaged over the rotor disk at X = 0, columns as in WindSeries.
+    """Return (time, value): the box averaged over the rotor disk at X = 0, columns as in WindSeries.
 
     value (n, 5): means of u, v, w over the disk, and the gradients of the plane that fits u best, per
     rotor diameter. weights: "area", or "chord" with chord = (radius, chord) of the blade: each ring then
