@@ -1,4 +1,4 @@
-"""Whether a platform can be what its file means: values at rest, natural periods, and what does not fit."""
+"""Checks whether a platform file is plausible: statics at rest, natural periods, inconsistencies."""
 
 from math import cos, degrees, hypot, pi, sin, sqrt, tan
 from typing import NamedTuple
@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fowt_env.analysis.equilibrium import MOTION_LABELS, causes_of, evaluated, metacentre
-from fowt_env.analysis.statics import Evaluation, Statics, statics
+from fowt_env.analysis.statics import Evaluation, Statics, named_periods, rotation_of, statics
 from fowt_env.analysis.tower_frequencies import TowerFrequency, tower_frequencies
 from fowt_env.analysis.trim import DIFFERENCE_STEPS, trim
 from fowt_env.errors import InputError, muted
@@ -159,9 +159,8 @@ def natural_modes(scene, point):
 
 def _kinematics(x):
     """Return (6, 6) rates of the motions by the velocities in body components, at a state."""
-    pose, roll, pitch = pose_of(np.ascontiguousarray(x)), x[State.ROLL], x[State.PLATFORM_PITCH]
-    found = np.zeros((6, 6))
-    found[:3, :3] = [[getattr(pose, f"r{i}{j}") for j in (1, 2, 3)] for i in (1, 2, 3)]
+    roll, pitch, found = x[State.ROLL], x[State.PLATFORM_PITCH], np.zeros((6, 6))
+    found[:3, :3] = rotation_of(pose_of(np.ascontiguousarray(x)))
     found[3:, 3:] = [
         [1.0, sin(roll) * tan(pitch), cos(roll) * tan(pitch)],
         [0.0, cos(roll), -sin(roll)],
@@ -178,13 +177,7 @@ def _periods(moved, mass, slopes, height, arm):
     shapes[1] -= height * vectors[3]
     shapes = np.abs(shapes) * np.array([1.0, 1.0, 1.0, arm, arm, arm])[:, None]
     shapes /= shapes.sum(axis=0)
-    found, free = {}, set(range(6))
-    for mode in np.argsort(-shapes.max(axis=0)):  # most clear-cut modes first
-        motion = max(free, key=lambda i: shapes[i, mode])
-        free.discard(motion)
-        square = -values[mode].real
-        found[motion] = float(2.0 * pi / np.sqrt(square)) if square > 1e-9 else float("inf")
-    return {label: found[motion] for motion, label in enumerate(MOTION_LABELS)}
+    return named_periods(values, shapes, MOTION_LABELS)
 
 
 def _at_own_frequency(motion, period, moved, mass, slopes, height, arm, potential):

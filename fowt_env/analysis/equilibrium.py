@@ -1,11 +1,11 @@
-"""Whether a steady state is one that a platform can be in, and what pulls at it where there is none."""
+"""Checks whether a steady state is possible for a platform, and explains a failed search for one."""
 
 from math import acos, cos, degrees, hypot, isnan, sqrt
 from typing import NamedTuple
 
 import numpy as np
 
-from fowt_env.analysis.statics import statics
+from fowt_env.analysis.statics import rotation_of, statics
 from fowt_env.errors import InputError, warn_once
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.mooring import SLACK
@@ -238,10 +238,7 @@ def _left(scene, end):
 
 def _by_load(scene, end):
     """{load: (6,)} of all loads: force in inertial axes, moment about the centre of mass in body axes."""
-    pose, body = pose_of(end.x), scene.model.rigid_body
-    to_inertial = np.array(
-        [[pose.r11, pose.r12, pose.r13], [pose.r21, pose.r22, pose.r23], [pose.r31, pose.r32, pose.r33]]
-    )
+    to_inertial, body = rotation_of(pose_of(end.x)), scene.model.rigid_body
     centre = np.array([body.s_x, body.s_y or 0.0, body.s_z]) / body.mass
     weight = -body.mass * body.gravity * to_inertial[2]
     wrenches = {name: end.cache[first : first + 6] for name, first in LOADS.items()}

@@ -1,12 +1,11 @@
-"""The drag of a hull in a random sea as a linear load: damping and wave force, by stochastic linearisation.
+"""Linearises the drag of a hull in a random sea stochastically: damping and wave force.
 
-The drag of a strip, 0.5 rho C_D D |r| r per length with r the velocity of the water relative to it across the
-axis, is replaced by the linear force with the least mean square error. For a Gaussian r its gain is the mean
-slope, 0.5 rho C_D D E[|r| I + r r'/|r|]; in one direction without current that is
-0.5 rho C_D D sqrt(8/pi) sigma_r (Borgman, 1967, J. Waterways and Harbors Division 93, 129-156; Price and Wu,
-1985). The gain depends on the motion of the hull, and the motion on the gain: callers iterate. So is the
-quadratic damping matrix of a body: column j times sqrt(8/pi) sigma_j of the hull's velocity j alone, since
-the matrix knows no water.
+The drag of a strip, 0.5 rho C_D D |r| r per length with the relative velocity r across the axis, is replaced
+by the linear force with the least mean square error. For a Gaussian r its gain is the mean slope, 0.5 rho
+C_D D E[|r| I + r r'/|r|], in one direction without current 0.5 rho C_D D sqrt(8/pi) sigma_r (Borgman, 1967,
+J. Waterways and Harbors Division 93, 129-156; Price and Wu, 1985). The gain depends on the motion of the
+hull, so callers iterate. Column j of a body's quadratic damping matrix is multiplied with sqrt(8/pi) sigma_j
+of the hull's velocity j alone.
 """
 
 from dataclasses import dataclass, replace
@@ -15,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fowt_env.analysis.statics import rotation_of
 from fowt_env.errors import InputError
 from fowt_env.plant.hydro.members import AX, AXIAL_DRAG, DRAG
 from fowt_env.plant.hydro.strips import GAUSS_OFFSET
@@ -227,9 +227,7 @@ def _slopes(r):
 
 def _axes(state):
     """Return (rotation (3, 3) from body to inertial components, height of the body origin, m) at a state."""
-    pose = pose_of(np.ascontiguousarray(state))
-    rows = [[getattr(pose, f"r{i}{j}") for j in (1, 2, 3)] for i in (1, 2, 3)]
-    return np.array(rows), float(state[State.HEAVE])
+    return rotation_of(pose_of(np.ascontiguousarray(state))), float(state[State.HEAVE])
 
 
 def _nodes(strips, height, rotation):

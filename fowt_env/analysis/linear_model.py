@@ -1,4 +1,4 @@
-"""Linear models of a scene about an operating point, by central differences of the nonlinear plant."""
+"""Linearises a scene about an operating point by central differences of the nonlinear plant."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import expm
 
+from fowt_env.analysis.statics import central_difference, named_periods, rotation_of
 from fowt_env.analysis.trim import AZIMUTHS, trim, without_fluctuations
 from fowt_env.analysis.wave_excitation import fit_wave_filter, wave_force
 from fowt_env.descriptions.checks import check_number, is_number, short
@@ -234,21 +235,16 @@ class LinearModel:
         euler: angular velocities are given as rates of the Euler angles, else by inertial axes.
         """
         turn = np.eye(len(self.states))
-        pose = pose_of(self.point.state)
-        body = np.array(
-            [[pose.r11, pose.r12, pose.r13], [pose.r21, pose.r22, pose.r23], [pose.r31, pose.r32, pose.r33]]
-        ).T
+        body = rotation_of(pose_of(self.point.state)).T
         first, roll, pitch = self.index("vx"), *self.point.state[[State.ROLL, State.PLATFORM_PITCH]]
         turn[first : first + 3, first : first + 3] = body
-        turn[first + 3 : first + 6, first + 3 : first + 6] = (
-            [
+        if euler:
+            body = [
                 [1.0, 0.0, -np.sin(pitch)],
                 [0.0, np.cos(roll), np.sin(roll) * np.cos(pitch)],
                 [0.0, -np.sin(roll), np.cos(roll) * np.cos(pitch)],
             ]
-            if euler
-            else body
-        )
+        turn[first + 3 : first + 6, first + 3 : first + 6] = body
         return turn
 
     def state(self, measured):
@@ -447,9 +443,8 @@ def modes(a, names, cm_height, arm):
             **{deflection: abs(part[deflection]) for deflection in TOWER if deflection in part},
         }
         name = max(participation, key=participation.get)
-        found.append(
-            Mode(name, float(2.0 * np.pi / value.imag), float(-value.real / abs(value)), float(abs(value)))
-        )
+        size = abs(value)
+        found.append(Mode(name, float(2.0 * np.pi / value.imag), float(-value.real / size), float(size)))
     return sorted(found, key=lambda mode: -mode.period)
 
 
@@ -467,7 +462,7 @@ def fill_response(x, u, force, model, data, dx, measurement, row):
 
 @entry
 def _mean_response(handle, x, u, force, azimuths, dx, measurement, row, rates, measured, recorded):
-    """Azimuth means of state rates, measurement and output row under u and additional hull forces (6,)."""
+    """Fill azimuth means of state rates, measurement and output row under u and additional hull forces."""
     model, data = model_of(handle), data_of(handle)
     start = x[State.AZIMUTH]
     rates[:] = 0.0
@@ -551,39 +546,43 @@ def linearize(scene, operating_point=None, *, wind=None):
         scene = scene.with_weather(wind=check_number("wind", wind, 0.0))
     point = trim(scene) if operating_point is None else operating_point
     parts = steady_parts(scene, point)
-    body = parts["rigid_body"]
-    plant = _Plant(without_fluctuations(scene, point.wind_speed).with_model(parts), scene.n_lines)
     x, u, force = point.state.copy(), point.command.copy(), np.zeros(6)
 
-    def slopes(vector, indices, steps):
-        columns = []
-        for index, step in zip(indices, steps, strict=True):
-            keep = vector[index].copy()
-            vector[index] = keep + step
-            up = plant(x, u, force)
-            vector[index] = keep - step
-            down = plant(x, u, force)
-            vector[index] = keep
-            columns.append((up - down) / (2.0 * step))
-        return np.array(columns).T
+    def plant_at(speed):
+        return _Plant(without_fluctuations(scene, speed).with_model(parts), scene.n_lines)
 
+    plant = plant_at(point.wind_speed)
     names, rows, state_steps = plant_states(scene)
+
+    def slopes(vector, indices, steps):
+        def evaluate():
+            return plant(x, u, force)
+
+        return [central_difference(evaluate, vector, *each) for each in zip(indices, steps, strict=True)]
+
     of_states = slopes(x, of_all_blades(scene, rows), state_steps)
-    of_inputs = np.zeros((of_states.shape[0], len(INPUTS)))
-    of_inputs[:, :2] = slopes(u, ([0], list(range(1, scene.n_commands))), INPUT_STEPS[:2])
-    of_forces = slopes(force, [[i] for i in range(6)], FORCE_STEPS)
-    if point.wind_speed is not None:
-        step = INPUT_STEPS[2]
-        sides = []
-        for sign in (1.0, -1.0):
-            air = without_fluctuations(scene, point.wind_speed + sign * step).with_model(parts)
-            sides.append(_Plant(air, scene.n_lines)(x, u, force))
-        of_inputs[:, 2] = (sides[0] - sides[1]) / (2.0 * step)
-    n = len(names)
+    of_inputs = slopes(u, ([0], list(range(1, scene.n_commands))), INPUT_STEPS[:2])
+    of_inputs.append(wind_slope(lambda speed: plant_at(speed)(x, u, force), point, of_inputs[0]))
+    of_forces = slopes(force, range(6), FORCE_STEPS)
+    return assembled(scene, point, (of_states, of_inputs, of_forces), names)
+
+
+def wind_slope(evaluate, point, like):
+    """Return the central difference of evaluate(wind speed) about an OperatingPoint; zeros without wind."""
+    if point.wind_speed is None:
+        return np.zeros_like(like)
+    up, down = (evaluate(point.wind_speed + sign * INPUT_STEPS[2]) for sign in (1.0, -1.0))
+    return (up - down) / (2.0 * INPUT_STEPS[2])
+
+
+def assembled(scene, point, columns, states, inputs=(), outputs=()):
+    """Return the LinearModel of columns by states, inputs and forces, with additional names."""
+    of_states, of_inputs, of_forces = (np.array(found).T for found in columns)
+    n, body = len(states), scene.model.rigid_body
     tensions = tuple(f"fairlead_tension_{i + 1}" for i in range(scene.n_lines))
     model = LinearModel(
         of_states[:n], of_inputs[:n], of_states[n:], of_inputs[n:], of_forces[:n], of_forces[n:],
-        names, INPUTS, (*MEASURED, *RECORDED, *tensions),
+        states, (*INPUTS, *inputs), (*MEASURED, *RECORDED, *tensions, *outputs),
         point, body.s_z / body.mass, 0.5 * scene.platform.draft, scene,
     )  # fmt: skip
     return with_memory(model, linear_memory(scene))
@@ -596,11 +595,8 @@ def with_memory(model, memory):
     """
     if memory is None:
         return model
-    pose = pose_of(model.point.state)
     turn = np.zeros((6, 6))
-    turn[:3, :3] = turn[3:, 3:] = [
-        [pose.r11, pose.r12, pose.r13], [pose.r21, pose.r22, pose.r23], [pose.r31, pose.r32, pose.r33]
-    ]  # fmt: skip
+    turn[:3, :3] = turn[3:, 3:] = rotation_of(pose_of(model.point.state))
     m, n = memory.A.shape[0], len(model.states)
     speeds = [model.index(name) for name in VELOCITIES]
     force = -turn.T @ memory.C
@@ -654,13 +650,4 @@ def _periods(model, omega):
         stiffness = np.linalg.solve(np.eye(n) + out @ np.linalg.solve(square, into), stiffness)
     values, vectors = np.linalg.eig(kinematics @ stiffness)
     scale = np.array([1.0, 1.0, 1.0, model.arm, model.arm, model.arm, *(1.0 for _ in deflections)])
-    shapes = np.abs(vectors) * scale[:, None]
-    periods = {}
-    free = set(range(n))
-    for motion in np.argsort(-shapes.max(axis=0)):  # most clear-cut modes first
-        order = np.argsort(-shapes[:, motion])
-        name = next(i for i in order if i in free)
-        free.discard(name)
-        square = -values[motion].real
-        periods[names[name]] = float(2.0 * np.pi / np.sqrt(square)) if square > 1e-9 else float("inf")
-    return {name: periods[name] for name in names}
+    return named_periods(values, np.abs(vectors) * scale[:, None], names)

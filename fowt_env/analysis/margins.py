@@ -1,7 +1,7 @@
-"""Stability margins of a linear model under a linear controller, with the loop broken at the plant's input.
+"""Computes stability margins of a linear model under a linear controller at the plant's input.
 
-With G from the inputs that the controller moves to what it reads, and its law u = K y, the sensitivity there
-is S = (I - K G)^-1 and the loop transfer L = -K G. An input that is opened alone, the others closed, has
+With G from the controller's commands to its measurements and the law u = K y, the sensitivity is
+S = (I - K G)^-1 and the loop transfer L = -K G. With one input opened and the others closed,
 1 + L_i = 1/S_ii. Sources: Skogestad and Postlethwaite, Multivariable Feedback Control, 2nd ed. (2005),
 sections 2.4 and 6.2 (margins, peak of S); Seiler, Packard and Gahinet, An introduction to disk margins, IEEE
 Control Systems 40(5), 2020.

@@ -1,19 +1,15 @@
-"""Linear models as designs of controllers take them: the states of the rigid bodies alone, blades that lag.
+"""Reduces linear models to the states of the rigid bodies, with a lag of the blades, for controller design.
 
-The other states z follow the rigid bodies' x by z' = A_zz z + A_zx x + B_z u + E_z f. To cut them off would
-omit what they pass on (a flexible tower, all of the rotor's thrust on the platform), so they are
-residualised (Kokotovic, Khalil and O'Reilly, Singular Perturbation Methods in Control, 1986):
+The other states z, z' = A_zz z + A_zx x + B_z u + E_z f, are residualised (Kokotovic, Khalil and O'Reilly,
+Singular Perturbation Methods in Control, 1986), because truncation would remove their steady effect:
 
-A flexible tower, the wake of dynamic inflow, a pitch drive with inertia and a generator that lags are where
-they come to rest under x, u and f: z = -A_zz^-1 (A_zx x + B_z u + E_z f). The tower is then a static spring
-without velocity, which moves the mass of its top with the platform; the drive is the lag that trails a
-slow command as far.
+- flexible tower, wake, second-order pitch drive and generator lag are in equilibrium,
+  z = -A_zz^-1 (A_zx x + B_z u + E_z f): a static spring that moves the top mass with the platform, a drive
+  with the same lag for slow commands;
+- radiation memory, as slow as the platform, is replaced by its complex gain at a frequency w: the real part
+  acts with x, the imaginary part over w with dx/dt, which are added mass and damping at w.
 
-Radiation memory decays as slowly as the platform moves. At a frequency w its states are a complex gain times
-x, u and f, whose real part acts with x and whose imaginary part, over w, with dx/dt. So its force becomes the
-added mass and the damping of that frequency, exactly there and nearly about it.
-
-Blades that follow their command at once are no state: designs give them LEAST_LAG.
+Blades that follow their command at once have no state: designs use LEAST_LAG.
 """
 
 from dataclasses import replace

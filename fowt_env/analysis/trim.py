@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from fowt_env.analysis.equilibrium import check_equilibrium, evaluated, label, unbalanced
-from fowt_env.analysis.statics import mean_derivative
+from fowt_env.analysis.statics import central_difference, mean_derivative
 from fowt_env.descriptions.channel_meanings import channel_meaning
 from fowt_env.display import html_table
 from fowt_env.errors import InputError, unknown
@@ -233,26 +233,19 @@ class _Steady:
         """Set rotor speed, blade pitch and torque to their steady values for the present platform."""
         turbine = self.scene.turbine
         drive = turbine.pitch_drive
-        wind = self.scene.wind_speed
-        if wind is None or wind <= 0.0:
-            self.rotor_acceleration(0.0, min(max(0.0, drive.minimum), drive.maximum))
-            return
-        if wind > turbine.cut_out_wind_speed:
-            self.rotor_acceleration(0.0, min(FEATHERED, drive.maximum))
-            return
-        rated = turbine.rated_rotor_speed
-        finest = drive.minimum
-        if self.rotor_acceleration(rated, finest) > 0.0:
-            high = 0.8
-            beta = self._root(lambda b: self.rotor_acceleration(rated, b), finest, high)
-            self.rotor_acceleration(rated, beta)
-            return
+        wind, rated, finest = self.scene.wind_speed, turbine.rated_rotor_speed, drive.minimum
         slow = 0.02 * rated
-        if self.rotor_acceleration(slow, finest) <= 0.0:
-            self.rotor_acceleration(0.0, finest)
-            return
-        speed = self._root(lambda w: self.rotor_acceleration(w, finest), slow, rated)
-        self.rotor_acceleration(speed, finest)
+        if wind is None or wind <= 0.0:
+            speed, pitch = 0.0, min(max(0.0, finest), drive.maximum)
+        elif wind > turbine.cut_out_wind_speed:
+            speed, pitch = 0.0, min(FEATHERED, drive.maximum)
+        elif self.rotor_acceleration(rated, finest) > 0.0:
+            speed, pitch = rated, self._root(lambda b: self.rotor_acceleration(rated, b), finest, 0.8)
+        elif self.rotor_acceleration(slow, finest) <= 0.0:
+            speed, pitch = 0.0, finest
+        else:
+            speed, pitch = self._root(lambda w: self.rotor_acceleration(w, finest), slow, rated), finest
+        self.rotor_acceleration(speed, pitch)
 
     def _root(self, excess, low, high):
         """Zero of the rotor's acceleration. Raises: InputError if a falling platform leaves none."""
@@ -303,20 +296,15 @@ class _Steady:
 
     def jacobian(self, free):
         """Return the derivatives of the residual by the free states, central differences."""
-        columns = []
-        for index in free:
-            step = DIFFERENCE_STEPS.get(index, DEFLECTION_STEP)
-            keep = self.x[index]
-            self.x[index] = keep + step
-            up = self.residual(free)
-            self.x[index] = keep - step
-            down = self.residual(free)
-            self.x[index] = keep
-            columns.append((up - down) / (2.0 * step))
+        steps = [DIFFERENCE_STEPS.get(index, DEFLECTION_STEP) for index in free]
+        columns = [
+            central_difference(lambda: self.residual(free), self.x, index, step)
+            for index, step in zip(free, steps, strict=True)
+        ]
         return np.array(columns).T
 
     def settle(self, free):
-        """Newton on the free states for zero acceleration; returns the remaining one.
+        """Solve for zero acceleration by Newton's method on the free states; return the remaining one.
 
         The Jacobian is kept while it brings the residual down tenfold a round. A step that does not
         lower the residual is halved: far from the solution lines go taut within metres.
@@ -356,8 +344,7 @@ class _Steady:
 
     def _of_motions(self, jacobian):
         """Return the part of a Jacobian that has the motions alone."""
-        n = len(self.motions())
-        return jacobian[:n, :n]
+        return jacobian[: len(self.motions()), : len(self.motions())]
 
     def refusal(self, ending=None):
         """InputError of a search that ends at this state without a steady one; ending as in unbalanced."""
