@@ -1,4 +1,4 @@
-"""Whether the places in a platform file can be meant: lines, anchors, fairleads, members."""
+"""Checks positions in a platform file for plausibility: lines, anchors, fairleads, members."""
 
 from math import degrees, dist
 

@@ -1,4 +1,4 @@
-"""What is odd about the wind and the sea of a scene, and warned of when it is built."""
+"""Describes implausible winds and seas of a scene, for warnings of build_scene."""
 
 from math import pi, tanh
 

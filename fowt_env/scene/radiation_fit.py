@@ -1,12 +1,10 @@
-"""Radiation memory from potential-flow coefficients: a rational approximation, or convolution.
+"""Fits the radiation memory of potential-flow coefficients by a rational approximation, or convolves it.
 
-The retardation of a body is K(i w) = B(w) + i w (A(w) - A_inf), and follows from B alone, since it is causal.
-So both forms have the K of B: files give an A that agrees with their B to some per cent, where panels are
-coarse or inner waves resonate, and by far more than the fit is in error. The rational approximation has real
-coefficients, stable poles, K(0) = 0 and no direct term, and the poles of motions that are coupled are common
-to all entries between them. Poles are found by vector fitting (Gustavsen and Semlyen, IEEE Trans. Power
-Delivery 14(3), 1999; relaxed as in 21(3), 2006) and then by nonlinear least squares; residues by linear least
-squares under the condition that Re K is positive semidefinite (theory.md, 5.8).
+Both forms use the retardation K(i w) = B(w) + i w (A(w) - A_inf) that follows from B by causality: the A of
+files agrees with their B only to some per cent. The rational approximation has real coefficients, stable
+poles, K(0) = 0 and no direct term; coupled motions share poles. Poles are found by vector fitting (Gustavsen
+and Semlyen, IEEE Trans. Power Delivery 14(3), 1999; relaxed as in 21(3), 2006) and nonlinear least squares,
+residues by linear least squares with Re K positive semidefinite (theory.md, 5.8).
 """
 
 import hashlib

@@ -1,7 +1,4 @@
-"""The bending of the tower as the plant has it: integrals of mass, stiffness and weight along the modes.
-
-Sums over ElastoDyn's elements, mass and stiffness at their middles (theory.md, section 2.8).
-"""
+"""Integrates mass, stiffness and weight of the tower along its bending modes (theory.md, section 2.8)."""
 
 import numpy as np
 
