@@ -1,8 +1,8 @@
-"""Deterministic gusts of IEC 61400-1 (ed. 3), 6.3.2 "Extreme wind conditions", as rows for a WindSeries.
+"""Computes deterministic gusts of IEC 61400-1 (ed. 3), 6.3.2 "Extreme wind conditions".
 
-Each gust takes the hub speed and returns (duration, value): value (n, 5) with the columns of
-WindSeries, evenly spaced over the duration. Before it the first row holds, after it the last.
-The numbers in its docstring are those of the standard; speeds in m/s, lengths in m, times in s.
+Each gust takes the hub speed and returns (duration, value): value (n, 5) with the columns of WindSeries,
+evenly spaced over the duration; the wind is constant before the first and after the last row. Numbers in the
+docstrings are those of the standard; speeds in m/s, lengths in m, times in s.
 """
 
 from math import atan, ceil, pi, radians

@@ -1,4 +1,4 @@
-"""Sums of complex exponentials over evenly spaced times, and the cubic B-splines that stand for them."""
+"""Sums complex exponentials over evenly spaced times, and fits cubic B-splines to the sums."""
 
 from math import ceil, pi
 from typing import NamedTuple
@@ -55,7 +55,7 @@ def harmonics_of(omega):
 
 
 def _common_part(gaps, without):
-    """What gaps (n,) are multiples of, by Euclid's rule with room for rounded figures; of none `without`."""
+    """Return the common divisor of gaps (n,) by Euclid's rule with tolerance; `without` if there are none."""
     if gaps.size == 0:
         return without
     common = float(gaps.min())
@@ -113,8 +113,13 @@ def pack_table(values, step, span, periodic):
     return TimeTable(table, float(1.0 / step), float(span), bool(periodic))
 
 
+def constant_table(value):
+    """Return a TimeTable of constant values (m,)."""
+    return pack_table(np.tile(value, (11, 1)), 1.0, 8.0, True)
+
+
 def response_of_spline(omega, step):
-    """Return what a cubic B-spline makes of exponentials sampled as its coefficients."""
+    """Return the response of a cubic B-spline whose coefficients are samples of exponentials."""
     return (4.0 + 2.0 * np.cos(omega * step)) / 6.0
 
 

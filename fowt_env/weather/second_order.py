@@ -1,13 +1,13 @@
-"""Difference-frequency wave forces of a sea on a potential-flow body, from its quadratic transfer function.
+"""Computes difference-frequency wave forces on a potential-flow body from its quadratic transfer function.
 
-The force is F(t) = Re sum_i sum_j a_i a_j* Q(w_i, w_j) exp(i (w_i - w_j) t) over all pairs, Q interpolated
-bilinearly between the pairs of the file. With the hat functions u_p of its frequencies that is a
-quadratic form at each time, Re sum_p sum_q Q_pq A_p(t) A_q*(t) with A_p(t) = sum_i a_i u_p(w_i) exp(i w_i t),
-which takes a transform per frequency of the file instead of a loop over pairs of components.
+The double sum (A42) of theory.md, with Q interpolated bilinearly, is evaluated as the quadratic form (A43) of
+sums A_p(t), which needs a transform per frequency of the file instead of a loop over pairs of components.
 """
 
 import warnings
+from collections.abc import Callable
 from math import ceil, pi
+from typing import NamedTuple
 
 import numpy as np
 from scipy.fft import ifft, irfft, next_fast_len, rfft
@@ -18,6 +18,7 @@ from fowt_env.plant.hydro.excitation import SecondOrder
 from fowt_env.weather.harmonics import (
     MARGIN,
     MOST_ROWS,
+    constant_table,
     direct_sum,
     harmonics_of,
     pack_table,
@@ -49,15 +50,13 @@ def build_second_order(body, waves, method, *, duration, cutoff=None):
     ramp = float(waves.ramp)
     used = _inside(qtf, waves)
     if not waves.amplitude[used].any():
-        flat = pack_table(np.zeros((11, 6)), 1.0, 8.0, True)
-        return SecondOrder(flat, np.zeros(6), ramp)
+        return SecondOrder(constant_table(np.zeros(6)), np.zeros(6), ramp)
     wave = waves.amplitude[used] * np.exp(-1j * waves.phase[used])
     omega = waves.omega[used]
     groups = _heading_groups(qtf, np.arctan2(waves.sin_heading, waves.cos_heading)[used])
     mean = _mean(qtf, omega, wave, groups)
     if method == "mean_drift":
-        flat = pack_table(np.tile(mean, (11, 1)), 1.0, 8.0, True)
-        return SecondOrder(flat, mean, ramp)
+        return SecondOrder(constant_table(mean), mean, ramp)
     form = (_full if method == "full" else _newman)(qtf, omega, wave, groups)
     found = harmonics_of(omega)
     if found is None:
@@ -82,29 +81,24 @@ def _inside(qtf, waves):
 
 
 def _heading_groups(qtf, heading):
-    """[(components, {other group: row of the QTF, whether turned around})] for each heading of the sea."""
+    """Return [(components, {other group: row of the QTF, whether exchanged})] for each heading of the sea."""
     values = []
     for angle in heading:
         if not any(_same(angle, other) for other in values):
             values.append(angle)
     groups = []
     for angle in values:
-        pairs = {}
-        for other, second in enumerate(values):
-            pairs[other] = _pair(qtf, angle, second)
-        own = np.array([_same(angle, one) for one in heading])
-        groups.append((np.flatnonzero(own), pairs))
+        pairs = {other: _pair(qtf, angle, second) for other, second in enumerate(values)}
+        groups.append((np.flatnonzero([_same(angle, one) for one in heading]), pairs))
     return groups
 
 
 def _pair(qtf, first, second):
     """Return (row of the QTF, whether its two waves are exchanged) for a pair of headings."""
-    for row, (one, other) in enumerate(qtf.heading):
-        if _same(first, one) and _same(second, other):
-            return row, False
-    for row, (one, other) in enumerate(qtf.heading):
-        if _same(first, other) and _same(second, one):
-            return row, True
+    for turned, wanted in ((False, (first, second)), (True, (second, first))):
+        for row, pair in enumerate(qtf.heading):
+            if all(map(_same, wanted, pair)):
+                return row, turned
     known = ", ".join(f"({one:g}, {other:g})" for one, other in np.degrees(qtf.heading)[:12])
     raise InputError(
         f"sea: the difference-frequency QTF has no pair of headings ({np.degrees(first):.4g},"
@@ -117,7 +111,7 @@ def _same(a, b):
 
 
 def _table(qtf, row, turned):
-    """(k, k, 6) of a pair of headings. What the file omits is the conjugate of the exchanged pair."""
+    """Return Q (k, k, 6) of a pair of headings; missing values are conjugates of the exchanged pair."""
     value = qtf.value[row]
     if turned:
         return np.conj(value.transpose(1, 0, 2))
@@ -137,7 +131,7 @@ def _hats(qtf, omega):
 
 
 def _diagonal(qtf, omega, row):
-    """(n, 6) real Q(w, w) of one heading; linear along the diagonal where the file has nothing beside it."""
+    """Return the real Q(w, w) (n, 6) of a heading; linear along the diagonal without neighbouring values."""
     table = _table(qtf, row, False)
     low, share = _hats(qtf, omega)
     high, share = np.minimum(low + 1, qtf.omega.size - 1), share[:, None]
@@ -158,12 +152,11 @@ def _mean(qtf, omega, wave, groups):
     return total
 
 
-class _Form:
-    """Forces from sums of components: coefficient (n, m), whose sums at some times make the forces."""
+class _Form(NamedTuple):
+    """Computes forces from sums of components."""
 
-    def __init__(self, coefficient, force):
-        self.coefficient = coefficient
-        self.force = force  # (rows, m) complex sums -> (rows, 6)
+    coefficient: np.ndarray  # (n, m) of the components
+    force: Callable  # (rows, m) complex sums -> (rows, 6)
 
 
 def _newman(qtf, omega, wave, groups):

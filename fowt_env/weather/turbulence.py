@@ -1,29 +1,22 @@
-"""Turbulent wind of IEC 61400-1 (Kaimal spectrum, exponential coherence) as seen by a whole rotor.
+"""Generates turbulent wind of IEC 61400-1 (Kaimal spectrum, exponential coherence) averaged over the rotor.
 
-A hub-point series blown uniformly over the disk overstates what a rotor feels: gusts smaller than
-the rotor cancel. So each series is averaged over the disk, exactly in the second moments: the point
-spectrum times the average of the coherence over all pairs of points of the disk. The gradients of u
-over the disk (which turn the rotor plane) follow in the same way, from pairs weighted with their
-positions.
+A hub-point series applied to the whole disk overestimates the turbulence of a rotor, because gusts smaller
+than the rotor cancel. The point spectrum is therefore multiplied with the coherence averaged over all pairs
+of points of the disk, (A22) of theory.md; gradients of u follow from pairs weighted with their positions.
+The coherence exp(-k r), k = 12 sqrt((f/V)^2 + (0.12/Lc)^2), Lc = 8.1 Lambda_1 (Annex B), makes the averages
+functions of k R alone: one table serves every rotor, wind speed and frequency.
 
-Coherence depends on distance r and frequency f only through k r, with
-    k = 12 sqrt((f/V)^2 + (0.12/Lc)^2),   coherence = exp(-k r),   Lc = 8.1 Lambda_1   (Annex B)
-so the averages are functions of k R alone: one table serves every rotor, wind speed and frequency.
-
-Assumptions, stated because the standard leaves them open:
-- Area weighting, which needs no blade data. At a given rotor speed thrust and torque respond to u
-  nearly in proportion to chord x radius per radius, i.e. to the chord per area, which favours the
-  inner disk: weighted so, the wind over the NREL 5 MW in a TurbSim box (18 m/s, class B) deviates 2 to
-  3 % more than with area weights.
-- The rotor-averaged wind is the mean over azimuth and radius: the multiples of the blade-passing
-  frequency, which a blade meets by slicing through gusts, are not in it.
-- v and w get the coherence of u (the standard gives none for them), and are independent of u.
-- The amplitudes follow the spectrum exactly and only the phases are random: the point series has the
-  standard deviation sigma_1 over its period. sigma_1 itself is the standard's 90 % quantile in every
-  seed, or drawn from its distribution (drawn_ntm_sigma).
+Assumptions that the standard does not specify:
+- Area weighting. With weights chord x radius, to which thrust and torque respond at constant rotor speed, the
+  wind over the NREL 5 MW in a TurbSim box (18 m/s, class B) deviates 2 to 3 % more.
+- The mean over azimuth and radius has no multiples of the blade-passing frequency.
+- v and w have the coherence of u, and are independent of u.
+- Only the phases are random: the point series has the standard deviation sigma_1 over its period. sigma_1 is
+  the standard's 90 % quantile in every seed, or drawn from its distribution (drawn_ntm_sigma).
 """
 
 import numpy as np
+from scipy.fft import next_fast_len
 
 from fowt_env.caches import cached
 from fowt_env.descriptions.iec import length_scale, ntm_sigma_at
@@ -74,9 +67,9 @@ def disk_average(kr):
 
 
 def disk_gradient(kr):
-    """Variance of R times the fitted gradient of u over the disk over the point variance, for k R = kr.
+    """Return the variance of R times the gradient of u over the point variance, for k R = kr.
 
-    The gradient along one axis of the plane that fits u best over the disk (area weighting).
+    The gradient is that along one axis of the plane fitted to u over the disk (area weighting).
     """
     log_kr, _, gradient = _pair_tables()
     return np.exp(np.interp(np.log(kr), log_kr, gradient))
@@ -135,15 +128,7 @@ def amplitudes(speed, sigma, height, diameter, samples, step, average):
 
 def fft_length(minimum):
     """Return the smallest even length with no prime factor above 5 that is at least the minimum."""
-    length = 2 * ((minimum + 1) // 2)
-    while True:
-        rest = length
-        for prime in (2, 3, 5):
-            while rest % prime == 0:
-                rest //= prime
-        if rest == 1:
-            return length
-        length += 2
+    return 2 * next_fast_len((minimum + 1) // 2, real=True)
 
 
 def component_generator(seed, component):
@@ -170,10 +155,10 @@ def drawn_ntm_sigma(speed, turbulence_class, seed):
 def turbulence(
     speed, sigma, *, height, diameter, period, seed, average="rotor", shear_turbulence=True, step=STEP
 ):
-    """(period, value): one period of turbulence about a mean of zero, (n + 1, 5), last row = first row.
+    """Return (period, value (n + 1, 5)) of one period of turbulence with zero mean; last row = first row.
 
     Columns as in WindSeries, the shears per rotor diameter; sigma is the standard deviation (m/s) of
-    u at a point. The period returned is the one requested (s), rounded up to a length that transforms
+    u at a point. The returned period is the one requested (s), rounded up to a length that transforms
     quickly. The phases belong to the frequencies k/period, so another period gives another wind.
     """
     samples = fft_length(int(np.ceil(period / step - 1e-9)))
@@ -186,10 +171,10 @@ def turbulence(
 
 
 def hub_turbulence(speed, sigma, *, height, diameter, period, seed, step=STEP):
-    """(period, value): turbulence at the hub, (n + 1, 3), in the wind whose disc average is turbulence(...).
+    """Return (period, value (n + 1, 3)) of turbulence at the hub, with the disc average turbulence(...).
 
-    Arguments as there. u, v and w of a point have the whole Kaimal spectrum. Each is the part that goes with
-    the disc average, by the mean coherence of the centre with the disc, and a rest that is independent of it.
+    u, v and w have the complete Kaimal spectrum: a part correlated with the disc average, by the mean
+    coherence of the centre with the disc, and an independent rest. Arguments as turbulence.
     """
     samples = fft_length(int(np.ceil(period / step - 1e-9)))
     point = amplitudes(speed, sigma, height, diameter, samples, step, "point")[:3]
@@ -210,7 +195,7 @@ def _phasor(seed, component, count):
 
 
 def _one_period(spectrum, samples, columns):
-    """(samples + 1, columns) series of spectra (rows, m), zero in further columns, last row = first row."""
+    """Return series (samples + 1, columns) of spectra (rows, m), zero in other columns; last row = first."""
     value = np.zeros((samples + 1, columns))
     value[:-1, : len(spectrum)] = np.fft.irfft(spectrum, samples, axis=1).T
     value[-1] = value[0]

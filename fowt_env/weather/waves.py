@@ -1,7 +1,7 @@
-"""The waves of a scene as a sum of components, and the spectra that they are drawn from.
+"""Builds the waves of a scene as a sum of components, from spectra and random phases.
 
-Everything random happens here, before stepping. A component travels towards its heading:
-phase P = k (X cos b + Y sin b) - omega t + e, elevation a cos P (theory.md, 5.4).
+A component propagates towards its heading: phase P = k (X cos b + Y sin b) - omega t + e, elevation a cos P
+(theory.md, 5.4).
 """
 
 from math import pi
