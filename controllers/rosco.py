@@ -1,23 +1,19 @@
-"""ROSCO, the reference open-source controller, through its own library, with the published OC3 gains.
+"""Runs ROSCO, the reference open-source controller, through its own library, with the published OC3 gains.
 
 Abbas et al., Wind Energ. Sci. 7, 2022. The library (libdiscon of the PyPI wheel `rosco`, installed with
---no-deps: its toolbox is not used) is called like OpenFAST calls it, by the Bladed interface. Its data
-of the plant are written for the scene at hand: DISCON.IN from the turbine's description, and the Cp, Ct,
-Cq table from this project's blade elements. A turbine whose file names a DISCON.IN of its own is controlled
-by that one as it stands, with the table that it names, or this project's where there is none. Else gains and
-schedule of the blade pitch are those published for OC3-Hywind, as no ROSCO tuning of it is published and the
-automatic one turns the proportional gain positive beyond 16 deg (or those of controllers/gains.py); torque
-above rated is constant as there. Below rated ROSCO does what it does by default: an extended Kalman filter
-estimates the wind and the torque tracks the best tip-speed ratio, with the set-point smoother between the
-regions and no peak shaving.
+--no-deps: its toolbox is not used) is called through the Bladed interface, as OpenFAST does. DISCON.IN is
+written for the scene from the turbine's description, the Cp, Ct, Cq table from the blade elements. If the
+turbine file names a DISCON.IN, that file is used unchanged with its table, or with a computed table if it
+has none. Otherwise gains and schedule are those published for OC3-Hywind (or of controllers/gains.py),
+because no ROSCO tuning of it is published and the automatic one has a positive proportional gain above 16
+deg; torque above rated is constant. Below rated ROSCO has its defaults: wind estimation by an extended
+Kalman filter, tracking of the best tip-speed ratio, set-point smoother, no peak shaving.
 
-Its individual pitch control integrates the tilt and yaw moment of the hub to cyclic pitch. It is switched on
-in the turbine's own DISCON.IN, whose gains stay. Else the integral gain is that of `ipc`
-(controllers/ipc/design.py) at zero blade pitch, as the library has no schedule for it, with the azimuth lead
-for the lag of the drive and the limits of its toolbox.
+Its individual pitch control integrates the tilt and yaw moment of the hub. The gains are those of the
+turbine's DISCON.IN, otherwise the integral gain of `ipc` (controllers/ipc/design.py) at zero blade pitch, as
+the library has no schedule for it, with the azimuth lead for the drive's lag and the limits of its toolbox.
 
-A loaded library is one controller that can be started once. So every reset() loads a private copy of the
-file and drops the one before.
+A loaded library is one controller that can start once: every reset() loads a private copy of the file.
 """
 
 import ctypes

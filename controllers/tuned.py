@@ -1,7 +1,7 @@
-"""The settings in tuned.toml, which training/design/tune.py has found on OC3-Hywind, for any turbine.
+"""Reads the settings that training/design/tune.py found on OC3-Hywind (tuned.toml), for any turbine.
 
-Others than the NREL 5 MW turbine take them in their own units: velocities by the rated wind, frequencies by
-the rated rotor speed, torques by the rated torque. Nobody has searched for better ones there.
+For turbines other than the NREL 5 MW they are scaled: velocities by the rated wind, frequencies by the rated
+rotor speed, torques by the rated torque. They are not tuned again.
 """
 
 import tomllib

@@ -1,8 +1,7 @@
-"""PI gains and gain schedule from a specified frequency and damping ratio, on linear models over the wind.
+"""Designs PI gains and schedule for a frequency and damping ratio, on linear models over the wind.
 
-The rotor alone, as in the published design (theory.md, Eq. (A6)): its acceleration per blade pitch is taken
-from each linear model, the aerodynamic damping of its speed is omitted. What the platform makes of the
-gains is computed afterwards from the whole plant.
+As in the published design (theory.md, Eq. (A6)) the design model is the rotor alone, without the aerodynamic
+damping of its speed; the effect on the platform is computed afterwards from the complete plant.
 """
 
 from dataclasses import dataclass

@@ -1,8 +1,7 @@
-"""Controllers saved as files: plain JSON with a version, whose every value is checked when it is read.
+"""Saves and loads controllers as JSON files with a version, whose every value is checked.
 
-A design of kind "pi" holds gains and schedule; one of kind "lqr" holds its settings and the linear models
-that it is made for, so that it can be run at any control period and does not know a plant that was changed
-since. Used by name as design:FILE.
+A design of kind "pi" contains gains and schedule, one of kind "lqr" its settings and linear models, so that
+it runs at any control period and independently of later changes of the plant. Used by name as design:FILE.
 """
 
 import json

@@ -1,14 +1,13 @@
-"""LQG design of blade pitch and generator torque on the linear models of a scene, and what it predicts.
+"""Designs LQG control of blade pitch and generator torque on the linear models of a scene.
 
 Per wind speed: surge, platform pitch, rotor and pitch actuator in the plane, the rotor-averaged wind as a
-second-order filter fitted to its Kaimal spectrum, the waves of the site's sea as one resonance acting with
-the hull's force at the spectrum's peak. The controls are the rates of torque and blade-pitch command.
-Radiation memory, a flexible tower and other internal states have no state here but act on those that have
-(analysis/reduced_model.py); what that omits, the estimator takes as a moment on the platform.
+second-order filter fitted to its Kaimal spectrum, the waves of the site's sea as one resonance with the
+hull's force at the spectrum's peak. The controls are the rates of torque and blade-pitch command. Other
+internal states are residualised (analysis/reduced_model.py); the estimator represents the rest by a moment
+on the platform.
 
-Winds, travels and moments that were found for the NREL 5 MW turbine are scaled to others: winds by the
-difference of the rated ones, blade-pitch travel by the rated rotor speed, moments by swept area and hub
-height.
+Winds, travels and moments of the NREL 5 MW turbine are scaled to other turbines: winds by the difference of
+the rated ones, blade-pitch travel by the rated rotor speed, moments by swept area and hub height.
 """
 
 from dataclasses import asdict, dataclass, fields, replace

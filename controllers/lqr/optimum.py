@@ -1,10 +1,10 @@
-"""Feedback of lqr at one wind: the linear optimum, at the control period, under limits on what it may spend.
+"""Computes the feedback of lqr at one wind: the linear optimum at the control period under limits.
 
 Minimised is (1 - share) var(rotor speed) + share var(platform pitch), each over that of gspi_oc3 on the same
-linear model, with the blade-pitch travel, the deviations of power and torque and that of the shaft torque
-within limits. By duality that is a quadratic cost with a multiplier per limit, and the multipliers are found
-by iteration: each grows while its limit is exceeded and shrinks while it is kept. Deviations are those of
-the sampled loop with the Kalman filter and the noise of its sensors.
+linear model, with limits on blade-pitch travel and on the deviations of power, torque and shaft torque. By
+duality that is a quadratic cost with a multiplier per limit, found by iteration: it increases while its
+limit is exceeded and decreases otherwise. Deviations are those of the sampled loop with Kalman filter and
+sensor noise.
 """
 
 from dataclasses import dataclass

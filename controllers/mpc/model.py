@@ -1,8 +1,8 @@
-"""The discrete model of each wind, the LQ feedback and the cost-to-go that end the prediction.
+"""Computes the discrete model of each wind, the LQ feedback and the terminal cost of the prediction.
 
 States are those of feedback_plant in controllers/lqr/design.py, less the trim of the wind: platform, rotor
-and blades, torque (rated torques), pitch command, integral of the rotor speed's error, wind filter and waves.
-Inputs are the rates of torque and pitch command, held over a period.
+and blades, torque (rated torques), pitch command, integral of the rotor speed's error, wind filter and
+waves. Inputs are the rates of torque and pitch command, constant over a period.
 """
 
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""The quadratic programs of the predictive law, by OSQP (Stellato et al., Math. Prog. Comp. 12, 2020)."""
+"""Solves quadratic programs of the predictive law by OSQP (Stellato et al., Math. Prog. Comp. 12, 2020)."""
 
 import numpy as np
 from scipy import sparse
