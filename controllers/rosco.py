@@ -395,7 +395,7 @@ _tables = Cache(16)  # (id of the turbine, density) -> (turbine, Table): runs of
 
 
 def _table(turbine, density):
-    """Return the table of a turbine's blade elements."""
+    """Return the Table of a turbine's blade elements."""
     key = (id(turbine), density)
 
     def make():

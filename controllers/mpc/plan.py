@@ -59,7 +59,7 @@ class Work(NamedTuple):
 
 
 def grid_of(settings, period):
-    """Return the grid of an MPCSettings."""
+    """Return the Grid of an MPCSettings."""
     total, lengths, length = round(settings.horizon / period), [], 1.0
     while sum(lengths) < total:
         if len(lengths) >= FIRST_BLOCKS:
@@ -69,7 +69,7 @@ def grid_of(settings, period):
 
 
 def work_of(grid):
-    """Return the work for a Grid."""
+    """Return the Work arrays for a Grid."""
     steps, moves = len(grid.block_of), 2 * len(grid.ends)
     rows = 2 * RATED_BLOCKS + len(LIMITED) * len(grid.ends)
     shapes = (

@@ -181,7 +181,7 @@ def _relocated(s, f, w, poles):
 
 
 def _pairs(poles, count):
-    """Return the that many upper poles of pairs within DECAY and FREQUENCY; two real ones become a pair."""
+    """Return the upper poles of `count` pairs within DECAY and FREQUENCY; two real ones become a pair."""
     upper = list(poles[poles.imag > 1e-9])
     real = np.sort(np.abs(poles[np.abs(poles.imag) <= 1e-9].real))
     upper += [complex(-np.sqrt(a * b), 0.5 * (b - a)) for a, b in zip(real[::2], real[1::2], strict=False)]
